@@ -1,0 +1,2 @@
+//! The rig's firmware.
+fn main() {}

@@ -1,0 +1,1 @@
+//! Tactus on a PC.

@@ -1,0 +1,2 @@
+//! The command `tactus`.
+fn main() {}

@@ -1,0 +1,303 @@
+//! Exploratory movements: a contact force and a sliding speed (eq. 20-22), and what a slide takes of the sample and of the
+//! skin.
+
+use core::fmt;
+
+/// One exploratory movement: the contact force that is set before the slide and the speed of the slide.
+///
+/// Whole millinewtons and micrometres per second, so that a movement in a table, on the link and in a recording's manifest
+/// is the same movement to the bit.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub struct Movement {
+    force_mn: u16,
+    speed_um_s: u32,
+}
+
+/// Why a force and a speed are no movement of this rig.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum MovementError {
+    /// Contact force in mN outside [`Movement::FORCE_MN`].
+    Force(u32),
+    /// Sliding speed in um/s outside [`Movement::SPEED_UM_S`].
+    Speed(u32),
+}
+
+impl fmt::Display for MovementError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Force(mn) => write!(
+                f,
+                "contact force {mn} mN is outside {}..={} mN",
+                Movement::FORCE_MN.start(),
+                Movement::FORCE_MN.end()
+            ),
+            Self::Speed(um_s) => write!(
+                f,
+                "sliding speed {um_s} um/s is outside {}..={} um/s",
+                Movement::SPEED_UM_S.start(),
+                Movement::SPEED_UM_S.end()
+            ),
+        }
+    }
+}
+
+impl core::error::Error for MovementError {}
+
+impl Movement {
+    /// Contact forces that a movement may have: a tenth of a newton is 9 counts of P_DC, and over 2 N the skin touches the
+    /// core (fig. 3).
+    pub const FORCE_MN: core::ops::RangeInclusive<u16> = 100..=2000;
+    /// Sliding speeds that a movement may have.
+    pub const SPEED_UM_S: core::ops::RangeInclusive<u32> = 5_000..=150_000;
+
+    /// Movement 1 of the study: 1.26 N, 1.00 cm/s, the most useful one for traction.
+    pub const FOR_TRACTION: Self = Self::on_grid(5, 1);
+    /// Movement 2 of the study: 0.50 N, 2.51 cm/s, the most useful one for fineness.
+    pub const FOR_FINENESS: Self = Self::on_grid(3, 3);
+    /// Movement 3 of the study: 0.20 N, 6.31 cm/s, the most useful one for roughness.
+    pub const FOR_ROUGHNESS: Self = Self::on_grid(1, 5);
+
+    /// A movement of `force_mn` millinewtons and `speed_um_s` micrometres per second.
+    ///
+    /// # Errors
+    /// The first value that is out of its range.
+    pub const fn new(force_mn: u16, speed_um_s: u32) -> Result<Self, MovementError> {
+        if force_mn < *Self::FORCE_MN.start() || force_mn > *Self::FORCE_MN.end() {
+            return Err(MovementError::Force(force_mn as u32));
+        }
+        if speed_um_s < *Self::SPEED_UM_S.start() || speed_um_s > *Self::SPEED_UM_S.end() {
+            return Err(MovementError::Speed(speed_um_s));
+        }
+        Ok(Self {
+            force_mn,
+            speed_um_s,
+        })
+    }
+
+    /// A movement from newtons and millimetres per second, rounded to whole mN and um/s.
+    ///
+    /// # Errors
+    /// The first value that is out of its range; not-a-number is out of every range.
+    pub fn from_si(force_n: f32, speed_mm_s: f32) -> Result<Self, MovementError> {
+        // `as` saturates, and turns not-a-number into 0: both are refused below
+        let force_mn = libm::roundf(force_n * 1e3) as u32;
+        let speed_um_s = libm::roundf(speed_mm_s * 1e3) as u32;
+        match u16::try_from(force_mn) {
+            Ok(mn) => Self::new(mn, speed_um_s),
+            Err(_) => Err(MovementError::Force(force_mn)),
+        }
+    }
+
+    /// Grid cell (i, k) of eq. 21 (force) and eq. 20 (speed), both 1..=6; other indices give the nearest cell.
+    const fn on_grid(i: usize, k: usize) -> Self {
+        // 10^((i-1)/5) in thousandths
+        const STEPS: [u32; 6] = [100_000, 158_489, 251_189, 398_107, 630_957, 1_000_000];
+        const fn step(i: usize) -> u32 {
+            match i {
+                0 | 1 => STEPS[0],
+                2 => STEPS[1],
+                3 => STEPS[2],
+                4 => STEPS[3],
+                5 => STEPS[4],
+                _ => STEPS[5],
+            }
+        }
+        Self {
+            force_mn: ((step(i) * 2 + 500) / 1000) as u16,
+            speed_um_s: (step(k) + 5) / 10,
+        }
+    }
+
+    /// The 36 movements of the pilot study, force by force: F_i of eq. 21 with v_k of eq. 20.
+    pub fn grid() -> impl Iterator<Item = Self> {
+        (1..=6).flat_map(|i| (1..=6).map(move |k| Self::on_grid(i, k)))
+    }
+
+    /// Contact force in mN.
+    pub const fn force_mn(self) -> u16 {
+        self.force_mn
+    }
+
+    /// Contact force in N.
+    pub fn force_n(self) -> f32 {
+        f32::from(self.force_mn) * 1e-3
+    }
+
+    /// Sliding speed in um/s.
+    pub const fn speed_um_s(self) -> u32 {
+        self.speed_um_s
+    }
+
+    /// Sliding speed in mm/s.
+    pub fn speed_mm_s(self) -> f32 {
+        // at most 150 000: exact in f32
+        self.speed_um_s as f32 * 1e-3
+    }
+
+    /// Sliding power over the coefficient of friction, F v, in mW (eq. 22 without its mu).
+    ///
+    /// The paper prints `10^((a-2)/5) mu 20 mW`; 0.2 N times 1 cm/s is 2 mW, and that is what this returns.
+    pub fn power_mw(self) -> f32 {
+        self.force_n() * self.speed_mm_s()
+    }
+
+    /// Whether the movement wears the fingerprints off (Results, "Identifying the most useful exploratory movements").
+    ///
+    /// The paper avoids pairs of high sliding power but prints the limit only as grey boxes in fig. 7. Its three chosen
+    /// movements all have a = i + k = 6 (12.6 mW); its example of a worn-out one has a = 10 (79.6 mW). Chosen here: the
+    /// limit lies half a step of the grid above the chosen three.
+    pub fn is_high_wear(self) -> bool {
+        self.power_mw() > Self::WEAR_LIMIT_MW
+    }
+
+    /// See [`Movement::is_high_wear`]: 2 mW times 10^(4.5/5).
+    pub const WEAR_LIMIT_MW: f32 = 15.887;
+}
+
+impl fmt::Display for Movement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.2} N, {:.1} mm/s", self.force_n(), self.speed_mm_s())
+    }
+}
+
+/// What a slide asks of the stage: constant speed over `length`, with a ramp before and one after.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct SlidePath {
+    /// Sliding speed in mm/s.
+    pub speed_mm_s: f32,
+    /// Distance at constant speed in mm.
+    pub length_mm: f32,
+    /// Acceleration of both ramps in mm/s^2.
+    pub acceleration_mm_s2: f32,
+}
+
+impl SlidePath {
+    /// Acceleration of the reference stage.
+    pub const ACCELERATION_MM_S2: f32 = 1000.0;
+    /// The square of texture is 75 mm wide (Methods, "Textures").
+    pub const SAMPLE_MM: f32 = 75.0;
+    /// Longest slide at constant speed: what is left of the sample is where its start may be drawn from.
+    pub const LONGEST_MM: f32 = 60.0;
+
+    /// A slide of `length_mm` at the speed of `movement`, with the reference stage's acceleration.
+    pub fn new(movement: Movement, length_mm: f32) -> Self {
+        Self {
+            speed_mm_s: movement.speed_mm_s(),
+            length_mm,
+            acceleration_mm_s2: Self::ACCELERATION_MM_S2,
+        }
+    }
+
+    /// Duration of one ramp in s.
+    pub fn ramp_s(&self) -> f32 {
+        self.speed_mm_s / self.acceleration_mm_s2
+    }
+
+    /// Duration of the part at constant speed in s.
+    pub fn steady_s(&self) -> f32 {
+        self.length_mm / self.speed_mm_s
+    }
+
+    /// Duration from rest to rest in s.
+    pub fn duration_s(&self) -> f32 {
+        self.steady_s() + 2.0 * self.ramp_s()
+    }
+
+    /// Travel from rest to rest in mm: each ramp takes v^2 / 2a.
+    pub fn travel_mm(&self) -> f32 {
+        self.length_mm + self.speed_mm_s * self.ramp_s()
+    }
+
+    /// Where the slide may start so that the finger stays on a sample of `sample_mm`, as the room in mm behind the first
+    /// possible start; `None` if the slide does not fit at all.
+    pub fn start_room_mm(&self, sample_mm: f32) -> Option<f32> {
+        let room = sample_mm - self.travel_mm();
+        (room >= 0.0).then_some(room)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grid_is_the_geometric_series_of_eq_20_and_21() {
+        let grid: heapless::Vec<Movement, 36> = Movement::grid().collect();
+        assert_eq!(grid.len(), 36);
+        for (n, m) in grid.iter().enumerate() {
+            let (i, k) = (n / 6, n % 6);
+            let force = 0.2 * 10f64.powf(i as f64 / 5.0);
+            let speed = 10.0 * 10f64.powf(k as f64 / 5.0);
+            assert!((f64::from(m.force_mn()) - force * 1e3).abs() <= 0.5);
+            assert!((f64::from(m.speed_um_s()) - speed * 1e3).abs() <= 0.5);
+            assert_eq!(Movement::new(m.force_mn(), m.speed_um_s()), Ok(*m));
+        }
+    }
+
+    #[test]
+    fn the_studys_movements_are_low_wear_and_its_worn_example_is_not() {
+        for (m, force, speed) in [
+            (Movement::FOR_TRACTION, 1.26, 10.0),
+            (Movement::FOR_FINENESS, 0.50, 25.1),
+            (Movement::FOR_ROUGHNESS, 0.20, 63.1),
+        ] {
+            assert!((m.force_n() - force).abs() < 5e-3 && (m.speed_mm_s() - speed).abs() < 0.05);
+            assert!(
+                (m.power_mw() - 12.6).abs() < 0.05,
+                "the three have equal power"
+            );
+            assert!(!m.is_high_wear());
+        }
+        assert!(Movement::from_si(1.262, 63.096).unwrap().is_high_wear());
+        // a = i + k <= 6: 5 + 4 + 3 + 2 + 1 cells
+        assert_eq!(Movement::grid().filter(|m| !m.is_high_wear()).count(), 15);
+    }
+
+    #[test]
+    fn out_of_range_is_refused_with_the_value() {
+        assert_eq!(Movement::new(99, 10_000), Err(MovementError::Force(99)));
+        assert_eq!(Movement::new(2001, 10_000), Err(MovementError::Force(2001)));
+        assert_eq!(Movement::new(200, 4_999), Err(MovementError::Speed(4_999)));
+        assert_eq!(
+            Movement::new(200, 150_001),
+            Err(MovementError::Speed(150_001))
+        );
+        assert!(Movement::new(100, 5_000).is_ok() && Movement::new(2000, 150_000).is_ok());
+        assert_eq!(
+            Movement::from_si(f32::NAN, 25.0),
+            Err(MovementError::Force(0))
+        );
+        assert_eq!(
+            Movement::from_si(70.0, 25.0),
+            Err(MovementError::Force(70_000))
+        );
+        assert_eq!(
+            Movement::from_si(0.5, -3.0),
+            Err(MovementError::Speed(0)),
+            "negative speeds saturate to 0"
+        );
+    }
+
+    #[test]
+    fn a_75_mm_sample_at_1000_mm_s2_gives_the_times_of_the_hardware_facts() {
+        for (speed, steady_s) in [(10.0, 7.49), (63.1, 1.126), (100.0, 0.65)] {
+            let length = 75.0 - speed * speed / 1000.0;
+            let path = SlidePath {
+                speed_mm_s: speed,
+                length_mm: length,
+                acceleration_mm_s2: 1000.0,
+            };
+            assert!((path.steady_s() - steady_s).abs() < 1e-3);
+            assert!((path.travel_mm() - 75.0).abs() < 1e-4);
+            assert!((path.duration_s() - (path.steady_s() + 2.0 * speed / 1000.0)).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn start_room_is_what_the_sample_leaves() {
+        let path = SlidePath::new(Movement::FOR_TRACTION, SlidePath::LONGEST_MM);
+        let room = path.start_room_mm(SlidePath::SAMPLE_MM).unwrap();
+        assert!((room - 14.9).abs() < 1e-4);
+        assert!(path.start_room_mm(60.0).is_none());
+    }
+}

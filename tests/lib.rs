@@ -1,0 +1,39 @@
+//! What the tests share: where the recordings are, and how a test says that it was skipped.
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// The folder of test data `name` ("biotac", "worlds"): below `TACTUS_DATA`, else below `../shared/data`.
+///
+/// Where it is missing the test is to return: the skip is written to the file that `TACTUS_SKIP_LOG` names (xtask lists
+/// it), and under `TACTUS_REQUIRE_DATA=1` this panics instead.
+pub fn data(name: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("TACTUS_DATA").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
+        PathBuf::from,
+    );
+    let folder = root.join(name);
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    assert!(
+        std::env::var("TACTUS_REQUIRE_DATA").as_deref() != Ok("1"),
+        "TACTUS_REQUIRE_DATA=1, but there is no folder {}",
+        folder.display()
+    );
+    let test = std::thread::current()
+        .name()
+        .unwrap_or("unnamed test")
+        .to_owned();
+    eprintln!("SKIPPED {test}: no folder {}", folder.display());
+    if let Some(log) = std::env::var_os("TACTUS_SKIP_LOG") {
+        let line = format!("{test}: no folder {}\n", folder.display());
+        // one write per line, so that parallel tests do not mix
+        std::fs::OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(log)
+            .and_then(|mut f| f.write_all(line.as_bytes()))
+            .expect("the file named by TACTUS_SKIP_LOG can be written");
+    }
+    None
+}
