@@ -10,4 +10,8 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod features;
+pub mod fir;
+pub mod kernels;
 pub mod movement;
+pub mod spectrum;
