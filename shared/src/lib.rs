@@ -10,8 +10,11 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod explorer;
 pub mod features;
 pub mod fir;
 pub mod kernels;
 pub mod movement;
+pub mod rig;
 pub mod spectrum;
+pub mod table;

@@ -1,0 +1,139 @@
+//! What performs a movement, and the exploration that it serves.
+//!
+//! A property means something only for the movement that made it, so moving and sensing are one act.
+
+use core::fmt;
+
+use crate::explorer::{Explorer, ObserveError, Outlook, Verdict};
+use crate::features::{Measurement, Plan, PropertySet, Slide, SlideError};
+use crate::kernels::Kernels;
+use crate::movement::Movement;
+use crate::table::Action;
+
+/// Slides in a row without properties, after which an exploration ends.
+pub const MAX_REJECTED: u8 = 3;
+
+/// A board, a simulator or a recording: it makes one movement and delivers what was felt.
+#[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
+pub trait Rig {
+    /// Why a movement failed.
+    type Error;
+
+    /// The properties that this rig can measure.
+    fn measures(&self) -> PropertySet;
+
+    /// Presses, measures the still finger, slides, lifts, and gives all samples to `slide`, in the order that [`Slide`]
+    /// asks for.
+    ///
+    /// # Errors
+    /// The movement failed. The stage then stands still and the finger is lifted.
+    async fn perform<K: Kernels>(
+        &mut self,
+        movement: Movement,
+        slide: &mut Slide<'_, K>,
+    ) -> Result<(), Self::Error>;
+}
+
+/// What an exploration does, as it does it.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Event<'a> {
+    /// This action comes next; it and the others promised this.
+    Chosen(Action, &'a [Outlook]),
+    /// The slide was made and taken in; the posterior of every texture.
+    Felt(Action, &'a Measurement, &'a [f32]),
+    /// The slide was made, but has no value of the property; it is repeated.
+    Rejected(Action, Rejection),
+}
+
+/// Why a slide is repeated.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Rejection {
+    /// Its samples give no properties.
+    Slide(SlideError),
+    /// Its properties say nothing to the explorer.
+    Observe(ObserveError),
+}
+
+impl fmt::Display for Rejection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Slide(why) => why.fmt(f),
+            Self::Observe(why) => why.fmt(f),
+        }
+    }
+}
+
+/// Why an exploration ended without an answer.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum ExploreError<E> {
+    /// The rig failed.
+    Rig(E),
+    /// [`MAX_REJECTED`] slides in a row were no good, the last one for this reason.
+    Rejected(Rejection),
+    /// The table has no such movement.
+    Movement(u8),
+}
+
+impl<E: fmt::Display> fmt::Display for ExploreError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Rig(why) => why.fmt(f),
+            Self::Rejected(why) => write!(f, "{MAX_REJECTED} slides in a row were no good: {why}"),
+            Self::Movement(index) => write!(f, "the table has no movement {}", index + 1),
+        }
+    }
+}
+
+impl<E: fmt::Debug + fmt::Display> core::error::Error for ExploreError<E> {}
+
+/// Explores until there is an answer. `random` serves [`crate::explorer::Strategy::Random`]; `tell` hears of everything.
+///
+/// # Errors
+/// See [`ExploreError`].
+pub async fn explore<R: Rig, const N: usize, K: Kernels>(
+    rig: &mut R,
+    explorer: &mut Explorer<'_, N, K>,
+    plan: &Plan,
+    mut random: impl FnMut() -> u32,
+    mut tell: impl FnMut(Event<'_>),
+) -> Result<Verdict, ExploreError<R::Error>> {
+    let mut rejected = 0;
+    loop {
+        if let Some(verdict) = explorer.verdict() {
+            return Ok(verdict);
+        }
+        let outlook = explorer.outlook();
+        let action = explorer.choose(&outlook, random());
+        tell(Event::Chosen(action, &outlook));
+        let movement = explorer
+            .table()
+            .movement(action.movement)
+            .ok_or(ExploreError::Movement(action.movement))?;
+        let mut slide = Slide::<K>::new(plan);
+        rig.perform(movement, &mut slide)
+            .await
+            .map_err(ExploreError::Rig)?;
+        let felt = slide
+            .finish()
+            .map_err(Rejection::Slide)
+            .and_then(|measurement| {
+                explorer
+                    .observe(action, &measurement.properties)
+                    .map_err(Rejection::Observe)?;
+                Ok(measurement)
+            });
+        match felt {
+            Ok(measurement) => {
+                rejected = 0;
+                tell(Event::Felt(action, &measurement, explorer.posterior()));
+            }
+            Err(why) => {
+                rejected += 1;
+                tell(Event::Rejected(action, why));
+                if rejected == MAX_REJECTED {
+                    return Err(ExploreError::Rejected(why));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,711 @@
+//! The texture table: what every known texture feels like at every movement, in fixed point.
+//!
+//! A [`Table`] borrows the binary form, from flash or a file, and copies nothing. [`Experience`] is what learning keeps
+//! for one texture and movement; [`encode`] writes a table of it, and [`Table::experience`] gives it back, so that a
+//! table can go on learning.
+//!
+//! # Binary form, version 1, little-endian
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 4 | magic `TACT` |
+//! | 2 | version, 1 |
+//! | 1 | method, 0: one Gaussian per (texture, movement, property) |
+//! | 1 | properties measured, a bit each: 1 traction, 2 roughness, 4 fineness |
+//! | 4 | length of the whole table in bytes |
+//! | 2 | number of textures T |
+//! | 1 | number of movements M |
+//! | 1 | 0 |
+//! | 6 M | per movement: force in mN (2), speed in um/s (4) |
+//! | 12 T M | per texture, movement and property: mean (i16, see [`mean_step`]), standard deviation (u16, [`SD_STEP`]) |
+//! | T M | per texture and movement: number of trials, 255 for more |
+//! | | per texture: length of its name (1), the name in UTF-8 |
+//! | 4 | CRC-32 (ISO-HDLC) of all before |
+
+use core::fmt;
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+
+use crate::features::{Properties, Property, PropertySet};
+use crate::movement::{Movement, MovementError};
+
+const MAGIC: [u8; 4] = *b"TACT";
+/// Version of the binary form that this code reads and writes.
+pub const VERSION: u16 = 1;
+const METHOD_GAUSSIAN: u8 = 0;
+const HEADER: usize = 16;
+const MOVEMENT_BYTES: usize = 6;
+const PROPERTIES: usize = Property::ALL.len();
+const CELL_BYTES: usize = 4;
+const CRC_BYTES: usize = 4;
+const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// Most movements in a table: the whole grid of the pilot study.
+pub const MAX_MOVEMENTS: usize = 36;
+/// Most actions of a table.
+pub const MAX_ACTIONS: usize = MAX_MOVEMENTS * PROPERTIES;
+
+/// One step of a stored standard deviation, in the unit of its property; the largest is 4.
+pub const SD_STEP: f32 = 1.0 / 16384.0;
+/// Smallest standard deviation in a table, the coarsest step of a mean: a few trials that agree by chance by more than
+/// the table can show would otherwise outweigh all others.
+pub const SD_LEAST: f32 = 1.0 / 2048.0;
+
+/// One step of a stored mean of `property`, in its unit: traction reaches +-8 N, roughness +-16, fineness +-8.
+pub const fn mean_step(property: Property) -> f32 {
+    match property {
+        Property::Traction | Property::Fineness => 1.0 / 4096.0,
+        Property::Roughness => 1.0 / 2048.0,
+    }
+}
+
+/// What an exploration does next: makes one of the table's movements and measures one property of it.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub struct Action {
+    /// Index of the movement in the table.
+    pub movement: u8,
+    /// The property measured.
+    pub property: Property,
+}
+
+impl Action {
+    /// Place among a table's actions: movement by movement, properties in the order of [`Property::ALL`].
+    pub const fn index(self) -> usize {
+        self.movement as usize * PROPERTIES + self.property.index()
+    }
+}
+
+/// What was learned of one texture at one movement: number of trials, running mean and sum of squared deviations of each
+/// property (Welford).
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Experience {
+    trials: u8,
+    mean: [f32; PROPERTIES],
+    squares: [f32; PROPERTIES],
+}
+
+impl Experience {
+    /// Takes in one more trial. A property that was not measured, or that is not a finite number, leaves the whole
+    /// experience as it was.
+    ///
+    /// After 255 trials the oldest are slowly forgotten.
+    ///
+    /// # Errors
+    /// The property of `measured` that the trial lacks.
+    pub fn learn(&mut self, measured: PropertySet, trial: &Properties) -> Result<(), Property> {
+        let mut next = *self;
+        next.trials = self.trials.saturating_add(1);
+        let n = f32::from(next.trials);
+        // beyond 255 trials the sum of squares stays that of 255
+        let keep = f32::from(next.trials - 1) / f32::from(self.trials.max(1));
+        for (property, (mean, squares)) in Property::ALL
+            .into_iter()
+            .zip(next.mean.iter_mut().zip(&mut next.squares))
+        {
+            if measured.contains(property) {
+                let x = trial
+                    .get(property)
+                    .filter(|x| x.is_finite())
+                    .ok_or(property)?;
+                let before = x - *mean;
+                *mean += before / n;
+                *squares =
+                    *squares * if self.trials > 0 { keep } else { 0.0 } + before * (x - *mean);
+            }
+        }
+        *self = next;
+        Ok(())
+    }
+
+    /// Number of trials, 255 for more.
+    pub fn trials(&self) -> u8 {
+        self.trials
+    }
+
+    /// Mean and standard deviation (n - 1) of `property`; `None` before the second trial.
+    pub fn gaussian(&self, property: Property) -> Option<Gaussian> {
+        let (mean, squares) = (
+            self.mean.get(property.index())?,
+            self.squares.get(property.index())?,
+        );
+        (self.trials >= 2).then(|| Gaussian {
+            mean: *mean,
+            sd: libm::sqrtf(squares / f32::from(self.trials - 1)),
+        })
+    }
+}
+
+/// What one property of a texture is expected to be (eq. 4).
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Gaussian {
+    /// Mean, in the unit of the property.
+    pub mean: f32,
+    /// Standard deviation, in the unit of the property.
+    pub sd: f32,
+}
+
+/// Why bytes are no texture table.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum TableError {
+    /// Fewer bytes than the table needs.
+    Truncated {
+        /// Bytes there are.
+        got: usize,
+        /// Bytes that are needed.
+        wanted: usize,
+    },
+    /// It does not begin with `TACT`.
+    Magic([u8; 4]),
+    /// Written by another version.
+    Version(u16),
+    /// A way of deciding that this version does not know.
+    Method(u8),
+    /// The length in the header does not fit what it holds.
+    Length {
+        /// What the header says.
+        header: usize,
+        /// What the contents take.
+        contents: usize,
+    },
+    /// The checksum differs: the bytes have changed since they were written.
+    Crc {
+        /// Stored checksum.
+        stored: u32,
+        /// Checksum of the bytes.
+        computed: u32,
+    },
+    /// No texture, no movement or no property, too many movements, or a reserved byte that is not 0.
+    Header,
+    /// A movement that no rig makes.
+    Movement(u8, MovementError),
+    /// The same movement twice.
+    TwinMovement(u8),
+    /// A standard deviation of 0 where there are trials to have one.
+    Deviation {
+        /// Index of the texture.
+        texture: u16,
+        /// The action concerned.
+        action: Action,
+    },
+    /// A name that is empty, not UTF-8, or another texture's as well.
+    Name(u16),
+}
+
+impl fmt::Display for TableError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Truncated { got, wanted } => write!(f, "truncated: {got} bytes of {wanted}"),
+            Self::Magic(found) => write!(
+                f,
+                "not a texture table: it begins with {found:02x?}, not `TACT`"
+            ),
+            Self::Version(found) => {
+                write!(
+                    f,
+                    "version {found}, and this program reads version {VERSION}: learn the table anew"
+                )
+            }
+            Self::Method(found) => write!(f, "method {found} is unknown to this program"),
+            Self::Length { header, contents } => {
+                write!(
+                    f,
+                    "the header says {header} bytes, the contents take {contents}"
+                )
+            }
+            Self::Crc { stored, computed } => {
+                write!(
+                    f,
+                    "damaged: checksum {computed:08x}, and {stored:08x} was written"
+                )
+            }
+            Self::Header => {
+                f.write_str("the header counts no textures, movements or properties, or too many")
+            }
+            Self::Movement(index, why) => write!(f, "movement {}: {why}", index + 1),
+            Self::TwinMovement(index) => write!(f, "movement {} is there twice", index + 1),
+            Self::Deviation { texture, action } => write!(
+                f,
+                "texture {}, movement {}, {}: trials, but no standard deviation",
+                texture + 1,
+                action.movement + 1,
+                action.property
+            ),
+            Self::Name(texture) => {
+                write!(
+                    f,
+                    "the name of texture {} is empty, not UTF-8, or another's as well",
+                    texture + 1
+                )
+            }
+        }
+    }
+}
+
+impl core::error::Error for TableError {}
+
+/// A checked texture table, borrowed from where it is stored.
+#[derive(Clone, Copy, Debug)]
+pub struct Table<'a> {
+    bytes: &'a [u8],
+    textures: u16,
+    movements: u8,
+    measured: PropertySet,
+}
+
+/// Where the parts of a table with these counts begin.
+struct Layout {
+    cells: usize,
+    trials: usize,
+    names: usize,
+}
+
+impl Layout {
+    const fn new(textures: usize, movements: usize) -> Self {
+        let cells = HEADER + movements * MOVEMENT_BYTES;
+        let trials = cells + textures * movements * PROPERTIES * CELL_BYTES;
+        Self {
+            cells,
+            trials,
+            names: trials + textures * movements,
+        }
+    }
+}
+
+fn array<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {
+    bytes.get(at..)?.first_chunk().copied()
+}
+
+impl<'a> Table<'a> {
+    /// Checks the table at the beginning of `bytes` and borrows it; what follows it is left alone.
+    ///
+    /// # Errors
+    /// The first check that failed.
+    pub fn read(bytes: &'a [u8]) -> Result<Self, TableError> {
+        let truncated = |wanted| TableError::Truncated {
+            got: bytes.len(),
+            wanted,
+        };
+        let header: &[u8; HEADER] = bytes.first_chunk().ok_or(truncated(HEADER))?;
+        let [
+            m0,
+            m1,
+            m2,
+            m3,
+            v0,
+            v1,
+            method,
+            measured,
+            l0,
+            l1,
+            l2,
+            l3,
+            t0,
+            t1,
+            movements,
+            reserved,
+        ] = *header;
+        if [m0, m1, m2, m3] != MAGIC {
+            return Err(TableError::Magic([m0, m1, m2, m3]));
+        }
+        let version = u16::from_le_bytes([v0, v1]);
+        if version != VERSION {
+            return Err(TableError::Version(version));
+        }
+        let length = u32::from_le_bytes([l0, l1, l2, l3]) as usize;
+        let bytes = bytes.get(..length).ok_or(truncated(length))?;
+        let (body, stored) = bytes.split_last_chunk().ok_or(TableError::Length {
+            header: length,
+            contents: HEADER,
+        })?;
+        let (stored, computed) = (u32::from_le_bytes(*stored), CRC32.checksum(body));
+        if stored != computed {
+            return Err(TableError::Crc { stored, computed });
+        }
+        if method != METHOD_GAUSSIAN {
+            return Err(TableError::Method(method));
+        }
+        let textures = u16::from_le_bytes([t0, t1]);
+        let measured = PropertySet::from_bits(measured)
+            .filter(|set| !set.is_empty())
+            .ok_or(TableError::Header)?;
+        if textures == 0
+            || movements == 0
+            || usize::from(movements) > MAX_MOVEMENTS
+            || reserved != 0
+        {
+            return Err(TableError::Header);
+        }
+        let table = Self {
+            bytes,
+            textures,
+            movements,
+            measured,
+        };
+        table.check()?;
+        Ok(table)
+    }
+
+    fn check(&self) -> Result<(), TableError> {
+        let mut contents = self.layout().names + CRC_BYTES;
+        let length = |contents| TableError::Length {
+            header: self.bytes.len(),
+            contents,
+        };
+        if contents > self.bytes.len() {
+            return Err(length(contents));
+        }
+        for index in 0..self.movements {
+            let (force_mn, speed_um_s) = self.stored_movement(index).ok_or(length(contents))?;
+            let movement = Movement::new(force_mn, speed_um_s)
+                .map_err(|why| TableError::Movement(index, why))?;
+            if self.movements().take(index.into()).any(|m| m == movement) {
+                return Err(TableError::TwinMovement(index));
+            }
+        }
+        for texture in 0..self.textures {
+            for action in self
+                .actions()
+                .filter(|a| self.trials(texture, a.movement) >= 2)
+            {
+                if self.cell(texture, action).is_none_or(|(_, sd)| sd == 0) {
+                    return Err(TableError::Deviation { texture, action });
+                }
+            }
+        }
+        let mut at = self.layout().names;
+        for texture in 0..self.textures {
+            let (name, next) = self.name_at(at).ok_or(length(contents))?;
+            contents += next - at;
+            at = next;
+            let twin = || {
+                self.names()
+                    .take(texture.into())
+                    .any(|other| other.as_bytes() == name)
+            };
+            if name.is_empty() || core::str::from_utf8(name).is_err() || twin() {
+                return Err(TableError::Name(texture));
+            }
+        }
+        if contents != self.bytes.len() {
+            return Err(length(contents));
+        }
+        Ok(())
+    }
+
+    fn layout(&self) -> Layout {
+        Layout::new(self.textures.into(), self.movements.into())
+    }
+
+    fn stored_movement(&self, index: u8) -> Option<(u16, u32)> {
+        let at = HEADER + usize::from(index) * MOVEMENT_BYTES;
+        Some((
+            u16::from_le_bytes(array(self.bytes, at)?),
+            u32::from_le_bytes(array(self.bytes, at + 2)?),
+        ))
+    }
+
+    /// Stored mean and standard deviation.
+    fn cell(&self, texture: u16, action: Action) -> Option<(i16, u16)> {
+        if texture >= self.textures || action.movement >= self.movements {
+            return None;
+        }
+        let row = usize::from(texture) * usize::from(self.movements) * PROPERTIES;
+        let [m0, m1, s0, s1] = array(
+            self.bytes,
+            self.layout().cells + (row + action.index()) * CELL_BYTES,
+        )?;
+        Some((i16::from_le_bytes([m0, m1]), u16::from_le_bytes([s0, s1])))
+    }
+
+    /// The bytes of the name at `at`, and where the next one begins; the checksum is no name.
+    fn name_at(&self, at: usize) -> Option<(&'a [u8], usize)> {
+        let (body, _) = self.bytes.split_last_chunk::<CRC_BYTES>()?;
+        let end = at + 1 + usize::from(*body.get(at)?);
+        Some((body.get(at + 1..end)?, end))
+    }
+
+    /// Number of textures.
+    pub fn textures(&self) -> u16 {
+        self.textures
+    }
+
+    /// The properties that the table was learned from.
+    pub fn measured(&self) -> PropertySet {
+        self.measured
+    }
+
+    /// The movements, in the order of [`Action::movement`].
+    pub fn movements(&self) -> impl ExactSizeIterator<Item = Movement> + use<'_, 'a> {
+        (0..self.movements).map(|index| {
+            self.movement(index).unwrap_or(Movement::FOR_ROUGHNESS) // `read` has checked them all
+        })
+    }
+
+    /// The movement with this index.
+    pub fn movement(&self, index: u8) -> Option<Movement> {
+        let (force_mn, speed_um_s) = self
+            .stored_movement(index)
+            .filter(|_| index < self.movements)?;
+        Movement::new(force_mn, speed_um_s).ok()
+    }
+
+    /// All (movement, property) pairs that were measured, in the order of [`Action::index`].
+    pub fn actions(&self) -> impl Iterator<Item = Action> + use<> {
+        let measured = self.measured;
+        (0..self.movements).flat_map(move |movement| {
+            measured
+                .iter()
+                .map(move |property| Action { movement, property })
+        })
+    }
+
+    /// The names, in the order of the textures' indices.
+    pub fn names(&self) -> impl Iterator<Item = &'a str> + use<'a> {
+        let table = *self;
+        let mut at = self.layout().names;
+        (0..self.textures).map_while(move |_| {
+            let (name, next) = table.name_at(at)?;
+            at = next;
+            core::str::from_utf8(name).ok()
+        })
+    }
+
+    /// The name of a texture.
+    pub fn name(&self, texture: u16) -> Option<&'a str> {
+        self.names().nth(texture.into())
+    }
+
+    /// The texture with this name.
+    pub fn find(&self, name: &str) -> Option<u16> {
+        self.names()
+            .zip(0..)
+            .find_map(|(other, texture)| (other == name).then_some(texture))
+    }
+
+    /// Number of trials that a texture was learned from at a movement, 255 for more.
+    pub fn trials(&self, texture: u16, movement: u8) -> u8 {
+        if texture >= self.textures || movement >= self.movements {
+            return 0;
+        }
+        let at = self.layout().trials
+            + usize::from(texture) * usize::from(self.movements)
+            + usize::from(movement);
+        self.bytes.get(at).copied().unwrap_or(0)
+    }
+
+    /// What a property of a texture is expected to be; `None` where fewer than two trials were made, and outside the
+    /// table.
+    pub fn gaussian(&self, texture: u16, action: Action) -> Option<Gaussian> {
+        if self.trials(texture, action.movement) < 2 {
+            return None;
+        }
+        let (mean, sd) = self.cell(texture, action)?;
+        Some(Gaussian {
+            mean: f32::from(mean) * mean_step(action.property),
+            sd: f32::from(sd) * SD_STEP,
+        })
+    }
+
+    /// What was learned of a texture at a movement, to go on from; what is in the table is rounded.
+    pub fn experience(&self, texture: u16, movement: u8) -> Experience {
+        let trials = self.trials(texture, movement);
+        let mut experience = Experience {
+            trials,
+            ..Experience::default()
+        };
+        for (property, (mean, squares)) in Property::ALL
+            .into_iter()
+            .zip(experience.mean.iter_mut().zip(&mut experience.squares))
+        {
+            let (m, sd) = self
+                .cell(texture, Action { movement, property })
+                .unwrap_or_default();
+            let sd = f32::from(sd) * SD_STEP;
+            *mean = f32::from(m) * mean_step(property);
+            *squares = sd * sd * f32::from(trials.saturating_sub(1));
+        }
+        experience
+    }
+
+    /// The checksum, which also tells one table from another.
+    pub fn crc(&self) -> u32 {
+        self.bytes
+            .split_last_chunk()
+            .map_or(0, |(_, crc)| u32::from_le_bytes(*crc))
+    }
+
+    /// The table as stored.
+    pub fn as_bytes(&self) -> &'a [u8] {
+        self.bytes
+    }
+}
+
+/// One texture of a table to be written.
+#[derive(Clone, Copy, Debug)]
+pub struct Texture<'a> {
+    /// Its name, unlike every other, of 1 to 255 bytes.
+    pub name: &'a str,
+    /// What was learned, movement by movement.
+    pub experience: &'a [Experience],
+}
+
+/// Why a table was not written.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum EncodeError {
+    /// No texture, movement or property, or more movements than [`MAX_MOVEMENTS`].
+    Empty,
+    /// The table takes this many bytes, and there is less room.
+    Room(usize),
+    /// A texture has not as many experiences as there are movements.
+    Movements(u16),
+    /// A name is longer than 255 bytes.
+    Name(u16),
+    /// A mean that the fixed point cannot hold.
+    Range {
+        /// Index of the texture.
+        texture: u16,
+        /// The action concerned.
+        action: Action,
+        /// The mean.
+        mean: f32,
+    },
+    /// What was written does not read: a name is empty or there twice, or a movement is.
+    Invalid(TableError),
+}
+
+impl fmt::Display for EncodeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Empty => write!(
+                f,
+                "a table needs a texture, a property and 1 to {MAX_MOVEMENTS} movements"
+            ),
+            Self::Room(needed) => {
+                write!(f, "the table takes {needed} bytes, and there is less room")
+            }
+            Self::Movements(texture) => write!(
+                f,
+                "texture {} was not learned at every movement",
+                texture + 1
+            ),
+            Self::Name(texture) => write!(
+                f,
+                "the name of texture {} is longer than 255 bytes",
+                texture + 1
+            ),
+            Self::Range {
+                texture,
+                action,
+                mean,
+            } => write!(
+                f,
+                "texture {}, movement {}: {} {mean} is beyond the table's +-{}",
+                texture + 1,
+                action.movement + 1,
+                action.property,
+                mean_step(action.property) * 32768.0
+            ),
+            Self::Invalid(why) => why.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for EncodeError {}
+
+/// Bytes that a table takes, names and their lengths included in `names`.
+pub const fn encoded_len(textures: usize, movements: usize, names: usize) -> usize {
+    Layout::new(textures, movements).names + names + CRC_BYTES
+}
+
+/// Writes a table into `out` and reads it back.
+///
+/// Means are rounded to [`mean_step`], standard deviations to [`SD_STEP`] and kept between [`SD_LEAST`] and 4.
+///
+/// # Errors
+/// Nothing usable is in `out` then.
+pub fn encode<'o, 'a>(
+    out: &'o mut [u8],
+    measured: PropertySet,
+    movements: &[Movement],
+    textures: impl Iterator<Item = Texture<'a>> + Clone,
+) -> Result<Table<'o>, EncodeError> {
+    let (count, names) = textures.clone().fold((0usize, 0), |(n, names), t| {
+        (n + 1, names + 1 + t.name.len())
+    });
+    let length = encoded_len(count, movements.len(), names);
+    let (Ok(count), Ok(length_field)) = (u16::try_from(count), u32::try_from(length)) else {
+        return Err(EncodeError::Room(length));
+    };
+    if count == 0 || measured.is_empty() || movements.is_empty() || movements.len() > MAX_MOVEMENTS
+    {
+        return Err(EncodeError::Empty);
+    }
+    let mut writer = Writer {
+        room: out.get_mut(..length).ok_or(EncodeError::Room(length))?,
+        at: 0,
+    };
+    writer.put(&MAGIC);
+    writer.put(&VERSION.to_le_bytes());
+    writer.put(&[METHOD_GAUSSIAN, measured.bits()]);
+    writer.put(&length_field.to_le_bytes());
+    writer.put(&count.to_le_bytes());
+    writer.put(&[movements.len() as u8, 0]);
+    for movement in movements {
+        writer.put(&movement.force_mn().to_le_bytes());
+        writer.put(&movement.speed_um_s().to_le_bytes());
+    }
+    for (texture, index) in textures.clone().zip(0..) {
+        if texture.experience.len() != movements.len() {
+            return Err(EncodeError::Movements(index));
+        }
+        for (experience, movement) in texture.experience.iter().zip(0..) {
+            for (property, mean) in Property::ALL.into_iter().zip(experience.mean) {
+                let action = Action { movement, property };
+                let range = EncodeError::Range {
+                    texture: index,
+                    action,
+                    mean,
+                };
+                let step = libm::roundf(mean / mean_step(property));
+                if !(f32::from(i16::MIN)..=f32::from(i16::MAX)).contains(&step) {
+                    return Err(range);
+                }
+                let sd = experience
+                    .gaussian(property)
+                    .map_or(0.0, |g| g.sd.max(SD_LEAST));
+                writer.put(&(step as i16).to_le_bytes());
+                // `as` saturates: trials that differ by more than 4 are no worse than that
+                writer.put(&(libm::roundf(sd / SD_STEP) as u16).to_le_bytes());
+            }
+        }
+    }
+    for experience in textures.clone().flat_map(|t| t.experience) {
+        writer.put(&[experience.trials]);
+    }
+    for (texture, index) in textures.zip(0..) {
+        writer.put(&[u8::try_from(texture.name.len()).map_err(|_| EncodeError::Name(index))?]);
+        writer.put(texture.name.as_bytes());
+    }
+    let crc = CRC32.checksum(writer.written());
+    writer.put(&crc.to_le_bytes());
+    Table::read(writer.room).map_err(EncodeError::Invalid)
+}
+
+/// Fills a slice from its beginning.
+struct Writer<'o> {
+    room: &'o mut [u8],
+    at: usize,
+}
+
+impl Writer<'_> {
+    fn put(&mut self, bytes: &[u8]) {
+        if let Some(room) = self.room.get_mut(self.at..self.at + bytes.len()) {
+            room.copy_from_slice(bytes);
+        }
+        self.at += bytes.len();
+    }
+
+    fn written(&self) -> &[u8] {
+        self.room.get(..self.at).unwrap_or_default()
+    }
+}
