@@ -11,3 +11,4 @@
 extern crate std;
 
 pub mod movement;
+pub mod pressure;
