@@ -12,3 +12,4 @@ extern crate std;
 
 pub mod movement;
 pub mod pressure;
+pub mod sensor;
