@@ -10,6 +10,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod biotac;
 pub mod movement;
 pub mod pressure;
 pub mod sensor;
