@@ -11,6 +11,7 @@
 extern crate std;
 
 pub mod biotac;
+pub mod mcp3202;
 pub mod movement;
 pub mod pressure;
 pub mod sensor;
