@@ -1,4 +1,4 @@
-//! The BioTac fingertip: commands, words, and how well the link works.
+//! The BioTac fingertip: commands, words, properties, and how well the link works.
 //!
 //! Sources, cited by these names:
 //! - SPM: BioTac SP Product Manual V2, 2015 (CNCR-NTU/biotac_sp_ros, doc/), whose protocol is the BioTac's;
@@ -10,10 +10,14 @@
 
 mod command;
 mod link;
+mod property;
+#[cfg(test)]
+mod tests;
 mod word;
 
 pub use command::{Channel, FULL_FRAME, GAP_US, PRESSURE_SLOTS, READ_MOSI, REST_US};
 pub use link::{Diagnosis, WordStats};
+pub use property::{Ascii, Identity, IdentityBytes, Property, PropertyError};
 pub use word::{BadParity, ErrorCode, WordError, decode, encode, encode_error};
 
 use core::ops::RangeInclusive;
