@@ -10,11 +10,15 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod biotac;
 pub mod explorer;
 pub mod features;
 pub mod fir;
 pub mod kernels;
+pub mod mcp3202;
 pub mod movement;
+pub mod pressure;
 pub mod rig;
+pub mod sensor;
 pub mod spectrum;
 pub mod table;
