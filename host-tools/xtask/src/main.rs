@@ -1,2 +1,157 @@
-//! The project's own commands: `cargo xtask build | test`.
-fn main() {}
+//! The project's own commands: `cargo xtask build | test | mutants | bench`.
+mod firmware;
+mod test;
+mod toolchain;
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use anyhow::{Context as _, Result, bail};
+use clap::Parser;
+
+/// Builds, tests and measures Tactus.
+///
+/// `cargo xtask test` is the whole check, as CI runs it. For one test use cargo itself: `cargo test -p tactus-core grid`.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+enum Cli {
+    /// Build the firmware for the chip, with warnings as errors
+    ///
+    /// Prints where each ELF is, its SHA-256 and what it takes of the chip. Builds with the active Rust toolchain if that
+    /// has the target thumbv7em-none-eabihf (`rustup target add thumbv7em-none-eabihf`). If it has not, Debian's Rust
+    /// packages build it, and where those are missing too, root gets them installed by apt-get.
+    Build,
+    /// Run every check: formatting, lints, licences, tests, documentation, firmware
+    ///
+    /// All of them run even when one fails. The last lines say what ran and how long it took, and what was skipped and why;
+    /// tests that want recordings are skipped where there are none (TACTUS_REQUIRE_DATA=1 makes them fail instead).
+    Test {
+        /// Leave out the firmware build
+        #[arg(long)]
+        quick: bool,
+    },
+    /// Show what the core's tests would miss: run them on copies of the core with one thing changed
+    ///
+    /// Changes the sensor, table and explorer modules (cargo-mutants). A mutant that survives is a change no test sees.
+    #[command(after_help = "Examples:
+  cargo xtask mutants --list             what would be changed
+  cargo xtask mutants --jobs 2           two at a time
+  cargo xtask mutants --in-diff my.diff  only what a diff touches")]
+    Mutants {
+        /// Options for cargo-mutants
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
+    /// Time the core's functions on this PC
+    ///
+    /// Good for comparing two versions on one PC. What the chip needs is another matter.
+    #[command(after_help = "Example:
+  cargo xtask bench spectrum             only benches with `spectrum` in their name")]
+    Bench {
+        /// Filter and options for the benches (divan's)
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
+}
+
+fn main() -> ExitCode {
+    let done = match Cli::parse() {
+        Cli::Build => firmware::build(),
+        Cli::Test { quick } => return test::run(quick),
+        Cli::Mutants { options } => mutants(options),
+        Cli::Bench { options } => bench(options),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("error: {e:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn mutants(options: Vec<OsString>) -> Result<()> {
+    if !has_subcommand("mutants") {
+        bail!("cargo-mutants is not installed: cargo install cargo-mutants --locked");
+    }
+    let mut cargo = cargo();
+    cargo.args(["mutants", "--package", "tactus-core"]);
+    cargo.args(["--test-package", "tactus-core"]);
+    for module in ["biotac", "table", "explorer"] {
+        cargo.args(["--file", &format!("shared/src/{module}*")]);
+        cargo.args(["--file", &format!("shared/src/{module}*/**")]);
+    }
+    run(cargo.args(options))
+}
+
+fn bench(options: Vec<OsString>) -> Result<()> {
+    // by target: `cargo bench` alone would hand divan's options to every unit test binary too
+    let mut cargo = cargo();
+    cargo.args(["bench", "--package", "tactus-tests", "--bench", "*", "--"]);
+    run(cargo.args(options))
+}
+
+/// The top of the repository.
+fn root() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.ancestors().nth(2).unwrap_or(here).to_owned()
+}
+
+/// Where cargo puts what it builds.
+fn target() -> PathBuf {
+    root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
+}
+
+/// The cargo that runs this program, at the top of the repository.
+fn cargo() -> Command {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.current_dir(root());
+    cargo
+}
+
+fn has_subcommand(name: &str) -> bool {
+    cargo()
+        .args([name, "--version"])
+        .output()
+        .is_ok_and(|o| o.status.success())
+}
+
+/// Runs a command with its output where ours goes; an error unless it succeeds.
+fn run(command: &mut Command) -> Result<()> {
+    let program = command.get_program().to_owned();
+    let status = command
+        .status()
+        .with_context(|| format!("cannot start {}", program.display()))?;
+    if !status.success() {
+        let name = Path::new(&program).file_name().unwrap_or(&program);
+        bail!("{} ended with {status}", name.display());
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn options_behind_mutants_and_bench_go_through() {
+        let Cli::Mutants { options } = Cli::parse_from(["xtask", "mutants", "--jobs", "2"]) else {
+            panic!("not mutants");
+        };
+        assert_eq!(options, ["--jobs", "2"]);
+    }
+
+    #[test]
+    fn a_command_that_fails_is_an_error_with_its_name() {
+        assert!(run(&mut Command::new("true")).is_ok());
+        let error = run(&mut Command::new("false")).unwrap_err().to_string();
+        assert!(error.starts_with("false ended with"), "{error}");
+    }
+}

@@ -1,0 +1,130 @@
+//! The firmware build, and what is said about its result.
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+
+use anyhow::{Context as _, Result, bail, ensure};
+use object::{Object as _, ObjectSegment as _};
+use sha2::{Digest as _, Sha256};
+
+use crate::{root, toolchain};
+
+/// Builds every binary of the firmware and says what came out.
+pub(crate) fn build() -> Result<()> {
+    let toolchain = toolchain::get()?;
+    println!("Building with {}", toolchain.version());
+    let mut cargo = toolchain.cargo_build();
+    cargo.args(["--package", "tactus-firmware", "--profile", "firmware"]);
+    // progress and diagnostics go to stderr; stdout says where the ELFs are
+    cargo.arg("--message-format=json-render-diagnostics");
+    let output = cargo
+        .stderr(Stdio::inherit())
+        .output()
+        .context("cannot start cargo")?;
+    ensure!(
+        output.status.success(),
+        "the firmware does not build (warnings are errors here)"
+    );
+    let elves = executables(&String::from_utf8_lossy(&output.stdout));
+    ensure!(!elves.is_empty(), "cargo named no firmware binary");
+    for elf in elves {
+        describe(&elf)?;
+    }
+    Ok(())
+}
+
+/// The binaries that cargo's messages name.
+fn executables(messages: &str) -> Vec<PathBuf> {
+    messages
+        .lines()
+        .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
+        .filter_map(|message| Some(message.get("executable")?.as_str()?.into()))
+        .collect()
+}
+
+fn describe(elf: &Path) -> Result<()> {
+    let image = std::fs::read(elf).with_context(|| elf.display().to_string())?;
+    let size = Size::of(&image).with_context(|| elf.display().to_string())?;
+    let hash: String = Sha256::digest(&image)
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
+    let root = root();
+    println!(
+        "ELF      {}",
+        elf.strip_prefix(&root).unwrap_or(elf).display()
+    );
+    println!("SHA-256  {hash}");
+    println!("flash    {} bytes", size.flash);
+    println!("RAM      {} bytes, and the stack", size.ram);
+    println!("CCM      {} bytes", size.ccm);
+    Ok(())
+}
+
+/// What an image takes of the chip's memories, in bytes.
+#[derive(PartialEq, Eq, Default, Debug)]
+struct Size {
+    /// Code, constants and the initial values of variables.
+    flash: u64,
+    /// Variables.
+    ram: u64,
+    ccm: u64,
+}
+
+impl Size {
+    fn of(elf: &[u8]) -> Result<Self> {
+        let file = object::File::parse(elf)?;
+        Self::sum(
+            file.segments()
+                .map(|s| (s.address(), s.size(), s.file_range().1)),
+        )
+    }
+
+    /// Sums segments of (address at run time, size there, bytes in the file); the regions are memory.x's.
+    fn sum(segments: impl Iterator<Item = (u64, u64, u64)>) -> Result<Self> {
+        let mut size = Self::default();
+        for (address, in_memory, in_file) in segments {
+            // variables with initial values have those in flash
+            size.flash += in_file;
+            match address >> 24 {
+                0x08 => {}
+                0x10 => size.ccm += in_memory,
+                0x20 => size.ram += in_memory,
+                _ => bail!("a segment at {address:#x} is in no memory of the chip"),
+            }
+        }
+        Ok(size)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn variables_with_initial_values_take_flash_and_ram() {
+        let segments = [
+            (0x0800_0000, 428, 428),
+            (0x0800_01ac, 8204, 8204),
+            (0x2000_0000, 80, 80),
+            (0x2000_0050, 1124, 0),
+            (0x1000_0000, 16, 0),
+        ];
+        let size = Size {
+            flash: 428 + 8204 + 80,
+            ram: 80 + 1124,
+            ccm: 16,
+        };
+        assert_eq!(Size::sum(segments.into_iter()).unwrap(), size);
+        assert!(Size::sum([(0x6000_0000, 4, 4)].into_iter()).is_err());
+        assert!(Size::of(b"no ELF").is_err());
+    }
+
+    #[test]
+    fn only_binaries_are_taken_from_cargos_messages() {
+        let messages = r#"{"reason":"compiler-artifact","executable":null}
+not json
+{"reason":"compiler-artifact","executable":"/t/tactus-rig"}
+{"reason":"build-finished","success":true}"#;
+        assert_eq!(executables(messages), [Path::new("/t/tactus-rig")]);
+    }
+}

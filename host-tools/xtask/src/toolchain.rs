@@ -1,0 +1,262 @@
+//! What can build for the chip on this machine.
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context as _, Result, bail};
+
+use crate::{cargo, root, run, target};
+
+/// The chip's target: Cortex-M4 with its FPU.
+pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// What builds the firmware.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Toolchain {
+    /// The one cargo runs with; it brings the chip's `core`.
+    Active,
+    /// Debian's packages, which bring the source of `core`.
+    Debian,
+}
+
+/// What was found.
+#[derive(Clone, Copy)]
+struct Found {
+    active_has_target: bool,
+    debian: bool,
+    /// apt-get is here and we are root.
+    may_install: bool,
+}
+
+#[derive(PartialEq, Eq, Debug)]
+enum Choice {
+    Use(Toolchain),
+    InstallDebian,
+    Neither,
+}
+
+fn choose(found: Found) -> Choice {
+    if found.active_has_target {
+        Choice::Use(Toolchain::Active)
+    } else if found.debian {
+        Choice::Use(Toolchain::Debian)
+    } else if found.may_install {
+        Choice::InstallDebian
+    } else {
+        Choice::Neither
+    }
+}
+
+/// A toolchain for the chip, installed if need be.
+pub(crate) fn get() -> Result<Toolchain> {
+    let found = Found {
+        active_has_target: active_has_target(),
+        debian: debian_lacks().is_none(),
+        may_install: Path::new("/usr/bin/apt-get").exists()
+            && stdout("id", &["-u"]).as_deref() == Some("0"),
+    };
+    match choose(found) {
+        Choice::Use(toolchain) => Ok(toolchain),
+        Choice::InstallDebian => {
+            install_debian()?;
+            match debian_lacks() {
+                None => Ok(Toolchain::Debian),
+                Some(what) => bail!("Debian's packages are installed, but {what}.\n{HELP}"),
+            }
+        }
+        Choice::Neither => bail!("no Rust toolchain here builds for {TARGET}.\n{HELP}"),
+    }
+}
+
+const HELP: &str = "\
+Install one of:
+  with rustup         rustup target add thumbv7em-none-eabihf
+  Debian 12, as root  apt-get update
+                      apt-get install --no-install-recommends rustc-web cargo-web rust-web-src rust-web-llvm lld-22 llvm-22
+  newer Debian        apt-get install --no-install-recommends rustc cargo rust-src lld   (Rust 1.95 or newer)
+and run the command again.";
+
+impl Toolchain {
+    /// A `cargo build` for the chip, without profile and package.
+    ///
+    /// The image is not to depend on who builds it, so RUSTFLAGS from outside do not count: they are what denies warnings
+    /// (only in the workspace: cargo caps the lints of dependencies). And the toolchains have a target folder each, so that
+    /// neither builds the other's, or the flags', work anew.
+    pub(crate) fn cargo_build(self) -> Command {
+        let mut cargo = match self {
+            Self::Active => cargo(),
+            Self::Debian => debian_cargo(),
+        };
+        let folder = match self {
+            Self::Active => "chip",
+            Self::Debian => "debian",
+        };
+        cargo
+            .env_remove("CARGO_ENCODED_RUSTFLAGS")
+            .env("RUSTFLAGS", "-Dwarnings")
+            .args(["build", "--target", TARGET, "--target-dir"])
+            .arg(target().join(folder));
+        if self == Self::Debian {
+            cargo.arg("-Zbuild-std=core");
+        }
+        cargo
+    }
+
+    /// Name and version of the compiler.
+    pub(crate) fn version(self) -> String {
+        let (rustc, whose) = match self {
+            Self::Active => ("rustc", ""),
+            Self::Debian => (DEBIAN_RUSTC, "Debian's "),
+        };
+        let version = stdout(rustc, &["--version"]).unwrap_or_else(|| rustc.into());
+        format!("{whose}{version}")
+    }
+}
+
+const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+const DEBIAN_CARGO: &str = "/usr/bin/cargo";
+/// The workspace's rust-version.
+const OLDEST: (u32, u32) = (1, 95);
+
+fn debian_cargo() -> Command {
+    let mut cargo = Command::new(DEBIAN_CARGO);
+    cargo
+        .current_dir(root())
+        // rustup's cargo, which runs this program, has put its own libraries and choice here
+        .env_remove("LD_LIBRARY_PATH")
+        .env_remove("RUSTUP_TOOLCHAIN")
+        // else rustup's rustc is found on the PATH, and its sysroot has no source of `core`
+        .env("RUSTC", DEBIAN_RUSTC)
+        // for -Zbuild-std
+        .env("RUSTC_BOOTSTRAP", "1");
+    if let Some(path) = path_with_rust_lld() {
+        cargo.env("PATH", path);
+    }
+    cargo
+}
+
+/// What Debian's toolchain lacks to build for the chip, if anything.
+fn debian_lacks() -> Option<String> {
+    if !Path::new(DEBIAN_CARGO).exists() {
+        return Some(format!("there is no {DEBIAN_CARGO}"));
+    }
+    let Some(version) = stdout(DEBIAN_RUSTC, &["--version"]) else {
+        return Some(format!("{DEBIAN_RUSTC} does not run"));
+    };
+    if parse_version(&version).is_none_or(|v| v < OLDEST) {
+        return Some(format!("{version} is older than {}.{}", OLDEST.0, OLDEST.1));
+    }
+    let sysroot = stdout(DEBIAN_RUSTC, &["--print", "sysroot"]).unwrap_or_default();
+    let source = Path::new(&sysroot).join("lib/rustlib/src/rust/library/core");
+    if !source.is_dir() {
+        return Some(format!("there is no {}", source.display()));
+    }
+    if path_with_rust_lld().is_none() {
+        return Some("there is no rust-lld".into());
+    }
+    None
+}
+
+/// "rustc 1.96.0 (...)" -> (1, 96)
+fn parse_version(text: &str) -> Option<(u32, u32)> {
+    let mut numbers = text.split_whitespace().nth(1)?.split('.');
+    Some((numbers.next()?.parse().ok()?, numbers.next()?.parse().ok()?))
+}
+
+/// The PATH, with the folder of the active toolchain's rust-lld at its end in case Debian's is not there.
+fn path_with_rust_lld() -> Option<OsString> {
+    let mut folders: Vec<PathBuf> =
+        std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();
+    if let Some(lib) = stdout("rustc", &["--print", "target-libdir"]) {
+        folders.push(Path::new(&lib).with_file_name("bin"));
+    }
+    let found = folders.iter().any(|f| f.join("rust-lld").exists());
+    found.then(|| std::env::join_paths(folders).ok()).flatten()
+}
+
+fn install_debian() -> Result<()> {
+    eprintln!("No Rust toolchain here builds for {TARGET}: installing Debian's packages.");
+    apt_get(&["update"])?;
+    // Debian 12 has a new Rust beside its own old one, for browsers; newer releases have only their own
+    let web = stdout("apt-cache", &["policy", "rustc-web"])
+        .is_some_and(|policy| policy.contains("Candidate: 1."));
+    let packages: &[&str] = if web {
+        &[
+            "rustc-web",
+            "cargo-web",
+            "rust-web-src",
+            "rust-web-llvm",
+            "lld-22",
+            "llvm-22",
+        ]
+    } else {
+        &["rustc", "cargo", "rust-src", "lld"]
+    };
+    let install = ["install", "--yes", "--no-install-recommends"];
+    apt_get(&[&install, packages].concat())
+}
+
+fn apt_get(arguments: &[&str]) -> Result<()> {
+    // somebody else's apt-get may hold the lock for a while
+    let mut apt_get = Command::new("apt-get");
+    apt_get.args(["--option", "DPkg::Lock::Timeout=300"]);
+    apt_get.env("DEBIAN_FRONTEND", "noninteractive");
+    run(apt_get.args(arguments)).context(HELP)
+}
+
+fn active_has_target() -> bool {
+    stdout("rustc", &["--print", "target-libdir", "--target", TARGET])
+        .is_some_and(|folder| Path::new(&folder).is_dir())
+}
+
+fn stdout(program: &str, arguments: &[&str]) -> Option<String> {
+    let output = Command::new(program).args(arguments).output().ok()?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    output.status.success().then(|| text.trim().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_active_toolchain_goes_first_and_nothing_is_installed_in_vain() {
+        let nothing = Found {
+            active_has_target: false,
+            debian: false,
+            may_install: false,
+        };
+        assert_eq!(choose(nothing), Choice::Neither);
+        let root = Found {
+            may_install: true,
+            ..nothing
+        };
+        assert_eq!(choose(root), Choice::InstallDebian);
+        let debian = Found {
+            debian: true,
+            ..root
+        };
+        assert_eq!(choose(debian), Choice::Use(Toolchain::Debian));
+        let both = Found {
+            active_has_target: true,
+            ..debian
+        };
+        assert_eq!(choose(both), Choice::Use(Toolchain::Active));
+    }
+
+    #[test]
+    fn versions_are_compared_as_numbers() {
+        let debian = "rustc 1.96.0 (ac68faa20 2026-05-25) (built from a source tarball)";
+        assert_eq!(parse_version(debian), Some((1, 96)));
+        assert!(parse_version("rustc 1.100.0-nightly") > Some(OLDEST));
+        assert!(parse_version("rustc 1.63.0") < Some(OLDEST));
+        assert_eq!(parse_version("rustc"), None);
+    }
+
+    #[test]
+    fn the_oldest_rust_is_the_workspaces() {
+        let manifest = std::fs::read_to_string(root().join("Cargo.toml")).unwrap();
+        let line = format!("rust-version = \"{}.{}\"", OLDEST.0, OLDEST.1);
+        assert!(manifest.contains(&line), "no {line}");
+    }
+}
