@@ -1,1 +1,3 @@
 //! Tactus on a PC.
+pub mod recordings;
+pub mod rows;

@@ -1,0 +1,195 @@
+//! Rows of a CSV table with a header, one at a time; every error names the file, the line and the column.
+use std::fs::File;
+use std::io::{self, BufReader, Read as _};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// Largest table that is read, in bytes: a damaged file must not fill the memory with one endless line.
+pub const MAX_BYTES: u64 = 64 << 20;
+
+/// What is wrong with a table, and where.
+#[derive(thiserror::Error, Debug)]
+#[error("{}:{line}: {}{cause}", path.display(), column.map(|c| format!("column {c}: ")).unwrap_or_default())]
+pub struct RowError {
+    /// The table.
+    pub path: PathBuf,
+    /// Line in the file; the header is line 1.
+    pub line: u64,
+    /// Column, by its name in the header, if the error is about one.
+    pub column: Option<&'static str>,
+    /// What is wrong, and what to do.
+    pub cause: String,
+}
+
+/// A table that is being read.
+pub struct Rows {
+    path: PathBuf,
+    reader: csv::Reader<BufReader<io::Take<File>>>,
+    record: csv::StringRecord,
+    header_fields: usize,
+    /// where the wanted columns are
+    columns: Vec<(&'static str, usize)>,
+}
+
+/// One row of a table.
+#[derive(Clone, Copy, Debug)]
+pub struct Row<'a> {
+    path: &'a Path,
+    record: &'a csv::StringRecord,
+    columns: &'a [(&'static str, usize)],
+}
+
+impl Rows {
+    /// Opens the table at `path`, which must have `columns`, in any order; it may have others.
+    ///
+    /// # Errors
+    /// If the file cannot be read or a column is missing.
+    pub fn open(path: &Path, columns: &[&'static str]) -> Result<Self, RowError> {
+        let header_error = |cause: String| RowError {
+            path: path.to_owned(),
+            line: 1,
+            column: None,
+            cause,
+        };
+        let file = File::open(path).map_err(|e| header_error(e.to_string()))?;
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .flexible(true)
+            .from_reader(BufReader::new(file.take(MAX_BYTES)));
+        let header = reader
+            .headers()
+            .map_err(|e| header_error(cause_of(&e)))?
+            .clone();
+        let columns = columns
+            .iter()
+            .map(|&name| {
+                let mut at = (0..).zip(&header).filter(|(_, h)| *h == name);
+                match (at.next(), at.next()) {
+                    (Some((i, _)), None) => Ok((name, i)),
+                    (None, _) => {
+                        let found: Vec<&str> = header.iter().take(50).collect();
+                        Err(header_error(format!(
+                            "no column {name} in the header ({})",
+                            found.join(",")
+                        )))
+                    }
+                    (Some(_), Some(_)) => {
+                        Err(header_error(format!("two columns {name} in the header")))
+                    }
+                }
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            path: path.to_owned(),
+            reader,
+            record: csv::StringRecord::new(),
+            header_fields: header.len(),
+            columns,
+        })
+    }
+
+    /// The next row; empty lines are skipped.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or the row has another number of fields than the header. One comma too many at the end
+    /// is let pass: the BioTac publisher's rows have it.
+    pub fn next_row(&mut self) -> Result<Option<Row<'_>>, RowError> {
+        let line = self.reader.position().line();
+        let error = |line, cause| RowError {
+            path: self.path.clone(),
+            line,
+            column: None,
+            cause,
+        };
+        let more = self.reader.read_record(&mut self.record).map_err(|e| {
+            let line = e.position().map_or(line, csv::Position::line);
+            error(line, cause_of(&e))
+        })?;
+        if self.reader.get_ref().get_ref().limit() == 0 {
+            let cause = format!("the table is longer than {MAX_BYTES} bytes; split it");
+            return Err(error(line, cause));
+        }
+        if !more {
+            return Ok(None);
+        }
+        let line = self.record.position().map_or(line, csv::Position::line);
+        let (fields, wanted) = (self.record.len(), self.header_fields);
+        if fields < wanted || self.record.iter().skip(wanted).any(|f| !f.is_empty()) {
+            let cause = format!(
+                "{fields} fields where the header has {wanted}: cut off or damaged; fetch or write the file again"
+            );
+            return Err(error(line, cause));
+        }
+        Ok(Some(Row {
+            path: &self.path,
+            record: &self.record,
+            columns: &self.columns,
+        }))
+    }
+}
+
+impl<'a> Row<'a> {
+    /// Line of this row in the file.
+    pub fn line(&self) -> u64 {
+        self.record.position().map_or(0, csv::Position::line)
+    }
+
+    /// The text in `column`, without spaces around it; empty if [`Rows::open`] was not asked for it.
+    pub fn text(&self, column: &'static str) -> &'a str {
+        let at = self.columns.iter().find(|(name, _)| *name == column);
+        at.and_then(|&(_, i)| self.record.get(i)).unwrap_or("")
+    }
+
+    /// The value in `column`; `what` it should be is named if it is not.
+    ///
+    /// # Errors
+    /// If it is not.
+    pub fn parse<T: FromStr>(&self, column: &'static str, what: &str) -> Result<T, RowError> {
+        let text = self.text(column);
+        let wrong = |_| {
+            let text: String = text.chars().take(40).collect();
+            self.error(Some(column), format!("{text:?} is not {what}"))
+        };
+        text.parse().map_err(wrong)
+    }
+
+    /// The finite number in `column`.
+    ///
+    /// # Errors
+    /// If it is not a number, or not finite.
+    pub fn number<T>(&self, column: &'static str) -> Result<T, RowError>
+    where
+        T: FromStr + Into<f64> + Copy,
+    {
+        let number: T = self.parse(column, "a number")?;
+        if !number.into().is_finite() {
+            return Err(self.error(
+                Some(column),
+                format!(
+                    "{} is not a finite number; measure it again or leave the row out",
+                    self.text(column)
+                ),
+            ));
+        }
+        Ok(number)
+    }
+
+    /// An error in this row.
+    pub fn error(&self, column: Option<&'static str>, cause: String) -> RowError {
+        RowError {
+            path: self.path.to_owned(),
+            line: self.line(),
+            column,
+            cause,
+        }
+    }
+}
+
+/// What csv says, without the place, which is ours to say.
+fn cause_of(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::Io(e) => e.to_string(),
+        csv::ErrorKind::Utf8 { .. } => "not UTF-8 text; this is no such table".to_owned(),
+        _ => error.to_string(),
+    }
+}
