@@ -79,9 +79,9 @@ and run the command again.";
 impl Toolchain {
     /// A `cargo build` for the chip, without profile and package.
     ///
-    /// The image is not to depend on who builds it, so RUSTFLAGS from outside do not count: they are what denies warnings
-    /// (only in the workspace: cargo caps the lints of dependencies). And the toolchains have a target folder each, so that
-    /// neither builds the other's, or the flags', work anew.
+    /// The ELF is not to depend on who builds it and where, so RUSTFLAGS from outside do not count and folders are left out
+    /// of it. Warnings are denied in the workspace only: cargo caps the lints of dependencies. The toolchains have a target
+    /// folder each, so that neither builds the other's work anew.
     pub(crate) fn cargo_build(self) -> Command {
         let mut cargo = match self {
             Self::Active => cargo(),
@@ -92,8 +92,7 @@ impl Toolchain {
             Self::Debian => "debian",
         };
         cargo
-            .env_remove("CARGO_ENCODED_RUSTFLAGS")
-            .env("RUSTFLAGS", "-Dwarnings")
+            .env("CARGO_ENCODED_RUSTFLAGS", rustflags())
             .args(["build", "--target", TARGET, "--target-dir"])
             .arg(target().join(folder));
         if self == Self::Debian {
@@ -111,6 +110,23 @@ impl Toolchain {
         let version = stdout(rustc, &["--version"]).unwrap_or_else(|| rustc.into());
         format!("{whose}{version}")
     }
+}
+
+fn rustflags() -> OsString {
+    let mut flags = OsString::from("-Dwarnings");
+    let mut leave_out = |folder: &Path, name: &str| {
+        // cargo's separator: folders may have spaces
+        flags.push("\x1f--remap-path-prefix=");
+        flags.push(folder);
+        flags.push(name);
+    };
+    // "." and not a made-up name: a debugger started at the top still finds the source
+    leave_out(&root(), "=.");
+    let home = |name| std::env::var_os(name).map(PathBuf::from);
+    if let Some(cargo) = home("CARGO_HOME").or_else(|| Some(home("HOME")?.join(".cargo"))) {
+        leave_out(&cargo, "=cargo");
+    }
+    flags
 }
 
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
