@@ -1,3 +1,10 @@
-//! Tactus on a PC.
+//! Tactus on a PC: recordings, replays of them, virtual explorations, and what the command `tactus` shows.
+
+pub mod evaluate;
+pub mod experiment;
+pub mod import;
+pub mod properties;
 pub mod recordings;
+pub mod replay;
 pub mod rows;
+pub mod show;

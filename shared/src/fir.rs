@@ -6,9 +6,8 @@
 use core::f64::consts::PI;
 
 use crate::kernels::Kernels;
+use crate::pressure::RATE_HZ;
 
-/// Sampling rate of P_AC (Methods, "Biomimetic tactile sensor").
-pub const SAMPLE_RATE_HZ: f64 = 2200.0;
 /// Number of coefficients of the 66th-order filter.
 pub const TAPS: usize = 67;
 /// Edges of the pass band in Hz, the range of the Pacinian corpuscles that the paper imitates.
@@ -26,8 +25,8 @@ impl Taps {
     /// Designs the band-pass: the ideal response, cut by a Hamming window and scaled to gain 1 in the middle of the band.
     pub fn band_pass() -> Self {
         let (low, high) = (
-            PASS_BAND_HZ.0 / SAMPLE_RATE_HZ,
-            PASS_BAND_HZ.1 / SAMPLE_RATE_HZ,
+            PASS_BAND_HZ.0 / f64::from(RATE_HZ),
+            PASS_BAND_HZ.1 / f64::from(RATE_HZ),
         );
         let middle = low + high;
         // both of one tap at `m` samples from the centre; frequencies in cycles per sample
@@ -147,7 +146,7 @@ mod tests {
 
     /// |H(f)|, from the definition of a filter's response.
     fn gain(f_hz: f64) -> f64 {
-        let w = 2.0 * PI * f_hz / SAMPLE_RATE_HZ;
+        let w = 2.0 * PI * f_hz / f64::from(RATE_HZ);
         let (re, im) = Taps::band_pass().as_slice().iter().enumerate().fold(
             (0.0, 0.0),
             |(re, im), (n, &h)| {
@@ -185,7 +184,8 @@ mod tests {
     fn power_of_a_sine_in_the_band_is_half_its_square() {
         let sine: Vec<i16> = (0..4400)
             .map(|n| {
-                (3000.0 * (2.0 * PI * 300.0 / SAMPLE_RATE_HZ * f64::from(n)).sin()).round() as i16
+                (3000.0 * (2.0 * PI * 300.0 / f64::from(RATE_HZ) * f64::from(n)).sin()).round()
+                    as i16
             })
             .collect();
         let taps = Taps::band_pass();

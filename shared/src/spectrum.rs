@@ -7,8 +7,8 @@
 
 use core::ops::Range;
 
-use crate::fir::SAMPLE_RATE_HZ;
 use crate::kernels::Kernels;
+use crate::pressure::RATE_HZ;
 
 /// Samples in a frame.
 pub const FRAME: usize = 512;
@@ -17,7 +17,7 @@ pub const HOP: usize = 256;
 /// Bins of the single-sided spectrum, both ends included.
 pub const BINS: usize = FRAME / 2 + 1;
 /// Width of a bin in Hz.
-pub const BIN_HZ: f32 = SAMPLE_RATE_HZ as f32 / FRAME as f32;
+pub const BIN_HZ: f32 = RATE_HZ as f32 / FRAME as f32;
 
 /// Sum of the squares of the Hann window: 3/8 of its length.
 const WINDOW_POWER: f32 = FRAME as f32 * 3.0 / 8.0;
@@ -196,7 +196,8 @@ mod tests {
             .map(|n| {
                 (offset
                     + amplitude
-                        * (2.0 * core::f64::consts::PI * f_hz / SAMPLE_RATE_HZ * n as f64).sin())
+                        * (2.0 * core::f64::consts::PI * f_hz / f64::from(RATE_HZ) * n as f64)
+                            .sin())
                 .round() as i16
             })
             .collect()

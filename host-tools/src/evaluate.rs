@@ -1,0 +1,267 @@
+//! Thousands of virtual explorations, and what they add up to.
+
+use std::collections::HashMap;
+
+use rand::Rng as _;
+use rayon::prelude::*;
+use serde::Serialize;
+use tactus_core::explorer::{Config, Explorer, ExplorerError, Strategy};
+use tactus_core::features::PropertySet;
+use tactus_core::table::{EncodeError, Table, TableError};
+
+use crate::experiment::{Experiment, Run};
+
+/// Most textures that a PC explores among.
+pub const MAX_TEXTURES: usize = 2048;
+
+/// How a run decides and moves on.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// The paper's: one property per slide, the movement chosen by Bayesian exploration.
+    Paper,
+    /// The paper's likelihoods, the best movement of each property in turn.
+    Cycle,
+    /// The paper's likelihoods, any movement and property at random.
+    Random,
+}
+
+impl Method {
+    /// The strategy of the core's explorer.
+    pub fn strategy(self) -> Strategy {
+        match self {
+            Self::Paper => Strategy::Bayesian,
+            Self::Cycle => Strategy::Cycling,
+            Self::Random => Strategy::Random,
+        }
+    }
+}
+
+/// How one run ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Outcome {
+    /// The texture that was to be identified.
+    pub unknown: usize,
+    /// The answer.
+    pub identified: usize,
+    /// Whether the threshold was exceeded.
+    pub sure: bool,
+    /// Slides made.
+    pub slides: u8,
+}
+
+/// Why an evaluation came to nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum EvaluateError {
+    /// The table cannot be written.
+    #[error("the table cannot be written: {0}")]
+    Encode(#[from] EncodeError),
+    /// The table cannot be read back.
+    #[error("the table does not read back: {0}")]
+    Table(#[from] TableError),
+    /// The table cannot be explored.
+    #[error("the table cannot be explored: {0}")]
+    Explorer(#[from] ExplorerError),
+}
+
+/// Plays one run to its end.
+pub fn play<const N: usize>(
+    explorer: &mut Explorer<'_, N>,
+    strategy: Strategy,
+    mut run: Run<'_>,
+) -> Outcome {
+    explorer.restart();
+    let verdict = loop {
+        if let Some(verdict) = explorer.verdict() {
+            break verdict;
+        }
+        // only Bayesian exploration looks ahead
+        let outlook = if strategy == Strategy::Bayesian {
+            explorer.outlook()
+        } else {
+            Default::default()
+        };
+        let action = explorer.choose(&outlook, run.random.next_u32());
+        let slide = run.slide(action.movement.into());
+        explorer
+            .observe(action, &slide)
+            .expect("every slide has the properties that the explorer was told of");
+    };
+    Outcome {
+        unknown: run.unknown,
+        identified: verdict.texture.into(),
+        sure: verdict.sure,
+        slides: explorer.slides(),
+    }
+}
+
+/// Plays `runs` runs on all cores; `done` is called after each. The outcomes are in the order of the runs, and the same
+/// whatever the number of threads.
+///
+/// # Errors
+/// See [`EvaluateError`].
+pub fn evaluate(
+    experiment: &Experiment,
+    config: Config,
+    runs: u64,
+    done: impl Fn() + Sync,
+) -> Result<Vec<Outcome>, EvaluateError> {
+    let measured: PropertySet = experiment.measured();
+    // where every run learns from the same slides, one table serves all
+    let bytes = if experiment.is_fixed() {
+        Some(experiment.run(0).learn()?)
+    } else {
+        None
+    };
+    let shared = match &bytes {
+        Some(bytes) => Some(Explorer::<MAX_TEXTURES>::new(
+            Table::read(bytes)?,
+            measured,
+            config,
+        )?),
+        None => None,
+    };
+    (0..runs)
+        .into_par_iter()
+        .map_init(
+            || shared.clone(),
+            |shared, index| {
+                let run = experiment.run(index);
+                let outcome = match shared {
+                    Some(explorer) => play(explorer, config.strategy, run),
+                    None => {
+                        let bytes = run.learn()?;
+                        let mut explorer =
+                            Explorer::<MAX_TEXTURES>::new(Table::read(&bytes)?, measured, config)?;
+                        play(&mut explorer, config.strategy, run)
+                    }
+                };
+                done();
+                Ok(outcome)
+            },
+        )
+        .collect()
+}
+
+/// Two textures, and how often the first was taken for the second.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Confused {
+    /// The unknown texture.
+    pub texture: String,
+    /// The answer.
+    pub identified: String,
+    /// Share of all runs, 0 to 1.
+    pub share: f64,
+}
+
+/// The figures of an evaluation.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Summary {
+    /// Right answers over runs.
+    pub accuracy: f64,
+    /// Share of the runs that stopped by the threshold.
+    pub converged: f64,
+    /// Wrong answers among those.
+    pub wrong_when_sure: f64,
+    /// Median number of slides; a run that did not converge counts one more than the limit.
+    pub median_slides: f64,
+    /// Mean number of slides.
+    pub mean_slides: f64,
+    /// The most confused pairs, most often first, ten at most.
+    pub confused: Vec<Confused>,
+}
+
+impl Summary {
+    /// Sums up outcomes, of which there is at least one.
+    pub fn new(outcomes: &[Outcome], names: &[String], max_slides: u8) -> Self {
+        let share = |part: usize, of: usize| {
+            if of == 0 {
+                0.0
+            } else {
+                part as f64 / of as f64
+            }
+        };
+        let right = outcomes
+            .iter()
+            .filter(|o| o.identified == o.unknown)
+            .count();
+        let sure = outcomes.iter().filter(|o| o.sure).count();
+        let wrong = outcomes
+            .iter()
+            .filter(|o| o.sure && o.identified != o.unknown)
+            .count();
+        let mut slides: Vec<f64> = outcomes
+            .iter()
+            .map(|o| {
+                f64::from(if o.sure {
+                    o.slides
+                } else {
+                    max_slides.saturating_add(1)
+                })
+            })
+            .collect();
+        slides.sort_by(f64::total_cmp);
+        let middle = |at: usize| slides.get(at).copied().unwrap_or(0.0);
+        let made: f64 = outcomes.iter().map(|o| f64::from(o.slides)).sum();
+        let mut pairs: HashMap<(usize, usize), usize> = HashMap::new();
+        for o in outcomes.iter().filter(|o| o.identified != o.unknown) {
+            *pairs.entry((o.unknown, o.identified)).or_default() += 1;
+        }
+        let mut pairs: Vec<_> = pairs.into_iter().collect();
+        pairs.sort_by_key(|&(pair, count)| (std::cmp::Reverse(count), pair));
+        Self {
+            accuracy: share(right, outcomes.len()),
+            converged: share(sure, outcomes.len()),
+            wrong_when_sure: share(wrong, sure),
+            median_slides: (middle(outcomes.len().saturating_sub(1) / 2)
+                + middle(outcomes.len() / 2))
+                / 2.0,
+            mean_slides: made / outcomes.len().max(1) as f64,
+            confused: pairs
+                .into_iter()
+                .take(10)
+                .map(|((unknown, identified), count)| Confused {
+                    texture: names[unknown].clone(),
+                    identified: names[identified].clone(),
+                    share: share(count, outcomes.len()),
+                })
+                .collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn summary_counts_as_the_protocols_say() {
+        let outcome = |unknown, identified, sure, slides| Outcome {
+            unknown,
+            identified,
+            sure,
+            slides,
+        };
+        let names = ["a".to_owned(), "b".to_owned(), "c".to_owned()];
+        let outcomes = [
+            outcome(0, 0, true, 3),
+            outcome(1, 1, true, 5),
+            outcome(0, 1, true, 4),
+            outcome(2, 2, false, 10),
+            outcome(1, 0, false, 10),
+            outcome(0, 1, false, 10),
+        ];
+        let s = Summary::new(&outcomes, &names, 10);
+        assert_eq!((s.accuracy, s.converged), (0.5, 0.5));
+        assert_eq!(s.wrong_when_sure, 1.0 / 3.0, "of the sure ones only");
+        assert_eq!(s.median_slides, 8.0, "3 4 5 11 11 11");
+        assert_eq!(s.mean_slides, 7.0);
+        let pairs: Vec<_> = s
+            .confused
+            .iter()
+            .map(|c| (c.texture.as_str(), c.identified.as_str(), c.share))
+            .collect();
+        assert_eq!(pairs, [("a", "b", 2.0 / 6.0), ("b", "a", 1.0 / 6.0)]);
+        assert_eq!(Summary::new(&outcomes[..3], &names, 10).median_slides, 4.0);
+    }
+}

@@ -1,0 +1,224 @@
+//! Explorations and tables for people to look at.
+
+use std::io::{self, Write};
+
+use tactus_core::explorer::{Outlook, Verdict};
+use tactus_core::features::Property;
+use tactus_core::rig::Event;
+use tactus_core::table::{Action, Table};
+
+const BAR: usize = 24;
+/// Most candidates listed after a slide.
+const LISTED: usize = 5;
+/// Candidates less probable than this are not listed.
+const WORTH_LISTING: f32 = 0.001;
+
+/// Shows an exploration slide by slide.
+#[derive(Debug)]
+pub struct Show<'t, W> {
+    table: Table<'t>,
+    out: W,
+    slides: u32,
+    /// The first failure to write, kept until the end.
+    failed: io::Result<()>,
+}
+
+impl<'t, W: Write> Show<'t, W> {
+    /// Shows what an explorer does with `table`.
+    pub fn new(table: Table<'t>, out: W) -> Self {
+        Self {
+            table,
+            out,
+            slides: 0,
+            failed: Ok(()),
+        }
+    }
+
+    /// Shows one event.
+    pub fn event(&mut self, event: Event<'_>) {
+        if self.failed.is_ok() {
+            self.failed = self.try_event(event);
+        }
+    }
+
+    fn try_event(&mut self, event: Event<'_>) -> io::Result<()> {
+        match event {
+            Event::Chosen(action, outlook) => {
+                self.slides += 1;
+                writeln!(self.out, "\nSlide {}: {}", self.slides, self.name(action))?;
+                if let Some(chosen) = outlook.iter().find(|o| o.action == action) {
+                    writeln!(self.out, "  because {}", self.reason(chosen, outlook))?;
+                }
+            }
+            Event::Felt(action, measurement, posterior) => {
+                let bound =
+                    measurement.roughness_is_bound && action.property == Property::Roughness;
+                if let Some(value) = measurement.properties.get(action.property) {
+                    let unit = if action.property == Property::Traction {
+                        " N"
+                    } else {
+                        ""
+                    };
+                    let at_most = if bound { "at most " } else { "" };
+                    writeln!(
+                        self.out,
+                        "  felt    {} {at_most}{value:.3}{unit}",
+                        action.property
+                    )?;
+                }
+                self.candidates(posterior)?;
+            }
+            Event::Rejected(_, why) => writeln!(self.out, "  rejected, and repeated: {why}")?,
+        }
+        self.out.flush()
+    }
+
+    /// "fineness at 0.80 N, 25.0 mm/s"
+    fn name(&self, action: Action) -> String {
+        match self.table.movement(action.movement) {
+            Some(movement) => format!("{} at {movement}", action.property),
+            None => action.property.to_string(),
+        }
+    }
+
+    fn reason(&self, chosen: &Outlook, outlook: &[Outlook]) -> String {
+        let left = |o: &Outlook| format!("{:.1} %", o.uncertainty * 100.0);
+        let mut others: Vec<&Outlook> = outlook
+            .iter()
+            .filter(|o| o.action != chosen.action)
+            .collect();
+        others.sort_by(|a, b| b.benefit.total_cmp(&a.benefit));
+        let single = self.table.movements().len() == 1;
+        let name = |o: &Outlook| {
+            if single {
+                o.action.property.to_string()
+            } else {
+                self.name(o.action)
+            }
+        };
+        let rest: Vec<String> = others
+            .iter()
+            .take(2)
+            .map(|o| {
+                // an action that would leave less was made before, and is worth less for that
+                let worn = if o.uncertainty < chosen.uncertainty {
+                    ", but it was made before"
+                } else {
+                    ""
+                };
+                format!("{} {}{worn}", name(o), left(o))
+            })
+            .collect();
+        let rest = if rest.is_empty() {
+            String::new()
+        } else {
+            format!(" ({})", rest.join("; "))
+        };
+        format!(
+            "{} should leave {} uncertainty{rest}",
+            chosen.action.property,
+            left(chosen)
+        )
+    }
+
+    fn candidates(&mut self, posterior: &[f32]) -> io::Result<()> {
+        let mut ranked: Vec<(f32, &str)> =
+            posterior.iter().copied().zip(self.table.names()).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let listed = ranked
+            .iter()
+            .take(LISTED)
+            .filter(|(p, _)| *p >= WORTH_LISTING)
+            .count();
+        let (listed, others) = ranked.split_at(listed);
+        for (probability, name) in listed {
+            let full = (probability * BAR as f32).round() as usize;
+            let bar = format!(
+                "{}{}",
+                "█".repeat(full.min(BAR)),
+                "░".repeat(BAR.saturating_sub(full))
+            );
+            writeln!(self.out, "  {bar} {:5.1} %  {name}", probability * 100.0)?;
+        }
+        let rest: f32 = others.iter().map(|(p, _)| p).sum();
+        if rest >= WORTH_LISTING {
+            writeln!(
+                self.out,
+                "  {:BAR$} {:5.1} %  {} others",
+                "",
+                rest * 100.0,
+                others.len()
+            )?;
+        }
+        Ok(())
+    }
+
+    /// Shows the answer, and whether it is right.
+    ///
+    /// # Errors
+    /// The first failure to write.
+    pub fn finish(mut self, verdict: Verdict, slides: u8, truth: &str) -> io::Result<()> {
+        self.failed?;
+        let name = self.table.name(verdict.texture).unwrap_or("?");
+        let p = verdict.probability * 100.0;
+        let slides = format!("{slides} slide{}", if slides == 1 { "" } else { "s" });
+        if verdict.sure {
+            writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}.")?;
+        } else {
+            writeln!(
+                self.out,
+                "\nNot sure after {slides}; most likely {name}, {p:.1} %."
+            )?;
+        }
+        if name == truth {
+            writeln!(self.out, "Right.")
+        } else {
+            writeln!(self.out, "Wrong: it was {truth}.")
+        }
+    }
+}
+
+/// Prints what a table holds.
+///
+/// # Errors
+/// A failure to write.
+pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
+    writeln!(
+        out,
+        "{} textures, {} movements, {} bytes, checksum {:08x}",
+        table.textures(),
+        table.movements().len(),
+        table.as_bytes().len(),
+        table.crc()
+    )?;
+    for (movement, index) in table.movements().zip(0..) {
+        writeln!(out, "\nmovement {}: {movement}", index + 1)?;
+        write!(out, "{:>4} {:<24} {:>6}", "no.", "texture", "trials")?;
+        for property in table.measured().iter() {
+            write!(out, "  {property:>10} {:>8}", "sd")?;
+        }
+        writeln!(out)?;
+        for (name, texture) in table.names().zip(0..) {
+            write!(
+                out,
+                "{:>4} {name:<24} {:>6}",
+                texture + 1,
+                table.trials(texture, index)
+            )?;
+            for property in table.measured().iter() {
+                match table.gaussian(
+                    texture,
+                    Action {
+                        movement: index,
+                        property,
+                    },
+                ) {
+                    Some(g) => write!(out, "  {:>10.4} {:>8.4}", g.mean, g.sd)?,
+                    None => write!(out, "  {:>10} {:>8}", "-", "-")?,
+                }
+            }
+            writeln!(out)?;
+        }
+    }
+    Ok(())
+}

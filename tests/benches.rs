@@ -1,0 +1,161 @@
+//! How long the core's main steps take on this machine: `cargo bench`. Nothing here is gated; gates are on instructions.
+
+use divan::Bencher;
+use tactus::evaluate::{Method, evaluate};
+use tactus::experiment::{Experiment, Protocol, encode};
+use tactus::replay::Felt;
+use tactus_core::explorer::{Config, Explorer};
+use tactus_core::features::{Measurement, Plan, Properties, Property, PropertySet, Slide};
+use tactus_core::kernels::Plain;
+use tactus_core::movement::Movement;
+use tactus_core::table::{Action, Experience, Table};
+
+fn main() {
+    divan::main();
+}
+
+/// Noise between -1 and 1, always the same.
+fn noise(seed: u32) -> impl FnMut() -> f32 {
+    let mut x = seed;
+    move || {
+        x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        x as f32 / u32::MAX as f32 * 2.0 - 1.0
+    }
+}
+
+fn samples(count: usize) -> Vec<i16> {
+    let mut noise = noise(1);
+    (0..count)
+        .map(|n| (300.0 * (n as f32 * 0.3).sin() + 40.0 * noise()) as i16)
+        .collect()
+}
+
+/// A 5 s slide, all features, in blocks of 100 ms.
+#[divan::bench]
+fn features_of_a_slide(bencher: Bencher<'_, '_>) {
+    let (plan, samples) = (Plan::new(), samples(11_000));
+    bencher.bench(|| {
+        let mut slide = Slide::<Plain>::new(&plan);
+        slide.set_background(2.0);
+        slide.start(0..11_000);
+        for block in samples.chunks(220) {
+            slide.push(block);
+        }
+        slide.finish()
+    });
+}
+
+/// 117 textures, three movements, three properties, neighbours hard to tell apart.
+fn table() -> Vec<u8> {
+    let mut noise = noise(2);
+    let names: Vec<String> = (0..117).map(|t| format!("texture {t}")).collect();
+    let movements = [
+        Movement::FOR_TRACTION,
+        Movement::FOR_FINENESS,
+        Movement::FOR_ROUGHNESS,
+    ];
+    let experience: Vec<Vec<Experience>> = names
+        .iter()
+        .map(|_| {
+            movements
+                .map(|_| {
+                    let centre = [1.0 + 0.8 * noise(), 8.0 + 3.0 * noise(), 4.0 + noise()];
+                    let mut experience = Experience::default();
+                    for _ in 0..5 {
+                        let trial = Properties::new(centre.map(|c| Some(c + 0.1 * noise())));
+                        experience.learn(PropertySet::ALL, &trial).unwrap();
+                    }
+                    experience
+                })
+                .to_vec()
+        })
+        .collect();
+    encode(PropertySet::ALL, &movements, &names, &experience).unwrap()
+}
+
+const SLIDE: Properties = Properties::new([Some(1.0), Some(8.0), Some(4.0)]);
+const ACTION: Action = Action {
+    movement: 2,
+    property: Property::Roughness,
+};
+
+/// One posterior update, 117 textures.
+#[divan::bench]
+fn posterior_update(bencher: Bencher<'_, '_>) {
+    let bytes = table();
+    let mut explorer = Explorer::<128>::new(
+        Table::read(&bytes).unwrap(),
+        PropertySet::ALL,
+        Config::default(),
+    )
+    .unwrap();
+    bencher.bench_local(|| {
+        explorer.restart();
+        explorer.observe(ACTION, &SLIDE)
+    });
+}
+
+/// One choice among 9 actions after the first slide, as many textures live as it has left.
+#[divan::bench]
+fn choice_of_the_next_movement(bencher: Bencher<'_, '_>) {
+    let bytes = table();
+    let mut explorer = Explorer::<128>::new(
+        Table::read(&bytes).unwrap(),
+        PropertySet::ALL,
+        Config::default(),
+    )
+    .unwrap();
+    explorer.observe(ACTION, &SLIDE).unwrap();
+    bencher.bench_local(|| {
+        let outlook = explorer.outlook();
+        explorer.choose(&outlook, 0)
+    });
+}
+
+/// Building an explorer, which computes the first choice among 9 actions and 117 equally probable textures.
+#[divan::bench]
+fn first_choice(bencher: Bencher<'_, '_>) {
+    let bytes = table();
+    let table = Table::read(&bytes).unwrap();
+    bencher.bench(|| {
+        Explorer::<128>::new(table, PropertySet::ALL, Config::default()).map(|e| e.slides())
+    });
+}
+
+/// 8000 runs of `tactus evaluate`: 20 textures of 34 slides, one movement, as in data/biotac.
+#[divan::bench(sample_count = 10)]
+fn evaluate_8000_runs(bencher: Bencher<'_, '_>) {
+    let mut noise = noise(3);
+    let plan = Plan::new();
+    let samples = samples(600);
+    let measurement: Measurement = {
+        let mut slide = Slide::<Plain>::new(&plan);
+        slide.set_background(2.0);
+        slide.start(0..600);
+        slide.push(&samples);
+        slide.finish().unwrap()
+    };
+    let names: Vec<String> = (0..20).map(|t| format!("texture {t}")).collect();
+    let felt: Vec<Vec<Felt>> = names
+        .iter()
+        .map(|_| {
+            let centre = [2.5 + noise(), 9.0 + 1.5 * noise(), 2.5 + 0.5 * noise()];
+            (1..=34)
+                .map(|number| Felt {
+                    number,
+                    movement: Movement::FOR_FINENESS,
+                    measurement: Measurement {
+                        properties: Properties::new(centre.map(|c| Some(c + 0.2 * noise()))),
+                        ..measurement.clone()
+                    },
+                })
+                .collect()
+        })
+        .collect();
+    let experiment = Experiment::recorded(names, &felt, None, Protocol::Interleaved, 5, 1).unwrap();
+    let config = Config {
+        strategy: Method::Paper.strategy(),
+        ..Config::default()
+    };
+    bencher.bench(|| evaluate(&experiment, config, 8000, || ()).unwrap().len());
+}

@@ -1,0 +1,132 @@
+//! `evaluate` beside the reference program of the protocols (numpy, seed 1).
+
+use std::path::Path;
+
+use tactus::evaluate::{Method, Summary, evaluate};
+use tactus::experiment::{Experiment, Protocol};
+use tactus::properties::PropertyTable;
+use tactus::recordings::RecordingSet;
+use tactus::replay::feel;
+use tactus_core::explorer::Config;
+use tactus_tests::data;
+
+const RUNS: u64 = 8000;
+
+fn summary(experiment: &Experiment, method: Method, runs: u64) -> Summary {
+    let config = Config {
+        strategy: method.strategy(),
+        ..Config::default()
+    };
+    let outcomes = evaluate(experiment, config, runs, || ()).unwrap();
+    Summary::new(&outcomes, experiment.names(), config.max_slides)
+}
+
+fn recorded(folder: &Path, protocol: Protocol, train_slides: usize) -> Experiment {
+    let set = RecordingSet::open(folder).unwrap();
+    let names = set.textures().iter().map(|t| t.name.clone()).collect();
+    Experiment::recorded(
+        names,
+        &feel(&set, |_| ()).unwrap(),
+        None,
+        protocol,
+        train_slides,
+        1,
+    )
+    .unwrap()
+}
+
+#[test]
+fn recorded_slides_give_the_reference_figures() {
+    let Some(folder) = data("biotac") else { return };
+    // accuracy and median of paper, cycle and random
+    for (protocol, train_slides, reference) in [
+        (
+            Protocol::Interleaved,
+            5,
+            [(0.894, 3.0), (0.886, 3.0), (0.870, 5.0)],
+        ),
+        (
+            Protocol::Blocked,
+            5,
+            [(0.762, 3.0), (0.756, 3.0), (0.736, 5.0)],
+        ),
+        (
+            Protocol::Blocked,
+            15,
+            [(0.826, 4.0), (0.815, 4.0), (0.786, 5.0)],
+        ),
+        (
+            Protocol::Drift,
+            5,
+            [(0.622, 3.0), (0.622, 3.0), (0.604, 4.0)],
+        ),
+    ] {
+        let experiment = recorded(&folder, protocol, train_slides);
+        for (method, (accuracy, median)) in [Method::Paper, Method::Cycle, Method::Random]
+            .into_iter()
+            .zip(reference)
+        {
+            let s = summary(&experiment, method, RUNS);
+            let what = format!("{protocol:?}, {train_slides} training slides, {method:?}");
+            println!(
+                "{what}: {:.3} (reference {accuracy}), median {}",
+                s.accuracy, s.median_slides
+            );
+            assert!(
+                (s.accuracy - accuracy).abs() <= 0.02,
+                "{what}: accuracy {} for {accuracy}",
+                s.accuracy
+            );
+            assert_eq!(s.median_slides, median, "{what}");
+        }
+    }
+}
+
+#[test]
+fn property_worlds_give_the_reference_figures() {
+    let Some(folder) = data("worlds") else { return };
+    for (world, paper, random) in [
+        (1, (0.900, 5.0), (0.830, 7.0)),
+        (2, (0.873, 5.0), (0.802, 7.0)),
+        (3, (0.960, 5.0), (0.897, 7.0)),
+    ] {
+        let set = PropertyTable::read(&folder.join(format!("world_{world}.csv"))).unwrap();
+        let experiment = Experiment::given(&set, 1).unwrap();
+        assert_eq!(
+            (
+                experiment.names().len(),
+                experiment.movements().len(),
+                experiment.train_slides()
+            ),
+            (117, 3, 5)
+        );
+        for (method, (accuracy, median)) in [(Method::Paper, paper), (Method::Random, random)] {
+            let s = summary(&experiment, method, 4000);
+            println!(
+                "world {world}, {method:?}: {:.3} (reference {accuracy}), median {}",
+                s.accuracy, s.median_slides
+            );
+            assert!(
+                (s.accuracy - accuracy).abs() <= 0.03,
+                "world {world}, {method:?}: {} for {accuracy}",
+                s.accuracy
+            );
+            assert_eq!(s.median_slides, median, "world {world}, {method:?}");
+        }
+    }
+}
+
+#[test]
+fn figures_do_not_depend_on_the_number_of_threads() {
+    let Some(folder) = data("biotac") else { return };
+    let experiment = recorded(&folder, Protocol::Interleaved, 5);
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| evaluate(&experiment, Config::default(), 400, || ()).unwrap())
+    };
+    let one = on(1);
+    assert!(one == on(3) && one.iter().any(|o| o.sure));
+}
