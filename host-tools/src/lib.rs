@@ -1,3 +1,5 @@
 //! Tactus on a PC.
+pub mod import;
+pub mod properties;
 pub mod recordings;
 pub mod rows;
