@@ -1,5 +1,10 @@
 //! The readers against the real recordings of `data/biotac`.
-use tactus::recordings::{Background, RecordingSet};
+use std::fmt::Write as _;
+use std::path::Path;
+
+use tactus::import::import;
+use tactus::properties::PropertySet;
+use tactus::recordings::{Background, RecordingSet, Slide};
 use tactus_tests::data;
 
 #[test]
@@ -50,5 +55,110 @@ fn shear_force_gives_the_golden_traction() {
             let sum: f64 = window.iter().map(|mn| f64::from(*mn)).sum();
             assert!((sum / window.len() as f64 / 1000.0 - row[2]).abs() < 1e-6);
         }
+    }
+}
+
+#[test]
+fn import_of_the_real_recordings_keeps_every_sample() {
+    let Some(folder) = data("biotac") else { return };
+    let to = tempfile::tempdir().unwrap();
+    let mut calls = 0;
+    let done = import(&folder, to.path(), &mut |_, _| calls += 1).unwrap();
+    assert_eq!(
+        (done.textures, done.slides, done.lost_rows, calls),
+        (20, 680, 0, 680)
+    );
+    let (from, to) = (
+        RecordingSet::open(&folder).unwrap(),
+        RecordingSet::open(to.path()).unwrap(),
+    );
+    assert_eq!(from.textures(), to.textures());
+    for texture in 0..20 {
+        assert_eq!(
+            from.load_texture(texture).unwrap(),
+            to.load_texture(texture).unwrap()
+        );
+    }
+}
+
+/// The publisher's files, made again from `data/biotac`: the import must give back all magnitudes and forces, and signs
+/// that agree with those of the data.
+#[test]
+fn import_of_rectified_recordings_rebuilds_their_signs() {
+    let Some(folder) = data("biotac") else { return };
+    let set = RecordingSet::open(&folder).unwrap();
+    let (from, to) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let textures = [0, 6, 19];
+    let mut slides = Vec::new();
+    for texture in textures {
+        let slide = set.load_texture(texture).unwrap().swap_remove(7);
+        publish(from.path(), set.textures()[texture].id, &slide);
+        slides.push(slide);
+    }
+    import(from.path(), to.path(), &mut |_, _| ()).unwrap();
+    let imported = RecordingSet::open(to.path()).unwrap();
+    for (texture, slide) in slides.iter().enumerate() {
+        let rebuilt = imported.load_texture(texture).unwrap().remove(0);
+        assert_eq!(
+            (rebuilt.number, rebuilt.movement, rebuilt.window),
+            (slide.number, slide.movement, slide.window)
+        );
+        assert_eq!(
+            (&rebuilt.pdc, &rebuilt.shear_mn),
+            (&slide.pdc, &slide.shear_mn)
+        );
+        assert_eq!(rebuilt.background, slide.background);
+        let magnitudes = |pac: &[i16]| pac.iter().map(|x| x.unsigned_abs()).collect::<Vec<_>>();
+        assert_eq!(magnitudes(&rebuilt.pac), magnitudes(&slide.pac));
+        let agreement = agreement(&rebuilt.pac, &slide.pac);
+        // all one sign would give 0.978
+        assert!(agreement > 0.987, "slide over {texture}: {agreement}");
+    }
+}
+
+/// Of the neighbouring samples that are not 0, how many change their sign in both or in neither.
+fn agreement(a: &[i16], b: &[i16]) -> f64 {
+    let signs: Vec<bool> = a
+        .iter()
+        .zip(b)
+        .filter(|(x, _)| **x != 0)
+        .map(|(x, y)| (*x < 0) == (*y < 0))
+        .collect();
+    let same = signs.windows(2).filter(|w| w[0] == w[1]).count();
+    same as f64 / (signs.len() - 1) as f64
+}
+
+/// Writes a slide as the publisher of the BioTac recordings did.
+fn publish(folder: &Path, material: u32, slide: &Slide) {
+    let folder = folder.join(format!("raw_data/mat{material}"));
+    std::fs::create_dir_all(&folder).unwrap();
+    let pac: String = (1..=22).map(|n| format!(",pac{n}")).collect();
+    let mut bio = format!("timestamp,pdc{pac}\n");
+    let mut cw = String::from("timestamp,fx,fy,fz\n");
+    let shear = slide.shear_mn.as_ref().unwrap();
+    for (row, samples) in slide.pac.chunks(22).enumerate() {
+        let time = 1_581_073_084.0 + row as f64 / 100.0;
+        let samples: String = samples.iter().map(|x| format!(",{}", x.abs())).collect();
+        writeln!(bio, "{time:.9},{}{samples},", slide.pdc[row]).unwrap();
+        writeln!(cw, "{time:.9},0,0,{}", f64::from(shear[row]) / 1000.0).unwrap();
+    }
+    let name = |kind| folder.join(format!("mat{material}_{}_{kind}.csv", slide.number));
+    std::fs::write(name("bio"), bio).unwrap();
+    std::fs::write(name("cw"), cw).unwrap();
+}
+
+#[test]
+fn the_property_worlds_are_read() {
+    let Some(folder) = data("worlds") else { return };
+    for world in 1..=3 {
+        let set = PropertySet::read(&folder.join(format!("world_{world}.csv"))).unwrap();
+        assert_eq!((set.textures.len(), set.movements.len()), (117, 3));
+        assert!(set.train.iter().flatten().all(|trials| trials.len() == 5));
+        let tested = set
+            .validate
+            .iter()
+            .filter(|t| t.iter().all(|trials| trials.len() == 5));
+        assert_eq!(tested.count(), 16);
+        assert_eq!(set.validate.iter().flatten().flatten().count(), 16 * 3 * 5);
     }
 }

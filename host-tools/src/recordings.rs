@@ -97,6 +97,12 @@ pub enum RecordingError {
          (mat1/mat1_1_bio.csv, ...) must pass through `tactus import` first", .0.display()
     )]
     NoManifest(PathBuf),
+    /// The folder has nothing that can be imported.
+    #[error(
+        "{}: nothing to import: neither a manifest, nor raw_data/mat1/mat1_1_bio.csv and the like of \
+         https://github.com/dexrob/BioTac_slide_20_50; give the folder that holds raw_data or mat1, mat2, ...", .0.display()
+    )]
+    NothingToImport(PathBuf),
     /// The system could not read or write.
     #[error("{}: {source}", path.display())]
     Io {
@@ -280,7 +286,7 @@ impl Slide {
     }
 
     /// Says what makes this slide unusable, if anything: every reader and writer asks.
-    fn fault(&self) -> Option<String> {
+    pub(crate) fn fault(&self) -> Option<String> {
         let (start, end) = self.window;
         if !(start.is_finite() && end.is_finite() && 0.0 <= start && start < end) {
             return Some(format!(

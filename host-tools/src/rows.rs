@@ -13,7 +13,7 @@ pub const MAX_BYTES: u64 = 64 << 20;
 pub struct RowError {
     /// The table.
     pub path: PathBuf,
-    /// Line in the file; the header is line 1.
+    /// Line in the file; the header is line 1. After empty lines it may be the number of the first of these.
     pub line: u64,
     /// Column, by its name in the header, if the error is about one.
     pub column: Option<&'static str>,
@@ -53,6 +53,8 @@ impl Rows {
         };
         let file = File::open(path).map_err(|e| header_error(e.to_string()))?;
         let mut reader = csv::ReaderBuilder::new()
+            // of "\r\n" the first half is trimmed away: csv's own way of ending a line there counts lines one short
+            .terminator(csv::Terminator::Any(b'\n'))
             .trim(csv::Trim::All)
             .flexible(true)
             .from_reader(BufReader::new(file.take(MAX_BYTES)));
@@ -94,25 +96,31 @@ impl Rows {
     /// If the file cannot be read, or the row has another number of fields than the header. One comma too many at the end
     /// is let pass: the BioTac publisher's rows have it.
     pub fn next_row(&mut self) -> Result<Option<Row<'_>>, RowError> {
-        let line = self.reader.position().line();
         let error = |line, cause| RowError {
             path: self.path.clone(),
             line,
             column: None,
             cause,
         };
-        let more = self.reader.read_record(&mut self.record).map_err(|e| {
-            let line = e.position().map_or(line, csv::Position::line);
-            error(line, cause_of(&e))
-        })?;
-        if self.reader.get_ref().get_ref().limit() == 0 {
-            let cause = format!("the table is longer than {MAX_BYTES} bytes; split it");
-            return Err(error(line, cause));
+        loop {
+            let line = self.reader.position().line();
+            let more = self.reader.read_record(&mut self.record).map_err(|e| {
+                let line = e.position().map_or(line, csv::Position::line);
+                error(line, cause_of(&e))
+            })?;
+            if self.reader.get_ref().get_ref().limit() == 0 {
+                let cause = format!("the table is longer than {MAX_BYTES} bytes; split it");
+                return Err(error(line, cause));
+            }
+            if !more {
+                return Ok(None);
+            }
+            // a line with nothing but a carriage return
+            if self.record.len() > 1 || self.record.iter().any(|f| !f.is_empty()) {
+                break;
+            }
         }
-        if !more {
-            return Ok(None);
-        }
-        let line = self.record.position().map_or(line, csv::Position::line);
+        let line = self.record.position().map_or(0, csv::Position::line);
         let (fields, wanted) = (self.record.len(), self.header_fields);
         if fields < wanted || self.record.iter().skip(wanted).any(|f| !f.is_empty()) {
             let cause = format!(
@@ -191,5 +199,77 @@ fn cause_of(error: &csv::Error) -> String {
         csv::ErrorKind::Io(e) => e.to_string(),
         csv::ErrorKind::Utf8 { .. } => "not UTF-8 text; this is no such table".to_owned(),
         _ => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn errors(text: &[u8]) -> (usize, String) {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        let mut rows = match Rows::open(file.path(), &["a", "b"]) {
+            Ok(rows) => rows,
+            Err(e) => return (0, e.to_string()),
+        };
+        let mut count = 0;
+        loop {
+            let number = match rows.next_row() {
+                Ok(Some(row)) => row.number::<f64>("b"),
+                Ok(None) => return (count, String::new()),
+                Err(e) => return (count, e.to_string()),
+            };
+            match number {
+                Ok(_) => count += 1,
+                Err(e) => return (count, e.to_string()),
+            }
+        }
+    }
+
+    #[test]
+    fn the_line_is_right_whatever_ends_the_lines() {
+        for end in ["\n", "\r\n"] {
+            for (lines, count, place) in [
+                (
+                    &["a,b", "1,2", "1,x"][..],
+                    1,
+                    ":3: column b: \"x\" is not a number",
+                ),
+                (
+                    &["b,c,a", "2,1,1", "2,1"],
+                    1,
+                    ":3: 2 fields where the header has 3",
+                ),
+                (
+                    &["a,b", "1,2", "1,2,", "1,2,3"],
+                    2,
+                    ":4: 3 fields where the header has 2",
+                ),
+                (
+                    &["a,b", "1,2", "1,inf"],
+                    1,
+                    ":3: column b: inf is not a finite number",
+                ),
+                (&["a,b", "1, 2 ", " \"1\",\"2\"", ""], 2, ""),
+                (
+                    &["a,b", "1,2", "1,", "", ""],
+                    1,
+                    ":3: column b: \"\" is not a number",
+                ),
+                (&["a,b", "\"1", "1\",2", "1,x"], 1, ":4: column b"),
+                (&["a,c"], 0, ":1: no column b in the header (a,c)"),
+                (&["a,b,a"], 0, ":1: two columns a"),
+            ] {
+                let (found, message) = errors(lines.join(end).as_bytes());
+                assert!(
+                    message.contains(place) && message.is_empty() == place.is_empty(),
+                    "{place:?} is not in {message:?}"
+                );
+                assert_eq!(found, count, "{lines:?}");
+            }
+        }
+        let (_, message) = errors(b"a,b\n1,2\n\xff,2");
+        assert!(message.contains(":3: not UTF-8"), "{message}");
     }
 }
