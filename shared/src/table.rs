@@ -17,7 +17,7 @@
 //! | 1 | number of movements M |
 //! | 1 | 0 |
 //! | 6 M | per movement: force in mN (2), speed in um/s (4) |
-//! | 12 T M | per texture, movement and property: mean (i16, see [`mean_step`]), standard deviation (u16, [`SD_STEP`]) |
+//! | 12 T M | per texture, movement and property: mean (i16, see [`mean_step`]), standard deviation (u16, [`SD_STEP`]); 0 and 0 for a property not measured |
 //! | T M | per texture and movement: number of trials, 255 for more |
 //! | | per texture: length of its name (1), the name in UTF-8 |
 //! | 4 | CRC-32 (ISO-HDLC) of all before |
@@ -404,9 +404,12 @@ impl<'a> Table<'a> {
         ))
     }
 
-    /// Stored mean and standard deviation.
+    /// Stored mean and standard deviation of a property that was measured.
     fn cell(&self, texture: u16, action: Action) -> Option<(i16, u16)> {
-        if texture >= self.textures || action.movement >= self.movements {
+        if texture >= self.textures
+            || action.movement >= self.movements
+            || !self.measured.contains(action.property)
+        {
             return None;
         }
         let row = usize::from(texture) * usize::from(self.movements) * PROPERTIES;
@@ -493,8 +496,8 @@ impl<'a> Table<'a> {
         self.bytes.get(at).copied().unwrap_or(0)
     }
 
-    /// What a property of a texture is expected to be; `None` where fewer than two trials were made, and outside the
-    /// table.
+    /// What a property of a texture is expected to be; `None` where fewer than two trials were made, for a property that
+    /// was not measured, and outside the table.
     pub fn gaussian(&self, texture: u16, action: Action) -> Option<Gaussian> {
         if self.trials(texture, action.movement) < 2 {
             return None;
@@ -660,6 +663,10 @@ pub fn encode<'o, 'a>(
         }
         for (experience, movement) in texture.experience.iter().zip(0..) {
             for (property, mean) in Property::ALL.into_iter().zip(experience.mean) {
+                if !measured.contains(property) {
+                    writer.put(&[0; CELL_BYTES]);
+                    continue;
+                }
                 let action = Action { movement, property };
                 let range = EncodeError::Range {
                     texture: index,
