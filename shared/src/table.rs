@@ -346,16 +346,16 @@ impl<'a> Table<'a> {
     }
 
     fn check(&self) -> Result<(), TableError> {
-        let mut contents = self.layout().names + CRC_BYTES;
-        let length = |contents| TableError::Length {
+        let mut at = self.layout().names;
+        let length = |end| TableError::Length {
             header: self.bytes.len(),
-            contents,
+            contents: end + CRC_BYTES,
         };
-        if contents > self.bytes.len() {
-            return Err(length(contents));
+        if at + CRC_BYTES > self.bytes.len() {
+            return Err(length(at));
         }
         for index in 0..self.movements {
-            let (force_mn, speed_um_s) = self.stored_movement(index).ok_or(length(contents))?;
+            let (force_mn, speed_um_s) = self.stored_movement(index).ok_or(length(at))?;
             let movement = Movement::new(force_mn, speed_um_s)
                 .map_err(|why| TableError::Movement(index, why))?;
             if self.movements().take(index.into()).any(|m| m == movement) {
@@ -372,10 +372,8 @@ impl<'a> Table<'a> {
                 }
             }
         }
-        let mut at = self.layout().names;
         for texture in 0..self.textures {
-            let (name, next) = self.name_at(at).ok_or(length(contents))?;
-            contents += next - at;
+            let (name, next) = self.name_at(at).map_err(length)?;
             at = next;
             let twin = || {
                 self.names()
@@ -386,8 +384,8 @@ impl<'a> Table<'a> {
                 return Err(TableError::Name(texture));
             }
         }
-        if contents != self.bytes.len() {
-            return Err(length(contents));
+        if at + CRC_BYTES != self.bytes.len() {
+            return Err(length(at));
         }
         Ok(())
     }
@@ -421,10 +419,13 @@ impl<'a> Table<'a> {
     }
 
     /// The bytes of the name at `at`, and where the next one begins; the checksum is no name.
-    fn name_at(&self, at: usize) -> Option<(&'a [u8], usize)> {
-        let (body, _) = self.bytes.split_last_chunk::<CRC_BYTES>()?;
-        let end = at + 1 + usize::from(*body.get(at)?);
-        Some((body.get(at + 1..end)?, end))
+    ///
+    /// # Errors
+    /// Where the name would end, were it there.
+    fn name_at(&self, at: usize) -> Result<(&'a [u8], usize), usize> {
+        let (body, _) = self.bytes.split_last_chunk::<CRC_BYTES>().ok_or(at)?;
+        let end = at + 1 + usize::from(*body.get(at).ok_or(at + 1)?);
+        Ok((body.get(at + 1..end).ok_or(end)?, end))
     }
 
     /// Number of textures.
@@ -467,7 +468,7 @@ impl<'a> Table<'a> {
         let table = *self;
         let mut at = self.layout().names;
         (0..self.textures).map_while(move |_| {
-            let (name, next) = table.name_at(at)?;
+            let (name, next) = table.name_at(at).ok()?;
             at = next;
             core::str::from_utf8(name).ok()
         })
