@@ -88,7 +88,7 @@ impl Experience {
     /// Takes in one more trial. A property that was not measured, or that is not a finite number, leaves the whole
     /// experience as it was.
     ///
-    /// After 255 trials the oldest are slowly forgotten.
+    /// After 255 trials the older ones are slowly forgotten: each new one has the weight of one in 255.
     ///
     /// # Errors
     /// The property of `measured` that the trial lacks.
@@ -96,7 +96,7 @@ impl Experience {
         let mut next = *self;
         next.trials = self.trials.saturating_add(1);
         let n = f32::from(next.trials);
-        // beyond 255 trials the sum of squares stays that of 255
+        // 1 up to 255 trials; beyond them the sum of squares stays that of 255
         let keep = f32::from(next.trials - 1) / f32::from(self.trials.max(1));
         for (property, (mean, squares)) in Property::ALL
             .into_iter()
@@ -109,8 +109,7 @@ impl Experience {
                     .ok_or(property)?;
                 let before = x - *mean;
                 *mean += before / n;
-                *squares =
-                    *squares * if self.trials > 0 { keep } else { 0.0 } + before * (x - *mean);
+                *squares = *squares * keep + before * (x - *mean);
             }
         }
         *self = next;
@@ -513,6 +512,9 @@ impl<'a> Table<'a> {
     /// What was learned of a texture at a movement, to go on from; what is in the table is rounded.
     pub fn experience(&self, texture: u16, movement: u8) -> Experience {
         let trials = self.trials(texture, movement);
+        if trials == 0 {
+            return Experience::default();
+        }
         let mut experience = Experience {
             trials,
             ..Experience::default()
@@ -526,7 +528,7 @@ impl<'a> Table<'a> {
                 .unwrap_or_default();
             let sd = f32::from(sd) * SD_STEP;
             *mean = f32::from(m) * mean_step(property);
-            *squares = sd * sd * f32::from(trials.saturating_sub(1));
+            *squares = sd * sd * f32::from(trials - 1);
         }
         experience
     }
@@ -626,7 +628,7 @@ pub const fn encoded_len(textures: usize, movements: usize, names: usize) -> usi
 /// Means are rounded to [`mean_step`], standard deviations to [`SD_STEP`] and kept between [`SD_LEAST`] and 4.
 ///
 /// # Errors
-/// Nothing usable is in `out` then.
+/// Parts of `out` may have been written then.
 pub fn encode<'o, 'a>(
     out: &'o mut [u8],
     measured: PropertySet,
