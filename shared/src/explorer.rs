@@ -328,12 +328,8 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         }
         let mut total = 0.0;
         for (log, posterior) in self.log.iter_mut().zip(&mut self.posterior) {
-            // candidates stay candidates, however improbable
-            *log = if *log > f32::NEG_INFINITY {
-                (*log - top).max(-1e30)
-            } else {
-                *log
-            };
+            // a slide takes at most 1e12 from a candidate: however improbable, it stays one
+            *log -= top;
             *posterior = libm::expf(*log);
             total += *posterior;
         }
