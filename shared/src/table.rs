@@ -719,3 +719,6 @@ impl Writer<'_> {
         self.room.get(..self.at).unwrap_or_default()
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tests;
