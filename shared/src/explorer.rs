@@ -446,3 +446,6 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
 pub fn benefit(uncertainty: f32, made: u8) -> f32 {
     1.0 - libm::powf(uncertainty.clamp(0.0, 1.0), 1.0 / (f32::from(made) + 1.0))
 }
+
+#[cfg(test)]
+mod tests;
