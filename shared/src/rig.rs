@@ -41,11 +41,12 @@ pub enum Event<'a> {
     Chosen(Action, &'a [Outlook]),
     /// The slide was made and taken in; the posterior of every texture.
     Felt(Action, &'a Measurement, &'a [f32]),
-    /// The slide was made, but has no value of the property; it is repeated.
+    /// The slide was made, but has no value of the property. It does not count: the choice is made again, and is the same
+    /// unless it is random.
     Rejected(Action, Rejection),
 }
 
-/// Why a slide is repeated.
+/// Why a slide does not count.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Rejection {
     /// Its samples give no properties.
