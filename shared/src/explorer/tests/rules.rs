@@ -419,3 +419,60 @@ fn the_errors_say_what_is_missing() {
         "roughness of movement 2 is none of the actions"
     );
 }
+
+/// The study's size, learned from five trials each: the paper's equations in f64 give the same explorations.
+#[test]
+fn single_precision_is_enough_for_117_textures() {
+    let mut x = 1u32;
+    let mut uniform = || {
+        x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (x >> 8) as f32 / 16_777_216.0
+    };
+    // the sum of twelve is close to a standard normal number
+    let mut normal = || (0..12).map(|_| uniform()).sum::<f32>() - 6.0;
+    let world: Vec<Vec<[f32; 3]>> = (0..117)
+        .map(|_| (0..3).map(|_| [normal(), normal(), normal()]).collect())
+        .collect();
+    let mut trial = |texture: usize, movement: usize| {
+        world[texture][movement].map(|mean| mean + 0.15 * normal())
+    };
+    let trials: Vec<Vec<Vec<[f32; 3]>>> = (0..117)
+        .map(|t| {
+            (0..3)
+                .map(|m| (0..5).map(|_| trial(t, m)).collect())
+                .collect()
+        })
+        .collect();
+    let bytes = table_of(PropertySet::ALL, &trials);
+    let table = Table::read(&bytes).unwrap();
+    let mut explorer =
+        Explorer::<'_, 117>::new(table, PropertySet::ALL, Config::default()).unwrap();
+    for truth in (0..117).step_by(6) {
+        explorer.restart();
+        let mut paper = Paper::new(table, &(0..117).collect::<Vec<_>>());
+        // the sum of eq. 4's exponents: the densities themselves underflow even in f64
+        let mut log = vec![0f64; 117];
+        while explorer.verdict().is_none() {
+            let outlook = explorer.outlook();
+            let action = explorer.choose(&outlook, 0);
+            for o in &outlook {
+                let difference = f64::from(o.uncertainty) - paper.uncertainty(o.action);
+                assert!(difference.abs() < 2e-5, "{o:?} {difference}");
+                assert!(paper.benefit(o.action) <= paper.benefit(action) + 1e-6);
+            }
+            let x = trial(truth, action.movement.into())[action.property.index()];
+            explorer.observe(action, &all(x)).unwrap();
+            for (log, known) in log.iter_mut().zip(&paper.known) {
+                let (mean, sd) = known[&action.index()];
+                *log -= sd.ln() + ((f64::from(x) - mean) / sd).powi(2) / 2.0;
+            }
+            let top = log.iter().copied().fold(f64::MIN, f64::max);
+            let sum: f64 = log.iter().map(|l| (l - top).exp()).sum();
+            paper.p = log.iter().map(|l| (l - top).exp() / sum).collect();
+            *paper.made.entry(action.index()).or_default() += 1;
+            for (&p, &expected) in explorer.posterior().iter().zip(&paper.p) {
+                assert!((f64::from(p) - expected).abs() < 1e-5);
+            }
+        }
+    }
+}
