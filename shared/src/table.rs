@@ -17,7 +17,7 @@
 //! | 1 | number of movements M |
 //! | 1 | 0 |
 //! | 6 M | per movement: force in mN (2), speed in um/s (4) |
-//! | 12 T M | per texture, movement and property: mean (i16, see [`mean_step`]), standard deviation (u16, [`SD_STEP`]) |
+//! | 12 T M | per texture, movement and property: mean (i16, see [`mean_step`]), standard deviation (u16, [`SD_STEP`]); 0 and 0 for a property not measured |
 //! | T M | per texture and movement: number of trials, 255 for more |
 //! | | per texture: length of its name (1), the name in UTF-8 |
 //! | 4 | CRC-32 (ISO-HDLC) of all before |
@@ -88,7 +88,7 @@ impl Experience {
     /// Takes in one more trial. A property that was not measured, or that is not a finite number, leaves the whole
     /// experience as it was.
     ///
-    /// After 255 trials the oldest are slowly forgotten.
+    /// After 255 trials the older ones are slowly forgotten: each new one has the weight of one in 255.
     ///
     /// # Errors
     /// The property of `measured` that the trial lacks.
@@ -96,7 +96,7 @@ impl Experience {
         let mut next = *self;
         next.trials = self.trials.saturating_add(1);
         let n = f32::from(next.trials);
-        // beyond 255 trials the sum of squares stays that of 255
+        // 1 up to 255 trials; beyond them the sum of squares stays that of 255
         let keep = f32::from(next.trials - 1) / f32::from(self.trials.max(1));
         for (property, (mean, squares)) in Property::ALL
             .into_iter()
@@ -109,8 +109,7 @@ impl Experience {
                     .ok_or(property)?;
                 let before = x - *mean;
                 *mean += before / n;
-                *squares =
-                    *squares * if self.trials > 0 { keep } else { 0.0 } + before * (x - *mean);
+                *squares = *squares * keep + before * (x - *mean);
             }
         }
         *self = next;
@@ -346,16 +345,16 @@ impl<'a> Table<'a> {
     }
 
     fn check(&self) -> Result<(), TableError> {
-        let mut contents = self.layout().names + CRC_BYTES;
-        let length = |contents| TableError::Length {
+        let mut at = self.layout().names;
+        let length = |end| TableError::Length {
             header: self.bytes.len(),
-            contents,
+            contents: end + CRC_BYTES,
         };
-        if contents > self.bytes.len() {
-            return Err(length(contents));
+        if at + CRC_BYTES > self.bytes.len() {
+            return Err(length(at));
         }
         for index in 0..self.movements {
-            let (force_mn, speed_um_s) = self.stored_movement(index).ok_or(length(contents))?;
+            let (force_mn, speed_um_s) = self.stored_movement(index).ok_or(length(at))?;
             let movement = Movement::new(force_mn, speed_um_s)
                 .map_err(|why| TableError::Movement(index, why))?;
             if self.movements().take(index.into()).any(|m| m == movement) {
@@ -372,10 +371,8 @@ impl<'a> Table<'a> {
                 }
             }
         }
-        let mut at = self.layout().names;
         for texture in 0..self.textures {
-            let (name, next) = self.name_at(at).ok_or(length(contents))?;
-            contents += next - at;
+            let (name, next) = self.name_at(at).map_err(length)?;
             at = next;
             let twin = || {
                 self.names()
@@ -386,8 +383,8 @@ impl<'a> Table<'a> {
                 return Err(TableError::Name(texture));
             }
         }
-        if contents != self.bytes.len() {
-            return Err(length(contents));
+        if at + CRC_BYTES != self.bytes.len() {
+            return Err(length(at));
         }
         Ok(())
     }
@@ -404,9 +401,12 @@ impl<'a> Table<'a> {
         ))
     }
 
-    /// Stored mean and standard deviation.
+    /// Stored mean and standard deviation of a property that was measured.
     fn cell(&self, texture: u16, action: Action) -> Option<(i16, u16)> {
-        if texture >= self.textures || action.movement >= self.movements {
+        if texture >= self.textures
+            || action.movement >= self.movements
+            || !self.measured.contains(action.property)
+        {
             return None;
         }
         let row = usize::from(texture) * usize::from(self.movements) * PROPERTIES;
@@ -418,10 +418,13 @@ impl<'a> Table<'a> {
     }
 
     /// The bytes of the name at `at`, and where the next one begins; the checksum is no name.
-    fn name_at(&self, at: usize) -> Option<(&'a [u8], usize)> {
-        let (body, _) = self.bytes.split_last_chunk::<CRC_BYTES>()?;
-        let end = at + 1 + usize::from(*body.get(at)?);
-        Some((body.get(at + 1..end)?, end))
+    ///
+    /// # Errors
+    /// Where the name would end, were it there.
+    fn name_at(&self, at: usize) -> Result<(&'a [u8], usize), usize> {
+        let (body, _) = self.bytes.split_last_chunk::<CRC_BYTES>().ok_or(at)?;
+        let end = at + 1 + usize::from(*body.get(at).ok_or(at + 1)?);
+        Ok((body.get(at + 1..end).ok_or(end)?, end))
     }
 
     /// Number of textures.
@@ -464,7 +467,7 @@ impl<'a> Table<'a> {
         let table = *self;
         let mut at = self.layout().names;
         (0..self.textures).map_while(move |_| {
-            let (name, next) = table.name_at(at)?;
+            let (name, next) = table.name_at(at).ok()?;
             at = next;
             core::str::from_utf8(name).ok()
         })
@@ -493,8 +496,8 @@ impl<'a> Table<'a> {
         self.bytes.get(at).copied().unwrap_or(0)
     }
 
-    /// What a property of a texture is expected to be; `None` where fewer than two trials were made, and outside the
-    /// table.
+    /// What a property of a texture is expected to be; `None` where fewer than two trials were made, for a property that
+    /// was not measured, and outside the table.
     pub fn gaussian(&self, texture: u16, action: Action) -> Option<Gaussian> {
         if self.trials(texture, action.movement) < 2 {
             return None;
@@ -509,6 +512,9 @@ impl<'a> Table<'a> {
     /// What was learned of a texture at a movement, to go on from; what is in the table is rounded.
     pub fn experience(&self, texture: u16, movement: u8) -> Experience {
         let trials = self.trials(texture, movement);
+        if trials == 0 {
+            return Experience::default();
+        }
         let mut experience = Experience {
             trials,
             ..Experience::default()
@@ -522,7 +528,7 @@ impl<'a> Table<'a> {
                 .unwrap_or_default();
             let sd = f32::from(sd) * SD_STEP;
             *mean = f32::from(m) * mean_step(property);
-            *squares = sd * sd * f32::from(trials.saturating_sub(1));
+            *squares = sd * sd * f32::from(trials - 1);
         }
         experience
     }
@@ -622,7 +628,7 @@ pub const fn encoded_len(textures: usize, movements: usize, names: usize) -> usi
 /// Means are rounded to [`mean_step`], standard deviations to [`SD_STEP`] and kept between [`SD_LEAST`] and 4.
 ///
 /// # Errors
-/// Nothing usable is in `out` then.
+/// Parts of `out` may have been written then.
 pub fn encode<'o, 'a>(
     out: &'o mut [u8],
     measured: PropertySet,
@@ -660,6 +666,10 @@ pub fn encode<'o, 'a>(
         }
         for (experience, movement) in texture.experience.iter().zip(0..) {
             for (property, mean) in Property::ALL.into_iter().zip(experience.mean) {
+                if !measured.contains(property) {
+                    writer.put(&[0; CELL_BYTES]);
+                    continue;
+                }
                 let action = Action { movement, property };
                 let range = EncodeError::Range {
                     texture: index,
@@ -709,3 +719,6 @@ impl Writer<'_> {
         self.room.get(..self.at).unwrap_or_default()
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -1,0 +1,270 @@
+//! Damage of every kind, and the check that names it.
+
+use super::*;
+
+proptest! {
+    #![proptest_config(fixed(256))]
+
+    #[test]
+    fn no_bytes_make_it_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+        prop_assert!(Table::read(&bytes).is_err());
+        // and the beginning of a table, so that something is read of it
+        let mut begun = small();
+        begun.truncate(12);
+        begun.extend(&bytes);
+        read_all(&begun);
+        read_all(&seal(begun));
+    }
+
+    #[test]
+    fn no_damage_makes_it_panic(changes in proptest::collection::vec((8usize..89, any::<u8>()), 1..4), length in 12usize..120) {
+        read_all(&wrong(|bytes| for &(at, byte) in &changes { bytes[at] = byte; }));
+        read_all(&wrong(|bytes| {
+            for &(at, byte) in &changes { bytes[at] = byte; }
+            bytes.resize(length, 0);
+            bytes[8] = (length + CRC_BYTES) as u8;
+        }));
+    }
+}
+
+/// Reads everything that a table offers, if it is one.
+fn read_all(bytes: &[u8]) {
+    let Ok(table) = Table::read(bytes) else {
+        return;
+    };
+    assert_eq!(table.names().count(), usize::from(table.textures()));
+    assert!(table.movements().len() <= MAX_MOVEMENTS);
+    for texture in 0..table.textures() {
+        for action in table.actions() {
+            let gaussian = table.gaussian(texture, action);
+            assert!(gaussian.is_none_or(|g| g.mean.is_finite() && g.sd > 0.0));
+            let mut experience = table.experience(texture, action.movement);
+            experience
+                .learn(PropertySet::ALL, &Properties::new([Some(1.0); 3]))
+                .unwrap();
+            assert!(
+                experience
+                    .gaussian(action.property)
+                    .is_none_or(|g| g.sd >= 0.0)
+            );
+        }
+    }
+}
+
+#[test]
+fn every_flipped_bit_is_noticed() {
+    let good = small();
+    for at in 0..good.len() {
+        for bit in 0..8 {
+            let mut bytes = good.clone();
+            bytes[at] ^= 1 << bit;
+            let named = match (at, error(&bytes)) {
+                (0..4, why) => why == TableError::Magic(bytes[..4].try_into().unwrap()),
+                (4..6, why) => why == TableError::Version(u16::from_le_bytes([bytes[4], bytes[5]])),
+                (8..12, TableError::Truncated { got: 93, wanted }) => wanted > 93,
+                (
+                    8..12,
+                    TableError::Length {
+                        header,
+                        contents: HEADER,
+                    },
+                ) => header < CRC_BYTES,
+                (8..12, TableError::Crc { .. }) => bytes[8] < 93,
+                (_, TableError::Crc { stored, computed }) => {
+                    stored == crc_of(&bytes) && computed == crc32(&bytes[..89])
+                }
+                _ => false,
+            };
+            assert!(named, "byte {at}, bit {bit}: {}", error(&bytes));
+        }
+    }
+}
+
+/// The stored checksum.
+fn crc_of(bytes: &[u8]) -> u32 {
+    u32::from_le_bytes(bytes[bytes.len() - 4..].try_into().unwrap())
+}
+
+#[test]
+fn every_truncation_is_noticed() {
+    let good = small();
+    for got in 0..good.len() {
+        let wanted = if got < HEADER { HEADER } else { good.len() };
+        assert_eq!(error(&good[..got]), TableError::Truncated { got, wanted });
+    }
+    assert!(Table::read(&good).is_ok());
+}
+
+#[test]
+fn every_check_names_what_is_wrong() {
+    assert!(Table::read(&wrong(|_| ())).is_ok());
+    let at = |at: usize, byte: u8| error(&wrong(|bytes| bytes[at] = byte));
+    let length = |header, contents| TableError::Length { header, contents };
+    assert_eq!(at(3, b'Z'), TableError::Magic(*b"TACZ"));
+    assert_eq!(at(5, 1), TableError::Version(257));
+    assert_eq!(at(6, 1), TableError::Method(1));
+    assert_eq!(
+        at(8, 200),
+        TableError::Truncated {
+            got: 93,
+            wanted: 200
+        }
+    );
+    assert_eq!(at(8, 3), length(3, 16), "too short for a checksum");
+    for (field, byte) in [(7, 0), (7, 8), (12, 0), (14, 0), (14, 37), (15, 1)] {
+        assert_eq!(at(field, byte), TableError::Header, "byte {field}");
+    }
+    assert_eq!(
+        at(14, 36),
+        length(93, 16 + 36 * 6 + 2 * 36 * 13 + 4),
+        "36 movements are not too many"
+    );
+    assert_eq!(at(12, 3), length(93, 16 + 12 + 3 * 26 + 4));
+    assert_eq!(
+        at(17, 0xff),
+        TableError::Movement(0, MovementError::Force(0xffee))
+    );
+    assert_eq!(at(22, 0), TableError::Movement(1, MovementError::Force(0)));
+    assert_eq!(
+        at(26, 3),
+        TableError::Movement(1, MovementError::Speed(0x3_f678))
+    );
+    let trial_missing = wrong(|bytes| {
+        bytes.truncate(79);
+        bytes[8] = 83;
+    });
+    assert_eq!(error(&trial_missing), length(83, 84));
+    let twin = error(&wrong(|bytes| bytes.copy_within(16..22, 22)));
+    assert_eq!(twin, TableError::TwinMovement(1));
+    let deviation = |texture, action| TableError::Deviation { texture, action };
+    let fineness = error(&wrong(|bytes| bytes[38..40].fill(0)));
+    assert_eq!(fineness, deviation(0, act(0, Property::Fineness)));
+    assert_eq!(at(66, 0), deviation(1, act(1, Property::Traction)));
+    assert_eq!(
+        at(78, 2),
+        deviation(1, act(0, Property::Traction)),
+        "two trials need a deviation"
+    );
+    let unmeasured = wrong(|bytes| {
+        bytes[7] = 0b110;
+        bytes[66] = 0;
+    });
+    assert!(
+        Table::read(&unmeasured).is_ok(),
+        "only what is measured needs a deviation"
+    );
+    assert_eq!(at(81, 0xff), TableError::Name(0), "not UTF-8");
+    let named = |names: &[u8]| {
+        let bytes = wrong(|bytes| {
+            bytes.truncate(80);
+            bytes.extend(names);
+            bytes[8] = (bytes.len() + CRC_BYTES) as u8;
+        });
+        Table::read(&bytes).map(|table| table.names().map(String::from).collect::<Vec<_>>())
+    };
+    assert_eq!(named(b"\x01a\x01b").unwrap(), ["a", "b"]);
+    assert_eq!(named(b"\x01a\x01a"), Err(TableError::Name(1)), "twins");
+    assert_eq!(named(b"\x01a\0"), Err(TableError::Name(1)), "empty");
+    assert_eq!(named(b"\0\x01a"), Err(TableError::Name(0)), "empty");
+    assert_eq!(named(b""), Err(length(84, 85)), "no name");
+    assert_eq!(
+        named(b"\x05felt"),
+        Err(length(89, 90)),
+        "one byte of the name is missing"
+    );
+    assert_eq!(named(b"\x01a"), Err(length(86, 87)), "no second name");
+    assert_eq!(
+        named(b"\x01a\x03oa"),
+        Err(length(89, 90)),
+        "one byte of the second name is missing"
+    );
+    assert_eq!(
+        named(b"\x01a\x01bc"),
+        Err(length(89, 88)),
+        "a byte too many"
+    );
+    assert_eq!(
+        error(&wrong(|bytes| bytes[0] ^= 1)[..16]),
+        TableError::Magic(*b"UACT"),
+        "before the length"
+    );
+}
+
+#[test]
+fn what_is_wrong_is_told() {
+    let action = act(1, Property::Fineness);
+    for (error, message) in [
+        (
+            TableError::Truncated { got: 5, wanted: 16 },
+            "truncated: 5 bytes of 16",
+        ),
+        (
+            TableError::Magic(*b"PK\x03\x04"),
+            "not a texture table: it begins with [50, 4b, 03, 04], not `TACT`",
+        ),
+        (
+            TableError::Version(2),
+            "version 2, and this program reads version 1: learn the table anew",
+        ),
+        (TableError::Method(7), "method 7 is unknown"),
+        (
+            TableError::Length {
+                header: 90,
+                contents: 93,
+            },
+            "the header says 90 bytes, the contents take 93",
+        ),
+        (
+            TableError::Crc {
+                stored: 0xab,
+                computed: 0x1234_5678,
+            },
+            "damaged: checksum 12345678, and 000000ab was written",
+        ),
+        (
+            TableError::Header,
+            "the header counts no textures, movements or properties, or too many",
+        ),
+        (
+            TableError::Movement(0, MovementError::Force(99)),
+            "movement 1: contact force 99 mN is outside",
+        ),
+        (TableError::TwinMovement(1), "movement 2 is there twice"),
+        (
+            TableError::Deviation { texture: 4, action },
+            "texture 5, movement 2, fineness: trials, but no standard deviation",
+        ),
+        (
+            TableError::Name(0),
+            "the name of texture 1 is empty, not UTF-8, or another's as well",
+        ),
+    ] {
+        assert!(error.to_string().contains(message), "{error}");
+        assert_eq!(EncodeError::Invalid(error).to_string(), error.to_string());
+    }
+    for (error, message) in [
+        (
+            EncodeError::Empty,
+            "a table needs a texture, a property and 1 to 36 movements",
+        ),
+        (EncodeError::Room(93), "the table takes 93 bytes"),
+        (
+            EncodeError::Movements(0),
+            "texture 1 was not learned at every movement",
+        ),
+        (
+            EncodeError::Name(1),
+            "the name of texture 2 is longer than 255 bytes",
+        ),
+        (
+            EncodeError::Range {
+                texture: 2,
+                action,
+                mean: 8.5,
+            },
+            "texture 3, movement 2: fineness 8.5 is beyond the table's +-8",
+        ),
+    ] {
+        assert!(error.to_string().contains(message), "{error}");
+    }
+}
