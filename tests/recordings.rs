@@ -3,7 +3,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use tactus::import::import;
-use tactus::properties::PropertySet;
+use tactus::properties::PropertyTable;
 use tactus::recordings::{Background, RecordingSet, Slide};
 use tactus_tests::data;
 
@@ -151,7 +151,7 @@ fn publish(folder: &Path, material: u32, slide: &Slide) {
 fn the_property_worlds_are_read() {
     let Some(folder) = data("worlds") else { return };
     for world in 1..=3 {
-        let set = PropertySet::read(&folder.join(format!("world_{world}.csv"))).unwrap();
+        let set = PropertyTable::read(&folder.join(format!("world_{world}.csv"))).unwrap();
         assert_eq!((set.textures.len(), set.movements.len()), (117, 3));
         assert!(set.train.iter().flatten().all(|trials| trials.len() == 5));
         let tested = set

@@ -1,11 +1,12 @@
 //! The command `tactus`.
 
 mod cli;
+mod commands;
 
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    match cli::run() {
+    match commands::run() {
         Ok(()) => ExitCode::SUCCESS,
         // `tactus features | head` is no failure
         Err(why) if is_broken_pipe(&why) => ExitCode::SUCCESS,

@@ -24,7 +24,7 @@ pub type Properties = [f32; 3];
 
 /// A table of properties.
 #[derive(Clone, PartialEq, Debug)]
-pub struct PropertySet {
+pub struct PropertyTable {
     /// Names of the textures, in the order in which they first come.
     pub textures: Vec<String>,
     /// Names of the movements, in the order in which they first come.
@@ -63,7 +63,7 @@ pub enum PropertyError {
 /// Trials with their numbers, by texture and movement.
 type Trials = HashMap<(usize, usize), Vec<(u32, Properties)>>;
 
-impl PropertySet {
+impl PropertyTable {
     /// Reads and checks a table.
     ///
     /// # Errors
@@ -213,10 +213,10 @@ mod tests {
         rows
     }
 
-    fn read(text: &str) -> Result<PropertySet, PropertyError> {
+    fn read(text: &str) -> Result<PropertyTable, PropertyError> {
         let file = tempfile::NamedTempFile::with_suffix("_world.csv").unwrap();
         std::fs::write(file.path(), text).unwrap();
-        PropertySet::read(file.path())
+        PropertyTable::read(file.path())
     }
 
     #[test]
@@ -345,7 +345,7 @@ mod tests {
             let message = read(&lines.join("\n")).unwrap_err().to_string();
             assert!(message.contains(&format!("no {set} rows")), "{message}");
         }
-        let message = PropertySet::read(Path::new("/nowhere/w.csv"))
+        let message = PropertyTable::read(Path::new("/nowhere/w.csv"))
             .unwrap_err()
             .to_string();
         assert!(

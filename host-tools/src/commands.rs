@@ -1,0 +1,471 @@
+//! What every command does.
+
+use std::io::{self, Write};
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::{Context as _, bail};
+use clap::{CommandFactory as _, Parser as _, ValueEnum as _};
+use indicatif::{ProgressBar, ProgressStyle};
+use rand::{Rng as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+use tactus::evaluate::{MAX_TEXTURES, Method, Summary, evaluate};
+use tactus::experiment::{self, Experiment, Protocol};
+use tactus::properties::PropertyTable;
+use tactus::recordings::{RecordingSet, Slide};
+use tactus::replay::{Felt, Replay, feel};
+use tactus::show::{Show, show_table};
+use tactus_core::explorer::Explorer;
+use tactus_core::features::{BAND_EDGES, Plan, Property, PropertySet};
+use tactus_core::rig::{Rig as _, explore};
+use tactus_core::table::{Experience, Table};
+
+use crate::cli::{Command, Evaluate, Format, Identify, Rows, TableCommand, Tactus};
+
+/// Runs what the arguments ask for.
+pub(crate) fn run() -> anyhow::Result<()> {
+    let out = &mut io::BufWriter::new(io::stdout().lock());
+    match Tactus::parse().command {
+        None => write!(out, "{}", Tactus::command().render_help())?,
+        Some(Command::Features { from, format }) => features(&from.recordings, format, out)?,
+        Some(Command::Learn {
+            from,
+            train_slides,
+            out: file,
+        }) => {
+            learn(&from.recordings, train_slides, &file, out)?;
+        }
+        Some(Command::Table(TableCommand::Show { file })) => {
+            show_table(read_table(&file, &mut Vec::new())?, out)?
+        }
+        Some(Command::Table(TableCommand::Check { file })) => {
+            let mut bytes = Vec::new();
+            let table = read_table(&file, &mut bytes)?;
+            writeln!(
+                out,
+                "{}: good; {} textures, {} movements, {} bytes, checksum {:08x}",
+                file.display(),
+                table.textures(),
+                table.movements().len(),
+                table.as_bytes().len(),
+                table.crc()
+            )?;
+        }
+        Some(Command::Identify(args)) => identify(&args, out)?,
+        Some(Command::Evaluate(args)) => run_evaluation(&args, out)?,
+        Some(Command::Import { from, to }) => import(&from, &to, out)?,
+    }
+    out.flush()?;
+    Ok(())
+}
+
+/// A bar on the terminal; nothing where there is none.
+fn progress(length: u64, what: &'static str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}, {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(length)
+        .with_style(style)
+        .with_message(what);
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}
+
+/// Opens a folder and feels all of its slides.
+fn feel_folder(folder: &Path) -> anyhow::Result<(RecordingSet, Vec<Vec<Felt>>)> {
+    let set = RecordingSet::open(folder)?;
+    let bar = progress(set.textures().len() as u64, "feeling slides");
+    let felt = feel(&set, |_| bar.inc(1))
+        .with_context(|| format!("recordings in {}", folder.display()))?;
+    bar.finish_and_clear();
+    Ok((set, felt))
+}
+
+fn names(set: &RecordingSet) -> Vec<String> {
+    set.textures().iter().map(|t| t.name.clone()).collect()
+}
+
+fn features(folder: &Path, format: Rows, out: &mut impl Write) -> anyhow::Result<()> {
+    let (set, felt) = feel_folder(folder)?;
+    let rows = set
+        .textures()
+        .iter()
+        .zip(&felt)
+        .flat_map(|(texture, slides)| slides.iter().map(move |s| (texture, s)));
+    match format {
+        Rows::Csv => {
+            write!(
+                out,
+                "material,slide,traction_n,roughness_ln,fineness_unfiltered_ln"
+            )?;
+            for band in 0..BAND_EDGES.len() - 1 {
+                write!(out, ",ln_psd_band{band}")?;
+            }
+            writeln!(out)?;
+            for (texture, slide) in rows {
+                write!(out, "{},{}", texture.id, slide.number)?;
+                for property in Property::ALL {
+                    match slide.measurement.properties.get(property) {
+                        Some(value) => write!(out, ",{value:.6}")?,
+                        None => write!(out, ",")?,
+                    }
+                }
+                for band in slide.measurement.ln_bands() {
+                    write!(out, ",{band:.6}")?;
+                }
+                writeln!(out)?;
+            }
+        }
+        Rows::Text => {
+            writeln!(
+                out,
+                "{:>3} {:<24} {:>5}  {:<20} {:>10} {:>10} {:>10}  ln of eight bands, 20 to 1000 Hz",
+                "no.", "texture", "slide", "movement", "traction N", "roughness", "fineness"
+            )?;
+            for (texture, slide) in rows {
+                write!(
+                    out,
+                    "{:>3} {:<24} {:>5}  {:<20}",
+                    texture.id,
+                    texture.name,
+                    slide.number,
+                    slide.movement.to_string()
+                )?;
+                for property in Property::ALL {
+                    match slide.measurement.properties.get(property) {
+                        Some(value) => write!(out, " {value:>10.3}")?,
+                        None => write!(out, " {:>10}", "-")?,
+                    }
+                }
+                write!(out, " ")?;
+                for band in slide.measurement.ln_bands() {
+                    write!(out, " {band:>5.1}")?;
+                }
+                writeln!(
+                    out,
+                    "{}",
+                    if slide.measurement.roughness_is_bound {
+                        "  (not rougher than this)"
+                    } else {
+                        ""
+                    }
+                )?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The first slides of every texture and movement, and the table that they teach.
+fn learn_first(set: &RecordingSet, felt: &[Vec<Felt>], slides: usize) -> anyhow::Result<Vec<u8>> {
+    if slides < 2 {
+        bail!("--train-slides {slides}: a standard deviation takes at least two slides");
+    }
+    let movements = set.movements();
+    let measured = felt
+        .iter()
+        .flatten()
+        .fold(PropertySet::ALL, |measured, slide| {
+            measured.and(slide.measurement.properties.measured())
+        });
+    let mut experience: Vec<Vec<Experience>> = Vec::new();
+    for (texture, felt) in set.textures().iter().zip(felt) {
+        let mut of_texture = Vec::new();
+        for &movement in &movements {
+            let same = felt.iter().filter(|s| s.movement == movement);
+            let trials: Vec<_> = same
+                .take(slides)
+                .map(|s| s.measurement.properties)
+                .collect();
+            if trials.len() < slides {
+                bail!(
+                    "{}, {movement}: there are {} slides, and --train-slides is {slides}",
+                    texture.name,
+                    trials.len()
+                );
+            }
+            of_texture.push(experiment::learned(measured, &trials));
+        }
+        experience.push(of_texture);
+    }
+    Ok(experiment::encode(
+        measured,
+        &movements,
+        &names(set),
+        &experience,
+    )?)
+}
+
+fn learn(folder: &Path, slides: usize, file: &Path, out: &mut impl Write) -> anyhow::Result<()> {
+    let (set, felt) = feel_folder(folder)?;
+    let bytes = learn_first(&set, &felt, slides)?;
+    std::fs::write(file, &bytes).with_context(|| file.display().to_string())?;
+    writeln!(
+        out,
+        "{}: {} textures learned from the first {slides} slides of each, {} bytes",
+        file.display(),
+        set.textures().len(),
+        bytes.len()
+    )?;
+    Ok(())
+}
+
+fn read_table<'b>(file: &Path, bytes: &'b mut Vec<u8>) -> anyhow::Result<Table<'b>> {
+    *bytes = std::fs::read(file).with_context(|| file.display().to_string())?;
+    let table = Table::read(bytes).with_context(|| file.display().to_string())?;
+    let behind = bytes.len() - table.as_bytes().len();
+    if behind > 0 {
+        bail!(
+            "{}: {behind} bytes follow the table; the file is not what `tactus learn` wrote",
+            file.display()
+        );
+    }
+    Ok(table)
+}
+
+fn identify(args: &Identify, out: &mut impl Write) -> anyhow::Result<()> {
+    let folder = &args.from.recordings;
+    let set = RecordingSet::open(folder)?;
+    let index = find_material(&set, &args.material)?;
+    let name = &set.textures()[index].name;
+    let mut random = ChaCha8Rng::seed_from_u64(args.seed);
+    let mut bytes = Vec::new();
+    let (table, shown): (Table<'_>, Vec<Slide>) = match &args.table {
+        Some(file) => {
+            let table = read_table(file, &mut bytes)?;
+            // a table of this folder was learned from its first slides: those are not shown
+            let learned = table
+                .find(name)
+                .map_or(0, |t| usize::from(table.trials(t, 0)));
+            let mut slides = set.load_texture(index)?;
+            let shown: Vec<Slide> = if learned < slides.len() {
+                slides.split_off(learned)
+            } else {
+                slides
+            };
+            (table, shown)
+        }
+        None => {
+            let (_, felt) = feel_folder(folder)?;
+            let experiment = Experiment::recorded(
+                names(&set),
+                &felt,
+                None,
+                Protocol::Interleaved,
+                args.train_slides,
+                args.seed,
+            )?;
+            let run = experiment.run(index as u64);
+            bytes = run.learn()?;
+            let learned = &run.training[index];
+            let unseen = |slide: &Slide, felt: &Felt| {
+                slide.number == felt.number
+                    && !learned
+                        .iter()
+                        .flatten()
+                        .any(|l| *l == felt.measurement.properties)
+            };
+            let slides = set.load_texture(index)?.into_iter().zip(&felt[index]);
+            let shown = slides
+                .filter(|(slide, felt)| unseen(slide, felt))
+                .map(|(slide, _)| slide)
+                .collect();
+            (Table::read(&bytes)?, shown)
+        }
+    };
+    if table.find(name).is_none() {
+        writeln!(
+            out,
+            "The table does not know {name}: whatever the answer, it will be wrong."
+        )?;
+    }
+    let shown_count = shown.len();
+    let mut rig = Replay::new(shown, ChaCha8Rng::from_rng(&mut random));
+    let mut explorer =
+        Explorer::<MAX_TEXTURES>::new(table, rig.measures(), args.stop.config(args.method))?;
+    writeln!(
+        out,
+        "An unknown texture, one of {}. Presented: {name}, {shown_count} slides that were not learned from (seed {}).",
+        table.textures(),
+        args.seed
+    )?;
+    let mut show = Show::new(table, out);
+    let verdict = embassy_futures::block_on(explore(
+        &mut rig,
+        &mut explorer,
+        &Plan::new(),
+        || random.next_u32(),
+        |event| show.event(event),
+    ));
+    show.finish(verdict?, explorer.slides(), name)?;
+    Ok(())
+}
+
+fn find_material(set: &RecordingSet, wanted: &str) -> anyhow::Result<usize> {
+    let number = wanted.trim_start_matches("mat").parse::<u32>().ok();
+    let by_name = set
+        .textures()
+        .iter()
+        .position(|t| t.name.eq_ignore_ascii_case(wanted));
+    by_name
+        .or_else(|| set.textures().iter().position(|t| Some(t.id) == number))
+        .with_context(|| {
+            let known: Vec<String> = set
+                .textures()
+                .iter()
+                .map(|t| format!("{} {}", t.id, t.name))
+                .collect();
+            format!(
+                "--material {wanted}: not in {}, which has: {}",
+                set.folder().display(),
+                known.join(", ")
+            )
+        })
+}
+
+/// What `evaluate` prints.
+#[derive(Serialize)]
+struct Evaluation {
+    method: Method,
+    protocol: &'static str,
+    train_slides: usize,
+    runs: u64,
+    textures: usize,
+    threshold: f32,
+    max_slides: u8,
+    seed: u64,
+    #[serde(flatten)]
+    summary: Summary,
+}
+
+fn run_evaluation(args: &Evaluate, out: &mut impl Write) -> anyhow::Result<()> {
+    let (experiment, protocol) = if let Some(folder) = &args.recordings {
+        let (set, felt) = feel_folder(folder)?;
+        let test = args.test.as_deref().map(feel_folder).transpose()?;
+        let test = test.map(|(set, felt)| (names(&set), felt));
+        let test = test
+            .as_ref()
+            .map(|(names, felt)| (names.as_slice(), felt.as_slice()));
+        let experiment = Experiment::recorded(
+            names(&set),
+            &felt,
+            test,
+            args.protocol,
+            args.train_slides,
+            args.seed,
+        )?;
+        let protocol = match args.protocol {
+            Protocol::Interleaved => "interleaved",
+            Protocol::Blocked => "blocked",
+            Protocol::Drift => "drift",
+        };
+        (experiment, protocol)
+    } else if let Some(file) = &args.properties {
+        (
+            Experiment::given(&PropertyTable::read(file)?, args.seed)?,
+            "properties",
+        )
+    } else {
+        bail!("give --recordings or --properties");
+    };
+    let bar = progress(args.runs, "exploring");
+    let outcomes = evaluate(
+        &experiment,
+        args.stop.config(args.method),
+        args.runs,
+        || bar.inc(1),
+    )?;
+    bar.finish_and_clear();
+    let evaluation = Evaluation {
+        method: args.method,
+        protocol,
+        train_slides: experiment.train_slides(),
+        runs: args.runs,
+        textures: experiment.names().len(),
+        threshold: args.stop.threshold,
+        max_slides: args.stop.max_slides,
+        seed: args.seed,
+        summary: Summary::new(&outcomes, experiment.names(), args.stop.max_slides),
+    };
+    match args.format {
+        Format::Json => writeln!(out, "{}", serde_json::to_string_pretty(&evaluation)?)?,
+        Format::Text => print_evaluation(&evaluation, out)?,
+    }
+    Ok(())
+}
+
+fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
+    let method = e
+        .method
+        .to_possible_value()
+        .map_or_else(String::new, |v| v.get_name().to_owned());
+    writeln!(
+        out,
+        "{method}, {}, {} training slides: {} runs over {} textures, threshold {} %, at most {} slides, seed {}",
+        e.protocol,
+        e.train_slides,
+        e.runs,
+        e.textures,
+        e.threshold * 100.0,
+        e.max_slides,
+        e.seed
+    )?;
+    let s = &e.summary;
+    writeln!(
+        out,
+        "  right answers              {:5.1} %",
+        s.accuracy * 100.0
+    )?;
+    writeln!(
+        out,
+        "  sure before the last slide {:5.1} %",
+        s.converged * 100.0
+    )?;
+    writeln!(
+        out,
+        "  wrong among the sure       {:5.1} %",
+        s.wrong_when_sure * 100.0
+    )?;
+    writeln!(
+        out,
+        "  slides                     median {}, mean {:.2}",
+        s.median_slides, s.mean_slides
+    )?;
+    if !s.confused.is_empty() {
+        writeln!(out, "  most confused")?;
+    }
+    for pair in &s.confused {
+        writeln!(
+            out,
+            "    {:4.1} %  {} taken for {}",
+            pair.share * 100.0,
+            pair.texture,
+            pair.identified
+        )?;
+    }
+    Ok(())
+}
+
+fn import(from: &Path, to: &Path, out: &mut impl Write) -> anyhow::Result<()> {
+    let bar = progress(0, "importing slides");
+    let imported = tactus::import::import(from, to, &mut |done, all| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
+    writeln!(
+        out,
+        "{}: {} textures, {} slides",
+        to.display(),
+        imported.textures,
+        imported.slides
+    )?;
+    if imported.lost_rows > 0 {
+        writeln!(
+            out,
+            "{} rows of 10 ms are missing from the publisher's files; what lies before and after them was joined",
+            imported.lost_rows
+        )?;
+    }
+    Ok(())
+}
