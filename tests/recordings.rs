@@ -111,7 +111,7 @@ fn import_of_rectified_recordings_rebuilds_their_signs() {
         let magnitudes = |pac: &[i16]| pac.iter().map(|x| x.unsigned_abs()).collect::<Vec<_>>();
         assert_eq!(magnitudes(&rebuilt.pac), magnitudes(&slide.pac));
         let agreement = agreement(&rebuilt.pac, &slide.pac);
-        // all one sign would give 0.978
+        // one sign for all would give about 0.98
         assert!(agreement > 0.987, "slide over {texture}: {agreement}");
     }
 }

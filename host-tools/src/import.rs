@@ -11,7 +11,8 @@
 //!   along z, so that `fz` is the tangential force.
 //!
 //! What is made of them: `pac` row by row, `pdc` as it is, `shear` = `fz` at the times of the rows of `_bio`, interpolated, in
-//! mN. For the slides that `data/biotac` has, these are its values to the bit, except for signs.
+//! mN. `data/biotac` was made in this way, and keeps the first 590 of some 600 rows: this was checked by hand on rows of its
+//! slide 10 over material 1.
 //!
 //! **The signs of P_AC are not in the files; they are rebuilt** ([`signs`]): magnitudes are exact, power is exact, spectra are
 //! good, zero crossings and the sign of the whole are not known. The sign of P_DC is not rebuilt.

@@ -7,9 +7,12 @@
 //! The search goes along the signal and keeps the [`SURVIVORS`] best choices of the last signs.
 //!
 //! Magnitudes stay exact. What is lost: the sign of the whole (the first sample that is not 0 is taken as positive), and
-//! crossings where the signal is small against its own noise. Against the signs of `data/biotac`, themselves rebuilt by
-//! somebody else, 99.4 % of neighbouring samples agree in whether the sign changes, and the eight band powers differ by
-//! 0.01 to 0.1 in the natural logarithm (rms).
+//! crossings where the signal is small against its own noise.
+//!
+//! Measured on 114 slides of `data/biotac` (every sixth of all), rectified and rebuilt, against the signs that somebody else
+//! had rebuilt: 99.5 % of neighbouring samples agree in whether the sign changes (one sign for all would give 98.0 %), and
+//! 252 changes a slide stand against 258. Roughness differs by 0.002 (rms), fineness by 0.015, the logarithms of the eight
+//! band powers by 0.01 to 0.04 and that of 33 to 53 Hz by 0.12; slides over one texture differ by 0.16, 0.07 and 0.2.
 
 /// Choices of signs that are kept at each sample.
 const SURVIVORS: usize = 64;
