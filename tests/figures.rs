@@ -85,10 +85,11 @@ fn recorded_slides_give_the_reference_figures() {
 #[test]
 fn property_worlds_give_the_reference_figures() {
     let Some(folder) = data("worlds") else { return };
+    // the reference program with 2000 runs; the 400 that it prints by itself have a standard error of 0.02
     for (world, paper, random) in [
-        (1, (0.900, 5.0), (0.830, 7.0)),
-        (2, (0.873, 5.0), (0.802, 7.0)),
-        (3, (0.960, 5.0), (0.897, 7.0)),
+        (1, (0.918, 5.0), (0.870, 7.0)),
+        (2, (0.877, 5.0), (0.813, 7.0)),
+        (3, (0.966, 5.0), (0.875, 7.0)),
     ] {
         let set = PropertyTable::read(&folder.join(format!("world_{world}.csv"))).unwrap();
         let experiment = Experiment::given(&set, 1).unwrap();

@@ -271,10 +271,12 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         &self.posterior
     }
 
-    /// The answer, once there is one: the threshold is exceeded, or the last slide was made.
+    /// The answer, once there is one: the threshold is exceeded, or the last slide was made. There is none before the
+    /// first slide, however few the candidates.
     pub fn verdict(&self) -> Option<Verdict> {
         let best = self.best();
-        (best.sure || self.slides >= self.config.max_slides).then_some(best)
+        let sure = best.sure && self.slides > 0;
+        (sure || self.slides >= self.config.max_slides).then_some(best)
     }
 
     /// The most probable texture as things stand, the first of equals.

@@ -87,7 +87,7 @@ impl<E: fmt::Display> fmt::Display for ExploreError<E> {
 
 impl<E: fmt::Debug + fmt::Display> core::error::Error for ExploreError<E> {}
 
-/// Explores until there is an answer. `random` serves [`crate::explorer::Strategy::Random`]; `tell` hears of everything.
+/// Explores from the beginning until there is an answer. `random` serves [`crate::explorer::Strategy::Random`]; `tell` hears of everything.
 ///
 /// # Errors
 /// See [`ExploreError`].
@@ -98,6 +98,7 @@ pub async fn explore<R: Rig, const N: usize, K: Kernels>(
     mut random: impl FnMut() -> u32,
     mut tell: impl FnMut(Event<'_>),
 ) -> Result<Verdict, ExploreError<R::Error>> {
+    explorer.restart();
     let mut rejected = 0;
     loop {
         if let Some(verdict) = explorer.verdict() {

@@ -26,8 +26,14 @@ use core::fmt;
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 
-use crate::features::{Properties, Property, PropertySet};
+use crate::features::{Property, PropertySet};
 use crate::movement::{Movement, MovementError};
+
+mod encode;
+mod experience;
+
+pub use encode::{EncodeError, Texture, encode, encoded_len};
+pub use experience::{Experience, Gaussian};
 
 const MAGIC: [u8; 4] = *b"TACT";
 /// Version of the binary form that this code reads and writes.
@@ -73,74 +79,6 @@ impl Action {
     pub const fn index(self) -> usize {
         self.movement as usize * PROPERTIES + self.property.index()
     }
-}
-
-/// What was learned of one texture at one movement: number of trials, running mean and sum of squared deviations of each
-/// property (Welford).
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
-pub struct Experience {
-    trials: u8,
-    mean: [f32; PROPERTIES],
-    squares: [f32; PROPERTIES],
-}
-
-impl Experience {
-    /// Takes in one more trial. A property that was not measured, or that is not a finite number, leaves the whole
-    /// experience as it was.
-    ///
-    /// After 255 trials the older ones are slowly forgotten: each new one has the weight of one in 255.
-    ///
-    /// # Errors
-    /// The property of `measured` that the trial lacks.
-    pub fn learn(&mut self, measured: PropertySet, trial: &Properties) -> Result<(), Property> {
-        let mut next = *self;
-        next.trials = self.trials.saturating_add(1);
-        let n = f32::from(next.trials);
-        // 1 up to 255 trials; beyond them the sum of squares stays that of 255
-        let keep = f32::from(next.trials - 1) / f32::from(self.trials.max(1));
-        for (property, (mean, squares)) in Property::ALL
-            .into_iter()
-            .zip(next.mean.iter_mut().zip(&mut next.squares))
-        {
-            if measured.contains(property) {
-                let x = trial
-                    .get(property)
-                    .filter(|x| x.is_finite())
-                    .ok_or(property)?;
-                let before = x - *mean;
-                *mean += before / n;
-                *squares = *squares * keep + before * (x - *mean);
-            }
-        }
-        *self = next;
-        Ok(())
-    }
-
-    /// Number of trials, 255 for more.
-    pub fn trials(&self) -> u8 {
-        self.trials
-    }
-
-    /// Mean and standard deviation (n - 1) of `property`; `None` before the second trial.
-    pub fn gaussian(&self, property: Property) -> Option<Gaussian> {
-        let (mean, squares) = (
-            self.mean.get(property.index())?,
-            self.squares.get(property.index())?,
-        );
-        (self.trials >= 2).then(|| Gaussian {
-            mean: *mean,
-            sd: libm::sqrtf(squares / f32::from(self.trials - 1)),
-        })
-    }
-}
-
-/// What one property of a texture is expected to be (eq. 4).
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Gaussian {
-    /// Mean, in the unit of the property.
-    pub mean: f32,
-    /// Standard deviation, in the unit of the property.
-    pub sd: f32,
 }
 
 /// Why bytes are no texture table.
@@ -543,180 +481,6 @@ impl<'a> Table<'a> {
     /// The table as stored.
     pub fn as_bytes(&self) -> &'a [u8] {
         self.bytes
-    }
-}
-
-/// One texture of a table to be written.
-#[derive(Clone, Copy, Debug)]
-pub struct Texture<'a> {
-    /// Its name, unlike every other, of 1 to 255 bytes.
-    pub name: &'a str,
-    /// What was learned, movement by movement.
-    pub experience: &'a [Experience],
-}
-
-/// Why a table was not written.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub enum EncodeError {
-    /// No texture, movement or property, or more movements than [`MAX_MOVEMENTS`].
-    Empty,
-    /// The table takes this many bytes, and there is less room.
-    Room(usize),
-    /// A texture has not as many experiences as there are movements.
-    Movements(u16),
-    /// A name is longer than 255 bytes.
-    Name(u16),
-    /// A mean that the fixed point cannot hold.
-    Range {
-        /// Index of the texture.
-        texture: u16,
-        /// The action concerned.
-        action: Action,
-        /// The mean.
-        mean: f32,
-    },
-    /// What was written does not read: a name is empty or there twice, or a movement is.
-    Invalid(TableError),
-}
-
-impl fmt::Display for EncodeError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Empty => write!(
-                f,
-                "a table needs a texture, a property and 1 to {MAX_MOVEMENTS} movements"
-            ),
-            Self::Room(needed) => {
-                write!(f, "the table takes {needed} bytes, and there is less room")
-            }
-            Self::Movements(texture) => write!(
-                f,
-                "texture {} was not learned at every movement",
-                texture + 1
-            ),
-            Self::Name(texture) => write!(
-                f,
-                "the name of texture {} is longer than 255 bytes",
-                texture + 1
-            ),
-            Self::Range {
-                texture,
-                action,
-                mean,
-            } => write!(
-                f,
-                "texture {}, movement {}: {} {mean} is beyond the table's +-{}",
-                texture + 1,
-                action.movement + 1,
-                action.property,
-                mean_step(action.property) * 32768.0
-            ),
-            Self::Invalid(why) => why.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for EncodeError {}
-
-/// Bytes that a table takes, names and their lengths included in `names`.
-pub const fn encoded_len(textures: usize, movements: usize, names: usize) -> usize {
-    Layout::new(textures, movements).names + names + CRC_BYTES
-}
-
-/// Writes a table into `out` and reads it back.
-///
-/// Means are rounded to [`mean_step`], standard deviations to [`SD_STEP`] and kept between [`SD_LEAST`] and 4.
-///
-/// # Errors
-/// Parts of `out` may have been written then.
-pub fn encode<'o, 'a>(
-    out: &'o mut [u8],
-    measured: PropertySet,
-    movements: &[Movement],
-    textures: impl Iterator<Item = Texture<'a>> + Clone,
-) -> Result<Table<'o>, EncodeError> {
-    let (count, names) = textures.clone().fold((0usize, 0), |(n, names), t| {
-        (n + 1, names + 1 + t.name.len())
-    });
-    let length = encoded_len(count, movements.len(), names);
-    let (Ok(count), Ok(length_field)) = (u16::try_from(count), u32::try_from(length)) else {
-        return Err(EncodeError::Room(length));
-    };
-    if count == 0 || measured.is_empty() || movements.is_empty() || movements.len() > MAX_MOVEMENTS
-    {
-        return Err(EncodeError::Empty);
-    }
-    let mut writer = Writer {
-        room: out.get_mut(..length).ok_or(EncodeError::Room(length))?,
-        at: 0,
-    };
-    writer.put(&MAGIC);
-    writer.put(&VERSION.to_le_bytes());
-    writer.put(&[METHOD_GAUSSIAN, measured.bits()]);
-    writer.put(&length_field.to_le_bytes());
-    writer.put(&count.to_le_bytes());
-    writer.put(&[movements.len() as u8, 0]);
-    for movement in movements {
-        writer.put(&movement.force_mn().to_le_bytes());
-        writer.put(&movement.speed_um_s().to_le_bytes());
-    }
-    for (texture, index) in textures.clone().zip(0..) {
-        if texture.experience.len() != movements.len() {
-            return Err(EncodeError::Movements(index));
-        }
-        for (experience, movement) in texture.experience.iter().zip(0..) {
-            for (property, mean) in Property::ALL.into_iter().zip(experience.mean) {
-                if !measured.contains(property) {
-                    writer.put(&[0; CELL_BYTES]);
-                    continue;
-                }
-                let action = Action { movement, property };
-                let range = EncodeError::Range {
-                    texture: index,
-                    action,
-                    mean,
-                };
-                let step = libm::roundf(mean / mean_step(property));
-                if !(f32::from(i16::MIN)..=f32::from(i16::MAX)).contains(&step) {
-                    return Err(range);
-                }
-                let sd = experience
-                    .gaussian(property)
-                    .map_or(0.0, |g| g.sd.max(SD_LEAST));
-                writer.put(&(step as i16).to_le_bytes());
-                // `as` saturates: trials that differ by more than 4 are no worse than that
-                writer.put(&(libm::roundf(sd / SD_STEP) as u16).to_le_bytes());
-            }
-        }
-    }
-    for experience in textures.clone().flat_map(|t| t.experience) {
-        writer.put(&[experience.trials]);
-    }
-    for (texture, index) in textures.zip(0..) {
-        writer.put(&[u8::try_from(texture.name.len()).map_err(|_| EncodeError::Name(index))?]);
-        writer.put(texture.name.as_bytes());
-    }
-    let crc = CRC32.checksum(writer.written());
-    writer.put(&crc.to_le_bytes());
-    Table::read(writer.room).map_err(EncodeError::Invalid)
-}
-
-/// Fills a slice from its beginning.
-struct Writer<'o> {
-    room: &'o mut [u8],
-    at: usize,
-}
-
-impl Writer<'_> {
-    fn put(&mut self, bytes: &[u8]) {
-        if let Some(room) = self.room.get_mut(self.at..self.at + bytes.len()) {
-            room.copy_from_slice(bytes);
-        }
-        self.at += bytes.len();
-    }
-
-    fn written(&self) -> &[u8] {
-        self.room.get(..self.at).unwrap_or_default()
     }
 }
 
