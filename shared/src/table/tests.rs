@@ -4,6 +4,7 @@ mod damage;
 mod learning;
 
 use super::*;
+use crate::features::Properties;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::string::{String, ToString};

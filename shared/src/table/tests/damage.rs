@@ -1,6 +1,7 @@
 //! Damage of every kind, and the check that names it.
 
 use super::*;
+use crate::features::Properties;
 
 proptest! {
     #![proptest_config(fixed(256))]

@@ -1,6 +1,7 @@
 //! Learning, against statistics in two passes.
 
 use super::*;
+use crate::features::Properties;
 
 proptest! {
     #![proptest_config(fixed(128))]
