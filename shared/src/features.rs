@@ -191,6 +191,8 @@ pub enum SlideError {
     NoBackground,
     /// P_AC does not move at all: no sensor, or one that hangs.
     Silent,
+    /// So many samples between the background and the end of the slide were lost.
+    Gap(u32),
 }
 
 impl fmt::Display for SlideError {
@@ -213,6 +215,7 @@ impl fmt::Display for SlideError {
                 f.write_str("the background of the still finger was not measured")
             }
             Self::Silent => f.write_str("P_AC never changed: is the sensor connected?"),
+            Self::Gap(lost) => write!(f, "{lost} samples were lost"),
         }
     }
 }
@@ -235,6 +238,7 @@ pub struct Slide<'p, K = Plain> {
     spectrum: SpectrumSum,
     shear_mn: i64,
     shears: u32,
+    lost: u32,
     kernels: PhantomData<K>,
 }
 
@@ -252,6 +256,7 @@ impl<'p, K: Kernels> Slide<'p, K> {
             spectrum: SpectrumSum::default(),
             shear_mn: 0,
             shears: 0,
+            lost: 0,
             kernels: PhantomData,
         }
     }
@@ -303,6 +308,11 @@ impl<'p, K: Kernels> Slide<'p, K> {
         self.shears += samples_mn.len() as u32;
     }
 
+    /// So many samples were lost: nothing stands in for them, the slide has no properties.
+    pub fn lose(&mut self, samples: u32) {
+        self.lost = self.lost.saturating_add(samples);
+    }
+
     /// The properties, when the steady part is over.
     ///
     /// # Errors
@@ -310,6 +320,9 @@ impl<'p, K: Kernels> Slide<'p, K> {
     pub fn finish(mut self) -> Result<Measurement, SlideError> {
         let wanted = self.steady.end.saturating_sub(self.steady.start);
         let got = self.spectrum.samples();
+        if self.lost > 0 {
+            return Err(SlideError::Gap(self.lost));
+        }
         if wanted == 0 {
             return Err(SlideError::NotStarted);
         }

@@ -2,6 +2,14 @@
 //!
 //! A property means something only for the movement that made it, so moving and sensing are one act.
 
+pub mod calibration;
+pub mod control;
+pub mod force;
+pub mod guard;
+pub mod lever;
+pub mod skin;
+pub mod stage;
+
 use core::fmt;
 
 use crate::explorer::{Explorer, ObserveError, Outlook, Verdict};

@@ -1,0 +1,312 @@
+//! The simulated rig: the world of [`crate::sim`] at one end of the pins, the core's [`Control`] at the other, and what the
+//! board's timers do in between, in virtual time.
+
+use std::time::Duration;
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use tactus_core::biotac;
+use tactus_core::features::{PropertySet, Slide};
+use tactus_core::kernels::Kernels;
+use tactus_core::movement::Movement;
+use tactus_core::pressure::{Calibration, Channel, Pressure, RATE_HZ, SLOTS_HZ};
+use tactus_core::rig::Rig;
+use tactus_core::rig::calibration::{LineFit, RigCalibration, RigCalibrationError};
+use tactus_core::rig::control::{Control, Ended, Felt, Inputs, Outputs, Phase, Refused};
+use tactus_core::rig::guard::{Fault, Unguarded};
+use tactus_core::rig::stage::StageConstants;
+use tactus_core::sensor::PressureSensor as _;
+
+use crate::sim::world::{Setup, World};
+
+const TICK_NS: u64 = 1_000_000;
+/// Two bytes at 5.25 MHz.
+const TRANSFER_NS: u64 = 3_048;
+/// The answer is read this long after the command ended: the sensor's 50 us and some.
+const GAP_NS: u64 = 55_000;
+/// STEP stays high this long.
+const PULSE_NS: u64 = 5_000;
+/// DIR is set this long before STEP rises.
+const DIR_NS: u64 = 2_000;
+/// A rig that does not come to an end within this is broken.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Motor current amplifier of the reference board: 1 V/A about half of 3.3 V, 12 bits.
+fn amperes(adc: u16) -> f32 {
+    (f32::from(adc) - 2048.0) * (3.3 / 4096.0)
+}
+
+/// Why the simulated rig did not make a movement.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum SimError {
+    /// It was refused.
+    #[error(transparent)]
+    Refused(#[from] Refused),
+    /// A fault was seen.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+    /// It was stopped.
+    #[error("stopped")]
+    Stopped,
+    /// Nothing came of it in two minutes of virtual time.
+    #[error("the rig hangs in {0:?}")]
+    Hangs(Phase),
+    /// A calibration came to nothing.
+    #[error(transparent)]
+    Calibration(#[from] RigCalibrationError),
+}
+
+/// The board's timers between control and world: sensor slots, step pulses, the 1 kHz tick.
+pub struct SimRig {
+    world: World,
+    control: Control,
+    random: ChaCha8Rng,
+    now_ns: u64,
+    slot: u64,
+    words: Vec<Option<Pressure>>,
+    steps: i32,
+    rate: i32,
+    down: bool,
+    next_step_ns: u64,
+    outputs: Outputs,
+}
+
+impl SimRig {
+    /// A rig at power-up, its guards all on, with the reference constants in place of measured ones.
+    pub fn new(setup: Setup) -> Self {
+        Self::unguarded(setup, Unguarded::default())
+    }
+
+    /// As [`SimRig::new`], with a guard switched off: for tests.
+    pub fn unguarded(setup: Setup, unguarded: Unguarded) -> Self {
+        let calibration = RigCalibration {
+            pressure: Calibration::PAPER,
+            unloaded_a: (0.037, 0.0),
+            newton_per_ampere: 16.4,
+            date: 0,
+            serial: [0; 16],
+        };
+        Self {
+            world: World::new(setup),
+            control: Control::new(StageConstants::REFERENCE, calibration, unguarded),
+            random: ChaCha8Rng::seed_from_u64(setup.trial_seed),
+            now_ns: 0,
+            slot: 0,
+            words: Vec::new(),
+            steps: 0,
+            rate: 0,
+            down: true,
+            next_step_ns: 0,
+            outputs: Outputs::default(),
+        }
+    }
+
+    /// The world behind the pins: its truth, its faults.
+    pub fn world(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    /// The control at the other end.
+    pub fn control(&mut self) -> &mut Control {
+        &mut self.control
+    }
+
+    /// Virtual time since power-up.
+    pub fn now(&self) -> Duration {
+        Duration::from_nanos(self.now_ns)
+    }
+
+    /// What the control told the pins last.
+    pub fn outputs(&self) -> &Outputs {
+        &self.outputs
+    }
+
+    /// Puts another texture under the lifted finger.
+    ///
+    /// # Errors
+    /// [`Refused::Busy`] while the finger is down.
+    pub fn place(&mut self, texture: u8) -> Result<(), SimError> {
+        self.world.place(texture).map_err(|_| Refused::Busy)?;
+        self.control.sample_changed();
+        Ok(())
+    }
+
+    /// One millisecond: the slots and steps in it, then the control.
+    pub fn tick(&mut self) -> &Outputs {
+        let end = self.now_ns + TICK_NS;
+        loop {
+            // slots from a timer of 4400 Hz: no drift
+            let slot_ns = (u128::from(self.slot) * 1_000_000_000 / u128::from(SLOTS_HZ)) as u64;
+            let step_ns = if self.rate == 0 { u64::MAX } else { self.next_step_ns };
+            if slot_ns.min(step_ns) >= end {
+                break;
+            }
+            if slot_ns <= step_ns {
+                self.sample(slot_ns);
+            } else {
+                self.step(step_ns);
+            }
+        }
+        self.world.advance_to(end);
+        self.now_ns = end;
+        let stage_limits = self.world.stage_limits();
+        let inputs = Inputs {
+            words: self.words.drain(..).collect(),
+            steps: self.steps,
+            encoder: self.world.encoder(),
+            current_a: amperes(self.world.motor_adc()),
+            lever_top: self.world.lever_top(),
+            stage_limits,
+            e_stop: self.world.e_stop(),
+        };
+        self.outputs = self.control.tick(&inputs);
+        self.world.lever_enable(end, self.outputs.lever_enabled);
+        self.world.stage_enable(end, self.outputs.stage_enabled);
+        self.world.stage_pwm(end, self.outputs.stage_duty.into());
+        self.set_rate(self.outputs.lever_steps_s);
+        &self.outputs
+    }
+
+    /// A slot: the command, and its answer after the gap.
+    fn sample(&mut self, at_ns: u64) {
+        let channel = Channel::PATTERN[(self.slot % 2) as usize];
+        self.slot += 1;
+        let mut exchange = biotac::BioTac::exchange(channel);
+        if let Some(command) = exchange.command {
+            self.world.spi(at_ns, TRANSFER_NS, &command, &mut [0; 2]);
+        }
+        let read_ns = at_ns + TRANSFER_NS + GAP_NS;
+        // steps that fall due in the gap are made in it
+        while self.rate != 0 && self.next_step_ns < read_ns {
+            self.step(self.next_step_ns);
+        }
+        let mosi = exchange.read;
+        self.world.spi(read_ns, TRANSFER_NS, &mosi, &mut exchange.read);
+        self.words.push(biotac::BioTac::decode(channel, exchange.read).ok());
+    }
+
+    fn step(&mut self, at_ns: u64) {
+        let down = self.rate > 0;
+        if down != self.down {
+            self.down = down;
+            self.world.lever_dir(at_ns.saturating_sub(DIR_NS), down);
+        }
+        self.world.lever_step(at_ns, true);
+        self.world.lever_step(at_ns + PULSE_NS, false);
+        self.steps += if down { 1 } else { -1 };
+        self.next_step_ns = at_ns + 1_000_000_000 / u64::from(self.rate.unsigned_abs());
+    }
+
+    fn set_rate(&mut self, rate: i32) {
+        if rate != self.rate {
+            self.rate = rate;
+            if rate != 0 {
+                self.next_step_ns = self.now_ns + 1_000_000_000 / u64::from(rate.unsigned_abs());
+            }
+        }
+    }
+
+    /// Lets the rig go on until it is at rest: ready, parked or faulted with the finger off the sample.
+    ///
+    /// # Errors
+    /// The fault that it came to, or that it never came to rest.
+    pub fn rest(&mut self, mut each: impl FnMut(&Outputs)) -> Result<(), SimError> {
+        let until = self.now() + PATIENCE;
+        while self.now() < until {
+            each(self.tick());
+            match self.control.phase() {
+                Phase::Ready | Phase::Parked => return Ok(()),
+                Phase::Faulted(fault) if self.outputs.lever_steps_s == 0 && self.outputs.lever_enabled => {
+                    return Err(fault.into());
+                }
+                Phase::Faulted(fault @ Fault::LeverNotHome) => return Err(fault.into()),
+                _ => {}
+            }
+        }
+        Err(SimError::Hangs(self.control.phase()))
+    }
+
+    /// Powers up: waits for the sensor, finds the limit switches.
+    ///
+    /// # Errors
+    /// See [`SimError`].
+    pub fn home(&mut self) -> Result<(), SimError> {
+        for _ in 0..=biotac::BioTac::POWER_UP_MS {
+            self.tick();
+        }
+        self.control.home()?;
+        self.rest(|_| ())
+    }
+
+    /// Measures this rig's motor current without load, and takes it into the calibration.
+    ///
+    /// # Errors
+    /// See [`SimError`].
+    pub fn calibrate_current(&mut self) -> Result<RigCalibration, SimError> {
+        let mut fit = LineFit::default();
+        for speed_mm_s in [10.0, 25.0, 40.0, 63.0] {
+            // to the right, the way of every slide; the way back only returns
+            for measured in [true, false] {
+                self.control.start_unloaded(speed_mm_s)?;
+                self.rest(|_| ())?;
+                if let Some(current_a) = self.control.mean_current_a().filter(|a| measured || *a > 0.0) {
+                    fit.push(speed_mm_s, current_a);
+                }
+            }
+        }
+        let calibration = RigCalibration { unloaded_a: fit.line()?, ..*self.control.calibration() };
+        self.control.calibrate(calibration)?;
+        Ok(calibration)
+    }
+
+    /// Makes one movement, beginning at `start` (0 to 1 of the room that the sample leaves); `each` sees what every tick
+    /// told the pins.
+    ///
+    /// # Errors
+    /// See [`SimError`]. The stage stands then, and the finger is lifted.
+    pub fn slide(&mut self, movement: Movement, start: f32, each: impl FnMut(&Outputs)) -> Result<Ended, SimError> {
+        self.control.start(movement, start)?;
+        self.rest(each)?;
+        match self.control.take_ended() {
+            Some(Ended::Stopped) | None => Err(SimError::Stopped),
+            Some(ended) => Ok(ended),
+        }
+    }
+}
+
+impl Rig for SimRig {
+    type Error = SimError;
+
+    fn measures(&self) -> PropertySet {
+        PropertySet::ALL
+    }
+
+    async fn perform<K: Kernels>(&mut self, movement: Movement, slide: &mut Slide<'_, K>) -> Result<(), SimError> {
+        if self.control.phase() == Phase::Parked {
+            self.home()?;
+        }
+        let start = self.random.random();
+        let ended = self.slide(movement, start, |outputs| feel(outputs, slide))?;
+        if let Ended::Gap(samples) = ended {
+            slide.lose(samples);
+        }
+        Ok(())
+    }
+}
+
+/// Gives what a tick felt to the core.
+pub fn feel<K: Kernels>(outputs: &Outputs, slide: &mut Slide<'_, K>) {
+    match &outputs.felt {
+        Felt::Nothing => return,
+        Felt::Still => return slide.push_still(&outputs.pac),
+        Felt::Begin(steady) => slide.start(steady.clone()),
+        Felt::Slide => {}
+    }
+    slide.push(&outputs.pac);
+    slide.push_shear(outputs.shear_mn.as_slice());
+}
+
+/// Seconds as samples of one pressure.
+pub fn samples(seconds: f64) -> u32 {
+    (seconds * f64::from(RATE_HZ)) as u32
+}

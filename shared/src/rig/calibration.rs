@@ -1,0 +1,203 @@
+//! The constants of one rig, and how they are found: lines through measured points.
+
+use crate::pressure::{Calibration, CalibrationError};
+
+/// What was measured of one rig, on which day, and with which sensor.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct RigCalibration {
+    /// Fingertip: zero and counts per newton.
+    pub pressure: Calibration,
+    /// Motor current of the stage without load: A at standstill, and A per mm/s.
+    pub unloaded_a: (f32, f32),
+    /// Shear per motor current above that, N/A (the paper's inclined stage).
+    pub newton_per_ampere: f32,
+    /// Day of the measurement, as 20261121; 0 for values that nobody measured.
+    pub date: u32,
+    /// Serial number of the sensor, as the sensor says it.
+    pub serial: [u8; 16],
+}
+
+impl RigCalibration {
+    /// Shear in N at a motor current and speed.
+    pub fn shear_n(&self, current_a: f32, speed_mm_s: f32) -> f32 {
+        let (standstill, per_mm_s) = self.unloaded_a;
+        (current_a - standstill - per_mm_s * speed_mm_s) * self.newton_per_ampere
+    }
+
+    /// Checks a record before a motor is moved by it.
+    ///
+    /// # Errors
+    /// See [`RigCalibrationError`].
+    pub fn check(&self) -> Result<(), RigCalibrationError> {
+        self.pressure
+            .check()
+            .map_err(RigCalibrationError::Pressure)?;
+        let (standstill, per_mm_s) = self.unloaded_a;
+        let good = standstill.is_finite() && per_mm_s.is_finite();
+        if !(good && self.newton_per_ampere > 0.0 && self.newton_per_ampere.is_finite()) {
+            return Err(RigCalibrationError::Current);
+        }
+        Ok(())
+    }
+}
+
+/// Why a calibration is not used.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum RigCalibrationError {
+    /// The fingertip's constants.
+    Pressure(CalibrationError),
+    /// The stage's constants.
+    Current,
+    /// Fewer than three points, or all at the same place.
+    Points,
+    /// The points do not lie on a line: R^2 below 0.99.
+    NoLine,
+}
+
+impl core::fmt::Display for RigCalibrationError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Pressure(why) => why.fmt(f),
+            Self::Current => {
+                f.write_str("the stage's current must be finite, and newtons per ampere above 0")
+            }
+            Self::Points => f.write_str("a line takes three points or more, at different places"),
+            Self::NoLine => {
+                f.write_str("the points do not lie on a line (R^2 below 0.99): measure again")
+            }
+        }
+    }
+}
+
+impl core::error::Error for RigCalibrationError {}
+
+/// Least R^2 that counts as a line; the paper's force line has 0.995 (fig. 3).
+const LEAST_R2: f64 = 0.99;
+
+/// A straight line through points as they come: force against P_DC (fig. 3), motor current against load on the inclined
+/// stage (Methods, "Traction of texture"), motor current against speed.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct LineFit {
+    points: u32,
+    x: f64,
+    y: f64,
+    xx: f64,
+    xy: f64,
+    yy: f64,
+}
+
+impl LineFit {
+    /// Takes a point; one that is not finite is left out.
+    pub fn push(&mut self, x: f32, y: f32) {
+        if !(x.is_finite() && y.is_finite()) {
+            return;
+        }
+        self.points += 1;
+        let n = f64::from(self.points);
+        let (dx, dy) = (f64::from(x) - self.x, f64::from(y) - self.y);
+        self.x += dx / n;
+        self.y += dy / n;
+        // Welford's way, which does not lose small slopes on large offsets
+        self.xx += dx * (f64::from(x) - self.x);
+        self.xy += dx * (f64::from(y) - self.y);
+        self.yy += dy * (f64::from(y) - self.y);
+    }
+
+    /// Offset and slope of y = offset + slope x.
+    ///
+    /// # Errors
+    /// See [`RigCalibrationError`].
+    pub fn line(&self) -> Result<(f32, f32), RigCalibrationError> {
+        if self.points < 3 || self.xx <= 0.0 {
+            return Err(RigCalibrationError::Points);
+        }
+        let slope = self.xy / self.xx;
+        if self.yy > 0.0 && slope * self.xy < LEAST_R2 * self.yy {
+            return Err(RigCalibrationError::NoLine);
+        }
+        Ok(((self.y - slope * self.x) as f32, slope as f32))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_found_again() {
+        let mut fit = LineFit::default();
+        for n in 0..20 {
+            let x = n as f32 * 0.1;
+            let wobble = if n % 2 == 0 { 0.001 } else { -0.001 };
+            fit.push(x, 0.3 + 0.05 * x + wobble);
+        }
+        let (offset, slope) = fit.line().unwrap();
+        assert!(
+            (offset - 0.3).abs() < 1e-3 && (slope - 0.05).abs() < 1e-3,
+            "{offset} {slope}"
+        );
+    }
+
+    #[test]
+    fn what_is_no_line_is_refused() {
+        let fit = |points: &[(f32, f32)]| {
+            let mut fit = LineFit::default();
+            points.iter().for_each(|&(x, y)| fit.push(x, y));
+            fit.line()
+        };
+        assert_eq!(
+            fit(&[(0.0, 1.0), (1.0, 2.0)]),
+            Err(RigCalibrationError::Points)
+        );
+        assert_eq!(
+            fit(&[(1.0, 1.0), (1.0, 2.0), (1.0, 3.0)]),
+            Err(RigCalibrationError::Points)
+        );
+        assert_eq!(
+            fit(&[(0.0, 0.0), (1.0, 3.0), (2.0, 1.0), (3.0, 2.0)]),
+            Err(RigCalibrationError::NoLine)
+        );
+        assert_eq!(
+            fit(&[(0.0, 0.0), (1.0, f32::NAN), (2.0, 1.0)]),
+            Err(RigCalibrationError::Points)
+        );
+        assert_eq!(fit(&[(0.0, 2.0), (1.0, 2.0), (2.0, 2.0)]), Ok((2.0, 0.0)));
+    }
+
+    #[test]
+    fn shear_is_the_current_above_the_unloaded_one() {
+        let rig = RigCalibration {
+            pressure: Calibration::PAPER,
+            unloaded_a: (0.1, 0.002),
+            newton_per_ampere: 8.0,
+            date: 20_261_121,
+            serial: *b"BT-0000000000001",
+        };
+        assert!((rig.shear_n(0.25, 25.0) - 0.8).abs() < 1e-5);
+        assert_eq!(rig.check(), Ok(()));
+        assert_eq!(
+            RigCalibration {
+                newton_per_ampere: 0.0,
+                ..rig
+            }
+            .check(),
+            Err(RigCalibrationError::Current)
+        );
+        assert_eq!(
+            RigCalibration {
+                unloaded_a: (f32::NAN, 0.0),
+                ..rig
+            }
+            .check(),
+            Err(RigCalibrationError::Current)
+        );
+        let pressure = Calibration {
+            force_mn_per_count: -1.0,
+            ..Calibration::PAPER
+        };
+        assert!(matches!(
+            RigCalibration { pressure, ..rig }.check(),
+            Err(RigCalibrationError::Pressure(_))
+        ));
+    }
+}

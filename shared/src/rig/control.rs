@@ -1,0 +1,593 @@
+//! One movement from beginning to end: position the stage, press, measure the still finger, slide, lift. Lever, stage and
+//! guard under one roof, asked a thousand times a second.
+//!
+//! No input or output of its own: [`Control::tick`] takes what the pins say and returns what they shall do, so that board
+//! and simulator run the same code.
+
+use core::ops::Range;
+
+use heapless::Vec;
+
+use super::calibration::RigCalibration;
+use super::force::ForceMeter;
+use super::guard::{Fault, Guard, Seen, Unguarded};
+use super::lever::{Lever, LeverState};
+use super::skin::SkinCare;
+use super::stage::{MARGIN_MM, Stage, StageConstants, StageState};
+use crate::movement::{Movement, SlidePath};
+use crate::pressure::{Channel, Pressure, RATE_HZ};
+
+/// Most words in one tick: 14 ms of slots, should a tick be late.
+pub const MAX_WORDS: usize = 64;
+/// The still finger is measured for so long.
+pub const BACKGROUND_MS: u32 = 1000;
+/// Longest slide at constant speed.
+const STEADY_S: f32 = 3.0;
+/// After the ramp the servo has this long to settle before samples count.
+const STEADY_MARGIN_S: f32 = 0.1;
+/// Speed of the stage while the finger is lifted.
+const RETURN_MM_S: f32 = 50.0;
+/// Forces over this are pressed only by a rig that was allowed to.
+const HIGH_FORCE_MN: u16 = 1500;
+/// With the lever driver off the finger pushes it back; only then it is lifted.
+const RELEASE_MS: u32 = 20;
+
+/// What the pins say.
+#[derive(Clone, Debug, Default)]
+pub struct Inputs {
+    /// Sensor words since the last tick, oldest first; `None` is a damaged or missing one.
+    pub words: Vec<Option<Pressure>, MAX_WORDS>,
+    /// Steps made by the lever so far, downwards positive.
+    pub steps: i32,
+    /// Count of the stage's encoder.
+    pub encoder: i32,
+    /// Motor current of the stage, A.
+    pub current_a: f32,
+    /// The lever's upper limit switch.
+    pub lever_top: bool,
+    /// The stage's limit switches, left and right.
+    pub stage_limits: (bool, bool),
+    /// The emergency stop.
+    pub e_stop: bool,
+}
+
+/// What the pins shall do.
+#[derive(Clone, Debug, Default)]
+pub struct Outputs {
+    /// Steps per second of the lever, downwards positive; 0 holds.
+    pub lever_steps_s: i32,
+    /// The lever's driver has current.
+    pub lever_enabled: bool,
+    /// Duty of the stage's motor, -1 to 1.
+    pub stage_duty: f32,
+    /// The stage's bridge is on.
+    pub stage_enabled: bool,
+    /// What the samples of this tick are.
+    pub felt: Felt,
+    /// P_AC of this tick in counts about the still finger's, where it is felt.
+    pub pac: Vec<i16, MAX_WORDS>,
+    /// Shear of this tick in mN, at constant speed.
+    pub shear_mn: Option<i16>,
+}
+
+/// What the samples of a tick belong to.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub enum Felt {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// The background: the finger is pressed and still.
+    Still,
+    /// The slide begins; these of its P_AC samples will be at constant speed.
+    Begin(Range<u32>),
+    /// The slide goes on.
+    Slide,
+}
+
+/// What the rig is doing.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Phase {
+    /// Nothing; it does not know where lever and stage are.
+    Parked,
+    /// The lever, then the stage look for their limit switches.
+    Homing,
+    /// Lifted and waiting.
+    Ready,
+    /// The stage goes to where the slide begins.
+    Positioning,
+    /// The lever comes down until the force is right.
+    Pressing,
+    /// The still finger is measured.
+    Background,
+    /// Sliding.
+    Sliding,
+    /// The finger is lifted; then the slide is over.
+    Lifting,
+    /// The stage goes without load, its current is measured.
+    Unloaded,
+    /// A fault was seen; the finger is being lifted, or is. Nothing moves until [`Control::reset`].
+    Faulted(Fault),
+}
+
+/// How a movement ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Ended {
+    /// All samples are there.
+    Whole,
+    /// So many words were damaged or missing between the beginning of the background and the end of the slide.
+    Gap(u32),
+    /// It was stopped.
+    Stopped,
+}
+
+/// Why a command is refused.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Refused {
+    /// Something else is being done.
+    Busy,
+    /// Lever and stage do not know where they are: home first.
+    NotHomed,
+    /// A fault has to be reset first.
+    Fault(Fault),
+    /// The force is over what this rig may press.
+    Force(u16),
+    /// The slide does not fit on the sample.
+    Length,
+}
+
+impl core::fmt::Display for Refused {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Busy => f.write_str("the rig is busy; stop it first"),
+            Self::NotHomed => {
+                f.write_str("lever and stage do not know where they are; home them first")
+            }
+            Self::Fault(fault) => write!(
+                f,
+                "{fault}: {}",
+                fault.row().map_or("reset", |row| row.recovery)
+            ),
+            Self::Force(mn) => write!(
+                f,
+                "{mn} mN is more than this rig may press; {HIGH_FORCE_MN} mN unless high forces are allowed"
+            ),
+            Self::Length => f.write_str("the slide does not fit on the sample"),
+        }
+    }
+}
+
+impl core::error::Error for Refused {}
+
+/// The whole rig.
+#[derive(Clone, Debug)]
+pub struct Control {
+    lever: Lever,
+    stage: Stage,
+    guard: Guard,
+    meter: ForceMeter,
+    calibration: RigCalibration,
+    skin: SkinCare,
+    phase: Phase,
+    ms: u32,
+    ended: Option<Ended>,
+    movement: Movement,
+    /// Where the slide begins and ends, mm.
+    path_mm: (f32, f32),
+    /// Constant speed, as ms since the slide began.
+    steady_ms: Range<u32>,
+    /// Sum and number of P_AC words since the lever last moved: the baseline.
+    pac: (u32, u32),
+    baseline: i32,
+    damaged: u32,
+    allow_high_force: bool,
+    /// Duty of the last tick.
+    duty: f32,
+    /// Sum and number of motor currents at constant speed.
+    current: (f32, u32),
+}
+
+impl Control {
+    /// A rig that does not know where it is, with all guards but `unguarded`.
+    pub fn new(
+        constants: StageConstants,
+        calibration: RigCalibration,
+        unguarded: Unguarded,
+    ) -> Self {
+        Self {
+            lever: Lever::new(),
+            stage: Stage::new(constants),
+            guard: Guard::new(unguarded),
+            meter: ForceMeter::new(calibration.pressure.pdc_no_contact),
+            calibration,
+            skin: SkinCare::default(),
+            phase: Phase::Parked,
+            ms: 0,
+            ended: None,
+            movement: Movement::FOR_ROUGHNESS,
+            path_mm: (0.0, 0.0),
+            steady_ms: 0..0,
+            pac: (0, 0),
+            baseline: 0,
+            damaged: 0,
+            allow_high_force: false,
+            duty: 0.0,
+            current: (0.0, 0),
+        }
+    }
+
+    /// What the rig is doing.
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// How the last movement ended, told once.
+    pub fn take_ended(&mut self) -> Option<Ended> {
+        self.ended.take()
+    }
+
+    /// Contact force in mN as P_DC has it, mean over 10 ms.
+    pub fn force_mn(&self) -> f32 {
+        self.meter.force_mn(&self.calibration.pressure)
+    }
+
+    /// Wear of the skin.
+    pub fn skin(&mut self) -> &mut SkinCare {
+        &mut self.skin
+    }
+
+    /// The constants in use.
+    pub fn calibration(&self) -> &RigCalibration {
+        &self.calibration
+    }
+
+    /// Takes other constants, while nothing moves.
+    ///
+    /// # Errors
+    /// [`Refused::Busy`].
+    pub fn calibrate(&mut self, calibration: RigCalibration) -> Result<(), Refused> {
+        if !matches!(self.phase, Phase::Parked | Phase::Ready) {
+            return Err(Refused::Busy);
+        }
+        self.calibration = calibration;
+        self.meter = ForceMeter::new(calibration.pressure.pdc_no_contact);
+        Ok(())
+    }
+
+    /// Allows forces up to 2 N: the last row of the grid of eq. 21.
+    pub fn allow_high_force(&mut self, allow: bool) {
+        self.allow_high_force = allow;
+    }
+
+    /// Another sample lies under the finger: how thick it is has to be found out anew.
+    pub fn sample_changed(&mut self) {
+        self.lever.forget_contact();
+    }
+
+    /// Looks for the limit switches, the lever's first.
+    ///
+    /// # Errors
+    /// See [`Refused`].
+    pub fn home(&mut self) -> Result<(), Refused> {
+        match self.phase {
+            Phase::Parked | Phase::Ready => {
+                self.guard.reset();
+                self.lever.home();
+                self.enter(Phase::Homing);
+                Ok(())
+            }
+            Phase::Faulted(fault) => Err(Refused::Fault(fault)),
+            _ => Err(Refused::Busy),
+        }
+    }
+
+    /// Makes one movement, beginning at `start`: 0 to 1 of the room that the sample leaves.
+    ///
+    /// # Errors
+    /// See [`Refused`].
+    pub fn start(&mut self, movement: Movement, start: f32) -> Result<(), Refused> {
+        self.may_start()?;
+        if movement.force_mn() > HIGH_FORCE_MN && !self.allow_high_force {
+            return Err(Refused::Force(movement.force_mn()));
+        }
+        let speed = movement.speed_mm_s();
+        let length = (speed * STEADY_S).min(SlidePath::LONGEST_MM);
+        let path = SlidePath {
+            acceleration_mm_s2: self.stage.constants().acceleration_mm_s2,
+            ..SlidePath::new(movement, length)
+        };
+        let sample = SlidePath::SAMPLE_MM.min(self.stage.constants().travel_mm - 2.0 * MARGIN_MM);
+        let room = path.start_room_mm(sample).ok_or(Refused::Length)?;
+        // not-a-number clamps to itself, and is no start
+        let start = if start >= 0.0 { start.min(1.0) } else { 0.0 };
+        let from = MARGIN_MM + start * room;
+        self.path_mm = (from, from + path.travel_mm());
+        let steady = (path.ramp_s() + STEADY_MARGIN_S.min(0.2 * path.steady_s()))
+            ..(path.ramp_s() + path.steady_s());
+        self.steady_ms =
+            libm::ceilf(steady.start * 1e3) as u32..libm::floorf(steady.end * 1e3) as u32;
+        self.movement = movement;
+        self.damaged = 0;
+        self.current = (0.0, 0);
+        self.ended = None;
+        self.stage.go(from, RETURN_MM_S);
+        self.enter(Phase::Positioning);
+        Ok(())
+    }
+
+    /// Moves the stage over the whole sample at `speed_mm_s` with the finger lifted, and measures the motor current at
+    /// constant speed: see [`Control::mean_current_a`].
+    ///
+    /// # Errors
+    /// See [`Refused`].
+    pub fn start_unloaded(&mut self, speed_mm_s: f32) -> Result<(), Refused> {
+        self.may_start()?;
+        let far = self.stage.constants().travel_mm;
+        let to = if self.stage.position_mm() < far / 2.0 {
+            far
+        } else {
+            0.0
+        };
+        let profile = self.stage.go(to, speed_mm_s).ok_or(Refused::Busy)?;
+        let ramp_ms = profile.duration_s() * 1e3
+            - speed_mm_s / self.stage.constants().acceleration_mm_s2 * 1e3;
+        self.steady_ms = (libm::ceilf(speed_mm_s) as u32 + 150)..(libm::floorf(ramp_ms) as u32);
+        self.current = (0.0, 0);
+        self.ended = None;
+        self.enter(Phase::Unloaded);
+        Ok(())
+    }
+
+    /// Mean motor current at constant speed of the last slide or unloaded run, A; positive drives to the right.
+    pub fn mean_current_a(&self) -> Option<f32> {
+        let (sum, ticks) = self.current;
+        (ticks > 0).then(|| sum / ticks as f32)
+    }
+
+    fn may_start(&self) -> Result<(), Refused> {
+        match self.phase {
+            Phase::Ready => Ok(()),
+            Phase::Parked => Err(Refused::NotHomed),
+            Phase::Faulted(fault) => Err(Refused::Fault(fault)),
+            _ => Err(Refused::Busy),
+        }
+    }
+
+    /// Stops the stage and lifts the finger.
+    pub fn stop(&mut self) {
+        match self.phase {
+            Phase::Positioning
+            | Phase::Pressing
+            | Phase::Background
+            | Phase::Sliding
+            | Phase::Unloaded => {
+                self.stage.stop();
+                self.lever.home();
+                self.ended = Some(Ended::Stopped);
+                self.enter(Phase::Lifting);
+            }
+            Phase::Homing => {
+                self.stage.stop();
+                self.lever = Lever::new();
+                self.enter(Phase::Parked);
+            }
+            _ => {}
+        }
+    }
+
+    /// Ends a fault. Lever and stage have to be homed again.
+    pub fn reset(&mut self) {
+        if let Phase::Faulted(_) = self.phase {
+            self.guard.reset();
+            self.stage.stop();
+            self.lever = Lever::new();
+            self.enter(Phase::Parked);
+        }
+    }
+
+    fn enter(&mut self, phase: Phase) {
+        self.phase = phase;
+        self.ms = 0;
+    }
+
+    fn fail(&mut self, fault: Fault) {
+        self.stage.stop();
+        self.lever.home();
+        self.enter(Phase::Faulted(fault));
+    }
+
+    /// One millisecond.
+    pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
+        self.ms = self.ms.saturating_add(1);
+        for word in inputs.words.iter().flatten() {
+            if word.channel == Channel::Pdc {
+                self.meter.push(word.counts);
+            }
+        }
+        if let Some(fault) = self.watch(inputs) {
+            self.fail(fault);
+        }
+        let mut outputs = Outputs {
+            lever_enabled: true,
+            stage_enabled: true,
+            ..Outputs::default()
+        };
+        match self.stage.tick(inputs.encoder, inputs.stage_limits.0) {
+            Ok(duty) => outputs.stage_duty = duty,
+            Err(fault) => self.check(fault.into()),
+        }
+        match self
+            .lever
+            .tick(&mut self.meter, inputs.steps, inputs.lever_top)
+        {
+            Ok(rate) => outputs.lever_steps_s = rate,
+            Err(fault) => self.check(fault.into()),
+        }
+        self.advance(inputs, &mut outputs);
+        match self.phase {
+            Phase::Faulted(fault) => {
+                outputs.stage_duty = 0.0;
+                outputs.stage_enabled = false;
+                // a driver that steps on its own must lose its current; then the finger has pushed it back
+                outputs.lever_enabled = fault != Fault::LeverNotHome
+                    && (fault != Fault::ForceHigh || self.ms > RELEASE_MS);
+                if !outputs.lever_enabled {
+                    outputs.lever_steps_s = 0;
+                }
+            }
+            Phase::Parked => {
+                outputs.stage_duty = 0.0;
+                outputs.stage_enabled = false;
+            }
+            _ => {}
+        }
+        self.duty = outputs.stage_duty;
+        outputs
+    }
+
+    /// A fault that lever or stage have found themselves.
+    fn check(&mut self, fault: Fault) {
+        if self.guard.looks_for(fault) && !matches!(self.phase, Phase::Faulted(_)) {
+            self.fail(fault);
+        }
+    }
+
+    fn watch(&mut self, inputs: &Inputs) -> Option<Fault> {
+        let moving = match self.stage.state() {
+            StageState::Moving(profile) => profile.velocity_mm_s(),
+            _ => 0.0,
+        };
+        let pressing = matches!(
+            self.phase,
+            Phase::Pressing | Phase::Background | Phase::Sliding
+        );
+        let seen = Seen {
+            words: &inputs.words,
+            e_stop: inputs.e_stop,
+            lever_top: inputs.lever_top && pressing && self.lever.state() != LeverState::Lifted,
+            stage_limit: moving != 0.0 && (inputs.stage_limits.0 || inputs.stage_limits.1),
+            stage_wanted_mm_s: moving,
+            stage_mm: self.stage.position_mm(),
+            emf_mm_s: self
+                .stage
+                .constants()
+                .emf_speed_mm_s(self.duty, inputs.current_a),
+        };
+        let fault = self.guard.tick(
+            &seen,
+            &self.meter,
+            self.calibration.pressure.force_mn_per_count,
+        )?;
+        // a sensor that is switched off is no fault of a rig that does nothing
+        let idle = matches!(self.phase, Phase::Parked | Phase::Faulted(_));
+        (!idle).then_some(fault)
+    }
+
+    fn advance(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
+        if outputs.lever_steps_s != 0 {
+            self.pac = (0, 0);
+        }
+        for word in inputs
+            .words
+            .iter()
+            .flatten()
+            .filter(|w| w.channel == Channel::Pac)
+        {
+            self.pac.0 += u32::from(word.counts.get());
+            self.pac.1 += 1;
+        }
+        match self.phase {
+            Phase::Parked | Phase::Ready | Phase::Faulted(_) => {}
+            Phase::Homing => {
+                if self.lever.is_lifted() {
+                    match self.stage.state() {
+                        StageState::Unknown => self.stage.home(),
+                        StageState::Standing if self.ms > 1 => self.enter(Phase::Ready),
+                        _ => {}
+                    }
+                }
+            }
+            Phase::Positioning => {
+                if self.stage.state() == StageState::Standing {
+                    let target = f32::from(self.movement.force_mn())
+                        / self.calibration.pressure.force_mn_per_count;
+                    self.lever.press(target);
+                    self.enter(Phase::Pressing);
+                }
+            }
+            Phase::Pressing => {
+                if self.lever.state() == LeverState::Holding {
+                    let (sum, samples) = self.pac;
+                    self.baseline = ((sum + samples / 2) / samples.max(1)) as i32;
+                    self.enter(Phase::Background);
+                }
+            }
+            Phase::Background => {
+                self.feel(inputs, outputs);
+                outputs.felt = Felt::Still;
+                if self.ms >= BACKGROUND_MS {
+                    self.stage.go(self.path_mm.1, self.movement.speed_mm_s());
+                    self.enter(Phase::Sliding);
+                }
+            }
+            Phase::Sliding => {
+                self.feel(inputs, outputs);
+                // the stage started with the tick before the first one of this phase
+                let sample = |ms: u32| (u64::from(ms) * u64::from(RATE_HZ) / 1000) as u32;
+                outputs.felt = if self.ms == 1 {
+                    Felt::Begin(sample(self.steady_ms.start)..sample(self.steady_ms.end))
+                } else {
+                    Felt::Slide
+                };
+                let shear_n = self
+                    .calibration
+                    .shear_n(inputs.current_a, self.movement.speed_mm_s());
+                if self.steady_ms.contains(&self.ms) {
+                    outputs.shear_mn = Some((shear_n * 1e3) as i16);
+                }
+                self.skin
+                    .slid(shear_n, self.force_mn() * 1e-3, self.stage.velocity_mm_s());
+                if self.stage.state() == StageState::Standing {
+                    self.ended = Some(if self.damaged == 0 {
+                        Ended::Whole
+                    } else {
+                        Ended::Gap(self.damaged)
+                    });
+                    self.lever.lift(inputs.steps);
+                    self.enter(Phase::Lifting);
+                }
+            }
+            Phase::Unloaded => {
+                self.weigh_current(inputs);
+                if self.stage.state() == StageState::Standing {
+                    self.ended = Some(Ended::Whole);
+                    self.enter(Phase::Ready);
+                }
+            }
+            Phase::Lifting => {
+                if self.lever.is_lifted() {
+                    self.enter(Phase::Ready);
+                }
+            }
+        }
+    }
+
+    fn weigh_current(&mut self, inputs: &Inputs) {
+        if self.steady_ms.contains(&self.ms) {
+            self.current.0 += inputs.current_a;
+            self.current.1 += 1;
+        }
+    }
+
+    /// P_AC of this tick about the baseline.
+    fn feel(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
+        self.damaged += inputs.words.iter().filter(|w| w.is_none()).count() as u32;
+        let pac = inputs
+            .words
+            .iter()
+            .flatten()
+            .filter(|w| w.channel == Channel::Pac);
+        outputs.pac = pac
+            .map(|w| (i32::from(w.counts.get()) - self.baseline) as i16)
+            .collect();
+    }
+}

@@ -1,0 +1,338 @@
+//! What can go wrong, how it is noticed and what happens then: one table, and the detection of everything in it that can
+//! be seen from outside the lever and the stage.
+//!
+//! Whatever is noticed, the stage's motor goes off and the finger lifts before anything is reported.
+
+use super::force::ForceMeter;
+use super::lever::LeverFault;
+use super::stage::StageFault;
+use crate::pressure::Pressure;
+
+/// A fault of the rig.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub enum Fault {
+    /// The finger is pressed too hard.
+    ForceHigh,
+    /// The emergency stop is pressed.
+    EStop,
+    /// The limit switch of the lever is pressed while the finger presses.
+    LeverLimit,
+    /// The stage is at a limit switch while it should not be.
+    StageLimit,
+    /// The motor of the stage is driven and does not turn.
+    StageStall,
+    /// The motor of the stage turns, and the encoder says nothing.
+    EncoderSilent,
+    /// The stage does not follow its profile.
+    StageOff,
+    /// No readable word from the sensor.
+    SensorSilent,
+    /// Too many words are damaged.
+    SensorErrors,
+    /// The sensor says the same thing again and again.
+    SensorFrozen,
+    /// Samples of a slide are missing.
+    SlideGap,
+    /// Three slides in a row were rejected.
+    Rejected,
+    /// The lever came down all the way without contact.
+    NoContact,
+    /// The lever steps and the force does not follow.
+    LeverSlips,
+    /// The contact force does not stay where it was put.
+    Unsteady,
+    /// The lever did not find its limit switch.
+    LeverNotHome,
+    /// The stage did not find its limit switch.
+    StageNotHome,
+}
+
+/// A row of the fault table.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Row {
+    /// The fault.
+    pub fault: Fault,
+    /// Its name on the link and on the display.
+    pub name: &'static str,
+    /// How it is detected.
+    pub detected: &'static str,
+    /// Longest time in ms from the moment it can be detected until the motors have been told.
+    pub deadline_ms: u32,
+    /// What stops.
+    pub stops: &'static str,
+    /// What is refused until it is over.
+    pub refused: &'static str,
+    /// What the user does.
+    pub recovery: &'static str,
+}
+
+const BOTH: &str = "stage motor off, finger lifted to the limit switch";
+const ALL: &str = "every movement, until reset";
+
+macro_rules! rows {
+    ($($fault:ident, $name:literal, $detected:literal, $deadline:literal, $stops:expr, $refused:expr, $recovery:literal;)*) => {
+        /// Every fault, once.
+        pub const FAULTS: &[Row] = &[$(Row {
+            fault: Fault::$fault,
+            name: $name,
+            detected: $detected,
+            deadline_ms: $deadline,
+            stops: $stops,
+            refused: $refused,
+            recovery: $recovery,
+        }),*];
+    };
+}
+
+rows! {
+    ForceHigh, "force too high", "P_DC means more than 2.1 N, mean of 10 ms made up for its lag", 2,
+        "lever driver off at once, then finger lifted; stage motor off", ALL, "look at the lever and the sample, then reset";
+    EStop, "emergency stop", "its input", 2, BOTH, ALL, "release it, then reset";
+    LeverLimit, "lever at its limit", "upper limit switch while approaching, pressing or sliding, 3 ms", 5, BOTH, ALL,
+        "check the switch and its wire, then reset";
+    StageLimit, "stage at its limit", "a limit switch while moving and not looking for it, 3 ms", 5, BOTH, ALL,
+        "clear the stage's way, then reset";
+    StageStall, "stage blocked", "less than a tenth of the way made in 30 ms, and the motor has no back-EMF", 35, BOTH, ALL,
+        "clear the stage's way, then reset";
+    EncoderSilent, "encoder silent", "less than a tenth of the way made in 30 ms, and the motor's back-EMF says that it turns", 35,
+        BOTH, ALL, "check the encoder's wires, then reset";
+    StageOff, "stage off its path", "more than 1.5 mm off the profile, or not arrived 0.3 s after its end", 2, BOTH, ALL,
+        "check load, supply and encoder, then reset";
+    SensorSilent, "sensor silent", "no readable word for 10 ms", 12, BOTH, ALL, "check the sensor's cable and power, then reset";
+    SensorErrors, "sensor link bad", "23 damaged words within a second: half a percent", 2, BOTH, ALL,
+        "check cable length, ground and clock phase, then reset";
+    SensorFrozen, "sensor frozen", "P_AC the same for 100 ms, which always has noise", 102, BOTH, ALL,
+        "switch the sensor's power off and on, then reset";
+    SlideGap, "gap in a slide", "a damaged or late word between the background and the end of the slide", 2,
+        "nothing: the slide is finished", "the slide: it is repeated", "none";
+    Rejected, "three slides rejected", "counted", 2, "the exploration ends, finger lifted", "nothing", "look at the reasons given";
+    NoContact, "no contact", "lever at its lower end, P_DC unchanged", 2, BOTH, ALL, "put a sample under the finger, then reset";
+    LeverSlips, "lever slips", "3 mm of steps after contact and the force not reached", 2, BOTH, ALL,
+        "check the lever's motor and its current, then reset";
+    Unsteady, "force unsteady", "six trims and still more than 1 count and 5 % off", 2, BOTH, ALL,
+        "check that sample and lever are fixed, then reset";
+    LeverNotHome, "lever not home", "limit switch not reached in 1.25 times the travel", 2,
+        "both motors off", ALL, "lift the finger by hand, check the switch, then reset";
+    StageNotHome, "stage not home", "limit switch not reached in 1.25 times the travel", 2, BOTH, ALL,
+        "check the switch, then reset";
+}
+
+impl Fault {
+    /// The fault's row of the table.
+    pub fn row(self) -> Option<&'static Row> {
+        FAULTS.iter().find(|row| row.fault == self)
+    }
+
+    const fn bit(self) -> u32 {
+        1 << self as u32
+    }
+}
+
+impl core::fmt::Display for Fault {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(self.row().map_or("unknown fault", |row| row.name))
+    }
+}
+
+impl core::error::Error for Fault {}
+
+impl From<LeverFault> for Fault {
+    fn from(fault: LeverFault) -> Self {
+        match fault {
+            LeverFault::NotHome => Self::LeverNotHome,
+            LeverFault::NoContact => Self::NoContact,
+            LeverFault::Slips => Self::LeverSlips,
+            LeverFault::Unsteady => Self::Unsteady,
+        }
+    }
+}
+
+impl From<StageFault> for Fault {
+    fn from(fault: StageFault) -> Self {
+        match fault {
+            StageFault::Following => Self::StageOff,
+            StageFault::NotHome => Self::StageNotHome,
+        }
+    }
+}
+
+/// Force at which the finger is lifted, mN.
+pub const FORCE_LIMIT_MN: f32 = 2100.0;
+const SILENT_MS: u32 = 10;
+const FROZEN_MS: u32 = 100;
+const SWITCH_MS: u32 = 3;
+const MOTION_MS: u32 = 30;
+/// Damaged words in a second that are one too many.
+const MAX_DAMAGED: u32 = 22;
+/// Slices of that second.
+const SLICES: usize = 10;
+const SLICE_MS: u32 = 100;
+
+/// Faults whose detection is switched off. For tests, which must see that a missing guard is noticed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Unguarded(u32);
+
+impl Unguarded {
+    /// All guards are on but this one.
+    pub const fn against(fault: Fault) -> Self {
+        Self(fault.bit())
+    }
+
+    /// Whether `fault` is not looked for.
+    pub const fn ignores(self, fault: Fault) -> bool {
+        self.0 & fault.bit() != 0
+    }
+}
+
+/// What the guard looks at every millisecond.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    /// Words since the last millisecond; `None` is a damaged one.
+    pub words: &'a [Option<Pressure>],
+    /// The emergency stop.
+    pub e_stop: bool,
+    /// The lever's upper limit switch, while it should be open.
+    pub lever_top: bool,
+    /// A limit switch of the stage, while both should be open.
+    pub stage_limit: bool,
+    /// How fast the stage should go, mm/s.
+    pub stage_wanted_mm_s: f32,
+    /// How far the stage has come, mm.
+    pub stage_mm: f32,
+    /// How fast the stage's motor turns by its back-EMF, mm/s.
+    pub emf_mm_s: f32,
+}
+
+/// Watches over sensor, switches, stage and force.
+#[derive(Clone, Debug, Default)]
+pub struct Guard {
+    unguarded: Unguarded,
+    silent_ms: u32,
+    /// The last P_AC and P_DC, and for how many ms they have not changed.
+    last: [Option<Pressure>; 2],
+    frozen_ms: [u32; 2],
+    damaged: [u32; SLICES],
+    slice_ms: u32,
+    lever_top_ms: u32,
+    stage_limit_ms: u32,
+    motion_ms: u32,
+    /// Where the stage was when the motion began to be watched, how far it should have come since, and how far it has by
+    /// the motor's back-EMF, mm.
+    motion: (f32, f32, f32),
+}
+
+impl Guard {
+    /// A guard that looks for everything but `unguarded`.
+    pub fn new(unguarded: Unguarded) -> Self {
+        Self {
+            unguarded,
+            ..Self::default()
+        }
+    }
+
+    /// Forgets what it has seen, not what it ignores.
+    pub fn reset(&mut self) {
+        *self = Self::new(self.unguarded);
+    }
+
+    /// Whether `fault` is looked for.
+    pub fn looks_for(&self, fault: Fault) -> bool {
+        !self.unguarded.ignores(fault)
+    }
+
+    /// One millisecond. The first of several faults is the one that can hurt most.
+    pub fn tick(
+        &mut self,
+        seen: &Seen<'_>,
+        meter: &ForceMeter,
+        mn_per_count: f32,
+    ) -> Option<Fault> {
+        let sensor = self.sensor(seen.words);
+        let stage = self.stage(seen);
+        self.lever_top_ms = if seen.lever_top {
+            self.lever_top_ms + 1
+        } else {
+            0
+        };
+        self.stage_limit_ms = if seen.stage_limit {
+            self.stage_limit_ms + 1
+        } else {
+            0
+        };
+        let force = meter.counts().max(meter.counts_now()) * mn_per_count > FORCE_LIMIT_MN;
+        [
+            force.then_some(Fault::ForceHigh),
+            seen.e_stop.then_some(Fault::EStop),
+            (self.lever_top_ms >= SWITCH_MS).then_some(Fault::LeverLimit),
+            (self.stage_limit_ms >= SWITCH_MS).then_some(Fault::StageLimit),
+            stage,
+        ]
+        .into_iter()
+        .chain(sensor)
+        .flatten()
+        .find(|&fault| self.looks_for(fault))
+    }
+
+    fn sensor(&mut self, words: &[Option<Pressure>]) -> [Option<Fault>; 3] {
+        self.silent_ms = if words.iter().any(Option::is_some) {
+            0
+        } else {
+            self.silent_ms.saturating_add(1)
+        };
+        for frozen in &mut self.frozen_ms {
+            *frozen = frozen.saturating_add(1);
+        }
+        for word in words.iter().flatten() {
+            let channel = word.channel as usize;
+            if let (Some(last), Some(frozen)) =
+                (self.last.get_mut(channel), self.frozen_ms.get_mut(channel))
+                && *last != Some(*word)
+            {
+                *last = Some(*word);
+                *frozen = 0;
+            }
+        }
+        let damaged = words.iter().filter(|w| w.is_none()).count() as u32;
+        self.slice_ms += 1;
+        if self.slice_ms >= SLICE_MS {
+            self.slice_ms = 0;
+            self.damaged.rotate_right(1);
+            let [newest, ..] = &mut self.damaged;
+            *newest = 0;
+        }
+        let [newest, ..] = &mut self.damaged;
+        *newest += damaged;
+        // P_DC may well stand still for that long; P_AC has noise of a count and more
+        let [pac_frozen_ms, _] = self.frozen_ms;
+        [
+            (self.silent_ms >= SILENT_MS).then_some(Fault::SensorSilent),
+            (self.damaged.iter().sum::<u32>() > MAX_DAMAGED).then_some(Fault::SensorErrors),
+            (pac_frozen_ms >= FROZEN_MS).then_some(Fault::SensorFrozen),
+        ]
+    }
+
+    fn stage(&mut self, seen: &Seen<'_>) -> Option<Fault> {
+        let wanted = libm::fabsf(seen.stage_wanted_mm_s);
+        if wanted < 1.0 {
+            self.motion_ms = 0;
+            return None;
+        }
+        if self.motion_ms == 0 {
+            self.motion = (seen.stage_mm, 0.0, 0.0);
+        }
+        self.motion_ms += 1;
+        let (from, expected, turned) = &mut self.motion;
+        *expected += wanted * 1e-3;
+        *turned += libm::fabsf(seen.emf_mm_s) * 1e-3;
+        if self.motion_ms < MOTION_MS {
+            return None;
+        }
+        self.motion_ms = 0;
+        let stands = libm::fabsf(seen.stage_mm - *from) < *expected * 0.1;
+        match (stands, *turned < *expected * 0.5) {
+            (true, true) => Some(Fault::StageStall),
+            (true, false) => Some(Fault::EncoderSilent),
+            (false, _) => None,
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! The lever's motor: it lowers the finger until the force is right, holds, and lifts it again.
+//!
+//! A plain state machine, asked a thousand times a second. It answers with a step rate; whoever makes the steps counts
+//! them and gives the count back.
+
+use super::force::ForceMeter;
+
+/// Travel of the reference lever per step, um: lead 2 mm, 200 steps, 1/16.
+pub const STEP_UM: f32 = 0.625;
+/// Steps per second while approaching: 0.5 mm/s (Methods, "Force Control with Stepper Motor").
+pub const APPROACH_STEPS_S: i32 = 800;
+/// Steps per second while lifting, upwards: 2 mm/s, still within what a stepper starts and stops at without a ramp.
+pub const RETRACT_STEPS_S: i32 = -3200;
+/// Steps per second while the force is trimmed: slow enough to stop on a step.
+const TRIM_STEPS_S: i32 = 200;
+/// Between trials the finger hangs this far above the last contact: 1 mm.
+const CLEARANCE_STEPS: i32 = 1600;
+/// The lever goes at most this far below the limit switch: 10.5 mm, half a millimetre above its lower end. Where nothing was
+/// touched by then, there is no sample.
+pub const MAX_STEPS: i32 = 16_800;
+/// Contact is seen when the mean of P_DC has risen by this many counts: thirty times its noise.
+const CONTACT_COUNTS: f32 = 3.0;
+/// From contact to 2 N the finger gives way by less than 3 mm; more steps than that without the force are lost steps.
+const PRESS_STEPS: i32 = 4800;
+/// The skin creeps after it was pressed, and P_DC with it.
+const SETTLE_MS: u32 = 250;
+/// Mean of P_DC from which the force is trimmed: 100 ms, 220 samples.
+const WEIGH_MS: u32 = 100;
+/// The approach stops short by this many counts, so that trimming mostly presses on and never meets the backlash.
+const SHORT_COUNTS: f32 = 0.6;
+/// The force is good when it is this near, in counts, or ...
+const GOOD_COUNTS: f32 = 0.25;
+/// ... this near, as a share of the target.
+const GOOD_SHARE: f32 = 0.01;
+/// After this many trims the force has to be within tolerance.
+const MAX_TRIMS: u8 = 6;
+/// Tolerance of a pressed finger: 1 count or 5 %, whichever is more.
+const TOLERANCE_COUNTS: f32 = 1.0;
+const TOLERANCE_SHARE: f32 = 0.05;
+/// The value of no contact is a mean over this time.
+const ZERO_MS: u32 = 200;
+/// Vibration of the motor dies down before the zero is taken.
+const QUIET_MS: u32 = 100;
+
+/// What the lever is doing.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum LeverState {
+    /// Its position is not known, the motor stands.
+    Unknown,
+    /// Up, to the limit switch.
+    Homing,
+    /// Lifted and standing.
+    Lifted,
+    /// Lifted, and P_DC without contact is measured; for so many ms.
+    Zeroing(u32),
+    /// Down; the count of steps where contact was seen.
+    Approaching(Option<i32>),
+    /// Pressed, and waiting for the skin; for so many ms.
+    Settling(u32),
+    /// Pressed; the last correction is being stepped, to this count.
+    Trimming(i32),
+    /// Pressed with the force that was asked for. The motor stands, whatever the force does.
+    Holding,
+    /// Up, to this count of steps.
+    Retracting(i32),
+}
+
+/// Why pressing failed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum LeverFault {
+    /// The limit switch was not reached.
+    NotHome,
+    /// The lever came to its lower end without touching anything.
+    NoContact,
+    /// Steps are made, and the force does not follow.
+    Slips,
+    /// The force does not stay where it was put.
+    Unsteady,
+}
+
+/// The state machine of the lever.
+#[derive(Clone, Debug)]
+pub struct Lever {
+    state: LeverState,
+    /// Force asked for, in counts above no contact.
+    target: f32,
+    trims: u8,
+    /// Counts of P_DC per step near the target, learned during the approach.
+    counts_per_step: f32,
+    /// Count of steps and P_DC some way before the target.
+    before: Option<(i32, f32)>,
+    /// Count of steps at the limit switch, which is 0 of the travel.
+    top: i32,
+    /// Count of steps at the last contact.
+    contact: Option<i32>,
+    ms: u32,
+}
+
+impl Default for Lever {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Lever {
+    /// A lever that does not know where it is.
+    pub fn new() -> Self {
+        Self {
+            state: LeverState::Unknown,
+            target: 0.0,
+            trims: 0,
+            counts_per_step: 0.0,
+            before: None,
+            top: 0,
+            contact: None,
+            ms: 0,
+        }
+    }
+
+    /// What it is doing.
+    pub fn state(&self) -> LeverState {
+        self.state
+    }
+
+    /// Whether the finger is certainly off the sample, and the motor stands.
+    pub fn is_lifted(&self) -> bool {
+        self.state == LeverState::Lifted
+    }
+
+    /// Goes up to the limit switch. This is also what lifts the finger whatever has happened.
+    pub fn home(&mut self) {
+        self.enter(LeverState::Homing);
+    }
+
+    /// Measures P_DC without contact, then presses until P_DC has risen by `target` counts. Only a lifted lever does.
+    pub fn press(&mut self, target: f32) -> bool {
+        let lifted = self.is_lifted();
+        if lifted {
+            self.target = target;
+            self.enter(LeverState::Zeroing(0));
+        }
+        lifted
+    }
+
+    /// Lifts the finger clear of the sample.
+    pub fn lift(&mut self, steps: i32) {
+        match self.contact {
+            Some(contact) if self.state != LeverState::Unknown => {
+                self.enter(LeverState::Retracting(
+                    (contact - CLEARANCE_STEPS).max(self.top).min(steps),
+                ));
+            }
+            _ => self.home(),
+        }
+    }
+
+    /// Forgets where contact was: another sample may be thicker.
+    pub fn forget_contact(&mut self) {
+        self.contact = None;
+    }
+
+    fn enter(&mut self, state: LeverState) {
+        self.state = state;
+        self.ms = 0;
+    }
+
+    /// One millisecond: `steps` made so far (downwards positive), and whether the limit switch is pressed. Returns the
+    /// steps per second to make now, downwards positive.
+    ///
+    /// # Errors
+    /// The motor is to stand; the guard then lifts the finger.
+    pub fn tick(
+        &mut self,
+        meter: &mut ForceMeter,
+        steps: i32,
+        at_top: bool,
+    ) -> Result<i32, LeverFault> {
+        self.ms = self.ms.saturating_add(1);
+        match self.state {
+            LeverState::Unknown | LeverState::Lifted | LeverState::Holding => Ok(0),
+            LeverState::Homing => {
+                if at_top {
+                    self.top = steps;
+                    self.contact = None;
+                    self.enter(LeverState::Lifted);
+                    return Ok(0);
+                }
+                // the whole travel and a quarter, at the speed of lifting
+                let longest_ms = MAX_STEPS as u32 * 1250 / RETRACT_STEPS_S.unsigned_abs();
+                if self.ms > longest_ms {
+                    Err(LeverFault::NotHome)
+                } else {
+                    Ok(RETRACT_STEPS_S)
+                }
+            }
+            LeverState::Zeroing(_) => {
+                if self.ms == QUIET_MS {
+                    meter.begin_long();
+                } else if self.ms >= QUIET_MS + ZERO_MS {
+                    meter.zero();
+                    self.before = None;
+                    self.trims = 0;
+                    self.enter(LeverState::Approaching(None));
+                    return Ok(APPROACH_STEPS_S);
+                }
+                self.state = LeverState::Zeroing(self.ms);
+                Ok(0)
+            }
+            LeverState::Approaching(contact) => self.approach(meter, steps, contact),
+            LeverState::Settling(_) => {
+                if self.ms == SETTLE_MS {
+                    meter.begin_long();
+                } else if self.ms >= SETTLE_MS + WEIGH_MS {
+                    return self.weigh(meter, steps);
+                }
+                self.state = LeverState::Settling(self.ms);
+                Ok(0)
+            }
+            LeverState::Trimming(to) => {
+                if steps == to {
+                    self.enter(LeverState::Settling(0));
+                    Ok(0)
+                } else {
+                    Ok(TRIM_STEPS_S * (to - steps).signum())
+                }
+            }
+            LeverState::Retracting(to) => {
+                if at_top || steps <= to {
+                    self.enter(LeverState::Lifted);
+                    Ok(0)
+                } else {
+                    Ok(RETRACT_STEPS_S)
+                }
+            }
+        }
+    }
+
+    fn approach(
+        &mut self,
+        meter: &ForceMeter,
+        steps: i32,
+        contact: Option<i32>,
+    ) -> Result<i32, LeverFault> {
+        let counts = meter.counts_now();
+        let contact = contact.or_else(|| (meter.counts() > CONTACT_COUNTS).then_some(steps));
+        self.state = LeverState::Approaching(contact);
+        match contact {
+            None if steps - self.top >= MAX_STEPS => return Err(LeverFault::NoContact),
+            None => return Ok(APPROACH_STEPS_S),
+            Some(at) if steps - at > PRESS_STEPS => return Err(LeverFault::Slips),
+            Some(at) => self.contact = Some(at),
+        }
+        // stiffness over the last part of the way, for the trims
+        if self.before.is_none() && counts > self.target * 0.6 {
+            self.before = Some((steps, counts));
+        }
+        if counts < self.target - SHORT_COUNTS {
+            return Ok(APPROACH_STEPS_S);
+        }
+        if let Some((from, before)) = self.before {
+            let made = (steps - from) as f32;
+            let rise = (counts - before) / made;
+            // a light target is reached before the mean has filled: 1 N/mm then, the softest that a finger is
+            let softest = STEP_UM / 11.5;
+            self.counts_per_step = if made > 0.0 && rise > softest {
+                rise
+            } else {
+                softest
+            };
+        }
+        self.enter(LeverState::Settling(0));
+        Ok(0)
+    }
+
+    /// The skin has settled: is the force right, or how many steps is it off?
+    fn weigh(&mut self, meter: &ForceMeter, steps: i32) -> Result<i32, LeverFault> {
+        let Some(counts) = meter.long_counts() else {
+            return Err(LeverFault::Unsteady);
+        };
+        let off = self.target - counts;
+        let near = |counts: f32, share: f32| libm::fabsf(off) <= counts.max(share * self.target);
+        if near(GOOD_COUNTS, GOOD_SHARE)
+            || (self.trims >= MAX_TRIMS && near(TOLERANCE_COUNTS, TOLERANCE_SHARE))
+        {
+            self.enter(LeverState::Holding);
+            return Ok(0);
+        }
+        if self.trims >= MAX_TRIMS {
+            return Err(LeverFault::Unsteady);
+        }
+        self.trims += 1;
+        // never more than half the way to the lower end of the press at once, whatever was learned
+        let correction = libm::roundf(off / self.counts_per_step).clamp(-400.0, 400.0) as i32;
+        let correction = if correction == 0 {
+            if off > 0.0 { 1 } else { -1 }
+        } else {
+            correction
+        };
+        self.enter(LeverState::Trimming(steps + correction));
+        Ok(TRIM_STEPS_S * correction.signum())
+    }
+}

@@ -1,0 +1,302 @@
+//! The stage: a trapezoidal profile, and the velocity PI that follows it a thousand times a second.
+
+/// Constants of one stage.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct StageConstants {
+    /// Travel per encoder count, mm.
+    pub mm_per_count: f32,
+    /// Length of the travel between the limit switches, mm.
+    pub travel_mm: f32,
+    /// Acceleration of every ramp, mm/s^2.
+    pub acceleration_mm_s2: f32,
+    /// Feed-forward: duty per mm/s, and per mm/s^2.
+    pub duty_per_mm_s: f32,
+    /// See above.
+    pub duty_per_mm_s2: f32,
+    /// Proportional gain: duty per mm/s of velocity error.
+    pub p: f32,
+    /// Integral gain: duty per mm; the integral of the velocity error is the position error.
+    pub i: f32,
+    /// Supply of the bridge, V.
+    pub supply_v: f32,
+    /// Resistance of motor, leads and bridge, ohm.
+    pub resistance_ohm: f32,
+    /// Back-EMF, V per mm/s.
+    pub emf_v_per_mm_s: f32,
+}
+
+impl StageConstants {
+    /// The reference stage: 12 V, a 10 mm screw, 16.4 N/A, 1.2 kg, an encoder of 1 um.
+    pub const REFERENCE: Self = Self {
+        mm_per_count: 1e-3,
+        travel_mm: 77.0,
+        acceleration_mm_s2: 1000.0,
+        duty_per_mm_s: 1.37e-3,
+        duty_per_mm_s2: 4.7e-5,
+        p: 0.006,
+        i: 0.15,
+        supply_v: 12.0,
+        resistance_ohm: 7.5,
+        emf_v_per_mm_s: 0.0164,
+    };
+
+    /// Speed in mm/s at which the motor must be turning, from what it is given and what it takes: tells a blocked stage
+    /// from a silent encoder.
+    pub fn emf_speed_mm_s(&self, duty: f32, current_a: f32) -> f32 {
+        (duty * self.supply_v - current_a * self.resistance_ohm) / self.emf_v_per_mm_s
+    }
+}
+
+/// Largest distance between profile and stage that is still following, mm.
+const FOLLOWING_MM: f32 = 1.5;
+/// Velocity is taken over this many ms of encoder counts.
+const VELOCITY_MS: usize = 4;
+/// Distance kept from the limit switches, mm.
+pub const MARGIN_MM: f32 = 1.0;
+const HOMING_MM_S: f32 = 10.0;
+/// The stage has arrived when it stands this near, mm.
+const ARRIVED_MM: f32 = 0.05;
+/// It has time for that after the profile's end, ms.
+const ARRIVE_MS: u32 = 300;
+
+/// What the stage is doing.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum StageState {
+    /// It does not know where it is; the motor is off.
+    Unknown,
+    /// Towards the left limit switch.
+    Homing,
+    /// Standing; the motor is off.
+    Standing,
+    /// On its way.
+    Moving(Profile),
+}
+
+/// Rest to rest: ramp, constant speed, ramp.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Profile {
+    from_mm: f32,
+    direction: f32,
+    distance_mm: f32,
+    speed_mm_s: f32,
+    acceleration_mm_s2: f32,
+    ms: u32,
+}
+
+impl Profile {
+    fn new(from_mm: f32, to_mm: f32, speed_mm_s: f32, acceleration_mm_s2: f32) -> Self {
+        let way = to_mm - from_mm;
+        let distance_mm = libm::fabsf(way);
+        // a short way has no constant part
+        let speed_mm_s = speed_mm_s.min(libm::sqrtf(distance_mm * acceleration_mm_s2));
+        Self {
+            from_mm,
+            direction: if way < 0.0 { -1.0 } else { 1.0 },
+            distance_mm,
+            speed_mm_s,
+            acceleration_mm_s2,
+            ms: 0,
+        }
+    }
+
+    fn ramp_s(&self) -> f32 {
+        self.speed_mm_s / self.acceleration_mm_s2
+    }
+
+    /// Duration in s.
+    pub fn duration_s(&self) -> f32 {
+        if self.speed_mm_s > 0.0 {
+            self.distance_mm / self.speed_mm_s + self.ramp_s()
+        } else {
+            0.0
+        }
+    }
+
+    /// Velocity in mm/s at this moment of the move.
+    pub fn velocity_mm_s(&self) -> f32 {
+        self.at(self.ms as f32 * 1e-3).1
+    }
+
+    /// Position in mm, velocity in mm/s and acceleration in mm/s^2 at `t` seconds.
+    pub fn at(&self, t: f32) -> (f32, f32, f32) {
+        let (ramp, end) = (self.ramp_s(), self.duration_s());
+        let a = self.acceleration_mm_s2;
+        let (way, v, a) = if t >= end {
+            (self.distance_mm, 0.0, 0.0)
+        } else if t < ramp {
+            (a * t * t / 2.0, a * t, a)
+        } else if t < end - ramp {
+            (self.speed_mm_s * (t - ramp / 2.0), self.speed_mm_s, 0.0)
+        } else {
+            let left = end - t;
+            (self.distance_mm - a * left * left / 2.0, a * left, -a)
+        };
+        (
+            self.from_mm + self.direction * way,
+            self.direction * v,
+            self.direction * a,
+        )
+    }
+}
+
+/// Why a move failed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum StageFault {
+    /// The motor pushes and the stage does not follow.
+    Following,
+    /// The limit switch was not reached.
+    NotHome,
+}
+
+/// The state machine of the stage.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    constants: StageConstants,
+    state: StageState,
+    /// Encoder count at position 0, the left limit switch.
+    zero: i32,
+    /// The last counts, newest last.
+    counts: [i32; VELOCITY_MS + 1],
+    /// Homing: where the profile has come to, mm from where it began.
+    homing: (i32, u32),
+}
+
+impl Stage {
+    /// A stage that does not know where it is.
+    pub fn new(constants: StageConstants) -> Self {
+        Self {
+            constants,
+            state: StageState::Unknown,
+            zero: 0,
+            counts: [0; VELOCITY_MS + 1],
+            homing: (0, 0),
+        }
+    }
+
+    /// What it is doing.
+    pub fn state(&self) -> StageState {
+        self.state
+    }
+
+    /// Its constants.
+    pub fn constants(&self) -> &StageConstants {
+        &self.constants
+    }
+
+    /// Position in mm from the left limit switch.
+    pub fn position_mm(&self) -> f32 {
+        (self.now() - self.zero) as f32 * self.constants.mm_per_count
+    }
+
+    /// Velocity in mm/s, mean over the last 4 ms.
+    pub fn velocity_mm_s(&self) -> f32 {
+        let [oldest, ..] = self.counts;
+        (self.now() - oldest) as f32 * self.constants.mm_per_count * (1000.0 / VELOCITY_MS as f32)
+    }
+
+    fn now(&self) -> i32 {
+        let [.., newest] = self.counts;
+        newest
+    }
+
+    /// Looks for the left limit switch.
+    pub fn home(&mut self) {
+        self.homing = (self.now(), 0);
+        self.state = StageState::Homing;
+    }
+
+    /// Moves to `to_mm`, kept [`MARGIN_MM`] from the limit switches. Only a standing stage does; the profile says how long
+    /// it takes.
+    pub fn go(&mut self, to_mm: f32, speed_mm_s: f32) -> Option<Profile> {
+        if self.state != StageState::Standing {
+            return None;
+        }
+        let to_mm = to_mm.clamp(MARGIN_MM, self.constants.travel_mm - MARGIN_MM);
+        let profile = Profile::new(
+            self.position_mm(),
+            to_mm,
+            speed_mm_s,
+            self.constants.acceleration_mm_s2,
+        );
+        self.state = StageState::Moving(profile);
+        Some(profile)
+    }
+
+    /// The motor goes off, whatever it was doing.
+    pub fn stop(&mut self) {
+        if self.state != StageState::Unknown && self.state != StageState::Homing {
+            self.state = StageState::Standing;
+        } else {
+            self.state = StageState::Unknown;
+        }
+    }
+
+    /// One millisecond: the encoder's count, and whether the left limit switch is pressed. Returns the duty of the motor,
+    /// -1 to 1.
+    ///
+    /// # Errors
+    /// The motor is to be off.
+    pub fn tick(&mut self, count: i32, at_left: bool) -> Result<f32, StageFault> {
+        self.counts.rotate_left(1);
+        let [.., newest] = &mut self.counts;
+        *newest = count;
+        let c = self.constants;
+        match self.state {
+            StageState::Unknown | StageState::Standing => Ok(0.0),
+            StageState::Homing => {
+                if at_left {
+                    self.zero = count;
+                    self.state = StageState::Standing;
+                    return Ok(0.0);
+                }
+                let (from, ms) = self.homing;
+                self.homing.1 = ms + 1;
+                let t = ms as f32 * 1e-3;
+                let way = (from - count) as f32 * c.mm_per_count;
+                let off = HOMING_MM_S * t - way;
+                if t * HOMING_MM_S > c.travel_mm * 1.25 {
+                    return Err(StageFault::NotHome);
+                }
+                if off > FOLLOWING_MM {
+                    return Err(StageFault::Following);
+                }
+                let duty = c.duty_per_mm_s * HOMING_MM_S
+                    + c.p * (HOMING_MM_S + self.velocity_mm_s())
+                    + c.i * off;
+                Ok((-duty).clamp(-1.0, 1.0))
+            }
+            StageState::Moving(mut profile) => {
+                profile.ms += 1;
+                let t = profile.ms as f32 * 1e-3;
+                let (x, v, a) = profile.at(t);
+                let off = x - self.position_mm();
+                let over = profile
+                    .ms
+                    .saturating_sub(libm::ceilf(profile.duration_s() * 1e3) as u32);
+                if libm::fabsf(off) > FOLLOWING_MM || over > ARRIVE_MS {
+                    return Err(StageFault::Following);
+                }
+                if over > 0
+                    && libm::fabsf(off) < ARRIVED_MM
+                    && libm::fabsf(self.velocity_mm_s()) < 0.5
+                {
+                    self.state = StageState::Standing;
+                    return Ok(0.0);
+                }
+                self.state = StageState::Moving(profile);
+                // the velocity lags by half of what it is taken over
+                let (_, v_then, _) = profile.at(t - VELOCITY_MS as f32 * 0.5e-3);
+                let duty = c.duty_per_mm_s * v
+                    + c.duty_per_mm_s2 * a
+                    + c.p
+                        * (if t < VELOCITY_MS as f32 * 0.5e-3 {
+                            0.0
+                        } else {
+                            v_then
+                        } - self.velocity_mm_s())
+                    + c.i * off;
+                Ok(duty.clamp(-1.0, 1.0))
+            }
+        }
+    }
+}
