@@ -8,3 +8,4 @@ pub mod recordings;
 pub mod replay;
 pub mod rows;
 pub mod show;
+pub mod sim;

@@ -1,0 +1,27 @@
+//! The simulated world: textures, their surfaces, the finger that touches them, and the sensor's words.
+//!
+//! Everything here is physics and protocol. It knows nothing of the features, tables and decisions of the core and may not
+//! import them (a test looks): what is simulated has to be hard to fool. Every constant is a figure of the paper (PAPER:
+//! Fishel & Loeb 2012), of the makers' documents (SPM, HDR, OUT: see shared/facts/biotac.md) or says "chosen".
+//!
+//! A world is its seeds: the same seeds give the same words.
+
+pub mod finger;
+mod noise;
+pub mod sensor;
+pub mod surface;
+pub mod textures;
+
+#[cfg(test)]
+mod tests;
+
+/// Ticks of the world in a second: three for each of the 4400 slots in which the sensor is asked for a sample (PAPER: both
+/// pressures at 2200 Hz).
+pub const TICKS_PER_S: u32 = 13_200;
+/// Length of a tick, s.
+pub const TICK_S: f64 = 1.0 / 13_200.0;
+
+/// How much one touch of a texture differs from the next: a factor on the deviations of the contact's state, drawn at
+/// every touch (see [`finger`]), and on the heterogeneity of the samples (see [`surface`]). Chosen; 0 leaves the start
+/// position and the noise of the sensor as the only differences.
+pub const TRIAL_VARIATION: f64 = 1.0;

@@ -1,0 +1,261 @@
+//! The BioTac finger: what a contact does to its skin, its fluid and its two pressure signals.
+//!
+//! A tick goes: the skin is indented ([`skin`]), sticks or slips along the surface, ridges and fluid turn what they slide
+//! over into pressure ([`vibration`]), and the amplifiers make the two signals that the sensor samples ([`amplifier`]).
+
+mod amplifier;
+mod skin;
+mod vibration;
+
+use super::noise::Noise;
+use super::surface::Surface;
+use super::{TICK_S, TRIAL_VARIATION};
+use amplifier::Amplifiers;
+use skin::Skin;
+use vibration::Vibrations;
+
+pub use amplifier::{PAC_NOISE_FIELD_COUNTS, PAC_NOISE_PA, PAC_PA_PER_COUNT, PDC_PA_PER_COUNT};
+pub use skin::N_PER_COUNT;
+
+/// Pressure of the fluid for each newton on the skin, Pa/N: a P_DC count (PAPER: 36.96 Pa) is 11.5 mN (PAPER fig. 3).
+pub const PA_PER_N: f64 = PDC_PA_PER_COUNT / N_PER_COUNT;
+
+/// Deviations of the contact's state, drawn at every touch and multiplied by [`TRIAL_VARIATION`]; all chosen.
+mod touch {
+    /// Of ln(friction) at rest: moisture, dust, how the skin has landed.
+    pub(super) const FRICTION: f64 = 0.02;
+    /// It grows with speed, being twice as much at this one, mm/s (PAPER: slow slides gave the more stable forces).
+    pub(super) const FRICTION_SPEED_MM_S: f64 = 40.0;
+    /// Of the shear that does not depend on load (adhesion), N.
+    pub(super) const ADHESION_N: f64 = 0.008;
+    /// Of ln(amplitude of vibrations).
+    pub(super) const VIBRATION: f64 = 0.04;
+    /// More of the same for each newton: pressed hard, it matters more how the skin lies on the core.
+    pub(super) const VIBRATION_PER_N: f64 = 0.10;
+    /// Of ln(resonant frequency).
+    pub(super) const RESONANCE: f64 = 0.03;
+}
+
+/// Relative deviation of friction while it slides at 25 mm/s, growing with speed (PAPER: slow slides are the more stable).
+const UNSTEADY: f64 = 0.02;
+/// Speed for the above, mm/s.
+const UNSTEADY_AT_MM_S: f64 = 25.0;
+/// Memory of that, s (chosen).
+const UNSTEADY_S: f64 = 0.15;
+
+/// Shear stiffness of the skin, N/mm (chosen: as stiff as it is in the direction of the press).
+const SHEAR_N_PER_MM: f64 = 1.0;
+/// Shear bulges the skin: part of it that adds to the fluid's pressure like a normal force (PAPER: "modest changes").
+const SHEAR_TO_PDC: f64 = 0.03;
+/// Friction changes slowly along a sample: it is looked up every so many ticks.
+const FRICTION_TICKS: u32 = 8;
+
+/// Sliding energy after which the ridges are gone, at low power, J. Chosen so that the paper's 117 * 15 slides, some 50 J,
+/// take about the two skins that they took, each replaced at the first visible sign of wear.
+const SKIN_LIFE_J: f64 = 200.0;
+/// Sliding power at which a joule wears twice as much as at low power, mW (chosen: the paper's movements, all of
+/// 12.6 mW times the coefficient of friction, wear little; those it avoided for wear are above 20 mW).
+const WEAR_POWER_MW: f64 = 25.0;
+
+/// What the finger touches and how it moves.
+#[derive(Clone, Copy)]
+pub struct Contact<'a> {
+    /// How far the skin is pressed against the surface, mm; not touching if not above 0.
+    pub indentation_mm: f64,
+    /// What is under the finger.
+    pub surface: Option<&'a Surface>,
+    /// Position of the finger on the sample, mm.
+    pub x_mm: f64,
+    /// Velocity of the finger along the sample, mm/s.
+    pub speed_mm_s: f64,
+    /// Pressure that the vibration of the mounting adds, Pa.
+    pub lever_vibration: f64,
+}
+
+/// State of one contact, drawn when the skin lands; standard normal but for the scale of the whole.
+#[derive(Clone, Copy, Default)]
+struct Touch {
+    friction: f64,
+    adhesion: f64,
+    vibration: f64,
+    resonance: f64,
+}
+
+/// A BioTac.
+pub struct Finger {
+    noise: Noise,
+    skin: Skin,
+    vibrations: Vibrations,
+    amplifiers: Amplifiers,
+    /// the present contact
+    touch: Option<Touch>,
+    /// relative unsteadiness of friction
+    unsteady: f64,
+    /// coefficient of friction as last looked up, and when to look again
+    friction: f64,
+    look_again: u32,
+    slipping: bool,
+    shear_n: f64,
+    wear: f64,
+}
+
+impl Finger {
+    /// A finger with a new skin.
+    pub fn new(seed: u64) -> Self {
+        let mut noise = Noise::new(seed, 500);
+        Self {
+            skin: Skin::default(),
+            vibrations: Vibrations::default(),
+            amplifiers: Amplifiers::new(&mut noise),
+            touch: None,
+            unsteady: 0.0,
+            friction: 0.0,
+            look_again: 0,
+            slipping: false,
+            shear_n: 0.0,
+            wear: 0.0,
+            noise,
+        }
+    }
+
+    /// The same finger with another noise of the amplifier of P_AC, in counts rms: 1.4 as in the paper, which is the
+    /// default, or [`PAC_NOISE_FIELD_COUNTS`] as in recordings of real devices.
+    #[must_use]
+    pub fn with_pac_noise(mut self, counts: f64) -> Self {
+        self.amplifiers.set_pac_noise(counts * PAC_PA_PER_COUNT);
+        self
+    }
+
+    /// Advances by [`TICK_S`].
+    pub fn tick(&mut self, contact: &Contact<'_>) {
+        let white = self.noise.white();
+        let mut pressure_pa = contact.lever_vibration;
+        match contact.surface {
+            Some(surface) if contact.indentation_mm > 0.0 => {
+                pressure_pa += self.touching(contact, surface, white);
+            }
+            _ => {
+                self.touch = None;
+                self.skin.lift();
+                self.shear_n = 0.0;
+                self.slipping = false;
+            }
+        }
+        let resonance = self
+            .touch
+            .map_or(0.0, |t| touch::RESONANCE * t.resonance)
+            .exp();
+        let force = self.skin.fluid_n();
+        let fluid_pa = self
+            .vibrations
+            .fluid(pressure_pa + PA_PER_N * force, force, resonance);
+        let dc_n = force + SHEAR_TO_PDC * self.shear_n.abs();
+        self.amplifiers
+            .tick(fluid_pa, PA_PER_N * dc_n, &mut self.noise);
+    }
+
+    /// A tick in contact; gives the pressure of vibrations, Pa.
+    fn touching(&mut self, contact: &Contact<'_>, surface: &Surface, white: [f64; 2]) -> f64 {
+        let landed = self.touch.is_none();
+        let touch = match self.touch {
+            Some(touch) => touch,
+            None => self.land(),
+        };
+        let texture = surface.texture();
+        let force = self.skin.fluid_n();
+        let deviation = touch::VIBRATION + touch::VIBRATION_PER_N * force;
+        let amplitude = (deviation * touch.vibration).exp();
+        let follow_um =
+            self.vibrations
+                .follow_um(surface, contact.x_mm, force, amplitude, self.wear);
+        self.skin.press(
+            contact.indentation_mm + 1e-3 * follow_um,
+            texture.compliance_mm_per_n,
+            landed,
+        );
+        let load_n = self.skin.force_n();
+
+        let speed = contact.speed_mm_s.abs();
+        if self.look_again == 0 || landed {
+            self.look_again = FRICTION_TICKS;
+            self.friction = surface.friction(contact.x_mm, speed, load_n);
+            let deviation = touch::FRICTION * (1.0 + speed / touch::FRICTION_SPEED_MM_S);
+            self.friction *= (deviation * touch.friction).exp();
+        }
+        self.look_again -= 1;
+        self.shear(contact.speed_mm_s, load_n, texture.stiction, touch);
+
+        let sliding = if self.slipping { speed } else { 0.0 };
+        let power_mw = self.shear_n.abs() * sliding;
+        let excess = power_mw / WEAR_POWER_MW;
+        self.wear =
+            (self.wear + 1e-3 * power_mw * TICK_S / SKIN_LIFE_J * (1.0 + excess * excess)).min(1.0);
+
+        self.vibrations
+            .sliding_pa(surface, contact.x_mm, sliding, self.shear_n.abs(), white)
+    }
+
+    /// Draws the state of a new contact.
+    fn land(&mut self) -> Touch {
+        let mut draw = || TRIAL_VARIATION * self.noise.normal();
+        let touch = Touch {
+            friction: draw(),
+            adhesion: draw(),
+            vibration: draw(),
+            resonance: draw(),
+        };
+        self.touch = Some(touch);
+        touch
+    }
+
+    /// Sticks, breaks away or slips: the skin stretches until static friction gives way, then kinetic friction holds it.
+    fn shear(&mut self, speed_mm_s: f64, load_n: f64, stiction: f64, touch: Touch) {
+        let memory = TICK_S / UNSTEADY_S;
+        let kick = (2.0 * memory).sqrt() * UNSTEADY * (speed_mm_s.abs() / UNSTEADY_AT_MM_S).sqrt();
+        self.unsteady += -memory * self.unsteady + kick * self.noise.white()[0];
+        let adhesion = touch::ADHESION_N * touch.adhesion;
+        let kinetic = (self.friction * (1.0 + self.unsteady) * load_n + adhesion).max(0.0);
+
+        // opposes the motion; unloading the skin lets it spring back
+        self.shear_n -= SHEAR_N_PER_MM * speed_mm_s * TICK_S;
+        let held = if self.slipping {
+            kinetic
+        } else {
+            kinetic * (1.0 + stiction)
+        };
+        self.slipping = speed_mm_s != 0.0 && self.shear_n.abs() >= held;
+        if self.shear_n.abs() > held {
+            self.shear_n = kinetic.copysign(self.shear_n);
+        }
+    }
+
+    /// Force on the skin, N.
+    pub fn force_n(&self) -> f64 {
+        self.skin.force_n()
+    }
+
+    /// Shear force on the finger, N; it opposes the motion.
+    pub fn shear_n(&self) -> f64 {
+        self.shear_n
+    }
+
+    /// Wear of the skin: 0 is new, at 1 its ridges are gone.
+    pub fn wear(&self) -> f64 {
+        self.wear
+    }
+
+    /// Puts on a new skin.
+    pub fn replace_skin(&mut self) {
+        self.wear = 0.0;
+    }
+
+    /// Samples P_AC, in counts, `fraction` (0..1) of a tick after the last but one.
+    pub fn sample_pac(&mut self, fraction: f64) -> u16 {
+        self.amplifiers.sample_pac(fraction, &mut self.noise)
+    }
+
+    /// Samples P_DC, in counts, `fraction` (0..1) of a tick after the last but one.
+    pub fn sample_pdc(&mut self, fraction: f64) -> u16 {
+        self.amplifiers.sample_pdc(fraction, &mut self.noise)
+    }
+}

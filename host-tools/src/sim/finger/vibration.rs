@@ -1,0 +1,137 @@
+//! What sliding makes of a surface: vibrations, and how the fluid carries them.
+//!
+//! Three sources. The ridges follow the surface up and down: a spatial filter over the contact patch, which gives lines at
+//! v/lambda (eq. 17) and tells coarse from fine. Asperities too fine to be followed catch and release: impulses, more of
+//! them the faster it goes, that excite the resonance of the fluid whatever the speed. And friction itself fluctuates,
+//! with a 1/f spectrum, in proportion to the shear (PAPER after Wiertlewski 2011).
+
+use std::f64::consts::TAU;
+
+use super::PA_PER_N;
+use crate::sim::TICK_S;
+use crate::sim::surface::Surface;
+
+/// Distance of the ridges, mm (PAPER).
+const RIDGE_MM: f64 = 0.4;
+/// Half length of the contact patch at 1 N, mm; it goes with the cube root of force (Hertz). Chosen: a finger of about
+/// 7 mm radius.
+const PATCH_MM: f64 = 2.5;
+/// Half length of the patch that the profile of a surface still has to cover, mm.
+const PATCH_MAX_MM: f64 = 3.4;
+/// Vibrations with the ridges gone, relative to new (chosen; PAPER: ridges "greatly enhance" them).
+const WITHOUT_RIDGES: f64 = 0.3;
+
+/// Vibrations fall as 1 / (1 + F / this), N, the skin being clamped the more it is pressed (chosen; PAPER: "greater forces
+/// tend to dampen vibrations").
+const DAMPING_N: f64 = 0.6;
+/// Impulses of unresolved asperities: Pa for each um of height and each root of an asperity in a millisecond, as noise of
+/// one value a tick (chosen, for the levels of P_AC that sliding fingers show).
+const IMPULSE_PA: f64 = 22.0;
+/// Fluctuations of friction grow with speed to this power ...
+const FRICTION_SPEED_POWER: f64 = 0.3;
+/// ... and are the texture's at this speed, mm/s. Both chosen.
+const FRICTION_SPEED_MM_S: f64 = 25.0;
+
+/// Resonance of the fluid at rest and its rise with the root of force, Hz and Hz/N^0.5: 200 to 350 Hz from 0 to 2 N (PAPER:
+/// 200-350 Hz).
+const RESONANCE_HZ: (f64, f64) = (200.0, 106.0);
+/// Its damping ratio at rest, and its rise with force, 1/N (chosen).
+const RESONANCE_DAMPING: (f64, f64) = (0.15, 0.08);
+/// Ticks from one tuning of the resonance to the next.
+const TUNE_TICKS: u32 = 16;
+
+/// Sections that make 1/f noise of white noise, each of the same power, with corners two octaves apart over the band of
+/// P_AC (3, 12, 48, 192 and 768 Hz): pole a tick, and gain.
+const PINK: [(f64, f64); 5] = {
+    // 2 pi 3 Hz at 13,200 ticks a second
+    const POLE: f64 = TAU * 3.0 * TICK_S;
+    [
+        (POLE, 16.0 * GAIN),
+        (4.0 * POLE, 8.0 * GAIN),
+        (16.0 * POLE, 4.0 * GAIN),
+        (64.0 * POLE, 2.0 * GAIN),
+        (256.0 * POLE, GAIN),
+    ]
+};
+/// Gain of the fastest section: for a sum of rms 1 (found by `tests::noises`).
+const GAIN: f64 = 0.5;
+
+/// State of the vibrations.
+#[derive(Default)]
+pub(super) struct Vibrations {
+    /// part of the vibrations that passes
+    passed: f64,
+    pink: [f64; 5],
+    /// the fluid's pressure, Pa, and its rate, Pa/s
+    fluid: f64,
+    rate: f64,
+    tune_in: u32,
+    stiffness: f64,
+    drag: f64,
+    /// half length of the patch, mm
+    patch_mm: f64,
+}
+
+impl Vibrations {
+    /// How far the patch follows the surface at `x_mm`, um. `amplitude` is that of this touch.
+    pub(super) fn follow_um(
+        &mut self,
+        surface: &Surface,
+        x_mm: f64,
+        load_n: f64,
+        amplitude: f64,
+        wear: f64,
+    ) -> f64 {
+        let ridges = 1.0 - (1.0 - WITHOUT_RIDGES) * wear;
+        let swallowed = 1.0 - surface.texture().damping;
+        self.passed = amplitude * ridges * swallowed / (1.0 + load_n / DAMPING_N);
+        // a point on every ridge and one between, which carries nothing while the ridges stand
+        let patch_mm = self.patch_mm.clamp(RIDGE_MM, PATCH_MAX_MM);
+        self.passed * surface.contact_um(x_mm, patch_mm, RIDGE_MM / 2.0, 1.0 - wear)
+    }
+
+    /// Pressure of impulses and friction while sliding at `speed` (mm/s; 0 while it sticks) against `shear_n`, Pa; after
+    /// [`follow_um`](Self::follow_um).
+    pub(super) fn sliding_pa(
+        &mut self,
+        surface: &Surface,
+        x_mm: f64,
+        speed: f64,
+        shear_n: f64,
+        white: [f64; 2],
+    ) -> f64 {
+        let mut pink = 0.0;
+        for (state, (pole, gain)) in self.pink.iter_mut().zip(PINK) {
+            *state += pole * (white[0] - *state);
+            pink += gain * *state;
+        }
+        if speed == 0.0 {
+            return 0.0;
+        }
+        let texture = surface.texture();
+        let per_ms = speed / texture.fine_mm * 1e-3;
+        let impulses = IMPULSE_PA
+            * surface.unresolved_um()
+            * surface.amplitude(x_mm)
+            * per_ms.sqrt()
+            * white[1];
+        let speeding = (speed / FRICTION_SPEED_MM_S).powf(FRICTION_SPEED_POWER);
+        let friction = PA_PER_N * shear_n * texture.friction_noise * speeding * pink;
+        self.passed * (impulses + friction)
+    }
+
+    /// A tick of the fluid under this pressure; gives the pressure that reaches the transducer, Pa.
+    pub(super) fn fluid(&mut self, pressure_pa: f64, load_n: f64, detune: f64) -> f64 {
+        if self.tune_in == 0 {
+            self.tune_in = TUNE_TICKS;
+            let omega = TAU * detune * (RESONANCE_HZ.0 + RESONANCE_HZ.1 * load_n.sqrt());
+            self.stiffness = omega * omega;
+            self.drag = 2.0 * omega * (RESONANCE_DAMPING.0 + RESONANCE_DAMPING.1 * load_n);
+            self.patch_mm = PATCH_MM * load_n.cbrt();
+        }
+        self.tune_in -= 1;
+        self.rate += TICK_S * (self.stiffness * (pressure_pa - self.fluid) - self.drag * self.rate);
+        self.fluid += TICK_S * self.rate;
+        self.fluid
+    }
+}

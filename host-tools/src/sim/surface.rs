@@ -1,0 +1,272 @@
+//! One sample of a texture: a profile of heights, made from its spectrum, and friction along it.
+
+use std::f64::consts::TAU;
+
+use super::TRIAL_VARIATION;
+use super::noise::Noise;
+use super::textures::Texture;
+
+/// Length of a sample, mm (PAPER: squares of 75 mm).
+pub const LENGTH_MM: f64 = 75.0;
+/// Distance of the profile's points, mm (chosen: half of what the finest asperities need).
+pub const POINT_MM: f64 = 0.005;
+/// Points of the profile: a power of two that covers the sample and half a contact patch at either end.
+const POINTS: usize = 1 << 14;
+/// Where the profile starts, mm: it covers -3.46 .. 78.46 mm.
+const START_MM: f64 = (LENGTH_MM - POINTS as f64 * POINT_MM) / 2.0;
+
+/// Shortest wavelength that the silicone of the skin follows into the valleys, mm (chosen: a quarter of a ridge).
+const FOLLOWED_MM: f64 = 0.1;
+/// Relative width of the band of the finest asperities (chosen).
+const FINE_WIDTH: f64 = 0.3;
+/// Distance over which local amplitude and friction wander, mm (chosen: several times the contact patch).
+const WANDER_MM: f64 = 8.0;
+/// Points of the slow variations, at both ends of every piece.
+const SLOW_POINTS: usize = 83;
+/// Distance of those points, mm.
+const SLOW_MM: f64 = 1.0;
+
+/// Load and speed at which a texture's friction is quoted, N and mm/s (chosen: the paper's second movement).
+pub const FRICTION_AT: (f64, f64) = (0.5, 25.1);
+/// Lowest load and speed of the friction law, N and mm/s (chosen: below them it stays as it is there).
+const FRICTION_FROM: (f64, f64) = (0.01, 0.5);
+
+/// One sample of a texture, 75 mm long in the direction of the slide.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    texture: Texture,
+    /// heights, um
+    height: Vec<f32>,
+    /// what of them the skin follows, um
+    followed: Vec<f32>,
+    /// rms of what it does not follow, um
+    unresolved_um: f64,
+    /// friction relative to the texture's, every [`SLOW_MM`]
+    friction: Vec<f64>,
+    /// amplitude relative to the texture's, every [`SLOW_MM`]
+    amplitude: Vec<f64>,
+}
+
+impl Surface {
+    /// Cuts a sample of `texture`.
+    pub fn new(texture: &Texture, seed: u64) -> Self {
+        let mut noise = Noise::new(seed, 1000 + u64::from(texture.number));
+        let deviation = TRIAL_VARIATION * texture.heterogeneity;
+        let amplitude = wandering(&mut noise, deviation);
+        // friction varies less than heights do: chosen
+        let friction = wandering(&mut noise, 0.4 * deviation);
+
+        let mut coarse = random_profile(&mut noise, |wavelength_mm| texture.relief(wavelength_mm));
+        scale_to_rms(&mut coarse, texture.relief_um);
+        add_weave(&mut coarse, texture, &mut noise);
+        let mut fine = random_profile(&mut noise, |wavelength_mm| {
+            let x = (wavelength_mm / texture.fine_mm).ln() / FINE_WIDTH;
+            (-0.5 * x * x).exp()
+        });
+        scale_to_rms(&mut fine, texture.fine_um);
+
+        let height: Vec<f32> = coarse
+            .iter()
+            .zip(&fine)
+            .enumerate()
+            .map(|(i, (coarse, fine))| {
+                let local = slow(&amplitude, START_MM + i as f64 * POINT_MM);
+                (local * (coarse + fine)) as f32
+            })
+            .collect();
+        let followed = smooth(&height, FOLLOWED_MM);
+        let rest = height
+            .iter()
+            .zip(&followed)
+            .map(|(h, f)| f64::from(h - f).powi(2));
+        let unresolved_um = (rest.sum::<f64>() / POINTS as f64).sqrt();
+        Self {
+            texture: texture.clone(),
+            height,
+            followed,
+            unresolved_um,
+            friction,
+            amplitude,
+        }
+    }
+
+    /// The texture of which this is a sample.
+    pub fn texture(&self) -> &Texture {
+        &self.texture
+    }
+
+    /// Height at `x_mm` along the sample, um about its mean.
+    pub fn height_um(&self, x_mm: f64) -> f64 {
+        let (i, rest) = place(x_mm);
+        let [a, b] = [0, 1].map(|k| f64::from(self.height[(i + k) % POINTS]));
+        a + (b - a) * rest
+    }
+
+    /// Coefficient of kinetic friction of the skin at `x_mm`, sliding at `speed_mm_s` under `load_n`: a power law of both.
+    pub fn friction(&self, x_mm: f64, speed_mm_s: f64, load_n: f64) -> f64 {
+        let load = (load_n.max(FRICTION_FROM.0) / FRICTION_AT.0).ln();
+        let speed = (speed_mm_s.abs().max(FRICTION_FROM.1) / FRICTION_AT.1).ln();
+        let law = self.texture.friction_load * load + self.texture.friction_speed * speed;
+        self.texture.friction * slow(&self.friction, x_mm) * law.exp()
+    }
+
+    /// Thickness of the sample, mm.
+    pub fn thickness_mm(&self) -> f64 {
+        self.texture.thickness_mm
+    }
+
+    /// Local amplitude of heights relative to the whole sample's.
+    pub(super) fn amplitude(&self, x_mm: f64) -> f64 {
+        slow(&self.amplitude, x_mm)
+    }
+
+    /// Rms of the asperities that the skin does not follow, um.
+    pub(super) fn unresolved_um(&self) -> f64 {
+        self.unresolved_um
+    }
+
+    /// Mean height, um, that the skin follows about `x_mm`, with the pressure of a Hertz contact `half_mm` to either side
+    /// (at most 3.4), taken at points `pitch_mm` (a multiple of [`POINT_MM`]) apart of which every second, the first at
+    /// `x_mm`, carries 1 + `contrast` and the others 1 - `contrast`.
+    pub(super) fn contact_um(&self, x_mm: f64, half_mm: f64, pitch_mm: f64, contrast: f64) -> f64 {
+        let (i, rest) = place(x_mm);
+        let stride = (pitch_mm / POINT_MM).round() as usize;
+        let (left, right) = (1.0 - rest, rest);
+        let at = |k: usize| {
+            f64::from(self.followed[k % POINTS]) * left
+                + f64::from(self.followed[(k + 1) % POINTS]) * right
+        };
+        let mut carried = 1.0 + contrast;
+        let mut sum = carried * at(i);
+        let mut weights = carried;
+        let scale = (pitch_mm / half_mm).powi(2);
+        let mut k = 1_usize;
+        loop {
+            let pressure = 1.0 - scale * (k * k) as f64;
+            if pressure <= 0.0 {
+                return sum / weights;
+            }
+            carried = 2.0 - carried;
+            let weight = carried * pressure;
+            sum += weight * (at(i + k * stride) + at(i + POINTS - k * stride));
+            weights += 2.0 * weight;
+            k += 1;
+        }
+    }
+}
+
+/// Point before `x_mm` and how far beyond it that is, in points.
+fn place(x_mm: f64) -> (usize, f64) {
+    let x = ((x_mm - START_MM) / POINT_MM).clamp(0.0, (POINTS - 1) as f64);
+    let i = x as usize;
+    (i, x - i as f64)
+}
+
+/// Linear between the points of a slow variation.
+fn slow(points: &[f64], x_mm: f64) -> f64 {
+    let x = ((x_mm - START_MM) / SLOW_MM).clamp(0.0, (SLOW_POINTS - 2) as f64);
+    let i = x as usize;
+    points[i] + (points[i + 1] - points[i]) * (x - i as f64)
+}
+
+/// A factor about 1 that wanders along the sample: log-normal with this deviation.
+fn wandering(noise: &mut Noise, deviation: f64) -> Vec<f64> {
+    let memory = (-SLOW_MM / WANDER_MM).exp();
+    let mut x = noise.normal();
+    (0..SLOW_POINTS)
+        .map(|_| {
+            x = memory * x + (1.0 - memory * memory).sqrt() * noise.normal();
+            (deviation * x).exp()
+        })
+        .collect()
+}
+
+/// A random profile with the given relative power density over spatial frequency, told by its wavelength in mm.
+fn random_profile(noise: &mut Noise, density: impl Fn(f64) -> f64) -> Vec<f64> {
+    let length_mm = POINTS as f64 * POINT_MM;
+    let (mut re, mut im) = (vec![0.0; POINTS], vec![0.0; POINTS]);
+    for k in 1..POINTS / 2 {
+        let amplitude = density(length_mm / k as f64).sqrt();
+        re[k] = amplitude * noise.normal();
+        im[k] = amplitude * noise.normal();
+    }
+    // the real part of the one-sided sum is the profile
+    fourier(&mut re, &mut im);
+    re
+}
+
+/// Scales a profile of mean 0 to this rms.
+fn scale_to_rms(profile: &mut [f64], rms: f64) {
+    let power = profile.iter().map(|h| h * h).sum::<f64>() / profile.len() as f64;
+    let factor = if power > 0.0 { rms / power.sqrt() } else { 0.0 };
+    profile.iter_mut().for_each(|h| *h *= factor);
+}
+
+/// Adds the periodic part: harmonics that fall off as 1/k^n, with a period that wanders by the texture's jitter.
+fn add_weave(profile: &mut [f64], texture: &Texture, noise: &mut Noise) {
+    let Some(weave) = texture.weave else { return };
+    let phases: Vec<f64> = (0..weave.harmonics)
+        .map(|_| TAU * noise.uniform())
+        .collect();
+    let falls: Vec<f64> = (1..=weave.harmonics)
+        .map(|k| f64::from(k).powf(-weave.falloff))
+        .collect();
+    // a sine of amplitude a has power a^2 / 2
+    let scale = weave.rms_um / (falls.iter().map(|a| a * a / 2.0).sum::<f64>()).sqrt();
+    let per_period = (weave.wavelength_mm / POINT_MM).round().max(1.0) as usize;
+    let mut step = TAU * POINT_MM / weave.wavelength_mm;
+    let mut phase = TAU * noise.uniform();
+    for (i, height) in profile.iter_mut().enumerate() {
+        if i % per_period == 0 {
+            step = TAU * POINT_MM / weave.wavelength_mm * (1.0 + weave.jitter * noise.normal());
+        }
+        phase += step;
+        for (k, (fall, offset)) in falls.iter().zip(&phases).enumerate() {
+            *height += scale * fall * ((k + 1) as f64 * phase + offset).sin();
+        }
+    }
+}
+
+/// What is left of a profile when wavelengths below `shortest_mm` are lost: two running means of half of it.
+fn smooth(profile: &[f32], shortest_mm: f64) -> Vec<f32> {
+    let half = (shortest_mm / 4.0 / POINT_MM).round() as usize;
+    let n = profile.len();
+    let mean = |p: &[f32]| -> Vec<f32> {
+        let at = |i: usize| f64::from(p[i % n]);
+        let mut sum: f64 = (0..=2 * half).map(|j| at(n - half + j)).sum();
+        (0..n)
+            .map(|i| {
+                let mean = sum / (2 * half + 1) as f64;
+                sum += at(i + half + 1) - at(i + n - half);
+                mean as f32
+            })
+            .collect()
+    };
+    mean(&mean(profile))
+}
+
+/// Fourier transform in place, radix 2.
+fn fourier(re: &mut [f64], im: &mut [f64]) {
+    let n = re.len();
+    let bits = n.trailing_zeros();
+    for i in 0..n {
+        let j = i.reverse_bits() >> (usize::BITS - bits);
+        if i < j {
+            re.swap(i, j);
+            im.swap(i, j);
+        }
+    }
+    let mut half = 1;
+    while half < n {
+        for k in 0..half {
+            let (sin, cos) = (TAU / 2.0 * k as f64 / half as f64).sin_cos();
+            for a in (k..n).step_by(2 * half) {
+                let b = a + half;
+                let (r, i) = (re[b] * cos - im[b] * sin, re[b] * sin + im[b] * cos);
+                (re[b], im[b]) = (re[a] - r, im[a] - i);
+                (re[a], im[a]) = (re[a] + r, im[a] + i);
+            }
+        }
+        half *= 2;
+    }
+}

@@ -1,0 +1,3 @@
+//! The simulated world against what the paper observed.
+
+mod protocol;

@@ -1,0 +1,152 @@
+//! What the 117 textures of the paper's Table 1 are like: physical parameters, drawn from their group's distribution.
+//!
+//! The medians are chosen, each from what such a material is like (yarn counts of cloth, grain of wood, finish of metal)
+//! and from what the paper says of it by name (Table 2 and Results). What the paper measured of them is in no table, so a
+//! world is one of many possible collections of 117 such textures.
+
+mod names;
+mod recipes;
+
+pub use names::{Group, Named, TEXTURES};
+
+use super::noise::Noise;
+use recipes::recipe;
+
+/// The periodic part of a surface.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Weave {
+    /// Period, mm.
+    pub wavelength_mm: f64,
+    /// Rms height of all harmonics together, um.
+    pub rms_um: f64,
+    /// Relative deviation of one period from the next.
+    pub jitter: f64,
+    /// How many harmonics it has.
+    pub harmonics: u32,
+    /// Their amplitudes fall as 1/k to this power.
+    pub falloff: f64,
+}
+
+/// Physical parameters of one texture.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Texture {
+    /// Its number in Table 1.
+    pub number: u8,
+    /// Coefficient of kinetic friction against the skin's silicone at [`super::surface::FRICTION_AT`].
+    pub friction: f64,
+    /// Friction goes with load to this power: towards -1/3 for smooth surfaces (Hertz), near 0 for rough ones (Amontons).
+    pub friction_load: f64,
+    /// Friction goes with speed to this power.
+    pub friction_speed: f64,
+    /// By how much static friction exceeds kinetic friction, relative.
+    pub stiction: f64,
+    /// Rms of the 1/f fluctuation of friction, relative to it.
+    pub friction_noise: f64,
+    /// Rms height of the finest asperities, um.
+    pub fine_um: f64,
+    /// Wavelength about which they lie, mm.
+    pub fine_mm: f64,
+    /// Rms height of the random relief, um.
+    pub relief_um: f64,
+    /// Wavelength above which its spectrum is flat, mm.
+    pub relief_mm: f64,
+    /// Power density of the relief falls with spatial frequency to this power.
+    pub relief_exponent: f64,
+    /// The periodic part, if it has one.
+    pub weave: Option<Weave>,
+    /// How much of the vibrations the material swallows, 0..1.
+    pub damping: f64,
+    /// Deviation of ln(local height amplitude) over the sample.
+    pub heterogeneity: f64,
+    /// Thickness, mm.
+    pub thickness_mm: f64,
+    /// How much it gives way under the finger, mm/N.
+    pub compliance_mm_per_n: f64,
+}
+
+impl Texture {
+    /// Relative power density of the relief at a wavelength in mm: flat, and 1/f^a at short wavelengths.
+    pub(super) fn relief(&self, wavelength_mm: f64) -> f64 {
+        1.0 / (1.0 + (self.relief_mm / wavelength_mm).powf(self.relief_exponent))
+    }
+}
+
+/// Deviations of ln(parameter) among the textures of a group, or of one texture among worlds.
+struct Spread {
+    friction: f64,
+    height: f64,
+    wavelength: f64,
+}
+
+/// Of a texture of which only the group is known (chosen).
+const GROUP_SPREAD: Spread = Spread {
+    friction: 0.20,
+    height: 0.45,
+    wavelength: 0.25,
+};
+/// Of a texture of which the paper or its name says more (chosen).
+const HINTED_SPREAD: Spread = Spread {
+    friction: 0.08,
+    height: 0.15,
+    wavelength: 0.10,
+};
+/// Rougher than its kind is more slippery than its kind, having less area in contact: ln friction falls by this much when
+/// the heights are a deviation above their median (chosen).
+const SLIPPERY_IF_ROUGH: f64 = 0.05;
+
+/// Deviation of a period from the next in cloth (chosen).
+const CLOTH_JITTER: f64 = 0.03;
+/// The same in what is moulded, machined or extruded (chosen).
+const GRATING_JITTER: f64 = 0.001;
+
+/// Draws the parameters of texture `number` in the world `seed`.
+///
+/// # Panics
+/// If `number` is not in 1..=117.
+pub fn draw(number: u8, seed: u64) -> Texture {
+    let named = TEXTURES[usize::from(number) - 1];
+    let mut noise = Noise::new(seed, u64::from(number));
+    let noise = &mut noise;
+    let (medians, hinted) = recipe(named);
+    let spread = if hinted { HINTED_SPREAD } else { GROUP_SPREAD };
+
+    let rougher = noise.normal();
+    let height = (spread.height * rougher).exp();
+    let fine_um = noise.about(medians.fine.0 * height, 0.5 * spread.height);
+    let relief_um = noise.about(medians.relief.0 * height, 0.5 * spread.height);
+    let weave = (medians.weave.0 > 0.0).then(|| Weave {
+        wavelength_mm: noise.about(
+            medians.weave.1,
+            if medians.grating { 0.1 } else { 1.0 } * spread.wavelength,
+        ),
+        rms_um: noise.about(medians.weave.0 * height, 0.5 * spread.height),
+        jitter: if medians.grating {
+            GRATING_JITTER
+        } else {
+            CLOTH_JITTER
+        },
+        harmonics: 8,
+        falloff: noise.between(1.0, 2.0),
+    });
+    // smooth surfaces touch all over (Hertz: -1/3), rough ones at points whose number grows with load (Amontons: 0)
+    let smoothness = 1.0 / (1.0 + fine_um);
+    Texture {
+        number,
+        friction: noise.about(medians.friction, spread.friction)
+            * (-SLIPPERY_IF_ROUGH * rougher).exp(),
+        friction_load: -0.25 * smoothness * noise.between(0.7, 1.3),
+        friction_speed: 0.04 + 0.04 * noise.normal(),
+        stiction: noise.between(0.05, 0.25),
+        friction_noise: noise.about(medians.friction_noise, 0.2),
+        fine_um,
+        fine_mm: noise.about(medians.fine.1, spread.wavelength),
+        relief_um,
+        relief_mm: noise.about(medians.relief.1, spread.wavelength),
+        relief_exponent: noise.between(2.0, 3.0),
+        weave,
+        damping: medians.damping,
+        heterogeneity: noise.about(medians.heterogeneity, 0.3),
+        thickness_mm: noise.about(medians.thickness_mm, 0.2),
+        compliance_mm_per_n: noise.about(medians.compliance_mm_per_n, 0.2),
+    }
+}
