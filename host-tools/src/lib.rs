@@ -9,3 +9,4 @@ pub mod replay;
 pub mod rows;
 pub mod show;
 pub mod sim;
+pub mod simulated;

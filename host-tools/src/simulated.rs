@@ -137,7 +137,11 @@ impl SimRig {
         loop {
             // slots from a timer of 4400 Hz: no drift
             let slot_ns = (u128::from(self.slot) * 1_000_000_000 / u128::from(SLOTS_HZ)) as u64;
-            let step_ns = if self.rate == 0 { u64::MAX } else { self.next_step_ns };
+            let step_ns = if self.rate == 0 {
+                u64::MAX
+            } else {
+                self.next_step_ns
+            };
             if slot_ns.min(step_ns) >= end {
                 break;
             }
@@ -181,8 +185,10 @@ impl SimRig {
             self.step(self.next_step_ns);
         }
         let mosi = exchange.read;
-        self.world.spi(read_ns, TRANSFER_NS, &mosi, &mut exchange.read);
-        self.words.push(biotac::BioTac::decode(channel, exchange.read).ok());
+        self.world
+            .spi(read_ns, TRANSFER_NS, &mosi, &mut exchange.read);
+        self.words
+            .push(biotac::BioTac::decode(channel, exchange.read).ok());
     }
 
     fn step(&mut self, at_ns: u64) {
@@ -216,7 +222,9 @@ impl SimRig {
             each(self.tick());
             match self.control.phase() {
                 Phase::Ready | Phase::Parked => return Ok(()),
-                Phase::Faulted(fault) if self.outputs.lever_steps_s == 0 && self.outputs.lever_enabled => {
+                Phase::Faulted(fault)
+                    if self.outputs.lever_steps_s == 0 && self.outputs.lever_enabled =>
+                {
                     return Err(fault.into());
                 }
                 Phase::Faulted(fault @ Fault::LeverNotHome) => return Err(fault.into()),
@@ -249,12 +257,19 @@ impl SimRig {
             for measured in [true, false] {
                 self.control.start_unloaded(speed_mm_s)?;
                 self.rest(|_| ())?;
-                if let Some(current_a) = self.control.mean_current_a().filter(|a| measured || *a > 0.0) {
+                if let Some(current_a) = self
+                    .control
+                    .mean_current_a()
+                    .filter(|a| measured || *a > 0.0)
+                {
                     fit.push(speed_mm_s, current_a);
                 }
             }
         }
-        let calibration = RigCalibration { unloaded_a: fit.line()?, ..*self.control.calibration() };
+        let calibration = RigCalibration {
+            unloaded_a: fit.line()?,
+            ..*self.control.calibration()
+        };
         self.control.calibrate(calibration)?;
         Ok(calibration)
     }
@@ -264,7 +279,12 @@ impl SimRig {
     ///
     /// # Errors
     /// See [`SimError`]. The stage stands then, and the finger is lifted.
-    pub fn slide(&mut self, movement: Movement, start: f32, each: impl FnMut(&Outputs)) -> Result<Ended, SimError> {
+    pub fn slide(
+        &mut self,
+        movement: Movement,
+        start: f32,
+        each: impl FnMut(&Outputs),
+    ) -> Result<Ended, SimError> {
         self.control.start(movement, start)?;
         self.rest(each)?;
         match self.control.take_ended() {
@@ -281,7 +301,11 @@ impl Rig for SimRig {
         PropertySet::ALL
     }
 
-    async fn perform<K: Kernels>(&mut self, movement: Movement, slide: &mut Slide<'_, K>) -> Result<(), SimError> {
+    async fn perform<K: Kernels>(
+        &mut self,
+        movement: Movement,
+        slide: &mut Slide<'_, K>,
+    ) -> Result<(), SimError> {
         if self.control.phase() == Phase::Parked {
             self.home()?;
         }

@@ -24,7 +24,7 @@ pub const BACKGROUND_MS: u32 = 1000;
 /// Longest slide at constant speed.
 const STEADY_S: f32 = 3.0;
 /// After the ramp the servo has this long to settle before samples count.
-const STEADY_MARGIN_S: f32 = 0.1;
+const STEADY_MARGIN_S: f32 = 0.2;
 /// Speed of the stage while the finger is lifted.
 const RETURN_MM_S: f32 = 50.0;
 /// Forces over this are pressed only by a rig that was allowed to.
@@ -272,6 +272,7 @@ impl Control {
             Phase::Parked | Phase::Ready => {
                 self.guard.reset();
                 self.lever.home();
+                self.stage.forget();
                 self.enter(Phase::Homing);
                 Ok(())
             }
@@ -456,15 +457,13 @@ impl Control {
             StageState::Moving(profile) => profile.velocity_mm_s(),
             _ => 0.0,
         };
-        let pressing = matches!(
-            self.phase,
-            Phase::Pressing | Phase::Background | Phase::Sliding
-        );
         let seen = Seen {
             words: &inputs.words,
             e_stop: inputs.e_stop,
-            lever_top: inputs.lever_top && pressing && self.lever.state() != LeverState::Lifted,
-            stage_limit: moving != 0.0 && (inputs.stage_limits.0 || inputs.stage_limits.1),
+            lever_top: inputs.lever_top && self.lever.is_down(inputs.steps),
+            // off a switch it may always go
+            stage_limit: (moving < 0.0 && inputs.stage_limits.0)
+                || (moving > 0.0 && inputs.stage_limits.1),
             stage_wanted_mm_s: moving,
             stage_mm: self.stage.position_mm(),
             emf_mm_s: self
@@ -501,7 +500,10 @@ impl Control {
                 if self.lever.is_lifted() {
                     match self.stage.state() {
                         StageState::Unknown => self.stage.home(),
-                        StageState::Standing if self.ms > 1 => self.enter(Phase::Ready),
+                        StageState::Standing if self.stage.position_mm() < MARGIN_MM / 2.0 => {
+                            self.stage.go(MARGIN_MM, RETURN_MM_S);
+                        }
+                        StageState::Standing => self.enter(Phase::Ready),
                         _ => {}
                     }
                 }
@@ -538,6 +540,7 @@ impl Control {
                 } else {
                     Felt::Slide
                 };
+                self.weigh_current(inputs);
                 let shear_n = self
                     .calibration
                     .shear_n(inputs.current_a, self.movement.speed_mm_s());

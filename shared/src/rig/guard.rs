@@ -90,7 +90,7 @@ rows! {
     EStop, "emergency stop", "its input", 2, BOTH, ALL, "release it, then reset";
     LeverLimit, "lever at its limit", "upper limit switch while approaching, pressing or sliding, 3 ms", 5, BOTH, ALL,
         "check the switch and its wire, then reset";
-    StageLimit, "stage at its limit", "a limit switch while moving and not looking for it, 3 ms", 5, BOTH, ALL,
+    StageLimit, "stage at its limit", "the limit switch that it is moving towards, and it is not looking for it, 3 ms", 5, BOTH, ALL,
         "clear the stage's way, then reset";
     StageStall, "stage blocked", "less than a tenth of the way made in 30 ms, and the motor has no back-EMF", 35, BOTH, ALL,
         "clear the stage's way, then reset";
@@ -193,7 +193,7 @@ pub struct Seen<'a> {
     pub e_stop: bool,
     /// The lever's upper limit switch, while it should be open.
     pub lever_top: bool,
-    /// A limit switch of the stage, while both should be open.
+    /// The limit switch that the stage is moving towards, while it should be open.
     pub stage_limit: bool,
     /// How fast the stage should go, mm/s.
     pub stage_wanted_mm_s: f32,

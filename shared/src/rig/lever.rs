@@ -15,9 +15,9 @@ pub const RETRACT_STEPS_S: i32 = -3200;
 const TRIM_STEPS_S: i32 = 200;
 /// Between trials the finger hangs this far above the last contact: 1 mm.
 const CLEARANCE_STEPS: i32 = 1600;
-/// The lever goes at most this far below the limit switch: 10.5 mm, half a millimetre above its lower end. Where nothing was
-/// touched by then, there is no sample.
-pub const MAX_STEPS: i32 = 16_800;
+/// The lever goes at most this far below the limit switch: 16 mm, just above its lower end. Where nothing was touched
+/// by then, there is no sample.
+pub const MAX_STEPS: i32 = 25_600;
 /// Contact is seen when the mean of P_DC has risen by this many counts: thirty times its noise.
 const CONTACT_COUNTS: f32 = 3.0;
 /// From contact to 2 N the finger gives way by less than 3 mm; more steps than that without the force are lost steps.
@@ -125,6 +125,15 @@ impl Lever {
     /// Whether the finger is certainly off the sample, and the motor stands.
     pub fn is_lifted(&self) -> bool {
         self.state == LeverState::Lifted
+    }
+
+    /// Whether it is so far below the limit switch that the switch must be open: half a millimetre.
+    pub fn is_down(&self, steps: i32) -> bool {
+        let known = !matches!(
+            self.state,
+            LeverState::Unknown | LeverState::Homing | LeverState::Retracting(_)
+        );
+        known && steps - self.top > 800
     }
 
     /// Goes up to the limit switch. This is also what lifts the finger whatever has happened.

@@ -13,6 +13,8 @@ pub struct StageConstants {
     pub duty_per_mm_s: f32,
     /// See above.
     pub duty_per_mm_s2: f32,
+    /// Feed-forward: duty that overcomes the friction of the moving stage, with a finger on it.
+    pub duty_friction: f32,
     /// Proportional gain: duty per mm/s of velocity error.
     pub p: f32,
     /// Integral gain: duty per mm; the integral of the velocity error is the position error.
@@ -33,8 +35,9 @@ impl StageConstants {
         acceleration_mm_s2: 1000.0,
         duty_per_mm_s: 1.37e-3,
         duty_per_mm_s2: 4.7e-5,
-        p: 0.006,
-        i: 0.15,
+        duty_friction: 0.03,
+        p: 0.012,
+        i: 0.6,
         supply_v: 12.0,
         resistance_ohm: 7.5,
         emf_v_per_mm_s: 0.0164,
@@ -50,12 +53,13 @@ impl StageConstants {
 /// Largest distance between profile and stage that is still following, mm.
 const FOLLOWING_MM: f32 = 1.5;
 /// Velocity is taken over this many ms of encoder counts.
-const VELOCITY_MS: usize = 4;
+const VELOCITY_MS: usize = 2;
 /// Distance kept from the limit switches, mm.
 pub const MARGIN_MM: f32 = 1.0;
 const HOMING_MM_S: f32 = 10.0;
-/// The stage has arrived when it stands this near, mm.
-const ARRIVED_MM: f32 = 0.05;
+/// The stage has arrived when it stands this near, mm: friction holds it within 0.2 mm, and every move begins where it
+/// stands.
+const ARRIVED_MM: f32 = 0.3;
 /// It has time for that after the profile's end, ms.
 const ARRIVE_MS: u32 = 300;
 
@@ -188,7 +192,7 @@ impl Stage {
         (self.now() - self.zero) as f32 * self.constants.mm_per_count
     }
 
-    /// Velocity in mm/s, mean over the last 4 ms.
+    /// Velocity in mm/s, mean over the last 2 ms.
     pub fn velocity_mm_s(&self) -> f32 {
         let [oldest, ..] = self.counts;
         (self.now() - oldest) as f32 * self.constants.mm_per_count * (1000.0 / VELOCITY_MS as f32)
@@ -220,6 +224,11 @@ impl Stage {
         );
         self.state = StageState::Moving(profile);
         Some(profile)
+    }
+
+    /// The motor goes off, and the stage no longer knows where it is.
+    pub fn forget(&mut self) {
+        self.state = StageState::Unknown;
     }
 
     /// The motor goes off, whatever it was doing.
@@ -261,6 +270,7 @@ impl Stage {
                     return Err(StageFault::Following);
                 }
                 let duty = c.duty_per_mm_s * HOMING_MM_S
+                    + c.duty_friction
                     + c.p * (HOMING_MM_S + self.velocity_mm_s())
                     + c.i * off;
                 Ok((-duty).clamp(-1.0, 1.0))
@@ -286,7 +296,13 @@ impl Stage {
                 self.state = StageState::Moving(profile);
                 // the velocity lags by half of what it is taken over
                 let (_, v_then, _) = profile.at(t - VELOCITY_MS as f32 * 0.5e-3);
+                let friction = if v == 0.0 {
+                    0.0
+                } else {
+                    libm::copysignf(c.duty_friction, v)
+                };
                 let duty = c.duty_per_mm_s * v
+                    + friction
                     + c.duty_per_mm_s2 * a
                     + c.p
                         * (if t < VELOCITY_MS as f32 * 0.5e-3 {
