@@ -7,6 +7,7 @@
 //! A world is its seeds: the same seeds give the same words.
 
 pub mod finger;
+pub mod lever;
 mod noise;
 pub mod sensor;
 pub mod surface;
