@@ -6,10 +6,12 @@
 //!
 //! A world is its seeds: the same seeds give the same words.
 
+pub mod encoder;
 pub mod finger;
 pub mod lever;
 mod noise;
 pub mod sensor;
+pub mod stage;
 pub mod surface;
 pub mod textures;
 
