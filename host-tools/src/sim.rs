@@ -6,11 +6,16 @@
 //!
 //! A world is its seeds: the same seeds give the same words.
 
+pub mod encoder;
+pub mod faults;
 pub mod finger;
+pub mod lever;
 mod noise;
 pub mod sensor;
+pub mod stage;
 pub mod surface;
 pub mod textures;
+pub mod world;
 
 #[cfg(test)]
 mod tests;

@@ -1,0 +1,210 @@
+//! The stage's quadrature encoder: two lines in Gray code, A before B towards higher positions, and what a counter on them
+//! says, also with a wire cut.
+
+use std::collections::VecDeque;
+
+/// Counts per mm: 1 um per count, all four edges counted (chosen).
+pub const COUNTS_PER_MM: f64 = 1e3;
+
+/// A wire of the encoder that is cut. The counter's pull-down holds its input low.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Cut {
+    /// Line A: the count moves to and fro by one.
+    A,
+    /// Line B: likewise.
+    B,
+    /// Both, or the supply: the count stands.
+    Both,
+}
+
+/// The lines from this instant on.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Edge {
+    /// When.
+    pub at_ns: u64,
+    /// Line A.
+    pub a: bool,
+    /// Line B.
+    pub b: bool,
+}
+
+/// Encoder and counter. The count is 0 where the stage stood at power-up: there is no index.
+#[derive(Clone, Debug)]
+pub struct Encoder {
+    origin: f64,
+    cut: Option<Cut>,
+    /// count - what [`Encoder::followed`] says
+    offset: i64,
+    /// counts and when they were reached, if somebody wants edges
+    passed: Option<VecDeque<(u64, i64)>>,
+    shown: (bool, bool),
+}
+
+impl Encoder {
+    /// An encoder that is switched on at a position. With `edges`, each edge is kept until it is fetched.
+    pub fn new(position_mm: f64, edges: bool) -> Self {
+        Self {
+            origin: (position_mm * COUNTS_PER_MM).floor(),
+            cut: None,
+            offset: 0,
+            passed: edges.then(VecDeque::new),
+            shown: lines(0, None),
+        }
+    }
+
+    /// The stage went from one position to another at constant speed, from `began_ns` to `ended_ns`.
+    pub fn pass(&mut self, [from_mm, to_mm]: [f64; 2], [began_ns, ended_ns]: [u64; 2]) {
+        let (from, to) = (self.counts(from_mm), self.counts(to_mm));
+        let Some(passed) = &mut self.passed else {
+            return;
+        };
+        let mut pass = |count: i64, boundary: i64| {
+            let at_mm = (boundary as f64 + self.origin) / COUNTS_PER_MM;
+            let share = ((at_mm - from_mm) / (to_mm - from_mm)).clamp(0.0, 1.0);
+            let at_ns = began_ns + (share * (ended_ns - began_ns) as f64) as u64;
+            passed.push_back((at_ns, count));
+        };
+        if to > from {
+            (from + 1..=to).for_each(|count| pass(count, count));
+        } else {
+            (to..from).rev().for_each(|count| pass(count, count + 1));
+        }
+    }
+
+    /// What the counter says with the stage at a position.
+    pub fn count(&self, position_mm: f64) -> i32 {
+        (self.offset + followed(self.counts(position_mm), self.cut)) as i32
+    }
+
+    /// Cuts wires, or joins them again, with the stage at a position.
+    pub fn set_cut(&mut self, cut: Option<Cut>, position_mm: f64, now_ns: u64) {
+        if cut == self.cut {
+            return;
+        }
+        let count = self.counts(position_mm);
+        let before = self.offset + followed(count, self.cut);
+        let jump = step(lines(count, self.cut), lines(count, cut));
+        self.cut = cut;
+        self.offset = before + jump - followed(count, cut);
+        if let Some(passed) = &mut self.passed {
+            passed.push_front((now_ns, count));
+        }
+    }
+
+    /// The oldest edge up to `now_ns` that was not fetched yet.
+    pub fn next_edge(&mut self, now_ns: u64) -> Option<Edge> {
+        let passed = self.passed.as_mut()?;
+        while let Some(&(at_ns, count)) = passed.front().filter(|(at_ns, _)| *at_ns <= now_ns) {
+            passed.pop_front();
+            let (a, b) = lines(count, self.cut);
+            if (a, b) != self.shown {
+                self.shown = (a, b);
+                return Some(Edge { at_ns, a, b });
+            }
+        }
+        None
+    }
+
+    fn counts(&self, position_mm: f64) -> i64 {
+        ((position_mm * COUNTS_PER_MM).floor() - self.origin) as i64
+    }
+}
+
+fn lines(count: i64, cut: Option<Cut>) -> (bool, bool) {
+    let a = matches!(count & 3, 1 | 2);
+    let b = matches!(count & 3, 2 | 3);
+    match cut {
+        None => (a, b),
+        Some(Cut::A) => (false, b),
+        Some(Cut::B) => (a, false),
+        Some(Cut::Both) => (false, false),
+    }
+}
+
+/// What a counter makes of an edge; two lines at once are nothing to it.
+fn step(from: (bool, bool), to: (bool, bool)) -> i64 {
+    let quarter = |(a, b): (bool, bool)| match (a, b) {
+        (false, false) => 0,
+        (true, false) => 1,
+        (true, true) => 2,
+        (false, true) => 3,
+    };
+    match (quarter(to) - quarter(from)) & 3 {
+        1 => 1,
+        3 => -1,
+        _ => 0,
+    }
+}
+
+/// What a counter adds up to from the lines of a count, but for an offset.
+fn followed(count: i64, cut: Option<Cut>) -> i64 {
+    match (cut, lines(count, cut)) {
+        (None, _) => count,
+        (Some(Cut::A), (_, b)) => -i64::from(b),
+        (Some(Cut::B), (a, _)) => i64::from(a),
+        (Some(Cut::Both), _) => 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Goes to and fro with wires cut and joined, and counts edges as a timer does.
+    #[test]
+    fn the_count_is_what_a_counter_makes_of_the_edges() {
+        let mut encoder = Encoder::new(10.0003, true);
+        let cuts = [None, Some(Cut::A), Some(Cut::B), Some(Cut::Both), None];
+        let way = [10.0003, 10.0121, 10.0049, 10.0301, 9.9907, 10.0307];
+        let (mut counted, mut shown) = (0, (false, false));
+        let mut now = 0;
+        for (cut, leg) in cuts.into_iter().zip(way.windows(2)) {
+            encoder.set_cut(cut, leg[0], now);
+            encoder.pass([leg[0], leg[1]], [now, now + 1_000]);
+            now += 1_000;
+            while let Some(edge) = encoder.next_edge(now) {
+                counted += step(shown, (edge.a, edge.b));
+                shown = (edge.a, edge.b);
+            }
+            assert_eq!(encoder.count(leg[1]), counted as i32, "{cut:?}");
+        }
+    }
+
+    #[test]
+    fn edges_are_gray_coded_and_in_time() {
+        let mut encoder = Encoder::new(5.0004, true);
+        encoder.pass([5.0004, 5.0104], [1_000, 2_000]);
+        let edges: Vec<Edge> = std::iter::from_fn(|| encoder.next_edge(2_000)).collect();
+        assert_eq!(edges.len(), 10);
+        assert_eq!(encoder.count(5.0104), 10);
+        // the first boundary is 0.6 um away, the next ones 1 um, at 10 um per 1000 ns
+        let stamps: Vec<u64> = edges
+            .iter()
+            .map(|edge| (edge.at_ns + 5) / 10 * 10)
+            .collect();
+        assert_eq!(stamps, (0..10).map(|i| 1_060 + 100 * i).collect::<Vec<_>>());
+        assert_eq!((edges[0].a, edges[0].b), (true, false), "A leads upwards");
+        for pair in edges.windows(2) {
+            assert_eq!(
+                (pair[0].a != pair[1].a) as u8 + (pair[0].b != pair[1].b) as u8,
+                1
+            );
+        }
+    }
+
+    #[test]
+    fn one_cut_wire_makes_the_count_move_to_and_fro() {
+        for cut in [Cut::A, Cut::B] {
+            let mut encoder = Encoder::new(0.0, false);
+            encoder.set_cut(Some(cut), 0.0, 0);
+            let counts: Vec<i32> = (0..100)
+                .map(|i| encoder.count(f64::from(i) * 1e-3 + 1e-4))
+                .collect();
+            let (low, high) = (counts.iter().min().unwrap(), counts.iter().max().unwrap());
+            assert_eq!(high - low, 1, "{cut:?}");
+        }
+        let mut encoder = Encoder::new(0.0, false);
+        encoder.set_cut(Some(Cut::Both), 0.01, 0);
+        assert_eq!(encoder.count(0.01), encoder.count(50.0));
+    }
+}

@@ -1,0 +1,173 @@
+//! What can go wrong with the rig, and what it does to the words on the way from the sensor.
+
+use super::encoder::Cut;
+use super::noise::Noise;
+
+/// Stream of the trial's seed that faults draw from.
+const STREAM: u64 = 0xfa01;
+
+/// Something that breaks. Each shows only at the pins, as it would on a bench.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Fault {
+    /// The sensor's plug is out: MISO's pull-up reads as FF.
+    SensorUnplugged,
+    /// This share of the words has one bit flipped, any of the 16.
+    BitFlips {
+        /// 0 to 1.
+        share: f64,
+    },
+    /// MISO is shorted to a level.
+    MisoStuck {
+        /// Which level.
+        high: bool,
+    },
+    /// The sensor's converter hangs: the last word of each channel comes again and again, with good parity.
+    SensorFrozen,
+    /// The static pressure drifts, as with the temperature of the fluid. The finger itself feels nothing.
+    PdcDrift {
+        /// Counts of P_DC per second, of either sign.
+        counts_per_s: f64,
+    },
+    /// The stage is held by something; its motor can still push.
+    StageJammed,
+    /// A wire of the encoder is cut.
+    EncoderCut(Cut),
+    /// A limit switch of the stage sticks.
+    StageLimitStuck {
+        /// The upper or the lower one.
+        upper: bool,
+        /// Closed or open.
+        closed: bool,
+    },
+    /// The lever's limit switch sticks.
+    LeverTopStuck {
+        /// Closed or open.
+        closed: bool,
+    },
+    /// The lever misses this share of its steps.
+    LeverLosesSteps {
+        /// 0 to 1.
+        share: f64,
+    },
+    /// The lever's driver steps down on its own with 800 steps/s, until its enable is taken away or STEP asked for more
+    /// steps up than it made by itself.
+    LeverRunaway,
+    /// Somebody presses the emergency stop. It is a contact that the firmware sees; it cuts no power, since a finger that
+    /// presses must still be lifted.
+    EStop,
+}
+
+impl Fault {
+    /// One of each kind, for campaigns.
+    pub const EXAMPLES: [Self; 18] = [
+        Self::SensorUnplugged,
+        Self::BitFlips { share: 0.05 },
+        Self::MisoStuck { high: false },
+        Self::MisoStuck { high: true },
+        Self::SensorFrozen,
+        Self::PdcDrift {
+            counts_per_s: -20.0,
+        },
+        Self::StageJammed,
+        Self::EncoderCut(Cut::A),
+        Self::EncoderCut(Cut::B),
+        Self::EncoderCut(Cut::Both),
+        Self::StageLimitStuck {
+            upper: false,
+            closed: true,
+        },
+        Self::StageLimitStuck {
+            upper: true,
+            closed: true,
+        },
+        Self::StageLimitStuck {
+            upper: true,
+            closed: false,
+        },
+        Self::LeverTopStuck { closed: true },
+        Self::LeverTopStuck { closed: false },
+        Self::LeverLosesSteps { share: 0.1 },
+        Self::LeverRunaway,
+        Self::EStop,
+    ];
+}
+
+/// The faults that are there now, as far as they are neither the lever's nor the stage's nor the encoder's own.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Faults {
+    pub(super) e_stop: bool,
+    pub(super) top_stuck: Option<bool>,
+    pub(super) limit_stuck: (Option<bool>, Option<bool>),
+    pub(super) flip_share: f64,
+    pub(super) miso_stuck: Option<bool>,
+    pub(super) frozen: bool,
+    /// counts per second, and since when
+    pub(super) drift: Option<(f64, u64)>,
+}
+
+/// Command that samples the static pressure (SPM table 7).
+const SAMPLE_PDC: u8 = 0x83;
+
+/// The wire from the sensor: what MISO says, given what the sensor sent.
+#[derive(Clone, Debug)]
+pub(super) struct Miso {
+    command: u8,
+    /// last word of each channel, by command
+    last: [Option<[u8; 2]>; 256],
+    noise: Noise,
+}
+
+impl Miso {
+    pub(super) fn new(trial_seed: u64) -> Self {
+        Self {
+            command: 0,
+            last: [None; 256],
+            noise: Noise::new(trial_seed, STREAM),
+        }
+    }
+
+    /// Changes the bytes of one transfer.
+    pub(super) fn pass(&mut self, now_ns: u64, mosi: &[u8], miso: &mut [u8], faults: &Faults) {
+        // a read says 00 first, every command something else
+        if let Some(command) = mosi.first().filter(|byte| **byte != 0) {
+            self.command = *command;
+        } else if let [byte0, byte1] = miso {
+            let last = &mut self.last[usize::from(self.command)];
+            match *last {
+                Some(word) if faults.frozen => [*byte0, *byte1] = word,
+                _ => {
+                    *last = is_sample([*byte0, *byte1])
+                        .then_some([*byte0, *byte1])
+                        .or(*last)
+                }
+            }
+            if let Some((counts_per_s, since_ns)) = faults.drift
+                && self.command == SAMPLE_PDC
+                && is_sample([*byte0, *byte1])
+            {
+                let drift = counts_per_s * now_ns.saturating_sub(since_ns) as f64 * 1e-9;
+                [*byte0, *byte1] = shifted([*byte0, *byte1], drift);
+            }
+            if faults.flip_share > 0.0 && self.noise.uniform() < faults.flip_share {
+                let bit = (self.noise.uniform() * 16.0) as usize;
+                miso[bit / 8] ^= 1 << (bit % 8);
+            }
+        }
+        if let Some(high) = faults.miso_stuck {
+            miso.fill(if high { 0xFF } else { 0x00 });
+        }
+    }
+}
+
+/// Whether a word has odd parity in both bytes, as samples have, and neither error frames nor a floating line.
+fn is_sample(word: [u8; 2]) -> bool {
+    word.iter().all(|byte| byte.count_ones() % 2 == 1)
+}
+
+/// The word of a sample that is some counts larger.
+fn shifted(word: [u8; 2], counts: f64) -> [u8; 2] {
+    let value = f64::from(word[0] >> 1) * 32.0 + f64::from(word[1] >> 3);
+    let value = (value + counts).round().clamp(0.0, 4095.0) as u16;
+    [(value >> 5 << 1) as u8, (value << 3) as u8]
+        .map(|bits| bits | u8::from(bits.count_ones().is_multiple_of(2)))
+}

@@ -1,0 +1,256 @@
+//! The stage that slides the sample under the fingertip: a brushed DC motor on a screw, behind an H-bridge, with a
+//! quadrature encoder, two limit switches and a current amplifier.
+//!
+//! The paper's stage (ANT130, Aerotech) is a linear motor whose controller tells its current; ours is the reference stage of
+//! facts/hardware.md. Its current is that of the unloaded stage plus the shear force over [`FORCE_N_PER_A`], as the paper
+//! found by weights on the inclined stage.
+//!
+//! ```text
+//! mass dv/dt = K i + shear - friction(x, v)      K = 2 pi Kt / lead, in N/A and in V s/m
+//! R i        = duty x supply - K v               (L/R is 35 us, less than a tick)
+//! ```
+//! The two are solved together for the speed at the end of the tick, so that a steady speed is exact.
+
+use std::f64::consts::TAU;
+
+use super::TICK_S;
+use super::noise::Noise;
+
+/// Supply of the H-bridge, V (chosen).
+pub const SUPPLY_V: f64 = 12.0;
+/// Motor, leads, shunt and bridge, ohm (chosen, like a 24 V motor of 23 mm: 7.1 ohm and 26.1 mNm/A), so that a jammed stage
+/// draws 1.6 A, which the amplifier still measures.
+pub const RESISTANCE_OHM: f64 = 7.5;
+/// Torque per current, Nm/A (chosen, see above).
+pub const TORQUE_NM_PER_A: f64 = 0.0261;
+/// Way of the stage per revolution of the screw, mm (chosen).
+pub const LEAD_MM: f64 = 10.0;
+/// Force per current, N/A, and back-EMF per speed, V s/m: 16.4.
+pub const FORCE_N_PER_A: f64 = TAU * TORQUE_NM_PER_A / (LEAD_MM * 1e-3);
+/// Table and sample, 0.8 kg, and rotor and screw, 1.1e-6 kg m^2, as seen through the screw (chosen).
+pub const MASS_KG: f64 = 0.8 + 1.1e-6 * (TAU / (LEAD_MM * 1e-3)) * (TAU / (LEAD_MM * 1e-3));
+/// Coulomb friction of the moving stage, N (chosen): 37 mA.
+pub const COULOMB_N: f64 = 0.6;
+/// Friction of the standing stage in units of [`COULOMB_N`], falling to 1 over [`STRIBECK_MM_S`] (chosen).
+pub const BREAKAWAY: f64 = 1.2;
+/// Speed over which the friction of rest is lost, mm/s (chosen; well below the slowest slide).
+pub const STRIBECK_MM_S: f64 = 1.0;
+/// Viscous friction, N s/m (chosen): 0.2 N at 100 mm/s.
+pub const VISCOUS_N_S_PER_M: f64 = 2.0;
+/// How the Coulomb friction differs over the travel: share, and wavelength in mm (chosen): once per revolution of the
+/// screw, and over its length.
+pub const FRICTION_WAVES: [(f64, f64); 2] = [(0.02, LEAD_MM), (0.02, 63.0)];
+/// Standard deviation of the Coulomb friction from trial to trial, share (chosen).
+pub const FRICTION_SPREAD: f64 = 0.01;
+/// Current ripple: the torque constant falls and rises by this share (chosen)...
+pub const RIPPLE: f64 = 0.02;
+/// ... this often per revolution, by commutation (5 segments).
+pub const RIPPLES_PER_TURN: f64 = 10.0;
+
+/// Way between the hard stops, mm (chosen). Positions count from the lower one.
+pub const TRAVEL_MM: f64 = 85.0;
+/// Where the sample of [`SAMPLE_MM`] begins: in the middle of the travel.
+pub const SAMPLE_AT_MM: f64 = 5.0;
+/// Length of a sample (paper, Textures).
+pub const SAMPLE_MM: f64 = 75.0;
+/// Distance from each hard stop at which its limit switch closes, mm: 1 mm beyond the sample (chosen). From 100 mm/s a
+/// shorted motor runs on for 3 mm, a reversed one for 0.3.
+pub const LIMIT_MM: f64 = 4.0;
+/// Way between closing and opening of a limit switch, mm (chosen).
+pub const LIMIT_HYSTERESIS_MM: f64 = 0.1;
+
+/// Current amplifier: 20 V/V over 50 mohm (INA240A1), its output at half the reference without current.
+pub const ADC_V_PER_A: f64 = 1.0;
+/// Reference of the 12-bit converter, V.
+pub const ADC_REFERENCE_V: f64 = 3.3;
+/// Noise of a reading, counts rms (chosen).
+pub const ADC_NOISE_COUNTS: f64 = 1.5;
+/// Largest error of the zero, counts, and of the gain (chosen; offset of amplifier and resistors, shunt of 0.5 %).
+pub const ADC_ERRORS: (f64, f64) = (8.0, 0.005);
+/// Stream of the seeds that the stage draws from.
+const STREAM: u64 = 0x57a6;
+
+/// The stage, its motor, its bridge and its amplifier.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    duty: f64,
+    enabled: bool,
+    jammed: bool,
+    /// at the end of the last tick, and at its begin
+    position_mm: f64,
+    position_before_mm: f64,
+    speed_mm_s: f64,
+    current_a: f64,
+    limits: (bool, bool),
+    friction_scale: f64,
+    friction_phase: [f64; 2],
+    ripple_phase: f64,
+    adc_offset: f64,
+    adc_gain: f64,
+    noise_seed: u64,
+}
+
+impl Stage {
+    /// A stage that stands at `position_mm`. What differs between stages is drawn from `world_seed`, what differs between
+    /// trials from `trial_seed`.
+    pub fn new(position_mm: f64, world_seed: u64, trial_seed: u64) -> Self {
+        let mut stage = Noise::new(world_seed, STREAM);
+        let mut trial = Noise::new(trial_seed, STREAM);
+        let position_mm = position_mm.clamp(0.0, TRAVEL_MM);
+        let mut stage = Self {
+            duty: 0.0,
+            enabled: false,
+            jammed: false,
+            position_mm,
+            position_before_mm: position_mm,
+            speed_mm_s: 0.0,
+            current_a: 0.0,
+            limits: (false, false),
+            friction_scale: 1.0 + FRICTION_SPREAD * trial.normal(),
+            friction_phase: [stage.between(0.0, TAU), stage.between(0.0, TAU)],
+            ripple_phase: stage.between(0.0, TAU),
+            adc_offset: stage.between(-ADC_ERRORS.0, ADC_ERRORS.0),
+            adc_gain: 1.0 + stage.between(-ADC_ERRORS.1, ADC_ERRORS.1),
+            noise_seed: trial.uniform().to_bits(),
+        };
+        stage.switch_limits();
+        stage
+    }
+
+    /// Duty of the bridge, -1 to 1; positive drives to higher positions. 0 shorts the motor, which brakes it.
+    pub fn set_duty(&mut self, duty: f64) {
+        self.duty = if duty.is_finite() {
+            duty.clamp(-1.0, 1.0)
+        } else {
+            0.0
+        };
+    }
+
+    /// The bridge's enable: without it the motor has no current and the stage coasts.
+    pub fn enable(&mut self, on: bool) {
+        self.enabled = on;
+    }
+
+    /// Whether something holds the stage (fault).
+    pub fn jam(&mut self, jammed: bool) {
+        self.jammed = jammed;
+    }
+
+    /// Lets one tick pass, the finger pushing the stage with `shear_n` (positive to higher positions).
+    pub fn tick(&mut self, shear_n: f64) {
+        let force_n_per_a = self.force_n_per_a();
+        let (drive_v, conductance) = if self.enabled {
+            (self.duty * SUPPLY_V, 1.0 / RESISTANCE_OHM)
+        } else {
+            (0.0, 0.0)
+        };
+        let v = self.speed_mm_s * 1e-3;
+        // as if there were no dry friction ...
+        let push_n = force_n_per_a * drive_v * conductance + shear_n;
+        let drag = force_n_per_a * force_n_per_a * conductance + VISCOUS_N_S_PER_M;
+        let inertia = MASS_KG / TICK_S + drag;
+        let free = (MASS_KG / TICK_S * v + push_n) / inertia;
+        // ... which then takes what it can, but turns nothing round
+        let dry = self.dry_friction_n() / inertia;
+        let after = if self.jammed || free.abs() <= dry {
+            0.0
+        } else {
+            free - dry * free.signum()
+        };
+        self.current_a = (drive_v - force_n_per_a * after) * conductance;
+        self.position_before_mm = self.position_mm;
+        self.position_mm += after * 1e3 * TICK_S;
+        self.speed_mm_s = after * 1e3;
+        if !(0.0..=TRAVEL_MM).contains(&self.position_mm) {
+            self.position_mm = self.position_mm.clamp(0.0, TRAVEL_MM);
+            self.speed_mm_s = 0.0;
+        }
+        self.switch_limits();
+    }
+
+    /// Position at the end of the last tick, mm from the lower hard stop.
+    pub fn position_mm(&self) -> f64 {
+        self.position_mm
+    }
+
+    /// Position within the last tick: 0 is its begin, 1 its end.
+    pub fn position_at_mm(&self, fraction: f64) -> f64 {
+        self.position_before_mm + (self.position_mm - self.position_before_mm) * fraction
+    }
+
+    /// Where on the sample the finger is, mm from its edge. The last point of a sample goes on to the hard stop: a finger
+    /// never falls off the edge.
+    pub fn on_sample_mm(&self) -> f64 {
+        (self.position_mm - SAMPLE_AT_MM).clamp(0.0, SAMPLE_MM)
+    }
+
+    /// Speed at the end of the last tick, mm/s.
+    pub fn speed_mm_s(&self) -> f64 {
+        self.speed_mm_s
+    }
+
+    /// Motor current, A; positive drives to higher positions.
+    pub fn current_a(&self) -> f64 {
+        self.current_a
+    }
+
+    /// The limit switches at the lower and the upper end.
+    pub fn limits(&self) -> (bool, bool) {
+        self.limits
+    }
+
+    /// What the converter reads of the current at a time: two readings at the same time are the same.
+    pub fn adc(&self, now_ns: u64) -> u16 {
+        let counts_per_v = 4096.0 / ADC_REFERENCE_V;
+        let reading = 2048.0
+            + self.current_a * ADC_V_PER_A * self.adc_gain * counts_per_v
+            + self.adc_offset
+            + ADC_NOISE_COUNTS * gauss(self.noise_seed ^ now_ns);
+        reading.round().clamp(0.0, 4095.0) as u16
+    }
+
+    fn force_n_per_a(&self) -> f64 {
+        let turns = self.position_mm / LEAD_MM;
+        FORCE_N_PER_A * (1.0 + RIPPLE * (turns * RIPPLES_PER_TURN * TAU + self.ripple_phase).sin())
+    }
+
+    fn dry_friction_n(&self) -> f64 {
+        let over_travel: f64 = FRICTION_WAVES
+            .iter()
+            .zip(self.friction_phase)
+            .map(|((share, wave_mm), phase)| {
+                share * (self.position_mm / wave_mm * TAU + phase).sin()
+            })
+            .sum();
+        let slow = (-self.speed_mm_s.abs() / STRIBECK_MM_S).exp();
+        COULOMB_N * self.friction_scale * (1.0 + over_travel) * (1.0 + (BREAKAWAY - 1.0) * slow)
+    }
+
+    fn switch_limits(&mut self) {
+        let closed = |was: bool, from_stop_mm: f64| {
+            from_stop_mm < LIMIT_MM + if was { LIMIT_HYSTERESIS_MM } else { 0.0 }
+        };
+        self.limits = (
+            closed(self.limits.0, self.position_mm),
+            closed(self.limits.1, TRAVEL_MM - self.position_mm),
+        );
+    }
+}
+
+/// A number from the standard normal distribution, near enough for noise, that depends on `seed` alone.
+fn gauss(seed: u64) -> f64 {
+    // the finaliser of SplitMix64, twice: neighbouring seeds have nothing in common
+    let mut bits = seed;
+    for _ in 0..2 {
+        bits = bits.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        bits ^= bits >> 31;
+    }
+    // the sum of four uniform 16-bit draws, scaled to a standard deviation of 1
+    let sum: u64 = (0..4).map(|i| (bits >> (16 * i)) & 0xFFFF).sum();
+    (sum as f64 - 2.0 * 65535.0) / (65536.0 * (4.0f64 / 12.0).sqrt())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,395 @@
+//! The whole rig behind its pins: finger, sample, lever, stage, encoder, amplifier, switches.
+//!
+//! Inputs are levels, duties and bytes with their time in ns; outputs are what the pins say at the time reached. Nothing
+//! here knows what a controller means to do. [`World::truth`] is for tests and displays only.
+//!
+//! Time: [`World::advance_to`] goes on in ticks of [`TICK_S`](super::TICK_S). The tick that holds the time reached is computed as a whole, with
+//! the inputs as they were at its begin, so that an input acts within 76 us, and outputs between ticks are interpolated.
+//! Times may repeat; one that is earlier than the last acts now, though the driver still measures STEP and DIR by it.
+//!
+//! A world is its [`Setup`] and its inputs: the same give the same words, on any thread.
+
+use super::encoder::{Edge, Encoder};
+use super::faults::{Fault, Faults, Miso};
+use super::finger::{Contact, Finger};
+use super::lever::Lever;
+use super::sensor::SensorPeer;
+use super::stage::Stage;
+use super::surface::Surface;
+use super::{noise::Noise, textures};
+
+/// What a world is made from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Setup {
+    /// Number of the texture that is mounted, 1 to 117 (Table 1).
+    pub texture: u8,
+    /// What the textures, this rig's motors and its amplifier are like.
+    pub world_seed: u64,
+    /// What differs between trials: where lever and stage stand at power-up, noise, hum, the stage's friction.
+    pub trial_seed: u64,
+    /// Which fingertip it is.
+    pub finger_seed: u64,
+    /// Whether [`World::next_encoder_edge`] is going to be asked: edges are kept until then.
+    pub keep_edges: bool,
+}
+
+impl Default for Setup {
+    fn default() -> Self {
+        Self {
+            texture: 1,
+            world_seed: 1,
+            trial_seed: 1,
+            finger_seed: 1,
+            keep_edges: false,
+        }
+    }
+}
+
+/// What is really so, as no pin tells it.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Truth {
+    /// Time of these values: the end of the tick, at most 76 us ahead of the time reached.
+    pub at_ns: u64,
+    /// Number of the mounted texture.
+    pub texture: u8,
+    /// Contact force, N.
+    pub force_n: f64,
+    /// Largest contact force of all ticks since [`World::reset_extremes`], N.
+    pub force_max_n: f64,
+    /// Shear on the stage, N; positive towards higher positions, so against a movement it is negative.
+    pub shear_n: f64,
+    /// Height of the undeformed fingertip over the steel plate, mm.
+    pub tip_mm: f64,
+    /// How deep the sample pushes into the fingertip, mm; negative is a gap.
+    pub indentation_mm: f64,
+    /// Steps down that STEP asked for and the lever did not make, less those up.
+    pub lever_missing_steps: f64,
+    /// STEP and DIR edges that broke the driver's timing.
+    pub lever_bad_pulses: u64,
+    /// Place of the stage, mm from its lower hard stop.
+    pub stage_mm: f64,
+    /// Lowest and highest place of the stage since [`World::reset_extremes`], mm.
+    pub stage_reach_mm: (f64, f64),
+    /// Place of the finger on the sample, mm from its edge.
+    pub sample_mm: f64,
+    /// Speed of the stage, mm/s.
+    pub speed_mm_s: f64,
+    /// Motor current, A.
+    pub current_a: f64,
+    /// Work that the finger's shear took since power-up, J: what wears the skin.
+    pub sliding_j: f64,
+    /// Wear of the skin, as the finger has it.
+    pub wear: f64,
+}
+
+/// Why another sample cannot be mounted: the finger is on this one.
+#[derive(thiserror::Error, Clone, Copy, PartialEq, Debug)]
+#[error("the finger is {indentation_mm:.3} mm deep in the sample: lift it first")]
+pub struct NotLifted {
+    /// How deep.
+    pub indentation_mm: f64,
+}
+
+/// The rig.
+pub struct World {
+    setup: Setup,
+    now_ns: u64,
+    ticks: u64,
+    tick_began_ns: u64,
+    tick_ends_ns: u64,
+    lever: Lever,
+    stage: Stage,
+    encoder: Encoder,
+    surface: Surface,
+    finger: Finger,
+    sensor: SensorPeer,
+    miso: Miso,
+    faults: Faults,
+    /// latest first
+    scheduled: Vec<(u64, Fault)>,
+    force_max_n: f64,
+    stage_reach_mm: (f64, f64),
+    sliding_j: f64,
+}
+
+impl World {
+    /// Where the tip may be at power-up, mm over the plate, and the stage, mm (chosen): a controller has to find its
+    /// switches.
+    const POWER_UP_MM: [(f64, f64); 2] = [(12.0, 15.0), (20.0, 65.0)];
+
+    /// A rig just powered up: no current in either motor, the finger in the air.
+    pub fn new(setup: Setup) -> Self {
+        let mut trial = Noise::new(setup.trial_seed, 0x3071d);
+        // the finger draws its landings and its noise from one seed: another trial, other ones
+        let finger_noise = setup.finger_seed.rotate_left(32) ^ trial.uniform().to_bits();
+        let [tip_mm, stage_mm] = Self::POWER_UP_MM.map(|(low, high)| trial.between(low, high));
+        let mut world = Self {
+            setup,
+            now_ns: 0,
+            ticks: 0,
+            tick_began_ns: 0,
+            tick_ends_ns: 0,
+            lever: Lever::new(tip_mm, setup.world_seed, setup.trial_seed),
+            stage: Stage::new(stage_mm, setup.world_seed, setup.trial_seed),
+            encoder: Encoder::new(stage_mm, setup.keep_edges),
+            surface: sample(setup.texture, setup.world_seed),
+            finger: Finger::new(finger_noise),
+            sensor: SensorPeer::new(setup.finger_seed),
+            miso: Miso::new(setup.trial_seed),
+            faults: Faults::default(),
+            scheduled: Vec::new(),
+            force_max_n: 0.0,
+            stage_reach_mm: (stage_mm, stage_mm),
+            sliding_j: 0.0,
+        };
+        world.advance_to(0);
+        world
+    }
+
+    /// Lets time pass.
+    pub fn advance_to(&mut self, now_ns: u64) {
+        self.now_ns = self.now_ns.max(now_ns);
+        while self.tick_ends_ns <= self.now_ns {
+            self.tick();
+        }
+    }
+
+    /// The time reached, ns.
+    pub fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    /// STEP of the lever's driver. Each rising edge is a step; levels of at least 4 us.
+    pub fn lever_step(&mut self, now_ns: u64, high: bool) {
+        self.advance_to(now_ns);
+        self.lever.step(now_ns, high, self.finger.force_n());
+    }
+
+    /// DIR of the lever's driver: high is down. Stable for 1 us before STEP rises.
+    pub fn lever_dir(&mut self, now_ns: u64, high: bool) {
+        self.advance_to(now_ns);
+        self.lever.dir(now_ns, high);
+    }
+
+    /// EN of the lever's driver: high gives current (chosen; a driver with a low-active EN has an inverter). Low at
+    /// power-up.
+    pub fn lever_enable(&mut self, now_ns: u64, high: bool) {
+        self.advance_to(now_ns);
+        self.lever.enable(high, self.finger.force_n());
+    }
+
+    /// Duty of the stage's H-bridge, -1 to 1; positive drives to higher positions and counts. 0 shorts the motor: it
+    /// brakes.
+    pub fn stage_pwm(&mut self, now_ns: u64, duty: f64) {
+        self.advance_to(now_ns);
+        self.stage.set_duty(duty);
+    }
+
+    /// Enable of the stage's H-bridge: low, the motor has no current and the stage coasts. Low at power-up.
+    pub fn stage_enable(&mut self, now_ns: u64, high: bool) {
+        self.advance_to(now_ns);
+        self.stage.enable(high);
+    }
+
+    /// One transfer with the sensor, chip select low from `now_ns` for `duration_ns`; fills `miso`.
+    pub fn spi(&mut self, now_ns: u64, duration_ns: u64, mosi: &[u8], miso: &mut [u8]) {
+        self.advance_to(now_ns);
+        let fraction = self.fraction();
+        self.sensor
+            .transfer(now_ns, duration_ns, mosi, miso, &mut self.finger, fraction);
+        self.miso.pass(now_ns, mosi, miso, &self.faults);
+    }
+
+    /// Count of the stage's encoder, 1000 per mm, 0 where it stood at power-up.
+    pub fn encoder(&self) -> i32 {
+        self.encoder
+            .count(self.stage.position_at_mm(self.fraction()))
+    }
+
+    /// The next edge of the encoder's lines up to the time reached, if [`Setup::keep_edges`] is set. Both lines are low at
+    /// power-up.
+    pub fn next_encoder_edge(&mut self) -> Option<Edge> {
+        self.encoder.next_edge(self.now_ns)
+    }
+
+    /// The converter's reading of the stage's motor current: 12 bits over 3.3 V, about 2048 without current, 1 V/A.
+    pub fn motor_adc(&self) -> u16 {
+        self.stage.adc(self.now_ns)
+    }
+
+    /// The limit switch at the top of the lever's travel; `true` is closed.
+    pub fn lever_top(&self) -> bool {
+        self.faults.top_stuck.unwrap_or(self.lever.at_top())
+    }
+
+    /// The limit switches at the lower and the upper end of the stage; `true` is closed.
+    pub fn stage_limits(&self) -> (bool, bool) {
+        let (lower, upper) = self.stage.limits();
+        let stuck = self.faults.limit_stuck;
+        (stuck.0.unwrap_or(lower), stuck.1.unwrap_or(upper))
+    }
+
+    /// The emergency stop; `true` is pressed.
+    pub fn e_stop(&self) -> bool {
+        self.faults.e_stop
+    }
+
+    /// Mounts another sample.
+    ///
+    /// # Errors
+    /// If the finger touches the one that is there.
+    pub fn place(&mut self, texture: u8) -> Result<(), NotLifted> {
+        self.must_be_lifted()?;
+        self.setup.texture = texture;
+        self.surface = sample(texture, self.setup.world_seed);
+        Ok(())
+    }
+
+    /// Gives the finger a new skin.
+    ///
+    /// # Errors
+    /// If the finger touches the sample.
+    pub fn replace_skin(&mut self) -> Result<(), NotLifted> {
+        self.must_be_lifted()?;
+        self.finger.replace_skin();
+        Ok(())
+    }
+
+    /// Breaks something now, or presses the stop. Faults add up.
+    pub fn inject(&mut self, fault: Fault) {
+        let faults = &mut self.faults;
+        match fault {
+            Fault::SensorUnplugged => self.sensor.unplug(),
+            Fault::BitFlips { share } => faults.flip_share = share,
+            Fault::MisoStuck { high } => faults.miso_stuck = Some(high),
+            Fault::SensorFrozen => faults.frozen = true,
+            Fault::PdcDrift { counts_per_s } => faults.drift = Some((counts_per_s, self.now_ns)),
+            Fault::StageJammed => self.stage.jam(true),
+            Fault::EncoderCut(cut) => self.set_cut(Some(cut)),
+            Fault::StageLimitStuck {
+                upper: false,
+                closed,
+            } => faults.limit_stuck.0 = Some(closed),
+            Fault::StageLimitStuck {
+                upper: true,
+                closed,
+            } => faults.limit_stuck.1 = Some(closed),
+            Fault::LeverTopStuck { closed } => faults.top_stuck = Some(closed),
+            Fault::LeverLosesSteps { share } => self.lever.lose_steps(share),
+            Fault::LeverRunaway => self.lever.run_away_down(true),
+            Fault::EStop => faults.e_stop = true,
+        }
+    }
+
+    /// Lets something break at a time, to the tick: up to 76 us late.
+    pub fn schedule(&mut self, at_ns: u64, fault: Fault) {
+        self.scheduled.push((at_ns, fault));
+        self.scheduled
+            .sort_by_key(|(at_ns, _)| std::cmp::Reverse(*at_ns));
+    }
+
+    /// Repairs everything, and forgets what was scheduled; a sensor that is plugged in again starts up. What a fault has done stays: lost steps, lost counts, a lever
+    /// that ran down.
+    pub fn clear(&mut self) {
+        self.faults = Faults::default();
+        self.scheduled.clear();
+        self.sensor.plug(self.now_ns);
+        self.stage.jam(false);
+        self.set_cut(None);
+        self.lever.lose_steps(0.0);
+        self.lever.run_away_down(false);
+    }
+
+    /// What is really so.
+    pub fn truth(&self) -> Truth {
+        Truth {
+            at_ns: self.tick_ends_ns,
+            texture: self.setup.texture,
+            force_n: self.finger.force_n(),
+            force_max_n: self.force_max_n,
+            shear_n: self.finger.shear_n(),
+            tip_mm: self.lever.height_mm(),
+            indentation_mm: self.indentation_mm(),
+            lever_missing_steps: self.lever.missing_steps(),
+            lever_bad_pulses: self.lever.bad_pulses(),
+            stage_mm: self.stage.position_mm(),
+            stage_reach_mm: self.stage_reach_mm,
+            sample_mm: self.stage.on_sample_mm(),
+            speed_mm_s: self.stage.speed_mm_s(),
+            current_a: self.stage.current_a(),
+            sliding_j: self.sliding_j,
+            wear: self.finger.wear(),
+        }
+    }
+
+    /// Begins the maxima and the reach of [`Truth`] anew.
+    pub fn reset_extremes(&mut self) {
+        self.force_max_n = self.finger.force_n();
+        self.stage_reach_mm = (self.stage.position_mm(), self.stage.position_mm());
+    }
+
+    fn tick(&mut self) {
+        self.tick_began_ns = self.tick_ends_ns;
+        while let Some((_, fault)) = self
+            .scheduled
+            .pop_if(|(at_ns, _)| *at_ns <= self.tick_began_ns)
+        {
+            self.inject(fault);
+        }
+        self.ticks += 1;
+        // 1 s / 13 200 is 2 500 000 / 33 ns
+        self.tick_ends_ns = (u128::from(self.ticks) * 2_500_000 / 33) as u64;
+
+        let shear_n = self.finger.shear_n();
+        self.lever.tick(self.tick_ends_ns, self.finger.force_n());
+        let from_mm = self.stage.position_mm();
+        self.stage.tick(shear_n);
+        let to_mm = self.stage.position_mm();
+        if from_mm != to_mm {
+            self.encoder
+                .pass([from_mm, to_mm], [self.tick_began_ns, self.tick_ends_ns]);
+        }
+        self.finger.tick(&Contact {
+            indentation_mm: self.indentation_mm(),
+            surface: Some(&self.surface),
+            x_mm: self.stage.on_sample_mm(),
+            speed_mm_s: self.stage.speed_mm_s(),
+            lever_vibration: self.lever.vibration_pa(),
+        });
+
+        self.force_max_n = self.force_max_n.max(self.finger.force_n());
+        self.stage_reach_mm.0 = self.stage_reach_mm.0.min(to_mm);
+        self.stage_reach_mm.1 = self.stage_reach_mm.1.max(to_mm);
+        self.sliding_j -= shear_n * (to_mm - from_mm) * 1e-3;
+    }
+
+    /// How far the time reached is into its tick, 0 to 1.
+    fn fraction(&self) -> f64 {
+        (self.now_ns - self.tick_began_ns) as f64 / (self.tick_ends_ns - self.tick_began_ns) as f64
+    }
+
+    fn indentation_mm(&self) -> f64 {
+        self.surface.thickness_mm() - self.lever.height_mm()
+    }
+
+    fn must_be_lifted(&self) -> Result<(), NotLifted> {
+        let indentation_mm = self.indentation_mm();
+        if indentation_mm > 0.0 || self.finger.force_n() > 0.0 {
+            return Err(NotLifted { indentation_mm });
+        }
+        Ok(())
+    }
+
+    fn set_cut(&mut self, cut: Option<super::encoder::Cut>) {
+        let position_mm = self.stage.position_at_mm(self.fraction());
+        self.encoder.set_cut(cut, position_mm, self.now_ns);
+    }
+}
+
+/// The sample of a texture that belongs to a world.
+fn sample(texture: u8, world_seed: u64) -> Surface {
+    Surface::new(&textures::draw(texture, world_seed), world_seed)
+}
+
+#[cfg(test)]
+mod tests;
