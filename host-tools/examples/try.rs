@@ -10,6 +10,33 @@ fn main() {
         ..Setup::default()
     });
     let t = std::time::Instant::now();
+    if std::env::args().nth(2).as_deref() == Some("nothome") {
+        for _ in 0..101 {
+            rig.tick();
+        }
+        rig.world()
+            .inject(tactus::sim::faults::Fault::LeverTopStuck { closed: false });
+        println!("{:?}", rig.home());
+        println!("{:?}", rig.world().truth());
+        rig.world().clear();
+        rig.control().reset();
+        println!("{:?}", rig.home());
+        println!("{:?} {:?}", rig.world().truth(), rig.world().lever_top());
+        rig.control().start(Movement::FOR_TRACTION, 0.0).unwrap();
+        for n in 0..10000 {
+            rig.tick();
+            if n % 500 == 0 {
+                println!(
+                    "{:?} {:?} {} {:?}",
+                    rig.control().phase(),
+                    rig.world().truth().tip_mm,
+                    rig.world().truth().lever_missing_steps,
+                    rig.world().lever_top()
+                );
+            }
+        }
+        return;
+    }
     println!("home {:?} at {:?}", rig.home(), rig.now());
     println!("truth {:?}", rig.world().truth());
     println!("cal {:?} at {:?}", rig.calibrate_current(), rig.now());

@@ -426,8 +426,8 @@ impl Control {
         self.advance(inputs, &mut outputs);
         match self.phase {
             Phase::Faulted(fault) => {
+                // with its bridge on and no duty the motor is shorted, and brakes
                 outputs.stage_duty = 0.0;
-                outputs.stage_enabled = false;
                 // a driver that steps on its own must lose its current; then the finger has pushed it back
                 outputs.lever_enabled = fault != Fault::LeverNotHome
                     && (fault != Fault::ForceHigh || self.ms > RELEASE_MS);
@@ -550,11 +550,13 @@ impl Control {
                 self.skin
                     .slid(shear_n, self.force_mn() * 1e-3, self.stage.velocity_mm_s());
                 if self.stage.state() == StageState::Standing {
-                    self.ended = Some(if self.damaged == 0 {
-                        Ended::Whole
-                    } else {
-                        Ended::Gap(self.damaged)
-                    });
+                    self.ended = Some(
+                        if self.damaged == 0 || !self.guard.looks_for(Fault::SlideGap) {
+                            Ended::Whole
+                        } else {
+                            Ended::Gap(self.damaged)
+                        },
+                    );
                     self.lever.lift(inputs.steps);
                     self.enter(Phase::Lifting);
                 }

@@ -20,6 +20,9 @@ const CLEARANCE_STEPS: i32 = 1600;
 pub const MAX_STEPS: i32 = 25_600;
 /// Contact is seen when the mean of P_DC has risen by this many counts: thirty times its noise.
 const CONTACT_COUNTS: f32 = 3.0;
+/// Nearer to the top than this the limit switch may be closed, further down it must be open: 1 mm, the switch's
+/// own way and the half millimetre from it to the hard stop.
+const NEAR_TOP_STEPS: i32 = 1600;
 /// From contact to 2 N the finger gives way by less than 3 mm; more steps than that without the force are lost steps.
 const PRESS_STEPS: i32 = 4800;
 /// The skin creeps after it was pressed, and P_DC with it.
@@ -34,6 +37,10 @@ const GOOD_COUNTS: f32 = 0.25;
 const GOOD_SHARE: f32 = 0.01;
 /// After this many trims the force has to be within tolerance.
 const MAX_TRIMS: u8 = 6;
+/// All trims together press on by no more than this share of the target and this many counts: the skin creeps by less,
+/// and a P_DC that drifts must not be followed until the finger is crushed.
+const MAX_CREEP_SHARE: f32 = 0.15;
+const MAX_CREEP_COUNTS: f32 = 3.0;
 /// Tolerance of a pressed finger: 1 count or 5 %, whichever is more.
 const TOLERANCE_COUNTS: f32 = 1.0;
 const TOLERANCE_SHARE: f32 = 0.05;
@@ -85,12 +92,15 @@ pub struct Lever {
     /// Force asked for, in counts above no contact.
     target: f32,
     trims: u8,
+    /// Counts that the trims have pressed on by.
+    crept: f32,
     /// Counts of P_DC per step near the target, learned during the approach.
     counts_per_step: f32,
     /// Count of steps and P_DC some way before the target.
     before: Option<(i32, f32)>,
-    /// Count of steps at the limit switch, which is 0 of the travel.
+    /// Count of steps at the limit switch, which is 0 of the travel, once it was found.
     top: i32,
+    known: bool,
     /// Count of steps at the last contact.
     contact: Option<i32>,
     ms: u32,
@@ -109,9 +119,11 @@ impl Lever {
             state: LeverState::Unknown,
             target: 0.0,
             trims: 0,
+            crept: 0.0,
             counts_per_step: 0.0,
             before: None,
             top: 0,
+            known: false,
             contact: None,
             ms: 0,
         }
@@ -127,17 +139,18 @@ impl Lever {
         self.state == LeverState::Lifted
     }
 
-    /// Whether it is so far below the limit switch that the switch must be open: half a millimetre.
+    /// Whether it is so far below the limit switch that the switch must be open.
     pub fn is_down(&self, steps: i32) -> bool {
-        let known = !matches!(
-            self.state,
-            LeverState::Unknown | LeverState::Homing | LeverState::Retracting(_)
-        );
-        known && steps - self.top > 800
+        let known = !matches!(self.state, LeverState::Unknown | LeverState::Homing);
+        known && steps - self.top > NEAR_TOP_STEPS
     }
 
-    /// Goes up to the limit switch. This is also what lifts the finger whatever has happened.
+    /// Goes up to the limit switch. This is also what lifts the finger whatever has happened: a lever that knows where it
+    /// is believes the switch only near the top, for a switch that sticks must not leave the finger down.
     pub fn home(&mut self) {
+        if self.state == LeverState::Unknown {
+            self.known = false;
+        }
         self.enter(LeverState::Homing);
     }
 
@@ -188,8 +201,9 @@ impl Lever {
         match self.state {
             LeverState::Unknown | LeverState::Lifted | LeverState::Holding => Ok(0),
             LeverState::Homing => {
-                if at_top {
+                if at_top && (!self.known || steps - self.top <= NEAR_TOP_STEPS) {
                     self.top = steps;
+                    self.known = true;
                     self.contact = None;
                     self.enter(LeverState::Lifted);
                     return Ok(0);
@@ -209,6 +223,7 @@ impl Lever {
                     meter.zero();
                     self.before = None;
                     self.trims = 0;
+                    self.crept = 0.0;
                     self.enter(LeverState::Approaching(None));
                     return Ok(APPROACH_STEPS_S);
                 }
@@ -234,7 +249,7 @@ impl Lever {
                 }
             }
             LeverState::Retracting(to) => {
-                if at_top || steps <= to {
+                if steps <= to || (at_top && steps - self.top <= NEAR_TOP_STEPS) {
                     self.enter(LeverState::Lifted);
                     Ok(0)
                 } else {
@@ -254,6 +269,8 @@ impl Lever {
         let contact = contact.or_else(|| (meter.counts() > CONTACT_COUNTS).then_some(steps));
         self.state = LeverState::Approaching(contact);
         match contact {
+            // less than no contact: the zero has drifted, and with it the force that would be pressed
+            None if meter.counts() < -CONTACT_COUNTS => return Err(LeverFault::Unsteady),
             None if steps - self.top >= MAX_STEPS => return Err(LeverFault::NoContact),
             None => return Ok(APPROACH_STEPS_S),
             Some(at) if steps - at > PRESS_STEPS => return Err(LeverFault::Slips),
@@ -298,8 +315,11 @@ impl Lever {
             return Err(LeverFault::Unsteady);
         }
         self.trims += 1;
-        // never more than half the way to the lower end of the press at once, whatever was learned
-        let correction = libm::roundf(off / self.counts_per_step).clamp(-400.0, 400.0) as i32;
+        self.crept += off;
+        if self.crept > MAX_CREEP_COUNTS + MAX_CREEP_SHARE * self.target {
+            return Err(LeverFault::Unsteady);
+        }
+        let correction = libm::roundf(off / self.counts_per_step) as i32;
         let correction = if correction == 0 {
             if off > 0.0 { 1 } else { -1 }
         } else {

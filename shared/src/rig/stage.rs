@@ -50,12 +50,16 @@ impl StageConstants {
     }
 }
 
-/// Largest distance between profile and stage that is still following, mm.
-const FOLLOWING_MM: f32 = 1.5;
+/// Largest distance between profile and stage that is still following: so many mm, and the way of so many s. Long enough
+/// for the guard to say why the stage stands.
+const FOLLOWING_MM: f32 = 1.0;
+const FOLLOWING_S: f32 = 0.04;
 /// Velocity is taken over this many ms of encoder counts.
 const VELOCITY_MS: usize = 2;
 /// Distance kept from the limit switches, mm.
 pub const MARGIN_MM: f32 = 1.0;
+/// Most duty from the integral: enough for a loaded stage, and not for one that runs away without an encoder.
+const MAX_INTEGRAL: f32 = 0.25;
 const HOMING_MM_S: f32 = 10.0;
 /// The stage has arrived when it stands this near, mm: friction holds it within 0.2 mm, and every move begins where it
 /// stands.
@@ -148,7 +152,7 @@ impl Profile {
 pub enum StageFault {
     /// The motor pushes and the stage does not follow.
     Following,
-    /// The limit switch was not reached.
+    /// The limit switch was not found: something is in the way, or the switch does not close.
     NotHome,
 }
 
@@ -263,11 +267,10 @@ impl Stage {
                 let t = ms as f32 * 1e-3;
                 let way = (from - count) as f32 * c.mm_per_count;
                 let off = HOMING_MM_S * t - way;
-                if t * HOMING_MM_S > c.travel_mm * 1.25 {
+                if off > FOLLOWING_MM + FOLLOWING_S * HOMING_MM_S
+                    || t * HOMING_MM_S > c.travel_mm * 1.25
+                {
                     return Err(StageFault::NotHome);
-                }
-                if off > FOLLOWING_MM {
-                    return Err(StageFault::Following);
                 }
                 let duty = c.duty_per_mm_s * HOMING_MM_S
                     + c.duty_friction
@@ -283,7 +286,8 @@ impl Stage {
                 let over = profile
                     .ms
                     .saturating_sub(libm::ceilf(profile.duration_s() * 1e3) as u32);
-                if libm::fabsf(off) > FOLLOWING_MM || over > ARRIVE_MS {
+                let following = FOLLOWING_MM + FOLLOWING_S * profile.speed_mm_s;
+                if libm::fabsf(off) > following || over > ARRIVE_MS {
                     return Err(StageFault::Following);
                 }
                 if over > 0
@@ -310,7 +314,7 @@ impl Stage {
                         } else {
                             v_then
                         } - self.velocity_mm_s())
-                    + c.i * off;
+                    + (c.i * off).clamp(-MAX_INTEGRAL, MAX_INTEGRAL);
                 Ok(duty.clamp(-1.0, 1.0))
             }
         }
