@@ -35,8 +35,8 @@ pub struct Encoder {
     cut: Option<Cut>,
     /// count - what [`Encoder::followed`] says
     offset: i64,
-    /// counts and when they were reached, if somebody wants edges
-    passed: Option<VecDeque<(u64, i64)>>,
+    /// counts, when they were reached and how the lines were then, if somebody wants edges
+    passed: Option<VecDeque<(i64, Edge)>>,
     shown: (bool, bool),
 }
 
@@ -62,7 +62,7 @@ impl Encoder {
             let at_mm = (boundary as f64 + self.origin) / COUNTS_PER_MM;
             let share = ((at_mm - from_mm) / (to_mm - from_mm)).clamp(0.0, 1.0);
             let at_ns = began_ns + (share * (ended_ns - began_ns) as f64) as u64;
-            passed.push_back((at_ns, count));
+            passed.push_back((count, edge(at_ns, count, self.cut)));
         };
         if to > from {
             (from + 1..=to).for_each(|count| pass(count, count));
@@ -76,7 +76,8 @@ impl Encoder {
         (self.offset + followed(self.counts(position_mm), self.cut)) as i32
     }
 
-    /// Cuts wires, or joins them again, with the stage at a position.
+    /// Cuts wires, or joins them again, at a time with the stage at a position. Edges of that tick that are yet to come are
+    /// changed.
     pub fn set_cut(&mut self, cut: Option<Cut>, position_mm: f64, now_ns: u64) {
         if cut == self.cut {
             return;
@@ -87,19 +88,21 @@ impl Encoder {
         self.cut = cut;
         self.offset = before + jump - followed(count, cut);
         if let Some(passed) = &mut self.passed {
-            passed.push_front((now_ns, count));
+            let now = passed.partition_point(|(_, edge)| edge.at_ns <= now_ns);
+            for (count, to_come) in passed.range_mut(now..) {
+                *to_come = edge(to_come.at_ns, *count, cut);
+            }
+            passed.insert(now, (count, edge(now_ns, count, cut)));
         }
     }
 
     /// The oldest edge up to `now_ns` that was not fetched yet.
     pub fn next_edge(&mut self, now_ns: u64) -> Option<Edge> {
         let passed = self.passed.as_mut()?;
-        while let Some(&(at_ns, count)) = passed.front().filter(|(at_ns, _)| *at_ns <= now_ns) {
-            passed.pop_front();
-            let (a, b) = lines(count, self.cut);
-            if (a, b) != self.shown {
-                self.shown = (a, b);
-                return Some(Edge { at_ns, a, b });
+        while let Some((_, edge)) = passed.pop_front_if(|(_, edge)| edge.at_ns <= now_ns) {
+            if (edge.a, edge.b) != self.shown {
+                self.shown = (edge.a, edge.b);
+                return Some(edge);
             }
         }
         None
@@ -108,6 +111,11 @@ impl Encoder {
     fn counts(&self, position_mm: f64) -> i64 {
         ((position_mm * COUNTS_PER_MM).floor() - self.origin) as i64
     }
+}
+
+fn edge(at_ns: u64, count: i64, cut: Option<Cut>) -> Edge {
+    let (a, b) = lines(count, cut);
+    Edge { at_ns, a, b }
 }
 
 fn lines(count: i64, cut: Option<Cut>) -> (bool, bool) {

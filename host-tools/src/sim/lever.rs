@@ -68,7 +68,7 @@ pub struct Lever {
     enabled: bool,
     /// whether the last rising edge was a step: a short pulse takes it back
     last_edge_stepped: bool,
-    last_step_ns: u64,
+    last_step_ns: Option<u64>,
     /// microsteps/s and sign of the last step
     rate: f64,
     direction: i64,
@@ -127,7 +127,7 @@ impl Lever {
             dir: Pin::default(),
             enabled: false,
             last_edge_stepped: false,
-            last_step_ns: 0,
+            last_step_ns: None,
             rate: 0.0,
             direction: 1,
             stalled: false,
@@ -224,7 +224,7 @@ impl Lever {
             return;
         }
         self.run_away(load_n);
-        let idle_ns = now_ns.saturating_sub(self.last_step_ns);
+        let idle_ns = now_ns.saturating_sub(self.last_step_ns.unwrap_or(0));
         if self.rate > START_STOP_PER_S && idle_ns > OVERRUN_NS {
             self.rate = 0.0;
             self.slip(self.direction, load_n);
@@ -281,7 +281,9 @@ impl Lever {
     }
 
     fn take_step(&mut self, at_ns: u64, sign: i64, load_n: f64) {
-        let rate = 1e9 / at_ns.saturating_sub(self.last_step_ns).max(1) as f64;
+        let rate = self.last_step_ns.map_or(0.0, |last_ns| {
+            1e9 / at_ns.saturating_sub(last_ns).max(1) as f64
+        });
         let ran_at = if sign == self.direction {
             self.rate.max(START_STOP_PER_S)
         } else {
@@ -290,7 +292,7 @@ impl Lever {
         let can_run_at = (ran_at * ran_at + 2.0 * RAMP_PER_S2).sqrt().min(TOP_PER_S);
         self.field += sign;
         self.direction = sign;
-        self.last_step_ns = at_ns;
+        self.last_step_ns = Some(at_ns);
         if rate <= START_STOP_PER_S || (!self.stalled && rate <= can_run_at * RATE_SLACK) {
             self.stalled = false;
             self.standing = false;

@@ -3,9 +3,10 @@
 //! Inputs are levels, duties and bytes with their time in ns; outputs are what the pins say at the time reached. Nothing
 //! here knows what a controller means to do. [`World::truth`] is for tests and displays only.
 //!
-//! Time: [`World::advance_to`] goes on in ticks of [`TICK_S`](super::TICK_S). The tick that holds the time reached is computed as a whole, with
-//! the inputs as they were at its begin, so that an input acts within 76 us, and outputs between ticks are interpolated.
-//! Times may repeat; one that is earlier than the last acts now, though the driver still measures STEP and DIR by it.
+//! Time: [`World::advance_to`] goes on in ticks of 76 us ([`TICKS_PER_S`](super::TICKS_PER_S)). The tick that holds the
+//! time reached is computed as a whole, with the inputs as they were at its begin, so that an input acts within 76 us;
+//! outputs between ticks are interpolated. Times may repeat; a time earlier than the last acts now, though the driver still
+//! measures STEP and DIR by it.
 //!
 //! A world is its [`Setup`] and its inputs: the same give the same words, on any thread.
 
@@ -257,15 +258,20 @@ impl World {
 
     /// Breaks something now, or presses the stop. Faults add up.
     pub fn inject(&mut self, fault: Fault) {
+        let position_mm = self.stage.position_at_mm(self.fraction());
+        self.inject_at(fault, self.now_ns, position_mm);
+    }
+
+    fn inject_at(&mut self, fault: Fault, at_ns: u64, position_mm: f64) {
         let faults = &mut self.faults;
         match fault {
             Fault::SensorUnplugged => self.sensor.unplug(),
             Fault::BitFlips { share } => faults.flip_share = share,
             Fault::MisoStuck { high } => faults.miso_stuck = Some(high),
             Fault::SensorFrozen => faults.frozen = true,
-            Fault::PdcDrift { counts_per_s } => faults.drift = Some((counts_per_s, self.now_ns)),
+            Fault::PdcDrift { counts_per_s } => faults.drift = Some((counts_per_s, at_ns)),
             Fault::StageJammed => self.stage.jam(true),
-            Fault::EncoderCut(cut) => self.set_cut(Some(cut)),
+            Fault::EncoderCut(cut) => self.encoder.set_cut(Some(cut), position_mm, at_ns),
             Fault::StageLimitStuck {
                 upper: false,
                 closed,
@@ -295,7 +301,8 @@ impl World {
         self.scheduled.clear();
         self.sensor.plug(self.now_ns);
         self.stage.jam(false);
-        self.set_cut(None);
+        let position_mm = self.stage.position_at_mm(self.fraction());
+        self.encoder.set_cut(None, position_mm, self.now_ns);
         self.lever.lose_steps(0.0);
         self.lever.run_away_down(false);
     }
@@ -330,11 +337,9 @@ impl World {
 
     fn tick(&mut self) {
         self.tick_began_ns = self.tick_ends_ns;
-        while let Some((_, fault)) = self
-            .scheduled
-            .pop_if(|(at_ns, _)| *at_ns <= self.tick_began_ns)
-        {
-            self.inject(fault);
+        let began_ns = self.tick_began_ns;
+        while let Some((_, fault)) = self.scheduled.pop_if(|(at_ns, _)| *at_ns <= began_ns) {
+            self.inject_at(fault, began_ns, self.stage.position_mm());
         }
         self.ticks += 1;
         // 1 s / 13 200 is 2 500 000 / 33 ns
@@ -378,11 +383,6 @@ impl World {
             return Err(NotLifted { indentation_mm });
         }
         Ok(())
-    }
-
-    fn set_cut(&mut self, cut: Option<super::encoder::Cut>) {
-        let position_mm = self.stage.position_at_mm(self.fraction());
-        self.encoder.set_cut(cut, position_mm, self.now_ns);
     }
 }
 

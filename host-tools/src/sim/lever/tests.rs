@@ -169,6 +169,16 @@ fn pulses_that_break_the_timing_are_no_steps() {
 }
 
 #[test]
+fn the_first_step_may_come_at_once() {
+    let mut lever = Lever::new(8.0, 1, 2);
+    lever.enable(true, 0.0);
+    lever.dir(0, true);
+    lever.step(1_000, true, 0.0);
+    lever.step(6_000, false, 0.0);
+    assert_eq!((lever.missing_steps(), lever.bad_pulses()), (0.0, 0));
+}
+
+#[test]
 fn it_starts_at_the_start_rate_and_not_above() {
     for (per_s, lost) in [(800.0, false), (6_300.0, false), (8_000.0, true)] {
         let mut bench = Bench::at(TOP_MM - 1.0);
