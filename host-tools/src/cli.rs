@@ -18,14 +18,17 @@ pub(crate) struct Tactus {
     pub(crate) command: Option<Command>,
 }
 
-const FIRST_STEPS: &str = "\
-Try first (DIR is a folder of recordings, such as ../shared/data/biotac):
-  tactus identify --recordings DIR --material 3    an unknown texture is recognised, slide by slide
+pub(crate) const FIRST_STEPS: &str = "\
+Try first:
+  tactus                                           a simulated probe recognises an unknown texture
+  tactus identify --simulated --texture burlap     another one
+With a folder of recordings, such as ../shared/data/biotac:
+  tactus identify --recordings DIR --material 3    a real texture is recognised from its slides
   tactus features --recordings DIR                 what was felt of every slide
   tactus evaluate --recordings DIR                 how often the answers are right, and how sure
 
 No recordings are shipped. The publisher of the BioTac's has them at
-https://github.com/dexrob/BioTac_slide_20_50; `tactus import` reads them.";
+https://github.com/dexrob/BioTac_slide_20_50; `tactus import` reads them. `tactus simulate` makes some.";
 
 #[derive(Subcommand)]
 pub(crate) enum Command {
@@ -62,6 +65,21 @@ than --threshold, or after --max-slides.
 With --properties FILE, slides are rows of texture,movement,trial,set,traction,roughness,fineness, where set is train or
 validate, and an action is any (movement, property) pair.")]
     Evaluate(Evaluate),
+    /// Record slides on the simulated rig, in the project's format
+    Simulate {
+        /// The folder to write; it must not hold recordings yet
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// Textures of Table 1, by number or name; all 117 unless given
+        #[arg(long, value_name = "T,T,...", value_delimiter = ',')]
+        textures: Vec<String>,
+        /// Trials per texture and movement
+        #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+        trials: u32,
+        /// Another seed is another world: other textures of the same names
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+    },
     /// Convert recordings into the project's format (.npy files and a CSV manifest)
     Import {
         /// A folder in the layout of data/biotac, or the publisher's folders of CSV files
@@ -94,13 +112,33 @@ pub(crate) enum TableCommand {
 
 #[derive(Args)]
 pub(crate) struct Identify {
-    #[command(flatten)]
-    pub(crate) from: Recordings,
-    /// The texture to present as unknown: its number or its name
-    #[arg(long, value_name = "M")]
-    pub(crate) material: String,
+    /// Folder of recordings
+    #[arg(
+        long,
+        value_name = "DIR",
+        required_unless_present = "simulated",
+        conflicts_with = "simulated"
+    )]
+    pub(crate) recordings: Option<PathBuf>,
+    /// The recorded texture to present as unknown: its number or its name
+    #[arg(
+        long,
+        value_name = "M",
+        required_unless_present = "simulated",
+        conflicts_with = "simulated"
+    )]
+    pub(crate) material: Option<String>,
+    /// Explore live on the simulated rig, in place of recordings
+    #[arg(long)]
+    pub(crate) simulated: bool,
+    /// The texture to put under the simulated finger: its name in Table 1 or its number; drawn by the seed unless given
+    #[arg(long, value_name = "NAME", requires = "simulated")]
+    pub(crate) texture: Option<String>,
+    /// How many textures the simulated probe knows; the unknown one is among them
+    #[arg(long, value_name = "N", default_value_t = 20, requires = "simulated", value_parser = clap::value_parser!(u8).range(2..=117))]
+    pub(crate) among: u8,
     /// Texture table to use; without it one is learned from slides drawn at random, and the rest are presented
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "simulated")]
     pub(crate) table: Option<PathBuf>,
     /// Slides per texture to learn from, where no table is given
     #[arg(long, value_name = "N", default_value_t = 5)]

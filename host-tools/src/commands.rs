@@ -5,29 +5,31 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::{Context as _, bail};
-use clap::{CommandFactory as _, Parser as _, ValueEnum as _};
+use clap::{Parser as _, ValueEnum as _};
 use indicatif::{ProgressBar, ProgressStyle};
-use rand::{Rng as _, SeedableRng as _};
+use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use tactus::evaluate::{MAX_TEXTURES, Method, Summary, evaluate};
 use tactus::experiment::{self, Experiment, Protocol};
 use tactus::properties::PropertyTable;
-use tactus::recordings::{RecordingSet, Slide};
+use tactus::recordings::{RecordingSet, RecordingWriter, Slide, Texture};
 use tactus::replay::{Felt, Replay, feel};
 use tactus::show::{Show, show_table};
+use tactus::sim::textures::TEXTURES;
+use tactus::simulated::{Collection, SimRig, calibrated, texture_name, texture_number};
 use tactus_core::explorer::Explorer;
 use tactus_core::features::{BAND_EDGES, Plan, Property, PropertySet};
 use tactus_core::rig::{Rig as _, explore};
 use tactus_core::table::{Experience, Table};
 
-use crate::cli::{Command, Evaluate, Format, Identify, Rows, TableCommand, Tactus};
+use crate::cli::{Command, Evaluate, FIRST_STEPS, Format, Identify, Rows, TableCommand, Tactus};
 
 /// Runs what the arguments ask for.
 pub(crate) fn run() -> anyhow::Result<()> {
     let out = &mut io::BufWriter::new(io::stdout().lock());
     match Tactus::parse().command {
-        None => write!(out, "{}", Tactus::command().render_help())?,
+        None => demonstrate(out)?,
         Some(Command::Features { from, format }) => features(&from.recordings, format, out)?,
         Some(Command::Learn {
             from,
@@ -52,7 +54,18 @@ pub(crate) fn run() -> anyhow::Result<()> {
                 table.crc()
             )?;
         }
-        Some(Command::Identify(args)) => identify(&args, out)?,
+        Some(Command::Identify(args)) => match (&args.recordings, &args.material) {
+            (Some(folder), Some(material)) => identify(&args, folder, material, out)?,
+            _ => identify_simulated(&args, out)?,
+        },
+        Some(Command::Simulate {
+            out: folder,
+            textures,
+            trials,
+            seed,
+        }) => {
+            simulate(&folder, &textures, trials, seed, out)?;
+        }
         Some(Command::Evaluate(args)) => run_evaluation(&args, out)?,
         Some(Command::Import { from, to }) => import(&from, &to, out)?,
     }
@@ -223,10 +236,14 @@ fn read_table<'b>(file: &Path, bytes: &'b mut Vec<u8>) -> anyhow::Result<Table<'
     Ok(table)
 }
 
-fn identify(args: &Identify, out: &mut impl Write) -> anyhow::Result<()> {
-    let folder = &args.from.recordings;
+fn identify(
+    args: &Identify,
+    folder: &Path,
+    material: &str,
+    out: &mut impl Write,
+) -> anyhow::Result<()> {
     let set = RecordingSet::open(folder)?;
-    let index = find_material(&set, &args.material)?;
+    let index = find_material(&set, material)?;
     let name = &set.textures()[index].name;
     let mut random = ChaCha8Rng::seed_from_u64(args.seed);
     let mut bytes = Vec::new();
@@ -298,6 +315,150 @@ fn identify(args: &Identify, out: &mut impl Write) -> anyhow::Result<()> {
         |event| show.event(event),
     ));
     show.finish(verdict?, explorer.slides(), name)?;
+    Ok(())
+}
+
+/// What a newcomer sees first.
+fn demonstrate(out: &mut impl Write) -> anyhow::Result<()> {
+    writeln!(
+        out,
+        "Tactus tells what a surface is by touching it. Here is a simulated probe: a BioTac fingertip on a lever, over a\n\
+         stage that slides the sample. It learns twenty textures, five trials each at three movements, and is then given\n\
+         one of them without being told which. Everything it computes and controls is what runs on the chip.\n"
+    )?;
+    out.flush()?;
+    let Some(Command::Identify(args)) =
+        Tactus::parse_from(["tactus", "identify", "--simulated"]).command
+    else {
+        bail!("the demonstration cannot be parsed");
+    };
+    identify_simulated(&args, out)?;
+    writeln!(out, "\n{FIRST_STEPS}\n\nAll commands: tactus --help")?;
+    Ok(())
+}
+
+/// The textures asked for, by name or number; without any, all.
+fn find_textures(wanted: &[String]) -> anyhow::Result<Vec<u8>> {
+    if wanted.is_empty() {
+        return Ok(TEXTURES.iter().map(|t| t.number).collect());
+    }
+    wanted
+        .iter()
+        .map(|name| {
+            texture_number(name.trim()).with_context(|| {
+                let known: Vec<&str> = TEXTURES.iter().map(|t| t.name).collect();
+                format!(
+                    "no texture {name} in Table 1, which has: {}",
+                    known.join(", ")
+                )
+            })
+        })
+        .collect()
+}
+
+fn simulate(
+    folder: &Path,
+    wanted: &[String],
+    trials: u32,
+    seed: u64,
+    out: &mut impl Write,
+) -> anyhow::Result<()> {
+    let mut textures = find_textures(wanted)?;
+    textures.sort_unstable();
+    textures.dedup();
+    let collection = Collection {
+        seed,
+        textures,
+        trials,
+    };
+    let named = collection.textures.iter().map(|&number| Texture {
+        id: number.into(),
+        name: texture_name(number).to_owned(),
+    });
+    let mut writer = RecordingWriter::create(folder, named.collect())?;
+    let bar = progress(collection.textures.len() as u64, "sliding over textures");
+    let calibration = calibrated(collection.setup(collection.textures[0], 0))?;
+    let slides = collection.record(calibration, || bar.inc(1))?;
+    for slide in slides.iter().flatten() {
+        writer.write(slide)?;
+    }
+    writer.finish()?;
+    bar.finish_and_clear();
+    writeln!(
+        out,
+        "{}: {} textures, {} slides, world {seed}",
+        folder.display(),
+        collection.textures.len(),
+        slides.iter().map(Vec::len).sum::<usize>()
+    )?;
+    Ok(())
+}
+
+/// The unknown texture and `among - 1` others, spread over Table 1.
+fn choose_textures(unknown: u8, among: u8) -> Vec<u8> {
+    let mut textures: Vec<u8> = (0..u16::from(among) - 1)
+        .map(|n| (n * 116 / (u16::from(among) - 1)) as u8 + 1)
+        .map(|number| number + u8::from(number >= unknown))
+        .collect();
+    textures.push(unknown);
+    textures.sort_unstable();
+    textures
+}
+
+fn identify_simulated(args: &Identify, out: &mut impl Write) -> anyhow::Result<()> {
+    let mut random = ChaCha8Rng::seed_from_u64(args.seed);
+    let unknown = match &args.texture {
+        Some(name) => find_textures(std::slice::from_ref(name))?[0],
+        None => random.random_range(1..=117),
+    };
+    if args.train_slides < 2 {
+        bail!(
+            "--train-slides {}: a standard deviation takes at least two slides",
+            args.train_slides
+        );
+    }
+    let collection = Collection {
+        seed: args.seed,
+        textures: choose_textures(unknown, args.among),
+        trials: u32::try_from(args.train_slides).context("--train-slides")?,
+    };
+    let bar = progress(collection.textures.len() as u64, "learning textures");
+    let calibration = calibrated(collection.setup(unknown, 0))?;
+    let bytes = collection.learn(calibration, || bar.inc(1))?;
+    bar.finish_and_clear();
+    let table = Table::read(&bytes)?;
+    let mut rig = SimRig::new(collection.setup(unknown, 1 + u64::from(random.next_u32() % 1000)));
+    rig.control().calibrate(calibration)?;
+    let mut explorer =
+        Explorer::<MAX_TEXTURES>::new(table, rig.measures(), args.stop.config(args.method))?;
+    writeln!(
+        out,
+        "An unknown texture, one of {}. Under the finger: {} (seed {}).",
+        table.textures(),
+        texture_name(unknown),
+        args.seed
+    )?;
+    out.flush()?;
+    let mut show = Show::new(table, &mut *out);
+    let verdict = embassy_futures::block_on(explore(
+        &mut rig,
+        &mut explorer,
+        &Plan::new(),
+        || random.next_u32(),
+        |event| show.event(event),
+    ));
+    show.finish(verdict?, explorer.slides(), texture_name(unknown))?;
+    writeln!(
+        out,
+        "{:.0} s of the rig's time; skin: {:.2} J of sliding{}.",
+        rig.now().as_secs_f64(),
+        rig.control().skin().energy_j(),
+        if rig.control().skin().is_worn() {
+            ", look at it"
+        } else {
+            ""
+        }
+    )?;
     Ok(())
 }
 

@@ -5,18 +5,24 @@ use std::time::Duration;
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use tactus_core::biotac;
-use tactus_core::features::{PropertySet, Slide};
+use tactus_core::features::{Plan, PropertySet, Slide, SlideError};
 use tactus_core::kernels::Kernels;
 use tactus_core::movement::Movement;
 use tactus_core::pressure::{Calibration, Channel, Pressure, RATE_HZ, SLOTS_HZ};
-use tactus_core::rig::Rig;
 use tactus_core::rig::calibration::{LineFit, RigCalibration, RigCalibrationError};
 use tactus_core::rig::control::{Control, Ended, Felt, Inputs, Outputs, Phase, Refused};
 use tactus_core::rig::guard::{Fault, Unguarded};
 use tactus_core::rig::stage::StageConstants;
+use tactus_core::rig::{MAX_REJECTED, Rig};
 use tactus_core::sensor::PressureSensor as _;
+use tactus_core::table::EncodeError;
 
+use crate::experiment::{encode, learned};
+use crate::recordings::{self, Background};
+use crate::replay::measure;
+use crate::sim::textures::TEXTURES;
 use crate::sim::world::{Setup, World};
 
 const TICK_NS: u64 = 1_000_000;
@@ -69,6 +75,22 @@ pub struct SimRig {
     down: bool,
     next_step_ns: u64,
     outputs: Outputs,
+    /// P_DC words of the last tick.
+    pdc: Vec<u16>,
+    performed: Option<Performed>,
+}
+
+/// How a slide was really made: the world's truth, which the control does not know.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Performed {
+    /// Contact force when the slide began, N.
+    pub force_n: f64,
+    /// Largest contact force since the lever came down, N.
+    pub force_max_n: f64,
+    /// Mean speed of the steady part, mm/s.
+    pub speed_mm_s: f64,
+    /// Largest relative deviation of the mean speed of any 100 ms of the steady part.
+    pub speed_error: f64,
 }
 
 impl SimRig {
@@ -98,7 +120,14 @@ impl SimRig {
             down: true,
             next_step_ns: 0,
             outputs: Outputs::default(),
+            pdc: Vec::new(),
+            performed: None,
         }
+    }
+
+    /// How the last slide was really made.
+    pub fn performed(&self) -> Option<Performed> {
+        self.performed
     }
 
     /// The world behind the pins: its truth, its faults.
@@ -153,6 +182,12 @@ impl SimRig {
         }
         self.world.advance_to(end);
         self.now_ns = end;
+        let pdc = self
+            .words
+            .iter()
+            .flatten()
+            .filter(|w| w.channel == Channel::Pdc);
+        self.pdc = pdc.map(|w| w.counts.get()).collect();
         let stage_limits = self.world.stage_limits();
         let inputs = Inputs {
             words: self.words.drain(..).collect(),
@@ -283,15 +318,131 @@ impl SimRig {
         &mut self,
         movement: Movement,
         start: f32,
-        each: impl FnMut(&Outputs),
+        mut each: impl FnMut(&Outputs, &[u16]),
     ) -> Result<Ended, SimError> {
         self.control.start(movement, start)?;
-        self.rest(each)?;
+        self.world.reset_extremes();
+        let until = self.now() + PATIENCE;
+        let mut truth = Performed::default();
+        let mut speeds = Vec::new();
+        loop {
+            self.tick();
+            each(&self.outputs, &self.pdc);
+            let now = self.world.truth();
+            truth.force_max_n = now.force_max_n;
+            match &self.outputs.felt {
+                Felt::Still => truth.force_n = now.force_n,
+                Felt::Begin(_) | Felt::Slide if self.outputs.shear_mn.is_some() => {
+                    speeds.push(now.speed_mm_s)
+                }
+                _ => {}
+            }
+            match self.control.phase() {
+                Phase::Ready => break,
+                Phase::Faulted(_) => self.rest(|_| ())?,
+                phase if self.now() > until => return Err(SimError::Hangs(phase)),
+                _ => {}
+            }
+        }
+        if !speeds.is_empty() {
+            let mean = |speeds: &[f64]| speeds.iter().sum::<f64>() / speeds.len() as f64;
+            let wanted = f64::from(movement.speed_um_s()) * 1e-3;
+            truth.speed_mm_s = mean(&speeds);
+            let off = speeds
+                .windows(100.min(speeds.len()))
+                .map(|w| (mean(w) / wanted - 1.0).abs());
+            truth.speed_error = off.fold(0.0, f64::max);
+        }
+        self.performed = Some(truth);
         match self.control.take_ended() {
             Some(Ended::Stopped) | None => Err(SimError::Stopped),
             Some(ended) => Ok(ended),
         }
     }
+
+    /// Makes one movement and records it; a slide with a gap is repeated. Texture and number are left at 0.
+    ///
+    /// # Errors
+    /// See [`SimError`].
+    pub fn record(&mut self, movement: Movement) -> Result<recordings::Slide, SimError> {
+        for _ in 0..MAX_REJECTED {
+            let mut slide = recordings::Slide {
+                texture: 0,
+                number: 0,
+                movement,
+                pac: Vec::new(),
+                pdc: Vec::new(),
+                pdc_rate_hz: RATE_HZ,
+                shear_mn: Some(Vec::new()),
+                shear_rate_hz: 1000,
+                window: (0.0, 0.0),
+                background: Background::Power(0.0),
+            };
+            let mut still = Vec::new();
+            let start = self.random.random();
+            let no_contact = self.control.calibration().pressure.pdc_no_contact as i16;
+            let ended = self.slide(movement, start, |outputs, pdc| {
+                match &outputs.felt {
+                    Felt::Nothing => return,
+                    Felt::Still => return still.extend_from_slice(&outputs.pac),
+                    Felt::Begin(steady) => {
+                        let seconds = |sample: u32| sample as f32 / RATE_HZ as f32;
+                        slide.window = (seconds(steady.start), seconds(steady.end));
+                    }
+                    Felt::Slide => {}
+                }
+                slide.pac.extend_from_slice(&outputs.pac);
+                slide
+                    .pdc
+                    .extend(pdc.iter().map(|&counts| counts as i16 - no_contact));
+                slide
+                    .shear_mn
+                    .get_or_insert_default()
+                    .push(outputs.shear_mn.unwrap_or(0));
+            })?;
+            if ended == Ended::Whole {
+                slide.background = Background::Still(still);
+                return Ok(slide);
+            }
+        }
+        Err(Fault::Rejected.into())
+    }
+}
+
+/// Measures the unloaded current of the rig of a world once; all rigs of that world have the same motor.
+///
+/// # Errors
+/// See [`SimError`].
+pub fn calibrated(setup: Setup) -> Result<RigCalibration, SimError> {
+    let mut rig = SimRig::new(setup);
+    rig.home()?;
+    rig.calibrate_current()
+}
+
+/// Trials of one texture at every movement, movement by movement, numbered in the order of time.
+///
+/// # Errors
+/// See [`SimError`].
+pub fn record_texture(
+    setup: Setup,
+    calibration: RigCalibration,
+    movements: &[Movement],
+    trials: u32,
+) -> Result<Vec<recordings::Slide>, SimError> {
+    let mut rig = SimRig::new(setup);
+    rig.control.calibrate(calibration)?;
+    rig.home()?;
+    let mut slides = Vec::new();
+    for &movement in movements {
+        for _ in 0..trials {
+            let slide = rig.record(movement)?;
+            slides.push(recordings::Slide {
+                number: slides.len() as u32 + 1,
+                ..slide
+            });
+        }
+    }
+    Ok(slides)
 }
 
 impl Rig for SimRig {
@@ -310,7 +461,7 @@ impl Rig for SimRig {
             self.home()?;
         }
         let start = self.random.random();
-        let ended = self.slide(movement, start, |outputs| feel(outputs, slide))?;
+        let ended = self.slide(movement, start, |outputs, _| feel(outputs, slide))?;
         if let Ended::Gap(samples) = ended {
             slide.lose(samples);
         }
@@ -330,7 +481,139 @@ pub fn feel<K: Kernels>(outputs: &Outputs, slide: &mut Slide<'_, K>) {
     slide.push_shear(outputs.shear_mn.as_slice());
 }
 
-/// Seconds as samples of one pressure.
-pub fn samples(seconds: f64) -> u32 {
-    (seconds * f64::from(RATE_HZ)) as u32
+/// Textures of a simulated world, to record and to learn.
+#[derive(Clone, Debug)]
+pub struct Collection {
+    /// The world's seed: what its textures, motors and fingertip are like.
+    pub seed: u64,
+    /// Numbers of the textures in Table 1.
+    pub textures: Vec<u8>,
+    /// Trials of each texture and movement.
+    pub trials: u32,
+}
+
+impl Collection {
+    /// The movements of the study.
+    pub const MOVEMENTS: [Movement; 3] = [
+        Movement::FOR_TRACTION,
+        Movement::FOR_FINENESS,
+        Movement::FOR_ROUGHNESS,
+    ];
+
+    /// A rig of this world with a texture under it. Different trials of one texture are `trial` apart.
+    pub fn setup(&self, texture: u8, trial: u64) -> Setup {
+        Setup {
+            texture,
+            world_seed: self.seed,
+            trial_seed: self
+                .seed
+                .wrapping_mul(1_000_003)
+                .wrapping_add(u64::from(texture))
+                .wrapping_mul(1009)
+                + trial,
+            finger_seed: self.seed,
+            keep_edges: false,
+        }
+    }
+
+    /// Names of the textures.
+    pub fn names(&self) -> Vec<String> {
+        self.textures
+            .iter()
+            .map(|&number| texture_name(number).to_owned())
+            .collect()
+    }
+
+    /// Records all trials of all textures, textures side by side; `done` hears of each. Per texture, its slides in the
+    /// order of time.
+    ///
+    /// # Errors
+    /// The first fault of a rig.
+    pub fn record(
+        &self,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<Vec<recordings::Slide>>, SimError> {
+        self.textures
+            .par_iter()
+            .enumerate()
+            .map(|(index, &texture)| {
+                let mut slides = record_texture(
+                    self.setup(texture, 0),
+                    calibration,
+                    &Self::MOVEMENTS,
+                    self.trials,
+                )?;
+                for slide in &mut slides {
+                    slide.texture = index;
+                }
+                done();
+                Ok(slides)
+            })
+            .collect()
+    }
+
+    /// Learns a texture table from trials of all textures.
+    ///
+    /// # Errors
+    /// The first fault of a rig, or slide without properties.
+    pub fn learn(
+        &self,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<u8>, LearnError> {
+        let plan = Plan::new();
+        let experience = self
+            .record(calibration, done)?
+            .iter()
+            .map(|slides| {
+                Self::MOVEMENTS
+                    .iter()
+                    .map(|movement| {
+                        let trials = slides.iter().filter(|s| s.movement == *movement);
+                        let felt: Result<Vec<_>, SlideError> =
+                            trials.map(|s| Ok(measure(&plan, s)?.properties)).collect();
+                        Ok(learned(PropertySet::ALL, &felt?))
+                    })
+                    .collect::<Result<Vec<_>, SlideError>>()
+            })
+            .collect::<Result<Vec<_>, SlideError>>()?;
+        Ok(encode(
+            PropertySet::ALL,
+            &Self::MOVEMENTS,
+            &self.names(),
+            &experience,
+        )?)
+    }
+}
+
+/// Why a simulated world taught nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum LearnError {
+    /// A rig failed.
+    #[error(transparent)]
+    Rig(#[from] SimError),
+    /// A slide has no properties.
+    #[error(transparent)]
+    Slide(#[from] SlideError),
+    /// The table cannot be written.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+}
+
+/// Name of a texture by its number in Table 1.
+pub fn texture_name(number: u8) -> &'static str {
+    TEXTURES
+        .iter()
+        .find(|t| t.number == number)
+        .map_or("?", |t| t.name)
+}
+
+/// Number of a texture by its name in Table 1, whatever the case, or by its number.
+pub fn texture_number(name: &str) -> Option<u8> {
+    let number = name.trim_start_matches(['T', 't']).parse().ok();
+    TEXTURES
+        .iter()
+        .find(|t| t.name.eq_ignore_ascii_case(name) || Some(t.number) == number)
+        .map(|t| t.number)
 }

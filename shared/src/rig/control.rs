@@ -8,7 +8,7 @@ use core::ops::Range;
 
 use heapless::Vec;
 
-use super::calibration::RigCalibration;
+use super::calibration::{RigCalibration, RigCalibrationError};
 use super::force::ForceMeter;
 use super::guard::{Fault, Guard, Seen, Unguarded};
 use super::lever::{Lever, LeverState};
@@ -133,6 +133,8 @@ pub enum Refused {
     Force(u16),
     /// The slide does not fit on the sample.
     Length,
+    /// The calibration cannot be.
+    Calibration(RigCalibrationError),
 }
 
 impl core::fmt::Display for Refused {
@@ -152,6 +154,7 @@ impl core::fmt::Display for Refused {
                 "{mn} mN is more than this rig may press; {HIGH_FORCE_MN} mN unless high forces are allowed"
             ),
             Self::Length => f.write_str("the slide does not fit on the sample"),
+            Self::Calibration(why) => why.fmt(f),
         }
     }
 }
@@ -243,11 +246,12 @@ impl Control {
     /// Takes other constants, while nothing moves.
     ///
     /// # Errors
-    /// [`Refused::Busy`].
+    /// [`Refused::Busy`], or [`Refused::Calibration`] for constants that cannot be.
     pub fn calibrate(&mut self, calibration: RigCalibration) -> Result<(), Refused> {
         if !matches!(self.phase, Phase::Parked | Phase::Ready) {
             return Err(Refused::Busy);
         }
+        calibration.check().map_err(Refused::Calibration)?;
         self.calibration = calibration;
         self.meter = ForceMeter::new(calibration.pressure.pdc_no_contact);
         Ok(())

@@ -6,7 +6,7 @@
 use super::force::ForceMeter;
 use super::lever::LeverFault;
 use super::stage::StageFault;
-use crate::pressure::Pressure;
+use crate::pressure::{Calibration, Pressure};
 
 /// A fault of the rig.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -262,6 +262,8 @@ impl Guard {
         } else {
             0
         };
+        // a calibration that says less than the paper's does not allow more
+        let mn_per_count = mn_per_count.max(Calibration::PAPER.force_mn_per_count);
         let force = meter.counts().max(meter.counts_now()) * mn_per_count > FORCE_LIMIT_MN;
         [
             force.then_some(Fault::ForceHigh),
