@@ -26,9 +26,13 @@ const WITHOUT_RIDGES: f64 = 0.3;
 const DAMPING_N: f64 = 0.6;
 /// Impulses of unresolved asperities: Pa for each um of height and each root of an asperity in a millisecond, as noise of
 /// one value a tick (chosen, for the levels of P_AC that sliding fingers show).
-const IMPULSE_PA: f64 = 22.0;
+const IMPULSE_PA: f64 = 70.0;
+/// Relative bandwidth of an impulse, which goes up and down again (chosen).
+const IMPULSE_WIDTH: f64 = 1.25;
+/// The skin comes to skip asperities that follow each other faster than this, 1/ms (chosen).
+const IMPULSES_PER_MS: f64 = 1.5;
 /// Fluctuations of friction grow with speed to this power ...
-const FRICTION_SPEED_POWER: f64 = 0.3;
+const FRICTION_SPEED_POWER: f64 = 0.25;
 /// ... and are the texture's at this speed, mm/s. Both chosen.
 const FRICTION_SPEED_MM_S: f64 = 25.0;
 
@@ -36,7 +40,7 @@ const FRICTION_SPEED_MM_S: f64 = 25.0;
 /// 200-350 Hz).
 const RESONANCE_HZ: (f64, f64) = (200.0, 106.0);
 /// Its damping ratio at rest, and its rise with force, 1/N (chosen).
-const RESONANCE_DAMPING: (f64, f64) = (0.15, 0.08);
+const RESONANCE_DAMPING: (f64, f64) = (0.22, 0.08);
 /// Ticks from one tuning of the resonance to the next.
 const TUNE_TICKS: u32 = 16;
 
@@ -53,14 +57,16 @@ const PINK: [(f64, f64); 5] = {
         (256.0 * POLE, GAIN),
     ]
 };
-/// Gain of the fastest section: for a sum of rms 1 (found by `tests::noises`).
-const GAIN: f64 = 0.5;
+/// Gain of the fastest section: makes the rms of the sum 1.
+const GAIN: f64 = 0.6;
 
 /// State of the vibrations.
 #[derive(Default)]
 pub(super) struct Vibrations {
     /// part of the vibrations that passes
     passed: f64,
+    /// the impulses' band-pass
+    impulse: [f64; 2],
     pink: [f64; 5],
     /// the fluid's pressure, Pa, and its rate, Pa/s
     fluid: f64,
@@ -100,24 +106,34 @@ impl Vibrations {
         shear_n: f64,
         white: [f64; 2],
     ) -> f64 {
-        let mut pink = 0.0;
-        for (state, (pole, gain)) in self.pink.iter_mut().zip(PINK) {
-            *state += pole * (white[0] - *state);
-            pink += gain * *state;
-        }
+        let texture = surface.texture();
+        let centre = (TAU * TICK_S * texture.impulse_hz).min(1.0);
+        self.impulse[0] += centre * self.impulse[1];
+        self.impulse[1] += centre * (white[1] - self.impulse[0] - IMPULSE_WIDTH * self.impulse[1]);
+        let pink = self.pink(white[0]);
         if speed == 0.0 {
             return 0.0;
         }
-        let texture = surface.texture();
         let per_ms = speed / texture.fine_mm * 1e-3;
+        let rate = per_ms / (1.0 + per_ms / IMPULSES_PER_MS);
         let impulses = IMPULSE_PA
             * surface.unresolved_um()
             * surface.amplitude(x_mm)
-            * per_ms.sqrt()
-            * white[1];
+            * rate.sqrt()
+            * self.impulse[1];
         let speeding = (speed / FRICTION_SPEED_MM_S).powf(FRICTION_SPEED_POWER);
         let friction = PA_PER_N * shear_n * texture.friction_noise * speeding * pink;
         self.passed * (impulses + friction)
+    }
+
+    /// The next value of 1/f noise of rms 1.
+    fn pink(&mut self, white: f64) -> f64 {
+        let mut sum = 0.0;
+        for (state, (pole, gain)) in self.pink.iter_mut().zip(PINK) {
+            *state += pole * (white - *state);
+            sum += gain * *state;
+        }
+        sum
     }
 
     /// A tick of the fluid under this pressure; gives the pressure that reaches the transducer, Pa.
@@ -130,8 +146,40 @@ impl Vibrations {
             self.patch_mm = PATCH_MM * load_n.cbrt();
         }
         self.tune_in -= 1;
-        self.rate += TICK_S * (self.stiffness * (pressure_pa - self.fluid) - self.drag * self.rate);
-        self.fluid += TICK_S * self.rate;
+        let lag = pressure_pa - self.fluid;
+        self.rate += TICK_S * self.stiffness * lag;
+        self.fluid += TICK_S * (self.rate + self.drag * lag);
         self.fluid
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::noise::Noise;
+
+    #[test]
+    fn friction_noise_has_rms_1_and_falls_by_3_db_an_octave() {
+        let (mut noise, mut vibrations) = (Noise::new(1, 1), Vibrations::default());
+        let (mut power, mut octaves) = (0.0, [0.0; 5]);
+        // differences of running values tell how much lies about each octave
+        let mut slow = [0.0; 6];
+        for _ in 0..2_000_000 {
+            let value = vibrations.pink(noise.white()[0]);
+            power += value * value / 2e6;
+            for (i, state) in slow.iter_mut().enumerate() {
+                *state += TAU * 20.0 * f64::from(1 << i) * TICK_S * (value - *state);
+            }
+            for (i, octave) in octaves.iter_mut().enumerate() {
+                *octave += (slow[i + 1] - slow[i]).powi(2);
+            }
+        }
+        assert!((power - 1.0).abs() < 0.15, "{power}");
+        // 1/f has as much power in every octave
+        let mean = octaves.iter().sum::<f64>() / 5.0;
+        assert!(
+            octaves.iter().all(|o| (o / mean - 1.0).abs() < 0.25),
+            "{octaves:.0?}"
+        );
     }
 }
