@@ -77,7 +77,7 @@ pub struct SimRig {
     outputs: Outputs,
     /// P_DC words of the last tick.
     pdc: Vec<u16>,
-    performed: Option<Performed>,
+    performed: Vec<Performed>,
 }
 
 /// How a slide was really made: the world's truth, which the control does not know.
@@ -121,13 +121,13 @@ impl SimRig {
             next_step_ns: 0,
             outputs: Outputs::default(),
             pdc: Vec::new(),
-            performed: None,
+            performed: Vec::new(),
         }
     }
 
-    /// How the last slide was really made.
-    pub fn performed(&self) -> Option<Performed> {
-        self.performed
+    /// How every slide so far was really made.
+    pub fn performed(&self) -> &[Performed] {
+        &self.performed
     }
 
     /// The world behind the pins: its truth, its faults.
@@ -353,7 +353,7 @@ impl SimRig {
                 .map(|w| (mean(w) / wanted - 1.0).abs());
             truth.speed_error = off.fold(0.0, f64::max);
         }
-        self.performed = Some(truth);
+        self.performed.push(truth);
         match self.control.take_ended() {
             Some(Ended::Stopped) | None => Err(SimError::Stopped),
             Some(ended) => Ok(ended),
@@ -373,7 +373,8 @@ impl SimRig {
                 pac: Vec::new(),
                 pdc: Vec::new(),
                 pdc_rate_hz: RATE_HZ,
-                shear_mn: Some(Vec::new()),
+                // the first tick of a slide is its first millisecond
+                shear_mn: Some(vec![0]),
                 shear_rate_hz: 1000,
                 window: (0.0, 0.0),
                 background: Background::Power(0.0),

@@ -1,0 +1,359 @@
+//! The whole loop on the simulated rig: learning, 200 explorations, and whatever commands come.
+
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+use rayon::prelude::*;
+use tactus::replay::measure;
+use tactus::sim::stage::{SAMPLE_AT_MM, SAMPLE_MM};
+use tactus::sim::world::Setup;
+use tactus::simulated::{Collection, Performed, SimRig, calibrated, record_texture, texture_name};
+use tactus_core::explorer::{Config, Explorer};
+use tactus_core::features::{Plan, Property, PropertySet};
+use tactus_core::movement::Movement;
+use tactus_core::pressure::Calibration;
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::control::{Control, Phase, Refused};
+use tactus_core::rig::skin::SkinCare;
+use tactus_core::rig::{Event, explore};
+use tactus_core::table::Table;
+
+/// Whether an exploration was right, what it did, and what to tell of it.
+type Explored = (bool, Vec<(Movement, Performed)>, String);
+
+/// A count of P_DC, N.
+const COUNT_N: f64 = 0.0115;
+
+#[test]
+fn two_hundred_explorations() {
+    let world = Collection {
+        seed: 11,
+        textures: (1..=117).collect(),
+        trials: 5,
+    };
+    let calibration = calibrated(world.setup(1, 0)).unwrap();
+    let bytes = world.learn(calibration, || ()).unwrap();
+    let table = Table::read(&bytes).unwrap();
+    let plan = Plan::new();
+
+    let explored: Vec<Explored> = (0..200u64)
+        .into_par_iter()
+        .map(|n| {
+            let unknown = 1 + (n * 37 % 117) as u8;
+            let mut rig = SimRig::new(world.setup(unknown, 100 + n));
+            rig.control().calibrate(calibration).unwrap();
+            let mut explorer =
+                Explorer::<128>::new(table, PropertySet::ALL, Config::default()).unwrap();
+            let mut movements = Vec::new();
+            let verdict = embassy_futures::block_on(explore(
+                &mut rig,
+                &mut explorer,
+                &plan,
+                || 0,
+                |event| match event {
+                    Event::Felt(action, ..) => {
+                        movements.push(table.movement(action.movement).unwrap())
+                    }
+                    Event::Rejected(_, why) => panic!("{}: {why}", texture_name(unknown)),
+                    Event::Chosen(..) => {}
+                },
+            ));
+            let verdict = verdict.unwrap_or_else(|why| panic!("{}: {why}", texture_name(unknown)));
+            let identified = table.name(verdict.texture).unwrap();
+            let told = format!(
+                "{} taken for {identified}, {:.3}",
+                texture_name(unknown),
+                verdict.probability
+            );
+            let performed = movements
+                .into_iter()
+                .zip(rig.performed().to_vec())
+                .collect();
+            (identified == texture_name(unknown), performed, told)
+        })
+        .collect();
+
+    let right = explored.iter().filter(|e| e.0).count();
+    let slides: Vec<(Movement, Performed)> = explored.iter().flat_map(|e| e.1.clone()).collect();
+    let worst =
+        |of: &dyn Fn(&(Movement, Performed)) -> f64| slides.iter().map(of).fold(0.0, f64::max);
+    let force_off = |(m, p): &(Movement, Performed)| (p.force_n - f64::from(m.force_n())).abs();
+    println!(
+        "{right} of 200 right, {} slides; force at most {:.4} N off, speed {:.2} %, largest force {:.3} N",
+        slides.len(),
+        worst(&force_off),
+        worst(&|s| s.1.speed_error) * 100.0,
+        worst(&|s| s.1.force_max_n)
+    );
+    for e in explored.iter().filter(|e| !e.0) {
+        println!("  {}", e.2);
+    }
+    for slide in &slides {
+        let tolerance = (0.05 * f64::from(slide.0.force_n())).max(COUNT_N);
+        assert!(force_off(slide) <= tolerance, "{slide:?}");
+        assert!(slide.1.speed_error <= 0.01, "{slide:?}");
+        assert!(slide.1.force_max_n <= 2.2, "{slide:?}");
+    }
+    assert!(right >= 170, "{right} of 200 right");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_slides_on_any_number_of_threads() {
+    let world = Collection {
+        seed: 3,
+        textures: vec![10, 47, 100],
+        trials: 1,
+    };
+    let calibration = calibrated(world.setup(10, 0)).unwrap();
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| world.record(calibration, || ()).unwrap())
+    };
+    let one = on(1);
+    assert!(one == on(3));
+    let other = Collection {
+        seed: 4,
+        ..world.clone()
+    };
+    assert!(one != other.record(calibration, || ()).unwrap());
+}
+
+#[test]
+fn a_recorded_slide_has_the_properties_that_were_felt_live() {
+    // the same rig twice: once it explores, once it records
+    let setup = Setup {
+        texture: 100,
+        trial_seed: 5,
+        ..Setup::default()
+    };
+    let calibration = calibrated(setup).unwrap();
+    let recorded = &record_texture(setup, calibration, &[Movement::FOR_FINENESS], 1).unwrap()[0];
+    let recorded = measure(&Plan::new(), recorded).unwrap();
+
+    let plan = Plan::new();
+    let mut rig = SimRig::new(setup);
+    rig.control().calibrate(calibration).unwrap();
+    let mut slide = tactus_core::features::Slide::<tactus_core::kernels::Plain>::new(&plan);
+    embassy_futures::block_on(tactus_core::rig::Rig::perform(
+        &mut rig,
+        Movement::FOR_FINENESS,
+        &mut slide,
+    ))
+    .unwrap();
+    assert_eq!(slide.finish().unwrap(), recorded);
+}
+
+#[test]
+fn traction_is_the_shear_that_really_acts() {
+    for texture in [30, 43, 47, 84] {
+        let setup = Setup {
+            texture,
+            trial_seed: 2,
+            ..Setup::default()
+        };
+        let calibration = calibrated(setup).unwrap();
+        let mut rig = SimRig::new(setup);
+        rig.control().calibrate(calibration).unwrap();
+        rig.home().unwrap();
+        let mut shear = Vec::new();
+        let slide = {
+            rig.control().start(Movement::FOR_TRACTION, 0.5).unwrap();
+            let plan = Plan::new();
+            let mut slide = tactus_core::features::Slide::<tactus_core::kernels::Plain>::new(&plan);
+            while rig.control().phase() != Phase::Ready {
+                let outputs = rig.tick().clone();
+                tactus::simulated::feel(&outputs, &mut slide);
+                if outputs.shear_mn.is_some() {
+                    shear.push(rig.world().truth().shear_n.abs());
+                }
+            }
+            slide.finish().unwrap()
+        };
+        let truth = shear.iter().sum::<f64>() / shear.len() as f64;
+        let traction = f64::from(slide.properties.get(Property::Traction).unwrap());
+        println!(
+            "{}: traction {traction:.3} N, shear {truth:.3} N",
+            texture_name(texture)
+        );
+        assert!(
+            (traction - truth).abs() < 0.03 + 0.03 * truth,
+            "{}: {traction} {truth}",
+            texture_name(texture)
+        );
+    }
+}
+
+#[test]
+fn the_skin_is_reported_worn_before_its_roughness_goes() {
+    // a high-wear movement on a rough texture, until the finger's own wear shows
+    let mut rig = SimRig::new(Setup {
+        texture: 100,
+        ..Setup::default()
+    });
+    rig.home().unwrap();
+    rig.calibrate_current().unwrap();
+    let mut warned_at = None;
+    let mut roughness = Vec::new();
+    let plan = Plan::new();
+    let rough = Movement::from_si(1.26, 63.1).unwrap();
+    for n in 0..400 {
+        let recorded = rig.record(rough).unwrap();
+        let m = measure(&plan, &recorded).unwrap();
+        roughness.push(m.properties.get(Property::Roughness).unwrap());
+        if rig.control().skin().is_worn() && warned_at.is_none() {
+            warned_at = Some(n);
+            break;
+        }
+    }
+    let warned_at = warned_at.expect("a warning within 400 slides");
+    let mean = |r: &[f32]| r.iter().sum::<f32>() / r.len() as f32;
+    let (first, last) = (
+        mean(&roughness[..10]),
+        mean(&roughness[warned_at - 9..=warned_at]),
+    );
+    let spread = {
+        let m = mean(&roughness[..10]);
+        (roughness[..10].iter().map(|r| (r - m).powi(2)).sum::<f32>() / 9.0).sqrt()
+    };
+    let wear = rig.world().truth().wear;
+    let energy = f64::from(rig.control().skin().energy_j());
+    println!(
+        "warned after {warned_at} slides, {energy:.2} J, wear {wear:.3}; roughness {first:.3} to {last:.3}, sd {spread:.3}"
+    );
+    assert!(
+        (first - last).abs() < 3.0 * spread,
+        "roughness has gone already"
+    );
+    let truth = rig.world().truth().sliding_j;
+    assert!(
+        (energy / truth - 1.0).abs() < 0.1,
+        "counted {energy} J of {truth} J"
+    );
+    rig.control().skin().replaced();
+    assert!(!rig.control().skin().is_worn());
+    assert!(SkinCare::after(9.0).is_worn());
+}
+
+/// What a user, or a broken host, may ask for.
+#[derive(Clone, Debug)]
+enum Command {
+    Home,
+    Start {
+        force_mn: u16,
+        speed_um_s: u32,
+        start: f32,
+    },
+    Unloaded(f32),
+    Stop,
+    Reset,
+    AllowHighForce(bool),
+    Calibrate {
+        mn_per_count: f32,
+        no_contact: f32,
+        newton_per_ampere: f32,
+    },
+    Place(u8),
+    SampleChanged,
+}
+
+fn command() -> impl Strategy<Value = Command> {
+    let any_float = || {
+        prop_oneof![
+            Just(f32::NAN),
+            Just(f32::INFINITY),
+            -1e3f32..1e4,
+            5.0f32..20.0
+        ]
+    };
+    prop_oneof![
+        2 => Just(Command::Home),
+        6 => (100u16..=2000, 5_000u32..=150_000, any_float()).prop_map(|(force_mn, speed_um_s, start)| Command::Start { force_mn, speed_um_s, start }),
+        1 => any_float().prop_map(Command::Unloaded),
+        1 => Just(Command::Stop),
+        1 => Just(Command::Reset),
+        1 => any::<bool>().prop_map(Command::AllowHighForce),
+        1 => (any_float(), any_float(), any_float()).prop_map(|(mn_per_count, no_contact, newton_per_ampere)| Command::Calibrate { mn_per_count, no_contact, newton_per_ampere }),
+        1 => (1u8..=117).prop_map(Command::Place),
+        1 => Just(Command::SampleChanged),
+    ]
+}
+
+fn obey(control: &mut Control, command: &Command) -> Result<(), Refused> {
+    match *command {
+        Command::Home => control.home(),
+        Command::Start {
+            force_mn,
+            speed_um_s,
+            start,
+        } => control.start(Movement::new(force_mn, speed_um_s).unwrap(), start),
+        Command::Unloaded(speed) => control.start_unloaded(speed),
+        Command::Stop => {
+            control.stop();
+            Ok(())
+        }
+        Command::Reset => {
+            control.reset();
+            Ok(())
+        }
+        Command::AllowHighForce(allow) => {
+            control.allow_high_force(allow);
+            Ok(())
+        }
+        Command::Calibrate {
+            mn_per_count,
+            no_contact,
+            newton_per_ampere,
+        } => {
+            let pressure = Calibration {
+                force_mn_per_count: mn_per_count,
+                pdc_no_contact: no_contact,
+                ..Calibration::PAPER
+            };
+            control.calibrate(RigCalibration {
+                pressure,
+                newton_per_ampere,
+                ..*control.calibration()
+            })
+        }
+        Command::SampleChanged => {
+            control.sample_changed();
+            Ok(())
+        }
+        Command::Place(_) => Ok(()),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 48,
+        rng_seed: RngSeed::Fixed(3),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+    #[test]
+    fn no_commands_leave_the_limits_of_force_and_travel(
+        texture in 1u8..=117,
+        seed in 0u64..1000,
+        commands in proptest::collection::vec((command(), prop_oneof![0u32..50, 0u32..3000, 3000u32..40_000]), 1..25),
+    ) {
+        let mut rig = SimRig::new(Setup { texture, trial_seed: seed, ..Setup::default() });
+        let _ = rig.home();
+        for (command, wait_ms) in &commands {
+            if let Command::Place(texture) = command {
+                let _ = rig.place(*texture);
+            }
+            let _ = obey(rig.control(), command);
+            for _ in 0..*wait_ms {
+                rig.tick();
+            }
+        }
+        let truth = rig.world().truth();
+        prop_assert!(truth.force_max_n <= 2.2, "{} N", truth.force_max_n);
+        let (low, high) = truth.stage_reach_mm;
+        // never into a hard stop: the switches lie 1 mm beyond the sample
+        prop_assert!(low > SAMPLE_AT_MM - 2.0 && high < SAMPLE_AT_MM + SAMPLE_MM + 2.0, "{low} to {high} mm");
+        prop_assert_eq!(truth.lever_bad_pulses, 0);
+    }
+}
