@@ -31,7 +31,7 @@ mod touch {
     /// Of ln(amplitude of vibrations).
     pub(super) const VIBRATION: f64 = 0.04;
     /// More of the same for each newton: pressed hard, it matters more how the skin lies on the core.
-    pub(super) const VIBRATION_PER_N: f64 = 0.10;
+    pub(super) const VIBRATION_PER_N: f64 = 0.06;
     /// Of ln(resonant frequency).
     pub(super) const RESONANCE: f64 = 0.03;
 }

@@ -1,3 +1,5 @@
 //! The simulated world against what the paper observed.
 
+mod bench;
+mod explore;
 mod protocol;

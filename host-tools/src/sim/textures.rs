@@ -27,6 +27,9 @@ pub struct Weave {
     pub falloff: f64,
 }
 
+/// Longest wavelength of the relief relative to the one from which it is flat (chosen).
+const LONGEST: f64 = 2.0;
+
 /// Physical parameters of one texture.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Texture {
@@ -46,6 +49,8 @@ pub struct Texture {
     pub fine_um: f64,
     /// Wavelength about which they lie, mm.
     pub fine_mm: f64,
+    /// Centre of the spectrum of the impulses with which those asperities catch and release, Hz: hard ones are short.
+    pub impulse_hz: f64,
     /// Rms height of the random relief, um.
     pub relief_um: f64,
     /// Wavelength above which its spectrum is flat, mm.
@@ -65,9 +70,12 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// Relative power density of the relief at a wavelength in mm: flat, and 1/f^a at short wavelengths.
+    /// Relative power density of the relief at a wavelength in mm: 1/f^a at short wavelengths, flat about `relief_mm`, and
+    /// nothing much at [`LONGEST`] times that and more: samples lie flat on their magnets.
     pub(super) fn relief(&self, wavelength_mm: f64) -> f64 {
-        1.0 / (1.0 + (self.relief_mm / wavelength_mm).powf(self.relief_exponent))
+        let short = (self.relief_mm / wavelength_mm).powf(self.relief_exponent);
+        let long = (wavelength_mm / (LONGEST * self.relief_mm)).powi(4);
+        1.0 / (1.0 + short + long)
     }
 }
 
@@ -80,7 +88,7 @@ struct Spread {
 
 /// Of a texture of which only the group is known (chosen).
 const GROUP_SPREAD: Spread = Spread {
-    friction: 0.20,
+    friction: 0.25,
     height: 0.45,
     wavelength: 0.25,
 };
@@ -90,6 +98,8 @@ const HINTED_SPREAD: Spread = Spread {
     height: 0.15,
     wavelength: 0.10,
 };
+/// Deviation of ln(centre of the impulses' spectrum) (chosen).
+const IMPULSE_SPREAD: f64 = 0.3;
 /// Rougher than its kind is more slippery than its kind, having less area in contact: ln friction falls by this much when
 /// the heights are a deviation above their median (chosen).
 const SLIPPERY_IF_ROUGH: f64 = 0.05;
@@ -134,15 +144,16 @@ pub fn draw(number: u8, seed: u64) -> Texture {
         number,
         friction: noise.about(medians.friction, spread.friction)
             * (-SLIPPERY_IF_ROUGH * rougher).exp(),
-        friction_load: -0.25 * smoothness * noise.between(0.7, 1.3),
+        friction_load: -0.15 * smoothness * noise.between(0.7, 1.3),
         friction_speed: 0.04 + 0.04 * noise.normal(),
         stiction: noise.between(0.05, 0.25),
         friction_noise: noise.about(medians.friction_noise, 0.2),
         fine_um,
         fine_mm: noise.about(medians.fine.1, spread.wavelength),
+        impulse_hz: noise.about(medians.impulse_hz, IMPULSE_SPREAD),
         relief_um,
         relief_mm: noise.about(medians.relief.1, spread.wavelength),
-        relief_exponent: noise.between(2.0, 3.0),
+        relief_exponent: medians.relief_exponent + noise.between(-0.4, 0.4),
         weave,
         damping: medians.damping,
         heterogeneity: noise.about(medians.heterogeneity, 0.3),

@@ -26,9 +26,13 @@ const WITHOUT_RIDGES: f64 = 0.3;
 const DAMPING_N: f64 = 0.6;
 /// Impulses of unresolved asperities: Pa for each um of height and each root of an asperity in a millisecond, as noise of
 /// one value a tick (chosen, for the levels of P_AC that sliding fingers show).
-const IMPULSE_PA: f64 = 22.0;
+const IMPULSE_PA: f64 = 70.0;
+/// Relative bandwidth of an impulse, which goes up and down again (chosen).
+const IMPULSE_WIDTH: f64 = 1.25;
+/// The skin comes to skip asperities that follow each other faster than this, 1/ms (chosen).
+const IMPULSES_PER_MS: f64 = 1.5;
 /// Fluctuations of friction grow with speed to this power ...
-const FRICTION_SPEED_POWER: f64 = 0.3;
+const FRICTION_SPEED_POWER: f64 = 0.25;
 /// ... and are the texture's at this speed, mm/s. Both chosen.
 const FRICTION_SPEED_MM_S: f64 = 25.0;
 
@@ -36,7 +40,7 @@ const FRICTION_SPEED_MM_S: f64 = 25.0;
 /// 200-350 Hz).
 const RESONANCE_HZ: (f64, f64) = (200.0, 106.0);
 /// Its damping ratio at rest, and its rise with force, 1/N (chosen).
-const RESONANCE_DAMPING: (f64, f64) = (0.15, 0.08);
+const RESONANCE_DAMPING: (f64, f64) = (0.22, 0.08);
 /// Ticks from one tuning of the resonance to the next.
 const TUNE_TICKS: u32 = 16;
 
@@ -61,6 +65,8 @@ const GAIN: f64 = 0.5;
 pub(super) struct Vibrations {
     /// part of the vibrations that passes
     passed: f64,
+    /// the impulses' band-pass
+    impulse: [f64; 2],
     pink: [f64; 5],
     /// the fluid's pressure, Pa, and its rate, Pa/s
     fluid: f64,
@@ -100,6 +106,10 @@ impl Vibrations {
         shear_n: f64,
         white: [f64; 2],
     ) -> f64 {
+        let texture = surface.texture();
+        let centre = (TAU * TICK_S * texture.impulse_hz).min(1.0);
+        self.impulse[0] += centre * self.impulse[1];
+        self.impulse[1] += centre * (white[1] - self.impulse[0] - IMPULSE_WIDTH * self.impulse[1]);
         let mut pink = 0.0;
         for (state, (pole, gain)) in self.pink.iter_mut().zip(PINK) {
             *state += pole * (white[0] - *state);
@@ -108,13 +118,13 @@ impl Vibrations {
         if speed == 0.0 {
             return 0.0;
         }
-        let texture = surface.texture();
         let per_ms = speed / texture.fine_mm * 1e-3;
+        let rate = per_ms / (1.0 + per_ms / IMPULSES_PER_MS);
         let impulses = IMPULSE_PA
             * surface.unresolved_um()
             * surface.amplitude(x_mm)
-            * per_ms.sqrt()
-            * white[1];
+            * rate.sqrt()
+            * self.impulse[1];
         let speeding = (speed / FRICTION_SPEED_MM_S).powf(FRICTION_SPEED_POWER);
         let friction = PA_PER_N * shear_n * texture.friction_noise * speeding * pink;
         self.passed * (impulses + friction)
@@ -130,8 +140,9 @@ impl Vibrations {
             self.patch_mm = PATCH_MM * load_n.cbrt();
         }
         self.tune_in -= 1;
-        self.rate += TICK_S * (self.stiffness * (pressure_pa - self.fluid) - self.drag * self.rate);
-        self.fluid += TICK_S * self.rate;
+        let lag = pressure_pa - self.fluid;
+        self.rate += TICK_S * self.stiffness * lag;
+        self.fluid += TICK_S * (self.rate + self.drag * lag);
         self.fluid
     }
 }
