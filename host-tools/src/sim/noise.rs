@@ -33,9 +33,9 @@ impl Noise {
         (-2.0 * u.ln()).sqrt() * (TAU * v).cos()
     }
 
-    /// `median` times a log-normal factor of deviation `spread`.
+    /// `median` times a log-normal factor of deviation `spread`, at most two and a half of which are drawn.
     pub(super) fn about(&mut self, median: f64, spread: f64) -> f64 {
-        median * (spread * self.normal()).exp()
+        median * (spread * self.normal().clamp(-2.5, 2.5)).exp()
     }
 
     /// Two independent numbers of mean 0 and variance 1 for noise at every tick: sums of two uniform ones, which filters

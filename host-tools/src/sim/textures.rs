@@ -88,7 +88,7 @@ struct Spread {
 
 /// Of a texture of which only the group is known (chosen).
 const GROUP_SPREAD: Spread = Spread {
-    friction: 0.25,
+    friction: 0.28,
     height: 0.45,
     wavelength: 0.25,
 };
@@ -100,10 +100,6 @@ const HINTED_SPREAD: Spread = Spread {
 };
 /// Deviation of ln(centre of the impulses' spectrum) (chosen).
 const IMPULSE_SPREAD: f64 = 0.3;
-/// Rougher than its kind is more slippery than its kind, having less area in contact: ln friction falls by this much when
-/// the heights are a deviation above their median (chosen).
-const SLIPPERY_IF_ROUGH: f64 = 0.05;
-
 /// Deviation of a period from the next in cloth (chosen).
 const CLOTH_JITTER: f64 = 0.03;
 /// The same in what is moulded, machined or extruded (chosen).
@@ -120,8 +116,7 @@ pub fn draw(number: u8, seed: u64) -> Texture {
     let (medians, hinted) = recipe(named);
     let spread = if hinted { HINTED_SPREAD } else { GROUP_SPREAD };
 
-    let rougher = noise.normal();
-    let height = (spread.height * rougher).exp();
+    let height = noise.about(1.0, spread.height);
     let fine_um = noise.about(medians.fine.0 * height, 0.5 * spread.height);
     let relief_um = noise.about(medians.relief.0 * height, 0.5 * spread.height);
     let weave = (medians.weave.0 > 0.0).then(|| Weave {
@@ -142,8 +137,7 @@ pub fn draw(number: u8, seed: u64) -> Texture {
     let smoothness = 1.0 / (1.0 + fine_um);
     Texture {
         number,
-        friction: noise.about(medians.friction, spread.friction)
-            * (-SLIPPERY_IF_ROUGH * rougher).exp(),
+        friction: noise.about(medians.friction, spread.friction),
         friction_load: -0.15 * smoothness * noise.between(0.7, 1.3),
         friction_speed: 0.04 + 0.04 * noise.normal(),
         stiction: noise.between(0.05, 0.25),

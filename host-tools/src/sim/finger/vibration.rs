@@ -57,8 +57,8 @@ const PINK: [(f64, f64); 5] = {
         (256.0 * POLE, GAIN),
     ]
 };
-/// Gain of the fastest section: for a sum of rms 1 (found by `tests::noises`).
-const GAIN: f64 = 0.5;
+/// Gain of the fastest section: makes the rms of the sum 1.
+const GAIN: f64 = 0.6;
 
 /// State of the vibrations.
 #[derive(Default)]
@@ -110,11 +110,7 @@ impl Vibrations {
         let centre = (TAU * TICK_S * texture.impulse_hz).min(1.0);
         self.impulse[0] += centre * self.impulse[1];
         self.impulse[1] += centre * (white[1] - self.impulse[0] - IMPULSE_WIDTH * self.impulse[1]);
-        let mut pink = 0.0;
-        for (state, (pole, gain)) in self.pink.iter_mut().zip(PINK) {
-            *state += pole * (white[0] - *state);
-            pink += gain * *state;
-        }
+        let pink = self.pink(white[0]);
         if speed == 0.0 {
             return 0.0;
         }
@@ -128,6 +124,16 @@ impl Vibrations {
         let speeding = (speed / FRICTION_SPEED_MM_S).powf(FRICTION_SPEED_POWER);
         let friction = PA_PER_N * shear_n * texture.friction_noise * speeding * pink;
         self.passed * (impulses + friction)
+    }
+
+    /// The next value of 1/f noise of rms 1.
+    fn pink(&mut self, white: f64) -> f64 {
+        let mut sum = 0.0;
+        for (state, (pole, gain)) in self.pink.iter_mut().zip(PINK) {
+            *state += pole * (white - *state);
+            sum += gain * *state;
+        }
+        sum
     }
 
     /// A tick of the fluid under this pressure; gives the pressure that reaches the transducer, Pa.
@@ -144,5 +150,36 @@ impl Vibrations {
         self.rate += TICK_S * self.stiffness * lag;
         self.fluid += TICK_S * (self.rate + self.drag * lag);
         self.fluid
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::noise::Noise;
+
+    #[test]
+    fn friction_noise_has_rms_1_and_falls_by_3_db_an_octave() {
+        let (mut noise, mut vibrations) = (Noise::new(1, 1), Vibrations::default());
+        let (mut power, mut octaves) = (0.0, [0.0; 5]);
+        // differences of running values tell how much lies about each octave
+        let mut slow = [0.0; 6];
+        for _ in 0..2_000_000 {
+            let value = vibrations.pink(noise.white()[0]);
+            power += value * value / 2e6;
+            for (i, state) in slow.iter_mut().enumerate() {
+                *state += TAU * 20.0 * f64::from(1 << i) * TICK_S * (value - *state);
+            }
+            for (i, octave) in octaves.iter_mut().enumerate() {
+                *octave += (slow[i + 1] - slow[i]).powi(2);
+            }
+        }
+        assert!((power - 1.0).abs() < 0.15, "{power}");
+        // 1/f has as much power in every octave
+        let mean = octaves.iter().sum::<f64>() / 5.0;
+        assert!(
+            octaves.iter().all(|o| (o / mean - 1.0).abs() < 0.25),
+            "{octaves:.0?}"
+        );
     }
 }

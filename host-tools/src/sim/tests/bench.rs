@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::sim::finger::{Contact, Finger, PA_PER_N, PAC_PA_PER_COUNT};
+use crate::sim::finger::{Contact, Finger};
 use crate::sim::noise::Noise;
 use crate::sim::surface::Surface;
 use crate::sim::textures::draw;
@@ -19,8 +19,31 @@ const APPROACH_MM_S: f64 = 4.0;
 /// Distance in which the skin has begun to slip for certain, mm.
 const ONSET_MM: f64 = 4.0;
 /// Longest steady part of a slide, mm and s.
-const STEADY_MM: f64 = 40.0;
-const STEADY_S: f64 = 2.0;
+const STEADY_MM: f64 = 50.0;
+const STEADY_S: f64 = 1.0;
+
+/// A locked stepper motor: three tones in the fluid, other ones for each slide (PAPER: its noise differs from trial to trial).
+/// About the amplifier's own noise; chosen.
+struct Hum([(f64, f64, f64); 3]);
+
+impl Hum {
+    fn new(seed: u64) -> Self {
+        let mut noise = Noise::new(seed, 10);
+        Self(std::array::from_fn(|_| {
+            (noise.about(0.3, 0.7), noise.between(60.0, 600.0), 0.0)
+        }))
+    }
+
+    fn tick(&mut self) -> f64 {
+        self.0
+            .iter_mut()
+            .map(|(pa, hz, turns)| {
+                *turns += *hz * TICK_S;
+                *pa * (TAU * *turns).sin()
+            })
+            .sum()
+    }
+}
 
 /// A slide as it was sampled and as it was.
 pub(super) struct Slide {
@@ -50,6 +73,7 @@ pub(super) fn slide(
 ) -> Slide {
     let steady_mm = STEADY_MM.min(STEADY_S * speed);
     let mut x_mm = Noise::new(seed, 9).between(2.0, 73.0 - ONSET_MM - steady_mm);
+    let mut hum = Hum::new(seed);
     let mut contact = Contact {
         indentation_mm: 0.0,
         surface: Some(surface),
@@ -59,6 +83,7 @@ pub(super) fn slide(
     };
     let mut ticks = 0_u32;
     let mut run = |contact: &mut Contact<'_>, finger: &mut Finger| {
+        contact.lever_vibration = hum.tick();
         finger.tick(contact);
         x_mm += contact.speed_mm_s * TICK_S;
         contact.x_mm = x_mm;
@@ -181,9 +206,6 @@ pub(super) fn line(signal: &[f64], hz: f64) -> f64 {
     // amplitude a gives a n / 4
     8.0 * (re * re + im * im) / (n * n)
 }
-
-/// Counts of P_AC that a newton in the band would be.
-pub(super) const PAC_COUNTS_PER_N: f64 = PA_PER_N / PAC_PA_PER_COUNT;
 
 pub(super) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let (n, sum) = values

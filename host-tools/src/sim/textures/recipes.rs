@@ -40,20 +40,20 @@ fn of(group: Group) -> Recipe {
     //   friction, fine um, mm, Hz, relief um, mm, weave um, mm, friction noise, heterogeneity, damping, thickness, compliance
     let (friction, fine, impulse_hz, relief, weave, friction_noise, heterogeneity, damping, thickness_mm, compliance_mm_per_n) =
         match group {
-            Paper       => (0.55, (2.0, 0.06),  900.0, ( 4.0, 1.0), ( 0.0, 1.0), 0.006, 0.06, 0.0,  0.3, 0.02),
-            Art         => (0.50, (4.0, 0.08),  500.0, (20.0, 1.5), ( 0.0, 1.0), 0.008, 0.10, 0.1,  2.0, 0.20),
-            Glass       => (1.00, (0.1, 0.05), 1200.0, ( 0.5, 2.0), ( 0.0, 1.0), 0.005, 0.05, 0.0,  4.0, 0.00),
-            Foam        => (0.95, (3.0, 0.10),  300.0, (60.0, 1.2), ( 0.0, 1.0), 0.010, 0.08, 0.2, 10.0, 0.80),
-            Tile        => (0.75, (0.6, 0.05), 1000.0, ( 3.0, 2.0), ( 0.0, 1.0), 0.006, 0.06, 0.0,  6.0, 0.00),
-            Wood        => (0.50, (2.0, 0.06),  900.0, ( 8.0, 1.0), ( 0.0, 1.0), 0.008, 0.12, 0.0,  5.0, 0.01),
-            Engineering => (0.60, (0.6, 0.05), 1000.0, ( 2.0, 1.0), ( 0.0, 1.0), 0.006, 0.05, 0.0,  4.0, 0.00),
-            Rubber      => (1.15, (0.4, 0.05),  300.0, ( 1.5, 1.0), ( 0.0, 1.0), 0.006, 0.05, 0.0,  3.0, 0.10),
-            Vinyl       => (0.85, (0.8, 0.06),  400.0, ( 8.0, 1.0), ( 0.0, 1.0), 0.007, 0.07, 0.0,  1.0, 0.05),
-            Leather     => (0.65, (2.0, 0.08),  450.0, (12.0, 0.8), ( 0.0, 1.0), 0.008, 0.12, 0.1,  1.5, 0.10),
-            Cotton      => (0.45, (3.0, 0.06),  800.0, ( 8.0, 0.8), (10.0, 0.30), 0.008, 0.07, 0.1, 0.4, 0.05),
-            Fabric      => (0.50, (4.0, 0.07),  600.0, (12.0, 0.8), (12.0, 0.45), 0.008, 0.09, 0.1, 0.8, 0.10),
-            Weave       => (0.45, (5.0, 0.08),  700.0, (20.0, 1.0), (40.0, 0.90), 0.008, 0.09, 0.1, 0.8, 0.08),
-            Fur         => (0.40, (4.0, 0.08),  300.0, (25.0, 1.5), ( 0.0, 1.0), 0.010, 0.12, 0.4, 10.0, 0.80),
+            Paper       => (0.55, (2.0, 0.06),  900.0, ( 4.0, 1.0), ( 0.0, 1.0), 0.0040, 0.06, 0.0,  0.3, 0.02),
+            Art         => (0.50, (4.0, 0.08),  500.0, (20.0, 1.5), ( 0.0, 1.0), 0.0053, 0.10, 0.1,  2.0, 0.20),
+            Glass       => (1.00, (0.1, 0.05), 1200.0, ( 0.5, 2.0), ( 0.0, 1.0), 0.0033, 0.05, 0.0,  4.0, 0.00),
+            Foam        => (0.95, (3.0, 0.10),  300.0, (60.0, 1.2), ( 0.0, 1.0), 0.0067, 0.08, 0.2, 10.0, 0.80),
+            Tile        => (0.75, (0.6, 0.05), 1000.0, ( 3.0, 2.0), ( 0.0, 1.0), 0.0040, 0.06, 0.0,  6.0, 0.00),
+            Wood        => (0.50, (2.0, 0.06),  900.0, ( 8.0, 1.0), ( 0.0, 1.0), 0.0053, 0.12, 0.0,  5.0, 0.01),
+            Engineering => (0.60, (0.6, 0.05), 1000.0, ( 2.0, 1.0), ( 0.0, 1.0), 0.0040, 0.05, 0.0,  4.0, 0.00),
+            Rubber      => (1.15, (0.4, 0.05),  300.0, ( 1.5, 1.0), ( 0.0, 1.0), 0.0040, 0.05, 0.0,  3.0, 0.10),
+            Vinyl       => (0.85, (0.8, 0.06),  400.0, ( 8.0, 1.0), ( 0.0, 1.0), 0.0047, 0.07, 0.0,  1.0, 0.05),
+            Leather     => (0.65, (2.0, 0.08),  450.0, (12.0, 0.8), ( 0.0, 1.0), 0.0053, 0.12, 0.1,  1.5, 0.10),
+            Cotton      => (0.45, (3.0, 0.06), 1000.0, ( 8.0, 0.8), (10.0, 0.30), 0.0053, 0.07, 0.1, 0.4, 0.05),
+            Fabric      => (0.50, (4.0, 0.07),  900.0, (12.0, 0.8), (12.0, 0.45), 0.0053, 0.09, 0.1, 0.8, 0.10),
+            Weave       => (0.45, (5.0, 0.08),  900.0, (20.0, 1.0), (30.0, 0.90), 0.0053, 0.09, 0.1, 0.8, 0.08),
+            Fur         => (0.40, (4.0, 0.08),  300.0, (25.0, 1.5), ( 0.0, 1.0), 0.0067, 0.12, 0.4, 10.0, 0.80),
         };
     // cells are round, grain and fibres are not
     let relief_exponent = if group == Foam { 4.0 } else { 3.0 };
@@ -74,7 +74,7 @@ pub(super) fn recipe(named: Named) -> (Recipe, bool) {
         // flutes under the liner
         8 => Recipe { weave: (8.0, 6.0), grating: true, ..r },
         // Table 2: low traction, rough, coarse
-        10 => Recipe { friction: 0.30, fine: (2.0, 0.08), relief: (25.0, 1.2), weave: (60.0, 1.6), ..r },
+        10 => Recipe { friction: 0.30, fine: (2.0, 0.08), relief: (20.0, 1.2), weave: (50.0, 1.6), ..r },
         11 => Recipe { friction: 0.50, relief: (40.0, 0.8), ..r },
         17 => Recipe { friction: 0.90, fine: (1.5, 0.08), relief: (8.0, 0.8), ..r },
         18 | 19 => Recipe { friction: 0.75, fine: (0.4, 0.05), relief: (1.5, 1.0), ..r },
@@ -91,21 +91,21 @@ pub(super) fn recipe(named: Named) -> (Recipe, bool) {
         28 => Recipe { relief: (25.0, 3.0), ..r },
         29 => Recipe { friction: 0.80, fine: (3.0, 0.08), relief: (20.0, 2.0), compliance_mm_per_n: 0.05, ..r },
         // Table 2: high traction, very rough, coarse
-        30 => Recipe { friction: 1.10, fine: (3.0, 0.10), relief: (60.0, 1.2), ..r },
+        30 => Recipe { friction: 1.10, fine: (3.0, 0.10), relief: (100.0, 1.2), ..r },
         32 => Recipe { friction: 0.95, fine: (0.15, 0.05), relief: (0.8, 2.0), ..r },
         33 => Recipe { friction: 1.00, fine: (0.12, 0.05), relief: (0.8, 2.0), ..r },
         34 => Recipe { friction: 0.55, fine: (2.5, 0.06), relief: (15.0, 1.5), ..r },
         37 => Recipe { friction: 0.75, fine: (0.6, 0.05), relief: (3.0, 1.5), ..r },
         41 => Recipe { friction: 0.95, fine: (0.08, 0.05), relief: (0.5, 2.0), ..r },
         // T43 is the paper's "graphite". Results: the lowest traction. Table 2: medium roughness, fine
-        42 => Recipe { friction: 0.28, fine: (1.8, 0.05), relief: (2.0, 0.5), friction_noise: 0.03, ..r },
-        43 => Recipe { friction: 0.20, fine: (2.2, 0.05), relief: (2.0, 0.4), friction_noise: 0.03, ..r },
+        42 => Recipe { friction: 0.28, fine: (1.8, 0.05), relief: (2.0, 0.5), friction_noise: 0.025, ..r },
+        43 => Recipe { friction: 0.20, fine: (2.2, 0.05), relief: (2.0, 0.4), friction_noise: 0.025, ..r },
         // marks of the cutter at the feed per turn
         44 => Recipe { friction: 0.60, weave: (3.0, 0.25), grating: true, ..r },
         // T45 is the paper's "milled aluminum". Table 2: medium traction, smooth, very fine
-        45 => Recipe { friction: 0.60, fine: (0.9, 0.04), relief: (1.0, 0.3), ..r },
+        45 => Recipe { friction: 0.60, fine: (1.1, 0.04), relief: (1.0, 0.3), ..r },
         // Table 2: very high traction, very smooth, no features
-        46 => Recipe { friction: 1.30, fine: (0.03, 0.05), relief: (0.3, 2.0), friction_noise: 0.004, ..r },
+        46 => Recipe { friction: 1.30, fine: (0.03, 0.05), relief: (0.3, 2.0), friction_noise: 0.0023, ..r },
         // Table 2: very high traction, smooth, no features
         47 => Recipe { friction: 1.30, fine: (0.20, 0.05), relief: (0.8, 1.5), ..r },
         57 | 58 => Recipe { relief: (18.0, 1.0), ..r },
