@@ -83,11 +83,11 @@ pub struct Truth {
     pub wear: f64,
 }
 
-/// Why another sample cannot be mounted: the finger is on this one.
+/// Why a hand cannot get between finger and sample, or another sample cannot.
 #[derive(thiserror::Error, Clone, Copy, PartialEq, Debug)]
-#[error("the finger is {indentation_mm:.3} mm deep in the sample: lift it first")]
+#[error("the finger would be {indentation_mm:.3} mm deep in the sample: lift it first")]
 pub struct NotLifted {
-    /// How deep.
+    /// How deep, mm.
     pub indentation_mm: f64,
 }
 
@@ -238,11 +238,13 @@ impl World {
     /// Mounts another sample.
     ///
     /// # Errors
-    /// If the finger touches the one that is there.
+    /// If the finger touches the one that is there or would touch the other, which may be thicker by millimetres.
     pub fn place(&mut self, texture: u8) -> Result<(), NotLifted> {
-        self.must_be_lifted()?;
+        let surface = sample(texture, self.setup.world_seed);
+        self.must_be_over(&self.surface)?;
+        self.must_be_over(&surface)?;
         self.setup.texture = texture;
-        self.surface = sample(texture, self.setup.world_seed);
+        self.surface = surface;
         Ok(())
     }
 
@@ -251,7 +253,7 @@ impl World {
     /// # Errors
     /// If the finger touches the sample.
     pub fn replace_skin(&mut self) -> Result<(), NotLifted> {
-        self.must_be_lifted()?;
+        self.must_be_over(&self.surface)?;
         self.finger.replace_skin();
         Ok(())
     }
@@ -377,9 +379,9 @@ impl World {
         self.surface.thickness_mm() - self.lever.height_mm()
     }
 
-    fn must_be_lifted(&self) -> Result<(), NotLifted> {
-        let indentation_mm = self.indentation_mm();
-        if indentation_mm > 0.0 || self.finger.force_n() > 0.0 {
+    fn must_be_over(&self, surface: &Surface) -> Result<(), NotLifted> {
+        let indentation_mm = surface.thickness_mm() - self.lever.height_mm();
+        if indentation_mm > 0.0 {
             return Err(NotLifted { indentation_mm });
         }
         Ok(())

@@ -128,6 +128,32 @@ fn a_small_duty_does_not_overcome_the_friction_of_rest() {
 }
 
 #[test]
+fn friction_differs_over_the_travel() {
+    let friction = |position_mm: f64| Stage::new(position_mm, 1, 2).dry_friction_n();
+    let all: Vec<f64> = (0..=85).map(|mm| friction(f64::from(mm))).collect();
+    let mean = all.iter().sum::<f64>() / all.len() as f64;
+    let spread = all
+        .iter()
+        .map(|n| (n / mean - 1.0).abs())
+        .fold(0.0, f64::max);
+    assert!((0.02..0.05).contains(&spread), "{spread}");
+    assert!(
+        (mean / (COULOMB_N * BREAKAWAY) - 1.0).abs() < 0.05,
+        "{mean}"
+    );
+    // the part of the screw comes back with each revolution; over half of one, only the other part is left
+    let screw = |mm: f64| friction(mm) - friction(mm + 0.5 * LEAD_MM);
+    assert!((screw(20.0) - screw(20.0 + LEAD_MM)).abs() < 0.012);
+    let largest = (0..10)
+        .map(|i| screw(20.0 + f64::from(i)))
+        .fold(0.0, f64::max);
+    assert!(
+        (0.02..0.04).contains(&largest),
+        "twice 2 % of 0.72 N: {largest}"
+    );
+}
+
+#[test]
 fn current_has_ripple_of_the_commutation() {
     let mut stage = stage_at(5.0);
     stage.set_duty(0.1);

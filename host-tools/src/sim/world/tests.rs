@@ -276,10 +276,21 @@ fn samples_and_skins_are_changed_with_the_finger_lifted() {
     assert!(bench.world.replace_skin().is_err());
     assert_eq!(bench.world.truth().texture, 46);
     bench.turn_to(false);
-    bench.steps(3_000, 1_600);
-    bench.world.place(47).unwrap();
+    bench.steps(1_000, 1_600);
     bench.world.replace_skin().unwrap();
-    assert_eq!(bench.world.truth().texture, 47);
+    let [thick, thin] = [true, false].map(|thick| {
+        let over = bench.world.truth().tip_mm - 0.1;
+        let fits = |number: &u8| sample(*number, 1).thickness_mm() < over;
+        (1..=117).find(|number| fits(number) != thick).unwrap()
+    });
+    assert!(
+        bench.world.place(thick).is_err(),
+        "it would lift the finger"
+    );
+    bench.world.place(thin).unwrap();
+    bench.wait_ms(10);
+    let truth = bench.world.truth();
+    assert_eq!((truth.texture, truth.force_n), (thin, 0.0));
 }
 
 #[test]
