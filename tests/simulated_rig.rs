@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use rayon::prelude::*;
 use tactus::replay::measure;
-use tactus::sim::stage::{SAMPLE_AT_MM, SAMPLE_MM};
+use tactus::sim::stage::{FORCE_N_PER_A, SAMPLE_AT_MM, SAMPLE_MM};
 use tactus::sim::world::Setup;
 use tactus::simulated::{Collection, Performed, SimRig, calibrated, record_texture, texture_name};
 use tactus_core::explorer::{Config, Explorer};
@@ -143,6 +143,32 @@ fn a_recorded_slide_has_the_properties_that_were_felt_live() {
     ))
     .unwrap();
     assert_eq!(slide.finish().unwrap(), recorded);
+}
+
+#[test]
+fn calibration_finds_the_constants_of_the_rig() {
+    for seed in 1..=3 {
+        let mut rig = SimRig::new(Setup {
+            texture: 41,
+            world_seed: seed,
+            finger_seed: seed,
+            ..Setup::default()
+        });
+        rig.home().unwrap();
+        let found = rig.calibrate(20_261_121).unwrap();
+        println!("{found:?}");
+        // the amplifier's gain is off by half a percent at most
+        let per_ampere = f64::from(found.newton_per_ampere);
+        assert!(
+            (per_ampere / FORCE_N_PER_A - 1.0).abs() < 0.02,
+            "{per_ampere}"
+        );
+        let mn_per_count = f64::from(found.pressure.force_mn_per_count);
+        assert!((mn_per_count / 11.5 - 1.0).abs() < 0.03, "{mn_per_count}");
+        assert_eq!(found.date, 20_261_121);
+        assert!(found.serial.starts_with(b"BT"));
+        assert_eq!(RigCalibration::from_bytes(&found.to_bytes()), Ok(found));
+    }
 }
 
 #[test]

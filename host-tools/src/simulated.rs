@@ -60,6 +60,9 @@ pub enum SimError {
     /// A calibration came to nothing.
     #[error(transparent)]
     Calibration(#[from] RigCalibrationError),
+    /// The sensor does not say what it is.
+    #[error(transparent)]
+    Sensor(#[from] biotac::PropertyError),
 }
 
 /// The board's timers between control and world: sensor slots, step pulses, the 1 kHz tick.
@@ -304,6 +307,90 @@ impl SimRig {
         let calibration = RigCalibration {
             unloaded_a: fit.line()?,
             ..*self.control.calibration()
+        };
+        self.control.calibrate(calibration)?;
+        Ok(calibration)
+    }
+
+    /// The sensor's serial number, asked for between two slots.
+    ///
+    /// # Errors
+    /// It is not that of a BioTac.
+    pub fn serial(&mut self) -> Result<[u8; 16], SimError> {
+        let mut bytes = biotac::IdentityBytes::default();
+        for exchange in bytes.exchanges() {
+            if let Some(command) = exchange.command {
+                self.world
+                    .spi(self.now_ns, TRANSFER_NS, &command, &mut [0; 2]);
+            }
+            // the timer of the slots stands meanwhile
+            self.now_ns += TICK_NS / 4;
+            let mosi = exchange.read.to_vec();
+            let duration_ns = TRANSFER_NS / 2 * mosi.len() as u64;
+            self.world
+                .spi(self.now_ns, duration_ns, &mosi, exchange.read.as_mut());
+            self.now_ns += TICK_NS / 4;
+        }
+        let identity = bytes.decode()?;
+        let mut serial = [0; 16];
+        for (byte, character) in serial.iter_mut().zip(identity.serial.as_str().bytes()) {
+            *byte = character;
+        }
+        Ok(serial)
+    }
+
+    /// Measures everything that differs from rig to rig: the motor current without load, newtons per ampere on the
+    /// inclined stage, and counts of P_DC per newton on a force plate. `date` as 20261121.
+    ///
+    /// # Errors
+    /// See [`SimError`].
+    pub fn calibrate(&mut self, date: u32) -> Result<RigCalibration, SimError> {
+        let serial = self.serial()?;
+        let unloaded = self.calibrate_current()?;
+        let mut incline = LineFit::default();
+        for pull_n in [0.0f32, 1.0, 2.0, 3.0] {
+            self.world.incline(pull_n.into());
+            for rightwards in [true, false] {
+                self.control.start_unloaded(25.0)?;
+                self.rest(|_| ())?;
+                if let Some(current_a) = self.control.mean_current_a().filter(|_| rightwards) {
+                    incline.push(pull_n, current_a);
+                }
+            }
+        }
+        self.world.incline(0.0);
+        let (_, ampere_per_newton) = incline.line()?;
+        // the plate is what lies under the finger, and reads what really presses on it
+        let mut plate = LineFit::default();
+        for force_mn in [300, 600, 900, 1200] {
+            let Ok(movement) = Movement::new(force_mn, 10_000) else {
+                continue;
+            };
+            let mn_per_count = unloaded.pressure.force_mn_per_count;
+            self.control.start(movement, 0.0)?;
+            while self.control.phase() != Phase::Sliding {
+                self.tick();
+                if let Phase::Faulted(fault) = self.control.phase() {
+                    return Err(fault.into());
+                }
+            }
+            plate.push(
+                self.control.force_mn() / mn_per_count,
+                (self.world.truth().force_n * 1e3) as f32,
+            );
+            self.control.stop();
+            self.rest(|_| ())?;
+        }
+        let (_, force_mn_per_count) = plate.line()?;
+        let calibration = RigCalibration {
+            pressure: Calibration {
+                force_mn_per_count,
+                ..unloaded.pressure
+            },
+            newton_per_ampere: 1.0 / ampere_per_newton,
+            date,
+            serial,
+            ..unloaded
         };
         self.control.calibrate(calibration)?;
         Ok(calibration)

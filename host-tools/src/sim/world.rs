@@ -111,6 +111,8 @@ pub struct World {
     force_max_n: f64,
     stage_reach_mm: (f64, f64),
     sliding_j: f64,
+    /// a weight on the inclined stage, N
+    pull_n: f64,
 }
 
 impl World {
@@ -142,6 +144,7 @@ impl World {
             force_max_n: 0.0,
             stage_reach_mm: (stage_mm, stage_mm),
             sliding_j: 0.0,
+            pull_n: 0.0,
         };
         world.advance_to(0);
         world
@@ -248,6 +251,12 @@ impl World {
         Ok(())
     }
 
+    /// Inclines the stage with a weight on it, so that it is pulled towards lower positions with `pull_n` (paper, Traction:
+    /// weights on the stage at 45 degrees).
+    pub fn incline(&mut self, pull_n: f64) {
+        self.pull_n = -pull_n;
+    }
+
     /// Gives the finger a new skin.
     ///
     /// # Errors
@@ -350,7 +359,7 @@ impl World {
         let shear_n = self.finger.shear_n();
         self.lever.tick(self.tick_ends_ns, self.finger.force_n());
         let from_mm = self.stage.position_mm();
-        self.stage.tick(shear_n);
+        self.stage.tick(shear_n + self.pull_n);
         let to_mm = self.stage.position_mm();
         if from_mm != to_mm {
             self.encoder

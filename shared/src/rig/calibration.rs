@@ -1,6 +1,10 @@
 //! The constants of one rig, and how they are found: lines through measured points.
 
+use crc::{CRC_32_ISO_HDLC, Crc};
+
 use crate::pressure::{Calibration, CalibrationError};
+
+const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// What was measured of one rig, on which day, and with which sensor.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -22,6 +26,78 @@ impl RigCalibration {
     pub fn shear_n(&self, current_a: f32, speed_mm_s: f32) -> f32 {
         let (standstill, per_mm_s) = self.unloaded_a;
         (current_a - standstill - per_mm_s * speed_mm_s) * self.newton_per_ampere
+    }
+
+    /// Length of a stored record.
+    pub const BYTES: usize = 60;
+
+    /// The record as it is stored: nine f32, the date, the serial number, and a CRC-32 of these; little-endian.
+    pub fn to_bytes(&self) -> [u8; Self::BYTES] {
+        let mut bytes = [0; Self::BYTES];
+        let (body, end) = bytes.split_at_mut(Self::BYTES - 4);
+        let (numbers, serial) = body.split_at_mut(40);
+        let (floats, date) = numbers.split_at_mut(36);
+        for (room, value) in floats.chunks_exact_mut(4).zip(self.numbers()) {
+            room.copy_from_slice(&value.to_le_bytes());
+        }
+        date.copy_from_slice(&self.date.to_le_bytes());
+        serial.copy_from_slice(&self.serial);
+        end.copy_from_slice(&CRC32.checksum(body).to_le_bytes());
+        bytes
+    }
+
+    /// The record in `bytes`, checked.
+    ///
+    /// # Errors
+    /// [`RigCalibrationError::Damaged`], or what [`RigCalibration::check`] says.
+    pub fn from_bytes(bytes: &[u8; Self::BYTES]) -> Result<Self, RigCalibrationError> {
+        let (body, crc) = bytes
+            .split_last_chunk::<4>()
+            .ok_or(RigCalibrationError::Damaged)?;
+        if CRC32.checksum(body) != u32::from_le_bytes(*crc) {
+            return Err(RigCalibrationError::Damaged);
+        }
+        let (body, serial) = body
+            .split_last_chunk::<16>()
+            .ok_or(RigCalibrationError::Damaged)?;
+        let mut words = body.as_chunks::<4>().0.iter();
+        let mut number = || {
+            words
+                .next()
+                .map_or(f32::NAN, |word| f32::from_le_bytes(*word))
+        };
+        let record = Self {
+            pressure: Calibration {
+                pac_pa_per_count: number(),
+                pac_rest: number(),
+                pdc_pa_per_count: number(),
+                pdc_no_contact: number(),
+                force_mn_per_count: number(),
+                linear_mn: number(),
+            },
+            unloaded_a: (number(), number()),
+            newton_per_ampere: number(),
+            date: words.next().map_or(0, |word| u32::from_le_bytes(*word)),
+            serial: *serial,
+        };
+        record.check()?;
+        Ok(record)
+    }
+
+    fn numbers(&self) -> [f32; 9] {
+        let p = &self.pressure;
+        let (standstill, per_mm_s) = self.unloaded_a;
+        [
+            p.pac_pa_per_count,
+            p.pac_rest,
+            p.pdc_pa_per_count,
+            p.pdc_no_contact,
+            p.force_mn_per_count,
+            p.linear_mn,
+            standstill,
+            per_mm_s,
+            self.newton_per_ampere,
+        ]
     }
 
     /// Checks a record before a motor is moved by it.
@@ -48,6 +124,8 @@ pub enum RigCalibrationError {
     Pressure(CalibrationError),
     /// The stage's constants.
     Current,
+    /// The stored record has changed since it was written.
+    Damaged,
     /// Fewer than three points, or all at the same place.
     Points,
     /// The points do not lie on a line: R^2 below 0.99.
@@ -61,6 +139,7 @@ impl core::fmt::Display for RigCalibrationError {
             Self::Current => {
                 f.write_str("the stage's current must be finite, and newtons per ampere above 0")
             }
+            Self::Damaged => f.write_str("the stored calibration is damaged: calibrate again"),
             Self::Points => f.write_str("a line takes three points or more, at different places"),
             Self::NoLine => {
                 f.write_str("the points do not lie on a line (R^2 below 0.99): measure again")
@@ -189,6 +268,24 @@ mod tests {
                 ..rig
             }
             .check(),
+            Err(RigCalibrationError::Current)
+        );
+        assert_eq!(RigCalibration::from_bytes(&rig.to_bytes()), Ok(rig));
+        for bit in 0..8 * RigCalibration::BYTES {
+            let mut bytes = rig.to_bytes();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            assert_eq!(
+                RigCalibration::from_bytes(&bytes),
+                Err(RigCalibrationError::Damaged)
+            );
+        }
+        let nonsense = RigCalibration {
+            newton_per_ampere: f32::NAN,
+            ..rig
+        }
+        .to_bytes();
+        assert_eq!(
+            RigCalibration::from_bytes(&nonsense),
             Err(RigCalibrationError::Current)
         );
         let pressure = Calibration {
