@@ -92,20 +92,122 @@ fn part_of(folder: &Path, to: &Path, keep: impl Fn(u64) -> bool) {
 }
 
 #[test]
-fn without_arguments_it_says_what_it_is_and_what_to_try_first() {
-    let help = printed(&[]);
+fn help_says_what_it_is_and_what_to_try_first() {
+    let help = printed(&["--help"]);
     assert!(
-        help.contains("touching")
+        help.contains("touching it")
             && help.contains("Try first")
             && help.contains("tactus identify --recordings")
     );
     assert!(help.contains("https://github.com/dexrob/BioTac_slide_20_50"));
     for command in [
-        "features", "learn", "table", "identify", "evaluate", "import",
+        "features", "learn", "table", "identify", "evaluate", "simulate", "import",
     ] {
         assert!(help.contains(command), "{command}");
         assert!(printed(&[command, "--help"]).contains("Usage"), "{command}");
     }
+}
+
+#[test]
+fn without_arguments_a_simulated_probe_recognises_a_texture() {
+    let shown = printed(&[]);
+    for part in [
+        "touching it",
+        "An unknown texture, one of 20",
+        "Slide 1:",
+        "because",
+        "█",
+        "Right.",
+        "Try first",
+    ] {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
+}
+
+#[test]
+fn the_simulated_probe_is_given_the_texture_asked_for() {
+    let arguments = [
+        "identify",
+        "--simulated",
+        "--texture",
+        "burlap",
+        "--among",
+        "5",
+        "--seed",
+        "3",
+    ];
+    let shown = printed(&arguments);
+    assert!(
+        shown.contains("one of 5") && shown.contains("Under the finger: Burlap"),
+        "{shown}"
+    );
+    assert!(
+        shown.contains("Right.") || shown.contains("Wrong: it was Burlap"),
+        "{shown}"
+    );
+    assert_eq!(shown, printed(&arguments), "the same seed");
+    let said = complaint(&["identify", "--simulated", "--texture", "cheese"]);
+    assert!(said.contains("cheese") && said.contains("Burlap"), "{said}");
+}
+
+#[test]
+fn simulated_recordings_are_learned_and_evaluated_like_real_ones() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path().join("simulated");
+    let said = printed(&[
+        "simulate",
+        "--out",
+        path(&folder),
+        "--textures",
+        "burlap,47,Oak wood",
+        "--trials",
+        "4",
+        "--seed",
+        "2",
+    ]);
+    assert!(said.contains("3 textures, 36 slides"), "{said}");
+    let e = json(&printed(&[
+        "evaluate",
+        "--recordings",
+        path(&folder),
+        "--train-slides",
+        "3",
+        "--runs",
+        "300",
+        "--format",
+        "json",
+    ]));
+    assert!(e["accuracy"].as_f64().unwrap() > 0.9, "{e}");
+    let features = printed(&["features", "--recordings", path(&folder), "--format", "csv"]);
+    assert_eq!(features.lines().count(), 37);
+    let table = temp.path().join("table");
+    printed(&[
+        "learn",
+        "--recordings",
+        path(&folder),
+        "--train-slides",
+        "3",
+        "--out",
+        path(&table),
+    ]);
+    assert!(printed(&["table", "show", path(&table)]).contains("movement 3: 0.20 N, 63.1 mm/s"));
+    let explored = printed(&[
+        "identify",
+        "--recordings",
+        path(&folder),
+        "--material",
+        "burlap",
+        "--table",
+        path(&table),
+    ]);
+    assert!(
+        explored.contains("Right.") && explored.contains("3 slides that were not learned from"),
+        "{explored}"
+    );
+    // nothing is overwritten
+    assert!(
+        complaint(&["simulate", "--out", path(&folder), "--textures", "1"]).contains("simulated")
+    );
 }
 
 #[test]

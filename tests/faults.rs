@@ -9,7 +9,7 @@ use tactus::sim::world::Setup;
 use tactus::simulated::{SimError, SimRig};
 use tactus_core::movement::Movement;
 use tactus_core::rig::control::{Ended, Phase, Refused};
-use tactus_core::rig::guard::{FAULTS, Fault, Unguarded};
+use tactus_core::rig::guard::{FAULTS, Fault, Row, Unguarded};
 
 /// When the cause comes.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -453,4 +453,29 @@ fn every_fault_of_the_table_is_tested() {
             CASES.iter().any(|case| case.fault == row.fault) || elsewhere.contains(&row.fault);
         assert!(tested, "{}", row.name);
     }
+}
+
+#[test]
+fn the_readme_has_the_table() {
+    let table: String = FAULTS
+        .iter()
+        .map(|row| {
+            let Row {
+                name,
+                detected,
+                deadline_ms,
+                stops,
+                refused,
+                recovery,
+                ..
+            } = row;
+            format!("| {name} | {detected} | {deadline_ms} | {stops} | {refused} | {recovery} |\n")
+        })
+        .collect();
+    let readme =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md")).unwrap();
+    assert!(
+        readme.contains(&table),
+        "the README's table of faults should be\n{table}"
+    );
 }

@@ -1,5 +1,6 @@
 //! What every command does.
 
+use std::collections::HashMap;
 use std::io::{self, Write};
 use std::path::Path;
 use std::time::Duration;
@@ -20,6 +21,7 @@ use tactus::sim::textures::TEXTURES;
 use tactus::simulated::{Collection, SimRig, calibrated, texture_name, texture_number};
 use tactus_core::explorer::Explorer;
 use tactus_core::features::{BAND_EDGES, Plan, Property, PropertySet};
+use tactus_core::movement::Movement;
 use tactus_core::rig::{Rig as _, explore};
 use tactus_core::table::{Experience, Table};
 
@@ -250,16 +252,27 @@ fn identify(
     let (table, shown): (Table<'_>, Vec<Slide>) = match &args.table {
         Some(file) => {
             let table = read_table(file, &mut bytes)?;
-            // a table of this folder was learned from its first slides: those are not shown
-            let learned = table
-                .find(name)
-                .map_or(0, |t| usize::from(table.trials(t, 0)));
-            let mut slides = set.load_texture(index)?;
-            let shown: Vec<Slide> = if learned < slides.len() {
-                slides.split_off(learned)
-            } else {
-                slides
+            // a table of this folder was learned from the first slides of every movement: those are not shown
+            let learned = |movement: Movement| {
+                let at = table.movements().position(|m| m == movement);
+                table
+                    .find(name)
+                    .zip(at)
+                    .map_or(0, |(t, at)| usize::from(table.trials(t, at as u8)))
             };
+            let mut seen: HashMap<Movement, usize> = HashMap::new();
+            let mut shown = set.load_texture(index)?;
+            shown.retain(|slide| {
+                let before = seen.entry(slide.movement).or_default();
+                *before += 1;
+                *before > learned(slide.movement)
+            });
+            if shown.is_empty() {
+                bail!(
+                    "{}: learned from every slide of {name}; none is left to present",
+                    file.display()
+                );
+            }
             (table, shown)
         }
         None => {
