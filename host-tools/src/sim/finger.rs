@@ -1,7 +1,7 @@
 //! The BioTac finger: what a contact does to its skin, its fluid and its two pressure signals.
 //!
-//! A tick goes: the skin is indented ([`skin`]), sticks or slips along the surface, ridges and fluid turn what they slide
-//! over into pressure ([`vibration`]), and the amplifiers make the two signals that the sensor samples ([`amplifier`]).
+//! A tick goes: the skin is indented (`skin`), sticks or slips along the surface, ridges and fluid turn what they slide
+//! over into pressure (`vibration`), and the amplifiers make the two signals that the sensor samples (`amplifier`).
 
 mod amplifier;
 mod skin;
@@ -36,7 +36,8 @@ mod touch {
     pub(super) const RESONANCE: f64 = 0.03;
 }
 
-/// Relative deviation of friction while it slides at 25 mm/s, growing with speed (PAPER: slow slides are the more stable).
+/// Relative deviation of friction while it slides at 25 mm/s, growing with the root of speed (chosen; PAPER: slow slides
+/// are the more stable).
 const UNSTEADY: f64 = 0.02;
 /// Speed for the above, mm/s.
 const UNSTEADY_AT_MM_S: f64 = 25.0;
@@ -72,13 +73,14 @@ pub struct Contact<'a> {
     pub lever_vibration: f64,
 }
 
-/// State of one contact, drawn when the skin lands; standard normal but for the scale of the whole.
-#[derive(Clone, Copy, Default)]
+/// State of one contact, drawn when the skin lands: deviations in units of those in [`touch`], and the factor on the
+/// resonant frequency.
+#[derive(Clone, Copy)]
 struct Touch {
     friction: f64,
     adhesion: f64,
     vibration: f64,
-    resonance: f64,
+    detuned: f64,
 }
 
 /// A BioTac.
@@ -141,14 +143,11 @@ impl Finger {
                 self.slipping = false;
             }
         }
-        let resonance = self
-            .touch
-            .map_or(0.0, |t| touch::RESONANCE * t.resonance)
-            .exp();
+        let detuned = self.touch.map_or(1.0, |touch| touch.detuned);
         let force = self.skin.fluid_n();
         let fluid_pa = self
             .vibrations
-            .fluid(pressure_pa + PA_PER_N * force, force, resonance);
+            .fluid(pressure_pa + PA_PER_N * force, force, detuned);
         let dc_n = force + SHEAR_TO_PDC * self.shear_n.abs();
         self.amplifiers
             .tick(fluid_pa, PA_PER_N * dc_n, &mut self.noise);
@@ -202,7 +201,7 @@ impl Finger {
             friction: draw(),
             adhesion: draw(),
             vibration: draw(),
-            resonance: draw(),
+            detuned: (touch::RESONANCE * draw()).exp(),
         };
         self.touch = Some(touch);
         touch
@@ -216,15 +215,15 @@ impl Finger {
         let adhesion = touch::ADHESION_N * touch.adhesion;
         let kinetic = (self.friction * (1.0 + self.unsteady) * load_n + adhesion).max(0.0);
 
-        // opposes the motion; unloading the skin lets it spring back
+        let opposes = self.shear_n * speed_mm_s < 0.0;
+        self.slipping &= opposes;
+        if self.slipping {
+            self.shear_n = kinetic.copysign(-speed_mm_s);
+            return;
+        }
         self.shear_n -= SHEAR_N_PER_MM * speed_mm_s * TICK_S;
-        let held = if self.slipping {
-            kinetic
-        } else {
-            kinetic * (1.0 + stiction)
-        };
-        self.slipping = speed_mm_s != 0.0 && self.shear_n.abs() >= held;
-        if self.shear_n.abs() > held {
+        if self.shear_n.abs() > kinetic * (1.0 + stiction) {
+            self.slipping = opposes;
             self.shear_n = kinetic.copysign(self.shear_n);
         }
     }

@@ -88,7 +88,7 @@ struct Spread {
 
 /// Of a texture of which only the group is known (chosen).
 const GROUP_SPREAD: Spread = Spread {
-    friction: 0.28,
+    friction: 0.22,
     height: 0.45,
     wavelength: 0.25,
 };

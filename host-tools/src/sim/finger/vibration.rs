@@ -32,9 +32,12 @@ const IMPULSE_WIDTH: f64 = 1.25;
 /// The skin comes to skip asperities that follow each other faster than this, 1/ms (chosen).
 const IMPULSES_PER_MS: f64 = 1.5;
 /// Fluctuations of friction grow with speed to this power ...
-const FRICTION_SPEED_POWER: f64 = 0.25;
+const FRICTION_SPEED_POWER: f64 = 0.4;
 /// ... and are the texture's at this speed, mm/s. Both chosen.
 const FRICTION_SPEED_MM_S: f64 = 25.0;
+/// They average out over the contact, relative to friction: as its length, the root of its area. The texture's are those at
+/// 0.2 N, with a patch of this half length, mm.
+const FRICTION_PATCH_MM: f64 = 1.46;
 
 /// Resonance of the fluid at rest and its rise with the root of force, Hz and Hz/N^0.5: 200 to 350 Hz from 0 to 2 N (PAPER:
 /// 200-350 Hz).
@@ -92,8 +95,12 @@ impl Vibrations {
         let swallowed = 1.0 - surface.texture().damping;
         self.passed = amplitude * ridges * swallowed / (1.0 + load_n / DAMPING_N);
         // a point on every ridge and one between, which carries nothing while the ridges stand
-        let patch_mm = self.patch_mm.clamp(RIDGE_MM, PATCH_MAX_MM);
-        self.passed * surface.contact_um(x_mm, patch_mm, RIDGE_MM / 2.0, 1.0 - wear)
+        self.passed * surface.contact_um(x_mm, self.patch_mm(), RIDGE_MM / 2.0, 1.0 - wear)
+    }
+
+    /// Half length of the contact patch.
+    fn patch_mm(&self) -> f64 {
+        self.patch_mm.clamp(RIDGE_MM, PATCH_MAX_MM)
     }
 
     /// Pressure of impulses and friction while sliding at `speed` (mm/s; 0 while it sticks) against `shear_n`, Pa; after
@@ -122,7 +129,8 @@ impl Vibrations {
             * rate.sqrt()
             * self.impulse[1];
         let speeding = (speed / FRICTION_SPEED_MM_S).powf(FRICTION_SPEED_POWER);
-        let friction = PA_PER_N * shear_n * texture.friction_noise * speeding * pink;
+        let relative = texture.friction_noise * speeding * FRICTION_PATCH_MM / self.patch_mm();
+        let friction = PA_PER_N * shear_n * relative * pink;
         self.passed * (impulses + friction)
     }
 

@@ -88,7 +88,9 @@ pub(super) fn slide(
         x_mm += contact.speed_mm_s * TICK_S;
         contact.x_mm = x_mm;
         ticks += 1;
-        (ticks % SAMPLE_TICKS == 0).then(|| f64::from(finger.sample_pac(1.0)))
+        ticks
+            .is_multiple_of(SAMPLE_TICKS)
+            .then(|| f64::from(finger.sample_pac(1.0)))
     };
     while finger.force_n() < force_n {
         contact.indentation_mm += APPROACH_MM_S * TICK_S;

@@ -91,7 +91,7 @@ pub(super) fn recipe(named: Named) -> (Recipe, bool) {
         28 => Recipe { relief: (25.0, 3.0), ..r },
         29 => Recipe { friction: 0.80, fine: (3.0, 0.08), relief: (20.0, 2.0), compliance_mm_per_n: 0.05, ..r },
         // Table 2: high traction, very rough, coarse
-        30 => Recipe { friction: 1.10, fine: (3.0, 0.10), relief: (100.0, 1.2), ..r },
+        30 => Recipe { friction: 1.10, fine: (1.5, 0.10), relief: (100.0, 1.6), ..r },
         32 => Recipe { friction: 0.95, fine: (0.15, 0.05), relief: (0.8, 2.0), ..r },
         33 => Recipe { friction: 1.00, fine: (0.12, 0.05), relief: (0.8, 2.0), ..r },
         34 => Recipe { friction: 0.55, fine: (2.5, 0.06), relief: (15.0, 1.5), ..r },
