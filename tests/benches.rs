@@ -79,16 +79,16 @@ const ACTION: Action = Action {
     property: Property::Roughness,
 };
 
+fn explorer(table: &[u8]) -> Explorer<'_, 128> {
+    let table = Table::read(table).unwrap();
+    Explorer::new(table, PropertySet::ALL, Config::default()).unwrap()
+}
+
 /// One posterior update, 117 textures.
 #[divan::bench]
 fn posterior_update(bencher: Bencher<'_, '_>) {
     let bytes = table();
-    let mut explorer = Explorer::<128>::new(
-        Table::read(&bytes).unwrap(),
-        PropertySet::ALL,
-        Config::default(),
-    )
-    .unwrap();
+    let mut explorer = explorer(&bytes);
     bencher.bench_local(|| {
         explorer.restart();
         explorer.observe(ACTION, &SLIDE)
@@ -99,12 +99,7 @@ fn posterior_update(bencher: Bencher<'_, '_>) {
 #[divan::bench]
 fn choice_of_the_next_movement(bencher: Bencher<'_, '_>) {
     let bytes = table();
-    let mut explorer = Explorer::<128>::new(
-        Table::read(&bytes).unwrap(),
-        PropertySet::ALL,
-        Config::default(),
-    )
-    .unwrap();
+    let mut explorer = explorer(&bytes);
     explorer.observe(ACTION, &SLIDE).unwrap();
     bencher.bench_local(|| {
         let outlook = explorer.outlook();

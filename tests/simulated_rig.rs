@@ -3,10 +3,11 @@
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use rayon::prelude::*;
+use tactus::collection::{Collection, calibrated, record_texture, texture_name};
 use tactus::replay::measure;
 use tactus::sim::stage::{FORCE_N_PER_A, SAMPLE_AT_MM, SAMPLE_MM};
 use tactus::sim::world::Setup;
-use tactus::simulated::{Collection, Performed, SimRig, calibrated, record_texture, texture_name};
+use tactus::simulated::{Performed, SimRig};
 use tactus_core::explorer::{Config, Explorer};
 use tactus_core::features::{Plan, Property, PropertySet};
 use tactus_core::movement::Movement;

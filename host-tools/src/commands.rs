@@ -1,6 +1,5 @@
 //! What every command does.
 
-use std::collections::HashMap;
 use std::io::{self, Write};
 use std::path::Path;
 use std::time::Duration;
@@ -8,24 +7,20 @@ use std::time::Duration;
 use anyhow::{Context as _, bail};
 use clap::{Parser as _, ValueEnum as _};
 use indicatif::{ProgressBar, ProgressStyle};
-use rand::{Rng as _, RngExt as _, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
-use tactus::evaluate::{MAX_TEXTURES, Method, Summary, evaluate};
+use tactus::collection::{Collection, calibrated, texture_name, texture_number};
+use tactus::evaluate::{Method, Summary, evaluate};
 use tactus::experiment::{self, Experiment, Protocol};
 use tactus::properties::PropertyTable;
-use tactus::recordings::{RecordingSet, RecordingWriter, Slide, Texture};
-use tactus::replay::{Felt, Replay, feel};
-use tactus::show::{Show, show_table};
+use tactus::recordings::{RecordingSet, RecordingWriter, Texture};
+use tactus::replay::{Felt, feel};
+use tactus::show::show_table;
 use tactus::sim::textures::TEXTURES;
-use tactus::simulated::{Collection, SimRig, calibrated, texture_name, texture_number};
-use tactus_core::explorer::Explorer;
-use tactus_core::features::{BAND_EDGES, Plan, Property, PropertySet};
-use tactus_core::movement::Movement;
-use tactus_core::rig::{Rig as _, explore};
+use tactus_core::features::{BAND_EDGES, Property, PropertySet};
 use tactus_core::table::{Experience, Table};
 
-use crate::cli::{Command, Evaluate, FIRST_STEPS, Format, Identify, Rows, TableCommand, Tactus};
+use crate::cli::{Command, Evaluate, Format, Rows, TableCommand, Tactus};
+use crate::identify::{demonstrate, identify, identify_simulated};
 
 /// Runs what the arguments ask for.
 pub(crate) fn run() -> anyhow::Result<()> {
@@ -76,7 +71,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
 }
 
 /// A bar on the terminal; nothing where there is none.
-fn progress(length: u64, what: &'static str) -> ProgressBar {
+pub(crate) fn progress(length: u64, what: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}, {eta} left")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(length)
@@ -87,7 +82,7 @@ fn progress(length: u64, what: &'static str) -> ProgressBar {
 }
 
 /// Opens a folder and feels all of its slides.
-fn feel_folder(folder: &Path) -> anyhow::Result<(RecordingSet, Vec<Vec<Felt>>)> {
+pub(crate) fn feel_folder(folder: &Path) -> anyhow::Result<(RecordingSet, Vec<Vec<Felt>>)> {
     let set = RecordingSet::open(folder)?;
     let bar = progress(set.textures().len() as u64, "feeling slides");
     let felt = feel(&set, |_| bar.inc(1))
@@ -96,7 +91,7 @@ fn feel_folder(folder: &Path) -> anyhow::Result<(RecordingSet, Vec<Vec<Felt>>)> 
     Ok((set, felt))
 }
 
-fn names(set: &RecordingSet) -> Vec<String> {
+pub(crate) fn names(set: &RecordingSet) -> Vec<String> {
     set.textures().iter().map(|t| t.name.clone()).collect()
 }
 
@@ -225,7 +220,7 @@ fn learn(folder: &Path, slides: usize, file: &Path, out: &mut impl Write) -> any
     Ok(())
 }
 
-fn read_table<'b>(file: &Path, bytes: &'b mut Vec<u8>) -> anyhow::Result<Table<'b>> {
+pub(crate) fn read_table<'b>(file: &Path, bytes: &'b mut Vec<u8>) -> anyhow::Result<Table<'b>> {
     *bytes = std::fs::read(file).with_context(|| file.display().to_string())?;
     let table = Table::read(bytes).with_context(|| file.display().to_string())?;
     let behind = bytes.len() - table.as_bytes().len();
@@ -238,120 +233,8 @@ fn read_table<'b>(file: &Path, bytes: &'b mut Vec<u8>) -> anyhow::Result<Table<'
     Ok(table)
 }
 
-fn identify(
-    args: &Identify,
-    folder: &Path,
-    material: &str,
-    out: &mut impl Write,
-) -> anyhow::Result<()> {
-    let set = RecordingSet::open(folder)?;
-    let index = find_material(&set, material)?;
-    let name = &set.textures()[index].name;
-    let mut random = ChaCha8Rng::seed_from_u64(args.seed);
-    let mut bytes = Vec::new();
-    let (table, shown): (Table<'_>, Vec<Slide>) = match &args.table {
-        Some(file) => {
-            let table = read_table(file, &mut bytes)?;
-            // a table of this folder was learned from the first slides of every movement: those are not shown
-            let learned = |movement: Movement| {
-                let at = table.movements().position(|m| m == movement);
-                table
-                    .find(name)
-                    .zip(at)
-                    .map_or(0, |(t, at)| usize::from(table.trials(t, at as u8)))
-            };
-            let mut seen: HashMap<Movement, usize> = HashMap::new();
-            let mut shown = set.load_texture(index)?;
-            shown.retain(|slide| {
-                let before = seen.entry(slide.movement).or_default();
-                *before += 1;
-                *before > learned(slide.movement)
-            });
-            if shown.is_empty() {
-                bail!(
-                    "{}: learned from every slide of {name}; none is left to present",
-                    file.display()
-                );
-            }
-            (table, shown)
-        }
-        None => {
-            let (_, felt) = feel_folder(folder)?;
-            let experiment = Experiment::recorded(
-                names(&set),
-                &felt,
-                None,
-                Protocol::Interleaved,
-                args.train_slides,
-                args.seed,
-            )?;
-            let run = experiment.run(index as u64);
-            bytes = run.learn()?;
-            let learned = &run.training[index];
-            let unseen = |slide: &Slide, felt: &Felt| {
-                slide.number == felt.number
-                    && !learned
-                        .iter()
-                        .flatten()
-                        .any(|l| *l == felt.measurement.properties)
-            };
-            let slides = set.load_texture(index)?.into_iter().zip(&felt[index]);
-            let shown = slides
-                .filter(|(slide, felt)| unseen(slide, felt))
-                .map(|(slide, _)| slide)
-                .collect();
-            (Table::read(&bytes)?, shown)
-        }
-    };
-    if table.find(name).is_none() {
-        writeln!(
-            out,
-            "The table does not know {name}: whatever the answer, it will be wrong."
-        )?;
-    }
-    let shown_count = shown.len();
-    let mut rig = Replay::new(shown, ChaCha8Rng::from_rng(&mut random));
-    let mut explorer =
-        Explorer::<MAX_TEXTURES>::new(table, rig.measures(), args.stop.config(args.method))?;
-    writeln!(
-        out,
-        "An unknown texture, one of {}. Presented: {name}, {shown_count} slides that were not learned from (seed {}).",
-        table.textures(),
-        args.seed
-    )?;
-    let mut show = Show::new(table, out);
-    let verdict = embassy_futures::block_on(explore(
-        &mut rig,
-        &mut explorer,
-        &Plan::new(),
-        || random.next_u32(),
-        |event| show.event(event),
-    ));
-    show.finish(verdict?, explorer.slides(), name)?;
-    Ok(())
-}
-
-/// What a newcomer sees first.
-fn demonstrate(out: &mut impl Write) -> anyhow::Result<()> {
-    writeln!(
-        out,
-        "Tactus tells what a surface is by touching it. Here is a simulated probe: a BioTac fingertip on a lever, over a\n\
-         stage that slides the sample. It learns twenty textures, five trials each at three movements, and is then given\n\
-         one of them without being told which. Everything it computes and controls is what runs on the chip.\n"
-    )?;
-    out.flush()?;
-    let Some(Command::Identify(args)) =
-        Tactus::parse_from(["tactus", "identify", "--simulated"]).command
-    else {
-        bail!("the demonstration cannot be parsed");
-    };
-    identify_simulated(&args, out)?;
-    writeln!(out, "\n{FIRST_STEPS}\n\nAll commands: tactus --help")?;
-    Ok(())
-}
-
 /// The textures asked for, by name or number; without any, all.
-fn find_textures(wanted: &[String]) -> anyhow::Result<Vec<u8>> {
+pub(crate) fn find_textures(wanted: &[String]) -> anyhow::Result<Vec<u8>> {
     if wanted.is_empty() {
         return Ok(TEXTURES.iter().map(|t| t.number).collect());
     }
@@ -405,96 +288,6 @@ fn simulate(
         slides.iter().map(Vec::len).sum::<usize>()
     )?;
     Ok(())
-}
-
-/// The unknown texture and `among - 1` others, spread over Table 1.
-fn choose_textures(unknown: u8, among: u8) -> Vec<u8> {
-    let mut textures: Vec<u8> = (0..u16::from(among) - 1)
-        .map(|n| (n * 116 / (u16::from(among) - 1)) as u8 + 1)
-        .map(|number| number + u8::from(number >= unknown))
-        .collect();
-    textures.push(unknown);
-    textures.sort_unstable();
-    textures
-}
-
-fn identify_simulated(args: &Identify, out: &mut impl Write) -> anyhow::Result<()> {
-    let mut random = ChaCha8Rng::seed_from_u64(args.seed);
-    let unknown = match &args.texture {
-        Some(name) => find_textures(std::slice::from_ref(name))?[0],
-        None => random.random_range(1..=117),
-    };
-    if args.train_slides < 2 {
-        bail!(
-            "--train-slides {}: a standard deviation takes at least two slides",
-            args.train_slides
-        );
-    }
-    let collection = Collection {
-        seed: args.seed,
-        textures: choose_textures(unknown, args.among),
-        trials: u32::try_from(args.train_slides).context("--train-slides")?,
-    };
-    let bar = progress(collection.textures.len() as u64, "learning textures");
-    let calibration = calibrated(collection.setup(unknown, 0))?;
-    let bytes = collection.learn(calibration, || bar.inc(1))?;
-    bar.finish_and_clear();
-    let table = Table::read(&bytes)?;
-    let mut rig = SimRig::new(collection.setup(unknown, 1 + u64::from(random.next_u32() % 1000)));
-    rig.control().calibrate(calibration)?;
-    let mut explorer =
-        Explorer::<MAX_TEXTURES>::new(table, rig.measures(), args.stop.config(args.method))?;
-    writeln!(
-        out,
-        "An unknown texture, one of {}. Under the finger: {} (seed {}).",
-        table.textures(),
-        texture_name(unknown),
-        args.seed
-    )?;
-    out.flush()?;
-    let mut show = Show::new(table, &mut *out);
-    let verdict = embassy_futures::block_on(explore(
-        &mut rig,
-        &mut explorer,
-        &Plan::new(),
-        || random.next_u32(),
-        |event| show.event(event),
-    ));
-    show.finish(verdict?, explorer.slides(), texture_name(unknown))?;
-    writeln!(
-        out,
-        "{:.0} s of the rig's time; skin: {:.2} J of sliding{}.",
-        rig.now().as_secs_f64(),
-        rig.control().skin().energy_j(),
-        if rig.control().skin().is_worn() {
-            ", look at it"
-        } else {
-            ""
-        }
-    )?;
-    Ok(())
-}
-
-fn find_material(set: &RecordingSet, wanted: &str) -> anyhow::Result<usize> {
-    let number = wanted.trim_start_matches("mat").parse::<u32>().ok();
-    let by_name = set
-        .textures()
-        .iter()
-        .position(|t| t.name.eq_ignore_ascii_case(wanted));
-    by_name
-        .or_else(|| set.textures().iter().position(|t| Some(t.id) == number))
-        .with_context(|| {
-            let known: Vec<String> = set
-                .textures()
-                .iter()
-                .map(|t| format!("{} {}", t.id, t.name))
-                .collect();
-            format!(
-                "--material {wanted}: not in {}, which has: {}",
-                set.folder().display(),
-                known.join(", ")
-            )
-        })
 }
 
 /// What `evaluate` prints.

@@ -1,5 +1,6 @@
 //! Tactus on a PC: recordings, replays of them, virtual explorations, and what the command `tactus` shows.
 
+pub mod collection;
 pub mod evaluate;
 pub mod experiment;
 pub mod import;

@@ -2,6 +2,7 @@
 
 mod cli;
 mod commands;
+mod identify;
 
 use std::process::ExitCode;
 

@@ -5,24 +5,20 @@ use std::time::Duration;
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 use tactus_core::biotac;
-use tactus_core::features::{Plan, PropertySet, Slide, SlideError};
+use tactus_core::features::{PropertySet, Slide};
 use tactus_core::kernels::Kernels;
 use tactus_core::movement::Movement;
 use tactus_core::pressure::{Calibration, Channel, Pressure, RATE_HZ, SLOTS_HZ};
 use tactus_core::rig::calibration::{LineFit, RigCalibration, RigCalibrationError};
-use tactus_core::rig::control::{Control, Ended, Felt, Inputs, Outputs, Phase, Refused};
+use tactus_core::rig::control::{Control, Ended, Phase, Refused};
 use tactus_core::rig::guard::{Fault, Unguarded};
+use tactus_core::rig::pins::{Felt, Inputs, Outputs};
 use tactus_core::rig::stage::StageConstants;
 use tactus_core::rig::{MAX_REJECTED, Rig};
 use tactus_core::sensor::PressureSensor as _;
-use tactus_core::table::EncodeError;
 
-use crate::experiment::{encode, learned};
 use crate::recordings::{self, Background};
-use crate::replay::measure;
-use crate::sim::textures::TEXTURES;
 use crate::sim::world::{Setup, World};
 
 const TICK_NS: u64 = 1_000_000;
@@ -497,42 +493,6 @@ impl SimRig {
     }
 }
 
-/// Measures the unloaded current of the rig of a world once; all rigs of that world have the same motor.
-///
-/// # Errors
-/// See [`SimError`].
-pub fn calibrated(setup: Setup) -> Result<RigCalibration, SimError> {
-    let mut rig = SimRig::new(setup);
-    rig.home()?;
-    rig.calibrate_current()
-}
-
-/// Trials of one texture at every movement, movement by movement, numbered in the order of time.
-///
-/// # Errors
-/// See [`SimError`].
-pub fn record_texture(
-    setup: Setup,
-    calibration: RigCalibration,
-    movements: &[Movement],
-    trials: u32,
-) -> Result<Vec<recordings::Slide>, SimError> {
-    let mut rig = SimRig::new(setup);
-    rig.control.calibrate(calibration)?;
-    rig.home()?;
-    let mut slides = Vec::new();
-    for &movement in movements {
-        for _ in 0..trials {
-            let slide = rig.record(movement)?;
-            slides.push(recordings::Slide {
-                number: slides.len() as u32 + 1,
-                ..slide
-            });
-        }
-    }
-    Ok(slides)
-}
-
 impl Rig for SimRig {
     type Error = SimError;
 
@@ -567,141 +527,4 @@ pub fn feel<K: Kernels>(outputs: &Outputs, slide: &mut Slide<'_, K>) {
     }
     slide.push(&outputs.pac);
     slide.push_shear(outputs.shear_mn.as_slice());
-}
-
-/// Textures of a simulated world, to record and to learn.
-#[derive(Clone, Debug)]
-pub struct Collection {
-    /// The world's seed: what its textures, motors and fingertip are like.
-    pub seed: u64,
-    /// Numbers of the textures in Table 1.
-    pub textures: Vec<u8>,
-    /// Trials of each texture and movement.
-    pub trials: u32,
-}
-
-impl Collection {
-    /// The movements of the study.
-    pub const MOVEMENTS: [Movement; 3] = [
-        Movement::FOR_TRACTION,
-        Movement::FOR_FINENESS,
-        Movement::FOR_ROUGHNESS,
-    ];
-
-    /// A rig of this world with a texture under it. Different trials of one texture are `trial` apart.
-    pub fn setup(&self, texture: u8, trial: u64) -> Setup {
-        Setup {
-            texture,
-            world_seed: self.seed,
-            trial_seed: self
-                .seed
-                .wrapping_mul(1_000_003)
-                .wrapping_add(u64::from(texture))
-                .wrapping_mul(1009)
-                + trial,
-            finger_seed: self.seed,
-            keep_edges: false,
-        }
-    }
-
-    /// Names of the textures.
-    pub fn names(&self) -> Vec<String> {
-        self.textures
-            .iter()
-            .map(|&number| texture_name(number).to_owned())
-            .collect()
-    }
-
-    /// Records all trials of all textures, textures side by side; `done` hears of each. Per texture, its slides in the
-    /// order of time.
-    ///
-    /// # Errors
-    /// The first fault of a rig.
-    pub fn record(
-        &self,
-        calibration: RigCalibration,
-        done: impl Fn() + Sync,
-    ) -> Result<Vec<Vec<recordings::Slide>>, SimError> {
-        self.textures
-            .par_iter()
-            .enumerate()
-            .map(|(index, &texture)| {
-                let mut slides = record_texture(
-                    self.setup(texture, 0),
-                    calibration,
-                    &Self::MOVEMENTS,
-                    self.trials,
-                )?;
-                for slide in &mut slides {
-                    slide.texture = index;
-                }
-                done();
-                Ok(slides)
-            })
-            .collect()
-    }
-
-    /// Learns a texture table from trials of all textures.
-    ///
-    /// # Errors
-    /// The first fault of a rig, or slide without properties.
-    pub fn learn(
-        &self,
-        calibration: RigCalibration,
-        done: impl Fn() + Sync,
-    ) -> Result<Vec<u8>, LearnError> {
-        let plan = Plan::new();
-        let experience = self
-            .record(calibration, done)?
-            .iter()
-            .map(|slides| {
-                Self::MOVEMENTS
-                    .iter()
-                    .map(|movement| {
-                        let trials = slides.iter().filter(|s| s.movement == *movement);
-                        let felt: Result<Vec<_>, SlideError> =
-                            trials.map(|s| Ok(measure(&plan, s)?.properties)).collect();
-                        Ok(learned(PropertySet::ALL, &felt?))
-                    })
-                    .collect::<Result<Vec<_>, SlideError>>()
-            })
-            .collect::<Result<Vec<_>, SlideError>>()?;
-        Ok(encode(
-            PropertySet::ALL,
-            &Self::MOVEMENTS,
-            &self.names(),
-            &experience,
-        )?)
-    }
-}
-
-/// Why a simulated world taught nothing.
-#[derive(Debug, thiserror::Error)]
-pub enum LearnError {
-    /// A rig failed.
-    #[error(transparent)]
-    Rig(#[from] SimError),
-    /// A slide has no properties.
-    #[error(transparent)]
-    Slide(#[from] SlideError),
-    /// The table cannot be written.
-    #[error(transparent)]
-    Encode(#[from] EncodeError),
-}
-
-/// Name of a texture by its number in Table 1.
-pub fn texture_name(number: u8) -> &'static str {
-    TEXTURES
-        .iter()
-        .find(|t| t.number == number)
-        .map_or("?", |t| t.name)
-}
-
-/// Number of a texture by its name in Table 1, whatever the case, or by its number.
-pub fn texture_number(name: &str) -> Option<u8> {
-    let number = name.trim_start_matches(['T', 't']).parse().ok();
-    TEXTURES
-        .iter()
-        .find(|t| t.name.eq_ignore_ascii_case(name) || Some(t.number) == number)
-        .map(|t| t.number)
 }

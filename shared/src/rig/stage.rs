@@ -320,3 +320,66 @@ impl Stage {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The profile against sums of its own acceleration and velocity, in f64.
+    fn integrates(from: f32, to: f32, speed: f32) {
+        let profile = Profile::new(from, to, speed, 1000.0);
+        let (mut x, mut v) = (f64::from(from), 0.0);
+        let dt = 1e-5;
+        let steps = (f64::from(profile.duration_s()) / dt) as u32;
+        for n in 0..steps {
+            let t = (f64::from(n) + 0.5) * dt;
+            let (_, _, a) = profile.at(t as f32);
+            v += f64::from(a) * dt;
+            x += v * dt;
+            let (at, velocity, _) = profile.at((t + 0.5 * dt) as f32);
+            assert!(
+                (f64::from(velocity) - v).abs() < 0.05,
+                "{t}: {velocity} {v}"
+            );
+            assert!((f64::from(at) - x).abs() < 0.01, "{t}: {at} {x}");
+            assert!(velocity.abs() <= speed + 1e-3);
+        }
+        assert!((x - f64::from(to)).abs() < 0.01);
+        assert_eq!(profile.at(profile.duration_s() + 1.0), (to, 0.0, 0.0));
+    }
+
+    #[test]
+    fn profiles_go_from_rest_to_rest() {
+        integrates(1.0, 61.0, 63.1);
+        integrates(61.0, 1.0, 50.0);
+        // too short to reach its speed
+        integrates(10.0, 10.5, 100.0);
+        assert_eq!(Profile::new(5.0, 5.0, 50.0, 1000.0).duration_s(), 0.0);
+    }
+
+    #[test]
+    fn a_stage_that_does_not_know_where_it_is_does_not_move() {
+        let mut stage = Stage::new(StageConstants::REFERENCE);
+        assert_eq!(stage.go(30.0, 50.0), None);
+        assert_eq!(stage.tick(0, false), Ok(0.0));
+        stage.home();
+        assert!(stage.tick(0, false).unwrap() < 0.0, "to the left");
+        assert_eq!(stage.tick(-20, true), Ok(0.0));
+        assert_eq!(stage.position_mm(), 0.0, "the switch is the origin");
+        // outside the travel is brought inside
+        stage.go(500.0, 50.0).unwrap();
+        assert!(stage.tick(-20, true).unwrap() > 0.0);
+        assert_eq!(stage.go(10.0, 50.0), None, "busy");
+        stage.stop();
+        assert_eq!(stage.state(), StageState::Standing);
+    }
+
+    #[test]
+    fn back_emf_tells_a_blocked_stage_from_one_that_turns() {
+        let c = StageConstants::REFERENCE;
+        // 2 V over a standing motor
+        assert!(c.emf_speed_mm_s(2.0 / 12.0, 2.0 / 7.5).abs() < 1e-3);
+        // 63 mm/s is 1.03 V
+        assert!((c.emf_speed_mm_s((1.0348 + 0.3) / 12.0, 0.3 / 7.5) - 63.1).abs() < 0.1);
+    }
+}

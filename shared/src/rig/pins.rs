@@ -1,0 +1,62 @@
+//! What goes in and out of the rig's control every millisecond: the one seam between the control logic and board or
+//! simulator.
+
+use core::ops::Range;
+
+use heapless::Vec;
+
+use crate::pressure::Pressure;
+
+/// Most words in one tick: 14 ms of slots, should a tick be late.
+pub const MAX_WORDS: usize = 64;
+/// What the pins say.
+#[derive(Clone, Debug, Default)]
+pub struct Inputs {
+    /// Sensor words since the last tick, oldest first; `None` is a damaged or missing one.
+    pub words: Vec<Option<Pressure>, MAX_WORDS>,
+    /// Steps made by the lever so far, downwards positive.
+    pub steps: i32,
+    /// Count of the stage's encoder.
+    pub encoder: i32,
+    /// Motor current of the stage, A.
+    pub current_a: f32,
+    /// The lever's upper limit switch.
+    pub lever_top: bool,
+    /// The stage's limit switches, left and right.
+    pub stage_limits: (bool, bool),
+    /// The emergency stop.
+    pub e_stop: bool,
+}
+
+/// What the pins shall do.
+#[derive(Clone, Debug, Default)]
+pub struct Outputs {
+    /// Steps per second of the lever, downwards positive; 0 holds.
+    pub lever_steps_s: i32,
+    /// The lever's driver has current.
+    pub lever_enabled: bool,
+    /// Duty of the stage's motor, -1 to 1.
+    pub stage_duty: f32,
+    /// The stage's bridge is on.
+    pub stage_enabled: bool,
+    /// What the samples of this tick are.
+    pub felt: Felt,
+    /// P_AC of this tick in counts about the still finger's, where it is felt.
+    pub pac: Vec<i16, MAX_WORDS>,
+    /// Shear of this tick in mN, at constant speed.
+    pub shear_mn: Option<i16>,
+}
+
+/// What the samples of a tick belong to.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub enum Felt {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// The background: the finger is pressed and still.
+    Still,
+    /// The slide begins; these of its P_AC samples will be at constant speed.
+    Begin(Range<u32>),
+    /// The slide goes on.
+    Slide,
+}
