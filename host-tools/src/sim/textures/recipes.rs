@@ -74,7 +74,7 @@ pub(super) fn recipe(named: Named) -> (Recipe, bool) {
         // flutes under the liner
         8 => Recipe { weave: (8.0, 6.0), grating: true, ..r },
         // Table 2: low traction, rough, coarse
-        10 => Recipe { friction: 0.30, fine: (2.0, 0.08), relief: (20.0, 1.2), weave: (50.0, 1.6), ..r },
+        10 => Recipe { friction: 0.30, fine: (2.0, 0.08), relief: (15.0, 1.2), weave: (38.0, 1.6), ..r },
         11 => Recipe { friction: 0.50, relief: (40.0, 0.8), ..r },
         17 => Recipe { friction: 0.90, fine: (1.5, 0.08), relief: (8.0, 0.8), ..r },
         18 | 19 => Recipe { friction: 0.75, fine: (0.4, 0.05), relief: (1.5, 1.0), ..r },
@@ -91,7 +91,7 @@ pub(super) fn recipe(named: Named) -> (Recipe, bool) {
         28 => Recipe { relief: (25.0, 3.0), ..r },
         29 => Recipe { friction: 0.80, fine: (3.0, 0.08), relief: (20.0, 2.0), compliance_mm_per_n: 0.05, ..r },
         // Table 2: high traction, very rough, coarse
-        30 => Recipe { friction: 1.10, fine: (1.5, 0.10), relief: (100.0, 1.6), ..r },
+        30 => Recipe { friction: 1.10, fine: (3.0, 0.10), relief: (160.0, 1.2), ..r },
         32 => Recipe { friction: 0.95, fine: (0.15, 0.05), relief: (0.8, 2.0), ..r },
         33 => Recipe { friction: 1.00, fine: (0.12, 0.05), relief: (0.8, 2.0), ..r },
         34 => Recipe { friction: 0.55, fine: (2.5, 0.06), relief: (15.0, 1.5), ..r },
@@ -114,7 +114,7 @@ pub(super) fn recipe(named: Named) -> (Recipe, bool) {
         67 => Recipe { relief: (25.0, 1.2), ..r },
         69 => Recipe { friction: 0.80, fine: (1.0, 0.06), relief: (4.0, 0.8), ..r },
         // satins: Table 2 (T84): medium traction and roughness, very fine; Results: among the roughest
-        74 | 84 | 88 | 99 => Recipe { friction: 0.50, fine: (5.0, 0.05), relief: (4.0, 0.4), weave: (2.0, 0.1), ..r },
+        74 | 84 | 88 | 99 => Recipe { friction: 0.50, fine: (6.0, 0.05), relief: (4.0, 0.4), weave: (2.0, 0.1), ..r },
         // Table 2: medium traction, very rough, medium fineness
         87 => Recipe { friction: 0.50, fine: (4.0, 0.07), relief: (15.0, 0.6), weave: (60.0, 0.7), ..r },
         // wales
