@@ -4,7 +4,7 @@
 //! crossed: of all choices of signs the one is wanted that a linear predictor predicts best (the least sum of squared errors
 //! of an autoregressive model). The predictor is not known either, so the two are found in turns: signs for a predictor of
 //! plain smoothness, the predictor that fits the result (Yule-Walker), signs for that one, with more coefficients each time.
-//! The search goes along the signal and keeps the [`SURVIVORS`] best choices of the last signs.
+//! The search goes along the signal and keeps the 64 best choices of the last signs.
 //!
 //! Magnitudes stay exact. What is lost: the sign of the whole (the first sample that is not 0 is taken as positive), and
 //! crossings where the signal is small against its own noise.

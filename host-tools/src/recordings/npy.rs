@@ -21,7 +21,7 @@ pub fn write(samples: &[i16]) -> Vec<u8> {
     bytes
 }
 
-/// The samples of a `.npy` file: little-endian 16-bit integers in one dimension, as `numpy.save` and [`write`] make them.
+/// The samples of a `.npy` file: little-endian 16-bit integers in one dimension, as `numpy.save` and [`write()`] make them.
 ///
 /// The header is compared with the one form it can have. npyz would parse it as a Python literal of any depth and size,
 /// which a damaged file can turn against us.
