@@ -3,8 +3,9 @@
 /// Sliding energy after which the skin should be looked at, J.
 ///
 /// The paper changed the skin twice during 117 textures x 3 movements x 5 trials, every time there were visible signs of
-/// wear: about 585 slides a skin, of about 30 mm at 0.6 N of shear, 18 mJ each.
-pub const WARN_J: f32 = 8.0;
+/// wear: about 585 slides a skin, of about 30 mm at 0.6 N of shear, 18 mJ each. Half of that, so that the warning comes
+/// first.
+pub const WARN_J: f32 = 5.0;
 
 /// Sliding energy since the skin was replaced.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
