@@ -272,7 +272,7 @@ enum Command {
         speed_um_s: u32,
         start: f32,
     },
-    Unloaded(f32),
+    Unloaded(u32),
     Stop,
     Reset,
     AllowHighForce(bool),
@@ -297,7 +297,7 @@ fn command() -> impl Strategy<Value = Command> {
     prop_oneof![
         2 => Just(Command::Home),
         6 => (100u16..=2000, 5_000u32..=150_000, any_float()).prop_map(|(force_mn, speed_um_s, start)| Command::Start { force_mn, speed_um_s, start }),
-        1 => any_float().prop_map(Command::Unloaded),
+        1 => prop_oneof![5_000u32..150_000, any::<u32>()].prop_map(Command::Unloaded),
         1 => Just(Command::Stop),
         1 => Just(Command::Reset),
         1 => any::<bool>().prop_map(Command::AllowHighForce),

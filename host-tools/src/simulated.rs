@@ -286,17 +286,17 @@ impl SimRig {
     /// See [`SimError`].
     pub fn calibrate_current(&mut self) -> Result<RigCalibration, SimError> {
         let mut fit = LineFit::default();
-        for speed_mm_s in [10.0, 25.0, 40.0, 63.0] {
+        for speed_um_s in [10_000u32, 25_000, 40_000, 63_000] {
             // to the right, the way of every slide; the way back only returns
             for measured in [true, false] {
-                self.control.start_unloaded(speed_mm_s)?;
+                self.control.start_unloaded(speed_um_s)?;
                 self.rest(|_| ())?;
                 if let Some(current_a) = self
                     .control
                     .mean_current_a()
                     .filter(|a| measured || *a > 0.0)
                 {
-                    fit.push(speed_mm_s, current_a);
+                    fit.push(speed_um_s as f32 * 1e-3, current_a);
                 }
             }
         }
@@ -347,7 +347,7 @@ impl SimRig {
         for pull_n in [0.0f32, 1.0, 2.0, 3.0] {
             self.world.incline(pull_n.into());
             for rightwards in [true, false] {
-                self.control.start_unloaded(25.0)?;
+                self.control.start_unloaded(25_000)?;
                 self.rest(|_| ())?;
                 if let Some(current_a) = self.control.mean_current_a().filter(|_| rightwards) {
                     incline.push(pull_n, current_a);

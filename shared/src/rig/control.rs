@@ -76,6 +76,8 @@ pub enum Refused {
     Fault(Fault),
     /// The force is over what this rig may press.
     Force(u16),
+    /// No speed of this stage, um/s.
+    Speed(u32),
     /// The slide does not fit on the sample.
     Length,
     /// The calibration cannot be.
@@ -98,6 +100,7 @@ impl core::fmt::Display for Refused {
                 f,
                 "{mn} mN is more than this rig may press; {HIGH_FORCE_MN} mN unless high forces are allowed"
             ),
+            Self::Speed(um_s) => crate::movement::MovementError::Speed(*um_s).fmt(f),
             Self::Length => f.write_str("the slide does not fit on the sample"),
             Self::Calibration(why) => why.fmt(f),
         }
@@ -264,13 +267,17 @@ impl Control {
         Ok(())
     }
 
-    /// Moves the stage over the whole sample at `speed_mm_s` with the finger lifted, and measures the motor current at
+    /// Moves the stage over the whole sample at `speed_um_s` um/s with the finger lifted, and measures the motor current at
     /// constant speed: see [`Control::mean_current_a`].
     ///
     /// # Errors
     /// See [`Refused`].
-    pub fn start_unloaded(&mut self, speed_mm_s: f32) -> Result<(), Refused> {
+    pub fn start_unloaded(&mut self, speed_um_s: u32) -> Result<(), Refused> {
         self.may_start()?;
+        if !Movement::SPEED_UM_S.contains(&speed_um_s) {
+            return Err(Refused::Speed(speed_um_s));
+        }
+        let speed_mm_s = speed_um_s as f32 * 1e-3;
         let far = self.stage.constants().travel_mm;
         let to = if self.stage.position_mm() < far / 2.0 {
             far
@@ -278,9 +285,9 @@ impl Control {
             0.0
         };
         let profile = self.stage.go(to, speed_mm_s).ok_or(Refused::Busy)?;
-        let ramp_ms = profile.duration_s() * 1e3
-            - speed_mm_s / self.stage.constants().acceleration_mm_s2 * 1e3;
-        self.steady_ms = (libm::ceilf(speed_mm_s) as u32 + 150)..(libm::floorf(ramp_ms) as u32);
+        let ramp_s = speed_mm_s / self.stage.constants().acceleration_mm_s2;
+        let steady_s = (ramp_s + STEADY_MARGIN_S)..(profile.duration_s() - ramp_s);
+        self.steady_ms = (steady_s.start * 1e3) as u32..(steady_s.end * 1e3) as u32;
         self.current = (0.0, 0);
         self.ended = None;
         self.enter(Phase::Unloaded);
