@@ -570,6 +570,33 @@ fn a_second_folder_brings_the_test_slides() {
         "100",
     ]);
 
+    // a table of the one folder has seen nothing of the other
+    let table = temp.path().join("table");
+    printed(&[
+        "learn",
+        "--recordings",
+        path(&train),
+        "--train-slides",
+        "12",
+        "--out",
+        path(&table),
+    ]);
+    for (folder, slides) in [(&test, "17 slides"), (&train, "5 slides")] {
+        let explored = printed(&[
+            "identify",
+            "--recordings",
+            path(folder),
+            "--material",
+            "3",
+            "--table",
+            path(&table),
+        ]);
+        assert!(
+            explored.contains(&format!("{slides} that were not learned from")),
+            "{explored}"
+        );
+    }
+
     let lone = temp.path().join("lone");
     fs::create_dir(&lone).unwrap();
     part_of(&folder, &lone, |slide| slide < 30);
@@ -650,6 +677,16 @@ fn properties_are_evaluated_and_checked() {
         (Some(1.0), Some(3))
     );
     assert_eq!(e["median_slides"].as_f64(), Some(1.0));
+    let two: Vec<&str> = evaluate
+        .into_iter()
+        .chain(["--train-slides", "2"])
+        .collect();
+    assert_eq!(json(&printed(&two))["train_slides"].as_u64(), Some(2));
+    let four: Vec<&str> = evaluate
+        .into_iter()
+        .chain(["--train-slides", "4"])
+        .collect();
+    assert!(complaint(&four).contains("3 slides to train from"));
 
     fs::write(&file, csv.replacen("1.01,1.01,1.01", "1.01,NaN,1.01", 1)).unwrap();
     let said = complaint(&evaluate);

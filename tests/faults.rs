@@ -68,13 +68,6 @@ const ALL: &[When] = &[
     When::Sliding,
 ];
 const MOVING: &[When] = &[When::Returning, When::Sliding];
-const STANDING_TOO: &[When] = &[
-    When::Returning,
-    When::Approaching,
-    When::Settling,
-    When::Background,
-    When::Sliding,
-];
 
 const CASES: &[Case] = &[
     Case {
@@ -121,13 +114,13 @@ const CASES: &[Case] = &[
     Case {
         fault: Fault::StageStall,
         cause: Cause::StageJammed,
-        when: STANDING_TOO,
+        when: ALL,
         since: Since::Motion,
     },
     Case {
         fault: Fault::EncoderSilent,
         cause: Cause::EncoderCut(Cut::A),
-        when: STANDING_TOO,
+        when: ALL,
         since: Since::Motion,
     },
     Case {
@@ -267,22 +260,20 @@ fn judge(case: &Case, when: When, seed: u64, unguarded: Unguarded) -> Result<(),
         Movement::FOR_FINENESS,
         Movement::FOR_ROUGHNESS,
     ][choice as usize];
+    // up to the cause nothing can be wrong: what goes wrong here is the test's
     if when == When::Homing {
         for _ in 0..100 {
             rig.tick();
         }
         rig.world().inject(case.cause);
-        rig.control().home().map_err(|e| e.to_string())?;
+        rig.control().home().unwrap();
     } else {
-        rig.home().map_err(|e| e.to_string())?;
+        rig.home().unwrap();
         if when == When::Returning {
             // from the end of a slide to the beginning of the next, the finger clear of the sample
-            rig.slide(movement, 1.0, |_, _| ())
-                .map_err(|e| e.to_string())?;
+            rig.slide(movement, 1.0, |_, _| ()).unwrap();
         }
-        rig.control()
-            .start(movement, 0.3)
-            .map_err(|e| e.to_string())?;
+        rig.control().start(movement, 0.3).unwrap();
         let (phase, wait_ms) = match when {
             When::Returning => (Phase::Positioning, 40 + draw(seed + 2, 400)),
             When::Approaching => (Phase::Pressing, 1000 + draw(seed + 2, 3000)),
@@ -295,16 +286,19 @@ fn judge(case: &Case, when: When, seed: u64, unguarded: Unguarded) -> Result<(),
         };
         until(&mut rig, "in the phase", |rig| {
             rig.control().phase() == phase
-        })?;
+        })
+        .unwrap();
         if when == When::Settling {
             until(&mut rig, "touching", |rig| {
                 rig.world().truth().force_n > 0.9 * f64::from(movement.force_n())
-            })?;
+            })
+            .unwrap();
         }
         if when == When::Touching {
             until(&mut rig, "touching", |rig| {
                 rig.world().truth().force_n > 0.3
-            })?;
+            })
+            .unwrap();
         }
         for _ in 0..wait_ms {
             rig.tick();
@@ -312,7 +306,8 @@ fn judge(case: &Case, when: When, seed: u64, unguarded: Unguarded) -> Result<(),
         if when == When::Arriving {
             until(&mut rig, "arriving", |rig| {
                 rig.world().truth().speed_mm_s < 29.0
-            })?;
+            })
+            .unwrap();
         }
         rig.world().inject(case.cause);
     }

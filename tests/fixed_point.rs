@@ -175,7 +175,7 @@ fn property_worlds_are_decided_as_in_f64() {
     let Some(folder) = data("worlds") else { return };
     for world in 1..=3 {
         let set = PropertyTable::read(&folder.join(format!("world_{world}.csv"))).unwrap();
-        let (answer, all) = agreement(&Experiment::given(&set, 1).unwrap(), 1600);
+        let (answer, all) = agreement(&Experiment::given(&set, None, 1).unwrap(), 1600);
         println!(
             "world {world}: same answer in {:.2} % of 1600 runs, same slides too in {:.2} %",
             answer * 100.0,

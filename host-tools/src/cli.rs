@@ -11,8 +11,7 @@ use tactus_core::explorer::Config;
 #[derive(Parser)]
 #[command(version, about = "Tactus tells what a surface is by touching it", long_about = "Tactus tells what a surface is by touching it: it slides a BioTac fingertip, measures traction, roughness and \
 fineness, and chooses each next movement so as to tell the remaining candidates apart (Bayesian exploration, Fishel & \
-Loeb 2012).\n\nThis command runs the core of the firmware on recordings: what it computes here, the chip computes to \
-the bit.", after_help = FIRST_STEPS)]
+Loeb 2012).\n\nThis command runs the core of the firmware, the same code, on recordings and on a simulated rig.", after_help = FIRST_STEPS)]
 pub(crate) struct Tactus {
     #[command(subcommand)]
     pub(crate) command: Option<Command>,
@@ -148,7 +147,7 @@ pub(crate) struct Identify {
     pub(crate) method: Method,
     #[command(flatten)]
     pub(crate) stop: Stop,
-    /// Another seed draws other slides
+    /// Another seed draws other slides; with --simulated also another world, and another texture unless one is given
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
 }
@@ -159,7 +158,7 @@ pub(crate) struct Stop {
     #[arg(long, default_value_t = 0.99, value_parser = probability)]
     pub(crate) threshold: f32,
     /// Stop after this many slides
-    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u8).range(1..))]
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u8).range(1..=254))]
     pub(crate) max_slides: u8,
 }
 
@@ -199,16 +198,11 @@ pub(crate) struct Evaluate {
     /// How to decide and to choose the next movement
     #[arg(long, value_enum, default_value_t = Method::Paper)]
     pub(crate) method: Method,
-    /// Slides to learn from, per texture and movement
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 5,
-        conflicts_with = "properties"
-    )]
-    pub(crate) train_slides: usize,
-    /// Which slides to learn from and which to test on
-    #[arg(long, value_enum, default_value_t = Protocol::Interleaved, conflicts_with = "properties")]
+    /// Slides to learn from, per texture and movement: 5 unless given, or all training rows of --properties
+    #[arg(long, value_name = "N")]
+    pub(crate) train_slides: Option<usize>,
+    /// Which slides to learn from and which to test on; --properties says so itself, in its column set
+    #[arg(long, value_enum, default_value_t = Protocol::Interleaved)]
     pub(crate) protocol: Protocol,
     /// Number of virtual explorations
     #[arg(long, default_value_t = 8000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]

@@ -12,7 +12,7 @@ use tactus::collection::{Collection, calibrated, texture_name, texture_number};
 use tactus::evaluate::{Method, Summary, evaluate};
 use tactus::experiment::{self, Experiment, Protocol};
 use tactus::properties::PropertyTable;
-use tactus::recordings::{RecordingSet, RecordingWriter, Texture};
+use tactus::recordings::{RecordingSet, RecordingWriter, Slide as Recorded, Texture};
 use tactus::replay::{Felt, feel};
 use tactus::show::show_table;
 use tactus::sim::textures::TEXTURES;
@@ -167,7 +167,11 @@ fn features(folder: &Path, format: Rows, out: &mut impl Write) -> anyhow::Result
 }
 
 /// The first slides of every texture and movement, and the table that they teach.
-fn learn_first(set: &RecordingSet, felt: &[Vec<Felt>], slides: usize) -> anyhow::Result<Vec<u8>> {
+pub(crate) fn learn_first(
+    set: &RecordingSet,
+    felt: &[Vec<Felt>],
+    slides: usize,
+) -> anyhow::Result<Vec<u8>> {
     if slides < 2 {
         bail!("--train-slides {slides}: a standard deviation takes at least two slides");
     }
@@ -209,7 +213,12 @@ fn learn_first(set: &RecordingSet, felt: &[Vec<Felt>], slides: usize) -> anyhow:
 fn learn(folder: &Path, slides: usize, file: &Path, out: &mut impl Write) -> anyhow::Result<()> {
     let (set, felt) = feel_folder(folder)?;
     let bytes = learn_first(&set, &felt, slides)?;
-    std::fs::write(file, &bytes).with_context(|| file.display().to_string())?;
+    // an old table is replaced whole or not at all
+    let mut part = file.as_os_str().to_owned();
+    part.push(".part");
+    std::fs::write(&part, &bytes)
+        .and_then(|()| std::fs::rename(&part, file))
+        .with_context(|| file.display().to_string())?;
     writeln!(
         out,
         "{}: {} textures learned from the first {slides} slides of each, {} bytes",
@@ -274,9 +283,25 @@ fn simulate(
     let mut writer = RecordingWriter::create(folder, named.collect())?;
     let bar = progress(collection.textures.len() as u64, "sliding over textures");
     let calibration = calibrated(collection.setup(collection.textures[0], 0))?;
-    let slides = collection.record(calibration, || bar.inc(1))?;
-    for slide in slides.iter().flatten() {
-        writer.write(slide)?;
+    let (mut done, mut slides) = (0, 0);
+    // a few textures at a time: a large set does not fit into memory
+    for textures in collection.textures.chunks(8) {
+        let part = Collection {
+            textures: textures.to_vec(),
+            ..collection.clone()
+        };
+        for (index, recorded) in part
+            .record(calibration, || bar.inc(1))?
+            .into_iter()
+            .enumerate()
+        {
+            for slide in recorded {
+                let texture = done + index;
+                writer.write(&Recorded { texture, ..slide })?;
+                slides += 1;
+            }
+        }
+        done += textures.len();
     }
     writer.finish()?;
     bar.finish_and_clear();
@@ -285,7 +310,7 @@ fn simulate(
         "{}: {} textures, {} slides, world {seed}",
         folder.display(),
         collection.textures.len(),
-        slides.iter().map(Vec::len).sum::<usize>()
+        slides
     )?;
     Ok(())
 }
@@ -318,7 +343,7 @@ fn run_evaluation(args: &Evaluate, out: &mut impl Write) -> anyhow::Result<()> {
             &felt,
             test,
             args.protocol,
-            args.train_slides,
+            args.train_slides.unwrap_or(5),
             args.seed,
         )?;
         let protocol = match args.protocol {
@@ -329,7 +354,8 @@ fn run_evaluation(args: &Evaluate, out: &mut impl Write) -> anyhow::Result<()> {
         (experiment, protocol)
     } else if let Some(file) = &args.properties {
         (
-            Experiment::given(&PropertyTable::read(file)?, args.seed)?,
+            Experiment::given(&PropertyTable::read(file)?, args.train_slides, args.seed)
+                .with_context(|| file.display().to_string())?,
             "properties",
         )
     } else {
@@ -385,7 +411,7 @@ fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
     )?;
     writeln!(
         out,
-        "  sure before the last slide {:5.1} %",
+        "  sure                       {:5.1} %",
         s.converged * 100.0
     )?;
     writeln!(

@@ -54,13 +54,13 @@ pub struct Outcome {
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluateError {
     /// The table cannot be written.
-    #[error("the table cannot be written: {0}")]
+    #[error("the table cannot be written")]
     Encode(#[from] EncodeError),
     /// The table cannot be read back.
-    #[error("the table does not read back: {0}")]
+    #[error("the table does not read back")]
     Table(#[from] TableError),
     /// The table cannot be explored.
-    #[error("the table cannot be explored: {0}")]
+    #[error("the table cannot be explored")]
     Explorer(#[from] ExplorerError),
 }
 

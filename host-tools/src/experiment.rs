@@ -21,9 +21,10 @@ use crate::replay::Felt;
 pub enum Protocol {
     /// Training slides at random from all of a session, tested on the rest: optimistic.
     Interleaved,
-    /// Training slides at random from the first 19 of 34, tested on the last 15.
+    /// Training slides at random from the first 19 of 34 (of another number, the same share), tested on the later ones;
+    /// with --test, trained on slide numbers below 30 and tested on those above 34.
     Blocked,
-    /// Trained on the first slides of a session, tested on all later ones.
+    /// Trained on the first slides of a session, tested on all later ones; with --test, on all of that folder.
     Drift,
 }
 
@@ -71,8 +72,11 @@ pub enum ExperimentError {
         "the test folder has no {0}, which the training folder has; give a folder of the same textures"
     )]
     Missing(String),
+    /// More movements than a table holds.
+    #[error("{0} movements; a table holds {max} at most", max = table::MAX_MOVEMENTS)]
+    Movements(usize),
     /// The table cannot hold what was felt.
-    #[error("the table cannot be written: {0}")]
+    #[error("the table cannot be written")]
     Encode(#[from] EncodeError),
 }
 
@@ -200,16 +204,37 @@ impl Experiment {
     }
 
     /// Slides that were cut into properties elsewhere: per texture and movement, those to train from and those to test
-    /// with. Textures without test slides are never the unknown one. All training slides are used.
+    /// with. Textures without test slides are never the unknown one. Without `train_slides`, all training slides are used,
+    /// else the first so many.
     ///
     /// The movements have no force and speed; they stand in the table as the first cells of the grid.
     ///
     /// # Errors
     /// See [`ExperimentError`].
-    pub fn given(set: &PropertyTable, seed: u64) -> Result<Self, ExperimentError> {
-        let train_slides = set.train.iter().flatten().map(Vec::len).min().unwrap_or(0);
+    pub fn given(
+        set: &PropertyTable,
+        train_slides: Option<usize>,
+        seed: u64,
+    ) -> Result<Self, ExperimentError> {
+        if set.movements.len() > table::MAX_MOVEMENTS {
+            return Err(ExperimentError::Movements(set.movements.len()));
+        }
+        let there = set.train.iter().flatten().map(Vec::len).min().unwrap_or(0);
+        let train_slides = train_slides.unwrap_or(there);
         if train_slides < 2 {
             return Err(ExperimentError::One(train_slides));
+        }
+        let movements: Vec<Movement> = Movement::grid().take(set.movements.len()).collect();
+        if let (true, [texture, ..], [movement, ..]) =
+            (train_slides > there, &set.textures[..], &movements[..])
+        {
+            let (texture, movement) = (texture.clone(), *movement);
+            return Err(ExperimentError::Training {
+                texture,
+                movement,
+                there,
+                wanted: train_slides,
+            });
         }
         let wrap = |trials: &[[f32; 3]]| {
             trials
@@ -233,7 +258,7 @@ impl Experiment {
         let tested = |validate: &[Vec<[f32; 3]>]| validate.iter().all(|trials| !trials.is_empty());
         Ok(Self {
             names: set.textures.clone(),
-            movements: Movement::grid().take(set.movements.len()).collect(),
+            movements,
             pools: pools.collect(),
             unknowns: (0..set.textures.len())
                 .filter(|&t| tested(&set.validate[t]))

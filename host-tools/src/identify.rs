@@ -22,7 +22,7 @@ use tactus_core::rig::{Rig, explore};
 use tactus_core::table::Table;
 
 use crate::cli::{Command, FIRST_STEPS, Identify, Tactus};
-use crate::commands::{feel_folder, find_textures, names, progress, read_table};
+use crate::commands::{feel_folder, find_textures, learn_first, names, progress, read_table};
 
 pub(crate) fn identify(
     args: &Identify,
@@ -38,24 +38,21 @@ pub(crate) fn identify(
     let (table, shown): (Table<'_>, Vec<Slide>) = match &args.table {
         Some(file) => {
             let table = read_table(file, &mut bytes)?;
-            // a table of this folder was learned from the first slides of every movement: those are not shown
-            let learned = |movement: Movement| {
-                let at = table.movements().position(|m| m == movement);
-                table
-                    .find(name)
-                    .zip(at)
-                    .map_or(0, |(t, at)| usize::from(table.trials(t, at as u8)))
-            };
-            let mut seen: HashMap<Movement, usize> = HashMap::new();
             let mut shown = set.load_texture(index)?;
-            shown.retain(|slide| {
-                let before = seen.entry(slide.movement).or_default();
-                *before += 1;
-                *before > learned(slide.movement)
-            });
+            // a table learned from this very folder has seen the first slides of every movement
+            let trials = table.trials(0, 0).into();
+            let (_, felt) = feel_folder(folder)?;
+            if learn_first(&set, &felt, trials).is_ok_and(|own| own == table.as_bytes()) {
+                let mut seen: HashMap<Movement, usize> = HashMap::new();
+                shown.retain(|slide| {
+                    let before = seen.entry(slide.movement).or_default();
+                    *before += 1;
+                    *before > trials
+                });
+            }
             if shown.is_empty() {
                 bail!(
-                    "{}: learned from every slide of {name}; none is left to present",
+                    "{}: learned from every slide of {name} here; none is left to present",
                     file.display()
                 );
             }
@@ -139,7 +136,7 @@ pub(crate) fn demonstrate(out: &mut impl Write) -> anyhow::Result<()> {
         out,
         "Tactus tells what a surface is by touching it. Here is a simulated probe: a BioTac fingertip on a lever, over a\n\
          stage that slides the sample. It learns twenty textures, five trials each at three movements, and is then given\n\
-         one of them without being told which. Everything it computes and controls is what runs on the chip.\n"
+         one of them without being told which. It is felt, decided and controlled by the firmware's own core.\n"
     )?;
     out.flush()?;
     let Some(Command::Identify(args)) =

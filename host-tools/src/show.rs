@@ -44,13 +44,18 @@ impl<'t, W: Write> Show<'t, W> {
     fn try_event(&mut self, event: Event<'_>) -> io::Result<()> {
         match event {
             Event::Chosen(action, outlook) => {
-                self.slides += 1;
-                writeln!(self.out, "\nSlide {}: {}", self.slides, self.name(action))?;
+                writeln!(
+                    self.out,
+                    "\nSlide {}: {}",
+                    self.slides + 1,
+                    self.name(action)
+                )?;
                 if let Some(chosen) = outlook.iter().find(|o| o.action == action) {
                     writeln!(self.out, "  because {}", self.reason(chosen, outlook))?;
                 }
             }
             Event::Felt(action, measurement, posterior) => {
+                self.slides += 1;
                 let bound =
                     measurement.roughness_is_bound && action.property == Property::Roughness;
                 if let Some(value) = measurement.properties.get(action.property) {
@@ -68,7 +73,7 @@ impl<'t, W: Write> Show<'t, W> {
                 }
                 self.candidates(posterior)?;
             }
-            Event::Rejected(_, why) => writeln!(self.out, "  rejected, and repeated: {why}")?,
+            Event::Rejected(_, why) => writeln!(self.out, "  rejected: {why}")?,
         }
         self.out.flush()
     }

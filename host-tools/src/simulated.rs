@@ -287,17 +287,8 @@ impl SimRig {
     pub fn calibrate_current(&mut self) -> Result<RigCalibration, SimError> {
         let mut fit = LineFit::default();
         for speed_um_s in [10_000u32, 25_000, 40_000, 63_000] {
-            // to the right, the way of every slide; the way back only returns
-            for measured in [true, false] {
-                self.control.start_unloaded(speed_um_s)?;
-                self.rest(|_| ())?;
-                if let Some(current_a) = self
-                    .control
-                    .mean_current_a()
-                    .filter(|a| measured || *a > 0.0)
-                {
-                    fit.push(speed_um_s as f32 * 1e-3, current_a);
-                }
+            for current_a in self.unloaded_to_the_right(speed_um_s)? {
+                fit.push(speed_um_s as f32 * 1e-3, current_a);
             }
         }
         let calibration = RigCalibration {
@@ -306,6 +297,20 @@ impl SimRig {
         };
         self.control.calibrate(calibration)?;
         Ok(calibration)
+    }
+
+    /// Mean motor current of a run there and back, as far as it drove the stage to the right: the way of every slide.
+    fn unloaded_to_the_right(&mut self, speed_um_s: u32) -> Result<Vec<f32>, SimError> {
+        let mut currents = Vec::new();
+        for _ in 0..2 {
+            let from = self.world.truth().stage_mm;
+            self.control.start_unloaded(speed_um_s)?;
+            self.rest(|_| ())?;
+            if self.world.truth().stage_mm > from {
+                currents.extend(self.control.mean_current_a());
+            }
+        }
+        Ok(currents)
     }
 
     /// The sensor's serial number, asked for between two slots.
@@ -346,12 +351,8 @@ impl SimRig {
         let mut incline = LineFit::default();
         for pull_n in [0.0f32, 1.0, 2.0, 3.0] {
             self.world.incline(pull_n.into());
-            for rightwards in [true, false] {
-                self.control.start_unloaded(25_000)?;
-                self.rest(|_| ())?;
-                if let Some(current_a) = self.control.mean_current_a().filter(|_| rightwards) {
-                    incline.push(pull_n, current_a);
-                }
+            for current_a in self.unloaded_to_the_right(25_000)? {
+                incline.push(pull_n, current_a);
             }
         }
         self.world.incline(0.0);

@@ -1,24 +1,35 @@
 //! Wear of the skin: sliding rubs the fingerprints off, and roughness changes when they go.
 
-/// Sliding energy after which the skin should be looked at, J.
+use crate::movement::Movement;
+
+/// Wear after which the skin should be looked at, J of sliding weighted by [`wearing`].
 ///
 /// The paper changed the skin twice during 117 textures x 3 movements x 5 trials, every time there were visible signs of
-/// wear: about 585 slides a skin, of about 30 mm at 0.6 N of shear, 18 mJ each. Half of that, so that the warning comes
-/// first.
-pub const WARN_J: f32 = 5.0;
+/// wear: about 585 slides a skin, of about 30 mm at 0.6 N of shear, 18 mJ each at 8 mW. Half of that, so that the warning
+/// comes first.
+pub const WARN_J: f32 = 8.0;
 
-/// Sliding energy since the skin was replaced.
+/// How much worse a joule is at this sliding power: the paper found that movements of high power wear the fingerprints
+/// off, which slow or light ones of the same energy do not. Chosen: twice as bad at the limit of
+/// [`Movement::is_high_wear`], and on in proportion.
+pub fn wearing(power_mw: f32) -> f32 {
+    1.0 + power_mw / Movement::WEAR_LIMIT_MW
+}
+
+/// Sliding since the skin was replaced.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct SkinCare {
-    /// In mJ, as f64: millions of small additions.
+    /// Energy in mJ, plain and weighted; f64, for they are sums of millions of small parts.
     energy_mj: f64,
+    wear_mj: f64,
 }
 
 impl SkinCare {
-    /// A skin that has done `energy_j` joules.
-    pub fn after(energy_j: f32) -> Self {
+    /// A skin that has done `energy_j` joules, which wore it like `wear_j`.
+    pub fn after(energy_j: f32, wear_j: f32) -> Self {
         Self {
             energy_mj: f64::from(energy_j) * 1e3,
+            wear_mj: f64::from(wear_j) * 1e3,
         }
     }
 
@@ -30,8 +41,10 @@ impl SkinCare {
         } else {
             force_n.max(0.0)
         };
-        // N times mm/s is mW; over a ms that is uJ
-        self.energy_mj += f64::from(friction * libm::fabsf(speed_mm_s)) * 1e-3;
+        let power_mw = friction * libm::fabsf(speed_mm_s);
+        let energy_mj = f64::from(power_mw) * 1e-3;
+        self.energy_mj += energy_mj;
+        self.wear_mj += energy_mj * f64::from(wearing(power_mw));
     }
 
     /// Sliding energy since the last replacement, J.
@@ -39,13 +52,49 @@ impl SkinCare {
         (self.energy_mj * 1e-3) as f32
     }
 
+    /// The same, weighted by how much it wears, J.
+    pub fn wear_j(&self) -> f32 {
+        (self.wear_mj * 1e-3) as f32
+    }
+
     /// Whether the skin should be looked at before the next training.
     pub fn is_worn(&self) -> bool {
-        self.energy_j() > WARN_J
+        self.wear_j() > WARN_J
     }
 
     /// The skin was replaced.
     pub fn replaced(&mut self) {
         *self = Self::default();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn energy_is_shear_times_way_and_high_power_wears_more() {
+        let slide = |shear_n: f32, speed: f32, ms: u32| {
+            let mut skin = SkinCare::default();
+            (0..ms).for_each(|_| skin.slid(shear_n, 1.0, speed));
+            skin
+        };
+        // 0.5 N over 30 mm
+        let slow = slide(0.5, 10.0, 3000);
+        let fast = slide(0.5, 100.0, 300);
+        assert!((slow.energy_j() - 0.015).abs() < 1e-6 && (fast.energy_j() - 0.015).abs() < 1e-6);
+        assert!((slow.wear_j() / slow.energy_j() - (1.0 + 5.0 / 15.887)).abs() < 1e-3);
+        assert!((fast.wear_j() / fast.energy_j() - (1.0 + 50.0 / 15.887)).abs() < 1e-3);
+        // without a shear the force counts
+        assert!((slide(0.0, 10.0, 3000).energy_j() - 0.03).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_worn_skin_is_reported_until_it_is_replaced() {
+        assert!(!SkinCare::after(7.0, 7.99).is_worn());
+        let mut worn = SkinCare::after(5.0, 8.01);
+        assert!(worn.is_worn());
+        worn.replaced();
+        assert_eq!(worn, SkinCare::default());
     }
 }
