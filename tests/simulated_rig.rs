@@ -346,10 +346,7 @@ fn obey(control: &mut Control, command: &Command) -> Result<(), Refused> {
             control.stop();
             Ok(())
         }
-        Command::Reset => {
-            control.reset();
-            Ok(())
-        }
+        Command::Reset => control.reset(),
         Command::AllowHighForce(allow) => {
             control.allow_high_force(allow);
             Ok(())

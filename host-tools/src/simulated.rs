@@ -255,13 +255,8 @@ impl SimRig {
         while self.now() < until {
             each(self.tick());
             match self.control.phase() {
-                Phase::Ready | Phase::Parked => return Ok(()),
-                Phase::Faulted(fault)
-                    if self.outputs.lever_steps_s == 0 && self.outputs.lever_enabled =>
-                {
-                    return Err(fault.into());
-                }
-                Phase::Faulted(fault @ Fault::LeverNotHome) => return Err(fault.into()),
+                Phase::Faulted(fault) if self.control.is_at_rest() => return Err(fault.into()),
+                _ if self.control.is_at_rest() => return Ok(()),
                 _ => {}
             }
         }

@@ -108,6 +108,9 @@ impl RigCalibration {
         self.pressure
             .check()
             .map_err(RigCalibrationError::Pressure)?;
+        if !PLAUSIBLE_MN.contains(&self.pressure.force_mn_per_count) {
+            return Err(RigCalibrationError::Pressure(CalibrationError::Scale));
+        }
         let (standstill, per_mm_s) = self.unloaded_a;
         let good = standstill.is_finite() && per_mm_s.is_finite();
         if !(good && self.newton_per_ampere > 0.0 && self.newton_per_ampere.is_finite()) {
@@ -149,6 +152,9 @@ impl core::fmt::Display for RigCalibrationError {
 }
 
 impl core::error::Error for RigCalibrationError {}
+
+/// Contact force per count that a fingertip can have, mN: the paper's 11.5, half of it and twice as much (chosen).
+const PLAUSIBLE_MN: core::ops::RangeInclusive<f32> = 5.75..=23.0;
 
 /// Least R^2 that counts as a line; the paper's force line has 0.995 (fig. 3).
 const LEAST_R2: f64 = 0.99;

@@ -8,13 +8,13 @@ use core::ops::Range;
 
 use super::calibration::{RigCalibration, RigCalibrationError};
 use super::force::ForceMeter;
-use super::guard::{Fault, Guard, Seen, Unguarded};
+use super::guard::{FORCE_LIMIT_MN, Fault, Guard, Seen, Unguarded};
 use super::lever::{Lever, LeverState};
 use super::pins::{Felt, Inputs, Outputs};
 use super::skin::SkinCare;
 use super::stage::{MARGIN_MM, Stage, StageConstants, StageState};
 use crate::movement::{Movement, SlidePath};
-use crate::pressure::{Channel, RATE_HZ};
+use crate::pressure::{Calibration, Channel, RATE_HZ};
 
 /// The still finger is measured for so long.
 pub const BACKGROUND_MS: u32 = 1000;
@@ -25,9 +25,17 @@ const STEADY_MARGIN_S: f32 = 0.2;
 /// Speed of the stage while the finger is lifted.
 const RETURN_MM_S: f32 = 50.0;
 /// Forces over this are pressed only by a rig that was allowed to.
-const HIGH_FORCE_MN: u16 = 1500;
+const HIGH_FORCE_MN: u16 = Movement::FOR_TRACTION.force_mn();
 /// With the lever driver off the finger pushes it back; only then it is lifted.
 const RELEASE_MS: u32 = 20;
+/// A limit switch that is looked for is believed after so many ms: less is its bouncing.
+const SWITCH_MS: u32 = 3;
+/// Slower than this the stage stands, mm/s.
+const STANDS_MM_S: f32 = 0.5;
+/// A lifted finger shows no more than these counts above its zero.
+const LIFTED_COUNTS: f32 = 8.0;
+/// P_AC words of a slide may differ from what its time holds by so many.
+const WORDS_OFF: u32 = 4;
 
 /// What the rig is doing.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -131,6 +139,12 @@ pub struct Control {
     baseline: i32,
     damaged: u32,
     allow_high_force: bool,
+    /// The finger cannot be lifted: the lever's driver stays off.
+    gave_up: bool,
+    /// For how many ms the lever's and the left limit switch have been closed.
+    closed_ms: [u32; 2],
+    /// P_AC words of the slide so far.
+    slide_words: u32,
     /// Duty of the last tick.
     duty: f32,
     /// Sum and number of motor currents at constant speed.
@@ -161,6 +175,9 @@ impl Control {
             baseline: 0,
             damaged: 0,
             allow_high_force: false,
+            gave_up: false,
+            closed_ms: [0; 2],
+            slide_words: 0,
             duty: 0.0,
             current: (0.0, 0),
         }
@@ -239,16 +256,24 @@ impl Control {
     /// See [`Refused`].
     pub fn start(&mut self, movement: Movement, start: f32) -> Result<(), Refused> {
         self.may_start()?;
-        if movement.force_mn() > HIGH_FORCE_MN && !self.allow_high_force {
+        let pressable = self
+            .calibration
+            .pressure
+            .force_counts(movement.force_mn())
+            .is_ok();
+        if !pressable || (movement.force_mn() > HIGH_FORCE_MN && !self.allow_high_force) {
             return Err(Refused::Force(movement.force_mn()));
         }
         let speed = movement.speed_mm_s();
-        let length = (speed * STEADY_S).min(SlidePath::LONGEST_MM);
+        let sample = SlidePath::SAMPLE_MM.min(self.stage.constants().travel_mm - 2.0 * MARGIN_MM);
+        let ramps = speed * speed / self.stage.constants().acceleration_mm_s2;
+        let length = (speed * STEADY_S)
+            .min(SlidePath::LONGEST_MM)
+            .min(sample - ramps);
         let path = SlidePath {
             acceleration_mm_s2: self.stage.constants().acceleration_mm_s2,
             ..SlidePath::new(movement, length)
         };
-        let sample = SlidePath::SAMPLE_MM.min(self.stage.constants().travel_mm - 2.0 * MARGIN_MM);
         let room = path.start_room_mm(sample).ok_or(Refused::Length)?;
         // not-a-number clamps to itself, and is no start
         let start = if start >= 0.0 { start.min(1.0) } else { 0.0 };
@@ -322,22 +347,41 @@ impl Control {
                 self.ended = Some(Ended::Stopped);
                 self.enter(Phase::Lifting);
             }
+            // the lever goes on to its limit switch: that is what lifts the finger
             Phase::Homing => {
-                self.stage.stop();
-                self.lever = Lever::new();
-                self.enter(Phase::Parked);
+                self.stage.forget();
+                self.ended = Some(Ended::Stopped);
+                self.enter(Phase::Lifting);
             }
             _ => {}
         }
     }
 
     /// Ends a fault. Lever and stage have to be homed again.
-    pub fn reset(&mut self) {
+    ///
+    /// # Errors
+    /// [`Refused::Busy`] while the finger is still being lifted.
+    pub fn reset(&mut self) -> Result<(), Refused> {
         if let Phase::Faulted(_) = self.phase {
+            if !self.is_at_rest() {
+                return Err(Refused::Busy);
+            }
             self.guard.reset();
             self.stage.stop();
             self.lever = Lever::new();
+            self.gave_up = false;
             self.enter(Phase::Parked);
+        }
+        Ok(())
+    }
+
+    /// Whether nothing moves and nothing will without a command: ready, parked, or at the end of a fault. The finger is
+    /// lifted then, unless the fault is [`Fault::LeverNotHome`].
+    pub fn is_at_rest(&self) -> bool {
+        match self.phase {
+            Phase::Parked | Phase::Ready => true,
+            Phase::Faulted(_) => self.lever.is_lifted() || self.gave_up,
+            _ => false,
         }
     }
 
@@ -349,6 +393,7 @@ impl Control {
     fn fail(&mut self, fault: Fault) {
         self.stage.stop();
         self.lever.home();
+        self.ended = None;
         self.enter(Phase::Faulted(fault));
     }
 
@@ -360,22 +405,32 @@ impl Control {
                 self.meter.push(word.counts);
             }
         }
-        if let Some(fault) = self.watch(inputs) {
-            self.fail(fault);
+        for (ms, closed) in self
+            .closed_ms
+            .iter_mut()
+            .zip([inputs.lever_top, inputs.stage_limits.0])
+        {
+            *ms = if closed { ms.saturating_add(1) } else { 0 };
+        }
+        let [at_top, at_left] = self.closed_ms.map(|ms| ms >= SWITCH_MS);
+        match self.watch(inputs) {
+            // lifting makes it worse: a driver or a wire that does not do what it is told
+            Some(Fault::ForceHigh) if matches!(self.phase, Phase::Faulted(_)) => {
+                self.gave_up |= self.ms > 2 * RELEASE_MS;
+            }
+            Some(fault) => self.fail(fault),
+            None => {}
         }
         let mut outputs = Outputs {
             lever_enabled: true,
             stage_enabled: true,
             ..Outputs::default()
         };
-        match self.stage.tick(inputs.encoder, inputs.stage_limits.0) {
+        match self.stage.tick(inputs.encoder, at_left) {
             Ok(duty) => outputs.stage_duty = duty,
             Err(fault) => self.check(fault.into()),
         }
-        match self
-            .lever
-            .tick(&mut self.meter, inputs.steps, inputs.lever_top)
-        {
+        match self.lever.tick(&mut self.meter, inputs.steps, at_top) {
             Ok(rate) => outputs.lever_steps_s = rate,
             Err(fault) => self.check(fault.into()),
         }
@@ -384,9 +439,10 @@ impl Control {
             Phase::Faulted(fault) => {
                 // with its bridge on and no duty the motor is shorted, and brakes
                 outputs.stage_duty = 0.0;
-                // a driver that steps on its own must lose its current; then the finger has pushed it back
-                outputs.lever_enabled = fault != Fault::LeverNotHome
-                    && (fault != Fault::ForceHigh || self.ms > RELEASE_MS);
+                // a driver that steps on its own must lose its current; then the finger has pushed it back. Once lifted,
+                // nothing is to happen any more.
+                let released = fault != Fault::ForceHigh || self.ms > RELEASE_MS;
+                outputs.lever_enabled = released && !self.is_at_rest();
                 if !outputs.lever_enabled {
                     outputs.lever_steps_s = 0;
                 }
@@ -394,6 +450,8 @@ impl Control {
             Phase::Parked => {
                 outputs.stage_duty = 0.0;
                 outputs.stage_enabled = false;
+                outputs.lever_enabled = false;
+                outputs.lever_steps_s = 0;
             }
             _ => {}
         }
@@ -401,9 +459,16 @@ impl Control {
         outputs
     }
 
-    /// A fault that lever or stage have found themselves.
+    /// A fault that lever or stage have found themselves. That the finger cannot be lifted is worse than what it was to be
+    /// lifted for.
     fn check(&mut self, fault: Fault) {
-        if self.guard.looks_for(fault) && !matches!(self.phase, Phase::Faulted(_)) {
+        if !self.guard.looks_for(fault) {
+            return;
+        }
+        if fault == Fault::LeverNotHome {
+            self.gave_up = true;
+            self.fail(fault);
+        } else if !matches!(self.phase, Phase::Faulted(_)) {
             self.fail(fault);
         }
     }
@@ -427,18 +492,19 @@ impl Control {
                 .constants()
                 .emf_speed_mm_s(self.duty, inputs.current_a),
         };
-        let fault = self.guard.tick(
-            &seen,
-            &self.meter,
-            self.calibration.pressure.force_mn_per_count,
-        )?;
-        // a sensor that is switched off is no fault of a rig that does nothing
+        let pressure = &self.calibration.pressure;
+        // the tolerance of the paper's 2 N also for a finger whose line ends earlier
+        let limit_mn = pressure.linear_mn * (FORCE_LIMIT_MN / Calibration::PAPER.linear_mn);
+        let fault = self
+            .guard
+            .tick(&seen, &self.meter, pressure.force_mn_per_count, limit_mn)?;
+        // a sensor that is switched off is no fault of a rig that does nothing; too much force always is
         let idle = matches!(self.phase, Phase::Parked | Phase::Faulted(_));
-        (!idle).then_some(fault)
+        (!idle || (fault == Fault::ForceHigh && self.phase != Phase::Parked)).then_some(fault)
     }
 
     fn advance(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
-        if outputs.lever_steps_s != 0 {
+        if outputs.lever_steps_s != 0 || self.phase != Phase::Pressing {
             self.pac = (0, 0);
         }
         for word in inputs
@@ -447,8 +513,8 @@ impl Control {
             .flatten()
             .filter(|w| w.channel == Channel::Pac)
         {
-            self.pac.0 += u32::from(word.counts.get());
-            self.pac.1 += 1;
+            self.pac.0 = self.pac.0.saturating_add(u32::from(word.counts.get()));
+            self.pac.1 = self.pac.1.saturating_add(1);
         }
         match self.phase {
             Phase::Parked | Phase::Ready | Phase::Faulted(_) => {}
@@ -483,6 +549,7 @@ impl Control {
                 self.feel(inputs, outputs);
                 outputs.felt = Felt::Still;
                 if self.ms >= BACKGROUND_MS {
+                    self.slide_words = 0;
                     self.stage.go(self.path_mm.1, self.movement.speed_mm_s());
                     self.enter(Phase::Sliding);
                 }
@@ -506,6 +573,9 @@ impl Control {
                 self.skin
                     .slid(shear_n, self.force_mn() * 1e-3, self.stage.velocity_mm_s());
                 if self.stage.state() == StageState::Standing {
+                    let due = (u64::from(self.ms) * u64::from(RATE_HZ) / 1000) as u32;
+                    let missing = due.abs_diff(self.slide_words);
+                    self.damaged += if missing > WORDS_OFF { missing } else { 0 };
                     self.ended = Some(
                         if self.damaged == 0 || !self.guard.looks_for(Fault::SlideGap) {
                             Ended::Whole
@@ -525,8 +595,16 @@ impl Control {
                 }
             }
             Phase::Lifting => {
-                if self.lever.is_lifted() {
-                    self.enter(Phase::Ready);
+                if self.lever.is_lifted() && libm::fabsf(self.stage.velocity_mm_s()) < STANDS_MM_S {
+                    // steps that were asked for and not made leave the finger down
+                    if self.meter.counts() > LIFTED_COUNTS {
+                        self.check(Fault::LeverSlips);
+                    } else if self.stage.state() == StageState::Unknown {
+                        self.lever = Lever::new();
+                        self.enter(Phase::Parked);
+                    } else {
+                        self.enter(Phase::Ready);
+                    }
                 }
             }
         }
@@ -547,6 +625,7 @@ impl Control {
             .iter()
             .flatten()
             .filter(|w| w.channel == Channel::Pac);
+        self.slide_words = self.slide_words.saturating_add(pac.clone().count() as u32);
         outputs.pac = pac
             .map(|w| (i32::from(w.counts.get()) - self.baseline) as i16)
             .collect();

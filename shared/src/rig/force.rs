@@ -57,7 +57,7 @@ impl ForceMeter {
         self.next = (self.next + 1) % KEPT;
         self.filled = (self.filled + 1).min(KEPT);
         self.long.0 = self.long.0.saturating_add(u32::from(counts));
-        self.long.1 += 1;
+        self.long.1 = self.long.1.saturating_add(1);
     }
 
     /// Forgets the samples, not the zero: after a gap they would be of two times.

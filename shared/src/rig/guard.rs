@@ -88,7 +88,7 @@ rows! {
     ForceHigh, "force too high", "P_DC means more than 2.05 N, mean of 10 ms made up for its lag; it bends: that is 2.1 N", 12,
         "lever driver off at once, then finger lifted; stage motor braked", ALL, "look at the lever and the sample, then reset";
     EStop, "emergency stop", "its input", 2, BOTH, ALL, "release it, then reset";
-    LeverLimit, "lever at its limit", "upper limit switch while approaching, pressing or sliding, 3 ms", 5, BOTH, ALL,
+    LeverLimit, "lever at its limit", "upper limit switch closed more than 1 mm below it, 3 ms", 5, BOTH, ALL,
         "check the switch and its wire, then reset";
     StageLimit, "stage at its limit", "the limit switch that it is moving towards, and it is not looking for it, 3 ms", 5, BOTH, ALL,
         "clear the stage's way, then reset";
@@ -98,7 +98,7 @@ rows! {
         BOTH, ALL, "check the encoder's wires, then reset";
     StageOff, "stage off its path", "more than 1 mm and the way of 40 ms off the profile, or not arrived 0.3 s after its end", 2, BOTH, ALL,
         "check load, supply and encoder, then reset";
-    SensorSilent, "sensor silent", "no readable word for 10 ms", 12, BOTH, ALL, "check the sensor's cable and power, then reset";
+    SensorSilent, "sensor silent", "no readable word of P_AC or of P_DC for 10 ms", 12, BOTH, ALL, "check the sensor's cable and power, then reset";
     SensorErrors, "sensor link bad", "23 damaged words within a second: half a percent", 2, BOTH, ALL,
         "check cable length, ground and clock phase, then reset";
     SensorFrozen, "sensor frozen", "P_AC the same for 100 ms, which always has noise", 102, BOTH, ALL,
@@ -107,9 +107,9 @@ rows! {
         "nothing: the slide is finished", "the slide: it is repeated", "none";
     Rejected, "three slides rejected", "counted", 2, "the exploration ends, finger lifted", "nothing", "look at the reasons given";
     NoContact, "no contact", "lever at its lower end, P_DC unchanged", 2, BOTH, ALL, "put a sample under the finger, then reset";
-    LeverSlips, "lever slips", "3 mm of steps after contact and the force not reached", 2, BOTH, ALL,
+    LeverSlips, "lever slips", "3 mm of steps after contact and the force not reached, or still in contact when lifted", 2, BOTH, ALL,
         "check the lever's motor and its current, then reset";
-    Unsteady, "force unsteady", "six trims and still more than 1 count and 5 % off, trims that add up to 15 %, or P_DC below its zero in the air", 2, BOTH, ALL,
+    Unsteady, "force unsteady", "six trims and still more than 1 count and 5 % off, trims that add up to 15 %, or a zero that has moved by 8 counts", 2, BOTH, ALL,
         "check that sample and lever are fixed, then reset";
     LeverNotHome, "lever not home", "limit switch not reached in 1.25 times the travel", 2,
         "lever motor off, stage motor braked", ALL, "lift the finger by hand, check the switch, then reset";
@@ -210,7 +210,8 @@ pub struct Seen<'a> {
 #[derive(Clone, Debug, Default)]
 pub struct Guard {
     unguarded: Unguarded,
-    silent_ms: u32,
+    /// For how many ms nothing was heard of P_AC and of P_DC.
+    silent_ms: [u32; 2],
     /// The last P_AC and P_DC, and for how many ms they have not changed.
     last: [Option<Pressure>; 2],
     frozen_ms: [u32; 2],
@@ -243,28 +244,31 @@ impl Guard {
         !self.unguarded.ignores(fault)
     }
 
-    /// One millisecond. The first of several faults is the one that can hurt most.
+    /// One millisecond. `limit_mn` is the force at which the finger is lifted, at most [`FORCE_LIMIT_MN`]. The first of
+    /// several faults is the one that can hurt most.
     pub fn tick(
         &mut self,
         seen: &Seen<'_>,
         meter: &ForceMeter,
         mn_per_count: f32,
+        limit_mn: f32,
     ) -> Option<Fault> {
         let sensor = self.sensor(seen.words);
         let stage = self.stage(seen);
         self.lever_top_ms = if seen.lever_top {
-            self.lever_top_ms + 1
+            self.lever_top_ms.saturating_add(1)
         } else {
             0
         };
         self.stage_limit_ms = if seen.stage_limit {
-            self.stage_limit_ms + 1
+            self.stage_limit_ms.saturating_add(1)
         } else {
             0
         };
         // a calibration that says less than the paper's does not allow more
         let mn_per_count = mn_per_count.max(Calibration::PAPER.force_mn_per_count);
-        let force = meter.counts().max(meter.counts_now()) * mn_per_count > FORCE_LIMIT_MN;
+        let force =
+            meter.counts().max(meter.counts_now()) * mn_per_count > limit_mn.min(FORCE_LIMIT_MN);
         [
             force.then_some(Fault::ForceHigh),
             seen.e_stop.then_some(Fault::EStop),
@@ -292,11 +296,14 @@ impl Guard {
                 *frozen = 0;
             }
         }
-        self.silent_ms = if words.iter().any(Option::is_some) {
-            0
-        } else {
-            self.silent_ms.saturating_add(1)
-        };
+        for silent in &mut self.silent_ms {
+            *silent = silent.saturating_add(1);
+        }
+        for word in words.iter().flatten() {
+            if let Some(silent) = self.silent_ms.get_mut(word.channel as usize) {
+                *silent = 0;
+            }
+        }
         // where nothing at all is heard, that is silence and no damage
         let heard = words.iter().flatten().count();
         let damaged = if heard > 0 {
@@ -316,7 +323,10 @@ impl Guard {
         // P_DC may well stand still for that long; P_AC has noise of a count and more
         let [pac_frozen_ms, _] = self.frozen_ms;
         [
-            (self.silent_ms >= SILENT_MS).then_some(Fault::SensorSilent),
+            self.silent_ms
+                .iter()
+                .any(|&ms| ms >= SILENT_MS)
+                .then_some(Fault::SensorSilent),
             (self.damaged.iter().sum::<u32>() > MAX_DAMAGED).then_some(Fault::SensorErrors),
             (pac_frozen_ms >= FROZEN_MS).then_some(Fault::SensorFrozen),
         ]
@@ -405,6 +415,7 @@ mod tests {
                     },
                     &meter,
                     11.5,
+                    2050.0,
                 )?,
             ))
         })
@@ -511,6 +522,7 @@ mod tests {
                 },
                 &meter,
                 mn_per_count,
+                2050.0,
             );
             assert_eq!(fault, Some(Fault::ForceHigh));
         }
@@ -522,7 +534,8 @@ mod tests {
                     ..seen
                 },
                 &ForceMeter::new(2000.0),
-                11.5
+                11.5,
+                2050.0
             ),
             None
         );
@@ -545,12 +558,12 @@ mod tests {
             ..seen
         };
         let meter = ForceMeter::new(2593.0);
-        assert_eq!(guard.tick(&seen, &meter, 11.5), None);
+        assert_eq!(guard.tick(&seen, &meter, 11.5, 2050.0), None);
         guard.reset();
-        guard.tick(&seen, &meter, 11.5);
-        guard.tick(&seen, &meter, 11.5);
+        guard.tick(&seen, &meter, 11.5, 2050.0);
+        guard.tick(&seen, &meter, 11.5, 2050.0);
         assert_eq!(
-            guard.tick(&seen, &meter, 11.5),
+            guard.tick(&seen, &meter, 11.5, 2050.0),
             Some(Fault::LeverLimit),
             "the others are still looked for"
         );

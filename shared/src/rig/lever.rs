@@ -4,6 +4,7 @@
 //! them and gives the count back.
 
 use super::force::ForceMeter;
+use crate::pressure::Counts;
 
 /// Travel of the reference lever per step, um: lead 2 mm, 200 steps, 1/16.
 pub const STEP_UM: f32 = 0.625;
@@ -41,6 +42,16 @@ const MAX_TRIMS: u8 = 6;
 /// and a P_DC that drifts must not be followed until the finger is crushed.
 const MAX_CREEP_SHARE: f32 = 0.15;
 const MAX_CREEP_COUNTS: f32 = 3.0;
+/// P_DC counts at the force guard's limit, 2.05 N: trims never press on beyond.
+const LIMIT_COUNTS: f32 = 178.0;
+/// The zero of one press and of the next differ by less, in counts: drift, and nothing that presses.
+const ZERO_COUNTS: f32 = 8.0;
+/// 1 N/mm, the softest that a finger is, in counts per step.
+const SOFTEST: f32 = STEP_UM / 11.5;
+/// Longest times of a trim, of lifting and of an approach, ms: a motor that makes no steps must not go unnoticed.
+const TRIM_MS: u32 = 20_000;
+const LIFT_MS: u32 = 10_000;
+const APPROACH_MS: u32 = 60_000;
 /// Tolerance of a pressed finger: 1 count or 5 %, whichever is more.
 const TOLERANCE_COUNTS: f32 = 1.0;
 const TOLERANCE_SHARE: f32 = 0.05;
@@ -98,6 +109,8 @@ pub struct Lever {
     counts_per_step: f32,
     /// Count of steps and P_DC some way before the target.
     before: Option<(i32, f32)>,
+    /// P_DC without contact at the last press, since homing.
+    zero: Option<f32>,
     /// Count of steps at the limit switch, which is 0 of the travel, once it was found.
     top: i32,
     known: bool,
@@ -122,6 +135,7 @@ impl Lever {
             crept: 0.0,
             counts_per_step: 0.0,
             before: None,
+            zero: None,
             top: 0,
             known: false,
             contact: None,
@@ -205,6 +219,7 @@ impl Lever {
                     self.top = steps;
                     self.known = true;
                     self.contact = None;
+                    self.zero = None;
                     self.enter(LeverState::Lifted);
                     return Ok(0);
                 }
@@ -221,6 +236,16 @@ impl Lever {
                     meter.begin_long();
                 } else if self.ms >= QUIET_MS + ZERO_MS {
                     meter.zero();
+                    let zero = meter.no_contact();
+                    // something presses already, or full scale comes before the guard's limit
+                    let moved = self
+                        .zero
+                        .is_some_and(|last| libm::fabsf(zero - last) > ZERO_COUNTS);
+                    if moved || zero + LIMIT_COUNTS > f32::from(Counts::MAX.get()) {
+                        return Err(LeverFault::Unsteady);
+                    }
+                    self.zero = Some(zero);
+                    self.counts_per_step = SOFTEST;
                     self.before = None;
                     self.trims = 0;
                     self.crept = 0.0;
@@ -241,6 +266,9 @@ impl Lever {
                 Ok(0)
             }
             LeverState::Trimming(to) => {
+                if self.ms > TRIM_MS {
+                    return Err(LeverFault::Slips);
+                }
                 if steps == to {
                     self.enter(LeverState::Settling(0));
                     Ok(0)
@@ -249,6 +277,9 @@ impl Lever {
                 }
             }
             LeverState::Retracting(to) => {
+                if self.ms > LIFT_MS {
+                    return Err(LeverFault::NotHome);
+                }
                 if steps <= to || (at_top && steps - self.top <= NEAR_TOP_STEPS) {
                     self.enter(LeverState::Lifted);
                     Ok(0)
@@ -271,7 +302,9 @@ impl Lever {
         match contact {
             // less than no contact: the zero has drifted, and with it the force that would be pressed
             None if meter.counts() < -CONTACT_COUNTS => return Err(LeverFault::Unsteady),
-            None if steps - self.top >= MAX_STEPS => return Err(LeverFault::NoContact),
+            None if self.ms > APPROACH_MS || steps - self.top >= MAX_STEPS => {
+                return Err(LeverFault::NoContact);
+            }
             None => return Ok(APPROACH_STEPS_S),
             Some(at) if steps - at > PRESS_STEPS => return Err(LeverFault::Slips),
             Some(at) => self.contact = Some(at),
@@ -287,11 +320,10 @@ impl Lever {
             let made = (steps - from) as f32;
             let rise = (counts - before) / made;
             // a light target is reached before the mean has filled: 1 N/mm then, the softest that a finger is
-            let softest = STEP_UM / 11.5;
-            self.counts_per_step = if made > 0.0 && rise > softest {
+            self.counts_per_step = if made > 0.0 && rise > SOFTEST {
                 rise
             } else {
-                softest
+                SOFTEST
             };
         }
         self.enter(LeverState::Settling(0));
@@ -316,10 +348,13 @@ impl Lever {
         }
         self.trims += 1;
         self.crept += off;
-        if self.crept > MAX_CREEP_COUNTS + MAX_CREEP_SHARE * self.target {
+        let most =
+            (MAX_CREEP_COUNTS + MAX_CREEP_SHARE * self.target).min(LIMIT_COUNTS - self.target);
+        if self.crept > most.max(0.0) {
             return Err(LeverFault::Unsteady);
         }
-        let correction = libm::roundf(off / self.counts_per_step) as i32;
+        let most = PRESS_STEPS as f32 / 4.0;
+        let correction = libm::roundf(off / self.counts_per_step).clamp(-most, most) as i32;
         let correction = if correction == 0 {
             if off > 0.0 { 1 } else { -1 }
         } else {

@@ -60,6 +60,8 @@ const VELOCITY_MS: usize = 2;
 pub const MARGIN_MM: f32 = 1.0;
 /// Most duty from the integral: enough for a loaded stage, and not for one that runs away without an encoder.
 const MAX_INTEGRAL: f32 = 0.25;
+/// While homing, no guard tells a blocked stage from a silent encoder: less is allowed.
+const HOMING_FOLLOWING_MM: f32 = 0.5;
 const HOMING_MM_S: f32 = 10.0;
 /// The stage has arrived when it stands this near, mm: friction holds it within 0.2 mm, and every move begins where it
 /// stands.
@@ -267,15 +269,13 @@ impl Stage {
                 let t = ms as f32 * 1e-3;
                 let way = (from - count) as f32 * c.mm_per_count;
                 let off = HOMING_MM_S * t - way;
-                if off > FOLLOWING_MM + FOLLOWING_S * HOMING_MM_S
-                    || t * HOMING_MM_S > c.travel_mm * 1.25
-                {
+                if off > HOMING_FOLLOWING_MM || t * HOMING_MM_S > c.travel_mm * 1.25 {
                     return Err(StageFault::NotHome);
                 }
                 let duty = c.duty_per_mm_s * HOMING_MM_S
                     + c.duty_friction
                     + c.p * (HOMING_MM_S + self.velocity_mm_s())
-                    + c.i * off;
+                    + (c.i * off).clamp(-MAX_INTEGRAL, MAX_INTEGRAL);
                 Ok((-duty).clamp(-1.0, 1.0))
             }
             StageState::Moving(mut profile) => {
