@@ -476,3 +476,18 @@ fn single_precision_is_enough_for_117_textures() {
         }
     }
 }
+
+#[test]
+fn even_a_single_candidate_is_touched_before_it_is_named() {
+    let bytes = plain(&[0.5], 1);
+    let mut explorer = explorer(&bytes, Strategy::Bayesian);
+    assert!(explorer.best().sure);
+    assert_eq!(explorer.verdict(), None);
+    explorer
+        .observe(act(0, Property::Traction), &all(0.5))
+        .unwrap();
+    assert_eq!(
+        explorer.verdict().map(|v| (v.texture, v.sure)),
+        Some((0, true))
+    );
+}
