@@ -4,6 +4,8 @@ use divan::Bencher;
 use tactus::evaluate::{Method, evaluate};
 use tactus::experiment::{Experiment, Protocol, encode};
 use tactus::replay::Felt;
+use tactus::sim::world::Setup;
+use tactus::simulated::SimRig;
 use tactus_core::explorer::{Config, Explorer};
 use tactus_core::features::{Measurement, Plan, Properties, Property, PropertySet, Slide};
 use tactus_core::kernels::Plain;
@@ -153,4 +155,16 @@ fn evaluate_8000_runs(bencher: Bencher<'_, '_>) {
         ..Config::default()
     };
     bencher.bench(|| evaluate(&experiment, config, 8000, || ()).unwrap().len());
+}
+
+/// A second of the simulated rig at rest: world, sensor words and control.
+#[divan::bench]
+fn second_of_the_simulated_rig(bencher: Bencher<'_, '_>) {
+    let mut rig = SimRig::new(Setup::default());
+    rig.home().unwrap();
+    bencher.bench_local(|| {
+        for _ in 0..1000 {
+            rig.tick();
+        }
+    });
 }

@@ -8,7 +8,6 @@ mod surface;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use rayon::prelude::*;
 
@@ -140,34 +139,4 @@ fn the_same_seed_gives_the_same_words_on_any_thread() {
             .flatten()
             .all(|byte| byte.count_ones() % 2 == 1)
     );
-}
-
-#[test]
-#[ignore = "a measurement: cargo test --release -p tactus ticks_per_second -- --ignored --nocapture"]
-fn ticks_per_second() {
-    let surface = bench::sample(100, 1);
-    let mut finger = Finger::new(1);
-    let began = Instant::now();
-    let ticks = 4_000_000;
-    for tick in 0..ticks {
-        finger.tick(&Contact {
-            indentation_mm: 0.63,
-            surface: Some(&surface),
-            x_mm: f64::from(tick % 30_000) * 0.0019,
-            speed_mm_s: 25.0,
-            lever_vibration: 0.0,
-        });
-        match tick % 6 {
-            0 => _ = finger.sample_pac(0.5),
-            3 => _ = finger.sample_pdc(0.5),
-            _ => {}
-        }
-    }
-    let rate = f64::from(ticks) / began.elapsed().as_secs_f64();
-    println!(
-        "{:.2} million ticks a second at {:.2} N",
-        1e-6 * rate,
-        finger.force_n()
-    );
-    assert!(rate > 2e6);
 }

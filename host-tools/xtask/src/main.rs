@@ -77,7 +77,7 @@ fn mutants(options: Vec<OsString>) -> Result<()> {
     }
     let mut cargo = cargo();
     cargo.args(["mutants", "--package", "tactus-core"]);
-    cargo.args(["--test-package", "tactus-core"]);
+    cargo.args(["--test-package", "tactus-core", "--profile", "mutants"]);
     for module in ["biotac", "table", "explorer"] {
         cargo.args(["--file", &format!("shared/src/{module}*")]);
         cargo.args(["--file", &format!("shared/src/{module}*/**")]);

@@ -342,23 +342,3 @@ fn the_same_seeds_give_the_same_words_on_any_thread() {
     assert_ne!(first, third);
     assert_eq!(first, hash_of_ten_seconds(base));
 }
-
-/// `cargo test --release -p tactus -- --ignored --nocapture ticks_per_second`
-#[test]
-#[ignore = "measures time"]
-fn a_million_ticks_per_second() {
-    let mut bench = Bench::pressed(setup(20, 7), 0.4);
-    let began = std::time::Instant::now();
-    let ticks = bench.world.ticks;
-    for leg in 0..20 {
-        bench
-            .world
-            .stage_pwm(bench.now_ns, if leg % 2 == 0 { 0.15 } else { -0.15 });
-        for slot in 0..2_200 {
-            bench.sample(if slot % 2 == 0 { PAC } else { PDC });
-        }
-    }
-    let per_s = (bench.world.ticks - ticks) as f64 / began.elapsed().as_secs_f64();
-    println!("{:.2} million ticks/s", per_s * 1e-6);
-    assert!(per_s > 1e6);
-}
