@@ -60,13 +60,8 @@ impl ForceMeter {
         self.long.1 = self.long.1.saturating_add(1);
     }
 
-    /// Forgets the samples, not the zero: after a gap they would be of two times.
-    pub fn clear(&mut self) {
-        *self = Self::new(self.no_contact);
-    }
-
     /// Whether a mean and its slope are known.
-    pub fn is_full(&self) -> bool {
+    fn is_full(&self) -> bool {
         self.filled >= KEPT
     }
 
@@ -175,7 +170,5 @@ mod tests {
             meter.push(Counts::new(2644).unwrap());
         }
         assert!((meter.force_mn(&calibration) - 43.5 * 11.5).abs() < 1e-2);
-        meter.clear();
-        assert!(!meter.is_full() && meter.no_contact() == 2600.5);
     }
 }

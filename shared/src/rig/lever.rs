@@ -69,12 +69,12 @@ pub enum LeverState {
     Homing,
     /// Lifted and standing.
     Lifted,
-    /// Lifted, and P_DC without contact is measured; for so many ms.
-    Zeroing(u32),
+    /// Lifted, and P_DC without contact is measured.
+    Zeroing,
     /// Down; the count of steps where contact was seen.
     Approaching(Option<i32>),
-    /// Pressed, and waiting for the skin; for so many ms.
-    Settling(u32),
+    /// Pressed, and waiting for the skin; then the force is weighed.
+    Settling,
     /// Pressed; the last correction is being stepped, to this count.
     Trimming(i32),
     /// Pressed with the force that was asked for. The motor stands, whatever the force does.
@@ -173,7 +173,7 @@ impl Lever {
         let lifted = self.is_lifted();
         if lifted {
             self.target = target;
-            self.enter(LeverState::Zeroing(0));
+            self.enter(LeverState::Zeroing);
         }
         lifted
     }
@@ -231,7 +231,7 @@ impl Lever {
                     Ok(RETRACT_STEPS_S)
                 }
             }
-            LeverState::Zeroing(_) => {
+            LeverState::Zeroing => {
                 if self.ms == QUIET_MS {
                     meter.begin_long();
                 } else if self.ms >= QUIET_MS + ZERO_MS {
@@ -252,17 +252,15 @@ impl Lever {
                     self.enter(LeverState::Approaching(None));
                     return Ok(APPROACH_STEPS_S);
                 }
-                self.state = LeverState::Zeroing(self.ms);
                 Ok(0)
             }
             LeverState::Approaching(contact) => self.approach(meter, steps, contact),
-            LeverState::Settling(_) => {
+            LeverState::Settling => {
                 if self.ms == SETTLE_MS {
                     meter.begin_long();
                 } else if self.ms >= SETTLE_MS + WEIGH_MS {
                     return self.weigh(meter, steps);
                 }
-                self.state = LeverState::Settling(self.ms);
                 Ok(0)
             }
             LeverState::Trimming(to) => {
@@ -270,7 +268,7 @@ impl Lever {
                     return Err(LeverFault::Slips);
                 }
                 if steps == to {
-                    self.enter(LeverState::Settling(0));
+                    self.enter(LeverState::Settling);
                     Ok(0)
                 } else {
                     Ok(TRIM_STEPS_S * (to - steps).signum())
@@ -326,7 +324,7 @@ impl Lever {
                 SOFTEST
             };
         }
-        self.enter(LeverState::Settling(0));
+        self.enter(LeverState::Settling);
         Ok(0)
     }
 
