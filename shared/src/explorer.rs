@@ -8,6 +8,7 @@ use core::fmt;
 use core::marker::PhantomData;
 
 use heapless::Vec;
+use serde::{Deserialize, Serialize};
 
 use crate::features::{Properties, Property, PropertySet};
 use crate::kernels::{Kernels, Plain};
@@ -18,7 +19,7 @@ use crate::table::{Action, Gaussian, MAX_ACTIONS, Table, mean_step};
 const NEGLIGIBLE: f32 = 1e-6;
 
 /// How the next movement is chosen.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub enum Strategy {
     /// The action of the greatest benefit (eq. 12).
     #[default]

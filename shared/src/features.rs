@@ -6,12 +6,14 @@ use core::fmt;
 use core::marker::PhantomData;
 use core::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use crate::fir::{BandPower, TAPS, Taps};
 use crate::kernels::{Kernels, Plain};
 use crate::spectrum::{FRAME, Spectrum, SpectrumSum, hann};
 
 /// A property of texture, one of the paper's three.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 pub enum Property {
     /// Mean tangential force of the slide in N, from motor current or a force sensor (eq. 14).
     Traction,

@@ -22,3 +22,4 @@ pub mod rig;
 pub mod sensor;
 pub mod spectrum;
 pub mod table;
+pub mod wire;

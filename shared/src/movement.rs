@@ -3,11 +3,14 @@
 
 use core::fmt;
 
+use serde::{Deserialize, Serialize};
+
 /// One exploratory movement: the contact force that is set before the slide and the speed of the slide.
 ///
 /// Whole millinewtons and micrometres per second, so that a movement in a table, on the link and in a recording's manifest
 /// is the same movement to the bit.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+#[serde(try_from = "(u16, u32)", into = "(u16, u32)")]
 pub struct Movement {
     force_mn: u16,
     speed_um_s: u32,
@@ -42,6 +45,21 @@ impl fmt::Display for MovementError {
 }
 
 impl core::error::Error for MovementError {}
+
+/// Force in mN and speed in um/s.
+impl TryFrom<(u16, u32)> for Movement {
+    type Error = MovementError;
+
+    fn try_from((force_mn, speed_um_s): (u16, u32)) -> Result<Self, MovementError> {
+        Self::new(force_mn, speed_um_s)
+    }
+}
+
+impl From<Movement> for (u16, u32) {
+    fn from(movement: Movement) -> Self {
+        (movement.force_mn, movement.speed_um_s)
+    }
+}
 
 impl Movement {
     /// Contact forces that a movement may have: a tenth of a newton is 9 counts of P_DC, and over 2 N the skin touches the

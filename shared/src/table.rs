@@ -25,6 +25,7 @@
 use core::fmt;
 
 use crc::{CRC_32_ISO_HDLC, Crc};
+use serde::{Deserialize, Serialize};
 
 use crate::features::{Property, PropertySet};
 use crate::movement::{Movement, MovementError};
@@ -66,7 +67,7 @@ pub const fn mean_step(property: Property) -> f32 {
 }
 
 /// What an exploration does next: makes one of the table's movements and measures one property of it.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 pub struct Action {
     /// Index of the movement in the table.
     pub movement: u8,

@@ -3,13 +3,15 @@
 //!
 //! Whatever is noticed, the stage's motor is braked and the finger lifts before anything is reported.
 
+use serde::{Deserialize, Serialize};
+
 use super::force::ForceMeter;
 use super::lever::LeverFault;
 use super::stage::StageFault;
 use crate::pressure::{Calibration, Pressure};
 
 /// A fault of the rig.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 pub enum Fault {
     /// The finger is pressed too hard.
     ForceHigh,
