@@ -33,6 +33,8 @@ const STORE_AT: usize = 0x0810_0000;
 const STORE_LENGTH: usize = 64 * 1024;
 /// A movement that takes longer than this does not end.
 const PATIENCE_MS: u32 = 120_000;
+/// The sensor's first words are there by now.
+const HEARD_MS: u64 = 150;
 /// How often the samples are looked after.
 const LOOK_MS: u64 = 10;
 
@@ -261,7 +263,8 @@ pub(crate) async fn session(flash: board::Storage, samples: Consumer<'static, Sa
         }
     }
     use_table(store.as_ref());
-    // whatever was before the reset, the finger is lifted first
+    // Whatever was before the reset, the finger is lifted first. Homing wants to hear the sensor.
+    Timer::after_millis(HEARD_MS).await;
     let _ = probe.home().await;
     loop {
         BUSY.store(false, Relaxed);
