@@ -98,13 +98,6 @@ pub fn encode<'o, 'a>(
     movements: &[Movement],
     textures: impl Iterator<Item = Texture<'a>> + Clone,
 ) -> Result<Table<'o>, EncodeError> {
-    if let Some((_, index)) = textures
-        .clone()
-        .zip(0..)
-        .find(|(texture, _)| texture.experience.len() != movements.len())
-    {
-        return Err(EncodeError::Movements(index));
-    }
     let textures = textures.map(|t| (t.name, t.experience.iter().copied()));
     write(out, measured, movements.iter().copied(), textures)
 }
@@ -119,31 +112,28 @@ pub fn amend<'o>(
     old: &Table<'_>,
     texture: Texture<'_>,
 ) -> Result<Table<'o>, EncodeError> {
-    let movements = usize::from(old.movements);
     let place = old.find(texture.name).unwrap_or(old.textures);
-    if texture.experience.len() != movements {
-        return Err(EncodeError::Movements(place));
-    }
     let added = (place == old.textures).then_some(texture.name);
     let textures = old.names().chain(added).zip(0u16..).map(|(name, index)| {
-        let learned = texture
-            .experience
-            .iter()
-            .map(move |new| (index == place).then_some(*new));
-        let experience = learned
-            .zip(0u8..)
-            .map(move |(new, movement)| new.unwrap_or_else(|| old.experience(index, movement)));
+        let learned = texture.experience.iter().enumerate();
+        let experience = learned.map(move |(movement, new)| {
+            if index == place {
+                *new
+            } else {
+                old.experience(index, movement as u8)
+            }
+        });
         (name, experience)
     });
     write(out, old.measured, old.movements(), textures)
 }
 
-/// Writes textures of as many experiences as there are movements.
+/// Writes names and experiences, movement by movement.
 fn write<'o, 'a>(
     out: &'o mut [u8],
     measured: PropertySet,
     movements: impl ExactSizeIterator<Item = Movement>,
-    textures: impl Iterator<Item = (&'a str, impl Iterator<Item = Experience> + Clone)> + Clone,
+    textures: impl Iterator<Item = (&'a str, impl ExactSizeIterator<Item = Experience> + Clone)> + Clone,
 ) -> Result<Table<'o>, EncodeError> {
     let (count, names) = textures.clone().fold((0usize, 0), |(n, names), (name, _)| {
         (n + 1, names + 1 + name.len())
@@ -152,10 +142,10 @@ fn write<'o, 'a>(
     let (Ok(count), Ok(length_field)) = (u16::try_from(count), u32::try_from(length)) else {
         return Err(EncodeError::Room(length));
     };
-    if count == 0 || measured.is_empty() || movements.len() == 0 || movements.len() > MAX_MOVEMENTS
-    {
+    if count == 0 || measured.is_empty() || !(1..=MAX_MOVEMENTS).contains(&movements.len()) {
         return Err(EncodeError::Empty);
     }
+    let per_texture = movements.len();
     let mut writer = Writer {
         room: out.get_mut(..length).ok_or(EncodeError::Room(length))?,
         at: 0,
@@ -171,6 +161,9 @@ fn write<'o, 'a>(
         writer.put(&movement.speed_um_s().to_le_bytes());
     }
     for ((_, experiences), index) in textures.clone().zip(0..) {
+        if experiences.len() != per_texture {
+            return Err(EncodeError::Movements(index));
+        }
         for (experience, movement) in experiences.zip(0..) {
             for (property, mean) in Property::ALL.into_iter().zip(experience.mean) {
                 if !measured.contains(property) {
