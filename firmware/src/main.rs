@@ -20,6 +20,8 @@ mod lever;
 #[cfg(target_os = "none")]
 mod link;
 #[cfg(target_os = "none")]
+mod probe;
+#[cfg(target_os = "none")]
 mod rescue;
 #[cfg(target_os = "none")]
 mod servo;

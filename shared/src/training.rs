@@ -241,6 +241,14 @@ impl Training {
         (experience.trials() < self.trials).then_some(*movement)
     }
 
+    /// Trials that are still to be made, of all movements.
+    pub fn left(&self) -> u16 {
+        self.learned
+            .iter()
+            .map(|(_, e)| u16::from(self.trials.saturating_sub(e.trials())))
+            .sum()
+    }
+
     /// Takes a slide in, and gives what is to be stored.
     ///
     /// # Errors

@@ -329,11 +329,6 @@ impl Control {
         Ok(())
     }
 
-    /// Where the stage stands, mm from the left limit switch; meaningless before the first [`Control::home`].
-    pub fn stage_mm(&self) -> f32 {
-        self.stage.position_mm()
-    }
-
     /// Mean motor current at constant speed of the last slide or unloaded run, A; positive drives to the right.
     pub fn mean_current_a(&self) -> Option<f32> {
         let (sum, ticks) = self.current;
