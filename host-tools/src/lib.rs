@@ -4,6 +4,7 @@ pub mod collection;
 pub mod evaluate;
 pub mod experiment;
 pub mod import;
+pub mod link;
 pub mod properties;
 pub mod recordings;
 pub mod replay;
