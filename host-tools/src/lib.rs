@@ -6,6 +6,7 @@ pub mod experiment;
 pub mod follow;
 pub mod import;
 pub mod link;
+pub mod played;
 pub mod properties;
 pub mod recordings;
 pub mod replay;
