@@ -106,22 +106,14 @@ impl Agreement {
     }
 }
 
-/// The samples of the slide that is being made.
-#[derive(Clone, Debug)]
-enum Samples<'p> {
-    /// As far as they have come, and the number of the next block.
-    Whole(Slide<'p>, u16),
-    /// A block is missing.
-    Broken,
-}
-
 /// Follows one exploration.
 #[derive(Clone, Debug)]
 pub struct Follower<'t> {
     explorer: Explorer<'t, MAX_TEXTURES>,
     plan: &'t Plan,
     random: bool,
-    samples: Samples<'t>,
+    /// The slide as far as its samples have come, and the number of the next block; `None` once a block is missing.
+    samples: Option<(Slide<'t>, u16)>,
     agreement: Agreement,
 }
 
@@ -150,7 +142,7 @@ impl<'t> Follower<'t> {
             explorer,
             plan,
             random: asked.strategy == Strategy::Random,
-            samples: Samples::Whole(Slide::new(plan), 0),
+            samples: Some((Slide::new(plan), 0)),
             agreement: Agreement::default(),
         })
     }
@@ -220,7 +212,7 @@ impl<'t> Follower<'t> {
     }
 
     fn chosen(&mut self, slide: u8, there: Action, told: &[Promise]) -> Result<(), FollowError> {
-        self.samples = Samples::Whole(Slide::new(self.plan), 0);
+        self.samples = Some((Slide::new(self.plan), 0));
         self.in_order(slide)?;
         let outlook = self.explorer.outlook();
         let agreement = &mut self.agreement;
@@ -250,12 +242,12 @@ impl<'t> Follower<'t> {
 
     fn block(&mut self, block: &Block) -> Result<(), FollowError> {
         let slide_number = self.due();
-        let Samples::Whole(slide, next) = &mut self.samples else {
+        let Some((slide, next)) = &mut self.samples else {
             return Ok(());
         };
         if block.number != *next {
             let expected = *next;
-            self.samples = Samples::Broken;
+            self.samples = None;
             return Err(FollowError::MissingBlock {
                 slide: slide_number,
                 expected,
@@ -305,11 +297,11 @@ impl<'t> Follower<'t> {
 
     /// What is felt here from the samples, against what was felt there.
     fn compare(&mut self, slide: u8, there: &Felt) -> Result<(), FollowError> {
-        let here = match std::mem::replace(&mut self.samples, Samples::Broken) {
+        let here = match self.samples.take() {
             // it was said before
-            Samples::Broken => return Ok(()),
-            Samples::Whole(_, 0) => return Err(FollowError::NoBlocks(slide)),
-            Samples::Whole(samples, _) => samples
+            None => return Ok(()),
+            Some((_, 0)) => return Err(FollowError::NoBlocks(slide)),
+            Some((samples, _)) => samples
                 .finish()
                 .map_err(|why| FollowError::Slide { slide, why })?,
         };
@@ -331,8 +323,7 @@ impl<'t> Follower<'t> {
 
     fn rejected(&mut self, slide: u8) -> Result<(), FollowError> {
         self.agreement.rejected += 1;
-        let samples = std::mem::replace(&mut self.samples, Samples::Broken);
-        if let Samples::Whole(samples, 1..) = samples
+        if let Some((samples, 1..)) = self.samples.take()
             && samples.finish().is_ok()
         {
             self.agreement.rejected_only_there += 1;
