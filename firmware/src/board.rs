@@ -1,33 +1,103 @@
-//! The NUCLEO-F429ZI: its clocks and its pins (UM1974).
-use embassy_stm32::Peri;
-use embassy_stm32::gpio::{AnyPin, Level, Output, OutputOpenDrain, Pull, Speed};
+//! The NUCLEO-F429ZI: its clocks, and who gets which pin and timer (UM1974). Pins are named by their Arduino and Zio
+//! connectors in the README.
+use assign_resources::assign_resources;
+use embassy_stm32::gpio::{Level, OutputOpenDrain, Pull, Speed};
+use embassy_stm32::interrupt::{self, InterruptExt as _, Priority};
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllQDiv, PllSource,
     Sysclk,
 };
 use embassy_stm32::time::Hertz;
+use embassy_stm32::{Peri, bind_interrupts, flash, peripherals, usart};
 
-/// What is on the board's pins.
-pub(crate) struct Board {
-    /// LD1 green, LD2 blue, LD3 red.
-    pub(crate) leds: [Output<'static>; 3],
-    /// Dropping it would let go of the pin.
-    _pa12: OutputOpenDrain<'static>,
+assign_resources! {
+    acquire: Acquire {
+        spi: SPI1,
+        sck: PA5,
+        miso: PA6,
+        // not PA7, which is the Ethernet PHY's CRS_DV
+        mosi: PB5,
+        select: PD14,
+        slots: TIM2,
+    }
+    lever: Lever {
+        timer: TIM1,
+        step: PE9,
+        /// High is down.
+        direction: PE11,
+        /// High gives current.
+        enable: PE13,
+    }
+    stage: Stage {
+        timer: TIM3,
+        pwm: PC6,
+        /// High drives to higher positions.
+        direction: PC7,
+        /// High turns the bridge on.
+        enable: PC8,
+        encoder: TIM4,
+        encoder_a: PD12,
+        encoder_b: PD13,
+        adc: ADC1,
+        /// 1 V/A about half of 3.3 V.
+        current: PA3,
+    }
+    /// Normally closed to ground: high is pressed, or a broken wire.
+    switches: Switches {
+        lever_top: PF12,
+        stage_left: PF14,
+        stage_right: PF15,
+        e_stop: PF13,
+    }
+    link: Link {
+        uart: USART3,
+        tx: PD8,
+        rx: PD9,
+    }
+    store: Storage {
+        flash: FLASH,
+    }
+    watchdog: Watchdog {
+        iwdg: IWDG,
+    }
+    leds: Leds {
+        green: PB0,
+        blue: PB7,
+        red: PB14,
+    }
+    errata: Errata {
+        pa12: PA12,
+    }
 }
 
-impl Board {
-    /// Starts the clocks and takes the pins. To be called once, first of all.
-    pub(crate) fn new() -> Self {
-        let p = embassy_stm32::init(clocks());
-        let led = |pin: Peri<'static, AnyPin>| Output::new(pin, Level::Low, Speed::Low);
-        Self {
-            // Chips before revision 3 misread bank 2 while PA12 moves (errata sheet ES0206, 2.2.11), and the store is in
-            // bank 2. embassy's flash driver wants exactly this, an output that is low and pulled down, and panics
-            // otherwise; so PA12 is taken before anything can read the store, and is no one else's.
-            _pa12: OutputOpenDrain::new_pull(p.PA12, Level::Low, Speed::Low, Pull::Down),
-            leds: [led(p.PB0.into()), led(p.PB7.into()), led(p.PB14.into())],
-        }
-    }
+bind_interrupts!(pub(crate) struct Irqs {
+    USART3 => usart::BufferedInterruptHandler<peripherals::USART3>;
+    FLASH => flash::InterruptHandler;
+});
+
+/// Starts the clocks, sets the priorities and hands out the pins. To be called once, first of all.
+pub(crate) fn start() -> AssignedResources {
+    let p = embassy_stm32::init(clocks());
+    let r = split_resources!(p);
+    // Chips before revision 3 misread bank 2 while PA12 moves (errata sheet ES0206, 2.2.11), and the store is in bank 2.
+    // embassy's flash driver wants exactly this, an output that is low and pulled down, and panics otherwise; so PA12 is
+    // taken before anything can read the store, and is no one else's.
+    core::mem::forget(OutputOpenDrain::new_pull(
+        // SAFETY: nobody else takes PA12, and it is never given back.
+        unsafe { r.errata.pa12.clone_unchecked() },
+        Level::Low,
+        Speed::Low,
+        Pull::Down,
+    ));
+    // The slots of the sensor before all, then the lever's steps, the clock, the servo, the link.
+    interrupt::TIM2.set_priority(Priority::P0);
+    interrupt::UART4.set_priority(Priority::P1);
+    interrupt::TIM1_UP_TIM10.set_priority(Priority::P2);
+    interrupt::TIM5.set_priority(Priority::P3);
+    interrupt::UART5.set_priority(Priority::P4);
+    interrupt::USART3.set_priority(Priority::P5);
+    interrupt::FLASH.set_priority(Priority::P6);
+    r
 }
 
 /// 168 MHz: the fastest without overdrive, and its PLL gives the 48 MHz of USB.

@@ -196,6 +196,7 @@ impl SimRig {
             lever_top: self.world.lever_top(),
             stage_limits,
             e_stop: self.world.e_stop(),
+            hung: false,
         };
         self.outputs = self.control.tick(&inputs);
         self.world.lever_enable(end, self.outputs.lever_enabled);

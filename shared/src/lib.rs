@@ -21,5 +21,6 @@ pub mod pressure;
 pub mod rig;
 pub mod sensor;
 pub mod spectrum;
+pub mod store;
 pub mod table;
 pub mod wire;

@@ -495,6 +495,14 @@ pub struct Receiver {
 }
 
 impl Receiver {
+    /// One that has heard nothing yet.
+    pub const fn new() -> Self {
+        Self {
+            frame: Vec::new(),
+            too_long: false,
+        }
+    }
+
     /// Takes in a byte; at the end of a frame, the message in it. An empty frame is nothing: a 0 more does no harm.
     pub fn push<M: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<M, FrameError>> {
         if byte != 0 {

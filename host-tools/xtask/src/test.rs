@@ -1,9 +1,10 @@
 //! `cargo xtask test`: every check, and an account of what ran.
 use std::fmt::Write as _;
-use std::process::{Command, ExitCode};
+use std::io::{BufRead as _, BufReader};
+use std::process::{Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
-use anyhow::Result;
+use anyhow::{Context as _, Result, bail};
 
 use crate::{cargo, firmware, has_subcommand, run as run_command, target};
 
@@ -46,7 +47,9 @@ pub(crate) fn run(quick: bool) -> ExitCode {
     steps.push(step("tests", || {
         let mut tests = cargo();
         tests.args(["test", "--workspace", "--no-fail-fast"]);
-        announce_and_run(tests.env("TACTUS_SKIP_LOG", &skip_log))
+        tests.env("TACTUS_SKIP_LOG", &skip_log);
+        announce(&tests);
+        run_tests(&mut tests)
     }));
     steps.push(step("documentation", || {
         let mut doc = cargo();
@@ -102,9 +105,62 @@ fn cargo_step(arguments: &[&str]) -> Result<()> {
 }
 
 fn announce_and_run(command: &mut Command) -> Result<()> {
+    announce(command);
+    run_command(command)
+}
+
+fn announce(command: &Command) {
     let arguments: Vec<_> = command.get_args().map(|a| a.to_string_lossy()).collect();
     println!("\n== cargo {}", arguments.join(" "));
-    run_command(command)
+}
+
+/// Runs tests, shows what they print, and says again at the end what the failed ones had to say: whoever sees only the end
+/// of a log must see why.
+fn run_tests(command: &mut Command) -> Result<()> {
+    let mut tests = command
+        .stdout(Stdio::piped())
+        .spawn()
+        .context("cannot start cargo")?;
+    let mut failures = Failures::default();
+    if let Some(output) = tests.stdout.take() {
+        // not by lines(): a test may print bytes that are not UTF-8
+        for line in BufReader::new(output).split(b'\n') {
+            let line = line.context("cannot read what the tests print")?;
+            let line = String::from_utf8_lossy(&line);
+            println!("{line}");
+            failures.hear(&line);
+        }
+    }
+    let status = tests.wait().context("cargo vanished")?;
+    if !status.success() {
+        bail!("cargo ended with {status}{}", failures.told);
+    }
+    Ok(())
+}
+
+/// What the failed tests of a run printed, from the sections that libtest prints of them.
+#[derive(Default)]
+struct Failures {
+    told: String,
+    inside: bool,
+}
+
+impl Failures {
+    /// Lines of one section that are kept: what was wrong comes first.
+    const LINES: usize = 12;
+
+    fn hear(&mut self, line: &str) {
+        if line.starts_with("---- ") && line.ends_with(" stdout ----") {
+            self.inside = true;
+        } else if line == "failures:" || line == "stack backtrace:" {
+            self.inside = false;
+        }
+        let in_section = self.told.rsplit("\n---- ").next().unwrap_or_default();
+        if self.inside && !line.is_empty() && in_section.lines().count() < Self::LINES {
+            self.told.push('\n');
+            self.told.push_str(line);
+        }
+    }
 }
 
 /// The closing lines: a line for each step and each test that was skipped, and the count of these lines.
@@ -126,8 +182,6 @@ fn summary(steps: &[Step], skipped_tests: &[&str]) -> String {
             }
             Outcome::Failed(why) => {
                 failed += 1;
-                // the rest of a long message was printed where it happened
-                let why = why.lines().next().unwrap_or_default();
                 writeln!(text, "FAILED   {name} ({seconds:.1} s): {why}")
             }
             Outcome::Skipped(why) => {
@@ -157,7 +211,7 @@ mod tests {
             },
             Step {
                 name: "tests",
-                outcome: Outcome::Failed("cargo ended with 101\nand more".into()),
+                outcome: Outcome::Failed("cargo ended with 101\n---- a::b".into()),
                 took: Duration::from_secs(60),
             },
             skipped("firmware", "--quick"),
@@ -169,11 +223,27 @@ mod tests {
             [
                 "passed   lints (1.2 s)",
                 "FAILED   tests (60.0 s): cargo ended with 101",
+                "---- a::b",
                 "skipped  firmware: --quick",
                 "skipped  test golden: no folder x",
                 "1 passed, 1 failed, 2 skipped",
             ]
         );
+    }
+
+    #[test]
+    fn what_failed_tests_printed_is_kept_up_to_a_few_lines() {
+        let long = "noise\n".repeat(30);
+        let printed = format!(
+            "test a ... FAILED\n\nfailures:\n\n---- a stdout ----\n\nthread 'a' panicked at x.rs:1:\nleft\nstack backtrace:\n  0: y\n\n\n---- b stdout ----\n{long}\n\nfailures:\n    a\n    b\n"
+        );
+        let mut failures = Failures::default();
+        printed.lines().for_each(|line| failures.hear(line));
+        let expected = format!(
+            "\n---- a stdout ----\nthread 'a' panicked at x.rs:1:\nleft\n---- b stdout ----{}",
+            "\nnoise".repeat(Failures::LINES - 1)
+        );
+        assert_eq!(failures.told, expected);
     }
 
     #[test]

@@ -198,6 +198,16 @@ impl Control {
         self.meter.force_mn(&self.calibration.pressure)
     }
 
+    /// Place of the stage by its encoder, mm from its left limit switch.
+    pub fn stage_mm(&self) -> f32 {
+        self.stage.position_mm()
+    }
+
+    /// Speed of the stage by its encoder, mm/s.
+    pub fn stage_velocity_mm_s(&self) -> f32 {
+        self.stage.velocity_mm_s()
+    }
+
     /// Wear of the skin.
     pub fn skin(&mut self) -> &mut SkinCare {
         &mut self.skin
@@ -481,6 +491,7 @@ impl Control {
         let seen = Seen {
             words: &inputs.words,
             e_stop: inputs.e_stop,
+            hung: inputs.hung,
             lever_top: inputs.lever_top && self.lever.is_down(inputs.steps),
             // off a switch it may always go
             stage_limit: (moving < 0.0 && inputs.stage_limits.0)

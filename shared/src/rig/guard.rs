@@ -43,6 +43,8 @@ pub enum Fault {
     LeverSlips,
     /// The contact force does not stay where it was put.
     Unsteady,
+    /// The probe's own tasks do nothing any more.
+    TasksHung,
     /// The lever did not find its limit switch.
     LeverNotHome,
     /// The stage did not find its limit switch.
@@ -113,6 +115,8 @@ rows! {
         "check the lever's motor and its current, then reset";
     Unsteady, "force unsteady", "six trims and still more than 1 count and 5 % off, trims that add up to 15 %, or a zero that has moved by 8 counts", 2, BOTH, ALL,
         "check that sample and lever are fixed, then reset";
+    TasksHung, "tasks hung", "the firmware's tasks have not checked in for 2 s", 2, BOTH, ALL,
+        "none: the watchdog restarts the probe once the finger is lifted";
     LeverNotHome, "lever not home", "limit switch not reached in 1.25 times the travel", 2,
         "lever motor off, stage motor braked", ALL, "lift the finger by hand, check the switch, then reset";
     StageNotHome, "stage not home", "limit switch not reached: the stage falls behind, or has gone 1.25 times the travel", 2, BOTH, ALL,
@@ -196,6 +200,8 @@ pub struct Seen<'a> {
     pub words: &'a [Option<Pressure>],
     /// The emergency stop.
     pub e_stop: bool,
+    /// The tasks that the rig serves have not checked in.
+    pub hung: bool,
     /// The lever's upper limit switch, while it should be open.
     pub lever_top: bool,
     /// The limit switch that the stage is moving towards, while it should be open.
@@ -274,6 +280,7 @@ impl Guard {
         [
             force.then_some(Fault::ForceHigh),
             seen.e_stop.then_some(Fault::EStop),
+            seen.hung.then_some(Fault::TasksHung),
             (self.lever_top_ms >= SWITCH_MS).then_some(Fault::LeverLimit),
             (self.stage_limit_ms >= SWITCH_MS).then_some(Fault::StageLimit),
             stage,
@@ -390,6 +397,7 @@ mod tests {
         let seen = Seen {
             words: &[],
             e_stop: false,
+            hung: false,
             lever_top: false,
             stage_limit: false,
             stage_wanted_mm_s: 0.0,

@@ -26,6 +26,8 @@ pub struct Inputs {
     pub stage_limits: (bool, bool),
     /// The emergency stop.
     pub e_stop: bool,
+    /// The tasks that the rig serves have not checked in for too long.
+    pub hung: bool,
 }
 
 /// What the pins shall do.

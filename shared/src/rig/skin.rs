@@ -25,6 +25,12 @@ pub struct SkinCare {
 }
 
 impl SkinCare {
+    /// A new skin.
+    pub const NEW: Self = Self {
+        energy_mj: 0.0,
+        wear_mj: 0.0,
+    };
+
     /// A skin that has done `energy_j` joules, which wore it like `wear_j`.
     pub fn after(energy_j: f32, wear_j: f32) -> Self {
         Self {

@@ -1,11 +1,13 @@
 //! What a few trials teach of a texture at one movement.
 
+use serde::{Deserialize, Serialize};
+
 use super::PROPERTIES;
 use crate::features::{Properties, Property, PropertySet};
 
 /// What was learned of one texture at one movement: number of trials, running mean and sum of squared deviations of each
 /// property (Welford).
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Experience {
     pub(super) trials: u8,
     pub(super) mean: [f32; PROPERTIES],

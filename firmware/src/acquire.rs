@@ -1,0 +1,141 @@
+//! Sensor words, alone in the highest executor: a slot every 227 us from TIM2, P_AC and P_DC in turn. The command goes out
+//! at the timer's update and the answer is read at its compare, so that the sensor's 50 us are not waited for.
+use core::future::poll_fn;
+use core::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
+use core::task::Poll;
+
+use embassy_stm32::gpio::{Level, Output, Pull, Speed};
+use embassy_stm32::pac::TIM2;
+use embassy_stm32::spi::{self, Spi};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::timer::low_level::Timer as SlotTimer;
+use embassy_stm32::interrupt;
+use embassy_sync::waitqueue::AtomicWaker;
+use embassy_time::Timer;
+use heapless::spsc::Producer;
+use tactus_core::biotac::{BioTac, WordStats};
+use tactus_core::pressure::{Channel, Pressure};
+use tactus_core::sensor::PressureSensor as _;
+
+use crate::board;
+
+/// A sensor word; `None` is a damaged or missing one.
+pub(crate) type Word = Option<Pressure>;
+/// Words on their way to the servo: 29 ms.
+pub(crate) const WORDS: usize = 128;
+
+/// 84 MHz / 19 091: 4399.98 slots a second.
+const SLOT_TICKS: u32 = 19_091;
+/// The answer is read 60 us after the slot began.
+const READ_TICKS: u32 = 60 * 84;
+/// A command that ends later than this, 10 us, leaves the sensor less than its 50 us.
+const LATE_TICKS: u32 = 10 * 84;
+
+/// Slots since boot, those that came too late, and words by what was wrong with them.
+pub(crate) static SLOTS: AtomicU32 = AtomicU32::new(0);
+pub(crate) static LATE: AtomicU32 = AtomicU32::new(0);
+pub(crate) static PARITY: AtomicU32 = AtomicU32::new(0);
+pub(crate) static ERROR_FRAMES: AtomicU32 = AtomicU32::new(0);
+pub(crate) static LOST: AtomicU32 = AtomicU32::new(0);
+
+const BEGIN: u8 = 1;
+const READ: u8 = 2;
+static DUE: AtomicU8 = AtomicU8::new(0);
+/// Slots that began before the one before them was served.
+static MISSED: AtomicU32 = AtomicU32::new(0);
+static WAKER: AtomicWaker = AtomicWaker::new();
+
+#[interrupt]
+fn TIM2() {
+    let flags = TIM2.sr().read();
+    // a flag is cleared by writing 0; 1 leaves it
+    TIM2.sr().write(|w| w.0 = !flags.0);
+    let mut due = 0;
+    if flags.uif() {
+        due |= BEGIN;
+    }
+    if flags.ccif(0) {
+        due |= READ;
+    }
+    if DUE.fetch_or(due, Relaxed) & due & BEGIN != 0 {
+        MISSED.fetch_add(1, Relaxed);
+    }
+    WAKER.wake();
+}
+
+/// Until the timer says so.
+async fn due(what: u8) {
+    poll_fn(|context| {
+        WAKER.register(context.waker());
+        if DUE.fetch_and(!what, Relaxed) & what == 0 {
+            Poll::Pending
+        } else {
+            Poll::Ready(())
+        }
+    })
+    .await;
+}
+
+#[embassy_executor::task]
+pub(crate) async fn acquire(pins: board::Acquire, mut words: Producer<'static, Word>) {
+    let mut config = spi::Config::default();
+    // 84 MHz / 16; mode 0
+    config.frequency = Hertz(5_250_000);
+    // nobody there then reads as FF FF
+    config.miso_pull = Pull::Up;
+    let mut spi = Spi::new_blocking(pins.spi, pins.sck, pins.mosi, pins.miso, config);
+    let mut select = Output::new(pins.select, Level::High, Speed::VeryHigh);
+    Timer::after_millis(BioTac::POWER_UP_MS.into()).await;
+
+    let timer = SlotTimer::new(pins.slots);
+    TIM2.arr().write_value(SLOT_TICKS - 1);
+    TIM2.ccr(0).write_value(READ_TICKS);
+    TIM2.dier().write(|w| {
+        w.set_uie(true);
+        w.set_ccie(0, true);
+    });
+    // SAFETY: the handler is above, its state is ready.
+    unsafe { interrupt::InterruptExt::enable(interrupt::TIM2) };
+    timer.start();
+
+    let mut stats = WordStats::default();
+    let mut slot: u32 = 0;
+    let mut put = |word: Word| {
+        if words.enqueue(word).is_err() {
+            LOST.fetch_add(1, Relaxed);
+        }
+    };
+    loop {
+        due(BEGIN).await;
+        for _ in 0..MISSED.swap(0, Relaxed) {
+            slot = slot.wrapping_add(1);
+            LATE.fetch_add(1, Relaxed);
+            put(None);
+        }
+        let channel = if slot % 2 == 0 { Channel::Pac } else { Channel::Pdc };
+        slot = slot.wrapping_add(1);
+        SLOTS.store(slot, Relaxed);
+        let mut exchange = BioTac::exchange(channel);
+        if let Some(command) = exchange.command {
+            select.set_low();
+            // the bus itself cannot fail: no mode fault with software select, no overrun with blocking transfers
+            let _ = spi.blocking_write(&command);
+            select.set_high();
+        }
+        let late = TIM2.cnt().read() > LATE_TICKS;
+        due(READ).await;
+        if late {
+            LATE.fetch_add(1, Relaxed);
+            put(None);
+            continue;
+        }
+        select.set_low();
+        let _ = spi.blocking_transfer_in_place(&mut exchange.read);
+        select.set_high();
+        let word = BioTac::decode(channel, exchange.read);
+        stats.count(&word);
+        PARITY.store(stats.parity.saturating_add(stats.padding), Relaxed);
+        ERROR_FRAMES.store(stats.error_frames.saturating_add(stats.no_sensor), Relaxed);
+        put(word.ok());
+    }
+}

@@ -1,0 +1,122 @@
+//! What is left to do when the firmware gives up: stop the stage, lift the finger, remember why, start again.
+use core::fmt::Write as _;
+use core::mem::MaybeUninit;
+use core::panic::PanicInfo;
+use core::ptr::addr_of_mut;
+use core::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use cortex_m::peripheral::SCB;
+use cortex_m_rt::{ExceptionFrame, exception};
+use embassy_stm32::pac::{GPIOC, GPIOF, IWDG, RCC, TIM3};
+use heapless::String;
+use tactus_core::rig::lever::MAX_STEPS;
+use tactus_core::wire::{Reset, Text};
+
+use crate::lever;
+
+const MAGIC: u32 = 0x7ac7_1a57;
+const LEVER_TOP: usize = 12;
+
+/// Last words that survive a reset; RAM that the start-up code leaves alone.
+struct LastWords {
+    magic: u32,
+    length: usize,
+    bytes: [u8; 120],
+}
+
+#[unsafe(link_section = ".uninit.LAST_WORDS")]
+static mut LAST_WORDS: MaybeUninit<LastWords> = MaybeUninit::uninit();
+
+/// The pins are set up: lever and stage can be driven by hand.
+pub(crate) static ARMED: AtomicBool = AtomicBool::new(false);
+
+/// Why the chip started, and what the firmware said before; forgets both.
+pub(crate) fn reset_cause() -> (Reset, Option<Text>) {
+    let flags = RCC.csr().read();
+    RCC.csr().modify(|w| w.set_rmvf(true));
+    let reset = if flags.wdgrstf() || flags.wwdgrstf() {
+        Reset::Watchdog
+    } else if flags.sftrstf() {
+        Reset::Software
+    } else if flags.porrstf() || flags.borrstf() {
+        Reset::Power
+    } else if flags.padrstf() {
+        Reset::Pin
+    } else {
+        Reset::Other
+    };
+    // SAFETY: no other code uses it before interrupts are on or after they are off; every bit pattern is a value.
+    let words = unsafe { &mut *addr_of_mut!(LAST_WORDS).cast::<LastWords>() };
+    let said = (words.magic == MAGIC)
+        .then(|| words.bytes.get(..words.length))
+        .flatten()
+        .and_then(|bytes| core::str::from_utf8(bytes).ok())
+        .and_then(|text| Text::try_from(text).ok());
+    words.magic = 0;
+    (reset, said)
+}
+
+/// Keeps a sentence over the next reset.
+pub(crate) fn remember(text: &str) {
+    critical_section::with(|_| {
+        // SAFETY: interrupts are off.
+        let words = unsafe { &mut *addr_of_mut!(LAST_WORDS).cast::<LastWords>() };
+        let mut length = text.len().min(words.bytes.len());
+        while !text.is_char_boundary(length) {
+            length -= 1;
+        }
+        for (to, from) in words.bytes.iter_mut().zip(text.as_bytes()) {
+            *to = *from;
+        }
+        words.length = length;
+        words.magic = MAGIC;
+    });
+}
+
+/// Pets the watchdog; does no harm where it is not running.
+pub(crate) fn pet() {
+    IWDG.kr()
+        .write(|w| w.set_key(embassy_stm32::pac::iwdg::vals::Key::RESET));
+}
+
+/// Brakes the stage, lifts the finger up to the limit switch and starts the chip again. Whatever went wrong: nothing here
+/// needs an interrupt, memory or another task.
+fn give_up(why: &str) -> ! {
+    cortex_m::interrupt::disable();
+    remember(why);
+    if ARMED.load(Relaxed) {
+        // the bridge stays on: without duty it shorts the motor
+        TIM3.ccr(0).write_value(0);
+        GPIOC.bsrr().write(|w| w.set_bs(8, true));
+        let mut closed = 0;
+        lever::lift_by_hand(|steps| {
+            pet();
+            // pressed, or its wire is broken: three times, for it bounces
+            closed = if GPIOF.idr().read().idr(LEVER_TOP) == embassy_stm32::pac::gpio::vals::Idr::HIGH {
+                closed + 1
+            } else {
+                0
+            };
+            closed >= 3 || steps > MAX_STEPS as u32 * 5 / 4
+        });
+    }
+    SCB::sys_reset()
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    let mut text: String<120> = String::new();
+    // cut off where it is too long
+    let _ = match info.location() {
+        Some(at) => write!(text, "{}:{} {}", at.file(), at.line(), info.message()),
+        None => write!(text, "{}", info.message()),
+    };
+    give_up(&text)
+}
+
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    let mut text: String<120> = String::new();
+    let _ = write!(text, "hard fault at {:#010x}", frame.pc());
+    give_up(&text)
+}

@@ -1,0 +1,305 @@
+//! A thousand times a second: the pins into [`Control`], what it says to the pins, and the samples of the slide on their
+//! way to the features. Lever, stage and guard live in the core; here is only where their pins are.
+use core::cell::Cell;
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
+
+use embassy_stm32::adc::{Adc, SampleTime};
+use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::timer::qei::Qei;
+use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use embassy_time::{Duration, Ticker};
+use heapless::Vec;
+use heapless::spsc::{Consumer, Producer};
+use tactus_core::movement::Movement;
+use tactus_core::pressure::Calibration;
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::control::{Control, Ended, Phase, Refused};
+use tactus_core::rig::guard::Unguarded;
+use tactus_core::rig::pins::{Felt, Inputs, MAX_WORDS, Outputs};
+use tactus_core::rig::skin::SkinCare;
+use tactus_core::rig::stage::StageConstants;
+
+use crate::acquire::Word;
+use crate::{board, lever, rescue};
+
+/// A tick's samples; longer ones come in several.
+#[derive(Clone, Default)]
+pub(crate) struct Samples {
+    pub(crate) felt: Felt,
+    pub(crate) pac: Vec<i16, 8>,
+    pub(crate) shear_mn: Option<i16>,
+}
+
+/// Samples on their way to the features: a quarter of a second.
+pub(crate) const SAMPLES: usize = 256;
+
+/// What the rig shall do.
+#[derive(Clone, Copy)]
+pub(crate) enum Command {
+    /// Ends a fault if there is one, then finds the limit switches.
+    Home,
+    /// A movement, and where on the sample it begins, 0 to 1.
+    Start(Movement, f32),
+    /// A run without load at this speed, um/s.
+    StartUnloaded(u32),
+    Calibrate(RigCalibration),
+    /// Another sample may lie under the finger.
+    SampleChanged,
+    /// What the skin has been through, from the store.
+    Skin(SkinCare),
+}
+
+/// What the rig is at, a thousand times a second.
+#[derive(Clone, Copy)]
+pub(crate) struct Snapshot {
+    pub(crate) phase: Phase,
+    pub(crate) at_rest: bool,
+    /// How the last movement ended, until the next begins.
+    pub(crate) ended: Option<Ended>,
+    pub(crate) force_mn: f32,
+    pub(crate) steps: i32,
+    pub(crate) stage_mm: f32,
+    pub(crate) velocity_mm_s: f32,
+    pub(crate) current_a: f32,
+    pub(crate) mean_current_a: Option<f32>,
+    pub(crate) calibration: RigCalibration,
+    pub(crate) skin: SkinCare,
+}
+
+static COMMAND: Signal<CriticalSectionRawMutex, Command> = Signal::new();
+static ANSWER: Signal<CriticalSectionRawMutex, Result<(), Refused>> = Signal::new();
+/// Stop and lift, whatever is being done.
+static STOP: AtomicBool = AtomicBool::new(false);
+static SNAPSHOT: Mutex<CriticalSectionRawMutex, Cell<Snapshot>> =
+    Mutex::new(Cell::new(Snapshot {
+        phase: Phase::Parked,
+        at_rest: true,
+        ended: None,
+        force_mn: 0.0,
+        steps: 0,
+        stage_mm: 0.0,
+        velocity_mm_s: 0.0,
+        current_a: 0.0,
+        mean_current_a: None,
+        calibration: UNMEASURED,
+        skin: SkinCare::NEW,
+    }));
+/// Samples that found no room.
+pub(crate) static LOST: AtomicU32 = AtomicU32::new(0);
+/// Milliseconds since the tasks in thread mode have checked in.
+static SILENT_MS: AtomicU32 = AtomicU32::new(0);
+
+/// The reference rig's constants, until measured ones are read from the store.
+pub(crate) const UNMEASURED: RigCalibration = RigCalibration {
+    pressure: Calibration::PAPER,
+    unloaded_a: (0.037, 0.0),
+    newton_per_ampere: 16.4,
+    date: 0,
+    serial: [0; 16],
+};
+
+/// Tasks that are silent for longer hang: the longest that they compute, the choice among the actions of a whole grid, is
+/// half of it.
+const HUNG_MS: u32 = 2000;
+/// Without the servo for this long the chip starts again.
+const WATCHDOG_US: u32 = 100_000;
+
+/// Gives a command and waits for the answer. For one task at a time.
+pub(crate) async fn command(command: Command) -> Result<(), Refused> {
+    ANSWER.reset();
+    COMMAND.signal(command);
+    ANSWER.wait().await
+}
+
+/// Stops what is being done.
+pub(crate) fn stop() {
+    STOP.store(true, Relaxed);
+}
+
+/// What the rig is at.
+pub(crate) fn snapshot() -> Snapshot {
+    SNAPSHOT.lock(Cell::get)
+}
+
+/// The tasks in thread mode are alive.
+pub(crate) fn check_in() {
+    SILENT_MS.store(0, Relaxed);
+}
+
+/// Amperes of the stage's motor by the amplifier's 12 bits over 3.3 V: 1 V/A about 2048.
+fn amperes(adc: u16) -> f32 {
+    (f32::from(adc) - 2048.0) * (3.3 / 4096.0)
+}
+
+struct Switches {
+    lever_top: Input<'static>,
+    stage_left: Input<'static>,
+    stage_right: Input<'static>,
+    e_stop: Input<'static>,
+}
+
+#[embassy_executor::task]
+pub(crate) async fn servo(
+    lever: board::Lever,
+    stage: board::Stage,
+    switches: board::Switches,
+    watchdog: board::Watchdog,
+    mut words: Consumer<'static, Word>,
+    mut samples: Producer<'static, Samples>,
+) {
+    let mut lever = lever::Lever::new(lever);
+    let mut pwm = SimplePwm::new(
+        stage.timer,
+        Some(PwmPin::new(stage.pwm, OutputType::PushPull)),
+        None,
+        None,
+        None,
+        Hertz::khz(20),
+        Default::default(),
+    );
+    let mut pwm = pwm.ch1();
+    pwm.set_duty_cycle_fully_off();
+    pwm.enable();
+    let mut bridge = Output::new(stage.enable, Level::Low, Speed::Low);
+    let mut right = Output::new(stage.direction, Level::Low, Speed::Low);
+    let encoder = Qei::new(stage.encoder, stage.encoder_a, stage.encoder_b, Default::default());
+    let mut adc = Adc::new(stage.adc);
+    let mut current = stage.current;
+    let switch = |pin| Input::new(pin, Pull::Up);
+    let switches = Switches {
+        lever_top: switch(switches.lever_top.into()),
+        stage_left: switch(switches.stage_left.into()),
+        stage_right: switch(switches.stage_right.into()),
+        e_stop: switch(switches.e_stop.into()),
+    };
+    rescue::ARMED.store(true, Relaxed);
+    let mut watchdog = IndependentWatchdog::new(watchdog.iwdg, WATCHDOG_US);
+    watchdog.unleash();
+
+    let mut control = Control::new(StageConstants::REFERENCE, UNMEASURED, Unguarded::default());
+    let mut ended = None;
+    let mut count: i32 = 0;
+    let mut hung = false;
+    let mut ticker = Ticker::every(Duration::from_millis(1));
+    loop {
+        ticker.next().await;
+        if STOP.swap(false, Relaxed) {
+            control.stop();
+        }
+        if let Some(command) = COMMAND.try_take() {
+            ended = None;
+            ANSWER.signal(obey(&mut control, command));
+        }
+        let silent_ms = SILENT_MS.fetch_add(1, Relaxed);
+        // once hung, hung until the watchdog has done its work
+        hung |= silent_ms > HUNG_MS;
+
+        let mut inputs = Inputs::default();
+        while inputs.words.len() < MAX_WORDS
+            && let Some(word) = words.dequeue()
+        {
+            // there is room
+            let _ = inputs.words.push(word);
+        }
+        inputs.steps = lever.steps();
+        count += i32::from(encoder.count().wrapping_sub(count as u16) as i16);
+        inputs.encoder = count;
+        inputs.current_a = amperes(adc.blocking_read(&mut current, SampleTime::CYCLES56));
+        inputs.lever_top = switches.lever_top.is_high();
+        inputs.stage_limits = (
+            switches.stage_left.is_high(),
+            switches.stage_right.is_high(),
+        );
+        inputs.e_stop = switches.e_stop.is_high();
+        inputs.hung = hung;
+
+        let outputs = control.tick(&inputs);
+        lever.drive(outputs.lever_enabled, outputs.lever_steps_s);
+        right.set_level((outputs.stage_duty > 0.0).into());
+        let full = pwm.max_duty_cycle();
+        pwm.set_duty_cycle((libm::fabsf(outputs.stage_duty).min(1.0) * full as f32) as u32);
+        bridge.set_level(outputs.stage_enabled.into());
+
+        pass_on(&outputs, &mut samples);
+        ended = control.take_ended().or(ended);
+        SNAPSHOT.lock(|cell| {
+            cell.set(Snapshot {
+                phase: control.phase(),
+                at_rest: control.is_at_rest(),
+                ended,
+                force_mn: control.force_mn(),
+                steps: inputs.steps,
+                stage_mm: control.stage_mm(),
+                velocity_mm_s: control.stage_velocity_mm_s(),
+                current_a: inputs.current_a,
+                mean_current_a: control.mean_current_a(),
+                calibration: *control.calibration(),
+                skin: *control.skin(),
+            });
+        });
+        if hung && control.is_at_rest() {
+            rescue::remember("the tasks in thread mode did not check in for 2 s");
+        } else {
+            watchdog.pet();
+        }
+    }
+}
+
+fn obey(control: &mut Control, command: Command) -> Result<(), Refused> {
+    match command {
+        Command::Home => {
+            control.reset()?;
+            control.home()
+        }
+        Command::Start(movement, start) => control.start(movement, start),
+        Command::StartUnloaded(speed_um_s) => control.start_unloaded(speed_um_s),
+        Command::Calibrate(calibration) => control.calibrate(calibration),
+        Command::SampleChanged => {
+            control.sample_changed();
+            Ok(())
+        }
+        Command::Skin(skin) => {
+            *control.skin() = skin;
+            Ok(())
+        }
+    }
+}
+
+fn pass_on(outputs: &Outputs, samples: &mut Producer<'static, Samples>) {
+    if outputs.felt == Felt::Nothing {
+        return;
+    }
+    let mut part = Samples {
+        felt: outputs.felt.clone(),
+        pac: Vec::new(),
+        shear_mn: outputs.shear_mn,
+    };
+    let mut put = |part: Samples| {
+        let many = part.pac.len() as u32;
+        if samples.enqueue(part).is_err() {
+            LOST.fetch_add(many, Relaxed);
+        }
+    };
+    for &sample in &outputs.pac {
+        if part.pac.push(sample).is_err() {
+            let felt = match part.felt {
+                Felt::Still => Felt::Still,
+                _ => Felt::Slide,
+            };
+            put(core::mem::replace(
+                &mut part,
+                Samples {
+                    felt,
+                    ..Samples::default()
+                },
+            ));
+            let _ = part.pac.push(sample);
+        }
+    }
+    put(part);
+}

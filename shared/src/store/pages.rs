@@ -1,0 +1,162 @@
+//! The two sectors of the settings, as `sequential-storage` sees them: pages that are a little smaller than a sector.
+//!
+//! `sequential-storage` fills one page, copies what is still valid to the other one, and erases the first. A cut in the
+//! middle of that erase can leave any words of the old page, and it cannot tell such a page from one whose copying was cut
+//! short: it would erase the copy. The last words of every sector, which it does not see, say what is going on. Erasing
+//! a sector can turn their bits into ones in any order, so a state counts only when its word matches exactly.
+
+use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+
+use super::WORD;
+
+/// The other page is being erased.
+const ERASING: [u8; WORD] = *b"eras";
+/// All settings are being erased.
+const WIPING: [u8; WORD] = *b"wipe";
+const DONE: [u8; WORD] = [0; WORD];
+/// Bytes at the end of a sector that are not the page's.
+const TRAILER: usize = 16;
+/// `sequential-storage` takes a page for a used one from so many zero bits on in the page's first word.
+const MARKED: u32 = 4;
+
+/// Bytes of a page.
+pub(super) const fn page_size<F: NorFlash>() -> usize {
+    F::ERASE_SIZE - TRAILER
+}
+
+/// The pages of the settings.
+pub(super) struct Pages<'f, F>(pub(super) &'f mut F);
+
+#[derive(Clone, Copy)]
+enum Word {
+    /// [`ERASING`], then [`DONE`].
+    Erase,
+    /// [`WIPING`].
+    Wipe,
+}
+
+impl<F: NorFlash> Pages<'_, F> {
+    const SIZE: usize = page_size::<F>();
+    /// Sector of the first page.
+    const FIRST: u32 = 2;
+
+    fn sector(page: u32) -> u32 {
+        (Self::FIRST + page) * F::ERASE_SIZE as u32
+    }
+
+    /// Place in the flash of a place in the pages.
+    fn place(offset: u32) -> u32 {
+        let size = Self::SIZE as u32;
+        Self::sector(offset / size) + offset % size
+    }
+
+    fn word_at(page: u32, word: Word) -> u32 {
+        let at = match word {
+            Word::Erase => 0,
+            Word::Wipe => WORD as u32,
+        };
+        Self::sector(page) + Self::SIZE as u32 + at
+    }
+
+    async fn word(&mut self, page: u32, word: Word) -> Result<[u8; WORD], F::Error> {
+        let mut bytes = [0; WORD];
+        self.0.read(Self::word_at(page, word), &mut bytes).await?;
+        Ok(bytes)
+    }
+
+    async fn mark(&mut self, page: u32, word: Word, to: [u8; WORD]) -> Result<(), F::Error> {
+        self.0.write(Self::word_at(page, word), &to).await
+    }
+
+    async fn erase_sector(&mut self, page: u32) -> Result<(), F::Error> {
+        let start = Self::sector(page);
+        self.0.erase(start, start + F::ERASE_SIZE as u32).await
+    }
+
+    async fn erase_page(&mut self, page: u32) -> Result<(), F::Error> {
+        let other = 1 - page;
+        // A page erases the other one once for good; where it has done so, what is erased now is an unfinished copy of it,
+        // and half a copy cannot be mistaken for anything else.
+        if self.word(other, Word::Erase).await? == DONE {
+            return self.erase_sector(page).await;
+        }
+        self.mark(other, Word::Erase, ERASING).await?;
+        self.erase_sector(page).await?;
+        self.mark(other, Word::Erase, DONE).await
+    }
+
+    /// Finishes what a power cut has interrupted.
+    pub(super) async fn recover(&mut self) -> Result<(), F::Error> {
+        for page in 0..2 {
+            if self.word(page, Word::Wipe).await? == WIPING {
+                return self.wipe().await;
+            }
+        }
+        for page in 0..2 {
+            if self.word(page, Word::Erase).await? == ERASING {
+                self.erase_sector(1 - page).await?;
+                self.mark(page, Word::Erase, DONE).await?;
+            }
+        }
+        for page in 0..2 {
+            let mut first = [0; WORD];
+            self.0.read(Self::sector(page), &mut first).await?;
+            let used = u32::from_le_bytes(first).count_zeros() >= MARKED;
+            if !used && !self.is_blank(page).await? {
+                self.erase_sector(page).await?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Erases all settings.
+    pub(super) async fn wipe(&mut self) -> Result<(), F::Error> {
+        self.mark(0, Word::Wipe, WIPING).await?;
+        self.erase_sector(1).await?;
+        self.erase_page(0).await
+    }
+
+    async fn is_blank(&mut self, page: u32) -> Result<bool, F::Error> {
+        let mut chunk = [0; TRAILER];
+        for at in (0..F::ERASE_SIZE as u32).step_by(TRAILER) {
+            self.0.read(Self::sector(page) + at, &mut chunk).await?;
+            if chunk != [0xFF; TRAILER] {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+}
+
+impl<F: ErrorType> ErrorType for Pages<'_, F> {
+    type Error = F::Error;
+}
+
+impl<F: NorFlash> ReadNorFlash for Pages<'_, F> {
+    const READ_SIZE: usize = WORD;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+        self.0.read(Self::place(offset), bytes).await
+    }
+
+    fn capacity(&self) -> usize {
+        2 * Self::SIZE
+    }
+}
+
+impl<F: NorFlash> NorFlash for Pages<'_, F> {
+    const WRITE_SIZE: usize = WORD;
+    const ERASE_SIZE: usize = Self::SIZE;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
+        let size = Self::SIZE as u32;
+        for page in from / size..to / size {
+            self.erase_page(page).await?;
+        }
+        Ok(())
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
+        self.0.write(Self::place(offset), bytes).await
+    }
+}

@@ -1,0 +1,361 @@
+//! The settings: one record per key in a `sequential-storage` map.
+
+use core::fmt;
+
+use embedded_storage_async::nor_flash::NorFlash;
+use sequential_storage::cache::{Cache, Uncached};
+use sequential_storage::map::{MapConfig, MapStorage};
+use sequential_storage::{Error, map};
+use serde::{Deserialize, Serialize};
+
+use super::pages::{Pages, page_size};
+use super::{Store, StoreError};
+use crate::movement::Movement;
+use crate::rig::calibration::RigCalibration;
+use crate::rig::skin::SkinCare;
+use crate::table::Experience;
+use crate::wire::Name;
+
+/// Version of the records and of the map they are in (`sequential-storage` 8).
+pub const SCHEMA: u16 = 1;
+/// Most records of training: two pilots of 36 movements, and two textures at each of 36 more. With all of them in use a
+/// page of 16 KB is four fifths full.
+pub const MAX_RECORDS: u8 = 144;
+
+const KEY_SCHEMA: u8 = 0;
+const KEY_CALIBRATION: u8 = 1;
+const KEY_SKIN: u8 = 2;
+const KEY_TRAINED: u8 = 16;
+/// The longest record with its key, in whole words: one of training takes 81 bytes.
+const RECORD: usize = 96;
+
+/// Why settings cannot be used.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum SettingsError {
+    /// They do not read: erase them.
+    Corrupt,
+    /// They were written by another version: erase them.
+    Schema(u16),
+    /// No room for more progress of training: forget a texture.
+    Full,
+}
+
+impl fmt::Display for SettingsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Corrupt => {
+                f.write_str("the settings are damaged: erase them, and calibrate again")
+            }
+            Self::Schema(found) => write!(
+                f,
+                "the settings are of version {found}, and this program knows {SCHEMA}: erase them, and calibrate again"
+            ),
+            Self::Full => {
+                f.write_str("no room for more unfinished training: finish or forget a texture")
+            }
+        }
+    }
+}
+
+impl core::error::Error for SettingsError {}
+
+/// How far the training of a texture at one movement has come.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Trained {
+    /// The texture.
+    pub name: Name,
+    /// The movement.
+    pub movement: Movement,
+    /// Checksum of the table whose trials of this texture are counted in; `None` for trials of its own only.
+    pub table: Option<u32>,
+    /// What was learned.
+    pub experience: Experience,
+}
+
+impl Trained {
+    fn is(&self, name: &str, movement: Movement, table: Option<u32>) -> bool {
+        self.name == name && self.movement == movement && self.table == table
+    }
+}
+
+type Map<'f, F> = MapStorage<u8, Pages<'f, F>, Cache<Uncached, Uncached, Uncached, u8>>;
+
+impl<E> From<Error<E>> for StoreError<E> {
+    fn from(why: Error<E>) -> Self {
+        match why {
+            Error::Storage { value, .. } => Self::Flash(value),
+            Error::FullStorage => Self::Settings(SettingsError::Full),
+            _ => Self::Settings(SettingsError::Corrupt),
+        }
+    }
+}
+
+/// One pass over all records of training, oldest first: what a key held last counts.
+struct Records<'m, 'f, F: NorFlash>(
+    map::MapItemIter<'m, u8, Pages<'f, F>, Cache<Uncached, Uncached, Uncached, u8>>,
+);
+
+impl<F: NorFlash> Records<'_, '_, F> {
+    /// Place and record, `None` for a place that was cleared.
+    async fn next(&mut self) -> Result<Option<(u8, Option<Trained>)>, StoreError<F::Error>> {
+        let mut buffer = [0; RECORD];
+        while let Some((key, bytes)) = self.0.next::<&[u8]>(&mut buffer).await? {
+            if let Some(place) = key.checked_sub(KEY_TRAINED) {
+                return Ok(Some((place, decode(bytes)?)));
+            }
+        }
+        Ok(None)
+    }
+}
+
+fn decode<'b, T: Deserialize<'b>, E>(bytes: &'b [u8]) -> Result<T, StoreError<E>> {
+    postcard::from_bytes(bytes).map_err(|_| StoreError::Settings(SettingsError::Corrupt))
+}
+
+impl<F: NorFlash> Store<F> {
+    /// Whether the settings can be used. If not, [`Store::erase_settings`] makes them so; the tables are not concerned.
+    ///
+    /// # Errors
+    /// Why not.
+    pub fn settings(&self) -> Result<(), SettingsError> {
+        self.settings.map(|_| ())
+    }
+
+    /// Erases all settings: calibration, skin care and unfinished training.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`].
+    pub async fn erase_settings(&mut self) -> Result<(), StoreError<F::Error>> {
+        self.settings = Err(SettingsError::Corrupt);
+        Pages(&mut self.flash)
+            .wipe()
+            .await
+            .map_err(StoreError::Flash)?;
+        self.open_settings().await
+    }
+
+    /// The calibration of this rig; `None` if there was none.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Calibration`].
+    pub async fn calibration(&mut self) -> Result<Option<RigCalibration>, StoreError<F::Error>> {
+        let mut buffer = [0; RECORD];
+        let Some(bytes) = self.fetch(KEY_CALIBRATION, &mut buffer).await? else {
+            return Ok(None);
+        };
+        let bytes = bytes
+            .try_into()
+            .map_err(|_| StoreError::Settings(SettingsError::Corrupt))?;
+        RigCalibration::from_bytes(bytes)
+            .map(Some)
+            .map_err(StoreError::Calibration)
+    }
+
+    /// Stores the calibration of this rig.
+    ///
+    /// # Errors
+    /// [`StoreError::Calibration`] for one that could not be used, [`StoreError::Flash`], [`StoreError::Settings`],
+    /// [`StoreError::Worn`].
+    pub async fn set_calibration(
+        &mut self,
+        calibration: &RigCalibration,
+    ) -> Result<(), StoreError<F::Error>> {
+        calibration.check().map_err(StoreError::Calibration)?;
+        self.store(KEY_CALIBRATION, &calibration.to_bytes()).await
+    }
+
+    /// Sliding since the skin was replaced; none if nothing is stored.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::Settings`].
+    pub async fn skin(&mut self) -> Result<SkinCare, StoreError<F::Error>> {
+        let mut buffer = [0; RECORD];
+        let Some(bytes) = self.fetch(KEY_SKIN, &mut buffer).await? else {
+            return Ok(SkinCare::default());
+        };
+        let (energy_j, wear_j) = decode(bytes)?;
+        Ok(SkinCare::after(energy_j, wear_j))
+    }
+
+    /// Stores the sliding since the skin was replaced.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
+    pub async fn set_skin(&mut self, skin: &SkinCare) -> Result<(), StoreError<F::Error>> {
+        self.encode(KEY_SKIN, &(skin.energy_j(), skin.wear_j()))
+            .await
+    }
+
+    /// What the training of a texture has learned so far at a movement, on top of the table with this checksum, or of its
+    /// own only.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::Settings`].
+    pub async fn trained(
+        &mut self,
+        name: &str,
+        movement: Movement,
+        table: Option<u32>,
+    ) -> Result<Option<Experience>, StoreError<F::Error>> {
+        self.settings.map_err(StoreError::Settings)?;
+        let mut found = None;
+        let mut buffer = [0; RECORD];
+        let mut map = self.map();
+        let mut records = Records(map.fetch_all_items(&mut buffer).await?);
+        while let Some((place, record)) = records.next().await? {
+            match record {
+                Some(record) if record.is(name, movement, table) => {
+                    found = Some((place, record.experience));
+                }
+                // the place went to another
+                _ if found.is_some_and(|(at, _)| at == place) => found = None,
+                _ => {}
+            }
+        }
+        Ok(found.map(|(_, experience)| experience))
+    }
+
+    /// Stores how far a training has come, in place of what was stored for this texture, movement and table. When room runs
+    /// out, progress on top of other tables than this record's is given up.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
+    pub async fn set_trained(&mut self, new: &Trained) -> Result<(), StoreError<F::Error>> {
+        #[derive(Clone, Copy, PartialEq)]
+        enum Use {
+            Free,
+            /// On top of a table that is no longer used.
+            Stale,
+            Taken,
+            /// Of this texture, movement and table.
+            Same,
+        }
+        self.settings.map_err(StoreError::Settings)?;
+        let mut places = [Use::Free; MAX_RECORDS as usize];
+        let mut buffer = [0; RECORD];
+        let mut map = self.map();
+        let mut records = Records(map.fetch_all_items(&mut buffer).await?);
+        while let Some((place, record)) = records.next().await? {
+            if let Some(now) = places.get_mut(usize::from(place)) {
+                *now = match record {
+                    None => Use::Free,
+                    Some(old) if old.is(&new.name, new.movement, new.table) => Use::Same,
+                    Some(old)
+                        if new.table.is_some() && old.table.is_some() && old.table != new.table =>
+                    {
+                        Use::Stale
+                    }
+                    Some(_) => Use::Taken,
+                };
+            }
+        }
+        let place = [Use::Same, Use::Free, Use::Stale]
+            .into_iter()
+            .find_map(|wanted| places.iter().position(|now| *now == wanted))
+            .and_then(|place| u8::try_from(place).ok())
+            .ok_or(StoreError::Settings(SettingsError::Full))?;
+        self.encode(KEY_TRAINED + place, &Some(new)).await
+    }
+
+    /// Forgets the unfinished training of a texture, movement by movement: after a cut some may be left.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
+    pub async fn forget_trained(&mut self, name: &str) -> Result<(), StoreError<F::Error>> {
+        self.settings.map_err(StoreError::Settings)?;
+        let mut of_texture = [false; MAX_RECORDS as usize];
+        let mut buffer = [0; RECORD];
+        let mut map = self.map();
+        let mut records = Records(map.fetch_all_items(&mut buffer).await?);
+        while let Some((place, record)) = records.next().await? {
+            if let Some(now) = of_texture.get_mut(usize::from(place)) {
+                *now = record.is_some_and(|record| record.name == name);
+            }
+        }
+        for (place, is_its) in (KEY_TRAINED..).zip(of_texture) {
+            if is_its {
+                self.encode(place, &None::<Trained>).await?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Brings the pages into order, and looks whether they can be read.
+    pub(super) async fn open_settings(&mut self) -> Result<(), StoreError<F::Error>> {
+        Pages(&mut self.flash)
+            .recover()
+            .await
+            .map_err(StoreError::Flash)?;
+        self.settings = match self.read_all().await {
+            Ok(schema_written) => Ok(schema_written),
+            Err(StoreError::Settings(why)) => Err(why),
+            Err(why) => return Err(why),
+        };
+        Ok(())
+    }
+
+    /// Reads every record once; whether there is any.
+    async fn read_all(&mut self) -> Result<bool, StoreError<F::Error>> {
+        let mut buffer = [0; RECORD];
+        let mut map = self.map();
+        let schema = map.fetch_item::<&[u8]>(&mut buffer, &KEY_SCHEMA).await?;
+        match schema.map(decode::<u16, F::Error>).transpose()? {
+            Some(SCHEMA) => {}
+            Some(other) => return Err(StoreError::Settings(SettingsError::Schema(other))),
+            None => {
+                // the schema is the first record of all
+                let mut items = map.fetch_all_items(&mut buffer).await?;
+                let mut buffer = [0; RECORD];
+                return match items.next::<&[u8]>(&mut buffer).await? {
+                    None => Ok(false),
+                    Some(_) => Err(StoreError::Settings(SettingsError::Corrupt)),
+                };
+            }
+        }
+        let mut records = Records(map.fetch_all_items(&mut buffer).await?);
+        while records.next().await?.is_some() {}
+        Ok(true)
+    }
+
+    fn map(&mut self) -> Map<'_, F> {
+        let config = const { MapConfig::new(0..2 * page_size::<F>() as u32) };
+        MapStorage::new(Pages(&mut self.flash), config, Cache::new_uncached())
+    }
+
+    async fn fetch<'b>(
+        &mut self,
+        key: u8,
+        buffer: &'b mut [u8; RECORD],
+    ) -> Result<Option<&'b [u8]>, StoreError<F::Error>> {
+        self.settings.map_err(StoreError::Settings)?;
+        Ok(self.map().fetch_item(buffer, &key).await?)
+    }
+
+    async fn encode(
+        &mut self,
+        key: u8,
+        value: &impl Serialize,
+    ) -> Result<(), StoreError<F::Error>> {
+        let mut room = [0; RECORD];
+        let bytes = postcard::to_slice(value, &mut room)
+            .map_err(|_| StoreError::Settings(SettingsError::Corrupt))?;
+        self.store(key, bytes).await
+    }
+
+    /// Stores a record and reads it back.
+    async fn store(&mut self, key: u8, bytes: &[u8]) -> Result<(), StoreError<F::Error>> {
+        let schema_written = self.settings.map_err(StoreError::Settings)?;
+        let mut buffer = [0; RECORD];
+        let mut map = self.map();
+        if !schema_written {
+            let mut room = [0; RECORD];
+            let schema: &[u8] = postcard::to_slice(&SCHEMA, &mut room)
+                .map_err(|_| StoreError::Settings(SettingsError::Corrupt))?;
+            map.store_item(&mut buffer, &KEY_SCHEMA, &schema).await?;
+        }
+        map.store_item(&mut buffer, &key, &bytes).await?;
+        let kept = map.fetch_item::<&[u8]>(&mut buffer, &key).await? == Some(bytes);
+        self.settings = Ok(true);
+        if kept { Ok(()) } else { Err(StoreError::Worn) }
+    }
+}

@@ -1,0 +1,373 @@
+//! The two slots of the texture table.
+
+use embedded_storage_async::nor_flash::NorFlash;
+
+use super::{CRC32, Store, StoreError, WORD};
+use crate::table::Table;
+
+const MAGIC: u32 = u32::from_le_bytes(*b"SLOT");
+const LAYOUT: u32 = 1;
+const COMMIT: u32 = u32::from_le_bytes(*b"COMM");
+/// Header without the commit word.
+const HEADER: usize = 24;
+const COMMIT_AT: u32 = 28;
+/// Where the table begins in its sector.
+const TABLE_AT: u32 = 32;
+/// Bytes read at a time.
+const CHUNK: usize = 128;
+
+/// A table that is stored whole.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct StoredTable {
+    /// Where its bytes begin in the store, a multiple of 4.
+    pub offset: u32,
+    /// Bytes it has.
+    pub length: usize,
+    /// Its checksum, as [`Table::crc`] gives it.
+    pub crc: u32,
+    /// Larger than that of every table before it.
+    pub generation: u32,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(super) enum Slot {
+    A,
+    #[default]
+    B,
+}
+
+impl Slot {
+    fn other(self) -> Self {
+        match self {
+            Self::A => Self::B,
+            Self::B => Self::A,
+        }
+    }
+
+    fn start<F: NorFlash>(self) -> u32 {
+        match self {
+            Self::A => 0,
+            Self::B => F::ERASE_SIZE as u32,
+        }
+    }
+}
+
+/// A table on its way into the flash.
+struct Push {
+    slot: Slot,
+    length: usize,
+    /// Bytes taken; those of an unfinished word are in `word`.
+    at: usize,
+    word: [u8; WORD],
+}
+
+#[derive(Default)]
+pub(super) struct Slots {
+    /// The slot in use, and the table in it.
+    active: Option<(Slot, StoredTable)>,
+    /// Largest generation that either slot has had.
+    generation: u32,
+    push: Option<Push>,
+}
+
+impl<F: NorFlash> Store<F> {
+    /// Bytes that a table may have at most.
+    pub const MAX_TABLE: usize = F::ERASE_SIZE - TABLE_AT as usize;
+
+    /// The table to be used: the newest one that was committed and is whole; `None`: the factory's.
+    ///
+    /// Checked are the store's own header and the table's checksum; [`Table::read`] finds the rest, as when the table was
+    /// written for another version of the program.
+    ///
+    /// On the chip the bytes are read where they lie. They stay there until the table after the next one is begun: once
+    /// [`Store::commit_table`] or [`Store::factory_table`] has returned, whoever borrows the former table must let go of
+    /// it before [`Store::begin_table`] is called again.
+    pub fn table(&self) -> Option<StoredTable> {
+        self.slots.active.map(|(_, table)| table)
+    }
+
+    /// Reads the table to be used into the beginning of `room`; `None`: the factory's is.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::Buffer`]; [`StoreError::Table`] when [`Table::read`] refuses it.
+    pub async fn read_table<'r>(
+        &mut self,
+        room: &'r mut [u8],
+    ) -> Result<Option<Table<'r>>, StoreError<F::Error>> {
+        match self.table() {
+            Some(table) => self
+                .read_back(table.offset, table.length, room)
+                .await
+                .map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// Begins a table of `length` bytes: erases the slot that is not in use. The table in use stays until the new one is
+    /// committed. One that was begun before and not committed is given up.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::TooLong`].
+    pub async fn begin_table(&mut self, length: usize) -> Result<(), StoreError<F::Error>> {
+        self.slots.push = None;
+        if length > Self::MAX_TABLE {
+            return Err(StoreError::TooLong {
+                length,
+                room: Self::MAX_TABLE,
+            });
+        }
+        let slot = self
+            .slots
+            .active
+            .map(|(slot, _)| slot)
+            .unwrap_or_default()
+            .other();
+        let start = slot.start::<F>();
+        self.flash
+            .erase(start, start + F::ERASE_SIZE as u32)
+            .await
+            .map_err(StoreError::Flash)?;
+        self.slots.push = Some(Push {
+            slot,
+            length,
+            at: 0,
+            word: [0xFF; WORD],
+        });
+        Ok(())
+    }
+
+    /// Writes the next part of the table, of any size; `offset` says where it belongs. Offset and length are checked before
+    /// anything is written.
+    ///
+    /// # Errors
+    /// [`StoreError::NoTable`], [`StoreError::Part`]; [`StoreError::Flash`], after which the table must be begun anew.
+    pub async fn write_table(
+        &mut self,
+        offset: usize,
+        bytes: &[u8],
+    ) -> Result<(), StoreError<F::Error>> {
+        // taken out, so that a part that fails or is cancelled ends the table
+        let mut push = self.slots.push.take().ok_or(StoreError::NoTable)?;
+        if offset != push.at || bytes.len() > push.length - push.at {
+            let wanted = push.at;
+            self.slots.push = Some(push);
+            return Err(StoreError::Part { offset, wanted });
+        }
+        let table = push.slot.start::<F>() + TABLE_AT;
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let within = push.at % WORD;
+            let word_at = table + (push.at - within) as u32;
+            if within == 0 && rest.len() >= WORD {
+                let (whole, tail) = rest.split_at(rest.len() - rest.len() % WORD);
+                self.program(word_at, whole).await?;
+                push.at += whole.len();
+                rest = tail;
+            } else {
+                let (now, tail) = rest.split_at(rest.len().min(WORD - within));
+                for (to, from) in push.word.iter_mut().skip(within).zip(now) {
+                    *to = *from;
+                }
+                push.at += now.len();
+                rest = tail;
+                if push.at.is_multiple_of(WORD) || push.at == push.length {
+                    self.program(word_at, &push.word).await?;
+                    push.word = [0xFF; WORD];
+                }
+            }
+        }
+        self.slots.push = Some(push);
+        Ok(())
+    }
+
+    /// Reads the new table back into the beginning of `room`, checks it, and commits it: from here on it is the one to be
+    /// used.
+    ///
+    /// # Errors
+    /// The former table stays then, and the new one must be begun anew, except after [`StoreError::NoTable`],
+    /// [`StoreError::Unfinished`] and [`StoreError::Buffer`].
+    pub async fn commit_table<'r>(
+        &mut self,
+        room: &'r mut [u8],
+    ) -> Result<(StoredTable, Table<'r>), StoreError<F::Error>> {
+        let push = self.slots.push.as_ref().ok_or(StoreError::NoTable)?;
+        let (slot, length, got) = (push.slot, push.length, push.at);
+        if got != length {
+            return Err(StoreError::Unfinished {
+                got,
+                wanted: length,
+            });
+        }
+        if room.len() < length {
+            return Err(StoreError::Buffer(length));
+        }
+        self.slots.push = None;
+        let start = slot.start::<F>();
+        let table = self.read_back(start + TABLE_AT, length, room).await?;
+        if table.as_bytes().len() != length {
+            return Err(StoreError::Unfinished {
+                got: length,
+                wanted: table.as_bytes().len(),
+            });
+        }
+        let stored = StoredTable {
+            offset: start + TABLE_AT,
+            length,
+            crc: table.crc(),
+            generation: self.slots.generation.saturating_add(1),
+        };
+        let header = header(&stored);
+        self.program(start, &header).await?;
+        let mut back = [0; HEADER];
+        self.read(start, &mut back).await?;
+        if back != header {
+            return Err(StoreError::Worn);
+        }
+        self.program(start + COMMIT_AT, &COMMIT.to_le_bytes())
+            .await?;
+        self.slots.generation = stored.generation;
+        if self.commit_word(slot).await? != COMMIT {
+            return Err(StoreError::Worn);
+        }
+        self.slots.active = Some((slot, stored));
+        Ok((stored, table))
+    }
+
+    /// Gives the stored tables up: from here on the factory's is to be used.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`].
+    pub async fn factory_table(&mut self) -> Result<(), StoreError<F::Error>> {
+        self.slots.push = None;
+        let Some((active, _)) = self.slots.active else {
+            return Ok(());
+        };
+        // the older one first: the active one hides it until it is given up itself
+        for slot in [active.other(), active] {
+            if self.commit_word(slot).await? == COMMIT {
+                self.program(slot.start::<F>() + COMMIT_AT, &[0; WORD])
+                    .await?;
+            }
+        }
+        self.slots.active = None;
+        Ok(())
+    }
+
+    /// Looks for the table to be used.
+    pub(super) async fn find_tables(&mut self) -> Result<(), StoreError<F::Error>> {
+        for slot in [Slot::A, Slot::B] {
+            let Some(table) = self.slot_header(slot).await? else {
+                continue;
+            };
+            self.slots.generation = self.slots.generation.max(table.generation);
+            let newer = self
+                .slots
+                .active
+                .is_none_or(|(_, other)| other.generation < table.generation);
+            if newer && self.commit_word(slot).await? == COMMIT && self.is_whole(&table).await? {
+                self.slots.active = Some((slot, table));
+            }
+        }
+        Ok(())
+    }
+
+    async fn slot_header(
+        &mut self,
+        slot: Slot,
+    ) -> Result<Option<StoredTable>, StoreError<F::Error>> {
+        let start = slot.start::<F>();
+        let mut bytes = [0; HEADER];
+        self.read(start, &mut bytes).await?;
+        let mut words = bytes
+            .as_chunks::<WORD>()
+            .0
+            .iter()
+            .map(|word| u32::from_le_bytes(*word));
+        let mut word = || words.next().unwrap_or_default();
+        let (_, _, generation, length, crc) = (word(), word(), word(), word(), word());
+        let table = StoredTable {
+            offset: start + TABLE_AT,
+            length: length as usize,
+            crc,
+            generation,
+        };
+        Ok((bytes == header(&table) && table.length <= Self::MAX_TABLE).then_some(table))
+    }
+
+    async fn commit_word(&mut self, slot: Slot) -> Result<u32, StoreError<F::Error>> {
+        let mut word = [0; WORD];
+        self.read(slot.start::<F>() + COMMIT_AT, &mut word).await?;
+        Ok(u32::from_le_bytes(word))
+    }
+
+    /// Whether the bytes of a table still have its checksum.
+    async fn is_whole(&mut self, table: &StoredTable) -> Result<bool, StoreError<F::Error>> {
+        let Some(body) = table.length.checked_sub(WORD) else {
+            return Ok(false);
+        };
+        let mut digest = CRC32.digest();
+        let mut chunk = [0; CHUNK];
+        let mut stored = [0; WORD];
+        for at in (0..table.length).step_by(CHUNK) {
+            self.read(table.offset + at as u32, &mut chunk).await?;
+            let (here, _) = chunk.split_at((table.length - at).min(CHUNK));
+            let (here, crc) = here.split_at(body.saturating_sub(at).min(here.len()));
+            digest.update(here);
+            for byte in crc {
+                let [_, a, b, c] = stored;
+                stored = [a, b, c, *byte];
+            }
+        }
+        Ok(digest.finalize() == table.crc && u32::from_le_bytes(stored) == table.crc)
+    }
+
+    async fn read_back<'r>(
+        &mut self,
+        offset: u32,
+        length: usize,
+        room: &'r mut [u8],
+    ) -> Result<Table<'r>, StoreError<F::Error>> {
+        let room = room.get_mut(..length).ok_or(StoreError::Buffer(length))?;
+        let (words, tail) = room.split_at_mut(length - length % WORD);
+        self.read(offset, words).await?;
+        if !tail.is_empty() {
+            let mut word = [0; WORD];
+            self.read(offset + words.len() as u32, &mut word).await?;
+            for (to, from) in tail.iter_mut().zip(word) {
+                *to = from;
+            }
+        }
+        Table::read(room).map_err(StoreError::Table)
+    }
+
+    async fn read(&mut self, offset: u32, room: &mut [u8]) -> Result<(), StoreError<F::Error>> {
+        self.flash
+            .read(offset, room)
+            .await
+            .map_err(StoreError::Flash)
+    }
+
+    async fn program(&mut self, offset: u32, words: &[u8]) -> Result<(), StoreError<F::Error>> {
+        self.flash
+            .write(offset, words)
+            .await
+            .map_err(StoreError::Flash)
+    }
+}
+
+fn header(table: &StoredTable) -> [u8; HEADER] {
+    let mut bytes = [0; HEADER];
+    let (body, end) = bytes.split_at_mut(HEADER - WORD);
+    let fields = [
+        MAGIC,
+        LAYOUT,
+        table.generation,
+        table.length as u32,
+        table.crc,
+    ];
+    for (room, field) in body.chunks_exact_mut(WORD).zip(fields) {
+        room.copy_from_slice(&field.to_le_bytes());
+    }
+    end.copy_from_slice(&CRC32.checksum(body).to_le_bytes());
+    bytes
+}
