@@ -15,6 +15,7 @@ pub mod pins;
 mod record;
 mod rig;
 mod serial;
+pub mod talk;
 
 pub use board::{Emulator, Error, Options};
 pub use flash::{FLASH, STORE};
