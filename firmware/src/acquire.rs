@@ -5,11 +5,11 @@ use core::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
 use core::task::Poll;
 
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
+use embassy_stm32::interrupt;
 use embassy_stm32::pac::TIM2;
 use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::Timer as SlotTimer;
-use embassy_stm32::interrupt;
 use embassy_sync::waitqueue::AtomicWaker;
 use embassy_time::Timer;
 use heapless::spsc::Producer;
@@ -112,7 +112,11 @@ pub(crate) async fn acquire(pins: board::Acquire, mut words: Producer<'static, W
             LATE.fetch_add(1, Relaxed);
             put(None);
         }
-        let channel = if slot % 2 == 0 { Channel::Pac } else { Channel::Pdc };
+        let channel = if slot % 2 == 0 {
+            Channel::Pac
+        } else {
+            Channel::Pdc
+        };
         slot = slot.wrapping_add(1);
         SLOTS.store(slot, Relaxed);
         let mut exchange = BioTac::exchange(channel);

@@ -117,7 +117,8 @@ fn TIM1_UP_TIM10() {
     }
     PHASE.store(phase, Relaxed);
     PULSE.store(pulse, Relaxed);
-    TIM1.ccr(0).write(|w| w.set_ccr(if pulse { HIGH } else { 0 }));
+    TIM1.ccr(0)
+        .write(|w| w.set_ccr(if pulse { HIGH } else { 0 }));
 }
 
 /// Steps upwards, without interrupts, until `done` says so; it is asked before every step and told how many were made. For

@@ -52,7 +52,9 @@ pub(crate) static TABLE: Mutex<ThreadModeRawMutex, Cell<TableInUse>> =
     }));
 
 /// Opens the line.
-pub(crate) fn open(pins: board::Link) -> Option<(BufferedUartTx<'static>, BufferedUartRx<'static>)> {
+pub(crate) fn open(
+    pins: board::Link,
+) -> Option<(BufferedUartTx<'static>, BufferedUartRx<'static>)> {
     static TX: ConstStaticCell<[u8; CHUNK]> = ConstStaticCell::new([0; CHUNK]);
     static RX: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
     let mut config = usart::Config::default();

@@ -1,44 +1,119 @@
-//! The rig's firmware: so far it boots the board, says which movements it knows and blinks.
+//! The rig's firmware. Who runs where, and who tells whom what:
+//!
+//! | executor | task | does | tells |
+//! |---|---|---|---|
+//! | UART4's interrupt, after TIM2 | `acquire` | a sensor word every 227 us | words to `servo` |
+//! | UART5's interrupt, before the link | `servo` | control, guard and watchdog, 1 kHz | samples to `session`, a snapshot to all |
+//! | thread mode | `session` | explorations, training, tables; owns the store | commands to `servo`, reports to `send` |
+//! | thread mode | `watch` | phases, faults and places as they change | reports to `send` |
+//! | thread mode | `receive`, `send` | frames of USART3 | requests to `session` |
+//!
+//! TIM1's interrupt, between the two, makes the lever's steps.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
+mod acquire;
+#[cfg(target_os = "none")]
 mod board;
 #[cfg(target_os = "none")]
+mod lever;
+#[cfg(target_os = "none")]
+mod link;
+#[cfg(target_os = "none")]
+mod rescue;
+#[cfg(target_os = "none")]
+mod servo;
+#[cfg(target_os = "none")]
+mod session;
+
+#[cfg(target_os = "none")]
 use {
-    board::Board, defmt_rtt as _, embassy_executor::Spawner, embassy_time::Timer, panic_probe as _,
-    tactus_core::movement::Movement,
+    acquire::{WORDS, Word},
+    defmt_rtt as _,
+    embassy_executor::{InterruptExecutor, Spawner},
+    embassy_stm32::interrupt,
+    heapless::spsc::Queue,
+    servo::{SAMPLES, Samples},
+    static_cell::ConstStaticCell,
+    tactus_core::wire::{PROTOCOL, Tell},
 };
 
 #[cfg(target_os = "none")]
+static ACQUIRE: InterruptExecutor = InterruptExecutor::new();
+#[cfg(target_os = "none")]
+static SERVO: InterruptExecutor = InterruptExecutor::new();
+
+#[cfg(target_os = "none")]
+#[interrupt]
+fn UART4() {
+    // SAFETY: called from here only, and started before the interrupt is on.
+    unsafe { ACQUIRE.on_interrupt() }
+}
+
+#[cfg(target_os = "none")]
+#[interrupt]
+fn UART5() {
+    // SAFETY: as above.
+    unsafe { SERVO.on_interrupt() }
+}
+
+#[cfg(target_os = "none")]
+defmt::timestamp!("{=u64:us}", embassy_time::Instant::now().as_micros());
+
+#[cfg(target_os = "none")]
 #[embassy_executor::main]
-async fn main(_spawner: Spawner) -> ! {
-    let mut board = Board::new();
+async fn main(thread: Spawner) {
+    static WORD_QUEUE: ConstStaticCell<Queue<Word, WORDS>> = ConstStaticCell::new(Queue::new());
+    static SAMPLE_QUEUE: ConstStaticCell<Queue<Samples, SAMPLES>> =
+        ConstStaticCell::new(Queue::new());
+    let (reset, last_words) = rescue::reset_cause();
+    let r = board::start();
     defmt::info!("tactus-rig {=str}", env!("CARGO_PKG_VERSION"));
-    for (property, movement) in [
-        ("traction", Movement::FOR_TRACTION),
-        ("fineness", Movement::FOR_FINENESS),
-        ("roughness", Movement::FOR_ROUGHNESS),
-    ] {
-        defmt::info!(
-            "{=str}: {=u16} mN, {=u32} um/s",
-            property,
-            movement.force_mn(),
-            movement.speed_um_s()
-        );
+    let (words_in, words_out) = WORD_QUEUE.take().split();
+    let (samples_in, samples_out) = SAMPLE_QUEUE.take().split();
+
+    let servo = SERVO.start(interrupt::UART5);
+    let acquire = ACQUIRE.start(interrupt::UART4);
+    if let Some((tx, rx)) = link::open(r.link) {
+        spawn(&thread, link::send(tx));
+        spawn(&thread, link::receive(rx));
     }
-    loop {
-        for led in &mut board.leds {
-            led.set_high();
-            Timer::after_millis(200).await;
-            led.set_low();
-        }
+    link::tell(Tell::Booted {
+        protocol: PROTOCOL,
+        version: env!("CARGO_PKG_VERSION").try_into().unwrap_or_default(),
+        reset,
+        last_words,
+    });
+    match servo::servo(
+        r.lever, r.stage, r.switches, r.watchdog, words_out, samples_in,
+    ) {
+        Ok(task) => servo.spawn(task),
+        Err(_) => defmt::error!("no servo"),
+    }
+    match acquire::acquire(r.acquire, words_in) {
+        Ok(task) => acquire.spawn(task),
+        Err(_) => defmt::error!("no acquisition"),
+    }
+    spawn(&thread, link::watch());
+    spawn(&thread, session::session(r.store, samples_out));
+}
+
+/// Spawns a task, of which there is only one.
+#[cfg(target_os = "none")]
+fn spawn<S>(
+    thread: &Spawner,
+    task: Result<embassy_executor::SpawnToken<S>, embassy_executor::SpawnError>,
+) {
+    match task {
+        Ok(task) => thread.spawn(task),
+        Err(_) => defmt::error!("a task was spawned twice"),
     }
 }
 
 #[cfg(not(target_os = "none"))]
 fn main() {
     eprintln!(
-        "tactus-rig is firmware for the STM32F429ZI and does nothing on a PC. Build it with `cargo xtask build`."
+        "tactus-rig is firmware for the STM32F429ZI and does nothing on a PC. Run it on the emulated board with `cargo xtask emulate`."
     );
     std::process::exit(2);
 }

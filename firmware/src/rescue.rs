@@ -86,17 +86,18 @@ fn give_up(why: &str) -> ! {
     remember(why);
     if ARMED.load(Relaxed) {
         // the bridge stays on: without duty it shorts the motor
-        TIM3.ccr(0).write_value(0);
+        TIM3.ccr(0).write(|w| w.0 = 0);
         GPIOC.bsrr().write(|w| w.set_bs(8, true));
         let mut closed = 0;
         lever::lift_by_hand(|steps| {
             pet();
             // pressed, or its wire is broken: three times, for it bounces
-            closed = if GPIOF.idr().read().idr(LEVER_TOP) == embassy_stm32::pac::gpio::vals::Idr::HIGH {
-                closed + 1
-            } else {
-                0
-            };
+            closed =
+                if GPIOF.idr().read().idr(LEVER_TOP) == embassy_stm32::pac::gpio::vals::Idr::HIGH {
+                    closed + 1
+                } else {
+                    0
+                };
             closed >= 3 || steps > MAX_STEPS as u32 * 5 / 4
         });
     }

@@ -3,8 +3,9 @@
 use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
+use embassy_stm32::Peri;
 use embassy_stm32::adc::{Adc, SampleTime};
-use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::gpio::{AnyPin, Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::qei::Qei;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
@@ -46,6 +47,7 @@ pub(crate) enum Command {
     /// A movement, and where on the sample it begins, 0 to 1.
     Start(Movement, f32),
     /// A run without load at this speed, um/s.
+    #[allow(dead_code)]
     StartUnloaded(u32),
     Calibrate(RigCalibration),
     /// Another sample may lie under the finger.
@@ -66,6 +68,7 @@ pub(crate) struct Snapshot {
     pub(crate) stage_mm: f32,
     pub(crate) velocity_mm_s: f32,
     pub(crate) current_a: f32,
+    #[allow(dead_code)]
     pub(crate) mean_current_a: Option<f32>,
     pub(crate) calibration: RigCalibration,
     pub(crate) skin: SkinCare,
@@ -75,20 +78,19 @@ static COMMAND: Signal<CriticalSectionRawMutex, Command> = Signal::new();
 static ANSWER: Signal<CriticalSectionRawMutex, Result<(), Refused>> = Signal::new();
 /// Stop and lift, whatever is being done.
 static STOP: AtomicBool = AtomicBool::new(false);
-static SNAPSHOT: Mutex<CriticalSectionRawMutex, Cell<Snapshot>> =
-    Mutex::new(Cell::new(Snapshot {
-        phase: Phase::Parked,
-        at_rest: true,
-        ended: None,
-        force_mn: 0.0,
-        steps: 0,
-        stage_mm: 0.0,
-        velocity_mm_s: 0.0,
-        current_a: 0.0,
-        mean_current_a: None,
-        calibration: UNMEASURED,
-        skin: SkinCare::NEW,
-    }));
+static SNAPSHOT: Mutex<CriticalSectionRawMutex, Cell<Snapshot>> = Mutex::new(Cell::new(Snapshot {
+    phase: Phase::Parked,
+    at_rest: true,
+    ended: None,
+    force_mn: 0.0,
+    steps: 0,
+    stage_mm: 0.0,
+    velocity_mm_s: 0.0,
+    current_a: 0.0,
+    mean_current_a: None,
+    calibration: UNMEASURED,
+    skin: SkinCare::NEW,
+}));
 /// Samples that found no room.
 pub(crate) static LOST: AtomicU32 = AtomicU32::new(0);
 /// Milliseconds since the tasks in thread mode have checked in.
@@ -167,10 +169,15 @@ pub(crate) async fn servo(
     pwm.enable();
     let mut bridge = Output::new(stage.enable, Level::Low, Speed::Low);
     let mut right = Output::new(stage.direction, Level::Low, Speed::Low);
-    let encoder = Qei::new(stage.encoder, stage.encoder_a, stage.encoder_b, Default::default());
+    let encoder = Qei::new(
+        stage.encoder,
+        stage.encoder_a,
+        stage.encoder_b,
+        Default::default(),
+    );
     let mut adc = Adc::new(stage.adc);
     let mut current = stage.current;
-    let switch = |pin| Input::new(pin, Pull::Up);
+    let switch = |pin: Peri<'static, AnyPin>| Input::new(pin, Pull::Up);
     let switches = Switches {
         lever_top: switch(switches.lever_top.into()),
         stage_left: switch(switches.stage_left.into()),
