@@ -93,23 +93,19 @@ pub(crate) fn explore(cli: &Cli, chosen: &Chosen, sha256: &str) -> anyhow::Resul
         |board, _| logged(board),
         |tell| matches!(tell, Tell::Booted { .. }).then_some(Ok(())),
     )?;
-    talk.wait(
-        PATIENCE_S,
-        |board, _| {
-            bar.set_message(format!(
-                "looking for the limit switches, {:.1} s",
-                now(board)
-            ));
-            logged(board);
-        },
-        |tell| match tell {
-            Tell::Phase(Phase::Ready) => Some(Ok(())),
-            Tell::Fault(fault) => Some(Err(tactus_emulator::talk::TalkError::Refused(
-                fault.to_string(),
-            ))),
-            _ => None,
-        },
-    )?;
+    let mut homing = |board: &mut Emulator, _: Option<&Report>| {
+        bar.set_message(format!("looking for the limit switches, {:.1} s", now(board)));
+        logged(board);
+    };
+    let fault = talk.wait(PATIENCE_S, &mut homing, |tell| match tell {
+        Tell::Phase(Phase::Ready) => Some(Ok(None)),
+        Tell::Fault(fault) => Some(Ok(Some(*fault))),
+        _ => None,
+    })?;
+    if let Some(fault) = fault {
+        bar.suspend(|| eprintln!("fault while homing: {fault}; homing again"));
+        talk.ask(Ask::Home, PATIENCE_S, &mut homing)?;
+    }
     bar.finish_and_clear();
     let write = Ask::WriteCalibration(calibration.to_bytes().into_iter().collect());
     talk.ask(write, PATIENCE_S, |board, _| logged(board))?;

@@ -576,3 +576,6 @@ impl Board {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
