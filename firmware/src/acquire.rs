@@ -127,6 +127,10 @@ pub(crate) async fn acquire(pins: board::Acquire, mut words: Producer<'static, W
             select.set_high();
         }
         let late = TIM2.cnt().read() > LATE_TICKS;
+        if !late {
+            // this slot's is yet to come: one that is there belongs to a slot that was not served
+            DUE.fetch_and(!READ, Relaxed);
+        }
         due(READ).await;
         if late {
             LATE.fetch_add(1, Relaxed);

@@ -89,13 +89,14 @@ pub(crate) fn start() -> AssignedResources {
         Speed::Low,
         Pull::Down,
     ));
-    // The slots of the sensor before all, then the lever's steps, the clock, the servo, the link.
+    // The slots of the sensor before all; a byte of the link waits at most 10.8 us, then it is lost; the lever's steps, the
+    // clock and the servo have more time.
     interrupt::TIM2.set_priority(Priority::P0);
     interrupt::UART4.set_priority(Priority::P1);
-    interrupt::TIM1_UP_TIM10.set_priority(Priority::P2);
-    interrupt::TIM5.set_priority(Priority::P3);
-    interrupt::UART5.set_priority(Priority::P4);
-    interrupt::USART3.set_priority(Priority::P5);
+    interrupt::USART3.set_priority(Priority::P2);
+    interrupt::TIM1_UP_TIM10.set_priority(Priority::P3);
+    interrupt::TIM5.set_priority(Priority::P4);
+    interrupt::UART5.set_priority(Priority::P5);
     interrupt::FLASH.set_priority(Priority::P6);
     r
 }

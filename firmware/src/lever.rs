@@ -4,7 +4,9 @@ use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering::Relaxed};
 
 use embassy_stm32::gpio::{Level, Output, OutputType, Speed};
 use embassy_stm32::interrupt;
-use embassy_stm32::pac::{GPIOE, TIM1, timer::vals::Ocm};
+use embassy_stm32::pac::{GPIOE, TIM1 as REGISTERS, timer::vals::Ocm};
+use embassy_stm32::peripherals::TIM1;
+use embassy_stm32::timer::Ch1;
 use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::timer::simple_pwm::PwmPin;
 
@@ -31,32 +33,34 @@ static PHASE: AtomicU32 = AtomicU32::new(0);
 pub(crate) struct Lever {
     enable: Output<'static>,
     _direction: Output<'static>,
-    _timer: Timer<'static, embassy_stm32::peripherals::TIM1>,
+    _step: PwmPin<'static, TIM1, Ch1>,
+    _timer: Timer<'static, TIM1>,
 }
 
 impl Lever {
     /// Takes the pins: no current, no steps.
     pub(crate) fn new(pins: board::Lever) -> Self {
-        let _ = PwmPin::new(pins.step, OutputType::PushPull);
+        let step = PwmPin::new(pins.step, OutputType::PushPull);
         let timer = Timer::new(pins.timer);
-        TIM1.psc().write_value(PRESCALER);
-        TIM1.arr().write(|w| w.set_arr(PERIOD - 1));
-        TIM1.ccmr_output(0).modify(|w| {
+        REGISTERS.psc().write_value(PRESCALER);
+        REGISTERS.arr().write(|w| w.set_arr(PERIOD - 1));
+        REGISTERS.ccmr_output(0).modify(|w| {
             w.set_ocm(0, Ocm::PWM_MODE1);
             w.set_ocpe(0, true);
         });
-        TIM1.ccr(0).write(|w| w.set_ccr(0));
-        TIM1.ccer().modify(|w| w.set_cce(0, true));
-        TIM1.bdtr().modify(|w| w.set_moe(true));
+        REGISTERS.ccr(0).write(|w| w.set_ccr(0));
+        REGISTERS.ccer().modify(|w| w.set_cce(0, true));
+        REGISTERS.bdtr().modify(|w| w.set_moe(true));
         // loads prescaler and compare
-        TIM1.egr().write(|w| w.set_ug(true));
-        TIM1.sr().write(|w| w.0 = 0);
-        TIM1.dier().write(|w| w.set_uie(true));
+        REGISTERS.egr().write(|w| w.set_ug(true));
+        REGISTERS.sr().write(|w| w.0 = 0);
+        REGISTERS.dier().write(|w| w.set_uie(true));
         // SAFETY: the handler is below, its state is ready.
         unsafe { interrupt::InterruptExt::enable(interrupt::TIM1_UP_TIM10) };
         Self {
             enable: Output::new(pins.enable, Level::Low, Speed::Low),
             _direction: Output::new(pins.direction, Level::Low, Speed::Low),
+            _step: step,
             _timer: timer,
         }
     }
@@ -74,14 +78,14 @@ impl Lever {
         }
         if rate != 0 {
             // the handler lets the timer run while there is a rate
-            TIM1.cr1().modify(|w| w.set_cen(true));
+            REGISTERS.cr1().modify(|w| w.set_cen(true));
         }
     }
 }
 
 #[interrupt]
 fn TIM1_UP_TIM10() {
-    TIM1.sr().write(|w| w.0 = 0);
+    REGISTERS.sr().write(|w| w.0 = 0);
     let rate = RATE.load(Relaxed);
     let mut down = DOWN.load(Relaxed);
     let pulses_now = PULSE.load(Relaxed);
@@ -93,7 +97,7 @@ fn TIM1_UP_TIM10() {
         // the next rate begins with a step
         phase = BASE_HZ;
         if !pulses_now {
-            TIM1.cr1().modify(|w| w.set_cen(false));
+            REGISTERS.cr1().modify(|w| w.set_cen(false));
         }
     } else if (rate > 0) != down && !pulses_now {
         // a whole period before the next pulse can come
@@ -117,19 +121,20 @@ fn TIM1_UP_TIM10() {
     }
     PHASE.store(phase, Relaxed);
     PULSE.store(pulse, Relaxed);
-    TIM1.ccr(0)
+    REGISTERS
+        .ccr(0)
         .write(|w| w.set_ccr(if pulse { HIGH } else { 0 }));
 }
 
 /// Steps upwards, without interrupts, until `done` says so; it is asked before every step and told how many were made. For
 /// when nothing else works any more.
 pub(crate) fn lift_by_hand(mut done: impl FnMut(u32) -> bool) {
-    TIM1.dier().write(|w| w.set_uie(false));
-    TIM1.ccr(0).write(|w| w.set_ccr(0));
-    TIM1.cr1().modify(|w| w.set_cen(true));
+    REGISTERS.dier().write(|w| w.set_uie(false));
+    REGISTERS.ccr(0).write(|w| w.set_ccr(0));
+    REGISTERS.cr1().modify(|w| w.set_cen(true));
     let period = || {
-        TIM1.sr().write(|w| w.0 = 0);
-        while !TIM1.sr().read().uif() {}
+        REGISTERS.sr().write(|w| w.0 = 0);
+        while !REGISTERS.sr().read().uif() {}
     };
     // the pulse that may be under way
     period();
@@ -140,10 +145,10 @@ pub(crate) fn lift_by_hand(mut done: impl FnMut(u32) -> bool) {
     period();
     let mut steps = 0;
     while !done(steps) {
-        TIM1.ccr(0).write(|w| w.set_ccr(HIGH));
+        REGISTERS.ccr(0).write(|w| w.set_ccr(HIGH));
         period();
         steps += 1;
     }
-    TIM1.ccr(0).write(|w| w.set_ccr(0));
+    REGISTERS.ccr(0).write(|w| w.set_ccr(0));
     period();
 }

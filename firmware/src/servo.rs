@@ -47,7 +47,6 @@ pub(crate) enum Command {
     /// A movement, and where on the sample it begins, 0 to 1.
     Start(Movement, f32),
     /// A run without load at this speed, um/s.
-    #[allow(dead_code)]
     StartUnloaded(u32),
     Calibrate(RigCalibration),
     /// Another sample may lie under the finger.
@@ -68,7 +67,6 @@ pub(crate) struct Snapshot {
     pub(crate) stage_mm: f32,
     pub(crate) velocity_mm_s: f32,
     pub(crate) current_a: f32,
-    #[allow(dead_code)]
     pub(crate) mean_current_a: Option<f32>,
     pub(crate) calibration: RigCalibration,
     pub(crate) skin: SkinCare,

@@ -7,23 +7,25 @@ use heapless::Vec;
 use heapless::spsc::Consumer;
 use static_cell::ConstStaticCell;
 use tactus_core::explorer::{Config, Explorer};
-use tactus_core::features::{Plan, PropertySet, Slide};
-use tactus_core::kernels::Kernels;
+use tactus_core::features::{Plan, Slide};
+use tactus_core::kernels::Plain;
 use tactus_core::movement::Movement;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::rig::control::{Ended, Phase, Refused};
+use tactus_core::rig::control::Phase;
 use tactus_core::rig::guard::Fault;
-use tactus_core::rig::pins::Felt;
-use tactus_core::rig::{Event, Rig, explore};
+use tactus_core::rig::unloaded::UnloadedRuns;
+use tactus_core::rig::{Event, MAX_REJECTED, Rig as _, explore};
 use tactus_core::store::{Store, StoreError};
-use tactus_core::table::Table;
+use tactus_core::table::{MAX_ACTIONS, MAX_MOVEMENTS, Table};
+use tactus_core::training::{Training, Wanted};
 use tactus_core::wire::{
-    self, Ask, Block, Identify, MAX_OUTLOOK, MAX_TEXTURES, Name, PART, Promise, Tell,
+    Ask, Identify, MAX_OUTLOOK, MAX_TEXTURES, Name, PART, Promise, Tell, Text, Train,
 };
 
-use crate::link::{BUSY, JOBS, STREAM, TABLE, TableInUse, refuse, tell, text};
+use crate::board;
+use crate::link::{self, BUSY, JOBS, TABLE, TableInUse, refuse, tell, text};
+use crate::probe::Probe;
 use crate::servo::{self, Command, Samples};
-use crate::{acquire, board};
 
 /// The table that comes with the firmware: textures of a simulated world, good for the emulated board. A real rig is
 /// taught, or given a table.
@@ -31,209 +33,10 @@ static FACTORY: &[u8] = include_bytes!("../factory.tact");
 /// Bank 2 in the chip's memory: memory.x, STORE.
 const STORE_AT: usize = 0x0810_0000;
 const STORE_LENGTH: usize = 64 * 1024;
-/// A movement that takes longer than this does not end.
-const PATIENCE_MS: u32 = 120_000;
-/// How often the samples are looked after.
-const LOOK_MS: u64 = 10;
+/// The sensor's first words are there by now.
+const HEARD_MS: u64 = 150;
 
 type Storage = Store<Bank2Region1<'static, Async>>;
-
-/// Why a movement of this probe failed.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) enum ProbeError {
-    Refused(Refused),
-    Fault(Fault),
-    Stopped,
-    Hangs,
-}
-
-impl core::fmt::Display for ProbeError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Refused(why) => why.fmt(f),
-            Self::Fault(fault) => {
-                let recovery = fault.row().map_or("reset", |row| row.recovery);
-                write!(f, "{fault}: {recovery}")
-            }
-            Self::Stopped => f.write_str("stopped"),
-            Self::Hangs => f.write_str("the rig does not come to an end: home it"),
-        }
-    }
-}
-
-impl core::error::Error for ProbeError {}
-
-/// The rig that the servo moves, as the exploration sees it.
-struct Probe {
-    samples: Consumer<'static, Samples>,
-    random: u32,
-}
-
-impl Probe {
-    /// Xorshift: for where slides begin and for random choices, not for secrets.
-    fn random(&mut self) -> u32 {
-        self.random ^= self.random << 13;
-        self.random ^= self.random >> 17;
-        self.random ^= self.random << 5;
-        self.random
-    }
-
-    /// 0 to 1.
-    fn start(&mut self) -> f32 {
-        (self.random() >> 8) as f32 / (1 << 24) as f32
-    }
-
-    /// Waits until the rig is at rest; `each` is called every [`LOOK_MS`], and once more at the end.
-    async fn rest(
-        &mut self,
-        mut each: impl FnMut(&mut Consumer<'static, Samples>),
-    ) -> Result<Option<Ended>, ProbeError> {
-        let mut left_ms = PATIENCE_MS;
-        loop {
-            Timer::after_millis(LOOK_MS).await;
-            // before the samples, so that none of a movement that is over is left behind
-            let rig = servo::snapshot();
-            each(&mut self.samples);
-            match rig.phase {
-                Phase::Faulted(fault) if rig.at_rest => return Err(ProbeError::Fault(fault)),
-                _ if rig.at_rest => return Ok(rig.ended),
-                _ => {}
-            }
-            left_ms = left_ms.saturating_sub(LOOK_MS as u32);
-            if left_ms == 0 {
-                servo::stop();
-                return Err(ProbeError::Hangs);
-            }
-        }
-    }
-
-    async fn home(&mut self) -> Result<(), ProbeError> {
-        servo::command(Command::Home)
-            .await
-            .map_err(ProbeError::Refused)?;
-        self.rest(|_| ()).await.map(|_| ())
-    }
-}
-
-/// Raw samples on their way to the host, in blocks.
-struct Blocks {
-    block: Block,
-}
-
-impl Blocks {
-    const EMPTY: Block = Block {
-        number: 0,
-        still: true,
-        steady: None,
-        pac: Vec::new(),
-        shear_mn: Vec::new(),
-        lost: 0,
-    };
-
-    fn send(&mut self) {
-        let number = self.block.number.wrapping_add(1);
-        let still = self.block.still;
-        let block = core::mem::replace(&mut self.block, Self::EMPTY);
-        tell(Tell::Block(block));
-        self.block.number = number;
-        self.block.still = still;
-    }
-
-    fn put(&mut self, samples: &Samples) {
-        let still = samples.felt == Felt::Still;
-        let full = self.block.pac.len() + samples.pac.len() > self.block.pac.capacity()
-            || self.block.shear_mn.is_full();
-        let begins = matches!(samples.felt, Felt::Begin(_));
-        if (full || still != self.block.still || begins)
-            && !(self.block.pac.is_empty() && self.block.shear_mn.is_empty())
-        {
-            self.send();
-        }
-        self.block.still = still;
-        if let Felt::Begin(steady) = &samples.felt {
-            self.block.steady = Some((steady.start, steady.end));
-        }
-        // there is room: a block takes many of these
-        let _ = self.block.pac.extend_from_slice(&samples.pac);
-        if let Some(shear_mn) = samples.shear_mn {
-            let _ = self.block.shear_mn.push(shear_mn);
-        }
-    }
-
-    fn end(mut self, lost: u32) {
-        self.block.lost = lost;
-        self.send();
-    }
-}
-
-impl Rig for Probe {
-    type Error = ProbeError;
-
-    fn measures(&self) -> PropertySet {
-        PropertySet::ALL
-    }
-
-    async fn perform<K: Kernels>(
-        &mut self,
-        movement: Movement,
-        slide: &mut Slide<'_, K>,
-    ) -> Result<(), ProbeError> {
-        if servo::snapshot().phase == Phase::Parked {
-            self.home().await?;
-        }
-        while self.samples.dequeue().is_some() {}
-        let lost = || {
-            acquire::LOST
-                .load(Relaxed)
-                .wrapping_add(servo::LOST.load(Relaxed))
-        };
-        let lost_before = lost();
-        let start = self.start();
-        servo::command(Command::Start(movement, start))
-            .await
-            .map_err(ProbeError::Refused)?;
-        let mut blocks = STREAM.load(Relaxed).then_some(Blocks {
-            block: Blocks::EMPTY,
-        });
-        let ended = self
-            .rest(|queue| {
-                while let Some(samples) = queue.dequeue() {
-                    feel(&samples, slide);
-                    if let Some(blocks) = &mut blocks {
-                        blocks.put(&samples);
-                    }
-                }
-            })
-            .await;
-        let gap = match ended {
-            Ok(Some(Ended::Gap(samples))) => samples,
-            _ => 0,
-        };
-        let gap = gap + lost().wrapping_sub(lost_before);
-        if gap > 0 {
-            slide.lose(gap);
-        }
-        if let Some(blocks) = blocks {
-            blocks.end(gap);
-        }
-        match ended? {
-            Some(Ended::Whole | Ended::Gap(_)) => Ok(()),
-            Some(Ended::Stopped) | None => Err(ProbeError::Stopped),
-        }
-    }
-}
-
-/// Gives what a tick felt to the core.
-fn feel<K: Kernels>(samples: &Samples, slide: &mut Slide<'_, K>) {
-    match &samples.felt {
-        Felt::Nothing => return,
-        Felt::Still => return slide.push_still(&samples.pac),
-        Felt::Begin(steady) => slide.start(steady.clone()),
-        Felt::Slide => {}
-    }
-    slide.push(&samples.pac);
-    slide.push_shear(samples.shear_mn.as_slice());
-}
 
 #[embassy_executor::task]
 pub(crate) async fn session(flash: board::Storage, samples: Consumer<'static, Samples>) {
@@ -251,17 +54,15 @@ pub(crate) async fn session(flash: board::Storage, samples: Consumer<'static, Sa
             None
         }
     };
-    let mut probe = Probe {
-        samples,
-        random: 0x2012_0618,
-    };
+    let mut probe = Probe::new(samples);
     if let Some(store) = &mut store {
         if let Err(why) = restore(store).await {
             defmt::error!("settings are not read: {=str}", text(&why).as_str());
         }
     }
     use_table(store.as_ref());
-    // whatever was before the reset, the finger is lifted first
+    // Whatever was before the reset, the finger is lifted first. Homing wants to hear the sensor.
+    Timer::after_millis(HEARD_MS).await;
     let _ = probe.home().await;
     loop {
         BUSY.store(false, Relaxed);
@@ -295,7 +96,10 @@ fn table_bytes(store: Option<&Storage>) -> &'static [u8] {
         let store = unsafe { core::slice::from_raw_parts(STORE_AT as *const u8, STORE_LENGTH) };
         store.get(at..at.checked_add(table.length)?)
     });
-    stored.unwrap_or(FACTORY)
+    // one that another version of this firmware wrote is not understood
+    stored
+        .filter(|bytes| Table::read(bytes).is_ok())
+        .unwrap_or(FACTORY)
 }
 
 fn use_table(store: Option<&Storage>) {
@@ -306,7 +110,7 @@ fn use_table(store: Option<&Storage>) {
                 textures: table.textures(),
                 bytes: bytes.len() as u32,
                 crc: table.crc(),
-                factory: store.is_none_or(|store| store.table().is_none()),
+                factory: core::ptr::eq(bytes, FACTORY),
             });
         });
     }
@@ -319,7 +123,7 @@ async fn work(
     store: &mut Option<Storage>,
     plan: &Plan,
     room: &mut [u8],
-) -> Result<(), wire::Text> {
+) -> Result<(), Text> {
     let no_store = || text("the store is broken: see the log");
     match ask {
         Ask::Home => probe.home().await.map_err(text),
@@ -340,8 +144,7 @@ async fn work(
             servo::command(Command::Calibrate(calibration))
                 .await
                 .map_err(text)?;
-            let store = store.as_mut().ok_or_else(no_store)?;
-            store.set_calibration(&calibration).await.map_err(text)
+            keep(store.as_mut().ok_or_else(no_store)?, &calibration).await
         }
         Ask::ReadTable(offset) => {
             let bytes = table_bytes(store.as_ref());
@@ -362,10 +165,11 @@ async fn work(
         }
         Ask::WriteTable { offset, bytes } => {
             let store = store.as_mut().ok_or_else(no_store)?;
-            store
-                .write_table(offset as usize, &bytes)
-                .await
-                .map_err(text)
+            match store.write_table(offset as usize, &bytes).await {
+                // said again by a host that did not hear the answer; the table's checksum is looked at in the end
+                Err(StoreError::Part { offset, wanted }) if offset + bytes.len() == wanted => Ok(()),
+                written => written.map_err(text),
+            }
         }
         Ask::CommitTable => {
             let opened = store.as_mut().ok_or_else(no_store)?;
@@ -379,7 +183,18 @@ async fn work(
             use_table(store.as_ref());
             Ok(())
         }
-        Ask::Train(_) | Ask::Calibrate => Err(text("todo")),
+        Ask::Calibrate => {
+            let calibration = calibrate(probe).await?;
+            tell(link::calibration());
+            keep(store.as_mut().ok_or_else(no_store)?, &calibration).await
+        }
+        Ask::Train(wanted) => {
+            let store = store.as_mut().ok_or_else(no_store)?;
+            let done = train(&wanted, probe, store, plan, room).await;
+            use_table(Some(store));
+            let _ = store.set_skin(&servo::snapshot().skin).await;
+            done
+        }
         Ask::Status | Ask::Stop | Ask::Stream(_) | Ask::ReadCalibration => Ok(()),
     }
 }
@@ -390,7 +205,7 @@ async fn explore_once(
     probe: &mut Probe,
     table: &'static [u8],
     plan: &Plan,
-) -> Result<(), wire::Text> {
+) -> Result<(), Text> {
     let table = Table::read(table).map_err(text)?;
     let config = Config {
         strategy: identify.strategy,
@@ -404,8 +219,7 @@ async fn explore_once(
         Explorer::among(table, probe.measures(), config, candidates)
     }
     .map_err(text)?;
-    // 0 would stay 0
-    probe.random = identify.seed.max(1);
+    probe.seed(identify.seed);
     let _ = servo::command(Command::SampleChanged).await;
     let mut random = identify.seed.rotate_left(16).max(1);
     let mut slide: u8 = 1;
@@ -421,7 +235,7 @@ async fn explore_once(
         },
         |event| match event {
             Event::Chosen(action, outlook) => {
-                let mut best: Vec<Promise, { tactus_core::table::MAX_ACTIONS }> = outlook
+                let mut best: Vec<Promise, MAX_ACTIONS> = outlook
                     .iter()
                     .map(|o| Promise {
                         action: o.action,
@@ -464,5 +278,106 @@ async fn explore_once(
         sure: verdict.sure,
         slides: explorer.slides(),
     });
+    Ok(())
+}
+
+/// Measures the motor's current without load and takes it into use.
+async fn calibrate(probe: &mut Probe) -> Result<RigCalibration, Text> {
+    if servo::snapshot().phase == Phase::Parked {
+        probe.home().await.map_err(text)?;
+    }
+    let mut runs = UnloadedRuns::default();
+    while let Some(speed_um_s) = runs.next_speed() {
+        let (from_mm, to_mm, current_a) = probe.run_unloaded(speed_um_s).await.map_err(text)?;
+        runs.took(from_mm, to_mm, current_a);
+    }
+    let calibration = runs.finish(&servo::snapshot().calibration).map_err(text)?;
+    servo::command(Command::Calibrate(calibration))
+        .await
+        .map_err(text)?;
+    Ok(calibration)
+}
+
+/// Keeps a calibration. Settings that cannot be read have lost theirs: they are begun anew.
+async fn keep(store: &mut Storage, calibration: &RigCalibration) -> Result<(), Text> {
+    if store.settings().is_err() {
+        store.erase_settings().await.map_err(text)?;
+    }
+    store.set_calibration(calibration).await.map_err(text)
+}
+
+/// Learns the texture under the finger, going on where an earlier training of it stopped; every trial is stored at once.
+async fn train(
+    wanted: &Train,
+    probe: &mut Probe,
+    store: &mut Storage,
+    plan: &Plan,
+    room: &mut [u8],
+) -> Result<(), Text> {
+    let table = Table::read(table_bytes(Some(store))).map_err(text)?;
+    let name = wanted.name.as_str();
+    let mut training = Training::new(
+        Wanted {
+            name,
+            trials: wanted.trials,
+            pilot: wanted.pilot,
+            measures: probe.measures(),
+        },
+        Some(&table),
+        Storage::MAX_TABLE,
+    )
+    .map_err(text)?;
+    let movements: Vec<Movement, MAX_MOVEMENTS> =
+        training.learned().iter().map(|(m, _)| *m).collect();
+    for movement in movements {
+        let before = store.trained(name, movement, training.table()).await;
+        if let Some(experience) = before.map_err(text)? {
+            training.resume(movement, experience).map_err(text)?;
+        }
+    }
+    probe.seed(wanted.seed);
+    let _ = servo::command(Command::SampleChanged).await;
+    let mut rejected = 0;
+    while let Some(movement) = training.next() {
+        let mut slide = Slide::<Plain>::new(plan);
+        probe.perform(movement, &mut slide).await.map_err(text)?;
+        let measurement = match slide.finish() {
+            Ok(measurement) => measurement,
+            Err(why) => {
+                rejected += 1;
+                tell(Tell::Rejected {
+                    slide: rejected,
+                    why: text(why),
+                });
+                if rejected == MAX_REJECTED {
+                    return Err(text(Fault::Rejected));
+                }
+                continue;
+            }
+        };
+        rejected = 0;
+        let trained = training
+            .took(movement, &measurement.properties)
+            .map_err(text)?;
+        store.set_trained(&trained).await.map_err(text)?;
+        tell(Tell::Learned {
+            movement,
+            trial: trained.experience.trials(),
+            left: training.left(),
+            felt: (&measurement).into(),
+        });
+    }
+    if training.makes_table() {
+        let length = {
+            let new = training.encode(Some(&table), room).map_err(text)?;
+            new.as_bytes().len()
+        };
+        store.begin_table(length).await.map_err(text)?;
+        let bytes = room.get(..length).unwrap_or_default();
+        store.write_table(0, bytes).await.map_err(text)?;
+        store.commit_table(room).await.map_err(text)?;
+        // what the table holds now need not be kept beside it
+        store.forget_trained(name).await.map_err(text)?;
+    }
     Ok(())
 }

@@ -3,7 +3,10 @@
 pub mod collection;
 pub mod evaluate;
 pub mod experiment;
+pub mod follow;
 pub mod import;
+pub mod link;
+pub mod played;
 pub mod properties;
 pub mod recordings;
 pub mod replay;

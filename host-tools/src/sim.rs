@@ -11,6 +11,7 @@ pub mod faults;
 pub mod finger;
 pub mod lever;
 mod noise;
+pub mod played;
 pub mod sensor;
 pub mod stage;
 pub mod surface;

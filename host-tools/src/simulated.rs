@@ -15,6 +15,7 @@ use tactus_core::rig::control::{Control, Ended, Phase, Refused};
 use tactus_core::rig::guard::{Fault, Unguarded};
 use tactus_core::rig::pins::{Felt, Inputs, Outputs};
 use tactus_core::rig::stage::StageConstants;
+use tactus_core::rig::unloaded::UnloadedRuns;
 use tactus_core::rig::{MAX_REJECTED, Rig};
 use tactus_core::sensor::PressureSensor as _;
 
@@ -281,32 +282,22 @@ impl SimRig {
     /// # Errors
     /// See [`SimError`].
     pub fn calibrate_current(&mut self) -> Result<RigCalibration, SimError> {
-        let mut fit = LineFit::default();
-        for speed_um_s in [10_000u32, 25_000, 40_000, 63_000] {
-            for current_a in self.unloaded_to_the_right(speed_um_s)? {
-                fit.push(speed_um_s as f32 * 1e-3, current_a);
-            }
+        let mut runs = UnloadedRuns::default();
+        while let Some(speed_um_s) = runs.next_speed() {
+            let (from, to, current_a) = self.run_unloaded(speed_um_s)?;
+            runs.took(from, to, current_a);
         }
-        let calibration = RigCalibration {
-            unloaded_a: fit.line()?,
-            ..*self.control.calibration()
-        };
+        let calibration = runs.finish(self.control.calibration())?;
         self.control.calibrate(calibration)?;
         Ok(calibration)
     }
 
-    /// Mean motor current of a run there and back, as far as it drove the stage to the right: the way of every slide.
-    fn unloaded_to_the_right(&mut self, speed_um_s: u32) -> Result<Vec<f32>, SimError> {
-        let mut currents = Vec::new();
-        for _ in 0..2 {
-            let from = self.world.truth().stage_mm;
-            self.control.start_unloaded(speed_um_s)?;
-            self.rest(|_| ())?;
-            if self.world.truth().stage_mm > from {
-                currents.extend(self.control.mean_current_a());
-            }
-        }
-        Ok(currents)
+    /// Where the stage stood before a run over the sample and after it, and its mean motor current.
+    fn run_unloaded(&mut self, speed_um_s: u32) -> Result<(f32, f32, Option<f32>), SimError> {
+        let from = self.control.stage_mm();
+        self.control.start_unloaded(speed_um_s)?;
+        self.rest(|_| ())?;
+        Ok((from, self.control.stage_mm(), self.control.mean_current_a()))
     }
 
     /// The sensor's serial number, asked for between two slots.
@@ -347,8 +338,13 @@ impl SimRig {
         let mut incline = LineFit::default();
         for pull_n in [0.0f32, 1.0, 2.0, 3.0] {
             self.world.incline(pull_n.into());
-            for current_a in self.unloaded_to_the_right(25_000)? {
-                incline.push(pull_n, current_a);
+            for _ in 0..2 {
+                // to the right: the way of every slide
+                if let (from, to, Some(current_a)) = self.run_unloaded(25_000)?
+                    && to > from
+                {
+                    incline.push(pull_n, current_a);
+                }
             }
         }
         self.world.incline(0.0);

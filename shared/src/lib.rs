@@ -23,4 +23,5 @@ pub mod sensor;
 pub mod spectrum;
 pub mod store;
 pub mod table;
+pub mod training;
 pub mod wire;

@@ -171,3 +171,6 @@ impl<F: NorFlash> Store<F> {
         self.flash
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -33,7 +33,7 @@ use crate::movement::{Movement, MovementError};
 mod encode;
 mod experience;
 
-pub use encode::{EncodeError, Texture, encode, encoded_len};
+pub use encode::{EncodeError, Texture, amend, encode, encoded_len};
 pub use experience::{Experience, Gaussian};
 
 const MAGIC: [u8; 4] = *b"TACT";
@@ -402,7 +402,7 @@ impl<'a> Table<'a> {
     }
 
     /// The names, in the order of the textures' indices.
-    pub fn names(&self) -> impl Iterator<Item = &'a str> + use<'a> {
+    pub fn names(&self) -> impl Iterator<Item = &'a str> + Clone + use<'a> {
         let table = *self;
         let mut at = self.layout().names;
         (0..self.textures).map_while(move |_| {

@@ -8,6 +8,7 @@ mod skin;
 mod vibration;
 
 use super::noise::Noise;
+use super::played::{PlayCounts, Playback, Played};
 use super::surface::Surface;
 use super::{TICK_S, TRIAL_VARIATION};
 use amplifier::Amplifiers;
@@ -99,6 +100,8 @@ pub struct Finger {
     slipping: bool,
     shear_n: f64,
     wear: f64,
+    /// recorded slides instead of what the surface does
+    playback: Option<Playback>,
 }
 
 impl Finger {
@@ -116,6 +119,7 @@ impl Finger {
             slipping: false,
             shear_n: 0.0,
             wear: 0.0,
+            playback: None,
             noise,
         }
     }
@@ -128,8 +132,24 @@ impl Finger {
         self
     }
 
+    /// From now on slides feel like these, in an order that `seed` gives; without any, like the surface again.
+    pub fn play(&mut self, slides: Vec<Played>, seed: u64) {
+        self.playback = (!slides.is_empty()).then(|| Playback::new(slides, seed));
+    }
+
+    /// What has been played.
+    pub fn played(&self) -> PlayCounts {
+        self.playback
+            .as_ref()
+            .map_or_else(PlayCounts::default, Playback::counts)
+    }
+
     /// Advances by [`TICK_S`].
     pub fn tick(&mut self, contact: &Contact<'_>) {
+        if let Some(playback) = &mut self.playback {
+            let touching = contact.surface.is_some() && contact.indentation_mm > 0.0;
+            playback.tick(touching, contact.speed_mm_s);
+        }
         let white = self.noise.white();
         let mut pressure_pa = contact.lever_vibration;
         match contact.surface {
@@ -213,7 +233,9 @@ impl Finger {
         let kick = (2.0 * memory).sqrt() * UNSTEADY * (speed_mm_s.abs() / UNSTEADY_AT_MM_S).sqrt();
         self.unsteady += -memory * self.unsteady + kick * self.noise.white()[0];
         let adhesion = touch::ADHESION_N * touch.adhesion;
-        let kinetic = (self.friction * (1.0 + self.unsteady) * load_n + adhesion).max(0.0);
+        let simulated = self.friction * (1.0 + self.unsteady) * load_n + adhesion;
+        let played = self.playback.as_ref().and_then(Playback::shear_n);
+        let kinetic = played.unwrap_or(simulated).max(0.0);
 
         let opposes = self.shear_n * speed_mm_s < 0.0;
         self.slipping &= opposes;
@@ -250,7 +272,22 @@ impl Finger {
 
     /// Samples P_AC, in counts, `fraction` (0..1) of a tick after the last but one.
     pub fn sample_pac(&mut self, fraction: f64) -> u16 {
-        self.amplifiers.sample_pac(fraction, &mut self.noise)
+        let Some(playback) = &mut self.playback else {
+            return self.amplifiers.sample_pac(fraction, &mut self.noise);
+        };
+        match playback.pac(fraction) {
+            // its noise is in the recording
+            Some(recorded) => {
+                let about_rest =
+                    recorded.unwrap_or_else(|| self.amplifiers.pac_noise(&mut self.noise));
+                let (counts, clipped) = self.amplifiers.convert_pac(about_rest);
+                if clipped {
+                    playback.clipped();
+                }
+                counts
+            }
+            None => self.amplifiers.sample_pac(fraction, &mut self.noise),
+        }
     }
 
     /// Samples P_DC, in counts, `fraction` (0..1) of a tick after the last but one.

@@ -14,6 +14,7 @@ use super::encoder::{Edge, Encoder};
 use super::faults::{Fault, Faults, Miso};
 use super::finger::{Contact, Finger};
 use super::lever::Lever;
+use super::played::{PlayCounts, Played};
 use super::sensor::SensorPeer;
 use super::stage::Stage;
 use super::surface::Surface;
@@ -291,6 +292,22 @@ impl World {
     /// weights on the stage at 45 degrees).
     pub fn incline(&mut self, pull_n: f64) {
         self.pull_n = -pull_n;
+    }
+
+    /// Has the finger feel recorded slides instead of the mounted sample: each press-and-slide is the next one of an order
+    /// that `seed` gives, over and over. Without any, the sample is felt again.
+    ///
+    /// From where the pressed finger begins to move, P_AC is the recorded one about the simulated finger's rest, and shear
+    /// the recorded force once the skin has stretched that far. The sample still carries the press, and makes P_DC; a still
+    /// finger has the simulated sensor's noise. Samples beyond 12 bits are cut, and a recording that is over is that noise:
+    /// see [`World::played`].
+    pub fn play(&mut self, slides: Vec<Played>, seed: u64) {
+        self.finger.play(slides, seed);
+    }
+
+    /// What has been played, and what of it was cut.
+    pub fn played(&self) -> PlayCounts {
+        self.finger.played()
     }
 
     /// Gives the finger a new skin.

@@ -18,8 +18,8 @@ use crate::wire::Name;
 
 /// Version of the records and of the map they are in (`sequential-storage` 8).
 pub const SCHEMA: u16 = 1;
-/// Most records of training: two pilots of 36 movements, and two textures at each of 36 more. With all of them in use a
-/// page of 16 KB is four fifths full.
+/// Most records of training: four pilots of 30 movements and eight textures of three. With all of them in use, 88 bytes
+/// each, a page of 16 KB is less than four fifths full.
 pub const MAX_RECORDS: u8 = 144;
 
 const KEY_SCHEMA: u8 = 0;

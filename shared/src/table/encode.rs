@@ -98,17 +98,54 @@ pub fn encode<'o, 'a>(
     movements: &[Movement],
     textures: impl Iterator<Item = Texture<'a>> + Clone,
 ) -> Result<Table<'o>, EncodeError> {
-    let (count, names) = textures.clone().fold((0usize, 0), |(n, names), t| {
-        (n + 1, names + 1 + t.name.len())
+    let textures = textures.map(|t| (t.name, t.experience.iter().copied()));
+    write(out, measured, movements.iter().copied(), textures)
+}
+
+/// Writes `old` into `out` with what was learned of one texture, movement by movement: in place of what the table has, or
+/// as one more texture behind the others. All else stays the same to the bit.
+///
+/// # Errors
+/// As [`encode`].
+pub fn amend<'o>(
+    out: &'o mut [u8],
+    old: &Table<'_>,
+    texture: Texture<'_>,
+) -> Result<Table<'o>, EncodeError> {
+    let place = old.find(texture.name).unwrap_or(old.textures);
+    let added = (place == old.textures).then_some(texture.name);
+    let textures = old.names().chain(added).zip(0u16..).map(|(name, index)| {
+        let learned = texture.experience.iter().enumerate();
+        let experience = learned.map(move |(movement, new)| {
+            if index == place {
+                *new
+            } else {
+                old.experience(index, movement as u8)
+            }
+        });
+        (name, experience)
+    });
+    write(out, old.measured, old.movements(), textures)
+}
+
+/// Writes names and experiences, movement by movement.
+fn write<'o, 'a>(
+    out: &'o mut [u8],
+    measured: PropertySet,
+    movements: impl ExactSizeIterator<Item = Movement>,
+    textures: impl Iterator<Item = (&'a str, impl ExactSizeIterator<Item = Experience> + Clone)> + Clone,
+) -> Result<Table<'o>, EncodeError> {
+    let (count, names) = textures.clone().fold((0usize, 0), |(n, names), (name, _)| {
+        (n + 1, names + 1 + name.len())
     });
     let length = encoded_len(count, movements.len(), names);
     let (Ok(count), Ok(length_field)) = (u16::try_from(count), u32::try_from(length)) else {
         return Err(EncodeError::Room(length));
     };
-    if count == 0 || measured.is_empty() || movements.is_empty() || movements.len() > MAX_MOVEMENTS
-    {
+    if count == 0 || measured.is_empty() || !(1..=MAX_MOVEMENTS).contains(&movements.len()) {
         return Err(EncodeError::Empty);
     }
+    let per_texture = movements.len();
     let mut writer = Writer {
         room: out.get_mut(..length).ok_or(EncodeError::Room(length))?,
         at: 0,
@@ -123,11 +160,11 @@ pub fn encode<'o, 'a>(
         writer.put(&movement.force_mn().to_le_bytes());
         writer.put(&movement.speed_um_s().to_le_bytes());
     }
-    for (texture, index) in textures.clone().zip(0..) {
-        if texture.experience.len() != movements.len() {
+    for ((_, experiences), index) in textures.clone().zip(0..) {
+        if experiences.len() != per_texture {
             return Err(EncodeError::Movements(index));
         }
-        for (experience, movement) in texture.experience.iter().zip(0..) {
+        for (experience, movement) in experiences.zip(0..) {
             for (property, mean) in Property::ALL.into_iter().zip(experience.mean) {
                 if !measured.contains(property) {
                     writer.put(&[0; CELL_BYTES]);
@@ -152,12 +189,12 @@ pub fn encode<'o, 'a>(
             }
         }
     }
-    for experience in textures.clone().flat_map(|t| t.experience) {
+    for experience in textures.clone().flat_map(|(_, experiences)| experiences) {
         writer.put(&[experience.trials]);
     }
-    for (texture, index) in textures.zip(0..) {
-        writer.put(&[u8::try_from(texture.name.len()).map_err(|_| EncodeError::Name(index))?]);
-        writer.put(texture.name.as_bytes());
+    for ((name, _), index) in textures.zip(0..) {
+        writer.put(&[u8::try_from(name.len()).map_err(|_| EncodeError::Name(index))?]);
+        writer.put(name.as_bytes());
     }
     let crc = CRC32.checksum(writer.written());
     writer.put(&crc.to_le_bytes());

@@ -93,7 +93,18 @@ impl Amplifiers {
     }
 
     pub(super) fn sample_pac(&mut self, fraction: f64, noise: &mut Noise) -> u16 {
-        counts(between(self.pac, fraction) + self.pac_noise_pa / PAC_PA_PER_COUNT * noise.normal())
+        counts(between(self.pac, fraction) + self.pac_noise(noise))
+    }
+
+    /// Noise of a P_AC sample, counts.
+    pub(super) fn pac_noise(&self, noise: &mut Noise) -> f64 {
+        self.pac_noise_pa / PAC_PA_PER_COUNT * noise.normal()
+    }
+
+    /// What the converter makes of a P_AC so far from its rest, counts, and whether that had to be cut.
+    pub(super) fn convert_pac(&self, about_rest: f64) -> (u16, bool) {
+        let value = self.pac_rest.round() + about_rest;
+        (counts(value), !(0.0..=FULL).contains(&value))
     }
 
     pub(super) fn sample_pdc(&mut self, fraction: f64, noise: &mut Noise) -> u16 {

@@ -1,4 +1,4 @@
-//! The rig's firmware. Who runs where, and who tells whom what:
+//! The rig. Who runs where, and who tells whom what:
 //!
 //! | executor | task | does | tells |
 //! |---|---|---|---|
@@ -9,60 +9,34 @@
 //! | thread mode | `receive`, `send` | frames of USART3 | requests to `session` |
 //!
 //! TIM1's interrupt, between the two, makes the lever's steps.
-#![cfg_attr(target_os = "none", no_std, no_main)]
 
-#[cfg(target_os = "none")]
-mod acquire;
-#[cfg(target_os = "none")]
-mod board;
-#[cfg(target_os = "none")]
-mod lever;
-#[cfg(target_os = "none")]
-mod link;
-#[cfg(target_os = "none")]
-mod rescue;
-#[cfg(target_os = "none")]
-mod servo;
-#[cfg(target_os = "none")]
-mod session;
+use embassy_executor::{InterruptExecutor, Spawner};
+use embassy_stm32::interrupt;
+use heapless::spsc::Queue;
+use static_cell::ConstStaticCell;
+use tactus_core::wire::{PROTOCOL, Tell};
 
-#[cfg(target_os = "none")]
-use {
-    acquire::{WORDS, Word},
-    defmt_rtt as _,
-    embassy_executor::{InterruptExecutor, Spawner},
-    embassy_stm32::interrupt,
-    heapless::spsc::Queue,
-    servo::{SAMPLES, Samples},
-    static_cell::ConstStaticCell,
-    tactus_core::wire::{PROTOCOL, Tell},
-};
+use crate::acquire::{self, WORDS, Word};
+use crate::servo::{self, SAMPLES, Samples};
+use crate::{board, link, rescue, session};
 
-#[cfg(target_os = "none")]
 static ACQUIRE: InterruptExecutor = InterruptExecutor::new();
-#[cfg(target_os = "none")]
 static SERVO: InterruptExecutor = InterruptExecutor::new();
 
-#[cfg(target_os = "none")]
 #[interrupt]
 fn UART4() {
     // SAFETY: called from here only, and started before the interrupt is on.
     unsafe { ACQUIRE.on_interrupt() }
 }
 
-#[cfg(target_os = "none")]
 #[interrupt]
 fn UART5() {
     // SAFETY: as above.
     unsafe { SERVO.on_interrupt() }
 }
 
-#[cfg(target_os = "none")]
-defmt::timestamp!("{=u64:us}", embassy_time::Instant::now().as_micros());
-
-#[cfg(target_os = "none")]
-#[embassy_executor::main]
-async fn main(thread: Spawner) {
+/// Starts everything. To be called once, from thread mode.
+pub async fn rig(thread: Spawner) {
     static WORD_QUEUE: ConstStaticCell<Queue<Word, WORDS>> = ConstStaticCell::new(Queue::new());
     static SAMPLE_QUEUE: ConstStaticCell<Queue<Samples, SAMPLES>> =
         ConstStaticCell::new(Queue::new());
@@ -99,7 +73,6 @@ async fn main(thread: Spawner) {
 }
 
 /// Spawns a task, of which there is only one.
-#[cfg(target_os = "none")]
 fn spawn<S>(
     thread: &Spawner,
     task: Result<embassy_executor::SpawnToken<S>, embassy_executor::SpawnError>,
@@ -108,12 +81,4 @@ fn spawn<S>(
         Ok(task) => thread.spawn(task),
         Err(_) => defmt::error!("a task was spawned twice"),
     }
-}
-
-#[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!(
-        "tactus-rig is firmware for the STM32F429ZI and does nothing on a PC. Run it on the emulated board with `cargo xtask emulate`."
-    );
-    std::process::exit(2);
 }

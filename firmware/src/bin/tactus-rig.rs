@@ -1,0 +1,16 @@
+//! The image of the rig: see [`tactus_firmware::rig`].
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+#[embassy_executor::main]
+async fn main(spawner: embassy_executor::Spawner) {
+    tactus_firmware::rig(spawner).await;
+}
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    eprintln!(
+        "tactus-rig is firmware for the STM32F429ZI and does nothing on a PC. Run it on the emulated board with `cargo xtask emulate`."
+    );
+    std::process::exit(2);
+}

@@ -1,0 +1,21 @@
+//! Tactus on a NUCLEO-F429ZI: pins, timing and messages round the core. Everything that decides is in `tactus-core`.
+//!
+//! On a PC this crate is empty: there is nothing to drive.
+#![cfg_attr(target_os = "none", no_std)]
+#![cfg(target_os = "none")]
+
+mod acquire;
+mod board;
+mod lever;
+mod link;
+mod probe;
+mod rescue;
+mod rig;
+mod servo;
+mod session;
+
+pub use rig::rig;
+
+use defmt_rtt as _;
+
+defmt::timestamp!("{=u64:us}", embassy_time::Instant::now().as_micros());

@@ -1,0 +1,248 @@
+//! The rig that the servo moves, as an exploration sees it: one movement after the other, its samples into the features.
+use core::sync::atomic::Ordering::Relaxed;
+
+use embassy_time::Timer;
+use heapless::Vec;
+use heapless::spsc::Consumer;
+use tactus_core::features::{PropertySet, Slide};
+use tactus_core::kernels::Kernels;
+use tactus_core::movement::Movement;
+use tactus_core::rig::Rig;
+use tactus_core::rig::control::{Ended, Phase, Refused};
+use tactus_core::rig::guard::Fault;
+use tactus_core::rig::pins::Felt;
+use tactus_core::wire::{Block, Tell};
+
+use crate::acquire;
+use crate::link::{STREAM, tell};
+use crate::servo::{self, Command, Samples, Snapshot};
+
+/// A movement that takes longer than this does not end.
+const PATIENCE_MS: u32 = 120_000;
+/// How often the samples are looked after.
+const LOOK_MS: u64 = 10;
+
+/// Why a movement of this probe failed.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum ProbeError {
+    Refused(Refused),
+    Fault(Fault),
+    Stopped,
+    Hangs,
+}
+
+impl core::fmt::Display for ProbeError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Refused(why) => why.fmt(f),
+            Self::Fault(fault) => {
+                let recovery = fault.row().map_or("reset", |row| row.recovery);
+                write!(f, "{fault}: {recovery}")
+            }
+            Self::Stopped => f.write_str("stopped"),
+            Self::Hangs => f.write_str("the rig does not come to an end: home it"),
+        }
+    }
+}
+
+impl core::error::Error for ProbeError {}
+
+/// The rig that the servo moves, as the exploration sees it.
+pub(crate) struct Probe {
+    samples: Consumer<'static, Samples>,
+    random: u32,
+}
+
+impl Probe {
+    pub(crate) fn new(samples: Consumer<'static, Samples>) -> Self {
+        Self { samples, random: 1 }
+    }
+
+    /// Begins a row of random numbers.
+    pub(crate) fn seed(&mut self, seed: u32) {
+        // 0 would stay 0
+        self.random = seed.max(1);
+    }
+
+    /// Xorshift: for where slides begin and for random choices, not for secrets.
+    fn random(&mut self) -> u32 {
+        self.random ^= self.random << 13;
+        self.random ^= self.random >> 17;
+        self.random ^= self.random << 5;
+        self.random
+    }
+
+    /// 0 to 1.
+    fn start(&mut self) -> f32 {
+        (self.random() >> 8) as f32 / (1 << 24) as f32
+    }
+
+    /// Waits until the rig is at rest; `each` is called every [`LOOK_MS`], and once more at the end.
+    async fn rest(
+        &mut self,
+        mut each: impl FnMut(&mut Consumer<'static, Samples>),
+    ) -> Result<Snapshot, ProbeError> {
+        let mut left_ms = PATIENCE_MS;
+        loop {
+            Timer::after_millis(LOOK_MS).await;
+            // before the samples, so that none of a movement that is over is left behind
+            let rig = servo::snapshot();
+            each(&mut self.samples);
+            match rig.phase {
+                Phase::Faulted(fault) if rig.at_rest => return Err(ProbeError::Fault(fault)),
+                _ if rig.at_rest => return Ok(rig),
+                _ => {}
+            }
+            left_ms = left_ms.saturating_sub(LOOK_MS as u32);
+            if left_ms == 0 {
+                servo::stop();
+                return Err(ProbeError::Hangs);
+            }
+        }
+    }
+
+    /// Finds the limit switches, the lever's first.
+    pub(crate) async fn home(&mut self) -> Result<(), ProbeError> {
+        servo::command(Command::Home)
+            .await
+            .map_err(ProbeError::Refused)?;
+        self.rest(|_| ()).await.map(|_| ())
+    }
+
+    /// A run without load, there or back: where it began and ended, mm, and its mean current, A.
+    pub(crate) async fn run_unloaded(
+        &mut self,
+        speed_um_s: u32,
+    ) -> Result<(f32, f32, Option<f32>), ProbeError> {
+        let from_mm = servo::snapshot().stage_mm;
+        servo::command(Command::StartUnloaded(speed_um_s))
+            .await
+            .map_err(ProbeError::Refused)?;
+        let rig = self.rest(|_| ()).await?;
+        match rig.ended {
+            Some(Ended::Whole) => Ok((from_mm, rig.stage_mm, rig.mean_current_a)),
+            _ => Err(ProbeError::Stopped),
+        }
+    }
+}
+
+/// Raw samples on their way to the host, in blocks.
+struct Blocks {
+    block: Block,
+}
+
+impl Blocks {
+    const EMPTY: Block = Block {
+        number: 0,
+        still: true,
+        steady: None,
+        pac: Vec::new(),
+        shear_mn: Vec::new(),
+        lost: 0,
+    };
+
+    fn send(&mut self) {
+        let number = self.block.number.wrapping_add(1);
+        let still = self.block.still;
+        let block = core::mem::replace(&mut self.block, Self::EMPTY);
+        tell(Tell::Block(block));
+        self.block.number = number;
+        self.block.still = still;
+    }
+
+    fn put(&mut self, samples: &Samples) {
+        let still = samples.felt == Felt::Still;
+        let full = self.block.pac.len() + samples.pac.len() > self.block.pac.capacity()
+            || self.block.shear_mn.is_full();
+        let begins = matches!(samples.felt, Felt::Begin(_));
+        if (full || still != self.block.still || begins)
+            && !(self.block.pac.is_empty() && self.block.shear_mn.is_empty())
+        {
+            self.send();
+        }
+        self.block.still = still;
+        if let Felt::Begin(steady) = &samples.felt {
+            self.block.steady = Some((steady.start, steady.end));
+        }
+        // there is room: a block takes many of these
+        let _ = self.block.pac.extend_from_slice(&samples.pac);
+        if let Some(shear_mn) = samples.shear_mn {
+            let _ = self.block.shear_mn.push(shear_mn);
+        }
+    }
+
+    fn end(mut self, lost: u32) {
+        self.block.lost = lost;
+        self.send();
+    }
+}
+
+impl Rig for Probe {
+    type Error = ProbeError;
+
+    fn measures(&self) -> PropertySet {
+        PropertySet::ALL
+    }
+
+    async fn perform<K: Kernels>(
+        &mut self,
+        movement: Movement,
+        slide: &mut Slide<'_, K>,
+    ) -> Result<(), ProbeError> {
+        if servo::snapshot().phase == Phase::Parked {
+            self.home().await?;
+        }
+        while self.samples.dequeue().is_some() {}
+        let lost = || {
+            acquire::LOST
+                .load(Relaxed)
+                .wrapping_add(servo::LOST.load(Relaxed))
+        };
+        let lost_before = lost();
+        let start = self.start();
+        servo::command(Command::Start(movement, start))
+            .await
+            .map_err(ProbeError::Refused)?;
+        let mut blocks = STREAM.load(Relaxed).then_some(Blocks {
+            block: Blocks::EMPTY,
+        });
+        let ended = self
+            .rest(|queue| {
+                while let Some(samples) = queue.dequeue() {
+                    feel(&samples, slide);
+                    if let Some(blocks) = &mut blocks {
+                        blocks.put(&samples);
+                    }
+                }
+            })
+            .await
+            .map(|rig| rig.ended);
+        let gap = match ended {
+            Ok(Some(Ended::Gap(samples))) => samples,
+            _ => 0,
+        };
+        let gap = gap + lost().wrapping_sub(lost_before);
+        if gap > 0 {
+            slide.lose(gap);
+        }
+        if let Some(blocks) = blocks {
+            blocks.end(gap);
+        }
+        match ended? {
+            Some(Ended::Whole | Ended::Gap(_)) => Ok(()),
+            Some(Ended::Stopped) | None => Err(ProbeError::Stopped),
+        }
+    }
+}
+
+/// Gives what a tick felt to the core.
+fn feel<K: Kernels>(samples: &Samples, slide: &mut Slide<'_, K>) {
+    match &samples.felt {
+        Felt::Nothing => return,
+        Felt::Still => return slide.push_still(&samples.pac),
+        Felt::Begin(steady) => slide.start(steady.clone()),
+        Felt::Slide => {}
+    }
+    slide.push(&samples.pac);
+    slide.push_shear(samples.shear_mn.as_slice());
+}

@@ -1,0 +1,349 @@
+//! The PC follows the probe: from the reports of one exploration with streaming on, it computes everything anew with the
+//! same core, and compares.
+
+use tactus_core::explorer::{Config, Explorer, ExplorerError, Strategy};
+use tactus_core::features::{Plan, PropertySet, Slide, SlideError};
+use tactus_core::table::{Action, Table};
+use tactus_core::wire::{Block, Felt, Identify, MAX_OUTLOOK, MAX_TEXTURES, Promise, Tell};
+
+/// Chip and PC do the same operations in the same order and agree to the bit; more than this apart they do not agree.
+pub const ALLOWED: f32 = 1e-4;
+
+/// Why a stretch of an exploration could not be compared. What follows is followed nevertheless.
+#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+pub enum FollowError {
+    /// A report with samples was lost.
+    #[error(
+        "slide {slide}: block {expected} is missing, block {got} came; the slide is not compared"
+    )]
+    MissingBlock {
+        /// Number of the slide.
+        slide: u8,
+        /// Number of the block that should have come.
+        expected: u16,
+        /// Number of the one that came.
+        got: u16,
+    },
+    /// The samples of a slide never came.
+    #[error("slide {0}: no samples came; ask for them with `Stream` before the exploration")]
+    NoBlocks(u8),
+    /// A slide or its choice was told out of order: a report was lost.
+    #[error("slide {got} was told where slide {expected} was due; a report was lost")]
+    Order {
+        /// Number of the slide that was due.
+        expected: u8,
+        /// Number that was told.
+        got: u8,
+    },
+    /// The probe has properties of the slide, and the samples that came give none.
+    #[error(
+        "slide {slide}: the samples give no properties here ({why}); the last blocks may be missing"
+    )]
+    Slide {
+        /// Number of the slide.
+        slide: u8,
+        /// Why they do not.
+        why: SlideError,
+    },
+    /// The explorer here could not take in what was told.
+    #[error("slide {slide}: what was felt says nothing here; do both ends have the same table?")]
+    Observe {
+        /// Number of the slide.
+        slide: u8,
+    },
+}
+
+/// Another choice than the one here.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct OtherChoice {
+    /// Number of the slide.
+    pub slide: u8,
+    /// What the probe chose.
+    pub there: Action,
+    /// What is chosen here.
+    pub here: Action,
+}
+
+/// How well probe and PC agree: largest absolute differences, infinite where one has a value and the other has none.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Agreement {
+    /// Slides whose samples were compared with what was felt.
+    pub slides: u32,
+    /// Of the properties, in their units.
+    pub properties: f32,
+    /// Of the background, counts^2, and of the logarithms of the band powers.
+    pub signal: f32,
+    /// Posteriors compared.
+    pub posteriors: u32,
+    /// Of posterior probabilities, the verdict's too.
+    pub posterior: f32,
+    /// Choices compared; random ones are not.
+    pub choices: u32,
+    /// Of the promised uncertainties and benefits.
+    pub outlook: f32,
+    /// Choices that are others here.
+    pub other_choices: Vec<OtherChoice>,
+    /// Slides that were rejected there.
+    pub rejected: u32,
+    /// Of these, those that count here.
+    pub rejected_only_there: u32,
+    /// Verdicts compared.
+    pub verdicts: u32,
+    /// Verdicts that are others here: their texture, how sure they are, or after how many slides.
+    pub other_verdicts: u32,
+}
+
+impl Agreement {
+    /// Whether nothing differs by more than [`ALLOWED`], and there was something to compare.
+    pub fn agrees(&self) -> bool {
+        let largest = [self.properties, self.signal, self.posterior, self.outlook];
+        self.slides > 0
+            && self.posteriors > 0
+            && largest.into_iter().all(|d| d <= ALLOWED)
+            && self.other_choices.is_empty()
+            && self.rejected_only_there == 0
+            && self.other_verdicts == 0
+    }
+}
+
+/// Follows one exploration.
+#[derive(Clone, Debug)]
+pub struct Follower<'t> {
+    explorer: Explorer<'t, MAX_TEXTURES>,
+    plan: &'t Plan,
+    random: bool,
+    /// The slide as far as its samples have come, and the number of the next block; `None` once a block is missing.
+    samples: Option<(Slide<'t>, u16)>,
+    agreement: Agreement,
+}
+
+impl<'t> Follower<'t> {
+    /// A follower of the exploration that was asked for, on the probe's table, with a rig that measures `measured`.
+    ///
+    /// # Errors
+    /// See [`ExplorerError`].
+    pub fn new(
+        table: Table<'t>,
+        measured: PropertySet,
+        asked: &Identify,
+        plan: &'t Plan,
+    ) -> Result<Self, ExplorerError> {
+        let config = Config {
+            strategy: asked.strategy,
+            threshold: asked.threshold,
+            max_slides: asked.max_slides,
+        };
+        let explorer = if asked.among.is_empty() {
+            Explorer::new(table, measured, config)?
+        } else {
+            Explorer::among(table, measured, config, asked.among.iter().copied())?
+        };
+        Ok(Self {
+            explorer,
+            plan,
+            random: asked.strategy == Strategy::Random,
+            samples: Some((Slide::new(plan), 0)),
+            agreement: Agreement::default(),
+        })
+    }
+
+    /// How well the two agree so far.
+    pub fn agreement(&self) -> &Agreement {
+        &self.agreement
+    }
+
+    /// Takes in what the probe says, report by report.
+    ///
+    /// # Errors
+    /// See [`FollowError`]: something could not be compared.
+    pub fn hear(&mut self, tell: &Tell) -> Result<(), FollowError> {
+        match tell {
+            Tell::Chosen {
+                slide,
+                action,
+                outlook,
+                ..
+            } => self.chosen(*slide, *action, outlook),
+            Tell::Block(block) => self.block(block),
+            Tell::Felt {
+                slide,
+                action,
+                felt,
+                posterior,
+            } => self.felt(*slide, *action, felt, posterior),
+            Tell::Rejected { slide, .. } => self.rejected(*slide),
+            Tell::Verdict {
+                texture,
+                probability,
+                sure,
+                slides,
+                ..
+            } => {
+                self.agreement.verdicts += 1;
+                let here = self.explorer.verdict();
+                let same = here.is_some_and(|here| {
+                    here.texture == *texture
+                        && here.sure == *sure
+                        && self.explorer.slides() == *slides
+                });
+                self.agreement.other_verdicts += u32::from(!same);
+                let here = here.map(|here| here.probability);
+                widen(
+                    &mut self.agreement.posterior,
+                    apart(here, Some(*probability)),
+                );
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The number of the slide that is due.
+    fn due(&self) -> u8 {
+        self.explorer.slides().saturating_add(1)
+    }
+
+    fn in_order(&self, got: u8) -> Result<(), FollowError> {
+        let expected = self.due();
+        if got != expected {
+            return Err(FollowError::Order { expected, got });
+        }
+        Ok(())
+    }
+
+    fn chosen(&mut self, slide: u8, there: Action, told: &[Promise]) -> Result<(), FollowError> {
+        self.samples = Some((Slide::new(self.plan), 0));
+        self.in_order(slide)?;
+        let outlook = self.explorer.outlook();
+        let agreement = &mut self.agreement;
+        if told.len() != outlook.len().min(MAX_OUTLOOK) {
+            agreement.outlook = f32::INFINITY;
+        }
+        for promise in told {
+            let here = outlook.iter().find(|here| here.action == promise.action);
+            for (here, there) in [
+                (here.map(|o| o.uncertainty), promise.uncertainty),
+                (here.map(|o| o.benefit), promise.benefit),
+            ] {
+                widen(&mut agreement.outlook, apart(here, Some(there)));
+            }
+        }
+        if !self.random {
+            agreement.choices += 1;
+            let here = self.explorer.choose(&outlook, 0);
+            if here != there {
+                agreement
+                    .other_choices
+                    .push(OtherChoice { slide, there, here });
+            }
+        }
+        Ok(())
+    }
+
+    fn block(&mut self, block: &Block) -> Result<(), FollowError> {
+        let slide_number = self.due();
+        let Some((slide, next)) = &mut self.samples else {
+            return Ok(());
+        };
+        if block.number != *next {
+            let expected = *next;
+            self.samples = None;
+            return Err(FollowError::MissingBlock {
+                slide: slide_number,
+                expected,
+                got: block.number,
+            });
+        }
+        *next = next.wrapping_add(1);
+        if block.lost > 0 {
+            slide.lose(block.lost);
+        }
+        if block.still {
+            slide.push_still(&block.pac);
+            return Ok(());
+        }
+        if let Some((from, to)) = block.steady {
+            slide.start(from..to);
+        }
+        slide.push(&block.pac);
+        slide.push_shear(&block.shear_mn);
+        Ok(())
+    }
+
+    fn felt(
+        &mut self,
+        slide: u8,
+        action: Action,
+        felt: &Felt,
+        posterior: &[f32],
+    ) -> Result<(), FollowError> {
+        self.in_order(slide)?;
+        let compared = self.compare(slide, felt);
+        // with what was told, so that a difference of the slide is not counted again
+        self.explorer
+            .observe(action, &felt.properties())
+            .map_err(|_| FollowError::Observe { slide })?;
+        let here = self.explorer.posterior();
+        let agreement = &mut self.agreement;
+        agreement.posteriors += 1;
+        if here.len() != posterior.len() {
+            agreement.posterior = f32::INFINITY;
+        }
+        for (&here, &there) in here.iter().zip(posterior) {
+            widen(&mut agreement.posterior, apart(Some(here), Some(there)));
+        }
+        compared
+    }
+
+    /// What is felt here from the samples, against what was felt there.
+    fn compare(&mut self, slide: u8, there: &Felt) -> Result<(), FollowError> {
+        let here = match self.samples.take() {
+            // it was said before
+            None => return Ok(()),
+            Some((_, 0)) => return Err(FollowError::NoBlocks(slide)),
+            Some((samples, _)) => samples
+                .finish()
+                .map_err(|why| FollowError::Slide { slide, why })?,
+        };
+        let here = Felt::from(&here);
+        let agreement = &mut self.agreement;
+        agreement.slides += 1;
+        for (here, there) in here.properties.into_iter().zip(there.properties) {
+            widen(&mut agreement.properties, apart(here, there));
+        }
+        if here.roughness_is_bound != there.roughness_is_bound {
+            agreement.properties = f32::INFINITY;
+        }
+        let signal = |felt: &Felt| std::iter::once(felt.background).chain(felt.ln_bands);
+        for (here, there) in signal(&here).zip(signal(there)) {
+            widen(&mut agreement.signal, apart(Some(here), Some(there)));
+        }
+        Ok(())
+    }
+
+    fn rejected(&mut self, slide: u8) -> Result<(), FollowError> {
+        self.agreement.rejected += 1;
+        if let Some((samples, 1..)) = self.samples.take()
+            && samples.finish().is_ok()
+        {
+            self.agreement.rejected_only_there += 1;
+        }
+        self.in_order(slide)
+    }
+}
+
+fn widen(largest: &mut f32, difference: f32) {
+    *largest = largest.max(difference);
+}
+
+/// How far two values are apart; infinitely if only one is there or is a number.
+fn apart(here: Option<f32>, there: Option<f32>) -> f32 {
+    match (here, there) {
+        (None, None) => 0.0,
+        (Some(here), Some(there)) if (here - there).is_finite() => (here - there).abs(),
+        _ => f32::INFINITY,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,335 @@
+//! The store against a flash that loses its power at every word and in every erase.
+
+mod cuts;
+mod ram;
+
+use super::*;
+use crate::movement::Movement;
+use crate::pressure::Calibration;
+use crate::rig::calibration::RigCalibration;
+use crate::rig::skin::SkinCare;
+use crate::table::tests::{around, table_of};
+use crate::table::{Experience, Table};
+use crate::wire::Name;
+use embassy_futures::block_on;
+use ram::{Ram, RamError, SECTOR};
+use std::vec;
+use std::vec::Vec;
+
+type Outcome<T> = Result<T, StoreError<RamError>>;
+
+/// A small table, unlike that of every other `n`; lengths of every remainder of 4.
+fn table(n: u8) -> Vec<u8> {
+    let trials = vec![vec![around([(f32::from(n) * 0.01, 0.1); 3])]; 1 + usize::from(n) % 3];
+    let mut bytes = table_of(crate::features::PropertySet::ALL, &trials);
+    assert!(Table::read(&bytes).is_ok());
+    // names of other lengths
+    if n % 2 == 1 {
+        let movements = [Movement::FOR_TRACTION];
+        let experience = [Table::read(&bytes).unwrap().experience(0, 0)];
+        let name = &"a longer name"[..1 + usize::from(n) % 13];
+        let texture = crate::table::Texture {
+            name,
+            experience: &experience,
+        };
+        let mut out = vec![0; 1000];
+        let all = crate::features::PropertySet::ALL;
+        let encoded = crate::table::encode(&mut out, all, &movements, [texture].into_iter());
+        bytes = encoded.unwrap().as_bytes().to_vec();
+    }
+    bytes
+}
+
+fn open(ram: Ram) -> Store<Ram> {
+    block_on(Store::open(ram)).unwrap()
+}
+
+async fn push(store: &mut Store<Ram>, bytes: &[u8], part: usize) -> Outcome<()> {
+    store.begin_table(bytes.len()).await?;
+    for (index, some) in bytes.chunks(part).enumerate() {
+        store.write_table(index * part, some).await?;
+    }
+    let mut room = [0; SECTOR];
+    let (stored, table) = store.commit_table(&mut room).await?;
+    assert_eq!((table.as_bytes(), table.crc()), (bytes, stored.crc));
+    Ok(())
+}
+
+/// The table in use.
+fn used(store: &mut Store<Ram>) -> Option<Vec<u8>> {
+    let mut room = [0; SECTOR];
+    let table = block_on(store.read_table(&mut room)).unwrap()?;
+    let bytes = table.as_bytes().to_vec();
+    let stored = store.table().unwrap();
+    assert_eq!((stored.crc, stored.length), (table.crc(), bytes.len()));
+    let mapped = &store.flash.bytes[stored.offset as usize..][..stored.length];
+    assert_eq!(mapped, bytes, "where it lies in the memory");
+    Some(bytes)
+}
+
+fn calibration(n: u8) -> RigCalibration {
+    RigCalibration {
+        pressure: Calibration::PAPER,
+        unloaded_a: (0.1, f32::from(n) * 1e-3),
+        newton_per_ampere: 8.0,
+        date: 20_261_121,
+        serial: [b'0'; 16],
+    }
+}
+
+fn experience(trials: u8) -> Experience {
+    let mut experience = Experience::default();
+    for n in 0..trials {
+        let trial = crate::features::Properties::new([Some(f32::from(n)); 3]);
+        let all = crate::features::PropertySet::ALL;
+        experience.learn(all, &trial).unwrap();
+    }
+    experience
+}
+
+fn trained(name: &str, movement: Movement, table: Option<u32>, trials: u8) -> super::Trained {
+    super::Trained {
+        name: Name::try_from(name).unwrap(),
+        movement,
+        table,
+        experience: experience(trials),
+    }
+}
+
+#[test]
+fn a_blank_flash_is_an_empty_store() {
+    let mut store = open(Ram::new());
+    assert_eq!(used(&mut store), None);
+    assert_eq!(store.settings(), Ok(()));
+    assert_eq!(block_on(store.calibration()), Ok(None));
+    assert_eq!(block_on(store.skin()), Ok(SkinCare::default()));
+    let none = block_on(store.trained("felt", Movement::FOR_TRACTION, None));
+    assert_eq!(none, Ok(None));
+    assert_eq!(store.close().operations, 0, "looking writes nothing");
+    let mut short = Ram::new();
+    short.bytes.truncate(3 * SECTOR);
+    assert_eq!(
+        block_on(Store::open(short)).err(),
+        Some(StoreError::Room(3 * SECTOR))
+    );
+}
+
+#[test]
+fn tables_come_in_parts_of_any_size_and_the_newest_counts() {
+    let mut store = open(Ram::new());
+    for n in 0..20 {
+        block_on(push(&mut store, &table(n), 1 + usize::from(n))).unwrap();
+        assert_eq!(used(&mut store), Some(table(n)));
+        store = open(store.close().again());
+        assert_eq!(used(&mut store), Some(table(n)));
+        assert_eq!(store.table().unwrap().generation, u32::from(n) + 1);
+    }
+    block_on(store.factory_table()).unwrap();
+    assert_eq!(store.table(), None);
+    store = open(store.close().again());
+    assert_eq!(store.table(), None);
+    block_on(push(&mut store, &table(3), 7)).unwrap();
+    store = open(store.close().again());
+    assert_eq!(used(&mut store), Some(table(3)));
+}
+
+#[test]
+fn a_table_that_is_not_whole_is_refused_and_the_former_one_stays() {
+    let mut store = open(Ram::new());
+    let (old, new) = (table(1), table(2));
+    block_on(push(&mut store, &old, 16)).unwrap();
+    let mut room = [0; SECTOR];
+    let part = |offset, wanted| Err(StoreError::Part { offset, wanted });
+    block_on(async {
+        assert_eq!(store.write_table(0, &new).await, Err(StoreError::NoTable));
+        assert_eq!(
+            store.commit_table(&mut room).await.err(),
+            Some(StoreError::NoTable)
+        );
+        let too_long = StoreError::TooLong {
+            length: SECTOR - 31,
+            room: SECTOR - 32,
+        };
+        assert_eq!(store.begin_table(SECTOR - 31).await, Err(too_long));
+        store.begin_table(new.len()).await.unwrap();
+        assert_eq!(store.write_table(4, &new).await, part(4, 0));
+        store.write_table(0, &new[..7]).await.unwrap();
+        assert_eq!(store.write_table(0, &new[..7]).await, part(0, 7));
+        assert_eq!(store.write_table(7, &new).await, part(7, 7));
+        let unfinished = StoreError::Unfinished {
+            got: 7,
+            wanted: new.len(),
+        };
+        assert_eq!(store.commit_table(&mut room).await.err(), Some(unfinished));
+        store.write_table(7, &new[7..]).await.unwrap();
+        let small = store.commit_table(&mut room[..new.len() - 1]).await.err();
+        assert_eq!(small, Some(StoreError::Buffer(new.len())));
+        store.commit_table(&mut room).await.unwrap();
+        // a damaged one
+        let mut damaged = old.clone();
+        damaged[30] ^= 1;
+        store.begin_table(damaged.len()).await.unwrap();
+        store.write_table(0, &damaged).await.unwrap();
+        assert!(matches!(
+            store.commit_table(&mut room).await,
+            Err(StoreError::Table(TableError::Crc { .. }))
+        ));
+        // one with something behind it
+        let mut longer = old.clone();
+        longer.push(0);
+        store.begin_table(longer.len()).await.unwrap();
+        store.write_table(0, &longer).await.unwrap();
+        assert!(matches!(
+            store.commit_table(&mut room).await,
+            Err(StoreError::Unfinished { .. })
+        ));
+    });
+    assert_eq!(used(&mut store), Some(new.clone()));
+    let mut store = open(store.close().again());
+    assert_eq!(used(&mut store), Some(new));
+}
+
+#[test]
+fn a_damaged_table_is_never_used() {
+    let mut store = open(Ram::new());
+    let (old, new) = (table(2), table(4));
+    block_on(push(&mut store, &old, 64)).unwrap();
+    block_on(push(&mut store, &new, 64)).unwrap();
+    let stored = store.table().unwrap();
+    let ram = store.close();
+    let start = stored.offset as usize - 32;
+    for bit in 8 * start..8 * (start + 32 + stored.length) {
+        let mut ram = ram.clone().again();
+        ram.bytes[bit / 8] ^= 1 << (bit % 8);
+        // four bytes of the header are free
+        let free = (24..28).contains(&(bit / 8 - start));
+        let expected = if free { &new } else { &old };
+        assert_eq!(used(&mut open(ram)).as_ref(), Some(expected), "bit {bit}");
+    }
+}
+
+#[test]
+fn settings_are_kept_over_many_rounds_of_the_pages() {
+    let mut store = open(Ram::new());
+    let mut skin = SkinCare::default();
+    block_on(async {
+        store.set_calibration(&calibration(7)).await.unwrap();
+        let mut one = trained("felt", Movement::FOR_TRACTION, Some(5), 3);
+        store.set_trained(&one).await.unwrap();
+        for n in 0..200u8 {
+            skin = SkinCare::after(f32::from(n), f32::from(n) * 1.5);
+            store.set_skin(&skin).await.unwrap();
+            one.experience = experience(n);
+            one.table = None;
+            store.set_trained(&one).await.unwrap();
+        }
+    });
+    let ram = store.close();
+    assert!(ram.erases >= 4, "{} erases", ram.erases);
+    let mut store = open(ram.again());
+    let at = |table| (Movement::FOR_TRACTION, table);
+    block_on(async {
+        assert_eq!(store.calibration().await, Ok(Some(calibration(7))));
+        assert_eq!(store.skin().await, Ok(skin));
+        for (name, (movement, table), trials) in [
+            ("felt", at(None), Some(199)),
+            ("felt", at(Some(5)), Some(3)),
+            ("felt", at(Some(6)), None),
+            ("wool", at(None), None),
+            ("felt", (Movement::FOR_ROUGHNESS, None), None),
+        ] {
+            let found = store.trained(name, movement, table).await.unwrap();
+            assert_eq!(found, trials.map(experience), "{name}");
+        }
+        store.forget_trained("felt").await.unwrap();
+        let (movement, table) = at(None);
+        assert_eq!(store.trained("felt", movement, table).await, Ok(None));
+        let unusable = RigCalibration {
+            newton_per_ampere: 0.0,
+            ..calibration(1)
+        };
+        let refused = store.set_calibration(&unusable).await;
+        assert!(matches!(refused, Err(StoreError::Calibration(_))));
+    });
+}
+
+#[test]
+fn progress_on_top_of_a_former_table_makes_room() {
+    let mut store = open(Ram::new());
+    block_on(async {
+        // 1 KB holds about nine
+        let mut stored = 0;
+        let full = loop {
+            let name = std::format!("{stored:040}");
+            match store
+                .set_trained(&trained(&name, Movement::FOR_TRACTION, Some(1), 2))
+                .await
+            {
+                Ok(()) => stored += 1,
+                Err(why) => break why,
+            }
+        };
+        assert_eq!(full, StoreError::Settings(SettingsError::Full));
+        assert!(stored >= 8, "{stored}");
+        // what there is can still be read, and forgotten
+        for n in 0..stored {
+            let name = std::format!("{n:040}");
+            let found = store.trained(&name, Movement::FOR_TRACTION, Some(1)).await;
+            assert_eq!(found, Ok(Some(experience(2))), "{n}");
+            store.forget_trained(&name).await.unwrap();
+        }
+        let one = trained("felt", Movement::FOR_TRACTION, Some(1), 2);
+        store.set_trained(&one).await.unwrap();
+    });
+}
+
+#[test]
+fn damaged_settings_are_told_and_erased_without_the_tables() {
+    for damage in 0..3 {
+        let mut store = open(Ram::new());
+        block_on(push(&mut store, &table(5), 64)).unwrap();
+        block_on(store.set_calibration(&calibration(7))).unwrap();
+        let mut ram = store.close().again();
+        let expected = match damage {
+            // both pages closed: no sequence of operations leaves that
+            0 => {
+                for at in [2 * SECTOR, 3 * SECTOR - 20, 3 * SECTOR, 4 * SECTOR - 20] {
+                    ram.bytes[at..at + 4].fill(0);
+                }
+                SettingsError::Corrupt
+            }
+            // the schema is the first record; its damage is a missing schema
+            1 => {
+                ram.bytes[2 * SECTOR + 4] ^= 1;
+                SettingsError::Corrupt
+            }
+            _ => {
+                let mut pages = super::pages::Pages(&mut ram);
+                block_on(pages.wipe()).unwrap();
+                let mut map = sequential_storage::map::MapStorage::<u8, _, _>::new(
+                    pages,
+                    sequential_storage::map::MapConfig::new(0..2 * (SECTOR as u32 - 16)),
+                    sequential_storage::cache::Cache::new_uncached(),
+                );
+                let newer: &[u8] = &[9];
+                block_on(map.store_item(&mut [0; 32], &0, &newer)).unwrap();
+                SettingsError::Schema(9)
+            }
+        };
+        let mut store = open(ram.again());
+        assert_eq!(store.settings(), Err(expected), "{damage}");
+        let told = StoreError::Settings(expected);
+        assert_eq!(block_on(store.calibration()), Err(told));
+        assert_eq!(block_on(store.set_skin(&SkinCare::default())), Err(told));
+        assert_eq!(
+            block_on(store.trained("felt", Movement::FOR_TRACTION, None)),
+            Err(told)
+        );
+        assert_eq!(used(&mut store), Some(table(5)));
+        block_on(store.erase_settings()).unwrap();
+        assert_eq!(store.settings(), Ok(()));
+        assert_eq!(block_on(store.calibration()), Ok(None));
+        block_on(store.set_calibration(&calibration(8))).unwrap();
+        assert_eq!(used(&mut store), Some(table(5)));
+    }
+}

@@ -1,0 +1,175 @@
+//! Flash in RAM that obeys the rules, and loses its power on demand.
+
+use embedded_storage_async::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+};
+use std::vec;
+use std::vec::Vec;
+
+/// Sectors of a sixteenth of the chip's, so that every word of every operation can be cut.
+pub(super) const SECTOR: usize = 1024;
+
+/// What is left of the operation that the power was cut in.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) enum Torn {
+    /// Nothing of the word; the erase had not begun.
+    Nothing,
+    /// Any bits of the word; any words of the sector are erased, and any bits of the others. From this seed.
+    Bits(u32),
+    /// The sector is erased up to here, in hundredths; half of the word.
+    Begin(usize),
+    /// The sector is erased from here on, in hundredths; half of the word.
+    End(usize),
+    /// Everything of it.
+    All,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum RamError {
+    Cut,
+    Rules,
+}
+
+impl NorFlashError for RamError {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
+#[derive(Clone)]
+pub(super) struct Ram {
+    pub(super) bytes: Vec<u8>,
+    /// Words programmed and sectors erased.
+    pub(super) operations: usize,
+    pub(super) erases: usize,
+    /// The operation that the power is cut in.
+    pub(super) cut: Option<(usize, Torn)>,
+    dead: bool,
+}
+
+impl Ram {
+    pub(super) fn new() -> Self {
+        Self {
+            bytes: vec![0xFF; 4 * SECTOR],
+            operations: 0,
+            erases: 0,
+            cut: None,
+            dead: false,
+        }
+    }
+
+    /// The flash when the power is back.
+    pub(super) fn again(self) -> Self {
+        Self {
+            bytes: self.bytes,
+            ..Self::new()
+        }
+    }
+
+    /// Counts an operation; what is left of it if the power is cut in it.
+    fn operate(&mut self) -> Result<Option<Torn>, RamError> {
+        if self.dead {
+            return Err(RamError::Cut);
+        }
+        self.operations += 1;
+        match self.cut {
+            Some((at, torn)) if at == self.operations => {
+                self.dead = true;
+                Ok(Some(torn))
+            }
+            _ => Ok(None),
+        }
+    }
+}
+
+fn next(seed: &mut u32) -> u32 {
+    *seed ^= *seed << 13;
+    *seed ^= *seed >> 17;
+    *seed ^= *seed << 5;
+    *seed
+}
+
+impl ErrorType for Ram {
+    type Error = RamError;
+}
+
+impl ReadNorFlash for Ram {
+    const READ_SIZE: usize = 4;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), RamError> {
+        let at = offset as usize;
+        assert!(
+            at.is_multiple_of(4) && bytes.len().is_multiple_of(4),
+            "alignment"
+        );
+        assert!(at + bytes.len() <= self.bytes.len(), "bounds");
+        bytes.copy_from_slice(&self.bytes[at..at + bytes.len()]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.bytes.len()
+    }
+}
+
+impl NorFlash for Ram {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = SECTOR;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), RamError> {
+        let (from, to) = (from as usize, to as usize);
+        assert!(
+            from.is_multiple_of(SECTOR) && to == from + SECTOR,
+            "sectors"
+        );
+        let torn = self.operate()?;
+        self.erases += 1;
+        let sector = &mut self.bytes[from..to];
+        match torn {
+            None | Some(Torn::All) => sector.fill(0xFF),
+            Some(Torn::Nothing) => {}
+            Some(Torn::Begin(part)) => sector[..SECTOR * part / 100].fill(0xFF),
+            Some(Torn::End(part)) => sector[SECTOR * part / 100..].fill(0xFF),
+            Some(Torn::Bits(mut seed)) => {
+                for word in sector.as_chunks_mut::<4>().0 {
+                    let erased = match next(&mut seed) % 3 {
+                        0 => 0,
+                        1 => u32::MAX,
+                        _ => next(&mut seed),
+                    };
+                    *word = (u32::from_le_bytes(*word) | erased).to_le_bytes();
+                }
+            }
+        }
+        torn.map_or(Ok(()), |_| Err(RamError::Cut))
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), RamError> {
+        let at = offset as usize;
+        assert!(
+            at.is_multiple_of(4) && bytes.len().is_multiple_of(4),
+            "alignment"
+        );
+        assert!(at + bytes.len() <= self.bytes.len(), "bounds");
+        for (word, at) in bytes.as_chunks::<4>().0.iter().zip((at..).step_by(4)) {
+            let torn = self.operate()?;
+            let room: &mut [u8; 4] = self.bytes[at..].first_chunk_mut().unwrap();
+            let (old, new) = (u32::from_le_bytes(*room), u32::from_le_bytes(*word));
+            if torn.is_none() && old & new != new {
+                return Err(RamError::Rules);
+            }
+            let cleared = match torn {
+                None | Some(Torn::All) => new,
+                Some(Torn::Nothing) => u32::MAX,
+                Some(Torn::Begin(_)) => new | 0xFFFF_0000,
+                Some(Torn::End(_)) => new | 0xFFFF,
+                Some(Torn::Bits(mut seed)) => new | next(&mut seed),
+            };
+            *room = (old & cleared).to_le_bytes();
+            if torn.is_some() {
+                return Err(RamError::Cut);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,538 @@
+//! Learning a texture by touching it: which movement comes next, what its slide has taught, and the table in the end.
+//!
+//! A [`Training`] touches nothing itself. Every [`Trained`] that it gives is to be stored before the next slide; a training
+//! begun anew with the same name and table goes on where it stood when it is given them back:
+//!
+//! ```text
+//! new -> resume per stored movement -> [ next -> slide -> took -> store ]* -> encode -> commit the table -> forget
+//! ```
+//!
+//! A pilot (the paper's "Identifying the most useful exploratory movements") makes other movements than the table has, so
+//! what it learns does not go into that table: its result is stored and told. It makes a table only where there is none,
+//! with the pilot's movements, or where the table has these already.
+
+use core::fmt;
+
+use heapless::Vec;
+
+use crate::features::{Properties, Property, PropertySet};
+use crate::movement::Movement;
+use crate::store::Trained;
+use crate::table::{
+    EncodeError, Experience, MAX_MOVEMENTS, Table, Texture, amend, encode, encoded_len,
+};
+use crate::wire::{MAX_TEXTURES, Name};
+
+/// The movements of a table that is begun: the three that the paper chose.
+pub const FIRST_MOVEMENTS: [Movement; 3] = [
+    Movement::FOR_TRACTION,
+    Movement::FOR_FINENESS,
+    Movement::FOR_ROUGHNESS,
+];
+
+/// Fewest trials that a standard deviation can be had of.
+pub const LEAST_TRIALS: u8 = 2;
+
+/// Movements of a pilot: the grid up to 1.26 N; with more force the skin touches the core (fig. 3).
+pub fn pilot_movements() -> impl Iterator<Item = Movement> {
+    Movement::grid().filter(|m| m.force_mn() <= Movement::FOR_TRACTION.force_mn())
+}
+
+/// Why a texture is not learned.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum TrainingError {
+    /// Its name is empty or longer than a [`Name`].
+    Name(usize),
+    /// Fewer trials are wanted than [`LEAST_TRIALS`].
+    Trials(u8),
+    /// The table has as many textures as it may have.
+    Textures,
+    /// The table would take this many bytes, and there is less room.
+    Room(usize),
+    /// This rig does not measure a property that the table has, or none at all.
+    Measures(Option<Property>),
+    /// The slide has no value of this property; it does not count.
+    Missing(Property),
+    /// A movement that is none of this training's.
+    Movement(Movement),
+    /// Trials are missing.
+    Unfinished(Movement),
+    /// A pilot's movements are not those of the table.
+    Pilot,
+    /// The table is another one than that this training was begun with.
+    Table,
+    /// The table cannot be written.
+    Encode(EncodeError),
+}
+
+impl fmt::Display for TrainingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Name(length) => write!(
+                f,
+                "a texture's name has 1 to {} bytes, not {length}",
+                Name::new().capacity()
+            ),
+            Self::Trials(trials) => write!(
+                f,
+                "{trials} trials give no standard deviation: {LEAST_TRIALS} or more"
+            ),
+            Self::Textures => write!(f, "the table has {MAX_TEXTURES} textures: it is full"),
+            Self::Room(bytes) => write!(
+                f,
+                "the table is full: it would take {bytes} bytes, and there is less room"
+            ),
+            Self::Measures(Some(property)) => {
+                write!(
+                    f,
+                    "the table has {property}, and this rig does not measure it"
+                )
+            }
+            Self::Measures(None) => f.write_str("this rig measures no property"),
+            Self::Missing(property) => write!(f, "the slide has no {property}: slide again"),
+            Self::Movement(movement) => write!(f, "{movement} is no part of this training"),
+            Self::Unfinished(movement) => write!(f, "trials at {movement} are missing"),
+            Self::Pilot => f.write_str("the movements of the pilot are not those of the table"),
+            Self::Table => {
+                f.write_str("the table was replaced during the training: begin it again")
+            }
+            Self::Encode(why) => why.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for TrainingError {}
+
+/// A texture to learn.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted<'n> {
+    /// Its name. One that the table knows goes on with the trials that it has there.
+    pub name: &'n str,
+    /// How often each movement is to have been made in the end.
+    pub trials: u8,
+    /// [`pilot_movements`] instead of the table's.
+    pub pilot: bool,
+    /// The properties that the rig measures.
+    pub measures: PropertySet,
+}
+
+/// A texture that is being learned.
+#[derive(Clone, Debug)]
+pub struct Training {
+    name: Name,
+    trials: u8,
+    measured: PropertySet,
+    /// Checksum of the table that there was at the beginning.
+    table: Option<u32>,
+    /// Whether trials of that table are counted in.
+    goes_on: bool,
+    /// Whether a table can be made of it.
+    makes_table: bool,
+    learned: Vec<(Movement, Experience), MAX_MOVEMENTS>,
+}
+
+impl Training {
+    /// Begins a training, or begins it again; `table` is the one in use, `room` the bytes that a table may have.
+    ///
+    /// Without a table its movements are [`FIRST_MOVEMENTS`], or the pilot's.
+    ///
+    /// # Errors
+    /// Everything that would keep the texture out of the table in the end: see [`TrainingError`].
+    pub fn new(
+        wanted: Wanted<'_>,
+        table: Option<&Table<'_>>,
+        room: usize,
+    ) -> Result<Self, TrainingError> {
+        let length = wanted.name.len();
+        let name = Name::try_from(wanted.name).map_err(|_| TrainingError::Name(length))?;
+        if name.is_empty() {
+            return Err(TrainingError::Name(0));
+        }
+        if wanted.trials < LEAST_TRIALS {
+            return Err(TrainingError::Trials(wanted.trials));
+        }
+        let measured = table.map_or(wanted.measures, Table::measured);
+        if measured.is_empty() {
+            return Err(TrainingError::Measures(None));
+        }
+        if let Some(missing) = measured.iter().find(|p| !wanted.measures.contains(*p)) {
+            return Err(TrainingError::Measures(Some(missing)));
+        }
+        let makes_table = match table {
+            Some(table) => !wanted.pilot || table.movements().eq(pilot_movements()),
+            None => true,
+        };
+        let known = table
+            .filter(|_| makes_table)
+            .and_then(|table| Some((table, table.find(&name)?)));
+        let mut learned = Vec::new();
+        match table.filter(|_| makes_table) {
+            Some(table) => learned.extend(table.movements().zip(0..).map(|(movement, index)| {
+                let known = known.map(|(table, texture)| table.experience(texture, index));
+                (movement, known.unwrap_or_default())
+            })),
+            None if wanted.pilot => learned.extend(pilot_movements().map(untouched)),
+            None => learned.extend(FIRST_MOVEMENTS.into_iter().map(untouched)),
+        }
+        if makes_table && known.is_none() {
+            let textures = table.map_or(0, |table| usize::from(table.textures())) + 1;
+            if textures > MAX_TEXTURES {
+                return Err(TrainingError::Textures);
+            }
+            let names = table
+                .into_iter()
+                .flat_map(Table::names)
+                .chain([wanted.name]);
+            let names = names.map(|name| 1 + name.len()).sum();
+            let length = encoded_len(textures, learned.len(), names);
+            if length > room {
+                return Err(TrainingError::Room(length));
+            }
+        }
+        Ok(Self {
+            name,
+            trials: wanted.trials,
+            measured,
+            table: table.map(Table::crc),
+            goes_on: known.is_some(),
+            makes_table,
+            learned,
+        })
+    }
+
+    /// The texture's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The checksum under which progress is stored: of the table whose trials of this texture are counted in, `None` where
+    /// there are none.
+    pub fn table(&self) -> Option<u32> {
+        self.table.filter(|_| self.goes_on)
+    }
+
+    /// Whether there is to be a table in the end; a pilot beside another table has only a result.
+    pub fn makes_table(&self) -> bool {
+        self.makes_table
+    }
+
+    /// Movements and what has been learned at them.
+    pub fn learned(&self) -> &[(Movement, Experience)] {
+        &self.learned
+    }
+
+    /// Takes up what was stored of this training at a movement.
+    ///
+    /// # Errors
+    /// [`TrainingError::Movement`].
+    pub fn resume(
+        &mut self,
+        movement: Movement,
+        experience: Experience,
+    ) -> Result<(), TrainingError> {
+        *self.at(movement)? = experience;
+        Ok(())
+    }
+
+    /// The movement to be made next: the one made least often, of several the first; `None` when there are enough trials of
+    /// all.
+    pub fn next(&self) -> Option<Movement> {
+        let (movement, experience) = self.learned.iter().min_by_key(|(_, e)| e.trials())?;
+        (experience.trials() < self.trials).then_some(*movement)
+    }
+
+    /// Trials that are still to be made, of all movements.
+    pub fn left(&self) -> u16 {
+        self.learned
+            .iter()
+            .map(|(_, e)| u16::from(self.trials.saturating_sub(e.trials())))
+            .sum()
+    }
+
+    /// Takes a slide in, and gives what is to be stored.
+    ///
+    /// # Errors
+    /// [`TrainingError::Movement`], [`TrainingError::Missing`]: the slide does not count.
+    pub fn took(
+        &mut self,
+        movement: Movement,
+        properties: &Properties,
+    ) -> Result<Trained, TrainingError> {
+        let measured = self.measured;
+        let experience = self.at(movement)?;
+        experience
+            .learn(measured, properties)
+            .map_err(TrainingError::Missing)?;
+        Ok(Trained {
+            experience: *experience,
+            name: self.name.clone(),
+            movement,
+            table: self.table(),
+        })
+    }
+
+    /// Writes the table with this texture into the beginning of `room`: `table`, the one in use, with all other textures as
+    /// they are to the bit, or one of this texture alone.
+    ///
+    /// # Errors
+    /// [`TrainingError::Unfinished`], [`TrainingError::Pilot`], [`TrainingError::Table`], [`TrainingError::Encode`].
+    pub fn encode<'r>(
+        &self,
+        table: Option<&Table<'_>>,
+        room: &'r mut [u8],
+    ) -> Result<Table<'r>, TrainingError> {
+        if let Some(movement) = self.next() {
+            return Err(TrainingError::Unfinished(movement));
+        }
+        if !self.makes_table {
+            return Err(TrainingError::Pilot);
+        }
+        if table.map(Table::crc) != self.table {
+            return Err(TrainingError::Table);
+        }
+        let experience: Vec<Experience, MAX_MOVEMENTS> =
+            self.learned.iter().map(|(_, e)| *e).collect();
+        let texture = Texture {
+            name: &self.name,
+            experience: &experience,
+        };
+        match table {
+            Some(table) => amend(room, table, texture),
+            None => {
+                let movements: Vec<Movement, MAX_MOVEMENTS> =
+                    self.learned.iter().map(|(m, _)| *m).collect();
+                encode(room, self.measured, &movements, [texture].into_iter())
+            }
+        }
+        .map_err(TrainingError::Encode)
+    }
+
+    fn at(&mut self, movement: Movement) -> Result<&mut Experience, TrainingError> {
+        self.learned
+            .iter_mut()
+            .find(|(m, _)| *m == movement)
+            .map(|(_, experience)| experience)
+            .ok_or(TrainingError::Movement(movement))
+    }
+}
+
+fn untouched(movement: Movement) -> (Movement, Experience) {
+    (movement, Experience::default())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::tests::{around, table_of};
+    use std::vec;
+    use std::vec::Vec as List;
+
+    fn wanted(name: &str) -> Wanted<'_> {
+        Wanted {
+            name,
+            trials: 3,
+            pilot: false,
+            measures: PropertySet::ALL,
+        }
+    }
+
+    /// `textures` textures at two movements.
+    fn table(textures: usize) -> List<u8> {
+        let cell = vec![around([(0.1, 0.2), (0.3, 0.1), (0.5, 0.4)]); 2];
+        table_of(PropertySet::ALL, &vec![cell; textures])
+    }
+
+    fn felt(value: f32) -> Properties {
+        Properties::new([Some(value), Some(2.0 * value), Some(3.0 * value)])
+    }
+
+    /// Makes all movements; those made.
+    fn train(training: &mut Training) -> List<Movement> {
+        let mut made = List::new();
+        while let Some(movement) = training.next() {
+            made.push(movement);
+            training
+                .took(movement, &felt(made.len() as f32 * 0.01))
+                .unwrap();
+        }
+        made
+    }
+
+    #[test]
+    fn a_new_texture_is_added_and_the_others_stay_to_the_bit() {
+        let bytes = table(5);
+        let old = Table::read(&bytes).unwrap();
+        let mut training = Training::new(wanted("felt"), Some(&old), 4096).unwrap();
+        assert_eq!((training.name(), training.table()), ("felt", None));
+        let mut room = vec![0; 4096];
+        let [first, second] = [0, 1].map(|m| old.movement(m).unwrap());
+        let unfinished = training.encode(Some(&old), &mut room).err();
+        assert_eq!(unfinished, Some(TrainingError::Unfinished(first)));
+        assert_eq!(
+            train(&mut training),
+            [first, second, first, second, first, second]
+        );
+        let new = training.encode(Some(&old), &mut room).unwrap();
+        assert_eq!(
+            new.names().collect::<List<_>>(),
+            ["t0", "t1", "t2", "t3", "t4", "felt"]
+        );
+        assert_eq!([0, 1].map(|m| new.trials(5, m)), [3, 3]);
+        // movements, cells and trials of the first five lie where they lay, but for the trials
+        let cells = 16 + 2 * 6 + 5 * 2 * 12;
+        assert_eq!(new.as_bytes()[16..cells], bytes[16..cells]);
+        for (texture, movement) in (0..5).flat_map(|t| [(t, 0), (t, 1)]) {
+            let of = |table: &Table<'_>| table.experience(texture, movement);
+            assert_eq!(of(&new), of(&old));
+        }
+        // and the other way round: learning nothing new writes the same table
+        let known = Training::new(
+            Wanted {
+                trials: 2,
+                ..wanted("t3")
+            },
+            Some(&old),
+            0,
+        );
+        let same = known.unwrap().encode(Some(&old), &mut room).unwrap();
+        assert_eq!(same.as_bytes(), bytes);
+        let other = training.encode(None, &mut room).err();
+        assert_eq!(other, Some(TrainingError::Table));
+    }
+
+    #[test]
+    fn a_known_texture_goes_on_with_its_trials() {
+        let bytes = table(3);
+        let old = Table::read(&bytes).unwrap();
+        let mut training = Training::new(wanted("t1"), Some(&old), 0).unwrap();
+        assert_eq!(training.table(), Some(old.crc()));
+        let (movement, two) = training.learned()[0];
+        assert_eq!(two.trials(), 2);
+        let record = training.took(movement, &felt(0.2)).unwrap();
+        assert_eq!(
+            (record.experience.trials(), record.table),
+            (3, Some(old.crc()))
+        );
+        assert_eq!((&record.name[..], record.movement), ("t1", movement));
+        // the power is cut
+        let mut training = Training::new(wanted("t1"), Some(&old), 0).unwrap();
+        training.resume(movement, record.experience).unwrap();
+        assert_eq!(train(&mut training), [old.movement(1).unwrap()]);
+        let mut room = vec![0; 4096];
+        let new = training.encode(Some(&old), &mut room).unwrap();
+        assert_eq!(
+            (new.textures(), new.trials(1, 0), new.trials(1, 1)),
+            (3, 3, 3)
+        );
+        let mean = new
+            .experience(1, 0)
+            .gaussian(Property::Traction)
+            .unwrap()
+            .mean;
+        assert!((mean - (0.1 + 0.1 + 0.2) / 3.0).abs() < 1e-3, "{mean}");
+    }
+
+    #[test]
+    fn what_cannot_end_in_a_table_is_refused_before_touching() {
+        let bytes = table(3);
+        let old = Table::read(&bytes).unwrap();
+        let refused = |wanted, room| Training::new(wanted, Some(&old), room).err();
+        let long = std::format!("{:041}", 0);
+        assert_eq!(refused(wanted(""), 4096), Some(TrainingError::Name(0)));
+        assert_eq!(refused(wanted(&long), 4096), Some(TrainingError::Name(41)));
+        assert_eq!(refused(wanted(&long[..40]), 4096), None);
+        let once = Wanted {
+            trials: 1,
+            ..wanted("felt")
+        };
+        assert_eq!(refused(once, 4096), Some(TrainingError::Trials(1)));
+        let needed = bytes.len() + 2 * 13 + 1 + 4;
+        assert_eq!(refused(wanted("felt"), needed), None);
+        assert_eq!(
+            refused(wanted("felt"), needed - 1),
+            Some(TrainingError::Room(needed))
+        );
+        let handheld = Wanted {
+            measures: PropertySet::from_bits(6).unwrap(),
+            ..wanted("felt")
+        };
+        let traction = TrainingError::Measures(Some(Property::Traction));
+        assert_eq!(refused(handheld, 4096), Some(traction));
+        let nothing = Wanted {
+            measures: PropertySet::default(),
+            ..wanted("felt")
+        };
+        let nothing = Training::new(nothing, None, 4096).err();
+        assert_eq!(nothing, Some(TrainingError::Measures(None)));
+        let full = table(MAX_TEXTURES);
+        let full = Table::read(&full).unwrap();
+        let one_more = Training::new(wanted("felt"), Some(&full), 16_384).err();
+        assert_eq!(one_more, Some(TrainingError::Textures));
+        assert!(Training::new(wanted("t7"), Some(&full), 16_384).is_ok());
+    }
+
+    #[test]
+    fn a_slide_that_lacks_a_property_does_not_count() {
+        let mut training = Training::new(wanted("felt"), None, 4096).unwrap();
+        let movement = training.next().unwrap();
+        let lacks = Properties::new([Some(1.0), None, Some(f32::NAN)]);
+        let missing = TrainingError::Missing(Property::Roughness);
+        assert_eq!(training.took(movement, &lacks), Err(missing));
+        assert_eq!(training.learned()[0].1, Experience::default());
+        let other = Movement::new(1000, 30_000).unwrap();
+        let foreign = Err(TrainingError::Movement(other));
+        assert_eq!(training.took(other, &felt(1.0)), foreign);
+        let foreign = Err(TrainingError::Movement(other));
+        assert_eq!(training.resume(other, Experience::default()), foreign);
+    }
+
+    #[test]
+    fn without_a_table_the_first_texture_makes_one() {
+        for pilot in [false, true] {
+            let wanted = Wanted {
+                pilot,
+                ..wanted("felt")
+            };
+            let mut training = Training::new(wanted, None, 4096).unwrap();
+            let made = train(&mut training);
+            assert_eq!(made.len(), if pilot { 90 } else { 9 });
+            let mut room = vec![0; 4096];
+            let first = training.encode(None, &mut room).unwrap();
+            assert_eq!(first.names().collect::<List<_>>(), ["felt"]);
+            if !pilot {
+                assert!(first.movements().eq(FIRST_MOVEMENTS));
+                continue;
+            }
+            assert!(first.movements().eq(pilot_movements()));
+            // where the table has the pilot's movements a second pilot goes into it
+            let second = Wanted {
+                name: "wool",
+                ..wanted
+            };
+            let mut training = Training::new(second, Some(&first), 4096).unwrap();
+            assert!(training.makes_table());
+            train(&mut training);
+            let mut room = vec![0; 4096];
+            let both = training.encode(Some(&first), &mut room).unwrap();
+            assert_eq!((both.textures(), both.movements().len()), (2, 30));
+        }
+    }
+
+    #[test]
+    fn a_pilot_beside_a_table_has_only_a_result() {
+        let bytes = table(3);
+        let old = Table::read(&bytes).unwrap();
+        let pilot = Wanted {
+            pilot: true,
+            ..wanted("t1")
+        };
+        // no room is asked for
+        let mut training = Training::new(pilot, Some(&old), 0).unwrap();
+        assert_eq!((training.makes_table(), training.table()), (false, None));
+        let made = train(&mut training);
+        assert!(made.iter().all(|m| m.force_mn() <= 1262) && made.len() == 90);
+        assert!(training.learned().iter().all(|(_, e)| e.trials() == 3));
+        let none = training.encode(Some(&old), &mut [0; 64]).err();
+        assert_eq!(none, Some(TrainingError::Pilot));
+    }
+}

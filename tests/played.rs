@@ -1,0 +1,244 @@
+//! Real recordings as what the finger of the simulated rig feels: how faithfully they are played, and how well the paper's
+//! method tells real materials by them.
+
+use rayon::prelude::*;
+use tactus::collection::calibrated;
+use tactus::evaluate::{Summary, evaluate};
+use tactus::experiment::{Experiment, Protocol};
+use tactus::played::Lesson;
+use tactus::recordings::{RecordingSet, Slide};
+use tactus::replay::{Felt, measure};
+use tactus::sim::played::Played;
+use tactus::simulated::SimRig;
+use tactus_core::explorer::{Config, Explorer};
+use tactus_core::features::{Plan, Property, PropertySet};
+use tactus_core::movement::Movement;
+use tactus_core::rig::{Event, explore};
+use tactus_core::table::Table;
+use tactus_tests::data;
+
+/// The movement of data/biotac.
+fn movement() -> Movement {
+    Movement::new(800, 25_000).unwrap()
+}
+
+/// A recording that says where in it one is: P_AC counts up, the force rises.
+fn ramp(from: i16) -> Played {
+    Played {
+        pac: (0..8000).map(|n| from + n % 500).collect(),
+        shear_mn: (0..500).map(|n| 300 + n).collect(),
+    }
+}
+
+#[test]
+fn every_sample_of_a_recording_is_felt_once() {
+    let setup = Lesson::setup(1);
+    let mut rig = SimRig::new(setup);
+    rig.control().calibrate(calibrated(setup).unwrap()).unwrap();
+    rig.home().unwrap();
+    rig.world().play(vec![ramp(0), ramp(600)], 1);
+    let mut begun = Vec::new();
+    for _ in 0..3 {
+        let felt = rig.record(movement()).unwrap();
+        // the stage gets going within milliseconds; until then the finger is still
+        let start = felt.pac.iter().position(|&x| x > 20).unwrap();
+        assert!(start < 100, "{start}");
+        let steady = felt.steady(2200);
+        let steps: Vec<i16> = felt.pac[steady.clone()]
+            .windows(2)
+            .map(|w| w[1] - w[0])
+            .collect();
+        assert!(steps.iter().all(|&step| step == 1 || step == -499));
+        begun.push(felt.pac[steady.start] > 550);
+        // 300 mN and 1 mN for every 10 ms since the movement began
+        let shear = felt.shear_mn.as_ref().unwrap();
+        let window = felt.steady(1000);
+        let middle = (window.start + window.end) / 2;
+        let mean = shear[window].iter().map(|&mn| f64::from(mn)).sum::<f64>()
+            / felt.steady(1000).len() as f64;
+        let expected = 300.0 + middle as f64 / 10.0;
+        assert!((mean - expected).abs() < 20.0, "{mean} mN, {expected}");
+    }
+    assert_eq!(begun[0], begun[2], "over and over");
+    assert_ne!(begun[0], begun[1], "the next slide is the next recording");
+    let counts = rig.world().played();
+    assert_eq!((counts.slides, counts.clipped, counts.over), (3, 0, 0));
+}
+
+#[test]
+fn what_is_cut_is_counted() {
+    let mut rig = SimRig::new(Lesson::setup(1));
+    rig.home().unwrap();
+    let loud = Played {
+        pac: [0, 3000].repeat(500),
+        shear_mn: vec![500],
+    };
+    rig.world().play(vec![loud], 1);
+    rig.record(movement()).unwrap();
+    let counts = rig.world().played();
+    assert_eq!(counts.clipped, 500);
+    assert!(counts.over > 4000, "{counts:?}");
+    // without recordings the sample is felt again
+    rig.world().play(Vec::new(), 1);
+    rig.record(movement()).unwrap();
+    assert_eq!(rig.world().played().slides, 0);
+}
+
+/// The stretch of a whole recording that the rig feels, s: its steady part begins so long after the recording's, and ends
+/// after 3 s of constant speed.
+const STRETCH_S: (f32, f32) = (0.5 + 0.225, 0.5 + 3.025);
+
+/// What came of explorations.
+#[derive(Clone, Copy, Default, Debug)]
+struct Tally {
+    right: u32,
+    sure: u32,
+    wrong_when_sure: u32,
+    slides: u32,
+    cut: u32,
+}
+
+/// An exploration of each of the 20 materials with slides that were not learned.
+fn explore_all(set: &RecordingSet, train: usize, seed: u64) -> Tally {
+    let calibration = calibrated(Lesson::setup(0)).unwrap();
+    let plan = Plan::new();
+    let lesson = Lesson::interleaved(set, train, seed).unwrap();
+    assert_eq!(lesson.movement, movement());
+    let bytes = lesson.learn(calibration).unwrap();
+    let table = Table::read(&bytes).unwrap();
+    let explore_one = |texture: usize| {
+        let mut rig = lesson.unknown(texture, seed);
+        rig.control().calibrate(calibration).unwrap();
+        let mut explorer = Explorer::<32>::new(table, PropertySet::ALL, Config::default()).unwrap();
+        let mut slides = 0;
+        let exploration = explore(
+            &mut rig,
+            &mut explorer,
+            &plan,
+            || 0,
+            |event| match event {
+                Event::Felt(..) => slides += 1,
+                Event::Rejected(_, why) => panic!("{}: {why}", lesson.names[texture]),
+                Event::Chosen(..) => {}
+            },
+        );
+        let verdict = embassy_futures::block_on(exploration).unwrap();
+        let counts = rig.world().played();
+        assert_eq!(counts.slides, slides, "a recording for each slide");
+        assert_eq!(counts.over, 0);
+        let right = usize::from(verdict.texture) == texture;
+        Tally {
+            right: right.into(),
+            sure: verdict.sure.into(),
+            wrong_when_sure: (verdict.sure && !right).into(),
+            slides,
+            cut: counts.clipped,
+        }
+    };
+    let tallies: Vec<Tally> = (0..lesson.names.len())
+        .into_par_iter()
+        .map(explore_one)
+        .collect();
+    tallies.iter().fold(Tally::default(), Tally::and)
+}
+
+impl Tally {
+    fn and(self, other: &Self) -> Self {
+        Self {
+            right: self.right + other.right,
+            sure: self.sure + other.sure,
+            wrong_when_sure: self.wrong_when_sure + other.wrong_when_sure,
+            slides: self.slides + other.slides,
+            cut: self.cut + other.cut,
+        }
+    }
+}
+
+/// Accuracy of 8000 virtual explorations with the same stretches of the recordings, no rig in between.
+fn without_a_rig(set: &RecordingSet, train: usize) -> f64 {
+    let plan = Plan::new();
+    let felt: Vec<Vec<Felt>> = (0..set.textures().len())
+        .into_par_iter()
+        .map(|texture| {
+            let slides = set.load_texture(texture).unwrap();
+            let felt = |mut slide: Slide| {
+                slide.window = STRETCH_S;
+                Felt {
+                    number: slide.number,
+                    movement: slide.movement,
+                    measurement: measure(&plan, &slide).unwrap(),
+                }
+            };
+            slides.into_iter().map(felt).collect()
+        })
+        .collect();
+    let names: Vec<String> = set.textures().iter().map(|t| t.name.clone()).collect();
+    let experiment =
+        Experiment::recorded(names, &felt, None, Protocol::Interleaved, train, 1).unwrap();
+    let config = Config::default();
+    let outcomes = evaluate(&experiment, config, 8000, || ()).unwrap();
+    Summary::new(&outcomes, experiment.names(), config.max_slides).accuracy
+}
+
+#[test]
+fn twenty_real_materials_are_told_apart_on_the_simulated_rig() {
+    let Some(folder) = data("biotac") else { return };
+    let set = RecordingSet::open(&folder).unwrap();
+    for train in [5, 15] {
+        let seeds: Vec<Tally> = (1..=5).map(|seed| explore_all(&set, train, seed)).collect();
+        let all = seeds.iter().fold(Tally::default(), Tally::and);
+        let rights: Vec<u32> = seeds.iter().map(|t| t.right).collect();
+        let expected = without_a_rig(&set, train);
+        println!(
+            "{train} slides learned: {rights:?} of 20 each, {all:?}; without a rig {expected:.3}"
+        );
+        // 100 runs scatter about what the recordings themselves allow
+        let spread = (100.0 * expected * (1.0 - expected)).sqrt();
+        let off = f64::from(all.right) - 100.0 * expected;
+        assert!(
+            off.abs() < 3.0 * spread,
+            "{all:?}, and {expected} without a rig"
+        );
+        assert!(all.right >= 80, "16 of 20: {rights:?}");
+    }
+}
+
+/// The rig feels 3 of the 5 s that the golden properties are of, and subtracts its own sensor's noise.
+#[test]
+fn played_recordings_have_the_properties_of_the_recordings() {
+    let Some(folder) = data("biotac") else { return };
+    let set = RecordingSet::open(&folder).unwrap();
+    let calibration = calibrated(Lesson::setup(0)).unwrap();
+    let plan = Plan::new();
+    let lesson = Lesson::interleaved(&set, 5, 1).unwrap();
+    let off: Vec<[f64; 3]> = (0..lesson.names.len())
+        .into_par_iter()
+        .map(|texture| {
+            let mut rig = SimRig::new(Lesson::setup(texture as u64));
+            rig.control().calibrate(calibration).unwrap();
+            rig.home().unwrap();
+            let recorded = set.load_texture(texture).unwrap();
+            // the same stretch of the same slide, straight from the folder
+            let whole = &recorded[7];
+            rig.world().play(
+                vec![Played {
+                    pac: whole.pac[1100..].to_vec(),
+                    shear_mn: whole.shear_mn.as_ref().unwrap()[50..].to_vec(),
+                }],
+                1,
+            );
+            let felt = rig.record(movement()).unwrap();
+            let mut stretch = whole.clone();
+            let moved = felt.window.1 + 0.5;
+            stretch.window = (felt.window.0 + 0.5, moved);
+            let [here, there] = [&felt, &stretch].map(|s| measure(&plan, s).unwrap().properties);
+            Property::ALL.map(|p| f64::from(here.get(p).unwrap() - there.get(p).unwrap()))
+        })
+        .collect();
+    for (property, n) in Property::ALL.into_iter().zip(0..) {
+        let largest = off.iter().map(|o| o[n].abs()).fold(0.0, f64::max);
+        println!("{property}: at most {largest:.4} off");
+        let allowed = [0.06, 0.05, 0.01][n];
+        assert!(largest < allowed, "{property}: {largest}");
+    }
+}

@@ -1,0 +1,113 @@
+//! Training on the simulated rig: with the power cut after any trial, what is learned is the same.
+
+use embassy_futures::block_on;
+use tactus::collection::{Collection, calibrated, texture_name};
+use tactus::simulated::SimRig;
+use tactus_core::explorer::{Config, Explorer};
+use tactus_core::features::{Plan, Properties, PropertySet, Slide};
+use tactus_core::kernels::Plain;
+use tactus_core::movement::Movement;
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::{Rig as _, explore};
+use tactus_core::store::Trained;
+use tactus_core::table::Table;
+use tactus_core::training::{Training, Wanted};
+
+const ROOM: usize = 16 * 1024 - 32;
+const NEW: u8 = 43;
+
+fn world() -> Collection {
+    Collection {
+        seed: 11,
+        textures: vec![10, 30, 47, 84, 100],
+        trials: 5,
+    }
+}
+
+fn wanted(name: &str) -> Wanted<'_> {
+    Wanted {
+        name,
+        trials: 5,
+        pilot: false,
+        measures: PropertySet::ALL,
+    }
+}
+
+/// Slides of the new texture on one rig, in the order that a training asks for.
+fn slides(
+    calibration: RigCalibration,
+    mut training: Training,
+) -> (Training, Vec<(Movement, Properties)>) {
+    let plan = Plan::new();
+    let mut rig = SimRig::new(world().setup(NEW, 7));
+    rig.control().calibrate(calibration).unwrap();
+    let mut felt = Vec::new();
+    while let Some(movement) = training.next() {
+        let mut slide = Slide::<Plain>::new(&plan);
+        block_on(rig.perform(movement, &mut slide)).unwrap();
+        let properties = slide.finish().unwrap().properties;
+        training.took(movement, &properties).unwrap();
+        felt.push((movement, properties));
+    }
+    (training, felt)
+}
+
+#[test]
+fn a_texture_is_trained_through_power_cuts_and_identified() {
+    let name = texture_name(NEW);
+    let calibration = calibrated(world().setup(10, 0)).unwrap();
+    let bytes = world().learn(calibration, || ()).unwrap();
+    let old = Table::read(&bytes).unwrap();
+    let begin = || Training::new(wanted(name), Some(&old), ROOM).unwrap();
+    let (training, felt) = slides(calibration, begin());
+    assert_eq!(felt.len(), 15);
+    let mut room = vec![0; ROOM];
+    let new = training.encode(Some(&old), &mut room).unwrap();
+
+    // cut after every trial: only what was stored is left
+    for cut in 0..=felt.len() {
+        let mut stored: Vec<Trained> = Vec::new();
+        let mut training = begin();
+        for (n, (movement, properties)) in felt.iter().enumerate() {
+            if n == cut {
+                training = begin();
+                for record in &stored {
+                    assert_eq!(record.table, training.table());
+                    training.resume(record.movement, record.experience).unwrap();
+                }
+            }
+            assert_eq!(
+                training.next(),
+                Some(*movement),
+                "cut after {cut}, trial {n}"
+            );
+            let record = training.took(*movement, properties).unwrap();
+            stored.retain(|other| other.movement != *movement);
+            stored.push(record);
+        }
+        let mut room = vec![0; ROOM];
+        let again = training.encode(Some(&old), &mut room).unwrap();
+        assert_eq!(again.as_bytes(), new.as_bytes(), "cut after {cut}");
+    }
+
+    // the others are what they were
+    assert_eq!(new.textures(), old.textures() + 1);
+    for (texture, of_old) in old.names().enumerate() {
+        assert_eq!(new.name(texture as u16), Some(of_old));
+        for movement in 0..3 {
+            let experience = |table: &Table<'_>| table.experience(texture as u16, movement);
+            assert_eq!(experience(&new), experience(&old));
+        }
+    }
+    let plan = Plan::new();
+    let mut right = 0;
+    for trial in 0..10 {
+        let mut rig = SimRig::new(world().setup(NEW, 100 + trial));
+        rig.control().calibrate(calibration).unwrap();
+        let mut explorer = Explorer::<128>::new(new, PropertySet::ALL, Config::default()).unwrap();
+        let verdict = block_on(explore(&mut rig, &mut explorer, &plan, || 0, |_| ())).unwrap();
+        right += usize::from(new.name(verdict.texture) == Some(name));
+    }
+    println!("{right} of 10 right");
+    assert!(right >= 9, "{right} of 10");
+}
