@@ -175,7 +175,6 @@ pub(crate) fn explore(cli: &Cli, chosen: &Chosen, sha256: &str) -> anyhow::Resul
                 ..
             } => {
                 truths.chosen(*movement, board);
-                forces.clear();
                 let outlook: Vec<Outlook> = outlook
                     .iter()
                     .map(|promise| Outlook {
@@ -195,6 +194,11 @@ pub(crate) fn explore(cli: &Cli, chosen: &Chosen, sha256: &str) -> anyhow::Resul
                 let properties = felt.properties();
                 show.felt(*action, &properties, felt.roughness_is_bound, posterior)
             }),
+            // from here on the force is about the still finger's
+            Tell::Phase(Phase::Pressing) => {
+                forces.clear();
+                Ok(())
+            }
             Tell::Rejected { why, .. } => show.line(&format!("  rejected: {why}")),
             Tell::Fault(fault) => show.line(&format!("  fault: {fault}")),
             Tell::Verdict {
