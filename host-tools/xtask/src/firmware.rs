@@ -8,8 +8,8 @@ use sha2::{Digest as _, Sha256};
 
 use crate::{root, toolchain};
 
-/// Builds every binary of the firmware and says what came out.
-pub(crate) fn build() -> Result<()> {
+/// Builds every binary of the firmware and says what came out; the ELFs.
+pub(crate) fn build() -> Result<Vec<PathBuf>> {
     let toolchain = toolchain::get()?;
     println!("Building with {}", toolchain.version());
     let mut cargo = toolchain.cargo_build();
@@ -26,10 +26,10 @@ pub(crate) fn build() -> Result<()> {
     );
     let elves = executables(&String::from_utf8_lossy(&output.stdout));
     ensure!(!elves.is_empty(), "cargo named no firmware binary");
-    for elf in elves {
-        describe(&elf)?;
+    for elf in &elves {
+        describe(elf)?;
     }
-    Ok(())
+    Ok(elves)
 }
 
 /// The binaries that cargo's messages name.

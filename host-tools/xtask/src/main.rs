@@ -1,4 +1,5 @@
-//! The project's own commands: `cargo xtask build | test | mutants | bench`.
+//! The project's own commands: `cargo xtask build | test | emulate | mutants | bench`.
+mod emulate;
 mod firmware;
 mod test;
 mod toolchain;
@@ -31,6 +32,18 @@ enum Cli {
         #[arg(long)]
         quick: bool,
     },
+    /// Run the firmware on the emulated board, where it identifies a texture of the simulated rig
+    ///
+    /// Builds the firmware and the emulator first; that takes some minutes the first time.
+    #[command(after_help = "Examples:
+  cargo xtask emulate --texture Felt --log   with the firmware's own log
+  cargo xtask emulate --help                 all options")]
+    #[command(disable_help_flag = true)]
+    Emulate {
+        /// Options for the emulator
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
     /// Show what the core's tests would miss: run them on copies of the core with one thing changed
     ///
     /// Changes the sensor, table and explorer modules (cargo-mutants). A mutant that survives is a change no test sees.
@@ -57,7 +70,8 @@ enum Cli {
 
 fn main() -> ExitCode {
     let done = match Cli::parse() {
-        Cli::Build => firmware::build(),
+        Cli::Build => firmware::build().map(|_| ()),
+        Cli::Emulate { options } => emulate::run(&options),
         Cli::Test { quick } => return test::run(quick),
         Cli::Mutants { options } => mutants(options),
         Cli::Bench { options } => bench(options),
