@@ -17,6 +17,7 @@ const BASE_HZ: u32 = 3200;
 /// The timer counts at 2 MHz.
 const PRESCALER: u16 = 83;
 const PERIOD: u16 = 625;
+const CORE_HZ: u32 = 168_000_000;
 /// STEP is high for 5 us.
 const HIGH: u16 = 10;
 const DIRECTION_PIN: usize = 11;
@@ -134,6 +135,8 @@ pub(crate) fn lift_by_hand(mut done: impl FnMut(u32) -> bool) {
     REGISTERS.cr1().modify(|w| w.set_cen(true));
     let period = || {
         REGISTERS.sr().write(|w| w.0 = 0);
+        // most of the period, so that the register is not asked all the time
+        cortex_m::asm::delay(CORE_HZ / BASE_HZ * 9 / 10);
         while !REGISTERS.sr().read().uif() {}
     };
     // the pulse that may be under way
