@@ -1,6 +1,6 @@
 //! The emulated board: a workspace of its own, since its crate wants a newer Rust than the others.
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context as _, Result};
@@ -17,12 +17,9 @@ pub(crate) fn run(options: &[OsString]) -> Result<()> {
     let elf = if help || named {
         None
     } else {
-        let elves = firmware::build()?;
-        let rig = |elf: &&PathBuf| elf.file_name() == Some("tactus-rig".as_ref());
-        let elf = elves.iter().find(rig);
-        Some(elf.context("the firmware has no tactus-rig")?.clone())
+        Some(rig(&firmware::build()?)?)
     };
-    crate::run(&mut build())?;
+    crate::run(cargo_there("build").arg("--release"))?;
     let mut emulator = Command::new(folder().join("release/tactus-emulator"));
     if let Some(elf) = elf {
         emulator.arg("--elf").arg(elf);
@@ -35,12 +32,39 @@ fn folder() -> PathBuf {
     target().join("emulator")
 }
 
-fn build() -> Command {
+/// The rig's image among those that were built.
+pub(crate) fn rig(elves: &[PathBuf]) -> Result<PathBuf> {
+    let rig = elves
+        .iter()
+        .find(|elf| elf.file_name() == Some("tactus-rig".as_ref()));
+    Ok(rig.context("the firmware has no tactus-rig")?.clone())
+}
+
+/// Formatting and lints of the emulator.
+pub(crate) fn lints() -> [Command; 2] {
+    let mut format = cargo();
+    format.current_dir(root().join("host-tools/emulator"));
+    format.args(["fmt", "--check"]);
+    let mut clippy = cargo_there("clippy");
+    clippy.args(["--all-targets", "--", "-Dwarnings"]);
+    [format, clippy]
+}
+
+/// The emulator's tests, with the image that would be flashed.
+pub(crate) fn tests(elf: &Path) -> Command {
+    let mut tests = cargo_there("test");
+    tests.args(["--release", "--no-fail-fast"]);
+    tests.env("TACTUS_ELF", elf).env("TACTUS_REQUIRE_ELF", "1");
+    tests
+}
+
+/// A cargo command in the emulator's workspace.
+fn cargo_there(command: &str) -> Command {
     let mut cargo = cargo();
     // its own configuration is read from there
     cargo.current_dir(root().join("host-tools/emulator"));
     // the crate below says Rust 1.98 and builds on 1.95
-    cargo.args(["build", "--release", "--locked", "--ignore-rust-version"]);
+    cargo.args([command, "--locked", "--ignore-rust-version"]);
     cargo.arg("--target-dir").arg(folder());
     cargo
 }
