@@ -21,7 +21,7 @@ fn elf() -> Option<PathBuf> {
 }
 
 /// Unused flash.
-const NOWHERE: u64 = 0x080F_FFF0;
+const NOWHERE: u64 = 0x080F_FF00;
 
 /// What a function does instead of its work, once: its code is whole again 10 ms later, as after a disturbance that left
 /// no trace.
@@ -31,6 +31,36 @@ enum Instead {
     Hangs,
     /// It runs into an undefined instruction.
     Crashes,
+    /// It panics.
+    Panics,
+}
+
+/// What a function that panics says.
+const LAST_WORDS: &str = "nobody expects";
+
+/// Code for [`NOWHERE`] that calls `core::panicking::panic`: r0 and r1 its message, r2 where it was called.
+fn panicking(panic: u64) -> Vec<u8> {
+    const FILE: &str = "nowhere.rs";
+    // ldr r0..r3 from the words behind, bx r3, nop
+    let code = [0x4802_u16, 0x4903, 0x4A03, 0x4B04, 0x4718, 0xBF00];
+    let at = NOWHERE as u32 + 2 * code.len() as u32;
+    let (location, file) = (at + 4 * 4, at + 8 * 4);
+    let message = file + FILE.len() as u32;
+    let words = [
+        message,
+        LAST_WORDS.len() as u32,
+        location,
+        panic as u32 | 1,
+        // core::panic::Location: file, line, column
+        file,
+        FILE.len() as u32,
+        12,
+        3,
+    ];
+    let mut bytes: Vec<u8> = code.iter().flat_map(|c| c.to_le_bytes()).collect();
+    bytes.extend(words.iter().flat_map(|w| w.to_le_bytes()));
+    bytes.extend(FILE.bytes().chain(LAST_WORDS.bytes()));
+    bytes
 }
 
 /// Thumb's `b.w` from one address to another (ARMv7-M manual, B, encoding T4).
@@ -55,6 +85,11 @@ fn break_code(board: &mut Emulator, name: &str, instead: Instead) -> (u64, Vec<u
         Instead::Hangs => {
             // a branch to itself
             board.write(NOWHERE, &[0xFE, 0xE7]).unwrap();
+            board.write(address, &branch(address, NOWHERE)).unwrap();
+        }
+        Instead::Panics => {
+            let (panic, _) = board.symbol("core9panicking5panic").unwrap();
+            board.write(NOWHERE, &panicking(panic)).unwrap();
             board.write(address, &branch(address, NOWHERE)).unwrap();
         }
         // udf
@@ -93,7 +128,7 @@ struct Case {
 }
 
 /// By the fault table: its deadline, and what it takes until the fault shows.
-const CASES: [Case; 15] = [
+const CASES: [Case; 16] = [
     Case {
         name: "sensor unplugged before the slide",
         cause: Cause::Rig(Fault::SensorUnplugged),
@@ -203,6 +238,14 @@ const CASES: [Case; 15] = [
         when: When::Sliding,
         seen: &[],
         deadline_ms: Some(3),
+    },
+    Case {
+        name: "a task panics",
+        cause: Cause::Code("___watch_task_inner_function0E4poll", Instead::Panics),
+        when: When::Sliding,
+        seen: &[],
+        // its task has its turn every 5 ms
+        deadline_ms: Some(8),
     },
 ];
 
@@ -404,6 +447,8 @@ fn objections(case: &Case, outcome: &Outcome) -> Vec<String> {
         }
         (Cause::Code(_, Instead::Crashes), Some((Reset::Software, Some(words))))
             if words.contains("hard fault") => {}
+        (Cause::Code(_, Instead::Panics), Some((Reset::Software, Some(words))))
+            if words.contains(LAST_WORDS) && words.contains("nowhere.rs:12") => {}
         (cause, rebooted) => objections.push(format!("{cause:?} came to {rebooted:?}")),
     }
     objections
@@ -459,4 +504,5 @@ faults! {
     tasks_hang: "the tasks of thread mode hang",
     servo_hangs: "the servo hangs",
     servo_crashes: "the servo crashes",
+    task_panics: "a task panics",
 }
