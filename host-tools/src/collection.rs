@@ -32,6 +32,18 @@ impl Collection {
         Movement::FOR_ROUGHNESS,
     ];
 
+    /// The textures of a collection of `among` that holds `unknown`: the others are spread over Table 1.
+    pub fn spread(unknown: u8, among: u8) -> Vec<u8> {
+        let others = u16::from(among.clamp(1, 117)) - 1;
+        let mut textures: Vec<u8> = (0..others)
+            .map(|n| (n * 116 / others) as u8 + 1)
+            .map(|number| number + u8::from(number >= unknown))
+            .collect();
+        textures.push(unknown);
+        textures.sort_unstable();
+        textures
+    }
+
     /// A rig of this world with a texture under it. Different trials of one texture are `trial` apart.
     pub fn setup(&self, texture: u8, trial: u64) -> Setup {
         Setup {

@@ -149,17 +149,6 @@ pub(crate) fn demonstrate(out: &mut impl Write) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The unknown texture and `among - 1` others, spread over Table 1.
-fn choose_textures(unknown: u8, among: u8) -> Vec<u8> {
-    let mut textures: Vec<u8> = (0..u16::from(among) - 1)
-        .map(|n| (n * 116 / (u16::from(among) - 1)) as u8 + 1)
-        .map(|number| number + u8::from(number >= unknown))
-        .collect();
-    textures.push(unknown);
-    textures.sort_unstable();
-    textures
-}
-
 pub(crate) fn identify_simulated(args: &Identify, out: &mut impl Write) -> anyhow::Result<()> {
     let mut random = ChaCha8Rng::seed_from_u64(args.seed);
     let unknown = match &args.texture {
@@ -174,7 +163,7 @@ pub(crate) fn identify_simulated(args: &Identify, out: &mut impl Write) -> anyho
     }
     let collection = Collection {
         seed: args.seed,
-        textures: choose_textures(unknown, args.among),
+        textures: Collection::spread(unknown, args.among),
         trials: u32::try_from(args.train_slides).context("--train-slides")?,
     };
     let bar = progress(collection.textures.len() as u64, "learning textures");

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use tactus_core::explorer::{Outlook, Verdict};
-use tactus_core::features::Property;
+use tactus_core::features::{Properties, Property};
 use tactus_core::rig::Event;
 use tactus_core::table::{Action, Table};
 
@@ -43,38 +43,70 @@ impl<'t, W: Write> Show<'t, W> {
 
     fn try_event(&mut self, event: Event<'_>) -> io::Result<()> {
         match event {
-            Event::Chosen(action, outlook) => {
-                writeln!(
-                    self.out,
-                    "\nSlide {}: {}",
-                    self.slides + 1,
-                    self.name(action)
-                )?;
-                if let Some(chosen) = outlook.iter().find(|o| o.action == action) {
-                    writeln!(self.out, "  because {}", self.reason(chosen, outlook))?;
-                }
-            }
-            Event::Felt(action, measurement, posterior) => {
-                self.slides += 1;
-                let bound =
-                    measurement.roughness_is_bound && action.property == Property::Roughness;
-                if let Some(value) = measurement.properties.get(action.property) {
-                    let unit = if action.property == Property::Traction {
-                        " N"
-                    } else {
-                        ""
-                    };
-                    let at_most = if bound { "at most " } else { "" };
-                    writeln!(
-                        self.out,
-                        "  felt    {} {at_most}{value:.3}{unit}",
-                        action.property
-                    )?;
-                }
-                self.candidates(posterior)?;
-            }
-            Event::Rejected(_, why) => writeln!(self.out, "  rejected: {why}")?,
+            Event::Chosen(action, outlook) => self.chosen(action, outlook),
+            Event::Felt(action, measurement, posterior) => self.felt(
+                action,
+                &measurement.properties,
+                measurement.roughness_is_bound,
+                posterior,
+            ),
+            Event::Rejected(_, why) => self.line(&format!("  rejected: {why}")),
         }
+    }
+
+    /// Shows what comes next, and why.
+    ///
+    /// # Errors
+    /// A failure to write.
+    pub fn chosen(&mut self, action: Action, outlook: &[Outlook]) -> io::Result<()> {
+        writeln!(
+            self.out,
+            "\nSlide {}: {}",
+            self.slides + 1,
+            self.name(action)
+        )?;
+        if let Some(chosen) = outlook.iter().find(|o| o.action == action) {
+            writeln!(self.out, "  because {}", self.reason(chosen, outlook))?;
+        }
+        self.out.flush()
+    }
+
+    /// Shows what a slide said, and what is left after it.
+    ///
+    /// # Errors
+    /// A failure to write.
+    pub fn felt(
+        &mut self,
+        action: Action,
+        properties: &Properties,
+        roughness_is_bound: bool,
+        posterior: &[f32],
+    ) -> io::Result<()> {
+        self.slides += 1;
+        let bound = roughness_is_bound && action.property == Property::Roughness;
+        if let Some(value) = properties.get(action.property) {
+            let unit = if action.property == Property::Traction {
+                " N"
+            } else {
+                ""
+            };
+            let at_most = if bound { "at most " } else { "" };
+            writeln!(
+                self.out,
+                "  felt    {} {at_most}{value:.3}{unit}",
+                action.property
+            )?;
+        }
+        self.candidates(posterior)?;
+        self.out.flush()
+    }
+
+    /// Shows a line of something else in between.
+    ///
+    /// # Errors
+    /// A failure to write.
+    pub fn line(&mut self, line: &str) -> io::Result<()> {
+        writeln!(self.out, "{line}")?;
         self.out.flush()
     }
 

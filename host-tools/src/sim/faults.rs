@@ -126,12 +126,12 @@ impl Miso {
         }
     }
 
-    /// Changes the bytes of one transfer.
-    pub(super) fn pass(&mut self, now_ns: u64, mosi: &[u8], miso: &mut [u8], faults: &Faults) {
+    /// Changes what the sensor puts on the line in answer to a transfer that begins with `mosi`.
+    pub(super) fn pass(&mut self, now_ns: u64, mosi: u8, line: &mut [u8], faults: &Faults) {
         // a read says 00 first, every command something else
-        if let Some(command) = mosi.first().filter(|byte| **byte != 0) {
-            self.command = *command;
-        } else if let [byte0, byte1] = miso {
+        if mosi != 0 {
+            self.command = mosi;
+        } else if let [byte0, byte1, ..] = line {
             let last = &mut self.last[usize::from(self.command)];
             match *last {
                 Some(word) if faults.frozen => [*byte0, *byte1] = word,
@@ -150,11 +150,19 @@ impl Miso {
             }
             if faults.flip_share > 0.0 && self.noise.uniform() < faults.flip_share {
                 let bit = (self.noise.uniform() * 16.0) as usize;
-                miso[bit / 8] ^= 1 << (bit % 8);
+                line[bit / 8] ^= 1 << (bit % 8);
             }
         }
-        if let Some(high) = faults.miso_stuck {
-            miso.fill(if high { 0xFF } else { 0x00 });
+        if faults.miso_stuck.is_some() {
+            line.fill(Self::idle(faults));
+        }
+    }
+
+    /// What the line reads as with nobody driving it: its pull-up, or what it is shorted to.
+    pub(super) fn idle(faults: &Faults) -> u8 {
+        match faults.miso_stuck {
+            Some(false) => 0x00,
+            _ => 0xFF,
         }
     }
 }

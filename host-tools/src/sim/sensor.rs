@@ -61,6 +61,12 @@ pub struct SensorPeer {
     ended_ns: u64,
     streaming: bool,
     flip: u16,
+    /// of this select: whether the sensor heard it, after how long, the bytes so far, what it says
+    on: bool,
+    quiet_ns: u64,
+    bytes: usize,
+    line: [u8; PROPERTY_LEN],
+    asked_property: bool,
 }
 
 impl SensorPeer {
@@ -81,6 +87,11 @@ impl SensorPeer {
             ended_ns: 0,
             streaming: false,
             flip: 0,
+            on: false,
+            quiet_ns: 0,
+            bytes: 0,
+            line: [FLOATING; PROPERTY_LEN],
+            asked_property: false,
         }
     }
 
@@ -89,6 +100,9 @@ impl SensorPeer {
         self.powered_ns = None;
         self.pending = None;
         self.streaming = false;
+        self.on = false;
+        self.asked_property = false;
+        self.line = [FLOATING; PROPERTY_LEN];
     }
 
     /// Plugs it in again.
@@ -101,10 +115,43 @@ impl SensorPeer {
         self.flip = bits;
     }
 
-    /// One period of chip select, from `now_ns` on: what comes of `mosi`, and `miso` in answer. A sample is taken at the
-    /// command, `fraction` of a tick after the last but one, and read at the next select.
+    /// Chip select falls. A sample is taken at the command, and read at the next select.
     ///
     /// A command while an answer waits starts anew (chosen: a host that restarts between the two is then in step again).
+    pub fn select(&mut self, now_ns: u64) {
+        self.quiet_ns = now_ns.saturating_sub(self.ended_ns);
+        self.on = self
+            .powered_ns
+            .is_some_and(|since| now_ns >= since + POWER_UP_NS);
+        self.bytes = 0;
+        self.line = [FLOATING; PROPERTY_LEN];
+    }
+
+    /// Takes a byte. The first one decides what is on the line: [`SensorPeer::line`]. The sample of a command is taken
+    /// `fraction` of a tick after the last but one.
+    pub fn byte(&mut self, mosi: u8, finger: &mut Finger, fraction: f64) {
+        self.bytes += 1;
+        match self.bytes {
+            1 => self.first(mosi, finger, fraction),
+            2 if self.asked_property => self.obey_property(mosi),
+            _ => {}
+        }
+    }
+
+    /// What the sensor says in this period of chip select, byte by byte; later ones float.
+    pub fn line(&mut self) -> &mut [u8; PROPERTY_LEN] {
+        &mut self.line
+    }
+
+    /// Chip select rises.
+    pub fn deselect(&mut self, now_ns: u64) {
+        if self.asked_property {
+            self.obey_property(0);
+        }
+        self.ended_ns = now_ns;
+    }
+
+    /// One period of chip select as a whole, from `now_ns` on: what comes of `mosi`, and `miso` in answer.
     pub fn transfer(
         &mut self,
         now_ns: u64,
@@ -114,49 +161,62 @@ impl SensorPeer {
         finger: &mut Finger,
         fraction: f64,
     ) {
+        self.select(now_ns);
+        for byte in mosi {
+            self.byte(*byte, finger, fraction);
+        }
         miso.fill(FLOATING);
-        let quiet_ns = now_ns.saturating_sub(self.ended_ns);
-        self.ended_ns = now_ns + duration_ns;
-        let on = self
-            .powered_ns
-            .is_some_and(|since| now_ns >= since + POWER_UP_NS);
-        if !on || mosi.is_empty() {
+        miso.iter_mut()
+            .zip(self.line)
+            .for_each(|(to, from)| *to = from);
+        self.deselect(now_ns + duration_ns);
+    }
+
+    fn first(&mut self, mosi: u8, finger: &mut Finger, fraction: f64) {
+        if !self.on {
             return;
         }
         if self.streaming {
-            if quiet_ns < STREAMING_NS {
+            if self.quiet_ns < STREAMING_NS {
                 return;
             }
             self.streaming = false;
         }
-        if self.pending.is_some() && !is_command(mosi[0]) {
-            let reply = self.pending.take().filter(|_| quiet_ns >= GAP_NS);
-            self.answer(reply.unwrap_or(error(TOO_EARLY)), miso);
-        } else if mosi[0] == 0 {
+        if self.pending.is_some() && !is_command(mosi) {
+            let reply = self.pending.take().filter(|_| self.quiet_ns >= GAP_NS);
+            self.answer(reply.unwrap_or(error(TOO_EARLY)));
+        } else if mosi == 0 {
             // a read, and nothing to read
-            self.answer(error(NOTHING_TO_SEND), miso);
+            self.answer(error(NOTHING_TO_SEND));
+        } else if mosi == PROPERTY {
+            self.asked_property = true;
         } else {
             self.pending = Some(self.obey(mosi, finger, fraction));
         }
     }
 
+    fn obey_property(&mut self, code: u8) {
+        self.asked_property = false;
+        self.pending = Some(self.property(code));
+    }
+
     /// Puts an answer on the line.
-    fn answer(&mut self, reply: Reply, miso: &mut [u8]) {
+    fn answer(&mut self, reply: Reply) {
         match &reply {
             Reply::Word(word) => {
                 let flipped = (u16::from_be_bytes(*word) ^ self.flip).to_be_bytes();
                 self.flip = 0;
-                miso.iter_mut()
+                self.line
+                    .iter_mut()
                     .zip(flipped)
                     .for_each(|(to, from)| *to = from);
             }
-            Reply::Property(text) => miso.iter_mut().zip(text).for_each(|(to, from)| *to = *from),
+            Reply::Property(text) => self.line = *text,
         }
     }
 
-    /// Takes a command and prepares its answer.
-    fn obey(&mut self, mosi: &[u8], finger: &mut Finger, fraction: f64) -> Reply {
-        let command = mosi[0];
+    /// Takes a command that is one byte and prepares its answer.
+    fn obey(&mut self, command: u8, finger: &mut Finger, fraction: f64) -> Reply {
         if command.count_ones().is_multiple_of(2) {
             return error(BAD_PARITY);
         }
@@ -165,7 +225,6 @@ impl SensorPeer {
                 self.streaming = true;
                 error(UNKNOWN_COMMAND)
             }
-            PROPERTY => self.property(mosi.get(1).copied().unwrap_or(0)),
             0x80..=0xFF => self.sample(command >> 1 & 0x3F, finger, fraction),
             _ => error(UNKNOWN_COMMAND),
         }

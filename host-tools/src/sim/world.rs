@@ -105,6 +105,8 @@ pub struct World {
     surface: Surface,
     finger: Finger,
     sensor: SensorPeer,
+    /// bytes since chip select fell
+    selected: Option<usize>,
     miso: Miso,
     faults: Faults,
     /// latest first
@@ -139,6 +141,7 @@ impl World {
             surface: sample(setup.texture, setup.world_seed),
             finger: Finger::new(finger_noise),
             sensor: SensorPeer::new(setup.finger_seed),
+            selected: None,
             miso: Miso::new(setup.trial_seed),
             faults: Faults::default(),
             scheduled: Vec::new(),
@@ -198,11 +201,44 @@ impl World {
 
     /// One transfer with the sensor, chip select low from `now_ns` for `duration_ns`; fills `miso`.
     pub fn spi(&mut self, now_ns: u64, duration_ns: u64, mosi: &[u8], miso: &mut [u8]) {
+        self.spi_select(now_ns);
+        for (mosi, miso) in mosi.iter().zip(miso) {
+            *miso = self.spi_byte(*mosi);
+        }
+        self.spi_deselect(now_ns + duration_ns);
+    }
+
+    /// The sensor's chip select falls.
+    pub fn spi_select(&mut self, now_ns: u64) {
         self.advance_to(now_ns);
+        self.sensor.select(now_ns);
+        self.selected = Some(0);
+    }
+
+    /// A byte to the sensor, and MISO meanwhile. The sample of a command is that of the time reached; FF without chip
+    /// select, by MISO's pull-up.
+    pub fn spi_byte(&mut self, mosi: u8) -> u8 {
+        let Some(count) = self.selected else {
+            return Miso::idle(&self.faults);
+        };
         let fraction = self.fraction();
+        self.sensor.byte(mosi, &mut self.finger, fraction);
+        if count == 0 {
+            let line = self.sensor.line();
+            self.miso.pass(self.now_ns, mosi, line, &self.faults);
+        }
+        self.selected = Some(count + 1);
         self.sensor
-            .transfer(now_ns, duration_ns, mosi, miso, &mut self.finger, fraction);
-        self.miso.pass(now_ns, mosi, miso, &self.faults);
+            .line()
+            .get(count)
+            .copied()
+            .unwrap_or(Miso::idle(&self.faults))
+    }
+
+    /// The sensor's chip select rises; time does not pass by it.
+    pub fn spi_deselect(&mut self, now_ns: u64) {
+        self.selected = None;
+        self.sensor.deselect(now_ns);
     }
 
     /// Count of the stage's encoder, 1000 per mm, 0 where it stood at power-up.

@@ -1,0 +1,476 @@
+//! The emulator for those who use it.
+
+use std::num::NonZeroU64;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::thread::JoinHandle;
+
+use object::{Object as _, ObjectSymbol as _};
+use rigless::device::ResetCause;
+use rigless::emulator::{Start, run};
+use rigless::image::Image;
+use rigless::session::Session;
+use rigless::soc::Width;
+use rigless::time::VirtualNanos;
+use tactus::sim::faults::Fault;
+use tactus::sim::world::Setup;
+
+use crate::driver::{Command, Driver, Standing};
+use crate::flash;
+use crate::log::Log;
+use crate::part::Board;
+use crate::pins;
+use crate::rig::{Rig, SharedRig, lock};
+
+/// What else a run is made from.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Instructions in a second of virtual time; the board's core makes about this many.
+    pub instructions_per_second: NonZeroU64,
+    /// Length of a step of switches, log and truth, ns. Sensor, encoder, STEP, PWM and current are exact in any case.
+    pub tick_ns: u64,
+    /// How long changes at the outputs are kept, s: [`Rig::trace`].
+    pub trace_s: u64,
+    /// What the firmware's store holds at power-up, from [`Emulator::store`]; blank otherwise.
+    pub store: Option<Vec<u8>>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            instructions_per_second: NonZeroU64::new(168_000_000).expect("it is not 0"),
+            tick_ns: 100_000,
+            trace_s: 2,
+            store: None,
+        }
+    }
+}
+
+/// Why there is no run, or no more of it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The ELF cannot be read.
+    #[error("cannot read {}: {source}. Build the firmware with `cargo xtask build`", path.display())]
+    Read {
+        /// Its path.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is no ELF.
+    #[error("{} is no ELF: {source}", path.display())]
+    Elf {
+        /// Its path.
+        path: PathBuf,
+        /// Why.
+        source: object::Error,
+    },
+    /// It does not fit into the chip, or is not for it.
+    #[error(transparent)]
+    Image(#[from] rigless::image::Error),
+    /// The emulator has failed.
+    #[error(transparent)]
+    Emulator(#[from] rigless::emulator::Error),
+    /// rigless' description of the chip is wrong.
+    #[error(transparent)]
+    Chip(#[from] rigless::soc::Error),
+    /// The run is over.
+    #[error("the run has ended")]
+    Ended,
+    /// No symbol, or several, of that name.
+    #[error(
+        "{name}: {count} symbols of the ELF have that in their name, it takes exactly one: {examples}"
+    )]
+    Symbol {
+        /// What was looked for.
+        name: String,
+        /// How many.
+        count: usize,
+        /// Some of them.
+        examples: String,
+    },
+    /// No memory there.
+    #[error("no memory at {address:#010x}")]
+    Memory {
+        /// Where.
+        address: u64,
+    },
+}
+
+/// A reset of the chip.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Reset {
+    /// When, ns.
+    pub at_ns: u64,
+    /// By what: the core itself, or an instance such as IWDG.
+    pub cause: ResetCause,
+}
+
+/// A board that runs an ELF, with the rig on its pins. It stands except in [`Emulator::run_until`] and its like.
+pub struct Emulator {
+    rig: SharedRig,
+    commands: Option<Sender<Command>>,
+    reached: Receiver<u64>,
+    thread: Option<JoinHandle<Result<(), Error>>>,
+    now_ns: u64,
+    /// name, address without the Thumb bit, size in bytes
+    symbols: Vec<(String, u64, u64)>,
+}
+
+impl Emulator {
+    /// Powers up a board with the ELF at `path` in its flash, and the rig of `setup` on its pins; stands at time 0.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn start(path: &Path, setup: Setup, options: Options) -> Result<Self, Error> {
+        let elf = std::fs::read(path).map_err(|source| Error::Read {
+            path: path.into(),
+            source,
+        })?;
+        let symbols = symbols(&elf).map_err(|source| Error::Elf {
+            path: path.into(),
+            source,
+        })?;
+        let block = symbols.iter().find(|(name, ..)| name == "_SEGGER_RTT");
+        let log = block.and_then(|(_, address, _)| Log::new(&elf, *address));
+        let mut images = vec![Image::new(path, elf, None)?];
+        if let Some(store) = &options.store {
+            let at = Some(flash::STORE.start);
+            images.push(Image::new(Path::new("store"), store.clone(), at)?);
+        }
+        let rig = Arc::new(Mutex::new(Rig::new(setup, options.trace_s * 1_000_000_000)));
+        let (commands, commanded) = channel();
+        let (reaches, reached) = channel();
+        let mut driver = Driver {
+            rig: rig.clone(),
+            commands: commanded,
+            reached: reaches,
+            log,
+            tick_ns: options.tick_ns.max(1),
+            next_tick_ns: 0,
+            until_ns: 0,
+            resets: 0,
+            switches: [None; 4],
+        };
+        let shared = rig.clone();
+        let thread = std::thread::spawn(move || {
+            let board = Board::new(&shared, options.instructions_per_second)?;
+            let mut session = Session::new(Box::new(board), 0, VirtualNanos(0))?;
+            driver.power_up(&mut session);
+            let mut start = Start::new(&images);
+            // without it a `bkpt` of the firmware would be a fault
+            start.semihosting = true;
+            run(session, &start, driver)?;
+            Ok(())
+        });
+        let mut emulator = Self {
+            rig,
+            commands: Some(commands),
+            reached,
+            thread: Some(thread),
+            now_ns: 0,
+            symbols,
+        };
+        emulator.wait()?;
+        Ok(emulator)
+    }
+
+    fn wait(&mut self) -> Result<(), Error> {
+        match self.reached.recv() {
+            Ok(now_ns) => {
+                self.now_ns = now_ns;
+                Ok(())
+            }
+            Err(_) => Err(self.end()),
+        }
+    }
+
+    /// Why the run is over.
+    fn end(&mut self) -> Error {
+        self.commands = None;
+        match self.thread.take().map(JoinHandle::join) {
+            Some(Ok(Err(why))) => why,
+            Some(Err(panic)) => std::panic::resume_unwind(panic),
+            Some(Ok(Ok(()))) | None => Error::Ended,
+        }
+    }
+
+    /// Virtual time since power-up, ns.
+    pub fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    /// Goes on to a virtual time, ns; one that is past is now.
+    ///
+    /// # Errors
+    /// [`Error::Ended`] if the firmware ended the run by semihosting, else the emulator's.
+    pub fn run_until(&mut self, until_ns: u64) -> Result<(), Error> {
+        if until_ns <= self.now_ns {
+            return Ok(());
+        }
+        let sent = self
+            .commands
+            .as_ref()
+            .map(|commands| commands.send(Command::RunUntil(until_ns)));
+        match sent {
+            Some(Ok(())) => self.wait(),
+            _ => Err(self.end()),
+        }
+    }
+
+    /// Goes on for so many ms.
+    ///
+    /// # Errors
+    /// See [`Emulator::run_until`].
+    pub fn run_ms(&mut self, ms: u64) -> Result<(), Error> {
+        self.run_until(self.now_ns + ms * 1_000_000)
+    }
+
+    /// Goes on in steps of `step_ns` until `done` says so, at most until `limit_ns`; whether it did.
+    ///
+    /// # Errors
+    /// See [`Emulator::run_until`].
+    pub fn run_to(
+        &mut self,
+        limit_ns: u64,
+        step_ns: u64,
+        mut done: impl FnMut(&mut Rig) -> bool,
+    ) -> Result<bool, Error> {
+        while !done(&mut lock(&self.rig)) {
+            if self.now_ns >= limit_ns {
+                return Ok(false);
+            }
+            self.run_until((self.now_ns + step_ns.max(1)).min(limit_ns))?;
+        }
+        Ok(true)
+    }
+
+    /// The rig on the board's pins. Let go of it before the emulator runs on.
+    pub fn rig(&self) -> MutexGuard<'_, Rig> {
+        lock(&self.rig)
+    }
+
+    /// Breaks something on the rig now.
+    pub fn inject(&mut self, fault: Fault) {
+        self.rig().world().inject(fault);
+    }
+
+    /// Lets something break on the rig at a virtual time, ns, to its tick of 76 us.
+    pub fn schedule(&mut self, at_ns: u64, fault: Fault) {
+        self.rig().world().schedule(at_ns, fault);
+    }
+
+    /// Bytes to the firmware by USART3, as fast as the line takes them.
+    pub fn send(&mut self, bytes: &[u8]) {
+        self.rig().to_say.extend(bytes);
+    }
+
+    /// Bytes that the firmware sent by USART3 since the last call, with the time at which each was over, ns.
+    pub fn received(&mut self) -> Vec<(u64, u8)> {
+        std::mem::take(&mut self.rig().heard)
+    }
+
+    fn with<T: Send + 'static>(
+        &mut self,
+        act: impl FnOnce(&mut Standing<'_>) -> T + Send + 'static,
+    ) -> Result<T, Error> {
+        let (answer, answered) = channel();
+        let command = Command::With(Box::new(move |standing| {
+            // the owner waits for it below
+            let _ = answer.send(act(standing));
+        }));
+        let sent = self.commands.as_ref().map(|to| to.send(command));
+        if let Some(Ok(())) = sent
+            && let Ok(answer) = answered.recv()
+        {
+            return Ok(answer);
+        }
+        Err(self.end())
+    }
+
+    /// Lines of the firmware's log since the last call, with the time at which they were read, ns.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn log(&mut self) -> Result<Vec<(u64, String)>, Error> {
+        self.with(|standing| {
+            standing
+                .log
+                .as_mut()
+                .map(|log| log.take())
+                .unwrap_or_default()
+        })
+    }
+
+    /// Resets of the chip since power-up, in the order of time.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn resets(&mut self) -> Result<Vec<Reset>, Error> {
+        self.with(|standing| {
+            let resets = standing.session.resets().iter();
+            resets
+                .map(|reset| Reset {
+                    at_ns: reset.at.0,
+                    cause: reset.cause,
+                })
+                .collect()
+        })
+    }
+
+    /// Registers that the firmware used and no model implements, "SYSCFG.EXTICR4" and so on. Only SYSCFG's should be here.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn unimplemented(&mut self) -> Result<Vec<String>, Error> {
+        self.with(|standing| {
+            let registers = standing.session.unimplemented().values();
+            registers
+                .map(|used| format!("{}.{}", used.instance, used.register))
+                .collect()
+        })
+    }
+
+    /// Addresses that the firmware used and nothing is at.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn unmapped(&mut self) -> Result<Vec<u64>, Error> {
+        self.with(|standing| {
+            let unmapped = standing.session.unmapped().into_iter();
+            // stores to the array are listed, since the driver does what they do
+            unmapped
+                .map(|access| access.address)
+                .filter(|address| !flash::ARRAY.contains(address))
+                .collect()
+        })
+    }
+
+    /// Presses the board's button or lets it go.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn press(&mut self, pressed: bool) -> Result<(), Error> {
+        let at = VirtualNanos(self.now_ns);
+        self.with(move |standing| {
+            let board = standing.session.board_mut();
+            board.drive(at, pins::BUTTON, Some(pressed));
+        })
+    }
+
+    /// Whether the green, the blue and the red LED are on.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn leds(&mut self) -> Result<[bool; 3], Error> {
+        self.with(|standing| pins::LEDS.map(|led| standing.session.board_mut().level(led)))
+    }
+
+    /// Resets the chip by its pin.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn reset(&mut self) -> Result<(), Error> {
+        let at = VirtualNanos(self.now_ns);
+        self.with(move |standing| standing.session.reset_by_pin(at, 0, standing.host))
+    }
+
+    /// The firmware's store as it is now: what survives a power cut.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn store(&mut self) -> Result<Vec<u8>, Error> {
+        self.read(flash::STORE.start, flash::STORE.end - flash::STORE.start)
+    }
+
+    /// Address and size, bytes, of the one symbol that has `name` as its name or in it; names in the ELF are mangled.
+    ///
+    /// # Errors
+    /// [`Error::Symbol`].
+    pub fn symbol(&self, name: &str) -> Result<(u64, u64), Error> {
+        let exact: Vec<_> = self.symbols.iter().filter(|(n, ..)| n == name).collect();
+        let found = if exact.is_empty() {
+            let within = self.symbols.iter().filter(|(n, ..)| n.contains(name));
+            within.collect()
+        } else {
+            exact
+        };
+        match found[..] {
+            [(_, address, size)] => Ok((*address, *size)),
+            _ => Err(Error::Symbol {
+                name: name.into(),
+                count: found.len(),
+                examples: found
+                    .iter()
+                    .take(5)
+                    .map(|(n, ..)| n.as_str())
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            }),
+        }
+    }
+
+    /// Reads memory.
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn read(&mut self, address: u64, length: u64) -> Result<Vec<u8>, Error> {
+        self.with(move |standing| {
+            let bytes = (address..address + length).map(|address| {
+                let byte = standing.host.read(address, Width::W8);
+                byte.map(|byte| byte as u8)
+                    .map_err(|_| Error::Memory { address })
+            });
+            bytes.collect()
+        })?
+    }
+
+    /// Writes memory, flash too, whatever is in it: to break code on purpose, put `[0xFE, 0xE7]`, a branch to itself, or
+    /// `[0x00, 0xDE]`, an undefined instruction, at the address of a function.
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn write(&mut self, address: u64, bytes: &[u8]) -> Result<(), Error> {
+        let bytes = bytes.to_vec();
+        self.with(move |standing| {
+            for (address, byte) in (address..).zip(bytes) {
+                let done = if flash::ARRAY.contains(&address) {
+                    standing.host.program(address, Width::W8, byte.into())
+                } else {
+                    standing.host.write(address, Width::W8, byte.into())
+                };
+                done.map_err(|_| Error::Memory { address })?;
+            }
+            Ok(())
+        })?
+    }
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        // the run ends when nobody commands it
+        self.commands = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Functions and variables.
+fn symbols(elf: &[u8]) -> object::Result<Vec<(String, u64, u64)>> {
+    let file = object::File::parse(elf)?;
+    let mut symbols = Vec::new();
+    for symbol in file.symbols() {
+        let address = match symbol.kind() {
+            object::SymbolKind::Text => symbol.address() & !1,
+            object::SymbolKind::Data => symbol.address(),
+            _ => continue,
+        };
+        if symbol.is_definition() {
+            symbols.push((symbol.name()?.to_owned(), address, symbol.size()));
+        }
+    }
+    Ok(symbols)
+}

@@ -1,0 +1,26 @@
+//! The NUCLEO-F429ZI in software, with the simulated rig on its pins: runs the firmware's ELF, unmodified.
+//!
+//! Chip and core are rigless' (STM32F427, Cortex-M4F); the rig is [`tactus::sim`]. Everything goes by virtual time and by
+//! seeds: the same ELF, [`Setup`] and calls give the same run.
+//!
+//! What passes here says much for logic and use of the drivers and nothing for silicon: instructions take 1/168 us each,
+//! whatever they are, and no wire has a length.
+
+mod board;
+mod driver;
+mod flash;
+mod log;
+mod part;
+pub mod pins;
+mod record;
+mod rig;
+mod serial;
+pub mod talk;
+
+pub use board::{Emulator, Error, Options};
+pub use flash::{FLASH, STORE};
+pub use record::Slide;
+pub use rig::{Output, Rig};
+pub use rigless::device::ResetCause;
+pub use tactus::sim::faults::Fault;
+pub use tactus::sim::world::Setup;

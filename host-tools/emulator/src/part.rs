@@ -1,0 +1,581 @@
+//! The chip: rigless' STM32F427 with what it lacks as the firmware's STM32F429, and with the rig on its pins.
+//!
+//! Added are the edge lines of EXTI and the programmable flash array. Models whose pins the rig needs to the nanosecond
+//! (TIM1, TIM3, TIM4, ADC1) are wrapped: [`Tapped`] lets the rig act before and after whatever happens in them.
+
+use std::num::{NonZeroU32, NonZeroU64};
+
+use rigless::device::{
+    Device, DeviceContext, ErasedDevice, Level, RegisterFile, RequestChange, ResetCause,
+};
+use rigless::machine::{Board as Machine, Target, armv7m};
+use rigless::mcu::{Mcu, Operate};
+use rigless::snapshot::Store;
+use rigless::soc::stm32f427::peripherals::adc::{self, Adc};
+use rigless::soc::stm32f427::peripherals::gpio::Gpio;
+use rigless::soc::stm32f427::peripherals::tim::{Advanced, Channel, Counter, General, Tim};
+use rigless::soc::stm32f427::peripherals::{Stm32f427, rcc};
+use rigless::soc::stm32f427::{CPU, MEMORY, generated, generated::exti::Register as ExtiRegister};
+use rigless::soc::{Bus, Region, RegisterSpec};
+use rigless::time::{EventId, VirtualNanos};
+
+use crate::pins::{PinId, REST_LEVELS};
+use crate::rig::{SharedRig, lock};
+use crate::serial::Serial;
+
+/// Timers run on the internal oscillator after a reset.
+const RESET_HZ: u64 = rcc::HSI_HZ;
+/// USART3's place among rigless' serial ports.
+const USART3: usize = 2;
+
+/// EXTI's lines 0 to 15 (RM0090 12.2).
+#[derive(Debug, Default)]
+struct Exti {
+    pending: u64,
+    /// NVIC outputs that are high
+    raised: u64,
+}
+
+impl Exti {
+    /// Lines behind each interrupt of the instance: the first one is PVD's.
+    const LINES: [u64; 8] = [0, 1, 2, 4, 8, 16, 0x03e0, 0xfc00];
+
+    fn edge(
+        &mut self,
+        line: u8,
+        rising: bool,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        let select = if rising {
+            ExtiRegister::Rtsr
+        } else {
+            ExtiRegister::Ftsr
+        };
+        self.pending |= registers.get(select) & 1 << line;
+        self.refresh(registers, context);
+    }
+
+    fn refresh(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        registers.set(ExtiRegister::Pr, self.pending);
+        let active = self.pending & registers.get(ExtiRegister::Imr);
+        for (output, lines) in Self::LINES.into_iter().enumerate() {
+            let bit = 1 << output;
+            match (active & lines != 0, self.raised & bit != 0) {
+                (true, false) => context.raise(output),
+                (false, true) => context.lower(output),
+                _ => continue,
+            }
+            self.raised ^= bit;
+        }
+    }
+}
+
+impl Device for Exti {
+    type Register = ExtiRegister;
+
+    fn write(
+        &mut self,
+        register: ExtiRegister,
+        value: u64,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        match register {
+            ExtiRegister::Swier => self.pending |= value & registers.get(ExtiRegister::Imr),
+            // a 1 clears the line, and what software set of it
+            ExtiRegister::Pr => {
+                self.pending &= !value;
+                let software = registers.get(ExtiRegister::Swier);
+                registers.set(ExtiRegister::Swier, software & !value);
+            }
+            _ => {}
+        }
+        self.refresh(registers, context);
+    }
+
+    fn reset(&mut self) {
+        *self = Self::default();
+    }
+}
+
+/// What the rig does round a model.
+trait Tap<M> {
+    /// Before the model is read, written or woken: what comes in by its pins up to now.
+    fn before(&mut self, _: &mut M, _: &mut RegisterFile, _: &mut DeviceContext<'_>) {}
+    /// After it: what its pins say now.
+    fn after(&mut self, _: &mut M, _: &RegisterFile, _: VirtualNanos) {}
+}
+
+/// A model with the rig on its pins.
+#[derive(Debug)]
+struct Tapped<M, T> {
+    model: M,
+    tap: T,
+}
+
+impl<M: ErasedDevice, T: Tap<M>> ErasedDevice for Tapped<M, T> {
+    fn layout(&self) -> &'static [RegisterSpec] {
+        self.model.layout()
+    }
+
+    fn read(
+        &mut self,
+        row: usize,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) -> Option<u64> {
+        self.tap.before(&mut self.model, registers, context);
+        self.model.read(row, registers, context)
+    }
+
+    fn peek(&self, row: usize, registers: &RegisterFile, now: VirtualNanos) -> Option<u64> {
+        self.model.peek(row, registers, now)
+    }
+
+    fn write(
+        &mut self,
+        row: usize,
+        value: u64,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.tap.before(&mut self.model, registers, context);
+        self.model.write(row, value, registers, context);
+        self.tap.after(&mut self.model, registers, context.now());
+    }
+
+    fn on_event(
+        &mut self,
+        event: EventId,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.tap.before(&mut self.model, registers, context);
+        self.model.on_event(event, registers, context);
+        self.tap.after(&mut self.model, registers, context.now());
+    }
+
+    fn on_request(
+        &mut self,
+        request: RequestChange,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.model.on_request(request, registers, context);
+        self.tap.after(&mut self.model, registers, context.now());
+    }
+
+    fn on_clock(&mut self, hz: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        self.model.on_clock(hz, registers, context);
+        self.tap.after(&mut self.model, registers, context.now());
+    }
+
+    fn on_clock_input(
+        &mut self,
+        input: usize,
+        hz: u64,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.model.on_clock_input(input, hz, registers, context);
+        self.tap.after(&mut self.model, registers, context.now());
+    }
+
+    fn poll(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        self.model.poll(registers, context);
+    }
+
+    fn reset(&mut self) {
+        self.model.reset();
+    }
+
+    fn reset_line(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        self.model.reset_line(registers, context);
+        self.tap.after(&mut self.model, registers, context.now());
+    }
+
+    fn on_access(
+        &mut self,
+        token: u64,
+        value: u64,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.model.on_access(token, value, registers, context);
+    }
+
+    fn on_refused(
+        &mut self,
+        token: u64,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.model.on_refused(token, registers, context);
+    }
+}
+
+fn channel(number: u8) -> Channel {
+    Channel::new(number).expect("timers have channels 1 to 4")
+}
+
+/// TIM1's channel 1: the lever's STEP.
+#[derive(Debug)]
+struct Step(SharedRig);
+
+impl Tap<Tim<Advanced>> for Step {
+    fn after(&mut self, tim: &mut Tim<Advanced>, registers: &RegisterFile, now: VirtualNanos) {
+        let high = tim.output(channel(1), registers) == Some(Level::High);
+        lock(&self.0).step_timer(now.0, high);
+    }
+}
+
+/// TIM3's channel 1: the stage's PWM. Its duty is that of the shadow registers, which hold for a whole period.
+#[derive(Debug)]
+struct Pwm(SharedRig);
+
+impl Tap<Tim<General>> for Pwm {
+    fn after(&mut self, tim: &mut Tim<General>, registers: &RegisterFile, now: VirtualNanos) {
+        let duty = match tim.pulse(channel(1), registers) {
+            Some(pulse) if pulse.period.0 > 0 => pulse.width.0 as f64 / pulse.period.0 as f64,
+            _ => f64::from(u8::from(
+                tim.output(channel(1), registers) == Some(Level::High),
+            )),
+        };
+        lock(&self.0).stage_duty(now.0, duty);
+    }
+}
+
+/// TIM4's channels 1 and 2: the stage's encoder. Its edges up to now are counted before anybody looks.
+#[derive(Debug)]
+struct Encoder {
+    rig: SharedRig,
+    lines: (bool, bool),
+}
+
+impl Encoder {
+    fn show(
+        shown: &mut (bool, bool),
+        (a, b): (bool, bool),
+        tim: &mut Tim<General>,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        if a != shown.0 {
+            tim.drive_input(channel(1), a.into(), registers, context);
+        }
+        if b != shown.1 {
+            tim.drive_input(channel(2), b.into(), registers, context);
+        }
+        *shown = (a, b);
+    }
+}
+
+impl Tap<Tim<General>> for Encoder {
+    fn before(
+        &mut self,
+        tim: &mut Tim<General>,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        let mut rig = lock(&self.rig);
+        rig.advance_to(context.now().0);
+        while let Some(lines) = rig.next_encoder_lines() {
+            Self::show(&mut self.lines, lines, tim, registers, context);
+        }
+        let lines = rig.encoder_lines();
+        Self::show(&mut self.lines, lines, tim, registers, context);
+    }
+}
+
+/// ADC1's channel 3: the motor's current, at the end of each conversion.
+#[derive(Debug)]
+struct Current(SharedRig);
+
+impl Current {
+    /// rigless makes code = input x 4095 / reference, both in whole mV: with this reference the input is the code.
+    const REFERENCE: u32 = 4095;
+}
+
+impl Tap<Adc> for Current {
+    fn before(&mut self, adc: &mut Adc, _: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let mut rig = lock(&self.0);
+        rig.advance_to(context.now().0);
+        let pa3 = adc::Channel::new(3).expect("the converter has channels 0 to 15");
+        adc.set_input(pa3, rig.world().motor_adc().into());
+    }
+}
+
+/// The part.
+#[derive(Debug)]
+pub(crate) struct Part {
+    pub(crate) f427: Stm32f427,
+    exti: Exti,
+    step: Tapped<Tim<Advanced>, Step>,
+    pwm: Tapped<Tim<General>, Pwm>,
+    encoder: Tapped<Tim<General>, Encoder>,
+    current: Tapped<Adc, Current>,
+    /// of EXTI, TIM1, TIM3, TIM4, ADC1 on the bus
+    slots: [usize; 5],
+}
+
+fn narrow() -> Tim<General> {
+    Tim::with_clock(RESET_HZ, Counter::Narrow)
+}
+
+fn advanced() -> Tim<Advanced> {
+    Tim::with_clock(RESET_HZ, Counter::Narrow).breaks_on("RCC", rcc::CLOCK_FAILURE)
+}
+
+fn converter() -> Adc {
+    // the common block divides by 2 at reset
+    let mut adc = Adc::with_clock(RESET_HZ / 2);
+    adc.set_reference(Current::REFERENCE);
+    adc
+}
+
+impl Part {
+    fn new(rig: &SharedRig) -> Result<Self, rigless::soc::Error> {
+        let mut f427 = Stm32f427::new()?;
+        // the debug probe's 8 MHz on OSC_IN; no 32 kHz crystal is used
+        f427.rcc.attach_crystals(8_000_000, 0);
+        f427.set_supply(3300);
+        let slot = |name| f427.bus().slot(name);
+        let slots = [
+            slot("EXTI")?,
+            slot("TIM1")?,
+            slot("TIM3")?,
+            slot("TIM4")?,
+            slot("ADC1")?,
+        ];
+        f427.usart[USART3].attach(Serial::new(rig.clone()));
+        f427.spi[0].attach(crate::rig::SensorPins(rig.clone()));
+        Ok(Self {
+            exti: Exti::default(),
+            step: Tapped {
+                model: advanced(),
+                tap: Step(rig.clone()),
+            },
+            pwm: Tapped {
+                model: narrow(),
+                tap: Pwm(rig.clone()),
+            },
+            encoder: Tapped {
+                model: narrow(),
+                tap: Encoder {
+                    rig: rig.clone(),
+                    lines: (false, false),
+                },
+            },
+            current: Tapped {
+                model: converter(),
+                tap: Current(rig.clone()),
+            },
+            f427,
+            slots,
+        })
+    }
+}
+
+impl Store for Part {}
+
+impl Mcu for Part {
+    fn bus(&self) -> &Bus {
+        self.f427.bus()
+    }
+
+    fn bus_mut(&mut self) -> &mut Bus {
+        self.f427.bus_mut()
+    }
+
+    fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
+        Mcu::reset(&mut self.f427, at, cause);
+        self.exti = Exti::default();
+        self.step.model = advanced();
+        self.pwm.model = narrow();
+        self.encoder.model = narrow();
+        self.current.model = converter();
+        // the fresh timer believes both lines low, until somebody looks
+        self.encoder.tap.lines = (false, false);
+    }
+
+    /// Only USART3 has somebody outside. rigless' own poll asks all eight ports at every stop.
+    fn poll(&mut self, now: VirtualNanos) {
+        self.f427
+            .drive_serial_port(now, USART3, |port, registers, context| {
+                Device::poll(port, registers, context);
+            });
+    }
+
+    fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
+        let model: &mut dyn ErasedDevice = match self.slots.iter().position(|own| *own == slot) {
+            Some(0) => &mut self.exti,
+            Some(1) => &mut self.step,
+            Some(2) => &mut self.pwm,
+            Some(3) => &mut self.encoder,
+            Some(_) => &mut self.current,
+            None => return self.f427.split(slot),
+        };
+        (self.f427.bus_mut(), Some(model))
+    }
+}
+
+/// The part's memory, its flash array programmable: a store to it reaches the driver, which does what the array does.
+static MEMORY_MAP: [Region; 5] = [
+    MEMORY[0].programmed_by("FLASH"),
+    MEMORY[1],
+    MEMORY[2],
+    MEMORY[3],
+    MEMORY[4],
+];
+
+/// Shows the core that memory; nothing else of it is ever asked.
+#[derive(Debug)]
+struct MemoryView(Bus);
+
+impl Mcu for MemoryView {
+    fn bus(&self) -> &Bus {
+        &self.0
+    }
+
+    fn bus_mut(&mut self) -> &mut Bus {
+        &mut self.0
+    }
+
+    fn reset(&mut self, _: VirtualNanos, _: ResetCause) {}
+
+    fn poll(&mut self, _: VirtualNanos) {}
+
+    fn split(&mut self, _: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
+        (&mut self.0, None)
+    }
+}
+
+/// The board.
+#[derive(Debug)]
+pub(crate) struct Board {
+    pub(crate) part: Part,
+    view: MemoryView,
+    instructions_per_second: NonZeroU64,
+    /// what drives pins from outside, in the order it began
+    driven: Vec<(PinId, Option<bool>)>,
+}
+
+impl Store for Board {}
+
+impl Machine for Board {
+    fn name(&self) -> &'static str {
+        "nucleo-f429zi"
+    }
+
+    fn target_names(&self) -> Vec<&'static str> {
+        vec!["mcu"]
+    }
+
+    fn mcu(&mut self, target: usize) -> Option<&mut dyn Mcu> {
+        (target == 0).then_some(&mut self.part)
+    }
+
+    fn targets(&mut self) -> Vec<Target<'_>> {
+        const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).expect("it is not 0");
+        const REFCLK_DIVIDER: NonZeroU32 = NonZeroU32::new(8).expect("it is not 0");
+        let lines = u32::from(Operate::cpu(&self.part).interrupt_lines);
+        let core = armv7m::Core {
+            variant: armv7m::Variant::M4,
+            clock_hz: CORE_HZ,
+            interrupt_lines: NonZeroU32::new(lines).expect("the part has interrupts"),
+            priority_bits: 4,
+            refclk_divider: REFCLK_DIVIDER,
+            instructions_per_second: self.instructions_per_second,
+            boot: "flash",
+        }
+        .spec_with_parts(
+            &rigless::cpu::armv7m::windows(Mcu::bus(&self.part)),
+            armv7m::Fpu::FpV4Sp,
+            armv7m::MpuRegions::Eight,
+        );
+        vec![Target::new("mcu", &mut self.view, core)]
+    }
+}
+
+impl Board {
+    /// A board with a rig on its pins.
+    ///
+    /// # Errors
+    /// rigless' tables of the part do not fit together.
+    pub(crate) fn new(
+        rig: &SharedRig,
+        instructions_per_second: NonZeroU64,
+    ) -> Result<Self, rigless::soc::Error> {
+        let view = Bus::builder(CPU, &MEMORY_MAP, [generated::FLASH]).build()?;
+        let mut board = Self {
+            part: Part::new(rig)?,
+            view: MemoryView(view),
+            instructions_per_second,
+            driven: Vec::new(),
+        };
+        for (pin, level) in REST_LEVELS {
+            board.drive(VirtualNanos(0), pin, Some(level));
+        }
+        Ok(board)
+    }
+
+    /// The level on a pin, whoever makes it.
+    pub(crate) fn level(&mut self, pin: PinId) -> bool {
+        let (gpio, registers) = self.part.f427.port(pin.port());
+        gpio.level(pin.pin(), registers) == Level::High
+    }
+
+    /// The alternate function that a pin carries, if it does.
+    pub(crate) fn function(&mut self, pin: PinId) -> Option<u8> {
+        let (_, registers) = self.part.f427.port(pin.port());
+        Gpio::function(pin.pin(), registers)
+    }
+
+    /// Drives a pin from outside, or lets it go, and gives EXTI its edge where SYSCFG leads the pin there.
+    pub(crate) fn drive(&mut self, at: VirtualNanos, id: PinId, level: Option<bool>) {
+        self.driven.retain(|(driven, _)| *driven != id);
+        self.driven.push((id, level));
+        let pin = id.pin();
+        let (before, after) =
+            self.part
+                .f427
+                .drive_port(at, id.port(), |gpio, registers, context| {
+                    let before = gpio.level(pin, registers);
+                    gpio.drive(pin, level.map(Level::from), registers, context);
+                    (before, gpio.level(pin, registers))
+                });
+        if before == after {
+            return;
+        }
+        use generated::syscfg::Register as Syscfg;
+        let line = id.number();
+        let control = [
+            Syscfg::Exticr1,
+            Syscfg::Exticr2,
+            Syscfg::Exticr3,
+            Syscfg::Exticr4,
+        ][usize::from(line / 4)];
+        let Some(syscfg) = self.part.bus().registers("SYSCFG") else {
+            return;
+        };
+        let routed = syscfg.get(control) >> (4 * (line % 4)) & 0xF;
+        if routed as usize == id.port() {
+            let slot = self.part.slots[0];
+            let (registers, mut context) = self.part.f427.bus_mut().drive(at, slot);
+            self.part
+                .exti
+                .edge(line, after == Level::High, registers, &mut context);
+        }
+    }
+
+    /// Drives everything again: a reset makes rigless build its ports anew.
+    pub(crate) fn redrive(&mut self, at: VirtualNanos) {
+        for (pin, level) in self.driven.clone() {
+            self.drive(at, pin, level);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
