@@ -167,9 +167,7 @@ async fn work(
             let store = store.as_mut().ok_or_else(no_store)?;
             match store.write_table(offset as usize, &bytes).await {
                 // said again by a host that did not hear the answer; the table's checksum is looked at in the end
-                Err(StoreError::Part { offset, wanted }) if offset + bytes.len() == wanted => {
-                    Ok(())
-                }
+                Err(StoreError::Part { offset, wanted }) if offset + bytes.len() == wanted => Ok(()),
                 written => written.map_err(text),
             }
         }
