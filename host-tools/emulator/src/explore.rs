@@ -94,7 +94,10 @@ pub(crate) fn explore(cli: &Cli, chosen: &Chosen, sha256: &str) -> anyhow::Resul
         |tell| matches!(tell, Tell::Booted { .. }).then_some(Ok(())),
     )?;
     let mut homing = |board: &mut Emulator, _: Option<&Report>| {
-        bar.set_message(format!("looking for the limit switches, {:.1} s", now(board)));
+        bar.set_message(format!(
+            "looking for the limit switches, {:.1} s",
+            now(board)
+        ));
         logged(board);
     };
     let fault = talk.wait(PATIENCE_S, &mut homing, |tell| match tell {
@@ -151,6 +154,19 @@ pub(crate) fn explore(cli: &Cli, chosen: &Chosen, sha256: &str) -> anyhow::Resul
             truths.update(board);
             return;
         };
+        // not within `suspend`, which holds the bar
+        if let Tell::Live(live) = tell {
+            forces.push(f32::from(live.force_mn) * 1e-3);
+            bar.set_message(format!(
+                "{:6.1} s  finger {:4.2} N  stage {:5.1} mm, {:5.1} mm/s  motor {:4} mA",
+                now(board),
+                f32::from(live.force_mn) * 1e-3,
+                live.stage_um as f32 * 1e-3,
+                live.speed_um_s as f32 * 1e-3,
+                live.current_ma
+            ));
+            return;
+        }
         let shown = bar.suspend(|| match tell {
             Tell::Chosen {
                 movement,
@@ -159,7 +175,6 @@ pub(crate) fn explore(cli: &Cli, chosen: &Chosen, sha256: &str) -> anyhow::Resul
                 ..
             } => {
                 truths.chosen(*movement, board);
-                forces.clear();
                 let outlook: Vec<Outlook> = outlook
                     .iter()
                     .map(|promise| Outlook {
@@ -179,20 +194,13 @@ pub(crate) fn explore(cli: &Cli, chosen: &Chosen, sha256: &str) -> anyhow::Resul
                 let properties = felt.properties();
                 show.felt(*action, &properties, felt.roughness_is_bound, posterior)
             }),
-            Tell::Rejected { why, .. } => show.line(&format!("  rejected: {why}")),
-            Tell::Fault(fault) => show.line(&format!("  fault: {fault}")),
-            Tell::Live(live) => {
-                forces.push(f32::from(live.force_mn) * 1e-3);
-                bar.set_message(format!(
-                    "{:6.1} s  finger {:4.2} N  stage {:5.1} mm, {:5.1} mm/s  motor {:4} mA",
-                    now(board),
-                    f32::from(live.force_mn) * 1e-3,
-                    live.stage_um as f32 * 1e-3,
-                    live.speed_um_s as f32 * 1e-3,
-                    live.current_ma
-                ));
+            // from here on the force is about the still finger's
+            Tell::Phase(Phase::Pressing) => {
+                forces.clear();
                 Ok(())
             }
+            Tell::Rejected { why, .. } => show.line(&format!("  rejected: {why}")),
+            Tell::Fault(fault) => show.line(&format!("  fault: {fault}")),
             Tell::Verdict {
                 texture,
                 name,

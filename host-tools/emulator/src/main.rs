@@ -82,8 +82,10 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         )
     })?;
     let sha256 = learned::hex_sha256(&elf);
-    if cli.format == Format::Text {
-        println!("ELF {}\nSHA-256 {sha256}", cli.elf.display());
+    let named = format!("ELF {}\nSHA-256 {sha256}", cli.elf.display());
+    match cli.format {
+        Format::Text => println!("{named}"),
+        Format::Json => eprintln!("{named}"),
     }
     let chosen = learned::Chosen::new(cli)?;
     match cli.port {

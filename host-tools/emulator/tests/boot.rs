@@ -30,3 +30,22 @@ fn the_firmware_boots_and_uses_only_what_is_modelled() {
         assert!(register.starts_with("SYSCFG."), "{register}");
     }
 }
+
+#[test]
+fn code_that_is_broken_on_purpose_hangs_until_the_watchdog_resets_the_chip() {
+    let Some(elf) = elf() else {
+        eprintln!("skipped: TACTUS_ELF is not set");
+        return;
+    };
+    let mut emulator = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
+    emulator.run_ms(150).unwrap();
+    assert_eq!(emulator.resets().unwrap(), []);
+    // the interrupt that the servo runs in: a branch to itself
+    let (address, _) = emulator.symbol("UART5").unwrap();
+    emulator.write(address, &[0xFE, 0xE7]).unwrap();
+    assert_eq!(emulator.read(address, 2).unwrap(), [0xFE, 0xE7]);
+    emulator.run_ms(300).unwrap();
+    let resets = emulator.resets().unwrap();
+    eprintln!("{resets:?}");
+    assert!(!resets.is_empty(), "the patched code was not run");
+}

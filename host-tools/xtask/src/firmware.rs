@@ -8,18 +8,19 @@ use sha2::{Digest as _, Sha256};
 
 use crate::{root, toolchain};
 
-/// Builds every image of the firmware and says what came out.
-pub(crate) fn build() -> Result<()> {
-    for elf in elves()? {
-        describe(&elf)?;
+/// Builds every image of the firmware and says what came out; the ELFs.
+pub(crate) fn build() -> Result<Vec<PathBuf>> {
+    let elves = elves()?;
+    for elf in &elves {
+        describe(elf)?;
     }
-    Ok(())
+    Ok(elves)
 }
 
-/// Builds every image of the firmware: the ELFs, by name.
+/// Builds every image of the firmware: the ELFs, by name. Leaves stdout to who asks.
 pub(crate) fn elves() -> Result<Vec<PathBuf>> {
     let toolchain = toolchain::get()?;
-    println!("Building with {}", toolchain.version());
+    eprintln!("Building with {}", toolchain.version());
     let mut cargo = toolchain.cargo_build();
     cargo.args(["--package", "tactus-firmware", "--profile", "firmware"]);
     // progress and diagnostics go to stderr; stdout says where the ELFs are

@@ -1,5 +1,6 @@
 //! The project's own commands: `cargo xtask --help` lists them.
 mod bundle;
+mod emulate;
 mod factory;
 mod firmware;
 mod flash;
@@ -34,6 +35,18 @@ enum Cli {
         /// Leave out the firmware build
         #[arg(long)]
         quick: bool,
+    },
+    /// Run the firmware on the emulated board, where it identifies a texture of the simulated rig
+    ///
+    /// Builds the firmware and the emulator first; that takes some minutes the first time.
+    #[command(after_help = "Examples:
+  cargo xtask emulate --texture Felt --log   with the firmware's own log
+  cargo xtask emulate --help                 all options")]
+    #[command(disable_help_flag = true)]
+    Emulate {
+        /// Options for the emulator
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
     },
     /// Build the firmware and flash it to the board (NUCLEO-F429ZI) with probe-rs
     ///
@@ -89,7 +102,8 @@ enum Cli {
 
 fn main() -> ExitCode {
     let done = match Cli::parse() {
-        Cli::Build => firmware::build(),
+        Cli::Build => firmware::build().map(|_| ()),
+        Cli::Emulate { options } => emulate::run(&options),
         Cli::Test { quick } => return test::run(quick),
         Cli::Flash(options) => flash::flash(&options),
         Cli::Size(options) => size::size(&options),

@@ -61,7 +61,7 @@ pub(crate) fn run(quick: bool) -> ExitCode {
     } else {
         step("firmware", || {
             println!("\n== cargo xtask build");
-            firmware::build()
+            firmware::build().map(|_| ())
         })
     });
 

@@ -293,10 +293,18 @@ fn every_pulse_of_tim1_is_a_step_with_its_instant() {
     let rises: Vec<u64> = edges.iter().filter(|e| e.1).map(|e| e.0).collect();
     assert!((100..=101).contains(&rises.len()), "{}", rises.len());
     assert!(rises.windows(2).all(|pair| pair[1] - pair[0] == MS));
-    assert!(edges.windows(2).filter(|pair| pair[0].1).all(|pair| pair[1].0 - pair[0].0 == 5_000));
+    assert!(
+        edges
+            .windows(2)
+            .filter(|pair| pair[0].1)
+            .all(|pair| pair[1].0 - pair[0].0 == 5_000)
+    );
     let truth = rig.world().truth();
     assert_eq!(truth.lever_bad_pulses, 0);
     let moved_mm = truth.tip_mm - up;
     // but for the step that the motor was pulled into when it got current
-    assert!((moved_mm - 0.000_625 * rises.len() as f64).abs() < 0.02, "{moved_mm}");
+    assert!(
+        (moved_mm - 0.000_625 * rises.len() as f64).abs() < 0.02,
+        "{moved_mm}"
+    );
 }

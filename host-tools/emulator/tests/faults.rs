@@ -1,0 +1,418 @@
+//! Faults of the rig and of the firmware itself, from seeded instants, on the emulated board: judged by the pins and by the
+//! world behind them, not by what the firmware says of itself.
+
+use std::path::PathBuf;
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use tactus::sim::encoder::Cut;
+use tactus_core::rig::guard::Fault as Seen;
+use tactus_core::wire::{Ask, Identify, Reset, Tell};
+use tactus_emulator::talk::{Talk, TalkError};
+use tactus_emulator::{Emulator, Fault, Options, Output, Setup};
+
+/// The firmware's ELF, which `cargo xtask test` names; without it these tests have nothing to run.
+fn elf() -> Option<PathBuf> {
+    let elf = std::env::var_os("TACTUS_ELF").map(PathBuf::from);
+    if elf.is_none() {
+        eprintln!("skipped: TACTUS_ELF is not set (run `cargo xtask test`)");
+    }
+    elf
+}
+
+/// A branch to itself, and an undefined instruction.
+const HANG: [u8; 2] = [0xFE, 0xE7];
+const CRASH: [u8; 2] = [0x00, 0xDE];
+
+/// What breaks.
+#[derive(Clone, Copy, Debug)]
+enum Cause {
+    Rig(Fault),
+    /// A function's first instruction, in flash, becomes another.
+    Code(&'static str, [u8; 2]),
+}
+
+/// When it breaks, by what really happens.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum When {
+    /// The finger is in the air, before the first contact.
+    Approaching,
+    /// The finger presses, the stage stands.
+    Pressing,
+    Sliding,
+}
+
+struct Case {
+    name: &'static str,
+    cause: Cause,
+    when: When,
+    /// What may be reported; nothing where the firmware itself goes down.
+    seen: &'static [Seen],
+    /// From the fault to the stage's brake and to the first step up, ms; `None` where the lever itself is at fault, and
+    /// steps are no measure.
+    deadline_ms: Option<u64>,
+}
+
+/// By the fault table: its deadline, and what it takes until the fault shows.
+const CASES: [Case; 15] = [
+    Case {
+        name: "sensor unplugged before the slide",
+        cause: Cause::Rig(Fault::SensorUnplugged),
+        when: When::Approaching,
+        seen: &[Seen::SensorSilent],
+        deadline_ms: Some(12),
+    },
+    Case {
+        name: "sensor unplugged while sliding",
+        cause: Cause::Rig(Fault::SensorUnplugged),
+        when: When::Sliding,
+        seen: &[Seen::SensorSilent],
+        deadline_ms: Some(12),
+    },
+    Case {
+        // 44 damaged words a second: the 23rd after half a second, give or take the luck
+        name: "one word in a hundred with a flipped bit",
+        cause: Cause::Rig(Fault::BitFlips { share: 0.01 }),
+        when: When::Sliding,
+        seen: &[Seen::SensorErrors],
+        deadline_ms: Some(1000),
+    },
+    Case {
+        name: "MISO stuck high",
+        cause: Cause::Rig(Fault::MisoStuck { high: true }),
+        when: When::Sliding,
+        seen: &[Seen::SensorSilent],
+        deadline_ms: Some(12),
+    },
+    Case {
+        name: "MISO stuck low",
+        cause: Cause::Rig(Fault::MisoStuck { high: false }),
+        when: When::Pressing,
+        seen: &[Seen::SensorSilent],
+        deadline_ms: Some(12),
+    },
+    Case {
+        name: "stage stalled",
+        cause: Cause::Rig(Fault::StageJammed),
+        when: When::Sliding,
+        seen: &[Seen::StageStall, Seen::StageOff],
+        // 30 ms of way are compared
+        deadline_ms: Some(65),
+    },
+    Case {
+        name: "encoder's wires cut",
+        cause: Cause::Rig(Fault::EncoderCut(Cut::Both)),
+        when: When::Sliding,
+        seen: &[Seen::EncoderSilent, Seen::StageOff],
+        deadline_ms: Some(65),
+    },
+    Case {
+        name: "lever loses steps",
+        cause: Cause::Rig(Fault::LeverLosesSteps { share: 1.0 }),
+        when: When::Pressing,
+        seen: &[Seen::LeverSlips, Seen::Unsteady, Seen::LeverNotHome],
+        deadline_ms: None,
+    },
+    Case {
+        name: "emergency stop while pressing",
+        cause: Cause::Rig(Fault::EStop),
+        when: When::Pressing,
+        seen: &[Seen::EStop],
+        deadline_ms: Some(2),
+    },
+    Case {
+        name: "emergency stop while sliding",
+        cause: Cause::Rig(Fault::EStop),
+        when: When::Sliding,
+        seen: &[Seen::EStop],
+        deadline_ms: Some(2),
+    },
+    Case {
+        name: "the lever's driver runs down on its own while pressing",
+        cause: Cause::Rig(Fault::LeverRunaway),
+        when: When::Pressing,
+        seen: &[Seen::ForceHigh, Seen::Unsteady],
+        deadline_ms: None,
+    },
+    Case {
+        name: "the lever's driver runs down on its own while sliding",
+        cause: Cause::Rig(Fault::LeverRunaway),
+        when: When::Sliding,
+        seen: &[Seen::ForceHigh],
+        deadline_ms: None,
+    },
+    Case {
+        // 2 s without a check-in
+        name: "the tasks of thread mode hang",
+        cause: Cause::Code("___watch_task_inner_function0E4poll", HANG),
+        when: When::Pressing,
+        seen: &[Seen::TasksHung],
+        deadline_ms: Some(2010),
+    },
+    Case {
+        // the watchdog's 100 ms, by an oscillator of 32 kHz, then the firmware's start
+        name: "the servo hangs",
+        cause: Cause::Code("___servo_task_inner_function0E4poll", HANG),
+        when: When::Sliding,
+        seen: &[],
+        deadline_ms: Some(500),
+    },
+    Case {
+        name: "the servo crashes",
+        cause: Cause::Code("___servo_task_inner_function0E4poll", CRASH),
+        when: When::Sliding,
+        seen: &[],
+        deadline_ms: Some(3),
+    },
+];
+
+fn board(elf: &std::path::Path, seed: u64, texture: u8) -> Talk {
+    let setup = Setup {
+        texture,
+        trial_seed: seed,
+        ..Setup::default()
+    };
+    let options = Options {
+        trace_s: 4,
+        ..Options::default()
+    };
+    let mut talk = Talk::new(Emulator::start(elf, setup, options).unwrap());
+    ready(&mut talk);
+    talk
+}
+
+fn ready(talk: &mut Talk) {
+    use tactus_core::wire::Phase::Ready;
+    talk.wait(30.0, |_, _| (), |tell| {
+        matches!(tell, Tell::Phase(Ready)).then_some(Ok(()))
+    })
+    .unwrap();
+}
+
+fn identify(max_slides: u8) -> Ask {
+    Ask::Identify(Identify {
+        among: Default::default(),
+        threshold: 0.99,
+        max_slides,
+        strategy: Default::default(),
+        seed: 5,
+    })
+}
+
+fn is_time(when: When, board: &mut Emulator) -> bool {
+    let truth = board.rig().world().truth();
+    match when {
+        // a millimetre and a half over the plate: lower than most samples are thick
+        When::Approaching => truth.force_n < 0.01 && truth.tip_mm < 10.0,
+        When::Pressing => truth.force_n > 0.15 && truth.speed_mm_s.abs() < 1.0,
+        When::Sliding => truth.force_n > 0.15 && truth.speed_mm_s > 5.0,
+    }
+}
+
+/// What came of a fault.
+#[derive(Debug, Default)]
+struct Outcome {
+    seen: Option<Seen>,
+    rebooted: Option<(Reset, Option<String>)>,
+    force_max_n: f64,
+    /// From the fault, ms: the stage without duty for good, and the first step up.
+    braked_ms: Option<f64>,
+    lifting_ms: Option<f64>,
+    force_n: f64,
+}
+
+fn run(case: &Case, elf: &std::path::Path, seed: u64) -> (Talk, Outcome) {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut talk = board(elf, seed, random.random_range(1..=117));
+    let mut outcome = Outcome::default();
+    let mut broken_ns = None;
+    let delay_ns = random.random_range(0..300_000_000);
+    let mut due_ns = None;
+    let mut over_ns = u64::MAX;
+    let mut booted = None;
+    let mut seen = None;
+    let after_ms = case.deadline_ms.unwrap_or(1500) + 400;
+    let ended = talk.ask(identify(10), 80.0, |board, report| {
+        if let Some(report) = report {
+            match &report.tell {
+                Tell::Fault(fault) => seen = Some(*fault),
+                Tell::Booted {
+                    reset, last_words, ..
+                } => booted = Some((*reset, last_words.as_ref().map(|w| w.as_str().to_owned()))),
+                _ => {}
+            }
+            return;
+        }
+        if due_ns.is_none() && is_time(case.when, board) {
+            due_ns = Some(board.now_ns() + delay_ns);
+        }
+        if broken_ns.is_none() && due_ns.is_some_and(|due| board.now_ns() >= due) {
+            // still so: a slide may have ended meanwhile
+            if !is_time(case.when, board) {
+                due_ns = None;
+                return;
+            }
+            match case.cause {
+                Cause::Rig(fault) => board.inject(fault),
+                Cause::Code(name, instruction) => {
+                    let (address, _) = board.symbol(name).unwrap();
+                    board.write(address & !1, &instruction).unwrap();
+                }
+            }
+            broken_ns = Some(board.now_ns());
+            over_ns = board.now_ns() + after_ms * 1_000_000;
+        }
+        if board.now_ns() >= over_ns {
+            over_ns = u64::MAX;
+            look(board, broken_ns.unwrap_or_default(), &mut outcome);
+        }
+    });
+    assert!(broken_ns.is_some(), "{}: its time never came: {ended:?}", case.name);
+    assert!(
+        matches!(ended, Err(TalkError::Refused(_) | TalkError::Rebooted(_))),
+        "{}: {ended:?}",
+        case.name
+    );
+    // to the end of lifting or of the restart
+    let until_ns = broken_ns.unwrap_or_default() + (after_ms + 8000) * 1_000_000;
+    while talk.board().now_ns() < until_ns {
+        for report in talk.step().unwrap() {
+            match report.tell {
+                Tell::Fault(fault) => seen = seen.or(Some(fault)),
+                Tell::Booted {
+                    reset, last_words, ..
+                } => booted = Some((reset, last_words.map(|w| w.as_str().to_owned()))),
+                _ => {}
+            }
+        }
+        if talk.board().now_ns() >= over_ns {
+            over_ns = u64::MAX;
+            look(talk.board(), broken_ns.unwrap_or_default(), &mut outcome);
+        }
+    }
+    outcome.seen = seen;
+    outcome.rebooted = booted;
+    let truth = talk.board().rig().world().truth();
+    outcome.force_max_n = truth.force_max_n;
+    outcome.force_n = truth.force_n;
+    (talk, outcome)
+}
+
+/// What the pins did since a fault.
+fn look(board: &mut Emulator, since_ns: u64, outcome: &mut Outcome) {
+    let rig = board.rig();
+    let ms = |at_ns: u64| at_ns.saturating_sub(since_ns) as f64 * 1e-6;
+    let (mut down, mut duty) = (true, 0.0);
+    outcome.braked_ms = Some(0.0);
+    for &(at_ns, output) in rig.trace() {
+        match output {
+            Output::LeverDown(is) => down = is,
+            Output::LeverStep(true) if !down && at_ns >= since_ns => {
+                outcome.lifting_ms.get_or_insert(ms(at_ns));
+            }
+            Output::StageDuty(now) => {
+                duty = now;
+                if now == 0.0 {
+                    outcome.braked_ms = Some(ms(at_ns));
+                }
+            }
+            _ => {}
+        }
+    }
+    if duty != 0.0 {
+        outcome.braked_ms = None;
+    }
+}
+
+/// What a fault must not come to; an empty list is good.
+fn objections(case: &Case, outcome: &Outcome) -> Vec<String> {
+    let mut objections = Vec::new();
+    if outcome.force_max_n > 2.2 {
+        objections.push(format!("{:.3} N", outcome.force_max_n));
+    }
+    let lifted = outcome.force_n < 0.02;
+    if !lifted && !matches!(case.cause, Cause::Rig(Fault::LeverLosesSteps { .. })) {
+        objections.push(format!("the finger still presses with {:.3} N", outcome.force_n));
+    }
+    if let Some(deadline_ms) = case.deadline_ms {
+        for (what, ms) in [
+            ("stage not braked", outcome.braked_ms),
+            ("no step up", outcome.lifting_ms),
+        ] {
+            // the tick of 1 ms that was under way, and the period of the lever's timer
+            if ms.is_none_or(|ms| ms > deadline_ms as f64 + 1.7) {
+                objections.push(format!("{what} within {deadline_ms} ms: {ms:?}"));
+            }
+        }
+    }
+    match (case.seen, outcome.seen) {
+        ([], None) => {}
+        (expected, Some(seen)) if expected.contains(&seen) => {}
+        (expected, seen) => objections.push(format!("saw {seen:?}, not {expected:?}")),
+    }
+    match (&case.cause, &outcome.rebooted) {
+        (Cause::Rig(_), None) => {}
+        (Cause::Code(name, HANG), Some((Reset::Watchdog, words))) => {
+            let said = words.as_ref().is_some_and(|w| w.contains("check in"));
+            if name.contains("watch") && !said {
+                objections.push(format!("last words {words:?}"));
+            }
+        }
+        (Cause::Code(_, CRASH), Some((Reset::Software, Some(words))))
+            if words.contains("hard fault") => {}
+        (cause, rebooted) => objections.push(format!("{cause:?} came to {rebooted:?}")),
+    }
+    objections
+}
+
+fn check(name: &str) {
+    let Some(elf) = elf() else { return };
+    let case = CASES.iter().find(|case| case.name == name).unwrap();
+    // of each case another seed
+    let seed = 40 + CASES.iter().position(|case| case.name == name).unwrap() as u64;
+    let (mut talk, outcome) = run(case, &elf, seed);
+    eprintln!("{name}: {outcome:?}");
+    assert_eq!(objections(case, &outcome), [""; 0], "{name}");
+    // and it works again once the fault is gone; broken code stays broken
+    if let Cause::Rig(_) = case.cause {
+        talk.board().rig().world().clear();
+        // the sensor starts up
+        talk.board().run_ms(200).unwrap();
+        talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
+        talk.ask(Ask::Calibrate, 80.0, |_, _| ()).unwrap();
+    }
+}
+
+macro_rules! faults {
+    ($($test:ident: $name:literal,)*) => {$(
+        #[test]
+        fn $test() {
+            check($name);
+        }
+    )*
+
+    #[test]
+    fn every_case_is_run() {
+        let run = [$($name),*];
+        assert!(CASES.iter().all(|case| run.contains(&case.name)));
+    }
+    };
+}
+
+faults! {
+    unplugged_before: "sensor unplugged before the slide",
+    unplugged_sliding: "sensor unplugged while sliding",
+    flipped_bits: "one word in a hundred with a flipped bit",
+    miso_high: "MISO stuck high",
+    miso_low: "MISO stuck low",
+    stage_stalled: "stage stalled",
+    encoder_cut: "encoder's wires cut",
+    lever_loses_steps: "lever loses steps",
+    e_stop_pressing: "emergency stop while pressing",
+    e_stop_sliding: "emergency stop while sliding",
+    runaway_pressing: "the lever's driver runs down on its own while pressing",
+    runaway_sliding: "the lever's driver runs down on its own while sliding",
+    tasks_hang: "the tasks of thread mode hang",
+    servo_hangs: "the servo hangs",
+    servo_crashes: "the servo crashes",
+}
