@@ -445,7 +445,7 @@ async fn rig(
     // should the firmware give up now, the rescue can drive both
     rescue::ARMED.store(true, Relaxed);
 
-    match test_lever(&mut lever, &switches).await {
+    let lifted = match test_lever(&mut lever, &switches).await {
         Ok((up, play)) => account.check(
             true,
             "lever",
@@ -460,6 +460,12 @@ async fn rig(
         ),
     };
     lever.drive(false, 0);
+    if !lifted {
+        rescue::ARMED.store(false, Relaxed);
+        blue.set_low();
+        account.leave_out("stage", "since the lever may be down");
+        return;
+    }
 
     let mut drive = |duty: f32| {
         right.set_level((duty > 0.0).into());

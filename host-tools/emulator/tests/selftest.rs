@@ -5,7 +5,7 @@
 use std::path::PathBuf;
 
 use tactus::sim::encoder::Cut;
-use tactus_emulator::{Emulator, Fault, Options, ResetCause, Setup};
+use tactus_emulator::{Emulator, Fault, Options, Output, ResetCause, Setup};
 
 /// How a run of the self-test ended.
 struct Run {
@@ -14,6 +14,8 @@ struct Run {
     checks: Vec<(String, bool)>,
     leds: [bool; 3],
     resets: Vec<ResetCause>,
+    /// What the motors were told, with the times, ns.
+    outputs: Vec<(u64, Output)>,
 }
 
 impl Run {
@@ -23,14 +25,19 @@ impl Run {
     }
 }
 
-fn run(faults: &[Fault]) -> Option<Run> {
+/// Runs the self-test with these faults from these times on, ns.
+fn run(faults: &[(u64, Fault)]) -> Option<Run> {
     let Some(elf) = std::env::var_os("TACTUS_SELFTEST_ELF").map(PathBuf::from) else {
         eprintln!("skipped: TACTUS_SELFTEST_ELF is not set");
         return None;
     };
-    let mut emulator = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
-    for fault in faults {
-        emulator.inject(*fault);
+    let options = Options {
+        trace_s: 60,
+        ..Options::default()
+    };
+    let mut emulator = Emulator::start(&elf, Setup::default(), options).unwrap();
+    for (at_ns, fault) in faults {
+        emulator.schedule(*at_ns, *fault);
     }
     let mut log = Vec::new();
     while !log.iter().any(|line: &String| line.contains("SELF-TEST")) {
@@ -58,6 +65,7 @@ fn run(faults: &[Fault]) -> Option<Run> {
             .into_iter()
             .map(|reset| reset.cause)
             .collect(),
+        outputs: emulator.rig().trace().copied().collect(),
         log,
     })
 }
@@ -99,7 +107,7 @@ fn an_intact_board_passes_every_check() {
 
 #[test]
 fn an_unplugged_sensor_fails_the_sensors_checks_only() {
-    let Some(run) = run(&[Fault::SensorUnplugged]) else {
+    let Some(run) = run(&[(0, Fault::SensorUnplugged)]) else {
         return;
     };
     let sensors = ["sensor identity", "sensor words", "P_AC noise", "P_DC"];
@@ -110,7 +118,7 @@ fn an_unplugged_sensor_fails_the_sensors_checks_only() {
 #[test]
 fn a_cut_encoder_fails_the_stage_only() {
     for cut in [Cut::A, Cut::B, Cut::Both] {
-        let Some(run) = run(&[Fault::EncoderCut(cut)]) else {
+        let Some(run) = run(&[(0, Fault::EncoderCut(cut))]) else {
             return;
         };
         assert_eq!(run.failed(), ["stage"], "{cut:?}");
@@ -118,19 +126,59 @@ fn a_cut_encoder_fails_the_stage_only() {
 }
 
 #[test]
-fn nothing_moves_while_the_emergency_stop_is_pressed() {
-    let Some(run) = run(&[Fault::EStop]) else {
+fn a_jammed_stage_fails_the_stage_only() {
+    let Some(run) = run(&[(0, Fault::StageJammed)]) else {
         return;
     };
-    assert_eq!(run.failed(), ["emergency stop PF13", "lever", "stage"]);
+    assert_eq!(run.failed(), ["stage"]);
 }
 
 #[test]
-fn a_lever_switch_that_never_closes_or_opens_fails_the_lever_only() {
+fn nothing_moves_while_the_emergency_stop_is_pressed() {
+    let Some(run) = run(&[(0, Fault::EStop)]) else {
+        return;
+    };
+    assert_eq!(run.failed(), ["emergency stop PF13", "lever", "stage"]);
+    assert!(!run.outputs.iter().any(|(_, output)| moves(output)));
+}
+
+#[test]
+fn the_stage_stays_where_it_is_if_the_levers_switch_never_closes_or_opens() {
     for closed in [false, true] {
-        let Some(run) = run(&[Fault::LeverTopStuck { closed }]) else {
+        let Some(run) = run(&[(0, Fault::LeverTopStuck { closed })]) else {
             return;
         };
-        assert_eq!(run.failed(), ["lever"], "stuck {closed}");
+        assert_eq!(run.failed(), ["lever", "stage"], "stuck {closed}");
+        let duty = |output: &Output| matches!(output, Output::StageDuty(duty) if *duty != 0.0);
+        assert!(!run.outputs.iter().any(|(_, output)| duty(output)));
+    }
+}
+
+#[test]
+fn the_emergency_stop_stops_lever_and_stage_at_once() {
+    // while the lever goes up, and while the stage goes to the right
+    for (at_ns, failed) in [
+        (5_000_000_000, &["lever", "stage"][..]),
+        (9_880_000_000, &["stage"][..]),
+    ] {
+        let Some(run) = run(&[(at_ns, Fault::EStop)]) else {
+            return;
+        };
+        assert_eq!(run.failed(), failed);
+        let moving = run.outputs.iter().filter(|(_, output)| moves(output));
+        let last_ns = moving.map(|(at_ns, _)| *at_ns).max().unwrap();
+        let ends = run.outputs.iter().filter(|(at, _)| *at > last_ns);
+        let end_ns = ends.map(|(at_ns, _)| *at_ns).min().unwrap();
+        assert!(last_ns > at_ns - 100_000_000, "it did not move before");
+        assert!(end_ns < at_ns + 3_000_000, "moves until {end_ns}");
+    }
+}
+
+/// A step, or a stage that is driven.
+fn moves(output: &Output) -> bool {
+    match output {
+        Output::LeverStep(high) => *high,
+        Output::StageDuty(duty) => *duty != 0.0,
+        _ => false,
     }
 }

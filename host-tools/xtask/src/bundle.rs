@@ -47,7 +47,10 @@ fn files(images: Vec<(String, Vec<u8>)>, factory: Vec<u8>) -> Result<Files> {
         files.insert(format!("{name}.elf"), elf);
     }
     files.insert("factory.tact".into(), factory);
-    files.insert("FLASHING.md".into(), flashing(env!("CARGO_PKG_VERSION")).into());
+    files.insert(
+        "FLASHING.md".into(),
+        flashing(env!("CARGO_PKG_VERSION")).into(),
+    );
     files.insert(SUMS.into(), sums(&files).into());
     Ok(files)
 }
@@ -80,7 +83,8 @@ fn write(out: &Path, files: &Files) -> Result<()> {
 
 /// What an ELF puts into the chip: addresses and bytes.
 fn loads(elf: &[u8]) -> Result<Vec<(u32, &[u8])>> {
-    let file = ElfFile::<FileHeader32<Endianness>>::parse(elf).context("not an ELF for the chip")?;
+    let file =
+        ElfFile::<FileHeader32<Endianness>>::parse(elf).context("not an ELF for the chip")?;
     let endian = file.endian();
     ensure!(
         file.elf_header().e_machine.get(endian) == elf::EM_ARM,
@@ -105,7 +109,10 @@ fn flat(loads: &[(u32, &[u8])]) -> Result<Vec<u8>> {
         let at = address.checked_sub(FLASH).map(|at| at as usize);
         let range = at.map(|at| at..at + bytes.len());
         let Some(range) = range.filter(|range| range.end <= FLASH_LENGTH) else {
-            bail!("{} bytes at {address:#010x} are outside of the image's flash", bytes.len());
+            bail!(
+                "{} bytes at {address:#010x} are outside of the image's flash",
+                bytes.len()
+            );
         };
         if image.len() < range.end {
             image.resize(range.end, 0xFF);
@@ -245,7 +252,11 @@ mod tests {
         write(folder.path(), &release()).unwrap();
         assert_eq!(std::fs::read(folder.path().join(SUMS)).unwrap(), first);
         let table = hash(b"table");
-        assert!(String::from_utf8(first).unwrap().contains(&format!("{table}  factory.tact\n")));
+        assert!(
+            String::from_utf8(first)
+                .unwrap()
+                .contains(&format!("{table}  factory.tact\n"))
+        );
         std::fs::write(folder.path().join("thesis.txt"), "mine").unwrap();
         let error = write(folder.path(), &release()).unwrap_err().to_string();
         assert!(error.contains("thesis.txt"), "{error}");

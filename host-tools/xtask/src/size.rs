@@ -241,7 +241,12 @@ mod tests {
         assert_eq!(json(&image)["stack"]["bound"], 9000);
         assert_eq!(json(&image)["symbols"][0]["bytes"], 4086);
         let text = text(&[image]);
-        for part in ["160000", "9000", "4086  session::work", "1200  UART5, 9 runs"] {
+        for part in [
+            "160000",
+            "9000",
+            "4086  session::work",
+            "1200  UART5, 9 runs",
+        ] {
             assert!(text.contains(part), "{part} is not in\n{text}");
         }
     }
