@@ -13,20 +13,12 @@ use rigless::soc::Width;
 use crate::board::Error;
 
 const PAINT: u32 = 0x7ac7_5afe;
-/// What a handler returns to (ARM DDI 0403, B1.5.8): with and without floating-point state, to a handler, to thread mode with
-/// either stack.
-const RETURNS: [u64; 6] = [
-    0xFFFF_FFF1,
-    0xFFFF_FFF9,
-    0xFFFF_FFFD,
-    0xFFFF_FFE1,
-    0xFFFF_FFE9,
-    0xFFFF_FFED,
-];
+/// Where an exception frame holds the address to return to (ARM DDI 0403, B1.5.6), bytes above the stack pointer.
+const RETURN: u32 = 24;
 /// The longest exception frame, with floating-point state and alignment.
 const FRAME: u32 = 0x68 + 4;
 /// How much is looked at first, bytes; it doubles when that is too little.
-const WINDOW: u32 = 512;
+const WINDOW: u32 = 1024;
 
 /// How deep a handler went.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -147,6 +139,8 @@ impl StackUse {
 struct Running {
     level: usize,
     sp: u32,
+    /// the instruction that it interrupted
+    returns_to: u64,
     /// what was below, the lowest first
     aside: Vec<u32>,
 }
@@ -171,7 +165,7 @@ impl Stack {
             // it is RAM
             let _ = host.write(address.into(), Width::W32, PAINT.into());
         }
-        for address in levels.iter().map(|level| level.address).chain(RETURNS) {
+        for address in levels.iter().map(|level| level.address) {
             assert!(
                 host.watch(Watch::Instruction(address)),
                 "rigless cannot watch {address:#x}"
@@ -203,12 +197,20 @@ impl Stack {
             return;
         };
         let of = |level: &StackLevel| level.address == hit.address;
-        if let Some(level) = self.found.levels.iter().position(of) {
-            self.begin(level, sp, host);
-        } else if self.running.last().is_some_and(|running| running.sp == sp)
-            && let Some(running) = self.running.pop()
-        {
+        let begins = self.found.levels.iter().position(of);
+        // it is over when its frame is gone, or when another begins upon the same one
+        let over = |running: &mut Running| {
+            if begins.is_some() {
+                running.sp <= sp
+            } else {
+                running.sp < sp && running.returns_to == hit.address
+            }
+        };
+        while let Some(running) = self.running.pop_if(over) {
             self.end(&running, host);
+        }
+        if let Some(level) = begins {
+            self.begin(level, sp, host);
         }
     }
 
@@ -222,7 +224,14 @@ impl Stack {
             was
         });
         let aside = aside.collect();
-        self.running.push(Running { level, sp, aside });
+        let returns_to = u64::from(word(sp + RETURN, host));
+        host.watch(Watch::Instruction(returns_to));
+        self.running.push(Running {
+            level,
+            sp,
+            returns_to,
+            aside,
+        });
     }
 
     fn end(&mut self, running: &Running, host: &mut dyn Host) {
@@ -236,12 +245,21 @@ impl Stack {
             .found
             .used
             .max(self.top - running.sp + length - painted);
-        if painted == 0 {
+        // a frame may have a gap that nothing was written to
+        if painted < length / 4 {
             self.found.incomplete = true;
             level.window = (2 * length).max(level.window);
         }
         for (address, word) in (from..).step_by(4).zip(&running.aside) {
             let _ = host.write(address.into(), Width::W32, u64::from(*word));
+        }
+        let others = self.running.iter().map(|running| running.returns_to);
+        let begins = self.found.levels.iter().map(|level| level.address);
+        if !others
+            .chain(begins)
+            .any(|address| address == running.returns_to)
+        {
+            host.unwatch(Watch::Instruction(running.returns_to));
         }
     }
 

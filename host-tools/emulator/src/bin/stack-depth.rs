@@ -16,7 +16,7 @@ struct Cli {
     /// The firmware
     elf: PathBuf,
     /// Slides
-    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..))]
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..))]
     slides: u8,
 }
 
