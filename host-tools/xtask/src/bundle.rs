@@ -175,7 +175,7 @@ An ELF has the symbols that the log is read with; .bin and .hex hold the same im
     shasum -a 256 --check {SUMS}          # macOS
     Get-FileHash tactus-rig.bin           # Windows PowerShell: compare with {SUMS}
 
-The same commit gives the same sums: `cargo xtask bundle` in a checkout.
+The same commit built by the same Rust gives the same sums: `cargo xtask bundle` in a checkout.
 
 ## Flash
 

@@ -61,8 +61,8 @@ enum Cli {
     Size(size::Options),
     /// Make a release: images, hash sums, and how to flash them without a checkout
     ///
-    /// The same commit gives the same bytes. An ELF has the symbols that `probe-rs attach` reads the log with; .bin and .hex
-    /// are the same image for other programmers.
+    /// The same commit built by the same Rust gives the same bytes. An ELF has the symbols that `probe-rs attach` reads the
+    /// log with; .bin and .hex are the same image for other programmers.
     Bundle {
         /// The folder to write; files of an earlier release in it are replaced
         #[arg(long, value_name = "DIR", default_value = "target/bundle")]
