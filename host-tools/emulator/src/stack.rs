@@ -17,8 +17,8 @@ const PAINT: u32 = 0x7ac7_5afe;
 const RETURN: u32 = 24;
 /// The longest exception frame, with floating-point state and alignment.
 const FRAME: u32 = 0x68 + 4;
-/// How much is looked at first, bytes; it doubles when that is too little.
-const WINDOW: u32 = 1024;
+/// How much is looked at first, bytes; it doubles when that is too little. The servo's tick takes 1.4 KB.
+const WINDOW: u32 = 2048;
 
 /// How deep a handler went.
 #[derive(Clone, PartialEq, Eq, Debug)]

@@ -193,14 +193,15 @@ fn stack_text(stack: &Value, line: &mut impl FnMut(std::fmt::Arguments<'_>)) {
     let levels = stack.get("levels").and_then(Value::as_array);
     for level in levels.into_iter().flatten() {
         let name = level.get("name").and_then(Value::as_str).unwrap_or("?");
-        line(format_args!(
-            "{:>7}  {name}, {} runs",
-            number(level, "deepest"),
-            number(level, "runs")
-        ));
+        let deepest = number(level, "deepest");
+        match level.get("runs").and_then(Value::as_u64) {
+            Some(runs) => line(format_args!("{deepest:>7}  {name}, {runs} runs")),
+            None => line(format_args!("{deepest:>7}  {name}")),
+        }
     }
     line(format_args!(
-        "{:>7}  in use at most, as it came\n{:>7}  all of them upon one another, with their exception frames: the bound",
+        "{:>7}  in use at most, as it came\n{:>7}  all of them upon one another, with their exception frames: the bound\n\
+         UART4 runs the acquisition, UART5 the servo: the table in firmware/src/rig.rs",
         number(stack, "used"),
         number(stack, "bound")
     ));

@@ -35,7 +35,7 @@ fn main() -> anyhow::Result<()> {
         layout.levels = found.levels;
     };
     let level = |level: &StackLevel| json!({"name": level.name, "runs": level.runs, "deepest": level.deepest});
-    let thread = json!({"name": "thread mode", "runs": 1, "deepest": found.thread});
+    let thread = json!({"name": "thread mode", "deepest": found.thread});
     let ran = found.levels.iter().filter(|level| level.runs > 0);
     let levels = std::iter::once(thread).chain(ran.map(level));
     let bound = found.bound();
