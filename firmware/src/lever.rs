@@ -1,6 +1,6 @@
-//! The lever's STEP and DIR, from TIM1: a period of 1/3200 s either has a pulse or has none, so that the rates in use
-//! (3200, 800 and 200 steps/s) come out even, and any other with one period of jitter.
-use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering::Relaxed};
+//! The lever's STEP and DIR, from TIM1: which of its periods have a pulse is [`Steps`]' to say.
+use core::cell::Cell;
+use core::sync::atomic::{AtomicI32, Ordering::Relaxed};
 
 use embassy_stm32::gpio::{Level, Output, OutputType, Speed};
 use embassy_stm32::interrupt;
@@ -9,25 +9,25 @@ use embassy_stm32::peripherals::TIM1;
 use embassy_stm32::timer::Ch1;
 use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::timer::simple_pwm::PwmPin;
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use tactus_core::rig::steps::{BASE_HZ, Steps};
 
 use crate::board;
 
-/// Periods, and at most steps, per second.
-const BASE_HZ: u32 = 3200;
 /// The timer counts at 2 MHz.
 const PRESCALER: u16 = 83;
-const PERIOD: u16 = 625;
+const PERIOD: u16 = (2_000_000 / BASE_HZ) as u16;
+const CORE_HZ: u32 = 168_000_000;
 /// STEP is high for 5 us.
 const HIGH: u16 = 10;
 const DIRECTION_PIN: usize = 11;
+const ENABLE_PIN: usize = 13;
 
-/// Steps per second that are wanted, downwards positive.
+/// Steps per second that are wanted, downwards positive, and steps made.
 static RATE: AtomicI32 = AtomicI32::new(0);
-static STEPS: AtomicI32 = AtomicI32::new(0);
-/// The period that begins with the next update has a pulse.
-static PULSE: AtomicBool = AtomicBool::new(false);
-static DOWN: AtomicBool = AtomicBool::new(false);
-static PHASE: AtomicU32 = AtomicU32::new(0);
+static MADE: AtomicI32 = AtomicI32::new(0);
+static STEPS: Mutex<CriticalSectionRawMutex, Cell<Steps>> = Mutex::new(Cell::new(Steps::new()));
 
 /// The lever's driver.
 pub(crate) struct Lever {
@@ -67,7 +67,7 @@ impl Lever {
 
     /// Steps made so far, downwards positive.
     pub(crate) fn steps(&self) -> i32 {
-        STEPS.load(Relaxed)
+        MADE.load(Relaxed)
     }
 
     /// Gives the motor current, or takes it away, and steps at this rate from the next period on.
@@ -87,43 +87,26 @@ impl Lever {
 fn TIM1_UP_TIM10() {
     REGISTERS.sr().write(|w| w.0 = 0);
     let rate = RATE.load(Relaxed);
-    let mut down = DOWN.load(Relaxed);
-    let pulses_now = PULSE.load(Relaxed);
-    if pulses_now {
-        STEPS.fetch_add(if down { 1 } else { -1 }, Relaxed);
+    let (next, made) = STEPS.lock(|cell| {
+        let mut steps = cell.get();
+        let next = steps.begin(rate);
+        cell.set(steps);
+        (next, steps.made())
+    });
+    MADE.store(made, Relaxed);
+    set_direction(next.down);
+    if next.rests {
+        REGISTERS.cr1().modify(|w| w.set_cen(false));
     }
-    let mut phase = PHASE.load(Relaxed);
-    if rate == 0 {
-        // the next rate begins with a step
-        phase = BASE_HZ;
-        if !pulses_now {
-            REGISTERS.cr1().modify(|w| w.set_cen(false));
-        }
-    } else if (rate > 0) != down && !pulses_now {
-        // a whole period before the next pulse can come
-        down = rate > 0;
-        GPIOE.bsrr().write(|w| {
-            if down {
-                w.set_bs(DIRECTION_PIN, true);
-            } else {
-                w.set_br(DIRECTION_PIN, true);
-            }
-        });
-        DOWN.store(down, Relaxed);
-    }
-    let mut pulse = false;
-    if rate != 0 && (rate > 0) == down {
-        phase = (phase + rate.unsigned_abs()).min(2 * BASE_HZ);
-        pulse = phase >= BASE_HZ;
-        if pulse {
-            phase -= BASE_HZ;
-        }
-    }
-    PHASE.store(phase, Relaxed);
-    PULSE.store(pulse, Relaxed);
-    REGISTERS
-        .ccr(0)
-        .write(|w| w.set_ccr(if pulse { HIGH } else { 0 }));
+    let high = if next.pulse { HIGH } else { 0 };
+    REGISTERS.ccr(0).write(|w| w.set_ccr(high));
+}
+
+fn set_direction(down: bool) {
+    GPIOE.bsrr().write(|w| match down {
+        true => w.set_bs(DIRECTION_PIN, true),
+        false => w.set_br(DIRECTION_PIN, true),
+    });
 }
 
 /// Steps upwards, without interrupts, until `done` says so; it is asked before every step and told how many were made. For
@@ -134,14 +117,14 @@ pub(crate) fn lift_by_hand(mut done: impl FnMut(u32) -> bool) {
     REGISTERS.cr1().modify(|w| w.set_cen(true));
     let period = || {
         REGISTERS.sr().write(|w| w.0 = 0);
+        // most of the period, so that the register is not asked all the time
+        cortex_m::asm::delay(CORE_HZ / BASE_HZ * 9 / 10);
         while !REGISTERS.sr().read().uif() {}
     };
     // the pulse that may be under way
     period();
-    GPIOE.bsrr().write(|w| {
-        w.set_br(DIRECTION_PIN, true);
-        w.set_bs(13, true);
-    });
+    set_direction(false);
+    GPIOE.bsrr().write(|w| w.set_bs(ENABLE_PIN, true));
     period();
     let mut steps = 0;
     while !done(steps) {

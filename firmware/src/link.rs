@@ -11,8 +11,9 @@ use embassy_time::{Duration, Instant, Ticker};
 use embedded_io_async::{Read as _, Write as _};
 use static_cell::ConstStaticCell;
 use tactus_core::rig::control::Phase;
+use tactus_core::session::text;
 use tactus_core::wire::{
-    self, Ask, Counts, Live, MAX_FRAME, Receiver, Report, Request, Status, Tell, Text,
+    self, Ask, Counts, Live, MAX_FRAME, Receiver, Report, Request, Status, Tell,
 };
 
 use crate::board::{self, Irqs};
@@ -95,14 +96,6 @@ pub(crate) fn tell(tell: Tell) {
     if !sent {
         LOST_REPORTS.fetch_add(1, Relaxed);
     }
-}
-
-/// A sentence, cut off where it is too long.
-pub(crate) fn text(sentence: impl core::fmt::Display) -> Text {
-    use core::fmt::Write as _;
-    let mut text = Text::new();
-    let _ = write!(text, "{sentence}");
-    text
 }
 
 /// Refuses a request.

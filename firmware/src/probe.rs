@@ -2,7 +2,6 @@
 use core::sync::atomic::Ordering::Relaxed;
 
 use embassy_time::Timer;
-use heapless::Vec;
 use heapless::spsc::Consumer;
 use tactus_core::features::{PropertySet, Slide};
 use tactus_core::kernels::Kernels;
@@ -11,7 +10,8 @@ use tactus_core::rig::Rig;
 use tactus_core::rig::control::{Ended, Phase, Refused};
 use tactus_core::rig::guard::Fault;
 use tactus_core::rig::pins::Felt;
-use tactus_core::wire::{Block, Tell};
+use tactus_core::session::{Blocks, Random};
+use tactus_core::wire::Tell;
 
 use crate::acquire;
 use crate::link::{STREAM, tell};
@@ -50,31 +50,22 @@ impl core::error::Error for ProbeError {}
 /// The rig that the servo moves, as the exploration sees it.
 pub(crate) struct Probe {
     samples: Consumer<'static, Samples>,
-    random: u32,
+    random: Random,
 }
 
 impl Probe {
     pub(crate) fn new(samples: Consumer<'static, Samples>) -> Self {
-        Self { samples, random: 1 }
+        Self {
+            samples,
+            random: Random::new(1),
+        }
     }
 
-    /// Begins a row of random numbers.
-    pub(crate) fn seed(&mut self, seed: u32) {
-        // 0 would stay 0
-        self.random = seed.max(1);
-    }
-
-    /// Xorshift: for where slides begin and for random choices, not for secrets.
-    fn random(&mut self) -> u32 {
-        self.random ^= self.random << 13;
-        self.random ^= self.random >> 17;
-        self.random ^= self.random << 5;
-        self.random
-    }
-
-    /// 0 to 1.
-    fn start(&mut self) -> f32 {
-        (self.random() >> 8) as f32 / (1 << 24) as f32
+    /// Something new begins: another sample may lie under the finger, and slides begin where these numbers say.
+    pub(crate) async fn begin(&mut self, seed: u32) {
+        self.random = Random::new(seed);
+        // never refused
+        let _ = servo::command(Command::SampleChanged).await;
     }
 
     /// Waits until the rig is at rest; `each` is called every [`LOOK_MS`], and once more at the end.
@@ -126,57 +117,6 @@ impl Probe {
     }
 }
 
-/// Raw samples on their way to the host, in blocks.
-struct Blocks {
-    block: Block,
-}
-
-impl Blocks {
-    const EMPTY: Block = Block {
-        number: 0,
-        still: true,
-        steady: None,
-        pac: Vec::new(),
-        shear_mn: Vec::new(),
-        lost: 0,
-    };
-
-    fn send(&mut self) {
-        let number = self.block.number.wrapping_add(1);
-        let still = self.block.still;
-        let block = core::mem::replace(&mut self.block, Self::EMPTY);
-        tell(Tell::Block(block));
-        self.block.number = number;
-        self.block.still = still;
-    }
-
-    fn put(&mut self, samples: &Samples) {
-        let still = samples.felt == Felt::Still;
-        let full = self.block.pac.len() + samples.pac.len() > self.block.pac.capacity()
-            || self.block.shear_mn.is_full();
-        let begins = matches!(samples.felt, Felt::Begin(_));
-        if (full || still != self.block.still || begins)
-            && !(self.block.pac.is_empty() && self.block.shear_mn.is_empty())
-        {
-            self.send();
-        }
-        self.block.still = still;
-        if let Felt::Begin(steady) = &samples.felt {
-            self.block.steady = Some((steady.start, steady.end));
-        }
-        // there is room: a block takes many of these
-        let _ = self.block.pac.extend_from_slice(&samples.pac);
-        if let Some(shear_mn) = samples.shear_mn {
-            let _ = self.block.shear_mn.push(shear_mn);
-        }
-    }
-
-    fn end(mut self, lost: u32) {
-        self.block.lost = lost;
-        self.send();
-    }
-}
-
 impl Rig for Probe {
     type Error = ProbeError;
 
@@ -199,19 +139,20 @@ impl Rig for Probe {
                 .wrapping_add(servo::LOST.load(Relaxed))
         };
         let lost_before = lost();
-        let start = self.start();
+        let start = self.random.next_f32();
         servo::command(Command::Start(movement, start))
             .await
             .map_err(ProbeError::Refused)?;
-        let mut blocks = STREAM.load(Relaxed).then_some(Blocks {
-            block: Blocks::EMPTY,
-        });
+        let mut blocks = STREAM.load(Relaxed).then(Blocks::default);
         let ended = self
             .rest(|queue| {
                 while let Some(samples) = queue.dequeue() {
                     feel(&samples, slide);
-                    if let Some(blocks) = &mut blocks {
-                        blocks.put(&samples);
+                    let block = blocks
+                        .as_mut()
+                        .and_then(|b| b.put(&samples.felt, &samples.pac, samples.shear_mn));
+                    if let Some(block) = block {
+                        tell(Tell::Block(block));
                     }
                 }
             })
@@ -226,7 +167,7 @@ impl Rig for Probe {
             slide.lose(gap);
         }
         if let Some(blocks) = blocks {
-            blocks.end(gap);
+            tell(Tell::Block(blocks.end(gap)));
         }
         match ended? {
             Some(Ended::Whole | Ended::Gap(_)) => Ok(()),

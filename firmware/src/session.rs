@@ -6,24 +6,18 @@ use embassy_time::Timer;
 use heapless::Vec;
 use heapless::spsc::Consumer;
 use static_cell::ConstStaticCell;
-use tactus_core::explorer::{Config, Explorer};
-use tactus_core::features::{Plan, Slide};
+use tactus_core::features::Plan;
 use tactus_core::kernels::Plain;
-use tactus_core::movement::Movement;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::control::Phase;
-use tactus_core::rig::guard::Fault;
 use tactus_core::rig::unloaded::UnloadedRuns;
-use tactus_core::rig::{Event, MAX_REJECTED, Rig as _, explore};
+use tactus_core::session::{self, text};
 use tactus_core::store::{Store, StoreError};
-use tactus_core::table::{MAX_ACTIONS, MAX_MOVEMENTS, Table};
-use tactus_core::training::{Training, Wanted};
-use tactus_core::wire::{
-    Ask, Identify, MAX_OUTLOOK, MAX_TEXTURES, Name, PART, Promise, Tell, Text, Train,
-};
+use tactus_core::table::Table;
+use tactus_core::wire::{Ask, PART, Tell, Text};
 
 use crate::board;
-use crate::link::{self, BUSY, JOBS, TABLE, TableInUse, refuse, tell, text};
+use crate::link::{self, BUSY, JOBS, TABLE, TableInUse, refuse, tell};
 use crate::probe::Probe;
 use crate::servo::{self, Command, Samples};
 
@@ -128,7 +122,9 @@ async fn work(
     match ask {
         Ask::Home => probe.home().await.map_err(text),
         Ask::Identify(identify) => {
-            let done = explore_once(&identify, probe, table_bytes(store.as_ref()), plan).await;
+            let table = Table::read(table_bytes(store.as_ref())).map_err(text)?;
+            probe.begin(identify.seed).await;
+            let done = session::identify::<_, Plain>(&identify, probe, table, plan, tell).await;
             if let Some(store) = store {
                 // what the skin has been through is worth keeping, but no reason to fail
                 let _ = store.set_skin(&servo::snapshot().skin).await;
@@ -167,7 +163,9 @@ async fn work(
             let store = store.as_mut().ok_or_else(no_store)?;
             match store.write_table(offset as usize, &bytes).await {
                 // said again by a host that did not hear the answer; the table's checksum is looked at in the end
-                Err(StoreError::Part { offset, wanted }) if offset + bytes.len() == wanted => Ok(()),
+                Err(StoreError::Part { offset, wanted }) if offset + bytes.len() == wanted => {
+                    Ok(())
+                }
                 written => written.map_err(text),
             }
         }
@@ -190,95 +188,16 @@ async fn work(
         }
         Ask::Train(wanted) => {
             let store = store.as_mut().ok_or_else(no_store)?;
-            let done = train(&wanted, probe, store, plan, room).await;
+            let table = Table::read(table_bytes(Some(store))).map_err(text)?;
+            probe.begin(wanted.seed).await;
+            let done =
+                session::train::<_, _, Plain>(&wanted, probe, store, table, plan, room, tell).await;
             use_table(Some(store));
             let _ = store.set_skin(&servo::snapshot().skin).await;
             done
         }
         Ask::Status | Ask::Stop | Ask::Stream(_) | Ask::ReadCalibration => Ok(()),
     }
-}
-
-/// An exploration from the first choice to the verdict, everything of it told.
-async fn explore_once(
-    identify: &Identify,
-    probe: &mut Probe,
-    table: &'static [u8],
-    plan: &Plan,
-) -> Result<(), Text> {
-    let table = Table::read(table).map_err(text)?;
-    let config = Config {
-        strategy: identify.strategy,
-        threshold: identify.threshold,
-        max_slides: identify.max_slides,
-    };
-    let mut explorer = if identify.among.is_empty() {
-        Explorer::<'_, MAX_TEXTURES>::new(table, probe.measures(), config)
-    } else {
-        let candidates = identify.among.iter().copied();
-        Explorer::among(table, probe.measures(), config, candidates)
-    }
-    .map_err(text)?;
-    probe.seed(identify.seed);
-    let _ = servo::command(Command::SampleChanged).await;
-    let mut random = identify.seed.rotate_left(16).max(1);
-    let mut slide: u8 = 1;
-    let verdict = explore(
-        probe,
-        &mut explorer,
-        plan,
-        || {
-            random ^= random << 13;
-            random ^= random >> 17;
-            random ^= random << 5;
-            random
-        },
-        |event| match event {
-            Event::Chosen(action, outlook) => {
-                let mut best: Vec<Promise, MAX_ACTIONS> = outlook
-                    .iter()
-                    .map(|o| Promise {
-                        action: o.action,
-                        uncertainty: o.uncertainty,
-                        benefit: o.benefit,
-                    })
-                    .collect();
-                best.sort_unstable_by(|a, b| b.benefit.total_cmp(&a.benefit));
-                if let Some(movement) = table.movement(action.movement) {
-                    tell(Tell::Chosen {
-                        slide,
-                        movement,
-                        action,
-                        outlook: best.into_iter().take(MAX_OUTLOOK).collect(),
-                    });
-                }
-            }
-            Event::Felt(action, measurement, posterior) => {
-                tell(Tell::Felt {
-                    slide,
-                    action,
-                    felt: measurement.into(),
-                    posterior: Vec::from_slice(posterior).unwrap_or_default(),
-                });
-                slide = slide.saturating_add(1);
-            }
-            Event::Rejected(_, why) => tell(Tell::Rejected {
-                slide,
-                why: text(why),
-            }),
-        },
-    )
-    .await
-    .map_err(text)?;
-    let name = table.name(verdict.texture).unwrap_or_default();
-    tell(Tell::Verdict {
-        texture: verdict.texture,
-        name: Name::try_from(name).unwrap_or_default(),
-        probability: verdict.probability,
-        sure: verdict.sure,
-        slides: explorer.slides(),
-    });
-    Ok(())
 }
 
 /// Measures the motor's current without load and takes it into use.
@@ -304,80 +223,4 @@ async fn keep(store: &mut Storage, calibration: &RigCalibration) -> Result<(), T
         store.erase_settings().await.map_err(text)?;
     }
     store.set_calibration(calibration).await.map_err(text)
-}
-
-/// Learns the texture under the finger, going on where an earlier training of it stopped; every trial is stored at once.
-async fn train(
-    wanted: &Train,
-    probe: &mut Probe,
-    store: &mut Storage,
-    plan: &Plan,
-    room: &mut [u8],
-) -> Result<(), Text> {
-    let table = Table::read(table_bytes(Some(store))).map_err(text)?;
-    let name = wanted.name.as_str();
-    let mut training = Training::new(
-        Wanted {
-            name,
-            trials: wanted.trials,
-            pilot: wanted.pilot,
-            measures: probe.measures(),
-        },
-        Some(&table),
-        Storage::MAX_TABLE,
-    )
-    .map_err(text)?;
-    let movements: Vec<Movement, MAX_MOVEMENTS> =
-        training.learned().iter().map(|(m, _)| *m).collect();
-    for movement in movements {
-        let before = store.trained(name, movement, training.table()).await;
-        if let Some(experience) = before.map_err(text)? {
-            training.resume(movement, experience).map_err(text)?;
-        }
-    }
-    probe.seed(wanted.seed);
-    let _ = servo::command(Command::SampleChanged).await;
-    let mut rejected = 0;
-    while let Some(movement) = training.next() {
-        let mut slide = Slide::<Plain>::new(plan);
-        probe.perform(movement, &mut slide).await.map_err(text)?;
-        let measurement = match slide.finish() {
-            Ok(measurement) => measurement,
-            Err(why) => {
-                rejected += 1;
-                tell(Tell::Rejected {
-                    slide: rejected,
-                    why: text(why),
-                });
-                if rejected == MAX_REJECTED {
-                    return Err(text(Fault::Rejected));
-                }
-                continue;
-            }
-        };
-        rejected = 0;
-        let trained = training
-            .took(movement, &measurement.properties)
-            .map_err(text)?;
-        store.set_trained(&trained).await.map_err(text)?;
-        tell(Tell::Learned {
-            movement,
-            trial: trained.experience.trials(),
-            left: training.left(),
-            felt: (&measurement).into(),
-        });
-    }
-    if training.makes_table() {
-        let length = {
-            let new = training.encode(Some(&table), room).map_err(text)?;
-            new.as_bytes().len()
-        };
-        store.begin_table(length).await.map_err(text)?;
-        let bytes = room.get(..length).unwrap_or_default();
-        store.write_table(0, bytes).await.map_err(text)?;
-        store.commit_table(room).await.map_err(text)?;
-        // what the table holds now need not be kept beside it
-        store.forget_trained(name).await.map_err(text)?;
-    }
-    Ok(())
 }

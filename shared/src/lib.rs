@@ -20,6 +20,7 @@ pub mod movement;
 pub mod pressure;
 pub mod rig;
 pub mod sensor;
+pub mod session;
 pub mod spectrum;
 pub mod store;
 pub mod table;

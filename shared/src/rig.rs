@@ -10,6 +10,7 @@ pub mod lever;
 pub mod pins;
 pub mod skin;
 pub mod stage;
+pub mod steps;
 pub mod unloaded;
 
 use core::fmt;

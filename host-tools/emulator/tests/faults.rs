@@ -20,16 +20,90 @@ fn elf() -> Option<PathBuf> {
     elf
 }
 
-/// A branch to itself, and an undefined instruction.
-const HANG: [u8; 2] = [0xFE, 0xE7];
-const CRASH: [u8; 2] = [0x00, 0xDE];
+/// Unused flash.
+const NOWHERE: u64 = 0x080F_FF00;
+
+/// What a function does instead of its work, once: its code is whole again 10 ms later, as after a disturbance that left
+/// no trace.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Instead {
+    /// It never returns.
+    Hangs,
+    /// It runs into an undefined instruction.
+    Crashes,
+    /// It panics.
+    Panics,
+}
+
+/// What a function that panics says.
+const LAST_WORDS: &str = "nobody expects";
+
+/// Code for [`NOWHERE`] that calls `core::panicking::panic`: r0 and r1 its message, r2 where it was called.
+fn panicking(panic: u64) -> Vec<u8> {
+    const FILE: &str = "nowhere.rs";
+    // ldr r0..r3 from the words behind, bx r3, nop
+    let code = [0x4802_u16, 0x4903, 0x4A03, 0x4B04, 0x4718, 0xBF00];
+    let at = NOWHERE as u32 + 2 * code.len() as u32;
+    let (location, file) = (at + 4 * 4, at + 8 * 4);
+    let message = file + FILE.len() as u32;
+    let words = [
+        message,
+        LAST_WORDS.len() as u32,
+        location,
+        panic as u32 | 1,
+        // core::panic::Location: file, line, column
+        file,
+        FILE.len() as u32,
+        12,
+        3,
+    ];
+    let mut bytes: Vec<u8> = code.iter().flat_map(|c| c.to_le_bytes()).collect();
+    bytes.extend(words.iter().flat_map(|w| w.to_le_bytes()));
+    bytes.extend(FILE.bytes().chain(LAST_WORDS.bytes()));
+    bytes
+}
+
+/// Thumb's `b.w` from one address to another (ARMv7-M manual, B, encoding T4).
+fn branch(from: u64, to: u64) -> [u8; 4] {
+    let offset = (to as i64 - (from as i64 + 4)) as u32;
+    let bit = |n: u32| offset >> n & 1;
+    let s = bit(24);
+    let high = 0xF000 | s << 10 | offset >> 12 & 0x3FF;
+    let (j1, j2) = (!(bit(23) ^ s) & 1, !(bit(22) ^ s) & 1);
+    let low = 0x9000 | j1 << 13 | j2 << 11 | offset >> 1 & 0x7FF;
+    let [a, b] = (high as u16).to_le_bytes();
+    let [c, d] = (low as u16).to_le_bytes();
+    [a, b, c, d]
+}
+
+/// Breaks a function; what to put back, and where.
+fn break_code(board: &mut Emulator, name: &str, instead: Instead) -> (u64, Vec<u8>) {
+    let (address, _) = board.symbol(name).unwrap();
+    let address = address & !1;
+    let code = board.read(address, 4).unwrap();
+    match instead {
+        Instead::Hangs => {
+            // a branch to itself
+            board.write(NOWHERE, &[0xFE, 0xE7]).unwrap();
+            board.write(address, &branch(address, NOWHERE)).unwrap();
+        }
+        Instead::Panics => {
+            let (panic, _) = board.symbol("core9panicking5panic").unwrap();
+            board.write(NOWHERE, &panicking(panic)).unwrap();
+            board.write(address, &branch(address, NOWHERE)).unwrap();
+        }
+        // udf
+        Instead::Crashes => board.write(address, &[0x00, 0xDE]).unwrap(),
+    }
+    (address, code)
+}
 
 /// What breaks.
 #[derive(Clone, Copy, Debug)]
 enum Cause {
     Rig(Fault),
-    /// A function's first instruction, in flash, becomes another.
-    Code(&'static str, [u8; 2]),
+    /// A function of the firmware, by its mangled name.
+    Code(&'static str, Instead),
 }
 
 /// When it breaks, by what really happens.
@@ -54,7 +128,7 @@ struct Case {
 }
 
 /// By the fault table: its deadline, and what it takes until the fault shows.
-const CASES: [Case; 15] = [
+const CASES: [Case; 16] = [
     Case {
         name: "sensor unplugged before the slide",
         cause: Cause::Rig(Fault::SensorUnplugged),
@@ -144,25 +218,34 @@ const CASES: [Case; 15] = [
     Case {
         // 2 s without a check-in
         name: "the tasks of thread mode hang",
-        cause: Cause::Code("___watch_task_inner_function0E4poll", HANG),
+        cause: Cause::Code("___watch_task_inner_function0E4poll", Instead::Hangs),
         when: When::Pressing,
-        seen: &[Seen::TasksHung],
+        // the task that would tell is the one that hangs: it is told after the restart
+        seen: &[],
         deadline_ms: Some(2010),
     },
     Case {
         // the watchdog's 100 ms, by an oscillator of 32 kHz, then the firmware's start
         name: "the servo hangs",
-        cause: Cause::Code("___servo_task_inner_function0E4poll", HANG),
+        cause: Cause::Code("___servo_task_inner_function0E4poll", Instead::Hangs),
         when: When::Sliding,
         seen: &[],
         deadline_ms: Some(500),
     },
     Case {
         name: "the servo crashes",
-        cause: Cause::Code("___servo_task_inner_function0E4poll", CRASH),
+        cause: Cause::Code("___servo_task_inner_function0E4poll", Instead::Crashes),
         when: When::Sliding,
         seen: &[],
         deadline_ms: Some(3),
+    },
+    Case {
+        name: "a task panics",
+        cause: Cause::Code("___watch_task_inner_function0E4poll", Instead::Panics),
+        when: When::Sliding,
+        seen: &[],
+        // its task has its turn every 5 ms
+        deadline_ms: Some(8),
     },
 ];
 
@@ -230,6 +313,7 @@ fn run(case: &Case, elf: &std::path::Path, seed: u64) -> (Talk, Outcome) {
     let mut broken_ns = None;
     let delay_ns = random.random_range(0..300_000_000);
     let mut due_ns = None;
+    let mut broken = None;
     let mut over_ns = u64::MAX;
     let mut booted = None;
     let mut seen = None;
@@ -256,13 +340,16 @@ fn run(case: &Case, elf: &std::path::Path, seed: u64) -> (Talk, Outcome) {
             }
             match case.cause {
                 Cause::Rig(fault) => board.inject(fault),
-                Cause::Code(name, instruction) => {
-                    let (address, _) = board.symbol(name).unwrap();
-                    board.write(address & !1, &instruction).unwrap();
-                }
+                Cause::Code(name, instead) => broken = Some(break_code(board, name, instead)),
             }
             broken_ns = Some(board.now_ns());
             over_ns = board.now_ns() + after_ms * 1_000_000;
+        }
+        if let Some(since_ns) = broken_ns
+            && board.now_ns() >= since_ns + 10_000_000
+            && let Some((address, code)) = broken.take()
+        {
+            board.write(address, &code).unwrap();
         }
         if board.now_ns() >= over_ns {
             over_ns = u64::MAX;
@@ -361,14 +448,16 @@ fn objections(case: &Case, outcome: &Outcome) -> Vec<String> {
     }
     match (&case.cause, &outcome.rebooted) {
         (Cause::Rig(_), None) => {}
-        (Cause::Code(name, HANG), Some((Reset::Watchdog, words))) => {
+        (Cause::Code(name, Instead::Hangs), Some((Reset::Watchdog, words))) => {
             let said = words.as_ref().is_some_and(|w| w.contains("check in"));
             if name.contains("watch") && !said {
                 objections.push(format!("last words {words:?}"));
             }
         }
-        (Cause::Code(_, CRASH), Some((Reset::Software, Some(words))))
+        (Cause::Code(_, Instead::Crashes), Some((Reset::Software, Some(words))))
             if words.contains("hard fault") => {}
+        (Cause::Code(_, Instead::Panics), Some((Reset::Software, Some(words))))
+            if words.contains(LAST_WORDS) && words.contains("nowhere.rs:12") => {}
         (cause, rebooted) => objections.push(format!("{cause:?} came to {rebooted:?}")),
     }
     objections
@@ -382,14 +471,14 @@ fn check(name: &str) {
     let (mut talk, outcome) = run(case, &elf, seed);
     eprintln!("{name}: {outcome:?}");
     assert_eq!(objections(case, &outcome), [""; 0], "{name}");
-    // and it works again once the fault is gone; broken code stays broken
+    // and it works again once the fault is gone
+    talk.board().rig().world().clear();
     if let Cause::Rig(_) = case.cause {
-        talk.board().rig().world().clear();
         // the sensor starts up
         talk.board().run_ms(200).unwrap();
         talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
-        talk.ask(Ask::Calibrate, 80.0, |_, _| ()).unwrap();
     }
+    talk.ask(Ask::Calibrate, 80.0, |_, _| ()).unwrap();
 }
 
 macro_rules! faults {
@@ -424,4 +513,5 @@ faults! {
     tasks_hang: "the tasks of thread mode hang",
     servo_hangs: "the servo hangs",
     servo_crashes: "the servo crashes",
+    task_panics: "a task panics",
 }

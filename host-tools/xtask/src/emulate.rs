@@ -3,7 +3,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::Command;
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 
 use crate::{cargo, firmware, root, target};
 
@@ -17,10 +17,7 @@ pub(crate) fn run(options: &[OsString]) -> Result<()> {
     let elf = if help || named {
         None
     } else {
-        let elves = firmware::build()?;
-        let rig = |elf: &&PathBuf| elf.file_name() == Some("tactus-rig".as_ref());
-        let elf = elves.iter().find(rig);
-        Some(elf.context("the firmware has no tactus-rig")?.clone())
+        Some(firmware::image(&firmware::build()?, "tactus-rig")?.to_owned())
     };
     crate::run(&mut build())?;
     let mut emulator = Command::new(folder().join("release/tactus-emulator"));
@@ -37,11 +34,39 @@ pub(crate) fn folder() -> PathBuf {
 
 /// Builds the emulator's programs.
 pub(crate) fn build() -> Command {
+    let mut build = cargo_there("build");
+    build.arg("--release");
+    build
+}
+
+/// Formatting and lints of the emulator.
+pub(crate) fn lints() -> [Command; 2] {
+    let mut format = cargo();
+    format.current_dir(root().join("host-tools/emulator"));
+    format.args(["fmt", "--check"]);
+    let mut clippy = cargo_there("clippy");
+    clippy.args(["--all-targets", "--", "-Dwarnings"]);
+    [format, clippy]
+}
+
+/// The emulator's tests, with the images that would be flashed.
+pub(crate) fn tests(elves: &[PathBuf]) -> Result<Command> {
+    let mut tests = cargo_there("test");
+    tests.args(["--release", "--no-fail-fast"]);
+    tests.env("TACTUS_ELF", firmware::image(elves, "tactus-rig")?);
+    let selftest = firmware::image(elves, "tactus-selftest")?;
+    tests.env("TACTUS_SELFTEST_ELF", selftest);
+    tests.env("TACTUS_REQUIRE_ELF", "1");
+    Ok(tests)
+}
+
+/// A cargo command in the emulator's workspace.
+fn cargo_there(command: &str) -> Command {
     let mut cargo = cargo();
     // its own configuration is read from there
     cargo.current_dir(root().join("host-tools/emulator"));
     // the crate below says Rust 1.98 and builds on 1.95
-    cargo.args(["build", "--release", "--locked", "--ignore-rust-version"]);
+    cargo.args([command, "--locked", "--ignore-rust-version"]);
     cargo.arg("--target-dir").arg(folder());
     cargo
 }

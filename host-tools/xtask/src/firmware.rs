@@ -39,6 +39,13 @@ pub(crate) fn elves() -> Result<Vec<PathBuf>> {
     Ok(elves)
 }
 
+/// The image of this name among those that were built.
+pub(crate) fn image<'a>(elves: &'a [PathBuf], name: &str) -> Result<&'a Path> {
+    let image = elves.iter().find(|elf| elf.ends_with(name));
+    let image = image.with_context(|| format!("the firmware has no {name}"))?;
+    Ok(image)
+}
+
 /// An image's name, "tactus-rig".
 pub(crate) fn name(elf: &Path) -> Result<&str> {
     let name = elf.file_name().and_then(|name| name.to_str());

@@ -41,8 +41,7 @@ pub(crate) fn flash(options: &Options) -> Result<()> {
         "tactus-rig"
     };
     let elves = firmware::elves()?;
-    let elf = elves.iter().find(|elf| elf.ends_with(wanted));
-    let elf = elf.with_context(|| format!("the build made no {wanted}"))?;
+    let elf = firmware::image(&elves, wanted)?;
     for mut command in commands(options.self_test, elf, &options.options) {
         println!("{}", line(&command));
         if !options.dry_run {

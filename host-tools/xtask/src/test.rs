@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo, firmware, has_subcommand, run as run_command, target};
+use crate::{cargo, emulate, firmware, has_subcommand, run as run_command, target};
 
 /// How a step ended.
 enum Outcome {
@@ -56,14 +56,28 @@ pub(crate) fn run(quick: bool) -> ExitCode {
         doc.args(["doc", "--workspace", "--no-deps"]);
         announce_and_run(doc.env("RUSTDOCFLAGS", "-Dwarnings"))
     }));
-    steps.push(if quick {
-        skipped("firmware", "--quick")
+    if quick {
+        steps.extend(["firmware", "emulator"].map(|name| skipped(name, "--quick")));
     } else {
-        step("firmware", || {
+        let mut elves = None;
+        steps.push(step("firmware", || {
             println!("\n== cargo xtask build");
-            firmware::build().map(|_| ())
-        })
-    });
+            elves = Some(firmware::build()?);
+            Ok(())
+        }));
+        steps.push(step("lints of the emulator", || {
+            emulate::lints().iter_mut().try_for_each(announce_and_run)
+        }));
+        steps.push(match elves {
+            Some(elves) => step("emulator", || {
+                let mut tests = emulate::tests(&elves)?;
+                tests.env("TACTUS_SKIP_LOG", &skip_log);
+                announce(&tests);
+                run_tests(&mut tests)
+            }),
+            None => skipped("emulator", "there is no firmware to run on it"),
+        });
+    }
 
     let log = std::fs::read_to_string(&skip_log).unwrap_or_default();
     let _ = std::fs::remove_file(&skip_log);
