@@ -11,10 +11,12 @@ mod link;
 mod probe;
 mod rescue;
 mod rig;
+mod selftest;
 mod servo;
 mod session;
 
 pub use rig::rig;
+pub use selftest::selftest;
 
 use defmt_rtt as _;
 

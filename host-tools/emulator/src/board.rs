@@ -22,6 +22,7 @@ use crate::log::Log;
 use crate::part::Board;
 use crate::pins;
 use crate::rig::{Rig, SharedRig, lock};
+use crate::stack::{Stack, StackLayout, StackUse};
 
 /// What else a run is made from.
 #[derive(Clone, Debug)]
@@ -148,6 +149,7 @@ impl Emulator {
             commands: commanded,
             reached: reaches,
             log,
+            stack: None,
             tick_ns: options.tick_ns.max(1),
             next_tick_ns: 0,
             until_ns: 0,
@@ -383,6 +385,26 @@ impl Emulator {
     /// The run is over.
     pub fn store(&mut self) -> Result<Vec<u8>, Error> {
         self.read(flash::STORE.start, flash::STORE.end - flash::STORE.start)
+    }
+
+    /// Measures from now on how deep the stack gets. To be called at time 0: it paints the whole stack. Costs most of the
+    /// speed.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn measure_stack(&mut self, layout: StackLayout) -> Result<(), Error> {
+        self.with(|standing| *standing.stack = Some(Stack::new(layout, standing.host)))
+    }
+
+    /// What was found of the stack since [`Emulator::measure_stack`]; `None` without it.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn stack_use(&mut self) -> Result<Option<StackUse>, Error> {
+        self.with(|standing| {
+            let stack = standing.stack.as_mut();
+            stack.map(|stack| stack.found(standing.host))
+        })
     }
 
     /// Address and size, bytes, of the one symbol that has `name` as its name or in it; names in the ELF are mangled.

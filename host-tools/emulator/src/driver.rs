@@ -15,6 +15,7 @@ use crate::log::Log;
 use crate::part::Board;
 use crate::pins::{self, PinId};
 use crate::rig::{SharedRig, lock};
+use crate::stack::Stack;
 
 const SPI1_CR1: u64 = 0x4001_3000;
 const TIM5_SR: u64 = 0x4000_0C10;
@@ -30,6 +31,7 @@ pub(crate) struct Standing<'a> {
     pub(crate) session: &'a mut Session<Board>,
     pub(crate) host: &'a mut dyn Host,
     pub(crate) log: Option<&'a mut Log>,
+    pub(crate) stack: &'a mut Option<Stack>,
 }
 
 /// What the owner wants.
@@ -46,6 +48,7 @@ pub(crate) struct Driver {
     /// told the time whenever it is reached
     pub(crate) reached: Sender<u64>,
     pub(crate) log: Option<Log>,
+    pub(crate) stack: Option<Stack>,
     pub(crate) tick_ns: u64,
     pub(crate) next_tick_ns: u64,
     pub(crate) until_ns: u64,
@@ -224,6 +227,7 @@ impl Driver {
                     session,
                     host,
                     log: self.log.as_mut(),
+                    stack: &mut self.stack,
                 }),
             }
         }
@@ -249,10 +253,16 @@ impl emulator::Driver<Board> for Driver {
                 self.restarted(session.board_mut(), at);
             }
         }
-        if let Settled::Access { access, .. } = settled
-            && access.kind == AccessKind::Write
-        {
-            self.write(session, host, &access);
+        match settled {
+            Settled::Access { access, .. } if access.kind == AccessKind::Write => {
+                self.write(session, host, &access);
+            }
+            Settled::Hit(hit) => {
+                if let Some(stack) = &mut self.stack {
+                    stack.hit(&hit, host);
+                }
+            }
+            _ => {}
         }
     }
 

@@ -15,6 +15,7 @@ pub mod pins;
 mod record;
 mod rig;
 mod serial;
+mod stack;
 pub mod talk;
 
 pub use board::{Emulator, Error, Options};
@@ -22,5 +23,6 @@ pub use flash::{FLASH, STORE};
 pub use record::Slide;
 pub use rig::{Output, Rig};
 pub use rigless::device::ResetCause;
+pub use stack::{StackLayout, StackLevel, StackUse};
 pub use tactus::sim::faults::Fault;
 pub use tactus::sim::world::Setup;

@@ -1,9 +1,9 @@
 //! The emulated board: a workspace of its own, since its crate wants a newer Rust than the others.
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 
 use crate::{cargo, firmware, root, target};
 
@@ -17,9 +17,9 @@ pub(crate) fn run(options: &[OsString]) -> Result<()> {
     let elf = if help || named {
         None
     } else {
-        Some(rig(&firmware::build()?)?)
+        Some(firmware::image(&firmware::build()?, "tactus-rig")?.to_owned())
     };
-    crate::run(cargo_there("build").arg("--release"))?;
+    crate::run(&mut build())?;
     let mut emulator = Command::new(folder().join("release/tactus-emulator"));
     if let Some(elf) = elf {
         emulator.arg("--elf").arg(elf);
@@ -28,16 +28,15 @@ pub(crate) fn run(options: &[OsString]) -> Result<()> {
 }
 
 /// Where cargo puts the emulator.
-fn folder() -> PathBuf {
+pub(crate) fn folder() -> PathBuf {
     target().join("emulator")
 }
 
-/// The rig's image among those that were built.
-pub(crate) fn rig(elves: &[PathBuf]) -> Result<PathBuf> {
-    let rig = elves
-        .iter()
-        .find(|elf| elf.file_name() == Some("tactus-rig".as_ref()));
-    Ok(rig.context("the firmware has no tactus-rig")?.clone())
+/// Builds the emulator's programs.
+pub(crate) fn build() -> Command {
+    let mut build = cargo_there("build");
+    build.arg("--release");
+    build
 }
 
 /// Formatting and lints of the emulator.
@@ -50,12 +49,15 @@ pub(crate) fn lints() -> [Command; 2] {
     [format, clippy]
 }
 
-/// The emulator's tests, with the image that would be flashed.
-pub(crate) fn tests(elf: &Path) -> Command {
+/// The emulator's tests, with the images that would be flashed.
+pub(crate) fn tests(elves: &[PathBuf]) -> Result<Command> {
     let mut tests = cargo_there("test");
     tests.args(["--release", "--no-fail-fast"]);
-    tests.env("TACTUS_ELF", elf).env("TACTUS_REQUIRE_ELF", "1");
-    tests
+    tests.env("TACTUS_ELF", firmware::image(elves, "tactus-rig")?);
+    let selftest = firmware::image(elves, "tactus-selftest")?;
+    tests.env("TACTUS_SELFTEST_ELF", selftest);
+    tests.env("TACTUS_REQUIRE_ELF", "1");
+    Ok(tests)
 }
 
 /// A cargo command in the emulator's workspace.

@@ -8,10 +8,19 @@ use sha2::{Digest as _, Sha256};
 
 use crate::{root, toolchain};
 
-/// Builds every binary of the firmware and says what came out; the ELFs.
+/// Builds every image of the firmware and says what came out; the ELFs.
 pub(crate) fn build() -> Result<Vec<PathBuf>> {
+    let elves = elves()?;
+    for elf in &elves {
+        describe(elf)?;
+    }
+    Ok(elves)
+}
+
+/// Builds every image of the firmware: the ELFs, by name. Leaves stdout to who asks.
+pub(crate) fn elves() -> Result<Vec<PathBuf>> {
     let toolchain = toolchain::get()?;
-    println!("Building with {}", toolchain.version());
+    eprintln!("Building with {}", toolchain.version());
     let mut cargo = toolchain.cargo_build();
     cargo.args(["--package", "tactus-firmware", "--profile", "firmware"]);
     // progress and diagnostics go to stderr; stdout says where the ELFs are
@@ -24,12 +33,38 @@ pub(crate) fn build() -> Result<Vec<PathBuf>> {
         output.status.success(),
         "the firmware does not build (warnings are errors here)"
     );
-    let elves = executables(&String::from_utf8_lossy(&output.stdout));
+    let mut elves = executables(&String::from_utf8_lossy(&output.stdout));
     ensure!(!elves.is_empty(), "cargo named no firmware binary");
-    for elf in &elves {
-        describe(elf)?;
-    }
+    elves.sort();
     Ok(elves)
+}
+
+/// The image of this name among those that were built.
+pub(crate) fn image<'a>(elves: &'a [PathBuf], name: &str) -> Result<&'a Path> {
+    let image = elves.iter().find(|elf| elf.ends_with(name));
+    let image = image.with_context(|| format!("the firmware has no {name}"))?;
+    Ok(image)
+}
+
+/// An image's name, "tactus-rig".
+pub(crate) fn name(elf: &Path) -> Result<&str> {
+    let name = elf.file_name().and_then(|name| name.to_str());
+    name.with_context(|| format!("{} has no name", elf.display()))
+}
+
+/// A path as people at the top of the repository would write it.
+pub(crate) fn shown(path: &Path) -> String {
+    let root = root();
+    path.strip_prefix(&root)
+        .unwrap_or(path)
+        .display()
+        .to_string()
+}
+
+/// SHA-256 in hexadecimal.
+pub(crate) fn hash(bytes: &[u8]) -> String {
+    let digest = Sha256::digest(bytes);
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// The binaries that cargo's messages name.
@@ -44,16 +79,8 @@ fn executables(messages: &str) -> Vec<PathBuf> {
 fn describe(elf: &Path) -> Result<()> {
     let image = std::fs::read(elf).with_context(|| elf.display().to_string())?;
     let size = Size::of(&image).with_context(|| elf.display().to_string())?;
-    let hash: String = Sha256::digest(&image)
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
-    let root = root();
-    println!(
-        "ELF      {}",
-        elf.strip_prefix(&root).unwrap_or(elf).display()
-    );
-    println!("SHA-256  {hash}");
+    println!("ELF      {}", shown(elf));
+    println!("SHA-256  {}", hash(&image));
     println!("flash    {} bytes", size.flash);
     println!("RAM      {} bytes, and the stack", size.ram);
     println!("CCM      {} bytes", size.ccm);
@@ -61,17 +88,17 @@ fn describe(elf: &Path) -> Result<()> {
 }
 
 /// What an image takes of the chip's memories, in bytes.
-#[derive(PartialEq, Eq, Default, Debug)]
-struct Size {
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub(crate) struct Size {
     /// Code, constants and the initial values of variables.
-    flash: u64,
+    pub(crate) flash: u64,
     /// Variables.
-    ram: u64,
-    ccm: u64,
+    pub(crate) ram: u64,
+    pub(crate) ccm: u64,
 }
 
 impl Size {
-    fn of(elf: &[u8]) -> Result<Self> {
+    pub(crate) fn of(elf: &[u8]) -> Result<Self> {
         let file = object::File::parse(elf)?;
         Self::sum(
             file.segments()

@@ -1,6 +1,10 @@
-//! The project's own commands: `cargo xtask build | test | emulate | mutants | bench`.
+//! The project's own commands: `cargo xtask --help` lists them.
+mod bundle;
 mod emulate;
+mod factory;
 mod firmware;
+mod flash;
+mod size;
 mod test;
 mod toolchain;
 
@@ -44,6 +48,34 @@ enum Cli {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
+    /// Build the firmware and flash it to the board (NUCLEO-F429ZI) with probe-rs
+    ///
+    /// Tables and settings that the board has stored stay: they are in sectors of their own.
+    #[command(after_help = flash::EXAMPLES)]
+    Flash(flash::Options),
+    /// Say what each image takes of the chip, and how deep the rig's stack gets
+    ///
+    /// The stack is measured on the emulated board, during an exploration. An error if an image takes more than 256 KB of
+    /// flash or 128 KB of RAM, or its variables and its stack together more than the 192 KB there are.
+    #[command(after_help = size::EXAMPLES)]
+    Size(size::Options),
+    /// Make a release: images, hash sums, and how to flash them without a checkout
+    ///
+    /// The same commit built by the same Rust gives the same bytes. An ELF has the symbols that `probe-rs attach` reads the
+    /// log with; .bin and .hex are the same image for other programmers.
+    Bundle {
+        /// The folder to write; files of an earlier release in it are replaced
+        #[arg(long, value_name = "DIR", default_value = "target/bundle")]
+        out: PathBuf,
+    },
+    /// Make the table that comes with the firmware, firmware/factory.tact
+    ///
+    /// Simulates 5 trials of 3 movements on each of the 117 textures of world 1 and learns them, which takes a minute or two.
+    Factory {
+        /// Leave the committed file alone; an error if it is not byte for byte what is made now
+        #[arg(long)]
+        check: bool,
+    },
     /// Show what the core's tests would miss: run them on copies of the core with one thing changed
     ///
     /// Changes the sensor, table and explorer modules (cargo-mutants). A mutant that survives is a change no test sees.
@@ -73,6 +105,10 @@ fn main() -> ExitCode {
         Cli::Build => firmware::build().map(|_| ()),
         Cli::Emulate { options } => emulate::run(&options),
         Cli::Test { quick } => return test::run(quick),
+        Cli::Flash(options) => flash::flash(&options),
+        Cli::Size(options) => size::size(&options),
+        Cli::Bundle { out } => bundle::bundle(&out),
+        Cli::Factory { check } => factory::factory(check),
         Cli::Mutants { options } => mutants(options),
         Cli::Bench { options } => bench(options),
     };

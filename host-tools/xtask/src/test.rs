@@ -59,18 +59,18 @@ pub(crate) fn run(quick: bool) -> ExitCode {
     if quick {
         steps.extend(["firmware", "emulator"].map(|name| skipped(name, "--quick")));
     } else {
-        let mut elf = None;
+        let mut elves = None;
         steps.push(step("firmware", || {
             println!("\n== cargo xtask build");
-            elf = Some(emulate::rig(&firmware::build()?)?);
+            elves = Some(firmware::build()?);
             Ok(())
         }));
         steps.push(step("lints of the emulator", || {
             emulate::lints().iter_mut().try_for_each(announce_and_run)
         }));
-        steps.push(match elf {
-            Some(elf) => step("emulator", || {
-                let mut tests = emulate::tests(&elf);
+        steps.push(match elves {
+            Some(elves) => step("emulator", || {
+                let mut tests = emulate::tests(&elves)?;
                 tests.env("TACTUS_SKIP_LOG", &skip_log);
                 announce(&tests);
                 run_tests(&mut tests)

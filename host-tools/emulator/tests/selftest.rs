@@ -1,0 +1,184 @@
+//! The board's self-test on boards that are intact, and on boards that are not.
+//!
+//! TACTUS_SELFTEST_ELF names the ELF, which `cargo xtask build` makes; without it there is nothing to run.
+
+use std::path::PathBuf;
+
+use tactus::sim::encoder::Cut;
+use tactus_emulator::{Emulator, Fault, Options, Output, ResetCause, Setup};
+
+/// How a run of the self-test ended.
+struct Run {
+    log: Vec<String>,
+    /// Names of the checks, in their order, and whether they passed.
+    checks: Vec<(String, bool)>,
+    leds: [bool; 3],
+    resets: Vec<ResetCause>,
+    /// What the motors were told, with the times, ns.
+    outputs: Vec<(u64, Output)>,
+}
+
+impl Run {
+    fn failed(&self) -> Vec<&str> {
+        let failed = self.checks.iter().filter(|(_, passed)| !passed);
+        failed.map(|(name, _)| name.as_str()).collect()
+    }
+}
+
+/// Runs the self-test with these faults from these times on, ns.
+fn run(faults: &[(u64, Fault)]) -> Option<Run> {
+    let Some(elf) = std::env::var_os("TACTUS_SELFTEST_ELF").map(PathBuf::from) else {
+        eprintln!("skipped: TACTUS_SELFTEST_ELF is not set");
+        return None;
+    };
+    let options = Options {
+        trace_s: 60,
+        ..Options::default()
+    };
+    let mut emulator = Emulator::start(&elf, Setup::default(), options).unwrap();
+    for (at_ns, fault) in faults {
+        emulator.schedule(*at_ns, *fault);
+    }
+    let mut log = Vec::new();
+    while !log.iter().any(|line: &String| line.contains("SELF-TEST")) {
+        assert!(emulator.now_ns() < 60_000_000_000, "no end: {log:#?}");
+        emulator.run_ms(100).unwrap();
+        log.extend(emulator.log().unwrap().into_iter().map(|(_, line)| line));
+    }
+    eprintln!("{}", log.join("\n"));
+    assert_eq!(emulator.unmapped().unwrap(), [0u64; 0]);
+    for register in emulator.unimplemented().unwrap() {
+        assert!(register.starts_with("SYSCFG."), "{register}");
+    }
+    let checks = log.iter().filter_map(|line| {
+        let (verdict, name) = [("PASS ", true), ("FAIL ", false)]
+            .into_iter()
+            .find_map(|(mark, passed)| Some((passed, line.split_once(mark)?.1)))?;
+        Some((name.split_once(": ")?.0.to_owned(), verdict))
+    });
+    Some(Run {
+        checks: checks.collect(),
+        leds: emulator.leds().unwrap(),
+        resets: emulator
+            .resets()
+            .unwrap()
+            .into_iter()
+            .map(|reset| reset.cause)
+            .collect(),
+        outputs: emulator.rig().trace().copied().collect(),
+        log,
+    })
+}
+
+const CHECKS: [&str; 16] = [
+    "reset",
+    "clock",
+    "PA12",
+    "sensor identity",
+    "sensor words",
+    "P_AC noise",
+    "P_DC",
+    "motor current at rest",
+    "left switch PF14",
+    "right switch PF15",
+    "emergency stop PF13",
+    "lever switch PF12",
+    "lever",
+    "stage",
+    "store",
+    "watchdog",
+];
+
+#[test]
+fn an_intact_board_passes_every_check() {
+    let Some(run) = run(&[]) else { return };
+    let names: Vec<&str> = run.checks.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, CHECKS);
+    assert_eq!(run.failed(), [""; 0]);
+    assert!(
+        run.log
+            .last()
+            .unwrap()
+            .contains("SELF-TEST PASSED: 16 checks")
+    );
+    assert_eq!(run.leds, [true, false, false]);
+    assert_eq!(run.resets.len(), 1, "only the watchdog's: {:?}", run.resets);
+}
+
+#[test]
+fn an_unplugged_sensor_fails_the_sensors_checks_only() {
+    let Some(run) = run(&[(0, Fault::SensorUnplugged)]) else {
+        return;
+    };
+    let sensors = ["sensor identity", "sensor words", "P_AC noise", "P_DC"];
+    assert_eq!(run.failed(), sensors);
+    assert_eq!(run.leds, [false, false, true]);
+}
+
+#[test]
+fn a_cut_encoder_fails_the_stage_only() {
+    for cut in [Cut::A, Cut::B, Cut::Both] {
+        let Some(run) = run(&[(0, Fault::EncoderCut(cut))]) else {
+            return;
+        };
+        assert_eq!(run.failed(), ["stage"], "{cut:?}");
+    }
+}
+
+#[test]
+fn a_jammed_stage_fails_the_stage_only() {
+    let Some(run) = run(&[(0, Fault::StageJammed)]) else {
+        return;
+    };
+    assert_eq!(run.failed(), ["stage"]);
+}
+
+#[test]
+fn nothing_moves_while_the_emergency_stop_is_pressed() {
+    let Some(run) = run(&[(0, Fault::EStop)]) else {
+        return;
+    };
+    assert_eq!(run.failed(), ["emergency stop PF13", "lever", "stage"]);
+    assert!(!run.outputs.iter().any(|(_, output)| moves(output)));
+}
+
+#[test]
+fn the_stage_stays_where_it_is_if_the_levers_switch_never_closes_or_opens() {
+    for closed in [false, true] {
+        let Some(run) = run(&[(0, Fault::LeverTopStuck { closed })]) else {
+            return;
+        };
+        assert_eq!(run.failed(), ["lever", "stage"], "stuck {closed}");
+        let duty = |output: &Output| matches!(output, Output::StageDuty(duty) if *duty != 0.0);
+        assert!(!run.outputs.iter().any(|(_, output)| duty(output)));
+    }
+}
+
+#[test]
+fn the_emergency_stop_stops_lever_and_stage_at_once() {
+    // while the lever goes up, and while the stage goes to the right
+    for (at_ns, failed) in [
+        (5_000_000_000, &["lever", "stage"][..]),
+        (9_880_000_000, &["stage"][..]),
+    ] {
+        let Some(run) = run(&[(at_ns, Fault::EStop)]) else {
+            return;
+        };
+        assert_eq!(run.failed(), failed);
+        let moving = run.outputs.iter().filter(|(_, output)| moves(output));
+        let last_ns = moving.map(|(at_ns, _)| *at_ns).max().unwrap();
+        let ends = run.outputs.iter().filter(|(at, _)| *at > last_ns);
+        let end_ns = ends.map(|(at_ns, _)| *at_ns).min().unwrap();
+        assert!(last_ns > at_ns - 100_000_000, "it did not move before");
+        assert!(end_ns < at_ns + 3_000_000, "moves until {end_ns}");
+    }
+}
+
+/// A step, or a stage that is driven.
+fn moves(output: &Output) -> bool {
+    match output {
+        Output::LeverStep(high) => *high,
+        Output::StageDuty(duty) => *duty != 0.0,
+        _ => false,
+    }
+}
