@@ -122,6 +122,8 @@ fn rustflags() -> OsString {
     };
     // "." and not a made-up name: a debugger started at the top still finds the source
     leave_out(&root(), "=.");
+    // wherever it is: build scripts' output is named in debug information. The last one that fits counts.
+    leave_out(&target(), "=./target");
     let home = |name| std::env::var_os(name).map(PathBuf::from);
     if let Some(cargo) = home("CARGO_HOME").or_else(|| Some(home("HOME")?.join(".cargo"))) {
         leave_out(&cargo, "=cargo");
