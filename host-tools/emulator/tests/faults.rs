@@ -183,9 +183,11 @@ fn board(elf: &std::path::Path, seed: u64, texture: u8) -> Talk {
 
 fn ready(talk: &mut Talk) {
     use tactus_core::wire::Phase::Ready;
-    talk.wait(30.0, |_, _| (), |tell| {
-        matches!(tell, Tell::Phase(Ready)).then_some(Ok(()))
-    })
+    talk.wait(
+        30.0,
+        |_, _| (),
+        |tell| matches!(tell, Tell::Phase(Ready)).then_some(Ok(())),
+    )
     .unwrap();
 }
 
@@ -267,7 +269,11 @@ fn run(case: &Case, elf: &std::path::Path, seed: u64) -> (Talk, Outcome) {
             look(board, broken_ns.unwrap_or_default(), &mut outcome);
         }
     });
-    assert!(broken_ns.is_some(), "{}: its time never came: {ended:?}", case.name);
+    assert!(
+        broken_ns.is_some(),
+        "{}: its time never came: {ended:?}",
+        case.name
+    );
     assert!(
         matches!(ended, Err(TalkError::Refused(_) | TalkError::Rebooted(_))),
         "{}: {ended:?}",
@@ -332,7 +338,10 @@ fn objections(case: &Case, outcome: &Outcome) -> Vec<String> {
     }
     let lifted = outcome.force_n < 0.02;
     if !lifted && !matches!(case.cause, Cause::Rig(Fault::LeverLosesSteps { .. })) {
-        objections.push(format!("the finger still presses with {:.3} N", outcome.force_n));
+        objections.push(format!(
+            "the finger still presses with {:.3} N",
+            outcome.force_n
+        ));
     }
     if let Some(deadline_ms) = case.deadline_ms {
         for (what, ms) in [
