@@ -19,7 +19,7 @@ use clap::{Parser, ValueEnum};
     version,
     after_help = "Examples:
   tactus-emulator --elf tactus-rig                       a texture drawn by the seed
-  tactus-emulator --elf tactus-rig --texture Felt --log  with the firmware's own log
+  tactus-emulator --elf tactus-rig --texture 10 --log    with the firmware's own log
   tactus-emulator --elf tactus-rig --recording 3         slides of a real BioTac
   tactus-emulator --elf tactus-rig --port 7429           talk to it yourself"
 )]

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::collection::{Collection, texture_number};
+use tactus::collection::Collection;
 use tactus::link::{Question, ReadTable};
 use tactus_core::table::Table;
 use tactus_core::wire::{Identify, Report, Tell, Train};
@@ -133,8 +133,8 @@ fn a_texture_taught_on_the_probe_is_kept() {
     let Some(elf) = elf() else { return };
     let (collection, known) = world();
     let name = "Taught here";
-    let new = texture_number("Felt").unwrap();
-    let unknown = lessons::mounted(collection, new, 1);
+    let new = (1..=117).find(|number| !collection.textures.contains(number));
+    let unknown = lessons::mounted(collection, new.unwrap(), 1);
     let mut talk = ready(&elf, &unknown, None);
     talk.teach(&known.calibration, &known.table, |_, _| ())
         .unwrap();
