@@ -36,7 +36,7 @@ enum Cli {
     ///
     /// Builds the firmware and the emulator first; that takes some minutes the first time.
     #[command(after_help = "Examples:
-  cargo xtask emulate --texture 10 --log   with the firmware's own log
+  cargo xtask emulate --texture 10 --log     with the firmware's own log
   cargo xtask emulate --help                 all options")]
     #[command(disable_help_flag = true)]
     Emulate {
