@@ -3,20 +3,18 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::{Context as _, bail};
+use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use sha2::{Digest as _, Sha256};
-use tactus::collection::{Collection, calibrated, texture_number};
+use tactus::collection::{Collection, texture_number};
+use tactus::played::Lesson;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::Table;
-use tactus_emulator::Setup;
+use tactus_emulator::lessons::{self, Known, TRIALS, Unknown};
 
 use crate::Cli;
-
-/// Trials of each texture and movement (PAPER: five).
-const TRIALS: u32 = 5;
 
 pub(crate) fn hex_sha256(bytes: &[u8]) -> String {
     let digest = Sha256::digest(bytes);
@@ -34,19 +32,32 @@ pub(crate) fn progress(length: u64, what: &'static str) -> ProgressBar {
     bar
 }
 
+/// Where the textures come from.
+enum World {
+    Simulated(Collection),
+    Recorded(Lesson),
+}
+
 /// What the seed draws.
 pub(crate) struct Chosen {
-    /// Number of the texture under the finger.
-    pub(crate) texture: u8,
-    pub(crate) setup: Setup,
+    pub(crate) unknown: Unknown,
     /// For the firmware's own draws.
     pub(crate) seed: u32,
-    collection: Collection,
+    world: World,
 }
 
 impl Chosen {
     pub(crate) fn new(cli: &Cli) -> anyhow::Result<Self> {
         let mut random = ChaCha8Rng::seed_from_u64(cli.seed);
+        if let Some(name) = &cli.recording {
+            let lesson = lessons::recordings(cli.seed)?;
+            let texture = lessons::material(&lesson, name)?;
+            return Ok(Self {
+                unknown: lessons::played(&lesson, texture, cli.seed),
+                seed: random.next_u32(),
+                world: World::Recorded(lesson),
+            });
+        }
         let texture = match &cli.texture {
             Some(name) => texture_number(name).with_context(|| {
                 format!("no texture {name} in Table 1: `tactus textures` lists them, or give a number from 1 to 117")
@@ -61,57 +72,61 @@ impl Chosen {
         // trials that nothing was learned from
         let trial = 1 + u64::from(random.next_u32() % 1000);
         Ok(Self {
-            texture,
-            setup: collection.setup(texture, trial),
+            unknown: lessons::mounted(&collection, texture, trial),
             seed: random.next_u32(),
-            collection,
+            world: World::Simulated(collection),
         })
     }
 
     /// Calibration of the rig and table of the textures.
-    pub(crate) fn learn(&self, cli: &Cli) -> anyhow::Result<(RigCalibration, Vec<u8>)> {
+    pub(crate) fn learn(&self, cli: &Cli) -> anyhow::Result<Known> {
         let kept = self.kept_in();
-        let both = match kept.as_deref().map(read) {
-            Some(Some(both)) => both,
+        let mut known = match kept.as_deref().map(read) {
+            Some(Some(known)) => known,
             _ => {
-                let both = self.learn_anew()?;
+                let known = self.learn_anew()?;
                 if let Some(file) = kept {
                     // another time it is learned anew then
-                    let _ = write(&file, &both);
+                    let _ = write(&file, &known);
                 }
-                both
+                known
             }
         };
-        let (calibration, mut table) = both;
         if let Some(file) = &cli.table {
-            table =
+            known.table =
                 std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
         }
-        let read = Table::read(&table).context("the table is damaged: learn it anew")?;
-        if usize::from(read.textures()) > tactus_core::wire::MAX_TEXTURES {
-            bail!(
-                "the table has {} textures, the firmware holds 128",
-                read.textures()
-            );
+        Ok(known)
+    }
+
+    fn learn_anew(&self) -> anyhow::Result<Known> {
+        match &self.world {
+            World::Simulated(collection) => {
+                let bar = progress(collection.textures.len() as u64, "learning textures");
+                let known = lessons::simulated(collection, || bar.inc(1))?;
+                bar.finish_and_clear();
+                Ok(known)
+            }
+            World::Recorded(lesson) => {
+                let bar = ProgressBar::new_spinner().with_message("learning materials");
+                bar.enable_steady_tick(Duration::from_millis(200));
+                let known = lessons::recorded(lesson)?;
+                bar.finish_and_clear();
+                Ok(known)
+            }
         }
-        Ok((calibration, table))
     }
 
-    fn learn_anew(&self) -> anyhow::Result<(RigCalibration, Vec<u8>)> {
-        let bar = progress(self.collection.textures.len() as u64, "learning textures");
-        let calibration = calibrated(self.collection.setup(self.texture, 0))?;
-        let table = self.collection.learn(calibration, || bar.inc(1))?;
-        bar.finish_and_clear();
-        Ok((calibration, table))
-    }
-
-    /// A file named for all that the table depends on: the world, and this program, which holds core and simulator.
+    /// A file named for all that the table depends on: the world, and this program, which holds core and simulator. None
+    /// for recordings: what they hold is not in their name.
     fn kept_in(&self) -> Option<PathBuf> {
+        let World::Simulated(collection) = &self.world else {
+            return None;
+        };
         let program = std::env::current_exe().ok()?;
         let key = format!(
-            "{} {:?}",
+            "{} {collection:?}",
             hex_sha256(&std::fs::read(&program).ok()?),
-            self.collection
         );
         let name = &hex_sha256(key.as_bytes())[..16];
         // target/emulator/release/tactus-emulator
@@ -120,19 +135,23 @@ impl Chosen {
     }
 }
 
-fn read(file: &Path) -> Option<(RigCalibration, Vec<u8>)> {
+fn read(file: &Path) -> Option<Known> {
     let bytes = std::fs::read(file).ok()?;
     let (calibration, table) = bytes.split_first_chunk::<{ RigCalibration::BYTES }>()?;
     Table::read(table).ok()?;
-    Some((RigCalibration::from_bytes(calibration).ok()?, table.into()))
+    Some(Known {
+        calibration: RigCalibration::from_bytes(calibration).ok()?,
+        table: table.into(),
+    })
 }
 
-fn write(file: &Path, (calibration, table): &(RigCalibration, Vec<u8>)) -> std::io::Result<()> {
+fn write(file: &Path, known: &Known) -> std::io::Result<()> {
     if let Some(folder) = file.parent() {
         std::fs::create_dir_all(folder)?;
     }
     // whole or not at all
     let begun = file.with_extension("part");
-    std::fs::write(&begun, [&calibration.to_bytes()[..], table].concat())?;
+    let bytes = [&known.calibration.to_bytes()[..], &known.table].concat();
+    std::fs::write(&begun, bytes)?;
     std::fs::rename(begun, file)
 }

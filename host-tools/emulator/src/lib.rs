@@ -7,8 +7,11 @@
 //! whatever they are, and no wire has a length.
 
 mod board;
+pub mod campaign;
 mod driver;
+pub mod exploration;
 mod flash;
+pub mod lessons;
 mod log;
 mod part;
 pub mod pins;

@@ -19,7 +19,8 @@ use clap::{Parser, ValueEnum};
     version,
     after_help = "Examples:
   tactus-emulator --elf tactus-rig                       a texture drawn by the seed
-  tactus-emulator --elf tactus-rig --texture Felt --log  with the firmware's own log
+  tactus-emulator --elf tactus-rig --texture 10 --log    with the firmware's own log
+  tactus-emulator --elf tactus-rig --recording 3         slides of a real BioTac
   tactus-emulator --elf tactus-rig --port 7429           talk to it yourself"
 )]
 struct Cli {
@@ -29,6 +30,10 @@ struct Cli {
     /// The texture under the finger: its name in Table 1 or its number; drawn by the seed unless given
     #[arg(long, value_name = "NAME")]
     texture: Option<String>,
+    /// Let the finger feel recordings of this material of data/biotac instead: its name or its number. The firmware knows
+    /// all 20, from other slides
+    #[arg(long, value_name = "MATERIAL", conflicts_with_all = ["texture", "among"])]
+    recording: Option<String>,
     /// How many textures the firmware is to know; the unknown one is among them
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u8).range(2..=117))]
     among: u8,

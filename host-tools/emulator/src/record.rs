@@ -34,6 +34,8 @@ pub struct Slide {
     pub speed_error: f64,
     /// Slots that the sensor was asked in.
     pub slots: usize,
+    /// Slots between the first and the last of these that it was not asked in.
+    pub missed_slots: usize,
     /// Largest deviation of a slot from the regular grid, us.
     pub slot_jitter_us: f64,
 }
@@ -123,23 +125,33 @@ impl Recorder {
             slide.speed_error = errors.fold(0.0, f64::max);
         }
         slide.slots = self.commands.len();
+        slide.missed_slots = missed(&self.commands);
         slide.slot_jitter_us = jitter_ns(&self.commands) * 1e-3;
         self.slides.push(slide);
     }
 }
 
+/// Number of an instant's slot, that of the first being 0.
+fn slot(first: u64, at: u64) -> f64 {
+    ((at - first) as f64 * SLOTS_HZ * 1e-9).round()
+}
+
+fn missed(instants: &[u64]) -> usize {
+    let [first, .., last] = *instants else {
+        return 0;
+    };
+    (slot(first, last) as usize + 1).saturating_sub(instants.len())
+}
+
 /// Largest deviation from the grid that fits the instants best: its period need not be exactly 1/4400 s, which no timer
 /// divides its clock to.
 fn jitter_ns(instants: &[u64]) -> f64 {
-    let [first, .., _] = instants else {
+    let [first, .., _] = *instants else {
         return 0.0;
     };
     let points: Vec<(f64, f64)> = instants
         .iter()
-        .map(|at| {
-            let since = (at - first) as f64;
-            ((since * SLOTS_HZ * 1e-9).round(), since)
-        })
+        .map(|&at| (slot(first, at), (at - first) as f64))
         .collect();
     let n = points.len() as f64;
     let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
@@ -170,6 +182,7 @@ mod tests {
         // a slot that was left out is no jitter of the others
         late.remove(500);
         assert!(jitter_ns(&late) < 1e-3);
+        assert_eq!((missed(&grid), missed(&late)), (0, 1));
         assert_eq!(jitter_ns(&[]), 0.0);
     }
 }

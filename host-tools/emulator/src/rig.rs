@@ -66,6 +66,7 @@ pub struct Rig {
     trace_ns: u64,
     trace: VecDeque<(u64, Output)>,
     recorder: Recorder,
+    commands: u64,
     /// From the firmware, with the time at which each byte was over.
     pub(crate) heard: Vec<(u64, u8)>,
     /// To the firmware.
@@ -109,6 +110,7 @@ impl Rig {
             trace_ns,
             trace: VecDeque::new(),
             recorder: Recorder::default(),
+            commands: 0,
             heard: Vec::new(),
             to_say: VecDeque::new(),
         }
@@ -128,6 +130,11 @@ impl Rig {
     /// How every slide so far was really made.
     pub fn slides(&self) -> &[Slide] {
         self.recorder.slides()
+    }
+
+    /// Sample commands that the sensor got since power-up, one in each slot.
+    pub fn sensor_commands(&self) -> u64 {
+        self.commands
     }
 
     /// Tells the truth recorder the speed that the next slides are to have, mm/s. Without it, their median speed counts.
@@ -263,6 +270,7 @@ impl Rig {
         self.bytes += 1;
         self.byte_ns = now_ns;
         if first && mosi & 0x80 != 0 {
+            self.commands += 1;
             self.recorder.command(self.selected_ns);
         }
         if too_fast || self.spi_control & CR1_LSB_FIRST != 0 {

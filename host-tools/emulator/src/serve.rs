@@ -19,7 +19,7 @@ pub(crate) fn serve(cli: &Cli, chosen: &Chosen, port: u16) -> anyhow::Result<()>
         format!("cannot listen on port {port}: is it in use? 0 takes any free one")
     })?;
     listener.set_nonblocking(true)?;
-    let mut board = Emulator::start(&cli.elf, chosen.setup, Options::default())?;
+    let mut board = chosen.unknown.start(&cli.elf, Options::default())?;
     println!("serial port at {}, until Ctrl-C", listener.local_addr()?);
     let began = Instant::now();
     let mut client: Option<TcpStream> = None;

@@ -1,11 +1,18 @@
-//! A host in the same process: requests to the firmware, and its reports.
+//! A host in the same process: [`tactus::link`] over the emulated board's USART3, by virtual time.
 
-use tactus_core::wire::{self, Ask, MAX_FRAME, Receiver, Report, Request, Tell};
+use std::task::Poll;
+
+use tactus::link::{Errand, Job, LinkError, PushTable, Question, Session};
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::guard::Fault;
+use tactus_core::wire::{Ask, Phase, Report, Reset, Tell};
 
 use crate::board::{Emulator, Error};
 
 /// How far the board runs between two looks at the line, ns.
 const STEP_NS: u64 = 1_000_000;
+/// Longest that anything but explorations and training takes, virtual seconds.
+pub const PATIENCE_S: f64 = 60.0;
 
 /// Why the firmware does not do what it is asked for.
 #[derive(Debug, thiserror::Error)]
@@ -14,15 +21,15 @@ pub enum TalkError {
     /// The emulator.
     #[error(transparent)]
     Emulator(#[from] Error),
-    /// The request does not fit into a frame.
-    #[error("{0}")]
-    TooLong(wire::TooLong),
     /// It says why.
     #[error("the firmware refuses: {0}")]
     Refused(String),
     /// It has started anew meanwhile.
     #[error("the firmware restarted instead of answering ({0:?})")]
-    Rebooted(wire::Reset),
+    Rebooted(Reset),
+    /// The link, otherwise.
+    #[error(transparent)]
+    Link(LinkError),
     /// It says nothing more.
     #[error(
         "no answer from the firmware in {0} virtual seconds: does this ELF speak the protocol? See its log with --log"
@@ -30,12 +37,20 @@ pub enum TalkError {
     Silent(f64),
 }
 
+impl From<LinkError> for TalkError {
+    fn from(why: LinkError) -> Self {
+        match why {
+            LinkError::Refused(why) => Self::Refused(why),
+            LinkError::Rebooted { reset, .. } => Self::Rebooted(reset),
+            why => Self::Link(why),
+        }
+    }
+}
+
 /// The host's end of the line.
 pub struct Talk {
     emulator: Emulator,
-    receiver: Receiver,
-    next_id: u16,
-    damaged: u32,
+    session: Session,
 }
 
 impl Talk {
@@ -43,9 +58,7 @@ impl Talk {
     pub fn new(emulator: Emulator) -> Self {
         Self {
             emulator,
-            receiver: Receiver::default(),
-            next_id: 0,
-            damaged: 0,
+            session: Session::default(),
         }
     }
 
@@ -54,9 +67,15 @@ impl Talk {
         &mut self.emulator
     }
 
-    /// Frames that came damaged.
-    pub fn damaged(&self) -> u32 {
-        self.damaged
+    /// What was damaged and lost on the way from the firmware.
+    pub fn session(&self) -> &Session {
+        &self.session
+    }
+
+    fn bytes(&mut self) -> Result<Vec<u8>, Error> {
+        self.emulator.run_until(self.emulator.now_ns() + STEP_NS)?;
+        let received = self.emulator.received();
+        Ok(received.into_iter().map(|(_, byte)| byte).collect())
     }
 
     /// Runs the board for a millisecond and gives what the firmware said in it.
@@ -64,16 +83,8 @@ impl Talk {
     /// # Errors
     /// See [`Emulator::run_until`].
     pub fn step(&mut self) -> Result<Vec<Report>, Error> {
-        self.emulator.run_until(self.emulator.now_ns() + STEP_NS)?;
-        let mut reports = Vec::new();
-        for (_, byte) in self.emulator.received() {
-            match self.receiver.push::<Report>(byte) {
-                Some(Ok(report)) => reports.push(report),
-                Some(Err(_)) => self.damaged += 1,
-                None => {}
-            }
-        }
-        Ok(reports)
+        let bytes = self.bytes()?;
+        Ok(self.session.receive(&bytes))
     }
 
     /// Runs the board until `pick` makes something of a report; `each` sees all of them, and after every millisecond none.
@@ -103,28 +114,79 @@ impl Talk {
         Err(TalkError::Silent(patience_s))
     }
 
+    /// Sees an errand through; `each` sees all reports meanwhile, and after every millisecond none.
+    ///
+    /// # Errors
+    /// [`TalkError::Silent`] if that takes longer than `patience_s` of virtual time; see also [`TalkError`].
+    pub fn run<E: Errand>(
+        &mut self,
+        errand: E,
+        patience_s: f64,
+        mut each: impl FnMut(&mut Emulator, Option<&Report>),
+    ) -> Result<E::Outcome, TalkError> {
+        let mut send = Vec::new();
+        let mut job = Job::begin(errand, &mut self.session, &mut send)?;
+        let until_ns = self.emulator.now_ns() + (patience_s * 1e9) as u64;
+        while self.emulator.now_ns() < until_ns {
+            self.emulator.send(&send);
+            send.clear();
+            let bytes = self.bytes()?;
+            let polled = job.poll(&mut self.session, &bytes, &mut send, |report| {
+                each(&mut self.emulator, Some(report));
+            });
+            each(&mut self.emulator, None);
+            if let Poll::Ready(outcome) = polled {
+                return Ok(outcome?);
+            }
+        }
+        Err(TalkError::Silent(patience_s))
+    }
+
     /// Asks for something and waits until it is over; `each` sees all reports meanwhile.
     ///
     /// # Errors
-    /// See [`Talk::wait`] and [`TalkError`].
+    /// See [`Talk::run`].
     pub fn ask(
         &mut self,
         ask: Ask,
         patience_s: f64,
         each: impl FnMut(&mut Emulator, Option<&Report>),
     ) -> Result<(), TalkError> {
-        let id = self.next_id;
-        self.next_id = id.wrapping_add(1);
-        let mut room = [0; MAX_FRAME + 1];
-        let frame = wire::encode(&Request { id, ask }, &mut room).map_err(TalkError::TooLong)?;
-        self.emulator.send(frame);
-        self.wait(patience_s, each, |tell| match tell {
-            Tell::Done(done) if *done == id => Some(Ok(())),
-            Tell::Refused { id: refused, why } if *refused == id => {
-                Some(Err(TalkError::Refused(why.as_str().to_owned())))
-            }
-            Tell::Booted { reset, .. } => Some(Err(TalkError::Rebooted(*reset))),
+        self.run(Question::command(ask), patience_s, each)
+    }
+
+    /// Waits until the firmware has booted and found the limit switches. A fault of that is given back, after it has been
+    /// asked to home again.
+    ///
+    /// # Errors
+    /// See [`Talk::run`].
+    pub fn ready(
+        &mut self,
+        mut each: impl FnMut(&mut Emulator, Option<&Report>),
+    ) -> Result<Option<Fault>, TalkError> {
+        let fault = self.wait(PATIENCE_S, &mut each, |tell| match tell {
+            Tell::Phase(Phase::Ready) => Some(Ok(None)),
+            Tell::Fault(fault) => Some(Ok(Some(*fault))),
             _ => None,
-        })
+        })?;
+        if fault.is_some() {
+            self.ask(Ask::Home, PATIENCE_S, each)?;
+        }
+        Ok(fault)
+    }
+
+    /// Gives the firmware calibration and table, which it keeps.
+    ///
+    /// # Errors
+    /// See [`Talk::run`].
+    pub fn teach(
+        &mut self,
+        calibration: &RigCalibration,
+        table: &[u8],
+        mut each: impl FnMut(&mut Emulator, Option<&Report>),
+    ) -> Result<(), TalkError> {
+        let write = Question::write_calibration(calibration)?;
+        self.run(write, PATIENCE_S, &mut each)?;
+        self.run(PushTable::new(table)?, PATIENCE_S, each)
     }
 }

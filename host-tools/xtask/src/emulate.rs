@@ -7,8 +7,8 @@ use anyhow::Result;
 
 use crate::{cargo, firmware, root, target};
 
-/// Builds firmware and emulator and runs the one on the other.
-pub(crate) fn run(options: &[OsString]) -> Result<()> {
+/// Builds firmware and emulator and starts a program of the emulator's with them.
+pub(crate) fn start(program: &str, options: &[OsString]) -> Result<()> {
     let help = options.iter().any(|o| o == "--help" || o == "-h");
     // an ELF that is named is the one to run
     let named = options
@@ -20,7 +20,7 @@ pub(crate) fn run(options: &[OsString]) -> Result<()> {
         Some(firmware::image(&firmware::build()?, "tactus-rig")?.to_owned())
     };
     crate::run(&mut build())?;
-    let mut emulator = Command::new(folder().join("release/tactus-emulator"));
+    let mut emulator = Command::new(folder().join("release").join(program));
     if let Some(elf) = elf {
         emulator.arg("--elf").arg(elf);
     }

@@ -40,7 +40,7 @@ enum Cli {
     ///
     /// Builds the firmware and the emulator first; that takes some minutes the first time.
     #[command(after_help = "Examples:
-  cargo xtask emulate --texture Felt --log   with the firmware's own log
+  cargo xtask emulate --texture 10 --log     with the firmware's own log
   cargo xtask emulate --help                 all options")]
     #[command(disable_help_flag = true)]
     Emulate {
@@ -76,6 +76,19 @@ enum Cli {
         #[arg(long)]
         check: bool,
     },
+    /// Run many explorations on emulated boards and hold them against the bars
+    ///
+    /// In a simulated world and on recordings of a real finger, side by side on all cores. Exit code 1 if a bar is missed.
+    #[command(after_help = "Examples:
+  cargo xtask campaign                                  20 of each; some ten minutes on two cores
+  cargo xtask campaign --simulated 4 --recordings 0     fewer
+  cargo xtask campaign --format json --out result.json  for programs")]
+    #[command(disable_help_flag = true)]
+    Campaign {
+        /// Options for the campaign
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
     /// Show what the core's tests would miss: run them on copies of the core with one thing changed
     ///
     /// Changes the sensor, table and explorer modules (cargo-mutants). A mutant that survives is a change no test sees.
@@ -103,7 +116,8 @@ enum Cli {
 fn main() -> ExitCode {
     let done = match Cli::parse() {
         Cli::Build => firmware::build().map(|_| ()),
-        Cli::Emulate { options } => emulate::run(&options),
+        Cli::Emulate { options } => emulate::start("tactus-emulator", &options),
+        Cli::Campaign { options } => emulate::start("tactus-campaign", &options),
         Cli::Test { quick } => return test::run(quick),
         Cli::Flash(options) => flash::flash(&options),
         Cli::Size(options) => size::size(&options),

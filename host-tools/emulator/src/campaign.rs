@@ -1,0 +1,165 @@
+//! Many explorations side by side, in simulated worlds and on recordings, against the bars.
+
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use tactus::collection::Collection;
+use tactus::played::Lesson;
+use tactus_core::explorer::Strategy;
+use tactus_core::wire::Identify;
+
+use crate::board::Options;
+use crate::exploration::{Exploration, ExploreError, RIGHT_SHARE, explore};
+use crate::lessons::{self, Known, TRIALS, Unknown};
+use crate::talk::Talk;
+
+/// A texture more probable than this is the answer (PAPER).
+const THRESHOLD: f32 = 0.99;
+/// Slides at most (PAPER).
+const MAX_SLIDES: u8 = 10;
+/// Textures of the simulated world's table.
+const AMONG: u8 = 20;
+
+/// Explorations whose firmware knows the same table.
+#[derive(Clone, Debug)]
+pub struct Group {
+    /// What the firmware is told.
+    pub known: Known,
+    /// What lies under the finger, exploration by exploration.
+    pub unknown: Vec<Unknown>,
+    /// For the firmware's own draws.
+    pub seed: u64,
+}
+
+/// `count` explorations of the 20 textures of a simulated world in turn; `done` hears of each that is learned.
+///
+/// # Errors
+/// See [`lessons::LessonError`].
+pub fn simulated(
+    count: usize,
+    seed: u64,
+    done: impl Fn() + Sync,
+) -> Result<Group, lessons::LessonError> {
+    let collection = Collection {
+        seed,
+        textures: Collection::spread(1, AMONG),
+        trials: TRIALS,
+    };
+    let known = lessons::simulated(&collection, done)?;
+    let textures = collection.textures.iter().cycle().take(count);
+    let unknown = textures
+        .zip(1..)
+        .map(|(texture, trial)| lessons::mounted(&collection, *texture, trial))
+        .collect();
+    Ok(Group {
+        known,
+        unknown,
+        seed,
+    })
+}
+
+/// `count` explorations of the recorded materials in turn.
+///
+/// # Errors
+/// See [`lessons::LessonError`].
+pub fn recorded(lesson: &Lesson, count: usize, seed: u64) -> Result<Group, lessons::LessonError> {
+    let known = lessons::recorded(lesson)?;
+    let unknown = (0..lesson.names.len())
+        .cycle()
+        .zip(seed..)
+        .take(count)
+        .map(|(texture, seed)| lessons::played(lesson, texture, seed))
+        .collect();
+    Ok(Group {
+        known,
+        unknown,
+        seed,
+    })
+}
+
+/// What came of each exploration of a group.
+pub type Results = Vec<Result<Exploration, ExploreError>>;
+
+/// Makes all explorations of the groups, as many at once as there are cores; `done` hears of each.
+pub fn run(elf: &Path, groups: &[&Group], done: impl Fn() + Sync) -> Vec<Results> {
+    let tasks: Vec<(usize, usize)> = groups
+        .iter()
+        .enumerate()
+        .flat_map(|(group, of)| (0..of.unknown.len()).map(move |index| (group, index)))
+        .collect();
+    let next = AtomicUsize::new(0);
+    let results = Mutex::new(Vec::new());
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..cores.min(tasks.len()) {
+            scope.spawn(|| {
+                while let Some(&(group, index)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let result = one(elf, groups[group], index);
+                    let mut results = results.lock().unwrap_or_else(|e| e.into_inner());
+                    results.push(((group, index), result));
+                    done();
+                }
+            });
+        }
+    });
+    let mut results = results.into_inner().unwrap_or_else(|e| e.into_inner());
+    results.sort_by_key(|(task, _)| *task);
+    let mut sorted: Vec<Results> = groups.iter().map(|_| Vec::new()).collect();
+    for ((group, _), result) in results {
+        sorted[group].push(result);
+    }
+    sorted
+}
+
+fn one(elf: &Path, group: &Group, index: usize) -> Result<Exploration, ExploreError> {
+    let unknown = &group.unknown[index];
+    let mut talk = Talk::new(unknown.start(elf, Options::default())?);
+    talk.ready(|_, _| ())?;
+    let Known { calibration, table } = &group.known;
+    talk.teach(calibration, table, |_, _| ())?;
+    let identify = Identify {
+        among: Default::default(),
+        threshold: THRESHOLD,
+        max_slides: MAX_SLIDES,
+        strategy: Strategy::Bayesian,
+        seed: (group.seed as u32).wrapping_mul(1009) + index as u32 + 1,
+    };
+    explore(&mut talk, table, identify, &unknown.name, |_, _| ())
+}
+
+/// The bars that a group's results miss; none if all is well.
+pub fn missed(results: &Results) -> Vec<String> {
+    let mut missed = Vec::new();
+    let wanted = (RIGHT_SHARE * results.len() as f64).ceil() as usize;
+    let right = right(results);
+    if right < wanted {
+        missed.push(format!(
+            "{right} of {} right, {wanted} wanted",
+            results.len()
+        ));
+    }
+    missed.extend(troubles(results));
+    missed
+}
+
+/// Explorations that were right.
+pub fn right(results: &Results) -> usize {
+    results.iter().flatten().filter(|e| e.right()).count()
+}
+
+/// What is wrong with explorations whatever their verdicts.
+pub fn troubles(results: &Results) -> Vec<String> {
+    let mut troubles = Vec::new();
+    for (result, number) in results.iter().zip(1..) {
+        match result {
+            Ok(exploration) => {
+                let missed = exploration.missed().into_iter();
+                let truth = &exploration.truth;
+                troubles.extend(missed.map(|what| format!("{number} ({truth}): {what}")));
+            }
+            Err(why) => troubles.push(format!("{number}: {why}")),
+        }
+    }
+    troubles
+}

@@ -1,0 +1,438 @@
+//! Explorations by the firmware, judged by the rig's truth and by the PC that follows them.
+
+use serde_json::{Value, json};
+use tactus::follow::{ALLOWED, Agreement, Follower};
+use tactus::link::{Found, Question};
+use tactus::sim::played::PlayCounts;
+use tactus_core::features::{Plan, PropertySet};
+use tactus_core::movement::Movement;
+use tactus_core::table::{Action, Gaussian, Table, TableError};
+use tactus_core::wire::{Ask, Counts, Identify, Report, Tell};
+
+use crate::board::Emulator;
+use crate::record::Slide;
+use crate::talk::{PATIENCE_S, Talk, TalkError};
+
+/// A whole exploration, virtual seconds.
+const EXPLORATION_S: f64 = 600.0;
+
+/// The share of explorations that must be right.
+pub const RIGHT_SHARE: f64 = 16.0 / 20.0;
+/// Largest relative error of a slide's force ...
+pub const FORCE_SHARE: f64 = 0.05;
+/// ... unless it is less than a count of P_DC, N.
+pub const FORCE_N: f64 = 0.0115;
+/// Largest relative error of a slide's speed.
+pub const SPEED_SHARE: f64 = 0.01;
+/// Largest deviation of a slot from its grid, us.
+pub const JITTER_US: f64 = 2.0;
+
+/// Why there is no exploration to judge.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExploreError {
+    /// The firmware did not do what it was asked for.
+    #[error(transparent)]
+    Talk(#[from] TalkError),
+    /// The table cannot be read.
+    #[error("the table is damaged: {0}")]
+    Table(#[from] TableError),
+    /// The exploration cannot be followed.
+    #[error("the exploration cannot be followed: {0}")]
+    Follow(#[from] tactus_core::explorer::ExplorerError),
+}
+
+impl From<crate::board::Error> for ExploreError {
+    fn from(why: crate::board::Error) -> Self {
+        Self::Talk(why.into())
+    }
+}
+
+/// What a slide said, beside what is learned of the true texture.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Step {
+    /// The movement.
+    pub movement: Option<Movement>,
+    /// What was looked at.
+    pub action: Action,
+    /// What was felt; `None` where the slide has no such property.
+    pub felt: Option<f32>,
+    /// What the table says of the true texture.
+    pub learned: Option<Gaussian>,
+    /// Posterior probability of the true texture.
+    pub probability: f32,
+    /// The most probable other texture, and its probability.
+    pub other: Option<(String, f32)>,
+}
+
+impl Step {
+    /// How far the felt value is from what was learned of the true texture, in its standard deviations.
+    pub fn distance_sd(&self) -> Option<f32> {
+        let learned = self.learned?;
+        Some((self.felt? - learned.mean) / learned.sd)
+    }
+}
+
+/// An exploration, as the firmware told it and as it really was.
+#[derive(Clone, Debug)]
+pub struct Exploration {
+    /// Name of the texture under the finger.
+    pub truth: String,
+    /// The verdict.
+    pub found: Found,
+    /// From power-up to the end, virtual seconds.
+    pub virtual_s: f64,
+    /// How every slide was really made, and what it should have been.
+    pub slides: Vec<(Movement, Slide)>,
+    /// What every slide that counted said.
+    pub steps: Vec<Step>,
+    /// What the firmware counted.
+    pub counts: Counts,
+    /// Sample commands that the sensor got, before and after the firmware was asked what it counted.
+    pub commands: (u64, u64),
+    /// Resets since power-up.
+    pub resets: usize,
+    /// How well the PC agrees.
+    pub agreement: Agreement,
+    /// What the PC could not compare.
+    pub not_followed: Vec<String>,
+    /// Reports that came damaged or not at all.
+    pub lost_reports: u64,
+    /// What was played of recordings, all 0 without any.
+    pub played: PlayCounts,
+}
+
+/// Has the firmware find out what lies under its finger, and follows it. It must know `table` and be ready; `each` sees all
+/// reports meanwhile, and after every millisecond none.
+///
+/// # Errors
+/// See [`ExploreError`].
+pub fn explore(
+    talk: &mut Talk,
+    table: &[u8],
+    identify: Identify,
+    truth: &str,
+    mut each: impl FnMut(&mut Emulator, Option<&Report>),
+) -> Result<Exploration, ExploreError> {
+    let plan = Plan::new();
+    let table = Table::read(table)?;
+    let mut follower = Follower::new(table, PropertySet::ALL, &identify, &plan)?;
+    let mut not_followed = Vec::new();
+    let mut steps = Vec::new();
+    let mut slides = Vec::new();
+    let mut movement = None;
+    let before = talk.board().rig().slides().len();
+    talk.ask(Ask::Stream(true), PATIENCE_S, &mut each)?;
+    let asked = Question::identify(identify);
+    let found = talk.run(asked, EXPLORATION_S, |board, report| {
+        if let Some(report) = report {
+            if let Err(why) = follower.hear(&report.tell) {
+                not_followed.push(why.to_string());
+            }
+            match &report.tell {
+                Tell::Chosen {
+                    movement: chosen, ..
+                } => {
+                    movement = Some(*chosen);
+                    board.rig().expect_speed(chosen.speed_mm_s().into());
+                }
+                Tell::Felt {
+                    action,
+                    felt,
+                    posterior,
+                    ..
+                } => steps.push(step(
+                    table,
+                    truth,
+                    *action,
+                    felt.properties().get(action.property),
+                    posterior,
+                )),
+                _ => {}
+            }
+        } else if let Some(movement) = movement {
+            let rig = board.rig();
+            let new = rig.slides().iter().skip(before + slides.len());
+            slides.extend(new.map(|slide| (movement, *slide)));
+        }
+        each(board, report);
+    })?;
+    let commands = talk.board().rig().sensor_commands();
+    let status = talk.run(Question::status(), PATIENCE_S, &mut each)?;
+    let lost_reports = talk.session().damaged() + talk.session().missing();
+    let board = talk.board();
+    let commands = (commands, board.rig().sensor_commands());
+    let played = board.rig().world().played();
+    Ok(Exploration {
+        truth: truth.to_owned(),
+        found,
+        virtual_s: board.now_ns() as f64 * 1e-9,
+        slides,
+        steps,
+        counts: status.counts,
+        commands,
+        resets: board.resets()?.len(),
+        agreement: follower.agreement().clone(),
+        not_followed,
+        lost_reports,
+        played,
+    })
+}
+
+fn step(
+    table: Table<'_>,
+    truth: &str,
+    action: Action,
+    felt: Option<f32>,
+    posterior: &[f32],
+) -> Step {
+    let number = table.find(truth);
+    let other = posterior
+        .iter()
+        .zip(table.names())
+        .filter(|(_, name)| *name != truth)
+        .max_by(|a, b| a.0.total_cmp(b.0));
+    Step {
+        movement: table.movement(action.movement),
+        action,
+        felt,
+        learned: number.and_then(|number| table.gaussian(number, action)),
+        probability: number
+            .and_then(|number| posterior.get(usize::from(number)).copied())
+            .unwrap_or(0.0),
+        other: other.map(|(p, name)| (name.to_owned(), *p)),
+    }
+}
+
+/// Where a slide's force is off most: N, relative, and whether that is too much.
+fn force_error(slides: &[(Movement, Slide)]) -> (f64, f64, bool) {
+    let errors = slides.iter().map(|(movement, slide)| {
+        let wanted = f64::from(movement.force_n());
+        let error = (slide.force_n - wanted).abs();
+        (error, error / wanted)
+    });
+    errors.fold((0.0, 0.0, false), |worst, (newtons, share)| {
+        let over = newtons > FORCE_N && share > FORCE_SHARE;
+        (
+            f64::max(worst.0, newtons),
+            f64::max(worst.1, share),
+            worst.2 || over,
+        )
+    })
+}
+
+impl Exploration {
+    /// Whether the verdict is the texture under the finger.
+    pub fn right(&self) -> bool {
+        self.found.name.as_str() == self.truth
+    }
+
+    /// Largest error of a slide's force: N, and relative.
+    pub fn force_error(&self) -> (f64, f64) {
+        let (newtons, share, _) = force_error(&self.slides);
+        (newtons, share)
+    }
+
+    /// Largest relative error of a slide's speed.
+    pub fn speed_error(&self) -> f64 {
+        let errors = self.slides.iter().map(|(_, slide)| slide.speed_error);
+        errors.fold(0.0, f64::max)
+    }
+
+    /// Largest deviation of a slot from its grid, us.
+    pub fn jitter_us(&self) -> f64 {
+        let jitters = self.slides.iter().map(|(_, slide)| slide.slot_jitter_us);
+        jitters.fold(0.0, f64::max)
+    }
+
+    /// Slots in which the sensor was not asked, as the sensor saw it, during the slides.
+    pub fn missed_slots(&self) -> usize {
+        self.slides
+            .iter()
+            .map(|(_, slide)| slide.missed_slots)
+            .sum()
+    }
+
+    /// Largest difference of a property or of the signal it comes from.
+    pub fn features_difference(&self) -> f32 {
+        self.agreement.properties.max(self.agreement.signal)
+    }
+
+    /// The bars that were missed, whatever the verdict; none if all is well. The rig has no fault: every sample that is
+    /// lost, late or damaged is the firmware's.
+    pub fn missed(&self) -> Vec<String> {
+        let mut missed = Vec::new();
+        let mut check = |good: bool, what: String| {
+            if !good {
+                missed.push(what);
+            }
+        };
+        let (newtons, share, too_far) = force_error(&self.slides);
+        let (mn, percent) = (newtons * 1e3, share * 100.0);
+        check(!too_far, format!("force off by {mn:.1} mN, {percent:.1} %"));
+        let speed = self.speed_error();
+        check(
+            speed <= SPEED_SHARE,
+            format!("speed off by {:.2} %", speed * 100.0),
+        );
+        let jitter = self.jitter_us();
+        check(jitter <= JITTER_US, format!("slots off by {jitter:.2} us"));
+        check(self.resets == 0, format!("{} resets", self.resets));
+        let counts = self.counts;
+        check(
+            counts.lost_samples == 0,
+            format!("{} samples lost", counts.lost_samples),
+        );
+        check(
+            counts.late_slots == 0,
+            format!("{} slots late", counts.late_slots),
+        );
+        check(
+            self.missed_slots() as u64 <= u64::from(counts.late_slots),
+            format!(
+                "the sensor missed {} slots, the firmware tells of {}",
+                self.missed_slots(),
+                counts.late_slots
+            ),
+        );
+        let slots = u64::from(counts.slots);
+        // a slot is counted before its command goes out
+        let possible = self.commands.0..=self.commands.1 + u64::from(counts.late_slots) + 1;
+        check(
+            possible.contains(&slots),
+            format!("{slots} slots are told, the sensor saw {possible:?}"),
+        );
+        check(
+            counts.parity_errors == 0 && counts.error_frames == 0,
+            format!(
+                "{} parity errors and {} error frames, and the sensor sent none",
+                counts.parity_errors, counts.error_frames
+            ),
+        );
+        check(
+            counts.lost_reports == 0 && self.lost_reports == 0,
+            format!(
+                "{} reports lost by the firmware's account, {} by the PC's",
+                counts.lost_reports, self.lost_reports
+            ),
+        );
+        check(
+            !self.slides.is_empty() && self.steps.len() == usize::from(self.found.slides),
+            format!(
+                "{} slides made, {} felt, {} counted",
+                self.slides.len(),
+                self.steps.len(),
+                self.found.slides
+            ),
+        );
+        check(
+            self.agreement.agrees(),
+            format!("the PC does not agree: {:?}", self.agreement),
+        );
+        for why in &self.not_followed {
+            check(false, format!("not followed: {why}"));
+        }
+        missed
+    }
+
+    /// For programs: everything in the units of its name.
+    pub fn json(&self) -> Value {
+        let (force_n, force_share) = self.force_error();
+        let steps = self.steps.iter().map(|step| {
+            json!({
+                "movement": step.movement.map(|movement| movement.to_string()),
+                "property": step.action.property.to_string(),
+                "felt": step.felt,
+                "learned_mean": step.learned.map(|g| g.mean),
+                "learned_sd": step.learned.map(|g| g.sd),
+                "distance_sd": step.distance_sd(),
+                "probability_true": step.probability,
+                "other": step.other.as_ref().map(|(name, _)| name),
+                "probability_other": step.other.as_ref().map(|(_, p)| p),
+            })
+        });
+        let mut json = json!({
+            "texture_true": self.truth,
+            "texture_identified": self.found.name.as_str(),
+            "right": self.right(),
+            "probability": self.found.probability,
+            "sure": self.found.sure,
+            "slides": self.found.slides,
+            "virtual_seconds": self.virtual_s,
+            "lost_samples": self.counts.lost_samples,
+            "late_slots": self.counts.late_slots,
+            "parity_errors": self.counts.parity_errors,
+            "missed_slots_true": self.missed_slots(),
+            "resets": self.resets,
+            "force_error_max": force_share,
+            "force_error_max_n": force_n,
+            "speed_error_max": self.speed_error(),
+            "slot_jitter_us": self.jitter_us(),
+            "features_difference": number(self.features_difference()),
+            "posterior_difference": number(self.agreement.posterior),
+            "other_choices": self.agreement.other_choices.len(),
+            "follows": self.agreement.agrees() && self.not_followed.is_empty(),
+            "bars_missed": self.missed(),
+            "log": steps.collect::<Vec<_>>(),
+        });
+        if self.played != PlayCounts::default() {
+            json["played"] = json!({
+                "recordings": self.played.slides,
+                "samples_clipped": self.played.clipped,
+                "samples_beyond_the_end": self.played.over,
+                "movements": 1,
+                "seconds_used": "3 of 5",
+            });
+        }
+        json
+    }
+
+    /// When and by which property the exploration went where it went, a line for each slide.
+    pub fn log(&self) -> Vec<String> {
+        let lines = self.steps.iter().zip(1..).map(|(step, number)| {
+            let movement = step.movement.map_or("?".into(), |m| m.to_string());
+            let felt = match (step.felt, step.learned, step.distance_sd()) {
+                (Some(felt), Some(learned), Some(distance)) => format!(
+                    "felt {felt:.3}, learned {:.3} sd {:.3}: {distance:+.1} sd",
+                    learned.mean, learned.sd
+                ),
+                (felt, ..) => format!("felt {felt:?}"),
+            };
+            let (other, p) = step.other.as_ref().map_or(("?", 0.0), |(o, p)| (o, *p));
+            format!(
+                "slide {number}: {} at {movement}, {felt}; {} {:.1} %, {other} {:.1} %",
+                step.action.property,
+                self.truth,
+                step.probability * 100.0,
+                p * 100.0
+            )
+        });
+        lines.collect()
+    }
+
+    /// How well the PC agrees, for people.
+    pub fn followed(&self) -> String {
+        let agreement = &self.agreement;
+        format!(
+            "{}: features within {:.1e}, posterior within {:.1e} (allowed {ALLOWED:.0e}), {} other choices of {}",
+            if agreement.agrees() && self.not_followed.is_empty() {
+                "the PC agrees"
+            } else {
+                "THE PC DOES NOT AGREE"
+            },
+            self.features_difference(),
+            agreement.posterior,
+            agreement.other_choices.len(),
+            agreement.choices
+        )
+    }
+}
+
+/// JSON has no infinity; a difference that has no value must not read as none.
+fn number(difference: f32) -> Value {
+    if difference.is_finite() {
+        json!(difference)
+    } else {
+        json!("infinite")
+    }
+}

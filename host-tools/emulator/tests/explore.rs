@@ -1,0 +1,258 @@
+//! Explorations by the real ELF, judged by the rig's truth, and what it keeps of what it was told and taught.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use rand::{Rng as _, RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use tactus::collection::Collection;
+use tactus::link::{Question, ReadTable};
+use tactus_core::table::Table;
+use tactus_core::wire::{Identify, Report, Tell, Train};
+use tactus_emulator::campaign;
+use tactus_emulator::exploration::explore;
+use tactus_emulator::lessons::{self, Known, Unknown};
+use tactus_emulator::talk::{PATIENCE_S, Talk};
+use tactus_emulator::{Options, Setup};
+
+/// The firmware's ELF, which `cargo xtask test` names; without it these tests have nothing to run.
+fn elf() -> Option<PathBuf> {
+    let elf = std::env::var_os("TACTUS_ELF").map(PathBuf::from);
+    if elf.is_none() {
+        assert!(
+            std::env::var("TACTUS_REQUIRE_ELF").as_deref() != Ok("1"),
+            "TACTUS_REQUIRE_ELF=1, but TACTUS_ELF is not set"
+        );
+        eprintln!("skipped: TACTUS_ELF is not set (run `cargo xtask test`)");
+    }
+    elf
+}
+
+/// A board that has homed.
+fn ready(elf: &Path, unknown: &Unknown, store: Option<Vec<u8>>) -> Talk {
+    let options = Options {
+        store,
+        ..Options::default()
+    };
+    let mut talk = Talk::new(unknown.start(elf, options).unwrap());
+    assert_eq!(talk.ready(|_, _| ()).unwrap(), None);
+    talk
+}
+
+/// A simulated world of six textures.
+fn world() -> &'static (Collection, Known) {
+    static WORLD: OnceLock<(Collection, Known)> = OnceLock::new();
+    WORLD.get_or_init(|| {
+        let collection = Collection {
+            seed: 3,
+            textures: Collection::spread(47, 6),
+            trials: 5,
+        };
+        let known = lessons::simulated(&collection, || ()).unwrap();
+        (collection, known)
+    })
+}
+
+fn identify(among: &[u16], threshold: f32) -> Identify {
+    Identify {
+        among: among.iter().copied().collect(),
+        threshold,
+        max_slides: 10,
+        strategy: Default::default(),
+        seed: 11,
+    }
+}
+
+#[test]
+fn two_textures_that_change_places_change_the_verdicts() {
+    let Some(elf) = elf() else { return };
+    let (collection, known) = world();
+    let pair = [1, 2];
+    std::thread::scope(|scope| {
+        for mounted in pair {
+            let elf = &elf;
+            scope.spawn(move || {
+                let texture = collection.textures[usize::from(mounted)];
+                // all but the texture is the same
+                let setup = Setup {
+                    texture,
+                    ..collection.setup(collection.textures[1], 1)
+                };
+                let unknown = Unknown {
+                    setup,
+                    ..lessons::mounted(collection, texture, 1)
+                };
+                let mut talk = ready(elf, &unknown, None);
+                talk.teach(&known.calibration, &known.table, |_, _| ())
+                    .unwrap();
+                let asked = identify(&pair, 0.999);
+                let explored =
+                    explore(&mut talk, &known.table, asked, &unknown.name, |_, _| ()).unwrap();
+                assert_eq!(explored.missed(), [""; 0]);
+                assert!(explored.right() && explored.found.sure, "{explored:?}");
+                assert_eq!(explored.found.texture, mounted);
+            });
+        }
+    });
+}
+
+#[test]
+fn explorations_meet_the_bars() {
+    let Some(elf) = elf() else { return };
+    let simulated = campaign::simulated(6, 1, || ()).unwrap();
+    let recorded = lessons::recordings(1).map(|lesson| campaign::recorded(&lesson, 4, 1));
+    let recorded = match recorded {
+        Ok(group) => Some(group.unwrap()),
+        Err(why) => {
+            assert!(
+                std::env::var("TACTUS_REQUIRE_DATA").as_deref() != Ok("1"),
+                "{why}"
+            );
+            eprintln!("skipped the recordings: {why}");
+            None
+        }
+    };
+    let groups: Vec<_> = std::iter::once(&simulated).chain(&recorded).collect();
+    let results = campaign::run(&elf, &groups, || ());
+    for results in &results {
+        assert_eq!(campaign::troubles(results), [""; 0]);
+        for wrong in results.iter().flatten().filter(|e| !e.right()) {
+            eprintln!("{} was taken for {}", wrong.truth, wrong.found.name);
+            eprintln!("{}", wrong.log().join("\n"));
+        }
+    }
+    // a firmware that is right in 16 of 20 cases gets fewer than these right once in a hundred times
+    assert!(campaign::right(&results[0]) >= 3, "of 6 simulated");
+    if let Some(recorded) = results.get(1) {
+        assert!(campaign::right(recorded) >= 2, "of 4 recorded");
+    }
+}
+
+#[test]
+fn a_texture_taught_on_the_probe_is_kept() {
+    let Some(elf) = elf() else { return };
+    let (collection, known) = world();
+    let name = "Taught here";
+    let new = (1..=117).find(|number| !collection.textures.contains(number));
+    let unknown = lessons::mounted(collection, new.unwrap(), 1);
+    let mut talk = ready(&elf, &unknown, None);
+    talk.teach(&known.calibration, &known.table, |_, _| ())
+        .unwrap();
+    let before = Table::read(&known.table).unwrap();
+    let train = Train {
+        name: name.try_into().unwrap(),
+        trials: 2,
+        pilot: false,
+        seed: 1,
+    };
+    let slides = talk.run(Question::train(train), 300.0, |_, _| ()).unwrap();
+    assert_eq!(slides, 2 * before.movements().len() as u32);
+
+    let check = |talk: &mut Talk| {
+        let bytes = talk
+            .run(ReadTable::default(), PATIENCE_S, |_, _| ())
+            .unwrap();
+        let table = Table::read(&bytes).unwrap();
+        assert_eq!(table.textures(), before.textures() + 1);
+        let taught = table.find(name).expect("the table holds it");
+        for movement in 0..table.movements().len() as u8 {
+            assert_eq!(table.trials(taught, movement), 2);
+        }
+        let status = talk.run(Question::status(), PATIENCE_S, |_, _| ()).unwrap();
+        assert!(!status.factory);
+        assert_eq!(status.table_crc, table.crc());
+        let calibration = talk
+            .run(Question::read_calibration(), PATIENCE_S, |_, _| ())
+            .unwrap();
+        assert_eq!(calibration, known.calibration);
+        bytes
+    };
+    let taught = check(&mut talk);
+    let store = talk.board().store().unwrap();
+    let mut again = ready(&elf, &unknown, Some(store));
+    assert_eq!(check(&mut again), taught);
+}
+
+#[test]
+fn a_corrupt_table_gives_way_to_the_factorys_until_another_comes() {
+    let Some(elf) = elf() else { return };
+    let (collection, known) = world();
+    let unknown = lessons::mounted(collection, 47, 1);
+    let mut talk = ready(&elf, &unknown, None);
+    talk.teach(&known.calibration, &known.table, |_, _| ())
+        .unwrap();
+    assert!(!status(&mut talk).factory);
+    let mut store = talk.board().store().unwrap();
+    drop(talk);
+    // where it lies is the store's own affair
+    let at = store
+        .windows(known.table.len())
+        .position(|bytes| bytes == known.table)
+        .expect("the store holds the table");
+    let mut random = ChaCha8Rng::seed_from_u64(9);
+    for _ in 0..8 {
+        let byte = at + random.random_range(0..known.table.len());
+        store[byte] ^= 1 << random.random_range(0..8);
+    }
+    let mut talk = ready(&elf, &unknown, Some(store));
+    let factory = status(&mut talk);
+    assert!(factory.factory && factory.textures > 0, "{factory:?}");
+    assert_eq!(talk.board().resets().unwrap(), []);
+    talk.teach(&known.calibration, &known.table, |_, _| ())
+        .unwrap();
+    let own = status(&mut talk);
+    assert!(!own.factory);
+    assert_eq!(own.table_crc, Table::read(&known.table).unwrap().crc());
+}
+
+fn status(talk: &mut Talk) -> tactus_core::wire::Status {
+    talk.run(Question::status(), PATIENCE_S, |_, _| ()).unwrap()
+}
+
+#[test]
+fn garbage_on_the_line_is_told_and_believed_by_nobody() {
+    let Some(elf) = elf() else { return };
+    let (collection, known) = world();
+    let unknown = lessons::mounted(collection, collection.textures[3], 2);
+    let mut talk = ready(&elf, &unknown, None);
+    talk.teach(&known.calibration, &known.table, |_, _| ())
+        .unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(20);
+    let mut garbage = vec![0; 20_000];
+    random.fill_bytes(&mut garbage);
+    let mut pieces = garbage.chunks(400);
+    let (mut exploring, mut damaged, mut answers) = (false, 0, 0);
+    let asked = identify(&[], 0.99);
+    let explored = explore(
+        &mut talk,
+        &known.table,
+        asked,
+        &unknown.name,
+        |board, report| {
+            match report.map(|Report { tell, .. }| tell) {
+                Some(Tell::Chosen { .. }) => exploring = true,
+                Some(Tell::Damaged(count)) => damaged = *count,
+                // nothing but the requests that frame the exploration
+                Some(Tell::Done(_) | Tell::Refused { .. }) => answers += 1,
+                // every 50 ms, so that its answers find room
+                None if exploring && board.now_ns() / 1_000_000 % 50 == 0 => {
+                    board.send(pieces.next().unwrap_or_default());
+                }
+                _ => {}
+            }
+        },
+    )
+    .unwrap();
+    assert_eq!(pieces.next(), None, "all of it was sent");
+    // one in 256 bytes ends a frame
+    assert!(damaged > 40, "{damaged} damaged frames");
+    assert_eq!(explored.counts.damaged_frames, damaged);
+    assert_eq!(answers, 3, "Stream, Identify, Status");
+    assert_eq!(explored.missed(), [""; 0]);
+    assert!(explored.right(), "{explored:?}");
+    // what is not in the chip's model is not relied upon
+    for register in talk.board().unimplemented().unwrap() {
+        assert!(register.starts_with("SYSCFG."), "{register}");
+    }
+    assert_eq!(talk.board().unmapped().unwrap(), [0u64; 0]);
+}
