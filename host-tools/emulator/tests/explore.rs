@@ -99,8 +99,8 @@ fn two_textures_that_change_places_change_the_verdicts() {
 #[test]
 fn explorations_meet_the_bars() {
     let Some(elf) = elf() else { return };
-    let simulated = campaign::simulated(6, 1, || ()).unwrap();
-    let recorded = lessons::recordings(1).map(|lesson| campaign::recorded(&lesson, 4, 1));
+    let simulated = campaign::simulated(4, 1, || ()).unwrap();
+    let recorded = lessons::recordings(1).map(|lesson| campaign::recorded(&lesson, 3, 1));
     let recorded = match recorded {
         Ok(group) => Some(group.unwrap()),
         Err(why) => {
@@ -121,10 +121,11 @@ fn explorations_meet_the_bars() {
             eprintln!("{}", wrong.log().join("\n"));
         }
     }
-    // a firmware that is right in 16 of 20 cases gets fewer than these right once in a hundred times
-    assert!(campaign::right(&results[0]) >= 3, "of 6 simulated");
+    // a firmware that is right in 16 of 20 cases gets fewer than these right in 2.7 and in 0.8 of a hundred cases; the
+    // figure itself is the campaign's
+    assert!(campaign::right(&results[0]) >= 2, "of 4 simulated");
     if let Some(recorded) = results.get(1) {
-        assert!(campaign::right(recorded) >= 2, "of 4 recorded");
+        assert!(campaign::right(recorded) >= 1, "of 3 recorded");
     }
 }
 
