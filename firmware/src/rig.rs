@@ -2,13 +2,14 @@
 //!
 //! | executor | task | does | tells |
 //! |---|---|---|---|
-//! | UART4's interrupt, after TIM2 | `acquire` | a sensor word every 227 us | words to `servo` |
-//! | UART5's interrupt, before the link | `servo` | control, guard and watchdog, 1 kHz | samples to `session`, a snapshot to all |
+//! | UART4's interrupt, woken by TIM2's | `acquire` | a sensor word every 227 us | words to `servo` |
+//! | UART5's interrupt, woken by the clock's | `servo` | control, guard and watchdog, 1 kHz | samples to `session`, a snapshot to all |
 //! | thread mode | `session` | explorations, training, tables; owns the store | commands to `servo`, reports to `send` |
 //! | thread mode | `watch` | phases, faults and places as they change | reports to `send` |
 //! | thread mode | `receive`, `send` | frames of USART3 | requests to `session` |
 //!
-//! TIM1's interrupt, between the two, makes the lever's steps.
+//! Their priorities, and between the two executors those of the link's bytes and of the lever's steps (TIM1), are in
+//! `board`.
 
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::interrupt;

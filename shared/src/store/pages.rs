@@ -136,6 +136,8 @@ impl<F: NorFlash> ReadNorFlash for Pages<'_, F> {
     const READ_SIZE: usize = WORD;
 
     async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+        // turning a page reads for a second or more: other tasks must have their turn meanwhile
+        embassy_futures::yield_now().await;
         self.0.read(Self::place(offset), bytes).await
     }
 

@@ -3,6 +3,7 @@
 use core::fmt;
 
 use embedded_storage_async::nor_flash::NorFlash;
+use sequential_storage::cache::key_pointers::ArrayKeyPointers;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 use sequential_storage::{Error, map};
@@ -78,7 +79,16 @@ impl Trained {
     }
 }
 
-type Map<'f, F> = MapStorage<u8, Pages<'f, F>, Cache<Uncached, Uncached, Uncached, u8>>;
+/// Remembers where the newest record of every key is while one call lasts. Without it, turning a page looks through the
+/// whole page for every record in it.
+type Places = Cache<
+    Uncached,
+    Uncached,
+    ArrayKeyPointers<u8, { KEY_TRAINED as usize + MAX_RECORDS as usize }>,
+    u8,
+>;
+
+type Map<'f, F> = MapStorage<u8, Pages<'f, F>, Places>;
 
 impl<E> From<Error<E>> for StoreError<E> {
     fn from(why: Error<E>) -> Self {
@@ -91,9 +101,7 @@ impl<E> From<Error<E>> for StoreError<E> {
 }
 
 /// One pass over all records of training, oldest first: what a key held last counts.
-struct Records<'m, 'f, F: NorFlash>(
-    map::MapItemIter<'m, u8, Pages<'f, F>, Cache<Uncached, Uncached, Uncached, u8>>,
-);
+struct Records<'m, 'f, F: NorFlash>(map::MapItemIter<'m, u8, Pages<'f, F>, Places>);
 
 impl<F: NorFlash> Records<'_, '_, F> {
     /// Place and record, `None` for a place that was cleared.
@@ -319,7 +327,11 @@ impl<F: NorFlash> Store<F> {
 
     fn map(&mut self) -> Map<'_, F> {
         let config = const { MapConfig::new(0..2 * page_size::<F>() as u32) };
-        MapStorage::new(Pages(&mut self.flash), config, Cache::new_uncached())
+        MapStorage::new(
+            Pages(&mut self.flash),
+            config,
+            Cache::new(Uncached, Uncached, ArrayKeyPointers::new()),
+        )
     }
 
     async fn fetch<'b>(

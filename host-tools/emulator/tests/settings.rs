@@ -1,0 +1,77 @@
+//! The store of the real firmware, over many writes: its pages turn in time, and it loses nothing.
+
+use std::path::PathBuf;
+
+use tactus_core::pressure::Calibration;
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::wire::{Ask, Phase, Tell, Train};
+use tactus_emulator::talk::{Talk, TalkError};
+use tactus_emulator::{Emulator, Options, Setup};
+
+/// The tasks of thread mode are taken for hung after 2 s: half of it is the most that a write may keep them.
+const LONGEST_MS: u64 = 1000;
+
+fn calibration(date: u32) -> RigCalibration {
+    RigCalibration {
+        pressure: Calibration::PAPER,
+        unloaded_a: (0.037, 0.001),
+        newton_per_ampere: 16.4,
+        date,
+        serial: *b"BT000000SIMULATE",
+    }
+}
+
+fn boot(elf: &std::path::Path, store: Option<Vec<u8>>) -> Talk {
+    let options = Options {
+        store,
+        ..Options::default()
+    };
+    let mut talk = Talk::new(Emulator::start(elf, Setup::default(), options).unwrap());
+    let ready = |tell: &Tell| matches!(tell, Tell::Phase(Phase::Ready)).then_some(Ok(()));
+    talk.wait(30.0, |_, _| (), ready).unwrap();
+    talk
+}
+
+#[test]
+fn pages_turn_in_time_and_nothing_is_lost() {
+    let Some(elf) = std::env::var_os("TACTUS_ELF").map(PathBuf::from) else {
+        eprintln!("skipped: TACTUS_ELF is not set");
+        return;
+    };
+    let mut talk = boot(&elf, None);
+    // a calibration takes 84 bytes of a page of 16 KB: two pages and some
+    let mut longest_ms = (0, 0);
+    for n in 1..=430 {
+        let bytes = calibration(20_260_000 + n).to_bytes();
+        let began_ns = talk.board().now_ns();
+        let ask = Ask::WriteCalibration(bytes.into_iter().collect());
+        talk.ask(ask, 20.0, |_, _| ()).unwrap();
+        longest_ms = longest_ms.max(((talk.board().now_ns() - began_ns) / 1_000_000, n));
+    }
+    eprintln!("longest of 430 writes: {} ms, the {}th", longest_ms.0, longest_ms.1);
+    assert!(longest_ms.0 < LONGEST_MS, "{longest_ms:?}");
+    assert_eq!(talk.board().resets().unwrap(), []);
+
+    let store = talk.board().store().unwrap();
+    let mut talk = boot(&elf, Some(store));
+    let mut kept = None;
+    let hear = |_: &mut Emulator, report: Option<&tactus_core::wire::Report>| {
+        if let Some(Tell::Calibration(bytes)) = report.map(|r| &r.tell) {
+            kept = bytes.as_slice().try_into().ok();
+        }
+    };
+    talk.ask(Ask::ReadCalibration, 5.0, hear).unwrap();
+    assert_eq!(
+        RigCalibration::from_bytes(&kept.unwrap()),
+        Ok(calibration(20_260_430))
+    );
+    // and a training that cannot be is refused before anything moves
+    let nameless = Ask::Train(Train {
+        name: Default::default(),
+        trials: 5,
+        pilot: false,
+        seed: 1,
+    });
+    let refused = talk.ask(nameless, 5.0, |_, _| ());
+    assert!(matches!(refused, Err(TalkError::Refused(_))), "{refused:?}");
+}
