@@ -188,10 +188,13 @@ where
     while let Some(movement) = training.next() {
         let mut slide = Slide::<K>::new(plan);
         rig.perform(movement, &mut slide).await.map_err(text)?;
-        let felt = slide.finish().map_err(text).and_then(|measurement| {
-            let trained = training.took(movement, &measurement.properties);
-            Ok((trained.map_err(text)?, measurement))
-        });
+        let felt = match slide.finish() {
+            Ok(measurement) => match training.took(movement, &measurement.properties) {
+                Ok(trained) => Ok((trained, measurement)),
+                Err(why) => Err(text(why)),
+            },
+            Err(why) => Err(text(why)),
+        };
         match felt {
             Ok((trained, measurement)) => {
                 rejected = 0;

@@ -1,4 +1,4 @@
-//! The image of the rig: see [`tactus_firmware::rig`].
+//! The image of the rig: see `tactus_firmware::rig`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]

@@ -1,4 +1,4 @@
-//! The board's self-test: see [`tactus_firmware::selftest`].
+//! The board's self-test: see `tactus_firmware::selftest`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]

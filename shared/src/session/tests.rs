@@ -8,7 +8,7 @@ use std::string::String;
 use std::vec;
 
 /// A rig on which every texture has the traction that comes next, in mN; none is a slide without samples.
-struct Script(vec::IntoIter<Option<i16>>);
+struct Script(std::collections::VecDeque<Option<i16>>);
 
 impl Rig for Script {
     type Error = &'static str;
@@ -22,7 +22,7 @@ impl Rig for Script {
         _: Movement,
         slide: &mut Slide<'_, K>,
     ) -> Result<(), Self::Error> {
-        let Some(traction) = self.0.next().ok_or("the lever fell off")? else {
+        let Some(traction) = self.0.pop_front().ok_or("the lever fell off")? else {
             return Ok(());
         };
         slide.set_background(2.0);
@@ -55,7 +55,7 @@ fn identified(slides: &[Option<i16>], wanted: &Identify) -> (Result<(), Text>, v
     let mut told = vec::Vec::new();
     let result = block_on(identify::<_, crate::kernels::Plain>(
         wanted,
-        &mut Script(slides.to_vec().into_iter()),
+        &mut Script(slides.iter().copied().collect()),
         Table::read(&bytes).unwrap(),
         &Plan::new(),
         |tell| {
