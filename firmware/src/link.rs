@@ -147,7 +147,11 @@ fn answer(request: Request) {
             tell(Tell::Done(id));
         }
         Ask::Stop => {
-            servo::stop();
+            if BUSY.load(Relaxed) || !JOBS.is_empty() {
+                servo::stop_for_good();
+            } else {
+                servo::stop();
+            }
             tell(Tell::Done(id));
         }
         Ask::Stream(on) => {

@@ -94,10 +94,24 @@ impl Probe {
 
     /// Finds the limit switches, the lever's first.
     pub(crate) async fn home(&mut self) -> Result<(), ProbeError> {
-        servo::command(Command::Home)
-            .await
-            .map_err(ProbeError::Refused)?;
-        self.rest(|_| ()).await.map(|_| ())
+        self.command(Command::Home).await?;
+        match self.rest(|_| ()).await?.phase {
+            Phase::Ready => Ok(()),
+            _ => Err(ProbeError::Stopped),
+        }
+    }
+
+    /// Has something begun, unless all was stopped.
+    async fn command(&self, command: Command) -> Result<(), ProbeError> {
+        if servo::is_stopped() {
+            return Err(ProbeError::Stopped);
+        }
+        servo::command(command).await.map_err(ProbeError::Refused)?;
+        // it was stopped in the same millisecond, before it began
+        if servo::is_stopped() {
+            servo::stop();
+        }
+        Ok(())
     }
 
     /// A run without load, there or back: where it began and ended, mm, and its mean current, A.
@@ -106,9 +120,7 @@ impl Probe {
         speed_um_s: u32,
     ) -> Result<(f32, f32, Option<f32>), ProbeError> {
         let from_mm = servo::snapshot().stage_mm;
-        servo::command(Command::StartUnloaded(speed_um_s))
-            .await
-            .map_err(ProbeError::Refused)?;
+        self.command(Command::StartUnloaded(speed_um_s)).await?;
         let rig = self.rest(|_| ()).await?;
         match rig.ended {
             Some(Ended::Whole) => Ok((from_mm, rig.stage_mm, rig.mean_current_a)),
@@ -140,9 +152,7 @@ impl Rig for Probe {
         };
         let lost_before = lost();
         let start = self.random.next_f32();
-        servo::command(Command::Start(movement, start))
-            .await
-            .map_err(ProbeError::Refused)?;
+        self.command(Command::Start(movement, start)).await?;
         let mut blocks = STREAM.load(Relaxed).then(Blocks::default);
         let ended = self
             .rest(|queue| {

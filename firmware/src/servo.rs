@@ -76,6 +76,8 @@ static COMMAND: Signal<CriticalSectionRawMutex, Command> = Signal::new();
 static ANSWER: Signal<CriticalSectionRawMutex, Result<(), Refused>> = Signal::new();
 /// Stop and lift, whatever is being done.
 static STOP: AtomicBool = AtomicBool::new(false);
+/// The session was told to stop: between two movements the rig has nothing to stop.
+static STOPPED: AtomicBool = AtomicBool::new(false);
 static SNAPSHOT: Mutex<CriticalSectionRawMutex, Cell<Snapshot>> = Mutex::new(Cell::new(Snapshot {
     phase: Phase::Parked,
     at_rest: true,
@@ -116,9 +118,25 @@ pub(crate) async fn command(command: Command) -> Result<(), Refused> {
     ANSWER.wait().await
 }
 
-/// Stops what is being done.
+/// Stops what is being done now.
 pub(crate) fn stop() {
     STOP.store(true, Relaxed);
+}
+
+/// Stops what is being done, and what would come after it until [`forget_stop`].
+pub(crate) fn stop_for_good() {
+    STOPPED.store(true, Relaxed);
+    stop();
+}
+
+/// Whether [`stop_for_good`] was called.
+pub(crate) fn is_stopped() -> bool {
+    STOPPED.load(Relaxed)
+}
+
+/// What was stopped is over.
+pub(crate) fn forget_stop() {
+    STOPPED.store(false, Relaxed);
 }
 
 /// What the rig is at.

@@ -59,6 +59,7 @@ pub(crate) async fn session(flash: board::Storage, samples: Consumer<'static, Sa
     Timer::after_millis(HEARD_MS).await;
     let _ = probe.home().await;
     loop {
+        servo::forget_stop();
         BUSY.store(false, Relaxed);
         let request = JOBS.receive().await;
         BUSY.store(true, Relaxed);
@@ -71,14 +72,16 @@ pub(crate) async fn session(flash: board::Storage, samples: Consumer<'static, Sa
     }
 }
 
-/// Calibration and skin as they were.
+/// Skin and calibration as they were; each whatever becomes of the other.
 async fn restore(store: &mut Storage) -> Result<(), StoreError<embassy_stm32::flash::Error>> {
+    let skin = store.skin().await;
+    if let Ok(skin) = &skin {
+        let _ = servo::command(Command::Skin(*skin)).await;
+    }
     if let Some(calibration) = store.calibration().await? {
         let _ = servo::command(Command::Calibrate(calibration)).await;
     }
-    let skin = store.skin().await?;
-    let _ = servo::command(Command::Skin(skin)).await;
-    Ok(())
+    skin.map(|_| ())
 }
 
 /// The table in use: the stored one, or the factory's.
@@ -163,7 +166,9 @@ async fn work(
             let store = store.as_mut().ok_or_else(no_store)?;
             match store.write_table(offset as usize, &bytes).await {
                 // said again by a host that did not hear the answer; the table's checksum is looked at in the end
-                Err(StoreError::Part { offset, wanted }) if offset + bytes.len() == wanted => {
+                Err(StoreError::Part { offset, wanted })
+                    if offset.checked_add(bytes.len()) == Some(wanted) =>
+                {
                     Ok(())
                 }
                 written => written.map_err(text),

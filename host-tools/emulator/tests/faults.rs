@@ -7,7 +7,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus::sim::encoder::Cut;
 use tactus_core::rig::guard::Fault as Seen;
-use tactus_core::wire::{Ask, Identify, Reset, Tell};
+use tactus_core::wire::{Ask, Identify, MAX_FRAME, Phase, Request, Reset, Tell, encode};
 use tactus_emulator::talk::{Talk, TalkError};
 use tactus_emulator::{Emulator, Fault, Options, Output, Setup};
 
@@ -479,6 +479,40 @@ fn check(name: &str) {
         talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
     }
     talk.ask(Ask::Calibrate, 80.0, |_, _| ()).unwrap();
+}
+
+/// A stop between two movements, where the rig itself has nothing to stop.
+#[test]
+fn a_stop_holds_whenever_it_comes() {
+    let Some(elf) = elf() else { return };
+    let mut talk = board(&elf, 77, 5);
+    let mut room = [0; MAX_FRAME + 1];
+    let stop = Request {
+        id: 9999,
+        ask: Ask::Stop,
+    };
+    let frame = encode(&stop, &mut room).unwrap().to_vec();
+    let mut sent = false;
+    let mut chosen_after = 0;
+    // of a texture that two slides do not tell from all others
+    let ended = talk.ask(identify(10), 100.0, |board, report| {
+        let Some(report) = report else { return };
+        match report.tell {
+            Tell::Phase(Phase::Lifting) if !sent => {
+                sent = true;
+                board.send(&frame);
+            }
+            Tell::Phase(Phase::Pressing) if sent => chosen_after += 1,
+            _ => {}
+        }
+    });
+    assert!(
+        matches!(&ended, Err(TalkError::Refused(why)) if why == "stopped"),
+        "{ended:?}"
+    );
+    assert_eq!(chosen_after, 0, "the finger came down again");
+    // and what comes after it is not stopped
+    talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
 }
 
 macro_rules! faults {

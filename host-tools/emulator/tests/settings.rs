@@ -48,7 +48,10 @@ fn pages_turn_in_time_and_nothing_is_lost() {
         talk.ask(ask, 20.0, |_, _| ()).unwrap();
         longest_ms = longest_ms.max(((talk.board().now_ns() - began_ns) / 1_000_000, n));
     }
-    eprintln!("longest of 430 writes: {} ms, the {}th", longest_ms.0, longest_ms.1);
+    eprintln!(
+        "longest of 430 writes: {} ms, the {}th",
+        longest_ms.0, longest_ms.1
+    );
     assert!(longest_ms.0 < LONGEST_MS, "{longest_ms:?}");
     assert_eq!(talk.board().resets().unwrap(), []);
 
