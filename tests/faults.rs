@@ -8,8 +8,10 @@ use tactus::sim::faults::Fault as Cause;
 use tactus::sim::world::Setup;
 use tactus::simulated::{SimError, SimRig};
 use tactus_core::movement::Movement;
+use tactus_core::pressure::{Channel, Counts, Pressure};
 use tactus_core::rig::control::{Ended, Phase, Refused};
 use tactus_core::rig::guard::{FAULTS, Fault, Row, Unguarded};
+use tactus_core::rig::pins::Inputs;
 
 /// When the cause comes.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -577,6 +579,65 @@ fn a_reset_or_a_stop_does_not_leave_the_finger_down() {
         rig.world().lever_top(),
         "the lever has gone on to its switch"
     );
+}
+
+/// A switch that says "at the top" everywhere, and somebody who homes again and again: the lever must not take each place
+/// for a lower top, until its zero is taken under load.
+#[test]
+fn a_stuck_switch_and_a_stubborn_operator_do_not_let_the_lever_creep_down() {
+    let mut rig = pressed(Unguarded::default());
+    rig.world().inject(Cause::LeverTopStuck { closed: true });
+    for _ in 0..20 {
+        let _ = rig.rest(|_| ());
+        rig.control().reset().unwrap();
+        let _ = rig.control().home();
+        let _ = rig.rest(|_| ());
+        let _ = rig.slide(Movement::FOR_TRACTION, 0.5, |_, _| ());
+    }
+    let truth = rig.world().truth();
+    assert!(truth.force_max_n <= 2.2, "{} N", truth.force_max_n);
+    assert!(truth.indentation_mm < 0.0, "{} mm", truth.indentation_mm);
+}
+
+/// A force over the limit that lasts while the lever goes up, because somebody leans on it: it must go on, and it did not
+/// even begin where another fault had come first. One that rises while it goes up is the lever's own: it must stop.
+#[test]
+fn a_force_that_lasts_does_not_end_the_lifting() {
+    // counts of P_DC per ms of lifting
+    for (e_stop_first, rising, lifts) in [(false, 0, true), (true, 0, true), (false, 1, false)] {
+        let mut control = SimRig::new(Setup::default()).control().clone();
+        control.home().unwrap();
+        let mut steps = 0;
+        let mut lifted = 0;
+        for ms in 0..600_u16 {
+            let high = ms > 100;
+            let pdc = 2593 + if high { 190 + rising * (ms - 100) } else { 0 };
+            let word = |channel, counts| {
+                let counts = Counts::new(counts).unwrap();
+                Some(Pressure { channel, counts })
+            };
+            let mut inputs = Inputs {
+                steps,
+                e_stop: e_stop_first && ms > 20,
+                ..Inputs::default()
+            };
+            for n in 0..2 {
+                let words = [
+                    word(Channel::Pac, 2040 + (ms * 7 + n * 5) % 9),
+                    word(Channel::Pdc, pdc),
+                ];
+                inputs.words.extend(words);
+            }
+            let outputs = control.tick(&inputs);
+            if outputs.lever_enabled {
+                steps += outputs.lever_steps_s / 1000;
+                lifted += i32::from(ms > 200 && outputs.lever_steps_s < 0);
+            }
+        }
+        assert_eq!(control.phase(), Phase::Faulted(Fault::ForceHigh));
+        assert_eq!(lifted > 390, lifts, "{lifted} ms, rising {rising}");
+        assert_eq!(lifted == 0, !lifts, "{lifted} ms, rising {rising}");
+    }
 }
 
 #[test]

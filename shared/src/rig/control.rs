@@ -28,6 +28,8 @@ const RETURN_MM_S: f32 = 50.0;
 const HIGH_FORCE_MN: u16 = Movement::FOR_TRACTION.force_mn();
 /// With the lever driver off the finger pushes it back; only then it is lifted.
 const RELEASE_MS: u32 = 20;
+/// Force that has risen by so many counts since the lever's driver was off rises because of the lifting.
+const WORSE_COUNTS: f32 = 8.0;
 /// A limit switch that is looked for is believed after so many ms: less is its bouncing.
 const SWITCH_MS: u32 = 3;
 /// Slower than this the stage stands, mm/s.
@@ -141,6 +143,8 @@ pub struct Control {
     allow_high_force: bool,
     /// The finger cannot be lifted: the lever's driver stays off.
     gave_up: bool,
+    /// P_DC above no contact when the driver had been off for [`RELEASE_MS`].
+    released: f32,
     /// For how many ms the lever's and the left limit switch have been closed.
     closed_ms: [u32; 2],
     /// P_AC words of the slide so far.
@@ -176,6 +180,7 @@ impl Control {
             damaged: 0,
             allow_high_force: false,
             gave_up: false,
+            released: 0.0,
             closed_ms: [0; 2],
             slide_words: 0,
             duty: 0.0,
@@ -223,7 +228,7 @@ impl Control {
     /// # Errors
     /// [`Refused::Busy`], or [`Refused::Calibration`] for constants that cannot be.
     pub fn calibrate(&mut self, calibration: RigCalibration) -> Result<(), Refused> {
-        if !matches!(self.phase, Phase::Parked | Phase::Ready) {
+        if !self.is_at_rest() {
             return Err(Refused::Busy);
         }
         calibration.check().map_err(Refused::Calibration)?;
@@ -372,13 +377,18 @@ impl Control {
     /// # Errors
     /// [`Refused::Busy`] while the finger is still being lifted.
     pub fn reset(&mut self) -> Result<(), Refused> {
-        if let Phase::Faulted(_) = self.phase {
+        if let Phase::Faulted(fault) = self.phase {
             if !self.is_at_rest() {
                 return Err(Refused::Busy);
             }
             self.guard.reset();
             self.stage.stop();
-            self.lever = Lever::new();
+            if fault == Fault::LeverNotHome {
+                // it is somewhere else than its steps say, and may be moved by hand now
+                self.lever = Lever::new();
+            } else {
+                self.lever.reset();
+            }
             self.gave_up = false;
             self.enter(Phase::Parked);
         }
@@ -424,9 +434,13 @@ impl Control {
         }
         let [at_top, at_left] = self.closed_ms.map(|ms| ms >= SWITCH_MS);
         match self.watch(inputs) {
-            // lifting makes it worse: a driver or a wire that does not do what it is told
-            Some(Fault::ForceHigh) if matches!(self.phase, Phase::Faulted(_)) => {
-                self.gave_up |= self.ms > 2 * RELEASE_MS;
+            Some(Fault::ForceHigh) if self.phase == Phase::Faulted(Fault::ForceHigh) => {
+                let counts = self.meter.counts();
+                if self.ms <= RELEASE_MS {
+                    self.released = counts;
+                }
+                // lifting makes it worse: a driver or a wire that does not do what it is told
+                self.gave_up |= self.ms > 2 * RELEASE_MS && counts > self.released + WORSE_COUNTS;
             }
             Some(fault) => self.fail(fault),
             None => {}
@@ -611,7 +625,7 @@ impl Control {
                     if self.meter.counts() > LIFTED_COUNTS {
                         self.check(Fault::LeverSlips);
                     } else if self.stage.state() == StageState::Unknown {
-                        self.lever = Lever::new();
+                        self.lever.reset();
                         self.enter(Phase::Parked);
                     } else {
                         self.enter(Phase::Ready);

@@ -162,10 +162,12 @@ impl Lever {
     /// Goes up to the limit switch. This is also what lifts the finger whatever has happened: a lever that knows where it
     /// is believes the switch only near the top, for a switch that sticks must not leave the finger down.
     pub fn home(&mut self) {
-        if self.state == LeverState::Unknown {
-            self.known = false;
-        }
         self.enter(LeverState::Homing);
+    }
+
+    /// Has to be homed again. It goes on knowing its top.
+    pub fn reset(&mut self) {
+        self.enter(LeverState::Unknown);
     }
 
     /// Measures P_DC without contact, then presses until P_DC has risen by `target` counts. Only a lifted lever does.
@@ -216,8 +218,11 @@ impl Lever {
             LeverState::Unknown | LeverState::Lifted | LeverState::Holding => Ok(0),
             LeverState::Homing => {
                 if at_top && (!self.known || steps - self.top <= NEAR_TOP_STEPS) {
-                    self.top = steps;
-                    self.known = true;
+                    // a top once found is the top: a switch that is stuck would else move it down each time
+                    if !self.known {
+                        self.top = steps;
+                        self.known = true;
+                    }
                     self.contact = None;
                     self.zero = None;
                     self.enter(LeverState::Lifted);
