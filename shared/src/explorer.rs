@@ -10,13 +10,70 @@ use core::marker::PhantomData;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::features::{Properties, Property, PropertySet};
+use crate::features::{Property, PropertySet};
+use crate::fused::{FeatureSet, Observation, Vector};
 use crate::kernels::{Kernels, Plain};
-use crate::table::{Action, Gaussian, MAX_ACTIONS, Table, mean_step};
+use crate::table::{Action, Contents, Gaussian, MAX_ACTIONS, Table, mean_step};
+
+mod fused;
+mod student;
+
+use fused::Visits;
+use student::{Shrunk, Student};
 
 /// Textures less probable than this are left out of the expected uncertainty: each changes it by at most about twice its
 /// probability, all of 117 by about 2e-4.
 const NEGLIGIBLE: f32 = 1e-6;
+
+/// Log-odds for "none of these" over which a texture counts as unknown after one slide; after more it is 0.
+const UNKNOWN_AT_ONCE: f32 = 2.0;
+/// Log-odds up to which a verdict is certain enough to learn from.
+const CERTAIN: f32 = -2.0;
+/// Fewest slides after which a texture may be called unknown.
+const UNKNOWN_SLIDES: u8 = 2;
+
+/// How what was felt is compared with what is known.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+pub enum Method {
+    /// The paper's: one property per slide, Gaussians (eq. 4).
+    #[default]
+    Paper,
+    /// One property per slide, Student's t with variances drawn towards each other.
+    Student,
+    /// As `Student`, with all properties of every slide.
+    StudentAll,
+    /// All features of every slide at once, whitened.
+    Fused,
+}
+
+impl Method {
+    /// The best one for a table.
+    pub const fn of(contents: Contents) -> Self {
+        match contents {
+            Contents::Gaussians(_) => Self::StudentAll,
+            Contents::Fused(..) => Self::Fused,
+        }
+    }
+
+    /// Whether it can use such a table.
+    pub const fn suits(self, contents: Contents) -> bool {
+        matches!(
+            (self, contents),
+            (Self::Fused, Contents::Fused(..))
+                | (Self::Paper | Self::Student | Self::StudentAll, Contents::Gaussians(_))
+        )
+    }
+
+    /// Its name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Student => "student",
+            Self::StudentAll => "student-all",
+            Self::Fused => "fused",
+        }
+    }
+}
 
 /// How the next movement is chosen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
@@ -33,21 +90,27 @@ pub enum Strategy {
 /// How to choose, and when to stop.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Config {
+    /// How what was felt is compared with what is known.
+    pub method: Method,
     /// How the next movement is chosen.
     pub strategy: Strategy,
     /// A texture more probable than this is the answer.
     pub threshold: f32,
     /// After this many slides the most probable texture is the answer, sure or not.
     pub max_slides: u8,
+    /// Whether the answer may be that it is none of the candidates.
+    pub open: bool,
 }
 
 impl Default for Config {
     /// Absolute identification in the paper: Bayesian exploration, 99 %, at most 10 movements.
     fn default() -> Self {
         Self {
+            method: Method::Paper,
             strategy: Strategy::Bayesian,
             threshold: 0.99,
             max_slides: 10,
+            open: false,
         }
     }
 }
@@ -71,6 +134,10 @@ pub enum ExplorerError {
     Candidates,
     /// No property that the rig measures was learned of every candidate, at least twice, at any one movement.
     NothingToMeasure,
+    /// The rig does not measure the features that the table was learned from.
+    Features(FeatureSet),
+    /// The method cannot use this kind of table.
+    Method(Method),
 }
 
 impl fmt::Display for ExplorerError {
@@ -80,6 +147,19 @@ impl fmt::Display for ExplorerError {
             Self::Candidates => f.write_str("the candidates are not textures of the table"),
             Self::NothingToMeasure => f.write_str(
                 "no property that this rig measures was learned of every candidate at one movement, from two trials or more",
+            ),
+            Self::Features(set) => write!(
+                f,
+                "the table was learned from {}, and this rig does not measure them",
+                set.name()
+            ),
+            Self::Method(Method::Fused) => f.write_str(
+                "the method fused needs a table with whitened features; learn one, or take student-all",
+            ),
+            Self::Method(method) => write!(
+                f,
+                "the method {} needs a table of the three properties; this one is for the method fused",
+                method.name()
             ),
         }
     }
@@ -92,6 +172,8 @@ impl core::error::Error for ExplorerError {}
 pub enum ObserveError {
     /// The slide has no such property, or it is not a finite number.
     Missing(Property),
+    /// The slide lacks one of the features of the table.
+    Features(FeatureSet),
     /// The explorer does not know the action.
     Action(Action),
 }
@@ -100,11 +182,12 @@ impl fmt::Display for ObserveError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Missing(property) => write!(f, "the slide did not give a value of {property}"),
+            Self::Features(set) => write!(f, "the slide did not give {}", set.name()),
             Self::Action(action) => {
                 write!(
                     f,
                     "{} of movement {} is none of the actions",
-                    action.property,
+                    action.what(),
                     action.movement + 1
                 )
             }
@@ -121,8 +204,12 @@ pub struct Verdict {
     pub texture: u16,
     /// Its posterior probability.
     pub probability: f32,
-    /// Whether that exceeds the threshold.
+    /// Whether that exceeds the threshold, and it may well be one of the candidates.
     pub sure: bool,
+    /// Whether it is rather none of them.
+    pub unknown: bool,
+    /// Log-odds of that, where the method can tell.
+    pub log_odds: Option<f32>,
 }
 
 /// What an action promises.
@@ -146,8 +233,10 @@ pub fn confusion<K: Kernels>(a: Gaussian, b: Gaussian) -> f32 {
 /// A texture that is still likely, while an expected uncertainty is computed.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
+    texture: u16,
     probability: f32,
-    expected: Gaussian,
+    /// What is expected of the properties looked at.
+    expected: [Gaussian; Property::ALL.len()],
     /// Sum over all others of confusion times probability: the numerator of eq. 8.
     confused: f32,
 }
@@ -157,7 +246,9 @@ struct Candidate {
 pub struct Explorer<'t, const N: usize, K = Plain> {
     table: Table<'t>,
     config: Config,
-    /// Logarithm of the posterior, up to a constant; minus infinity for textures that are no candidates.
+    measured: PropertySet,
+    /// Logarithm of the posterior, up to a constant, for the methods that add it up; minus infinity for textures that are no
+    /// candidates.
     log: Vec<f32, N>,
     posterior: Vec<f32, N>,
     candidates: u16,
@@ -167,6 +258,11 @@ pub struct Explorer<'t, const N: usize, K = Plain> {
     /// Expected uncertainty of each action when nothing is known: a constant of table and candidates.
     at_first: Vec<f32, MAX_ACTIONS>,
     slides: u8,
+    /// The slides of this exploration, for the methods that take their mean.
+    visits: Visits,
+    log_odds: Option<f32>,
+    /// For Student's t: movement by movement, properties in their order.
+    shrunk: Vec<Shrunk, MAX_ACTIONS>,
     work: Vec<Candidate, N>,
     kernels: PhantomData<K>,
 }
@@ -207,21 +303,55 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         if candidates == 0 {
             return Err(ExplorerError::Candidates);
         }
-        let learned = |movement| {
-            log.iter()
-                .zip(0..)
-                .all(|(&l, texture)| l < 0.0 || table.trials(texture, movement) >= 2)
+        let method = config.method;
+        if !method.suits(table.contents()) {
+            return Err(ExplorerError::Method(method));
+        }
+        if let Contents::Fused(set, _) = table.contents()
+            && !set.measured_by(measured)
+        {
+            return Err(ExplorerError::Features(set));
+        }
+        let measured = measured.and(table.measured());
+        let learned_by = |movement, most: fn(u8) -> bool| {
+            let mut candidates = log.iter().zip(0..).filter(|(l, _)| **l == 0.0);
+            candidates.all(|(_, texture)| most(table.trials(texture, movement)))
         };
-        let actions: Vec<Action, MAX_ACTIONS> = table
-            .actions()
-            .filter(|a| measured.contains(a.property) && learned(a.movement))
-            .collect();
+        let movements = 0..table.movements().len() as u8;
+        let all_of = |movement| Action {
+            movement,
+            property: None,
+        };
+        let actions: Vec<Action, MAX_ACTIONS> = match method {
+            Method::Paper | Method::Student => table
+                .actions()
+                .filter(|a| a.property.is_some_and(|p| measured.contains(p)))
+                .filter(|a| learned_by(a.movement, |trials| trials >= 2))
+                .collect(),
+            Method::StudentAll => movements
+                .filter(|&m| !measured.is_empty() && learned_by(m, |trials| trials >= 2))
+                .map(all_of)
+                .collect(),
+            // one slide is enough, and a texture without any is not much in the way
+            Method::Fused => movements
+                .filter(|&m| !learned_by(m, |trials| trials == 0))
+                .map(all_of)
+                .collect(),
+        };
         if actions.is_empty() {
             return Err(ExplorerError::NothingToMeasure);
+        }
+        let mut shrunk = Vec::new();
+        if let Method::Student | Method::StudentAll = method {
+            for movement in 0..table.movements().len() as u8 {
+                let of = Property::ALL.map(|property| Shrunk::new(&table, movement, property));
+                shrunk.extend(of);
+            }
         }
         let mut explorer = Self {
             table,
             config,
+            measured,
             posterior: log.clone(),
             log,
             candidates,
@@ -229,6 +359,9 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             at_first: Vec::new(),
             actions,
             slides: 0,
+            visits: Vec::new(),
+            log_odds: None,
+            shrunk,
             work: Vec::new(),
             kernels: PhantomData,
         };
@@ -255,6 +388,8 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         }
         self.made = self.actions.iter().map(|_| 0).collect();
         self.slides = 0;
+        self.visits.clear();
+        self.log_odds = None;
     }
 
     /// The table.
@@ -272,12 +407,46 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         &self.posterior
     }
 
-    /// The answer, once there is one: the threshold is exceeded, or the last slide was made. There is none before the
-    /// first slide, however few the candidates.
+    /// The answer, once there is one: the threshold is exceeded, the texture is unknown, or the last slide was made. There is
+    /// none before the first slide, however few the candidates.
     pub fn verdict(&self) -> Option<Verdict> {
         let best = self.best();
         let sure = best.sure && self.slides > 0;
-        (sure || self.slides >= self.config.max_slides).then_some(best)
+        let unknown = best.unknown && self.slides >= UNKNOWN_SLIDES;
+        (sure || unknown || self.slides >= self.config.max_slides).then_some(best)
+    }
+
+    /// Log-odds that the texture is none of the candidates, after what was felt so far; `None` where the method or the table
+    /// cannot tell.
+    pub fn log_odds(&self) -> Option<f32> {
+        self.log_odds
+    }
+
+    /// Whether the texture is rather none of the candidates.
+    fn is_unknown(&self) -> bool {
+        let limit = if self.slides < UNKNOWN_SLIDES {
+            UNKNOWN_AT_ONCE
+        } else {
+            0.0
+        };
+        self.log_odds.is_some_and(|log_odds| log_odds > limit)
+    }
+
+    /// Whether what was felt is certain enough for the probe to learn from it by itself. Never by the paper's properties
+    /// alone: one in ten such lessons would be wrong.
+    pub fn is_certain(&self) -> bool {
+        let known = self.log_odds.is_some_and(|log_odds| log_odds <= CERTAIN);
+        known && self.best().probability > self.config.threshold
+    }
+
+    /// The movements made, with the number of slides and their whitened mean: what this exploration can teach a fused table.
+    pub fn felt(&self) -> impl Iterator<Item = (u8, u8, Vector)> + '_ {
+        let features = match self.table.contents() {
+            Contents::Fused(_, features) => usize::from(features),
+            Contents::Gaussians(_) => 0,
+        };
+        let visits = self.visits.iter().filter(move |_| features > 0);
+        visits.map(move |v| (v.movement, v.slides, v.mean(features)))
     }
 
     /// The most probable texture as things stand, the first of equals.
@@ -286,50 +455,161 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             texture: 0,
             probability: 0.0,
             sure: false,
+            unknown: self.config.open && self.is_unknown(),
+            log_odds: self.log_odds,
         };
         for (&probability, texture) in self.posterior.iter().zip(0..) {
             if probability > best.probability {
                 best = Verdict {
                     texture,
                     probability,
-                    sure: probability > self.config.threshold,
+                    sure: probability > self.config.threshold && !best.unknown,
+                    ..best
                 };
             }
         }
         best
     }
 
-    /// Takes in a slide: the property of `action` is compared with what every candidate would feel like (eq. 3, 4). The
-    /// other properties of the slide are not used.
+    /// Takes in a slide: what `action` looks at is compared with what every candidate would feel like (eq. 3, 4). The rest of
+    /// the slide is not used.
     ///
     /// # Errors
     /// See [`ObserveError`]; nothing has changed then.
-    pub fn observe(&mut self, action: Action, slide: &Properties) -> Result<(), ObserveError> {
+    pub fn observe(&mut self, action: Action, slide: &Observation) -> Result<(), ObserveError> {
         let made = self
             .actions
             .iter()
             .position(|&a| a == action)
-            .and_then(|at| self.made.get_mut(at));
+            .filter(|&at| at < self.made.len());
         let made = made.ok_or(ObserveError::Action(action))?;
-        let x = slide
-            .get(action.property)
-            .filter(|x| x.is_finite())
-            .ok_or(ObserveError::Missing(action.property))?;
-        *made = made.saturating_add(1);
+        match action.property {
+            Some(property) => self.observe_property(action, property, slide)?,
+            None if self.config.method == Method::Fused => self.observe_features(action, slide)?,
+            None => self.observe_properties(action, slide)?,
+        }
+        if let Some(made) = self.made.get_mut(made) {
+            *made = made.saturating_add(1);
+        }
         self.slides = self.slides.saturating_add(1);
-        // twice beyond any mean that a table can hold: squares stay finite
-        let reach = mean_step(action.property) * 65536.0;
-        let x = x.clamp(-reach, reach);
-        let mut top = f32::NEG_INFINITY;
-        for (log, texture) in self.log.iter_mut().zip(0..) {
-            if *log > f32::NEG_INFINITY
-                && let Some(expected) = self.table.gaussian(texture, action)
-            {
-                let z = (x - expected.mean) / expected.sd;
-                *log -= libm::logf(expected.sd) + 0.5 * z * z;
-                top = top.max(*log);
+        Ok(())
+    }
+
+    /// The value of a property of a slide, at most twice as far out as any mean that a table can hold: squares stay finite.
+    fn value(slide: &Observation, property: Property) -> Result<f32, ObserveError> {
+        let reach = mean_step(property) * 65536.0;
+        let x = slide.properties.get(property).filter(|x| x.is_finite());
+        x.map(|x| x.clamp(-reach, reach))
+            .ok_or(ObserveError::Missing(property))
+    }
+
+    /// One property: its likelihood is added to what was there.
+    fn observe_property(
+        &mut self,
+        action: Action,
+        property: Property,
+        slide: &Observation,
+    ) -> Result<(), ObserveError> {
+        let x = Self::value(slide, property)?;
+        let mut student: Option<Student> = None;
+        for texture in 0..self.table.textures() {
+            let Some(expected) = self.expected(texture, action.movement, property) else {
+                continue;
+            };
+            let likelihood = match self.config.method {
+                Method::Paper => {
+                    let z = (x - expected.mean) / expected.sd;
+                    -(libm::logf(expected.sd) + 0.5 * z * z)
+                }
+                _ => self
+                    .student(&mut student, texture, action.movement, property)
+                    .log(x, expected),
+            };
+            if let Some(log) = self.log.get_mut(usize::from(texture)) {
+                *log += likelihood;
             }
         }
+        self.normalise();
+        Ok(())
+    }
+
+    /// All properties: the means of the slides of every movement are compared anew.
+    fn observe_properties(&mut self, action: Action, slide: &Observation) -> Result<(), ObserveError> {
+        for property in self.measured.iter() {
+            Self::value(slide, property)?;
+        }
+        if let Some(visit) = fused::visit(&mut self.visits, action.movement) {
+            visit.slides = visit.slides.saturating_add(1);
+            for (property, sum) in Property::ALL.into_iter().zip(&mut visit.properties) {
+                *sum += Self::value(slide, property).unwrap_or(0.0);
+            }
+        }
+        for log in self.log.iter_mut().filter(|log| **log > f32::NEG_INFINITY) {
+            *log = 0.0;
+        }
+        for at in 0..self.visits.len() {
+            let Some(visit) = self.visits.get(at).copied() else {
+                continue;
+            };
+            for property in self.measured.iter() {
+                let Some(sum) = visit.properties.get(property.index()) else {
+                    continue;
+                };
+                let x = sum / f32::from(visit.slides);
+                let mut student: Option<Student> = None;
+                for texture in 0..self.table.textures() {
+                    let known = self.shrunk_of(texture, visit.movement, property);
+                    let Some((shrunk, known, trials)) = known else {
+                        continue;
+                    };
+                    let expected = shrunk.expect(known, trials, visit.slides);
+                    let student = self.student(&mut student, texture, visit.movement, property);
+                    if let Some(log) = self.log.get_mut(usize::from(texture)) {
+                        *log += student.log(x, expected);
+                    }
+                }
+            }
+        }
+        self.normalise();
+        Ok(())
+    }
+
+    /// All features, whitened.
+    fn observe_features(&mut self, action: Action, slide: &Observation) -> Result<(), ObserveError> {
+        let Contents::Fused(set, features) = self.table.contents() else {
+            return Err(ObserveError::Action(action));
+        };
+        let features = usize::from(features);
+        let white = slide
+            .vector(set, features)
+            .and_then(|vector| self.table.whiten(action.movement, &vector))
+            .ok_or(ObserveError::Features(set))?;
+        let visit = fused::visit(&mut self.visits, action.movement);
+        // beyond 255 slides nothing new is learned
+        if let Some(visit) = visit.filter(|visit| visit.slides < u8::MAX) {
+            visit.slides += 1;
+            for (sum, z) in visit.white.iter_mut().zip(&white) {
+                *sum += i32::from(*z);
+            }
+        }
+        let log = &self.log;
+        let is_candidate = |texture: u16| {
+            let log = log.get(usize::from(texture));
+            log.is_some_and(|&log| log > f32::NEG_INFINITY)
+        };
+        self.log_odds = fused::decide(
+            &self.table,
+            features,
+            &self.visits,
+            is_candidate,
+            &mut self.posterior,
+        );
+        Ok(())
+    }
+
+    /// The posterior (eq. 3) from its logarithms.
+    fn normalise(&mut self) {
+        let top = self.log.iter().copied().fold(f32::NEG_INFINITY, f32::max);
         let mut total = 0.0;
         for (log, posterior) in self.log.iter_mut().zip(&mut self.posterior) {
             // a slide takes at most 1e12 from a candidate: however improbable, it stays one
@@ -340,7 +620,51 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         for posterior in &mut self.posterior {
             *posterior /= total;
         }
-        Ok(())
+    }
+
+    /// What a property of a texture is expected to be in one slide.
+    fn expected(&self, texture: u16, movement: u8, property: Property) -> Option<Gaussian> {
+        if self.config.method == Method::Paper {
+            let property = Some(property);
+            return self.table.gaussian(texture, Action { movement, property });
+        }
+        let (shrunk, known, trials) = self.shrunk_of(texture, movement, property)?;
+        Some(shrunk.expect(known, trials, 1))
+    }
+
+    fn shrunk_of(
+        &self,
+        texture: u16,
+        movement: u8,
+        property: Property,
+    ) -> Option<(Shrunk, Gaussian, u8)> {
+        let at = usize::from(movement) * Property::ALL.len() + property.index();
+        let shrunk = self.shrunk.get(at)?;
+        let known = self.table.gaussian(
+            texture,
+            Action {
+                movement,
+                property: Some(property),
+            },
+        )?;
+        Some((*shrunk, known, self.table.trials(texture, movement)))
+    }
+
+    /// Student's t of a texture; `last` is that of the texture before it, which mostly has as many trials.
+    fn student(
+        &self,
+        last: &mut Option<Student>,
+        texture: u16,
+        movement: u8,
+        property: Property,
+    ) -> Student {
+        let at = usize::from(movement) * Property::ALL.len() + property.index();
+        let others = self.shrunk.get(at).map_or(0.0, |shrunk| shrunk.freedom);
+        let own = f32::from(self.table.trials(texture, movement)) - 1.0;
+        match last {
+            Some(student) if student.freedom() == others + own => *student,
+            _ => *last.insert(Student::new(others + own)),
+        }
     }
 
     /// The next action, where [`Explorer::outlook`] promises `outlook`. `random` decides for [`Strategy::Random`] and is
@@ -359,8 +683,8 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 best.map(|o| o.action)
             }
             Strategy::Cycling => {
-                let turns = self.best_of_each().count().max(1);
-                self.best_of_each().nth(usize::from(self.slides) % turns)
+                let turns = self.turns().count().max(1);
+                self.turns().nth(usize::from(self.slides) % turns)
             }
             Strategy::Random => {
                 let at = (u64::from(random) * self.actions.len() as u64) >> 32;
@@ -370,11 +694,11 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         // there is always an action: `among` refuses to begin without
         chosen.unwrap_or(Action {
             movement: 0,
-            property: Property::Roughness,
+            property: None,
         })
     }
 
-    /// What every action promises now, in the order of [`Action::index`].
+    /// What every action promises now, in their order.
     pub fn outlook(&mut self) -> Vec<Outlook, MAX_ACTIONS> {
         let actions = self.actions.clone().into_iter().zip(self.made.clone());
         let promise = |action, made, uncertainty| Outlook {
@@ -395,18 +719,21 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         }
     }
 
-    /// The best action of each property when nothing is known, properties in their order.
-    pub fn best_of_each(&self) -> impl Iterator<Item = Action> {
-        Property::ALL.into_iter().filter_map(|property| {
+    /// What cycling goes through: the best action of each property when nothing is known, properties in their order; where all
+    /// is looked at, every movement.
+    pub fn turns(&self) -> impl Iterator<Item = Action> {
+        let all = self.actions.iter().copied().filter(|a| a.property.is_none());
+        let each = Property::ALL.into_iter().filter_map(|property| {
             let of_property = self
                 .actions
                 .iter()
                 .zip(&self.at_first)
-                .filter(|(a, _)| a.property == property);
+                .filter(|(a, _)| a.property == Some(property));
             of_property
                 .reduce(|best, next| if next.1 < best.1 { next } else { best })
                 .map(|(&action, _)| action)
-        })
+        });
+        all.chain(each)
     }
 
     /// Expected uncertainty after `action` (eq. 11).
@@ -414,22 +741,43 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     /// Computed as eq. 10: 1 minus a sum that is close to 1 would lose the digits that decide late in an exploration.
     fn uncertainty(&mut self, action: Action) -> f32 {
         self.work.clear();
+        let looked_at: PropertySet = match action.property {
+            Some(property) => [property].into_iter().collect(),
+            None => self.measured,
+        };
+        let nothing = Gaussian { mean: 0.0, sd: 1.0 };
         for (&probability, texture) in self.posterior.iter().zip(0..) {
-            if probability >= NEGLIGIBLE
-                && let Some(expected) = self.table.gaussian(texture, action)
-            {
-                // there is room: `work` is as long as `posterior`
-                let _ = self.work.push(Candidate {
-                    probability,
-                    expected,
-                    confused: 0.0,
-                });
+            if probability < NEGLIGIBLE {
+                continue;
             }
+            let mut expected = [nothing; Property::ALL.len()];
+            for property in looked_at.iter() {
+                let of = self.expected(texture, action.movement, property);
+                if let (Some(slot), Some(of)) = (expected.get_mut(property.index()), of) {
+                    *slot = of;
+                }
+            }
+            // there is room: `work` is as long as `posterior`
+            let _ = self.work.push(Candidate {
+                texture,
+                probability,
+                expected,
+                confused: 0.0,
+            });
         }
+        let is_fused = self.config.method == Method::Fused;
         let mut rest = self.work.as_mut_slice();
         while let Some((a, others)) = rest.split_first_mut() {
             for b in others.iter_mut() {
-                let confusion = confusion::<K>(a.expected, b.expected);
+                let confusion = if is_fused {
+                    fused::confusion(&self.table, action.movement, a.texture, b.texture)
+                } else {
+                    let pairs = a.expected.iter().zip(&b.expected).zip(Property::ALL);
+                    pairs
+                        .filter(|(_, property)| looked_at.contains(*property))
+                        .map(|((a, b), _)| confusion::<K>(*a, *b))
+                        .product()
+                };
                 a.confused += confusion * b.probability;
                 b.confused += confusion * a.probability;
             }

@@ -49,7 +49,7 @@ impl fmt::Display for Property {
 }
 
 /// The properties of one slide; `None` is a property that this rig cannot measure.
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Properties([Option<f32>; 3]);
 
 impl Properties {
@@ -132,6 +132,15 @@ impl FromIterator<Property> for PropertySet {
 
 /// Edges of eight bands from 20 to 1000 Hz in equal ratios, as half-open ranges of bins.
 pub const BAND_EDGES: [usize; 9] = [5, 8, 13, 21, 33, 54, 88, 143, 233];
+
+/// Number of bands of the fused way of deciding.
+pub const FUSED_BANDS: usize = 12;
+/// Their edges, from 17 to 1000 Hz in nearly equal ratios, as half-open ranges of bins.
+pub const FUSED_EDGES: [usize; FUSED_BANDS + 1] =
+    [4, 6, 8, 11, 16, 22, 31, 43, 60, 84, 118, 166, 233];
+/// Added to the mean power of a band of them, counts^2 per bin, before the logarithm: what rounding to whole counts adds to
+/// every bin, and a little more.
+const FUSED_FLOOR: f32 = 0.1;
 
 /// Least share of the background power that a texture's power can be told from it.
 ///
@@ -240,6 +249,8 @@ pub struct Slide<'p, K = Plain> {
     spectrum: SpectrumSum,
     shear_mn: i64,
     shears: u32,
+    /// Sum of P_DC and of its squares, and their number.
+    pdc: (i64, u64, u32),
     lost: u32,
     kernels: PhantomData<K>,
 }
@@ -258,6 +269,7 @@ impl<'p, K: Kernels> Slide<'p, K> {
             spectrum: SpectrumSum::default(),
             shear_mn: 0,
             shears: 0,
+            pdc: (0, 0, 0),
             lost: 0,
             kernels: PhantomData,
         }
@@ -310,6 +322,16 @@ impl<'p, K: Kernels> Slide<'p, K> {
         self.shears += samples_mn.len() as u32;
     }
 
+    /// P_DC at constant speed in counts about that of the lifted finger.
+    pub fn push_pdc(&mut self, samples: &[i16]) {
+        let (sum, squares, number) = &mut self.pdc;
+        for &counts in samples {
+            *sum += i64::from(counts);
+            *squares += u64::from(counts.unsigned_abs()) * u64::from(counts.unsigned_abs());
+        }
+        *number += samples.len() as u32;
+    }
+
     /// So many samples were lost: nothing stands in for them, the slide has no properties.
     pub fn lose(&mut self, samples: u32) {
         self.lost = self.lost.saturating_add(samples);
@@ -347,10 +369,21 @@ impl<'p, K: Kernels> Slide<'p, K> {
         Ok(Measurement {
             properties: Properties::new([traction, Some(roughness), Some(libm::logf(centroid_hz))]),
             roughness_is_bound,
+            pdc: mean_and_sd(self.pdc),
             background,
             spectrum,
         })
     }
+}
+
+/// Mean and standard deviation (n - 1) from sum, sum of squares and number; `None` of fewer than two.
+fn mean_and_sd((sum, squares, number): (i64, u64, u32)) -> Option<(f32, f32)> {
+    if number < 2 {
+        return None;
+    }
+    let (sum, squares, n) = (sum as f64, squares as f64, f64::from(number));
+    let variance = ((squares - sum * sum / n) / (n - 1.0)).max(0.0);
+    Some(((sum / n) as f32, libm::sqrt(variance) as f32))
 }
 
 /// What one slide says about a texture.
@@ -360,6 +393,8 @@ pub struct Measurement {
     pub properties: Properties,
     /// The texture is at most this rough: its power is lost in the background (see [`roughness`]).
     pub roughness_is_bound: bool,
+    /// Mean and standard deviation of P_DC during the slide in counts about the lifted finger's; `None` if it was not given.
+    pub pdc: Option<(f32, f32)>,
     /// Power of the still finger in counts^2.
     pub background: f32,
     /// Averaged spectrum of the unfiltered P_AC, window mean removed.
@@ -370,10 +405,24 @@ impl Measurement {
     /// Natural logarithms of the eight band powers of [`BAND_EDGES`] in counts^2 per bin, each with 0.001 added so that
     /// silence has a value.
     pub fn ln_bands(&self) -> [f32; BAND_EDGES.len() - 1] {
-        let mut bands = [0.0; BAND_EDGES.len() - 1];
-        for (band, edges) in bands.iter_mut().zip(BAND_EDGES.windows(2)) {
+        self.ln_powers(BAND_EDGES, 1e-3)
+    }
+
+    /// Natural logarithms of the twelve band powers of [`FUSED_EDGES`] in counts^2 per bin, each with 0.1 added: silence has
+    /// a value, and what is far below a count has hardly any.
+    pub fn fused_bands(&self) -> [f32; FUSED_BANDS] {
+        self.ln_powers(FUSED_EDGES, FUSED_FLOOR)
+    }
+
+    fn ln_powers<const EDGES: usize, const BANDS: usize>(
+        &self,
+        edges: [usize; EDGES],
+        floor: f32,
+    ) -> [f32; BANDS] {
+        let mut bands = [0.0; BANDS];
+        for (band, edges) in bands.iter_mut().zip(edges.windows(2)) {
             if let &[low, high] = edges {
-                *band = libm::logf(self.spectrum.band(low..high) + 1e-3);
+                *band = libm::logf(self.spectrum.band(low..high) + floor);
             }
         }
         bands

@@ -17,6 +17,7 @@ use core::fmt;
 
 use crate::explorer::{Explorer, ObserveError, Outlook, Verdict};
 use crate::features::{Measurement, Plan, PropertySet, Slide, SlideError};
+use crate::fused::Observation;
 use crate::kernels::Kernels;
 use crate::movement::Movement;
 use crate::table::Action;
@@ -131,7 +132,7 @@ pub async fn explore<R: Rig, const N: usize, K: Kernels>(
             .map_err(Rejection::Slide)
             .and_then(|measurement| {
                 explorer
-                    .observe(action, &measurement.properties)
+                    .observe(action, &Observation::from(&measurement))
                     .map_err(Rejection::Observe)?;
                 Ok(measurement)
             });

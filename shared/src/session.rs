@@ -6,15 +6,17 @@ use core::fmt::{self, Write as _};
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
-use crate::explorer::{Config, Explorer};
+use crate::explorer::{Config, Explorer, Method};
 use crate::features::{Plan, Slide};
+use crate::fused::{Observation, Vector};
 use crate::kernels::Kernels;
 use crate::movement::Movement;
 use crate::rig::guard::Fault;
 use crate::rig::pins::Felt;
 use crate::rig::{Event, MAX_REJECTED, Rig, explore};
 use crate::store::Store;
-use crate::table::{MAX_ACTIONS, MAX_MOVEMENTS, Table};
+use crate::table::{Contents, MAX_ACTIONS, MAX_MOVEMENTS, Table};
+use crate::teaching::forget_stale;
 use crate::training::{Training, Wanted};
 use crate::wire::{Block, Identify, MAX_OUTLOOK, MAX_TEXTURES, Name, Promise, Tell, Text, Train};
 
@@ -60,6 +62,19 @@ impl Random {
     }
 }
 
+/// What an exploration can teach, until the next one begins.
+#[derive(Clone, Debug)]
+pub struct Visited {
+    /// Checksum of the table that was explored with.
+    pub table: u32,
+    /// The most probable texture.
+    pub texture: u16,
+    /// Whether the probe may learn from it by itself.
+    pub certain: bool,
+    /// The movements made, with the number of slides and their whitened mean; none with a table of Gaussians.
+    pub felt: Vec<(u8, u8, Vector), MAX_MOVEMENTS>,
+}
+
 /// Explores what lies under the finger until there is an answer, which is told; the error is why there is none.
 ///
 /// # Errors
@@ -70,16 +85,19 @@ pub async fn identify<R, K>(
     table: Table<'_>,
     plan: &Plan,
     mut tell: impl FnMut(Tell),
-) -> Result<(), Text>
+) -> Result<Visited, Text>
 where
     R: Rig,
     R::Error: fmt::Display,
     K: Kernels,
 {
+    let contents = table.contents();
     let config = Config {
+        method: wanted.method.unwrap_or(Method::of(contents)),
         strategy: wanted.strategy,
         threshold: wanted.threshold,
         max_slides: wanted.max_slides,
+        open: wanted.open,
     };
     let mut explorer = if wanted.among.is_empty() {
         Explorer::<'_, MAX_TEXTURES, K>::new(table, rig.measures(), config)
@@ -138,9 +156,17 @@ where
         name: Name::try_from(name).unwrap_or_default(),
         probability: verdict.probability,
         sure: verdict.sure,
+        unknown: verdict.unknown,
+        log_odds: verdict.log_odds,
         slides: explorer.slides(),
+        asks: matches!(contents, Contents::Fused(..)) && !explorer.is_certain(),
     });
-    Ok(())
+    Ok(Visited {
+        table: table.crc(),
+        texture: verdict.texture,
+        certain: explorer.is_certain(),
+        felt: explorer.felt().collect(),
+    })
 }
 
 /// Learns the texture under the finger on top of `table`, and goes on where an earlier training of it stopped: every trial
@@ -180,8 +206,8 @@ where
         training.learned().iter().map(|(m, _)| *m).collect();
     for movement in movements {
         let before = store.trained(name, movement, training.table()).await;
-        if let Some(experience) = before.map_err(text)? {
-            training.resume(movement, experience).map_err(text)?;
+        if let Some(lesson) = before.map_err(text)? {
+            training.resume(movement, lesson).map_err(text)?;
         }
     }
     let mut rejected = 0;
@@ -189,7 +215,7 @@ where
         let mut slide = Slide::<K>::new(plan);
         rig.perform(movement, &mut slide).await.map_err(text)?;
         let felt = match slide.finish() {
-            Ok(measurement) => match training.took(movement, &measurement.properties) {
+            Ok(measurement) => match training.took(Some(&table), movement, &Observation::from(&measurement)) {
                 Ok(trained) => Ok((trained, measurement)),
                 Err(why) => Err(text(why)),
             },
@@ -201,7 +227,7 @@ where
                 store.set_trained(&trained).await.map_err(text)?;
                 tell(Tell::Learned {
                     movement,
-                    trial: trained.experience.trials(),
+                    trial: trained.lesson.trials(),
                     left: training.left(),
                     felt: (&measurement).into(),
                 });
@@ -220,13 +246,33 @@ where
     }
     if training.makes_table() {
         let new = training.encode(Some(&table), room).map_err(text)?;
-        let length = new.as_bytes().len();
-        store.begin_table(length).await.map_err(text)?;
-        store.write_table(0, new.as_bytes()).await.map_err(text)?;
-        store.commit_table(room).await.map_err(text)?;
+        let number = new.find(name).map(|texture| new.number(texture));
+        let (length, lineage) = (new.as_bytes().len(), new.lineage());
+        if table.find(name).is_none() {
+            forget_stale(&table, store).await?;
+        }
+        commit(store, room, length).await?;
+        if let Some(number) = number {
+            // what the user teaches stands in place of what the probe had taught itself
+            let self_taught = store.forget_self_taught(Some((lineage, number))).await;
+            self_taught.map_err(text)?;
+        }
         // what the table holds now need not be kept beside it
         store.forget_trained(name).await.map_err(text)?;
     }
+    Ok(())
+}
+
+/// Makes the table at the beginning of `room` the one in use.
+pub(crate) async fn commit<F: NorFlash>(
+    store: &mut Store<F>,
+    room: &mut [u8],
+    length: usize,
+) -> Result<(), Text> {
+    store.begin_table(length).await.map_err(text)?;
+    let table = room.get(..length).unwrap_or_default();
+    store.write_table(0, table).await.map_err(text)?;
+    store.commit_table(room).await.map_err(text)?;
     Ok(())
 }
 

@@ -5,7 +5,7 @@
 //! | sector | what |
 //! |---|---|
 //! | 0, 1 | one texture table each, see [`Store::begin_table`] |
-//! | 2, 3 | settings: calibration, skin care, progress of the training |
+//! | 2, 3 | settings: calibration, skin care, progress of the training, what the probe has learned by itself |
 //!
 //! A cut at any moment, in the middle of a word or of an erase as well, leaves the state before an operation or the one
 //! after it. The same goes for a future that is dropped before its end; open the store anew then.
@@ -41,7 +41,7 @@ mod pages;
 mod settings;
 mod slots;
 
-pub use settings::{MAX_RECORDS, SCHEMA, SettingsError, Trained};
+pub use settings::{MAX_RECORDS, SCHEMA, SELF_MOVEMENTS, SelfTaught, SettingsError, Trained};
 pub use slots::StoredTable;
 
 const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);

@@ -1,24 +1,29 @@
 //! The texture table: what every known texture feels like at every movement, in fixed point.
 //!
-//! A [`Table`] borrows the binary form, from flash or a file, and copies nothing. [`Experience`] is what learning keeps
-//! for one texture and movement; [`encode`] writes a table of it, and [`Table::experience`] gives it back, so that a
-//! table can go on learning.
+//! A [`Table`] borrows the binary form, from flash or a file, and copies nothing. There are two kinds of contents, for the
+//! two ways of deciding: one Gaussian per (texture, movement, property), learned as [`Experience`] and written by
+//! [`encode`]; or the mean of all features of a slide in whitened space, learned as [`Whitened`] and written by
+//! [`encode_fused`]. [`amend`] teaches, renames and forgets textures of either kind.
 //!
-//! # Binary form, version 1, little-endian
+//! # Binary form, version 2, little-endian
 //!
 //! | bytes | what |
 //! |---|---|
 //! | 4 | magic `TACT` |
-//! | 2 | version, 1 |
-//! | 1 | method, 0: one Gaussian per (texture, movement, property) |
-//! | 1 | properties measured, a bit each: 1 traction, 2 roughness, 4 fineness |
+//! | 2 | version, 2 |
+//! | 1 | contents, 0: Gaussians, 1: fused |
+//! | 1 | Gaussians: properties measured, a bit each: 1 traction, 2 roughness, 4 fineness; fused: place in [`FeatureSet::ALL`] |
 //! | 4 | length of the whole table in bytes |
 //! | 2 | number of textures T |
 //! | 1 | number of movements M |
-//! | 1 | 0 |
+//! | 1 | Gaussians: 0; fused: number of features d |
 //! | 6 M | per movement: force in mN (2), speed in um/s (4) |
-//! | 12 T M | per texture, movement and property: mean (i16, see [`mean_step`]), standard deviation (u16, [`SD_STEP`]); 0 and 0 for a property not measured |
+//! | M (3 d + d (d + 1)) | fused only, per movement a [`Whitening`]: d means of the features (i16, 1/1024), binary places of d rows (u8), the rows of W up to the diagonal (i16) |
+//! | 12 T M | Gaussians: per texture, movement and property: mean (i16, see [`mean_step`]), standard deviation (u16, [`SD_STEP`]); 0 and 0 for a property not measured |
+//! | 2 d T M | fused: per texture and movement: mean of the d whitened features (i16, 1/256) |
 //! | T M | per texture and movement: number of trials, 255 for more |
+//! | 4 | CRC-32 of the table that this one was made from by teaching, the first of all; 0 for none |
+//! | 5 T | per texture: a number that stays its own (2); slides that were learned from the factory, the user and itself (1 each, 255 for more) |
 //! | | per texture: length of its name (1), the name in UTF-8 |
 //! | 4 | CRC-32 (ISO-HDLC) of all before |
 
@@ -28,18 +33,22 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 use serde::{Deserialize, Serialize};
 
 use crate::features::{Property, PropertySet};
+use crate::fused::{FeatureSet, MAX_FEATURES, Vector, Whitened, Whitening};
 use crate::movement::{Movement, MovementError};
 
 mod encode;
 mod experience;
 
-pub use encode::{EncodeError, Texture, amend, encode, encoded_len};
+pub use encode::{
+    Change, EncodeError, Known, Texture, amend, encode, encode_fused, encoded_len, retell,
+};
 pub use experience::{Experience, Gaussian};
 
 const MAGIC: [u8; 4] = *b"TACT";
 /// Version of the binary form that this code reads and writes.
-pub const VERSION: u16 = 1;
-const METHOD_GAUSSIAN: u8 = 0;
+pub const VERSION: u16 = 2;
+const GAUSSIANS: u8 = 0;
+const FUSED: u8 = 1;
 const HEADER: usize = 16;
 const MOVEMENT_BYTES: usize = 6;
 const PROPERTIES: usize = Property::ALL.len();
@@ -66,20 +75,44 @@ pub const fn mean_step(property: Property) -> f32 {
     }
 }
 
-/// What an exploration does next: makes one of the table's movements and measures one property of it.
+/// What an exploration does next: makes one of the table's movements and looks at one property of it, or at all that the
+/// slide says.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 pub struct Action {
     /// Index of the movement in the table.
     pub movement: u8,
-    /// The property measured.
-    pub property: Property,
+    /// The property looked at; `None` for all that the slide says.
+    pub property: Option<Property>,
 }
 
 impl Action {
-    /// Place among a table's actions: movement by movement, properties in the order of [`Property::ALL`].
-    pub const fn index(self) -> usize {
-        self.movement as usize * PROPERTIES + self.property.index()
+    /// The property looked at, in words.
+    pub const fn what(self) -> &'static str {
+        match self.property {
+            Some(property) => property.name(),
+            None => "all",
+        }
     }
+}
+
+/// What a table knows of a texture.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Contents {
+    /// A Gaussian per (movement, property), of these properties.
+    Gaussians(PropertySet),
+    /// The whitened mean of this many features per movement.
+    Fused(FeatureSet, u8),
+}
+
+/// From whom a texture was learned, in slides; 255 for more.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+pub struct Tally {
+    /// From whoever made the table.
+    pub factory: u8,
+    /// From the user, by teaching or by an answer.
+    pub user: u8,
+    /// From the probe's own certain verdicts.
+    pub itself: u8,
 }
 
 /// Why bytes are no texture table.
@@ -112,7 +145,7 @@ pub enum TableError {
         /// Checksum of the bytes.
         computed: u32,
     },
-    /// No texture, no movement or no property, too many movements, or a reserved byte that is not 0.
+    /// No texture, no movement or no property, too many movements or features, or a reserved byte that is not 0.
     Header,
     /// A movement that no rig makes.
     Movement(u8, MovementError),
@@ -125,8 +158,12 @@ pub enum TableError {
         /// The action concerned.
         action: Action,
     },
+    /// A whitening that cannot be one.
+    Whitening(u8),
     /// A name that is empty, not UTF-8, or another texture's as well.
     Name(u16),
+    /// A texture has the number of another one.
+    Number(u16),
 }
 
 impl fmt::Display for TableError {
@@ -166,8 +203,14 @@ impl fmt::Display for TableError {
                 "texture {}, movement {}, {}: trials, but no standard deviation",
                 texture + 1,
                 action.movement + 1,
-                action.property
+                action.what()
             ),
+            Self::Whitening(index) => {
+                write!(f, "the whitening of movement {} is damaged", index + 1)
+            }
+            Self::Number(texture) => {
+                write!(f, "texture {} has another's number", texture + 1)
+            }
             Self::Name(texture) => {
                 write!(
                     f,
@@ -187,25 +230,70 @@ pub struct Table<'a> {
     bytes: &'a [u8],
     textures: u16,
     movements: u8,
-    measured: PropertySet,
+    contents: Contents,
 }
 
-/// Where the parts of a table with these counts begin.
+/// Bytes of a texture's number and tally.
+const LABEL_BYTES: usize = 5;
+
+/// Where the parts of a table begin.
 struct Layout {
+    whitenings: usize,
     cells: usize,
     trials: usize,
+    lineage: usize,
+    labels: usize,
     names: usize,
 }
 
-impl Layout {
-    const fn new(textures: usize, movements: usize) -> Self {
-        let cells = HEADER + movements * MOVEMENT_BYTES;
-        let trials = cells + textures * movements * PROPERTIES * CELL_BYTES;
-        Self {
+impl Contents {
+    /// Bytes of a movement's whitening, and of a texture's cells at a movement.
+    const fn sizes(self) -> (usize, usize) {
+        match self {
+            Self::Gaussians(_) => (0, PROPERTIES * CELL_BYTES),
+            Self::Fused(_, features) => {
+                (Whitening::bytes(features as usize), 2 * features as usize)
+            }
+        }
+    }
+
+    const fn layout(self, textures: usize, movements: usize) -> Layout {
+        let (whitening, cell) = self.sizes();
+        let whitenings = HEADER + movements * MOVEMENT_BYTES;
+        let cells = whitenings + movements * whitening;
+        let trials = cells + textures * movements * cell;
+        let lineage = trials + textures * movements;
+        let labels = lineage + 4;
+        Layout {
+            whitenings,
             cells,
             trials,
-            names: trials + textures * movements,
+            lineage,
+            labels,
+            names: labels + textures * LABEL_BYTES,
         }
+    }
+
+    /// The three bytes of the header that say so.
+    const fn codes(self) -> [u8; 3] {
+        match self {
+            Self::Gaussians(measured) => [GAUSSIANS, measured.bits(), 0],
+            Self::Fused(set, features) => [FUSED, set as u8, features],
+        }
+    }
+
+    fn from_codes([contents, what, features]: [u8; 3]) -> Result<Self, TableError> {
+        match contents {
+            GAUSSIANS => PropertySet::from_bits(what)
+                .filter(|set| !set.is_empty() && features == 0)
+                .map(Self::Gaussians),
+            FUSED => FeatureSet::ALL
+                .get(usize::from(what))
+                .filter(|set| set.allows(features.into()))
+                .map(|set| Self::Fused(*set, features)),
+            other => return Err(TableError::Method(other)),
+        }
+        .ok_or(TableError::Header)
     }
 }
 
@@ -231,8 +319,8 @@ impl<'a> Table<'a> {
             m3,
             v0,
             v1,
-            method,
-            measured,
+            code,
+            what,
             l0,
             l1,
             l2,
@@ -240,7 +328,7 @@ impl<'a> Table<'a> {
             t0,
             t1,
             movements,
-            reserved,
+            features,
         ] = *header;
         if [m0, m1, m2, m3] != MAGIC {
             return Err(TableError::Magic([m0, m1, m2, m3]));
@@ -259,25 +347,16 @@ impl<'a> Table<'a> {
         if stored != computed {
             return Err(TableError::Crc { stored, computed });
         }
-        if method != METHOD_GAUSSIAN {
-            return Err(TableError::Method(method));
-        }
+        let contents = Contents::from_codes([code, what, features])?;
         let textures = u16::from_le_bytes([t0, t1]);
-        let measured = PropertySet::from_bits(measured)
-            .filter(|set| !set.is_empty())
-            .ok_or(TableError::Header)?;
-        if textures == 0
-            || movements == 0
-            || usize::from(movements) > MAX_MOVEMENTS
-            || reserved != 0
-        {
+        if textures == 0 || movements == 0 || usize::from(movements) > MAX_MOVEMENTS {
             return Err(TableError::Header);
         }
         let table = Self {
             bytes,
             textures,
             movements,
-            measured,
+            contents,
         };
         table.check()?;
         Ok(table)
@@ -300,14 +379,17 @@ impl<'a> Table<'a> {
                 return Err(TableError::TwinMovement(index));
             }
         }
+        match self.contents {
+            Contents::Gaussians(measured) => self.check_deviations(measured)?,
+            Contents::Fused(..) => {
+                let broken = (0..self.movements).find(|&m| self.whitening(m).is_none());
+                broken.map_or(Ok(()), |m| Err(TableError::Whitening(m)))?;
+            }
+        }
         for texture in 0..self.textures {
-            for action in self
-                .actions()
-                .filter(|a| self.trials(texture, a.movement) >= 2)
-            {
-                if self.cell(texture, action).is_none_or(|(_, sd)| sd == 0) {
-                    return Err(TableError::Deviation { texture, action });
-                }
+            let number = self.number(texture);
+            if (0..texture).any(|other| self.number(other) == number) {
+                return Err(TableError::Number(texture));
             }
         }
         for texture in 0..self.textures {
@@ -328,8 +410,25 @@ impl<'a> Table<'a> {
         Ok(())
     }
 
+    fn check_deviations(&self, measured: PropertySet) -> Result<(), TableError> {
+        for texture in 0..self.textures {
+            for movement in (0..self.movements).filter(|&m| self.trials(texture, m) >= 2) {
+                for property in measured.iter() {
+                    let cell = self.cell(texture, movement, property);
+                    if cell.is_none_or(|(_, sd)| sd == 0) {
+                        let property = Some(property);
+                        let action = Action { movement, property };
+                        return Err(TableError::Deviation { texture, action });
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
     fn layout(&self) -> Layout {
-        Layout::new(self.textures.into(), self.movements.into())
+        self.contents
+            .layout(self.textures.into(), self.movements.into())
     }
 
     fn stored_movement(&self, index: u8) -> Option<(u16, u32)> {
@@ -340,19 +439,23 @@ impl<'a> Table<'a> {
         ))
     }
 
-    /// Stored mean and standard deviation of a property that was measured.
-    fn cell(&self, texture: u16, action: Action) -> Option<(i16, u16)> {
-        if texture >= self.textures
-            || action.movement >= self.movements
-            || !self.measured.contains(action.property)
-        {
+    /// The bytes of a texture's cell at a movement.
+    fn cell_bytes(&self, texture: u16, movement: u8) -> Option<&'a [u8]> {
+        if texture >= self.textures || movement >= self.movements {
             return None;
         }
-        let row = usize::from(texture) * usize::from(self.movements) * PROPERTIES;
-        let [m0, m1, s0, s1] = array(
-            self.bytes,
-            self.layout().cells + (row + action.index()) * CELL_BYTES,
-        )?;
+        let (_, cell) = self.contents.sizes();
+        let index = usize::from(texture) * usize::from(self.movements) + usize::from(movement);
+        self.bytes.get(self.layout().cells + index * cell..)?.get(..cell)
+    }
+
+    /// Stored mean and standard deviation of a property that was measured.
+    fn cell(&self, texture: u16, movement: u8, property: Property) -> Option<(i16, u16)> {
+        if !self.measured().contains(property) {
+            return None;
+        }
+        let cells = self.cell_bytes(texture, movement)?;
+        let [m0, m1, s0, s1] = array(cells, property.index() * CELL_BYTES)?;
         Some((i16::from_le_bytes([m0, m1]), u16::from_le_bytes([s0, s1])))
     }
 
@@ -371,9 +474,17 @@ impl<'a> Table<'a> {
         self.textures
     }
 
-    /// The properties that the table was learned from.
+    /// What the table knows of a texture.
+    pub fn contents(&self) -> Contents {
+        self.contents
+    }
+
+    /// The properties that there are Gaussians of.
     pub fn measured(&self) -> PropertySet {
-        self.measured
+        match self.contents {
+            Contents::Gaussians(measured) => measured,
+            Contents::Fused(..) => PropertySet::default(),
+        }
     }
 
     /// The movements, in the order of [`Action::movement`].
@@ -391,13 +502,15 @@ impl<'a> Table<'a> {
         Movement::new(force_mn, speed_um_s).ok()
     }
 
-    /// All (movement, property) pairs that were measured, in the order of [`Action::index`].
+    /// All (movement, property) pairs that there are Gaussians of, movement by movement, properties in the order of
+    /// [`Property::ALL`].
     pub fn actions(&self) -> impl Iterator<Item = Action> + use<> {
-        let measured = self.measured;
+        let measured = self.measured();
         (0..self.movements).flat_map(move |movement| {
-            measured
-                .iter()
-                .map(move |property| Action { movement, property })
+            measured.iter().map(move |property| Action {
+                movement,
+                property: Some(property),
+            })
         })
     }
 
@@ -441,9 +554,10 @@ impl<'a> Table<'a> {
         if self.trials(texture, action.movement) < 2 {
             return None;
         }
-        let (mean, sd) = self.cell(texture, action)?;
+        let property = action.property?;
+        let (mean, sd) = self.cell(texture, action.movement, property)?;
         Some(Gaussian {
-            mean: f32::from(mean) * mean_step(action.property),
+            mean: f32::from(mean) * mean_step(property),
             sd: f32::from(sd) * SD_STEP,
         })
     }
@@ -462,14 +576,98 @@ impl<'a> Table<'a> {
             .into_iter()
             .zip(experience.mean.iter_mut().zip(&mut experience.squares))
         {
-            let (m, sd) = self
-                .cell(texture, Action { movement, property })
-                .unwrap_or_default();
+            let (m, sd) = self.cell(texture, movement, property).unwrap_or_default();
             let sd = f32::from(sd) * SD_STEP;
             *mean = f32::from(m) * mean_step(property);
             *squares = sd * sd * f32::from(trials - 1);
         }
         experience
+    }
+
+    /// How features are whitened at a movement; `None` in a table of Gaussians and outside the table.
+    pub fn whitening(&self, movement: u8) -> Option<Whitening> {
+        let Contents::Fused(_, features) = self.contents else {
+            return None;
+        };
+        if movement >= self.movements {
+            return None;
+        }
+        let length = Whitening::bytes(features.into());
+        let at = self.layout().whitenings + usize::from(movement) * length;
+        Whitening::read(self.bytes.get(at..)?.get(..length)?, features.into())
+    }
+
+    /// The whitened mean of a texture at a movement, in steps of 1/256 standard deviation; none in a table of Gaussians and
+    /// outside the table.
+    pub fn white_mean(
+        &self,
+        texture: u16,
+        movement: u8,
+    ) -> impl ExactSizeIterator<Item = i16> + Clone + use<'a> {
+        let cells = match self.contents {
+            Contents::Fused(..) => self.cell_bytes(texture, movement).unwrap_or_default(),
+            Contents::Gaussians(_) => &[],
+        };
+        cells.chunks_exact(2).map(|pair| match pair {
+            &[low, high] => i16::from_le_bytes([low, high]),
+            _ => 0,
+        })
+    }
+
+    /// What was learned of a texture at a movement in a fused table, to go on from.
+    pub fn whitened(&self, texture: u16, movement: u8) -> Whitened {
+        let mut whitened = Whitened {
+            slides: self.trials(texture, movement),
+            mean: [0; MAX_FEATURES],
+        };
+        for (mean, stored) in whitened.mean.iter_mut().zip(self.white_mean(texture, movement)) {
+            *mean = stored;
+        }
+        whitened
+    }
+
+    /// Whitens features at a movement; `None` as [`Table::whitening`].
+    pub fn whiten(&self, movement: u8, features: &[i16]) -> Option<Vector> {
+        Some(self.whitening(movement)?.apply(features))
+    }
+
+    fn label(&self, texture: u16) -> [u8; LABEL_BYTES] {
+        let at = self.layout().labels + usize::from(texture) * LABEL_BYTES;
+        let label = (texture < self.textures).then(|| array(self.bytes, at));
+        label.flatten().unwrap_or_default()
+    }
+
+    /// A texture's number, which stays its own when others are forgotten or it is renamed.
+    pub fn number(&self, texture: u16) -> u16 {
+        let [low, high, ..] = self.label(texture);
+        u16::from_le_bytes([low, high])
+    }
+
+    /// The number that one more texture gets.
+    pub fn next_number(&self) -> u16 {
+        let numbers = (0..self.textures).map(|texture| self.number(texture));
+        numbers.max().map_or(0, |most| most.wrapping_add(1))
+    }
+
+    /// The texture with this number.
+    pub fn numbered(&self, number: u16) -> Option<u16> {
+        (0..self.textures).find(|&texture| self.number(texture) == number)
+    }
+
+    /// From whom a texture was learned.
+    pub fn tally(&self, texture: u16) -> Tally {
+        let [_, _, factory, user, itself] = self.label(texture);
+        Tally {
+            factory,
+            user,
+            itself,
+        }
+    }
+
+    /// The checksum of the table that was in the beginning, before anything was taught: its own, if nothing was.
+    pub fn lineage(&self) -> u32 {
+        let stored = array(self.bytes, self.layout().lineage).map_or(0, u32::from_le_bytes);
+        if stored == 0 { self.crc() } else { stored }
     }
 
     /// The checksum, which also tells one table from another.

@@ -15,11 +15,15 @@ use core::fmt;
 
 use heapless::Vec;
 
-use crate::features::{Properties, Property, PropertySet};
+use serde::{Deserialize, Serialize};
+
+use crate::features::{Property, PropertySet};
+use crate::fused::{FeatureSet, Observation, Whitened};
 use crate::movement::Movement;
 use crate::store::Trained;
 use crate::table::{
-    EncodeError, Experience, MAX_MOVEMENTS, Table, Texture, amend, encode, encoded_len,
+    Change, Contents, EncodeError, Experience, Known, MAX_MOVEMENTS, Table, Tally, Texture, amend,
+    encode, encoded_len,
 };
 use crate::wire::{MAX_TEXTURES, Name};
 
@@ -30,8 +34,27 @@ pub const FIRST_MOVEMENTS: [Movement; 3] = [
     Movement::FOR_ROUGHNESS,
 ];
 
-/// Fewest trials that a standard deviation can be had of.
+/// Fewest trials that a standard deviation can be had of. A fused table has those of all textures and needs one.
 pub const LEAST_TRIALS: u8 = 2;
+
+/// What was learned of a texture at one movement, as the table that it is for keeps it.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub enum Lesson {
+    /// For a table of Gaussians.
+    Gaussians(Experience),
+    /// For a fused table.
+    Fused(Whitened),
+}
+
+impl Lesson {
+    /// Trials so far.
+    pub const fn trials(&self) -> u8 {
+        match self {
+            Self::Gaussians(experience) => experience.trials(),
+            Self::Fused(whitened) => whitened.slides,
+        }
+    }
+}
 
 /// Movements of a pilot: the grid up to 1.26 N; with more force the skin touches the core (fig. 3).
 pub fn pilot_movements() -> impl Iterator<Item = Movement> {
@@ -53,6 +76,10 @@ pub enum TrainingError {
     Measures(Option<Property>),
     /// The slide has no value of this property; it does not count.
     Missing(Property),
+    /// This rig, or the slide, does not have the features of the table.
+    Features(FeatureSet),
+    /// What was stored of this training is for another kind of table.
+    Lesson,
     /// A movement that is none of this training's.
     Movement(Movement),
     /// Trials are missing.
@@ -75,7 +102,7 @@ impl fmt::Display for TrainingError {
             ),
             Self::Trials(trials) => write!(
                 f,
-                "{trials} trials give no standard deviation: {LEAST_TRIALS} or more"
+                "{trials} trials give no standard deviation: {LEAST_TRIALS} or more, 1 or more for a fused table"
             ),
             Self::Textures => write!(f, "the table has {MAX_TEXTURES} textures: it is full"),
             Self::Room(bytes) => write!(
@@ -90,6 +117,12 @@ impl fmt::Display for TrainingError {
             }
             Self::Measures(None) => f.write_str("this rig measures no property"),
             Self::Missing(property) => write!(f, "the slide has no {property}: slide again"),
+            Self::Features(set) => {
+                write!(f, "the table was learned from {}, which are not measured here", set.name())
+            }
+            Self::Lesson => f.write_str(
+                "what is stored of this training is for another kind of table: forget it, and begin again",
+            ),
             Self::Movement(movement) => write!(f, "{movement} is no part of this training"),
             Self::Unfinished(movement) => write!(f, "trials at {movement} are missing"),
             Self::Pilot => f.write_str("the movements of the pilot are not those of the table"),
@@ -121,14 +154,15 @@ pub struct Wanted<'n> {
 pub struct Training {
     name: Name,
     trials: u8,
-    measured: PropertySet,
+    /// What its table knows of a texture.
+    contents: Contents,
     /// Checksum of the table that there was at the beginning.
     table: Option<u32>,
     /// Whether trials of that table are counted in.
     goes_on: bool,
     /// Whether a table can be made of it.
     makes_table: bool,
-    learned: Vec<(Movement, Experience), MAX_MOVEMENTS>,
+    learned: Vec<(Movement, Lesson), MAX_MOVEMENTS>,
 }
 
 impl Training {
@@ -148,28 +182,53 @@ impl Training {
         if name.is_empty() {
             return Err(TrainingError::Name(0));
         }
-        if wanted.trials < LEAST_TRIALS {
-            return Err(TrainingError::Trials(wanted.trials));
-        }
-        let measured = table.map_or(wanted.measures, Table::measured);
-        if measured.is_empty() {
-            return Err(TrainingError::Measures(None));
-        }
-        if let Some(missing) = measured.iter().find(|p| !wanted.measures.contains(*p)) {
-            return Err(TrainingError::Measures(Some(missing)));
-        }
         let makes_table = match table {
             Some(table) => !wanted.pilot || table.movements().eq(pilot_movements()),
             None => true,
         };
+        let contents = match table {
+            Some(table) if makes_table => table.contents(),
+            // a pilot is about properties
+            Some(table) if !table.measured().is_empty() => table.contents(),
+            _ => Contents::Gaussians(wanted.measures),
+        };
+        match contents {
+            Contents::Gaussians(measured) => {
+                if wanted.trials < LEAST_TRIALS {
+                    return Err(TrainingError::Trials(wanted.trials));
+                }
+                if measured.is_empty() {
+                    return Err(TrainingError::Measures(None));
+                }
+                if let Some(missing) = measured.iter().find(|p| !wanted.measures.contains(*p)) {
+                    return Err(TrainingError::Measures(Some(missing)));
+                }
+            }
+            Contents::Fused(set, _) => {
+                if wanted.trials == 0 {
+                    return Err(TrainingError::Trials(0));
+                }
+                if !set.measured_by(wanted.measures) {
+                    return Err(TrainingError::Features(set));
+                }
+            }
+        }
+        let untouched = match contents {
+            Contents::Gaussians(_) => Lesson::Gaussians(Experience::default()),
+            Contents::Fused(..) => Lesson::Fused(Whitened::default()),
+        };
+        let untouched = |movement| (movement, untouched);
         let known = table
             .filter(|_| makes_table)
             .and_then(|table| Some((table, table.find(&name)?)));
         let mut learned = Vec::new();
         match table.filter(|_| makes_table) {
             Some(table) => learned.extend(table.movements().zip(0..).map(|(movement, index)| {
-                let known = known.map(|(table, texture)| table.experience(texture, index));
-                (movement, known.unwrap_or_default())
+                let known = known.map(|(table, texture)| match contents {
+                    Contents::Gaussians(_) => Lesson::Gaussians(table.experience(texture, index)),
+                    Contents::Fused(..) => Lesson::Fused(table.whitened(texture, index)),
+                });
+                (movement, known.unwrap_or(untouched(movement).1))
             })),
             None if wanted.pilot => learned.extend(pilot_movements().map(untouched)),
             None => learned.extend(FIRST_MOVEMENTS.into_iter().map(untouched)),
@@ -184,7 +243,7 @@ impl Training {
                 .flat_map(Table::names)
                 .chain([wanted.name]);
             let names = names.map(|name| 1 + name.len()).sum();
-            let length = encoded_len(textures, learned.len(), names);
+            let length = encoded_len(contents, textures, learned.len(), names);
             if length > room {
                 return Err(TrainingError::Room(length));
             }
@@ -192,7 +251,7 @@ impl Training {
         Ok(Self {
             name,
             trials: wanted.trials,
-            measured,
+            contents,
             table: table.map(Table::crc),
             goes_on: known.is_some(),
             makes_table,
@@ -217,20 +276,24 @@ impl Training {
     }
 
     /// Movements and what has been learned at them.
-    pub fn learned(&self) -> &[(Movement, Experience)] {
+    pub fn learned(&self) -> &[(Movement, Lesson)] {
         &self.learned
     }
 
     /// Takes up what was stored of this training at a movement.
     ///
     /// # Errors
-    /// [`TrainingError::Movement`].
-    pub fn resume(
-        &mut self,
-        movement: Movement,
-        experience: Experience,
-    ) -> Result<(), TrainingError> {
-        *self.at(movement)? = experience;
+    /// [`TrainingError::Movement`], [`TrainingError::Lesson`].
+    pub fn resume(&mut self, movement: Movement, lesson: Lesson) -> Result<(), TrainingError> {
+        let fits = matches!(
+            (lesson, self.contents),
+            (Lesson::Gaussians(_), Contents::Gaussians(_)) | (Lesson::Fused(_), Contents::Fused(..))
+        );
+        let at = self.at(movement)?;
+        if !fits {
+            return Err(TrainingError::Lesson);
+        }
+        *at = lesson;
         Ok(())
     }
 
@@ -249,22 +312,35 @@ impl Training {
             .sum()
     }
 
-    /// Takes a slide in, and gives what is to be stored.
+    /// Takes a slide in, and gives what is to be stored. `table` is the one that the training was begun with.
     ///
     /// # Errors
-    /// [`TrainingError::Movement`], [`TrainingError::Missing`]: the slide does not count.
+    /// [`TrainingError::Movement`], [`TrainingError::Missing`], [`TrainingError::Features`]: the slide does not count.
     pub fn took(
         &mut self,
+        table: Option<&Table<'_>>,
         movement: Movement,
-        properties: &Properties,
+        slide: &Observation,
     ) -> Result<Trained, TrainingError> {
-        let measured = self.measured;
-        let experience = self.at(movement)?;
-        experience
-            .learn(measured, properties)
-            .map_err(TrainingError::Missing)?;
+        let contents = self.contents;
+        let lesson = self.at(movement)?;
+        match (&mut *lesson, contents) {
+            (Lesson::Gaussians(experience), Contents::Gaussians(measured)) => experience
+                .learn(measured, &slide.properties)
+                .map_err(TrainingError::Missing)?,
+            (Lesson::Fused(whitened), Contents::Fused(set, features)) => {
+                let white = slide.vector(set, features.into()).and_then(|vector| {
+                    let table = table?;
+                    let index = table.movements().position(|m| m == movement)?;
+                    table.whiten(index as u8, &vector)
+                });
+                whitened.teach(&white.ok_or(TrainingError::Features(set))?);
+            }
+            _ => return Err(TrainingError::Lesson),
+        }
+        let lesson = *lesson;
         Ok(Trained {
-            experience: *experience,
+            lesson,
             name: self.name.clone(),
             movement,
             table: self.table(),
@@ -290,42 +366,73 @@ impl Training {
         if table.map(Table::crc) != self.table {
             return Err(TrainingError::Table);
         }
-        let experience: Vec<Experience, MAX_MOVEMENTS> =
-            self.learned.iter().map(|(_, e)| *e).collect();
-        let texture = Texture {
-            name: &self.name,
-            experience: &experience,
+        let (mut experience, mut whitened) = (
+            Vec::<Experience, MAX_MOVEMENTS>::new(),
+            Vec::<Whitened, MAX_MOVEMENTS>::new(),
+        );
+        for (_, lesson) in &self.learned {
+            // there is room: all three are as long
+            let _ = match lesson {
+                Lesson::Gaussians(e) => experience.push(*e).is_ok(),
+                Lesson::Fused(w) => whitened.push(*w).is_ok(),
+            };
+        }
+        let known = match self.contents {
+            Contents::Gaussians(_) => Known::Gaussians(&experience),
+            Contents::Fused(..) => Known::Fused(&whitened),
         };
-        match table {
-            Some(table) => amend(room, table, texture),
-            None => {
+        let name = &self.name;
+        match (table, self.contents) {
+            (Some(table), _) => {
+                let tally = self.tally(table);
+                amend(room, table, Change::Put { name, known, tally })
+            }
+            (None, Contents::Gaussians(measured)) => {
                 let movements: Vec<Movement, MAX_MOVEMENTS> =
                     self.learned.iter().map(|(m, _)| *m).collect();
-                encode(room, self.measured, &movements, [texture].into_iter())
+                let experience = &experience;
+                let texture = Texture { name, experience };
+                encode(room, measured, &movements, [texture].into_iter())
             }
+            (None, Contents::Fused(..)) => return Err(TrainingError::Table),
         }
         .map_err(TrainingError::Encode)
     }
 
-    fn at(&mut self, movement: Movement) -> Result<&mut Experience, TrainingError> {
+    /// What the table counted of the texture, and what the user has taught since.
+    fn tally(&self, table: &Table<'_>) -> Tally {
+        let known = table.find(&self.name);
+        let before = known.map_or(Tally::default(), |texture| table.tally(texture));
+        let taught = self.learned.iter().zip(0..).map(|((_, lesson), movement)| {
+            let before = known.map_or(0, |texture| table.trials(texture, movement));
+            lesson.trials().saturating_sub(before)
+        });
+        Tally {
+            user: taught.fold(before.user, u8::saturating_add),
+            ..before
+        }
+    }
+
+    fn at(&mut self, movement: Movement) -> Result<&mut Lesson, TrainingError> {
         self.learned
             .iter_mut()
             .find(|(m, _)| *m == movement)
-            .map(|(_, experience)| experience)
+            .map(|(_, lesson)| lesson)
             .ok_or(TrainingError::Movement(movement))
     }
-}
-
-fn untouched(movement: Movement) -> (Movement, Experience) {
-    (movement, Experience::default())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::features::Properties;
     use crate::table::tests::{around, table_of};
     use std::vec;
     use std::vec::Vec as List;
+
+    const NONE: Lesson = Lesson::Gaussians(Experience {
+        ..Experience::NONE
+    });
 
     fn wanted(name: &str) -> Wanted<'_> {
         Wanted {
@@ -342,8 +449,8 @@ mod tests {
         table_of(PropertySet::ALL, &vec![cell; textures])
     }
 
-    fn felt(value: f32) -> Properties {
-        Properties::new([Some(value), Some(2.0 * value), Some(3.0 * value)])
+    fn felt(value: f32) -> Observation {
+        Properties::new([Some(value), Some(2.0 * value), Some(3.0 * value)]).into()
     }
 
     /// Makes all movements; those made.
@@ -352,7 +459,7 @@ mod tests {
         while let Some(movement) = training.next() {
             made.push(movement);
             training
-                .took(movement, &felt(made.len() as f32 * 0.01))
+                .took(None, movement, &felt(made.len() as f32 * 0.01))
                 .unwrap();
         }
         made
@@ -408,15 +515,15 @@ mod tests {
         assert_eq!(training.table(), Some(old.crc()));
         let (movement, two) = training.learned()[0];
         assert_eq!(two.trials(), 2);
-        let record = training.took(movement, &felt(0.2)).unwrap();
+        let record = training.took(None, movement, &felt(0.2)).unwrap();
         assert_eq!(
-            (record.experience.trials(), record.table),
+            (record.lesson.trials(), record.table),
             (3, Some(old.crc()))
         );
         assert_eq!((&record.name[..], record.movement), ("t1", movement));
         // the power is cut
         let mut training = Training::new(wanted("t1"), Some(&old), 0).unwrap();
-        training.resume(movement, record.experience).unwrap();
+        training.resume(movement, record.lesson).unwrap();
         assert_eq!(train(&mut training), [old.movement(1).unwrap()]);
         let mut room = vec![0; 4096];
         let new = training.encode(Some(&old), &mut room).unwrap();
@@ -477,13 +584,13 @@ mod tests {
         let movement = training.next().unwrap();
         let lacks = Properties::new([Some(1.0), None, Some(f32::NAN)]);
         let missing = TrainingError::Missing(Property::Roughness);
-        assert_eq!(training.took(movement, &lacks), Err(missing));
-        assert_eq!(training.learned()[0].1, Experience::default());
+        assert_eq!(training.took(None, movement, &lacks.into()), Err(missing));
+        assert_eq!(training.learned()[0].1, NONE);
         let other = Movement::new(1000, 30_000).unwrap();
         let foreign = Err(TrainingError::Movement(other));
-        assert_eq!(training.took(other, &felt(1.0)), foreign);
+        assert_eq!(training.took(None, other, &felt(1.0)), foreign);
         let foreign = Err(TrainingError::Movement(other));
-        assert_eq!(training.resume(other, Experience::default()), foreign);
+        assert_eq!(training.resume(other, NONE), foreign);
     }
 
     #[test]

@@ -11,14 +11,15 @@ use heapless::{String, Vec};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::explorer::Strategy;
-use crate::features::{Measurement, Properties, Property};
+use crate::explorer::{Method, Strategy};
+use crate::features::{FUSED_BANDS, Measurement, Properties, Property};
+use crate::fused::Observation;
 use crate::movement::Movement;
 use crate::rig::guard::Fault;
 use crate::table::Action;
 
 /// Version of the messages. The two ends must have the same.
-pub const PROTOCOL: u8 = 1;
+pub const PROTOCOL: u8 = 2;
 /// Most textures in one message; the probe's table holds no more.
 pub const MAX_TEXTURES: usize = 128;
 /// Longest message, bytes.
@@ -61,8 +62,20 @@ pub enum Ask {
     Stop,
     /// Finds out what lies under the finger.
     Identify(Identify),
+    /// What lay under the finger in the last exploration: one of the textures known, or a new one. The probe learns it from
+    /// the slides of that exploration.
+    Answer(Name),
     /// Learns what lies under the finger.
     Train(Train),
+    /// Gives a texture another name.
+    Rename {
+        /// Its name.
+        from: Name,
+        /// Its new name.
+        to: Name,
+    },
+    /// Forgets what was learned.
+    Forget(Forget),
     /// Measures the motor's current without load, takes and keeps it. [`Tell::Calibration`].
     Calibrate,
     /// [`Tell::Calibration`].
@@ -97,10 +110,27 @@ pub struct Identify {
     pub threshold: f32,
     /// After this many slides the most probable texture is the answer.
     pub max_slides: u8,
+    /// How what was felt is compared with what is known; the best one for the table, unless given.
+    pub method: Option<Method>,
     /// How the next movement is chosen.
     pub strategy: Strategy,
+    /// Whether the answer may be that it is none of them.
+    pub open: bool,
+    /// Whether the probe learns from a verdict that is certain.
+    pub learn: bool,
     /// For random choices, and for where on the sample slides begin.
     pub seed: u32,
+}
+
+/// What is to be forgotten.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum Forget {
+    /// A texture, whoever taught it.
+    Texture(Name),
+    /// All that the probe has learned by itself: the table is again as it was taught.
+    SelfTaught,
+    /// The unfinished training of a texture, or a finished pilot.
+    Training(Name),
 }
 
 /// A texture to learn.
@@ -196,8 +226,23 @@ pub enum Tell {
         probability: f32,
         /// Whether it is over the threshold.
         sure: bool,
+        /// Whether it is rather none of the textures known; the one named is the most alike.
+        unknown: bool,
+        /// Log-odds of that, where they can be told.
+        log_odds: Option<f32>,
         /// Slides that counted.
         slides: u8,
+        /// Whether the probe would learn from [`Ask::Answer`]: it is not certain.
+        asks: bool,
+    },
+    /// The probe has learned from what it felt: so many slides.
+    Taught {
+        /// Name of the texture.
+        name: Name,
+        /// How many slides.
+        slides: u8,
+        /// Whether by itself; otherwise from the user.
+        itself: bool,
     },
     /// A movement of a texture that is learned was made.
     Learned {
@@ -341,7 +386,7 @@ pub struct Promise {
 }
 
 /// What one slide says.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Felt {
     /// Values in the order of [`Property::ALL`].
     pub properties: [Option<f32>; 3],
@@ -349,8 +394,10 @@ pub struct Felt {
     pub roughness_is_bound: bool,
     /// Power of the still finger, counts^2.
     pub background: f32,
-    /// Natural logarithms of the band powers.
-    pub ln_bands: [f32; 8],
+    /// Natural logarithms of the band powers, in steps of 1/1024.
+    pub bands: Vec<i16, FUSED_BANDS>,
+    /// Mean and standard deviation of P_DC, in steps of 1/1024 of 100 counts.
+    pub pressure: Option<[i16; 2]>,
 }
 
 impl Felt {
@@ -358,15 +405,30 @@ impl Felt {
     pub const fn properties(&self) -> Properties {
         Properties::new(self.properties)
     }
+
+    /// What an exploration makes of it.
+    pub fn observation(&self) -> Observation {
+        Observation {
+            properties: self.properties(),
+            bands: self.bands.clone(),
+            pressure: self.pressure,
+        }
+    }
 }
 
 impl From<&Measurement> for Felt {
     fn from(slide: &Measurement) -> Self {
+        let Observation {
+            properties,
+            bands,
+            pressure,
+        } = slide.into();
         Self {
-            properties: Property::ALL.map(|p| slide.properties.get(p)),
+            properties: Property::ALL.map(|p| properties.get(p)),
             roughness_is_bound: slide.roughness_is_bound,
             background: slide.background,
-            ln_bands: slide.ln_bands(),
+            bands,
+            pressure,
         }
     }
 }

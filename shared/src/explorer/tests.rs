@@ -3,6 +3,7 @@
 mod rules;
 
 use super::*;
+use crate::features::Properties;
 use crate::table::tests::{around, fixed, table_of};
 use proptest::prelude::{any, prop, prop_assert, prop_assert_eq, prop_assert_ne, proptest};
 use proptest::strategy::Strategy as _;
@@ -22,7 +23,7 @@ struct Paper {
 impl Paper {
     fn new(table: Table<'_>, candidates: &[u16]) -> Self {
         let row = |&texture: &u16| {
-            let cell = |a: Action| Some((a.index(), table.gaussian(texture, a)?));
+            let cell = |a: Action| Some((index(a), table.gaussian(texture, a)?));
             table
                 .actions()
                 .filter_map(cell)
@@ -39,17 +40,17 @@ impl Paper {
     /// Eq. 3 with the densities of eq. 4.
     fn observe(&mut self, action: Action, x: f64) {
         let likely: Vec<f64> = (0..self.p.len())
-            .map(|i| density(x, self.known[i][&action.index()]) * self.p[i])
+            .map(|i| density(x, self.known[i][&index(action)]) * self.p[i])
             .collect();
         let sum: f64 = likely.iter().sum();
         self.p = likely.iter().map(|p| p / sum).collect();
-        *self.made.entry(action.index()).or_default() += 1;
+        *self.made.entry(index(action)).or_default() += 1;
     }
 
     /// Eq. 11.
     fn uncertainty(&self, action: Action) -> f64 {
         let textures = 0..self.p.len();
-        let known = |i: usize| self.known[i][&action.index()];
+        let known = |i: usize| self.known[i][&index(action)];
         let term = |i: usize| {
             let sum: f64 = textures
                 .clone()
@@ -66,7 +67,7 @@ impl Paper {
 
     /// Eq. 12.
     fn benefit(&self, action: Action) -> f64 {
-        let n = f64::from(self.made.get(&action.index()).copied().unwrap_or(0));
+        let n = f64::from(self.made.get(&index(action)).copied().unwrap_or(0));
         1.0 - self.uncertainty(action).max(0.0).powf(1.0 / (n + 1.0))
     }
 }
@@ -118,18 +119,24 @@ fn only(property: Property) -> PropertySet {
 }
 
 fn act(movement: u8, property: Property) -> Action {
+    let property = Some(property);
     Action { movement, property }
 }
 
-fn all(x: f32) -> Properties {
-    Properties::new([Some(x); 3])
+/// Place among a table's actions.
+fn index(action: Action) -> usize {
+    usize::from(action.movement) * 3 + action.property.map_or(0, Property::index)
+}
+
+fn all(x: f32) -> Observation {
+    Properties::new([Some(x); 3]).into()
 }
 
 /// A slide with a value of one property only.
-fn slide(action: Action, x: f32) -> Properties {
+fn slide(action: Action, x: f32) -> Observation {
     let mut values = [None; 3];
-    values[action.property.index()] = Some(x);
-    Properties::new(values)
+    values[action.property.unwrap().index()] = Some(x);
+    Properties::new(values).into()
 }
 
 /// A table of cells, all trained with two trials.
@@ -161,7 +168,7 @@ fn state<const N: usize>(
 ) -> (Vec<f32>, Vec<Outlook>, u8, Option<Verdict>, Vec<Action>) {
     let (outlook, each) = (
         explorer.outlook().to_vec(),
-        explorer.best_of_each().collect(),
+        explorer.turns().collect(),
     );
     (
         explorer.posterior().to_vec(),
@@ -206,7 +213,7 @@ proptest! {
             let most = table.actions().map(|a| paper.benefit(a)).fold(0.0, f64::max);
             let first = table.actions().find(|&a| paper.benefit(a) == most);
             prop_assert!(first == Some(chosen) || most - paper.benefit(chosen) < 1e-5);
-            let (mean, sd) = paper.known[truth][&chosen.index()];
+            let (mean, sd) = paper.known[truth][&index(chosen)];
             let x = (mean + sd * noise[done]) as f32;
             explorer.observe(chosen, &slide(chosen, x)).unwrap();
             paper.observe(chosen, x.into());

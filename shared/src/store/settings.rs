@@ -14,21 +14,27 @@ use super::{Store, StoreError};
 use crate::movement::Movement;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
-use crate::table::Experience;
-use crate::wire::Name;
+use crate::fused::Whitened;
+use crate::training::Lesson;
+use crate::wire::{MAX_TEXTURES, Name};
 
 /// Version of the records and of the map they are in (`sequential-storage` 8).
-pub const SCHEMA: u16 = 1;
-/// Most records of training: four pilots of 30 movements and eight textures of three. With all of them in use, 88 bytes
-/// each, a page of 16 KB is less than four fifths full.
-pub const MAX_RECORDS: u8 = 144;
+pub const SCHEMA: u16 = 2;
+/// Most records of training: a pilot of 30 movements and three textures of three. With all of them in use, 108 bytes each,
+/// and everything self-taught besides, 84 bytes a texture, a page of 16 KB is not full.
+pub const MAX_RECORDS: u8 = 40;
+/// Movements of a texture that a probe learns by itself: an exploration rarely makes more.
+pub const SELF_MOVEMENTS: usize = 2;
 
 const KEY_SCHEMA: u8 = 0;
 const KEY_CALIBRATION: u8 = 1;
 const KEY_SKIN: u8 = 2;
 const KEY_TRAINED: u8 = 16;
-/// The longest record with its key, in whole words: one of training takes 81 bytes.
-const RECORD: usize = 96;
+const KEY_SELF: u8 = 64;
+/// One past the last key.
+const KEYS: usize = KEY_SELF as usize + MAX_TEXTURES;
+/// The longest record with its key, in whole words: one of training takes 99 bytes, a self-taught one 106.
+const RECORD: usize = 112;
 
 /// Why settings cannot be used.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -70,7 +76,7 @@ pub struct Trained {
     /// Checksum of the table whose trials of this texture are counted in; `None` for trials of its own only.
     pub table: Option<u32>,
     /// What was learned.
-    pub experience: Experience,
+    pub lesson: Lesson,
 }
 
 impl Trained {
@@ -79,12 +85,23 @@ impl Trained {
     }
 }
 
+/// What the probe has learned by itself of a texture, in place of what the table says of it at these movements.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct SelfTaught {
+    /// [`crate::table::Table::lineage`] of the table: what was taught since does not change it.
+    pub lineage: u32,
+    /// [`crate::table::Table::number`] of the texture.
+    pub number: u16,
+    /// Per movement, slides that the probe learned by itself, and what it knows now.
+    pub movements: heapless::Vec<(u8, u8, Whitened), SELF_MOVEMENTS>,
+}
+
 /// Remembers where the newest record of every key is while one call lasts. Without it, turning a page looks through the
 /// whole page for every record in it.
 type Places = Cache<
     Uncached,
     Uncached,
-    ArrayKeyPointers<u8, { KEY_TRAINED as usize + MAX_RECORDS as usize }>,
+    ArrayKeyPointers<u8, KEYS>,
     u8,
 >;
 
@@ -100,15 +117,38 @@ impl<E> From<Error<E>> for StoreError<E> {
     }
 }
 
-/// One pass over all records of training, oldest first: what a key held last counts.
-struct Records<'m, 'f, F: NorFlash>(map::MapItemIter<'m, u8, Pages<'f, F>, Places>);
+/// One pass over all records with keys from `first` on, oldest first: what a key held last counts.
+struct Records<'m, 'f, F: NorFlash> {
+    items: map::MapItemIter<'m, u8, Pages<'f, F>, Places>,
+    first: u8,
+    places: u8,
+}
 
-impl<F: NorFlash> Records<'_, '_, F> {
+impl<'m, 'f, F: NorFlash> Records<'m, 'f, F> {
+    fn trained(items: map::MapItemIter<'m, u8, Pages<'f, F>, Places>) -> Self {
+        Self {
+            items,
+            first: KEY_TRAINED,
+            places: MAX_RECORDS,
+        }
+    }
+
+    fn self_taught(items: map::MapItemIter<'m, u8, Pages<'f, F>, Places>) -> Self {
+        Self {
+            items,
+            first: KEY_SELF,
+            places: MAX_TEXTURES as u8,
+        }
+    }
+
     /// Place and record, `None` for a place that was cleared.
-    async fn next(&mut self) -> Result<Option<(u8, Option<Trained>)>, StoreError<F::Error>> {
+    async fn next<T: for<'b> Deserialize<'b>>(
+        &mut self,
+    ) -> Result<Option<(u8, Option<T>)>, StoreError<F::Error>> {
         let mut buffer = [0; RECORD];
-        while let Some((key, bytes)) = self.0.next::<&[u8]>(&mut buffer).await? {
-            if let Some(place) = key.checked_sub(KEY_TRAINED) {
+        while let Some((key, bytes)) = self.items.next::<&[u8]>(&mut buffer).await? {
+            let place = key.checked_sub(self.first);
+            if let Some(place) = place.filter(|&place| place < self.places) {
                 return Ok(Some((place, decode(bytes)?)));
             }
         }
@@ -204,23 +244,23 @@ impl<F: NorFlash> Store<F> {
         name: &str,
         movement: Movement,
         table: Option<u32>,
-    ) -> Result<Option<Experience>, StoreError<F::Error>> {
+    ) -> Result<Option<Lesson>, StoreError<F::Error>> {
         self.settings.map_err(StoreError::Settings)?;
         let mut found = None;
         let mut buffer = [0; RECORD];
         let mut map = self.map();
-        let mut records = Records(map.fetch_all_items(&mut buffer).await?);
-        while let Some((place, record)) = records.next().await? {
+        let mut records = Records::trained(map.fetch_all_items(&mut buffer).await?);
+        while let Some((place, record)) = records.next::<Trained>().await? {
             match record {
                 Some(record) if record.is(name, movement, table) => {
-                    found = Some((place, record.experience));
+                    found = Some((place, record.lesson));
                 }
                 // the place went to another
                 _ if found.is_some_and(|(at, _)| at == place) => found = None,
                 _ => {}
             }
         }
-        Ok(found.map(|(_, experience)| experience))
+        Ok(found.map(|(_, lesson)| lesson))
     }
 
     /// Stores how far a training has come, in place of what was stored for this texture, movement and table. When room runs
@@ -242,8 +282,8 @@ impl<F: NorFlash> Store<F> {
         let mut places = [Use::Free; MAX_RECORDS as usize];
         let mut buffer = [0; RECORD];
         let mut map = self.map();
-        let mut records = Records(map.fetch_all_items(&mut buffer).await?);
-        while let Some((place, record)) = records.next().await? {
+        let mut records = Records::trained(map.fetch_all_items(&mut buffer).await?);
+        while let Some((place, record)) = records.next::<Trained>().await? {
             if let Some(now) = places.get_mut(usize::from(place)) {
                 *now = match record {
                     None => Use::Free,
@@ -274,8 +314,8 @@ impl<F: NorFlash> Store<F> {
         let mut of_texture = [false; MAX_RECORDS as usize];
         let mut buffer = [0; RECORD];
         let mut map = self.map();
-        let mut records = Records(map.fetch_all_items(&mut buffer).await?);
-        while let Some((place, record)) = records.next().await? {
+        let mut records = Records::trained(map.fetch_all_items(&mut buffer).await?);
+        while let Some((place, record)) = records.next::<Trained>().await? {
             if let Some(now) = of_texture.get_mut(usize::from(place)) {
                 *now = record.is_some_and(|record| record.name == name);
             }
@@ -286,6 +326,101 @@ impl<F: NorFlash> Store<F> {
             }
         }
         Ok(())
+    }
+
+    /// What the probe has learned by itself of the textures of the table with this lineage, one after the other: `each` hears
+    /// of the newest record of every texture.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::Settings`].
+    pub async fn self_taught(
+        &mut self,
+        lineage: u32,
+        mut each: impl FnMut(SelfTaught),
+    ) -> Result<(), StoreError<F::Error>> {
+        self.settings.map_err(StoreError::Settings)?;
+        // which record of every place is the last: only that one counts
+        let mut last = [0u16; MAX_TEXTURES];
+        let mut buffer = [0; RECORD];
+        let mut map = self.map();
+        let mut records = Records::self_taught(map.fetch_all_items(&mut buffer).await?);
+        let mut number = 0;
+        while let Some((place, _)) = records.next::<SelfTaught>().await? {
+            number += 1;
+            if let Some(last) = last.get_mut(usize::from(place)) {
+                *last = number;
+            }
+        }
+        let mut map = self.map();
+        let mut records = Records::self_taught(map.fetch_all_items(&mut buffer).await?);
+        let mut number = 0;
+        while let Some((place, record)) = records.next::<SelfTaught>().await? {
+            number += 1;
+            let is_last = last.get(usize::from(place)) == Some(&number);
+            if let Some(record) = record.filter(|record| is_last && record.lineage == lineage) {
+                each(record);
+            }
+        }
+        Ok(())
+    }
+
+    /// Stores what the probe has learned by itself of a texture, in place of what was stored of it. When room runs out, what
+    /// belongs to tables of another lineage is given up.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
+    pub async fn set_self_taught(&mut self, new: &SelfTaught) -> Result<(), StoreError<F::Error>> {
+        let same = |old: &SelfTaught| old.lineage == new.lineage && old.number == new.number;
+        let used = self.self_keys(|_| true).await?;
+        let place = match self.self_keys(same).await?.first() {
+            Some(key) => Some(*key),
+            None => (KEY_SELF..).take(MAX_TEXTURES).find(|key| !used.contains(key)),
+        };
+        let place = match place {
+            Some(key) => Some(key),
+            None => {
+                let stale = self.self_keys(|old| old.lineage != new.lineage).await?;
+                stale.first().copied()
+            }
+        };
+        let place = place.ok_or(StoreError::Settings(SettingsError::Full))?;
+        self.encode(place, &Some(new)).await
+    }
+
+    /// Forgets what the probe has learned by itself: of the texture with this number of that lineage, or all of it.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
+    pub async fn forget_self_taught(
+        &mut self,
+        of: Option<(u32, u16)>,
+    ) -> Result<(), StoreError<F::Error>> {
+        let is_its = |record: &SelfTaught| {
+            of.is_none_or(|(lineage, number)| record.lineage == lineage && record.number == number)
+        };
+        for key in self.self_keys(is_its).await? {
+            self.encode(key, &None::<SelfTaught>).await?;
+        }
+        Ok(())
+    }
+
+    /// The keys whose newest record is such a one.
+    async fn self_keys(
+        &mut self,
+        is_wanted: impl Fn(&SelfTaught) -> bool,
+    ) -> Result<heapless::Vec<u8, MAX_TEXTURES>, StoreError<F::Error>> {
+        self.settings.map_err(StoreError::Settings)?;
+        let mut wanted = [false; MAX_TEXTURES];
+        let mut buffer = [0; RECORD];
+        let mut map = self.map();
+        let mut records = Records::self_taught(map.fetch_all_items(&mut buffer).await?);
+        while let Some((place, record)) = records.next::<SelfTaught>().await? {
+            if let Some(now) = wanted.get_mut(usize::from(place)) {
+                *now = record.is_some_and(|record| is_wanted(&record));
+            }
+        }
+        let keys = (KEY_SELF..).zip(wanted);
+        Ok(keys.filter(|(_, wanted)| *wanted).map(|(key, _)| key).collect())
     }
 
     /// Brings the pages into order, and looks whether they can be read.
@@ -320,8 +455,11 @@ impl<F: NorFlash> Store<F> {
                 };
             }
         }
-        let mut records = Records(map.fetch_all_items(&mut buffer).await?);
-        while records.next().await?.is_some() {}
+        let mut records = Records::trained(map.fetch_all_items(&mut buffer).await?);
+        while records.next::<Trained>().await?.is_some() {}
+        let mut map = self.map();
+        let mut records = Records::self_taught(map.fetch_all_items(&mut buffer).await?);
+        while records.next::<SelfTaught>().await?.is_some() {}
         Ok(true)
     }
 

@@ -3,13 +3,14 @@
 use core::fmt;
 
 use super::{
-    Action, CELL_BYTES, CRC_BYTES, CRC32, Experience, Layout, MAGIC, MAX_MOVEMENTS,
-    METHOD_GAUSSIAN, SD_LEAST, SD_STEP, Table, TableError, VERSION, mean_step,
+    Action, CELL_BYTES, CRC_BYTES, CRC32, Contents, Experience, LABEL_BYTES, MAGIC, MAX_MOVEMENTS,
+    SD_LEAST, SD_STEP, Table, TableError, Tally, VERSION, mean_step,
 };
 use crate::features::{Property, PropertySet};
+use crate::fused::{FeatureSet, Whitened, Whitening};
 use crate::movement::Movement;
 
-/// One texture of a table to be written.
+/// One texture of a table of Gaussians to be written.
 #[derive(Clone, Copy, Debug)]
 pub struct Texture<'a> {
     /// Its name, unlike every other, of 1 to 255 bytes.
@@ -18,11 +19,47 @@ pub struct Texture<'a> {
     pub experience: &'a [Experience],
 }
 
+/// What was learned of a texture, movement by movement, as its table keeps it.
+#[derive(Clone, Copy, Debug)]
+pub enum Known<'a> {
+    /// For a table of Gaussians.
+    Gaussians(&'a [Experience]),
+    /// For a fused table.
+    Fused(&'a [Whitened]),
+}
+
+/// What is to be different in a table.
+#[derive(Clone, Copy, Debug)]
+pub enum Change<'a> {
+    /// A texture that is taught: in place of the one of that name, or one more.
+    Put {
+        /// Its name.
+        name: &'a str,
+        /// What was learned of it.
+        known: Known<'a>,
+        /// From whom.
+        tally: Tally,
+    },
+    /// Another name.
+    Rename {
+        /// Index of the texture.
+        texture: u16,
+        /// Its new name.
+        name: &'a str,
+    },
+    /// A texture less.
+    Forget(u16),
+}
+
 /// Why a table was not written.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum EncodeError {
     /// No texture, movement or property, or more movements than [`MAX_MOVEMENTS`].
     Empty,
+    /// What was learned is of another kind than the table, or of other features.
+    Contents,
+    /// There is no texture with this index.
+    Texture(u16),
     /// The table takes this many bytes, and there is less room.
     Room(usize),
     /// A texture has not as many experiences as there are movements.
@@ -49,6 +86,8 @@ impl fmt::Display for EncodeError {
                 f,
                 "a table needs a texture, a property and 1 to {MAX_MOVEMENTS} movements"
             ),
+            Self::Contents => f.write_str("what was learned does not fit this kind of table"),
+            Self::Texture(texture) => write!(f, "the table has no texture {}", texture + 1),
             Self::Room(needed) => {
                 write!(f, "the table takes {needed} bytes, and there is less room")
             }
@@ -71,8 +110,8 @@ impl fmt::Display for EncodeError {
                 "texture {}, movement {}: {} {mean} is beyond the table's +-{}",
                 texture + 1,
                 action.movement + 1,
-                action.property,
-                mean_step(action.property) * 32768.0
+                action.what(),
+                action.property.map_or(0.0, mean_step) * 32768.0
             ),
             Self::Invalid(why) => why.fmt(f),
         }
@@ -82,11 +121,16 @@ impl fmt::Display for EncodeError {
 impl core::error::Error for EncodeError {}
 
 /// Bytes that a table takes, names and their lengths included in `names`.
-pub const fn encoded_len(textures: usize, movements: usize, names: usize) -> usize {
-    Layout::new(textures, movements).names + names + CRC_BYTES
+pub const fn encoded_len(
+    contents: Contents,
+    textures: usize,
+    movements: usize,
+    names: usize,
+) -> usize {
+    contents.layout(textures, movements).names + names + CRC_BYTES
 }
 
-/// Writes a table into `out` and reads it back.
+/// Writes a table of Gaussians into `out` and reads it back.
 ///
 /// Means are rounded to [`mean_step`], standard deviations to [`SD_STEP`] and kept between [`SD_LEAST`] and 4.
 ///
@@ -98,51 +142,273 @@ pub fn encode<'o, 'a>(
     movements: &[Movement],
     textures: impl Iterator<Item = Texture<'a>> + Clone,
 ) -> Result<Table<'o>, EncodeError> {
-    let textures = textures.map(|t| (t.name, t.experience.iter().copied()));
-    write(out, measured, movements.iter().copied(), textures)
+    if measured.is_empty() {
+        return Err(EncodeError::Empty);
+    }
+    let rows = textures.zip(0u16..).map(|(texture, number)| {
+        let slides = texture.experience.iter().map(Experience::trials);
+        let known = Known::Gaussians(texture.experience);
+        Row::new(texture.name, number, known, slides)
+    });
+    let contents = Contents::Gaussians(measured);
+    write(out, contents, movements.iter().copied(), |_| (), 0, rows)
 }
 
-/// Writes `old` into `out` with what was learned of one texture, movement by movement: in place of what the table has, or
-/// as one more texture behind the others. All else stays the same to the bit.
+/// Writes a fused table into `out` and reads it back: every movement with its whitening, every texture with its name and
+/// what was learned of it, movement by movement.
 ///
 /// # Errors
-/// As [`encode`].
+/// Parts of `out` may have been written then.
+pub fn encode_fused<'o, 'a>(
+    out: &'o mut [u8],
+    set: FeatureSet,
+    movements: &[(Movement, Whitening)],
+    textures: impl Iterator<Item = (&'a str, &'a [Whitened])> + Clone,
+) -> Result<Table<'o>, EncodeError> {
+    let features = movements.first().map_or(0, |(_, w)| w.features());
+    if !set.allows(features) || movements.iter().any(|(_, w)| w.features() != features) {
+        return Err(EncodeError::Contents);
+    }
+    let rows = textures.zip(0u16..).map(|((name, whitened), number)| {
+        let slides = whitened.iter().map(|w| w.slides);
+        Row::new(name, number, Known::Fused(whitened), slides)
+    });
+    let whitenings = |writer: &mut Writer<'_>| {
+        for (_, whitening) in movements {
+            whitening.write(|bytes| writer.put(bytes));
+        }
+    };
+    let contents = Contents::Fused(set, features as u8);
+    let moved = movements.iter().map(|(movement, _)| *movement);
+    write(out, contents, moved, whitenings, 0, rows)
+}
+
+/// Writes `old` into `out` with one change. All other textures stay the same to the bit.
+///
+/// # Errors
+/// As [`encode`], and [`EncodeError::Texture`].
 pub fn amend<'o>(
     out: &'o mut [u8],
     old: &Table<'_>,
-    texture: Texture<'_>,
+    change: Change<'_>,
 ) -> Result<Table<'o>, EncodeError> {
-    let place = old.find(texture.name).unwrap_or(old.textures);
-    let added = (place == old.textures).then_some(texture.name);
-    let textures = old.names().chain(added).zip(0u16..).map(|(name, index)| {
-        let learned = texture.experience.iter().enumerate();
-        let experience = learned.map(move |(movement, new)| {
-            if index == place {
-                *new
-            } else {
-                old.experience(index, movement as u8)
-            }
-        });
-        (name, experience)
+    if let Change::Rename { texture, .. } | Change::Forget(texture) = change
+        && texture >= old.textures
+    {
+        return Err(EncodeError::Texture(texture));
+    }
+    let replaced = match change {
+        Change::Put { name, .. } => old.find(name),
+        _ => None,
+    };
+    let added = match change {
+        Change::Put { name, known, tally } if replaced.is_none() => {
+            Some(Row {
+                name,
+                number: old.next_number(),
+                tally,
+                cells: Cells::New(known),
+            })
+        }
+        _ => None,
+    };
+    let kept = old.names().zip(0..).filter_map(|(name, texture)| {
+        let row = Row {
+            name,
+            number: old.number(texture),
+            tally: old.tally(texture),
+            cells: Cells::Old(*old, texture),
+        };
+        match change {
+            Change::Forget(gone) if gone == texture => None,
+            Change::Rename { texture: it, name } if it == texture => Some(Row { name, ..row }),
+            Change::Put { known, tally, .. } if replaced == Some(texture) => Some(Row {
+                tally,
+                cells: Cells::New(known),
+                ..row
+            }),
+            _ => Some(row),
+        }
     });
-    write(out, old.measured, old.movements(), textures)
+    let layout = old.layout();
+    let whitenings = old.bytes.get(layout.whitenings..layout.cells);
+    write(
+        out,
+        old.contents,
+        old.movements(),
+        |writer| writer.put(whitenings.unwrap_or_default()),
+        old.lineage(),
+        kept.chain(added),
+    )
 }
 
-/// Writes names and experiences, movement by movement.
+/// Puts what a fused table has learned on the go of a texture at a movement in its place, and marks the table as made from
+/// the one that it was.
+///
+/// # Errors
+/// The bytes are no fused table, or have no such texture or movement.
+pub fn retell(
+    bytes: &mut [u8],
+    texture: u16,
+    movement: u8,
+    whitened: &Whitened,
+    tally: Tally,
+) -> Result<(), EncodeError> {
+    let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
+    let Contents::Fused(_, features) = table.contents else {
+        return Err(EncodeError::Contents);
+    };
+    if texture >= table.textures || movement >= table.movements {
+        return Err(EncodeError::Texture(texture));
+    }
+    let (layout, lineage) = (table.layout(), table.lineage());
+    let length = table.bytes.len();
+    let features = usize::from(features);
+    let cell = usize::from(texture) * usize::from(table.movements) + usize::from(movement);
+    let mut put = |at: usize, new: &[u8]| {
+        if let Some(room) = bytes.get_mut(at..at + new.len()) {
+            room.copy_from_slice(new);
+        }
+    };
+    for (mean, at) in whitened.mean.iter().take(features).zip((0..).step_by(2)) {
+        put(layout.cells + cell * 2 * features + at, &mean.to_le_bytes());
+    }
+    put(layout.trials + cell, &[whitened.slides]);
+    put(layout.lineage, &lineage.to_le_bytes());
+    let label = layout.labels + usize::from(texture) * LABEL_BYTES;
+    put(label + 2, &[tally.factory, tally.user, tally.itself]);
+    if let Some((body, crc)) = bytes.get_mut(..length).and_then(<[u8]>::split_last_chunk_mut) {
+        *crc = CRC32.checksum(body).to_le_bytes();
+    }
+    Ok(())
+}
+
+/// Where the cells of a texture come from.
+#[derive(Clone, Copy)]
+enum Cells<'a> {
+    Old(Table<'a>, u16),
+    New(Known<'a>),
+}
+
+/// One texture, as it is written.
+#[derive(Clone, Copy)]
+struct Row<'a> {
+    name: &'a str,
+    number: u16,
+    tally: Tally,
+    cells: Cells<'a>,
+}
+
+impl<'a> Row<'a> {
+    /// Of a table that is made.
+    fn new(name: &'a str, number: u16, known: Known<'a>, slides: impl Iterator<Item = u8>) -> Self {
+        Self {
+            name,
+            number,
+            tally: Tally {
+                factory: slides.fold(0, u8::saturating_add),
+                ..Tally::default()
+            },
+            cells: Cells::New(known),
+        }
+    }
+
+    /// Whether it has something at every movement.
+    fn fits(&self, contents: Contents, movements: usize) -> Result<bool, EncodeError> {
+        match (self.cells, contents) {
+            (Cells::Old(..), _) => Ok(true),
+            (Cells::New(Known::Gaussians(known)), Contents::Gaussians(_)) => {
+                Ok(known.len() == movements)
+            }
+            (Cells::New(Known::Fused(known)), Contents::Fused(..)) => Ok(known.len() == movements),
+            _ => Err(EncodeError::Contents),
+        }
+    }
+
+    fn put_cells(&self, writer: &mut Writer<'_>, contents: Contents, index: u16) -> Result<(), EncodeError> {
+        match (self.cells, contents) {
+            (Cells::Old(table, texture), _) => {
+                for movement in 0..table.movements {
+                    writer.put(table.cell_bytes(texture, movement).unwrap_or_default());
+                }
+                Ok(())
+            }
+            (Cells::New(Known::Gaussians(known)), Contents::Gaussians(measured)) => {
+                put_gaussians(writer, measured, known, index)
+            }
+            (Cells::New(Known::Fused(known)), Contents::Fused(_, features)) => {
+                for mean in known.iter().flat_map(|k| k.mean.iter().take(features.into())) {
+                    writer.put(&mean.to_le_bytes());
+                }
+                Ok(())
+            }
+            _ => Err(EncodeError::Contents),
+        }
+    }
+
+    fn put_trials(&self, writer: &mut Writer<'_>) {
+        match self.cells {
+            Cells::Old(table, texture) => {
+                (0..table.movements).for_each(|m| writer.put(&[table.trials(texture, m)]));
+            }
+            Cells::New(Known::Gaussians(known)) => {
+                known.iter().for_each(|k| writer.put(&[k.trials]));
+            }
+            Cells::New(Known::Fused(known)) => known.iter().for_each(|k| writer.put(&[k.slides])),
+        }
+    }
+}
+
+fn put_gaussians(
+    writer: &mut Writer<'_>,
+    measured: PropertySet,
+    known: &[Experience],
+    texture: u16,
+) -> Result<(), EncodeError> {
+    for (experience, movement) in known.iter().zip(0..) {
+        for (property, mean) in Property::ALL.into_iter().zip(experience.mean) {
+            if !measured.contains(property) {
+                writer.put(&[0; CELL_BYTES]);
+                continue;
+            }
+            let step = libm::roundf(mean / mean_step(property));
+            if !(f32::from(i16::MIN)..=f32::from(i16::MAX)).contains(&step) {
+                let property = Some(property);
+                let action = Action { movement, property };
+                return Err(EncodeError::Range {
+                    texture,
+                    action,
+                    mean,
+                });
+            }
+            let sd = experience
+                .gaussian(property)
+                .map_or(0.0, |g| g.sd.max(SD_LEAST));
+            writer.put(&(step as i16).to_le_bytes());
+            // `as` saturates: trials that differ by more than 4 are no worse than that
+            writer.put(&(libm::roundf(sd / SD_STEP) as u16).to_le_bytes());
+        }
+    }
+    Ok(())
+}
+
+/// Writes all parts, and reads the table back.
 fn write<'o, 'a>(
     out: &'o mut [u8],
-    measured: PropertySet,
+    contents: Contents,
     movements: impl ExactSizeIterator<Item = Movement>,
-    textures: impl Iterator<Item = (&'a str, impl ExactSizeIterator<Item = Experience> + Clone)> + Clone,
+    whitenings: impl FnOnce(&mut Writer<'_>),
+    lineage: u32,
+    rows: impl Iterator<Item = Row<'a>> + Clone,
 ) -> Result<Table<'o>, EncodeError> {
-    let (count, names) = textures.clone().fold((0usize, 0), |(n, names), (name, _)| {
-        (n + 1, names + 1 + name.len())
+    let (count, names) = rows.clone().fold((0usize, 0), |(n, names), row| {
+        (n + 1, names + 1 + row.name.len())
     });
-    let length = encoded_len(count, movements.len(), names);
+    let length = encoded_len(contents, count, movements.len(), names);
     let (Ok(count), Ok(length_field)) = (u16::try_from(count), u32::try_from(length)) else {
         return Err(EncodeError::Room(length));
     };
-    if count == 0 || measured.is_empty() || !(1..=MAX_MOVEMENTS).contains(&movements.len()) {
+    if count == 0 || !(1..=MAX_MOVEMENTS).contains(&movements.len()) {
         return Err(EncodeError::Empty);
     }
     let per_texture = movements.len();
@@ -150,51 +416,40 @@ fn write<'o, 'a>(
         room: out.get_mut(..length).ok_or(EncodeError::Room(length))?,
         at: 0,
     };
+    let [code, what, features] = contents.codes();
     writer.put(&MAGIC);
     writer.put(&VERSION.to_le_bytes());
-    writer.put(&[METHOD_GAUSSIAN, measured.bits()]);
+    writer.put(&[code, what]);
     writer.put(&length_field.to_le_bytes());
     writer.put(&count.to_le_bytes());
-    writer.put(&[movements.len() as u8, 0]);
+    writer.put(&[per_texture as u8, features]);
     for movement in movements {
         writer.put(&movement.force_mn().to_le_bytes());
         writer.put(&movement.speed_um_s().to_le_bytes());
     }
-    for ((_, experiences), index) in textures.clone().zip(0..) {
-        if experiences.len() != per_texture {
+    whitenings(&mut writer);
+    for (row, index) in rows.clone().zip(0..) {
+        if !row.fits(contents, per_texture)? {
             return Err(EncodeError::Movements(index));
         }
-        for (experience, movement) in experiences.zip(0..) {
-            for (property, mean) in Property::ALL.into_iter().zip(experience.mean) {
-                if !measured.contains(property) {
-                    writer.put(&[0; CELL_BYTES]);
-                    continue;
-                }
-                let action = Action { movement, property };
-                let range = EncodeError::Range {
-                    texture: index,
-                    action,
-                    mean,
-                };
-                let step = libm::roundf(mean / mean_step(property));
-                if !(f32::from(i16::MIN)..=f32::from(i16::MAX)).contains(&step) {
-                    return Err(range);
-                }
-                let sd = experience
-                    .gaussian(property)
-                    .map_or(0.0, |g| g.sd.max(SD_LEAST));
-                writer.put(&(step as i16).to_le_bytes());
-                // `as` saturates: trials that differ by more than 4 are no worse than that
-                writer.put(&(libm::roundf(sd / SD_STEP) as u16).to_le_bytes());
-            }
-        }
+        row.put_cells(&mut writer, contents, index)?;
     }
-    for experience in textures.clone().flat_map(|(_, experiences)| experiences) {
-        writer.put(&[experience.trials]);
+    for row in rows.clone() {
+        row.put_trials(&mut writer);
     }
-    for ((name, _), index) in textures.zip(0..) {
-        writer.put(&[u8::try_from(name.len()).map_err(|_| EncodeError::Name(index))?]);
-        writer.put(name.as_bytes());
+    writer.put(&lineage.to_le_bytes());
+    for row in rows.clone() {
+        let Tally {
+            factory,
+            user,
+            itself,
+        } = row.tally;
+        writer.put(&row.number.to_le_bytes());
+        writer.put(&[factory, user, itself]);
+    }
+    for (row, index) in rows.zip(0..) {
+        writer.put(&[u8::try_from(row.name.len()).map_err(|_| EncodeError::Name(index))?]);
+        writer.put(row.name.as_bytes());
     }
     let crc = CRC32.checksum(writer.written());
     writer.put(&crc.to_le_bytes());

@@ -47,7 +47,7 @@ impl Experience {
     }
 
     /// Number of trials, 255 for more.
-    pub fn trials(&self) -> u8 {
+    pub const fn trials(&self) -> u8 {
         self.trials
     }
 

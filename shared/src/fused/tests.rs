@@ -1,0 +1,1 @@
+//! Features and whitening against f64.

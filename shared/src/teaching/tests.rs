@@ -1,0 +1,1 @@
+//! Teaching, forgetting, and what a cut leaves.
