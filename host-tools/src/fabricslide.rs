@@ -16,7 +16,7 @@
 //! In `data/fabricslide` two denims were slid over in direction -1 only, and one fabric was not pressed with 180 at 150 mm/s.
 //! What remains is the protocol's 15 movements, 120, 150 and 180 at 10, 20, 50, 100 and 120 mm/s, each with two slides per
 //! repetition. Learning from repetition 0 and testing on 1 this way came nearest to the protocol's figures, by an independent
-//! program (numpy): 58 % right by the paper's way (the protocol says 56), 97 by Student-t (96), 100 in 2.8 slides by three
+//! program (numpy): 58 % right by the paper's way (the protocol says 56), 96 by Student-t (96), 100 in 2.8 slides by three
 //! properties fused (99.9 in 2.7), 100 by eight bands fused (100). The paper's figure is brittle, for its standard deviations
 //! come of two slides: a Hann window that is symmetric instead of periodic makes it 50.
 //!

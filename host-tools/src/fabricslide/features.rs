@@ -20,7 +20,7 @@ const BAND_FLOOR: f64 = 0.1;
 /// Variance below which a taxel shows nothing but a straight line and the rounding of f64. A single step of one count among
 /// 2^22 samples has more.
 const FLAT: f64 = 1e-9;
-/// Smallest decorrelation: taxels that move as one have a logarithm. Recordings are at 0.1 to 0.9.
+/// Smallest decorrelation: taxels that move as one have a logarithm. Those of data/fabricslide are at 0.27 or more.
 const RIGID: f64 = 1e-6;
 
 /// Bands and properties of a slide, as [`super::FabricSlide`] describes them.
