@@ -81,6 +81,13 @@ pub(crate) fn watch_start() {
     IWDG.kr().write(|w| w.set_key(Key::ENABLE));
     IWDG.pr().write(|w| w.set_pr(Pr::DIVIDE_BY32));
     IWDG.rlr().write(|w| w.set_rl(800));
+    // They take five of its cycles to arrive, 0.3 ms at most, and its oscillator has to start. Before that a reload would
+    // load 4 s, and what the servo sets would be ignored. The core runs at 16 MHz: at most some 10 ms.
+    for _ in 0..20_000 {
+        if IWDG.sr().read().0 == 0 {
+            break;
+        }
+    }
     pet();
 }
 
