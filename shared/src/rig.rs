@@ -7,6 +7,7 @@ pub mod control;
 pub mod force;
 pub mod guard;
 pub mod lever;
+pub mod patience;
 pub mod pins;
 pub mod skin;
 pub mod stage;
