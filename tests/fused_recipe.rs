@@ -232,3 +232,213 @@ fn pressure_does_as_well_as_traction() {
         println!("P_DC and 12 bands, {protocol:?} {n}: {figures}");
     }
 }
+
+/// Shares flagged as unknown after 1, 2 and 3 slides: of the texture that was left out, and of those that were learned.
+#[derive(Clone, Copy, Default, Debug)]
+struct Flagged {
+    unknown: [f64; 3],
+    known: [f64; 3],
+}
+
+impl std::fmt::Display for Flagged {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        for k in 0..3 {
+            let (unknown, known) = (self.unknown[k], self.known[k]);
+            write!(f, "  {}: {unknown:.3} at {known:.4} false alarms", k + 1)?;
+        }
+        Ok(())
+    }
+}
+
+/// Leaves each of `textures` out in turn and learns the others of `textures` from `n` slides: who is flagged?
+fn leave_one_out(
+    session: &Session,
+    textures: &[usize],
+    protocol: Protocol,
+    n: usize,
+    flags: impl Fn(&Trained, &Visit) -> bool + Sync,
+) -> (Flagged, Vec<f64>) {
+    let draws = RUNS as usize / textures.len();
+    let each: Vec<Flagged> = textures
+        .par_iter()
+        .map(|&left_out| {
+            let known: Vec<usize> = textures
+                .iter()
+                .copied()
+                .filter(|&t| t != left_out)
+                .collect();
+            let mut sum = Flagged::default();
+            for draw in 0..draws {
+                let mut random = Random::new(2, (left_out * draws + draw) as u64);
+                let (picks, test) = split(protocol, n, session[left_out].len(), &mut random);
+                let table = train(session, &known, &picks);
+                let mut show = |texture: usize, flagged: &mut [f64; 3], weight: f64| {
+                    let mut visit = Visit::new(1);
+                    for share in flagged {
+                        visit.slide(&table, 0, &session[texture][test[random.below(test.len())]]);
+                        *share += f64::from(u8::from(flags(&table, &visit))) * weight;
+                    }
+                };
+                show(left_out, &mut sum.unknown, 1.0 / draws as f64);
+                for &texture in &known {
+                    show(texture, &mut sum.known, 1.0 / (draws * known.len()) as f64);
+                }
+            }
+            sum
+        })
+        .collect();
+    let mut all = Flagged::default();
+    for flagged in &each {
+        for k in 0..3 {
+            all.unknown[k] += flagged.unknown[k] / each.len() as f64;
+            all.known[k] += flagged.known[k] / each.len() as f64;
+        }
+    }
+    (all, each.iter().map(|f| f.unknown[1]).collect())
+}
+
+#[test]
+fn unknown_materials_are_flagged() {
+    let Some(folder) = data("biotac") else { return };
+    for (what, features) in [
+        ("traction", with_traction as fn(&Slide) -> Vec<f64>),
+        ("P_DC", with_pressure),
+    ] {
+        let session = session(&folder, features);
+        let all: Vec<usize> = (0..session.len()).collect();
+        for (protocol, n) in PROTOCOLS {
+            let (flagged, each) = leave_one_out(&session, &all, protocol, n, |table, visit| {
+                visit.novel(table)
+            });
+            println!("unknown, {what} and 12 bands, {protocol:?} {n}:{flagged}");
+            let each: Vec<String> = each.iter().map(|e| format!("{e:.2}")).collect();
+            println!("    after two slides, by material: {}", each.join(" "));
+        }
+    }
+}
+
+/// What came of a session of single visits.
+#[derive(Clone, Default, Debug)]
+struct Lived {
+    visits: f64,
+    right: f64,
+    asked: f64,
+    /// Right where it did not ask; a visit where it asked ends with the right name.
+    right_or_asked: f64,
+    learned_wrong: f64,
+    /// Right by material.
+    by_texture: Vec<f64>,
+}
+
+impl Lived {
+    fn worst(&self) -> f64 {
+        let visits = self.visits / self.by_texture.len() as f64;
+        self.by_texture
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min)
+            / visits
+    }
+}
+
+impl std::fmt::Display for Lived {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{:.4} right, worst material {:.3}, gate not passed {:.4}, right with the user's answers {:.4}, wrong updates {:.5}",
+            self.right / self.visits,
+            self.worst(),
+            self.asked / self.visits,
+            self.right_or_asked / self.visits,
+            self.learned_wrong / self.visits
+        )
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Life {
+    /// Nothing is learned.
+    Static,
+    /// What passes the gate is learned.
+    Alone,
+    /// And what does not is learned under the name that the user gives.
+    WithUser,
+}
+
+/// The first `n` slides train; then each later slide of each of `textures` is a visit of its own, in the order of time.
+fn live(session: &Session, textures: &[usize], n: usize, life: Life, lives: u64) -> Lived {
+    let picks: Vec<usize> = (0..n).collect();
+    let trained = train(session, textures, &picks);
+    let all: Vec<Lived> = (0..lives)
+        .into_par_iter()
+        .map(|seed| {
+            let mut random = Random::new(3, seed);
+            let mut table = trained.clone();
+            let mut lived = Lived {
+                by_texture: vec![0.0; textures.len()],
+                ..Lived::default()
+            };
+            for slide in n..session[textures[0]].len() {
+                for texture in random.order(textures.len()) {
+                    let mut visit = Visit::new(1);
+                    visit.slide(&table, 0, &session[textures[texture]][slide]);
+                    let (best, _) = visit.best(&table);
+                    let certain = visit.certain(&table);
+                    let right = f64::from(u8::from(best == texture));
+                    lived.visits += 1.0;
+                    lived.right += right;
+                    lived.by_texture[texture] += right;
+                    lived.right_or_asked += if certain { right } else { 1.0 };
+                    lived.asked += f64::from(u8::from(!certain));
+                    let name = match life {
+                        Life::Static => None,
+                        Life::Alone => certain.then_some(best),
+                        Life::WithUser => Some(if certain { best } else { texture }),
+                    };
+                    if let Some(name) = name {
+                        lived.learned_wrong += f64::from(u8::from(name != texture));
+                        table.learn_visit(name, &visit);
+                    }
+                }
+            }
+            lived
+        })
+        .collect();
+    let mut sum = Lived {
+        by_texture: vec![0.0; textures.len()],
+        ..Lived::default()
+    };
+    for lived in all {
+        sum.visits += lived.visits;
+        sum.right += lived.right;
+        sum.asked += lived.asked;
+        sum.right_or_asked += lived.right_or_asked;
+        sum.learned_wrong += lived.learned_wrong;
+        for (sum, right) in sum.by_texture.iter_mut().zip(lived.by_texture) {
+            *sum += right;
+        }
+    }
+    sum
+}
+
+#[test]
+fn a_session_is_learned_on_the_go() {
+    let Some(folder) = data("biotac") else { return };
+    for (what, features) in [
+        ("traction", with_traction as fn(&Slide) -> Vec<f64>),
+        ("P_DC", with_pressure),
+    ] {
+        let session = session(&folder, features);
+        let all: Vec<usize> = (0..session.len()).collect();
+        for life in [Life::Static, Life::Alone, Life::WithUser] {
+            let lived = live(&session, &all, 5, life, 200);
+            println!("session, {what} and 12 bands, {life:?}: {lived}");
+            let each: Vec<String> = lived
+                .by_texture
+                .iter()
+                .map(|r| format!("{:.2}", r / lived.visits * 20.0))
+                .collect();
+            println!("    by material: {}", each.join(" "));
+        }
+    }
+}
