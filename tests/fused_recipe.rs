@@ -121,6 +121,7 @@ fn train(session: &Session, textures: &[usize], picks: &[usize]) -> Trained {
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Outcome {
+    best: usize,
     right: bool,
     sure: bool,
     slides: u32,
@@ -135,6 +136,7 @@ fn explore(table: &Trained, truth: usize, mut draw: impl FnMut() -> Vec<f64>) ->
         let sure = p > SURE;
         if sure || visit.slides() == LIMIT {
             return Outcome {
+                best,
                 right: best == truth,
                 sure,
                 slides: visit.slides(),
@@ -313,6 +315,9 @@ fn unknown_materials_are_flagged() {
             println!("unknown, {what} and 12 bands, {protocol:?} {n}:{flagged}");
             let each: Vec<String> = each.iter().map(|e| format!("{e:.2}")).collect();
             println!("    after two slides, by material: {}", each.join(" "));
+            if public(&folder) && what == "traction" && matches!(protocol, Protocol::Interleaved) {
+                assert!(flagged.unknown[1] >= 0.80 && flagged.known[1] <= 0.03);
+            }
         }
     }
 }
@@ -480,6 +485,20 @@ fn a_session_is_learned_on_the_go() {
             for life in [Life::Static, Life::Alone, Life::WithUser] {
                 let lived = live(&session, &all, 5, &learning, life, 200);
                 println!("learning, {what}, {name}, {life:?}, all materials: {lived}");
+                if public(&folder) && what == "traction" {
+                    match life {
+                        // the recipe's own memory of 8 falls short here: 0.969, worst material 0.72
+                        Life::Alone if name != "recipe" => {
+                            assert!(lived.accuracy() >= 0.97 && lived.worst() >= 0.80);
+                        }
+                        Life::WithUser => {
+                            assert!(lived.accuracy() >= 0.98 && lived.worst() >= 0.80);
+                            assert!(lived.asked / lived.visits <= 0.10);
+                            assert!(lived.learned_wrong == 0.0);
+                        }
+                        _ => (),
+                    }
+                }
                 let mut sum = Lived::new(others.len());
                 let mut worst = f64::INFINITY;
                 for cut in cut(&session) {
@@ -493,4 +512,264 @@ fn a_session_is_learned_on_the_go() {
             }
         }
     }
+}
+
+/// Share of `right` answers from one slide of a texture that was taught from `n`, the others having been learned from five.
+fn taught(session: &Session, n: usize) -> f64 {
+    let right: usize = (0..RUNS)
+        .into_par_iter()
+        .map(|run| {
+            let mut random = Random::new(4, run);
+            let new = run as usize % session.len();
+            let (picks, test) = split(Protocol::Interleaved, 5, session[new].len(), &mut random);
+            let known: Vec<usize> = (0..session.len()).filter(|&t| t != new).collect();
+            let mut table = train(session, &known, &picks);
+            let slides = picks[..n].iter().map(|&p| session[new][p].clone());
+            let index = table.teach(&[slides.collect()]);
+            let mut visit = Visit::new(1);
+            visit.slide(&table, 0, &session[new][test[random.below(test.len())]]);
+            usize::from(visit.best(&table).0 == index)
+        })
+        .sum();
+    right as f64 / RUNS as f64
+}
+
+#[test]
+fn a_texture_is_taught_from_few_slides() {
+    let Some(folder) = data("biotac") else { return };
+    let session = session(&folder, with_traction);
+    for (n, floor) in [(1, 0.84), (2, 0.90), (3, 0.93), (5, 0.94)] {
+        let right = taught(&session, n);
+        println!("taught from {n}: recognised from one slide {right:.4}");
+        assert!(!public(&folder) || right >= floor, "{n}: {right}");
+    }
+}
+
+/// The nearest multiple of 1 / `steps`, inside +-`limit`.
+fn rounded(z: &[f64], steps: f64, limit: f64) -> Vec<f64> {
+    let round = |z: &f64| (z * steps).round().clamp(-limit * steps, limit * steps) / steps;
+    z.iter().map(round).collect()
+}
+
+#[test]
+fn coarse_whitened_features_decide_alike() {
+    let Some(folder) = data("biotac") else { return };
+    let session = session(&folder, with_traction);
+    let textures: Vec<usize> = (0..session.len()).collect();
+    for (protocol, n) in PROTOCOLS {
+        // i16 and i8, means and slides alike
+        for (steps, limit) in [(256.0, 128.0 - 1.0 / 256.0), (4.0, 31.75)] {
+            let runs: Vec<(bool, bool, f64)> = (0..RUNS)
+                .into_par_iter()
+                .map(|run| {
+                    let mut random = Random::new(5, run);
+                    let truth = run as usize % session.len();
+                    let (picks, test) = split(protocol, n, session[truth].len(), &mut random);
+                    let table = train(&session, &textures, &picks);
+                    let mut coarse = table.clone();
+                    for mean in coarse.means.iter_mut().flatten() {
+                        *mean = rounded(mean, steps, limit);
+                    }
+                    let slides: Vec<Vec<f64>> = (0..LIMIT)
+                        .map(|_| &session[truth][test[random.below(test.len())]])
+                        .map(|x| table.movements[0].z(x))
+                        .collect();
+                    let mut of = slides.iter().cloned();
+                    let exact = explore(&table, truth, || of.next().unwrap());
+                    let mut of = slides.iter().map(|z| rounded(z, steps, limit));
+                    let rough = explore(&coarse, truth, || of.next().unwrap());
+                    let furthest = slides
+                        .iter()
+                        .flatten()
+                        .fold(0.0, |f: f64, z| f.max(z.abs()));
+                    (exact.best == rough.best, exact == rough, furthest)
+                })
+                .collect();
+            let share = |f: fn(&(bool, bool, f64)) -> bool| {
+                runs.iter().filter(|r| f(r)).count() as f64 / RUNS as f64
+            };
+            let (same, identical) = (share(|r| r.0), share(|r| r.1));
+            println!(
+                "z in steps of 1/{steps}, {protocol:?} {n}: same texture {same:.4}, and same slides {identical:.4}; \
+                 furthest z {:.1}, beyond the limit in {:.4} of the runs",
+                runs.iter().fold(0.0, |f: f64, r| f.max(r.2)),
+                runs.iter().filter(|r| r.2 > limit).count() as f64 / RUNS as f64
+            );
+            assert!(!public(&folder) || same >= if steps > 4.0 { 0.999 } else { 0.99 });
+        }
+    }
+}
+
+// By hand, without recordings.
+
+fn near(a: f64, b: f64) {
+    assert!((a - b).abs() < 1e-12 * (1.0 + b.abs()), "{a} for {b}");
+}
+
+/// One feature, textures about 1 and 11, variance 2.
+fn two_textures() -> Trained {
+    Trained::train(&vec![
+        vec![vec![vec![0.0], vec![2.0]]],
+        vec![vec![vec![10.0], vec![12.0]]],
+    ])
+}
+
+#[test]
+fn one_feature_by_hand() {
+    let mut table = two_textures();
+    let root = 2f64.sqrt();
+    near(table.movements[0].w[0][0], 1.0 / root);
+    near(table.movements[0].g[0], 6.0);
+    near(table.means[0][0][0], -5.0 / root);
+    near(table.means[1][0][0], 5.0 / root);
+    assert_eq!(table.counts, [[2.0], [2.0]]);
+
+    // one slide right on the first: v = 1 + 1/2, q = 0 and 50
+    let mut visit = Visit::new(1);
+    let confusion = (-50f64 / 12.0).exp();
+    near(visit.benefits(&table)[0], 1.0 / (1.0 + confusion));
+    visit.slide(&table, 0, &[1.0]);
+    let l = visit.log_likelihoods(&table);
+    near(l[0], -0.5 * 1.5f64.ln());
+    near(l[1], -0.5 * 1.5f64.ln() - 4.5 * (1.0 + 50.0 / 12.0f64).ln());
+    let ratio = (1.0 + 50.0 / 12.0f64).powf(-4.5);
+    near(visit.best(&table).1, 1.0 / (1.0 + ratio));
+    near(
+        visit.posterior_from(&table, &[1.0, 9.0])[0],
+        1.0 / (1.0 + 9.0 * ratio),
+    );
+    // the background: about 0, variance 12.5 + 1
+    near(
+        visit.novelty(&table),
+        -0.5 * 13.5f64.ln() - 4.5 * (1.0 + 12.5 / 13.5 / 8.0f64).ln() + 0.5 * 1.5f64.ln()
+            - (0.5 * (1.0 + ratio)).ln(),
+    );
+    // the benefit of a second slide: the square root of what is left
+    let p = visit.posterior(&table);
+    let left =
+        1.0 - p[0] * p[0] / (p[0] + confusion * p[1]) - p[1] * p[1] / (p[1] + confusion * p[0]);
+    near(visit.benefits(&table)[0], 1.0 - left.sqrt());
+
+    // a second slide replaces what the first said: k = 2, mean at 2
+    visit.slide(&table, 0, &[3.0]);
+    let l = visit.log_likelihoods(&table);
+    near(l[0], -4.5 * (1.0 + 0.5 / 8.0f64).ln());
+
+    // learned once for the visit: 1 moves a third of the way to 2
+    table.learn_visit(&Learning::RECIPE, 0, &visit);
+    near(table.means[0][0][0], (1.0 + 1.0 / 3.0 - 6.0) / root);
+    near(table.counts[0][0], 3.0);
+    // and a count stops at the memory, or stays where training brought it
+    for _ in 0..20 {
+        table.learn(&Learning::RECIPE, 0, 0, &[0.0]);
+    }
+    near(table.counts[0][0], 8.0);
+    table.counts[0][0] = 15.0;
+    table.means[0][0][0] = 9.0;
+    table.learn(&Learning::RECIPE, 0, 0, &[0.0]);
+    near(table.counts[0][0], 15.0);
+    near(table.means[0][0][0], 8.0);
+
+    let third = table.teach(&[vec![vec![20.0], vec![22.0], vec![24.0]]]);
+    assert_eq!(third, 2);
+    near(table.means[2][0][0], 16.0 / root);
+    near(table.counts[2][0], 3.0);
+}
+
+#[test]
+fn movements_add_and_lend_each_other_their_covariance() {
+    // variances 2 and 8 with two degrees of freedom each: 15 parts in 17 of the average, 5
+    let slides = |far: f64| {
+        vec![
+            vec![vec![far], vec![far + 2.0]],
+            vec![vec![far], vec![far + 4.0]],
+        ]
+    };
+    let table = Trained::train(&vec![slides(0.0), slides(10.0)]);
+    near(
+        table.movements[0].w[0][0],
+        (2.0 + 15.0 / 17.0 * 3.0f64).powf(-0.5),
+    );
+    near(
+        table.movements[1].w[0][0],
+        (8.0 - 15.0 / 17.0 * 3.0f64).powf(-0.5),
+    );
+    let mut of = [Visit::new(2), Visit::new(2), Visit::new(2)];
+    of[0].slide(&table, 0, &[1.0]);
+    of[1].slide(&table, 1, &[4.0]);
+    of[2].slide(&table, 0, &[1.0]);
+    of[2].slide(&table, 1, &[4.0]);
+    let [first, second, both] = of.map(|v| v.log_likelihoods(&table));
+    for j in 0..2 {
+        near(both[j], first[j] + second[j]);
+    }
+}
+
+#[test]
+fn shrinkage_by_hand() {
+    let unit = |d: usize, off: f64| -> oracle::Matrix {
+        (0..d)
+            .map(|i| (0..d).map(|j| if i == j { 1.0 } else { off }).collect())
+            .collect()
+    };
+    // nothing to estimate: all identity
+    for d in 1..5 {
+        near(oracle::oas(&unit(d, 0.0), 80.0), 1.0);
+    }
+    // d = 2, t = 2 + 2 / 4: (0 t + 4) / ((100 + 1 - 1) (1 / 2))
+    near(oracle::oas(&unit(2, 0.5), 100.0), 0.08);
+    // d = 4, t = 4 + 12 / 4: (7 / 2 + 16) / ((N + 1 / 2) 3)
+    near(oracle::oas(&unit(4, 0.5), 9.5), 0.65);
+    near(oracle::oas(&unit(4, 0.5), 1.0), 1.0);
+    // deviations 1 and 3 keep, the correlation loses 8 %
+    let s = oracle::shrunk(&vec![vec![1.0, 1.5], vec![1.5, 9.0]], 100.0);
+    for (s, exact) in s.iter().flatten().zip([1.0, 1.38, 1.38, 9.0]) {
+        near(*s, exact);
+    }
+}
+
+#[test]
+fn whitening_makes_the_covariance_the_identity() {
+    let s = vec![
+        vec![4.0, 2.0, -1.0],
+        vec![2.0, 10.0, 3.0],
+        vec![-1.0, 3.0, 6.0],
+    ];
+    let w = oracle::inverse_lower(&oracle::cholesky(&s));
+    for i in 0..3 {
+        assert!(w[i][i + 1..].iter().all(|&w| w == 0.0));
+        for j in 0..3 {
+            let mut sum = 0.0;
+            for (a, row) in s.iter().enumerate() {
+                for (b, s) in row.iter().enumerate() {
+                    sum += w[i][a] * s * w[j][b];
+                }
+            }
+            near(sum, f64::from(u8::from(i == j)));
+        }
+    }
+}
+
+#[test]
+fn a_tone_fills_its_band() {
+    // bin 20 of a periodic Hann window has A^2 N / 6, its neighbours a quarter of that, all in the fifth band of 6 bins
+    let tone: Vec<i16> = (0..1536)
+        .map(|n| {
+            let phase = std::f64::consts::TAU * 20.0 * f64::from(n) / 512.0;
+            (8000.0 * phase.cos()).round() as i16 + 100
+        })
+        .collect();
+    let bands = features::ln_bands(&tone);
+    let exact = (8000f64.powi(2) * 512.0 / 4.0 / 6.0).ln();
+    assert!((bands[4] - exact).abs() < 1e-4, "{} {exact}", bands[4]);
+    for other in [0, 1, 2, 6, 7, 8, 11] {
+        assert!(bands[other] < 1.0, "{bands:?}");
+    }
+    let x = features::with_pressure(&tone, &[1, 3, 1, 3]);
+    near(x[0], 2.0);
+    near(x[1], 1.0);
+    assert_eq!(x[2..], bands);
+    let x = features::with_traction(&tone, &[1000, 2000]);
+    near(x[0], 1.5);
+    assert_eq!(x.len(), 13);
 }
