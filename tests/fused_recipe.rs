@@ -412,7 +412,8 @@ fn live(
             let mut random = Random::new(3, seed);
             let mut table = trained.clone();
             let mut lived = Lived::new(textures.len());
-            for slide in n..session[textures[0]].len() {
+            let visits = n..session[textures[0]].len();
+            for slide in visits {
                 for texture in random.order(textures.len()) {
                     let mut visit = Visit::new(1);
                     visit.slide(&table, 0, &session[textures[texture]][slide]);

@@ -4,6 +4,7 @@
 //! recipe leaves something open, the reading taken here is marked "reading:".
 #![allow(dead_code)] // each test file that includes this module uses a part of it
 #![allow(unreachable_pub)]
+#![allow(clippy::needless_range_loop)] // indices as in the formulas
 
 use std::f64::consts::PI;
 
