@@ -484,7 +484,7 @@ fn a_session_is_learned_on_the_go() {
                 unknown_learned(&session, &others, &learning)
             );
             for life in [Life::Static, Life::Alone, Life::WithUser] {
-                let lived = live(&session, &all, 5, &learning, life, 200);
+                let lived = live(&session, &all, 5, &learning, life, 40);
                 println!("learning, {what}, {name}, {life:?}, all materials: {lived}");
                 if public(&folder) && what == "traction" {
                     match life {
@@ -503,7 +503,7 @@ fn a_session_is_learned_on_the_go() {
                 let mut sum = Lived::new(others.len());
                 let mut worst = f64::INFINITY;
                 for cut in cut(&session) {
-                    let lived = live(&cut, &others, 5, &learning, life, 50);
+                    let lived = live(&cut, &others, 5, &learning, life, 10);
                     worst = worst.min(lived.worst());
                     sum.add(&lived);
                 }
