@@ -148,11 +148,7 @@ pub fn evaluate(
         None
     };
     let shared = match &bytes {
-        Some(bytes) => Some(Explorer::<MAX_TEXTURES>::new(
-            Table::read(bytes)?,
-            measured,
-            config,
-        )?),
+        Some(bytes) => Some(explorer(bytes, measured, config)?),
         None => None,
     };
     (0..runs)
@@ -165,8 +161,7 @@ pub fn evaluate(
                     Some(explorer) => play(explorer, config.strategy, run),
                     None => {
                         let bytes = run.learn(config.method)?;
-                        let mut explorer =
-                            Explorer::<MAX_TEXTURES>::new(Table::read(&bytes)?, measured, config)?;
+                        let mut explorer = explorer(&bytes, measured, config)?;
                         play(&mut explorer, config.strategy, run)
                     }
                 };
@@ -175,6 +170,23 @@ pub fn evaluate(
             },
         )
         .collect()
+}
+
+/// An explorer on the heap: it is large, and the threads' stacks are not.
+///
+/// # Errors
+/// The table does not read, or cannot be explored.
+#[inline(never)]
+pub fn explorer(
+    bytes: &[u8],
+    measured: PropertySet,
+    config: Config,
+) -> Result<Box<Explorer<'_, MAX_TEXTURES>>, EvaluateError> {
+    Ok(Box::new(Explorer::new(
+        Table::read(bytes)?,
+        measured,
+        config,
+    )?))
 }
 
 /// Two textures, and how often the first was taken for the second.

@@ -44,7 +44,7 @@ pub fn measured(slides: &Slides) -> PropertySet {
 pub fn best_features(slides: &Slides) -> FeatureSet {
     let has = |set: FeatureSet| {
         let mut all = slides.iter().flatten().flatten();
-        all.all(|slide| slide.vector(set, length(set, slide)).is_some())
+        all.all(|slide| length(set, slide) > 0 && slide.vector(set, length(set, slide)).is_some())
     };
     FeatureSet::ALL
         .into_iter()

@@ -6,11 +6,11 @@ use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
-use tactus_core::explorer::{Config, Explorer};
+use tactus_core::explorer::Config;
 use tactus_core::fused::Observation;
 use tactus_core::table::{Action, Contents, EncodeError, Table, retell};
 
-use crate::evaluate::{EvaluateError, MAX_TEXTURES};
+use crate::evaluate::{EvaluateError, explorer};
 use crate::experiment::Experiment;
 
 /// From whom the probe learns during the session.
@@ -128,8 +128,7 @@ fn look(
     movement: u8,
     slide: &Observation,
 ) -> Result<(usize, bool), EvaluateError> {
-    let table = Table::read(bytes)?;
-    let mut explorer = Explorer::<MAX_TEXTURES>::new(table, experiment.measured(), config)?;
+    let mut explorer = explorer(bytes, experiment.measured(), config)?;
     let action = Action {
         movement,
         property: None,

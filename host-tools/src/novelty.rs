@@ -3,10 +3,9 @@
 use rand::RngExt as _;
 use rayon::prelude::*;
 use serde::Serialize;
-use tactus_core::explorer::{Config, Explorer};
-use tactus_core::table::Table;
+use tactus_core::explorer::Config;
 
-use crate::evaluate::{EvaluateError, MAX_TEXTURES};
+use crate::evaluate::{EvaluateError, explorer};
 use crate::experiment::{Experiment, Run};
 
 /// Slides after which it is counted.
@@ -67,8 +66,7 @@ fn visit(
     left_out: usize,
 ) -> Result<[bool; SLIDES], EvaluateError> {
     let bytes = run.learn_without(config.method, left_out)?;
-    let table = Table::read(&bytes)?;
-    let mut explorer = Explorer::<MAX_TEXTURES>::new(table, experiment.measured(), config)?;
+    let mut explorer = explorer(&bytes, experiment.measured(), config)?;
     let mut flagged = [false; SLIDES];
     for flag in &mut flagged {
         let outlook = explorer.outlook();
