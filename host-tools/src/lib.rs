@@ -3,6 +3,7 @@
 pub mod collection;
 pub mod evaluate;
 pub mod experiment;
+pub mod fabricslide;
 pub mod follow;
 pub mod import;
 pub mod link;

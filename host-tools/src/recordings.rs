@@ -17,6 +17,7 @@ use std::io::{self, Read as _};
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
 
+use flate2::read::GzDecoder;
 use sha2::{Digest as _, Sha256};
 use tactus_core::movement::Movement;
 
@@ -27,7 +28,7 @@ pub const PAC_RATE_HZ: u32 = 2200;
 /// Longest stream that is read, in samples: half an hour of P_AC. A slide lasts 15 s at most.
 pub const MAX_SAMPLES: usize = 1 << 22;
 /// Largest manifest that is read, in bytes.
-const MAX_MANIFEST: u64 = 64 << 20;
+pub(crate) const MAX_MANIFEST: u64 = 64 << 20;
 
 /// One slide over one texture.
 #[derive(Clone, PartialEq, Debug)]
@@ -367,7 +368,7 @@ fn distinct_textures(manifest: &Path, textures: &[Texture]) -> Result<()> {
 }
 
 /// The path of a file that a manifest names, if it is inside the manifest's folder.
-fn inside(folder: &Path, manifest: &str, name: &str) -> Result<PathBuf> {
+pub(crate) fn inside(folder: &Path, manifest: &str, name: &str) -> Result<PathBuf> {
     let relative = Path::new(name);
     let plain = |c: Component<'_>| matches!(c, Component::Normal(_));
     if name.is_empty() || !relative.components().all(plain) {
@@ -380,7 +381,7 @@ fn inside(folder: &Path, manifest: &str, name: &str) -> Result<PathBuf> {
 }
 
 /// The bytes of a file of at most `limit` bytes. Memory grows with the bytes that come, not with what a manifest claims.
-fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
+pub(crate) fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
     let io_error = |source| RecordingError::Io {
         path: path.to_owned(),
         source,
@@ -400,7 +401,7 @@ fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
 }
 
 /// SHA-256 in lower-case hexadecimal.
-fn sha256(bytes: &[u8]) -> String {
+pub(crate) fn sha256(bytes: &[u8]) -> String {
     let mut hex = String::new();
     for byte in Sha256::digest(bytes) {
         let _ = write!(hex, "{byte:02x}");
@@ -421,6 +422,44 @@ fn check_hash(path: &Path, what: &str, bytes: &[u8], expected: &str) -> Result<(
              again"
         ),
     })
+}
+
+/// The `bytes` bytes that a gzip file holds, with both SHA-256 checked. Never unpacks more than one byte too many.
+pub(crate) fn unpack(
+    path: &Path,
+    packed: &[u8],
+    sha256_gz: &str,
+    bytes: u64,
+    sha256_raw: &str,
+) -> Result<Vec<u8>> {
+    let fault = |cause| RecordingError::Samples {
+        path: path.to_owned(),
+        cause,
+    };
+    check_hash(path, "the gzip file", packed, sha256_gz)?;
+    let mut raw = Vec::new();
+    GzDecoder::new(packed)
+        .take(bytes.saturating_add(1))
+        .read_to_end(&mut raw)
+        .map_err(|e| fault(format!("no whole gzip stream ({e}); fetch it again")))?;
+    if raw.len() as u64 != bytes {
+        let more = if raw.len() as u64 > bytes {
+            "or more "
+        } else {
+            ""
+        };
+        let odd = if raw.len().is_multiple_of(2) {
+            ""
+        } else {
+            ", an odd number for 16-bit values"
+        };
+        return Err(fault(format!(
+            "unpacks to {} {more}bytes{odd}; the manifest says {bytes}",
+            raw.len()
+        )));
+    }
+    check_hash(path, "the unpacked samples", &raw, sha256_raw)?;
+    Ok(raw)
 }
 
 #[cfg(test)]

@@ -5,10 +5,8 @@
 //! each field of a record, in its order; wanted are `pac`, `pdc` and `f_tangential`), `motion.speed_mm_s`,
 //! `steady_window_s`, and per file its name, material, sizes and hashes. Nothing is assumed about how many materials, slides
 //! or samples there are.
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use flate2::read::GzDecoder;
 use serde::Deserialize;
 use tactus_core::movement::Movement;
 
@@ -302,31 +300,13 @@ impl Entry {
                 self.bytes_gz
             )));
         }
-        super::check_hash(path, "the gzip file", &packed, &self.sha256_gz)?;
-
-        let mut raw = Vec::new();
-        GzDecoder::new(packed.as_slice())
-            .take(self.bytes_raw + 1)
-            .read_to_end(&mut raw)
-            .map_err(|e| fault(format!("no whole gzip stream ({e}); fetch it again")))?;
-        if raw.len() as u64 != self.bytes_raw {
-            let more = if raw.len() as u64 > self.bytes_raw {
-                "or more "
-            } else {
-                ""
-            };
-            let odd = if raw.len().is_multiple_of(2) {
-                ""
-            } else {
-                ", an odd number for 16-bit values"
-            };
-            return Err(fault(format!(
-                "unpacks to {} {more}bytes{odd}; the manifest says {}",
-                raw.len(),
-                self.bytes_raw
-            )));
-        }
-        super::check_hash(path, "the unpacked samples", &raw, &self.sha256_raw)?;
+        let raw = super::unpack(
+            path,
+            &packed,
+            &self.sha256_gz,
+            self.bytes_raw,
+            &self.sha256_raw,
+        )?;
         Ok(super::npy::from_le_bytes(&raw))
     }
 }
