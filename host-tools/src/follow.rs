@@ -1,9 +1,10 @@
 //! The PC follows the probe: from the reports of one exploration with streaming on, it computes everything anew with the
 //! same core, and compares.
 
-use tactus_core::explorer::{Config, Explorer, ExplorerError, Strategy};
+use tactus_core::explorer::{Config, Explorer, ExplorerError, Method, Strategy};
 use tactus_core::features::{Plan, PropertySet, Slide, SlideError};
-use tactus_core::table::{Action, Table};
+use tactus_core::fused::FEATURE_STEPS;
+use tactus_core::table::{Action, Contents, Table};
 use tactus_core::wire::{Block, Felt, Identify, MAX_OUTLOOK, MAX_TEXTURES, Promise, Tell};
 
 /// Chip and PC do the same operations in the same order and agree to the bit; more than this apart they do not agree.
@@ -71,11 +72,11 @@ pub struct Agreement {
     pub slides: u32,
     /// Of the properties, in their units.
     pub properties: f32,
-    /// Of the background, counts^2, and of the logarithms of the band powers.
+    /// Of the background, counts^2, of the logarithms of the band powers, and of P_DC in 100 counts.
     pub signal: f32,
     /// Posteriors compared.
     pub posteriors: u32,
-    /// Of posterior probabilities, the verdict's too.
+    /// Of posterior probabilities, the verdict's too, and of its log-odds.
     pub posterior: f32,
     /// Choices compared; random ones are not.
     pub choices: u32,
@@ -89,7 +90,8 @@ pub struct Agreement {
     pub rejected_only_there: u32,
     /// Verdicts compared.
     pub verdicts: u32,
-    /// Verdicts that are others here: their texture, how sure they are, or after how many slides.
+    /// Verdicts that are others here: their texture, how sure they are, whether it is unknown, what the probe would learn, or
+    /// after how many slides.
     pub other_verdicts: u32,
 }
 
@@ -129,9 +131,11 @@ impl<'t> Follower<'t> {
         plan: &'t Plan,
     ) -> Result<Self, ExplorerError> {
         let config = Config {
+            method: asked.method.unwrap_or(Method::of(table.contents())),
             strategy: asked.strategy,
             threshold: asked.threshold,
             max_slides: asked.max_slides,
+            open: asked.open,
         };
         let explorer = if asked.among.is_empty() {
             Explorer::new(table, measured, config)?
@@ -176,22 +180,31 @@ impl<'t> Follower<'t> {
                 texture,
                 probability,
                 sure,
+                unknown,
+                log_odds,
                 slides,
+                asks,
                 ..
             } => {
                 self.agreement.verdicts += 1;
                 let here = self.explorer.verdict();
+                let is_fused = matches!(self.explorer.table().contents(), Contents::Fused(..));
                 let same = here.is_some_and(|here| {
                     here.texture == *texture
                         && here.sure == *sure
+                        && here.unknown == *unknown
                         && self.explorer.slides() == *slides
+                        && (is_fused && !self.explorer.is_certain()) == *asks
                 });
                 self.agreement.other_verdicts += u32::from(!same);
-                let here = here.map(|here| here.probability);
+                let agreement = &mut self.agreement;
+                let probable = here.map(|here| here.probability);
                 widen(
-                    &mut self.agreement.posterior,
-                    apart(here, Some(*probability)),
+                    &mut agreement.posterior,
+                    apart(probable, Some(*probability)),
                 );
+                let odds = here.and_then(|here| here.log_odds);
+                widen(&mut agreement.posterior, apart(odds, *log_odds));
                 Ok(())
             }
             _ => Ok(()),
@@ -281,7 +294,7 @@ impl<'t> Follower<'t> {
         let compared = self.compare(slide, felt);
         // with what was told, so that a difference of the slide is not counted again
         self.explorer
-            .observe(action, &felt.properties())
+            .observe(action, &felt.observation())
             .map_err(|_| FollowError::Observe { slide })?;
         let here = self.explorer.posterior();
         let agreement = &mut self.agreement;
@@ -314,9 +327,24 @@ impl<'t> Follower<'t> {
         if here.roughness_is_bound != there.roughness_is_bound {
             agreement.properties = f32::INFINITY;
         }
-        let signal = |felt: &Felt| std::iter::once(felt.background).chain(felt.ln_bands);
-        for (here, there) in signal(&here).zip(signal(there)) {
-            widen(&mut agreement.signal, apart(Some(here), Some(there)));
+        let (background, bands) = (here.background, &here.bands);
+        widen(
+            &mut agreement.signal,
+            apart(Some(background), Some(there.background)),
+        );
+        let bands = bands.iter().zip(&there.bands);
+        let (here_pdc, there_pdc) = (
+            here.pressure.iter().flatten(),
+            there.pressure.iter().flatten(),
+        );
+        for (here, there) in bands.chain(here_pdc.zip(there_pdc)) {
+            let (here, there) = (f32::from(*here), f32::from(*there));
+            widen(&mut agreement.signal, (here - there).abs() / FEATURE_STEPS);
+        }
+        if here.bands.len() != there.bands.len()
+            || here.pressure.is_some() != there.pressure.is_some()
+        {
+            agreement.signal = f32::INFINITY;
         }
         Ok(())
     }

@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 use tactus_core::rig::calibration::{RigCalibration, RigCalibrationError};
 use tactus_core::table::{Table, TableError};
 use tactus_core::wire::{
-    self, Ask, Identify, MAX_FRAME, MAX_TEXTURES, Name, PART, PROTOCOL, Receiver, Report, Request,
-    Reset, Status, Tell, TooLong, Train,
+    self, Ask, Forget, Identify, MAX_FRAME, MAX_TEXTURES, Name, PART, PROTOCOL, Receiver, Report,
+    Request, Reset, Status, Tell, TooLong, Train,
 };
 
 /// A request that may be made twice is made so often before the line is given up.
@@ -305,8 +305,16 @@ fn may_repeat(ask: &Ask) -> bool {
         | Ask::ReadTable(_)
         | Ask::BeginTable(_)
         | Ask::WriteTable { .. }
+        | Ask::Forget(Forget::SelfTaught | Forget::Training(_))
         | Ask::FactoryTable => true,
-        Ask::Home | Ask::Identify(_) | Ask::Train(_) | Ask::Calibrate | Ask::CommitTable => false,
+        Ask::Home
+        | Ask::Identify(_)
+        | Ask::Answer(_)
+        | Ask::Train(_)
+        | Ask::Rename { .. }
+        | Ask::Forget(Forget::Texture(_))
+        | Ask::Calibrate
+        | Ask::CommitTable => false,
     }
 }
 
@@ -345,7 +353,24 @@ pub struct Found {
     pub probability: f32,
     /// Whether it is over the threshold.
     pub sure: bool,
+    /// Whether it is rather none of the textures known; the one named is the most alike.
+    pub unknown: bool,
+    /// Log-odds of that, where they can be told.
+    pub log_odds: Option<f32>,
     /// Slides that counted.
+    pub slides: u8,
+    /// Whether the probe would learn from [`Question::answer`].
+    pub asks: bool,
+    /// Slides that the probe has learned from by itself.
+    pub learned: u8,
+}
+
+/// What the probe has learned from an answer.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Taught {
+    /// Name of the texture.
+    pub name: Name,
+    /// How many slides.
     pub slides: u8,
 }
 
@@ -357,6 +382,16 @@ impl Question<()> {
             answer: Some(()),
             pick: |_, _| Ok(()),
         }
+    }
+
+    /// Gives a texture another name.
+    pub fn rename(from: Name, to: Name) -> Self {
+        Self::command(Ask::Rename { from, to })
+    }
+
+    /// Has the probe forget a texture, what it taught itself, or a training.
+    pub fn forget(what: Forget) -> Self {
+        Self::command(Ask::Forget(what))
     }
 
     /// Has the probe take and keep these constants.
@@ -426,20 +461,62 @@ impl Question<Found> {
         Self {
             ask: Some(Ask::Identify(how)),
             answer: None,
+            pick: |tell, answer: &mut Option<Found>| {
+                match tell {
+                    Tell::Verdict {
+                        texture,
+                        name,
+                        probability,
+                        sure,
+                        unknown,
+                        log_odds,
+                        slides,
+                        asks,
+                    } => {
+                        *answer = Some(Found {
+                            texture: *texture,
+                            name: name.clone(),
+                            probability: *probability,
+                            sure: *sure,
+                            unknown: *unknown,
+                            log_odds: *log_odds,
+                            slides: *slides,
+                            asks: *asks,
+                            learned: 0,
+                        });
+                    }
+                    Tell::Taught {
+                        slides,
+                        itself: true,
+                        ..
+                    } => {
+                        if let Some(found) = answer {
+                            found.learned = *slides;
+                        }
+                    }
+                    _ => {}
+                }
+                Ok(())
+            },
+        }
+    }
+}
+
+impl Question<Taught> {
+    /// Tells the probe what lay under its finger in the last exploration; what it has learned from that.
+    pub fn answer(name: Name) -> Self {
+        Self {
+            ask: Some(Ask::Answer(name)),
+            answer: None,
             pick: |tell, answer| {
-                if let Tell::Verdict {
-                    texture,
+                if let Tell::Taught {
                     name,
-                    probability,
-                    sure,
                     slides,
+                    itself: false,
                 } = tell
                 {
-                    *answer = Some(Found {
-                        texture: *texture,
+                    *answer = Some(Taught {
                         name: name.clone(),
-                        probability: *probability,
-                        sure: *sure,
                         slides: *slides,
                     });
                 }

@@ -4,12 +4,14 @@ use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tactus_core::features::{Plan, PropertySet};
+use tactus_core::explorer::Method;
+use tactus_core::features::Plan;
+use tactus_core::fused::Observation;
 use tactus_core::movement::Movement;
 use tactus_core::rig::calibration::RigCalibration;
 
 use crate::collection::LearnError;
-use crate::experiment::{encode, learned};
+use crate::learn;
 use crate::recordings::{PAC_RATE_HZ, RecordingError, RecordingSet, Slide};
 use crate::replay::measure;
 use crate::sim::played::{Played, SHEAR_HZ};
@@ -123,13 +125,17 @@ impl Lesson {
         rig
     }
 
-    /// Learns a table on the rig: every slide to learn from is felt once.
+    /// Learns a table for a method on the rig: every slide to learn from is felt once.
     ///
     /// # Errors
     /// The first fault of a rig, or slide without properties.
-    pub fn learn(&self, calibration: RigCalibration) -> Result<Vec<u8>, LearnError> {
+    pub fn learn(
+        &self,
+        method: Method,
+        calibration: RigCalibration,
+    ) -> Result<Vec<u8>, LearnError> {
         let plan = Plan::new();
-        let experience = self
+        let felt = self
             .train
             .par_iter()
             .enumerate()
@@ -143,17 +149,18 @@ impl Lesson {
                 rig.home()?;
                 let felt = slides
                     .iter()
-                    .map(|_| Ok(measure(&plan, &rig.record(self.movement)?)?.properties))
+                    .map(|_| {
+                        Ok(Observation::from(&measure(
+                            &plan,
+                            &rig.record(self.movement)?,
+                        )?))
+                    })
                     .collect::<Result<Vec<_>, LearnError>>()?;
-                Ok(vec![learned(PropertySet::ALL, &felt)])
+                Ok(vec![felt])
             })
             .collect::<Result<Vec<_>, LearnError>>()?;
-        Ok(encode(
-            PropertySet::ALL,
-            &[self.movement],
-            &self.names,
-            &experience,
-        )?)
+        let movement = [self.movement];
+        Ok(learn::learn(method, None, &self.names, &movement, &felt)?)
     }
 }
 

@@ -4,8 +4,9 @@ use std::io::{self, Write};
 
 use tactus_core::explorer::{Outlook, Verdict};
 use tactus_core::features::{Properties, Property};
+use tactus_core::fused::white;
 use tactus_core::rig::Event;
-use tactus_core::table::{Action, Table};
+use tactus_core::table::{Action, Contents, Table};
 
 const BAR: usize = 24;
 /// Most candidates listed after a slide.
@@ -83,19 +84,27 @@ impl<'t, W: Write> Show<'t, W> {
         posterior: &[f32],
     ) -> io::Result<()> {
         self.slides += 1;
-        let bound = roughness_is_bound && action.property == Property::Roughness;
-        if let Some(value) = properties.get(action.property) {
-            let unit = if action.property == Property::Traction {
-                " N"
-            } else {
-                ""
-            };
-            let at_most = if bound { "at most " } else { "" };
-            writeln!(
-                self.out,
-                "  felt    {} {at_most}{value:.3}{unit}",
-                action.property
-            )?;
+        let felt: Vec<String> = Property::ALL
+            .into_iter()
+            .filter(|&property| {
+                action
+                    .property
+                    .is_none_or(|looked_at| looked_at == property)
+            })
+            .filter_map(|property| {
+                let value = properties.get(property)?;
+                let unit = if property == Property::Traction {
+                    " N"
+                } else {
+                    ""
+                };
+                let bound = roughness_is_bound && property == Property::Roughness;
+                let at_most = if bound { "at most " } else { "" };
+                Some(format!("{property} {at_most}{value:.3}{unit}"))
+            })
+            .collect();
+        if !felt.is_empty() {
+            writeln!(self.out, "  felt    {}", felt.join(", "))?;
         }
         self.candidates(posterior)?;
         self.out.flush()
@@ -110,11 +119,21 @@ impl<'t, W: Write> Show<'t, W> {
         self.out.flush()
     }
 
+    /// What an action looks at: "fineness", "all features".
+    fn looked_at(&self, action: Action) -> &'static str {
+        match (action.property, self.table.contents()) {
+            (Some(property), _) => property.name(),
+            (None, Contents::Fused(..)) => "all features",
+            (None, Contents::Gaussians(_)) => "all properties",
+        }
+    }
+
     /// "fineness at 0.80 N, 25.0 mm/s"
     fn name(&self, action: Action) -> String {
+        let looked_at = self.looked_at(action);
         match self.table.movement(action.movement) {
-            Some(movement) => format!("{} at {movement}", action.property),
-            None => action.property.to_string(),
+            Some(movement) => format!("{looked_at} at {movement}"),
+            None => looked_at.to_owned(),
         }
     }
 
@@ -126,12 +145,10 @@ impl<'t, W: Write> Show<'t, W> {
             .collect();
         others.sort_by(|a, b| b.benefit.total_cmp(&a.benefit));
         let single = self.table.movements().len() == 1;
-        let name = |o: &Outlook| {
-            if single {
-                o.action.property.to_string()
-            } else {
-                self.name(o.action)
-            }
+        let name = |o: &Outlook| match (o.action.property, self.table.movement(o.action.movement)) {
+            (Some(property), _) if single => property.to_string(),
+            (None, Some(movement)) => movement.to_string(),
+            _ => self.name(o.action),
         };
         let rest: Vec<String> = others
             .iter()
@@ -153,7 +170,7 @@ impl<'t, W: Write> Show<'t, W> {
         };
         format!(
             "{} should leave {} uncertainty{rest}",
-            chosen.action.property,
+            chosen.action.property.map_or("it", Property::name),
             left(chosen)
         )
     }
@@ -199,7 +216,16 @@ impl<'t, W: Write> Show<'t, W> {
         let name = self.table.name(verdict.texture).unwrap_or("?");
         let p = verdict.probability * 100.0;
         let slides = format!("{slides} slide{}", if slides == 1 { "" } else { "s" });
-        if verdict.sure {
+        if verdict.unknown {
+            let odds = verdict
+                .log_odds
+                .map_or(String::new(), |odds| format!(" (log-odds {odds:+.1})"));
+            writeln!(
+                self.out,
+                "\nIt is not one of the {} textures I know{odds} after {slides}; it is most like {name}.",
+                self.table.textures()
+            )?;
+        } else if verdict.sure {
             writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}.")?;
         } else {
             writeln!(
@@ -207,7 +233,8 @@ impl<'t, W: Write> Show<'t, W> {
                 "\nNot sure after {slides}; most likely {name}, {p:.1} %."
             )?;
         }
-        if name == truth {
+        let is_known = self.table.find(truth).is_some();
+        if (verdict.unknown && !is_known) || (!verdict.unknown && name == truth) {
             writeln!(self.out, "Right.")
         } else {
             writeln!(self.out, "Wrong: it was {truth}.")
@@ -228,6 +255,10 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
         table.as_bytes().len(),
         table.crc()
     )?;
+    if let Contents::Fused(set, features) = table.contents() {
+        writeln!(out, "{features} features: {}", set.name())?;
+        return show_whitened(table, out);
+    }
     for (movement, index) in table.movements().zip(0..) {
         writeln!(out, "\nmovement {}: {movement}", index + 1)?;
         write!(out, "{:>4} {:<24} {:>6}", "no.", "texture", "trials")?;
@@ -247,7 +278,7 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
                     texture,
                     Action {
                         movement: index,
-                        property,
+                        property: Some(property),
                     },
                 ) {
                     Some(g) => write!(out, "  {:>10.4} {:>8.4}", g.mean, g.sd)?,
@@ -258,4 +289,53 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
         }
     }
     Ok(())
+}
+
+/// Prints what a fused table holds: whitened means say nothing to people, how far they are apart does.
+fn show_whitened(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
+    for (movement, index) in table.movements().zip(0..) {
+        writeln!(out, "\nmovement {}: {movement}", index + 1)?;
+        writeln!(
+            out,
+            "{:>4} {:<24} {:>6}  {:>7} {:>4} {:>6}  {:>6}  most like",
+            "no.", "texture", "trials", "factory", "user", "itself", "sd off"
+        )?;
+        for (name, texture) in table.names().zip(0..) {
+            let tally = table.tally(texture);
+            write!(
+                out,
+                "{:>4} {name:<24} {:>6}  {:>7} {:>4} {:>6}",
+                texture + 1,
+                table.trials(texture, index),
+                tally.factory,
+                tally.user,
+                tally.itself
+            )?;
+            let others = table
+                .names()
+                .zip(0..)
+                .filter(|&(_, other)| other != texture);
+            let nearest = others
+                .filter_map(|(name, other)| Some((apart(table, index, [texture, other])?, name)))
+                .min_by(|a, b| a.0.total_cmp(&b.0));
+            match nearest {
+                Some((sd, other)) => writeln!(out, "  {sd:>6.1}  {other}")?,
+                None => writeln!(out, "  {:>6}  -", "-")?,
+            }
+        }
+    }
+    Ok(())
+}
+
+/// How far the means of two textures are apart at a movement, in standard deviations within a texture.
+fn apart(table: Table<'_>, movement: u8, textures: [u16; 2]) -> Option<f32> {
+    if textures
+        .iter()
+        .any(|&texture| table.trials(texture, movement) == 0)
+    {
+        return None;
+    }
+    let [a, b] = textures.map(|texture| table.white_mean(texture, movement));
+    let squares = a.zip(b).map(|(a, b)| (white(a) - white(b)).powi(2));
+    Some(squares.sum::<f32>().sqrt())
 }
