@@ -11,9 +11,10 @@ use tactus_core::kernels::Plain;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::control::Phase;
 use tactus_core::rig::unloaded::UnloadedRuns;
-use tactus_core::session::{self, text};
+use tactus_core::session::{self, Visited, text};
 use tactus_core::store::{Store, StoreError};
 use tactus_core::table::Table;
+use tactus_core::teaching;
 use tactus_core::wire::{Ask, PART, Tell, Text};
 
 use crate::board;
@@ -34,6 +35,18 @@ const HEARD_MS: u64 = 150;
 
 type Storage = Store<Bank2Region1<'static, Async>>;
 
+/// What the probe knows.
+struct Memory {
+    store: Option<Storage>,
+    /// Begins with the table in force: the stored one or the factory's, with what the probe has learned by itself. A new
+    /// table is made here too; afterwards [`Memory::reload`] is due.
+    room: &'static mut [u8],
+    /// Bytes of the table in force.
+    length: usize,
+    /// What the last exploration felt, until the rig moves again.
+    visited: Option<Visited>,
+}
+
 #[embassy_executor::task]
 pub(crate) async fn session(flash: board::Storage, samples: Consumer<'static, Samples>) {
     static PLAN: static_cell::StaticCell<Plan> = static_cell::StaticCell::new();
@@ -48,13 +61,19 @@ pub(crate) async fn session(flash: board::Storage, samples: Consumer<'static, Sa
     // move before the calibration is there, which says whether the finger is in the air.
     Timer::after_millis(HEARD_MS).await;
     let _ = probe.lift().await;
-    let mut store = with_timeout(OPENING, open(flash))
+    let store = with_timeout(OPENING, open(flash))
         .await
         .unwrap_or_else(|_| {
             defmt::error!("the store does not answer");
             None
         });
-    use_table(store.as_ref());
+    let mut memory = Memory {
+        store,
+        room,
+        length: 0,
+        visited: None,
+    };
+    memory.reload().await;
     let _ = probe.home().await;
     loop {
         servo::forget_stop();
@@ -64,7 +83,7 @@ pub(crate) async fn session(flash: board::Storage, samples: Consumer<'static, Sa
         servo::progress();
         BUSY.store(true, Relaxed);
         let id = request.id;
-        let done = work(request.ask, &mut probe, &mut store, plan, room).await;
+        let done = work(request.ask, &mut probe, &mut memory, plan).await;
         match done {
             Ok(()) => tell(Tell::Done(id)),
             Err(why) => refuse(id, why),
@@ -99,12 +118,12 @@ async fn restore(store: &mut Storage) -> Result<(), StoreError<embassy_stm32::fl
     skin.map(|_| ())
 }
 
-/// The table in use: the stored one, or the factory's.
-fn table_bytes(store: Option<&Storage>) -> &'static [u8] {
+/// The table that all learning begins with: the stored one, or the factory's.
+fn base_bytes(store: Option<&Storage>) -> &'static [u8] {
     let stored = store.and_then(Storage::table).and_then(|table| {
         let at = table.offset as usize;
-        // SAFETY: the store's sectors are mapped at this address and are nothing else; the slot in use is erased only while
-        // no exploration, and so no reader of this slice, is under way.
+        // SAFETY: the store's sectors are mapped at this address and are nothing else; the slot in use is erased only when
+        // the one after next is begun, and no reader of this slice lives that long.
         let store = unsafe { core::slice::from_raw_parts(STORE_AT as *const u8, STORE_LENGTH) };
         store.get(at..at.checked_add(table.length)?)
     });
@@ -114,39 +133,145 @@ fn table_bytes(store: Option<&Storage>) -> &'static [u8] {
         .unwrap_or(FACTORY)
 }
 
-fn use_table(store: Option<&Storage>) {
-    let bytes = table_bytes(store);
-    if let Ok(table) = Table::read(bytes) {
+fn broken() -> Text {
+    text("the store is broken: see the log")
+}
+
+impl Memory {
+    /// Puts the table in force, and tells the link of it.
+    async fn reload(&mut self) {
+        let bytes = base_bytes(self.store.as_ref());
+        self.length = match Table::read(bytes) {
+            Ok(base) => teaching::put_in_force(&base, self.store.as_mut(), self.room)
+                .await
+                .unwrap_or_else(|why| {
+                    defmt::error!("no table in force: {=str}", text(why).as_str());
+                    0
+                }),
+            Err(why) => {
+                defmt::error!("no table: {=str}", text(why).as_str());
+                0
+            }
+        };
+        self.tell_link();
+    }
+
+    /// The bytes of the table in force.
+    fn in_force(&self) -> &[u8] {
+        self.room.get(..self.length).unwrap_or_default()
+    }
+
+    fn tell_link(&self) {
+        let Ok(table) = Table::read(self.in_force()) else {
+            return;
+        };
         TABLE.lock(|cell| {
             cell.set(TableInUse {
                 textures: table.textures(),
-                bytes: bytes.len() as u32,
+                bytes: self.length as u32,
                 crc: table.crc(),
-                factory: core::ptr::eq(bytes, FACTORY),
+                factory: core::ptr::eq(base_bytes(self.store.as_ref()), FACTORY),
             });
         });
+    }
+
+    fn store(&mut self) -> Result<&mut Storage, Text> {
+        self.store.as_mut().ok_or_else(broken)
+    }
+
+    /// The store, the table that learning begins with, and the room for a new one.
+    fn to_learn(&mut self) -> Result<(&mut Storage, Table<'static>, &mut [u8]), Text> {
+        let base = Table::read(base_bytes(self.store.as_ref())).map_err(text)?;
+        let store = self.store.as_mut().ok_or_else(broken)?;
+        Ok((store, base, self.room))
+    }
+
+    /// What the skin has been through is worth keeping, but no reason to fail.
+    async fn keep_skin(&mut self) {
+        if let Some(store) = &mut self.store {
+            let _ = store.set_skin(&servo::snapshot().skin).await;
+        }
+    }
+
+    /// Learns from a visit that the probe is certain of. The exploration has its answer whatever becomes of that.
+    async fn learn_by_itself(&mut self, visited: &Visited) {
+        let Some(store) = &mut self.store else {
+            return;
+        };
+        match teaching::learn_by_itself(visited, store, self.room).await {
+            Ok(Some(taught)) => {
+                self.tell_link();
+                tell(taught);
+            }
+            Ok(None) => {}
+            Err(why) => {
+                defmt::error!("not learned: {=str}", why.as_str());
+                self.reload().await;
+            }
+        }
     }
 }
 
 /// Does what was asked for; the error is the answer.
-async fn work(
-    ask: Ask,
-    probe: &mut Probe,
-    store: &mut Option<Storage>,
-    plan: &Plan,
-    room: &mut [u8],
-) -> Result<(), Text> {
-    let no_store = || text("the store is broken: see the log");
+async fn work(ask: Ask, probe: &mut Probe, memory: &mut Memory, plan: &Plan) -> Result<(), Text> {
     match ask {
-        Ask::Home => probe.home().await.map_err(text),
-        Ask::Identify(identify) => {
-            let table = Table::read(table_bytes(store.as_ref())).map_err(text)?;
-            probe.begin(identify.seed).await;
-            let done = session::identify::<_, Plain>(&identify, probe, table, plan, tell).await;
-            if let Some(store) = store {
-                // what the skin has been through is worth keeping, but no reason to fail
-                let _ = store.set_skin(&servo::snapshot().skin).await;
+        Ask::Home => {
+            memory.visited = None;
+            probe.home().await.map_err(text)
+        }
+        Ask::Identify(wanted) => {
+            memory.visited = None;
+            probe.begin(wanted.seed).await;
+            let table = Table::read(memory.in_force()).map_err(text)?;
+            let done = session::identify::<_, Plain>(&wanted, probe, table, plan, tell).await;
+            memory.keep_skin().await;
+            let visited = done?;
+            if wanted.learn {
+                memory.learn_by_itself(&visited).await;
             }
+            memory.visited = Some(visited);
+            Ok(())
+        }
+        Ask::Answer(name) => {
+            let visited = memory
+                .visited
+                .take()
+                .ok_or_else(|| text("nothing was felt since the rig moved last: explore first"))?;
+            let (store, base, room) = memory.to_learn()?;
+            let done = teaching::answer(&visited, &name, &base, store, room).await;
+            memory.reload().await;
+            match done {
+                Ok(taught) => {
+                    tell(taught);
+                    Ok(())
+                }
+                Err(why) => {
+                    // another name may do
+                    memory.visited = Some(visited);
+                    Err(why)
+                }
+            }
+        }
+        Ask::Rename { from, to } => {
+            let (store, base, room) = memory.to_learn()?;
+            let done = teaching::rename(&from, &to, &base, store, room).await;
+            memory.reload().await;
+            done
+        }
+        Ask::Forget(what) => {
+            let (store, base, room) = memory.to_learn()?;
+            let done = teaching::forget(&what, &base, store, room).await;
+            memory.reload().await;
+            done
+        }
+        Ask::Train(wanted) => {
+            memory.visited = None;
+            probe.begin(wanted.seed).await;
+            let (store, base, room) = memory.to_learn()?;
+            let done =
+                session::train::<_, _, Plain>(&wanted, probe, store, base, plan, room, tell).await;
+            memory.reload().await;
+            memory.keep_skin().await;
             done
         }
         Ask::WriteCalibration(bytes) => {
@@ -158,10 +283,16 @@ async fn work(
             servo::command(Command::Calibrate(calibration))
                 .await
                 .map_err(text)?;
-            keep(store.as_mut().ok_or_else(no_store)?, &calibration).await
+            keep(memory.store()?, &calibration).await
+        }
+        Ask::Calibrate => {
+            memory.visited = None;
+            let calibration = calibrate(probe).await?;
+            tell(link::calibration());
+            keep(memory.store()?, &calibration).await
         }
         Ask::ReadTable(offset) => {
-            let bytes = table_bytes(store.as_ref());
+            let bytes = memory.in_force();
             let rest = bytes
                 .get(offset as usize..)
                 .ok_or_else(|| text("the table has no such byte"))?;
@@ -174,11 +305,11 @@ async fn work(
             Ok(())
         }
         Ask::BeginTable(length) => {
-            let store = store.as_mut().ok_or_else(no_store)?;
+            let store = memory.store()?;
             store.begin_table(length as usize).await.map_err(text)
         }
         Ask::WriteTable { offset, bytes } => {
-            let store = store.as_mut().ok_or_else(no_store)?;
+            let store = memory.store()?;
             match store.write_table(offset as usize, &bytes).await {
                 // said again by a host that did not hear the answer; the table's checksum is looked at in the end
                 Err(StoreError::Part { offset, wanted })
@@ -190,30 +321,15 @@ async fn work(
             }
         }
         Ask::CommitTable => {
-            let opened = store.as_mut().ok_or_else(no_store)?;
-            opened.commit_table(room).await.map_err(text)?;
-            use_table(store.as_ref());
-            Ok(())
+            let store = memory.store.as_mut().ok_or_else(broken)?;
+            let done = store.commit_table(memory.room).await;
+            let done = done.map(|_| ()).map_err(text);
+            memory.reload().await;
+            done
         }
         Ask::FactoryTable => {
-            let opened = store.as_mut().ok_or_else(no_store)?;
-            opened.factory_table().await.map_err(text)?;
-            use_table(store.as_ref());
-            Ok(())
-        }
-        Ask::Calibrate => {
-            let calibration = calibrate(probe).await?;
-            tell(link::calibration());
-            keep(store.as_mut().ok_or_else(no_store)?, &calibration).await
-        }
-        Ask::Train(wanted) => {
-            let store = store.as_mut().ok_or_else(no_store)?;
-            let table = Table::read(table_bytes(Some(store))).map_err(text)?;
-            probe.begin(wanted.seed).await;
-            let done =
-                session::train::<_, _, Plain>(&wanted, probe, store, table, plan, room, tell).await;
-            use_table(Some(store));
-            let _ = store.set_skin(&servo::snapshot().skin).await;
+            let done = memory.store()?.factory_table().await.map_err(text);
+            memory.reload().await;
             done
         }
         Ask::Status | Ask::Stop | Ask::Stream(_) | Ask::ReadCalibration => Ok(()),

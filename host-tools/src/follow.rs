@@ -199,7 +199,10 @@ impl<'t> Follower<'t> {
                 self.agreement.other_verdicts += u32::from(!same);
                 let agreement = &mut self.agreement;
                 let probable = here.map(|here| here.probability);
-                widen(&mut agreement.posterior, apart(probable, Some(*probability)));
+                widen(
+                    &mut agreement.posterior,
+                    apart(probable, Some(*probability)),
+                );
                 let odds = here.and_then(|here| here.log_odds);
                 widen(&mut agreement.posterior, apart(odds, *log_odds));
                 Ok(())
@@ -325,9 +328,15 @@ impl<'t> Follower<'t> {
             agreement.properties = f32::INFINITY;
         }
         let (background, bands) = (here.background, &here.bands);
-        widen(&mut agreement.signal, apart(Some(background), Some(there.background)));
+        widen(
+            &mut agreement.signal,
+            apart(Some(background), Some(there.background)),
+        );
         let bands = bands.iter().zip(&there.bands);
-        let (here_pdc, there_pdc) = (here.pressure.iter().flatten(), there.pressure.iter().flatten());
+        let (here_pdc, there_pdc) = (
+            here.pressure.iter().flatten(),
+            there.pressure.iter().flatten(),
+        );
         for (here, there) in bands.chain(here_pdc.zip(there_pdc)) {
             let (here, there) = (f32::from(*here), f32::from(*there));
             widen(&mut agreement.signal, (here - there).abs() / FEATURE_STEPS);

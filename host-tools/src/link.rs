@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 use tactus_core::rig::calibration::{RigCalibration, RigCalibrationError};
 use tactus_core::table::{Table, TableError};
 use tactus_core::wire::{
-    self, Ask, Forget, Identify, MAX_FRAME, MAX_TEXTURES, Name, PART, PROTOCOL, Receiver, Report, Request,
-    Reset, Status, Tell, TooLong, Train,
+    self, Ask, Forget, Identify, MAX_FRAME, MAX_TEXTURES, Name, PART, PROTOCOL, Receiver, Report,
+    Request, Reset, Status, Tell, TooLong, Train,
 };
 
 /// A request that may be made twice is made so often before the line is given up.

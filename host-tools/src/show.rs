@@ -4,9 +4,9 @@ use std::io::{self, Write};
 
 use tactus_core::explorer::{Outlook, Verdict};
 use tactus_core::features::{Properties, Property};
+use tactus_core::fused::white;
 use tactus_core::rig::Event;
 use tactus_core::table::{Action, Contents, Table};
-use tactus_core::fused::white;
 
 const BAR: usize = 24;
 /// Most candidates listed after a slide.
@@ -86,10 +86,18 @@ impl<'t, W: Write> Show<'t, W> {
         self.slides += 1;
         let felt: Vec<String> = Property::ALL
             .into_iter()
-            .filter(|&property| action.property.is_none_or(|looked_at| looked_at == property))
+            .filter(|&property| {
+                action
+                    .property
+                    .is_none_or(|looked_at| looked_at == property)
+            })
             .filter_map(|property| {
                 let value = properties.get(property)?;
-                let unit = if property == Property::Traction { " N" } else { "" };
+                let unit = if property == Property::Traction {
+                    " N"
+                } else {
+                    ""
+                };
                 let bound = roughness_is_bound && property == Property::Roughness;
                 let at_most = if bound { "at most " } else { "" };
                 Some(format!("{property} {at_most}{value:.3}{unit}"))
@@ -209,7 +217,9 @@ impl<'t, W: Write> Show<'t, W> {
         let p = verdict.probability * 100.0;
         let slides = format!("{slides} slide{}", if slides == 1 { "" } else { "s" });
         if verdict.unknown {
-            let odds = verdict.log_odds.map_or(String::new(), |odds| format!(" (log-odds {odds:+.1})"));
+            let odds = verdict
+                .log_odds
+                .map_or(String::new(), |odds| format!(" (log-odds {odds:+.1})"));
             writeln!(
                 self.out,
                 "\nIt is not one of the {} textures I know{odds} after {slides}; it is most like {name}.",
@@ -301,7 +311,10 @@ fn show_whitened(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
                 tally.user,
                 tally.itself
             )?;
-            let others = table.names().zip(0..).filter(|&(_, other)| other != texture);
+            let others = table
+                .names()
+                .zip(0..)
+                .filter(|&(_, other)| other != texture);
             let nearest = others
                 .filter_map(|(name, other)| Some((apart(table, index, [texture, other])?, name)))
                 .min_by(|a, b| a.0.total_cmp(&b.0));
@@ -316,7 +329,10 @@ fn show_whitened(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
 
 /// How far the means of two textures are apart at a movement, in standard deviations within a texture.
 fn apart(table: Table<'_>, movement: u8, textures: [u16; 2]) -> Option<f32> {
-    if textures.iter().any(|&texture| table.trials(texture, movement) == 0) {
+    if textures
+        .iter()
+        .any(|&texture| table.trials(texture, movement) == 0)
+    {
         return None;
     }
     let [a, b] = textures.map(|texture| table.white_mean(texture, movement));

@@ -120,91 +120,105 @@ fn asked() -> Identify {
         among: Default::default(),
         threshold: 1.0,
         max_slides: 4,
+        method: None,
         strategy: Strategy::Bayesian,
+        open: true,
+        learn: false,
         seed: 1,
     }
 }
 
-/// A table of three textures, and what a probe tells of an exploration with it.
+/// A fused table of three textures, and what a probe tells of an exploration with it.
 fn explored() -> &'static (Vec<u8>, Vec<Tell>) {
     static EXPLORED: OnceLock<(Vec<u8>, Vec<Tell>)> = OnceLock::new();
-    EXPLORED.get_or_init(|| {
-        let world = Collection {
-            seed: 5,
-            textures: vec![10, UNKNOWN, 100],
-            trials: 3,
-        };
-        let calibration = calibrated(world.setup(10, 0)).unwrap();
-        let bytes = world.learn(calibration, || ()).unwrap();
-        let table = Table::read(&bytes).unwrap();
-        let tells = Tells::default();
-        let mut rig = Streamed {
-            rig: SimRig::new(world.setup(UNKNOWN, 100)),
-            tells: &tells,
-        };
-        rig.rig.control().calibrate(calibration).unwrap();
-        let config = Config {
-            threshold: asked().threshold,
-            max_slides: asked().max_slides,
-            strategy: asked().strategy,
-        };
-        let mut explorer = Explorer::<8>::new(table, PropertySet::ALL, config).unwrap();
-        let (mut slide, plan) = (1, Plan::new());
-        let exploration = explore(
-            &mut rig,
-            &mut explorer,
-            &plan,
-            || 0,
-            |event| {
-                tells.push(match event {
-                    Event::Chosen(action, outlook) => {
-                        let mut outlook: Vec<Promise> = outlook
-                            .iter()
-                            .map(|o| Promise {
-                                action: o.action,
-                                uncertainty: o.uncertainty,
-                                benefit: o.benefit,
-                            })
-                            .collect();
-                        outlook.sort_by(|a, b| b.benefit.total_cmp(&a.benefit));
-                        Tell::Chosen {
-                            slide,
-                            movement: table.movement(action.movement).unwrap(),
-                            action,
-                            outlook: outlook.into_iter().take(MAX_OUTLOOK).collect(),
-                        }
+    EXPLORED.get_or_init(|| exploration(Method::Fused))
+}
+
+fn exploration(method: Method) -> (Vec<u8>, Vec<Tell>) {
+    let world = Collection {
+        seed: 5,
+        textures: vec![10, UNKNOWN, 100],
+        trials: 3,
+    };
+    let calibration = calibrated(world.setup(10, 0)).unwrap();
+    let bytes = world.learn(method, calibration, || ()).unwrap();
+    let table = Table::read(&bytes).unwrap();
+    let tells = Tells::default();
+    let mut rig = Streamed {
+        rig: SimRig::new(world.setup(UNKNOWN, 100)),
+        tells: &tells,
+    };
+    rig.rig.control().calibrate(calibration).unwrap();
+    let config = Config {
+        method,
+        open: asked().open,
+        threshold: asked().threshold,
+        max_slides: asked().max_slides,
+        strategy: asked().strategy,
+    };
+    let mut explorer = Explorer::<8>::new(table, PropertySet::ALL, config).unwrap();
+    let (mut slide, plan) = (1, Plan::new());
+    let exploration = explore(
+        &mut rig,
+        &mut explorer,
+        &plan,
+        || 0,
+        |event| {
+            tells.push(match event {
+                Event::Chosen(action, outlook) => {
+                    let mut outlook: Vec<Promise> = outlook
+                        .iter()
+                        .map(|o| Promise {
+                            action: o.action,
+                            uncertainty: o.uncertainty,
+                            benefit: o.benefit,
+                        })
+                        .collect();
+                    outlook.sort_by(|a, b| b.benefit.total_cmp(&a.benefit));
+                    Tell::Chosen {
+                        slide,
+                        movement: table.movement(action.movement).unwrap(),
+                        action,
+                        outlook: outlook.into_iter().take(MAX_OUTLOOK).collect(),
                     }
-                    Event::Felt(action, measurement, posterior) => {
-                        slide += 1;
-                        Tell::Felt {
-                            slide: slide - 1,
-                            action,
-                            felt: measurement.into(),
-                            posterior: posterior.iter().copied().collect(),
-                        }
+                }
+                Event::Felt(action, measurement, posterior) => {
+                    slide += 1;
+                    Tell::Felt {
+                        slide: slide - 1,
+                        action,
+                        felt: measurement.into(),
+                        posterior: posterior.iter().copied().collect(),
                     }
-                    Event::Rejected(..) => panic!("{event:?}"),
-                });
-            },
-        );
-        let verdict = embassy_futures::block_on(exploration).unwrap();
-        tells.push(Tell::Verdict {
-            texture: verdict.texture,
-            name: Name::try_from(table.name(verdict.texture).unwrap()).unwrap(),
-            probability: verdict.probability,
-            sure: verdict.sure,
-            slides: slide - 1,
-        });
-        let tells = tells.0.into_inner();
-        (bytes, tells)
-    })
+                }
+                Event::Rejected(..) => panic!("{event:?}"),
+            });
+        },
+    );
+    let verdict = embassy_futures::block_on(exploration).unwrap();
+    tells.push(Tell::Verdict {
+        texture: verdict.texture,
+        name: Name::try_from(table.name(verdict.texture).unwrap()).unwrap(),
+        probability: verdict.probability,
+        sure: verdict.sure,
+        unknown: verdict.unknown,
+        log_odds: verdict.log_odds,
+        slides: slide - 1,
+        asks: method == Method::Fused && !explorer.is_certain(),
+    });
+    let tells = tells.0.into_inner();
+    (bytes, tells)
 }
 
 /// Follows these reports; how well they agree, and what could not be compared.
 fn follow(tells: &[Tell]) -> (Agreement, Vec<FollowError>) {
+    follow_with(&explored().0, &asked(), tells)
+}
+
+fn follow_with(table: &[u8], asked: &Identify, tells: &[Tell]) -> (Agreement, Vec<FollowError>) {
     let plan = Plan::new();
-    let table = Table::read(&explored().0).unwrap();
-    let mut follower = Follower::new(table, PropertySet::ALL, &asked(), &plan).unwrap();
+    let table = Table::read(table).unwrap();
+    let mut follower = Follower::new(table, PropertySet::ALL, asked, &plan).unwrap();
     let errors = tells.iter().filter_map(|tell| follower.hear(tell).err());
     let errors = errors.collect();
     (follower.agreement().clone(), errors)
@@ -236,6 +250,13 @@ fn an_exploration_is_followed_to_the_bit() {
     };
     assert_eq!(agreement, exact);
     assert!(agreement.agrees());
+    // so is one by the paper's method, if it was asked for
+    let (table, tells) = exploration(Method::Paper);
+    let asked = Identify {
+        method: Some(Method::Paper),
+        ..asked()
+    };
+    assert_eq!(follow_with(&table, &asked, &tells), (exact, vec![]));
 }
 
 #[test]
@@ -293,6 +314,30 @@ fn a_changed_posterior_property_or_promise_is_found() {
         _ => false,
     });
     assert_eq!(agreement.other_verdicts, 1);
+    let (agreement, _) = changed(|tell| match tell {
+        Tell::Verdict { unknown, .. } => {
+            *unknown = !*unknown;
+            true
+        }
+        _ => false,
+    });
+    assert_eq!(agreement.other_verdicts, 1);
+    let (agreement, _) = changed(|tell| match tell {
+        Tell::Verdict { log_odds, .. } => {
+            *log_odds = log_odds.map(|odds| odds + 0.5);
+            true
+        }
+        _ => false,
+    });
+    assert!((agreement.posterior - 0.5).abs() < 1e-3, "{agreement:?}");
+    let (agreement, _) = changed(|tell| match tell {
+        Tell::Felt { slide: 1, felt, .. } => {
+            felt.bands[3] += 1;
+            true
+        }
+        _ => false,
+    });
+    assert!(agreement.signal >= 1.0 / FEATURE_STEPS && !agreement.agrees());
 }
 
 #[test]

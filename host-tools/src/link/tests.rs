@@ -2,27 +2,25 @@ use std::collections::VecDeque;
 use std::task::Poll;
 
 use proptest::prelude::*;
+use tactus_core::explorer::Method;
 use tactus_core::explorer::Strategy as Choice;
-use tactus_core::features::{Properties, PropertySet};
+use tactus_core::features::Properties;
+use tactus_core::fused::Observation;
 use tactus_core::movement::Movement;
 use tactus_core::pressure::Calibration;
 use tactus_core::wire::{BLOCK, Block, Phase, Text};
 
 use super::*;
-use crate::experiment::{encode, learned};
+use crate::learn::learn;
 
 /// A table of so many textures.
 fn table(textures: u16) -> Vec<u8> {
     let names: Vec<String> = (0..textures).map(|n| format!("texture {n}")).collect();
-    let felt = [0.4, 0.6].map(|x| Properties::new([Some(x), Some(3.0 + x), Some(5.0 + x)]));
-    let experience = vec![vec![learned(PropertySet::ALL, &felt)]; textures.into()];
-    encode(
-        PropertySet::ALL,
-        &[Movement::FOR_TRACTION],
-        &names,
-        &experience,
-    )
-    .unwrap()
+    let felt = [0.4, 0.6]
+        .map(|x| Observation::from(Properties::new([Some(x), Some(3.0 + x), Some(5.0 + x)])));
+    let felt = vec![vec![felt.to_vec()]; textures.into()];
+    let movements = [Movement::FOR_TRACTION];
+    learn(Method::Paper, None, &names, &movements, &felt).unwrap()
 }
 
 fn calibration() -> RigCalibration {
@@ -40,7 +38,10 @@ fn identify() -> Identify {
         among: (0..MAX_TEXTURES as u16).collect(),
         threshold: 0.99,
         max_slides: 10,
+        method: Some(Method::Fused),
         strategy: Choice::Bayesian,
+        open: true,
+        learn: true,
         seed: u32::MAX,
     }
 }
@@ -153,9 +154,23 @@ impl Probe {
                     name: Name::try_from("velcro").unwrap(),
                     probability: 0.995,
                     sure: true,
+                    unknown: false,
+                    log_odds: Some(-7.5),
                     slides: 3,
+                    asks: false,
+                },
+                Tell::Taught {
+                    name: Name::try_from("velcro").unwrap(),
+                    slides: 3,
+                    itself: true,
                 },
             ],
+            Ask::Answer(name) if name.is_empty() => return vec![refused("a name, please")],
+            Ask::Answer(name) => vec![Tell::Taught {
+                name,
+                slides: 2,
+                itself: false,
+            }],
             Ask::Home => vec![Tell::Phase(Phase::Homing), Tell::Phase(Phase::Ready)],
             _ => vec![],
         };
@@ -218,6 +233,10 @@ fn the_longest_requests_fit() {
             seed: u32::MAX,
         }),
         Ask::WriteCalibration((0..64).collect()),
+        Ask::Rename {
+            from: Name::try_from("n".repeat(40).as_str()).unwrap(),
+            to: Name::try_from("m".repeat(40).as_str()).unwrap(),
+        },
     ] {
         assert!(session.request(ask, &mut Vec::new()).is_ok());
     }
@@ -292,6 +311,16 @@ fn questions_are_answered() {
     );
     let found = found.unwrap().unwrap();
     assert_eq!((found.name.as_str(), found.slides), ("velcro", 3));
+    assert_eq!((found.learned, found.log_odds), (3, Some(-7.5)));
+    let named = |name| Question::answer(Name::try_from(name).unwrap());
+    let answered = see_through(&mut session, &mut probe, named("felt"), undisturbed);
+    let taught = Taught {
+        name: Name::try_from("felt").unwrap(),
+        slides: 2,
+    };
+    assert_eq!(answered, Some(Ok(taught)));
+    let nameless = see_through(&mut session, &mut probe, named(""), undisturbed);
+    assert!(matches!(nameless, Some(Err(LinkError::Refused(_)))));
     // the mock tells no status: done without an answer
     let status = see_through(&mut session, &mut probe, Question::status(), undisturbed);
     assert_eq!(status, Some(Err(LinkError::NoAnswer)));
@@ -480,7 +509,13 @@ proptest! {
     fn reports_do_not_depend_on_where_reads_end(cuts in proptest::collection::vec(1usize..300, 1..50)) {
         let mut probe = Probe { parts: usize::MAX, table: table(40), ..Probe::default() };
         let mut bytes = Vec::new();
-        for ask in [Ask::ReadTable(0), Ask::Home, Ask::Identify(identify())] {
+        for ask in [
+            Ask::ReadTable(0),
+            Ask::Home,
+            Ask::Identify(identify()),
+            Ask::Answer(Name::try_from("felt").unwrap()),
+            Ask::Forget(Forget::SelfTaught),
+        ] {
             for tell in probe.obey(Request { id: 9, ask }) {
                 bytes.extend(probe.tell(tell));
             }
