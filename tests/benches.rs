@@ -2,12 +2,14 @@
 
 use divan::Bencher;
 use tactus::evaluate::{Method, evaluate};
-use tactus::experiment::{Experiment, Protocol, encode};
+use tactus::experiment::{Experiment, Protocol};
+use tactus::learn::encode;
 use tactus::replay::Felt;
 use tactus::sim::world::Setup;
 use tactus::simulated::SimRig;
 use tactus_core::explorer::{Config, Explorer};
 use tactus_core::features::{Measurement, Plan, Properties, Property, PropertySet, Slide};
+use tactus_core::fused::Observation;
 use tactus_core::kernels::Plain;
 use tactus_core::movement::Movement;
 use tactus_core::table::{Action, Experience, Table};
@@ -75,10 +77,13 @@ fn table() -> Vec<u8> {
     encode(PropertySet::ALL, &movements, &names, &experience).unwrap()
 }
 
-const SLIDE: Properties = Properties::new([Some(1.0), Some(8.0), Some(4.0)]);
+fn slide() -> Observation {
+    Properties::new([Some(1.0), Some(8.0), Some(4.0)]).into()
+}
+
 const ACTION: Action = Action {
     movement: 2,
-    property: Property::Roughness,
+    property: Some(Property::Roughness),
 };
 
 fn explorer(table: &[u8]) -> Explorer<'_, 128> {
@@ -90,10 +95,10 @@ fn explorer(table: &[u8]) -> Explorer<'_, 128> {
 #[divan::bench]
 fn posterior_update(bencher: Bencher<'_, '_>) {
     let bytes = table();
-    let mut explorer = explorer(&bytes);
+    let (mut explorer, slide) = (explorer(&bytes), slide());
     bencher.bench_local(|| {
         explorer.restart();
-        explorer.observe(ACTION, &SLIDE)
+        explorer.observe(ACTION, &slide)
     });
 }
 
@@ -102,7 +107,7 @@ fn posterior_update(bencher: Bencher<'_, '_>) {
 fn choice_of_the_next_movement(bencher: Bencher<'_, '_>) {
     let bytes = table();
     let mut explorer = explorer(&bytes);
-    explorer.observe(ACTION, &SLIDE).unwrap();
+    explorer.observe(ACTION, &slide()).unwrap();
     bencher.bench_local(|| {
         let outlook = explorer.outlook();
         explorer.choose(&outlook, 0)

@@ -14,6 +14,7 @@ const RUNS: u64 = 8000;
 
 fn summary(experiment: &Experiment, method: Method, runs: u64) -> Summary {
     let config = Config {
+        method: method.method(),
         strategy: method.strategy(),
         ..Config::default()
     };

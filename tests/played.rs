@@ -10,7 +10,7 @@ use tactus::recordings::{RecordingSet, Slide};
 use tactus::replay::{Felt, measure};
 use tactus::sim::played::Played;
 use tactus::simulated::SimRig;
-use tactus_core::explorer::{Config, Explorer};
+use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{Plan, Property, PropertySet};
 use tactus_core::movement::Movement;
 use tactus_core::rig::{Event, explore};
@@ -98,18 +98,25 @@ struct Tally {
     cut: u32,
 }
 
+fn config(method: Method) -> Config {
+    Config {
+        method,
+        ..Config::default()
+    }
+}
+
 /// An exploration of each of the 20 materials with slides that were not learned.
-fn explore_all(set: &RecordingSet, train: usize, seed: u64) -> Tally {
+fn explore_all(set: &RecordingSet, method: Method, train: usize, seed: u64) -> Tally {
     let calibration = calibrated(Lesson::setup(0)).unwrap();
     let plan = Plan::new();
     let lesson = Lesson::interleaved(set, train, seed).unwrap();
     assert_eq!(lesson.movement, movement());
-    let bytes = lesson.learn(calibration).unwrap();
+    let bytes = lesson.learn(method, calibration).unwrap();
     let table = Table::read(&bytes).unwrap();
     let explore_one = |texture: usize| {
         let mut rig = lesson.unknown(texture, seed);
         rig.control().calibrate(calibration).unwrap();
-        let mut explorer = Explorer::<32>::new(table, PropertySet::ALL, Config::default()).unwrap();
+        let mut explorer = Explorer::<32>::new(table, PropertySet::ALL, config(method)).unwrap();
         let mut slides = 0;
         let exploration = explore(
             &mut rig,
@@ -155,7 +162,7 @@ impl Tally {
 }
 
 /// Accuracy of 8000 virtual explorations with the same stretches of the recordings, no rig in between.
-fn without_a_rig(set: &RecordingSet, train: usize) -> f64 {
+fn without_a_rig(set: &RecordingSet, method: Method, train: usize) -> f64 {
     let plan = Plan::new();
     let felt: Vec<Vec<Felt>> = (0..set.textures().len())
         .into_par_iter()
@@ -175,7 +182,7 @@ fn without_a_rig(set: &RecordingSet, train: usize) -> f64 {
     let names: Vec<String> = set.textures().iter().map(|t| t.name.clone()).collect();
     let experiment =
         Experiment::recorded(names, &felt, None, Protocol::Interleaved, train, 1).unwrap();
-    let config = Config::default();
+    let config = config(method);
     let outcomes = evaluate(&experiment, config, 8000, || ()).unwrap();
     Summary::new(&outcomes, experiment.names(), config.max_slides).accuracy
 }
@@ -184,22 +191,27 @@ fn without_a_rig(set: &RecordingSet, train: usize) -> f64 {
 fn twenty_real_materials_are_told_apart_on_the_simulated_rig() {
     let Some(folder) = data("biotac") else { return };
     let set = RecordingSet::open(&folder).unwrap();
-    for train in [5, 15] {
-        let seeds: Vec<Tally> = (1..=5).map(|seed| explore_all(&set, train, seed)).collect();
+    for (method, train, least) in [
+        (Method::Paper, 5, 80),
+        (Method::Paper, 15, 80),
+        (Method::Fused, 5, 95),
+    ] {
+        let explored = (1..=5).map(|seed| explore_all(&set, method, train, seed));
+        let seeds: Vec<Tally> = explored.collect();
         let all = seeds.iter().fold(Tally::default(), Tally::and);
         let rights: Vec<u32> = seeds.iter().map(|t| t.right).collect();
-        let expected = without_a_rig(&set, train);
+        let expected = without_a_rig(&set, method, train);
         println!(
-            "{train} slides learned: {rights:?} of 20 each, {all:?}; without a rig {expected:.3}"
+            "{method:?}, {train} slides learned: {rights:?} of 20 each, {all:?}; without a rig {expected:.3}"
         );
         // 100 runs scatter about what the recordings themselves allow
         let spread = (100.0 * expected * (1.0 - expected)).sqrt();
         let off = f64::from(all.right) - 100.0 * expected;
         assert!(
-            off.abs() < 3.0 * spread,
+            off.abs() < 3.0 * spread.max(1.0),
             "{all:?}, and {expected} without a rig"
         );
-        assert!(all.right >= 80, "16 of 20: {rights:?}");
+        assert!(all.right >= least, "{rights:?}");
     }
 }
 

@@ -3,8 +3,9 @@
 use embassy_futures::block_on;
 use tactus::collection::{Collection, calibrated, texture_name};
 use tactus::simulated::SimRig;
-use tactus_core::explorer::{Config, Explorer};
-use tactus_core::features::{Plan, Properties, PropertySet, Slide};
+use tactus_core::explorer::{Config, Explorer, Method};
+use tactus_core::features::{Plan, PropertySet, Slide};
+use tactus_core::fused::Observation;
 use tactus_core::kernels::Plain;
 use tactus_core::movement::Movement;
 use tactus_core::rig::calibration::RigCalibration;
@@ -36,8 +37,9 @@ fn wanted(name: &str) -> Wanted<'_> {
 /// Slides of the new texture on one rig, in the order that a training asks for.
 fn slides(
     calibration: RigCalibration,
+    table: &Table<'_>,
     mut training: Training,
-) -> (Training, Vec<(Movement, Properties)>) {
+) -> (Training, Vec<(Movement, Observation)>) {
     let plan = Plan::new();
     let mut rig = SimRig::new(world().setup(NEW, 7));
     rig.control().calibrate(calibration).unwrap();
@@ -45,9 +47,9 @@ fn slides(
     while let Some(movement) = training.next() {
         let mut slide = Slide::<Plain>::new(&plan);
         block_on(rig.perform(movement, &mut slide)).unwrap();
-        let properties = slide.finish().unwrap().properties;
-        training.took(movement, &properties).unwrap();
-        felt.push((movement, properties));
+        let observation = Observation::from(&slide.finish().unwrap());
+        training.took(Some(table), movement, &observation).unwrap();
+        felt.push((movement, observation));
     }
     (training, felt)
 }
@@ -56,10 +58,10 @@ fn slides(
 fn a_texture_is_trained_through_power_cuts_and_identified() {
     let name = texture_name(NEW);
     let calibration = calibrated(world().setup(10, 0)).unwrap();
-    let bytes = world().learn(calibration, || ()).unwrap();
+    let bytes = world().learn(Method::Fused, calibration, || ()).unwrap();
     let old = Table::read(&bytes).unwrap();
     let begin = || Training::new(wanted(name), Some(&old), ROOM).unwrap();
-    let (training, felt) = slides(calibration, begin());
+    let (training, felt) = slides(calibration, &old, begin());
     assert_eq!(felt.len(), 15);
     let mut room = vec![0; ROOM];
     let new = training.encode(Some(&old), &mut room).unwrap();
@@ -68,12 +70,12 @@ fn a_texture_is_trained_through_power_cuts_and_identified() {
     for cut in 0..=felt.len() {
         let mut stored: Vec<Trained> = Vec::new();
         let mut training = begin();
-        for (n, (movement, properties)) in felt.iter().enumerate() {
+        for (n, (movement, observation)) in felt.iter().enumerate() {
             if n == cut {
                 training = begin();
                 for record in &stored {
                     assert_eq!(record.table, training.table());
-                    training.resume(record.movement, record.experience).unwrap();
+                    training.resume(record.movement, record.lesson).unwrap();
                 }
             }
             assert_eq!(
@@ -81,7 +83,7 @@ fn a_texture_is_trained_through_power_cuts_and_identified() {
                 Some(*movement),
                 "cut after {cut}, trial {n}"
             );
-            let record = training.took(*movement, properties).unwrap();
+            let record = training.took(Some(&old), *movement, observation).unwrap();
             stored.retain(|other| other.movement != *movement);
             stored.push(record);
         }
@@ -95,16 +97,21 @@ fn a_texture_is_trained_through_power_cuts_and_identified() {
     for (texture, of_old) in old.names().enumerate() {
         assert_eq!(new.name(texture as u16), Some(of_old));
         for movement in 0..3 {
-            let experience = |table: &Table<'_>| table.experience(texture as u16, movement);
-            assert_eq!(experience(&new), experience(&old));
+            let known = |table: &Table<'_>| table.whitened(texture as u16, movement);
+            assert_eq!(known(&new), known(&old));
         }
     }
     let plan = Plan::new();
+    let config = Config {
+        method: Method::Fused,
+        open: true,
+        ..Config::default()
+    };
     let mut right = 0;
     for trial in 0..10 {
         let mut rig = SimRig::new(world().setup(NEW, 100 + trial));
         rig.control().calibrate(calibration).unwrap();
-        let mut explorer = Explorer::<128>::new(new, PropertySet::ALL, Config::default()).unwrap();
+        let mut explorer = Explorer::<128>::new(new, PropertySet::ALL, config).unwrap();
         let verdict = block_on(explore(&mut rig, &mut explorer, &plan, || 0, |_| ())).unwrap();
         right += usize::from(new.name(verdict.texture) == Some(name));
     }
