@@ -3,6 +3,8 @@
 use assign_resources::assign_resources;
 use embassy_stm32::gpio::{Level, OutputOpenDrain, Pull, Speed};
 use embassy_stm32::interrupt::{self, InterruptExt as _, Priority};
+use embassy_stm32::pac::RCC;
+use embassy_stm32::pac::rcc::vals::Pllsrc;
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllQDiv, PllSource,
     Sysclk,
@@ -75,9 +77,21 @@ bind_interrupts!(pub(crate) struct Irqs {
     FLASH => flash::InterruptHandler;
 });
 
+/// How often the 8 MHz are looked for, 100 us apart: 0.1 s, in which the probe has started too.
+const LOOKS: u32 = 1000;
+/// The core after its reset.
+pub(crate) const RESET_HZ: u32 = 16_000_000;
+
 /// Starts the clocks, sets the priorities and hands out the pins. To be called once, first of all.
 pub(crate) fn start() -> AssignedResources {
-    let p = embassy_stm32::init(clocks());
+    let external = find_clock();
+    let p = embassy_stm32::init(clocks(external));
+    if external {
+        // should it stop later: an NMI, see `rescue`
+        RCC.cr().modify(|w| w.set_csson(true));
+    } else {
+        defmt::error!("{=str}", NO_CLOCK);
+    }
     let r = split_resources!(p);
     // Chips before revision 3 misread bank 2 while PA12 moves (errata sheet ES0206, 2.2.11), and the store is in bank 2.
     // embassy's flash driver wants exactly this, an output that is low and pulled down, and panics otherwise; so PA12 is
@@ -101,18 +115,46 @@ pub(crate) fn start() -> AssignedResources {
     r
 }
 
-/// 168 MHz: the fastest without overdrive, and its PLL gives the 48 MHz of USB.
-fn clocks() -> embassy_stm32::Config {
-    let mut config = embassy_stm32::Config::default();
-    // the board's debug probe feeds 8 MHz into OSC_IN
-    config.rcc.hse = Some(Hse {
-        freq: Hertz::mhz(8),
-        mode: HseMode::Bypass,
+/// What is to be said of a board whose probe gives no clock.
+pub(crate) const NO_CLOCK: &str =
+    "no 8 MHz from the ST-LINK (see its solder bridges): runs by the chip's own clock, 1 % off";
+
+/// Whether the debug probe's 8 MHz are there. embassy would wait for them without end.
+fn find_clock() -> bool {
+    RCC.cr().modify(|w| w.set_hsebyp(true));
+    RCC.cr().modify(|w| w.set_hseon(true));
+    let found = (0..LOOKS).any(|_| {
+        cortex_m::asm::delay(RESET_HZ / 10_000);
+        RCC.cr().read().hserdy()
     });
-    config.rcc.pll_src = PllSource::HSE;
-    // 8 / 4 * 168 = 336 MHz: halved for the core, a seventh for USB
+    if !found {
+        RCC.cr().modify(|w| w.set_hseon(false));
+    }
+    found
+}
+
+/// Whether the chip runs by the debug probe's 8 MHz.
+pub(crate) fn has_clock() -> bool {
+    RCC.pllcfgr().read().pllsrc() == Pllsrc::HSE
+}
+
+/// 168 MHz: the fastest without overdrive, and its PLL gives the 48 MHz of USB. By the debug probe's 8 MHz on OSC_IN, or by
+/// the chip's own 16.
+fn clocks(external: bool) -> embassy_stm32::Config {
+    let mut config = embassy_stm32::Config::default();
+    let (source, prediv) = if external {
+        config.rcc.hse = Some(Hse {
+            freq: Hertz::mhz(8),
+            mode: HseMode::Bypass,
+        });
+        (PllSource::HSE, PllPreDiv::DIV4)
+    } else {
+        (PllSource::HSI, PllPreDiv::DIV8)
+    };
+    config.rcc.pll_src = source;
+    // 8 / 4 or 16 / 8, * 168 = 336 MHz: halved for the core, a seventh for USB
     config.rcc.pll = Some(Pll {
-        prediv: PllPreDiv::DIV4,
+        prediv,
         mul: PllMul::MUL168,
         divp: Some(PllPDiv::DIV2),
         divq: Some(PllQDiv::DIV7),

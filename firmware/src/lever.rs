@@ -1,6 +1,6 @@
 //! The lever's STEP and DIR, from TIM1: which of its periods have a pulse is [`Steps`]' to say.
 use core::cell::Cell;
-use core::sync::atomic::{AtomicI32, Ordering::Relaxed};
+use core::sync::atomic::{AtomicI32, AtomicU32, Ordering::Relaxed};
 
 use embassy_stm32::gpio::{Level, Output, OutputType, Speed};
 use embassy_stm32::interrupt;
@@ -18,7 +18,7 @@ use crate::board;
 /// The timer counts at 2 MHz.
 const PRESCALER: u16 = 83;
 const PERIOD: u16 = (2_000_000 / BASE_HZ) as u16;
-const CORE_HZ: u32 = 168_000_000;
+static CORE_HZ: AtomicU32 = AtomicU32::new(168_000_000);
 /// STEP is high for 5 us.
 const HIGH: u16 = 10;
 const DIRECTION_PIN: usize = 11;
@@ -109,16 +109,27 @@ fn set_direction(down: bool) {
     });
 }
 
+/// Core and timer run at 16 MHz from now on: for [`lift_by_hand`].
+pub(crate) fn slow_clock() {
+    CORE_HZ.store(board::RESET_HZ, Relaxed);
+    // 2 MHz again; loaded at once
+    REGISTERS
+        .psc()
+        .write_value((board::RESET_HZ / 2_000_000 - 1) as u16);
+    REGISTERS.egr().write(|w| w.set_ug(true));
+}
+
 /// Steps upwards, without interrupts, until `done` says so; it is asked before every step and told how many were made. For
 /// when nothing else works any more.
 pub(crate) fn lift_by_hand(mut done: impl FnMut(u32) -> bool) {
     REGISTERS.dier().write(|w| w.set_uie(false));
     REGISTERS.ccr(0).write(|w| w.set_ccr(0));
     REGISTERS.cr1().modify(|w| w.set_cen(true));
+    let core_hz = CORE_HZ.load(Relaxed);
     let period = || {
         REGISTERS.sr().write(|w| w.0 = 0);
         // most of the period, so that the register is not asked all the time
-        cortex_m::asm::delay(CORE_HZ / BASE_HZ * 9 / 10);
+        cortex_m::asm::delay(core_hz / BASE_HZ * 9 / 10);
         while !REGISTERS.sr().read().uif() {}
     };
     // the pulse that may be under way

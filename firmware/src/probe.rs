@@ -9,6 +9,7 @@ use tactus_core::movement::Movement;
 use tactus_core::rig::Rig;
 use tactus_core::rig::control::{Ended, Phase, Refused};
 use tactus_core::rig::guard::Fault;
+use tactus_core::rig::patience::{Patience, Wait};
 use tactus_core::rig::pins::Felt;
 use tactus_core::session::{Blocks, Random};
 use tactus_core::wire::Tell;
@@ -17,8 +18,6 @@ use crate::acquire;
 use crate::link::{STREAM, tell};
 use crate::servo::{self, Command, Samples, Snapshot};
 
-/// A movement that takes longer than this does not end.
-const PATIENCE_MS: u32 = 120_000;
 /// How often the samples are looked after.
 const LOOK_MS: u64 = 10;
 
@@ -73,23 +72,29 @@ impl Probe {
         &mut self,
         mut each: impl FnMut(&mut Consumer<'static, Samples>),
     ) -> Result<Snapshot, ProbeError> {
-        let mut left_ms = PATIENCE_MS;
+        let mut patience = Patience::default();
         loop {
             Timer::after_millis(LOOK_MS).await;
             // before the samples, so that none of a movement that is over is left behind
             let rig = servo::snapshot();
             each(&mut self.samples);
-            match rig.phase {
-                Phase::Faulted(fault) if rig.at_rest => return Err(ProbeError::Fault(fault)),
-                _ if rig.at_rest => return Ok(rig),
-                _ => {}
-            }
-            left_ms = left_ms.saturating_sub(LOOK_MS as u32);
-            if left_ms == 0 {
-                servo::stop();
-                return Err(ProbeError::Hangs);
+            servo::progress();
+            match (patience.wait(LOOK_MS as u32, rig.at_rest), rig.phase) {
+                (Wait::On, _) => {}
+                (Wait::Stop, _) => servo::stop(),
+                (Wait::Over | Wait::Hangs, Phase::Faulted(fault)) if rig.at_rest => {
+                    return Err(ProbeError::Fault(fault));
+                }
+                (Wait::Over, _) => return Ok(rig),
+                (Wait::Hangs, _) => return Err(ProbeError::Hangs),
             }
         }
+    }
+
+    /// Lifts the finger to its limit switch; the stage stays where it is.
+    pub(crate) async fn lift(&mut self) -> Result<(), ProbeError> {
+        self.command(Command::Lift).await?;
+        self.rest(|_| ()).await.map(|_| ())
     }
 
     /// Finds the limit switches, the lever's first.

@@ -73,6 +73,24 @@ pub(crate) fn remember(text: &str) {
     });
 }
 
+/// Starts the watchdog for the start-up, which takes milliseconds: half a second and more, by its oscillator of 17 to
+/// 47 kHz. The servo takes it over.
+pub(crate) fn watch_start() {
+    use embassy_stm32::pac::iwdg::vals::{Key, Pr};
+    IWDG.kr().write(|w| w.set_key(Key::START));
+    IWDG.kr().write(|w| w.set_key(Key::ENABLE));
+    IWDG.pr().write(|w| w.set_pr(Pr::DIVIDE_BY32));
+    IWDG.rlr().write(|w| w.set_rl(800));
+    // They take five of its cycles to arrive, 0.3 ms at most, and its oscillator has to start. Before that a reload would
+    // load 4 s, and what the servo sets would be ignored. The core runs at 16 MHz: at most some 10 ms.
+    for _ in 0..20_000 {
+        if IWDG.sr().read().0 == 0 {
+            break;
+        }
+    }
+    pet();
+}
+
 /// Pets the watchdog; does no harm where it is not running.
 pub(crate) fn pet() {
     IWDG.kr()
@@ -113,6 +131,14 @@ fn panic(info: &PanicInfo<'_>) -> ! {
         None => write!(text, "{}", info.message()),
     };
     give_up(&text)
+}
+
+/// The clock security system: the probe's 8 MHz have stopped, the chip goes on at 16 MHz by itself.
+#[exception]
+unsafe fn NonMaskableInt() -> ! {
+    RCC.cir().modify(|w| w.set_cssc(true));
+    lever::slow_clock();
+    give_up("the 8 MHz from the ST-LINK stopped")
 }
 
 #[exception]

@@ -15,6 +15,7 @@ use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::interrupt;
 use heapless::spsc::Queue;
 use static_cell::ConstStaticCell;
+use tactus_core::session::text;
 use tactus_core::wire::{PROTOCOL, Tell};
 
 use crate::acquire::{self, WORDS, Word};
@@ -42,7 +43,9 @@ pub async fn rig(thread: Spawner) {
     static SAMPLE_QUEUE: ConstStaticCell<Queue<Samples, SAMPLES>> =
         ConstStaticCell::new(Queue::new());
     let (reset, last_words) = rescue::reset_cause();
+    rescue::watch_start();
     let r = board::start();
+    let no_clock = (!board::has_clock()).then(|| text(&board::NO_CLOCK));
     defmt::info!("tactus-rig {=str}", env!("CARGO_PKG_VERSION"));
     let (words_in, words_out) = WORD_QUEUE.take().split();
     let (samples_in, samples_out) = SAMPLE_QUEUE.take().split();
@@ -57,7 +60,7 @@ pub async fn rig(thread: Spawner) {
         protocol: PROTOCOL,
         version: env!("CARGO_PKG_VERSION").try_into().unwrap_or_default(),
         reset,
-        last_words,
+        last_words: last_words.or(no_clock),
     });
     match servo::servo(
         r.lever, r.stage, r.switches, r.watchdog, words_out, samples_in,

@@ -42,6 +42,8 @@ pub(crate) const SAMPLES: usize = 256;
 /// What the rig shall do.
 #[derive(Clone, Copy)]
 pub(crate) enum Command {
+    /// Lifts the finger to its limit switch, and leaves the stage alone.
+    Lift,
     /// Ends a fault if there is one, then finds the limit switches.
     Home,
     /// A movement, and where on the sample it begins, 0 to 1.
@@ -68,6 +70,8 @@ pub(crate) struct Snapshot {
     pub(crate) velocity_mm_s: f32,
     pub(crate) current_a: f32,
     pub(crate) mean_current_a: Option<f32>,
+    /// P_DC in the air, by the last run without load.
+    pub(crate) air_counts: Option<f32>,
     pub(crate) calibration: RigCalibration,
     pub(crate) skin: SkinCare,
 }
@@ -88,6 +92,7 @@ static SNAPSHOT: Mutex<CriticalSectionRawMutex, Cell<Snapshot>> = Mutex::new(Cel
     velocity_mm_s: 0.0,
     current_a: 0.0,
     mean_current_a: None,
+    air_counts: None,
     calibration: UNMEASURED,
     skin: SkinCare::NEW,
 }));
@@ -95,6 +100,10 @@ static SNAPSHOT: Mutex<CriticalSectionRawMutex, Cell<Snapshot>> = Mutex::new(Cel
 pub(crate) static LOST: AtomicU32 = AtomicU32::new(0);
 /// Milliseconds since the tasks in thread mode have checked in.
 static SILENT_MS: AtomicU32 = AtomicU32::new(0);
+/// Milliseconds since the session made progress, or [`WAITS`].
+static STUCK_MS: AtomicU32 = AtomicU32::new(0);
+/// It waits for the host, and may do so for ever.
+const WAITS: u32 = u32::MAX;
 
 /// The reference rig's constants, until measured ones are read from the store.
 pub(crate) const UNMEASURED: RigCalibration = RigCalibration {
@@ -108,11 +117,15 @@ pub(crate) const UNMEASURED: RigCalibration = RigCalibration {
 /// Tasks that are silent for longer hang: the longest that they compute, the choice among the actions of a whole grid, is
 /// half of it.
 const HUNG_MS: u32 = 2000;
+/// A session without progress for longer waits for something that does not come, such as an interrupt of the flash. All
+/// that it does without the rig, the four sectors of the store erased and written, takes less than 5 s.
+const STUCK_LIMIT_MS: u32 = 30_000;
 /// Without the servo for this long the chip starts again.
 const WATCHDOG_US: u32 = 100_000;
 
 /// Gives a command and waits for the answer. For one task at a time.
 pub(crate) async fn command(command: Command) -> Result<(), Refused> {
+    progress();
     ANSWER.reset();
     COMMAND.signal(command);
     ANSWER.wait().await
@@ -147,6 +160,16 @@ pub(crate) fn snapshot() -> Snapshot {
 /// The tasks in thread mode are alive.
 pub(crate) fn check_in() {
     SILENT_MS.store(0, Relaxed);
+}
+
+/// The session goes on with what it was asked for.
+pub(crate) fn progress() {
+    STUCK_MS.store(0, Relaxed);
+}
+
+/// The session waits for a request.
+pub(crate) fn waits() {
+    STUCK_MS.store(WAITS, Relaxed);
 }
 
 /// Amperes of the stage's motor by the amplifier's 12 bits over 3.3 V: 1 V/A about 2048.
@@ -207,7 +230,7 @@ pub(crate) async fn servo(
     let mut control = Control::new(StageConstants::REFERENCE, UNMEASURED, Unguarded::default());
     let mut ended = None;
     let mut count: i32 = 0;
-    let mut hung = false;
+    let mut hung = None;
     let mut ticker = Ticker::every(Duration::from_millis(1));
     loop {
         ticker.next().await;
@@ -219,8 +242,17 @@ pub(crate) async fn servo(
             ANSWER.signal(obey(&mut control, command));
         }
         let silent_ms = SILENT_MS.fetch_add(1, Relaxed);
+        // thread mode does not come between: the servo interrupts it
+        let stuck_ms = match STUCK_MS.load(Relaxed) {
+            WAITS => 0,
+            _ => STUCK_MS.fetch_add(1, Relaxed),
+        };
         // once hung, hung until the watchdog has done its work
-        hung |= silent_ms > HUNG_MS;
+        if silent_ms > HUNG_MS {
+            hung.get_or_insert("the tasks in thread mode did not check in for 2 s");
+        } else if stuck_ms > STUCK_LIMIT_MS {
+            hung.get_or_insert("what was asked for made no progress for 30 s");
+        }
 
         let mut inputs = Inputs::default();
         while inputs.words.len() < MAX_WORDS
@@ -239,7 +271,7 @@ pub(crate) async fn servo(
             switches.stage_right.is_high(),
         );
         inputs.e_stop = switches.e_stop.is_high();
-        inputs.hung = hung;
+        inputs.hung = hung.is_some();
 
         let outputs = control.tick(&inputs);
         lever.drive(outputs.lever_enabled, outputs.lever_steps_s);
@@ -261,14 +293,14 @@ pub(crate) async fn servo(
                 velocity_mm_s: control.stage_velocity_mm_s(),
                 current_a: inputs.current_a,
                 mean_current_a: control.mean_current_a(),
+                air_counts: control.air_counts(),
                 calibration: *control.calibration(),
                 skin: *control.skin(),
             });
         });
-        if hung && control.is_at_rest() {
-            rescue::remember("the tasks in thread mode did not check in for 2 s");
-        } else {
-            watchdog.pet();
+        match hung {
+            Some(why) if control.is_at_rest() => rescue::remember(why),
+            _ => watchdog.pet(),
         }
     }
 }
@@ -278,6 +310,11 @@ fn obey(control: &mut Control, command: Command) -> Result<(), Refused> {
         Command::Home => {
             control.reset()?;
             control.home()
+        }
+        Command::Lift => {
+            control.home()?;
+            control.stop();
+            Ok(())
         }
         Command::Start(movement, start) => control.start(movement, start),
         Command::StartUnloaded(speed_um_s) => control.start_unloaded(speed_um_s),

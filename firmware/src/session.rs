@@ -2,7 +2,7 @@
 use core::sync::atomic::Ordering::Relaxed;
 
 use embassy_stm32::flash::{Async, Bank2Region1, Flash};
-use embassy_time::Timer;
+use embassy_time::{Duration, Timer, with_timeout};
 use heapless::Vec;
 use heapless::spsc::Consumer;
 use static_cell::ConstStaticCell;
@@ -28,6 +28,8 @@ static FACTORY: &[u8] = include_bytes!("../factory.tact");
 /// Bank 2 in the chip's memory: memory.x, STORE.
 const STORE_AT: usize = 0x0810_0000;
 const STORE_LENGTH: usize = 64 * 1024;
+/// The store is open by now, or will never be: two of its sectors erased take less than 2 s.
+const OPENING: Duration = Duration::from_secs(10);
 /// The sensor's first words are there by now.
 const HEARD_MS: u64 = 150;
 
@@ -54,33 +56,31 @@ pub(crate) async fn session(flash: board::Storage, samples: Consumer<'static, Sa
     let flash = Flash::new(flash.flash, board::Irqs)
         .into_regions()
         .bank2_region1;
-    let store = match Store::open(flash).await {
-        Ok(store) => Some(store),
-        Err(why) => {
-            defmt::error!("the store cannot be opened: {=str}", text(&why).as_str());
+    let mut probe = Probe::new(samples);
+    // Whatever was before the reset, the finger is lifted first, and waits for nothing but the sensor. The stage does not
+    // move before the calibration is there, which says whether the finger is in the air.
+    Timer::after_millis(HEARD_MS).await;
+    let _ = probe.lift().await;
+    let store = with_timeout(OPENING, open(flash))
+        .await
+        .unwrap_or_else(|_| {
+            defmt::error!("the store does not answer");
             None
-        }
-    };
+        });
     let mut memory = Memory {
         store,
         room,
         length: 0,
         visited: None,
     };
-    let mut probe = Probe::new(samples);
-    if let Some(store) = &mut memory.store {
-        if let Err(why) = restore(store).await {
-            defmt::error!("settings are not read: {=str}", text(&why).as_str());
-        }
-    }
     memory.reload().await;
-    // Whatever was before the reset, the finger is lifted first. Homing wants to hear the sensor.
-    Timer::after_millis(HEARD_MS).await;
     let _ = probe.home().await;
     loop {
         servo::forget_stop();
         BUSY.store(false, Relaxed);
+        servo::waits();
         let request = JOBS.receive().await;
+        servo::progress();
         BUSY.store(true, Relaxed);
         let id = request.id;
         let done = work(request.ask, &mut probe, &mut memory, plan).await;
@@ -89,6 +89,21 @@ pub(crate) async fn session(flash: board::Storage, samples: Consumer<'static, Sa
             Err(why) => refuse(id, why),
         }
     }
+}
+
+/// The store, its settings in use.
+async fn open(flash: Bank2Region1<'static, Async>) -> Option<Storage> {
+    let mut store = match Store::open(flash).await {
+        Ok(store) => store,
+        Err(why) => {
+            defmt::error!("the store cannot be opened: {=str}", text(&why).as_str());
+            return None;
+        }
+    };
+    if let Err(why) = restore(&mut store).await {
+        defmt::error!("settings are not read: {=str}", text(&why).as_str());
+    }
+    Some(store)
 }
 
 /// Skin and calibration as they were; each whatever becomes of the other.
@@ -331,7 +346,12 @@ async fn calibrate(probe: &mut Probe) -> Result<RigCalibration, Text> {
         let (from_mm, to_mm, current_a) = probe.run_unloaded(speed_um_s).await.map_err(text)?;
         runs.took(from_mm, to_mm, current_a);
     }
-    let calibration = runs.finish(&servo::snapshot().calibration).map_err(text)?;
+    let rig = servo::snapshot();
+    let mut calibration = runs.finish(&rig.calibration).map_err(text)?;
+    calibration.pressure.pdc_no_contact = rig
+        .air_counts
+        .unwrap_or(calibration.pressure.pdc_no_contact);
+    calibration.check().map_err(text)?;
     servo::command(Command::Calibrate(calibration))
         .await
         .map_err(text)?;

@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use tactus::evaluate::Method;
 use tactus::experiment::Protocol;
 use tactus_core::explorer::Config;
+use tactus_core::fused::FeatureSet;
 
 /// Tactus tells what a surface is by touching it.
 #[derive(Parser)]
@@ -46,6 +47,12 @@ pub(crate) enum Command {
         /// Slides to learn from, per texture and movement: the first ones of the session
         #[arg(long, value_name = "N", default_value_t = 5)]
         train_slides: usize,
+        /// The way of deciding that the table is for: fused, or the others, which share one kind of table
+        #[arg(long, value_enum, default_value_t = Method::Fused)]
+        method: Method,
+        /// What a fused table is learned from; the best that every slide has, unless given
+        #[arg(long, value_enum)]
+        features: Option<Features>,
         /// The file to write
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
@@ -62,7 +69,20 @@ choose; each slide it asks for is drawn from the test slides of that texture. It
 than --threshold, or after --max-slides.
 
 With --properties FILE, slides are rows of texture,movement,trial,set,traction,roughness,fineness, where set is train or
-validate, and an action is any (movement, property) pair.")]
+validate, and an action is any (movement, property) pair.
+
+With --fabrics DIR, the folder is one of FabricSlide: fabrics at many movements, learned from one repetition and tested on
+the other.
+
+--novelty leaves one texture after the other out of the table and counts how often it is noticed, and how often a known one
+is taken for new. --lifelong plays a session in time order: the first slides are learned, and every later one is a visit.
+Both need the method fused.
+
+Try:
+  tactus evaluate --recordings DIR --protocol drift
+  tactus evaluate --recordings DIR --method paper
+  tactus evaluate --recordings DIR --novelty leave-one-out
+  tactus evaluate --recordings DIR --lifelong")]
     Evaluate(Evaluate),
     /// Record slides on the simulated rig, in the project's format
     Simulate {
@@ -142,9 +162,9 @@ pub(crate) struct Identify {
     /// Slides per texture to learn from, where no table is given
     #[arg(long, value_name = "N", default_value_t = 5)]
     pub(crate) train_slides: usize,
-    /// How the next movement is chosen
-    #[arg(long, value_enum, default_value_t = Method::Paper)]
-    pub(crate) method: Method,
+    /// How to decide, and how the next movement is chosen: fused, or what the table is for
+    #[arg(long, value_enum)]
+    pub(crate) method: Option<Method>,
     #[command(flatten)]
     pub(crate) stop: Stop,
     /// Another seed draws other slides; with --simulated also another world, and another texture unless one is given
@@ -152,7 +172,7 @@ pub(crate) struct Identify {
     pub(crate) seed: u64,
 }
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct Stop {
     /// Stop when a texture is more probable than this
     #[arg(long, default_value_t = 0.99, value_parser = probability)]
@@ -165,9 +185,11 @@ pub(crate) struct Stop {
 impl Stop {
     pub(crate) fn config(&self, method: Method) -> Config {
         Config {
+            method: method.method(),
             strategy: method.strategy(),
             threshold: self.threshold,
             max_slides: self.max_slides,
+            open: false,
         }
     }
 }
@@ -179,25 +201,40 @@ fn probability(text: &str) -> Result<f32, String> {
     }
 }
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct Evaluate {
     /// Folder of recordings
     #[arg(
         long,
         value_name = "DIR",
-        required_unless_present = "properties",
-        conflicts_with = "properties"
+        required_unless_present_any = ["properties", "fabrics"],
+        conflicts_with_all = ["properties", "fabrics"]
     )]
     pub(crate) recordings: Option<PathBuf>,
     /// CSV file of properties in place of recordings
     #[arg(long, value_name = "FILE")]
     pub(crate) properties: Option<PathBuf>,
+    /// Folder of FabricSlide in place of recordings
+    #[arg(long, value_name = "DIR", conflicts_with = "properties")]
+    pub(crate) fabrics: Option<PathBuf>,
+    /// The repetition of the fabrics to learn from, 1 or 2; the other one is tested
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "fabrics", value_parser = clap::value_parser!(u8).range(1..=2))]
+    pub(crate) repetition: u8,
     /// Folder to take the test slides from; training slides still come from --recordings
     #[arg(long, value_name = "DIR", requires = "recordings")]
     pub(crate) test: Option<PathBuf>,
     /// How to decide and to choose the next movement
-    #[arg(long, value_enum, default_value_t = Method::Paper)]
+    #[arg(long, value_enum, default_value_t = Method::Fused)]
     pub(crate) method: Method,
+    /// What the method fused looks at; the best that every slide has, unless given
+    #[arg(long, value_enum)]
+    pub(crate) features: Option<Features>,
+    /// Count how textures that were not learned are noticed
+    #[arg(long, value_enum, conflicts_with = "lifelong")]
+    pub(crate) novelty: Option<Novelty>,
+    /// Play a session in time order, in which the probe goes on learning
+    #[arg(long)]
+    pub(crate) lifelong: bool,
     /// Slides to learn from, per texture and movement: 5 unless given, or all training rows of --properties
     #[arg(long, value_name = "N")]
     pub(crate) train_slides: Option<usize>,
@@ -215,6 +252,37 @@ pub(crate) struct Evaluate {
     /// How to print the figures
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub(crate) format: Format,
+}
+
+/// How novelty is tried.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Novelty {
+    /// One texture after the other is left out of the table
+    LeaveOneOut,
+}
+
+/// What a fused table is learned from.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Features {
+    /// Traction and twelve band powers
+    Force,
+    /// Mean and standard deviation of P_DC, and the band powers: for a rig without force sensing
+    Pressure,
+    /// The band powers alone
+    Bands,
+    /// The three properties of the paper
+    Properties,
+}
+
+impl Features {
+    pub(crate) fn set(self) -> FeatureSet {
+        match self {
+            Self::Force => FeatureSet::Force,
+            Self::Pressure => FeatureSet::Pressure,
+            Self::Bands => FeatureSet::Bands,
+            Self::Properties => FeatureSet::Properties,
+        }
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]

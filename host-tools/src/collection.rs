@@ -1,12 +1,13 @@
 //! The textures of a simulated world: recorded trial by trial, and learned.
 
 use rayon::prelude::*;
-use tactus_core::features::{Plan, PropertySet, SlideError};
+use tactus_core::explorer::Method;
+use tactus_core::features::{Plan, SlideError};
+use tactus_core::fused::Observation;
 use tactus_core::movement::Movement;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::table::EncodeError;
 
-use crate::experiment::{encode, learned};
+use crate::learn::{self, TableError};
 use crate::recordings;
 use crate::replay::measure;
 use crate::sim::textures::TEXTURES;
@@ -97,17 +98,18 @@ impl Collection {
             .collect()
     }
 
-    /// Learns a texture table from trials of all textures.
+    /// Learns a texture table for a method from trials of all textures.
     ///
     /// # Errors
     /// The first fault of a rig, or slide without properties.
     pub fn learn(
         &self,
+        method: Method,
         calibration: RigCalibration,
         done: impl Fn() + Sync,
     ) -> Result<Vec<u8>, LearnError> {
         let plan = Plan::new();
-        let experience = self
+        let felt = self
             .record(calibration, done)?
             .iter()
             .map(|slides| {
@@ -115,19 +117,15 @@ impl Collection {
                     .iter()
                     .map(|movement| {
                         let trials = slides.iter().filter(|s| s.movement == *movement);
-                        let felt: Result<Vec<_>, SlideError> =
-                            trials.map(|s| Ok(measure(&plan, s)?.properties)).collect();
-                        Ok(learned(PropertySet::ALL, &felt?))
+                        trials
+                            .map(|s| Ok(Observation::from(&measure(&plan, s)?)))
+                            .collect()
                     })
-                    .collect::<Result<Vec<_>, SlideError>>()
+                    .collect::<Result<Vec<Vec<_>>, SlideError>>()
             })
             .collect::<Result<Vec<_>, SlideError>>()?;
-        Ok(encode(
-            PropertySet::ALL,
-            &Self::MOVEMENTS,
-            &self.names(),
-            &experience,
-        )?)
+        let names = self.names();
+        Ok(learn::learn(method, None, &names, &Self::MOVEMENTS, &felt)?)
     }
 }
 
@@ -140,9 +138,9 @@ pub enum LearnError {
     /// A slide has no properties.
     #[error(transparent)]
     Slide(#[from] SlideError),
-    /// The table cannot be written.
+    /// The table cannot be learned.
     #[error(transparent)]
-    Encode(#[from] EncodeError),
+    Table(#[from] TableError),
 }
 
 /// Name of a texture by its number in Table 1.

@@ -10,16 +10,22 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use tactus::collection::{Collection, calibrated, texture_name, texture_number};
 use tactus::evaluate::{Method, Summary, evaluate};
-use tactus::experiment::{self, Experiment, Protocol};
+use tactus::experiment::{Experiment, Protocol};
+use tactus::fabricslide::FabricSet;
+use tactus::learn;
+use tactus::lifelong::{Learning, Lifelong, lifelong};
+use tactus::novelty::{After, leave_one_out};
 use tactus::properties::PropertyTable;
 use tactus::recordings::{RecordingSet, RecordingWriter, Slide as Recorded, Texture};
 use tactus::replay::{Felt, feel};
 use tactus::show::show_table;
 use tactus::sim::textures::TEXTURES;
-use tactus_core::features::{BAND_EDGES, Property, PropertySet};
-use tactus_core::table::{Experience, Table};
+use tactus_core::explorer::Config;
+use tactus_core::features::{BAND_EDGES, Property};
+use tactus_core::fused::{FeatureSet, Observation};
+use tactus_core::table::Table;
 
-use crate::cli::{Command, Evaluate, Format, Rows, TableCommand, Tactus};
+use crate::cli::{Command, Evaluate, Features, Format, Rows, TableCommand, Tactus};
 use crate::identify::{demonstrate, identify, identify_simulated};
 
 /// Runs what the arguments ask for.
@@ -31,9 +37,21 @@ pub(crate) fn run() -> anyhow::Result<()> {
         Some(Command::Learn {
             from,
             train_slides,
+            method,
+            features,
             out: file,
         }) => {
-            learn(&from.recordings, train_slides, &file, out)?;
+            let (set, felt) = feel_folder(&from.recordings)?;
+            let features = features.map(Features::set);
+            let bytes = learn_first(&set, &felt, train_slides, method, features)?;
+            write_table(&file, &bytes)?;
+            writeln!(
+                out,
+                "{}: {} textures learned from the first {train_slides} slides of each, {} bytes",
+                file.display(),
+                set.textures().len(),
+                bytes.len()
+            )?;
         }
         Some(Command::Table(TableCommand::Show { file })) => {
             show_table(read_table(&file, &mut Vec::new())?, out)?
@@ -171,25 +189,21 @@ pub(crate) fn learn_first(
     set: &RecordingSet,
     felt: &[Vec<Felt>],
     slides: usize,
+    method: Method,
+    features: Option<FeatureSet>,
 ) -> anyhow::Result<Vec<u8>> {
     if slides < 2 {
-        bail!("--train-slides {slides}: a standard deviation takes at least two slides");
+        bail!("--train-slides {slides}: how slides of one texture differ takes at least two slides");
     }
     let movements = set.movements();
-    let measured = felt
-        .iter()
-        .flatten()
-        .fold(PropertySet::ALL, |measured, slide| {
-            measured.and(slide.measurement.properties.measured())
-        });
-    let mut experience: Vec<Vec<Experience>> = Vec::new();
+    let mut first: Vec<Vec<Vec<Observation>>> = Vec::new();
     for (texture, felt) in set.textures().iter().zip(felt) {
         let mut of_texture = Vec::new();
         for &movement in &movements {
             let same = felt.iter().filter(|s| s.movement == movement);
-            let trials: Vec<_> = same
+            let trials: Vec<Observation> = same
                 .take(slides)
-                .map(|s| s.measurement.properties)
+                .map(|s| Observation::from(&s.measurement))
                 .collect();
             if trials.len() < slides {
                 bail!(
@@ -198,35 +212,21 @@ pub(crate) fn learn_first(
                     trials.len()
                 );
             }
-            of_texture.push(experiment::learned(measured, &trials));
+            of_texture.push(trials);
         }
-        experience.push(of_texture);
+        first.push(of_texture);
     }
-    Ok(experiment::encode(
-        measured,
-        &movements,
-        &names(set),
-        &experience,
-    )?)
+    let names = names(set);
+    Ok(learn::learn(method.method(), features, &names, &movements, &first)?)
 }
 
-fn learn(folder: &Path, slides: usize, file: &Path, out: &mut impl Write) -> anyhow::Result<()> {
-    let (set, felt) = feel_folder(folder)?;
-    let bytes = learn_first(&set, &felt, slides)?;
-    // an old table is replaced whole or not at all
+/// An old table is replaced whole or not at all.
+fn write_table(file: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     let mut part = file.as_os_str().to_owned();
     part.push(".part");
-    std::fs::write(&part, &bytes)
+    std::fs::write(&part, bytes)
         .and_then(|()| std::fs::rename(&part, file))
-        .with_context(|| file.display().to_string())?;
-    writeln!(
-        out,
-        "{}: {} textures learned from the first {slides} slides of each, {} bytes",
-        file.display(),
-        set.textures().len(),
-        bytes.len()
-    )?;
-    Ok(())
+        .with_context(|| file.display().to_string())
 }
 
 pub(crate) fn read_table<'b>(file: &Path, bytes: &'b mut Vec<u8>) -> anyhow::Result<Table<'b>> {
@@ -330,44 +330,53 @@ struct Evaluation {
     summary: Summary,
 }
 
+/// What `evaluate --novelty` prints.
+#[derive(Serialize)]
+struct NoveltyFigures {
+    method: Method,
+    protocol: &'static str,
+    train_slides: usize,
+    runs: u64,
+    seed: u64,
+    novelty: Vec<After>,
+}
+
+/// What `evaluate --lifelong` prints.
+#[derive(Serialize)]
+struct LifelongFigures {
+    method: Method,
+    train_slides: usize,
+    sessions: u64,
+    seed: u64,
+    lifelong: Vec<Lifelong>,
+}
+
+/// Most sessions of `--lifelong`; they differ in the order of the textures only.
+const SESSIONS: u64 = 50;
+
 fn run_evaluation(args: &Evaluate, out: &mut impl Write) -> anyhow::Result<()> {
-    let (experiment, protocol) = if let Some(folder) = &args.recordings {
-        let (set, felt) = feel_folder(folder)?;
-        let test = args.test.as_deref().map(feel_folder).transpose()?;
-        let test = test.map(|(set, felt)| (names(&set), felt));
-        let test = test
-            .as_ref()
-            .map(|(names, felt)| (names.as_slice(), felt.as_slice()));
-        let experiment = Experiment::recorded(
-            names(&set),
-            &felt,
-            test,
-            args.protocol,
-            args.train_slides.unwrap_or(5),
-            args.seed,
-        )?;
-        let protocol = match args.protocol {
-            Protocol::Interleaved => "interleaved",
-            Protocol::Blocked => "blocked",
-            Protocol::Drift => "drift",
+    if args.lifelong && args.protocol != Protocol::Drift {
+        // the first slides are learned from, all others come after them
+        let drift = Evaluate {
+            protocol: Protocol::Drift,
+            ..args.clone()
         };
-        (experiment, protocol)
-    } else if let Some(file) = &args.properties {
-        (
-            Experiment::given(&PropertyTable::read(file)?, args.train_slides, args.seed)
-                .with_context(|| file.display().to_string())?,
-            "properties",
-        )
-    } else {
-        bail!("give --recordings or --properties");
-    };
+        return run_evaluation(&drift, out);
+    }
+    if (args.lifelong || args.novelty.is_some()) && args.method.method() != FUSED {
+        bail!("--novelty and --lifelong need --method fused: the others cannot tell what they do not know");
+    }
+    let (experiment, protocol) = experiment(args)?;
+    let experiment = experiment.with_features(args.features.map(Features::set));
+    let config = args.stop.config(args.method);
+    if args.lifelong {
+        return run_lifelong(args, &experiment, config, out);
+    }
+    if args.novelty.is_some() {
+        return run_novelty(args, &experiment, protocol, config, out);
+    }
     let bar = progress(args.runs, "exploring");
-    let outcomes = evaluate(
-        &experiment,
-        args.stop.config(args.method),
-        args.runs,
-        || bar.inc(1),
-    )?;
+    let outcomes = evaluate(&experiment, config, args.runs, || bar.inc(1))?;
     bar.finish_and_clear();
     let evaluation = Evaluation {
         method: args.method,
@@ -381,8 +390,138 @@ fn run_evaluation(args: &Evaluate, out: &mut impl Write) -> anyhow::Result<()> {
         summary: Summary::new(&outcomes, experiment.names(), args.stop.max_slides),
     };
     match args.format {
-        Format::Json => writeln!(out, "{}", serde_json::to_string_pretty(&evaluation)?)?,
+        Format::Json => print_json(&evaluation, out)?,
         Format::Text => print_evaluation(&evaluation, out)?,
+    }
+    Ok(())
+}
+
+const FUSED: tactus_core::explorer::Method = tactus_core::explorer::Method::Fused;
+
+/// What is to be evaluated, and its name.
+fn experiment(args: &Evaluate) -> anyhow::Result<(Experiment, &'static str)> {
+    if let Some(folder) = &args.fabrics {
+        let set = FabricSet::open(folder)?;
+        let experiment = Experiment::fabrics(&set, args.repetition - 1, args.seed)?;
+        return Ok((experiment, "fabrics"));
+    }
+    if let Some(file) = &args.properties {
+        let set = PropertyTable::read(file)?;
+        let experiment = Experiment::given(&set, args.train_slides, args.seed)
+            .with_context(|| file.display().to_string())?;
+        return Ok((experiment, "properties"));
+    }
+    let Some(folder) = &args.recordings else {
+        bail!("give --recordings, --properties or --fabrics");
+    };
+    let (set, felt) = feel_folder(folder)?;
+    let test = args.test.as_deref().map(feel_folder).transpose()?;
+    let test = test.map(|(set, felt)| (names(&set), felt));
+    let test = test
+        .as_ref()
+        .map(|(names, felt)| (names.as_slice(), felt.as_slice()));
+    let experiment = Experiment::recorded(
+        names(&set),
+        &felt,
+        test,
+        args.protocol,
+        args.train_slides.unwrap_or(5),
+        args.seed,
+    )?;
+    let protocol = match args.protocol {
+        Protocol::Interleaved => "interleaved",
+        Protocol::Blocked => "blocked",
+        Protocol::Drift => "drift",
+    };
+    Ok((experiment, protocol))
+}
+
+fn print_json(figures: &impl Serialize, out: &mut impl Write) -> anyhow::Result<()> {
+    writeln!(out, "{}", serde_json::to_string_pretty(figures)?)?;
+    Ok(())
+}
+
+fn run_novelty(
+    args: &Evaluate,
+    experiment: &Experiment,
+    protocol: &'static str,
+    config: Config,
+    out: &mut impl Write,
+) -> anyhow::Result<()> {
+    if experiment.names().len() < 4 {
+        bail!("leaving one out takes four textures or more");
+    }
+    let bar = progress(args.runs, "presenting new textures");
+    let novelty = leave_one_out(experiment, config, args.runs, || bar.inc(1))?;
+    bar.finish_and_clear();
+    let figures = NoveltyFigures {
+        method: args.method,
+        protocol,
+        train_slides: experiment.train_slides(),
+        runs: args.runs,
+        seed: args.seed,
+        novelty,
+    };
+    if args.format == Format::Json {
+        return print_json(&figures, out);
+    }
+    writeln!(
+        out,
+        "Every texture left out in turn, {protocol}, {} training slides, {} runs, seed {}",
+        figures.train_slides, figures.runs, figures.seed
+    )?;
+    for after in &figures.novelty {
+        writeln!(
+            out,
+            "  after {} slide{}  noticed {:5.1} %, known ones taken for new {:4.1} %",
+            after.slides,
+            if after.slides == 1 { " " } else { "s" },
+            after.detections * 100.0,
+            after.false_alarms * 100.0
+        )?;
+    }
+    Ok(())
+}
+
+fn run_lifelong(
+    args: &Evaluate,
+    experiment: &Experiment,
+    config: Config,
+    out: &mut impl Write,
+) -> anyhow::Result<()> {
+    let sessions = args.runs.min(SESSIONS);
+    let bar = progress(3 * sessions, "living through sessions");
+    let figures = LifelongFigures {
+        method: args.method,
+        train_slides: experiment.train_slides(),
+        sessions,
+        seed: args.seed,
+        lifelong: lifelong(experiment, config, sessions, args.seed, || bar.inc(1))?,
+    };
+    bar.finish_and_clear();
+    if args.format == Format::Json {
+        return print_json(&figures, out);
+    }
+    writeln!(
+        out,
+        "A session in time order: {} slides to learn from, then visits of one slide; {sessions} orders of the textures, seed {}",
+        figures.train_slides, figures.seed
+    )?;
+    for life in &figures.lifelong {
+        let (who, uncertain) = match life.learning {
+            Learning::None => ("learning nothing      ", "uncertain"),
+            Learning::Itself => ("learning by itself    ", "uncertain"),
+            Learning::Asking => ("asking where uncertain", "asked"),
+        };
+        writeln!(
+            out,
+            "  {who}  right at first {:5.1} %, worst {:5.1} % ({}), {uncertain} {:4.1} %, wrong lessons {:.2} %",
+            life.accuracy * 100.0,
+            life.worst.0 * 100.0,
+            life.worst.1,
+            life.uncertain * 100.0,
+            life.wrong_lessons * 100.0
+        )?;
     }
     Ok(())
 }
@@ -424,6 +563,13 @@ fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
         "  slides                     median {}, mean {:.2}",
         s.median_slides, s.mean_slides
     )?;
+    if e.method.method() == FUSED {
+        writeln!(
+            out,
+            "  most like a new texture    {:5.1} %",
+            s.like_unknown * 100.0
+        )?;
+    }
     if !s.confused.is_empty() {
         writeln!(out, "  most confused")?;
     }

@@ -5,19 +5,30 @@ use std::collections::HashMap;
 use rand::Rng as _;
 use rayon::prelude::*;
 use serde::Serialize;
-use tactus_core::explorer::{Config, Explorer, ExplorerError, Strategy};
+use tactus_core::explorer::{self, Config, Explorer, ExplorerError, Strategy};
 use tactus_core::features::PropertySet;
-use tactus_core::table::{EncodeError, Table, TableError};
+use tactus_core::table::{Table, TableError};
 
 use crate::experiment::{Experiment, Run};
+use crate::learn;
 
 /// Most textures that a PC explores among.
 pub const MAX_TEXTURES: usize = 2048;
 
 /// How a run decides and moves on.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Method {
+    /// All features of every slide at once, whitened; the movement chosen by Bayesian exploration.
+    Fused,
+    /// As fused, one movement after the other.
+    FusedCycle,
+    /// As fused, any movement at random.
+    FusedRandom,
+    /// The three properties of every slide, Student's t.
+    StudentAll,
+    /// One property per slide, Student's t.
+    Student,
     /// The paper's: one property per slide, the movement chosen by Bayesian exploration.
     Paper,
     /// The paper's likelihoods, the best movement of each property in turn.
@@ -27,12 +38,32 @@ pub enum Method {
 }
 
 impl Method {
-    /// The strategy of the core's explorer.
+    /// How the core's explorer compares.
+    pub fn method(self) -> explorer::Method {
+        match self {
+            Self::Fused | Self::FusedCycle | Self::FusedRandom => explorer::Method::Fused,
+            Self::StudentAll => explorer::Method::StudentAll,
+            Self::Student => explorer::Method::Student,
+            Self::Paper | Self::Cycle | Self::Random => explorer::Method::Paper,
+        }
+    }
+
+    /// How the core's explorer chooses.
     pub fn strategy(self) -> Strategy {
         match self {
-            Self::Paper => Strategy::Bayesian,
-            Self::Cycle => Strategy::Cycling,
-            Self::Random => Strategy::Random,
+            Self::Fused | Self::StudentAll | Self::Student | Self::Paper => Strategy::Bayesian,
+            Self::FusedCycle | Self::Cycle => Strategy::Cycling,
+            Self::FusedRandom | Self::Random => Strategy::Random,
+        }
+    }
+
+    /// The best one for the contents of a table.
+    pub fn of(method: explorer::Method) -> Self {
+        match method {
+            explorer::Method::Fused => Self::Fused,
+            explorer::Method::StudentAll => Self::StudentAll,
+            explorer::Method::Student => Self::Student,
+            explorer::Method::Paper => Self::Paper,
         }
     }
 }
@@ -48,14 +79,16 @@ pub struct Outcome {
     pub sure: bool,
     /// Slides made.
     pub slides: u8,
+    /// Whether it would have been called unknown, had that been an answer.
+    pub unknown_like: bool,
 }
 
 /// Why an evaluation came to nothing.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluateError {
-    /// The table cannot be written.
-    #[error("the table cannot be written")]
-    Encode(#[from] EncodeError),
+    /// The table cannot be learned.
+    #[error(transparent)]
+    Learn(#[from] learn::TableError),
     /// The table cannot be read back.
     #[error("the table does not read back")]
     Table(#[from] TableError),
@@ -92,6 +125,7 @@ pub fn play<const N: usize>(
         identified: verdict.texture.into(),
         sure: verdict.sure,
         slides: explorer.slides(),
+        unknown_like: explorer.is_unknown(),
     }
 }
 
@@ -109,16 +143,12 @@ pub fn evaluate(
     let measured: PropertySet = experiment.measured();
     // where every run learns from the same slides, one table serves all
     let bytes = if experiment.is_fixed() {
-        Some(experiment.run(0).learn()?)
+        Some(experiment.run(0).learn(config.method)?)
     } else {
         None
     };
     let shared = match &bytes {
-        Some(bytes) => Some(Explorer::<MAX_TEXTURES>::new(
-            Table::read(bytes)?,
-            measured,
-            config,
-        )?),
+        Some(bytes) => Some(explorer(bytes, measured, config)?),
         None => None,
     };
     (0..runs)
@@ -130,9 +160,8 @@ pub fn evaluate(
                 let outcome = match shared {
                     Some(explorer) => play(explorer, config.strategy, run),
                     None => {
-                        let bytes = run.learn()?;
-                        let mut explorer =
-                            Explorer::<MAX_TEXTURES>::new(Table::read(&bytes)?, measured, config)?;
+                        let bytes = run.learn(config.method)?;
+                        let mut explorer = explorer(&bytes, measured, config)?;
                         play(&mut explorer, config.strategy, run)
                     }
                 };
@@ -141,6 +170,23 @@ pub fn evaluate(
             },
         )
         .collect()
+}
+
+/// An explorer on the heap: it is large, and the threads' stacks are not.
+///
+/// # Errors
+/// The table does not read, or cannot be explored.
+#[inline(never)]
+pub fn explorer(
+    bytes: &[u8],
+    measured: PropertySet,
+    config: Config,
+) -> Result<Box<Explorer<'_, MAX_TEXTURES>>, EvaluateError> {
+    Ok(Box::new(Explorer::new(
+        Table::read(bytes)?,
+        measured,
+        config,
+    )?))
 }
 
 /// Two textures, and how often the first was taken for the second.
@@ -167,6 +213,8 @@ pub struct Summary {
     pub median_slides: f64,
     /// Mean number of slides.
     pub mean_slides: f64,
+    /// Share of the runs that would have been called unknown after their last slide, had that been an answer.
+    pub like_unknown: f64,
     /// The most confused pairs, most often first, ten at most.
     pub confused: Vec<Confused>,
 }
@@ -217,6 +265,10 @@ impl Summary {
                 + middle(outcomes.len() / 2))
                 / 2.0,
             mean_slides: made / outcomes.len().max(1) as f64,
+            like_unknown: share(
+                outcomes.iter().filter(|o| o.unknown_like).count(),
+                outcomes.len(),
+            ),
             confused: pairs
                 .into_iter()
                 .take(10)
@@ -241,6 +293,7 @@ mod tests {
             identified,
             sure,
             slides,
+            unknown_like: slides == 4,
         };
         let names = ["a".to_owned(), "b".to_owned(), "c".to_owned()];
         let outcomes = [
@@ -256,6 +309,7 @@ mod tests {
         assert_eq!(s.wrong_when_sure, 1.0 / 3.0, "of the sure ones only");
         assert_eq!(s.median_slides, 8.0, "3 4 5 11 11 11");
         assert_eq!(s.mean_slides, 7.0);
+        assert_eq!(s.like_unknown, 1.0 / 6.0);
         let pairs: Vec<_> = s
             .confused
             .iter()

@@ -8,10 +8,14 @@ use std::collections::HashMap;
 use rand::seq::SliceRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
+use tactus_core::explorer::Method;
 use tactus_core::features::{Properties, PropertySet};
+use tactus_core::fused::{self, FeatureSet, Observation};
 use tactus_core::movement::Movement;
-use tactus_core::table::{self, EncodeError, Experience};
+use tactus_core::table;
 
+use crate::fabricslide::FabricSet;
+use crate::learn::{TableError, learn};
 use crate::properties::PropertyTable;
 use crate::replay::Felt;
 
@@ -65,7 +69,7 @@ pub enum ExperimentError {
         movement: Movement,
     },
     /// A standard deviation needs two slides.
-    #[error("--train-slides {0}: a standard deviation takes at least two slides")]
+    #[error("--train-slides {0}: how slides of one texture differ takes at least two slides")]
     One(usize),
     /// The folder of test slides lacks something.
     #[error(
@@ -75,18 +79,15 @@ pub enum ExperimentError {
     /// More movements than a table holds.
     #[error("{0} movements; a table holds {max} at most", max = table::MAX_MOVEMENTS)]
     Movements(usize),
-    /// The table cannot hold what was felt.
-    #[error("the table cannot be written")]
-    Encode(#[from] EncodeError),
 }
 
 /// Slides of one texture and movement.
 #[derive(Clone, PartialEq, Debug, Default)]
 struct Pool {
     /// What training slides are drawn from, in the order of time.
-    train: Vec<Properties>,
+    train: Vec<Observation>,
     /// What the unknown texture shows; without it, what training has left over.
-    test: Option<Vec<Properties>>,
+    test: Option<Vec<Observation>>,
 }
 
 /// A set of textures with a way to divide their slides.
@@ -103,6 +104,8 @@ pub struct Experiment {
     /// Training slides are drawn; otherwise they are the first.
     drawn: bool,
     measured: PropertySet,
+    /// What the fused method learns from; the best there is, unless given.
+    features: Option<FeatureSet>,
     seed: u64,
 }
 
@@ -128,12 +131,13 @@ impl Experiment {
                 movements.push(slide.movement);
             }
         }
-        let of = |slides: &[Felt], movement| -> Vec<(u32, Properties)> {
+        let of = |slides: &[Felt], movement| -> Vec<(u32, Observation)> {
             let same = slides.iter().filter(|s| s.movement == movement);
-            same.map(|s| (s.number, s.measurement.properties)).collect()
+            same.map(|s| (s.number, Observation::from(&s.measurement)))
+                .collect()
         };
         let properties =
-            |slides: &[(u32, Properties)]| slides.iter().map(|s| s.1).collect::<Vec<_>>();
+            |slides: &[(u32, Observation)]| slides.iter().map(|s| s.1.clone()).collect::<Vec<_>>();
         let pool = |texture: usize, movement: Movement| {
             let mut train = of(&felt[texture], movement);
             let mut tested = match test {
@@ -199,6 +203,7 @@ impl Experiment {
             train_slides,
             drawn: protocol != Protocol::Drift,
             measured,
+            features: None,
             seed,
         })
     }
@@ -239,7 +244,7 @@ impl Experiment {
         let wrap = |trials: &[[f32; 3]]| {
             trials
                 .iter()
-                .map(|t| Properties::new(t.map(Some)))
+                .map(|t| Observation::from(Properties::new(t.map(Some))))
                 .collect::<Vec<_>>()
         };
         let pools = set
@@ -266,8 +271,78 @@ impl Experiment {
             train_slides,
             drawn: false,
             measured: PropertySet::ALL,
+            features: None,
             seed,
         })
+    }
+
+    /// Fabrics, learned from all slides of one repetition and tested on the other.
+    ///
+    /// # Errors
+    /// See [`ExperimentError`].
+    pub fn fabrics(
+        set: &FabricSet,
+        learned_from: u8,
+        seed: u64,
+    ) -> Result<Self, ExperimentError> {
+        if set.movements.len() > table::MAX_MOVEMENTS {
+            return Err(ExperimentError::Movements(set.movements.len()));
+        }
+        let of = |fabric: usize, movement: usize, learned: bool| -> Vec<Observation> {
+            let same = set.slides.iter().filter(|s| {
+                s.fabric == fabric
+                    && s.movement == movement
+                    && (s.repetition == learned_from) == learned
+            });
+            let observation = |s: &crate::fabricslide::FabricSlide| Observation {
+                properties: Properties::new(s.properties.map(Some)),
+                bands: s.ln_bands.into_iter().filter_map(fused::fixed).collect(),
+                pressure: None,
+            };
+            same.map(observation).collect()
+        };
+        let pool = |fabric, movement| Pool {
+            train: of(fabric, movement, true),
+            test: Some(of(fabric, movement, false)),
+        };
+        let movements = 0..set.movements.len();
+        let pools: Vec<Vec<Pool>> = (0..set.fabrics.len())
+            .map(|fabric| movements.clone().map(|m| pool(fabric, m)).collect())
+            .collect();
+        let there = pools.iter().flatten().map(|pool| pool.train.len());
+        let train_slides = there.min().unwrap_or(0);
+        if train_slides < 2 {
+            return Err(ExperimentError::One(train_slides));
+        }
+        Ok(Self {
+            unknowns: (0..set.fabrics.len()).collect(),
+            names: set.fabrics.clone(),
+            movements: set.movements.clone(),
+            pools,
+            train_slides,
+            drawn: false,
+            measured: PropertySet::ALL,
+            features: None,
+            seed,
+        })
+    }
+
+    /// The same with other features for the fused method.
+    #[must_use]
+    pub fn with_features(self, features: Option<FeatureSet>) -> Self {
+        Self { features, ..self }
+    }
+
+    /// All slides of a texture in the order of time, by movement: those to learn from, and those after them.
+    pub fn session(&self, texture: usize) -> Vec<(&[Observation], &[Observation])> {
+        let pools = self.pools.get(texture).map_or(&[][..], Vec::as_slice);
+        pools
+            .iter()
+            .map(|pool| {
+                let later = pool.test.as_deref().unwrap_or_default();
+                (pool.train.as_slice(), later)
+            })
+            .collect()
     }
 
     /// Names of the textures.
@@ -300,7 +375,7 @@ impl Experiment {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         random.set_stream(run);
         let unknown = self.unknowns[(run % self.unknowns.len() as u64) as usize];
-        let mut shown: Vec<Vec<Properties>> = Vec::new();
+        let mut shown: Vec<Vec<Observation>> = Vec::new();
         // As in the reference program, the same places in the session are drawn for all textures: slides of one place share
         // what the session did to them.
         let mut orders: HashMap<(usize, usize), Vec<usize>> = HashMap::new();
@@ -318,7 +393,8 @@ impl Experiment {
                         order
                     });
                 let (learned, rest) = order.split_at(self.train_slides);
-                let slides = |at: &[usize]| at.iter().map(|&i| pool.train[i]).collect::<Vec<_>>();
+                let slides =
+                    |at: &[usize]| at.iter().map(|&i| pool.train[i].clone()).collect::<Vec<_>>();
                 if texture == unknown {
                     shown.push(pool.test.clone().unwrap_or_else(|| slides(rest)));
                 }
@@ -341,11 +417,11 @@ impl Experiment {
 pub struct Run<'e> {
     experiment: &'e Experiment,
     /// Training slides per texture and movement.
-    pub training: Vec<Vec<Vec<Properties>>>,
+    pub training: Vec<Vec<Vec<Observation>>>,
     /// The texture to be identified.
     pub unknown: usize,
     /// Its test slides, per movement.
-    shown: Vec<Vec<Properties>>,
+    shown: Vec<Vec<Observation>>,
     /// Drawn from for the slides; an explorer's own random choices go through it too.
     pub random: ChaCha8Rng,
 }
@@ -354,64 +430,37 @@ impl Run<'_> {
     /// The texture table learned from the training slides, as bytes.
     ///
     /// # Errors
-    /// See [`EncodeError`].
-    pub fn learn(&self) -> Result<Vec<u8>, EncodeError> {
+    /// See [`TableError`].
+    pub fn learn(&self, method: Method) -> Result<Vec<u8>, TableError> {
         let Experiment {
             names,
             movements,
-            measured,
+            features,
             ..
         } = self.experiment;
-        let experience: Vec<Vec<Experience>> = self
-            .training
-            .iter()
-            .map(|movements| {
-                movements
-                    .iter()
-                    .map(|slides| learned(*measured, slides))
-                    .collect()
-            })
-            .collect();
-        encode(*measured, movements, names, &experience)
+        learn(method, *features, names, movements, &self.training)
+    }
+
+    /// As [`Run::learn`], without one of the textures.
+    ///
+    /// # Errors
+    /// See [`TableError`].
+    pub fn learn_without(&self, method: Method, texture: usize) -> Result<Vec<u8>, TableError> {
+        let Experiment {
+            names,
+            movements,
+            features,
+            ..
+        } = self.experiment;
+        let (mut names, mut training) = (names.clone(), self.training.clone());
+        names.remove(texture);
+        training.remove(texture);
+        learn(method, *features, &names, movements, &training)
     }
 
     /// One more slide of the unknown texture.
-    pub fn slide(&mut self, movement: usize) -> Properties {
+    pub fn slide(&mut self, movement: usize) -> Observation {
         let slides = &self.shown[movement];
-        slides[self.random.random_range(0..slides.len())]
+        slides[self.random.random_range(0..slides.len())].clone()
     }
-}
-
-/// What these slides teach. All of them have the properties of `measured`.
-pub fn learned(measured: PropertySet, slides: &[Properties]) -> Experience {
-    let mut experience = Experience::default();
-    for slide in slides {
-        // a slide that lacks a property was not counted into `measured`
-        let _ = experience.learn(measured, slide);
-    }
-    experience
-}
-
-/// Writes a table of any size.
-///
-/// # Errors
-/// See [`EncodeError`].
-pub fn encode(
-    measured: PropertySet,
-    movements: &[Movement],
-    names: &[String],
-    experience: &[Vec<Experience>],
-) -> Result<Vec<u8>, EncodeError> {
-    let textures = names
-        .iter()
-        .zip(experience)
-        .map(|(name, experience)| table::Texture { name, experience });
-    let length = table::encoded_len(
-        names.len(),
-        movements.len(),
-        names.iter().map(|n| n.len() + 1).sum(),
-    );
-    let mut bytes = vec![0; length];
-    table::encode(&mut bytes, measured, movements, textures)?;
-    Ok(bytes)
 }

@@ -9,14 +9,15 @@ use clap::Parser as _;
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus::collection::{Collection, calibrated, texture_name};
-use tactus::evaluate::MAX_TEXTURES;
+use tactus::evaluate::{MAX_TEXTURES, Method};
 use tactus::experiment::{Experiment, Protocol};
 use tactus::recordings::{RecordingSet, Slide};
 use tactus::replay::{Felt, Replay};
 use tactus::show::Show;
 use tactus::simulated::SimRig;
-use tactus_core::explorer::Explorer;
+use tactus_core::explorer::{self, Config, Explorer};
 use tactus_core::features::Plan;
+use tactus_core::fused::Observation;
 use tactus_core::movement::Movement;
 use tactus_core::rig::{Rig, explore};
 use tactus_core::table::Table;
@@ -42,7 +43,9 @@ pub(crate) fn identify(
             // a table learned from this very folder has seen the first slides of every movement
             let trials = table.trials(0, 0).into();
             let (_, felt) = feel_folder(folder)?;
-            if learn_first(&set, &felt, trials).is_ok_and(|own| own == table.as_bytes()) {
+            let learned_as = Method::of(explorer::Method::of(table.contents()));
+            let own = learn_first(&set, &felt, trials, learned_as, None);
+            if own.is_ok_and(|own| own == table.as_bytes()) {
                 let mut seen: HashMap<Movement, usize> = HashMap::new();
                 shown.retain(|slide| {
                     let before = seen.entry(slide.movement).or_default();
@@ -69,14 +72,11 @@ pub(crate) fn identify(
                 args.seed,
             )?;
             let run = experiment.run(index as u64);
-            bytes = run.learn()?;
+            bytes = run.learn(args.method.unwrap_or(Method::Fused).method())?;
             let learned = &run.training[index];
             let unseen = |slide: &Slide, felt: &Felt| {
-                slide.number == felt.number
-                    && !learned
-                        .iter()
-                        .flatten()
-                        .any(|l| *l == felt.measurement.properties)
+                let felt_now = Observation::from(&felt.measurement);
+                slide.number == felt.number && !learned.iter().flatten().any(|l| *l == felt_now)
             };
             let slides = set.load_texture(index)?.into_iter().zip(&felt[index]);
             let shown = slides
@@ -115,8 +115,12 @@ fn show_exploration<R>(
 where
     R: Rig<Error: std::error::Error + Send + Sync + 'static>,
 {
-    let mut explorer =
-        Explorer::<MAX_TEXTURES>::new(table, rig.measures(), args.stop.config(args.method))?;
+    let best = Method::of(explorer::Method::of(table.contents()));
+    let config = Config {
+        open: true,
+        ..args.stop.config(args.method.unwrap_or(best))
+    };
+    let mut explorer = Explorer::<MAX_TEXTURES>::new(table, rig.measures(), config)?;
     out.flush()?;
     let mut show = Show::new(table, out);
     let verdict = embassy_futures::block_on(explore(
@@ -157,7 +161,7 @@ pub(crate) fn identify_simulated(args: &Identify, out: &mut impl Write) -> anyho
     };
     if args.train_slides < 2 {
         bail!(
-            "--train-slides {}: a standard deviation takes at least two slides",
+            "--train-slides {}: how slides of one texture differ takes at least two slides",
             args.train_slides
         );
     }
@@ -168,7 +172,8 @@ pub(crate) fn identify_simulated(args: &Identify, out: &mut impl Write) -> anyho
     };
     let bar = progress(collection.textures.len() as u64, "learning textures");
     let calibration = calibrated(collection.setup(unknown, 0))?;
-    let bytes = collection.learn(calibration, || bar.inc(1))?;
+    let method = args.method.unwrap_or(Method::Fused).method();
+    let bytes = collection.learn(method, calibration, || bar.inc(1))?;
     bar.finish_and_clear();
     let table = Table::read(&bytes)?;
     let mut rig = SimRig::new(collection.setup(unknown, 1 + u64::from(random.next_u32() % 1000)));

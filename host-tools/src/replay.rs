@@ -19,6 +19,12 @@ pub fn play<K: Kernels>(recorded: &Slide, slide: &mut features::Slide<'_, K>) {
     let steady = recorded.steady(crate::recordings::PAC_RATE_HZ);
     slide.start(steady.start as u32..steady.end as u32);
     slide.push(&recorded.pac);
+    slide.push_pdc(
+        recorded
+            .pdc
+            .get(recorded.steady(recorded.pdc_rate_hz))
+            .unwrap_or_default(),
+    );
     if let Some(shear) = &recorded.shear_mn {
         slide.push_shear(
             shear

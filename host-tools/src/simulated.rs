@@ -13,6 +13,7 @@ use tactus_core::pressure::{Calibration, Channel, Pressure, RATE_HZ, SLOTS_HZ};
 use tactus_core::rig::calibration::{LineFit, RigCalibration, RigCalibrationError};
 use tactus_core::rig::control::{Control, Ended, Phase, Refused};
 use tactus_core::rig::guard::{Fault, Unguarded};
+use tactus_core::rig::patience::{Patience, Wait};
 use tactus_core::rig::pins::{Felt, Inputs, Outputs};
 use tactus_core::rig::stage::StageConstants;
 use tactus_core::rig::unloaded::UnloadedRuns;
@@ -31,8 +32,6 @@ const GAP_NS: u64 = 55_000;
 const PULSE_NS: u64 = 5_000;
 /// DIR is set this long before STEP rises.
 const DIR_NS: u64 = 2_000;
-/// A rig that does not come to an end within this is broken.
-const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Motor current amplifier of the reference board: 1 V/A about half of 3.3 V, 12 bits.
 fn amperes(adc: u16) -> f32 {
@@ -253,16 +252,24 @@ impl SimRig {
     /// # Errors
     /// The fault that it came to, or that it never came to rest.
     pub fn rest(&mut self, mut each: impl FnMut(&Outputs)) -> Result<(), SimError> {
-        let until = self.now() + PATIENCE;
-        while self.now() < until {
+        let mut patience = Patience::default();
+        let mut hung = Phase::Parked;
+        loop {
             each(self.tick());
-            match self.control.phase() {
-                Phase::Faulted(fault) if self.control.is_at_rest() => return Err(fault.into()),
-                _ if self.control.is_at_rest() => return Ok(()),
-                _ => {}
+            let phase = self.control.phase();
+            match (patience.wait(1, self.control.is_at_rest()), phase) {
+                (Wait::On, _) => {}
+                (Wait::Stop, _) => {
+                    hung = phase;
+                    self.control.stop();
+                }
+                (Wait::Over | Wait::Hangs, Phase::Faulted(fault)) if self.control.is_at_rest() => {
+                    return Err(fault.into());
+                }
+                (Wait::Over, _) => return Ok(()),
+                (Wait::Hangs, _) => return Err(SimError::Hangs(hung)),
             }
         }
-        Err(SimError::Hangs(self.control.phase()))
     }
 
     /// Powers up: waits for the sensor, finds the limit switches.
@@ -328,7 +335,7 @@ impl SimRig {
     }
 
     /// Measures everything that differs from rig to rig: the motor current without load, newtons per ampere on the
-    /// inclined stage, and counts of P_DC per newton on a force plate. `date` as 20261121.
+    /// inclined stage, P_DC in the air, and its counts per newton on a force plate. `date` as 20261121.
     ///
     /// # Errors
     /// See [`SimError`].
@@ -374,6 +381,10 @@ impl SimRig {
         let calibration = RigCalibration {
             pressure: Calibration {
                 force_mn_per_count,
+                pdc_no_contact: self
+                    .control
+                    .air_counts()
+                    .unwrap_or(unloaded.pressure.pdc_no_contact),
                 ..unloaded.pressure
             },
             newton_per_ampere: 1.0 / ampere_per_newton,
@@ -398,7 +409,7 @@ impl SimRig {
     ) -> Result<Ended, SimError> {
         self.control.start(movement, start)?;
         self.world.reset_extremes();
-        let until = self.now() + PATIENCE;
+        let mut patience = Patience::default();
         let mut truth = Performed::default();
         let mut speeds = Vec::new();
         loop {
@@ -416,8 +427,13 @@ impl SimRig {
             match self.control.phase() {
                 Phase::Ready => break,
                 Phase::Faulted(_) => self.rest(|_| ())?,
-                phase if self.now() > until => return Err(SimError::Hangs(phase)),
-                _ => {}
+                phase => {
+                    if patience.wait(1, false) == Wait::Stop {
+                        self.control.stop();
+                        self.rest(|_| ())?;
+                        return Err(SimError::Hangs(phase));
+                    }
+                }
             }
         }
         if !speeds.is_empty() {

@@ -422,8 +422,8 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         self.log_odds
     }
 
-    /// Whether the texture is rather none of the candidates.
-    fn is_unknown(&self) -> bool {
+    /// Whether the texture is rather none of the candidates, as far as can be told.
+    pub fn is_unknown(&self) -> bool {
         let limit = if self.slides < UNKNOWN_SLIDES {
             UNKNOWN_AT_ONCE
         } else {

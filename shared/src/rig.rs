@@ -7,6 +7,7 @@ pub mod control;
 pub mod force;
 pub mod guard;
 pub mod lever;
+pub mod patience;
 pub mod pins;
 pub mod skin;
 pub mod stage;
@@ -245,10 +246,10 @@ mod tests {
                 told.push(match event {
                     Event::Chosen(action, outlook) => {
                         assert!(outlook.iter().any(|o| o.action == action));
-                        format!("{} {}", action.property, action.movement)
+                        format!("{} {}", action.what(), action.movement)
                     }
                     Event::Felt(action, slide, posterior) => {
-                        let x = slide.properties.get(action.property).unwrap();
+                        let x = slide.properties.get(action.property.unwrap()).unwrap();
                         format!("felt {} {x:.1}: {:.2}", action.movement, posterior[1])
                     }
                     Event::Rejected(action, why) => format!("rejected {}: {why}", action.movement),

@@ -430,9 +430,9 @@ mod tests {
     use std::vec;
     use std::vec::Vec as List;
 
-    const NONE: Lesson = Lesson::Gaussians(Experience {
-        ..Experience::NONE
-    });
+    fn none() -> Lesson {
+        Lesson::Gaussians(Experience::default())
+    }
 
     fn wanted(name: &str) -> Wanted<'_> {
         Wanted {
@@ -502,7 +502,21 @@ mod tests {
             0,
         );
         let same = known.unwrap().encode(Some(&old), &mut room).unwrap();
-        assert_eq!(same.as_bytes(), bytes);
+        // but for where it came from
+        let (lineage, end) = (16 + 2 * 6 + 5 * 2 * 12 + 5 * 2, bytes.len() - 4);
+        assert_eq!(same.as_bytes()[..lineage], bytes[..lineage]);
+        assert_eq!(same.as_bytes()[lineage..lineage + 4], bytes[end..]);
+        assert_eq!(same.as_bytes()[lineage + 4..end], bytes[lineage + 4..end]);
+        assert_eq!((same.lineage(), old.lineage()), (old.crc(), old.crc()));
+        // which stays as it is from then on
+        let once_more = Wanted {
+            trials: 2,
+            ..wanted("t0")
+        };
+        let known = Training::new(once_more, Some(&same), 0).unwrap();
+        let mut again = vec![0; 4096];
+        let again = known.encode(Some(&same), &mut again).unwrap();
+        assert_eq!(again.as_bytes(), same.as_bytes());
         let other = training.encode(None, &mut room).err();
         assert_eq!(other, Some(TrainingError::Table));
     }
@@ -553,7 +567,7 @@ mod tests {
             ..wanted("felt")
         };
         assert_eq!(refused(once, 4096), Some(TrainingError::Trials(1)));
-        let needed = bytes.len() + 2 * 13 + 1 + 4;
+        let needed = bytes.len() + 2 * 13 + 5 + 1 + 4;
         assert_eq!(refused(wanted("felt"), needed), None);
         assert_eq!(
             refused(wanted("felt"), needed - 1),
@@ -585,12 +599,12 @@ mod tests {
         let lacks = Properties::new([Some(1.0), None, Some(f32::NAN)]);
         let missing = TrainingError::Missing(Property::Roughness);
         assert_eq!(training.took(None, movement, &lacks.into()), Err(missing));
-        assert_eq!(training.learned()[0].1, NONE);
+        assert_eq!(training.learned()[0].1, none());
         let other = Movement::new(1000, 30_000).unwrap();
         let foreign = Err(TrainingError::Movement(other));
         assert_eq!(training.took(None, other, &felt(1.0)), foreign);
         let foreign = Err(TrainingError::Movement(other));
-        assert_eq!(training.resume(other, NONE), foreign);
+        assert_eq!(training.resume(other, none()), foreign);
     }
 
     #[test]

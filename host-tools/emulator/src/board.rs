@@ -33,6 +33,8 @@ pub struct Options {
     pub tick_ns: u64,
     /// How long changes at the outputs are kept, s: [`Rig::trace`].
     pub trace_s: u64,
+    /// Whether the debug probe gives its 8 MHz at power-up.
+    pub clock: bool,
     /// What the firmware's store holds at power-up, from [`Emulator::store`]; blank otherwise.
     pub store: Option<Vec<u8>>,
 }
@@ -43,6 +45,7 @@ impl Default for Options {
             instructions_per_second: NonZeroU64::new(168_000_000).expect("it is not 0"),
             tick_ns: 100_000,
             trace_s: 2,
+            clock: true,
             store: None,
         }
     }
@@ -155,6 +158,7 @@ impl Emulator {
             until_ns: 0,
             resets: 0,
             switches: [None; 4],
+            clock: options.clock,
         };
         let shared = rig.clone();
         let thread = std::thread::spawn(move || {
@@ -368,6 +372,22 @@ impl Emulator {
     /// The run is over.
     pub fn leds(&mut self) -> Result<[bool; 3], Error> {
         self.with(|standing| pins::LEDS.map(|led| standing.session.board_mut().level(led)))
+    }
+
+    /// The debug probe's 8 MHz stop, for good. The chip's clock security system, where the firmware has turned it on, does
+    /// all that it does but the NMI, which rigless cannot raise: write ICSR by code of your own.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn stop_clock(&mut self) -> Result<(), Error> {
+        let at = VirtualNanos(self.now_ns);
+        self.with(move |standing| {
+            *standing.clock = false;
+            let f427 = &mut standing.session.board_mut().part.f427;
+            f427.drive_clocks(at, |rcc, registers, context| {
+                rcc.fail_hse(registers, context);
+            });
+        })
     }
 
     /// Resets the chip by its pin.

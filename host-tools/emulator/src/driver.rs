@@ -20,6 +20,8 @@ use crate::stack::Stack;
 const SPI1_CR1: u64 = 0x4001_3000;
 const TIM5_SR: u64 = 0x4000_0C10;
 const TIM5_EGR: u64 = 0x4000_0C14;
+const RCC_CR: u64 = 0x4002_3800;
+const HSEON: u64 = 1 << 16;
 const FLASH_CR: u64 = 0x4002_3C10;
 /// Ports A to F, 1 KB each.
 const PORTS: std::ops::Range<u64> = 0x4002_0000..0x4002_1800;
@@ -32,6 +34,7 @@ pub(crate) struct Standing<'a> {
     pub(crate) host: &'a mut dyn Host,
     pub(crate) log: Option<&'a mut Log>,
     pub(crate) stack: &'a mut Option<Stack>,
+    pub(crate) clock: &'a mut bool,
 }
 
 /// What the owner wants.
@@ -55,6 +58,8 @@ pub(crate) struct Driver {
     pub(crate) resets: usize,
     /// lever top, e-stop, stage lower, stage upper, as they were driven last
     pub(crate) switches: [Option<bool>; 4],
+    /// the debug probe gives its 8 MHz
+    pub(crate) clock: bool,
 }
 
 impl Driver {
@@ -197,6 +202,12 @@ impl Driver {
                 // the register is there, and its clock is on: EGR has just been written
                 let _ = part.write(now, TIM5_SR, Width::W32, !0x1E);
             }
+            // To rigless a pin without a crystal gets ready too. Here it does not: before its time it is off again.
+            RCC_CR if !self.clock && access.value & HSEON != 0 => {
+                let part = &mut session.board_mut().part;
+                // the register is there
+                let _ = part.write(now, RCC_CR, Width::W32, access.value & !HSEON);
+            }
             address if address == FLASH_CR || flash::ARRAY.contains(&address) => {
                 // the array is there as a whole
                 let _ = self.flash(session, host, access);
@@ -228,6 +239,7 @@ impl Driver {
                     host,
                     log: self.log.as_mut(),
                     stack: &mut self.stack,
+                    clock: &mut self.clock,
                 }),
             }
         }

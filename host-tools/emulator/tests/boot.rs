@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use tactus_emulator::{Emulator, Options, Setup};
+use tactus_core::wire::{Ask, Phase, Tell};
+use tactus_emulator::talk::Talk;
+use tactus_emulator::{Emulator, Options, Output, Setup};
 
 /// The firmware's ELF, which `cargo xtask emulate` names; without it these tests have nothing to run.
 fn elf() -> Option<PathBuf> {
@@ -48,4 +50,106 @@ fn code_that_is_broken_on_purpose_hangs_until_the_watchdog_resets_the_chip() {
     let resets = emulator.resets().unwrap();
     eprintln!("{resets:?}");
     assert!(!resets.is_empty(), "the patched code was not run");
+}
+
+/// The words that a board without the debug probe's 8 MHz says, and whether it works all the same.
+#[test]
+fn a_board_without_the_probes_clock_runs_by_its_own() {
+    let Some(elf) = elf() else {
+        eprintln!("skipped: TACTUS_ELF is not set");
+        return;
+    };
+    for clock in [true, false] {
+        let options = Options {
+            clock,
+            ..Options::default()
+        };
+        let mut talk = Talk::new(Emulator::start(&elf, Setup::default(), options).unwrap());
+        let mut words = None;
+        let ready = |tell: &Tell| match tell {
+            Tell::Booted { last_words, .. } => {
+                words = Some(last_words.clone());
+                None
+            }
+            Tell::Phase(Phase::Ready) => Some(Ok(())),
+            _ => None,
+        };
+        talk.wait(30.0, |_, _| (), ready).unwrap();
+        let words = words.unwrap().map(|words| words.as_str().to_owned());
+        eprintln!("clock {clock}: {words:?}");
+        let said = words.is_some_and(|words| words.contains("8 MHz"));
+        assert_eq!(said, !clock);
+        // the line, the stage, the sensor's slots and the motor's current, at their rates
+        talk.ask(Ask::Calibrate, 80.0, |_, _| ()).unwrap();
+        assert_eq!(talk.board().resets().unwrap(), []);
+    }
+}
+
+/// Whatever becomes of the start-up, the watchdog is there.
+#[test]
+fn a_start_up_that_hangs_is_ended_by_the_watchdog() {
+    let Some(elf) = elf() else {
+        eprintln!("skipped: TACTUS_ELF is not set");
+        return;
+    };
+    let mut emulator = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
+    // where embassy waits for the PLL, without end
+    let (address, _) = emulator.symbol("rcc8__version8init_pll").unwrap();
+    emulator.write(address, &[0xFE, 0xE7]).unwrap();
+    emulator.run_ms(3000).unwrap();
+    let resets = emulator.resets().unwrap();
+    eprintln!("{resets:?}");
+    assert!(!resets.is_empty(), "it hangs for ever");
+}
+
+/// A flash that never says that it is ready keeps neither the finger down nor the rest of the rig from working.
+#[test]
+fn a_store_that_does_not_open_does_not_keep_the_finger_down() {
+    let Some(elf) = elf() else {
+        eprintln!("skipped: TACTUS_ELF is not set");
+        return;
+    };
+    // a power cut while a page was erased: the store goes on with it when it is opened
+    let mut store = vec![0xFF; 64 << 10];
+    store[0xBFF0..0xBFF4].copy_from_slice(b"eras");
+    let options = Options {
+        store: Some(store),
+        trace_s: 30,
+        ..Options::default()
+    };
+    let mut board = Emulator::start(&elf, Setup::default(), options).unwrap();
+    lose_flash_interrupts(&mut board);
+    let mut talk = Talk::new(board);
+    talk.wait(
+        20.0,
+        |_, _| (),
+        |tell| matches!(tell, Tell::Phase(Phase::Ready)).then_some(Ok(())),
+    )
+    .unwrap();
+    let now_ms = talk.board().now_ns() / 1_000_000;
+    // the pin is low at first, and is not told of then
+    let mut down = false;
+    let mut up_ms = |&(at_ns, output): &(u64, Output)| match output {
+        Output::LeverDown(is) => {
+            down = is;
+            None
+        }
+        Output::LeverStep(true) if !down => Some(at_ns / 1_000_000),
+        _ => None,
+    };
+    let first_ms = talk.board().rig().trace().find_map(&mut up_ms);
+    eprintln!("lifts from {first_ms:?} ms on, ready after {now_ms} ms");
+    assert!(first_ms.is_some_and(|ms| ms < 500), "{first_ms:?}");
+    assert_eq!(talk.board().resets().unwrap(), []);
+    talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
+}
+
+/// The flash's interrupt clears its flags, and wakes nobody.
+fn lose_flash_interrupts(board: &mut Emulator) {
+    let (address, _) = board.symbol("FLASH").unwrap();
+    let address = (address & !1).next_multiple_of(4);
+    // ldr r0, [pc, #4]; ldr r1, [r0]; str r1, [r0]; bx lr; FLASH_SR
+    let code = [0x4801_u16, 0x6801, 0x6001, 0x4770, 0x3C0C, 0x4002];
+    let bytes: Vec<u8> = code.iter().flat_map(|c| c.to_le_bytes()).collect();
+    board.write(address, &bytes).unwrap();
 }

@@ -33,6 +33,8 @@ enum Instead {
     Crashes,
     /// It panics.
     Panics,
+    /// It raises the NMI of the clock security system, and goes no further.
+    Nmi,
 }
 
 /// What a function that panics says.
@@ -92,6 +94,15 @@ fn break_code(board: &mut Emulator, name: &str, instead: Instead) -> (u64, Vec<u
             board.write(NOWHERE, &panicking(panic)).unwrap();
             board.write(address, &branch(address, NOWHERE)).unwrap();
         }
+        Instead::Nmi => {
+            // ldr r0, [pc, #8]; movs r1, #1; lsls r1, #31; str r1, [r0]; a branch to itself; nop; ICSR
+            let code = [
+                0x4802_u16, 0x2101, 0x07C9, 0x6001, 0xE7FE, 0xBF00, 0xED04, 0xE000,
+            ];
+            let bytes: Vec<u8> = code.iter().flat_map(|c| c.to_le_bytes()).collect();
+            board.write(NOWHERE, &bytes).unwrap();
+            board.write(address, &branch(address, NOWHERE)).unwrap();
+        }
         // udf
         Instead::Crashes => board.write(address, &[0x00, 0xDE]).unwrap(),
     }
@@ -104,7 +115,11 @@ enum Cause {
     Rig(Fault),
     /// A function of the firmware, by its mangled name.
     Code(&'static str, Instead),
+    /// The debug probe's 8 MHz stop.
+    Clock,
 }
+
+const SERVO: &str = "___servo_task_inner_function0E4poll";
 
 /// When it breaks, by what really happens.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -128,7 +143,7 @@ struct Case {
 }
 
 /// By the fault table: its deadline, and what it takes until the fault shows.
-const CASES: [Case; 16] = [
+const CASES: [Case; 17] = [
     Case {
         name: "sensor unplugged before the slide",
         cause: Cause::Rig(Fault::SensorUnplugged),
@@ -247,6 +262,14 @@ const CASES: [Case; 16] = [
         // its task has its turn every 5 ms
         deadline_ms: Some(8),
     },
+    Case {
+        name: "the clock stops",
+        cause: Cause::Clock,
+        when: When::Sliding,
+        seen: &[],
+        // the servo's next millisecond, where the NMI is raised, and periods of the lever's timer
+        deadline_ms: Some(3),
+    },
 ];
 
 fn board(elf: &std::path::Path, seed: u64, texture: u8) -> Talk {
@@ -341,6 +364,10 @@ fn run(case: &Case, elf: &std::path::Path, seed: u64) -> (Talk, Outcome) {
             match case.cause {
                 Cause::Rig(fault) => board.inject(fault),
                 Cause::Code(name, instead) => broken = Some(break_code(board, name, instead)),
+                Cause::Clock => {
+                    board.stop_clock().unwrap();
+                    broken = Some(break_code(board, SERVO, Instead::Nmi));
+                }
             }
             broken_ns = Some(board.now_ns());
             over_ns = board.now_ns() + after_ms * 1_000_000;
@@ -458,6 +485,7 @@ fn objections(case: &Case, outcome: &Outcome) -> Vec<String> {
             if words.contains("hard fault") => {}
         (Cause::Code(_, Instead::Panics), Some((Reset::Software, Some(words))))
             if words.contains(LAST_WORDS) && words.contains("nowhere.rs:12") => {}
+        (Cause::Clock, Some((Reset::Software, Some(words)))) if words.contains("8 MHz") => {}
         (cause, rebooted) => objections.push(format!("{cause:?} came to {rebooted:?}")),
     }
     objections
@@ -479,6 +507,45 @@ fn check(name: &str) {
         talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
     }
     talk.ask(Ask::Calibrate, 80.0, |_, _| ()).unwrap();
+}
+
+/// A flash that never says that it is done: the session waits for it, and everything else works.
+#[test]
+fn a_session_that_is_stuck_is_noticed() {
+    let Some(elf) = elf() else { return };
+    let mut talk = board(&elf, 78, 5);
+    let (address, _) = talk.board().symbol("FLASH").unwrap();
+    let address = (address & !1).next_multiple_of(4);
+    // ldr r0, [pc, #4]; ldr r1, [r0]; str r1, [r0]; bx lr; FLASH_SR: clears the flags, wakes nobody
+    let code = [0x4801_u16, 0x6801, 0x6001, 0x4770, 0x3C0C, 0x4002];
+    let bytes: Vec<u8> = code.iter().flat_map(|c| c.to_le_bytes()).collect();
+    let whole = talk.board().read(address, bytes.len() as u64).unwrap();
+    // an idle rig waits for its host as long as it likes
+    let idle_ns = talk.board().now_ns() + 35_000_000_000;
+    while talk.board().now_ns() < idle_ns {
+        talk.step().unwrap();
+    }
+    assert_eq!(talk.board().resets().unwrap(), []);
+    talk.board().write(address, &bytes).unwrap();
+    let began_ns = talk.board().now_ns();
+    let mut words = None;
+    let ended = talk.ask(Ask::FactoryTable, 60.0, |_, report| {
+        if let Some(Tell::Booted { last_words, .. }) = report.map(|report| &report.tell) {
+            words = last_words.as_ref().map(|words| words.as_str().to_owned());
+        }
+    });
+    let took_ms = (talk.board().now_ns() - began_ns) / 1_000_000;
+    eprintln!("{ended:?} after {took_ms} ms: {words:?}");
+    assert!(
+        matches!(ended, Err(TalkError::Rebooted(Reset::Watchdog))),
+        "{ended:?}"
+    );
+    assert!((30_000..31_000).contains(&took_ms));
+    assert!(words.is_some_and(|words| words.contains("no progress")));
+    // and it works again
+    talk.board().write(address, &whole).unwrap();
+    ready(&mut talk);
+    talk.ask(Ask::FactoryTable, 20.0, |_, _| ()).unwrap();
 }
 
 /// A stop between two movements, where the rig itself has nothing to stop.
@@ -548,4 +615,5 @@ faults! {
     servo_hangs: "the servo hangs",
     servo_crashes: "the servo crashes",
     task_panics: "a task panics",
+    clock_stops: "the clock stops",
 }

@@ -34,6 +34,10 @@ const WORSE_COUNTS: f32 = 8.0;
 const SWITCH_MS: u32 = 3;
 /// Slower than this the stage stands, mm/s.
 const STANDS_MM_S: f32 = 0.5;
+/// P_DC of a finger in the air is no further than this from what its calibration says, counts: between the drift with the
+/// finger's temperature and the 110 of a contact that is pressed (chosen). What it lets pass, 0.46 N, and 1.26 N on top
+/// are below the guard's limit.
+const AIR_COUNTS: f32 = 40.0;
 /// A lifted finger shows no more than these counts above its zero.
 const LIFTED_COUNTS: f32 = 8.0;
 /// P_AC words of a slide may differ from what its time holds by so many.
@@ -145,6 +149,12 @@ pub struct Control {
     gave_up: bool,
     /// P_DC above no contact when the driver had been off for [`RELEASE_MS`].
     released: f32,
+    /// P_DC without contact was measured: before that only its rise says anything of a finger that nobody calibrated.
+    zeroed: bool,
+    /// The first zero since homing was compared with the calibration's.
+    compared: bool,
+    /// P_DC in the air, mean of the last run without load.
+    air: Option<f32>,
     /// For how many ms the lever's and the left limit switch have been closed.
     closed_ms: [u32; 2],
     /// P_AC words of the slide so far.
@@ -181,6 +191,9 @@ impl Control {
             allow_high_force: false,
             gave_up: false,
             released: 0.0,
+            zeroed: false,
+            compared: false,
+            air: None,
             closed_ms: [0; 2],
             slide_words: 0,
             duty: 0.0,
@@ -234,6 +247,8 @@ impl Control {
         calibration.check().map_err(Refused::Calibration)?;
         self.calibration = calibration;
         self.meter = ForceMeter::new(calibration.pressure.pdc_no_contact);
+        self.zeroed = false;
+        self.forget_default();
         Ok(())
     }
 
@@ -257,12 +272,33 @@ impl Control {
                 self.guard.reset();
                 self.lever.home();
                 self.stage.forget();
+                self.compared = false;
+                self.forget_default();
                 self.enter(Phase::Homing);
                 Ok(())
             }
             Phase::Faulted(fault) => Err(Refused::Fault(fault)),
             _ => Err(Refused::Busy),
         }
+    }
+
+    /// A default says nothing of where this finger's P_DC is without contact.
+    fn knows_only_default(&self) -> bool {
+        !self.zeroed && self.calibration.date == 0
+    }
+
+    fn forget_default(&mut self) {
+        if self.knows_only_default() {
+            self.meter.forget_zero();
+        }
+    }
+
+    /// Whether P_DC at `counts` cannot be that of this finger in the air.
+    fn is_pressed(&self, counts: Option<f32>) -> bool {
+        self.calibration.date != 0
+            && counts.is_some_and(|counts| {
+                libm::fabsf(counts - self.calibration.pressure.pdc_no_contact) > AIR_COUNTS
+            })
     }
 
     /// Makes one movement, beginning at `start`: 0 to 1 of the room that the sample leaves.
@@ -330,6 +366,8 @@ impl Control {
         self.steady_ms = (steady_s.start * 1e3) as u32..(steady_s.end * 1e3) as u32;
         self.current = (0.0, 0);
         self.ended = None;
+        self.air = None;
+        self.meter.begin_long();
         self.enter(Phase::Unloaded);
         Ok(())
     }
@@ -338,6 +376,11 @@ impl Control {
     pub fn mean_current_a(&self) -> Option<f32> {
         let (sum, ticks) = self.current;
         (ticks > 0).then(|| sum / ticks as f32)
+    }
+
+    /// P_DC in the air, mean over the last whole run without load, counts.
+    pub fn air_counts(&self) -> Option<f32> {
+        self.air
     }
 
     fn may_start(&self) -> Result<(), Refused> {
@@ -424,6 +467,9 @@ impl Control {
             if word.channel == Channel::Pdc {
                 self.meter.push(word.counts);
             }
+        }
+        if self.phase != Phase::Parked && self.knows_only_default() {
+            self.meter.sink();
         }
         for (ms, closed) in self
             .closed_ms
@@ -546,7 +592,15 @@ impl Control {
             Phase::Homing => {
                 if self.lever.is_lifted() {
                     match self.stage.state() {
-                        StageState::Unknown => self.stage.home(),
+                        // a switch with a broken wire is closed everywhere: do not drag the finger along
+                        StageState::Unknown => {
+                            if self.is_pressed(self.meter.mean()) {
+                                self.check(Fault::LeverNotHome);
+                            }
+                            if self.phase == Phase::Homing {
+                                self.stage.home();
+                            }
+                        }
                         StageState::Standing if self.stage.position_mm() < MARGIN_MM / 2.0 => {
                             self.stage.go(MARGIN_MM, RETURN_MM_S);
                         }
@@ -559,12 +613,25 @@ impl Control {
                 if self.stage.state() == StageState::Standing {
                     let target = f32::from(self.movement.force_mn())
                         / self.calibration.pressure.force_mn_per_count;
-                    self.lever.press(target);
-                    self.enter(Phase::Pressing);
+                    if self.lever.press(target) {
+                        self.enter(Phase::Pressing);
+                    } else {
+                        // it is not lifted, whatever it has done: now it will be
+                        self.fail(Fault::LeverSlips);
+                    }
                 }
             }
             Phase::Pressing => {
-                if self.lever.state() == LeverState::Holding {
+                if let zero @ Some(_) = self.lever.zero()
+                    && self.lever.state() != LeverState::Zeroing
+                {
+                    self.zeroed = true;
+                    let first = !core::mem::replace(&mut self.compared, true);
+                    if first && self.is_pressed(zero) {
+                        self.check(Fault::LeverNotHome);
+                    }
+                }
+                if self.phase == Phase::Pressing && self.lever.state() == LeverState::Holding {
                     let (sum, samples) = self.pac;
                     self.baseline = ((sum + samples / 2) / samples.max(1)) as i32;
                     self.enter(Phase::Background);
@@ -616,6 +683,7 @@ impl Control {
                 self.weigh_current(inputs);
                 if self.stage.state() == StageState::Standing {
                     self.ended = Some(Ended::Whole);
+                    self.air = self.meter.long_mean();
                     self.enter(Phase::Ready);
                 }
             }
@@ -654,5 +722,39 @@ impl Control {
         outputs.pac = pac
             .map(|w| (i32::from(w.counts.get()) - self.baseline) as i16)
             .collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lever_that_cannot_press_is_a_fault_and_lifts() {
+        let calibration = RigCalibration {
+            pressure: Calibration::PAPER,
+            unloaded_a: (0.0, 0.0),
+            newton_per_ampere: 8.0,
+            date: 0,
+            serial: [0; 16],
+        };
+        let mut control = Control::new(
+            StageConstants::REFERENCE,
+            calibration,
+            Unguarded::against(Fault::SensorSilent),
+        );
+        assert_eq!(control.lever.state(), LeverState::Unknown);
+        control.enter(Phase::Positioning);
+        // where the stage stands is known, where the lever is is not
+        control.stage.home();
+        for ms in 0..100 {
+            let inputs = Inputs {
+                stage_limits: (ms > 10, false),
+                ..Inputs::default()
+            };
+            control.tick(&inputs);
+        }
+        assert_eq!(control.phase(), Phase::Faulted(Fault::LeverSlips));
+        assert_eq!(control.lever.state(), LeverState::Homing);
     }
 }

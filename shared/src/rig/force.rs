@@ -67,11 +67,7 @@ impl ForceMeter {
 
     /// P_DC counts above no contact, mean over the last 10 ms; 0 before there are 10 ms of samples.
     pub fn counts(&self) -> f32 {
-        if self.filled < MEAN_SAMPLES {
-            0.0
-        } else {
-            self.newer as f32 / MEAN_SAMPLES as f32 - self.no_contact
-        }
+        self.mean().map_or(0.0, |mean| mean - self.no_contact)
     }
 
     /// Change of that mean per second.
@@ -101,9 +97,7 @@ impl ForceMeter {
 
     /// P_DC counts above no contact, mean since [`ForceMeter::begin_long`]; `None` before the first sample.
     pub fn long_counts(&self) -> Option<f32> {
-        let (sum, samples) = self.long;
-        // over ten minutes of samples fit; f64 keeps the fraction
-        (samples > 0).then(|| (f64::from(sum) / f64::from(samples)) as f32 - self.no_contact)
+        self.long_mean().map(|mean| mean - self.no_contact)
     }
 
     /// Takes the longer mean as the value of no contact.
@@ -111,6 +105,30 @@ impl ForceMeter {
         if let Some(counts) = self.long_counts() {
             self.no_contact += counts;
         }
+    }
+
+    /// From now on the lowest mean is the value of no contact: see [`ForceMeter::sink`].
+    pub fn forget_zero(&mut self) {
+        self.no_contact = f32::from(Counts::MAX.get());
+    }
+
+    /// Takes the mean over the last 10 ms as the value of no contact if it is lower.
+    pub fn sink(&mut self) {
+        if let Some(mean) = self.mean() {
+            self.no_contact = self.no_contact.min(mean);
+        }
+    }
+
+    /// P_DC as it is, mean over the last 10 ms; `None` before there are 10 ms of samples.
+    pub fn mean(&self) -> Option<f32> {
+        (self.filled >= MEAN_SAMPLES).then(|| self.newer as f32 / MEAN_SAMPLES as f32)
+    }
+
+    /// P_DC as it is, mean since [`ForceMeter::begin_long`]; `None` before the first sample.
+    pub fn long_mean(&self) -> Option<f32> {
+        let (sum, samples) = self.long;
+        // over ten minutes of samples fit; f64 keeps the fraction
+        (samples > 0).then(|| (f64::from(sum) / f64::from(samples)) as f32)
     }
 
     /// Counts that mean no contact.
@@ -152,6 +170,20 @@ mod tests {
             assert!((meter.counts_per_s() - 2200.0).abs() < 1e-2);
             assert!((meter.counts_now() - f32::from(length - 1)).abs() < 1e-3);
         }
+    }
+
+    #[test]
+    fn the_lowest_mean_is_the_zero_until_there_is_one() {
+        let mut meter = meter([2800; 10]);
+        meter.forget_zero();
+        for (counts, above) in [(2800, 0.0), (2760, 0.0), (2770, 10.0), (2950, 190.0)] {
+            for _ in 0..MEAN_SAMPLES {
+                meter.push(Counts::new(counts).unwrap());
+                meter.sink();
+            }
+            assert_eq!(meter.counts(), above);
+        }
+        assert_eq!((meter.mean(), meter.no_contact()), (Some(2950.0), 2760.0));
     }
 
     #[test]

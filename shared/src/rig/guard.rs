@@ -111,14 +111,14 @@ rows! {
         "nothing: the slide is finished", "the slide: it is repeated", "none";
     Rejected, "three slides rejected", "counted", 2, "the exploration ends, finger lifted", "nothing", "look at the reasons given";
     NoContact, "no contact", "lever at its lower end, P_DC unchanged", 2, BOTH, ALL, "put a sample under the finger, then reset";
-    LeverSlips, "lever slips", "3 mm of steps after contact and the force not reached, or still in contact when lifted", 2, BOTH, ALL,
+    LeverSlips, "lever slips", "3 mm of steps after contact and the force not reached, or still in contact when lifted, or not lifted where a press begins", 2, BOTH, ALL,
         "check the lever's motor and its current, then reset";
     Unsteady, "force unsteady", "six trims and still more than 1 count and 5 % off, trims that add up to 15 %, or a zero that has moved by 8 counts", 2, BOTH, ALL,
         "check that sample and lever are fixed, then reset";
-    TasksHung, "tasks hung", "the firmware's tasks have not checked in for 2 s", 2, BOTH, ALL,
+    TasksHung, "tasks hung", "the firmware's tasks have not checked in for 2 s, or what was asked for makes no progress for 30 s", 2, BOTH, ALL,
         "none: the watchdog restarts the probe once the finger is lifted";
-    LeverNotHome, "lever not home", "limit switch not reached in 1.25 times the travel", 2,
-        "lever motor off, stage motor braked", ALL, "lift the finger by hand, check the switch, then reset";
+    LeverNotHome, "lever not home", "limit switch not reached in 1.25 times the travel, or P_DC there or at the first zero more than 40 counts off the calibration's", 2,
+        "lever motor off, stage motor braked", ALL, "lift the finger by hand, check the switch, then reset; calibrate a finger that has drifted";
     StageNotHome, "stage not home", "limit switch not reached: the stage falls behind, or has gone 1.25 times the travel", 2, BOTH, ALL,
         "clear the stage's way and check the switch, then reset";
 }

@@ -159,6 +159,11 @@ impl Lever {
         known && steps - self.top > NEAR_TOP_STEPS
     }
 
+    /// P_DC without contact as it was measured for the last press since homing.
+    pub fn zero(&self) -> Option<f32> {
+        self.zero
+    }
+
     /// Goes up to the limit switch. This is also what lifts the finger whatever has happened: a lever that knows where it
     /// is believes the switch only near the top, for a switch that sticks must not leave the finger down.
     pub fn home(&mut self) {

@@ -10,6 +10,7 @@ use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::table::tests::{around, table_of};
 use crate::table::{Experience, Table};
+use crate::training::Lesson;
 use crate::wire::Name;
 use embassy_futures::block_on;
 use ram::{Ram, RamError, SECTOR};
@@ -87,12 +88,16 @@ fn experience(trials: u8) -> Experience {
     experience
 }
 
+fn lesson(trials: u8) -> Lesson {
+    Lesson::Gaussians(experience(trials))
+}
+
 fn trained(name: &str, movement: Movement, table: Option<u32>, trials: u8) -> super::Trained {
     super::Trained {
         name: Name::try_from(name).unwrap(),
         movement,
         table,
-        experience: experience(trials),
+        lesson: lesson(trials),
     }
 }
 
@@ -219,7 +224,7 @@ fn settings_are_kept_over_many_rounds_of_the_pages() {
         for n in 0..200u8 {
             skin = SkinCare::after(f32::from(n), f32::from(n) * 1.5);
             store.set_skin(&skin).await.unwrap();
-            one.experience = experience(n);
+            one.lesson = lesson(n);
             one.table = None;
             store.set_trained(&one).await.unwrap();
         }
@@ -239,7 +244,7 @@ fn settings_are_kept_over_many_rounds_of_the_pages() {
             ("felt", (Movement::FOR_ROUGHNESS, None), None),
         ] {
             let found = store.trained(name, movement, table).await.unwrap();
-            assert_eq!(found, trials.map(experience), "{name}");
+            assert_eq!(found, trials.map(lesson), "{name}");
         }
         store.forget_trained("felt").await.unwrap();
         let (movement, table) = at(None);
@@ -275,7 +280,7 @@ fn progress_on_top_of_a_former_table_makes_room() {
         for n in 0..stored {
             let name = std::format!("{n:040}");
             let found = store.trained(&name, Movement::FOR_TRACTION, Some(1)).await;
-            assert_eq!(found, Ok(Some(experience(2))), "{n}");
+            assert_eq!(found, Ok(Some(lesson(2))), "{n}");
             store.forget_trained(&name).await.unwrap();
         }
         let one = trained("felt", Movement::FOR_TRACTION, Some(1), 2);

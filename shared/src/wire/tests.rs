@@ -28,13 +28,14 @@ fn report(tell: Tell) -> Report {
 fn longest() -> vec::Vec<Report> {
     let action = Action {
         movement: 35,
-        property: Property::Fineness,
+        property: Some(Property::Fineness),
     };
     let felt = Felt {
-        properties: [Some(1.0), None, Some(-2.5)],
+        properties: [Some(1.0), Some(f32::MAX), Some(-2.5)],
         roughness_is_bound: true,
         background: 2.2,
-        ln_bands: [0.1; 8],
+        bands: Vec::from_slice(&[i16::MIN; FUSED_BANDS]).unwrap(),
+        pressure: Some([i16::MAX, i16::MIN]),
     };
     let promise = Promise {
         action,
@@ -46,7 +47,7 @@ fn longest() -> vec::Vec<Report> {
         report(Tell::Felt {
             slide: 255,
             action,
-            felt,
+            felt: felt.clone(),
             posterior: Vec::from_slice(&[0.25; MAX_TEXTURES]).unwrap(),
         }),
         report(Tell::Chosen {
@@ -78,7 +79,106 @@ fn longest() -> vec::Vec<Report> {
             reset: Reset::Watchdog,
             last_words: Some(text()),
         }),
+        report(Tell::Verdict {
+            texture: u16::MAX,
+            name: name('n'),
+            probability: 0.999,
+            sure: true,
+            unknown: true,
+            log_odds: Some(-1e9),
+            slides: 255,
+            asks: true,
+        }),
+        report(Tell::Taught {
+            name: name('t'),
+            slides: 255,
+            itself: true,
+        }),
+        report(Tell::Learned {
+            movement: Movement::FOR_ROUGHNESS,
+            trial: 255,
+            left: u16::MAX,
+            felt,
+        }),
+        report(Tell::Rejected {
+            slide: 255,
+            why: text(),
+        }),
+        report(Tell::Calibration(Vec::from_slice(&[0; 64]).unwrap())),
+        report(Tell::Status(Status {
+            phase: Phase::Unloaded,
+            fault: Some(Fault::Rejected),
+            textures: u16::MAX,
+            table_bytes: u32::MAX,
+            table_crc: u32::MAX,
+            factory: true,
+            calibrated: u32::MAX,
+            counts: Counts {
+                slots: u32::MAX,
+                late_slots: u32::MAX,
+                parity_errors: u32::MAX,
+                error_frames: u32::MAX,
+                lost_samples: u32::MAX,
+                lost_reports: u32::MAX,
+                damaged_frames: u32::MAX,
+            },
+            skin_mj: (u32::MAX, u32::MAX),
+        })),
     ]
+}
+
+/// The longest name there is.
+fn name(letter: char) -> Name {
+    core::iter::repeat_n(letter, Name::new().capacity()).collect()
+}
+
+/// Every request that carries something, as long as it can be.
+fn requests() -> vec::Vec<Request> {
+    let identify = |method, open| {
+        Ask::Identify(Identify {
+            among: Vec::from_slice(&[u16::MAX; MAX_TEXTURES]).unwrap(),
+            threshold: 0.999,
+            max_slides: 255,
+            method,
+            strategy: crate::explorer::Strategy::Random,
+            open,
+            learn: !open,
+            seed: u32::MAX,
+        })
+    };
+    let methods = [
+        None,
+        Some(Method::Paper),
+        Some(Method::Student),
+        Some(Method::StudentAll),
+        Some(Method::Fused),
+    ];
+    let explorations = methods
+        .into_iter()
+        .flat_map(|method| [identify(method, false), identify(method, true)]);
+    let others = [
+        Ask::Answer(name('a')),
+        Ask::Rename {
+            from: name('f'),
+            to: name('t'),
+        },
+        Ask::Forget(Forget::Texture(name('g'))),
+        Ask::Forget(Forget::SelfTaught),
+        Ask::Forget(Forget::Training(name('h'))),
+        Ask::Train(Train {
+            name: name('i'),
+            trials: 255,
+            pilot: true,
+            seed: u32::MAX,
+        }),
+        Ask::WriteCalibration(Vec::from_slice(&[0; 64]).unwrap()),
+        Ask::WriteTable {
+            offset: u32::MAX,
+            bytes: Vec::from_slice(&[0; PART]).unwrap(),
+        },
+    ];
+    let id = u16::MAX;
+    explorations.chain(others).map(|ask| Request { id, ask }).collect()
 }
 
 #[test]
@@ -88,6 +188,48 @@ fn the_longest_messages_fit() {
         assert_eq!(bytes.iter().filter(|&&b| b == 0).count(), 1, "only the end");
         assert_eq!(receive::<Report>(&bytes), [Ok(message)]);
     }
+    for request in requests() {
+        assert_eq!(receive::<Request>(&frame(&request)), [Ok(request)]);
+    }
+}
+
+/// By hand, as documented for the host: what a verdict and an answer are on the line.
+#[test]
+fn a_verdict_and_an_answer_have_these_bytes() {
+    let body = |message: &dyn Fn(&mut [u8]) -> usize| {
+        let mut room = [0; 64];
+        let length = message(&mut room);
+        room[..length].to_vec()
+    };
+    let verdict = report(Tell::Verdict {
+        texture: 300,
+        name: Name::try_from("oak").unwrap(),
+        probability: 0.5,
+        sure: false,
+        unknown: true,
+        log_odds: Some(2.0),
+        slides: 2,
+        asks: true,
+    });
+    let bytes = body(&|room| postcard::to_slice(&verdict, room).unwrap().len());
+    // number 7, 1234 ms as a varint, variant 9, 300 as a varint, length and name, two f32, little-endian
+    assert_eq!(
+        bytes,
+        *b"\x07\xd2\x09\x09\xac\x02\x03oak\0\0\0\x3f\0\x01\x01\0\0\0\x40\x02\x01"
+    );
+    let answer = Request {
+        id: 5,
+        ask: Ask::Answer(Name::try_from("elm").unwrap()),
+    };
+    let bytes = body(&|room| postcard::to_slice(&answer, room).unwrap().len());
+    assert_eq!(bytes, *b"\x05\x04\x03elm");
+    // looking at everything has no property; fineness is the variant 2
+    let look = |property| {
+        let action = Action { movement: 2, property };
+        body(&|room| postcard::to_slice(&action, room).unwrap().len())
+    };
+    assert_eq!(look(None), [2, 0]);
+    assert_eq!(look(Some(Property::Fineness)), [2, 1, 2]);
 }
 
 /// By hand: id 0x0102 as a varint 82 02, `Status` is variant 0; COBS by its definition; the CRC by another library.
@@ -172,8 +314,13 @@ fn what_was_felt_goes_both_ways() {
         properties: [None, Some(2.0), Some(3.0)],
         roughness_is_bound: false,
         background: 1.0,
-        ln_bands: [0.0; 8],
+        bands: Vec::from_slice(&[-3, 5]).unwrap(),
+        pressure: Some([7, 8]),
     };
+    let observation = felt.observation();
+    assert_eq!(observation.properties, Properties::new(felt.properties));
+    assert_eq!(observation.bands, [-3, 5]);
+    assert_eq!(observation.pressure, Some([7, 8]));
     let measured = felt.properties().measured();
     let expected: PropertySet = [Property::Roughness, Property::Fineness]
         .into_iter()

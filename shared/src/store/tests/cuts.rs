@@ -26,7 +26,7 @@ struct Model {
     calibration: Option<RigCalibration>,
     skin: SkinCare,
     /// By texture and table.
-    trained: [[Option<Experience>; 2]; 2],
+    trained: [[Option<Lesson>; 2]; 2],
 }
 
 const NAMES: [&str; 2] = ["felt", "sandpaper of 100 grit"];
@@ -43,7 +43,7 @@ impl Model {
             Operation::Skin(n) => next.skin = SkinCare::after(n.into(), n.into()),
             Operation::Train(name, on, trials) => {
                 let on = TABLES.iter().position(|t| *t == on).unwrap();
-                next.trained[usize::from(name)][on] = Some(experience(trials));
+                next.trained[usize::from(name)][on] = Some(lesson(trials));
             }
             Operation::Forget(name) => next.trained[usize::from(name)] = [None; 2],
             Operation::EraseSettings => {

@@ -18,7 +18,7 @@ proptest! {
     }
 
     #[test]
-    fn no_damage_makes_it_panic(changes in proptest::collection::vec((8usize..89, any::<u8>()), 1..4), length in 12usize..120) {
+    fn no_damage_makes_it_panic(changes in proptest::collection::vec((8usize..103, any::<u8>()), 1..4), length in 12usize..120) {
         read_all(&wrong(|bytes| for &(at, byte) in &changes { bytes[at] = byte; }));
         read_all(&wrong(|bytes| {
             for &(at, byte) in &changes { bytes[at] = byte; }
@@ -45,7 +45,7 @@ fn read_all(bytes: &[u8]) {
                 .unwrap();
             assert!(
                 experience
-                    .gaussian(action.property)
+                    .gaussian(action.property.unwrap())
                     .is_none_or(|g| g.sd >= 0.0)
             );
         }
@@ -62,7 +62,7 @@ fn every_flipped_bit_is_noticed() {
             let named = match (at, error(&bytes)) {
                 (0..4, why) => why == TableError::Magic(bytes[..4].try_into().unwrap()),
                 (4..6, why) => why == TableError::Version(u16::from_le_bytes([bytes[4], bytes[5]])),
-                (8..12, TableError::Truncated { got: 93, wanted }) => wanted > 93,
+                (8..12, TableError::Truncated { got: 107, wanted }) => wanted > 107,
                 (
                     8..12,
                     TableError::Length {
@@ -70,9 +70,9 @@ fn every_flipped_bit_is_noticed() {
                         contents: HEADER,
                     },
                 ) => header < CRC_BYTES,
-                (8..12, TableError::Crc { .. }) => bytes[8] < 93,
+                (8..12, TableError::Crc { .. }) => bytes[8] < 107,
                 (_, TableError::Crc { stored, computed }) => {
-                    stored == crc_of(&bytes) && computed == crc32(&bytes[..89])
+                    stored == crc_of(&bytes) && computed == crc32(&bytes[..103])
                 }
                 _ => false,
             };
@@ -102,25 +102,25 @@ fn every_check_names_what_is_wrong() {
     let at = |at: usize, byte: u8| error(&wrong(|bytes| bytes[at] = byte));
     let length = |header, contents| TableError::Length { header, contents };
     assert_eq!(at(3, b'Z'), TableError::Magic(*b"TACZ"));
-    assert_eq!(at(5, 1), TableError::Version(257));
-    assert_eq!(at(6, 1), TableError::Method(1));
+    assert_eq!(at(5, 1), TableError::Version(258));
+    assert_eq!(at(6, 2), TableError::Method(2));
     assert_eq!(
         at(8, 200),
         TableError::Truncated {
-            got: 93,
+            got: 107,
             wanted: 200
         }
     );
     assert_eq!(at(8, 3), length(3, 16), "too short for a checksum");
-    for (field, byte) in [(7, 0), (7, 8), (12, 0), (14, 0), (14, 37), (15, 1)] {
+    for (field, byte) in [(6, 1), (7, 0), (7, 8), (12, 0), (14, 0), (14, 37), (15, 1)] {
         assert_eq!(at(field, byte), TableError::Header, "byte {field}");
     }
     assert_eq!(
         at(14, 36),
-        length(93, 16 + 36 * 6 + 2 * 36 * 13 + 4),
+        length(107, 16 + 36 * 6 + 2 * 36 * 13 + 4 + 2 * 5 + 4),
         "36 movements are not too many"
     );
-    assert_eq!(at(12, 3), length(93, 16 + 12 + 3 * 26 + 4));
+    assert_eq!(at(12, 3), length(107, 16 + 12 + 3 * 26 + 4 + 3 * 5 + 4));
     assert_eq!(
         at(17, 0xff),
         TableError::Movement(0, MovementError::Force(0xffee))
@@ -130,11 +130,11 @@ fn every_check_names_what_is_wrong() {
         at(26, 3),
         TableError::Movement(1, MovementError::Speed(0x3_f678))
     );
-    let trial_missing = wrong(|bytes| {
-        bytes.truncate(79);
-        bytes[8] = 83;
+    let tally_missing = wrong(|bytes| {
+        bytes.truncate(93);
+        bytes[8] = 97;
     });
-    assert_eq!(error(&trial_missing), length(83, 84));
+    assert_eq!(error(&tally_missing), length(97, 98));
     let twin = error(&wrong(|bytes| bytes.copy_within(16..22, 22)));
     assert_eq!(twin, TableError::TwinMovement(1));
     let deviation = |texture, action| TableError::Deviation { texture, action };
@@ -154,10 +154,11 @@ fn every_check_names_what_is_wrong() {
         Table::read(&unmeasured).is_ok(),
         "only what is measured needs a deviation"
     );
-    assert_eq!(at(81, 0xff), TableError::Name(0), "not UTF-8");
+    assert_eq!(at(89, 0), TableError::Number(1), "twins");
+    assert_eq!(at(95, 0xff), TableError::Name(0), "not UTF-8");
     let named = |names: &[u8]| {
         let bytes = wrong(|bytes| {
-            bytes.truncate(80);
+            bytes.truncate(94);
             bytes.extend(names);
             bytes[8] = (bytes.len() + CRC_BYTES) as u8;
         });
@@ -167,21 +168,21 @@ fn every_check_names_what_is_wrong() {
     assert_eq!(named(b"\x01a\x01a"), Err(TableError::Name(1)), "twins");
     assert_eq!(named(b"\x01a\0"), Err(TableError::Name(1)), "empty");
     assert_eq!(named(b"\0\x01a"), Err(TableError::Name(0)), "empty");
-    assert_eq!(named(b""), Err(length(84, 85)), "no name");
+    assert_eq!(named(b""), Err(length(98, 99)), "no name");
     assert_eq!(
         named(b"\x05felt"),
-        Err(length(89, 90)),
+        Err(length(103, 104)),
         "one byte of the name is missing"
     );
-    assert_eq!(named(b"\x01a"), Err(length(86, 87)), "no second name");
+    assert_eq!(named(b"\x01a"), Err(length(100, 101)), "no second name");
     assert_eq!(
         named(b"\x01a\x03oa"),
-        Err(length(89, 90)),
+        Err(length(103, 104)),
         "one byte of the second name is missing"
     );
     assert_eq!(
         named(b"\x01a\x01bc"),
-        Err(length(89, 88)),
+        Err(length(103, 102)),
         "a byte too many"
     );
     assert_eq!(
@@ -204,8 +205,8 @@ fn what_is_wrong_is_told() {
             "not a texture table: it begins with [50, 4b, 03, 04], not `TACT`",
         ),
         (
-            TableError::Version(2),
-            "version 2, and this program reads version 1: learn the table anew",
+            TableError::Version(1),
+            "version 1, and this program reads version 2: learn the table anew",
         ),
         (TableError::Method(7), "method 7 is unknown"),
         (
@@ -236,6 +237,14 @@ fn what_is_wrong_is_told() {
             "texture 5, movement 2, fineness: trials, but no standard deviation",
         ),
         (
+            TableError::Whitening(2),
+            "the whitening of movement 3 is damaged",
+        ),
+        (
+            TableError::Number(3),
+            "texture 4 has another's number",
+        ),
+        (
             TableError::Name(0),
             "the name of texture 1 is empty, not UTF-8, or another's as well",
         ),
@@ -244,6 +253,11 @@ fn what_is_wrong_is_told() {
         assert_eq!(EncodeError::Invalid(error).to_string(), error.to_string());
     }
     for (error, message) in [
+        (
+            EncodeError::Contents,
+            "what was learned does not fit this kind of table",
+        ),
+        (EncodeError::Texture(2), "the table has no texture 3"),
         (
             EncodeError::Empty,
             "a table needs a texture, a property and 1 to 36 movements",

@@ -1,0 +1,76 @@
+//! How long a movement may take, and that its finger is lifted before anybody hears that it took longer.
+
+/// A movement that takes longer than this does not end.
+const LONGEST_MS: u32 = 120_000;
+/// Stopping and lifting take less: the whole travel and a quarter are 10 s.
+const LIFTING_MS: u32 = 15_000;
+
+/// What to do with a movement that is waited for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Wait {
+    /// Go on waiting.
+    On,
+    /// Stop it, and go on waiting: the finger is being lifted.
+    Stop,
+    /// The rig is at rest.
+    Over,
+    /// It did not come to an end by itself. It is at rest now, or does not even stop.
+    Hangs,
+}
+
+/// Waits for a movement.
+#[derive(Clone, Copy, Debug)]
+pub struct Patience {
+    left_ms: u32,
+    stopped: bool,
+}
+
+impl Default for Patience {
+    fn default() -> Self {
+        Self {
+            left_ms: LONGEST_MS,
+            stopped: false,
+        }
+    }
+}
+
+impl Patience {
+    /// Another `ms` have passed, and the rig is at rest or is not.
+    pub fn wait(&mut self, ms: u32, at_rest: bool) -> Wait {
+        if at_rest {
+            return if self.stopped {
+                Wait::Hangs
+            } else {
+                Wait::Over
+            };
+        }
+        self.left_ms = self.left_ms.saturating_sub(ms);
+        match (self.left_ms, self.stopped) {
+            (1.., _) => Wait::On,
+            (0, true) => Wait::Hangs,
+            (0, false) => {
+                self.stopped = true;
+                self.left_ms = LIFTING_MS;
+                Wait::Stop
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patience_ends_twice() {
+        let mut patience = Patience::default();
+        let mut waited = |times: u32| (0..times).map(|_| patience.wait(10, false)).last();
+        assert_eq!(waited(LONGEST_MS / 10 - 1), Some(Wait::On));
+        assert_eq!(waited(1), Some(Wait::Stop));
+        assert_eq!(waited(LIFTING_MS / 10 - 1), Some(Wait::On));
+        let mut lifted = patience;
+        assert_eq!(lifted.wait(10, true), Wait::Hangs);
+        assert_eq!(patience.wait(10, false), Wait::Hangs);
+        assert_eq!(Patience::default().wait(10, true), Wait::Over);
+    }
+}
