@@ -119,8 +119,6 @@ enum Cause {
     Clock,
 }
 
-const SERVO: &str = "___servo_task_inner_function0E4poll";
-
 /// When it breaks, by what really happens.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum When {
@@ -267,7 +265,7 @@ const CASES: [Case; 17] = [
         cause: Cause::Clock,
         when: When::Sliding,
         seen: &[],
-        // the servo's next millisecond, where the NMI is raised, and periods of the lever's timer
+        // the slot in which the NMI is raised, and two periods of the lever's timer
         deadline_ms: Some(3),
     },
 ];
@@ -366,7 +364,8 @@ fn run(case: &Case, elf: &std::path::Path, seed: u64) -> (Talk, Outcome) {
                 Cause::Code(name, instead) => broken = Some(break_code(board, name, instead)),
                 Cause::Clock => {
                     board.stop_clock().unwrap();
-                    broken = Some(break_code(board, SERVO, Instead::Nmi));
+                    // by the slow clock the sensor's next slot comes within 2.4 ms
+                    broken = Some(break_code(board, "TIM2", Instead::Nmi));
                 }
             }
             broken_ns = Some(board.now_ns());
@@ -529,7 +528,7 @@ fn a_session_that_is_stuck_is_noticed() {
     talk.board().write(address, &bytes).unwrap();
     let began_ns = talk.board().now_ns();
     let mut words = None;
-    let ended = talk.ask(Ask::FactoryTable, 60.0, |_, report| {
+    let ended = talk.ask(Ask::BeginTable(1000), 60.0, |_, report| {
         if let Some(Tell::Booted { last_words, .. }) = report.map(|report| &report.tell) {
             words = last_words.as_ref().map(|words| words.as_str().to_owned());
         }
@@ -545,7 +544,7 @@ fn a_session_that_is_stuck_is_noticed() {
     // and it works again
     talk.board().write(address, &whole).unwrap();
     ready(&mut talk);
-    talk.ask(Ask::FactoryTable, 20.0, |_, _| ()).unwrap();
+    talk.ask(Ask::BeginTable(1000), 20.0, |_, _| ()).unwrap();
 }
 
 /// A stop between two movements, where the rig itself has nothing to stop.
