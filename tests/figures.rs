@@ -4,6 +4,9 @@ use std::path::Path;
 
 use tactus::evaluate::{Method, Summary, evaluate};
 use tactus::experiment::{Experiment, Protocol};
+use tactus::fabricslide::FabricSet;
+use tactus::lifelong::lifelong;
+use tactus::novelty::leave_one_out;
 use tactus::properties::PropertyTable;
 use tactus::recordings::RecordingSet;
 use tactus::replay::feel;
@@ -143,4 +146,103 @@ fn figures_do_not_depend_on_the_number_of_threads() {
     };
     let one = on(1);
     assert!(one == on(3) && one.iter().any(|o| o.sure));
+}
+
+/// The figures that the fused method is to reach (5 training slides unless said), on any folder of this layout.
+#[test]
+fn the_fused_method_is_right_when_it_is_sure() {
+    let Some(folder) = data("biotac") else { return };
+    for (protocol, train_slides, accuracy, wrong) in [
+        (Protocol::Interleaved, 5, 0.99, 0.008),
+        (Protocol::Blocked, 5, 0.985, 0.01),
+        (Protocol::Blocked, 15, 0.995, 0.01),
+        (Protocol::Drift, 5, 0.975, 0.01),
+    ] {
+        let manifest = std::fs::read_to_string(folder.join("manifest.json")).unwrap();
+        let public = manifest.contains(PUBLIC_FEATURES);
+        // others may be too few for that, and a little harder
+        if !public && train_slides > 5 {
+            continue;
+        }
+        let slack = if public { 0.0 } else { 0.03 };
+        let s = summary(
+            &recorded(&folder, protocol, train_slides),
+            Method::Fused,
+            RUNS,
+        );
+        println!(
+            "{protocol:?}, {train_slides} training slides, fused: {:.4}, wrong among the sure {:.4}, median {}",
+            s.accuracy, s.wrong_when_sure, s.median_slides
+        );
+        assert!(
+            s.accuracy >= accuracy - slack,
+            "{protocol:?}: {}",
+            s.accuracy
+        );
+        assert!(
+            s.wrong_when_sure <= wrong + slack,
+            "{protocol:?}: {}",
+            s.wrong_when_sure
+        );
+        assert_eq!(s.median_slides, 1.0, "{protocol:?}");
+    }
+}
+
+#[test]
+fn all_properties_of_a_slide_tell_the_worlds_apart() {
+    let Some(folder) = data("worlds") else { return };
+    let all: Vec<Summary> = (1..=3)
+        .map(|world| {
+            let set = PropertyTable::read(&folder.join(format!("world_{world}.csv"))).unwrap();
+            let experiment = Experiment::given(&set, None, 1).unwrap();
+            let s = summary(&experiment, Method::StudentAll, 4000);
+            println!(
+                "world {world}, student-all: {:.3}, wrong among the sure {:.3}, median {}",
+                s.accuracy, s.wrong_when_sure, s.median_slides
+            );
+            s
+        })
+        .collect();
+    let mean = |of: fn(&Summary) -> f64| all.iter().map(of).sum::<f64>() / 3.0;
+    assert!(mean(|s| s.accuracy) >= 0.975);
+    assert!(mean(|s| s.wrong_when_sure) <= 0.02);
+    assert!(all.iter().all(|s| s.median_slides <= 3.0));
+}
+
+#[test]
+fn choosing_among_fifteen_movements_pays_on_fabrics() {
+    let Some(folder) = data("fabricslide") else {
+        return;
+    };
+    let set = FabricSet::open(&folder).unwrap();
+    let experiment = Experiment::fabrics(&set, 0, 1).unwrap();
+    let [fused, cycle, paper] = [Method::Fused, Method::FusedCycle, Method::Paper].map(|method| {
+        let s = summary(&experiment, method, 2000);
+        println!("{method:?}: {:.3}, mean {:.2}", s.accuracy, s.mean_slides);
+        s
+    });
+    assert!(fused.accuracy >= 0.98 && fused.mean_slides <= 1.8);
+    assert!(fused.mean_slides < cycle.mean_slides && paper.accuracy < 0.8);
+}
+
+#[test]
+fn new_materials_are_noticed_and_a_session_is_followed() {
+    let Some(folder) = data("biotac") else { return };
+    let config = Config {
+        method: Method::Fused.method(),
+        ..Config::default()
+    };
+    let interleaved = recorded(&folder, Protocol::Interleaved, 5);
+    let after = leave_one_out(&interleaved, config, 2000, || ()).unwrap();
+    println!("{after:?}");
+    assert!(after[1].detections >= 0.80 && after[1].false_alarms <= 0.03);
+    let drift = recorded(&folder, Protocol::Drift, 5);
+    let lives = lifelong(&drift, config, 10, 1, || ()).unwrap();
+    println!("{lives:?}");
+    let [none, alone, asking] = lives.as_slice() else {
+        panic!("{lives:?}");
+    };
+    assert!(none.accuracy < alone.accuracy);
+    assert!(alone.accuracy >= 0.97 && alone.worst.0 >= 0.80);
+    assert!(asking.accuracy >= 0.98 && asking.uncertain <= 0.10);
 }

@@ -46,8 +46,7 @@ fn two_hundred_explorations() {
             let unknown = 1 + (n * 37 % 117) as u8;
             let mut rig = SimRig::new(world.setup(unknown, 100 + n));
             rig.control().calibrate(calibration).unwrap();
-            let mut explorer =
-                Explorer::<128>::new(table, PropertySet::ALL, config).unwrap();
+            let mut explorer = Explorer::<128>::new(table, PropertySet::ALL, config).unwrap();
             let mut movements = Vec::new();
             let verdict = embassy_futures::block_on(explore(
                 &mut rig,

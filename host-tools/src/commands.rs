@@ -193,7 +193,9 @@ pub(crate) fn learn_first(
     features: Option<FeatureSet>,
 ) -> anyhow::Result<Vec<u8>> {
     if slides < 2 {
-        bail!("--train-slides {slides}: how slides of one texture differ takes at least two slides");
+        bail!(
+            "--train-slides {slides}: how slides of one texture differ takes at least two slides"
+        );
     }
     let movements = set.movements();
     let mut first: Vec<Vec<Vec<Observation>>> = Vec::new();
@@ -217,7 +219,13 @@ pub(crate) fn learn_first(
         first.push(of_texture);
     }
     let names = names(set);
-    Ok(learn::learn(method.method(), features, &names, &movements, &first)?)
+    Ok(learn::learn(
+        method.method(),
+        features,
+        &names,
+        &movements,
+        &first,
+    )?)
 }
 
 /// An old table is replaced whole or not at all.
@@ -364,7 +372,9 @@ fn run_evaluation(args: &Evaluate, out: &mut impl Write) -> anyhow::Result<()> {
         return run_evaluation(&drift, out);
     }
     if (args.lifelong || args.novelty.is_some()) && args.method.method() != FUSED {
-        bail!("--novelty and --lifelong need --method fused: the others cannot tell what they do not know");
+        bail!(
+            "--novelty and --lifelong need --method fused: the others cannot tell what they do not know"
+        );
     }
     let (experiment, protocol) = experiment(args)?;
     let experiment = experiment.with_features(args.features.map(Features::set));

@@ -280,11 +280,7 @@ impl Experiment {
     ///
     /// # Errors
     /// See [`ExperimentError`].
-    pub fn fabrics(
-        set: &FabricSet,
-        learned_from: u8,
-        seed: u64,
-    ) -> Result<Self, ExperimentError> {
+    pub fn fabrics(set: &FabricSet, learned_from: u8, seed: u64) -> Result<Self, ExperimentError> {
         if set.movements.len() > table::MAX_MOVEMENTS {
             return Err(ExperimentError::Movements(set.movements.len()));
         }
@@ -393,8 +389,11 @@ impl Experiment {
                         order
                     });
                 let (learned, rest) = order.split_at(self.train_slides);
-                let slides =
-                    |at: &[usize]| at.iter().map(|&i| pool.train[i].clone()).collect::<Vec<_>>();
+                let slides = |at: &[usize]| {
+                    at.iter()
+                        .map(|&i| pool.train[i].clone())
+                        .collect::<Vec<_>>()
+                };
                 if texture == unknown {
                     shown.push(pool.test.clone().unwrap_or_else(|| slides(rest)));
                 }

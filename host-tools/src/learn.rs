@@ -37,7 +37,9 @@ pub fn measured(slides: &Slides) -> PropertySet {
         .iter()
         .flatten()
         .flatten()
-        .fold(PropertySet::ALL, |set, slide| set.and(slide.properties.measured()))
+        .fold(PropertySet::ALL, |set, slide| {
+            set.and(slide.properties.measured())
+        })
 }
 
 /// The best features that every slide has: force, else P_DC, else bands alone, else the three properties.
@@ -79,7 +81,11 @@ pub fn learn(
         let measured = measured(slides);
         let experience: Vec<Vec<Experience>> = slides
             .iter()
-            .map(|row| row.iter().map(|slides| experience(measured, slides)).collect())
+            .map(|row| {
+                row.iter()
+                    .map(|slides| experience(measured, slides))
+                    .collect()
+            })
             .collect();
         Ok(encode(measured, movements, names, &experience)?)
     }

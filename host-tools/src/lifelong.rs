@@ -174,7 +174,9 @@ fn sum_up(learning: Learning, visits: &[Visit], names: &[String]) -> Lifelong {
         learning,
         visits: visits.len(),
         accuracy: right(&|_| true),
-        worst: worst.map_or((0.0, String::new()), |(share, at)| (share, names[at].clone())),
+        worst: worst.map_or((0.0, String::new()), |(share, at)| {
+            (share, names[at].clone())
+        }),
         uncertain: share(visits.len() - certain.clone().count(), visits.len()),
         wrong_lessons: share(wrong, certain.count()),
     }
