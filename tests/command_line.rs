@@ -329,6 +329,8 @@ fn a_table_is_learned_shown_checked_and_used() {
         path(&folder),
         "--train-slides",
         "5",
+        "--method",
+        "paper",
         "--out",
         path(&file),
     ]);
@@ -391,7 +393,7 @@ fn a_bad_table_is_refused_with_the_check_that_failed() {
         (flipped, "checksum"),
         (other_version, "version 9"),
         (longer, "3 bytes follow"),
-        (good[..200].to_vec(), "truncated: 200 bytes of 548"),
+        (good[..200].to_vec(), "truncated: 200 bytes of 1153"),
         (b"texture,movement".to_vec(), "not a texture table"),
         (Vec::new(), "truncated: 0 bytes"),
     ] {
@@ -484,7 +486,7 @@ fn evaluate_prints_one_json_object() {
     let e = json(&text);
     assert_eq!(
         (e["method"].as_str(), e["protocol"].as_str()),
-        (Some("paper"), Some("interleaved"))
+        (Some("fused"), Some("interleaved"))
     );
     assert_eq!(
         (e["train_slides"].as_u64(), e["runs"].as_u64()),
@@ -563,6 +565,8 @@ fn a_second_folder_brings_the_test_slides() {
             path(&train),
             "--test",
             path(&test),
+            "--method",
+            "paper",
             "--protocol",
             protocol,
             "--runs",
