@@ -651,7 +651,7 @@ fn reboot(rig: &mut SimRig, calibration: RigCalibration, unguarded: Unguarded) {
 /// top. Only P_DC says that it is not, to a rig that knows what its finger says in the air.
 #[test]
 fn a_finger_that_is_not_in_the_air_is_neither_dragged_nor_pressed_further() {
-    let booted = |unguarded| {
+    let booted = |unguarded, like_the_firmware: bool| {
         let mut rig = SimRig::new(Setup {
             texture: 45,
             ..Setup::default()
@@ -664,8 +664,23 @@ fn a_finger_that_is_not_in_the_air_is_neither_dragged_nor_pressed_further() {
         })
         .unwrap();
         rig.world().inject(Cause::LeverTopStuck { closed: true });
-        reboot(&mut rig, calibration, unguarded);
-        wait(&mut rig, 200);
+        if like_the_firmware {
+            // it lifts the finger, then reads its calibration
+            let unmeasured = RigCalibration {
+                pressure: Calibration::PAPER,
+                date: 0,
+                ..calibration
+            };
+            reboot(&mut rig, unmeasured, unguarded);
+            wait(&mut rig, 200);
+            rig.control().home().unwrap();
+            rig.control().stop();
+            rig.rest(|_| ()).unwrap();
+            rig.control().calibrate(calibration).unwrap();
+        } else {
+            reboot(&mut rig, calibration, unguarded);
+            wait(&mut rig, 200);
+        }
         let pressed = rig.world().truth();
         assert!(pressed.force_n > 0.6, "{pressed:?}");
         rig.world().reset_extremes();
@@ -686,22 +701,29 @@ fn a_finger_that_is_not_in_the_air_is_neither_dragged_nor_pressed_further() {
         );
         (rig, calibration, first, dragged_mm)
     };
-    let (mut rig, calibration, first, dragged_mm) = booted(Unguarded::default());
-    let not_home = Err(SimError::Fault(Fault::LeverNotHome));
-    assert_eq!(first, Some(not_home));
-    let truth = rig.world().truth();
-    assert!(truth.force_max_n < 1.3 && dragged_mm < 0.1, "{truth:?}");
-    // the wire is mended
-    rig.world().clear();
-    rig.control().reset().unwrap();
-    rig.home().unwrap();
-    let slid = rig.slide(Movement::FOR_TRACTION, 0.5, |_, _| ());
-    assert_eq!(slid, Ok(Ended::Whole));
-    assert_eq!(rig.control().calibration(), &calibration);
-    // and without the guard it does harm
-    let (mut rig, _, _, dragged_mm) = booted(Unguarded::against(Fault::LeverNotHome));
-    let truth = rig.world().truth();
-    assert!(truth.force_max_n > 2.2 && dragged_mm > 10.0, "{truth:?}");
+    for like_the_firmware in [false, true] {
+        let (mut rig, calibration, first, dragged_mm) =
+            booted(Unguarded::default(), like_the_firmware);
+        let not_home = Err(SimError::Fault(Fault::LeverNotHome));
+        assert_eq!(first, Some(not_home));
+        let truth = rig.world().truth();
+        assert!(
+            truth.force_max_n < 1.3 && dragged_mm < 0.1,
+            "{dragged_mm} mm {truth:?}"
+        );
+        // the wire is mended
+        rig.world().clear();
+        rig.control().reset().unwrap();
+        rig.home().unwrap();
+        let slid = rig.slide(Movement::FOR_TRACTION, 0.5, |_, _| ());
+        assert_eq!(slid, Ok(Ended::Whole));
+        assert_eq!(rig.control().calibration(), &calibration);
+        // and without the guard it does harm
+        let unguarded = Unguarded::against(Fault::LeverNotHome);
+        let (mut rig, _, _, dragged_mm) = booted(unguarded, like_the_firmware);
+        let truth = rig.world().truth();
+        assert!(truth.force_max_n > 2.2 && dragged_mm > 10.0, "{truth:?}");
+    }
 }
 
 /// A finger whose P_DC drifts away after homing and before the first zero.

@@ -594,10 +594,13 @@ impl Control {
                     match self.stage.state() {
                         // a switch with a broken wire is closed everywhere: do not drag the finger along
                         StageState::Unknown => {
-                            if self.is_pressed(self.meter.mean()) {
+                            let mean = self.meter.mean();
+                            if self.is_pressed(mean) {
                                 self.check(Fault::LeverNotHome);
                             }
-                            if self.phase == Phase::Homing {
+                            // before there are 10 ms of P_DC nothing is known; that they come is the guard's to see
+                            let known = mean.is_some() || self.calibration.date == 0;
+                            if known && self.phase == Phase::Homing {
                                 self.stage.home();
                             }
                         }
