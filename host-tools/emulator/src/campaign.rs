@@ -5,8 +5,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use tactus::collection::Collection;
+use tactus::evaluate::Method;
 use tactus::played::Lesson;
-use tactus_core::explorer::Strategy;
 use tactus_core::wire::Identify;
 
 use crate::board::Options;
@@ -28,6 +28,8 @@ pub struct Group {
     pub known: Known,
     /// What lies under the finger, exploration by exploration.
     pub unknown: Vec<Unknown>,
+    /// How it decides.
+    pub method: Method,
     /// For the firmware's own draws.
     pub seed: u64,
 }
@@ -38,6 +40,7 @@ pub struct Group {
 /// See [`lessons::LessonError`].
 pub fn simulated(
     count: usize,
+    method: Method,
     seed: u64,
     done: impl Fn() + Sync,
 ) -> Result<Group, lessons::LessonError> {
@@ -46,7 +49,7 @@ pub fn simulated(
         textures: Collection::spread(1, AMONG),
         trials: TRIALS,
     };
-    let known = lessons::simulated(&collection, done)?;
+    let known = lessons::simulated(&collection, method.method(), done)?;
     let textures = collection.textures.iter().cycle().take(count);
     let unknown = textures
         .zip(1..)
@@ -55,6 +58,7 @@ pub fn simulated(
     Ok(Group {
         known,
         unknown,
+        method,
         seed,
     })
 }
@@ -63,8 +67,13 @@ pub fn simulated(
 ///
 /// # Errors
 /// See [`lessons::LessonError`].
-pub fn recorded(lesson: &Lesson, count: usize, seed: u64) -> Result<Group, lessons::LessonError> {
-    let known = lessons::recorded(lesson)?;
+pub fn recorded(
+    lesson: &Lesson,
+    count: usize,
+    method: Method,
+    seed: u64,
+) -> Result<Group, lessons::LessonError> {
+    let known = lessons::recorded(lesson, method.method())?;
     let unknown = (0..lesson.names.len())
         .cycle()
         .zip(seed..)
@@ -74,6 +83,7 @@ pub fn recorded(lesson: &Lesson, count: usize, seed: u64) -> Result<Group, lesso
     Ok(Group {
         known,
         unknown,
+        method,
         seed,
     })
 }
@@ -122,7 +132,10 @@ fn one(elf: &Path, group: &Group, index: usize) -> Result<Exploration, ExploreEr
         among: Default::default(),
         threshold: THRESHOLD,
         max_slides: MAX_SLIDES,
-        strategy: Strategy::Bayesian,
+        method: Some(group.method.method()),
+        strategy: group.method.strategy(),
+        open: true,
+        learn: false,
         seed: (group.seed as u32).wrapping_mul(1009) + index as u32 + 1,
     };
     explore(&mut talk, table, identify, &unknown.name, |_, _| ())

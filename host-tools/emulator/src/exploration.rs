@@ -1,13 +1,16 @@
 //! Explorations by the firmware, judged by the rig's truth and by the PC that follows them.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Value, json};
 use tactus::follow::{ALLOWED, Agreement, Follower};
 use tactus::link::{Found, Question};
 use tactus::sim::played::PlayCounts;
-use tactus_core::features::{Plan, PropertySet};
+use tactus_core::features::{Plan, Property, PropertySet};
+use tactus_core::fused::white;
 use tactus_core::movement::Movement;
-use tactus_core::table::{Action, Gaussian, Table, TableError};
-use tactus_core::wire::{Ask, Counts, Identify, Report, Tell};
+use tactus_core::table::{Action, Contents, Table, TableError};
+use tactus_core::wire::{Ask, Counts, Felt, Identify, Report, Tell};
 
 use crate::board::Emulator;
 use crate::record::Slide;
@@ -55,22 +58,26 @@ pub struct Step {
     pub movement: Option<Movement>,
     /// What was looked at.
     pub action: Action,
-    /// What was felt; `None` where the slide has no such property.
-    pub felt: Option<f32>,
-    /// What the table says of the true texture.
-    pub learned: Option<Gaussian>,
+    /// The properties that were looked at, with their values; all where the action looks at everything.
+    pub felt: Vec<(Property, f32)>,
+    /// How far what was felt is from what was learned of the true texture, in standard deviations: the root of the mean
+    /// square over all that was looked at, about 1 if it is that texture. `None` where nothing was learned.
+    pub distance_sd: Option<f32>,
     /// Posterior probability of the true texture.
     pub probability: f32,
-    /// The most probable other texture, and its probability.
-    pub other: Option<(String, f32)>,
+    /// The most probable other texture.
+    pub other: Option<Other>,
 }
 
-impl Step {
-    /// How far the felt value is from what was learned of the true texture, in its standard deviations.
-    pub fn distance_sd(&self) -> Option<f32> {
-        let learned = self.learned?;
-        Some((self.felt? - learned.mean) / learned.sd)
-    }
+/// Another texture than the true one.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Other {
+    /// Its name.
+    pub name: String,
+    /// Its posterior probability.
+    pub probability: f32,
+    /// See [`Step::distance_sd`].
+    pub distance_sd: Option<f32>,
 }
 
 /// An exploration, as the firmware told it and as it really was.
@@ -78,6 +85,8 @@ impl Step {
 pub struct Exploration {
     /// Name of the texture under the finger.
     pub truth: String,
+    /// Whether the table has it.
+    pub known: bool,
     /// The verdict.
     pub found: Found,
     /// From power-up to the end, virtual seconds.
@@ -141,13 +150,7 @@ pub fn explore(
                     felt,
                     posterior,
                     ..
-                } => steps.push(step(
-                    table,
-                    truth,
-                    *action,
-                    felt.properties().get(action.property),
-                    posterior,
-                )),
+                } => steps.push(step(table, truth, *action, felt, posterior)),
                 _ => {}
             }
         } else if let Some(movement) = movement {
@@ -165,6 +168,7 @@ pub fn explore(
     let played = board.rig().world().played();
     Ok(Exploration {
         truth: truth.to_owned(),
+        known: table.find(truth).is_some(),
         found,
         virtual_s: board.now_ns() as f64 * 1e-9,
         slides,
@@ -179,29 +183,66 @@ pub fn explore(
     })
 }
 
-fn step(
-    table: Table<'_>,
-    truth: &str,
-    action: Action,
-    felt: Option<f32>,
-    posterior: &[f32],
-) -> Step {
+fn step(table: Table<'_>, truth: &str, action: Action, felt: &Felt, posterior: &[f32]) -> Step {
     let number = table.find(truth);
-    let other = posterior
-        .iter()
-        .zip(table.names())
-        .filter(|(_, name)| *name != truth)
+    let others = posterior.iter().zip(0..);
+    let other = others
+        .filter(|(_, texture)| Some(*texture) != number)
         .max_by(|a, b| a.0.total_cmp(b.0));
+    let distance_sd = |texture| distance_sd(table, texture, action, felt);
+    let looked_at = |property: &Property| action.property.is_none_or(|only| only == *property);
+    let properties = felt.properties();
     Step {
         movement: table.movement(action.movement),
         action,
-        felt,
-        learned: number.and_then(|number| table.gaussian(number, action)),
+        felt: Property::ALL
+            .into_iter()
+            .filter(looked_at)
+            .filter_map(|property| Some((property, properties.get(property)?)))
+            .collect(),
+        distance_sd: number.and_then(distance_sd),
         probability: number
             .and_then(|number| posterior.get(usize::from(number)).copied())
             .unwrap_or(0.0),
-        other: other.map(|(p, name)| (name.to_owned(), *p)),
+        other: other.map(|(probability, texture)| Other {
+            name: table.name(texture).unwrap_or("?").to_owned(),
+            probability: *probability,
+            distance_sd: distance_sd(texture),
+        }),
     }
+}
+
+fn distance_sd(table: Table<'_>, texture: u16, action: Action, felt: &Felt) -> Option<f32> {
+    let squares: Vec<f32> = match table.contents() {
+        Contents::Fused(set, features) => {
+            if table.trials(texture, action.movement) == 0 {
+                return None;
+            }
+            let vector = felt.observation().vector(set, features.into())?;
+            let felt = table.whiten(action.movement, &vector)?;
+            let learned = table.white_mean(texture, action.movement);
+            let apart = felt
+                .into_iter()
+                .zip(learned)
+                .map(|(z, m)| white(z) - white(m));
+            apart.map(|sd| sd * sd).collect()
+        }
+        Contents::Gaussians(measured) => measured
+            .iter()
+            .filter(|property| action.property.is_none_or(|only| only == *property))
+            .map(|property| {
+                let property_of = Action {
+                    property: Some(property),
+                    ..action
+                };
+                let learned = table.gaussian(texture, property_of)?;
+                let sd = (felt.properties().get(property)? - learned.mean) / learned.sd;
+                Some(sd * sd)
+            })
+            .collect::<Option<_>>()?,
+    };
+    let mean = squares.iter().sum::<f32>() / squares.len() as f32;
+    mean.is_finite().then(|| mean.sqrt())
 }
 
 /// Where a slide's force is off most: N, relative, and whether that is too much.
@@ -222,9 +263,13 @@ fn force_error(slides: &[(Movement, Slide)]) -> (f64, f64, bool) {
 }
 
 impl Exploration {
-    /// Whether the verdict is the texture under the finger.
+    /// Whether the verdict is the texture under the finger, or that the table does not have it, and so it is.
     pub fn right(&self) -> bool {
-        self.found.name.as_str() == self.truth
+        if self.found.unknown {
+            !self.known
+        } else {
+            self.found.name.as_str() == self.truth
+        }
     }
 
     /// Largest error of a slide's force: N, and relative.
@@ -341,14 +386,13 @@ impl Exploration {
         let steps = self.steps.iter().map(|step| {
             json!({
                 "movement": step.movement.map(|movement| movement.to_string()),
-                "property": step.action.property.to_string(),
-                "felt": step.felt,
-                "learned_mean": step.learned.map(|g| g.mean),
-                "learned_sd": step.learned.map(|g| g.sd),
-                "distance_sd": step.distance_sd(),
+                "looked_at": step.action.what(),
+                "felt": step.felt.iter().map(|(p, x)| (p.name(), *x)).collect::<BTreeMap<_, _>>(),
+                "distance_sd": step.distance_sd,
                 "probability_true": step.probability,
-                "other": step.other.as_ref().map(|(name, _)| name),
-                "probability_other": step.other.as_ref().map(|(_, p)| p),
+                "other": step.other.as_ref().map(|other| &other.name),
+                "distance_sd_other": step.other.as_ref().map(|other| other.distance_sd),
+                "probability_other": step.other.as_ref().map(|other| other.probability),
             })
         });
         let mut json = json!({
@@ -357,6 +401,9 @@ impl Exploration {
             "right": self.right(),
             "probability": self.found.probability,
             "sure": self.found.sure,
+            "unknown": self.found.unknown,
+            "unknown_log_odds": self.found.log_odds,
+            "slides_learned_by_itself": self.found.learned,
             "slides": self.found.slides,
             "virtual_seconds": self.virtual_s,
             "lost_samples": self.counts.lost_samples,
@@ -391,20 +438,24 @@ impl Exploration {
     pub fn log(&self) -> Vec<String> {
         let lines = self.steps.iter().zip(1..).map(|(step, number)| {
             let movement = step.movement.map_or("?".into(), |m| m.to_string());
-            let felt = match (step.felt, step.learned, step.distance_sd()) {
-                (Some(felt), Some(learned), Some(distance)) => format!(
-                    "felt {felt:.3}, learned {:.3} sd {:.3}: {distance:+.1} sd",
-                    learned.mean, learned.sd
-                ),
-                (felt, ..) => format!("felt {felt:?}"),
-            };
-            let (other, p) = step.other.as_ref().map_or(("?", 0.0), |(o, p)| (o, *p));
+            let felt: Vec<String> = step
+                .felt
+                .iter()
+                .map(|(p, x)| format!("{p} {x:.3}"))
+                .collect();
+            let away =
+                |sd: Option<f32>| sd.map_or("never felt".into(), |sd| format!("{sd:.1} sd away"));
+            let other = step.other.as_ref().map_or("no other".into(), |other| {
+                let p = other.probability * 100.0;
+                format!("{} {p:.1} % ({})", other.name, away(other.distance_sd))
+            });
             format!(
-                "slide {number}: {} at {movement}, {felt}; {} {:.1} %, {other} {:.1} %",
-                step.action.property,
+                "slide {number}: {} at {movement}, felt {}; {} {:.1} % ({}), {other}",
+                step.action.what(),
+                felt.join(", "),
                 self.truth,
                 step.probability * 100.0,
-                p * 100.0
+                away(step.distance_sd),
             )
         });
         lines.collect()

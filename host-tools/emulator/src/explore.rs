@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context as _, bail};
 use indicatif::ProgressBar;
 use tactus::show::Show;
-use tactus_core::explorer::{Outlook, Strategy, Verdict};
+use tactus_core::explorer::{Outlook, Verdict};
 use tactus_core::table::Table;
 use tactus_core::wire::{Identify, Phase, Report, Tell};
 use tactus_emulator::lessons::RECORDED_LIMITS;
@@ -64,7 +64,11 @@ pub(crate) fn explore(cli: &Cli, chosen: &Chosen, sha256: &str) -> anyhow::Resul
         among: Default::default(),
         threshold: cli.threshold,
         max_slides: cli.max_slides,
-        strategy: Strategy::Bayesian,
+        // a table from a file may be for any method
+        method: cli.table.is_none().then(|| cli.method.method()),
+        strategy: cli.method.strategy(),
+        open: true,
+        learn: false,
         seed: chosen.seed,
     };
     let mut out: Box<dyn std::io::Write> = if text {
@@ -136,6 +140,8 @@ pub(crate) fn explore(cli: &Cli, chosen: &Chosen, sha256: &str) -> anyhow::Resul
         texture: explored.found.texture,
         probability: explored.found.probability,
         sure: explored.found.sure,
+        unknown: explored.found.unknown,
+        log_odds: explored.found.log_odds,
     };
     show.finish(verdict, explored.found.slides, truth)?;
     let wall_s = began.elapsed().as_secs_f64();

@@ -10,6 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use sha2::{Digest as _, Sha256};
 use tactus::collection::{Collection, texture_number};
 use tactus::played::Lesson;
+use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::Table;
 use tactus_emulator::lessons::{self, Known, TRIALS, Unknown};
@@ -80,11 +81,12 @@ impl Chosen {
 
     /// Calibration of the rig and table of the textures.
     pub(crate) fn learn(&self, cli: &Cli) -> anyhow::Result<Known> {
-        let kept = self.kept_in();
+        let method = cli.method.method();
+        let kept = self.kept_in(method);
         let mut known = match kept.as_deref().map(read) {
             Some(Some(known)) => known,
             _ => {
-                let known = self.learn_anew()?;
+                let known = self.learn_anew(method)?;
                 if let Some(file) = kept {
                     // another time it is learned anew then
                     let _ = write(&file, &known);
@@ -99,18 +101,18 @@ impl Chosen {
         Ok(known)
     }
 
-    fn learn_anew(&self) -> anyhow::Result<Known> {
+    fn learn_anew(&self, method: Method) -> anyhow::Result<Known> {
         match &self.world {
             World::Simulated(collection) => {
                 let bar = progress(collection.textures.len() as u64, "learning textures");
-                let known = lessons::simulated(collection, || bar.inc(1))?;
+                let known = lessons::simulated(collection, method, || bar.inc(1))?;
                 bar.finish_and_clear();
                 Ok(known)
             }
             World::Recorded(lesson) => {
                 let bar = ProgressBar::new_spinner().with_message("learning materials");
                 bar.enable_steady_tick(Duration::from_millis(200));
-                let known = lessons::recorded(lesson)?;
+                let known = lessons::recorded(lesson, method)?;
                 bar.finish_and_clear();
                 Ok(known)
             }
@@ -119,13 +121,13 @@ impl Chosen {
 
     /// A file named for all that the table depends on: the world, and this program, which holds core and simulator. None
     /// for recordings: what they hold is not in their name.
-    fn kept_in(&self) -> Option<PathBuf> {
+    fn kept_in(&self, method: Method) -> Option<PathBuf> {
         let World::Simulated(collection) = &self.world else {
             return None;
         };
         let program = std::env::current_exe().ok()?;
         let key = format!(
-            "{} {collection:?}",
+            "{} {method:?} {collection:?}",
             hex_sha256(&std::fs::read(&program).ok()?),
         );
         let name = &hex_sha256(key.as_bytes())[..16];

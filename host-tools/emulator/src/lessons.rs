@@ -7,6 +7,7 @@ use tactus::played::{Lesson, PlayError};
 use tactus::recordings::RecordingSet;
 use tactus::sim::played::Played;
 use tactus::sim::world::Setup;
+use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
 
 use crate::board::{Emulator, Error, Options};
@@ -80,14 +81,18 @@ impl Unknown {
     }
 }
 
-/// Learns the textures of a simulated world; `done` hears of each.
+/// Learns the textures of a simulated world for a method; `done` hears of each.
 ///
 /// # Errors
 /// See [`LessonError`].
-pub fn simulated(collection: &Collection, done: impl Fn() + Sync) -> Result<Known, LessonError> {
+pub fn simulated(
+    collection: &Collection,
+    method: Method,
+    done: impl Fn() + Sync,
+) -> Result<Known, LessonError> {
     let first = collection.textures.first().copied().unwrap_or(1);
     let calibration = calibrated(collection.setup(first, 0)).map_err(LearnError::from)?;
-    let table = collection.learn(calibration, done)?;
+    let table = collection.learn(method, calibration, done)?;
     Ok(Known { calibration, table })
 }
 
@@ -117,13 +122,13 @@ pub fn recordings(seed: u64) -> Result<Lesson, LessonError> {
     Ok(Lesson::interleaved(&set, RECORDED_TRIALS, seed)?)
 }
 
-/// Learns the recorded textures.
+/// Learns the recorded textures for a method.
 ///
 /// # Errors
 /// See [`LessonError`].
-pub fn recorded(lesson: &Lesson) -> Result<Known, LessonError> {
+pub fn recorded(lesson: &Lesson, method: Method) -> Result<Known, LessonError> {
     let calibration = calibrated(Lesson::setup(0)).map_err(LearnError::from)?;
-    let table = lesson.learn(calibration)?;
+    let table = lesson.learn(method, calibration)?;
     Ok(Known { calibration, table })
 }
 

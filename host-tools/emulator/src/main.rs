@@ -9,6 +9,7 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::{Parser, ValueEnum};
+use tactus::evaluate::Method;
 
 /// Runs the firmware's ELF, unmodified, on a NUCLEO-F429ZI in software with the simulated rig on its pins.
 ///
@@ -40,6 +41,9 @@ struct Cli {
     /// Another seed is another world, another trial, and another texture unless one is given
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// How the firmware decides, and what its table is learned for
+    #[arg(long, value_enum, default_value_t = Method::Fused)]
+    method: Method,
     /// Table to give to the firmware instead of one learned for this world
     #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,

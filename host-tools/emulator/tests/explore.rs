@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus::collection::Collection;
+use tactus::evaluate::Method;
 use tactus::link::{Question, ReadTable};
 use tactus_core::table::Table;
 use tactus_core::wire::{Identify, Report, Tell, Train};
@@ -48,7 +49,7 @@ fn world() -> &'static (Collection, Known) {
             textures: Collection::spread(47, 6),
             trials: 5,
         };
-        let known = lessons::simulated(&collection, || ()).unwrap();
+        let known = lessons::simulated(&collection, Method::Fused.method(), || ()).unwrap();
         (collection, known)
     })
 }
@@ -58,7 +59,10 @@ fn identify(among: &[u16], threshold: f32) -> Identify {
         among: among.iter().copied().collect(),
         threshold,
         max_slides: 10,
+        method: None,
         strategy: Default::default(),
+        open: true,
+        learn: false,
         seed: 11,
     }
 }
@@ -99,8 +103,9 @@ fn two_textures_that_change_places_change_the_verdicts() {
 #[test]
 fn explorations_meet_the_bars() {
     let Some(elf) = elf() else { return };
-    let simulated = campaign::simulated(4, 1, || ()).unwrap();
-    let recorded = lessons::recordings(1).map(|lesson| campaign::recorded(&lesson, 3, 1));
+    let simulated = campaign::simulated(4, Method::Fused, 1, || ()).unwrap();
+    let recorded =
+        lessons::recordings(1).map(|lesson| campaign::recorded(&lesson, 3, Method::Fused, 1));
     let recorded = match recorded {
         Ok(group) => Some(group.unwrap()),
         Err(why) => {

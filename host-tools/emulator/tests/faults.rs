@@ -300,7 +300,10 @@ fn identify(max_slides: u8) -> Ask {
         among: Default::default(),
         threshold: 0.99,
         max_slides,
+        method: None,
         strategy: Default::default(),
+        open: false,
+        learn: false,
         seed: 5,
     })
 }

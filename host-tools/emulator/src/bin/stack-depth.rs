@@ -62,7 +62,10 @@ fn explore(elf: &Path, layout: StackLayout, slides: u8) -> anyhow::Result<StackU
         among: Default::default(),
         threshold: 1.0,
         max_slides: slides,
+        method: None,
         strategy: Strategy::Bayesian,
+        open: true,
+        learn: true,
         seed: 1,
     };
     talk.ask(Ask::Identify(identify), PATIENCE_S, |board, report| {

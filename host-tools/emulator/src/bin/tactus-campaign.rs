@@ -10,6 +10,7 @@ use clap::{Parser, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
+use tactus::evaluate::Method;
 use tactus_emulator::campaign::{self, Group, Results};
 use tactus_emulator::exploration::{
     Exploration, FORCE_N, FORCE_SHARE, JITTER_US, RIGHT_SHARE, SPEED_SHARE,
@@ -32,6 +33,9 @@ struct Cli {
     /// Explorations on recordings
     #[arg(long, value_name = "N", default_value_t = 20)]
     recordings: usize,
+    /// How the firmware decides, and what its table is learned for
+    #[arg(long, value_enum, default_value_t = Method::Fused)]
+    method: Method,
     /// Another seed is another world, other slides to learn from, and other trials
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -87,12 +91,12 @@ fn run(cli: &Cli) -> anyhow::Result<bool> {
         bar.set_message("learning the recorded materials");
         // first, since it may be that there are none
         let lesson = lessons::recordings(cli.seed)?;
-        let group = campaign::recorded(&lesson, cli.recordings, cli.seed)?;
+        let group = campaign::recorded(&lesson, cli.recordings, cli.method, cli.seed)?;
         groups.push(("recordings", group));
     }
     if cli.simulated > 0 {
         bar.set_message("learning the simulated textures");
-        let group = campaign::simulated(cli.simulated, cli.seed, || ())?;
+        let group = campaign::simulated(cli.simulated, cli.method, cli.seed, || ())?;
         groups.insert(0, ("simulated", group));
     }
     bar.finish_and_clear();
@@ -129,6 +133,7 @@ fn object(cli: &Cli, sha256: &str, parts: &[Part], met: bool, wall_s: f64) -> Va
     let mut object = json!({
         "elf_sha256": sha256,
         "seed": cli.seed,
+        "method": cli.method,
         "wall_seconds": wall_s,
         "bars": {
             "right_share": RIGHT_SHARE,
@@ -193,7 +198,11 @@ fn text(parts: &[Part], met: bool, wall_s: f64) -> Result<String, std::fmt::Erro
                 out,
                 "{:22} {:22} {:5} {:6.4} {:6} {:5.1} s {:4.1} mN {:3.1} % {:5.2} % {:3.1} us {:>14} {:>9}",
                 short(&e.truth),
-                short(&e.found.name),
+                if e.found.unknown {
+                    "(unknown)".into()
+                } else {
+                    short(&e.found.name)
+                },
                 if e.right() { "yes" } else { "NO" },
                 e.found.probability,
                 e.found.slides,
@@ -218,7 +227,12 @@ fn text(parts: &[Part], met: bool, wall_s: f64) -> Result<String, std::fmt::Erro
             writeln!(
                 out,
                 "\nWhy {} was taken for {}:",
-                wrong.truth, wrong.found.name
+                wrong.truth,
+                if wrong.found.unknown {
+                    "unknown"
+                } else {
+                    wrong.found.name.as_str()
+                }
             )?;
             for line in wrong.log() {
                 writeln!(out, "  {line}")?;

@@ -1,0 +1,298 @@
+//! What the real ELF learns on the go: from teaching, from the host's answers, and by itself; asked over the link, judged by
+//! the texture that really lies under the finger.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use tactus::collection::Collection;
+use tactus::link::{Found, Question, ReadTable};
+use tactus_core::explorer::Method;
+use tactus_core::table::{Table, Tally};
+use tactus_core::wire::{Forget, Identify, Name, Status, Tell, Train};
+use tactus_emulator::Options;
+use tactus_emulator::exploration::{Exploration, explore};
+use tactus_emulator::lessons::{self, Known, Unknown};
+use tactus_emulator::talk::{PATIENCE_S, Talk, TalkError};
+
+/// A texture that the table does not have.
+const NEW: u8 = 31;
+/// One that it has.
+const OLD: u8 = 47;
+/// Longest exploration or training, virtual seconds.
+const LONG_S: f64 = 300.0;
+
+fn elf() -> Option<PathBuf> {
+    let elf = std::env::var_os("TACTUS_ELF").map(PathBuf::from);
+    if elf.is_none() {
+        assert!(
+            std::env::var("TACTUS_REQUIRE_ELF").as_deref() != Ok("1"),
+            "TACTUS_REQUIRE_ELF=1, but TACTUS_ELF is not set"
+        );
+        eprintln!("skipped: TACTUS_ELF is not set (run `cargo xtask test`)");
+    }
+    elf
+}
+
+/// A simulated world of eight textures without [`NEW`].
+fn world() -> &'static (Collection, Known) {
+    static WORLD: OnceLock<(Collection, Known)> = OnceLock::new();
+    WORLD.get_or_init(|| {
+        let textures = Collection::spread(OLD, 8);
+        assert!(!textures.contains(&NEW) && textures.contains(&OLD));
+        let collection = Collection {
+            seed: 3,
+            textures,
+            trials: 5,
+        };
+        let known = lessons::simulated(&collection, Method::Fused, || ()).unwrap();
+        (collection, known)
+    })
+}
+
+/// A trial of a texture that nothing was learned from.
+fn under(texture: u8, trial: u64) -> Unknown {
+    lessons::mounted(&world().0, texture, trial)
+}
+
+/// A board that has homed.
+fn boot(elf: &Path, unknown: &Unknown, store: Option<Vec<u8>>) -> Talk {
+    let options = Options {
+        store,
+        ..Options::default()
+    };
+    let mut talk = Talk::new(unknown.start(elf, options).unwrap());
+    assert_eq!(talk.ready(|_, _| ()).unwrap(), None);
+    talk
+}
+
+/// A board that was given the world's table.
+fn told(elf: &Path, unknown: &Unknown) -> Talk {
+    let mut talk = boot(elf, unknown, None);
+    let Known { calibration, table } = &world().1;
+    talk.teach(calibration, table, |_, _| ()).unwrap();
+    talk
+}
+
+/// Switches the board off, puts another sample under the finger, and switches it on again.
+fn again(elf: &Path, mut talk: Talk, unknown: &Unknown) -> Talk {
+    let store = talk.board().store().unwrap();
+    drop(talk);
+    boot(elf, unknown, Some(store))
+}
+
+fn name(name: &str) -> Name {
+    name.try_into().unwrap()
+}
+
+fn identify(seed: u32) -> Identify {
+    Identify {
+        among: Default::default(),
+        threshold: 0.99,
+        max_slides: 10,
+        method: None,
+        strategy: Default::default(),
+        open: true,
+        learn: false,
+        seed,
+    }
+}
+
+fn status(talk: &mut Talk) -> Status {
+    talk.run(Question::status(), PATIENCE_S, |_, _| ()).unwrap()
+}
+
+/// The table in force, which the status tells of as well.
+fn table(talk: &mut Talk) -> Vec<u8> {
+    let bytes = talk
+        .run(ReadTable::default(), PATIENCE_S, |_, _| ())
+        .unwrap();
+    let read = Table::read(&bytes).unwrap();
+    let told = status(talk);
+    assert_eq!(
+        (told.table_crc, told.table_bytes, told.textures),
+        (read.crc(), bytes.len() as u32, read.textures())
+    );
+    bytes
+}
+
+/// Explores, and follows; the probe's work is as good as ever.
+fn visit(talk: &mut Talk, asked: Identify, truth: &str) -> Exploration {
+    let bytes = table(talk);
+    let explored = explore(talk, &bytes, asked, truth, |_, _| ()).unwrap();
+    eprintln!(
+        "{truth}: {:?}\n{}",
+        explored.found,
+        explored.log().join("\n")
+    );
+    assert_eq!(explored.missed(), [""; 0]);
+    explored
+}
+
+fn assert_is(found: &Found, name: &str) {
+    assert!(found.sure && !found.unknown, "{found:?}");
+    assert_eq!(found.name.as_str(), name);
+}
+
+#[test]
+fn a_texture_taught_by_touching_is_recognised() {
+    let Some(elf) = elf() else { return };
+    let mut talk = told(&elf, &under(NEW, 1));
+    let before = table(&mut talk);
+    let train = Train {
+        name: name("taught"),
+        trials: 2,
+        pilot: false,
+        seed: 1,
+    };
+    let slides = talk.run(Question::train(train), LONG_S, |_, _| ()).unwrap();
+    assert_eq!(slides, 6);
+    let after = table(&mut talk);
+    let (old, new) = (Table::read(&before).unwrap(), Table::read(&after).unwrap());
+    // nothing else has changed
+    assert_eq!(new.textures(), old.textures() + 1);
+    for (texture, movement) in (0..old.textures()).flat_map(|t| (0..3).map(move |m| (t, m))) {
+        assert_eq!(
+            new.whitened(texture, movement),
+            old.whitened(texture, movement)
+        );
+    }
+    assert_eq!(new.lineage(), old.crc());
+    let taught = new.find("taught").unwrap();
+    assert_eq!(
+        new.tally(taught),
+        Tally {
+            user: 6,
+            ..Tally::default()
+        }
+    );
+    assert!(!status(&mut talk).factory);
+    // other trials of it, after the power was off, and of one that was there before
+    let mut talk = again(&elf, talk, &under(NEW, 2));
+    let explored = visit(&mut talk, identify(2), "taught");
+    assert_is(&explored.found, "taught");
+    let before = under(OLD, 2);
+    let mut talk = again(&elf, talk, &before);
+    let explored = visit(&mut talk, identify(3), &before.name);
+    assert_is(&explored.found, &before.name);
+}
+
+#[test]
+fn an_unknown_texture_is_said_to_be_and_its_name_learned() {
+    let Some(elf) = elf() else { return };
+    let unknown = under(NEW, 1);
+    let mut talk = told(&elf, &unknown);
+    // nothing was felt yet
+    let answer =
+        |talk: &mut Talk, text: &str| talk.run(Question::answer(name(text)), PATIENCE_S, |_, _| ());
+    let early = answer(&mut talk, "what I felt");
+    assert!(matches!(early, Err(TalkError::Refused(_))), "{early:?}");
+    let asked = Identify {
+        learn: true,
+        ..identify(4)
+    };
+    let before = table(&mut talk);
+    let explored = visit(&mut talk, asked, &unknown.name);
+    let found = explored.found.clone();
+    assert!(found.unknown && !found.sure && found.asks, "{found:?}");
+    assert!(explored.right() && found.log_odds > Some(0.0), "{found:?}");
+    // an unknown one teaches nothing before it has a name
+    assert_eq!(found.learned, 0);
+    assert_eq!(table(&mut talk), before);
+    let nameless = answer(&mut talk, "");
+    assert!(
+        matches!(nameless, Err(TalkError::Refused(_))),
+        "{nameless:?}"
+    );
+    let taught = answer(&mut talk, "what I felt").unwrap();
+    assert_eq!(
+        (taught.name.as_str(), taught.slides),
+        ("what I felt", found.slides)
+    );
+    // an answer is taken once
+    let twice = answer(&mut talk, "what I felt");
+    assert!(matches!(twice, Err(TalkError::Refused(_))), "{twice:?}");
+    let after = table(&mut talk);
+    let new = Table::read(&after).unwrap();
+    assert_eq!(new.textures(), Table::read(&before).unwrap().textures() + 1);
+    // the next visit, of another trial
+    let mut talk = again(&elf, talk, &under(NEW, 2));
+    assert_eq!(table(&mut talk), after);
+    let explored = visit(&mut talk, identify(5), "what I felt");
+    assert_eq!(explored.found.name.as_str(), "what I felt");
+    assert!(!explored.found.unknown, "{:?}", explored.found);
+}
+
+#[test]
+fn what_it_teaches_itself_is_kept_and_can_be_forgotten() {
+    let Some(elf) = elf() else { return };
+    let known = under(OLD, 3);
+    let mut talk = told(&elf, &known);
+    let base = table(&mut talk);
+    let asked = Identify {
+        learn: true,
+        ..identify(6)
+    };
+    let mut told = None;
+    let explored = explore(&mut talk, &base, asked, &known.name, |_, report| {
+        if let Some(Tell::Taught {
+            name,
+            slides,
+            itself,
+        }) = report.map(|report| &report.tell)
+        {
+            told = Some((name.clone(), *slides, *itself));
+        }
+    })
+    .unwrap();
+    assert_eq!(explored.missed(), [""; 0]);
+    assert_is(&explored.found, &known.name);
+    let found = &explored.found;
+    assert_eq!(told, Some((found.name.clone(), found.slides, true)));
+    assert_eq!(found.learned, found.slides);
+    let learned = table(&mut talk);
+    assert_ne!(learned, base);
+    let tally = Table::read(&learned).unwrap().tally(found.texture);
+    assert_eq!((tally.itself, tally.user), (found.slides, 0));
+    // a power cycle later it is the same
+    let mut talk = again(&elf, talk, &known);
+    assert_eq!(table(&mut talk), learned);
+    // forgetting it gives back what it was told, to the bit
+    let forget = || Question::forget(Forget::SelfTaught);
+    let store = talk.board().store().unwrap();
+    let mut forgetful = boot(&elf, &known, Some(store));
+    forgetful.run(forget(), PATIENCE_S, |_, _| ()).unwrap();
+    assert_eq!(table(&mut forgetful), base);
+    let mut forgetful = again(&elf, forgetful, &known);
+    assert_eq!(table(&mut forgetful), base);
+    drop(forgetful);
+    // what it learned stays with a texture that gets another name
+    let rename = |from: &str, to: &str| Question::rename(name(from), name(to));
+    let other = Table::read(&base).unwrap().names().next().unwrap();
+    let taken = talk.run(rename(other, &known.name), PATIENCE_S, |_, _| ());
+    assert!(matches!(taken, Err(TalkError::Refused(_))), "{taken:?}");
+    talk.run(rename(&known.name, "renamed"), PATIENCE_S, |_, _| ())
+        .unwrap();
+    let mut talk = again(&elf, talk, &known);
+    let renamed = table(&mut talk);
+    let table_of = |bytes| Table::read(bytes).unwrap();
+    assert_eq!(table_of(&renamed).find(&known.name), None);
+    assert_eq!(table_of(&renamed).find("renamed"), Some(found.texture));
+    assert_eq!(table_of(&renamed).tally(found.texture), tally);
+    talk.run(rename("renamed", &known.name), PATIENCE_S, |_, _| ())
+        .unwrap();
+    // what it taught itself can be forgotten still
+    talk.run(forget(), PATIENCE_S, |_, _| ()).unwrap();
+    let forgotten = table(&mut talk);
+    for (texture, movement) in (0..8).flat_map(|t| (0..3).map(move |m| (t, m))) {
+        let of = |bytes| table_of(bytes).whitened(texture, movement);
+        assert_eq!(of(&forgotten), of(&base));
+    }
+    assert_eq!(table_of(&forgotten).tally(found.texture).itself, 0);
+    // a texture goes altogether
+    let gone = Question::forget(Forget::Texture(name(other)));
+    talk.run(gone, PATIENCE_S, |_, _| ()).unwrap();
+    let less = table(&mut talk);
+    assert_eq!(table_of(&less).textures(), 7);
+    assert_eq!(table_of(&less).find(other), None);
+    assert_eq!(status(&mut talk).fault, None);
+}
