@@ -60,7 +60,10 @@ impl Method {
         matches!(
             (self, contents),
             (Self::Fused, Contents::Fused(..))
-                | (Self::Paper | Self::Student | Self::StudentAll, Contents::Gaussians(_))
+                | (
+                    Self::Paper | Self::Student | Self::StudentAll,
+                    Contents::Gaussians(_)
+                )
         )
     }
 
@@ -534,7 +537,11 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     }
 
     /// All properties: the means of the slides of every movement are compared anew.
-    fn observe_properties(&mut self, action: Action, slide: &Observation) -> Result<(), ObserveError> {
+    fn observe_properties(
+        &mut self,
+        action: Action,
+        slide: &Observation,
+    ) -> Result<(), ObserveError> {
         for property in self.measured.iter() {
             Self::value(slide, property)?;
         }
@@ -577,7 +584,11 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     }
 
     /// All features, whitened.
-    fn observe_features(&mut self, action: Action, slide: &Observation) -> Result<(), ObserveError> {
+    fn observe_features(
+        &mut self,
+        action: Action,
+        slide: &Observation,
+    ) -> Result<(), ObserveError> {
         let Contents::Fused(set, features) = self.table.contents() else {
             return Err(ObserveError::Action(action));
         };
@@ -724,7 +735,11 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     /// What cycling goes through: the best action of each property when nothing is known, properties in their order; where all
     /// is looked at, every movement.
     pub fn turns(&self) -> impl Iterator<Item = Action> {
-        let all = self.actions.iter().copied().filter(|a| a.property.is_none());
+        let all = self
+            .actions
+            .iter()
+            .copied()
+            .filter(|a| a.property.is_none());
         let each = Property::ALL.into_iter().filter_map(|property| {
             let of_property = self
                 .actions

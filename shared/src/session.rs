@@ -215,10 +215,12 @@ where
         let mut slide = Slide::<K>::new(plan);
         rig.perform(movement, &mut slide).await.map_err(text)?;
         let felt = match slide.finish() {
-            Ok(measurement) => match training.took(Some(&table), movement, &Observation::from(&measurement)) {
-                Ok(trained) => Ok((trained, measurement)),
-                Err(why) => Err(text(why)),
-            },
+            Ok(measurement) => {
+                match training.took(Some(&table), movement, &Observation::from(&measurement)) {
+                    Ok(trained) => Ok((trained, measurement)),
+                    Err(why) => Err(text(why)),
+                }
+            }
             Err(why) => Err(text(why)),
         };
         match felt {

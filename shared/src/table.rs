@@ -446,7 +446,9 @@ impl<'a> Table<'a> {
         }
         let (_, cell) = self.contents.sizes();
         let index = usize::from(texture) * usize::from(self.movements) + usize::from(movement);
-        self.bytes.get(self.layout().cells + index * cell..)?.get(..cell)
+        self.bytes
+            .get(self.layout().cells + index * cell..)?
+            .get(..cell)
     }
 
     /// Stored mean and standard deviation of a property that was measured.
@@ -620,7 +622,11 @@ impl<'a> Table<'a> {
             slides: self.trials(texture, movement),
             mean: [0; MAX_FEATURES],
         };
-        for (mean, stored) in whitened.mean.iter_mut().zip(self.white_mean(texture, movement)) {
+        for (mean, stored) in whitened
+            .mean
+            .iter_mut()
+            .zip(self.white_mean(texture, movement))
+        {
             *mean = stored;
         }
         whitened

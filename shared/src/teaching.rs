@@ -143,7 +143,9 @@ pub async fn answer<F: NorFlash>(
 ) -> Result<Tell, Text> {
     let in_force = Table::read(room).map_err(text)?.crc();
     if visited.table != in_force {
-        return Err(text("the table has changed since the exploration: explore again"));
+        return Err(text(
+            "the table has changed since the exploration: explore again",
+        ));
     }
     if visited.felt.is_empty() {
         return Err(text("this kind of table learns by `train` only"));

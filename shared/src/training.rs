@@ -287,7 +287,8 @@ impl Training {
     pub fn resume(&mut self, movement: Movement, lesson: Lesson) -> Result<(), TrainingError> {
         let fits = matches!(
             (lesson, self.contents),
-            (Lesson::Gaussians(_), Contents::Gaussians(_)) | (Lesson::Fused(_), Contents::Fused(..))
+            (Lesson::Gaussians(_), Contents::Gaussians(_))
+                | (Lesson::Fused(_), Contents::Fused(..))
         );
         let at = self.at(movement)?;
         if !fits {
@@ -424,6 +425,8 @@ impl Training {
 
 #[cfg(test)]
 mod tests {
+    mod fused;
+
     use super::*;
     use crate::features::Properties;
     use crate::table::tests::{around, table_of};
@@ -530,10 +533,7 @@ mod tests {
         let (movement, two) = training.learned()[0];
         assert_eq!(two.trials(), 2);
         let record = training.took(None, movement, &felt(0.2)).unwrap();
-        assert_eq!(
-            (record.lesson.trials(), record.table),
-            (3, Some(old.crc()))
-        );
+        assert_eq!((record.lesson.trials(), record.table), (3, Some(old.crc())));
         assert_eq!((&record.name[..], record.movement), ("t1", movement));
         // the power is cut
         let mut training = Training::new(wanted("t1"), Some(&old), 0).unwrap();

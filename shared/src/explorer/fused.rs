@@ -61,10 +61,7 @@ impl Visit {
 }
 
 /// |a - b|^2 of two whitened vectors, Q16.
-pub(super) fn distance(
-    a: impl Iterator<Item = i16>,
-    b: impl Iterator<Item = i16>,
-) -> u64 {
+pub(super) fn distance(a: impl Iterator<Item = i16>, b: impl Iterator<Item = i16>) -> u64 {
     a.zip(b)
         .map(|(a, b)| {
             let apart = i64::from(a) - i64::from(b);
@@ -191,7 +188,11 @@ pub(super) fn decide<const N: usize>(
             *log = log.saturating_add(likelihood);
         }
     }
-    let candidates = || log.iter().zip(0..).filter(|&(_, texture)| is_candidate(texture));
+    let candidates = || {
+        log.iter()
+            .zip(0..)
+            .filter(|&(_, texture)| is_candidate(texture))
+    };
     let top = candidates().map(|(&log, _)| log).max()?;
     let (mut sum, mut count) = (0u64, 0u32);
     for (&log, texture) in candidates() {

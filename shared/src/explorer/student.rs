@@ -1,8 +1,8 @@
 //! Student's t in place of the paper's Gaussians: with a few trials the standard deviation of one texture is itself
 //! uncertain, and what all textures have in common helps (Smyth 2004).
 
-use crate::table::{Gaussian, Table};
 use crate::features::Property;
+use crate::table::{Gaussian, Table};
 
 /// Degrees of freedom of what is taken as known.
 const KNOWN: f64 = 1000.0;
@@ -124,7 +124,10 @@ fn trigamma(mut x: f64) -> f64 {
         x += 1.0;
     }
     let square = 1.0 / (x * x);
-    below + 1.0 / x + 0.5 * square + square / x * (1.0 / 6.0 - square * (1.0 / 30.0 - square / 42.0))
+    below
+        + 1.0 / x
+        + 0.5 * square
+        + square / x * (1.0 / 6.0 - square * (1.0 / 30.0 - square / 42.0))
 }
 
 #[cfg(test)]

@@ -168,10 +168,7 @@ fn any_cells() -> impl proptest::strategy::Strategy<Value = Vec<Vec<[(f32, f32);
 fn state<const N: usize>(
     explorer: &mut Explorer<'_, N>,
 ) -> (Vec<f32>, Vec<Outlook>, u8, Option<Verdict>, Vec<Action>) {
-    let (outlook, each) = (
-        explorer.outlook().to_vec(),
-        explorer.turns().collect(),
-    );
+    let (outlook, each) = (explorer.outlook().to_vec(), explorer.turns().collect());
     (
         explorer.posterior().to_vec(),
         outlook,

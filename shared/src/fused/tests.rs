@@ -52,7 +52,11 @@ impl World {
             let rows = (0..features).map(|i| {
                 let scale = 0.1 + 0.5 * noise.uniform();
                 let row = (0..=i).map(|j| {
-                    let part = if i == j { 0.7 } else { 0.8 * noise.normal() / (features as f64).sqrt() };
+                    let part = if i == j {
+                        0.7
+                    } else {
+                        0.8 * noise.normal() / (features as f64).sqrt()
+                    };
                     scale * part
                 });
                 row.collect()
@@ -214,7 +218,10 @@ fn inverse(a: &Matrix) -> Matrix {
         for (i, other) in work.iter_mut().enumerate() {
             let factor = other[k];
             if i != k {
-                other.iter_mut().zip(&row).for_each(|(x, r)| *x -= factor * r);
+                other
+                    .iter_mut()
+                    .zip(&row)
+                    .for_each(|(x, r)| *x -= factor * r);
             }
         }
     }
@@ -270,7 +277,10 @@ fn features_without_scatter_of_their_own_are_bounded() {
     assert_eq!(z[1], other[1]);
     // 100 steps of a standard deviation of 50 sqrt(10/4)
     let apart = f64::from(other[0] - z[0]) / 256.0;
-    assert!((apart - 100.0 / (50.0 * 2.5f64.sqrt())).abs() < 0.02, "{apart}");
+    assert!(
+        (apart - 100.0 / (50.0 * 2.5f64.sqrt())).abs() < 0.02,
+        "{apart}"
+    );
     let off = whitening.apply(&[2000, 8, 4000]);
     // one step of a standard deviation of sqrt(1/12)
     let apart = f64::from(off[1] - z[1]) / 256.0;
@@ -373,7 +383,10 @@ fn the_farthest_values_do_not_overflow() {
                     above if above > 0 => i16::MAX,
                     _ => i16::MIN,
                 };
-                assert_eq!(whitening.apply(&[x; MAX_FEATURES]), [expected; MAX_FEATURES]);
+                assert_eq!(
+                    whitening.apply(&[x; MAX_FEATURES]),
+                    [expected; MAX_FEATURES]
+                );
             }
         }
     }
@@ -405,7 +418,10 @@ fn without_two_slides_of_a_texture_there_is_no_whitening() {
     assert_eq!(whiten(&[scatter.clone()]), Err(WhitenError::Trials(0)));
     let before = std::format!("{scatter:?}");
     let longer = Vector::from_slice(&[1, 2, 3]).unwrap();
-    assert_eq!(scatter.push(&[slide(1), longer]), Err(WhitenError::Features));
+    assert_eq!(
+        scatter.push(&[slide(1), longer]),
+        Err(WhitenError::Features)
+    );
     assert_eq!(std::format!("{scatter:?}"), before, "nothing was taken");
     let mut two = scatter.clone();
     two.push(&[slide(5), slide(90)]).unwrap();
@@ -471,7 +487,10 @@ fn more_slides_than_the_memory_stay_as_many() {
         let mut known = Whitened { slides, mean };
         known.adapt(&[0, 1800]);
         // a ninth of the way, however many there were
-        assert_eq!((known.slides, known.mean[0], known.mean[1]), (slides, 800, 1000));
+        assert_eq!(
+            (known.slides, known.mean[0], known.mean[1]),
+            (slides, 800, 1000)
+        );
         assert_eq!(known.mean[2..], mean[2..]);
     }
     let mut far = Whitened::default();
@@ -526,8 +545,16 @@ fn a_missing_feature_is_missed_where_it_is_needed() {
     assert_eq!(there(&observation()), FeatureSet::ALL);
     assert_eq!(there(&Observation::default()), []);
     let all = [Some(0.5), Some(-2.0), Some(5.25)];
-    assert_eq!(there(&Properties::new(all).into()), [FeatureSet::Properties]);
-    for value in [None, Some(f32::NAN), Some(f32::INFINITY), Some(f32::NEG_INFINITY)] {
+    assert_eq!(
+        there(&Properties::new(all).into()),
+        [FeatureSet::Properties]
+    );
+    for value in [
+        None,
+        Some(f32::NAN),
+        Some(f32::INFINITY),
+        Some(f32::NEG_INFINITY),
+    ] {
         for at in 0..3 {
             let mut some = all;
             some[at] = value;
@@ -556,7 +583,10 @@ fn a_missing_feature_is_missed_where_it_is_needed() {
 
 #[test]
 fn features_end_at_the_ends_of_their_numbers() {
-    assert_eq!((fixed(0.0), fixed(1.0), fixed(-1.0)), (Some(0), Some(1024), Some(-1024)));
+    assert_eq!(
+        (fixed(0.0), fixed(1.0), fixed(-1.0)),
+        (Some(0), Some(1024), Some(-1024))
+    );
     assert_eq!(fixed(0.6 / 1024.0), Some(1));
     assert_eq!(fixed(-0.6 / 1024.0), Some(-1));
     assert_eq!(fixed(0.4 / 1024.0), Some(0));
@@ -635,7 +665,10 @@ fn a_slide_says_its_bands_and_pressure() {
 fn the_errors_say_what_is_missing() {
     use std::string::ToString;
     for (error, message) in [
-        (WhitenError::Trials(1), "movement 2: no texture has two slides"),
+        (
+            WhitenError::Trials(1),
+            "movement 2: no texture has two slides",
+        ),
         (WhitenError::Features, "do not have the same features"),
         (WhitenError::Movements, "1 to 36 movements"),
     ] {

@@ -79,8 +79,15 @@ impl Whitening {
                 break;
             };
             rows = rest;
-            let apart = features.iter().zip(&self.mean).map(|(x, g)| i64::from(*x) - i64::from(*g));
-            let sum: i64 = weights.iter().zip(apart).map(|(w, x)| i64::from(*w) * x).sum();
+            let apart = features
+                .iter()
+                .zip(&self.mean)
+                .map(|(x, g)| i64::from(*x) - i64::from(*g));
+            let sum: i64 = weights
+                .iter()
+                .zip(apart)
+                .map(|(w, x)| i64::from(*w) * x)
+                .sum();
             // from 1/1024 of a unit, and the row's places, to 1/256
             let places = u32::from(places) + 2;
             let z = (sum + (1 << (places - 1))) >> places;
@@ -196,7 +203,11 @@ pub fn whiten(scatters: &[Scatter]) -> Result<Vec<Whitening, MAX_MOVEMENTS>, Whi
     }
     let mut average = [[0.0; MAX_FEATURES]; MAX_FEATURES];
     for scatter in scatters {
-        add(&mut average, &scatter.covariance(), 1.0 / scatters.len() as f64);
+        add(
+            &mut average,
+            &scatter.covariance(),
+            1.0 / scatters.len() as f64,
+        );
     }
     let mut whitenings = Vec::new();
     for scatter in scatters {
@@ -268,7 +279,11 @@ fn shrink(correlation: &mut Square, features: usize, freedom: f64) {
     let lambda = if above < below { above / below } else { 1.0 };
     for (at, row) in correlation.iter_mut().enumerate() {
         for (other, c) in row.iter_mut().enumerate() {
-            *c = if at == other { 1.0 } else { (1.0 - lambda) * *c };
+            *c = if at == other {
+                1.0
+            } else {
+                (1.0 - lambda) * *c
+            };
         }
     }
 }
@@ -320,7 +335,9 @@ impl Whitened {
     /// Takes in a whitened slide on the go (facts of the recipe, step 8).
     pub fn adapt(&mut self, slide: &[i16]) {
         self.follow(slide, self.slides.min(Self::MEMORY));
-        self.slides = self.slides.max(self.slides.saturating_add(1).min(Self::MEMORY));
+        self.slides = self
+            .slides
+            .max(self.slides.saturating_add(1).min(Self::MEMORY));
     }
 
     fn follow(&mut self, slide: &[i16], before: u8) {

@@ -11,10 +11,10 @@ use serde::{Deserialize, Serialize};
 
 use super::pages::{Pages, page_size};
 use super::{Store, StoreError};
+use crate::fused::Whitened;
 use crate::movement::Movement;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
-use crate::fused::Whitened;
 use crate::training::Lesson;
 use crate::wire::{MAX_TEXTURES, Name};
 
@@ -98,12 +98,7 @@ pub struct SelfTaught {
 
 /// Remembers where the newest record of every key is while one call lasts. Without it, turning a page looks through the
 /// whole page for every record in it.
-type Places = Cache<
-    Uncached,
-    Uncached,
-    ArrayKeyPointers<u8, KEYS>,
-    u8,
->;
+type Places = Cache<Uncached, Uncached, ArrayKeyPointers<u8, KEYS>, u8>;
 
 type Map<'f, F> = MapStorage<u8, Pages<'f, F>, Places>;
 
@@ -374,7 +369,9 @@ impl<F: NorFlash> Store<F> {
         let used = self.self_keys(|_| true).await?;
         let place = match self.self_keys(same).await?.first() {
             Some(key) => Some(*key),
-            None => (KEY_SELF..).take(MAX_TEXTURES).find(|key| !used.contains(key)),
+            None => (KEY_SELF..)
+                .take(MAX_TEXTURES)
+                .find(|key| !used.contains(key)),
         };
         let place = match place {
             Some(key) => Some(key),
@@ -420,7 +417,10 @@ impl<F: NorFlash> Store<F> {
             }
         }
         let keys = (KEY_SELF..).zip(wanted);
-        Ok(keys.filter(|(_, wanted)| *wanted).map(|(key, _)| key).collect())
+        Ok(keys
+            .filter(|(_, wanted)| *wanted)
+            .map(|(key, _)| key)
+            .collect())
     }
 
     /// Brings the pages into order, and looks whether they can be read.

@@ -202,14 +202,12 @@ pub fn amend<'o>(
         _ => None,
     };
     let added = match change {
-        Change::Put { name, known, tally } if replaced.is_none() => {
-            Some(Row {
-                name,
-                number: old.next_number(),
-                tally,
-                cells: Cells::New(known),
-            })
-        }
+        Change::Put { name, known, tally } if replaced.is_none() => Some(Row {
+            name,
+            number: old.next_number(),
+            tally,
+            cells: Cells::New(known),
+        }),
         _ => None,
     };
     let kept = old.names().zip(0..).filter_map(|(name, texture)| {
@@ -277,7 +275,10 @@ pub fn retell(
     put(layout.lineage, &lineage.to_le_bytes());
     let label = layout.labels + usize::from(texture) * LABEL_BYTES;
     put(label + 2, &[tally.factory, tally.user, tally.itself]);
-    if let Some((body, crc)) = bytes.get_mut(..length).and_then(<[u8]>::split_last_chunk_mut) {
+    if let Some((body, crc)) = bytes
+        .get_mut(..length)
+        .and_then(<[u8]>::split_last_chunk_mut)
+    {
         *crc = CRC32.checksum(body).to_le_bytes();
     }
     Ok(())
@@ -325,7 +326,12 @@ impl<'a> Row<'a> {
         }
     }
 
-    fn put_cells(&self, writer: &mut Writer<'_>, contents: Contents, index: u16) -> Result<(), EncodeError> {
+    fn put_cells(
+        &self,
+        writer: &mut Writer<'_>,
+        contents: Contents,
+        index: u16,
+    ) -> Result<(), EncodeError> {
         match (self.cells, contents) {
             (Cells::Old(table, texture), _) => {
                 for movement in 0..table.movements {
@@ -337,7 +343,10 @@ impl<'a> Row<'a> {
                 put_gaussians(writer, measured, known, index)
             }
             (Cells::New(Known::Fused(known)), Contents::Fused(_, features)) => {
-                for mean in known.iter().flat_map(|k| k.mean.iter().take(features.into())) {
+                for mean in known
+                    .iter()
+                    .flat_map(|k| k.mean.iter().take(features.into()))
+                {
                     writer.put(&mean.to_le_bytes());
                 }
                 Ok(())

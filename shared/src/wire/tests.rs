@@ -178,7 +178,10 @@ fn requests() -> vec::Vec<Request> {
         },
     ];
     let id = u16::MAX;
-    explorations.chain(others).map(|ask| Request { id, ask }).collect()
+    explorations
+        .chain(others)
+        .map(|ask| Request { id, ask })
+        .collect()
 }
 
 #[test]
@@ -225,7 +228,10 @@ fn a_verdict_and_an_answer_have_these_bytes() {
     assert_eq!(bytes, *b"\x05\x04\x03elm");
     // looking at everything has no property; fineness is the variant 2
     let look = |property| {
-        let action = Action { movement: 2, property };
+        let action = Action {
+            movement: 2,
+            property,
+        };
         body(&|room| postcard::to_slice(&action, room).unwrap().len())
     };
     assert_eq!(look(None), [2, 0]);

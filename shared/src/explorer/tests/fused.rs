@@ -39,9 +39,14 @@ impl Recipe {
 
     fn observe(&mut self, movement: u8, z: &[i16]) {
         let movement = usize::from(movement);
-        let (k, sum) = self.visits.entry(movement).or_insert((0.0, vec![0.0; z.len()]));
+        let (k, sum) = self
+            .visits
+            .entry(movement)
+            .or_insert((0.0, vec![0.0; z.len()]));
         *k += 1.0;
-        sum.iter_mut().zip(z).for_each(|(s, z)| *s += f64::from(*z) / 256.0);
+        sum.iter_mut()
+            .zip(z)
+            .for_each(|(s, z)| *s += f64::from(*z) / 256.0);
         *self.made.entry(movement).or_default() += 1.0;
     }
 
@@ -54,7 +59,11 @@ impl Recipe {
         for (i, z) in mean.iter().enumerate() {
             let centre = all.iter().map(|m| m[i]).sum::<f64>() / count.max(1.0);
             let squares: f64 = all.iter().map(|m| (m[i] - centre).powi(2)).sum();
-            let variance = if all.len() < 3 { 400.0 } else { squares / count };
+            let variance = if all.len() < 3 {
+                400.0
+            } else {
+                squares / count
+            };
             norm += (variance + 1.0 / k).ln();
             distance += (z - centre).powi(2) / (variance + 1.0 / k);
         }
@@ -117,7 +126,10 @@ impl Recipe {
 
     fn benefit(&self, movement: usize, p: &[f64]) -> f64 {
         let made = self.made.get(&movement).copied().unwrap_or(0.0);
-        1.0 - self.uncertainty(movement, p).max(0.0).powf(1.0 / (made + 1.0))
+        1.0 - self
+            .uncertainty(movement, p)
+            .max(0.0)
+            .powf(1.0 / (made + 1.0))
     }
 }
 
@@ -128,7 +140,10 @@ const OPEN: Config = Config {
     max_slides: 10,
     open: true,
 };
-const CLOSED: Config = Config { open: false, ..OPEN };
+const CLOSED: Config = Config {
+    open: false,
+    ..OPEN
+};
 
 type Twenty<'t> = Explorer<'t, 20>;
 
@@ -204,13 +219,21 @@ fn explored(
         let taught: Vec<u8> = (0..table.movements().len() as u8)
             .filter(|&m| candidates.iter().any(|&c| table.trials(c, m) > 0))
             .collect();
-        assert!(outlook.iter().map(|o| o.action).eq(taught.iter().map(|&m| look(m))));
+        assert!(
+            outlook
+                .iter()
+                .map(|o| o.action)
+                .eq(taught.iter().map(|&m| look(m)))
+        );
         for o in &outlook {
             let movement = o.action.movement.into();
             let difference = f64::from(o.uncertainty) - recipe.uncertainty(movement, &p);
             assert!(difference.abs() < 3e-4, "{o:?}: {difference}");
             let made = recipe.made.get(&movement).copied().unwrap_or(0.0);
-            let benefit = 1.0 - f64::from(o.uncertainty).clamp(0.0, 1.0).powf(1.0 / (made + 1.0));
+            let benefit = 1.0
+                - f64::from(o.uncertainty)
+                    .clamp(0.0, 1.0)
+                    .powf(1.0 / (made + 1.0));
             assert!((f64::from(o.benefit) - benefit).abs() < 1e-5, "{o:?}");
             if o.uncertainty > 0.01 {
                 let difference = f64::from(o.benefit) - recipe.benefit(movement, &p);
@@ -224,7 +247,9 @@ fn explored(
         let x = slide(action.movement);
         explorer.observe(action, &with_features(set, &x)).unwrap();
         recipe.observe(action.movement, &table.whiten(action.movement, &x).unwrap());
-        let untaught = candidates.iter().any(|&c| table.trials(c, action.movement) == 0);
+        let untaught = candidates
+            .iter()
+            .any(|&c| table.trials(c, action.movement) == 0);
         agreement.untaught += u32::from(untaught);
 
         let (p, log_odds) = recipe.decide(true);
@@ -233,13 +258,19 @@ fn explored(
         let mut total = 0.0;
         for (&c, p) in candidates.iter().zip(&p) {
             let posterior = f64::from(explorer.posterior()[usize::from(c)]);
-            assert!((posterior - p).abs() < 5e-4 + 5e-4 * visited, "{posterior} {p}");
+            assert!(
+                (posterior - p).abs() < 5e-4 + 5e-4 * visited,
+                "{posterior} {p}"
+            );
             total += posterior;
         }
         assert!((total - 1.0).abs() < 1e-5, "{total}");
         let others = explorer.posterior().iter().zip(0..);
         let mut others = others.filter(|(_, texture)| !candidates.contains(texture));
-        assert!(others.all(|(&p, _)| p == 0.0), "no candidate, no probability");
+        assert!(
+            others.all(|(&p, _)| p == 0.0),
+            "no candidate, no probability"
+        );
         assert_eq!(explorer.log_odds().is_some(), log_odds.is_some());
         if let (Some(found), Some(expected)) = (explorer.log_odds(), log_odds) {
             let error = (f64::from(found) - expected).abs();
@@ -250,7 +281,10 @@ fn explored(
         for (p, rounded) in p.iter().zip(&rounded) {
             assert!((p - rounded).abs() < 0.01, "{p} {rounded}");
         }
-        let best = (0..p.len()).rev().max_by(|&i, &j| p[i].total_cmp(&p[j])).unwrap();
+        let best = (0..p.len())
+            .rev()
+            .max_by(|&i, &j| p[i].total_cmp(&p[j]))
+            .unwrap();
         let limit = if slides < 2 { 2.0 } else { 0.0 };
         let unknown = config.open && log_odds.is_some_and(|l| l > limit);
         let sure = p[best] > f64::from(config.threshold) && !unknown;
@@ -320,7 +354,9 @@ fn explores_by_the_recipe() {
             .iter()
             .map(|row| {
                 let counts = [0, 1, 2, 5, 5, 5, 8, 40, 255];
-                row.iter().map(|mean| known(counts[noise.below(9)], mean)).collect()
+                row.iter()
+                    .map(|mean| known(counts[noise.below(9)], mean))
+                    .collect()
             })
             .collect();
         let bytes = straight_table(features, &table);
@@ -330,13 +366,30 @@ fn explores_by_the_recipe() {
         let truth = noise.below(textures + 1);
         let slide = |movement: u8| -> Vec<i16> {
             let mean = means[truth][usize::from(movement)].iter();
-            mean.map(|m| ((m + noise.normal()) * 1024.0).round().clamp(-32768.0, 32767.0) as i16)
-                .collect()
+            mean.map(|m| {
+                ((m + noise.normal()) * 1024.0)
+                    .round()
+                    .clamp(-32768.0, 32767.0) as i16
+            })
+            .collect()
         };
         let table = Table::read(&bytes).unwrap();
-        explored(table, FeatureSet::Bands, &candidates, config, slide, &mut agreement);
+        explored(
+            table,
+            FeatureSet::Bands,
+            &candidates,
+            config,
+            slide,
+            &mut agreement,
+        );
     }
-    let Agreement { same, all, unknown, sure, untaught } = agreement;
+    let Agreement {
+        same,
+        all,
+        unknown,
+        sure,
+        untaught,
+    } = agreement;
     std::println!("{same} of {all}, {unknown} unknown, {sure} sure, {untaught} untaught");
     assert!(f64::from(same) >= 0.995 * f64::from(all), "{same} of {all}");
     assert!(all > 2000 && unknown > 100 && sure > 500 && untaught > 500);
@@ -370,10 +423,23 @@ fn explores_what_was_learned_by_the_recipe() {
             let candidates = some_candidates(noise, 15);
             let truth = noise.below(18);
             let slide = |movement: u8| world.slide(noise, truth, movement.into()).to_vec();
-            explored(table, FeatureSet::Force, &candidates, config, slide, &mut agreement);
+            explored(
+                table,
+                FeatureSet::Force,
+                &candidates,
+                config,
+                slide,
+                &mut agreement,
+            );
         }
     }
-    let Agreement { same, all, unknown, sure, .. } = agreement;
+    let Agreement {
+        same,
+        all,
+        unknown,
+        sure,
+        ..
+    } = agreement;
     std::println!("{same} of {all}, {unknown} unknown, {sure} sure");
     assert!(f64::from(same) >= 0.995 * f64::from(all), "{same} of {all}");
     assert!(all > 1000 && unknown > 100 && sure > 500);
@@ -389,13 +455,25 @@ fn another_slide_of_a_movement_replaces_and_does_not_add() {
     let twice = 1.0 / (1.0 + (13.0f32 / 21.0).powf(4.5));
     let often = 1.0 / (1.0 + (9.0f32 / 17.0).powf(4.5));
     explorer.observe(look(0), &at(&[1.0])).unwrap();
-    assert!((explorer.posterior()[0] - once).abs() < 5e-4, "{}", explorer.posterior()[0]);
+    assert!(
+        (explorer.posterior()[0] - once).abs() < 5e-4,
+        "{}",
+        explorer.posterior()[0]
+    );
     explorer.observe(look(0), &at(&[1.0])).unwrap();
-    assert!((explorer.posterior()[0] - twice).abs() < 5e-4, "{}", explorer.posterior()[0]);
+    assert!(
+        (explorer.posterior()[0] - twice).abs() < 5e-4,
+        "{}",
+        explorer.posterior()[0]
+    );
     for _ in 0..400 {
         explorer.observe(look(0), &at(&[1.0])).unwrap();
     }
-    assert!((explorer.posterior()[0] - often).abs() < 1e-3, "{}", explorer.posterior()[0]);
+    assert!(
+        (explorer.posterior()[0] - often).abs() < 1e-3,
+        "{}",
+        explorer.posterior()[0]
+    );
     // 1 = the mean of 3 and -1
     let mut other = fused(&bytes, OPEN);
     other.observe(look(0), &at(&[3.0])).unwrap();
@@ -404,7 +482,11 @@ fn another_slide_of_a_movement_replaces_and_does_not_add() {
     assert!((other.posterior()[0] - twice).abs() < 5e-4);
     assert_eq!(other.log_odds(), None, "two textures say nothing of others");
     assert!(!other.is_certain());
-    assert!(other.felt().eq([(0, 2, heapless::Vec::from_slice(&[256]).unwrap())]));
+    assert!(
+        other
+            .felt()
+            .eq([(0, 2, heapless::Vec::from_slice(&[256]).unwrap())])
+    );
 }
 
 /// The most that is counted is 255 slides; whatever comes after is not taken in.
@@ -418,7 +500,10 @@ fn beyond_255_slides_nothing_changes() {
     let posterior = explorer.posterior().to_vec();
     for _ in 0..100 {
         explorer.observe(look(0), &at(&[30.0])).unwrap();
-        assert_eq!((explorer.posterior(), explorer.slides()), (&posterior[..], 255));
+        assert_eq!(
+            (explorer.posterior(), explorer.slides()),
+            (&posterior[..], 255)
+        );
     }
 }
 
@@ -430,7 +515,9 @@ fn the_order_of_slides_does_not_matter() {
             let mean: Vec<f64> = (0..5).map(|_| 2.0 * noise.normal()).collect();
             known((noise.uniform() * 4.0) as u8, &mean)
         };
-        let table: Vec<Vec<Whitened>> = (0..6).map(|_| vec![cell(), cell(), known(3, &[0.5; 5])]).collect();
+        let table: Vec<Vec<Whitened>> = (0..6)
+            .map(|_| vec![cell(), cell(), known(3, &[0.5; 5])])
+            .collect();
         let bytes = straight_table(5, &table);
         let mut slides: Vec<(u8, Observation)> = (0..7)
             .map(|_| {
@@ -449,7 +536,10 @@ fn the_order_of_slides_does_not_matter() {
         }
         assert!(there.slides() > 0);
         assert_eq!(there.posterior(), back.posterior());
-        let (a, b) = (there.log_odds().unwrap_or(0.0), back.log_odds().unwrap_or(0.0));
+        let (a, b) = (
+            there.log_odds().unwrap_or(0.0),
+            back.log_odds().unwrap_or(0.0),
+        );
         assert!((a - b).abs() < 1e-4, "{a} {b}");
     }
 }
@@ -458,7 +548,12 @@ fn the_order_of_slides_does_not_matter() {
 #[test]
 fn a_texture_never_learned_at_a_movement_is_like_any_other() {
     let cell = |x: f64, y: f64| vec![known(10, &[x, y])];
-    let table = [cell(5.0, 0.0), cell(-5.0, 0.0), cell(0.0, 5.0), vec![known(0, &[3.0, 3.0])]];
+    let table = [
+        cell(5.0, 0.0),
+        cell(-5.0, 0.0),
+        cell(0.0, 5.0),
+        vec![known(0, &[3.0, 3.0])],
+    ];
     let bytes = straight_table(2, &table);
     let table = Table::read(&bytes).unwrap();
     let mut pair = Twenty::among(table, PropertySet::ALL, OPEN, [0, 3]).unwrap();
@@ -499,7 +594,11 @@ fn what_no_texture_is_like_is_unknown_after_two_slides() {
     // far from all: log-odds over 2 at once
     let mut explorer = fused(&bytes, OPEN);
     explorer.observe(look(0), &at(&[4.0, -4.0, -4.0])).unwrap();
-    assert!(explorer.log_odds().unwrap() > 2.0, "{:?}", explorer.log_odds());
+    assert!(
+        explorer.log_odds().unwrap() > 2.0,
+        "{:?}",
+        explorer.log_odds()
+    );
     assert_eq!(explorer.verdict(), None, "one slide is not enough");
     assert!(explorer.best().unknown);
     explorer.observe(look(1), &at(&[4.0, -4.0, -4.0])).unwrap();
@@ -510,7 +609,10 @@ fn what_no_texture_is_like_is_unknown_after_two_slides() {
     let mut explorer = fused(&bytes, OPEN);
     explorer.observe(look(0), &at(&[4.0, -2.0, -1.0])).unwrap();
     let log_odds = explorer.log_odds().unwrap();
-    assert!((0.0..2.0).contains(&log_odds) && !explorer.best().unknown, "{log_odds}");
+    assert!(
+        (0.0..2.0).contains(&log_odds) && !explorer.best().unknown,
+        "{log_odds}"
+    );
     explorer.observe(look(0), &at(&[4.0, -2.0, -1.0])).unwrap();
     let log_odds = explorer.log_odds().unwrap();
     assert!((0.0..2.0).contains(&log_odds), "{log_odds}");
@@ -530,7 +632,10 @@ fn what_may_be_unknown_is_not_sure() {
     }
     assert_eq!((open.best().sure, open.verdict()), (false, None));
     let verdict = closed.verdict().unwrap();
-    assert_eq!((verdict.texture, verdict.sure, verdict.unknown), (0, true, false));
+    assert_eq!(
+        (verdict.texture, verdict.sure, verdict.unknown),
+        (0, true, false)
+    );
     // closed never says so, however far
     for z in [[30.0; 3], [-30.0, 30.0, 0.0]] {
         for movement in [0, 1, 0] {
@@ -545,7 +650,10 @@ fn what_may_be_unknown_is_not_sure() {
         open.observe(look(0), &at(&[5.0, 0.5, 0.0])).unwrap();
     }
     let verdict = open.verdict().unwrap();
-    assert_eq!((verdict.texture, verdict.sure, verdict.unknown), (0, true, false));
+    assert_eq!(
+        (verdict.texture, verdict.sure, verdict.unknown),
+        (0, true, false)
+    );
 }
 
 #[test]
@@ -556,12 +664,19 @@ fn it_learns_by_itself_only_where_it_is_certain() {
         assert!(!explorer.is_certain(), "before the first slide");
         explorer.observe(look(0), &at(&z)).unwrap();
         let best = explorer.best();
-        (explorer.is_certain(), best.sure, explorer.log_odds().unwrap())
+        (
+            explorer.is_certain(),
+            best.sure,
+            explorer.log_odds().unwrap(),
+        )
     };
     let (certain, sure, log_odds) = after([6.0, 0.0, 0.0], 0.99);
     assert!(certain && sure && log_odds < -2.0, "{log_odds}");
     let (certain, sure, log_odds) = after([4.5, -1.0, -0.5], 0.99);
-    assert!(!certain && sure && (-2.0..0.0).contains(&log_odds), "{log_odds}");
+    assert!(
+        !certain && sure && (-2.0..0.0).contains(&log_odds),
+        "{log_odds}"
+    );
     let (certain, sure, log_odds) = after([6.0, 0.0, 0.0], 0.999_999);
     assert!(!certain && !sure && log_odds < -2.0, "{log_odds}");
     // never by properties alone
@@ -676,8 +791,13 @@ fn the_method_must_suit_the_table_and_the_rig_its_features() {
         assert!(Method::of(contents).suits(contents));
     }
     // bands need nothing but the sensor
-    assert_eq!(begin(&fused_bytes, Method::Fused, PropertySet::default()), Ok(()));
-    let no_force: PropertySet = [Property::Roughness, Property::Fineness].into_iter().collect();
+    assert_eq!(
+        begin(&fused_bytes, Method::Fused, PropertySet::default()),
+        Ok(())
+    );
+    let no_force: PropertySet = [Property::Roughness, Property::Fineness]
+        .into_iter()
+        .collect();
     for (set, features, missing) in [
         (FeatureSet::Force, 13, true),
         (FeatureSet::Pressure, 14, false),
@@ -700,15 +820,26 @@ fn a_slide_without_the_features_teaches_nothing() {
     explorer.observe(look(0), &at(&[5.0, 1.0, 0.0])).unwrap();
     let before = (state(&mut explorer), explorer.felt().collect::<Vec<_>>());
     let missing = ObserveError::Features(FeatureSet::Bands);
-    for slide in [Observation::default(), all(1.0), at(&[1.0; 2]), at(&[1.0; 4])] {
+    for slide in [
+        Observation::default(),
+        all(1.0),
+        at(&[1.0; 2]),
+        at(&[1.0; 4]),
+    ] {
         assert_eq!(explorer.observe(look(1), &slide), Err(missing));
     }
     assert!(missing.to_string().contains("band powers"), "{missing}");
     for action in [look(2), act(0, Property::Traction)] {
         let slide = at(&[5.0, 1.0, 0.0]);
-        assert_eq!(explorer.observe(action, &slide), Err(ObserveError::Action(action)));
+        assert_eq!(
+            explorer.observe(action, &slide),
+            Err(ObserveError::Action(action))
+        );
     }
-    assert_eq!((state(&mut explorer), explorer.felt().collect::<Vec<_>>()), before);
+    assert_eq!(
+        (state(&mut explorer), explorer.felt().collect::<Vec<_>>()),
+        before
+    );
     // and a new exploration knows nothing of the last one
     explorer.restart();
     let mut new = fused(&bytes, OPEN);

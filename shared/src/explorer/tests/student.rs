@@ -74,7 +74,10 @@ fn normalised(l: &[f64]) -> Vec<f64> {
 
 fn near(posterior: &[f32], expected: &[f64]) {
     for (p, e) in posterior.iter().zip(expected) {
-        assert!((f64::from(*p) - e).abs() < 1e-3, "{posterior:?} {expected:?}");
+        assert!(
+            (f64::from(*p) - e).abs() < 1e-3,
+            "{posterior:?} {expected:?}"
+        );
     }
 }
 
@@ -86,10 +89,19 @@ fn world(noise: &mut Noise, same_trials: bool, differ: f64) -> Vec<u8> {
         .map(|_| {
             (0..movements)
                 .map(|_| {
-                    let n = if same_trials { each } else { 2 + noise.below(5) };
+                    let n = if same_trials {
+                        each
+                    } else {
+                        2 + noise.below(5)
+                    };
                     let mean: [f64; 3] = core::array::from_fn(|_| noise.normal());
-                    let sd: [f64; 3] = core::array::from_fn(|_| 0.3 * (differ * noise.normal()).exp());
-                    let mut trial = || core::array::from_fn(|p| (mean[p] + sd[p] * noise.normal()).clamp(-7.9, 7.9) as f32);
+                    let sd: [f64; 3] =
+                        core::array::from_fn(|_| 0.3 * (differ * noise.normal()).exp());
+                    let mut trial = || {
+                        core::array::from_fn(|p| {
+                            (mean[p] + sd[p] * noise.normal()).clamp(-7.9, 7.9) as f32
+                        })
+                    };
                     (0..n).map(|_| trial()).collect()
                 })
                 .collect()
@@ -121,14 +133,20 @@ fn uncertainty(known: &[Vec<(f64, f64)>], p: &[f64]) -> f64 {
 
 fn expected(table: &Table<'_>, action: Action) -> Vec<(f64, f64)> {
     let known = shrunk(table, action).into_iter();
-    known.map(|(mean, s2, _, n)| (mean, (s2 * (1.0 + 1.0 / n)).sqrt())).collect()
+    known
+        .map(|(mean, s2, _, n)| (mean, (s2 * (1.0 + 1.0 / n)).sqrt()))
+        .collect()
 }
 
 #[test]
 fn explores_by_students_t() {
     for seed in 0..200 {
         let noise = &mut Noise(seed);
-        let bytes = world(noise, seed % 2 == 0, [0.0, 0.3, 1.0, 2.0][seed as usize % 4]);
+        let bytes = world(
+            noise,
+            seed % 2 == 0,
+            [0.0, 0.3, 1.0, 2.0][seed as usize % 4],
+        );
         let table = Table::read(&bytes).unwrap();
         let mut explorer = begin(table, PropertySet::ALL, Method::Student);
         let mut log = vec![0.0; table.textures().into()];
@@ -138,7 +156,10 @@ fn explores_by_students_t() {
             let p: Vec<f64> = explorer.posterior().iter().map(|p| f64::from(*p)).collect();
             for o in &outlook {
                 let u = uncertainty(&[expected(&table, o.action)], &p);
-                assert!((f64::from(o.uncertainty) - u).abs() < 1e-4, "{seed} {o:?} {u}");
+                assert!(
+                    (f64::from(o.uncertainty) - u).abs() < 1e-4,
+                    "{seed} {o:?} {u}"
+                );
             }
             let action = explorer.choose(&outlook, 0);
             let x = (1.5 * noise.normal()) as f32;
@@ -156,7 +177,11 @@ fn explores_by_students_t() {
 fn explores_by_the_product_of_all_properties() {
     for seed in 0..200 {
         let noise = &mut Noise(1000 + seed);
-        let bytes = world(noise, seed % 2 == 0, [0.0, 0.3, 1.0, 2.0][seed as usize % 4]);
+        let bytes = world(
+            noise,
+            seed % 2 == 0,
+            [0.0, 0.3, 1.0, 2.0][seed as usize % 4],
+        );
         let table = Table::read(&bytes).unwrap();
         let measured = [0b111, 0b110, 0b001][seed as usize % 3];
         let measured = PropertySet::from_bits(measured).unwrap();
@@ -169,12 +194,22 @@ fn explores_by_the_product_of_all_properties() {
                 movement,
                 property: None,
             };
-            assert!(outlook.iter().map(|o| o.action).eq((0..movements).map(everything)));
+            assert!(
+                outlook
+                    .iter()
+                    .map(|o| o.action)
+                    .eq((0..movements).map(everything))
+            );
             let p: Vec<f64> = explorer.posterior().iter().map(|p| f64::from(*p)).collect();
             for o in &outlook {
-                let of = measured.iter().map(|p| expected(&table, act(o.action.movement, p)));
+                let of = measured
+                    .iter()
+                    .map(|p| expected(&table, act(o.action.movement, p)));
                 let u = uncertainty(&of.collect::<Vec<_>>(), &p);
-                assert!((f64::from(o.uncertainty) - u).abs() < 1e-4, "{seed} {o:?} {u}");
+                assert!(
+                    (f64::from(o.uncertainty) - u).abs() < 1e-4,
+                    "{seed} {o:?} {u}"
+                );
                 let made = slides.get(&o.action.movement).map_or(0, Vec::len) as u8;
                 assert_eq!(o.benefit, benefit(o.uncertainty, made));
             }
@@ -182,7 +217,9 @@ fn explores_by_the_product_of_all_properties() {
             let x: [f32; 3] = core::array::from_fn(|_| (1.5 * noise.normal()) as f32);
             // what is not measured need not be there
             let values = Property::ALL.map(|p| measured.contains(p).then_some(x[p.index()]));
-            explorer.observe(action, &Properties::new(values).into()).unwrap();
+            explorer
+                .observe(action, &Properties::new(values).into())
+                .unwrap();
             slides.entry(action.movement).or_default().push(x);
             let mut log = vec![0.0; table.textures().into()];
             for (&movement, slides) in &slides {
@@ -230,7 +267,11 @@ fn a_slide_without_one_of_the_properties_teaches_nothing() {
     let mut new = begin(table, PropertySet::ALL, Method::StudentAll);
     assert_eq!(state(&mut explorer), state(&mut new));
     explorer.observe(look(0), &all(0.4)).unwrap();
-    assert_eq!(state(&mut explorer), before, "nothing is left of the last one");
+    assert_eq!(
+        state(&mut explorer),
+        before,
+        "nothing is left of the last one"
+    );
 }
 
 /// Far away all are alike, and numbers stay numbers.

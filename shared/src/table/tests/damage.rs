@@ -251,10 +251,7 @@ fn what_is_wrong_is_told() {
             TableError::Whitening(2),
             "the whitening of movement 3 is damaged",
         ),
-        (
-            TableError::Number(3),
-            "texture 4 has another's number",
-        ),
+        (TableError::Number(3), "texture 4 has another's number"),
         (
             TableError::Name(0),
             "the name of texture 1 is empty, not UTF-8, or another's as well",

@@ -61,7 +61,9 @@ fn write<'a>(
     textures: &'a [(&'a str, Vec<Whitened>)],
 ) -> Result<Vec<u8>, EncodeError> {
     let mut out = vec![0xa5; 100_000];
-    let textures = textures.iter().map(|(name, known)| (*name, known.as_slice()));
+    let textures = textures
+        .iter()
+        .map(|(name, known)| (*name, known.as_slice()));
     let table = encode_fused(&mut out, set, movements, textures)?;
     Ok(table.as_bytes().to_vec())
 }
@@ -74,7 +76,10 @@ fn the_fused_form_is_the_documented_one() {
     let bytes = small_fused();
     let table = Table::read(&bytes).unwrap();
     assert_eq!(table.contents(), Contents::Fused(BANDS, 2));
-    assert_eq!((table.textures(), table.measured()), (2, PropertySet::default()));
+    assert_eq!(
+        (table.textures(), table.measured()),
+        (2, PropertySet::default())
+    );
     assert_eq!(table.movements().collect::<Vec<_>>(), MOVEMENTS);
     assert_eq!(table.actions().count(), 0);
     for (movement, (_, whitening)) in (0..).zip(movements()) {
@@ -85,9 +90,16 @@ fn the_fused_form_is_the_documented_one() {
         for (movement, known) in (0..).zip(known) {
             assert_eq!(table.whitened(texture, movement), known);
             assert_eq!(table.trials(texture, movement), known.slides);
-            assert!(table.white_mean(texture, movement).eq(known.mean[..2].iter().copied()));
+            assert!(
+                table
+                    .white_mean(texture, movement)
+                    .eq(known.mean[..2].iter().copied())
+            );
         }
-        assert_eq!((table.number(texture), table.numbered(texture)), (texture, Some(texture)));
+        assert_eq!(
+            (table.number(texture), table.numbered(texture)),
+            (texture, Some(texture))
+        );
     }
     let factory = |factory| Tally {
         factory,
@@ -95,7 +107,10 @@ fn the_fused_form_is_the_documented_one() {
     };
     assert_eq!([0, 1].map(|t| table.tally(t)), [factory(5), factory(255)]);
     assert_eq!((table.next_number(), table.numbered(2)), (2, None));
-    assert_eq!((table.crc(), table.lineage()), (crc32(&bytes[..95]), table.crc()));
+    assert_eq!(
+        (table.crc(), table.lineage()),
+        (crc32(&bytes[..95]), table.crc())
+    );
     // as in the whitening's own test: (1, 2) above g is (1, 3)
     assert_eq!(table.whiten(0, &[2048, 1536]).unwrap(), [256, 768]);
     assert_eq!(table.whiten(1, &[2048, 1536]).unwrap(), [512, 384]);
@@ -109,7 +124,10 @@ fn the_fused_form_is_the_documented_one() {
     assert_eq!(table.gaussian(0, act(0, Property::Traction)), None);
     let gaussians = small();
     let gaussians = Table::read(&gaussians).unwrap();
-    assert_eq!((gaussians.whitening(0), gaussians.white_mean(0, 0).len()), (None, 0));
+    assert_eq!(
+        (gaussians.whitening(0), gaussians.white_mean(0, 0).len()),
+        (None, 0)
+    );
 }
 
 #[test]
@@ -199,12 +217,20 @@ fn what_is_no_fused_table_is_not_written() {
     assert_eq!(write(BANDS, &mixed, &rows()), Err(EncodeError::Contents));
     assert_eq!(write(BANDS, &movements, &[]), Err(EncodeError::Empty));
     let short = [felt.clone(), ("oak", vec![oak.1[0]])];
-    assert_eq!(write(BANDS, &movements, &short), Err(EncodeError::Movements(1)));
+    assert_eq!(
+        write(BANDS, &movements, &short),
+        Err(EncodeError::Movements(1))
+    );
     let twins = [felt.clone(), ("felt", oak.1)];
     let twin = EncodeError::Invalid(TableError::Name(1));
     assert_eq!(write(BANDS, &movements, &twins), Err(twin));
     let mut out = [0; 98];
-    let none = encode_fused(&mut out, BANDS, &movements, [("felt", &felt.1[..]); 1].into_iter());
+    let none = encode_fused(
+        &mut out,
+        BANDS,
+        &movements,
+        [("felt", &felt.1[..]); 1].into_iter(),
+    );
     assert_eq!(none.unwrap().textures(), 1);
     let both = rows();
     let both = both.iter().map(|(name, known)| (*name, known.as_slice()));
@@ -240,14 +266,20 @@ fn the_study_takes_11_kb_at_most() {
     }
     let names: usize = table.names().map(|name| name.len() + 1).sum();
     assert_eq!(bytes.len() - names, encoded_len(contents, 117, 3, 0));
-    assert!(bytes.len() - names <= 11_000, "{} bytes", bytes.len() - names);
+    assert!(
+        bytes.len() - names <= 11_000,
+        "{} bytes",
+        bytes.len() - names
+    );
 }
 
 /// Everything that a table has of a texture but its place.
 fn whole(table: &Table<'_>, name: &str) -> (u16, Tally, Vec<Vec<u8>>, Vec<u8>) {
     let texture = table.find(name).unwrap();
     let movements = 0..table.movements().len() as u8;
-    let cells = movements.clone().map(|m| table.cell_bytes(texture, m).unwrap().to_vec());
+    let cells = movements
+        .clone()
+        .map(|m| table.cell_bytes(texture, m).unwrap().to_vec());
     (
         table.number(texture),
         table.tally(texture),
@@ -328,7 +360,10 @@ fn a_change_leaves_all_others_as_they_are() {
         let put = Change::Put { name, known, tally };
         let more = amend(&mut a, &first, put).unwrap();
         unchanged(&first, &more, &["t0", "t1", "t2", "t3", "t4"]);
-        assert_eq!(more.names().collect::<Vec<_>>(), ["t0", "t1", "t2", "t3", "t4", "oak"]);
+        assert_eq!(
+            more.names().collect::<Vec<_>>(),
+            ["t0", "t1", "t2", "t3", "t4", "oak"]
+        );
         is_it(&more, "oak");
         assert_eq!((more.number(5), more.lineage()), (5, first.crc()));
         assert_ne!(more.crc(), first.crc());
@@ -391,17 +426,28 @@ fn a_change_that_cannot_be_is_refused() {
         let is_fused = matches!(table.contents(), Contents::Fused(..));
         let (mine, other, short) = if is_fused {
             let short = Known::Fused(&whitened[..2]);
-            (Known::Fused(&whitened), Known::Gaussians(&experience), short)
+            (
+                Known::Fused(&whitened),
+                Known::Gaussians(&experience),
+                short,
+            )
         } else {
             let short = Known::Gaussians(&experience[..2]);
-            (Known::Gaussians(&experience), Known::Fused(&whitened), short)
+            (
+                Known::Gaussians(&experience),
+                Known::Fused(&whitened),
+                short,
+            )
         };
         for name in ["oak", "t3"] {
             assert_eq!(refused(put(name, other)), EncodeError::Contents);
             let index = if name == "oak" { 5 } else { 3 };
             assert_eq!(refused(put(name, short)), EncodeError::Movements(index));
         }
-        let length = amend(&mut out, &table, put("oak", mine)).unwrap().as_bytes().len();
+        let length = amend(&mut out, &table, put("oak", mine))
+            .unwrap()
+            .as_bytes()
+            .len();
         let less = amend(&mut out[..length - 1], &table, put("oak", mine)).map(|_| ());
         assert_eq!(less, Err(EncodeError::Room(length)));
     }
@@ -453,5 +499,8 @@ fn retelling_changes_one_mean_only() {
     assert_eq!(none, Err(EncodeError::Contents));
     twice[40] ^= 1;
     let none = retell(&mut twice, 0, 0, &new, tally);
-    assert!(matches!(none, Err(EncodeError::Invalid(TableError::Crc { .. }))));
+    assert!(matches!(
+        none,
+        Err(EncodeError::Invalid(TableError::Crc { .. }))
+    ));
 }
