@@ -173,4 +173,4 @@ impl<F: NorFlash> Store<F> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

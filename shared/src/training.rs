@@ -425,6 +425,8 @@ impl Training {
 
 #[cfg(test)]
 mod tests {
+    mod fused;
+
     use super::*;
     use crate::features::Properties;
     use crate::table::tests::{around, table_of};

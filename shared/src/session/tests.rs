@@ -1,7 +1,10 @@
 use super::*;
 use crate::features::{Property, PropertySet};
+use crate::fused::FeatureSet;
 use crate::rig::pins::MAX_WORDS;
-use crate::table::tests::{around, table_of};
+use crate::store::SelfTaught;
+use crate::store::tests::ram::Ram;
+use crate::table::tests::{around, fused_of, known, straight, table_of};
 use embassy_futures::block_on;
 use std::format;
 use std::string::String;
@@ -181,4 +184,168 @@ fn blocks_hold_every_sample_in_its_order() {
             .is_some_and(|b| b.steady.is_some())
     );
     assert_eq!(sent.iter().map(|b| b.lost).sum::<u32>(), 5);
+}
+
+/// Four textures whose tractions lie ten standard deviations apart; the third one's bands are those of the script's slides.
+fn fused_table() -> vec::Vec<u8> {
+    let bands = {
+        let plan = Plan::new();
+        let mut slide = Slide::<crate::kernels::Plain>::new(&plan);
+        block_on(Script([Some(0)].into()).perform(Movement::FOR_TRACTION, &mut slide)).unwrap();
+        Observation::from(&slide.finish().unwrap()).bands
+    };
+    let row = |traction: f64, apart: f64| {
+        let bands = bands.iter().map(|b| f64::from(*b) / 1024.0 + apart);
+        let mean: vec::Vec<f64> = core::iter::once(traction).chain(bands).collect();
+        vec![known(5, &mean)]
+    };
+    let rows = [
+        row(-10.0, -4.0),
+        row(0.0, 4.0),
+        row(10.0, 0.0),
+        row(20.0, 8.0),
+    ];
+    fused_of(FeatureSet::Force, &[straight(13)], &rows)
+}
+
+#[test]
+fn a_fused_exploration_says_whether_it_is_certain() {
+    let bytes = fused_table();
+    let explored = |slides: &[Option<i16>], open| {
+        let mut told = vec::Vec::new();
+        let wanted = Identify {
+            method: None,
+            open,
+            ..wanted(&[])
+        };
+        let visited = block_on(identify::<_, crate::kernels::Plain>(
+            &wanted,
+            &mut Script(slides.iter().copied().collect()),
+            Table::read(&bytes).unwrap(),
+            &Plan::new(),
+            |tell| told.push(tell),
+        ))
+        .unwrap();
+        (visited, told.pop().unwrap())
+    };
+    let (visited, verdict) = explored(&[Some(10_000)], true);
+    let Tell::Verdict {
+        texture: 2,
+        sure: true,
+        unknown: false,
+        asks: false,
+        slides: 1,
+        log_odds,
+        ..
+    } = verdict
+    else {
+        panic!("{verdict:?}");
+    };
+    assert!(log_odds.unwrap() < -2.0);
+    let table = Table::read(&bytes).unwrap();
+    assert_eq!(
+        (visited.table, visited.texture, visited.certain),
+        (table.crc(), 2, true)
+    );
+    let (movement, slides, mean) = &visited.felt[0];
+    assert_eq!((visited.felt.len(), *movement, *slides), (1, 0, 1));
+    let mean = mean.iter().zip(table.white_mean(2, 0));
+    assert!(mean.clone().count() == 13 && mean.clone().all(|(a, b)| a.abs_diff(b) <= 1));
+    // far from all
+    let (visited, verdict) = explored(&[Some(-32_000), Some(-32_000)], true);
+    let Tell::Verdict {
+        texture: 0,
+        sure: false,
+        unknown: true,
+        asks: true,
+        slides: 2,
+        ..
+    } = verdict
+    else {
+        panic!("{verdict:?}");
+    };
+    assert!(!visited.certain);
+    assert_eq!(visited.felt[0].1, 2);
+    let (visited, verdict) = explored(&[Some(-32_000)], false);
+    let Tell::Verdict {
+        texture: 0,
+        sure: true,
+        unknown: false,
+        asks: true,
+        ..
+    } = verdict
+    else {
+        panic!("{verdict:?}");
+    };
+    assert!(
+        !visited.certain,
+        "closed, and not to be learned from all the same"
+    );
+}
+
+/// The user trains a texture of which the probe had taught itself something: what the user taught stands in its place.
+#[test]
+fn training_a_fused_texture_ends_in_the_store() {
+    let bytes = fused_table();
+    let table = Table::read(&bytes).unwrap();
+    for (name, tractions) in [("elm", [31_000, 29_000]), ("t2", [11_000, 13_000])] {
+        let mut store = block_on(Store::open(Ram::<16_384>::new())).unwrap();
+        let movements = Vec::from_slice(&[(0, 3, known(9, &[1.0; 13]))]).unwrap();
+        // number 4 is the next one's
+        for number in [1, 2, 4] {
+            let record = SelfTaught {
+                lineage: table.lineage(),
+                number,
+                movements: movements.clone(),
+            };
+            block_on(store.set_self_taught(&record)).unwrap();
+        }
+        let known_before = table.find(name).map_or(0, |t| table.trials(t, 0));
+        let wanted = Train {
+            name: Name::try_from(name).unwrap(),
+            trials: known_before + 2,
+            pilot: false,
+            seed: 1,
+        };
+        let mut rig = Script([None, Some(tractions[0]), Some(tractions[1])].into());
+        let mut room = vec![0; 8192];
+        let mut told = vec::Vec::new();
+        block_on(train::<_, _, crate::kernels::Plain>(
+            &wanted,
+            &mut rig,
+            &mut store,
+            table,
+            &Plan::new(),
+            &mut room,
+            |tell| told.push(tell),
+        ))
+        .unwrap();
+        assert!(matches!(
+            told[..],
+            [
+                Tell::Rejected { slide: 1, .. },
+                Tell::Learned { left: 1, .. },
+                Tell::Learned { left: 0, .. }
+            ]
+        ));
+        let mut room = vec![0; 8192];
+        let new = block_on(store.read_table(&mut room)).unwrap().unwrap();
+        let texture = new.find(name).unwrap();
+        assert_eq!(new.trials(texture, 0), known_before + 2);
+        let mean = new.white_mean(texture, 0).next().unwrap();
+        let before = if known_before > 0 { 5.0 * 10.0 } else { 0.0 };
+        let sum = before + tractions.map(f64::from).iter().sum::<f64>() / 1000.0;
+        let expected = sum / f64::from(known_before + 2) * 256.0;
+        assert!(
+            (f64::from(mean) - expected).abs() <= 1.0,
+            "{mean} {expected}"
+        );
+        assert_eq!((new.tally(texture).user, new.lineage()), (2, table.crc()));
+        let number = new.number(texture);
+        let mut left = vec::Vec::new();
+        block_on(store.self_taught(table.lineage(), |r| left.push(r.number))).unwrap();
+        assert!(!left.contains(&number) && left.contains(&1), "{left:?}");
+        let unfinished = block_on(store.trained(name, table.movement(0).unwrap(), None));
+        assert_eq!(unfinished, Ok(None));
+    }
 }

@@ -1,7 +1,8 @@
 //! The store against a flash that loses its power at every word and in every erase.
 
 mod cuts;
-mod ram;
+pub(crate) mod ram;
+mod self_taught;
 
 use super::*;
 use crate::movement::Movement;
@@ -111,7 +112,7 @@ fn a_blank_flash_is_an_empty_store() {
     let none = block_on(store.trained("felt", Movement::FOR_TRACTION, None));
     assert_eq!(none, Ok(None));
     assert_eq!(store.close().operations, 0, "looking writes nothing");
-    let mut short = Ram::new();
+    let mut short = Ram::<SECTOR>::new();
     short.bytes.truncate(3 * SECTOR);
     assert_eq!(
         block_on(Store::open(short)).err(),

@@ -1,1 +1,597 @@
-//! Teaching, forgetting, and what a cut leaves.
+//! Learning by itself and from answers, against running means in f64; the power is cut at every word.
+
+use super::*;
+use crate::fused::{FeatureSet, MAX_FEATURES};
+use crate::store::tests::ram::{Ram, RamError, Torn};
+use crate::store::{StoreError, Trained};
+use crate::table::tests::{fused_of, known, straight};
+use crate::training::Lesson;
+use embassy_futures::block_on;
+use std::vec;
+use std::vec::Vec as List;
+
+/// Four textures at three movements, three features, five slides each.
+fn base() -> List<u8> {
+    let ends = [
+        [6.0, 0.0, 0.0],
+        [-6.0, 0.0, 0.0],
+        [0.0, 6.0, 0.0],
+        [0.0, -6.0, 1.0],
+    ];
+    let known: List<List<Whitened>> = ends.iter().map(|end| vec![known(5, end); 3]).collect();
+    let whitenings = [straight(3), straight(3), straight(3)];
+    fused_of(FeatureSet::Bands, &whitenings, &known)
+}
+
+/// A store with this table.
+fn store(bytes: &[u8]) -> Store<Ram> {
+    let mut store = block_on(Store::open(Ram::new())).unwrap();
+    let mut room = bytes.to_vec();
+    block_on(commit(&mut store, &mut room, bytes.len())).unwrap();
+    store
+}
+
+fn again(store: Store<Ram>) -> Store<Ram> {
+    block_on(Store::open(store.close().again())).unwrap()
+}
+
+/// The stored table.
+fn stored(store: &mut Store<Ram>) -> List<u8> {
+    let mut room = vec![0; 1024];
+    let table = block_on(store.read_table(&mut room)).unwrap().unwrap();
+    table.as_bytes().to_vec()
+}
+
+/// The table in force.
+fn in_force(store: &mut Store<Ram>) -> List<u8> {
+    let bytes = stored(store);
+    let mut room = vec![0xa5; 1024];
+    let base = Table::read(&bytes).unwrap();
+    let length = block_on(put_in_force(&base, Some(store), &mut room)).unwrap();
+    room.truncate(length);
+    room
+}
+
+fn selves(store: &mut Store<Ram>, lineage: u32) -> List<SelfTaught> {
+    let mut all = List::new();
+    block_on(store.self_taught(lineage, |record| all.push(record))).unwrap();
+    all
+}
+
+fn visited(table: &[u8], texture: u16, felt: &[(u8, u8, [i16; 3])]) -> Visited {
+    Visited {
+        table: Table::read(table).unwrap().crc(),
+        texture,
+        certain: true,
+        felt: felt
+            .iter()
+            .map(|(movement, slides, mean)| (*movement, *slides, Vector::from_slice(mean).unwrap()))
+            .collect(),
+    }
+}
+
+/// Room for a table, with this one at its beginning.
+fn room(table: &[u8]) -> List<u8> {
+    let mut room = table.to_vec();
+    room.resize(900, 0x5a);
+    room
+}
+
+/// Step 8 of the recipe, so many slides of this mean, in steps.
+fn recipe(mut mean: f64, mut n: f64, slides: u8, z: i16) -> (f64, f64) {
+    for _ in 0..slides {
+        mean += (f64::from(z) - mean) / (n.min(8.0) + 1.0);
+        n = n.max((n + 1.0).min(8.0));
+    }
+    (mean, n)
+}
+
+#[test]
+fn without_anything_learned_the_table_in_force_is_the_stored_one() {
+    let bytes = base();
+    let table = Table::read(&bytes).unwrap();
+    let mut room = room(&[]);
+    let length = block_on(put_in_force::<Ram>(&table, None, &mut room)).unwrap();
+    assert_eq!((&room[..length], room[length]), (&bytes[..], 0x5a));
+    let mut store = store(&bytes);
+    assert_eq!(in_force(&mut store), bytes);
+    let small = block_on(put_in_force(
+        &table,
+        Some(&mut store),
+        &mut room[..length - 1],
+    ));
+    assert_eq!(small, Err(EncodeError::Room(length)));
+    // what was learned of another table, or of a texture that is gone, is nothing to this one
+    for (lineage, number) in [(table.lineage() ^ 1, 0), (table.lineage(), 9)] {
+        let movements = Vec::from_slice(&[(0, 3, Whitened::default())]).unwrap();
+        let record = SelfTaught {
+            lineage,
+            number,
+            movements,
+        };
+        block_on(store.set_self_taught(&record)).unwrap();
+    }
+    assert_eq!(in_force(&mut store), bytes);
+}
+
+#[test]
+fn it_learns_by_itself_by_the_recipe() {
+    let bytes = base();
+    let old = Table::read(&bytes).unwrap();
+    let mut store = store(&bytes);
+    let mut force = room(&bytes);
+    // mean and number of every movement as the recipe has them
+    let mut means = [[0.0, 6.0 * 256.0, 0.0]; 3];
+    let mut counts = [5.0; 3];
+    let visits: [&[(u8, u8, [i16; 3])]; 4] = [
+        &[(1, 1, [100, 1400, -300])],
+        &[(1, 2, [150, 1300, -200]), (2, 4, [-500, 2000, 90])],
+        &[(2, 1, [0, 1000, 0])],
+        // a third movement has no room
+        &[(0, 3, [900, 900, 900]), (1, 9, [130, 1380, -280])],
+    ];
+    let mut total = 0;
+    for felt in visits {
+        let visit = visited(&force, 2, felt);
+        let told = block_on(learn_by_itself(&visit, &mut store, &mut force)).unwrap();
+        let mut slides = 0;
+        for &(movement, count, z) in felt.iter().filter(|f| f.0 != 0) {
+            slides += count;
+            let at = usize::from(movement);
+            let before = counts[at];
+            for (mean, z) in means[at].iter_mut().zip(z) {
+                (*mean, counts[at]) = recipe(*mean, before, count, z);
+            }
+        }
+        let name = Name::try_from("t2").unwrap();
+        let itself = true;
+        assert_eq!(
+            told,
+            Some(Tell::Taught {
+                name,
+                slides,
+                itself
+            })
+        );
+        total += slides;
+        let table = Table::read(&force).unwrap();
+        for movement in 0..3 {
+            let known = table.whitened(2, movement);
+            let at = usize::from(movement);
+            assert_eq!(f64::from(known.slides), counts[at]);
+            for (mean, expected) in known.mean.iter().zip(means[at]) {
+                assert!(
+                    (f64::from(*mean) - expected).abs() <= 4.5,
+                    "{mean} {expected}"
+                );
+            }
+        }
+        let tally = table.tally(2);
+        assert_eq!((tally.factory, tally.user, tally.itself), (15, 0, total));
+        assert_eq!(table.lineage(), old.crc());
+        for texture in [0, 1, 3] {
+            assert_eq!(table.tally(texture), old.tally(texture));
+            for movement in 0..3 {
+                assert_eq!(
+                    table.whitened(texture, movement),
+                    old.whitened(texture, movement)
+                );
+            }
+        }
+        // and so it is after a reset
+        store = again(store);
+        assert_eq!(in_force(&mut store), table.as_bytes());
+        assert_eq!(stored(&mut store), bytes, "the stored table is as it was");
+    }
+    assert_eq!(means[0], [0.0, 6.0 * 256.0, 0.0]);
+    block_on(forget(&Forget::SelfTaught, &old, &mut store, &mut force)).unwrap();
+    assert_eq!(in_force(&mut again(store)), bytes, "to the bit");
+}
+
+#[test]
+fn nothing_is_learned_that_is_not_certain() {
+    let bytes = base();
+    let mut store = store(&bytes);
+    let mut force = room(&bytes);
+    let felt = [(1, 1, [100, 1400, -300])];
+    let sure = visited(&bytes, 2, &felt);
+    let uncertain = Visited {
+        certain: false,
+        ..sure.clone()
+    };
+    let changed = Visited {
+        table: sure.table ^ 1,
+        ..sure.clone()
+    };
+    let nothing = visited(&bytes, 2, &[]);
+    let flash = store.close();
+    let before = flash.bytes.clone();
+    store = block_on(Store::open(flash)).unwrap();
+    for visit in [uncertain, changed, nothing] {
+        let told = block_on(learn_by_itself(&visit, &mut store, &mut force));
+        assert_eq!(told, Ok(None));
+    }
+    assert_eq!(force, room(&bytes));
+    let flash = store.close();
+    assert!(flash.bytes == before, "nothing is written");
+    // twice from one visit: the table is another one after the first time
+    let mut store = block_on(Store::open(flash.again())).unwrap();
+    assert!(
+        block_on(learn_by_itself(&sure, &mut store, &mut force))
+            .unwrap()
+            .is_some()
+    );
+    let once = force.clone();
+    assert_eq!(
+        block_on(learn_by_itself(&sure, &mut store, &mut force)),
+        Ok(None)
+    );
+    assert_eq!(force, once);
+}
+
+#[test]
+fn an_answer_teaches_a_known_texture() {
+    let bytes = base();
+    let old = Table::read(&bytes).unwrap();
+    let mut store = store(&bytes);
+    let mut force = room(&bytes);
+    // it has learned one movement of it by itself before
+    let visit = visited(&force, 1, &[(0, 2, [-1600, 40, 50])]);
+    block_on(learn_by_itself(&visit, &mut store, &mut force)).unwrap();
+    let by_itself = Table::read(&force).unwrap().whitened(1, 0);
+    let felt = [
+        (0, 3, [-1500, 10, 20]),
+        (2, 1, [-1700, -10, -20]),
+        (9, 1, [1, 2, 3]),
+    ];
+    // the most probable one was another
+    let visit = visited(&force, 3, &felt);
+    let told = block_on(answer(&visit, "t1", &old, &mut store, &mut force)).unwrap();
+    let taught = Tell::Taught {
+        name: Name::try_from("t1").unwrap(),
+        slides: 4,
+        itself: false,
+    };
+    assert_eq!(told, taught);
+    let mut store = again(store);
+    let new = stored(&mut store);
+    let new = Table::read(&new).unwrap();
+    assert!(new.names().eq(old.names()));
+    assert_eq!(new.lineage(), old.crc());
+    let mut expected = [[-6.0 * 256.0, 0.0, 0.0]; 3];
+    for &(movement, count, z) in felt.iter().take(2) {
+        let mean = &mut expected[usize::from(movement)];
+        for (mean, z) in mean.iter_mut().zip(z) {
+            *mean = recipe(*mean, 5.0, count, z).0;
+        }
+    }
+    for (movement, slides) in [(0, 8), (1, 5), (2, 6)] {
+        let known = new.whitened(1, movement);
+        assert_eq!(known.slides, slides);
+        for (mean, expected) in known.mean.iter().zip(expected[usize::from(movement)]) {
+            assert!(
+                (f64::from(*mean) - expected).abs() <= 4.5,
+                "{mean} {expected}"
+            );
+        }
+    }
+    let tally = new.tally(1);
+    assert_eq!((tally.factory, tally.user, tally.itself), (15, 4, 0));
+    for texture in [0, 2, 3] {
+        assert_eq!(new.tally(texture), old.tally(texture));
+        for movement in 0..3 {
+            assert_eq!(
+                new.whitened(texture, movement),
+                old.whitened(texture, movement)
+            );
+        }
+    }
+    // what it had learned by itself goes the same way, and is still in force
+    let force = in_force(&mut store);
+    let force = Table::read(&force).unwrap();
+    let mut expected = by_itself;
+    (0..3).for_each(|_| expected.adapt(&[-1500, 10, 20]));
+    assert_eq!(force.whitened(1, 0), expected);
+    assert_eq!(force.whitened(1, 2), new.whitened(1, 2));
+    let tally = force.tally(1);
+    assert_eq!((tally.factory, tally.user, tally.itself), (15, 4, 2));
+}
+
+#[test]
+fn an_answer_teaches_a_new_texture() {
+    let bytes = base();
+    let old = Table::read(&bytes).unwrap();
+    let mut store = store(&bytes);
+    // a cut has left what was learned of a texture that had its number
+    let stale = SelfTaught {
+        lineage: old.lineage(),
+        number: 4,
+        movements: Vec::from_slice(&[(0, 3, known(9, &[30.0; 3]))]).unwrap(),
+    };
+    block_on(store.set_self_taught(&stale)).unwrap();
+    let mut force = room(&bytes);
+    let felt = [(0, 3, [700, -701, 5]), (2, 1, [-3, 4, 9000])];
+    let visit = visited(&force, 3, &felt);
+    let told = block_on(answer(&visit, "elm", &old, &mut store, &mut force)).unwrap();
+    let taught = Tell::Taught {
+        name: Name::try_from("elm").unwrap(),
+        slides: 4,
+        itself: false,
+    };
+    assert_eq!(told, taught);
+    let mut store = again(store);
+    let new = stored(&mut store);
+    assert_eq!(in_force(&mut store), new, "nothing is left of the other");
+    assert_eq!(selves(&mut store, old.lineage()), []);
+    let new = Table::read(&new).unwrap();
+    assert_eq!(
+        (new.textures(), new.find("elm"), new.number(4)),
+        (5, Some(4), 4)
+    );
+    for &(movement, slides, mean) in &felt {
+        let mut expected = Whitened {
+            slides,
+            mean: [0; MAX_FEATURES],
+        };
+        expected.mean[..3].copy_from_slice(&mean);
+        assert_eq!(new.whitened(4, movement), expected);
+    }
+    assert_eq!(new.whitened(4, 1), Whitened::default());
+    let tally = new.tally(4);
+    assert_eq!((tally.factory, tally.user, tally.itself), (0, 4, 0));
+    for texture in 0..4 {
+        assert_eq!(new.tally(texture), old.tally(texture));
+        assert_eq!(new.number(texture), old.number(texture));
+        for movement in 0..3 {
+            assert_eq!(
+                new.whitened(texture, movement),
+                old.whitened(texture, movement)
+            );
+        }
+    }
+}
+
+#[test]
+fn an_answer_to_nothing_is_refused() {
+    let bytes = base();
+    let old = Table::read(&bytes).unwrap();
+    let mut store = store(&bytes);
+    let mut force = room(&bytes);
+    let good = visited(&bytes, 0, &[(0, 1, [1, 2, 3])]);
+    let mut refused = |visit: &Visited, name: &str, base: &Table<'_>, force: &mut List<u8>| {
+        let why = block_on(answer(visit, name, base, &mut store, force)).unwrap_err();
+        assert_eq!(stored(&mut store), bytes);
+        why
+    };
+    let changed = Visited {
+        table: good.table ^ 1,
+        ..good.clone()
+    };
+    let why = refused(&changed, "elm", &old, &mut force);
+    assert!(why.contains("changed since the exploration"), "{why}");
+    let nothing = visited(&bytes, 0, &[]);
+    let why = refused(&nothing, "elm", &old, &mut force);
+    assert!(why.contains("by `train` only"), "{why}");
+    let why = refused(&good, "", &old, &mut force);
+    assert!(why.contains("the name of texture 5 is empty"), "{why}");
+    let full = vec![vec![known(1, &[0.0])]; MAX_TEXTURES];
+    let full = fused_of(FeatureSet::Bands, &[straight(1)], &full);
+    let visit = visited(&full, 0, &[(0, 1, [1, 2, 3])]);
+    let mut force = full.clone();
+    let why = refused(&visit, "elm", &Table::read(&full).unwrap(), &mut force);
+    assert!(why.contains("forget a texture first"), "{why}");
+    // no room for one more
+    let mut force = bytes.clone();
+    let why = refused(&good, "elm", &old, &mut force);
+    assert!(why.contains("there is less room"), "{why}");
+}
+
+#[test]
+fn textures_are_renamed_and_forgotten() {
+    let bytes = base();
+    let old = Table::read(&bytes).unwrap();
+    let mut store = store(&bytes);
+    let mut force = room(&bytes);
+    for texture in [1, 3] {
+        let visit = visited(&force, texture, &[(0, 1, [1, 2, 3])]);
+        block_on(learn_by_itself(&visit, &mut store, &mut force)).unwrap();
+    }
+    let learned = Table::read(&force).unwrap().whitened(3, 0);
+    let refused = block_on(rename("elm", "oak", &old, &mut store, &mut force)).unwrap_err();
+    assert_eq!(refused, "there is no texture elm in the table");
+    let refused = block_on(rename("t1", "t2", &old, &mut store, &mut force)).unwrap_err();
+    assert_eq!(refused, "there is a texture t2 already");
+    assert_eq!(stored(&mut store), bytes);
+    block_on(rename("t3", "oak", &old, &mut store, &mut force)).unwrap();
+    let bytes = stored(&mut store);
+    let renamed = Table::read(&bytes).unwrap();
+    assert_eq!(
+        renamed.names().collect::<List<_>>(),
+        ["t0", "t1", "t2", "oak"]
+    );
+    let bytes = in_force(&mut store);
+    let force_now = Table::read(&bytes).unwrap();
+    assert_eq!(
+        force_now.whitened(3, 0),
+        learned,
+        "it keeps what was learned by itself"
+    );
+
+    let gone = |name| Forget::Texture(Name::try_from(name).unwrap());
+    let refused = block_on(forget(&gone("t3"), &renamed, &mut store, &mut force)).unwrap_err();
+    assert_eq!(refused, "there is no texture t3 in the table");
+    block_on(forget(&gone("t1"), &renamed, &mut store, &mut force)).unwrap();
+    let mut store = again(store);
+    let bytes = stored(&mut store);
+    let less = Table::read(&bytes).unwrap();
+    assert_eq!(less.names().collect::<List<_>>(), ["t0", "t2", "oak"]);
+    let left = selves(&mut store, old.crc());
+    assert_eq!(left.iter().map(|r| r.number).collect::<List<_>>(), [3]);
+    let bytes = in_force(&mut store);
+    let force_now = Table::read(&bytes).unwrap();
+    assert_eq!(force_now.whitened(2, 0), learned, "by its number");
+    for movement in 1..3 {
+        assert_eq!(force_now.whitened(2, movement), old.whitened(3, movement));
+    }
+    // the last one stays
+    let bytes = fused_of(FeatureSet::Bands, &[straight(1)], &[vec![known(1, &[0.0])]]);
+    let one = Table::read(&bytes).unwrap();
+    let refused = block_on(forget(&gone("t0"), &one, &mut store, &mut force)).unwrap_err();
+    assert_eq!(refused, "a table cannot be without any texture");
+}
+
+#[test]
+fn unfinished_training_is_forgotten() {
+    let bytes = base();
+    let old = Table::read(&bytes).unwrap();
+    let mut store = store(&bytes);
+    let movement = old.movement(0).unwrap();
+    let lesson = Lesson::Fused(known(2, &[1.0; 3]));
+    for name in ["elm", "oak"] {
+        let name = Name::try_from(name).unwrap();
+        let table = None;
+        let record = Trained {
+            name,
+            movement,
+            table,
+            lesson,
+        };
+        block_on(store.set_trained(&record)).unwrap();
+    }
+    let what = Forget::Training(Name::try_from("elm").unwrap());
+    block_on(forget(&what, &old, &mut store, &mut [])).unwrap();
+    assert_eq!(block_on(store.trained("elm", movement, None)), Ok(None));
+    assert_eq!(
+        block_on(store.trained("oak", movement, None)),
+        Ok(Some(lesson))
+    );
+    assert_eq!(stored(&mut store), bytes);
+}
+
+const WAYS: [Torn; 6] = [
+    Torn::Nothing,
+    Torn::Begin(50),
+    Torn::End(50),
+    Torn::Bits(77),
+    Torn::Bits(1_234_567),
+    Torn::All,
+];
+
+/// Cuts an operation, which says whether it went well, at every word and in every erase; hands the store as it is afterwards to `check`.
+fn cut_everywhere(
+    ram: &Ram,
+    operation: impl Fn(&mut Store<Ram>) -> bool,
+    mut check: impl FnMut(&mut Store<Ram>, bool),
+) -> usize {
+    let mut whole = block_on(Store::open(ram.clone().again())).unwrap();
+    assert!(operation(&mut whole));
+    let length = whole.close().operations;
+    for at in 1..=length {
+        for torn in WAYS {
+            let mut flash = ram.clone().again();
+            flash.cut = Some((at, torn));
+            let mut store = block_on(Store::open(flash)).unwrap();
+            assert!(!operation(&mut store), "{at} {torn:?}");
+            let mut store = again(store);
+            assert_eq!(store.settings(), Ok(()));
+            check(&mut store, false);
+            // and it goes on from there
+            operation(&mut store);
+            check(&mut again(store), true);
+        }
+    }
+    length * WAYS.len()
+}
+
+#[test]
+fn a_cut_in_an_answer_leaves_the_old_or_the_new_table() {
+    let bytes = base();
+    let old = Table::read(&bytes).unwrap();
+    let mut store = store(&bytes);
+    let mut force = room(&bytes);
+    let visit = visited(&force, 1, &[(0, 2, [-1600, 40, 50])]);
+    block_on(learn_by_itself(&visit, &mut store, &mut force)).unwrap();
+    let ram = store.close().again();
+    for name in ["t1", "elm"] {
+        let visit = visited(&force, 1, &[(0, 3, [-1500, 10, 20]), (1, 1, [9, 8, 7])]);
+        let operation = |store: &mut Store<Ram>| {
+            // the table that was explored with
+            let mut force = force.clone();
+            block_on(answer(&visit, name, &old, store, &mut force)).is_ok()
+        };
+        let open = |ram: &Ram| {
+            let mut store = block_on(Store::open(ram.clone().again())).unwrap();
+            let state = |store: &mut Store<Ram>| (stored(store), selves(store, old.crc()));
+            let before = state(&mut store);
+            assert!(operation(&mut store));
+            (before, state(&mut store))
+        };
+        let (before, after) = open(&ram);
+        assert_ne!(before.0, after.0);
+        assert_eq!(before.1 != after.1, name == "t1");
+        let (mut olds, mut news) = (0, 0);
+        let cuts = cut_everywhere(&ram, operation, |store, again| {
+            let table = stored(store);
+            let selves = selves(store, old.crc());
+            if again {
+                assert_eq!(table, after.0);
+                return;
+            }
+            assert!(table == before.0 || table == after.0);
+            assert!(selves == before.1 || selves == after.1);
+            // first the table
+            assert!(table == after.0 || selves == before.1);
+            olds += usize::from(table == before.0);
+            news += usize::from(table == after.0);
+            let force = in_force(store);
+            assert!(Table::read(&force).is_ok());
+        });
+        assert!(olds > 100 && news > 0, "{olds} {news} of {cuts}");
+    }
+}
+
+#[test]
+fn a_cut_while_it_learns_leaves_what_it_knew_or_what_it_learned() {
+    let bytes = base();
+    let mut store = store(&bytes);
+    let mut force = room(&bytes);
+    let mut visit = visited(&force, 2, &[(1, 1, [100, 1400, -300])]);
+    block_on(learn_by_itself(&visit, &mut store, &mut force)).unwrap();
+    visit = visited(&force, 2, &[(1, 1, [90, 1300, -200]), (2, 2, [4, 1500, 8])]);
+    let before = in_force(&mut store);
+    let ram = store.close().again();
+    let mut after = force.clone();
+    let mut whole = block_on(Store::open(ram.clone())).unwrap();
+    block_on(learn_by_itself(&visit, &mut whole, &mut after)).unwrap();
+    after.truncate(before.len());
+    let operation = |store: &mut Store<Ram>| {
+        let mut room = force.clone();
+        let told = block_on(learn_by_itself(&visit, store, &mut room));
+        assert_eq!(told.is_err(), room == force, "as it was, if it failed");
+        told.is_ok()
+    };
+    let (mut olds, mut news) = (0, 0);
+    cut_everywhere(&ram, operation, |store, again| {
+        assert_eq!(stored(store), bytes);
+        let now = in_force(store);
+        if !again {
+            assert!(now == before || now == after);
+            olds += usize::from(now == before);
+            news += usize::from(now == after);
+        }
+    });
+    assert!(olds > 20 && news > 0, "{olds} {news}");
+}
+
+#[test]
+fn a_flash_that_fails_is_told() {
+    let bytes = base();
+    let mut flash = store(&bytes).close().again();
+    flash.cut = Some((1, Torn::Nothing));
+    let mut store = block_on(Store::open(flash)).unwrap();
+    let mut force = room(&bytes);
+    let visit = visited(&bytes, 2, &[(1, 1, [100, 1400, -300])]);
+    let why = block_on(learn_by_itself(&visit, &mut store, &mut force)).unwrap_err();
+    assert_eq!(why, text(StoreError::Flash(RamError::Cut)));
+    assert_eq!(force, room(&bytes));
+}

@@ -2,6 +2,7 @@
 
 use super::ram::Torn;
 use super::*;
+use crate::fused::Whitened;
 use crate::table::tests::fixed;
 use proptest::prelude::*;
 
@@ -16,6 +17,10 @@ enum Operation {
     Skin(u8),
     Train(u8, Option<u32>, u8),
     Forget(u8),
+    /// By itself.
+    Learn(u8, u8),
+    /// What was learned by itself: of this texture, or all.
+    Unlearn(Option<u8>),
     EraseSettings,
 }
 
@@ -27,10 +32,29 @@ struct Model {
     skin: SkinCare,
     /// By texture and table.
     trained: [[Option<Lesson>; 2]; 2],
+    self_taught: [Option<SelfTaught>; 2],
 }
 
 const NAMES: [&str; 2] = ["felt", "sandpaper of 100 grit"];
 const TABLES: [Option<u32>; 2] = [None, Some(0x1234_5678)];
+
+/// Of both textures that are learned: lineage and number.
+const SELVES: [(u32, u16); 2] = [(0x89AB_CDEF, 0), (0x89AB_CDEF, 300)];
+
+fn self_taught(texture: u8, n: u8) -> SelfTaught {
+    let (lineage, number) = SELVES[usize::from(texture)];
+    let whitened = Whitened {
+        slides: n,
+        mean: core::array::from_fn(|i| i16::from(n) * i as i16),
+    };
+    SelfTaught {
+        lineage,
+        number,
+        movements: (0..1 + n % 2)
+            .map(|movement| (movement, n, whitened))
+            .collect(),
+    }
+}
 
 impl Model {
     fn after(&self, operation: &Operation) -> Self {
@@ -46,6 +70,11 @@ impl Model {
                 next.trained[usize::from(name)][on] = Some(lesson(trials));
             }
             Operation::Forget(name) => next.trained[usize::from(name)] = [None; 2],
+            Operation::Learn(texture, n) => {
+                next.self_taught[usize::from(texture)] = Some(self_taught(texture, n));
+            }
+            Operation::Unlearn(Some(texture)) => next.self_taught[usize::from(texture)] = None,
+            Operation::Unlearn(None) => next.self_taught = [None, None],
             Operation::EraseSettings => {
                 next = Self {
                     table: next.table,
@@ -69,7 +98,15 @@ impl Model {
                         .unwrap();
                 }
             }
+            let mut selves = [None, None];
+            let each = |record: SelfTaught| {
+                let of = (record.lineage, record.number);
+                let texture = SELVES.iter().position(|s| *s == of).unwrap();
+                assert_eq!(selves[texture].replace(record), None, "once only");
+            };
+            store.self_taught(SELVES[0].0, each).await.unwrap();
             Self {
+                self_taught: selves,
                 table,
                 calibration: store.calibration().await.unwrap(),
                 skin: store.skin().await.unwrap(),
@@ -86,6 +123,13 @@ impl Model {
             for on in 0..2 {
                 if self.trained[name][on].is_none() {
                     like.trained[name][on] = None;
+                }
+            }
+        }
+        if let Operation::Unlearn(None) = *operation {
+            for (like, left) in like.self_taught.iter_mut().zip(&self.self_taught) {
+                if left.is_none() {
+                    *like = None;
                 }
             }
         }
@@ -113,6 +157,11 @@ async fn perform(store: &mut Store<Ram>, operation: &Operation) -> Outcome<()> {
             store.set_trained(&new).await
         }
         Operation::Forget(name) => store.forget_trained(NAMES[usize::from(name)]).await,
+        Operation::Learn(texture, n) => store.set_self_taught(&self_taught(texture, n)).await,
+        Operation::Unlearn(texture) => {
+            let of = texture.map(|texture| SELVES[usize::from(texture)]);
+            store.forget_self_taught(of).await
+        }
         Operation::EraseSettings => store.erase_settings().await,
     }
 }
@@ -192,9 +241,17 @@ fn a_cut_anywhere_leaves_the_old_or_the_new_state() {
         if n % 9 == 0 {
             operations.push(Operation::Calibrate(n));
             operations.push(Operation::Train(0, TABLES[0], n));
+            operations.push(Operation::Learn(n % 2, n + 1));
         }
     }
-    operations.extend([Operation::Forget(0), Operation::EraseSettings]);
+    operations.extend([
+        Operation::Unlearn(Some(0)),
+        Operation::Learn(0, 7),
+        Operation::Unlearn(None),
+        Operation::Learn(1, 8),
+        Operation::Forget(0),
+        Operation::EraseSettings,
+    ]);
     for operation in &operations {
         let (next, made) = cut_everywhere(&ram, &model, operation);
         model = model.after(operation);
@@ -262,7 +319,7 @@ proptest! {
     #![proptest_config(fixed(300))]
     #[test]
     fn operations_and_cuts_in_any_order_agree_with_the_model(
-        steps in prop::collection::vec((0..9u8, 0..2u8, 0..60u8, any::<Option<(u16, u8)>>()), 1..60)
+        steps in prop::collection::vec((0..13u8, 0..2u8, 0..60u8, any::<Option<(u16, u8)>>()), 1..60)
     ) {
         let mut store = open(Ram::new());
         let mut model = Model::default();
@@ -275,6 +332,8 @@ proptest! {
                 3 => Operation::Calibrate(n),
                 4..=5 => Operation::Skin(n),
                 6..=7 => Operation::Train(name, on, n),
+                8..=10 => Operation::Learn(name, n),
+                11 => Operation::Unlearn((n > 9).then_some(name)),
                 _ if n == 0 => Operation::EraseSettings,
                 _ => Operation::Forget(name),
             };

@@ -6,12 +6,12 @@ use embedded_storage_async::nor_flash::{
 use std::vec;
 use std::vec::Vec;
 
-/// Sectors of a sixteenth of the chip's, so that every word of every operation can be cut.
-pub(super) const SECTOR: usize = 1024;
+/// Sectors of a sixteenth of the chip's, unless others are wanted, so that every word of every operation can be cut.
+pub(crate) const SECTOR: usize = 1024;
 
 /// What is left of the operation that the power was cut in.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) enum Torn {
+pub(crate) enum Torn {
     /// Nothing of the word; the erase had not begun.
     Nothing,
     /// Any bits of the word; any words of the sector are erased, and any bits of the others. From this seed.
@@ -25,7 +25,7 @@ pub(super) enum Torn {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum RamError {
+pub(crate) enum RamError {
     Cut,
     Rules,
 }
@@ -37,20 +37,20 @@ impl NorFlashError for RamError {
 }
 
 #[derive(Clone)]
-pub(super) struct Ram {
-    pub(super) bytes: Vec<u8>,
+pub(crate) struct Ram<const S: usize = SECTOR> {
+    pub(crate) bytes: Vec<u8>,
     /// Words programmed and sectors erased.
-    pub(super) operations: usize,
-    pub(super) erases: usize,
+    pub(crate) operations: usize,
+    pub(crate) erases: usize,
     /// The operation that the power is cut in.
-    pub(super) cut: Option<(usize, Torn)>,
+    pub(crate) cut: Option<(usize, Torn)>,
     dead: bool,
 }
 
-impl Ram {
-    pub(super) fn new() -> Self {
+impl<const S: usize> Ram<S> {
+    pub(crate) fn new() -> Self {
         Self {
-            bytes: vec![0xFF; 4 * SECTOR],
+            bytes: vec![0xFF; 4 * S],
             operations: 0,
             erases: 0,
             cut: None,
@@ -59,7 +59,7 @@ impl Ram {
     }
 
     /// The flash when the power is back.
-    pub(super) fn again(self) -> Self {
+    pub(crate) fn again(self) -> Self {
         Self {
             bytes: self.bytes,
             ..Self::new()
@@ -89,11 +89,11 @@ fn next(seed: &mut u32) -> u32 {
     *seed
 }
 
-impl ErrorType for Ram {
+impl<const S: usize> ErrorType for Ram<S> {
     type Error = RamError;
 }
 
-impl ReadNorFlash for Ram {
+impl<const S: usize> ReadNorFlash for Ram<S> {
     const READ_SIZE: usize = 4;
 
     async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), RamError> {
@@ -112,24 +112,21 @@ impl ReadNorFlash for Ram {
     }
 }
 
-impl NorFlash for Ram {
+impl<const S: usize> NorFlash for Ram<S> {
     const WRITE_SIZE: usize = 4;
-    const ERASE_SIZE: usize = SECTOR;
+    const ERASE_SIZE: usize = S;
 
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), RamError> {
         let (from, to) = (from as usize, to as usize);
-        assert!(
-            from.is_multiple_of(SECTOR) && to == from + SECTOR,
-            "sectors"
-        );
+        assert!(from.is_multiple_of(S) && to == from + S, "sectors");
         let torn = self.operate()?;
         self.erases += 1;
         let sector = &mut self.bytes[from..to];
         match torn {
             None | Some(Torn::All) => sector.fill(0xFF),
             Some(Torn::Nothing) => {}
-            Some(Torn::Begin(part)) => sector[..SECTOR * part / 100].fill(0xFF),
-            Some(Torn::End(part)) => sector[SECTOR * part / 100..].fill(0xFF),
+            Some(Torn::Begin(part)) => sector[..S * part / 100].fill(0xFF),
+            Some(Torn::End(part)) => sector[S * part / 100..].fill(0xFF),
             Some(Torn::Bits(mut seed)) => {
                 for word in sector.as_chunks_mut::<4>().0 {
                     let erased = match next(&mut seed) % 3 {
