@@ -9,7 +9,7 @@ use tactus::sim::stage::{FORCE_N_PER_A, SAMPLE_AT_MM, SAMPLE_MM};
 use tactus::sim::world::Setup;
 use tactus::simulated::{Performed, SimRig};
 use tactus_core::explorer::{Config, Explorer, Method};
-use tactus_core::features::{Plan, Property, PropertySet};
+use tactus_core::features::{Measurement, Plan, Property, PropertySet};
 use tactus_core::movement::Movement;
 use tactus_core::pressure::Calibration;
 use tactus_core::rig::calibration::RigCalibration;
@@ -134,7 +134,11 @@ fn a_recorded_slide_has_the_properties_that_were_felt_live() {
     };
     let calibration = calibrated(setup).unwrap();
     let recorded = &record_texture(setup, calibration, &[Movement::FOR_FINENESS], 1).unwrap()[0];
-    let recorded = measure(&Plan::new(), recorded).unwrap();
+    let recorded = Measurement {
+        // a rig with force sensing does not look at P_DC
+        pdc: None,
+        ..measure(&Plan::new(), recorded).unwrap()
+    };
 
     let plan = Plan::new();
     let mut rig = SimRig::new(setup);

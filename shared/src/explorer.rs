@@ -545,8 +545,10 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         for property in self.measured.iter() {
             Self::value(slide, property)?;
         }
-        if let Some(visit) = fused::visit(&mut self.visits, action.movement) {
-            visit.slides = visit.slides.saturating_add(1);
+        let visit = fused::visit(&mut self.visits, action.movement);
+        // beyond 255 slides nothing new is learned
+        if let Some(visit) = visit.filter(|visit| visit.slides < u8::MAX) {
+            visit.slides += 1;
             for (property, sum) in Property::ALL.into_iter().zip(&mut visit.properties) {
                 *sum += Self::value(slide, property).unwrap_or(0.0);
             }

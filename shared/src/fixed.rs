@@ -55,7 +55,7 @@ pub const fn ln_q16(x: u64) -> i32 {
     let part = (mantissa >> 58) as usize;
     let between = ((mantissa >> 26) & 0xffff_ffff) as i64;
     let (low, high) = (LN[part & (PARTS - 1)], LN[(part & (PARTS - 1)) + 1]);
-    let ln = low + (((high - low) >> 8) * (between >> 8) >> 16) + (exponent - 16) * LN_2;
+    let ln = low + ((((high - low) >> 8) * (between >> 8)) >> 16) + (exponent - 16) * LN_2;
     ((ln + (1 << 15)) >> 16) as i32
 }
 
@@ -69,7 +69,7 @@ pub const fn exp_neg_q30(x: u32) -> u32 {
     let part = ((octaves >> 41) & 31) as usize;
     let between = ((octaves >> 25) & 0xffff) as u32;
     let (high, low) = (EXP2[part], EXP2[part + 1]);
-    (high - ((high - low) as u64 * between as u64 >> 16) as u32) >> whole
+    (high - (((high - low) as u64 * between as u64) >> 16) as u32) >> whole
 }
 
 #[cfg(test)]

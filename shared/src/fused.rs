@@ -149,4 +149,4 @@ pub fn fixed(feature: f32) -> Option<i16> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

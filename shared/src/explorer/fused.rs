@@ -82,7 +82,7 @@ struct Spread {
 impl Spread {
     fn new(k: u8, n: u8, features: usize) -> Self {
         let (k64, n64) = (u64::from(k), u64::from(n));
-        let narrowness = (k64 * n64 << 16) / (8 * (k64 + n64));
+        let narrowness = ((k64 * n64) << 16) / (8 * (k64 + n64));
         Self {
             slides: n,
             narrowness,

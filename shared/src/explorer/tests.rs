@@ -1,6 +1,8 @@
 //! The explorer against the paper's equations, written out in f64.
 
+mod fused;
 mod rules;
+mod student;
 
 use super::*;
 use crate::features::Properties;

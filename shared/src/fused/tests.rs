@@ -1,1 +1,644 @@
-//! Features and whitening against f64.
+//! Features against their definitions, the whitening against its recipe in f64.
+
+use super::*;
+use crate::features::{Plan, Slide};
+use crate::kernels::Plain;
+use std::vec;
+use std::vec::Vec as List;
+
+/// Random numbers, the same in every run.
+pub(crate) struct Noise(pub(crate) u64);
+
+impl Noise {
+    /// From 0 to 1, without 1.
+    pub(crate) fn uniform(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Mean 0, standard deviation 1 (Box and Muller).
+    pub(crate) fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
+        radius * (2.0 * std::f64::consts::PI * self.uniform()).cos()
+    }
+
+    /// A whole number below `n`.
+    pub(crate) fn below(&mut self, n: usize) -> usize {
+        (self.uniform() * n as f64) as usize
+    }
+}
+
+/// Textures whose slides scatter in a correlated way, not the same at every movement.
+pub(crate) struct World {
+    /// Of every movement: what independent noise is mixed by, lower triangular, in units of the features.
+    mixing: List<List<List<f64>>>,
+    /// Of every movement and texture, in units of the features.
+    means: List<List<List<f64>>>,
+}
+
+impl World {
+    pub(crate) fn new(
+        noise: &mut Noise,
+        textures: usize,
+        movements: usize,
+        features: usize,
+    ) -> Self {
+        let mut mixing = List::new();
+        let mut means = List::new();
+        for _ in 0..movements {
+            let rows = (0..features).map(|i| {
+                let scale = 0.1 + 0.5 * noise.uniform();
+                let row = (0..=i).map(|j| {
+                    let part = if i == j { 0.7 } else { 0.8 * noise.normal() / (features as f64).sqrt() };
+                    scale * part
+                });
+                row.collect()
+            });
+            mixing.push(rows.collect());
+            let of = (0..textures).map(|_| (0..features).map(|_| 2.0 * noise.normal()).collect());
+            means.push(of.collect());
+        }
+        Self { mixing, means }
+    }
+
+    /// Features of one slide.
+    pub(crate) fn slide(&self, noise: &mut Noise, texture: usize, movement: usize) -> Vector {
+        let mean = &self.means[movement][texture];
+        let own: List<f64> = mean.iter().map(|_| noise.normal()).collect();
+        let rows = self.mixing[movement].iter().zip(mean);
+        rows.map(|(row, mean)| {
+            let x = mean + row.iter().zip(&own).map(|(a, e)| a * e).sum::<f64>();
+            (x * 1024.0).round().clamp(-32768.0, 32767.0) as i16
+        })
+        .collect()
+    }
+
+    /// So many slides of every texture at every movement.
+    pub(crate) fn slides(&self, noise: &mut Noise, each: usize) -> List<List<List<Vector>>> {
+        let of = |movement: usize, noise: &mut Noise| {
+            let textures = 0..self.means[movement].len();
+            textures
+                .map(|t| (0..each).map(|_| self.slide(noise, t, movement)).collect())
+                .collect()
+        };
+        (0..self.mixing.len()).map(|m| of(m, noise)).collect()
+    }
+}
+
+/// Learned as a table is: movement by movement, texture by texture.
+pub(crate) fn learned(slides: &[List<List<Vector>>]) -> List<Whitening> {
+    let scatters: List<Scatter> = slides
+        .iter()
+        .map(|textures| {
+            let mut scatter = Scatter::new(textures[0][0].len());
+            for slides in textures {
+                scatter.push(slides).unwrap();
+            }
+            scatter
+        })
+        .collect();
+    whiten(&scatters).unwrap().into_iter().collect()
+}
+
+type Matrix = List<List<f64>>;
+
+/// Step 2 and 3 of the recipe, in units of the features: W and g of every movement.
+fn recipe(slides: &[List<List<Vector>>]) -> List<(Matrix, List<f64>)> {
+    let d = slides[0][0][0].len();
+    let unit = |x: &Vector| -> List<f64> { x.iter().map(|x| f64::from(*x) / 1024.0).collect() };
+    let mean = |x: &[List<f64>]| -> List<f64> {
+        (0..d)
+            .map(|i| x.iter().map(|x| x[i]).sum::<f64>() / x.len() as f64)
+            .collect()
+    };
+    let square = || vec![vec![0.0; d]; d];
+    // S, K (n - 1) and g of every movement
+    let mut pooled: List<(Matrix, f64, List<f64>)> = List::new();
+    for textures in slides {
+        let (mut s, mut freedom, mut all) = (square(), 0.0, List::new());
+        for slides in textures {
+            let x: List<List<f64>> = slides.iter().map(unit).collect();
+            let mu = mean(&x);
+            freedom += x.len() as f64 - 1.0;
+            for x in &x {
+                for i in 0..d {
+                    for j in 0..d {
+                        s[i][j] += (x[i] - mu[i]) * (x[j] - mu[j]);
+                    }
+                }
+            }
+            all.extend(x);
+        }
+        s.iter_mut().flatten().for_each(|s| *s /= freedom);
+        pooled.push((s, freedom, mean(&all)));
+    }
+    let movements = pooled.len() as f64;
+    let mut average = square();
+    for (s, ..) in &pooled {
+        for i in 0..d {
+            for j in 0..d {
+                average[i][j] += s[i][j] / movements;
+            }
+        }
+    }
+    let whitening = |(s, freedom, g): &(Matrix, f64, List<f64>)| {
+        let blend = 15.0 / (15.0 + freedom);
+        let mut s = s.clone();
+        for i in 0..d {
+            for j in 0..d {
+                s[i][j] = (1.0 - blend) * s[i][j] + blend * average[i][j];
+            }
+        }
+        let sd: List<f64> = (0..d).map(|i| s[i][i].sqrt()).collect();
+        let (df, mut t) = (d as f64, 0.0);
+        for i in 0..d {
+            for j in 0..d {
+                s[i][j] /= sd[i] * sd[j];
+                t += s[i][j] * s[i][j];
+            }
+        }
+        let lambda = ((1.0 - 2.0 / df) * t + df * df) / ((freedom + 1.0 - 2.0 / df) * (t - df));
+        let lambda = if lambda.is_finite() && (0.0..1.0).contains(&lambda) {
+            lambda
+        } else {
+            1.0
+        };
+        for i in 0..d {
+            for j in 0..d {
+                let one = if i == j { 1.0 } else { 0.0 };
+                s[i][j] = ((1.0 - lambda) * s[i][j] + lambda * one) * sd[i] * sd[j];
+            }
+        }
+        (inverse(&cholesky(&s)), g.clone())
+    };
+    pooled.iter().map(whitening).collect()
+}
+
+/// L with L L' = S, column by column.
+fn cholesky(s: &Matrix) -> Matrix {
+    let d = s.len();
+    let mut rest = s.clone();
+    let mut l = vec![vec![0.0; d]; d];
+    for k in 0..d {
+        let pivot = rest[k][k].sqrt();
+        for i in k..d {
+            l[i][k] = rest[i][k] / pivot;
+        }
+        for i in k..d {
+            for j in k..d {
+                rest[i][j] -= l[i][k] * l[j][k];
+            }
+        }
+    }
+    l
+}
+
+/// Gauss and Jordan's.
+fn inverse(a: &Matrix) -> Matrix {
+    let d = a.len();
+    let mut work: Matrix = a
+        .iter()
+        .enumerate()
+        .map(|(i, row)| {
+            let unit = (0..d).map(|j| if i == j { 1.0 } else { 0.0 });
+            row.iter().copied().chain(unit).collect()
+        })
+        .collect();
+    for k in 0..d {
+        let pivot = work[k][k];
+        work[k].iter_mut().for_each(|x| *x /= pivot);
+        let row = work[k].clone();
+        for (i, other) in work.iter_mut().enumerate() {
+            let factor = other[k];
+            if i != k {
+                other.iter_mut().zip(&row).for_each(|(x, r)| *x -= factor * r);
+            }
+        }
+    }
+    work.into_iter().map(|row| row[d..].to_vec()).collect()
+}
+
+#[test]
+fn whitens_by_the_recipe() {
+    for (seed, (textures, movements, features, each)) in (1..).zip([
+        (20, 3, 13, 5),
+        (117, 3, 14, 5),
+        (3, 1, 13, 2),
+        (1, 2, 13, 2),
+        (5, 4, 3, 4),
+        (6, 2, 1, 3),
+        (10, 36, 5, 15),
+    ]) {
+        let noise = &mut Noise(seed);
+        let world = World::new(noise, textures, movements, features);
+        let slides = world.slides(noise, each);
+        let whitenings = learned(&slides);
+        let recipe = recipe(&slides);
+        assert_eq!((whitenings.len(), recipe.len()), (movements, movements));
+        for (movement, (whitening, (w, g))) in whitenings.iter().zip(&recipe).enumerate() {
+            for n in 0..100 {
+                let x = world.slide(noise, n % textures, movement);
+                let z = whitening.apply(&x);
+                assert_eq!(z.len(), features);
+                for (i, z) in z.iter().enumerate() {
+                    // g in whole steps
+                    let apart = |j: usize| f64::from(x[j]) - (g[j] * 1024.0).round();
+                    let exact: f64 = (0..=i).map(|j| w[i][j] * apart(j) / 1024.0).sum();
+                    let steps = (exact * 256.0).clamp(-32768.0, 32767.0);
+                    let error = (f64::from(*z) - steps).abs();
+                    assert!(error <= 2.0 + 1e-3 * steps.abs(), "{seed}: {z} {steps}");
+                }
+            }
+        }
+    }
+}
+
+/// A singular covariance is no reason to fail: a feature that never changes counts by its rounding, one that follows
+/// another by a thousandth of itself.
+#[test]
+fn features_without_scatter_of_their_own_are_bounded() {
+    let slide = |a: i16, e: i16| Vector::from_slice(&[a + e, 7, 2 * (a + e)]).unwrap();
+    let textures: List<List<Vector>> = (0..40)
+        .map(|a| (-2..=2).map(|e| slide(100 * a, 50 * e)).collect())
+        .collect();
+    let whitening = learned(&[textures]).remove(0);
+    let z = whitening.apply(&slide(2000, 0));
+    let other = whitening.apply(&slide(2000, 100));
+    assert_eq!(z[1], other[1]);
+    // 100 steps of a standard deviation of 50 sqrt(10/4)
+    let apart = f64::from(other[0] - z[0]) / 256.0;
+    assert!((apart - 100.0 / (50.0 * 2.5f64.sqrt())).abs() < 0.02, "{apart}");
+    let off = whitening.apply(&[2000, 8, 4000]);
+    // one step of a standard deviation of sqrt(1/12)
+    let apart = f64::from(off[1] - z[1]) / 256.0;
+    assert!((apart - 12f64.sqrt()).abs() < 0.1, "{apart}");
+}
+
+/// But for what the shrinking takes from directions that hardly scatter: little of four features, more of thirteen.
+#[test]
+fn the_scatter_of_a_texture_is_1_in_every_direction() {
+    for (features, most) in [(1, 0.01), (4, 0.05), (13, 0.2)] {
+        let noise = &mut Noise(77);
+        let world = World::new(noise, 60, 1, features);
+        let slides = world.slides(noise, 120);
+        let whitening = learned(&slides).remove(0);
+        let mut covariance = vec![vec![0.0; features]; features];
+        for slides in &slides[0] {
+            let z: List<List<f64>> = slides
+                .iter()
+                .map(|x| {
+                    let z = whitening.apply(x);
+                    z.iter().map(|z| f64::from(white(*z))).collect()
+                })
+                .collect();
+            let mean = |i: usize| z.iter().map(|z| z[i]).sum::<f64>() / 120.0;
+            let mean: List<f64> = (0..features).map(mean).collect();
+            for z in &z {
+                for i in 0..features {
+                    for j in 0..features {
+                        covariance[i][j] += (z[i] - mean[i]) * (z[j] - mean[j]) / (60.0 * 119.0);
+                    }
+                }
+            }
+        }
+        for (i, row) in covariance.iter().enumerate() {
+            for (j, c) in row.iter().enumerate() {
+                let one = if i == j { 1.0 } else { 0.0 };
+                assert!((c - one).abs() < most, "{features}: {i} {j}: {c}");
+            }
+        }
+    }
+}
+
+/// W = ((1, 0), (-1, 2)) and g = (1, -1/2), written down by hand.
+pub(crate) fn by_hand() -> [u8; 12] {
+    [
+        0x00, 0x04, 0x00, 0xfe, // g: 1024, -512
+        4, 3, // places
+        16, 0, // 1 of 4 places
+        0xf8, 0xff, 16, 0, // -1 and 2 of 3 places
+    ]
+}
+
+#[test]
+fn a_whitening_is_applied_as_it_is_documented() {
+    assert_eq!((Whitening::bytes(2), Whitening::bytes(13)), (12, 221));
+    let whitening = Whitening::read(&by_hand(), 2).unwrap();
+    assert_eq!(whitening.features(), 2);
+    let mut written = List::new();
+    whitening.write(|bytes| written.extend_from_slice(bytes));
+    assert_eq!(written, by_hand());
+    assert_eq!(whitening.apply(&[1024, -512]), [0, 0]);
+    // x - g = (1, 2): z = (1, 3)
+    assert_eq!(whitening.apply(&[2048, 1536]), [256, 768]);
+    // to the nearest step, halves upwards: 4 steps of a feature are 1
+    assert_eq!(whitening.apply(&[1025, -512]), [0, 0]);
+    assert_eq!(whitening.apply(&[1026, -512]), [1, 0]);
+    assert_eq!(whitening.apply(&[1022, -512]), [0, 1]);
+    assert_eq!(whitening.apply(&[1021, -512]), [-1, 1]);
+    // fewer in, fewer out
+    assert_eq!(whitening.apply(&[2048]), [256]);
+    assert_eq!(whitening.apply(&[]), []);
+    assert_eq!(whitening.apply(&[2048, 1536, 5]), [256, 768]);
+    // -64 at the least
+    assert_eq!(whitening.apply(&[i16::MAX, i16::MIN]), [7936, -24_064]);
+
+    assert_eq!(Whitening::read(&by_hand()[..11], 2), None);
+    assert_eq!(Whitening::read(&by_hand(), 3), None);
+    assert_eq!(Whitening::read(&[0; 3 * 15 + 15 * 16], 15), None);
+    let mut places = by_hand();
+    places[5] = 30;
+    assert!(Whitening::read(&places, 2).is_some());
+    places[5] = 31;
+    assert_eq!(Whitening::read(&places, 2), None);
+}
+
+#[test]
+fn the_farthest_values_do_not_overflow() {
+    for weight in [i16::MAX, i16::MIN] {
+        for mean in [i16::MAX, i16::MIN] {
+            let d = MAX_FEATURES;
+            let mut bytes = List::new();
+            (0..d).for_each(|_| bytes.extend(mean.to_le_bytes()));
+            bytes.extend(vec![0; d]);
+            (0..d * (d + 1) / 2).for_each(|_| bytes.extend(weight.to_le_bytes()));
+            let whitening = Whitening::read(&bytes, d).unwrap();
+            for x in [i16::MAX, i16::MIN] {
+                let apart = i64::from(x) - i64::from(mean);
+                let expected = match apart * i64::from(weight) {
+                    0 => 0,
+                    above if above > 0 => i16::MAX,
+                    _ => i16::MIN,
+                };
+                assert_eq!(whitening.apply(&[x; MAX_FEATURES]), [expected; MAX_FEATURES]);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_was_learned_reads_back() {
+    let noise = &mut Noise(3);
+    for features in 1..=MAX_FEATURES {
+        let world = World::new(noise, 4, 2, features);
+        for whitening in learned(&world.slides(noise, 3)) {
+            let mut bytes = List::new();
+            whitening.write(|some| bytes.extend_from_slice(some));
+            assert_eq!(bytes.len(), Whitening::bytes(features));
+            assert_eq!(Whitening::read(&bytes, features), Some(whitening));
+        }
+    }
+}
+
+#[test]
+fn without_two_slides_of_a_texture_there_is_no_whitening() {
+    let slide = |x: i16| Vector::from_slice(&[x, 2 * x]).unwrap();
+    let mut scatter = Scatter::new(2);
+    assert_eq!(whiten(&[]), Err(WhitenError::Movements));
+    assert_eq!(whiten(&[scatter.clone()]), Err(WhitenError::Trials(0)));
+    for x in 0..5 {
+        scatter.push(&[slide(x)]).unwrap();
+    }
+    assert_eq!(whiten(&[scatter.clone()]), Err(WhitenError::Trials(0)));
+    let before = std::format!("{scatter:?}");
+    let longer = Vector::from_slice(&[1, 2, 3]).unwrap();
+    assert_eq!(scatter.push(&[slide(1), longer]), Err(WhitenError::Features));
+    assert_eq!(std::format!("{scatter:?}"), before, "nothing was taken");
+    let mut two = scatter.clone();
+    two.push(&[slide(5), slide(90)]).unwrap();
+    assert!(whiten(&[two.clone()]).is_ok());
+    assert_eq!(whiten(&[two.clone(), scatter]), Err(WhitenError::Trials(1)));
+    let other = Scatter::new(3);
+    assert_eq!(whiten(&[two.clone(), other]), Err(WhitenError::Features));
+    for features in [0, MAX_FEATURES + 1] {
+        let none = whiten(&[Scatter::new(features)]);
+        assert_eq!(none, Err(WhitenError::Features));
+    }
+    assert_eq!(whiten(&vec![two.clone(); 36]).unwrap().len(), 36);
+    assert_eq!(whiten(&vec![two; 37]), Err(WhitenError::Movements));
+}
+
+/// Every step by the formula of the running mean; all of them together no farther off than their roundings can add up to.
+#[test]
+fn learning_is_the_running_mean() {
+    let noise = &mut Noise(11);
+    for features in [1, 13, 14] {
+        let (mut taught, mut adapted) = (Whitened::default(), Whitened::default());
+        let (mut all, mut recent) = (vec![0.0; features], vec![0.0; features]);
+        for n in 0..300u32 {
+            let centre = if n < 100 { 0.0 } else { 1500.0 };
+            let slide: Vector = (0..features)
+                .map(|_| (centre + 256.0 * noise.normal()) as i16)
+                .collect();
+            let before = (taught, adapted);
+            taught.teach(&slide);
+            adapted.adapt(&slide);
+            let own = f64::from(n.min(255));
+            let short = f64::from(n.min(8));
+            for i in 0..features {
+                let z = f64::from(slide[i]);
+                let step = |before: i16, n: f64| {
+                    let before = f64::from(before);
+                    before + (z - before) / (n + 1.0)
+                };
+                let error = f64::from(taught.mean[i]) - step(before.0.mean[i], own);
+                assert!(error.abs() <= 0.501, "{n}: {error}");
+                let error = f64::from(adapted.mean[i]) - step(before.1.mean[i], short);
+                assert!(error.abs() <= 0.501, "{n}: {error}");
+                all[i] += (z - all[i]) / (own + 1.0);
+                recent[i] += (z - recent[i]) / (short + 1.0);
+                let error = (f64::from(taught.mean[i]) - all[i]).abs();
+                assert!(error <= 0.5 + 0.25 * own, "{n}: {error}");
+                assert!(n >= 40 || error <= 4.0, "{n}: {error}");
+                let error = (f64::from(adapted.mean[i]) - recent[i]).abs();
+                assert!(error <= 4.5, "{n}: {error}");
+            }
+            assert_eq!(u32::from(taught.slides), (n + 1).min(255));
+            assert_eq!(u32::from(adapted.slides), (n + 1).min(8));
+            let beyond = &taught.mean[features..];
+            assert!(beyond.iter().all(|&mean| mean == 0));
+        }
+    }
+}
+
+#[test]
+fn more_slides_than_the_memory_stay_as_many() {
+    for slides in [8, 9, 40, 255] {
+        let mean = [900; MAX_FEATURES];
+        let mut known = Whitened { slides, mean };
+        known.adapt(&[0, 1800]);
+        // a ninth of the way, however many there were
+        assert_eq!((known.slides, known.mean[0], known.mean[1]), (slides, 800, 1000));
+        assert_eq!(known.mean[2..], mean[2..]);
+    }
+    let mut far = Whitened::default();
+    far.teach(&[i16::MAX]);
+    for _ in 0..300 {
+        far.teach(&[i16::MIN]);
+        far.adapt(&[i16::MAX]);
+        assert!(i32::from(far.mean[0]).abs() <= 32_768);
+    }
+}
+
+fn observation() -> Observation {
+    let bands: List<i16> = (1..=12).map(|n| 100 * n).collect();
+    Observation {
+        properties: Properties::new([Some(0.5), Some(-2.0), Some(5.25)]),
+        bands: Vec::from_slice(&bands).unwrap(),
+        pressure: Some([7, 8]),
+    }
+}
+
+#[test]
+fn every_set_has_its_features_in_their_order() {
+    let slide = observation();
+    let bands = &slide.bands[..];
+    let vector = |set, length| slide.vector(set, length).map(|v| v.to_vec());
+    for set in FeatureSet::ALL {
+        let (expected, least) = match set {
+            FeatureSet::Force => ([&[512], bands].concat(), 2),
+            FeatureSet::Pressure => ([&[7, 8], bands].concat(), 3),
+            FeatureSet::Bands => (bands.to_vec(), 1),
+            FeatureSet::Properties => (vec![512, -2048, 5376], 3),
+        };
+        let length = expected.len();
+        assert_eq!(vector(set, length), Some(expected));
+        for wrong in (0..20).filter(|&n| n != length) {
+            assert_eq!(vector(set, wrong), None, "{set:?} {wrong}");
+        }
+        let allowed: List<usize> = (0..20).filter(|&n| set.allows(n)).collect();
+        assert_eq!(allowed, (least..=length).collect::<List<_>>(), "{set:?}");
+    }
+}
+
+#[test]
+fn a_missing_feature_is_missed_where_it_is_needed() {
+    use FeatureSet::{Bands, Force, Pressure};
+    let there = |slide: &Observation| {
+        let lengths = [13, 14, 12, 3];
+        let sets = FeatureSet::ALL.into_iter().zip(lengths);
+        let there = sets.filter(|&(set, n)| slide.vector(set, n).is_some());
+        there.map(|(set, _)| set).collect::<List<_>>()
+    };
+    assert_eq!(there(&observation()), FeatureSet::ALL);
+    assert_eq!(there(&Observation::default()), []);
+    let all = [Some(0.5), Some(-2.0), Some(5.25)];
+    assert_eq!(there(&Properties::new(all).into()), [FeatureSet::Properties]);
+    for value in [None, Some(f32::NAN), Some(f32::INFINITY), Some(f32::NEG_INFINITY)] {
+        for at in 0..3 {
+            let mut some = all;
+            some[at] = value;
+            let slide = Observation {
+                properties: Properties::new(some),
+                ..observation()
+            };
+            let left = if at == 0 {
+                vec![Pressure, Bands]
+            } else {
+                vec![Force, Pressure, Bands]
+            };
+            assert_eq!(there(&slide), left, "{at} {value:?}");
+        }
+    }
+    let no_pressure = Observation {
+        pressure: None,
+        ..observation()
+    };
+    assert_eq!(there(&no_pressure), [Force, Bands, FeatureSet::Properties]);
+    let mut short = observation();
+    short.bands.pop();
+    assert_eq!(there(&short), [FeatureSet::Properties]);
+    assert_eq!(short.vector(Bands, 11).unwrap(), short.bands);
+}
+
+#[test]
+fn features_end_at_the_ends_of_their_numbers() {
+    assert_eq!((fixed(0.0), fixed(1.0), fixed(-1.0)), (Some(0), Some(1024), Some(-1024)));
+    assert_eq!(fixed(0.6 / 1024.0), Some(1));
+    assert_eq!(fixed(-0.6 / 1024.0), Some(-1));
+    assert_eq!(fixed(0.4 / 1024.0), Some(0));
+    for far in [31.9996, 32.0, 1e9, f32::MAX] {
+        assert_eq!(fixed(far), Some(i16::MAX));
+        assert_eq!(fixed(-far - 0.001), Some(i16::MIN));
+    }
+    for none in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        assert_eq!(fixed(none), None);
+    }
+    let far = Observation::from(Properties::new([Some(1e6), Some(-1e6), Some(0.0)]));
+    let vector = far.vector(FeatureSet::Properties, 3).unwrap();
+    assert_eq!(vector, [i16::MAX, i16::MIN, 0]);
+}
+
+#[test]
+fn what_a_rig_measures_decides_which_sets_it_has() {
+    let of = |bits| {
+        let measured = PropertySet::from_bits(bits).unwrap();
+        let sets = FeatureSet::ALL.into_iter();
+        sets.filter(|set| set.measured_by(measured))
+            .collect::<List<_>>()
+    };
+    use FeatureSet::{Bands, Force, Pressure};
+    assert_eq!(of(0b110), [Pressure, Bands], "no force sensing");
+    assert_eq!(of(0b001), [Force, Pressure, Bands]);
+    assert_eq!(of(0b111), FeatureSet::ALL);
+    assert_eq!(of(0), [Pressure, Bands]);
+}
+
+/// Powers of bands by the recipe's edges and its 0.1, from the spectrum that the slide has.
+#[test]
+fn a_slide_says_its_bands_and_pressure() {
+    const EDGES: [usize; 13] = [4, 6, 8, 11, 16, 22, 31, 43, 60, 84, 118, 166, 233];
+    let plan = Plan::new();
+    let noise = &mut Noise(5);
+    for amplitude in [0.4, 3.0, 40.0, 900.0] {
+        let mut slide = Slide::<Plain>::new(&plan);
+        slide.set_background(2.0);
+        slide.start(0..3000);
+        let mut last = 0.0;
+        let samples: List<i16> = (0..3000)
+            .map(|_| {
+                // more power in low bands than in high ones
+                last = 0.8 * last + amplitude * noise.normal();
+                f64::round(last) as i16
+            })
+            .collect();
+        slide.push(&samples);
+        slide.push_shear(&[250, 750]);
+        let pdc: List<i16> = (0..300).map(|n| 90 + (n * 7 % 40) as i16).collect();
+        slide.push_pdc(&pdc);
+        let measured = slide.finish().unwrap();
+        let felt = Observation::from(&measured);
+        assert_eq!(felt.properties, measured.properties);
+        assert_eq!(felt.bands.len(), 12);
+        for (edges, band) in EDGES.windows(2).zip(&felt.bands) {
+            let bins = &measured.spectrum.psd()[edges[0]..edges[1]];
+            let mean = bins.iter().map(|p| f64::from(*p)).sum::<f64>() / bins.len() as f64;
+            let steps = (mean + 0.1).ln() * 1024.0;
+            assert!((f64::from(*band) - steps).abs() < 0.52, "{band} {steps}");
+        }
+        let n = pdc.len() as f64;
+        let mean = pdc.iter().map(|x| f64::from(*x)).sum::<f64>() / n;
+        let squares: f64 = pdc.iter().map(|x| (f64::from(*x) - mean).powi(2)).sum();
+        let [m, sd] = felt.pressure.unwrap();
+        assert!((f64::from(m) - mean * 10.24).abs() < 0.51, "{m} {mean}");
+        let expected = (squares / (n - 1.0)).sqrt();
+        assert!((f64::from(sd) - expected * 10.24).abs() < 0.51, "{sd}");
+        assert!(felt.vector(FeatureSet::Pressure, 14).is_some());
+        assert_eq!(felt.vector(FeatureSet::Force, 13).unwrap()[0], 512);
+    }
+}
+
+#[test]
+fn the_errors_say_what_is_missing() {
+    use std::string::ToString;
+    for (error, message) in [
+        (WhitenError::Trials(1), "movement 2: no texture has two slides"),
+        (WhitenError::Features, "do not have the same features"),
+        (WhitenError::Movements, "1 to 36 movements"),
+    ] {
+        assert!(error.to_string().contains(message), "{error}");
+    }
+}

@@ -1,6 +1,7 @@
 //! The table against one written by hand, a checksum bit by bit and statistics in two passes.
 
 mod damage;
+mod fused;
 mod learning;
 
 use super::*;
@@ -43,6 +44,47 @@ pub(crate) fn table_of(measured: PropertySet, trials: &[Vec<Vec<[f32; 3]>>]) -> 
     let mut out = vec![0; 100_000];
     let table = encode(&mut out, measured, &movements, textures).unwrap();
     table.as_bytes().to_vec()
+}
+
+/// A whitening that changes nothing: 1 is 1 standard deviation.
+pub(crate) fn straight(features: usize) -> Whitening {
+    let mut bytes = vec![0; 2 * features];
+    bytes.extend(vec![14; features]);
+    for row in 0..features {
+        for column in 0..=row {
+            let weight: i16 = if row == column { 1 << 14 } else { 0 };
+            bytes.extend(weight.to_le_bytes());
+        }
+    }
+    Whitening::read(&bytes, features).unwrap()
+}
+
+/// A fused table of what is known of each texture, movement by movement, on the study's grid of movements.
+pub(crate) fn fused_of(
+    set: FeatureSet,
+    whitenings: &[Whitening],
+    known: &[Vec<Whitened>],
+) -> Vec<u8> {
+    let movements: Vec<(Movement, Whitening)> =
+        Movement::grid().zip(whitenings.iter().cloned()).collect();
+    let names: Vec<String> = (0..known.len()).map(|n| std::format!("t{n}")).collect();
+    let textures = names.iter().zip(known);
+    let textures = textures.map(|(name, known)| (name.as_str(), known.as_slice()));
+    let mut out = vec![0; 100_000];
+    let table = encode_fused(&mut out, set, &movements, textures).unwrap();
+    table.as_bytes().to_vec()
+}
+
+/// So many slides of this whitened mean, in standard deviations.
+pub(crate) fn known(slides: u8, mean: &[f64]) -> Whitened {
+    let mut known = Whitened {
+        slides,
+        ..Whitened::default()
+    };
+    for (to, from) in known.mean.iter_mut().zip(mean) {
+        *to = (from * 256.0).round() as i16;
+    }
+    known
 }
 
 /// CRC-32 of zip and Ethernet, bit by bit.

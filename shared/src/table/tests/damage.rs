@@ -29,13 +29,24 @@ proptest! {
 }
 
 /// Reads everything that a table offers, if it is one.
-fn read_all(bytes: &[u8]) {
+pub(super) fn read_all(bytes: &[u8]) {
     let Ok(table) = Table::read(bytes) else {
         return;
     };
     assert_eq!(table.names().count(), usize::from(table.textures()));
     assert!(table.movements().len() <= MAX_MOVEMENTS);
     for texture in 0..table.textures() {
+        for movement in 0..table.movements().len() as u8 {
+            let mut whitened = table.whitened(texture, movement);
+            whitened.teach(&[5; 14]);
+            whitened.adapt(&[i16::MIN; 14]);
+            let fused = matches!(table.contents(), Contents::Fused(..));
+            assert_eq!(table.white_mean(texture, movement).len() > 0, fused);
+            let white = table.whiten(movement, &[i16::MAX; 14]);
+            assert_eq!(white.is_some(), fused);
+        }
+        assert_eq!(table.numbered(table.number(texture)), Some(texture));
+        let _ = (table.tally(texture), table.lineage(), table.next_number());
         for action in table.actions() {
             let gaussian = table.gaussian(texture, action);
             assert!(gaussian.is_none_or(|g| g.mean.is_finite() && g.sd > 0.0));
@@ -82,7 +93,7 @@ fn every_flipped_bit_is_noticed() {
 }
 
 /// The stored checksum.
-fn crc_of(bytes: &[u8]) -> u32 {
+pub(super) fn crc_of(bytes: &[u8]) -> u32 {
     u32::from_le_bytes(bytes[bytes.len() - 4..].try_into().unwrap())
 }
 

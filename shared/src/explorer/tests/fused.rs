@@ -1,0 +1,717 @@
+//! The fused way of deciding against its recipe, written out in f64.
+
+use super::*;
+use crate::fused::tests::{Noise, World, learned};
+use crate::fused::{Whitened, Whitening};
+use crate::table::tests::{fused_of, known, straight};
+use std::string::ToString;
+
+/// Steps 4, 6 and 7 of the recipe on the means that the table holds.
+struct Recipe {
+    d: f64,
+    /// Slides and mean of every texture at every movement.
+    known: Vec<Vec<(f64, Vec<f64>)>>,
+    candidates: Vec<usize>,
+    /// Of every movement: slides, and their whitened sum.
+    visits: BTreeMap<usize, (f64, Vec<f64>)>,
+    made: BTreeMap<usize, f64>,
+}
+
+impl Recipe {
+    fn new(table: Table<'_>, candidates: &[u16]) -> Self {
+        let row = |texture| {
+            let cell = |movement| {
+                let mean = table.white_mean(texture, movement);
+                let mean: Vec<f64> = mean.map(|m| f64::from(m) / 256.0).collect();
+                (f64::from(table.trials(texture, movement)), mean)
+            };
+            (0..table.movements().len() as u8).map(cell).collect()
+        };
+        let known: Vec<Vec<_>> = (0..table.textures()).map(row).collect();
+        Self {
+            d: known[0][0].1.len() as f64,
+            known,
+            candidates: candidates.iter().map(|&c| c.into()).collect(),
+            visits: BTreeMap::new(),
+            made: BTreeMap::new(),
+        }
+    }
+
+    fn observe(&mut self, movement: u8, z: &[i16]) {
+        let movement = usize::from(movement);
+        let (k, sum) = self.visits.entry(movement).or_insert((0.0, vec![0.0; z.len()]));
+        *k += 1.0;
+        sum.iter_mut().zip(z).for_each(|(s, z)| *s += f64::from(*z) / 256.0);
+        *self.made.entry(movement).or_default() += 1.0;
+    }
+
+    /// l_b of a movement, and whether there are textures enough to have one.
+    fn background(&self, movement: usize, k: f64, mean: &[f64]) -> (f64, bool) {
+        let all = self.known.iter().map(|row| &row[movement]);
+        let all: Vec<&Vec<f64>> = all.filter(|(n, _)| *n > 0.0).map(|(_, m)| m).collect();
+        let count = all.len() as f64;
+        let (mut norm, mut distance) = (0.0, 0.0);
+        for (i, z) in mean.iter().enumerate() {
+            let centre = all.iter().map(|m| m[i]).sum::<f64>() / count.max(1.0);
+            let squares: f64 = all.iter().map(|m| (m[i] - centre).powi(2)).sum();
+            let variance = if all.len() < 3 { 400.0 } else { squares / count };
+            norm += (variance + 1.0 / k).ln();
+            distance += (z - centre).powi(2) / (variance + 1.0 / k);
+        }
+        let tail = (8.0 + self.d) / 2.0 * (1.0 + distance / 8.0).ln();
+        (-0.5 * norm - tail, all.len() >= 3)
+    }
+
+    /// Posterior of the candidates, and log-odds that it is none of them; from the means of the slides, or from these in whole
+    /// steps.
+    fn decide(&self, whole_steps: bool) -> (Vec<f64>, Option<f64>) {
+        let mut l = vec![0.0; self.known.len()];
+        let (mut elsewhere, mut can_tell) = (0.0, true);
+        for (&movement, (k, sum)) in &self.visits {
+            let mean = sum.iter().map(|s| s / k);
+            let mean: Vec<f64> = if whole_steps {
+                mean.map(|m| (m * 256.0 + 0.5).floor() / 256.0).collect()
+            } else {
+                mean.collect()
+            };
+            let (background, enough) = self.background(movement, *k, &mean);
+            elsewhere += background;
+            can_tell &= enough;
+            for (l, row) in l.iter_mut().zip(&self.known) {
+                let (n, m) = &row[movement];
+                let v = 1.0 / k + 1.0 / n;
+                let q: f64 = mean.iter().zip(m).map(|(z, m)| (z - m).powi(2)).sum();
+                *l += if *n == 0.0 {
+                    background
+                } else {
+                    -self.d / 2.0 * v.ln() - (8.0 + self.d) / 2.0 * (1.0 + q / (8.0 * v)).ln()
+                };
+            }
+        }
+        let l: Vec<f64> = self.candidates.iter().map(|&c| l[c]).collect();
+        let top = l.iter().copied().fold(f64::MIN, f64::max);
+        let sum: f64 = l.iter().map(|l| (l - top).exp()).sum();
+        let average = top + (sum / l.len() as f64).ln();
+        let p = l.iter().map(|l| (l - top).exp() / sum).collect();
+        (p, can_tell.then_some(elsewhere - average))
+    }
+
+    /// Eq. 11 with the confusion of step 6, for the probabilities `p` of the candidates.
+    fn uncertainty(&self, movement: usize, p: &[f64]) -> f64 {
+        let confusion = |i: usize, j: usize| {
+            let (a, b) = (&self.known[i][movement], &self.known[j][movement]);
+            let n = a.0.min(b.0);
+            if i == j || n == 0.0 {
+                return 1.0;
+            }
+            let apart: f64 = a.1.iter().zip(&b.1).map(|(a, b)| (a - b).powi(2)).sum();
+            (-apart / (8.0 * (1.0 + 1.0 / n))).exp()
+        };
+        let term = |(&i, pi): (&usize, &f64)| {
+            let others = self.candidates.iter().zip(p);
+            let sum: f64 = others.map(|(&j, pj)| confusion(i, j) * pj).sum();
+            if sum > 0.0 { pi * pi / sum } else { 0.0 }
+        };
+        1.0 - self.candidates.iter().zip(p).map(term).sum::<f64>()
+    }
+
+    fn benefit(&self, movement: usize, p: &[f64]) -> f64 {
+        let made = self.made.get(&movement).copied().unwrap_or(0.0);
+        1.0 - self.uncertainty(movement, p).max(0.0).powf(1.0 / (made + 1.0))
+    }
+}
+
+const OPEN: Config = Config {
+    method: Method::Fused,
+    strategy: Strategy::Bayesian,
+    threshold: 0.99,
+    max_slides: 10,
+    open: true,
+};
+const CLOSED: Config = Config { open: false, ..OPEN };
+
+type Twenty<'t> = Explorer<'t, 20>;
+
+/// An explorer of all textures on a rig that measures everything.
+fn fused(bytes: &[u8], config: Config) -> Twenty<'_> {
+    Explorer::new(Table::read(bytes).unwrap(), PropertySet::ALL, config).unwrap()
+}
+
+fn look(movement: u8) -> Action {
+    Action {
+        movement,
+        property: None,
+    }
+}
+
+/// A slide with these features of a table of traction and bands, or of bands only.
+fn with_features(set: FeatureSet, x: &[i16]) -> Observation {
+    let mut slide = Observation::default();
+    let bands = match set {
+        FeatureSet::Force => {
+            let traction = Some(f32::from(x[0]) / 1024.0);
+            slide.properties = Properties::new([traction, None, None]);
+            &x[1..]
+        }
+        _ => x,
+    };
+    slide.bands = bands.iter().copied().collect();
+    slide
+}
+
+/// A slide of bands that are whitened to this, in standard deviations: with a straight whitening.
+fn at(z: &[f64]) -> Observation {
+    let x: Vec<i16> = z.iter().map(|z| (z * 1024.0).round() as i16).collect();
+    with_features(FeatureSet::Bands, &x)
+}
+
+/// A table of bands with a straight whitening.
+fn straight_table(features: usize, known: &[Vec<Whitened>]) -> Vec<u8> {
+    let whitenings = vec![straight(features); known[0].len()];
+    fused_of(FeatureSet::Bands, &whitenings, known)
+}
+
+/// Verdicts that agree with the recipe's, and all.
+#[derive(Default)]
+struct Agreement {
+    same: u32,
+    all: u32,
+    unknown: u32,
+    sure: u32,
+    untaught: u32,
+}
+
+/// Explores to the last slide, and compares every step with the recipe.
+fn explored(
+    table: Table<'_>,
+    set: FeatureSet,
+    candidates: &[u16],
+    config: Config,
+    mut slide: impl FnMut(u8) -> Vec<i16>,
+    agreement: &mut Agreement,
+) {
+    let among = candidates.to_vec();
+    let Ok(mut explorer) = Twenty::among(table, PropertySet::ALL, config, among) else {
+        return;
+    };
+    let mut recipe = Recipe::new(table, candidates);
+    for slides in 1..=config.max_slides {
+        let outlook = explorer.outlook();
+        let p: Vec<f64> = candidates
+            .iter()
+            .map(|&c| explorer.posterior()[usize::from(c)].into())
+            .collect();
+        let taught: Vec<u8> = (0..table.movements().len() as u8)
+            .filter(|&m| candidates.iter().any(|&c| table.trials(c, m) > 0))
+            .collect();
+        assert!(outlook.iter().map(|o| o.action).eq(taught.iter().map(|&m| look(m))));
+        for o in &outlook {
+            let movement = o.action.movement.into();
+            let difference = f64::from(o.uncertainty) - recipe.uncertainty(movement, &p);
+            assert!(difference.abs() < 3e-4, "{o:?}: {difference}");
+            let made = recipe.made.get(&movement).copied().unwrap_or(0.0);
+            let benefit = 1.0 - f64::from(o.uncertainty).clamp(0.0, 1.0).powf(1.0 / (made + 1.0));
+            assert!((f64::from(o.benefit) - benefit).abs() < 1e-5, "{o:?}");
+            if o.uncertainty > 0.01 {
+                let difference = f64::from(o.benefit) - recipe.benefit(movement, &p);
+                assert!(difference.abs() < 1e-3, "{o:?}: {difference}");
+            }
+        }
+        let action = explorer.choose(&outlook, 0);
+        let most = outlook.iter().map(|o| o.benefit).fold(0.0, f32::max);
+        let first = outlook.iter().find(|o| o.benefit == most);
+        assert_eq!(first.unwrap().action, action);
+        let x = slide(action.movement);
+        explorer.observe(action, &with_features(set, &x)).unwrap();
+        recipe.observe(action.movement, &table.whiten(action.movement, &x).unwrap());
+        let untaught = candidates.iter().any(|&c| table.trials(c, action.movement) == 0);
+        agreement.untaught += u32::from(untaught);
+
+        let (p, log_odds) = recipe.decide(true);
+        // of every movement: what the line between two entries of a logarithm's table is off
+        let visited = recipe.visits.len() as f64;
+        let mut total = 0.0;
+        for (&c, p) in candidates.iter().zip(&p) {
+            let posterior = f64::from(explorer.posterior()[usize::from(c)]);
+            assert!((posterior - p).abs() < 5e-4 + 5e-4 * visited, "{posterior} {p}");
+            total += posterior;
+        }
+        assert!((total - 1.0).abs() < 1e-5, "{total}");
+        let others = explorer.posterior().iter().zip(0..);
+        let mut others = others.filter(|(_, texture)| !candidates.contains(texture));
+        assert!(others.all(|(&p, _)| p == 0.0), "no candidate, no probability");
+        assert_eq!(explorer.log_odds().is_some(), log_odds.is_some());
+        if let (Some(found), Some(expected)) = (explorer.log_odds(), log_odds) {
+            let error = (f64::from(found) - expected).abs();
+            assert!(error < 1e-3 + 3e-3 * visited, "{found} {expected}");
+        }
+        // the verdict, and what the mean's rounding may change: little
+        let (rounded, (p, log_odds)) = (p, recipe.decide(false));
+        for (p, rounded) in p.iter().zip(&rounded) {
+            assert!((p - rounded).abs() < 0.01, "{p} {rounded}");
+        }
+        let best = (0..p.len()).rev().max_by(|&i, &j| p[i].total_cmp(&p[j])).unwrap();
+        let limit = if slides < 2 { 2.0 } else { 0.0 };
+        let unknown = config.open && log_odds.is_some_and(|l| l > limit);
+        let sure = p[best] > f64::from(config.threshold) && !unknown;
+        let over = sure || unknown && slides >= 2 || slides >= config.max_slides;
+        let certain = p[best] > f64::from(config.threshold) && log_odds.is_some_and(|l| l <= -2.0);
+        let expected = (over, candidates[best], sure, unknown, certain);
+        let verdict = explorer.best();
+        let found = (
+            explorer.verdict().is_some(),
+            verdict.texture,
+            verdict.sure,
+            verdict.unknown,
+            explorer.is_certain(),
+        );
+        assert_eq!(verdict.log_odds, explorer.log_odds());
+        agreement.all += 1;
+        agreement.same += u32::from(found == expected);
+        agreement.sure += u32::from(sure);
+        agreement.unknown += u32::from(unknown);
+        if let Some(verdict) = explorer.verdict() {
+            assert_eq!(verdict, explorer.best());
+        }
+    }
+    // what can be learned of it
+    let felt: Vec<_> = explorer.felt().collect();
+    assert_eq!(felt.len(), recipe.visits.len());
+    for (movement, slides, mean) in felt {
+        let (k, sum) = &recipe.visits[&movement.into()];
+        assert_eq!((f64::from(slides), mean.len()), (*k, sum.len()));
+        for (mean, sum) in mean.iter().zip(sum) {
+            assert!((f64::from(*mean) - sum / k * 256.0).abs() <= 0.5);
+        }
+    }
+}
+
+fn some_config(noise: &mut Noise) -> Config {
+    Config {
+        threshold: if noise.below(2) == 0 { 0.99 } else { 0.9 },
+        max_slides: 1 + noise.below(10) as u8,
+        open: noise.below(3) > 0,
+        ..OPEN
+    }
+}
+
+fn some_candidates(noise: &mut Noise, textures: usize) -> Vec<u16> {
+    let mut candidates: Vec<u16> = (0..textures as u16).collect();
+    if noise.below(3) == 0 {
+        candidates.retain(|_| noise.below(2) == 0);
+    }
+    candidates
+}
+
+/// Any means, and any numbers of slides, none as well.
+#[test]
+fn explores_by_the_recipe() {
+    let mut agreement = Agreement::default();
+    for seed in 0..600 {
+        let noise = &mut Noise(seed);
+        let (textures, movements) = (1 + noise.below(20), 1 + noise.below(4));
+        let features = 1 + noise.below(12);
+        let spread = 0.5 + 4.0 * noise.uniform();
+        let mut mean = || -> Vec<f64> { (0..features).map(|_| spread * noise.normal()).collect() };
+        let means: Vec<Vec<Vec<f64>>> = (0..=textures)
+            .map(|_| (0..movements).map(|_| mean()).collect())
+            .collect();
+        let table: Vec<Vec<Whitened>> = means[..textures]
+            .iter()
+            .map(|row| {
+                let counts = [0, 1, 2, 5, 5, 5, 8, 40, 255];
+                row.iter().map(|mean| known(counts[noise.below(9)], mean)).collect()
+            })
+            .collect();
+        let bytes = straight_table(features, &table);
+        let config = some_config(noise);
+        let candidates = some_candidates(noise, textures);
+        // now and then one that the table does not have
+        let truth = noise.below(textures + 1);
+        let slide = |movement: u8| -> Vec<i16> {
+            let mean = means[truth][usize::from(movement)].iter();
+            mean.map(|m| ((m + noise.normal()) * 1024.0).round().clamp(-32768.0, 32767.0) as i16)
+                .collect()
+        };
+        let table = Table::read(&bytes).unwrap();
+        explored(table, FeatureSet::Bands, &candidates, config, slide, &mut agreement);
+    }
+    let Agreement { same, all, unknown, sure, untaught } = agreement;
+    std::println!("{same} of {all}, {unknown} unknown, {sure} sure, {untaught} untaught");
+    assert!(f64::from(same) >= 0.995 * f64::from(all), "{same} of {all}");
+    assert!(all > 2000 && unknown > 100 && sure > 500 && untaught > 500);
+}
+
+/// From slides to verdicts: whitening and means are learned from five slides of each texture.
+#[test]
+fn explores_what_was_learned_by_the_recipe() {
+    let mut agreement = Agreement::default();
+    for seed in 0..60 {
+        let noise = &mut Noise(seed);
+        let world = World::new(noise, 18, 3, 13);
+        let mut slides = world.slides(noise, 5);
+        slides.iter_mut().for_each(|textures| textures.truncate(15));
+        let whitenings: Vec<Whitening> = learned(&slides);
+        let row = |texture: usize| -> Vec<Whitened> {
+            let cell = |(whitening, textures): (&Whitening, &Vec<Vec<Vector>>)| {
+                let mut known = Whitened::default();
+                for slide in &textures[texture] {
+                    known.teach(&whitening.apply(slide));
+                }
+                known
+            };
+            whitenings.iter().zip(&slides).map(cell).collect()
+        };
+        let known: Vec<Vec<Whitened>> = (0..15).map(row).collect();
+        let bytes = fused_of(FeatureSet::Force, &whitenings, &known);
+        let table = Table::read(&bytes).unwrap();
+        for _ in 0..6 {
+            let config = some_config(noise);
+            let candidates = some_candidates(noise, 15);
+            let truth = noise.below(18);
+            let slide = |movement: u8| world.slide(noise, truth, movement.into()).to_vec();
+            explored(table, FeatureSet::Force, &candidates, config, slide, &mut agreement);
+        }
+    }
+    let Agreement { same, all, unknown, sure, .. } = agreement;
+    std::println!("{same} of {all}, {unknown} unknown, {sure} sure");
+    assert!(f64::from(same) >= 0.995 * f64::from(all), "{same} of {all}");
+    assert!(all > 1000 && unknown > 100 && sure > 500);
+}
+
+/// Means 0 and 4 of one slide each, d = 1; slides at 1. By hand: l = -(9/2) ln(1 + q/(8 v)).
+#[test]
+fn another_slide_of_a_movement_replaces_and_does_not_add() {
+    let bytes = straight_table(1, &[vec![known(1, &[0.0])], vec![known(1, &[4.0])]]);
+    let mut explorer = fused(&bytes, OPEN);
+    // v = 2: 1 + 1/16 and 1 + 9/16; v = 3/2: 1 + 1/12 and 1 + 9/12; v = 1 + 1/255: nearly 1 + 1/8 and 1 + 9/8
+    let once = 1.0 / (1.0 + (17.0f32 / 25.0).powf(4.5));
+    let twice = 1.0 / (1.0 + (13.0f32 / 21.0).powf(4.5));
+    let often = 1.0 / (1.0 + (9.0f32 / 17.0).powf(4.5));
+    explorer.observe(look(0), &at(&[1.0])).unwrap();
+    assert!((explorer.posterior()[0] - once).abs() < 5e-4, "{}", explorer.posterior()[0]);
+    explorer.observe(look(0), &at(&[1.0])).unwrap();
+    assert!((explorer.posterior()[0] - twice).abs() < 5e-4, "{}", explorer.posterior()[0]);
+    for _ in 0..400 {
+        explorer.observe(look(0), &at(&[1.0])).unwrap();
+    }
+    assert!((explorer.posterior()[0] - often).abs() < 1e-3, "{}", explorer.posterior()[0]);
+    // 1 = the mean of 3 and -1
+    let mut other = fused(&bytes, OPEN);
+    other.observe(look(0), &at(&[3.0])).unwrap();
+    assert!(other.posterior()[1] > 0.8);
+    other.observe(look(0), &at(&[-1.0])).unwrap();
+    assert!((other.posterior()[0] - twice).abs() < 5e-4);
+    assert_eq!(other.log_odds(), None, "two textures say nothing of others");
+    assert!(!other.is_certain());
+    assert!(other.felt().eq([(0, 2, heapless::Vec::from_slice(&[256]).unwrap())]));
+}
+
+/// The most that is counted is 255 slides; whatever comes after is not taken in.
+#[test]
+fn beyond_255_slides_nothing_changes() {
+    let bytes = straight_table(1, &[vec![known(9, &[0.0])], vec![known(9, &[1.0])]]);
+    let mut explorer = fused(&bytes, OPEN);
+    for _ in 0..255 {
+        explorer.observe(look(0), &at(&[0.25])).unwrap();
+    }
+    let posterior = explorer.posterior().to_vec();
+    for _ in 0..100 {
+        explorer.observe(look(0), &at(&[30.0])).unwrap();
+        assert_eq!((explorer.posterior(), explorer.slides()), (&posterior[..], 255));
+    }
+}
+
+#[test]
+fn the_order_of_slides_does_not_matter() {
+    for seed in 0..100 {
+        let noise = &mut Noise(seed);
+        let mut cell = || {
+            let mean: Vec<f64> = (0..5).map(|_| 2.0 * noise.normal()).collect();
+            known((noise.uniform() * 4.0) as u8, &mean)
+        };
+        let table: Vec<Vec<Whitened>> = (0..6).map(|_| vec![cell(), cell(), known(3, &[0.5; 5])]).collect();
+        let bytes = straight_table(5, &table);
+        let mut slides: Vec<(u8, Observation)> = (0..7)
+            .map(|_| {
+                let z: Vec<f64> = (0..5).map(|_| 2.0 * noise.normal()).collect();
+                (noise.below(3) as u8, at(&z))
+            })
+            .collect();
+        let (mut there, mut back) = (fused(&bytes, OPEN), fused(&bytes, OPEN));
+        for (movement, slide) in &slides {
+            // a movement that no texture has is none of the actions
+            let _ = there.observe(look(*movement), slide);
+        }
+        slides.reverse();
+        for (movement, slide) in &slides {
+            let _ = back.observe(look(*movement), slide);
+        }
+        assert!(there.slides() > 0);
+        assert_eq!(there.posterior(), back.posterior());
+        let (a, b) = (there.log_odds().unwrap_or(0.0), back.log_odds().unwrap_or(0.0));
+        assert!((a - b).abs() < 1e-4, "{a} {b}");
+    }
+}
+
+/// Where a texture was never learned it is as likely as one that the table does not have.
+#[test]
+fn a_texture_never_learned_at_a_movement_is_like_any_other() {
+    let cell = |x: f64, y: f64| vec![known(10, &[x, y])];
+    let table = [cell(5.0, 0.0), cell(-5.0, 0.0), cell(0.0, 5.0), vec![known(0, &[3.0, 3.0])]];
+    let bytes = straight_table(2, &table);
+    let table = Table::read(&bytes).unwrap();
+    let mut pair = Twenty::among(table, PropertySet::ALL, OPEN, [0, 3]).unwrap();
+    // far from the other candidate: all is on the side of the one never learned
+    pair.observe(look(0), &at(&[-30.0, -30.0])).unwrap();
+    assert!(pair.posterior()[3] > 0.999, "{:?}", pair.posterior());
+    assert_eq!(pair.posterior()[1..3], [0.0, 0.0]);
+    // l_b - ln((e^l_b + 0)/2) = ln 2
+    let log_odds = pair.log_odds().unwrap();
+    assert!((log_odds - 2f32.ln()).abs() < 2e-3, "{log_odds}");
+    pair.restart();
+    pair.observe(look(0), &at(&[5.0, 0.0])).unwrap();
+    assert!(pair.posterior()[0] > 0.9);
+    // and confused with all: eq. 11 of two equal ones that nothing tells apart is 1/2
+    pair.restart();
+    assert!((pair.outlook()[0].uncertainty - 0.5).abs() < 1e-6);
+    // alone it has nothing to be looked at
+    let alone = Twenty::among(table, PropertySet::ALL, OPEN, [3]).map(|_| ());
+    assert_eq!(alone, Err(ExplorerError::NothingToMeasure));
+}
+
+/// Five textures on the axes, six standard deviations out.
+fn axes() -> Vec<u8> {
+    let ends = [
+        [6.0, 0.0, 0.0],
+        [-6.0, 0.0, 0.0],
+        [0.0, 6.0, 0.0],
+        [0.0, -6.0, 0.0],
+        [0.0, 0.0, 6.0],
+    ];
+    let known: Vec<Vec<Whitened>> = ends.iter().map(|end| vec![known(10, end); 2]).collect();
+    straight_table(3, &known)
+}
+
+#[test]
+fn what_no_texture_is_like_is_unknown_after_two_slides() {
+    let bytes = axes();
+    // far from all: log-odds over 2 at once
+    let mut explorer = fused(&bytes, OPEN);
+    explorer.observe(look(0), &at(&[4.0, -4.0, -4.0])).unwrap();
+    assert!(explorer.log_odds().unwrap() > 2.0, "{:?}", explorer.log_odds());
+    assert_eq!(explorer.verdict(), None, "one slide is not enough");
+    assert!(explorer.best().unknown);
+    explorer.observe(look(1), &at(&[4.0, -4.0, -4.0])).unwrap();
+    let verdict = explorer.verdict().unwrap();
+    assert!(verdict.unknown && !verdict.sure && !explorer.is_certain());
+    assert_eq!(verdict.log_odds, explorer.log_odds());
+    // nearer: over 0, and only later than the first slide that is enough
+    let mut explorer = fused(&bytes, OPEN);
+    explorer.observe(look(0), &at(&[4.0, -2.0, -1.0])).unwrap();
+    let log_odds = explorer.log_odds().unwrap();
+    assert!((0.0..2.0).contains(&log_odds) && !explorer.best().unknown, "{log_odds}");
+    explorer.observe(look(0), &at(&[4.0, -2.0, -1.0])).unwrap();
+    let log_odds = explorer.log_odds().unwrap();
+    assert!((0.0..2.0).contains(&log_odds), "{log_odds}");
+    assert!(explorer.verdict().unwrap().unknown);
+}
+
+#[test]
+fn what_may_be_unknown_is_not_sure() {
+    let bytes = axes();
+    let beyond = at(&[12.0, -2.0, 0.0]);
+    let mut open = fused(&bytes, OPEN);
+    let mut closed = fused(&bytes, CLOSED);
+    for explorer in [&mut open, &mut closed] {
+        explorer.observe(look(0), &beyond).unwrap();
+        assert!(explorer.posterior()[0] > 0.99 && explorer.log_odds().unwrap() > 2.0);
+        assert!(!explorer.is_certain());
+    }
+    assert_eq!((open.best().sure, open.verdict()), (false, None));
+    let verdict = closed.verdict().unwrap();
+    assert_eq!((verdict.texture, verdict.sure, verdict.unknown), (0, true, false));
+    // closed never says so, however far
+    for z in [[30.0; 3], [-30.0, 30.0, 0.0]] {
+        for movement in [0, 1, 0] {
+            closed.observe(look(movement), &at(&z)).unwrap();
+            assert!(closed.log_odds().unwrap() > 2.0 && !closed.best().unknown);
+        }
+    }
+    // open it stays so until the last slide, and a slide that fits does away with it
+    open.restart();
+    open.observe(look(0), &beyond).unwrap();
+    for _ in 0..6 {
+        open.observe(look(0), &at(&[5.0, 0.5, 0.0])).unwrap();
+    }
+    let verdict = open.verdict().unwrap();
+    assert_eq!((verdict.texture, verdict.sure, verdict.unknown), (0, true, false));
+}
+
+#[test]
+fn it_learns_by_itself_only_where_it_is_certain() {
+    let bytes = axes();
+    let after = |z: [f64; 3], threshold| {
+        let mut explorer = fused(&bytes, Config { threshold, ..OPEN });
+        assert!(!explorer.is_certain(), "before the first slide");
+        explorer.observe(look(0), &at(&z)).unwrap();
+        let best = explorer.best();
+        (explorer.is_certain(), best.sure, explorer.log_odds().unwrap())
+    };
+    let (certain, sure, log_odds) = after([6.0, 0.0, 0.0], 0.99);
+    assert!(certain && sure && log_odds < -2.0, "{log_odds}");
+    let (certain, sure, log_odds) = after([4.5, -1.0, -0.5], 0.99);
+    assert!(!certain && sure && (-2.0..0.0).contains(&log_odds), "{log_odds}");
+    let (certain, sure, log_odds) = after([6.0, 0.0, 0.0], 0.999_999);
+    assert!(!certain && !sure && log_odds < -2.0, "{log_odds}");
+    // never by properties alone
+    let row = |mean| vec![around([(mean, 0.1); 3])];
+    let bytes = table_of(PropertySet::ALL, &[row(0.0), row(2.0), row(4.0), row(6.0)]);
+    for method in [Method::Paper, Method::Student, Method::StudentAll] {
+        let mut explorer = fused(&bytes, Config { method, ..OPEN });
+        for _ in 0..5 {
+            let outlook = explorer.outlook();
+            explorer.observe(outlook[0].action, &all(2.0)).unwrap();
+        }
+        assert!(explorer.best().probability > 0.99, "{method:?}");
+        assert!(!explorer.is_certain() && explorer.log_odds().is_none());
+        assert_eq!(explorer.felt().count(), 0);
+    }
+}
+
+#[test]
+fn far_off_values_neither_overflow_nor_panic() {
+    let ends = [i16::MAX, i16::MIN, 0, 1];
+    let whole = |slides, mean| Whitened {
+        slides,
+        mean: [mean; 14],
+    };
+    let rows = [
+        [whole(1, i16::MAX), whole(255, i16::MAX)],
+        [whole(255, i16::MIN), whole(0, 0)],
+        [whole(5, 0), whole(5, 1)],
+        [whole(5, 0), whole(5, 1)],
+    ];
+    // the steepest whitening there is: it saturates
+    let mut bytes = vec![0; 2 * 14 + 14];
+    (0..14 * 15 / 2).for_each(|_| bytes.extend(i16::MAX.to_le_bytes()));
+    let steep = Whitening::read(&bytes, 14).unwrap();
+    for whitening in [straight(14), steep] {
+        let rows: Vec<Vec<Whitened>> = rows.iter().map(|row| row.to_vec()).collect();
+        let bytes = fused_of(FeatureSet::Pressure, &vec![whitening; 2], &rows);
+        for x in ends {
+            for y in ends {
+                let mut explorer = fused(&bytes, OPEN);
+                for n in 0..300 {
+                    let slide = Observation {
+                        pressure: Some([x, y]),
+                        bands: heapless::Vec::from_slice(&[x; 12]).unwrap(),
+                        ..Observation::default()
+                    };
+                    let movement = (n / 3 % 2) as u8;
+                    explorer.observe(look(movement), &slide).unwrap();
+                    let posterior = explorer.posterior();
+                    let sum: f32 = posterior.iter().sum();
+                    assert!((sum - 1.0).abs() < 1e-5, "{x} {y}: {posterior:?}");
+                    assert!(posterior.iter().all(|p| (0.0..=1.0).contains(p)));
+                    assert!(explorer.log_odds().is_some_and(f32::is_finite));
+                    if n % 50 == 0 {
+                        let mut outlook = explorer.outlook().into_iter();
+                        let within = |x: f32| (0.0..=1.0).contains(&x);
+                        assert!(outlook.all(|o| within(o.uncertainty) && within(o.benefit)));
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn cycling_goes_through_the_movements_in_turn() {
+    let row = |mean: f64| vec![known(5, &[mean]); 3];
+    let bytes = straight_table(1, &[row(0.0), row(1.0)]);
+    let config = Config {
+        strategy: Strategy::Cycling,
+        ..OPEN
+    };
+    let mut explorer = fused(&bytes, config);
+    assert!(explorer.turns().eq([look(0), look(1), look(2)]));
+    for slide in 0..7 {
+        let outlook = explorer.outlook();
+        let action = explorer.choose(&outlook, 99);
+        assert_eq!(action, look(slide % 3));
+        explorer.observe(action, &at(&[0.5])).unwrap();
+    }
+    let random = Config {
+        strategy: Strategy::Random,
+        ..OPEN
+    };
+    let mut explorer = fused(&bytes, random);
+    let outlook = explorer.outlook();
+    let drawn = [0, u32::MAX / 2, u32::MAX].map(|random| explorer.choose(&outlook, random));
+    assert_eq!(drawn, [look(0), look(1), look(2)]);
+}
+
+#[test]
+fn the_method_must_suit_the_table_and_the_rig_its_features() {
+    let fused_bytes = axes();
+    let gaussians = plain(&[0.0, 1.0], 1);
+    fn begin(bytes: &[u8], method: Method, measured: PropertySet) -> Result<(), ExplorerError> {
+        let config = Config { method, ..OPEN };
+        Twenty::new(Table::read(bytes).unwrap(), measured, config).map(|_| ())
+    }
+    let all = PropertySet::ALL;
+    for method in [Method::Paper, Method::Student, Method::StudentAll] {
+        let error = begin(&fused_bytes, method, all).unwrap_err();
+        assert_eq!(error, ExplorerError::Method(method));
+        assert!(error.to_string().contains(method.name()), "{error}");
+        assert_eq!(begin(&gaussians, method, all), Ok(()));
+        assert!(method.suits(Table::read(&gaussians).unwrap().contents()));
+    }
+    let error = begin(&gaussians, Method::Fused, all).unwrap_err();
+    assert_eq!(error, ExplorerError::Method(Method::Fused));
+    assert!(error.to_string().contains("whitened features"), "{error}");
+    for bytes in [&fused_bytes, &gaussians] {
+        let contents = Table::read(bytes).unwrap().contents();
+        assert!(Method::of(contents).suits(contents));
+    }
+    // bands need nothing but the sensor
+    assert_eq!(begin(&fused_bytes, Method::Fused, PropertySet::default()), Ok(()));
+    let no_force: PropertySet = [Property::Roughness, Property::Fineness].into_iter().collect();
+    for (set, features, missing) in [
+        (FeatureSet::Force, 13, true),
+        (FeatureSet::Pressure, 14, false),
+        (FeatureSet::Properties, 3, true),
+    ] {
+        let bytes = fused_of(set, &[straight(features)], &[vec![known(2, &[0.0])]]);
+        let error = missing.then_some(ExplorerError::Features(set));
+        assert_eq!(begin(&bytes, Method::Fused, no_force).err(), error);
+        assert_eq!(begin(&bytes, Method::Fused, all), Ok(()));
+        if let Some(error) = error {
+            assert!(error.to_string().contains(set.name()), "{error}");
+        }
+    }
+}
+
+#[test]
+fn a_slide_without_the_features_teaches_nothing() {
+    let bytes = axes();
+    let mut explorer = fused(&bytes, OPEN);
+    explorer.observe(look(0), &at(&[5.0, 1.0, 0.0])).unwrap();
+    let before = (state(&mut explorer), explorer.felt().collect::<Vec<_>>());
+    let missing = ObserveError::Features(FeatureSet::Bands);
+    for slide in [Observation::default(), all(1.0), at(&[1.0; 2]), at(&[1.0; 4])] {
+        assert_eq!(explorer.observe(look(1), &slide), Err(missing));
+    }
+    assert!(missing.to_string().contains("band powers"), "{missing}");
+    for action in [look(2), act(0, Property::Traction)] {
+        let slide = at(&[5.0, 1.0, 0.0]);
+        assert_eq!(explorer.observe(action, &slide), Err(ObserveError::Action(action)));
+    }
+    assert_eq!((state(&mut explorer), explorer.felt().collect::<Vec<_>>()), before);
+    // and a new exploration knows nothing of the last one
+    explorer.restart();
+    let mut new = fused(&bytes, OPEN);
+    assert_eq!(state(&mut explorer), state(&mut new));
+    assert_eq!((explorer.log_odds(), explorer.felt().count()), (None, 0));
+}
