@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use tactus::link::{LinkError, Port, PortError, Question, ReadTable};
 use tactus_core::table::Table;
+use tactus_core::wire::Status;
 
 /// Ends the emulator, however the test ends.
 struct Running(Child);
@@ -49,6 +50,8 @@ fn the_probe_answers_on_the_tcp_port() {
         match port.run(Question::status(), |_| ()) {
             // it had its power just now
             Err(PortError::Link(LinkError::Rebooted { .. })) => {}
+            // nor has it opened its store yet
+            Ok(Status { textures: 0, .. }) => std::thread::sleep(Duration::from_millis(100)),
             answered => break answered.unwrap(),
         }
     };
