@@ -145,7 +145,7 @@ pub fn encode<'o, 'a>(
     if measured.is_empty() {
         return Err(EncodeError::Empty);
     }
-    let rows = textures.zip(0u16..).map(|(texture, number)| {
+    let rows = textures.zip(0..=u16::MAX).map(|(texture, number)| {
         let slides = texture.experience.iter().map(Experience::trials);
         let known = Known::Gaussians(texture.experience);
         Row::new(texture.name, number, known, slides)
@@ -169,7 +169,7 @@ pub fn encode_fused<'o, 'a>(
     if !set.allows(features) || movements.iter().any(|(_, w)| w.features() != features) {
         return Err(EncodeError::Contents);
     }
-    let rows = textures.zip(0u16..).map(|((name, whitened), number)| {
+    let rows = textures.zip(0..=u16::MAX).map(|((name, whitened), number)| {
         let slides = whitened.iter().map(|w| w.slides);
         Row::new(name, number, Known::Fused(whitened), slides)
     });
