@@ -9,7 +9,7 @@ use tactus::played::Lesson;
 use tactus::recordings::{RecordingSet, Slide};
 use tactus::replay::{Felt, measure};
 use tactus::sim::played::Played;
-use tactus::simulated::SimRig;
+use tactus::simulated::{Performed, SimRig};
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{Plan, Property, PropertySet};
 use tactus_core::movement::Movement;
@@ -213,6 +213,37 @@ fn twenty_real_materials_are_told_apart_on_the_simulated_rig() {
         );
         assert!(all.right >= least, "{rights:?}");
     }
+}
+
+/// Real tangential forces jump: the stage keeps its speed none the less.
+#[test]
+fn the_stage_keeps_its_speed_under_recorded_forces() {
+    let Some(folder) = data("biotac") else { return };
+    let set = RecordingSet::open(&folder).unwrap();
+    let calibration = calibrated(Lesson::setup(0)).unwrap();
+    let lesson = Lesson::interleaved(&set, 5, 1).unwrap();
+    let worst: Vec<(f64, f64, &str)> = (0..lesson.names.len())
+        .into_par_iter()
+        .map(|texture| {
+            let mut rig = SimRig::new(Lesson::setup(texture as u64));
+            rig.control().calibrate(calibration).unwrap();
+            rig.home().unwrap();
+            rig.world().play(lesson.test[texture].clone(), 1);
+            for _ in 0..lesson.test[texture].len() {
+                rig.record(lesson.movement).unwrap();
+            }
+            let performed = rig.performed();
+            let speed = performed.iter().map(|p| p.speed_error).fold(0.0, f64::max);
+            let force = |p: &Performed| (p.force_n / f64::from(lesson.movement.force_n()) - 1.0).abs();
+            let force = performed.iter().map(force).fold(0.0, f64::max);
+            (speed, force, lesson.names[texture].as_str())
+        })
+        .collect();
+    for (speed, force, name) in &worst {
+        println!("{name}: speed {:.2} %, force {:.2} % off", speed * 100.0, force * 100.0);
+    }
+    let (speed, _, name) = worst.iter().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+    assert!(*speed <= 0.01, "{name}: {speed}");
 }
 
 /// The rig feels 3 of the 5 s that the golden properties are of, and subtracts its own sensor's noise.
