@@ -95,6 +95,16 @@ pub enum Error {
         /// Some of them.
         examples: String,
     },
+    /// A function is too short for the code that is to take its place.
+    #[error("{name} has {size} bytes, {needed} are needed")]
+    Room {
+        /// The function.
+        name: &'static str,
+        /// What it has, bytes.
+        size: u64,
+        /// What it takes, bytes.
+        needed: u64,
+    },
     /// No memory there.
     #[error("no memory at {address:#010x}")]
     Memory {
@@ -388,6 +398,31 @@ impl Emulator {
                 rcc.fail_hse(registers, context);
             });
         })
+    }
+
+    /// From now on the flash's interrupt clears its flags, and wakes nobody; by new code for its handler. What to write back,
+    /// and where.
+    ///
+    /// # Errors
+    /// [`Error::Symbol`] and [`Error::Room`].
+    pub fn lose_flash_interrupts(&mut self) -> Result<(u64, Vec<u8>), Error> {
+        const HANDLER: &str = "FLASH";
+        let (address, size) = self.symbol(HANDLER)?;
+        let address = address & !1;
+        // ldr r0, [pc, #4]; ldr r1, [r0]; str r1, [r0]; bx lr; FLASH_SR
+        let mut code = vec![0x4801_u16, 0x6801, 0x6001, 0x4770, 0x3C0C, 0x4002];
+        if !address.is_multiple_of(4) {
+            // nop: the word at the end is read from a multiple of 4
+            code.insert(0, 0xBF00);
+        }
+        let bytes: Vec<u8> = code.iter().flat_map(|c| c.to_le_bytes()).collect();
+        let (name, needed) = (HANDLER, bytes.len() as u64);
+        if needed > size {
+            return Err(Error::Room { name, size, needed });
+        }
+        let whole = self.read(address, needed)?;
+        self.write(address, &bytes)?;
+        Ok((address, whole))
     }
 
     /// Resets the chip by its pin.

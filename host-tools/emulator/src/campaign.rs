@@ -10,7 +10,7 @@ use tactus::played::Lesson;
 use tactus_core::wire::Identify;
 
 use crate::board::Options;
-use crate::exploration::{Exploration, ExploreError, RIGHT_SHARE, explore};
+use crate::exploration::{Exploration, ExploreError, explore};
 use crate::lessons::{self, Known, TRIALS, Unknown};
 use crate::talk::Talk;
 
@@ -141,10 +141,35 @@ fn one(elf: &Path, group: &Group, index: usize) -> Result<Exploration, ExploreEr
     explore(&mut talk, table, identify, &unknown.name, |_, _| ())
 }
 
+/// What the verdicts of a group are held against.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Bars {
+    /// The share of explorations that must be right.
+    pub right_share: f64,
+    /// The most slides at the median.
+    pub median_slides: Option<u8>,
+}
+
+impl Bars {
+    /// Those of a method.
+    pub fn of(method: Method) -> Self {
+        match method {
+            Method::Fused => Self {
+                right_share: 19.0 / 20.0,
+                median_slides: Some(2),
+            },
+            _ => Self {
+                right_share: 16.0 / 20.0,
+                median_slides: None,
+            },
+        }
+    }
+}
+
 /// The bars that a group's results miss; none if all is well.
-pub fn missed(results: &Results) -> Vec<String> {
+pub fn missed(results: &Results, bars: Bars) -> Vec<String> {
     let mut missed = Vec::new();
-    let wanted = (RIGHT_SHARE * results.len() as f64).ceil() as usize;
+    let wanted = (bars.right_share * results.len() as f64).ceil() as usize;
     let right = right(results);
     if right < wanted {
         missed.push(format!(
@@ -152,8 +177,23 @@ pub fn missed(results: &Results) -> Vec<String> {
             results.len()
         ));
     }
+    if let (Some(most), Some(median)) = (bars.median_slides, median_slides(results))
+        && median > most
+    {
+        missed.push(format!("{median} slides at the median, {most} wanted"));
+    }
     missed.extend(troubles(results));
     missed
+}
+
+/// Slides at the median, the upper one of two; an exploration without a verdict has the most. None of none.
+pub fn median_slides(results: &Results) -> Option<u8> {
+    let slides = results
+        .iter()
+        .map(|result| result.as_ref().map_or(u8::MAX, |e| e.found.slides));
+    let mut slides: Vec<u8> = slides.collect();
+    slides.sort_unstable();
+    slides.get(slides.len() / 2).copied()
 }
 
 /// Explorations that were right.

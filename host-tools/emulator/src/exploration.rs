@@ -19,8 +19,6 @@ use crate::talk::{PATIENCE_S, Talk, TalkError};
 /// A whole exploration, virtual seconds.
 const EXPLORATION_S: f64 = 600.0;
 
-/// The share of explorations that must be right.
-pub const RIGHT_SHARE: f64 = 16.0 / 20.0;
 /// Largest relative error of a slide's force ...
 pub const FORCE_SHARE: f64 = 0.05;
 /// ... unless it is less than a count of P_DC, N.

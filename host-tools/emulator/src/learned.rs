@@ -51,7 +51,7 @@ impl Chosen {
     pub(crate) fn new(cli: &Cli) -> anyhow::Result<Self> {
         let mut random = ChaCha8Rng::seed_from_u64(cli.seed);
         if let Some(name) = &cli.recording {
-            let lesson = lessons::recordings(cli.seed)?;
+            let lesson = lessons::recordings(cli.method.method(), cli.seed)?;
             let texture = lessons::material(&lesson, name)?;
             return Ok(Self {
                 unknown: lessons::played(&lesson, texture, cli.seed),

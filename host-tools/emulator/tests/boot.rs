@@ -118,7 +118,7 @@ fn a_store_that_does_not_open_does_not_keep_the_finger_down() {
         ..Options::default()
     };
     let mut board = Emulator::start(&elf, Setup::default(), options).unwrap();
-    lose_flash_interrupts(&mut board);
+    board.lose_flash_interrupts().unwrap();
     let mut talk = Talk::new(board);
     talk.wait(
         20.0,
@@ -142,18 +142,4 @@ fn a_store_that_does_not_open_does_not_keep_the_finger_down() {
     assert!(first_ms.is_some_and(|ms| ms < 500), "{first_ms:?}");
     assert_eq!(talk.board().resets().unwrap(), []);
     talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
-}
-
-/// The flash's interrupt clears its flags, and wakes nobody.
-fn lose_flash_interrupts(board: &mut Emulator) {
-    let (address, size) = board.symbol("FLASH").unwrap();
-    // ldr r0, [pc, #4]; ldr r1, [r0]; str r1, [r0]; bx lr; FLASH_SR
-    let mut code = vec![0x4801_u16, 0x6801, 0x6001, 0x4770, 0x3C0C, 0x4002];
-    if address % 4 != 0 {
-        // nop: the word at the end is read from a multiple of 4
-        code.insert(0, 0xBF00);
-    }
-    let bytes: Vec<u8> = code.iter().flat_map(|c| c.to_le_bytes()).collect();
-    assert!(bytes.len() as u64 <= size, "{size} bytes of handler");
-    board.write(address, &bytes).unwrap();
 }

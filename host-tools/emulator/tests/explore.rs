@@ -104,8 +104,8 @@ fn two_textures_that_change_places_change_the_verdicts() {
 fn explorations_meet_the_bars() {
     let Some(elf) = elf() else { return };
     let simulated = campaign::simulated(4, Method::Fused, 1, || ()).unwrap();
-    let recorded =
-        lessons::recordings(1).map(|lesson| campaign::recorded(&lesson, 3, Method::Fused, 1));
+    let recorded = lessons::recordings(Method::Fused.method(), 1)
+        .map(|lesson| campaign::recorded(&lesson, 3, Method::Fused, 1));
     let recorded = match recorded {
         Ok(group) => Some(group.unwrap()),
         Err(why) => {
@@ -126,11 +126,11 @@ fn explorations_meet_the_bars() {
             eprintln!("{}", wrong.log().join("\n"));
         }
     }
-    // a firmware that is right in 16 of 20 cases gets fewer than these right in 2.7 and in 0.8 of a hundred cases; the
+    // a firmware that is right in 19 of 20 cases gets fewer than these right in 1.4 and in 0.7 of a hundred cases; the
     // figure itself is the campaign's
-    assert!(campaign::right(&results[0]) >= 2, "of 4 simulated");
+    assert!(campaign::right(&results[0]) >= 3, "of 4 simulated");
     if let Some(recorded) = results.get(1) {
-        assert!(campaign::right(recorded) >= 1, "of 3 recorded");
+        assert!(campaign::right(recorded) >= 2, "of 3 recorded");
     }
 }
 

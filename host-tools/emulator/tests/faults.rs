@@ -222,10 +222,11 @@ const CASES: [Case; 17] = [
         deadline_ms: None,
     },
     Case {
+        // on a soft sample the slide may end before the force is too high: then the steps up are lost
         name: "the lever's driver runs down on its own while sliding",
         cause: Cause::Rig(Fault::LeverRunaway),
         when: When::Sliding,
-        seen: &[Seen::ForceHigh],
+        seen: &[Seen::ForceHigh, Seen::LeverSlips],
         deadline_ms: None,
     },
     Case {
@@ -295,11 +296,12 @@ fn ready(talk: &mut Talk) {
     .unwrap();
 }
 
-fn identify(max_slides: u8) -> Ask {
+/// Never sure: an exploration of so many slides.
+fn identify(slides: u8) -> Ask {
     Ask::Identify(Identify {
         among: Default::default(),
-        threshold: 0.99,
-        max_slides,
+        threshold: 1.0,
+        max_slides: slides,
         method: None,
         strategy: Default::default(),
         open: false,
@@ -516,19 +518,13 @@ fn check(name: &str) {
 fn a_session_that_is_stuck_is_noticed() {
     let Some(elf) = elf() else { return };
     let mut talk = board(&elf, 78, 5);
-    let (address, _) = talk.board().symbol("FLASH").unwrap();
-    let address = (address & !1).next_multiple_of(4);
-    // ldr r0, [pc, #4]; ldr r1, [r0]; str r1, [r0]; bx lr; FLASH_SR: clears the flags, wakes nobody
-    let code = [0x4801_u16, 0x6801, 0x6001, 0x4770, 0x3C0C, 0x4002];
-    let bytes: Vec<u8> = code.iter().flat_map(|c| c.to_le_bytes()).collect();
-    let whole = talk.board().read(address, bytes.len() as u64).unwrap();
     // an idle rig waits for its host as long as it likes
     let idle_ns = talk.board().now_ns() + 35_000_000_000;
     while talk.board().now_ns() < idle_ns {
         talk.step().unwrap();
     }
     assert_eq!(talk.board().resets().unwrap(), []);
-    talk.board().write(address, &bytes).unwrap();
+    let (address, whole) = talk.board().lose_flash_interrupts().unwrap();
     let began_ns = talk.board().now_ns();
     let mut words = None;
     let ended = talk.ask(Ask::BeginTable(1000), 60.0, |_, report| {
@@ -563,7 +559,6 @@ fn a_stop_holds_whenever_it_comes() {
     let frame = encode(&stop, &mut room).unwrap().to_vec();
     let mut sent = false;
     let mut chosen_after = 0;
-    // of a texture that two slides do not tell from all others
     let ended = talk.ask(identify(10), 100.0, |board, report| {
         let Some(report) = report else { return };
         match report.tell {

@@ -11,10 +11,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
 use tactus::evaluate::Method;
-use tactus_emulator::campaign::{self, Group, Results};
-use tactus_emulator::exploration::{
-    Exploration, FORCE_N, FORCE_SHARE, JITTER_US, RIGHT_SHARE, SPEED_SHARE,
-};
+use tactus_emulator::campaign::{self, Bars, Group, Results};
+use tactus_emulator::exploration::{Exploration, FORCE_N, FORCE_SHARE, JITTER_US, SPEED_SHARE};
 use tactus_emulator::lessons::{self, RECORDED_LIMITS};
 
 /// Has the firmware identify many textures on emulated boards, several at once, and holds the results against the bars.
@@ -90,7 +88,7 @@ fn run(cli: &Cli) -> anyhow::Result<bool> {
     if cli.recordings > 0 {
         bar.set_message("learning the recorded materials");
         // first, since it may be that there are none
-        let lesson = lessons::recordings(cli.seed)?;
+        let lesson = lessons::recordings(cli.method.method(), cli.seed)?;
         let group = campaign::recorded(&lesson, cli.recordings, cli.method, cli.seed)?;
         groups.push(("recordings", group));
     }
@@ -113,12 +111,13 @@ fn run(cli: &Cli) -> anyhow::Result<bool> {
         .zip(results)
         .map(|((name, _), results)| Part { name, results })
         .collect();
+    let bars = Bars::of(cli.method);
     let met = parts
         .iter()
-        .all(|part| campaign::missed(&part.results).is_empty());
+        .all(|part| campaign::missed(&part.results, bars).is_empty());
     let wall_s = began.elapsed().as_secs_f64();
     let report = match cli.format {
-        Format::Text => text(&parts, met, wall_s)?,
+        Format::Text => text(&parts, bars, met, wall_s)?,
         Format::Json => format!("{}\n", object(cli, &sha256, &parts, met, wall_s)),
     };
     match &cli.out {
@@ -130,13 +129,15 @@ fn run(cli: &Cli) -> anyhow::Result<bool> {
 }
 
 fn object(cli: &Cli, sha256: &str, parts: &[Part], met: bool, wall_s: f64) -> Value {
+    let bars = Bars::of(cli.method);
     let mut object = json!({
         "elf_sha256": sha256,
         "seed": cli.seed,
         "method": cli.method,
         "wall_seconds": wall_s,
         "bars": {
-            "right_share": RIGHT_SHARE,
+            "right_share": bars.right_share,
+            "median_slides": bars.median_slides,
             "force_error": FORCE_SHARE,
             "force_error_or_n": FORCE_N,
             "speed_error": SPEED_SHARE,
@@ -157,7 +158,8 @@ fn object(cli: &Cli, sha256: &str, parts: &[Part], met: bool, wall_s: f64) -> Va
             "explorations": explorations.collect::<Vec<_>>(),
             "right": campaign::right(&part.results),
             "of": part.results.len(),
-            "missed": campaign::missed(&part.results),
+            "median_slides": campaign::median_slides(&part.results),
+            "missed": campaign::missed(&part.results, bars),
         });
         if part.name == "recordings" {
             object[part.name]["limits"] = RECORDED_LIMITS.into();
@@ -166,7 +168,7 @@ fn object(cli: &Cli, sha256: &str, parts: &[Part], met: bool, wall_s: f64) -> Va
     object
 }
 
-fn text(parts: &[Part], met: bool, wall_s: f64) -> Result<String, std::fmt::Error> {
+fn text(parts: &[Part], bars: Bars, met: bool, wall_s: f64) -> Result<String, std::fmt::Error> {
     let mut out = String::new();
     for part in parts {
         writeln!(
@@ -241,9 +243,10 @@ fn text(parts: &[Part], met: bool, wall_s: f64) -> Result<String, std::fmt::Erro
         let largest = |of: fn(&Exploration) -> f64| explorations().map(of).fold(0.0, f64::max);
         writeln!(
             out,
-            "\n{} of {} right. Off at most: force {:.1} %, speed {:.2} %, slots {:.2} us; PC: features {:.1e}, posterior {:.1e}.",
+            "\n{} of {} right, {} slides at the median. Off at most: force {:.1} %, speed {:.2} %, slots {:.2} us; PC: features {:.1e}, posterior {:.1e}.",
             campaign::right(&part.results),
             part.results.len(),
+            campaign::median_slides(&part.results).unwrap_or_default(),
             largest(|e| e.force_error().1) * 100.0,
             largest(|e| e.speed_error()) * 100.0,
             largest(|e| e.jitter_us()),
@@ -254,7 +257,7 @@ fn text(parts: &[Part], met: bool, wall_s: f64) -> Result<String, std::fmt::Erro
             let clipped: u32 = explorations().map(|e| e.played.clipped).sum();
             writeln!(out, "{RECORDED_LIMITS} {clipped} samples were clipped.")?;
         }
-        for missed in campaign::missed(&part.results) {
+        for missed in campaign::missed(&part.results, bars) {
             writeln!(out, "MISSED: {missed}")?;
         }
     }
