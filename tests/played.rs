@@ -234,13 +234,18 @@ fn the_stage_keeps_its_speed_under_recorded_forces() {
             }
             let performed = rig.performed();
             let speed = performed.iter().map(|p| p.speed_error).fold(0.0, f64::max);
-            let force = |p: &Performed| (p.force_n / f64::from(lesson.movement.force_n()) - 1.0).abs();
+            let force =
+                |p: &Performed| (p.force_n / f64::from(lesson.movement.force_n()) - 1.0).abs();
             let force = performed.iter().map(force).fold(0.0, f64::max);
             (speed, force, lesson.names[texture].as_str())
         })
         .collect();
     for (speed, force, name) in &worst {
-        println!("{name}: speed {:.2} %, force {:.2} % off", speed * 100.0, force * 100.0);
+        println!(
+            "{name}: speed {:.2} %, force {:.2} % off",
+            speed * 100.0,
+            force * 100.0
+        );
     }
     let (speed, _, name) = worst.iter().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
     assert!(*speed <= 0.01, "{name}: {speed}");

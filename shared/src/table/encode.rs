@@ -169,10 +169,12 @@ pub fn encode_fused<'o, 'a>(
     if !set.allows(features) || movements.iter().any(|(_, w)| w.features() != features) {
         return Err(EncodeError::Contents);
     }
-    let rows = textures.zip(0..=u16::MAX).map(|((name, whitened), number)| {
-        let slides = whitened.iter().map(|w| w.slides);
-        Row::new(name, number, Known::Fused(whitened), slides)
-    });
+    let rows = textures
+        .zip(0..=u16::MAX)
+        .map(|((name, whitened), number)| {
+            let slides = whitened.iter().map(|w| w.slides);
+            Row::new(name, number, Known::Fused(whitened), slides)
+        });
     let whitenings = |writer: &mut Writer<'_>| {
         for (_, whitening) in movements {
             whitening.write(|bytes| writer.put(bytes));
