@@ -148,7 +148,7 @@ pub fn evaluate(
         None
     };
     let shared = match &bytes {
-        Some(bytes) => Some(explorer(bytes, measured, config)?),
+        Some(bytes) => Some(explorer(bytes, measured, config, experiment.candidates())?),
         None => None,
     };
     (0..runs)
@@ -161,7 +161,8 @@ pub fn evaluate(
                     Some(explorer) => play(explorer, config.strategy, run),
                     None => {
                         let bytes = run.learn(config.method)?;
-                        let mut explorer = explorer(&bytes, measured, config)?;
+                        let candidates = experiment.candidates();
+                        let mut explorer = explorer(&bytes, measured, config, candidates)?;
                         play(&mut explorer, config.strategy, run)
                     }
                 };
@@ -172,21 +173,22 @@ pub fn evaluate(
         .collect()
 }
 
-/// An explorer on the heap: it is large, and the threads' stacks are not.
+/// An explorer on the heap: it is large, and the threads' stacks are not. Without `candidates`, all textures are.
 ///
 /// # Errors
 /// The table does not read, or cannot be explored.
 #[inline(never)]
-pub fn explorer(
-    bytes: &[u8],
+pub fn explorer<'b>(
+    bytes: &'b [u8],
     measured: PropertySet,
     config: Config,
-) -> Result<Box<Explorer<'_, MAX_TEXTURES>>, EvaluateError> {
-    Ok(Box::new(Explorer::new(
-        Table::read(bytes)?,
-        measured,
-        config,
-    )?))
+    candidates: Option<&[u16]>,
+) -> Result<Box<Explorer<'b, MAX_TEXTURES>>, EvaluateError> {
+    let table = Table::read(bytes)?;
+    Ok(Box::new(match candidates {
+        Some(candidates) => Explorer::among(table, measured, config, candidates.iter().copied())?,
+        None => Explorer::new(table, measured, config)?,
+    }))
 }
 
 /// Two textures, and how often the first was taken for the second.

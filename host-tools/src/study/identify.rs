@@ -1,0 +1,164 @@
+//! Identification among all textures (Table 5), and discrimination of pairs (Table 4): thousands of virtual explorations,
+//! each slide drawn from the validation trials.
+
+use serde::{Deserialize, Serialize};
+use tactus_core::explorer::Config;
+
+use super::StudyError;
+use super::published::{IDENTIFIED, PAIRS};
+use super::slides::TextureTrials;
+use crate::collection::{Collection, texture_name};
+use crate::evaluate::{Method, Outcome, Summary, evaluate};
+use crate::experiment::Experiment;
+
+/// The ways of exploring that are compared, the paper's three and the project's own.
+pub const METHODS: [Method; 4] = [Method::Cycle, Method::Random, Method::Paper, Method::Fused];
+/// Movements after which there is an answer, sure or not (paper).
+pub const MAX_SLIDES: u8 = 10;
+/// Most movements for a pair. The paper gives no limit; no pair comes near this one.
+const MAX_PAIR_SLIDES: u8 = 254;
+
+/// How a way of exploring did: a column of Table 5.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Column {
+    /// Right answers, %.
+    pub correct: f64,
+    /// Explorations that were right and sure, %.
+    pub converged: f64,
+    /// Of the sure, those that were wrong, %.
+    pub wrong_when_sure: f64,
+    /// Median number of movements; one that did not converge counts 11.
+    pub median: f64,
+    /// Mean number of movements.
+    pub mean: f64,
+    /// Right answers for each texture of [`IDENTIFIED`], %.
+    pub textures: Vec<f64>,
+}
+
+/// All textures with the slides to learn from, and those of [`IDENTIFIED`] with slides to test with.
+///
+/// # Errors
+/// See [`StudyError`].
+pub fn experiment(
+    training: &[TextureTrials],
+    validation: &[TextureTrials],
+    seed: u64,
+) -> Result<Experiment, StudyError> {
+    let names = training.iter().map(|t| texture_name(t.texture).to_owned());
+    let movements = Collection::MOVEMENTS.to_vec();
+    let tested = training.iter().map(|t| {
+        let validation = validation.iter().find(|v| v.texture == t.texture);
+        validation.map_or_else(|| vec![Vec::new(); movements.len()], |v| v.slides.clone())
+    });
+    let (tested, trained) = (
+        tested.collect(),
+        training.iter().map(|t| t.slides.clone()).collect(),
+    );
+    let trials = training.iter().flat_map(|t| &t.slides).map(Vec::len).min();
+    Ok(Experiment::collected(
+        names.collect(),
+        movements,
+        trained,
+        tested,
+        trials.unwrap_or(0),
+        seed,
+    )?)
+}
+
+/// Identification at 99 % by one way of exploring.
+///
+/// # Errors
+/// See [`StudyError`].
+pub fn identify(
+    experiment: &Experiment,
+    method: Method,
+    simulations: u64,
+    done: impl Fn() + Sync,
+) -> Result<(Column, Vec<Outcome>), StudyError> {
+    let config = Config {
+        method: method.method(),
+        strategy: method.strategy(),
+        max_slides: MAX_SLIDES,
+        ..Config::default()
+    };
+    let outcomes = evaluate(experiment, config, simulations, done)?;
+    let summary = Summary::new(&outcomes, experiment.names(), MAX_SLIDES);
+    let right = |o: &&Outcome| o.identified == o.unknown;
+    let textures = IDENTIFIED.iter().map(|&number| {
+        let of: Vec<&Outcome> = outcomes
+            .iter()
+            .filter(|o| o.unknown + 1 == usize::from(number))
+            .collect();
+        percent(of.iter().copied().filter(right).count(), of.len())
+    });
+    let column = Column {
+        correct: 100.0 * summary.accuracy,
+        converged: percent(
+            outcomes.iter().filter(right).filter(|o| o.sure).count(),
+            outcomes.len(),
+        ),
+        wrong_when_sure: 100.0 * summary.wrong_when_sure,
+        median: summary.median_slides,
+        mean: summary.mean_slides,
+        textures: textures.collect(),
+    };
+    Ok((column, outcomes))
+}
+
+/// A row of Table 4.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct PairRow {
+    /// Numbers of the textures.
+    pub textures: [u8; 2],
+    /// Their names.
+    pub names: [String; 2],
+    /// Right answers, %.
+    pub correct: f64,
+    /// Explorations that came to 99.9 %, in %.
+    pub converged: f64,
+    /// Median number of movements.
+    pub median: f64,
+    /// Mean number of movements.
+    pub mean: f64,
+    /// What the paper has: right answers of people and of its machine, %.
+    pub paper: [f64; 2],
+}
+
+/// The pairs of Table 4 at 99.9 %, by Bayesian exploration: `simulations` of each.
+///
+/// # Errors
+/// See [`StudyError`].
+pub fn pairs(
+    experiment: &Experiment,
+    simulations: u64,
+    done: impl Fn() + Sync,
+) -> Result<Vec<PairRow>, StudyError> {
+    let config = Config {
+        method: Method::Paper.method(),
+        strategy: Method::Paper.strategy(),
+        threshold: Config::PAIR_THRESHOLD,
+        max_slides: MAX_PAIR_SLIDES,
+        open: false,
+    };
+    let row = |pair: &super::published::Pair| {
+        let candidates = pair.textures.map(|number| u16::from(number) - 1);
+        let among = experiment.clone().among(&candidates);
+        let outcomes = evaluate(&among, config, simulations, &done)?;
+        let summary = Summary::new(&outcomes, among.names(), MAX_PAIR_SLIDES);
+        Ok(PairRow {
+            textures: pair.textures,
+            names: pair.textures.map(|number| texture_name(number).to_owned()),
+            correct: 100.0 * summary.accuracy,
+            converged: 100.0 * summary.converged,
+            median: summary.median_slides,
+            mean: summary.mean_slides,
+            paper: [pair.human, pair.machine],
+        })
+    };
+    PAIRS.iter().map(row).collect()
+}
+
+/// Share in %; of nothing, 0.
+pub(super) fn percent(part: usize, of: usize) -> f64 {
+    100.0 * part as f64 / of.max(1) as f64
+}
