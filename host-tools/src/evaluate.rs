@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::{self, Config, Explorer, ExplorerError, Strategy};
 use tactus_core::features::PropertySet;
-use tactus_core::table::{Table, TableError};
+use tactus_core::table::{Action, Table, TableError};
 
 use crate::experiment::{Experiment, Run};
 use crate::learn;
@@ -101,7 +101,17 @@ pub enum EvaluateError {
 pub fn play<const N: usize>(
     explorer: &mut Explorer<'_, N>,
     strategy: Strategy,
+    run: Run<'_>,
+) -> Outcome {
+    play_and_tell(explorer, strategy, run, |_, _| ())
+}
+
+/// As [`play`]; `tell` hears of every action and the posterior after it.
+pub fn play_and_tell<const N: usize>(
+    explorer: &mut Explorer<'_, N>,
+    strategy: Strategy,
     mut run: Run<'_>,
+    mut tell: impl FnMut(Action, &[f32]),
 ) -> Outcome {
     explorer.restart();
     let verdict = loop {
@@ -119,6 +129,7 @@ pub fn play<const N: usize>(
         explorer
             .observe(action, &slide)
             .expect("every slide has the properties that the explorer was told of");
+        tell(action, explorer.posterior());
     };
     Outcome {
         unknown: run.unknown,

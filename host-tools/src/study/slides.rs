@@ -106,6 +106,29 @@ impl StudyWorld {
             .collect()
     }
 
+    /// Makes slides of textures with a skin that is so worn before each of them.
+    ///
+    /// # Errors
+    /// See [`StudyWorld::record`].
+    pub fn record_worn(
+        self,
+        session: &Session<'_>,
+        wear: f64,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<TextureTrials>, StudyError> {
+        let plan = Plan::new();
+        session
+            .textures
+            .par_iter()
+            .map(|&texture| {
+                let trials = self.record_texture(session, texture, wear, calibration, &plan)?;
+                done();
+                Ok(trials)
+            })
+            .collect()
+    }
+
     fn record_texture(
         self,
         session: &Session<'_>,
