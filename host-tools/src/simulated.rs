@@ -104,10 +104,13 @@ impl SimRig {
         Self::of(World::new(setup), setup.trial_seed, unguarded)
     }
 
-    /// As [`SimRig::new`], in a world under these conditions.
-    pub fn under(setup: Setup, conditions: Conditions) -> Self {
-        let world = World::under(setup, conditions);
-        Self::of(world, setup.trial_seed, Unguarded::default())
+    /// As [`SimRig::unguarded`], in a world under these conditions.
+    pub fn under(setup: Setup, conditions: Conditions, unguarded: Unguarded) -> Self {
+        Self::of(
+            World::under(setup, conditions),
+            setup.trial_seed,
+            unguarded,
+        )
     }
 
     fn of(world: World, seed: u64, unguarded: Unguarded) -> Self {

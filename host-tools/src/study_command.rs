@@ -12,7 +12,7 @@ use tactus::study::published::PAIRS;
 use tactus::study::report;
 use tactus::study::signals::Signals;
 use tactus::study::slides::{Recorded, StudyWorld};
-use tactus::study::training::Training;
+use tactus::study::training::{Training, Worn};
 use tactus::study::{self, Study};
 
 use crate::cli::{self, Format, Seeds, Stage};
@@ -73,11 +73,10 @@ pub(crate) fn study(args: &cli::Study, out: &mut impl Write) -> anyhow::Result<(
             world.train_and_validate(done)
         })?;
         if is(Stage::Train) {
-            let worn = Training::WORN_TEXTURES;
-            let training = times.stage("worn skins", worn, |done| {
-                Training::of(world, &recorded.training, done)
+            let worn = times.stage("worn skins", Worn::TEXTURES, |done| {
+                Worn::record(world, done)
             })?;
-            study.training = Some(training);
+            study.training = Some(Training::of(&recorded.training, &worn)?);
         }
         explore(args, world, &recorded, &mut study, &mut times)?;
         if let Some(Seeds(first, last)) = args.seeds {

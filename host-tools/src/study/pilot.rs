@@ -74,6 +74,7 @@ impl Pilot {
             movements: &movements,
             trials: PILOT_TRIALS,
             number: SESSION,
+            force_guard: false,
         };
         let trials = world.record(&session, world.calibration()?, done)?;
         Self::of(&movements, &trials)

@@ -8,6 +8,7 @@ use tactus_core::features::Plan;
 use tactus_core::fused::Observation;
 use tactus_core::movement::{Movement, SlidePath};
 use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::guard::{Fault, Unguarded};
 
 use super::StudyError;
 use super::published::{IDENTIFIED, TRIALS};
@@ -59,6 +60,9 @@ pub struct Session<'a> {
     pub trials: u32,
     /// Tells sessions of one world apart: their trials differ.
     pub number: u64,
+    /// Whether the guard of the force watches. The paper's rig had none, and its pilot study needs forces up to 2 N, where
+    /// the shear on a sticky texture alone takes P_DC over the guard's limit.
+    pub force_guard: bool,
 }
 
 impl StudyWorld {
@@ -72,9 +76,18 @@ impl StudyWorld {
 
     /// A rig with a texture under it, and a finger that is so worn.
     pub fn rig(self, texture: u8, session: u64, wear: f64) -> SimRig {
+        self.guarded_rig(texture, session, wear, true)
+    }
+
+    fn guarded_rig(self, texture: u8, session: u64, wear: f64, force_guard: bool) -> SimRig {
         let setup = self.collection().setup(texture, session);
         let variation = self.variation;
-        SimRig::under(setup, Conditions { variation, wear })
+        let unguarded = if force_guard {
+            Unguarded::default()
+        } else {
+            Unguarded::against(Fault::ForceHigh)
+        };
+        SimRig::under(setup, Conditions { variation, wear }, unguarded)
     }
 
     /// What the rigs of this world have in common.
@@ -140,9 +153,8 @@ impl StudyWorld {
         let Session {
             movements, trials, ..
         } = *session;
-        let mut rig = self.rig(texture, session.number, wear);
-        // the pilot's grid goes up to 2 N
-        rig.control().allow_high_force(true);
+        let mut rig = self.guarded_rig(texture, session.number, wear, session.force_guard);
+        rig.control().allow_high_force(!session.force_guard);
         let mut felt = TextureTrials {
             texture,
             slides: Vec::with_capacity(movements.len()),
@@ -220,6 +232,7 @@ impl StudyWorld {
             movements: &Collection::MOVEMENTS,
             trials: TRIALS,
             number,
+            force_guard: true,
         };
         Ok(Recorded {
             training: self.record(&session(&all, TRAINING), calibration, &done)?,

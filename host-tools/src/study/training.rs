@@ -137,18 +137,11 @@ pub struct TableFile {
 }
 
 impl Training {
-    /// Textures slid over for [`skin effects`](SkinEffect), for a progress bar.
-    pub const WORN_TEXTURES: u64 = (WEAR.len() * PILOT_TEXTURES.len()) as u64;
-
-    /// What the trials say; a few more slides with worn skins are made for it.
+    /// What the trials say, and those with worn skins.
     ///
     /// # Errors
     /// See [`StudyError`].
-    pub fn of(
-        world: StudyWorld,
-        trials: &[TextureTrials],
-        done: impl Fn() + Sync,
-    ) -> Result<Self, StudyError> {
+    pub fn of(trials: &[TextureTrials], worn: &[Worn]) -> Result<Self, StudyError> {
         let movements = Collection::MOVEMENTS;
         let names: Vec<String> = trials
             .iter()
@@ -255,7 +248,7 @@ impl Training {
                     .collect(),
                 paper_changes: SKIN_CHANGES,
                 changed_at: 100.0 * VISIBLE_WEAR,
-                effects: skin_effects(world, &textures, done)?,
+                effects: skin_effects(worn, &textures),
             },
             tables,
             textures,
@@ -339,52 +332,65 @@ pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
     }
 }
 
-/// Slides over ten textures with worn skins, against the same touches with a new one.
-fn skin_effects(
-    world: StudyWorld,
-    textures: &[Trained],
-    done: impl Fn() + Sync,
-) -> Result<Vec<SkinEffect>, StudyError> {
-    let movements = Collection::MOVEMENTS;
-    let calibration = world.calibration()?;
-    let worn = WEAR
-        .iter()
-        .map(|&wear| {
-            let session = Session {
-                textures: &PILOT_TEXTURES,
-                movements: &movements,
-                trials: WEAR_TRIALS,
-                number: WEAR_SESSION,
-            };
-            world.record_worn(&session, wear, calibration, &done)
-        })
-        .collect::<Result<Vec<_>, _>>()?;
-    let new = &worn[0];
-    let mut effects = Vec::new();
-    for (wear, worn) in WEAR.iter().zip(&worn) {
-        for movement in 0..movements.len() {
-            let shift = std::array::from_fn(|property| {
-                let shifts = new.iter().zip(worn).map(|(new, worn)| {
-                    let mean = |t: &TextureTrials| {
-                        let trials = properties(&t.slides);
-                        let sum: f64 = trials[movement]
-                            .iter()
-                            .map(|p| f64::from(p[property]))
-                            .sum();
-                        sum / f64::from(WEAR_TRIALS)
-                    };
-                    let known = textures.iter().find(|t| t.texture.number == new.texture);
-                    let sd = known.map_or(1.0, |t| t.gaussians[movement][property].1);
-                    (mean(worn) - mean(new)) / f64::from(sd)
-                });
-                shifts.sum::<f64>() / new.len() as f64
-            });
-            effects.push(SkinEffect {
-                wear: 100.0 * wear,
-                movement,
-                shift,
-            });
-        }
+/// Slides over textures with a skin that is so worn before each of them.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Worn {
+    /// The wear.
+    pub wear: f64,
+    /// The slides: the same touches as with any other wear.
+    pub trials: Vec<TextureTrials>,
+}
+
+impl Worn {
+    /// Textures of [`Worn::record`], for a progress bar.
+    pub const TEXTURES: u64 = (WEAR.len() * PILOT_TEXTURES.len()) as u64;
+
+    /// Slides over ten textures with a new skin, and with worn ones.
+    ///
+    /// # Errors
+    /// See [`StudyError`].
+    pub fn record(world: StudyWorld, done: impl Fn() + Sync) -> Result<Vec<Self>, StudyError> {
+        let calibration = world.calibration()?;
+        let session = Session {
+            textures: &PILOT_TEXTURES,
+            movements: &Collection::MOVEMENTS,
+            trials: WEAR_TRIALS,
+            number: WEAR_SESSION,
+            force_guard: true,
+        };
+        let at = |&wear: &f64| {
+            let trials = world.record_worn(&session, wear, calibration, &done)?;
+            Ok(Self { wear, trials })
+        };
+        WEAR.iter().map(at).collect()
     }
-    Ok(effects)
+}
+
+/// What worn skins change against the first of them, which is new.
+fn skin_effects(worn: &[Worn], textures: &[Trained]) -> Vec<SkinEffect> {
+    let Some(new) = worn.first() else {
+        return Vec::new();
+    };
+    let mean = |t: &TextureTrials, movement: usize, property: usize| {
+        let trials = &properties(&t.slides)[movement];
+        let sum: f64 = trials.iter().map(|p| f64::from(p[property])).sum();
+        sum / trials.len().max(1) as f64
+    };
+    let effect = |worn: &Worn, movement: usize| SkinEffect {
+        wear: 100.0 * worn.wear,
+        movement,
+        shift: std::array::from_fn(|property| {
+            let shifts = new.trials.iter().zip(&worn.trials).map(|(new, worn)| {
+                let known = textures.iter().find(|t| t.texture.number == new.texture);
+                let sd = known.map_or(1.0, |t| t.gaussians[movement][property].1);
+                let change = mean(worn, movement, property) - mean(new, movement, property);
+                change / f64::from(sd)
+            });
+            shifts.sum::<f64>() / new.trials.len().max(1) as f64
+        }),
+    };
+    let movements = 0..Collection::MOVEMENTS.len();
+    worn.iter()
+        .flat_map(|worn| movements.clone().map(move |m| effect(worn, m)))
+        .collect()
 }

@@ -1,4 +1,5 @@
-//! The page: sections as HTML that needs no other file and no script.
+//! The page: sections as HTML that needs no other file and no script. It is well-formed XML as well, so that a small parser
+//! can check it.
 
 use std::fmt::Write as _;
 
@@ -35,10 +36,10 @@ td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 pub(super) fn html(study: &Study, sections: &[Section]) -> String {
     let mut page = String::new();
     let mut put = |text: &str| page.push_str(text);
-    put("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
-    put("<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n");
+    put("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n");
+    put("<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"/>\n");
     // no icon is asked for
-    put("<link rel=\"icon\" href=\"data:,\">\n");
+    put("<link rel=\"icon\" href=\"data:,\"/>\n");
     put("<title>The study of Fishel &amp; Loeb 2012, on the simulated rig</title>\n<style>\n");
     put(STYLE);
     put("</style>\n</head>\n<body>\n<main>\n");
