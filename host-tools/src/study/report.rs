@@ -41,6 +41,11 @@ impl Cell {
         Self::Text(text.to_string())
     }
 
+    /// A number of single precision, with the digits that it has.
+    fn single(value: f32, decimals: usize) -> Self {
+        Self::Number(value.to_string().parse().unwrap_or(f64::NAN), decimals)
+    }
+
     /// In a file.
     fn exact(&self) -> String {
         match self {

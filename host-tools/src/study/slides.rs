@@ -182,7 +182,7 @@ impl StudyWorld {
     ///
     /// Wear only grows with sliding, so what the textures before take of it is known from their friction, and all can be
     /// recorded side by side. A test holds it against the wear that comes.
-    fn skins(self, session: &Session<'_>) -> Vec<(u8, f64, bool)> {
+    pub fn skins(self, session: &Session<'_>) -> Vec<(u8, f64, bool)> {
         let mut wear = 0.0;
         let next = session.textures.iter().map(|&number| {
             let new_skin = wear >= VISIBLE_WEAR;

@@ -138,7 +138,7 @@ fn of_pilot(pilot: &Pilot) -> Drawn<Section> {
             .map(|m| {
                 let left = |at: usize| {
                     let left = pilot.movements[at].uncertainty[m.property.index()];
-                    Cell::Number(left.into(), 3)
+                    Cell::single(left, 3)
                 };
                 vec![
                     Cell::text(m.property),
@@ -170,13 +170,13 @@ fn of_pilot(pilot: &Pilot) -> Drawn<Section> {
             .iter()
             .map(|m| {
                 let mut row = vec![
-                    Cell::Number(m.force_n.into(), 2),
-                    Cell::Number(m.speed_mm_s.into(), 1),
-                    Cell::Number(m.power_mw.into(), 1),
+                    Cell::single(m.force_n, 2),
+                    Cell::single(m.speed_mm_s, 1),
+                    Cell::single(m.power_mw, 1),
                     Cell::text(if m.high_wear { "yes" } else { "no" }),
                     Cell::Number(m.wear, 2),
                 ];
-                row.extend(m.uncertainty.map(|u| Cell::Number(u.into(), 3)));
+                row.extend(m.uncertainty.map(|u| Cell::single(u, 3)));
                 row
             })
             .collect(),
@@ -205,11 +205,11 @@ fn of_pilot(pilot: &Pilot) -> Drawn<Section> {
                         let mut row = vec![
                             Cell::Number(texture.number.into(), 0),
                             Cell::text(texture.name),
-                            Cell::Number(m.force_n.into(), 2),
-                            Cell::Number(m.speed_mm_s.into(), 1),
+                            Cell::single(m.force_n, 2),
+                            Cell::single(m.speed_mm_s, 1),
                             Cell::Number(n as f64 + 1.0, 0),
                         ];
-                        row.extend(p.map(|p| Cell::Number(p.into(), 4)));
+                        row.extend(p.map(|p| Cell::single(p, 4)));
                         row
                     })
                 })
@@ -437,8 +437,8 @@ fn of_training(training: &Training) -> Drawn<Section> {
                 vec![
                     Cell::text(format!("T{} {}", p.textures.0.number, p.textures.0.name)),
                     Cell::text(format!("T{} {}", p.textures.1.number, p.textures.1.name)),
-                    Cell::Number(p.all.into(), 3),
-                    Cell::Number(p.most_useful.into(), 3),
+                    Cell::single(p.all, 3),
+                    Cell::single(p.most_useful, 3),
                 ]
             })
             .collect(),
@@ -584,7 +584,7 @@ fn matrix_table(id: &'static str, title: String, of: &[Vec<f32>]) -> Table {
         header: (1..=of.len()).map(|n| format!("T{n}")).collect(),
         rows: of
             .iter()
-            .map(|row| row.iter().map(|&c| Cell::Number(c.into(), 3)).collect())
+            .map(|row| row.iter().map(|&c| Cell::single(c, 3)).collect())
             .collect(),
     }
 }
@@ -607,7 +607,7 @@ fn trained_table(training: &Training) -> Table {
             .map(|t| {
                 let mut row = vec![Cell::Number(t.texture.number.into(), 0), Cell::text(t.texture.name)];
                 for (mean, sd) in t.gaussians.iter().flatten() {
-                    row.extend([Cell::Number((*mean).into(), 4), Cell::Number((*sd).into(), 4)]);
+                    row.extend([Cell::single(*mean, 4), Cell::single(*sd, 4)]);
                 }
                 row.extend([
                     Cell::Number(t.wear.0, 2),
@@ -1070,7 +1070,7 @@ fn of_signals(signals: &Signals) -> Drawn<Section> {
             vec![
                 Cell::text("slope, mN a count"),
                 Cell::Number(press.mn_per_count, 2),
-                Cell::Number(PAPER_LINE.0.into(), 1),
+                Cell::single(PAPER_LINE.0, 1),
             ],
             vec![
                 Cell::text("R\u{b2}"),
