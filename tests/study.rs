@@ -242,7 +242,10 @@ fn variation_is_what_tells_trials_apart() {
         deviation(&traction)
     };
     let [none, usual, twice] = [0.0, TRIAL_VARIATION, 2.0 * TRIAL_VARIATION].map(spread);
-    assert!(2.0 * none < usual && 1.5 * usual < twice, "{none} {usual} {twice}");
+    assert!(
+        2.0 * none < usual && 1.5 * usual < twice,
+        "{none} {usual} {twice}"
+    );
 }
 
 fn mean(of: &[f64]) -> f64 {
@@ -282,7 +285,10 @@ fn uncertainty_of_the_pilot_is_eq_11_in_f64() {
                 .sum();
             let found = f64::from(movement.uncertainty[property]);
             // the table rounds means and deviations
-            assert!((found - (1.0 - left)).abs() < 2e-3, "{m} {property}: {found} {left}");
+            assert!(
+                (found - (1.0 - left)).abs() < 2e-3,
+                "{m} {property}: {found} {left}"
+            );
         }
     }
     for useful in &pilot.most_useful {
@@ -317,8 +323,11 @@ fn confusion_and_its_geometric_mean_are_those_of_f64() {
                 three += found.ln() / 3.0;
             }
         }
-        let [all, useful] = [&training.geometric_mean, &training.geometric_mean_most_useful]
-            .map(|m| f64::from(m[a][b]));
+        let [all, useful] = [
+            &training.geometric_mean,
+            &training.geometric_mean_most_useful,
+        ]
+        .map(|m| f64::from(m[a][b]));
         assert!((all - nine.exp()).abs() < 1e-6 && (useful - three.exp()).abs() < 1e-6);
     }
     let over = (0..117).flat_map(|i| (0..i).map(move |j| (i, j)));
@@ -332,15 +341,17 @@ fn correlations_are_those_of_f64() {
     for (m, correlations) in training.correlations.iter().enumerate() {
         let means = |property| -> Vec<f64> {
             let of = training.textures.iter();
-            of.map(|t| mean(&values(&t.properties[m], property))).collect()
+            of.map(|t| mean(&values(&t.properties[m], property)))
+                .collect()
         };
         for (a, b) in [(0, 0), (0, 1), (0, 2), (2, 1)] {
             let (x, y) = (means(a), means(b));
             // by the products of standard scores
             let (sx, sy) = (deviation(&x), deviation(&y));
-            let scores = x.iter().zip(&y).map(|(p, q)| {
-                (p - mean(&x)) / sx * ((q - mean(&y)) / sy)
-            });
+            let scores = x
+                .iter()
+                .zip(&y)
+                .map(|(p, q)| (p - mean(&x)) / sx * ((q - mean(&y)) / sy));
             let expected = scores.sum::<f64>() / 116.0;
             let found = correlations.ours[a][b];
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
@@ -375,7 +386,9 @@ fn columns_add_up() {
         let steps = evolution.steps.len() + 1;
         let probabilities = &evolution.probabilities;
         assert!(probabilities.iter().all(|(_, p)| p.len() == steps));
-        let best = probabilities.iter().max_by(|a, b| last(a).total_cmp(&last(b)));
+        let best = probabilities
+            .iter()
+            .max_by(|a, b| last(a).total_cmp(&last(b)));
         assert_eq!(best.unwrap().0, evolution.identified);
         assert_eq!(last(best.unwrap()) > 0.99, evolution.sure);
     }
@@ -384,8 +397,16 @@ fn columns_add_up() {
 #[test]
 fn a_press_gives_the_papers_line() {
     let press = &shared().signals.as_ref().unwrap().press;
-    assert!((press.mn_per_count - 11.5).abs() < 0.6, "{}", press.mn_per_count);
-    assert!(press.r_squared > 0.99 && press.r_squared < 1.0, "{}", press.r_squared);
+    assert!(
+        (press.mn_per_count - 11.5).abs() < 0.6,
+        "{}",
+        press.mn_per_count
+    );
+    assert!(
+        press.r_squared > 0.99 && press.r_squared < 1.0,
+        "{}",
+        press.r_squared
+    );
     let most = press.loading.iter().map(|p| p.1).fold(0.0, f64::max);
     assert!((2.4..2.7).contains(&most), "{most} N");
 }
@@ -409,7 +430,10 @@ fn csv_and_json_have_the_same_numbers() {
     let same = |field: &str, value: &serde_json::Value| {
         let (file, value) = (field.parse::<f64>().unwrap(), value.as_f64().unwrap());
         // serde_json reads to the last digit but one
-        assert!((file - value).abs() <= 1e-15 * value.abs(), "{field} {value}");
+        assert!(
+            (file - value).abs() <= 1e-15 * value.abs(),
+            "{field} {value}"
+        );
     };
 
     let table5 = rows(folder, "table5-identification");
@@ -422,7 +446,10 @@ fn csv_and_json_have_the_same_numbers() {
             same(&table5[6 + texture][place], &ours["textures"][texture]);
         }
     }
-    assert_eq!([&table5[1][1], &table5[1][3], &table5[1][5]], ["49.9", "84.1", "95.4"]);
+    assert_eq!(
+        [&table5[1][1], &table5[1][3], &table5[1][5]],
+        ["49.9", "84.1", "95.4"]
+    );
 
     let table4 = rows(folder, "table4-pairs");
     for (row, pair) in table4[1..9].iter().zip(json["pairs"].as_array().unwrap()) {
@@ -432,12 +459,20 @@ fn csv_and_json_have_the_same_numbers() {
     }
     let matrix = rows(folder, "confusion-2-fineness");
     let of = json["training"]["confusion"].as_array().unwrap();
-    let of = of.iter().find(|c| c["movement"] == 1 && c["property"] == "Fineness").unwrap();
+    let of = of
+        .iter()
+        .find(|c| c["movement"] == 1 && c["property"] == "Fineness")
+        .unwrap();
     for (row, of) in matrix[1..].iter().zip(of["matrix"].as_array().unwrap()) {
-        row.iter().zip(of.as_array().unwrap()).for_each(|(f, v)| same(f, v));
+        row.iter()
+            .zip(of.as_array().unwrap())
+            .for_each(|(f, v)| same(f, v));
     }
     let movements = rows(folder, "movements");
-    for (row, of) in movements[1..].iter().zip(json["pilot"]["movements"].as_array().unwrap()) {
+    for (row, of) in movements[1..]
+        .iter()
+        .zip(json["pilot"]["movements"].as_array().unwrap())
+    {
         same(&row[0], &of["force_n"]);
         same(&row[4], &of["wear"]);
         same(&row[7], &of["uncertainty"][2]);
@@ -448,7 +483,15 @@ fn csv_and_json_have_the_same_numbers() {
 
 /// Every figure of the paper that the study makes, by what its file's name begins with.
 const FIGURES: [&str; 9] = [
-    "fig3", "fig4-signal", "fig4-spectrum", "fig5-", "fig6", "fig7-", "fig8-", "fig9-", "fig10-",
+    "fig3",
+    "fig4-signal",
+    "fig4-spectrum",
+    "fig5-",
+    "fig6",
+    "fig7-",
+    "fig8-",
+    "fig9-",
+    "fig10-",
 ];
 
 #[test]
@@ -463,7 +506,11 @@ fn the_page_is_whole() {
     let document = roxmltree::Document::parse_with_options(&page, options).unwrap();
     let elements = || document.descendants().filter(|n| n.is_element());
     let ids: Vec<&str> = elements().filter_map(|n| n.attribute("id")).collect();
-    assert_eq!(ids.len(), ids.iter().collect::<HashSet<_>>().len(), "an id comes twice");
+    assert_eq!(
+        ids.len(),
+        ids.iter().collect::<HashSet<_>>().len(),
+        "an id comes twice"
+    );
 
     // nothing is fetched, nothing runs
     for node in elements() {
@@ -497,43 +544,96 @@ fn the_page_is_whole() {
         .collect();
     for begin in FIGURES {
         let begin = format!("figure-{begin}");
-        assert!(panels.iter().any(|p| p.attribute("id").unwrap().starts_with(&begin)), "{begin}");
+        assert!(
+            panels
+                .iter()
+                .any(|p| p.attribute("id").unwrap().starts_with(&begin)),
+            "{begin}"
+        );
     }
     for panel in &panels {
         let id = panel.attribute("id").unwrap();
         let svg = panel.first_element_child().unwrap();
-        assert_eq!((svg.tag_name().name(), svg.attribute("role")), ("svg", Some("img")));
+        assert_eq!(
+            (svg.tag_name().name(), svg.attribute("role")),
+            ("svg", Some("img"))
+        );
         assert!(!svg.attribute("aria-label").unwrap().is_empty());
         let words: String = svg
             .descendants()
             .filter(|n| n.tag_name().name() == "text")
             .filter_map(|n| n.text())
             .collect();
-        let has_unit = ["(N)", "Hz)", "(mm/s)", "(s)", "(%)", "(Pa)", "counts", "Table 1", "probability", "standard deviations"];
-        assert!(has_unit.iter().any(|unit| words.contains(unit)), "{id}: {words}");
-        assert!(!words.contains("NaN") && !words.contains("inf"), "{id}: {words}");
+        let has_unit = [
+            "(N)",
+            "Hz)",
+            "(mm/s)",
+            "(s)",
+            "(%)",
+            "(Pa)",
+            "counts",
+            "Table 1",
+            "probability",
+            "standard deviations",
+        ];
+        assert!(
+            has_unit.iter().any(|unit| words.contains(unit)),
+            "{id}: {words}"
+        );
+        assert!(
+            !words.contains("NaN") && !words.contains("inf"),
+            "{id}: {words}"
+        );
         let name = id.strip_prefix("figure-").unwrap();
         let file = fs::read_to_string(folder.path().join(format!("figures/{name}.svg"))).unwrap();
         roxmltree::Document::parse(&file).unwrap();
-        assert!(page.contains(&file["<svg ".len()..]), "{id} is another one in its file");
+        assert!(
+            page.contains(&file["<svg ".len()..]),
+            "{id} is another one in its file"
+        );
     }
     let figures = fs::read_dir(folder.path().join("figures")).unwrap().count();
     assert_eq!(figures, panels.len());
 
     // every table: rows as long as the header, a caption, a file
-    let tables: Vec<_> = elements().filter(|n| n.tag_name().name() == "table").collect();
+    let tables: Vec<_> = elements()
+        .filter(|n| n.tag_name().name() == "table")
+        .collect();
     assert!(tables.len() >= 10);
     for table in tables {
-        let of = |name: &'static str| table.descendants().filter(move |n| n.tag_name().name() == name);
+        let of = |name: &'static str| {
+            table
+                .descendants()
+                .filter(move |n| n.tag_name().name() == name)
+        };
         let header = of("th").count();
-        assert!(of("caption").next().unwrap().text().is_some_and(|t| !t.is_empty()));
-        for row in of("tbody").next().unwrap().children().filter(|n| n.is_element()) {
+        assert!(
+            of("caption")
+                .next()
+                .unwrap()
+                .text()
+                .is_some_and(|t| !t.is_empty())
+        );
+        for row in of("tbody")
+            .next()
+            .unwrap()
+            .children()
+            .filter(|n| n.is_element())
+        {
             assert_eq!(row.children().filter(|n| n.is_element()).count(), header);
         }
     }
     // what it was made by
-    let words: String = elements().filter_map(|n| n.text()).collect::<Vec<_>>().join(" ");
-    for said in ["0.0.0-test", "tactus study all --seed 5 --out <here> & now", "world 5", "95.4"] {
+    let words: String = elements()
+        .filter_map(|n| n.text())
+        .collect::<Vec<_>>()
+        .join(" ");
+    for said in [
+        "0.0.0-test",
+        "tactus study all --seed 5 --out <here> & now",
+        "world 5",
+        "95.4",
+    ] {
         assert!(words.contains(said), "{said}");
     }
 }
@@ -551,14 +651,29 @@ fn a_browser_shows_all_of_it_without_a_complaint() {
     let folder = written(shared());
     let home = tempfile::tempdir().unwrap();
     let shown = Command::new(browser)
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--dump-dom"])
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--enable-logging=stderr",
+            "--dump-dom",
+        ])
         .arg(format!("--user-data-dir={}", home.path().display()))
-        .arg(format!("file://{}", folder.path().join("report.html").display()))
+        .arg(format!(
+            "file://{}",
+            folder.path().join("report.html").display()
+        ))
         .output()
         .unwrap();
     let said = String::from_utf8_lossy(&shown.stderr);
-    let complaints: Vec<&str> = said.lines().filter(|line| line.contains("CONSOLE")).collect();
-    assert!(shown.status.success() && complaints.is_empty(), "{complaints:#?}");
+    let complaints: Vec<&str> = said
+        .lines()
+        .filter(|line| line.contains("CONSOLE"))
+        .collect();
+    assert!(
+        shown.status.success() && complaints.is_empty(),
+        "{complaints:#?}"
+    );
     let dom = String::from_utf8(shown.stdout).unwrap();
     let figures = fs::read_dir(folder.path().join("figures")).unwrap();
     for figure in figures {
@@ -590,12 +705,21 @@ fn mistakes_are_told_before_the_work_begins() {
     fs::create_dir(&taken).unwrap();
     fs::write(taken.join("mine.txt"), "mine").unwrap();
     let said = complaint(&["study", "pilot", "--out", taken.to_str().unwrap()], 1);
-    assert!(said.contains("taken: is not empty") && said.contains("new folder"), "{said}");
+    assert!(
+        said.contains("taken: is not empty") && said.contains("new folder"),
+        "{said}"
+    );
     assert_eq!(files(&taken).len(), 1, "what was there stays alone");
 
     let below_a_file = taken.join("mine.txt").join("study");
-    let said = complaint(&["study", "all", "--out", below_a_file.to_str().unwrap()], 1);
-    assert!(said.contains("mine.txt") && said.contains("can be written"), "{said}");
+    let said = complaint(
+        &["study", "all", "--out", below_a_file.to_str().unwrap()],
+        1,
+    );
+    assert!(
+        said.contains("mine.txt") && said.contains("can be written"),
+        "{said}"
+    );
 
     for (wrong, hint) in [
         (["--seeds", "20-11"], "11-20"),

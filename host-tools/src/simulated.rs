@@ -106,11 +106,7 @@ impl SimRig {
 
     /// As [`SimRig::unguarded`], in a world under these conditions.
     pub fn under(setup: Setup, conditions: Conditions, unguarded: Unguarded) -> Self {
-        Self::of(
-            World::under(setup, conditions),
-            setup.trial_seed,
-            unguarded,
-        )
+        Self::of(World::under(setup, conditions), setup.trial_seed, unguarded)
     }
 
     fn of(world: World, seed: u64, unguarded: Unguarded) -> Self {

@@ -42,12 +42,14 @@ pub enum StudyError {
     Evaluate(#[from] EvaluateError),
 }
 
-/// The variation of trials in the study's worlds: its one free knob.
+/// The variation of trials in the study's worlds: its one free knob. Set on worlds 1 to 10, by
+/// `tactus study identify --seeds 1-10 --variation X`. Bayesian exploration was right in 96.4 % at 0.5 (worlds 1 to
+/// 5), 93.8 % at 0.7, and 91.8 % at 1 (worlds 1 to 4); the paper has 95.4 %.
 pub const VARIATION: f64 = 0.7;
 
 /// How the knob was set, for the report.
-pub const CALIBRATED: &str = "It was set on worlds 1 to 10 so that Bayesian exploration comes near its published 95.4 %, and \
-then left alone.";
+const CALIBRATED: &str = "It was set on worlds 1 to 10 so that Bayesian exploration comes within 2 points of its published \
+95.4 % there, and then left alone.";
 
 /// Everything that a study found: study.json.
 #[derive(Clone, PartialEq, Debug, Serialize)]

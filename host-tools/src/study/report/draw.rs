@@ -181,9 +181,11 @@ pub(super) fn chart(chart: &Chart<'_>) -> Result<String, DrawError> {
                 };
                 let style = style.pos(Pos::new(HPos::Left, VPos::Center));
                 let (x, mut y) = area.map_coordinate(last);
-                // names do not cover each other
+                // names do not cover each other, nor what is written below the axis
+                let (top, bottom) = area.get_y_axis_pixel_range().into_pair();
+                let away = if y > (top + bottom) / 2 { -1 } else { 1 };
                 while taken.iter().any(|other| (other - y).abs() < TEXT as i32) {
-                    y += 1;
+                    y += away;
                 }
                 taken.push(y);
                 root.draw(&Text::new(series.name.clone(), (x + 6, y), style))?;

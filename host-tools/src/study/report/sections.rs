@@ -646,7 +646,7 @@ fn fig8(training: &Training) -> Drawn<Vec<Figure>> {
             x_marks: 7,
             x_text: &plain,
             named_at_end: false,
-            size: (900, 260),
+            size: (480, 300),
             series: vec![points(0, Mark::Circle, "", values)],
         })?;
         Ok(figure(format!("fig8-{property}"), title, svg))
