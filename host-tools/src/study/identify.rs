@@ -265,9 +265,8 @@ fn examples(outcomes: &[Outcome]) -> Vec<(&'static str, u64)> {
             right(o) && !o.sure
         }),
     ];
-    let first = |(example, is): (&'static str, Is)| {
-        Some((example, outcomes.iter().position(is)? as u64))
-    };
+    let first =
+        |(example, is): (&'static str, Is)| Some((example, outcomes.iter().position(is)? as u64));
     kinds.into_iter().filter_map(first).collect()
 }
 
