@@ -26,6 +26,9 @@ With a folder of recordings, such as ../shared/data/biotac:
   tactus identify --recordings DIR --material 3    a real texture is recognised from its slides
   tactus features --recordings DIR                 what was felt of every slide
   tactus evaluate --recordings DIR                 how often the answers are right, and how sure
+With a probe, or with the emulated board that `cargo xtask emulate` builds:
+  tactus device list                               which port it is at
+  tactus device monitor [--emulated]               what it feels, live
 
 No recordings are shipped. The publisher of the BioTac's has them at
 https://github.com/dexrob/BioTac_slide_20_50; `tactus import` reads them. `tactus simulate` makes some.";
@@ -98,6 +101,21 @@ Try:
         /// Another seed is another world: other textures of the same names
         #[arg(long, default_value_t = 1)]
         seed: u64,
+    },
+    /// Work with a probe at its serial port, or with the emulated board
+    #[command(subcommand, after_help = crate::device::EXAMPLES)]
+    Device(crate::device::Device),
+    /// Print completions for a shell
+    #[command(after_help = crate::manual::COMPLETIONS)]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Write the manual pages
+    Man {
+        /// The folder to write; without it the first page is printed
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
     },
     /// Convert recordings into the project's format (.npy files and a CSV manifest)
     Import {
