@@ -5,8 +5,6 @@ mod log;
 mod monitor;
 mod port;
 mod record;
-#[cfg(test)]
-mod tests;
 
 use std::ffi::OsString;
 use std::io::{self, Write};

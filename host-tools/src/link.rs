@@ -735,6 +735,11 @@ impl<S: Read + Write> Port<S> {
         }
     }
 
+    /// Silence is taken for a loss after `patience` from now on.
+    pub fn set_patience(&mut self, patience: Duration) {
+        self.patience = patience;
+    }
+
     /// What was damaged and lost so far.
     pub fn session(&self) -> &Session {
         &self.session

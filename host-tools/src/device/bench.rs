@@ -17,6 +17,8 @@ use super::port::{Emulator, Line, OpenError, Where};
 
 /// A probe that says nothing for so long is taken for gone: its longest silence is an erase of its flash, 2 s.
 const PATIENCE: Duration = Duration::from_secs(5);
+/// Whether anybody is there is known sooner: a status is told at once.
+const GREETING: Duration = Duration::from_secs(1);
 /// An emulated board may go slower than real time.
 const EMULATED: Duration = Duration::from_secs(30);
 /// A probe opens its store within 10 s of its start.
@@ -109,11 +111,6 @@ impl Interrupt {
     pub(crate) fn take(&self) -> bool {
         self.0.swap(false, Relaxed)
     }
-
-    #[cfg(test)]
-    pub(crate) fn raise(&self) {
-        self.0.store(true, Relaxed);
-    }
 }
 
 /// A probe that somebody works with.
@@ -152,7 +149,7 @@ impl Bench {
             PATIENCE
         };
         let mut bench = Self {
-            port: Port::new(open.line, patience),
+            port: Port::new(open.line, GREETING),
             name: open.name,
             log,
             interrupt,
@@ -161,25 +158,12 @@ impl Bench {
             _emulator: open.emulator,
         };
         let status = bench.hello()?;
+        bench.port.set_patience(patience);
         Ok((bench, status))
     }
 
-    /// One over any line, for tests.
-    #[cfg(test)]
-    pub(crate) fn over(line: Box<dyn Line>, patience: Duration, interrupt: Interrupt) -> Self {
-        Self {
-            port: Port::new(line, patience),
-            name: "the test's line".to_owned(),
-            log: None,
-            interrupt,
-            phase: None,
-            lived: Instant::now(),
-            _emulator: None,
-        }
-    }
-
     /// The status of a probe that has come up.
-    pub(crate) fn hello(&mut self) -> Result<Status, BenchError> {
+    fn hello(&mut self) -> Result<Status, BenchError> {
         let began = Instant::now();
         loop {
             let status = self.run(Question::status(), |_| Ok(()));

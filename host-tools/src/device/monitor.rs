@@ -215,14 +215,23 @@ impl Monitor {
             } => {
                 let p = probability * 100.0;
                 let after = format!("{slides} slide{}", if *slides == 1 { "" } else { "s" });
-                let answer = if *unknown {
-                    format!("None that I know; most like {name}, after {after}")
+                let (answer, said) = if *unknown {
+                    (
+                        "It is none that I know".to_owned(),
+                        format!("none that I know, most like {name}, after {after}"),
+                    )
                 } else if *sure {
-                    format!("It is {name}: {p:.1} % after {after}")
+                    (
+                        format!("It is {name}"),
+                        format!("it is {name}: {p:.1} % after {after}"),
+                    )
                 } else {
-                    format!("Not sure after {after}; most likely {name}, {p:.1} %")
+                    (
+                        "Not sure; most likely".to_owned(),
+                        format!("not sure after {after}; most likely {name}, {p:.1} %"),
+                    )
                 };
-                self.note(Weight::Said, answer.clone());
+                self.note(Weight::Said, said);
                 self.answer = Some(answer);
             }
             Tell::Taught {

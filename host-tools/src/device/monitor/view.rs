@@ -44,8 +44,8 @@ pub(super) fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
     .areas(area);
     let [trace, spectrum] = Layout::horizontal([Constraint::Fill(1); 2]).areas(charts);
     let [rig, slide, textures] = Layout::horizontal([
-        Constraint::Length(25),
-        Constraint::Length(23),
+        Constraint::Length(24),
+        Constraint::Length(22),
         Constraint::Fill(1),
     ])
     .areas(panels);
@@ -149,6 +149,16 @@ fn draw_trace(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
                 ]),
         );
     frame.render_widget(chart, area);
+    if pac.is_empty() && area.height > 4 {
+        let hint = Rect {
+            x: area.x + 8,
+            y: area.y + area.height / 2 - 1,
+            width: area.width.saturating_sub(9),
+            height: 1,
+        };
+        let text = Line::from(dim("comes while the finger measures"));
+        frame.render_widget(text, hint);
+    }
 }
 
 fn draw_spectrum(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
@@ -248,10 +258,20 @@ fn draw_rig(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
             lines.push(Line::default());
             let (joule, wear) = monitor.status.skin_mj;
             lines.push(row("skin", format!("{:.1} J", f64::from(joule) * 1e-3)));
-            lines.push(row(
-                "",
-                format!("{:.1} J of it wear", f64::from(wear) * 1e-3),
-            ));
+            lines.push(row("wear", format!("{:.1} J", f64::from(wear) * 1e-3)));
+        }
+    }
+    // where there is room, what was counted since the probe has power
+    if inner.height > 8 {
+        let counts = &monitor.status.counts;
+        lines.resize(7, Line::default());
+        lines.push(Line::default());
+        for (name, count) in [
+            ("late", counts.late_slots),
+            ("parity", counts.parity_errors),
+            ("lost", counts.lost_samples),
+        ] {
+            lines.push(row(name, format!("{count:5}")));
         }
     }
     frame.render_widget(Paragraph::new(lines).block(block), area);
@@ -325,7 +345,8 @@ fn draw_textures(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     }
     let room = usize::from(inner.height).saturating_sub(lines.len());
     let width = usize::from(inner.width);
-    let name_width = (width / 2).clamp(8, 24);
+    // a name may be cut, a bar too short says nothing
+    let name_width = width.saturating_sub(18).clamp(8, 24);
     let bar_width = width.saturating_sub(name_width + 10);
     let ranked = monitor.ranked();
     if ranked.is_empty() {
