@@ -254,12 +254,12 @@ fn serve(line: Box<dyn Line>, hurry: u64, asked: Sender<Ask>) {
         wire.busy = false;
         wire.tell(match done {
             Ok(()) => Tell::Done(id),
-            Err(why) => Tell::Refused { id, why },
+            Err(why) => Tell::Refused { id, why: *why },
         });
     }
 }
 
-fn obey(ask: Ask, rig: &mut Streamed<'_>, pushed: &mut Vec<u8>) -> Result<(), wire::Text> {
+fn obey(ask: Ask, rig: &mut Streamed<'_>, pushed: &mut Vec<u8>) -> Result<(), Box<wire::Text>> {
     let wire = rig.wire;
     let tell = |tell| wire.borrow_mut().tell(tell);
     match ask {
@@ -298,7 +298,9 @@ fn obey(ask: Ask, rig: &mut Streamed<'_>, pushed: &mut Vec<u8>) -> Result<(), wi
             slides: 2,
             itself: false,
         }),
-        Ask::Rename { from, .. } if from == "cheese" => return Err(text("there is no cheese")),
+        Ask::Rename { from, .. } if from == "cheese" => {
+            return Err(Box::new(text("there is no cheese")));
+        }
         _ => {}
     }
     Ok(())

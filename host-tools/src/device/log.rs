@@ -27,7 +27,7 @@ enum Line<'a> {
         protocol: u8,
         port: Cow<'a, str>,
     },
-    Ask(Cow<'a, Ask>),
+    Ask(Box<Cow<'a, Ask>>),
     Report(Box<Cow<'a, Report>>),
 }
 
@@ -63,7 +63,7 @@ impl Log {
     }
 
     pub(crate) fn asked(&mut self, ask: &Ask) {
-        self.line(&Line::Ask(Cow::Borrowed(ask)));
+        self.line(&Line::Ask(Box::new(Cow::Borrowed(ask))));
     }
 
     pub(crate) fn told(&mut self, report: &Report) {

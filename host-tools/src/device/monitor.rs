@@ -272,8 +272,8 @@ impl Monitor {
 
 /// What the probe is asked for, one after the other.
 enum Doing {
-    Asked(Job<Question<()>>),
-    Table(Job<ReadTable>),
+    Asked(Box<Job<Question<()>>>),
+    Table(Box<Job<ReadTable>>),
 }
 
 /// How the user ended it.
@@ -387,8 +387,8 @@ fn watch(
             && let Some(ask) = to_do.pop_front()
         {
             let job = match ask {
-                Ask::ReadTable(_) => Doing::Table(bench.begin(ReadTable::default())?),
-                ask => Doing::Asked(bench.begin(Question::command(ask))?),
+                Ask::ReadTable(_) => Doing::Table(Box::new(bench.begin(ReadTable::default())?)),
+                ask => Doing::Asked(Box::new(bench.begin(Question::command(ask))?)),
             };
             doing = Some(job);
         }

@@ -146,10 +146,11 @@ impl fmt::Display for Found {
             return f.write_str("  no USB device");
         };
         write!(f, "  {:04x}:{:04x}", usb.vid, usb.pid)?;
-        for text in [&usb.manufacturer, &usb.product, &usb.serial_number] {
-            if let Some(text) = text {
-                write!(f, "  {text}")?;
-            }
+        for text in [&usb.manufacturer, &usb.product, &usb.serial_number]
+            .into_iter()
+            .flatten()
+        {
+            write!(f, "  {text}")?;
         }
         if self.is_nucleo() {
             f.write_str("  <- a NUCLEO: try this one")?;
