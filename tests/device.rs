@@ -1005,8 +1005,14 @@ mod unix {
             "the finger is lifted and the stage stands",
             "ended with 130",
         ]);
-        let asked: Vec<Ask> = asked.try_iter().collect();
-        assert!(asked.iter().filter(|ask| **ask == Ask::Stop).count() >= 2);
+        let stops = |asked: &Told<Ask>| asked.try_iter().filter(|ask| *ask == Ask::Stop).count();
+        assert!(stops(&asked) >= 2);
+        // and so does quitting, which is no failure
+        tmux.run(&["respawn-pane", "-k", "-t", "probe", &command]);
+        tmux.shows(&["phase   ready"]);
+        tmux.run(&["send-keys", "-t", "probe", "q"]);
+        tmux.shows(&["the finger is lifted and the stage stands", "ended with 0"]);
+        assert!(stops(&asked) >= 1);
         drop(tmux);
     }
 }

@@ -27,6 +27,8 @@ const MOST_N: f32 = 2.1;
 const SPECTRUM_HZ: (f32, f32) = (17.0, 1000.0);
 /// And its power per bin: 1 to 10^6 counts^2.
 const SPECTRUM_DB: f32 = 60.0;
+/// Textures less probable than this are not listed.
+const WORTH_LISTING: f32 = 0.001;
 /// The lever's step, mm (the reference rig's).
 const STEP_MM: f32 = 0.000_625;
 
@@ -357,11 +359,14 @@ fn draw_textures(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
         };
         lines.push(Line::from(dim(hint)));
     }
-    let listed = if ranked.len() > room {
+    // the rest takes a line
+    let most = if ranked.len() > room {
         room.saturating_sub(1)
     } else {
-        ranked.len()
+        room
     };
+    let worth = ranked.iter().filter(|(p, _)| *p >= WORTH_LISTING).count();
+    let listed = worth.max(1).min(most).min(ranked.len());
     let (listed, others) = ranked.split_at(listed);
     for ((probability, texture), place) in listed.iter().zip(0..) {
         let full = ((probability * bar_width as f32).round() as usize).min(bar_width);
