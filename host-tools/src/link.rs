@@ -799,12 +799,12 @@ impl<S: Read + Write> Port<S> {
         if self.heard.elapsed() >= self.patience {
             match job.repeat(&mut self.session, &mut self.send) {
                 Ok(true) => self.heard = Instant::now(),
-                Ok(false) | Err(LinkError::Disturbed) => {
-                    return Err(if self.bytes > 0 && self.reports == 0 {
-                        PortError::Garbage(self.bytes)
-                    } else {
-                        PortError::Silent(self.patience)
-                    });
+                Ok(false) | Err(LinkError::Disturbed) if self.bytes > 0 && self.reports == 0 => {
+                    return Err(PortError::Garbage(self.bytes));
+                }
+                Ok(false) => return Err(PortError::Silent(self.patience)),
+                Err(LinkError::Disturbed) => {
+                    return Err(PortError::Silent(self.patience * MAX_TRIES.into()));
                 }
                 Err(why) => return Err(why.into()),
             }

@@ -22,7 +22,7 @@ const GREETING: Duration = Duration::from_secs(1);
 /// An emulated board may go slower than real time.
 const EMULATED: Duration = Duration::from_secs(30);
 /// A probe opens its store within 10 s of its start.
-const BOOTING: Duration = Duration::from_secs(60);
+const BOOTING: Duration = Duration::from_secs(90);
 /// Longest way up, and some: 10 mm at 2 mm/s.
 const LIFTING: Duration = Duration::from_secs(30);
 /// A faulted rig tells where it is 20 times a second until it is at rest.
@@ -143,13 +143,13 @@ impl Bench {
             ),
             None => None,
         };
-        let patience = if open.emulator.is_some() {
-            EMULATED
+        let (greeting, patience) = if open.emulator.is_some() {
+            (EMULATED, EMULATED)
         } else {
-            PATIENCE
+            (GREETING, PATIENCE)
         };
         let mut bench = Self {
-            port: Port::new(open.line, GREETING),
+            port: Port::new(open.line, greeting),
             name: open.name,
             log,
             interrupt,
