@@ -215,7 +215,7 @@ impl Stop {
 fn probability(text: &str) -> Result<f32, String> {
     match text.parse() {
         Ok(p) if 0.0 < p && p <= 1.0 => Ok(p),
-        _ => Err("a probability above 0, such as 0.99; 1 is never exceeded".to_owned()),
+        _ => Err("a probability between 0 and 1, such as 0.99; 1 is never exceeded".to_owned()),
     }
 }
 
