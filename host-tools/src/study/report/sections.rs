@@ -242,7 +242,8 @@ compare the two columns of uncertainties. The study goes on with the paper's thr
         blocks: vec![
             text(format!(
                 "Ten textures (Table 2), 36 movements, {} slides each. The uncertainty is eq. 11 with equal priors: what one \
-slide leaves open among the ten, 0 nothing, 1 everything. {found}",
+slide leaves open among the ten, 0 nothing, 1 everything. The probe itself never presses so hard as these movements do, up to \
+2 N: here its guard of the force does not watch, as the paper's rig had none. {found}",
                 published::PILOT_TRIALS
             )),
             Block::Table(useful),
