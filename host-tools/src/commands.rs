@@ -27,6 +27,7 @@ use tactus_core::table::Table;
 
 use crate::cli::{Command, Evaluate, Features, Format, Rows, TableCommand, Tactus};
 use crate::identify::{demonstrate, identify, identify_simulated};
+use crate::study::study;
 
 /// Runs what the arguments ask for.
 pub(crate) fn run() -> anyhow::Result<()> {
@@ -82,6 +83,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
             simulate(&folder, &textures, trials, seed, out)?;
         }
         Some(Command::Evaluate(args)) => run_evaluation(&args, out)?,
+        Some(Command::Study(args)) => study(&args, out)?,
         Some(Command::Import { from, to }) => import(&from, &to, out)?,
     }
     out.flush()?;
@@ -446,7 +448,7 @@ fn experiment(args: &Evaluate) -> anyhow::Result<(Experiment, &'static str)> {
     Ok((experiment, protocol))
 }
 
-fn print_json(figures: &impl Serialize, out: &mut impl Write) -> anyhow::Result<()> {
+pub(crate) fn print_json(figures: &impl Serialize, out: &mut impl Write) -> anyhow::Result<()> {
     writeln!(out, "{}", serde_json::to_string_pretty(figures)?)?;
     Ok(())
 }

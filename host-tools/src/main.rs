@@ -3,6 +3,8 @@
 mod cli;
 mod commands;
 mod identify;
+#[path = "study_command.rs"]
+mod study;
 
 use std::process::ExitCode;
 
