@@ -12,13 +12,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::features::{Property, PropertySet};
 use crate::fused::{FeatureSet, Observation, Vector};
-use crate::kernels::{Kernels, Plain};
-use crate::table::{Action, Contents, Gaussian, MAX_ACTIONS, Table, mean_step};
+use crate::kernels::{Kernels, Plain, exp_neg};
+use crate::table::{Action, Contents, Gaussian, MAX_ACTIONS, MAX_MOVEMENTS, Table, mean_step};
 
 mod fused;
 mod student;
 
-use fused::Visits;
+use fused::{Background, Visits};
 use student::{Shrunk, Student};
 
 /// Textures less probable than this are left out of the expected uncertainty: each changes it by at most about twice its
@@ -230,16 +230,22 @@ pub struct Outlook {
 pub fn confusion<K: Kernels>(a: Gaussian, b: Gaussian) -> f32 {
     let variances = a.sd * a.sd + b.sd * b.sd;
     let apart = a.mean - b.mean;
-    K::sqrt(2.0 * a.sd * b.sd / variances) * libm::expf(-apart * apart / (4.0 * variances))
+    let exponent = apart * apart / (4.0 * variances);
+    if exponent > FAR {
+        return 0.0;
+    }
+    K::sqrt(2.0 * a.sd * b.sd / variances) * exp_neg(exponent)
 }
+
+/// Textures that far apart are not confused: e^-22 is 3e-10, and all of it together changes an expected uncertainty by less
+/// than that.
+const FAR: f32 = 22.0;
 
 /// A texture that is still likely, while an expected uncertainty is computed.
 #[derive(Clone, Copy, Debug)]
-struct Candidate {
+struct Live {
     texture: u16,
     probability: f32,
-    /// What is expected of the properties looked at.
-    expected: [Gaussian; Property::ALL.len()],
     /// Sum over all others of confusion times probability: the numerator of eq. 8.
     confused: f32,
 }
@@ -266,7 +272,8 @@ pub struct Explorer<'t, const N: usize, K = Plain> {
     log_odds: Option<f32>,
     /// For Student's t: movement by movement, properties in their order.
     shrunk: Vec<Shrunk, MAX_ACTIONS>,
-    work: Vec<Candidate, N>,
+    /// For the fused method: what a texture that is not in the table is like, at every movement.
+    backgrounds: Vec<Background, MAX_MOVEMENTS>,
     kernels: PhantomData<K>,
 }
 
@@ -351,6 +358,10 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 shrunk.extend(of);
             }
         }
+        let mut backgrounds = Vec::new();
+        if method == Method::Fused {
+            backgrounds.extend(actions.iter().map(|a| Background::new(&table, a.movement)));
+        }
         let mut explorer = Self {
             table,
             config,
@@ -365,16 +376,12 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             visits: Vec::new(),
             log_odds: None,
             shrunk,
-            work: Vec::new(),
+            backgrounds,
             kernels: PhantomData,
         };
         explorer.restart();
-        explorer.at_first = explorer
-            .actions
-            .clone()
-            .into_iter()
-            .map(|a| explorer.uncertainty(a))
-            .collect();
+        let actions = explorer.actions.iter();
+        explorer.at_first = actions.map(|a| explorer.uncertainty(*a)).collect();
         Ok(explorer)
     }
 
@@ -514,22 +521,24 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         slide: &Observation,
     ) -> Result<(), ObserveError> {
         let x = Self::value(slide, property)?;
-        let mut student: Option<Student> = None;
-        for texture in 0..self.table.textures() {
-            let Some(expected) = self.expected(texture, action.movement, property) else {
-                continue;
-            };
-            let likelihood = match self.config.method {
-                Method::Paper => {
-                    let z = (x - expected.mean) / expected.sd;
-                    -(libm::logf(expected.sd) + 0.5 * z * z)
+        if self.config.method == Method::Paper {
+            for (log, expected) in self.log.iter_mut().zip(self.table.gaussians(action)) {
+                let Some(expected) = expected else {
+                    continue;
+                };
+                let z = (x - expected.mean) / expected.sd;
+                *log += -(libm::logf(expected.sd) + 0.5 * z * z);
+            }
+        } else {
+            let mut student: Option<Student> = None;
+            for texture in 0..self.table.textures() {
+                let Some(expected) = self.expected(texture, action.movement, property) else {
+                    continue;
+                };
+                let student = self.student(&mut student, texture, action.movement, property);
+                if let Some(log) = self.log.get_mut(usize::from(texture)) {
+                    *log += student.log(x, expected);
                 }
-                _ => self
-                    .student(&mut student, texture, action.movement, property)
-                    .log(x, expected),
-            };
-            if let Some(log) = self.log.get_mut(usize::from(texture)) {
-                *log += likelihood;
             }
         }
         self.normalise();
@@ -610,10 +619,11 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             let log = log.get(usize::from(texture));
             log.is_some_and(|&log| log > f32::NEG_INFINITY)
         };
-        self.log_odds = fused::decide(
+        self.log_odds = fused::decide::<K, N>(
             &self.table,
             features,
             &self.visits,
+            &self.backgrounds,
             is_candidate,
             &mut self.posterior,
         );
@@ -627,7 +637,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         for (log, posterior) in self.log.iter_mut().zip(&mut self.posterior) {
             // a slide takes at most 1e12 from a candidate: however improbable, it stays one
             *log -= top;
-            *posterior = libm::expf(*log);
+            *posterior = exp_neg(-*log);
             total += *posterior;
         }
         for posterior in &mut self.posterior {
@@ -712,24 +722,20 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     }
 
     /// What every action promises now, in their order.
-    pub fn outlook(&mut self) -> Vec<Outlook, MAX_ACTIONS> {
-        let actions = self.actions.clone().into_iter().zip(self.made.clone());
-        let promise = |action, made, uncertainty| Outlook {
-            action,
-            uncertainty,
-            benefit: benefit(uncertainty, made),
-        };
-        if self.slides == 0 {
-            let known = self.at_first.iter();
-            actions
-                .zip(known)
-                .map(|((action, made), &u)| promise(action, made, u))
-                .collect()
-        } else {
-            actions
-                .map(|(action, made)| promise(action, made, self.uncertainty(action)))
-                .collect()
-        }
+    pub fn outlook(&self) -> Vec<Outlook, MAX_ACTIONS> {
+        let actions = self.actions.iter().zip(&self.made).zip(&self.at_first);
+        let promises = actions.map(|((&action, &made), &at_first)| {
+            let uncertainty = match self.slides {
+                0 => at_first,
+                _ => self.uncertainty(action),
+            };
+            Outlook {
+                action,
+                uncertainty,
+                benefit: benefit(uncertainty, made),
+            }
+        });
+        promises.collect()
     }
 
     /// What cycling goes through: the best action of each property when nothing is known, properties in their order; where all
@@ -756,54 +762,63 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     /// Expected uncertainty after `action` (eq. 11).
     ///
     /// Computed as eq. 10: 1 minus a sum that is close to 1 would lose the digits that decide late in an exploration.
-    fn uncertainty(&mut self, action: Action) -> f32 {
-        self.work.clear();
-        let looked_at: PropertySet = match action.property {
-            Some(property) => [property].into_iter().collect(),
-            None => self.measured,
-        };
-        let nothing = Gaussian { mean: 0.0, sd: 1.0 };
-        for (&probability, texture) in self.posterior.iter().zip(0..) {
-            if probability < NEGLIGIBLE {
-                continue;
-            }
-            let mut expected = [nothing; Property::ALL.len()];
-            for property in looked_at.iter() {
-                let of = self.expected(texture, action.movement, property);
-                if let (Some(slot), Some(of)) = (expected.get_mut(property.index()), of) {
-                    *slot = of;
-                }
-            }
-            // there is room: `work` is as long as `posterior`
-            let _ = self.work.push(Candidate {
+    fn uncertainty(&self, action: Action) -> f32 {
+        let textures = self.posterior.iter().zip(0..);
+        let mut live: Vec<Live, N> = textures
+            .filter(|(probability, _)| **probability >= NEGLIGIBLE)
+            .map(|(&probability, texture)| Live {
                 texture,
                 probability,
-                expected,
                 confused: 0.0,
-            });
+            })
+            .collect();
+        if self.config.method == Method::Fused {
+            fused::confuse::<K, N>(&self.table, action.movement, &mut live);
+        } else {
+            let properties: Vec<Property, 3> = match action.property {
+                Some(property) => [property].into_iter().collect(),
+                None => self.measured.iter().collect(),
+            };
+            // as many as are looked at, each loop of its own
+            match *properties.as_slice() {
+                [a] => self.confuse(action.movement, [a], &mut live),
+                [a, b] => self.confuse(action.movement, [a, b], &mut live),
+                [a, b, c] => self.confuse(action.movement, [a, b, c], &mut live),
+                _ => {}
+            }
         }
-        let is_fused = self.config.method == Method::Fused;
-        let mut rest = self.work.as_mut_slice();
-        while let Some((a, others)) = rest.split_first_mut() {
-            for b in others.iter_mut() {
-                let confusion = if is_fused {
-                    fused::confusion(&self.table, action.movement, a.texture, b.texture)
-                } else {
-                    let pairs = a.expected.iter().zip(&b.expected).zip(Property::ALL);
-                    pairs
-                        .filter(|(_, property)| looked_at.contains(*property))
-                        .map(|((a, b), _)| confusion::<K>(*a, *b))
-                        .product()
-                };
+        live.iter()
+            .map(|c| c.probability * c.confused / (c.probability + c.confused))
+            .sum()
+    }
+
+    /// Confusion of each of the textures that are still likely with all others, by these properties of a movement.
+    fn confuse<const P: usize>(
+        &self,
+        movement: u8,
+        properties: [Property; P],
+        live: &mut Vec<Live, N>,
+    ) {
+        let nothing = Gaussian { mean: 0.0, sd: 1.0 };
+        let expect = |texture| {
+            properties.map(|property| {
+                self.expected(texture, movement, property)
+                    .unwrap_or(nothing)
+            })
+        };
+        let expected: Vec<[Gaussian; P], N> = live.iter().map(|l| expect(l.texture)).collect();
+        let (mut rest, mut expected) = (live.as_mut_slice(), expected.as_slice());
+        while let (Some((a, others)), Some((of_a, of_others))) =
+            (rest.split_first_mut(), expected.split_first())
+        {
+            for (b, of_b) in others.iter_mut().zip(of_others) {
+                let pairs = of_a.iter().zip(of_b);
+                let confusion: f32 = pairs.map(|(a, b)| confusion::<K>(*a, *b)).product();
                 a.confused += confusion * b.probability;
                 b.confused += confusion * a.probability;
             }
-            rest = others;
+            (rest, expected) = (others, of_others);
         }
-        self.work
-            .iter()
-            .map(|c| c.probability * c.confused / (c.probability + c.confused))
-            .sum()
     }
 }
 
@@ -812,6 +827,9 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
 /// Eq. 13 reads alpha = 1/n, which has no value for an action that was never made; taken as infinity, all untried actions
 /// would tie. Here alpha = 1/(n+1).
 pub fn benefit(uncertainty: f32, made: u8) -> f32 {
+    if made == 0 {
+        return 1.0 - uncertainty.clamp(0.0, 1.0);
+    }
     1.0 - libm::powf(uncertainty.clamp(0.0, 1.0), 1.0 / (f32::from(made) + 1.0))
 }
 

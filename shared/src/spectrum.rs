@@ -95,15 +95,21 @@ impl Default for SpectrumSum {
 impl SpectrumSum {
     /// Takes samples, in blocks of any size.
     pub fn push<K: Kernels>(&mut self, window: &[f32; FRAME], samples: &[i16]) {
-        let mut samples = samples.iter();
-        while samples.len() > 0 {
+        let mut samples = samples;
+        self.samples += samples.len() as u32;
+        while !samples.is_empty() {
             let room = self.frame.get_mut(self.filled..).unwrap_or_default();
-            for (slot, &sample) in room.iter_mut().zip(samples.by_ref()) {
+            let many = samples.len().min(room.len());
+            let (now, later) = samples.split_at_checked(many).unwrap_or_default();
+            // a frame's sum is in 32 bits
+            let mut total = 0;
+            for (slot, &sample) in room.iter_mut().zip(now) {
                 *slot = sample;
-                self.filled += 1;
-                self.total += i64::from(sample);
-                self.samples += 1;
+                total += i32::from(sample);
             }
+            self.total += i64::from(total);
+            self.filled += many;
+            samples = later;
             if self.filled >= FRAME {
                 K::add_frame(window, &self.frame, &mut self.sum);
                 self.frame.copy_within(HOP.., 0);

@@ -1,4 +1,5 @@
 //! The project's own commands: `cargo xtask --help` lists them.
+mod bench;
 mod bundle;
 mod emulate;
 mod factory;
@@ -101,16 +102,12 @@ enum Cli {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
-    /// Time the core's functions on this PC
+    /// Count what the core's kernels cost on the chip
     ///
-    /// Good for comparing two versions on one PC. What the chip needs is another matter.
-    #[command(after_help = "Example:
-  cargo xtask bench spectrum             only benches with `spectrum` in their name")]
-    Bench {
-        /// Filter and options for the benches (divan's)
-        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-        options: Vec<OsString>,
-    },
+    /// Instructions of the bench image on the emulated board, the same code as in the rig's image, on a slide of a real finger
+    /// where there is one; every result is compared with the plain kernels' on this PC. An error if a kernel misses its gate.
+    #[command(after_help = bench::EXAMPLES)]
+    Bench(bench::Options),
 }
 
 fn main() -> ExitCode {
@@ -124,7 +121,7 @@ fn main() -> ExitCode {
         Cli::Bundle { out } => bundle::bundle(&out),
         Cli::Factory { check } => factory::factory(check),
         Cli::Mutants { options } => mutants(options),
-        Cli::Bench { options } => bench(options),
+        Cli::Bench(options) => bench::bench(&options),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -146,13 +143,6 @@ fn mutants(options: Vec<OsString>) -> Result<()> {
         cargo.args(["--file", &format!("shared/src/{module}*")]);
         cargo.args(["--file", &format!("shared/src/{module}*/**")]);
     }
-    run(cargo.args(options))
-}
-
-fn bench(options: Vec<OsString>) -> Result<()> {
-    // by target: `cargo bench` alone would hand divan's options to every unit test binary too
-    let mut cargo = cargo();
-    cargo.args(["bench", "--package", "tactus-tests", "--bench", "*", "--"]);
     run(cargo.args(options))
 }
 
@@ -205,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn options_behind_mutants_and_bench_go_through() {
+    fn options_behind_mutants_go_through() {
         let Cli::Mutants { options } = Cli::parse_from(["xtask", "mutants", "--jobs", "2"]) else {
             panic!("not mutants");
         };

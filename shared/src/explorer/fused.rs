@@ -6,8 +6,10 @@
 
 use heapless::Vec;
 
+use super::Live;
 use crate::fixed::{exp_neg_q30, ln_q16};
 use crate::fused::{MAX_FEATURES, Vector, white};
+use crate::kernels::Kernels;
 use crate::table::{MAX_MOVEMENTS, Table};
 
 /// Degrees of freedom of Student's t.
@@ -60,16 +62,6 @@ impl Visit {
     }
 }
 
-/// |a - b|^2 of two whitened vectors, Q16.
-pub(super) fn distance(a: impl Iterator<Item = i16>, b: impl Iterator<Item = i16>) -> u64 {
-    a.zip(b)
-        .map(|(a, b)| {
-            let apart = i64::from(a) - i64::from(b);
-            (apart * apart) as u64
-        })
-        .sum()
-}
-
 /// What Student's t makes of `k` slides against a mean of `n`: 1/(8 v) of the variance v = 1/k + 1/n in Q16, and
 /// -(d/2) ln v in Q16.
 #[derive(Clone, Copy)]
@@ -92,7 +84,13 @@ impl Spread {
 
     /// ln of the likelihood up to a constant, Q16.
     fn likelihood(&self, distance: u64, features: usize) -> i32 {
-        let odds = (1 << 16) + (distance.saturating_mul(self.narrowness) >> 16);
+        let beyond = if distance >> 32 == 0 {
+            // narrowness has 20 bits
+            distance * self.narrowness
+        } else {
+            distance.saturating_mul(self.narrowness)
+        };
+        let odds = (1 << 16) + (beyond >> 16);
         let tail = (FREEDOM + features as i64) * i64::from(ln_q16(odds)) / 2;
         // some 60 at most: 2^22 in Q16
         (self.norm - tail) as i32
@@ -101,7 +99,8 @@ impl Spread {
 
 /// The likelihood of a texture that the table does not have: means of textures scatter as those of the table do.
 #[derive(Clone, Copy, Debug)]
-struct Background {
+pub(super) struct Background {
+    movement: u8,
     mean: [f32; MAX_FEATURES],
     variance: [f32; MAX_FEATURES],
     /// Whether there are textures enough to tell.
@@ -109,7 +108,7 @@ struct Background {
 }
 
 impl Background {
-    fn new(table: &Table<'_>, movement: u8) -> Self {
+    pub(super) fn new(table: &Table<'_>, movement: u8) -> Self {
         let mut count = 0;
         let mut sum = [0i64; MAX_FEATURES];
         let mut squares = [0i64; MAX_FEATURES];
@@ -125,6 +124,7 @@ impl Background {
         let known = count >= POPULATION;
         let step = white(1);
         let mut background = Self {
+            movement,
             mean: sum.map(|sum| sum as f32 / n * step),
             variance: [WIDE; MAX_FEATURES],
             known,
@@ -156,25 +156,29 @@ impl Background {
 
 /// Sets the posterior of every texture from all slides of a visit; the log-odds that it
 /// is none of them, `None` where the table has too few textures to tell.
-pub(super) fn decide<const N: usize>(
+pub(super) fn decide<K: Kernels, const N: usize>(
     table: &Table<'_>,
     features: usize,
     visits: &Visits,
+    backgrounds: &[Background],
     is_candidate: impl Fn(u16) -> bool,
     posterior: &mut Vec<f32, N>,
 ) -> Option<f32> {
     let mut log: Vec<i32, N> = posterior.iter().map(|_| 0).collect();
+    let mut distances: Vec<u64, N> = posterior.iter().map(|_| 0).collect();
     let (mut elsewhere, mut can_tell) = (0.0, true);
     for visit in visits {
         let mean = visit.mean(features);
-        let background = Background::new(table, visit.movement);
+        let background = backgrounds.iter().find(|b| b.movement == visit.movement)?;
         let unknown = background.likelihood(&mean, visit.slides);
         elsewhere += unknown;
         can_tell &= background.known;
         let untaught = (unknown * 65536.0) as i32;
         let mut spread = Spread::new(visit.slides, 1, features);
-        for (log, texture) in log.iter_mut().zip(0..) {
-            let trials = table.trials(texture, visit.movement);
+        let (means, stride) = table.white_means(visit.movement);
+        K::distances(&mean, means, stride, &mut distances);
+        let trials = table.trials_at(visit.movement);
+        for ((log, distance), trials) in log.iter_mut().zip(&distances).zip(trials) {
             let likelihood = if trials == 0 {
                 // as little is known of it here as of a texture that the table does not have
                 untaught
@@ -182,8 +186,7 @@ pub(super) fn decide<const N: usize>(
                 if spread.slides != trials {
                     spread = Spread::new(visit.slides, trials, features);
                 }
-                let known = table.white_mean(texture, visit.movement);
-                spread.likelihood(distance(mean.iter().copied(), known), features)
+                spread.likelihood(*distance, features)
             };
             *log = log.saturating_add(likelihood);
         }
@@ -195,33 +198,84 @@ pub(super) fn decide<const N: usize>(
     };
     let top = candidates().map(|(&log, _)| log).max()?;
     let (mut sum, mut count) = (0u64, 0u32);
-    for (&log, texture) in candidates() {
-        let likely = exp_neg_q30(top.abs_diff(log));
-        sum += u64::from(likely);
-        count += 1;
-        if let Some(p) = posterior.get_mut(usize::from(texture)) {
+    for ((p, log), texture) in posterior.iter_mut().zip(&log).zip(0..) {
+        *p = 0.0;
+        if is_candidate(texture) {
+            let likely = exp_neg_q30(top.abs_diff(*log));
+            sum += u64::from(likely);
+            count += 1;
             *p = likely as f32;
         }
     }
     let sum = sum as f32;
-    for (p, texture) in posterior.iter_mut().zip(0..) {
-        *p = if is_candidate(texture) { *p / sum } else { 0.0 };
+    for p in posterior.iter_mut() {
+        *p /= sum;
     }
     let average = top as f32 / 65536.0 + libm::logf(sum / (1 << 30) as f32 / count as f32);
     can_tell.then_some(elsewhere - average)
 }
 
-/// Degree of confusion of two textures at a movement (eq. 7, of the means of whitened slides): 1 where one was never
-/// learned.
-pub(super) fn confusion(table: &Table<'_>, movement: u8, a: u16, b: u16) -> f32 {
-    let fewer = table.trials(a, movement).min(table.trials(b, movement));
+/// e^(-x) is 0 from here on, Q16: [`exp_neg_q30`].
+const FAR: u64 = 22 << 16;
+
+/// Degree of confusion of two textures (eq. 7, of the means of whitened slides) whose means are so far apart, Q16: 1 where
+/// one was never learned. `fewer` is the smaller number of slides of the two.
+fn confusion(apart: u64, fewer: u8) -> f32 {
     if fewer == 0 {
         return 1.0;
     }
-    let apart = distance(table.white_mean(a, movement), table.white_mean(b, movement));
-    // |m_i - m_j|^2 / (8 (1 + 1/n))
-    let n = u64::from(fewer);
-    let exponent = apart.saturating_mul(n) / (8 * (n + 1));
-    let exponent = u32::try_from(exponent).unwrap_or(u32::MAX);
+    // |m_i - m_j|^2 / (8 (1 + 1/n)), of which the last factor is 2 at most
+    if apart >= 16 * FAR {
+        return 0.0;
+    }
+    let n = u32::from(fewer);
+    let exponent = match (apart as u32).checked_mul(n) {
+        Some(product) => product / (8 * (n + 1)),
+        None => (apart * u64::from(n) / u64::from(8 * (n + 1))) as u32,
+    };
     exp_neg_q30(exponent) as f32 / (1u32 << 30) as f32
+}
+
+/// Bytes of a whitened mean that is filled up with zeros.
+const MEAN: usize = 2 * MAX_FEATURES;
+
+/// Confusion of each of the textures that are still likely with all others, at a movement.
+pub(super) fn confuse<K: Kernels, const N: usize>(
+    table: &Table<'_>,
+    movement: u8,
+    live: &mut Vec<Live, N>,
+) {
+    // rows of equal length, and a word's multiple of it
+    let mut means: Vec<[u8; MEAN], N> = Vec::new();
+    let mut trials: Vec<u8, N> = Vec::new();
+    let mut distances: Vec<u64, N> = Vec::new();
+    for texture in live.iter().map(|live| live.texture) {
+        let mut mean = [0; MEAN];
+        let known = table.white_mean(texture, movement);
+        for (pair, known) in mean.as_chunks_mut().0.iter_mut().zip(known) {
+            *pair = known.to_le_bytes();
+        }
+        // there is room: all are as long as `live`
+        let _ = means.push(mean);
+        let _ = trials.push(table.trials(texture, movement));
+        let _ = distances.push(0);
+    }
+    let (mut rest, mut trials, mut means) = (live.as_mut_slice(), &trials[..], &means[..]);
+    while let (Some((a, others)), Some((n, fewer)), Some((mean, further))) = (
+        rest.split_first_mut(),
+        trials.split_first(),
+        means.split_first(),
+    ) {
+        let mut from = [0; MAX_FEATURES];
+        for (from, pair) in from.iter_mut().zip(mean.as_chunks().0) {
+            *from = i16::from_le_bytes(*pair);
+        }
+        K::distances(&from, further.as_flattened(), MEAN, &mut distances);
+        for ((b, apart), m) in others.iter_mut().zip(&distances).zip(fewer) {
+            let confusion = confusion(*apart, *n.min(m));
+            a.confused += confusion * b.probability;
+            b.confused += confusion * a.probability;
+        }
+        (rest, trials, means) = (others, fewer, further);
+    }
 }
