@@ -203,10 +203,10 @@ fn explore<K: Kernels, const N: usize>(
     } else {
         begin().ok()?
     };
-    let choose = |explorer: &Explorer<'_, N, K>| {
-        let outlook = explorer.outlook();
-        let action = explorer.choose(&outlook, 0);
-        (action, outlook)
+    let mut outlook = Vec::new();
+    let mut choose = |explorer: &Explorer<'_, N, K>| {
+        outlook = explorer.outlook();
+        explorer.choose(&outlook, 0)
     };
     let chosen = match workload {
         Workload::FirstChoice => Some(counter.count(|| choose(black_box(&explorer)))),
@@ -245,7 +245,7 @@ fn explore<K: Kernels, const N: usize>(
     }
     let log_odds = explorer.log_odds().unwrap_or(f32::NAN);
     put(&log_odds.to_bits().to_le_bytes());
-    let (action, outlook) = chosen.unwrap_or_else(|| choose(&explorer));
+    let action = chosen.unwrap_or_else(|| choose(&explorer));
     put(&[action.movement]);
     for promise in &outlook {
         put(&promise.uncertainty.to_le_bytes());

@@ -228,13 +228,17 @@ pub struct Outlook {
 
 /// Degree of confusion of two textures by one property (eq. 7): 1 for equal, 0 for disjoint distributions.
 pub fn confusion<K: Kernels>(a: Gaussian, b: Gaussian) -> f32 {
+    confused(a, b, K::sqrt)
+}
+
+fn confused(a: Gaussian, b: Gaussian, sqrt: fn(f32) -> f32) -> f32 {
     let variances = a.sd * a.sd + b.sd * b.sd;
     let apart = a.mean - b.mean;
     let exponent = apart * apart / (4.0 * variances);
     if exponent > FAR {
         return 0.0;
     }
-    K::sqrt(2.0 * a.sd * b.sd / variances) * exp_neg(exponent)
+    sqrt(2.0 * a.sd * b.sd / variances) * exp_neg(exponent)
 }
 
 /// Textures that far apart are not confused: e^-22 is 3e-10, and all of it together changes an expected uncertainty by less
@@ -245,6 +249,8 @@ const FAR: f32 = 22.0;
 #[derive(Clone, Copy, Debug)]
 struct Live {
     texture: u16,
+    /// Slides that it was learned from at the movement looked at, for the fused method.
+    trials: u8,
     probability: f32,
     /// Sum over all others of confusion times probability: the numerator of eq. 8.
     confused: f32,
@@ -522,13 +528,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     ) -> Result<(), ObserveError> {
         let x = Self::value(slide, property)?;
         if self.config.method == Method::Paper {
-            for (log, expected) in self.log.iter_mut().zip(self.table.gaussians(action)) {
-                let Some(expected) = expected else {
-                    continue;
-                };
-                let z = (x - expected.mean) / expected.sd;
-                *log += -(libm::logf(expected.sd) + 0.5 * z * z);
-            }
+            add_likelihoods(&self.table, action, x, &mut self.log);
         } else {
             let mut student: Option<Student> = None;
             for texture in 0..self.table.textures() {
@@ -541,7 +541,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 }
             }
         }
-        self.normalise();
+        normalise(&mut self.log, &mut self.posterior);
         Ok(())
     }
 
@@ -588,7 +588,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 }
             }
         }
-        self.normalise();
+        normalise(&mut self.log, &mut self.posterior);
         Ok(())
     }
 
@@ -614,35 +614,14 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 *sum += i32::from(*z);
             }
         }
-        let log = &self.log;
-        let is_candidate = |texture: u16| {
-            let log = log.get(usize::from(texture));
-            log.is_some_and(|&log| log > f32::NEG_INFINITY)
-        };
         self.log_odds = fused::decide::<K, N>(
             &self.table,
-            features,
             &self.visits,
             &self.backgrounds,
-            is_candidate,
+            &self.log,
             &mut self.posterior,
         );
         Ok(())
-    }
-
-    /// The posterior (eq. 3) from its logarithms.
-    fn normalise(&mut self) {
-        let top = self.log.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        let mut total = 0.0;
-        for (log, posterior) in self.log.iter_mut().zip(&mut self.posterior) {
-            // a slide takes at most 1e12 from a candidate: however improbable, it stays one
-            *log -= top;
-            *posterior = exp_neg(-*log);
-            total += *posterior;
-        }
-        for posterior in &mut self.posterior {
-            *posterior /= total;
-        }
     }
 
     /// What a property of a texture is expected to be in one slide.
@@ -768,6 +747,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             .filter(|(probability, _)| **probability >= NEGLIGIBLE)
             .map(|(&probability, texture)| Live {
                 texture,
+                trials: 0,
                 probability,
                 confused: 0.0,
             })
@@ -811,14 +791,62 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         while let (Some((a, others)), Some((of_a, of_others))) =
             (rest.split_first_mut(), expected.split_first())
         {
-            for (b, of_b) in others.iter_mut().zip(of_others) {
-                let pairs = of_a.iter().zip(of_b);
-                let confusion: f32 = pairs.map(|(a, b)| confusion::<K>(*a, *b)).product();
-                a.confused += confusion * b.probability;
-                b.confused += confusion * a.probability;
+            if let [of_a] = of_a.as_slice() {
+                confuse_with(a, of_a, others, of_others.as_flattened(), K::sqrt);
+            } else {
+                for (b, of_b) in others.iter_mut().zip(of_others) {
+                    let pairs = of_a.iter().zip(of_b);
+                    let confusion = pairs.map(|(a, b)| confusion::<K>(*a, *b)).product();
+                    confuse(a, b, confusion);
+                }
             }
             (rest, expected) = (others, of_others);
         }
+    }
+}
+
+fn confuse(a: &mut Live, b: &mut Live, confusion: f32) {
+    a.confused += confusion * b.probability;
+    b.confused += confusion * a.probability;
+}
+
+// The loops over all textures are not generic: so they are compiled with this crate, for speed.
+
+/// Confusion of one texture with all others by one property.
+fn confuse_with(
+    a: &mut Live,
+    of_a: &Gaussian,
+    others: &mut [Live],
+    of_others: &[Gaussian],
+    sqrt: fn(f32) -> f32,
+) {
+    for (b, of_b) in others.iter_mut().zip(of_others) {
+        confuse(a, b, confused(*of_a, *of_b, sqrt));
+    }
+}
+
+/// Adds the likelihood of every texture when a property is `x` (eq. 4).
+fn add_likelihoods(table: &Table<'_>, action: Action, x: f32, log: &mut [f32]) {
+    for (log, expected) in log.iter_mut().zip(table.gaussians(action)) {
+        if let Some(expected) = expected {
+            let z = (x - expected.mean) / expected.sd;
+            *log += -(libm::logf(expected.sd) + 0.5 * z * z);
+        }
+    }
+}
+
+/// The posterior (eq. 3) from its logarithms.
+fn normalise(log: &mut [f32], posterior: &mut [f32]) {
+    let top = log.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let mut total = 0.0;
+    for (log, posterior) in log.iter_mut().zip(&mut *posterior) {
+        // a slide takes at most 1e12 from a candidate: however improbable, it stays one
+        *log -= top;
+        *posterior = exp_neg(-*log);
+        total += *posterior;
+    }
+    for posterior in posterior {
+        *posterior /= total;
     }
 }
 

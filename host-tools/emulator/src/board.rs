@@ -22,7 +22,7 @@ use crate::log::Log;
 use crate::part::Board;
 use crate::pins;
 use crate::rig::{Rig, SharedRig, lock};
-use crate::stack::{Stack, StackLayout, StackUse};
+use crate::stack::{Stack, StackLayout, StackUse, register};
 
 /// What else a run is made from.
 #[derive(Clone, Debug)]
@@ -407,6 +407,14 @@ impl Emulator {
         self.read(flash::STORE.start, flash::STORE.end - flash::STORE.start)
     }
 
+    /// Where the core stands: the address of its next instruction.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn program_counter(&mut self) -> Result<Option<u32>, Error> {
+        self.with(|standing| register(standing.host, 15))
+    }
+
     /// Measures from now on how deep the stack gets. To be called at time 0: it paints the whole stack. Costs most of the
     /// speed.
     ///
@@ -452,6 +460,16 @@ impl Emulator {
                     .join(", "),
             }),
         }
+    }
+
+    /// The function that an address is in, as the ELF names it.
+    pub fn function_at(&self, address: u64) -> Option<&str> {
+        let is_in =
+            |&&(_, begin, size): &&(String, u64, u64)| (begin..begin + size).contains(&address);
+        self.symbols
+            .iter()
+            .find(is_in)
+            .map(|(name, ..)| name.as_str())
     }
 
     /// Reads memory.

@@ -8,6 +8,7 @@
 
 mod board;
 pub mod campaign;
+pub mod cycles;
 mod driver;
 pub mod exploration;
 mod flash;

@@ -10,7 +10,7 @@ use super::Live;
 use crate::fixed::{exp_neg_q30, ln_q16};
 use crate::fused::{MAX_FEATURES, Vector, white};
 use crate::kernels::Kernels;
-use crate::table::{MAX_MOVEMENTS, Table};
+use crate::table::{Contents, MAX_MOVEMENTS, Table};
 
 /// Degrees of freedom of Student's t.
 const FREEDOM: i64 = 8;
@@ -154,18 +154,44 @@ impl Background {
     }
 }
 
-/// Sets the posterior of every texture from all slides of a visit; the log-odds that it
-/// is none of them, `None` where the table has too few textures to tell.
+/// [`Kernels::distances`].
+type Distances = fn(&[i16], &[u8], usize, &mut [u64]);
+
+/// Sets the posterior of every texture from all slides of a visit; the log-odds that it is none of them, `None` where the
+/// table has too few textures to tell. Those whose entry of `candidates` is minus infinity are none.
 pub(super) fn decide<K: Kernels, const N: usize>(
     table: &Table<'_>,
-    features: usize,
     visits: &Visits,
     backgrounds: &[Background],
-    is_candidate: impl Fn(u16) -> bool,
-    posterior: &mut Vec<f32, N>,
+    candidates: &[f32],
+    posterior: &mut [f32],
 ) -> Option<f32> {
-    let mut log: Vec<i32, N> = posterior.iter().map(|_| 0).collect();
-    let mut distances: Vec<u64, N> = posterior.iter().map(|_| 0).collect();
+    let mut log = [0; N];
+    let mut distances = [0; N];
+    let (log, distances) = (
+        log.get_mut(..posterior.len())?,
+        distances.get_mut(..posterior.len())?,
+    );
+    let (elsewhere, can_tell) =
+        add_likelihoods(table, visits, backgrounds, log, distances, K::distances)?;
+    let average = normalise(log, candidates, posterior)?;
+    can_tell.then_some(elsewhere - average)
+}
+
+/// Logarithms of the likelihoods up to a constant, Q16, of a texture that the table does not have as well, and whether that
+/// one is known. `distances` is room for as many.
+fn add_likelihoods(
+    table: &Table<'_>,
+    visits: &Visits,
+    backgrounds: &[Background],
+    log: &mut [i32],
+    distances: &mut [u64],
+    measure: Distances,
+) -> Option<(f32, bool)> {
+    let Contents::Fused(_, features) = table.contents() else {
+        return None;
+    };
+    let features = usize::from(features);
     let (mut elsewhere, mut can_tell) = (0.0, true);
     for visit in visits {
         let mean = visit.mean(features);
@@ -176,9 +202,9 @@ pub(super) fn decide<K: Kernels, const N: usize>(
         let untaught = (unknown * 65536.0) as i32;
         let mut spread = Spread::new(visit.slides, 1, features);
         let (means, stride) = table.white_means(visit.movement);
-        K::distances(&mean, means, stride, &mut distances);
+        measure(&mean, means, stride, distances);
         let trials = table.trials_at(visit.movement);
-        for ((log, distance), trials) in log.iter_mut().zip(&distances).zip(trials) {
+        for ((log, distance), trials) in log.iter_mut().zip(&*distances).zip(trials) {
             let likelihood = if trials == 0 {
                 // as little is known of it here as of a texture that the table does not have
                 untaught
@@ -191,16 +217,19 @@ pub(super) fn decide<K: Kernels, const N: usize>(
             *log = log.saturating_add(likelihood);
         }
     }
-    let candidates = || {
-        log.iter()
-            .zip(0..)
-            .filter(|&(_, texture)| is_candidate(texture))
-    };
-    let top = candidates().map(|(&log, _)| log).max()?;
+    Some((elsewhere, can_tell))
+}
+
+/// The posterior from its logarithms; the logarithm of the candidates' mean likelihood.
+fn normalise(log: &[i32], candidates: &[f32], posterior: &mut [f32]) -> Option<f32> {
+    let is_candidate = |candidate: &f32| *candidate > f32::NEG_INFINITY;
+    let of_candidates = log.iter().zip(candidates);
+    let of_candidates = of_candidates.filter(|(_, c)| is_candidate(c));
+    let top = of_candidates.map(|(&log, _)| log).max()?;
     let (mut sum, mut count) = (0u64, 0u32);
-    for ((p, log), texture) in posterior.iter_mut().zip(&log).zip(0..) {
+    for ((p, log), candidate) in posterior.iter_mut().zip(log).zip(candidates) {
         *p = 0.0;
-        if is_candidate(texture) {
+        if is_candidate(candidate) {
             let likely = exp_neg_q30(top.abs_diff(*log));
             sum += u64::from(likely);
             count += 1;
@@ -208,11 +237,10 @@ pub(super) fn decide<K: Kernels, const N: usize>(
         }
     }
     let sum = sum as f32;
-    for p in posterior.iter_mut() {
+    for p in posterior {
         *p /= sum;
     }
-    let average = top as f32 / 65536.0 + libm::logf(sum / (1 << 30) as f32 / count as f32);
-    can_tell.then_some(elsewhere - average)
+    Some(top as f32 / 65536.0 + libm::logf(sum / (1 << 30) as f32 / count as f32))
 }
 
 /// e^(-x) is 0 from here on, Q16: [`exp_neg_q30`].
@@ -247,35 +275,44 @@ pub(super) fn confuse<K: Kernels, const N: usize>(
 ) {
     // rows of equal length, and a word's multiple of it
     let mut means: Vec<[u8; MEAN], N> = Vec::new();
-    let mut trials: Vec<u8, N> = Vec::new();
-    let mut distances: Vec<u64, N> = Vec::new();
-    for texture in live.iter().map(|live| live.texture) {
-        let mut mean = [0; MEAN];
-        let known = table.white_mean(texture, movement);
-        for (pair, known) in mean.as_chunks_mut().0.iter_mut().zip(known) {
-            *pair = known.to_le_bytes();
-        }
-        // there is room: all are as long as `live`
-        let _ = means.push(mean);
-        let _ = trials.push(table.trials(texture, movement));
-        let _ = distances.push(0);
+    let mut distances = [0; N];
+    for live in live.iter_mut() {
+        // there is room: as many as `live`
+        let _ = means.push(mean_of(table, movement, live));
     }
-    let (mut rest, mut trials, mut means) = (live.as_mut_slice(), &trials[..], &means[..]);
-    while let (Some((a, others)), Some((n, fewer)), Some((mean, further))) = (
-        rest.split_first_mut(),
-        trials.split_first(),
-        means.split_first(),
-    ) {
+    let (mut rest, mut means) = (live.as_mut_slice(), &means[..]);
+    while let (Some((a, others)), Some((mean, further))) =
+        (rest.split_first_mut(), means.split_first())
+    {
         let mut from = [0; MAX_FEATURES];
         for (from, pair) in from.iter_mut().zip(mean.as_chunks().0) {
             *from = i16::from_le_bytes(*pair);
         }
         K::distances(&from, further.as_flattened(), MEAN, &mut distances);
-        for ((b, apart), m) in others.iter_mut().zip(&distances).zip(fewer) {
-            let confusion = confusion(*apart, *n.min(m));
-            a.confused += confusion * b.probability;
-            b.confused += confusion * a.probability;
+        confuse_with(a, others, &distances);
+        (rest, means) = (others, further);
+    }
+}
+
+/// The whitened mean of a texture, whose number of slides is noted beside its probability.
+fn mean_of(table: &Table<'_>, movement: u8, live: &mut Live) -> [u8; MEAN] {
+    live.trials = table.trials(live.texture, movement);
+    let mut mean = [0; MEAN];
+    let known = table.white_mean(live.texture, movement);
+    for (pair, known) in mean.as_chunks_mut().0.iter_mut().zip(known) {
+        *pair = known.to_le_bytes();
+    }
+    mean
+}
+
+/// Confusion of one texture with all others, which are so far from it.
+fn confuse_with(a: &mut Live, others: &mut [Live], distances: &[u64]) {
+    for (b, apart) in others.iter_mut().zip(distances) {
+        if *apart >= 16 * FAR && a.trials.min(b.trials) > 0 {
+            continue;
         }
-        (rest, trials, means) = (others, fewer, further);
+        let confusion = confusion(*apart, a.trials.min(b.trials));
+        a.confused += confusion * b.probability;
+        b.confused += confusion * a.probability;
     }
 }
