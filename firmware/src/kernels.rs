@@ -2,10 +2,11 @@
 //! them, to the bit.
 
 use core::arch::global_asm;
+use core::mem::offset_of;
 
 use tactus_core::fir::{TAPS, Taps};
 use tactus_core::fused::MAX_FEATURES;
-use tactus_core::kernels::{Kernels, Plain};
+use tactus_core::kernels::{Candidate, Kernels, Plain};
 use tactus_core::spectrum::{FRAME, FrameSum};
 
 /// Outputs of the band-pass that are computed at once.
@@ -147,6 +148,48 @@ global_asm!(
     "pop {{r8, r9}}",
     "pop {{r4-r11, pc}}",
     ".size tactus_distances, . - tactus_distances",
+    ".section .text.tactus_candidates,\"ax\",%progbits",
+    ".global tactus_candidates",
+    ".type tactus_candidates,%function",
+    ".thumb_func",
+    // r0: the one mean, 14 numbers, and r2 and r3 its sum of squares; r1: the others, and the first behind them on the stack.
+    "tactus_candidates:",
+    "push {{r4-r11, lr}}",
+    "push {{r2, r3}}",
+    "ldr lr, [sp, #44]",
+    "ldm r0, {{r4-r10}}",
+    "2:",
+    "mov r2, #0",
+    "mov r3, #0",
+    "ldr r0, [r1]",
+    "smlald r2, r3, r0, r4",
+    "ldr r0, [r1, #4]",
+    "smlald r2, r3, r0, r5",
+    "ldr r0, [r1, #8]",
+    "smlald r2, r3, r0, r6",
+    "ldr r0, [r1, #12]",
+    "smlald r2, r3, r0, r7",
+    "ldr r0, [r1, #16]",
+    "smlald r2, r3, r0, r8",
+    "ldr r0, [r1, #20]",
+    "smlald r2, r3, r0, r9",
+    "ldr r0, [r1, #24]",
+    "smlald r2, r3, r0, r10",
+    "ldrd r11, r12, [r1, #{square}]",
+    "subs r11, r11, r2",
+    "sbc r12, r12, r3",
+    "subs r11, r11, r2",
+    "sbc r12, r12, r3",
+    "ldrd r2, r3, [sp]",
+    "adds r11, r11, r2",
+    "adc r12, r12, r3",
+    "strd r11, r12, [r1, #{distance}]",
+    "add r1, r1, #{size}",
+    "cmp r1, lr",
+    "bne 2b",
+    "pop {{r2, r3}}",
+    "pop {{r4-r11, pc}}",
+    ".size tactus_candidates, . - tactus_candidates",
     ".section .text.tactus_sqrt,\"ax\",%progbits",
     ".global tactus_sqrt",
     ".type tactus_sqrt,%function",
@@ -158,6 +201,9 @@ global_asm!(
     "bx lr",
     ".size tactus_sqrt, . - tactus_sqrt",
     ".text",
+    square = const offset_of!(Candidate, square),
+    distance = const offset_of!(Candidate, distance),
+    size = const size_of::<Candidate>(),
 );
 
 unsafe extern "C" {
@@ -173,6 +219,14 @@ unsafe extern "C" {
         stride: usize,
         features: usize,
         square: u64,
+    );
+    /// `from` has 14 numbers and begins at a whole word, `square` is the sum of their squares; there is at least one of
+    /// `others`, and `behind` is where the last of them ends.
+    fn tactus_candidates(
+        from: *const i16,
+        others: *mut Candidate,
+        square: u64,
+        behind: *const Candidate,
     );
     safe fn tactus_sqrt(x: f32) -> f32;
 }
@@ -220,6 +274,18 @@ impl Kernels for Chip {
                 from.len(),
                 square,
             );
+        }
+    }
+
+    fn candidate_distances(from: &[i16; MAX_FEATURES], others: &mut [Candidate]) {
+        // its mean begins at a whole word
+        let from = Candidate::new(*from, 0.0, 0);
+        let range = others.as_mut_ptr_range();
+        if !range.is_empty() {
+            // SAFETY: there is one at least, and the others end where it is said.
+            unsafe {
+                tactus_candidates(from.mean.as_ptr(), range.start, from.square, range.end);
+            }
         }
     }
 

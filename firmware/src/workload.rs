@@ -203,10 +203,9 @@ fn explore<K: Kernels, const N: usize>(
     } else {
         begin().ok()?
     };
-    let mut outlook = Vec::new();
-    let mut choose = |explorer: &Explorer<'_, N, K>| {
-        outlook = explorer.outlook();
-        explorer.choose(&outlook, 0)
+    let choose = |explorer: &Explorer<'_, N, K>| {
+        let outlook = explorer.outlook();
+        black_box(explorer.choose(black_box(&outlook), 0))
     };
     let chosen = match workload {
         Workload::FirstChoice => Some(counter.count(|| choose(black_box(&explorer)))),
@@ -247,7 +246,7 @@ fn explore<K: Kernels, const N: usize>(
     put(&log_odds.to_bits().to_le_bytes());
     let action = chosen.unwrap_or_else(|| choose(&explorer));
     put(&[action.movement]);
-    for promise in &outlook {
+    for promise in &explorer.outlook() {
         put(&promise.uncertainty.to_le_bytes());
         put(&promise.benefit.to_le_bytes());
     }

@@ -231,6 +231,7 @@ pub fn confusion<K: Kernels>(a: Gaussian, b: Gaussian) -> f32 {
     confused(a, b, K::sqrt)
 }
 
+#[inline]
 fn confused(a: Gaussian, b: Gaussian, sqrt: fn(f32) -> f32) -> f32 {
     let variances = a.sd * a.sd + b.sd * b.sd;
     let apart = a.mean - b.mean;
@@ -241,16 +242,14 @@ fn confused(a: Gaussian, b: Gaussian, sqrt: fn(f32) -> f32) -> f32 {
     sqrt(2.0 * a.sd * b.sd / variances) * exp_neg(exponent)
 }
 
-/// Textures that far apart are not confused: e^-22 is 3e-10, and all of it together changes an expected uncertainty by less
-/// than that.
-const FAR: f32 = 22.0;
+/// Textures that far apart are not confused: 25 ln 2, where the exponential is half of the last place of a number near 1.
+const FAR: f32 = 17.33;
 
-/// A texture that is still likely, while an expected uncertainty is computed.
+/// A texture that is still likely, while an expected uncertainty is computed from Gaussians.
 #[derive(Clone, Copy, Debug)]
 struct Live {
-    texture: u16,
-    /// Slides that it was learned from at the movement looked at, for the fused method.
-    trials: u8,
+    /// What is expected of the properties looked at, those first.
+    expected: [Gaussian; Property::ALL.len()],
     probability: f32,
     /// Sum over all others of confusion times probability: the numerator of eq. 8.
     confused: f32,
@@ -702,19 +701,21 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
 
     /// What every action promises now, in their order.
     pub fn outlook(&self) -> Vec<Outlook, MAX_ACTIONS> {
+        let mut promises = Vec::new();
         let actions = self.actions.iter().zip(&self.made).zip(&self.at_first);
-        let promises = actions.map(|((&action, &made), &at_first)| {
+        for ((&action, &made), &at_first) in actions {
             let uncertainty = match self.slides {
                 0 => at_first,
                 _ => self.uncertainty(action),
             };
-            Outlook {
+            // there is room: as many as there are actions
+            let _ = promises.push(Outlook {
                 action,
                 uncertainty,
                 benefit: benefit(uncertainty, made),
-            }
-        });
-        promises.collect()
+            });
+        }
+        promises
     }
 
     /// What cycling goes through: the best action of each property when nothing is known, properties in their order; where all
@@ -742,90 +743,80 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     ///
     /// Computed as eq. 10: 1 minus a sum that is close to 1 would lose the digits that decide late in an exploration.
     fn uncertainty(&self, action: Action) -> f32 {
-        let textures = self.posterior.iter().zip(0..);
-        let mut live: Vec<Live, N> = textures
-            .filter(|(probability, _)| **probability >= NEGLIGIBLE)
-            .map(|(&probability, texture)| Live {
-                texture,
-                trials: 0,
+        let movement = action.movement;
+        if self.config.method == Method::Fused {
+            return fused::uncertainty::<K, N>(&self.table, movement, &self.posterior);
+        }
+        let looked_at: PropertySet = match action.property {
+            Some(property) => [property].into_iter().collect(),
+            None => self.measured,
+        };
+        let nothing = Gaussian { mean: 0.0, sd: 1.0 };
+        let mut live: Vec<Live, N> = Vec::new();
+        let known = self.table.gaussians(action);
+        for ((&probability, known), texture) in self.posterior.iter().zip(known).zip(0..) {
+            if probability < NEGLIGIBLE {
+                continue;
+            }
+            let mut expected = [nothing; Property::ALL.len()];
+            for (slot, property) in expected.iter_mut().zip(looked_at.iter()) {
+                let of = match self.config.method {
+                    Method::Paper => known,
+                    _ => self.expected(texture, movement, property),
+                };
+                *slot = of.unwrap_or(nothing);
+            }
+            // there is room: `posterior` is no longer than N
+            let _ = live.push(Live {
+                expected,
                 probability,
                 confused: 0.0,
-            })
-            .collect();
-        if self.config.method == Method::Fused {
-            fused::confuse::<K, N>(&self.table, action.movement, &mut live);
-        } else {
-            let properties: Vec<Property, 3> = match action.property {
-                Some(property) => [property].into_iter().collect(),
-                None => self.measured.iter().collect(),
-            };
-            // as many as are looked at, each loop of its own
-            match *properties.as_slice() {
-                [a] => self.confuse(action.movement, [a], &mut live),
-                [a, b] => self.confuse(action.movement, [a, b], &mut live),
-                [a, b, c] => self.confuse(action.movement, [a, b, c], &mut live),
-                _ => {}
-            }
+            });
         }
-        live.iter()
-            .map(|c| c.probability * c.confused / (c.probability + c.confused))
-            .sum()
+        uncertainty_of(&mut live, looked_at.iter().count(), K::sqrt)
     }
-
-    /// Confusion of each of the textures that are still likely with all others, by these properties of a movement.
-    fn confuse<const P: usize>(
-        &self,
-        movement: u8,
-        properties: [Property; P],
-        live: &mut Vec<Live, N>,
-    ) {
-        let nothing = Gaussian { mean: 0.0, sd: 1.0 };
-        let expect = |texture| {
-            properties.map(|property| {
-                self.expected(texture, movement, property)
-                    .unwrap_or(nothing)
-            })
-        };
-        let expected: Vec<[Gaussian; P], N> = live.iter().map(|l| expect(l.texture)).collect();
-        let (mut rest, mut expected) = (live.as_mut_slice(), expected.as_slice());
-        while let (Some((a, others)), Some((of_a, of_others))) =
-            (rest.split_first_mut(), expected.split_first())
-        {
-            if let [of_a] = of_a.as_slice() {
-                confuse_with(a, of_a, others, of_others.as_flattened(), K::sqrt);
-            } else {
-                for (b, of_b) in others.iter_mut().zip(of_others) {
-                    let pairs = of_a.iter().zip(of_b);
-                    let confusion = pairs.map(|(a, b)| confusion::<K>(*a, *b)).product();
-                    confuse(a, b, confusion);
-                }
-            }
-            (rest, expected) = (others, of_others);
-        }
-    }
-}
-
-fn confuse(a: &mut Live, b: &mut Live, confusion: f32) {
-    a.confused += confusion * b.probability;
-    b.confused += confusion * a.probability;
 }
 
 // The loops over all textures are not generic: so they are compiled with this crate, for speed.
 
-/// Confusion of one texture with all others by one property.
-fn confuse_with(
-    a: &mut Live,
-    of_a: &Gaussian,
-    others: &mut [Live],
-    of_others: &[Gaussian],
-    sqrt: fn(f32) -> f32,
-) {
-    for (b, of_b) in others.iter_mut().zip(of_others) {
-        confuse(a, b, confused(*of_a, *of_b, sqrt));
+/// Expected uncertainty (eq. 11) of these textures, of which so many properties are looked at.
+#[inline(never)]
+fn uncertainty_of(live: &mut [Live], properties: usize, sqrt: fn(f32) -> f32) -> f32 {
+    let mut rest = &mut *live;
+    while let Some((a, others)) = rest.split_first_mut() {
+        if properties == 1 {
+            confuse_by_one(a, others, sqrt);
+        } else {
+            for b in others.iter_mut() {
+                let pairs = a.expected.iter().zip(&b.expected).take(properties);
+                let confusion: f32 = pairs.map(|(a, b)| confused(*a, *b, sqrt)).product();
+                a.confused += confusion * b.probability;
+                b.confused += confusion * a.probability;
+            }
+        }
+        rest = others;
     }
+    let left = |c: &Live| c.probability * c.confused / (c.probability + c.confused);
+    live.iter().map(left).sum()
+}
+
+/// Confusion of one texture with all others by the first property that is looked at.
+fn confuse_by_one(a: &mut Live, others: &mut [Live], sqrt: fn(f32) -> f32) {
+    let [of_a, ..] = a.expected;
+    let mut sum = a.confused;
+    for b in others {
+        let [of_b, ..] = b.expected;
+        let confusion = confused(of_a, of_b, sqrt);
+        if confusion > 0.0 {
+            sum += confusion * b.probability;
+            b.confused += confusion * a.probability;
+        }
+    }
+    a.confused = sum;
 }
 
 /// Adds the likelihood of every texture when a property is `x` (eq. 4).
+#[inline(never)]
 fn add_likelihoods(table: &Table<'_>, action: Action, x: f32, log: &mut [f32]) {
     for (log, expected) in log.iter_mut().zip(table.gaussians(action)) {
         if let Some(expected) = expected {
@@ -836,6 +827,7 @@ fn add_likelihoods(table: &Table<'_>, action: Action, x: f32, log: &mut [f32]) {
 }
 
 /// The posterior (eq. 3) from its logarithms.
+#[inline(never)]
 fn normalise(log: &mut [f32], posterior: &mut [f32]) {
     let top = log.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     let mut total = 0.0;

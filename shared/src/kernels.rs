@@ -3,7 +3,42 @@
 //! [`Plain`] is the reference. Another implementation must give the same integers, and the same floats to the bit.
 
 use crate::fir::{TAPS, Taps};
+use crate::fused::MAX_FEATURES;
 use crate::spectrum::{FRAME, FrameSum};
+
+/// A texture that is still likely, while a movement is weighed. The order of the fields is fixed, for kernels that are not
+/// written in Rust.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct Candidate {
+    /// Its whitened mean, filled up with zeros: [`crate::fused`].
+    pub mean: [i16; MAX_FEATURES],
+    /// Its probability.
+    pub probability: f32,
+    /// Sum of squares of the mean, which [`Candidate::new`] computes.
+    pub square: u64,
+    /// Squared distance from the texture that it is compared with.
+    pub distance: u64,
+    /// Sum over all others of confusion times probability: the numerator of eq. 8.
+    pub confused: f32,
+    /// Slides that it was learned from.
+    pub slides: u8,
+}
+
+impl Candidate {
+    /// One that is not compared yet.
+    pub fn new(mean: [i16; MAX_FEATURES], probability: f32, slides: u8) -> Self {
+        let squares = mean.iter().map(|&m| i64::from(m) * i64::from(m));
+        Self {
+            mean,
+            probability,
+            square: squares.sum::<i64>() as u64,
+            distance: 0,
+            confused: 0.0,
+            slides,
+        }
+    }
+}
 
 /// What costs the time of a slide and of a decision.
 pub trait Kernels {
@@ -21,6 +56,9 @@ pub trait Kernels {
     /// Squared distances of `from` to whitened means: `means` has one at the beginning of every `stride` bytes, numbers of 16
     /// bits, little-endian, as many as `from` has. Where there are fewer means than distances, the others stay.
     fn distances(from: &[i16], means: &[u8], stride: usize, distances: &mut [u64]);
+
+    /// Sets the squared distance of each of `others` from a whitened mean.
+    fn candidate_distances(from: &[i16; MAX_FEATURES], others: &mut [Candidate]);
 
     /// Square root of a number that is not negative, correctly rounded (IEEE 754).
     fn sqrt(x: f32) -> f32;
@@ -45,6 +83,8 @@ impl Kernels for Plain {
             .sum()
     }
 
+    // with this crate, which is compiled for speed
+    #[inline(never)]
     fn add_frame(window: &[f32; FRAME], frame: &[i16; FRAME], sum: &mut FrameSum) {
         let mut x = [0.0; FRAME];
         for ((x, &sample), &w) in x.iter_mut().zip(frame).zip(window) {
@@ -62,6 +102,16 @@ impl Kernels for Plain {
                 (apart * apart) as u64
             });
             *distance = apart.sum();
+        }
+    }
+
+    fn candidate_distances(from: &[i16; MAX_FEATURES], others: &mut [Candidate]) {
+        for other in others {
+            let apart = from.iter().zip(&other.mean).map(|(a, b)| {
+                let apart = i64::from(*a) - i64::from(*b);
+                (apart * apart) as u64
+            });
+            other.distance = apart.sum();
         }
     }
 

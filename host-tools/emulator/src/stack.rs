@@ -273,7 +273,7 @@ impl Stack {
     }
 }
 
-fn word(address: u32, host: &mut dyn Host) -> u32 {
+pub(crate) fn word(address: u32, host: &mut dyn Host) -> u32 {
     host.read(address.into(), Width::W32).unwrap_or_default() as u32
 }
 

@@ -15,6 +15,8 @@ Examples:
 
 /// The image that counts.
 const IMAGE: &str = "tactus-bench";
+/// The one whose load is measured.
+const RIG: &str = "tactus-rig";
 
 #[derive(Args)]
 pub(crate) struct Options {
@@ -49,11 +51,12 @@ pub(crate) fn bench(options: &Options) -> Result<()> {
     run(&mut program)
 }
 
-/// Builds the bench image, and no other, and what counts its instructions.
+/// Builds the bench image, the rig's, and what counts their instructions.
 pub(crate) fn program() -> Result<Command> {
-    let elf = firmware::elf(IMAGE)?;
+    let elves = firmware::compile(&[IMAGE, RIG])?;
     run(emulate::build().args(["--bin", IMAGE]))?;
     let mut program = Command::new(emulate::folder().join("release").join(IMAGE));
-    program.arg(elf);
+    program.arg(firmware::image(&elves, IMAGE)?);
+    program.arg("--rig").arg(firmware::image(&elves, RIG)?);
     Ok(program)
 }

@@ -25,13 +25,8 @@ pub(crate) fn elves() -> Result<Vec<PathBuf>> {
     compile(&FLASHED)
 }
 
-/// Builds one image of the firmware: its ELF.
-pub(crate) fn elf(name: &str) -> Result<PathBuf> {
-    let elves = compile(&[name])?;
-    Ok(image(&elves, name)?.to_owned())
-}
-
-fn compile(images: &[&str]) -> Result<Vec<PathBuf>> {
+/// Builds these images of the firmware: the ELFs, by name.
+pub(crate) fn compile(images: &[&str]) -> Result<Vec<PathBuf>> {
     let toolchain = toolchain::get()?;
     eprintln!("Building with {}", toolchain.version());
     let mut cargo = toolchain.cargo_build();

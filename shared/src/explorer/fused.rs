@@ -6,14 +6,13 @@
 
 use heapless::Vec;
 
-use super::Live;
 use crate::fixed::{exp_neg_q30, ln_q16};
 use crate::fused::{MAX_FEATURES, Vector, white};
-use crate::kernels::Kernels;
+use crate::kernels::{Candidate, Kernels};
 use crate::table::{Contents, MAX_MOVEMENTS, Table};
 
 /// Degrees of freedom of Student's t.
-const FREEDOM: i64 = 8;
+const FREEDOM: i32 = 8;
 /// Fewest textures whose means say what textures are like.
 const POPULATION: usize = 3;
 /// Variance of textures' means where there are too few to say, standard deviations within a texture squared.
@@ -67,33 +66,35 @@ impl Visit {
 #[derive(Clone, Copy)]
 struct Spread {
     slides: u8,
-    narrowness: u64,
-    norm: i64,
+    narrowness: u32,
+    norm: i32,
 }
 
 impl Spread {
     fn new(k: u8, n: u8, features: usize) -> Self {
-        let (k64, n64) = (u64::from(k), u64::from(n));
-        let narrowness = ((k64 * n64) << 16) / (8 * (k64 + n64));
+        let (k32, n32) = (u32::from(k), u32::from(n));
+        // 20 bits at most, as k and n have 8 each
+        let narrowness = (u64::from(k32 * n32) << 16) / u64::from(8 * (k32 + n32));
         Self {
             slides: n,
-            narrowness,
-            norm: features as i64 * i64::from(ln_q16(8 * narrowness)) / 2,
+            narrowness: narrowness as u32,
+            // -(14/2) ln v, and ln v is 12 at most
+            norm: (features as i64 * i64::from(ln_q16(8 * narrowness)) / 2) as i32,
         }
     }
 
-    /// ln of the likelihood up to a constant, Q16.
-    fn likelihood(&self, distance: u64, features: usize) -> i32 {
-        let beyond = if distance >> 32 == 0 {
-            // narrowness has 20 bits
-            distance * self.narrowness
-        } else {
-            distance.saturating_mul(self.narrowness)
+    /// ln of the likelihood up to a constant, Q16. 8 degrees of freedom and `features` make `weight`.
+    fn likelihood(&self, distance: u64, weight: i32) -> i32 {
+        let narrowness = u64::from(self.narrowness);
+        let beyond = match u32::try_from(distance) {
+            Ok(distance) => u64::from(distance) * narrowness,
+            Err(_) => distance.saturating_mul(narrowness),
         };
         let odds = (1 << 16) + (beyond >> 16);
-        let tail = (FREEDOM + features as i64) * i64::from(ln_q16(odds)) / 2;
+        // the odds are at least 1, their logarithm is 34 at most: neither is negative, nor beyond 26 bits times 22
+        let tail = (weight * ln_q16(odds)) >> 1;
         // some 60 at most: 2^22 in Q16
-        (self.norm - tail) as i32
+        self.norm - tail
     }
 }
 
@@ -180,6 +181,7 @@ pub(super) fn decide<K: Kernels, const N: usize>(
 
 /// Logarithms of the likelihoods up to a constant, Q16, of a texture that the table does not have as well, and whether that
 /// one is known. `distances` is room for as many.
+#[inline(never)]
 fn add_likelihoods(
     table: &Table<'_>,
     visits: &Visits,
@@ -212,7 +214,7 @@ fn add_likelihoods(
                 if spread.slides != trials {
                     spread = Spread::new(visit.slides, trials, features);
                 }
-                spread.likelihood(*distance, features)
+                spread.likelihood(*distance, FREEDOM + features as i32)
             };
             *log = log.saturating_add(likelihood);
         }
@@ -221,8 +223,10 @@ fn add_likelihoods(
 }
 
 /// The posterior from its logarithms; the logarithm of the candidates' mean likelihood.
+#[inline(never)]
 fn normalise(log: &[i32], candidates: &[f32], posterior: &mut [f32]) -> Option<f32> {
-    let is_candidate = |candidate: &f32| *candidate > f32::NEG_INFINITY;
+    let none = f32::NEG_INFINITY.to_bits();
+    let is_candidate = |candidate: &f32| candidate.to_bits() != none;
     let of_candidates = log.iter().zip(candidates);
     let of_candidates = of_candidates.filter(|(_, c)| is_candidate(c));
     let top = of_candidates.map(|(&log, _)| log).max()?;
@@ -230,7 +234,8 @@ fn normalise(log: &[i32], candidates: &[f32], posterior: &mut [f32]) -> Option<f
     for ((p, log), candidate) in posterior.iter_mut().zip(log).zip(candidates) {
         *p = 0.0;
         if is_candidate(candidate) {
-            let likely = exp_neg_q30(top.abs_diff(*log));
+            let less = top.abs_diff(*log);
+            let likely = if less < FAR { exp_neg_q30(less) } else { 0 };
             sum += u64::from(likely);
             count += 1;
             *p = likely as f32;
@@ -244,75 +249,69 @@ fn normalise(log: &[i32], candidates: &[f32], posterior: &mut [f32]) -> Option<f
 }
 
 /// e^(-x) is 0 from here on, Q16: [`exp_neg_q30`].
-const FAR: u64 = 22 << 16;
+const FAR: u32 = 22 << 16;
 
 /// Degree of confusion of two textures (eq. 7, of the means of whitened slides) whose means are so far apart, Q16: 1 where
 /// one was never learned. `fewer` is the smaller number of slides of the two.
-fn confusion(apart: u64, fewer: u8) -> f32 {
+fn confusion(apart: u32, fewer: u8) -> f32 {
     if fewer == 0 {
         return 1.0;
     }
-    // |m_i - m_j|^2 / (8 (1 + 1/n)), of which the last factor is 2 at most
-    if apart >= 16 * FAR {
-        return 0.0;
-    }
+    // |m_i - m_j|^2 / (8 (1 + 1/n))
     let n = u32::from(fewer);
-    let exponent = match (apart as u32).checked_mul(n) {
+    let exponent = match apart.checked_mul(n) {
         Some(product) => product / (8 * (n + 1)),
-        None => (apart * u64::from(n) / u64::from(8 * (n + 1))) as u32,
+        None => (u64::from(apart) * u64::from(n) / u64::from(8 * (n + 1))) as u32,
     };
-    exp_neg_q30(exponent) as f32 / (1u32 << 30) as f32
+    exp_neg_q30(exponent) as f32 * (1.0 / (1u32 << 30) as f32)
 }
 
-/// Bytes of a whitened mean that is filled up with zeros.
-const MEAN: usize = 2 * MAX_FEATURES;
-
-/// Confusion of each of the textures that are still likely with all others, at a movement.
-pub(super) fn confuse<K: Kernels, const N: usize>(
+/// Sum over the textures that are still likely of the numerator of eq. 11, after a movement.
+pub(super) fn uncertainty<K: Kernels, const N: usize>(
     table: &Table<'_>,
     movement: u8,
-    live: &mut Vec<Live, N>,
-) {
-    // rows of equal length, and a word's multiple of it
-    let mut means: Vec<[u8; MEAN], N> = Vec::new();
-    let mut distances = [0; N];
-    for live in live.iter_mut() {
-        // there is room: as many as `live`
-        let _ = means.push(mean_of(table, movement, live));
-    }
-    let (mut rest, mut means) = (live.as_mut_slice(), &means[..]);
-    while let (Some((a, others)), Some((mean, further))) =
-        (rest.split_first_mut(), means.split_first())
-    {
-        let mut from = [0; MAX_FEATURES];
-        for (from, pair) in from.iter_mut().zip(mean.as_chunks().0) {
-            *from = i16::from_le_bytes(*pair);
+    posterior: &[f32],
+) -> f32 {
+    let mut live: Vec<Candidate, N> = Vec::new();
+    for (&probability, texture) in posterior.iter().zip(0..) {
+        if probability >= super::NEGLIGIBLE {
+            // there is room: `posterior` is no longer than N
+            let _ = live.push(candidate(table, movement, texture, probability));
         }
-        K::distances(&from, further.as_flattened(), MEAN, &mut distances);
-        confuse_with(a, others, &distances);
-        (rest, means) = (others, further);
     }
+    let mut rest = live.as_mut_slice();
+    while let Some((a, others)) = rest.split_first_mut() {
+        K::candidate_distances(&a.mean, others);
+        confuse_with(a, others);
+        rest = others;
+    }
+    let left = |c: &Candidate| c.probability * c.confused / (c.probability + c.confused);
+    live.iter().map(left).sum()
 }
 
-/// The whitened mean of a texture, whose number of slides is noted beside its probability.
-fn mean_of(table: &Table<'_>, movement: u8, live: &mut Live) -> [u8; MEAN] {
-    live.trials = table.trials(live.texture, movement);
-    let mut mean = [0; MEAN];
-    let known = table.white_mean(live.texture, movement);
-    for (pair, known) in mean.as_chunks_mut().0.iter_mut().zip(known) {
-        *pair = known.to_le_bytes();
+fn candidate(table: &Table<'_>, movement: u8, texture: u16, probability: f32) -> Candidate {
+    let mut mean = [0; MAX_FEATURES];
+    for (to, from) in mean.iter_mut().zip(table.white_mean(texture, movement)) {
+        *to = from;
     }
-    mean
+    Candidate::new(mean, probability, table.trials(texture, movement))
 }
 
-/// Confusion of one texture with all others, which are so far from it.
-fn confuse_with(a: &mut Live, others: &mut [Live], distances: &[u64]) {
-    for (b, apart) in others.iter_mut().zip(distances) {
-        if *apart >= 16 * FAR && a.trials.min(b.trials) > 0 {
-            continue;
-        }
-        let confusion = confusion(*apart, a.trials.min(b.trials));
-        a.confused += confusion * b.probability;
+/// Confusion of one texture with all others, whose distances from it are known.
+#[inline(never)]
+fn confuse_with(a: &mut Candidate, others: &mut [Candidate]) {
+    let mut confused = a.confused;
+    for b in others {
+        let fewer = a.slides.min(b.slides);
+        // the last factor of the exponent is 2 at most
+        let apart = match u32::try_from(b.distance) {
+            Ok(apart) if apart < 16 * FAR => apart,
+            _ if fewer == 0 => 0,
+            _ => continue,
+        };
+        let confusion = confusion(apart, fewer);
+        confused += confusion * b.probability;
         b.confused += confusion * a.probability;
     }
+    a.confused = confused;
 }

@@ -15,12 +15,14 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 use tactus::learn;
 use tactus::recordings::{PAC_RATE_HZ, RecordingSet};
-use tactus_core::explorer::{Config, Explorer, Method};
+use tactus_core::explorer::{Config, Explorer, Method, Strategy};
 use tactus_core::features::{Plan, Properties, Property, PropertySet};
 use tactus_core::fused::{FeatureSet, MAX_FEATURES, Observation};
 use tactus_core::kernels::Plain;
 use tactus_core::movement::Movement;
 use tactus_core::table::{Action, Contents, Table};
+use tactus_core::wire::{Ask, Identify, Phase, Tell};
+use tactus_emulator::talk::Talk;
 use tactus_emulator::{Emulator, Options, Setup, cycles};
 use workload::{Counter, Felt, Workload};
 
@@ -29,6 +31,9 @@ use workload::{Counter, Felt, Workload};
 struct Cli {
     /// The bench image
     elf: PathBuf,
+    /// The rig's image, whose acquisition, load and latency are measured during a slide
+    #[arg(long)]
+    rig: Option<PathBuf>,
     /// For people, or JSON for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
@@ -83,7 +88,10 @@ impl Row {
 
 fn run(cli: &Cli) -> anyhow::Result<bool> {
     let mut bench = Bench::start(cli)?;
-    let rows = rows(&mut bench)?;
+    let mut rows = rows(&mut bench)?;
+    if let Some(rig) = &cli.rig {
+        rows.extend(on_the_rig(rig)?);
+    }
     match cli.format {
         Format::Text => print(&rows, bench.source),
         Format::Json => println!("{}", Value::from_iter(rows.iter().map(json))),
@@ -298,6 +306,89 @@ fn rows(bench: &mut Bench) -> anyhow::Result<Vec<Row>> {
     }
     bench.source = slide.1;
     Ok(rows)
+}
+
+/// Longest that the rig takes for anything, virtual seconds.
+const PATIENCE_S: f64 = 120.0;
+const CORE_HZ: f64 = 168e6;
+
+/// Load and latency of the rig's image while it makes a slide.
+fn on_the_rig(elf: &Path) -> anyhow::Result<Vec<Row>> {
+    let emulator = Emulator::start(elf, Setup::default(), Options::default())?;
+    let handlers = ["TIM2", "UART4"].map(|name| emulator.symbol(name).map(|(address, _)| address));
+    let handlers = handlers.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let mut talk = Talk::new(emulator);
+    talk.ready(|_, _| ())?;
+    let identify = Identify {
+        among: Default::default(),
+        threshold: 1.0,
+        max_slides: 1,
+        method: None,
+        strategy: Strategy::Bayesian,
+        open: false,
+        learn: false,
+        seed: 1,
+    };
+    // times in ns and instructions so far
+    let (mut begun, mut over, mut told) = (None, None, None);
+    let mut failed = None;
+    talk.ask(Ask::Identify(identify), PATIENCE_S, |board, report| {
+        let mut now = |board: &mut Emulator| {
+            let instructions = board.instructions();
+            let instructions = instructions.map_err(|why| failed = Some(why)).unwrap_or(0);
+            Some((board.now_ns(), instructions))
+        };
+        match report.map(|report| &report.tell) {
+            Some(Tell::Phase(Phase::Sliding)) if begun.is_none() => {
+                begun = now(board);
+                let counted = board.count_handlers(handlers.clone());
+                failed = counted.err();
+            }
+            Some(Tell::Phase(Phase::Lifting)) if over.is_none() => over = now(board),
+            Some(Tell::Verdict { .. }) => told = now(board),
+            _ => {}
+        }
+    })?;
+    if let Some(why) = failed {
+        return Err(why.into());
+    }
+    let spent = talk.board().handlers()?;
+    let [timer, executor] = spent[..] else {
+        bail!("the handlers were not counted");
+    };
+    let begun = begun.context("the rig says nothing of a slide")?;
+    let over = over.context("the slide does not end")?;
+    let told = told.context("there is no verdict")?;
+    // the timer's update and its compare
+    let slots = timer.runs as f64 / 2.0;
+    let seconds = (over.0 - begun.0) as f64 * 1e-9;
+    let busy = (over.1 - begun.1) as f64 / (seconds * CORE_HZ);
+    let row = |kernel: &str, unit, measured, gate| Row {
+        kernel: kernel.into(),
+        unit,
+        instructions: measured,
+        cycles: None,
+        gate: Some(gate),
+        cmsis: None,
+        floor: None,
+        equal: true,
+    };
+    let slot = (timer.instructions + executor.instructions) as f64 / slots;
+    Ok(vec![
+        row("acquisition, bus waiting included", "slot", slot, 2500.0),
+        row(
+            "core busy during a slide",
+            "% at 168 MHz",
+            100.0 * busy,
+            10.0,
+        ),
+        row(
+            "last sample to the verdict on the link",
+            "ms",
+            (told.0 - over.0) as f64 * 1e-6,
+            5.0,
+        ),
+    ])
 }
 
 /// 3 s of a slide of a real finger, or of a synthetic one where there are no recordings; and which.
