@@ -161,18 +161,15 @@ global_asm!(
     "2:",
     "mov r2, #0",
     "mov r3, #0",
-    "ldr r0, [r1]",
+    "ldrd r0, r11, [r1]",
     "smlald r2, r3, r0, r4",
-    "ldr r0, [r1, #4]",
-    "smlald r2, r3, r0, r5",
-    "ldr r0, [r1, #8]",
+    "smlald r2, r3, r11, r5",
+    "ldrd r0, r11, [r1, #8]",
     "smlald r2, r3, r0, r6",
-    "ldr r0, [r1, #12]",
-    "smlald r2, r3, r0, r7",
-    "ldr r0, [r1, #16]",
+    "smlald r2, r3, r11, r7",
+    "ldrd r0, r11, [r1, #16]",
     "smlald r2, r3, r0, r8",
-    "ldr r0, [r1, #20]",
-    "smlald r2, r3, r0, r9",
+    "smlald r2, r3, r11, r9",
     "ldr r0, [r1, #24]",
     "smlald r2, r3, r0, r10",
     "ldrd r11, r12, [r1, #{square}]",
@@ -277,9 +274,7 @@ impl Kernels for Chip {
         }
     }
 
-    fn candidate_distances(from: &[i16; MAX_FEATURES], others: &mut [Candidate]) {
-        // its mean begins at a whole word
-        let from = Candidate::new(*from, 0.0, 0);
+    fn candidate_distances(from: &Candidate, others: &mut [Candidate]) {
         let range = others.as_mut_ptr_range();
         if !range.is_empty() {
             // SAFETY: there is one at least, and the others end where it is said.

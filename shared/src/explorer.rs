@@ -7,7 +7,7 @@
 use core::fmt;
 use core::marker::PhantomData;
 
-use heapless::Vec;
+use heapless::{Vec, VecView};
 use serde::{Deserialize, Serialize};
 
 use crate::features::{Property, PropertySet};
@@ -233,13 +233,14 @@ pub fn confusion<K: Kernels>(a: Gaussian, b: Gaussian) -> f32 {
 
 #[inline]
 fn confused(a: Gaussian, b: Gaussian, sqrt: fn(f32) -> f32) -> f32 {
-    let variances = a.sd * a.sd + b.sd * b.sd;
+    // a division takes 14 cycles
+    let narrowness = 1.0 / (a.sd * a.sd + b.sd * b.sd);
     let apart = a.mean - b.mean;
-    let exponent = apart * apart / (4.0 * variances);
+    let exponent = apart * apart * (0.25 * narrowness);
     if exponent > FAR {
         return 0.0;
     }
-    sqrt(2.0 * a.sd * b.sd / variances) * exp_neg(exponent)
+    sqrt(2.0 * a.sd * b.sd * narrowness) * exp_neg(exponent)
 }
 
 /// Textures that far apart are not confused: 25 ln 2, where the exponential is half of the last place of a number near 1.
@@ -253,6 +254,16 @@ struct Live {
     probability: f32,
     /// Sum over all others of confusion times probability: the numerator of eq. 8.
     confused: f32,
+}
+
+impl Live {
+    fn new(probability: f32) -> Self {
+        Self {
+            expected: [Gaussian { mean: 0.0, sd: 1.0 }; Property::ALL.len()],
+            probability,
+            confused: 0.0,
+        }
+    }
 }
 
 /// One exploration after another with the same table and candidates; room for `N` textures.
@@ -700,6 +711,8 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     }
 
     /// What every action promises now, in their order.
+    // its result is large: where it is wanted, and not moved there
+    #[inline(always)]
     pub fn outlook(&self) -> Vec<Outlook, MAX_ACTIONS> {
         let mut promises = Vec::new();
         let actions = self.actions.iter().zip(&self.made).zip(&self.at_first);
@@ -751,33 +764,42 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             Some(property) => [property].into_iter().collect(),
             None => self.measured,
         };
-        let nothing = Gaussian { mean: 0.0, sd: 1.0 };
         let mut live: Vec<Live, N> = Vec::new();
-        let known = self.table.gaussians(action);
-        for ((&probability, known), texture) in self.posterior.iter().zip(known).zip(0..) {
-            if probability < NEGLIGIBLE {
-                continue;
+        if self.config.method == Method::Paper {
+            gather(&self.table, action, &self.posterior, &mut live);
+        } else {
+            let expect = |texture, property| self.expected(texture, movement, property);
+            for (&probability, texture) in self.posterior.iter().zip(0..) {
+                if probability >= NEGLIGIBLE {
+                    let mut candidate = Live::new(probability);
+                    for (slot, property) in candidate.expected.iter_mut().zip(looked_at.iter()) {
+                        *slot = expect(texture, property).unwrap_or(*slot);
+                    }
+                    // there is room: `posterior` is no longer than N
+                    let _ = live.push(candidate);
+                }
             }
-            let mut expected = [nothing; Property::ALL.len()];
-            for (slot, property) in expected.iter_mut().zip(looked_at.iter()) {
-                let of = match self.config.method {
-                    Method::Paper => known,
-                    _ => self.expected(texture, movement, property),
-                };
-                *slot = of.unwrap_or(nothing);
-            }
-            // there is room: `posterior` is no longer than N
-            let _ = live.push(Live {
-                expected,
-                probability,
-                confused: 0.0,
-            });
         }
         uncertainty_of(&mut live, looked_at.iter().count(), K::sqrt)
     }
 }
 
 // The loops over all textures are not generic: so they are compiled with this crate, for speed.
+
+/// The textures that are still likely, with what is expected of the property that is looked at.
+#[inline(never)]
+fn gather(table: &Table<'_>, action: Action, posterior: &[f32], live: &mut VecView<Live>) {
+    for (&probability, known) in posterior.iter().zip(table.gaussians(action)) {
+        if probability >= NEGLIGIBLE {
+            let mut candidate = Live::new(probability);
+            if let ([slot, ..], Some(known)) = (&mut candidate.expected, known) {
+                *slot = known;
+            }
+            // there is room: as much as for the posterior
+            let _ = live.push(candidate);
+        }
+    }
+}
 
 /// Expected uncertainty (eq. 11) of these textures, of which so many properties are looked at.
 #[inline(never)]

@@ -57,8 +57,8 @@ pub trait Kernels {
     /// bits, little-endian, as many as `from` has. Where there are fewer means than distances, the others stay.
     fn distances(from: &[i16], means: &[u8], stride: usize, distances: &mut [u64]);
 
-    /// Sets the squared distance of each of `others` from a whitened mean.
-    fn candidate_distances(from: &[i16; MAX_FEATURES], others: &mut [Candidate]);
+    /// Sets the squared distance of each of `others` from the mean of `from`.
+    fn candidate_distances(from: &Candidate, others: &mut [Candidate]);
 
     /// Square root of a number that is not negative, correctly rounded (IEEE 754).
     fn sqrt(x: f32) -> f32;
@@ -105,9 +105,9 @@ impl Kernels for Plain {
         }
     }
 
-    fn candidate_distances(from: &[i16; MAX_FEATURES], others: &mut [Candidate]) {
+    fn candidate_distances(from: &Candidate, others: &mut [Candidate]) {
         for other in others {
-            let apart = from.iter().zip(&other.mean).map(|(a, b)| {
+            let apart = from.mean.iter().zip(&other.mean).map(|(a, b)| {
                 let apart = i64::from(*a) - i64::from(*b);
                 (apart * apart) as u64
             });

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo, emulate, firmware, has_subcommand, run as run_command, target};
+use crate::{bench, cargo, emulate, firmware, has_subcommand, run as run_command, size, target};
 
 /// How a step ended.
 enum Outcome {
@@ -57,7 +57,8 @@ pub(crate) fn run(quick: bool) -> ExitCode {
         announce_and_run(doc.env("RUSTDOCFLAGS", "-Dwarnings"))
     }));
     if quick {
-        steps.extend(["firmware", "emulator"].map(|name| skipped(name, "--quick")));
+        steps
+            .extend(["firmware", "emulator", "bench", "size"].map(|name| skipped(name, "--quick")));
     } else {
         let mut elves = None;
         steps.push(step("firmware", || {
@@ -77,6 +78,14 @@ pub(crate) fn run(quick: bool) -> ExitCode {
             }),
             None => skipped("emulator", "there is no firmware to run on it"),
         });
+        steps.push(step("bench", || {
+            println!("\n== cargo xtask bench");
+            bench::gates()
+        }));
+        steps.push(step("size", || {
+            println!("\n== cargo xtask size --no-stack");
+            size::gates()
+        }));
     }
 
     let log = std::fs::read_to_string(&skip_log).unwrap_or_default();

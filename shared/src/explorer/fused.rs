@@ -4,7 +4,7 @@
 //! degrees of freedom. A further slide replaces what the movement said before: adding to it would count the error of the
 //! texture's own mean again with every slide.
 
-use heapless::Vec;
+use heapless::{Vec, VecView};
 
 use crate::fixed::{exp_neg_q30, ln_q16};
 use crate::fused::{MAX_FEATURES, Vector, white};
@@ -273,15 +273,10 @@ pub(super) fn uncertainty<K: Kernels, const N: usize>(
     posterior: &[f32],
 ) -> f32 {
     let mut live: Vec<Candidate, N> = Vec::new();
-    for (&probability, texture) in posterior.iter().zip(0..) {
-        if probability >= super::NEGLIGIBLE {
-            // there is room: `posterior` is no longer than N
-            let _ = live.push(candidate(table, movement, texture, probability));
-        }
-    }
+    gather(table, movement, posterior, &mut live);
     let mut rest = live.as_mut_slice();
     while let Some((a, others)) = rest.split_first_mut() {
-        K::candidate_distances(&a.mean, others);
+        K::candidate_distances(a, others);
         confuse_with(a, others);
         rest = others;
     }
@@ -289,12 +284,25 @@ pub(super) fn uncertainty<K: Kernels, const N: usize>(
     live.iter().map(left).sum()
 }
 
-fn candidate(table: &Table<'_>, movement: u8, texture: u16, probability: f32) -> Candidate {
-    let mut mean = [0; MAX_FEATURES];
-    for (to, from) in mean.iter_mut().zip(table.white_mean(texture, movement)) {
-        *to = from;
+/// The textures that are still likely.
+#[inline(never)]
+fn gather(table: &Table<'_>, movement: u8, posterior: &[f32], live: &mut VecView<Candidate>) {
+    let (means, stride) = table.white_means(movement);
+    let Contents::Fused(_, features) = table.contents() else {
+        return;
+    };
+    let rows = means.chunks(stride.max(1)).zip(table.trials_at(movement));
+    for (&probability, (row, slides)) in posterior.iter().zip(rows) {
+        if probability >= super::NEGLIGIBLE {
+            let mut mean = [0; MAX_FEATURES];
+            let known = row.as_chunks().0.iter().take(features.into());
+            for (to, from) in mean.iter_mut().zip(known) {
+                *to = i16::from_le_bytes(*from);
+            }
+            // there is room: as much as for the posterior
+            let _ = live.push(Candidate::new(mean, probability, slides));
+        }
     }
-    Candidate::new(mean, probability, table.trials(texture, movement))
 }
 
 /// Confusion of one texture with all others, whose distances from it are known.
