@@ -294,11 +294,7 @@ fn gather(table: &Table<'_>, movement: u8, posterior: &[f32], live: &mut VecView
     let rows = means.chunks(stride.max(1)).zip(table.trials_at(movement));
     for (&probability, (row, slides)) in posterior.iter().zip(rows) {
         if probability >= super::NEGLIGIBLE {
-            let mut mean = [0; MAX_FEATURES];
-            let known = row.as_chunks().0.iter().take(features.into());
-            for (to, from) in mean.iter_mut().zip(known) {
-                *to = i16::from_le_bytes(*from);
-            }
+            let mean = row.get(..2 * usize::from(features)).unwrap_or_default();
             // there is room: as much as for the posterior
             let _ = live.push(Candidate::new(mean, probability, slides));
         }
