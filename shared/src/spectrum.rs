@@ -91,24 +91,31 @@ impl SpectrumSum {
         let mut samples = samples;
         self.samples += samples.len() as u32;
         while !samples.is_empty() {
-            let room = self.frame.get_mut(self.filled..).unwrap_or_default();
-            let many = samples.len().min(room.len());
-            let (now, later) = samples.split_at_checked(many).unwrap_or_default();
-            // a frame's sum is in 32 bits
-            let mut total = 0;
-            for (slot, &sample) in room.iter_mut().zip(now) {
-                *slot = sample;
-                total += i32::from(sample);
-            }
-            self.total += i64::from(total);
-            self.filled += many;
-            samples = later;
+            samples = self.fill(samples);
             if self.filled >= FRAME {
                 K::add_frame(window, &self.frame, &mut self.sum);
                 self.frame.copy_within(HOP.., 0);
                 self.filled = FRAME - HOP;
             }
         }
+    }
+
+    /// Takes as many samples as the frame has room for; the others.
+    // not generic: compiled with this crate, for speed
+    #[inline(never)]
+    fn fill<'s>(&mut self, samples: &'s [i16]) -> &'s [i16] {
+        let room = self.frame.get_mut(self.filled..).unwrap_or_default();
+        let many = samples.len().min(room.len());
+        let (now, later) = samples.split_at_checked(many).unwrap_or_default();
+        // a frame's sum is in 32 bits
+        let mut total = 0;
+        for (slot, &sample) in room.iter_mut().zip(now) {
+            *slot = sample;
+            total += i32::from(sample);
+        }
+        self.total += i64::from(total);
+        self.filled += many;
+        later
     }
 
     /// Number of samples taken.

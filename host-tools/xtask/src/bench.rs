@@ -26,6 +26,9 @@ pub(crate) struct Options {
     /// Measure times on this PC instead: good for comparing two versions on one PC
     #[arg(long)]
     pc: bool,
+    /// Tell how table and decision grow with the number of textures instead
+    #[arg(long, conflicts_with = "format")]
+    growth: bool,
     /// With --pc, filter and options for the benches (divan's)
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, requires = "pc")]
     options: Vec<OsString>,
@@ -47,6 +50,9 @@ pub(crate) fn bench(options: &Options) -> Result<()> {
     let mut program = program()?;
     if options.format == Format::Json {
         program.args(["--format", "json"]);
+    }
+    if options.growth {
+        program.arg("--growth");
     }
     run(&mut program)
 }

@@ -291,10 +291,13 @@ fn gather(table: &Table<'_>, movement: u8, posterior: &[f32], live: &mut VecView
     let Contents::Fused(_, features) = table.contents() else {
         return;
     };
-    let rows = means.chunks(stride.max(1)).zip(table.trials_at(movement));
-    for (&probability, (row, slides)) in posterior.iter().zip(rows) {
+    let bytes = 2 * usize::from(features);
+    for ((&probability, slides), texture) in
+        posterior.iter().zip(table.trials_at(movement)).zip(0..)
+    {
         if probability >= super::NEGLIGIBLE {
-            let mean = row.get(..2 * usize::from(features)).unwrap_or_default();
+            let row = means.get(texture * stride..).unwrap_or_default();
+            let mean = row.get(..bytes).unwrap_or_default();
             // there is room: as much as for the posterior
             let _ = live.push(Candidate::new(mean, probability, slides));
         }

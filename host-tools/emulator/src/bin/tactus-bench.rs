@@ -40,6 +40,9 @@ struct Cli {
     /// Tell on stderr which functions each kernel spends its instructions in
     #[arg(long)]
     profile: bool,
+    /// Tell how table and decision grow with the number of textures instead
+    #[arg(long)]
+    growth: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -88,6 +91,9 @@ impl Row {
 
 fn run(cli: &Cli) -> anyhow::Result<bool> {
     let mut bench = Bench::start(cli)?;
+    if cli.growth {
+        return growth(&mut bench);
+    }
     let mut rows = rows(&mut bench)?;
     if let Some(rig) = &cli.rig {
         rows.extend(on_the_rig(rig)?);
@@ -306,6 +312,31 @@ fn rows(bench: &mut Bench) -> anyhow::Result<Vec<Row>> {
     }
     bench.source = slide.1;
     Ok(rows)
+}
+
+/// Table bytes, and instructions of a fused decision of three movements after a typical slide.
+fn growth(bench: &mut Bench) -> anyhow::Result<bool> {
+    bench.model = false;
+    println!(
+        "{:>8} {:>12} {:>12} {:>6} {:>12}",
+        "textures", "table bytes", "posterior", "live", "choice"
+    );
+    let mut equal = true;
+    for textures in [20, 117, 500, 2000] {
+        let table = synthetic(Method::Fused, textures)?;
+        let felt = felt(&table, Method::Fused, textures.min(50))?;
+        let posterior = bench.count(Workload::Observe, &table, &felt.words)?;
+        let choice = bench.count(Workload::Choice, &table, &felt.words)?;
+        equal &= posterior.equal && choice.equal;
+        println!(
+            "{textures:>8} {:>12} {:>12} {:>6} {:>12}",
+            table.len(),
+            posterior.instructions,
+            felt.live,
+            choice.instructions
+        );
+    }
+    Ok(equal)
 }
 
 /// Longest that the rig takes for anything, virtual seconds.
