@@ -5,7 +5,9 @@
 #![cfg(target_os = "none")]
 
 mod acquire;
+mod bench;
 mod board;
+mod kernels;
 mod lever;
 mod link;
 mod probe;
@@ -14,7 +16,9 @@ mod rig;
 mod selftest;
 mod servo;
 mod session;
+pub mod workload;
 
+pub use bench::bench;
 pub use rig::rig;
 pub use selftest::selftest;
 

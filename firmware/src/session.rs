@@ -7,7 +7,6 @@ use heapless::Vec;
 use heapless::spsc::Consumer;
 use static_cell::ConstStaticCell;
 use tactus_core::features::Plan;
-use tactus_core::kernels::Plain;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::control::Phase;
 use tactus_core::rig::unloaded::UnloadedRuns;
@@ -18,6 +17,7 @@ use tactus_core::teaching;
 use tactus_core::wire::{Ask, PART, Tell, Text};
 
 use crate::board;
+use crate::kernels::Chip;
 use crate::link::{self, BUSY, JOBS, TABLE, TableInUse, refuse, tell};
 use crate::probe::Probe;
 use crate::servo::{self, Command, Samples};
@@ -223,7 +223,7 @@ async fn work(ask: Ask, probe: &mut Probe, memory: &mut Memory, plan: &Plan) -> 
             memory.visited = None;
             probe.begin(wanted.seed).await;
             let table = Table::read(memory.in_force()).map_err(text)?;
-            let done = session::identify::<_, Plain>(&wanted, probe, table, plan, tell).await;
+            let done = session::identify::<_, Chip>(&wanted, probe, table, plan, tell).await;
             memory.keep_skin().await;
             let visited = done?;
             if wanted.learn {
@@ -269,7 +269,7 @@ async fn work(ask: Ask, probe: &mut Probe, memory: &mut Memory, plan: &Plan) -> 
             probe.begin(wanted.seed).await;
             let (store, base, room) = memory.to_learn()?;
             let done =
-                session::train::<_, _, Plain>(&wanted, probe, store, base, plan, room, tell).await;
+                session::train::<_, _, Chip>(&wanted, probe, store, base, plan, room, tell).await;
             memory.reload().await;
             memory.keep_skin().await;
             done

@@ -14,12 +14,17 @@ pub const TAPS: usize = 67;
 pub const PASS_BAND_HZ: (f64, f64) = (20.0, 700.0);
 
 const HISTORY: usize = TAPS - 1;
-/// Samples filtered at once. No result depends on it.
-const BLOCK: usize = 128;
+/// Samples filtered at once, whole sixes for kernels that take so many. No result depends on it.
+const BLOCK: usize = 264;
+/// Pairs of coefficients that cover all of them from an even sample on, and from an odd one.
+pub const PAIRS: usize = TAPS.div_ceil(2);
 
 /// Coefficients of the band-pass in Q15, newest sample first. They are symmetric: the filter has linear phase.
 #[derive(Clone, Debug)]
-pub struct Taps([i16; TAPS]);
+pub struct Taps {
+    taps: [i16; TAPS],
+    pairs: [[u32; 2]; PAIRS],
+}
 
 impl Taps {
     /// Designs the band-pass: the ideal response, cut by a Hamming window and scaled to gain 1 in the middle of the band.
@@ -50,25 +55,49 @@ impl Taps {
         for (n, tap) in taps.iter_mut().enumerate() {
             *tap = libm::round(windowed(n).0 / gain * 32768.0) as i16;
         }
-        Self(taps)
+        let mut pairs = [[0; 2]; PAIRS];
+        let at = |n: Option<usize>| n.and_then(|n| taps.iter().rev().nth(n)).copied();
+        let word = |low: Option<i16>, high: Option<i16>| {
+            let half = |tap: Option<i16>| u32::from(tap.unwrap_or(0) as u16);
+            half(low) | half(high) << 16
+        };
+        for (pair, n) in pairs.iter_mut().zip((0..).step_by(2)) {
+            *pair = [
+                word(at(Some(n)), at(Some(n + 1))),
+                word(at(n.checked_sub(1)), at(Some(n))),
+            ];
+        }
+        Self { taps, pairs }
     }
 
     /// The coefficients in Q15, newest sample first.
     pub fn as_slice(&self) -> &[i16; TAPS] {
-        &self.0
+        &self.taps
     }
 
     /// The coefficients in Q15, oldest sample first.
     pub(crate) fn reversed(&self) -> impl Iterator<Item = &i16> {
-        self.0.iter().rev()
+        self.taps.iter().rev()
+    }
+
+    /// The same two to a word, the older sample's in the low half, for kernels that multiply pairs of samples. Of each two
+    /// words the first is for an output whose oldest sample is the first of a pair, the other for the output after it, which
+    /// begins with the second of that pair.
+    pub fn pairs(&self) -> &[[u32; 2]; PAIRS] {
+        &self.pairs
     }
 }
+
+/// Samples that begin at a whole word, for kernels that read two at once.
+#[derive(Clone, Debug)]
+#[repr(align(4))]
+struct Words([i16; HISTORY + BLOCK]);
 
 /// Mean power of the band-passed signal (eq. 15), sample by sample.
 #[derive(Clone, Debug)]
 pub struct BandPower {
     /// The last `HISTORY` samples before the block, then the block.
-    samples: [i16; HISTORY + BLOCK],
+    samples: Words,
     /// How many samples of the block are there.
     filled: usize,
     energy: u64,
@@ -79,7 +108,7 @@ impl Default for BandPower {
     /// A filter at rest: every earlier sample was 0.
     fn default() -> Self {
         Self {
-            samples: [0; HISTORY + BLOCK],
+            samples: Words([0; HISTORY + BLOCK]),
             filled: 0,
             energy: 0,
             outputs: 0,
@@ -101,20 +130,28 @@ impl BandPower {
     /// Filters samples (counts about the still baseline; beyond what 12 bits can differ by they are clipped) and counts
     /// their power.
     pub fn push<K: Kernels>(&mut self, taps: &Taps, samples: &[i16]) {
-        let mut samples = samples.iter();
-        while samples.len() > 0 {
-            let room = self
-                .samples
-                .get_mut(HISTORY + self.filled..)
-                .unwrap_or_default();
-            for (slot, &sample) in room.iter_mut().zip(samples.by_ref()) {
-                *slot = sample.clamp(-4096, 4095);
-                self.filled += 1;
-            }
+        let mut samples = samples;
+        while !samples.is_empty() {
+            samples = self.fill(samples);
             if self.filled >= BLOCK {
                 self.flush::<K>(taps);
             }
         }
+    }
+
+    /// Takes as many samples as the block has room for; the others.
+    // not generic: compiled with this crate, for speed
+    #[inline(never)]
+    fn fill<'s>(&mut self, samples: &'s [i16]) -> &'s [i16] {
+        let room = self.samples.0.get_mut(HISTORY + self.filled..);
+        let room = room.unwrap_or_default();
+        let many = samples.len().min(room.len());
+        let (now, later) = samples.split_at_checked(many).unwrap_or_default();
+        for (slot, &sample) in room.iter_mut().zip(now) {
+            *slot = sample.clamp(-4096, 4095);
+        }
+        self.filled += many;
+        later
     }
 
     /// Sum of squares of all outputs in Q14 counts^2, and their number.
@@ -122,10 +159,10 @@ impl BandPower {
         let filled = self.filled.min(BLOCK);
         self.energy += K::band_energy(
             taps,
-            self.samples.get(..HISTORY + filled).unwrap_or_default(),
+            self.samples.0.get(..HISTORY + filled).unwrap_or_default(),
         );
         self.outputs += filled as u32;
-        self.samples.copy_within(filled..filled + HISTORY, 0);
+        self.samples.0.copy_within(filled..filled + HISTORY, 0);
         self.filled = 0;
     }
 

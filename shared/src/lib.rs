@@ -13,6 +13,7 @@ extern crate std;
 pub mod biotac;
 pub mod explorer;
 pub mod features;
+mod fft;
 pub mod fir;
 pub mod fixed;
 pub mod fused;

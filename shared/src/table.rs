@@ -564,6 +564,59 @@ impl<'a> Table<'a> {
         })
     }
 
+    /// [`Table::gaussian`] of every texture, in their order.
+    pub fn gaussians(&self, action: Action) -> impl Iterator<Item = Option<Gaussian>> + use<'a> {
+        let property = action
+            .property
+            .filter(|p| self.measured().contains(*p) && action.movement < self.movements);
+        let step = property.map_or(0.0, mean_step);
+        let (_, cell) = self.contents.sizes();
+        let movement = usize::from(action.movement);
+        let at = property.map_or(0, |p| movement * cell + p.index() * CELL_BYTES);
+        let cells = self.rows(self.layout().cells + at, cell);
+        let trials = self.rows(self.layout().trials + movement, 1);
+        cells.zip(trials).map(move |(cell, trials)| {
+            let &[m0, m1, s0, s1] = cell.first_chunk()?;
+            let learned = property.is_some() && trials.first().is_some_and(|t| *t >= 2);
+            learned.then(|| Gaussian {
+                mean: f32::from(i16::from_le_bytes([m0, m1])) * step,
+                sd: f32::from(u16::from_le_bytes([s0, s1])) * SD_STEP,
+            })
+        })
+    }
+
+    /// [`Table::trials`] of every texture, in their order.
+    pub fn trials_at(&self, movement: u8) -> impl Iterator<Item = u8> + use<'a> {
+        let is_there = movement < self.movements;
+        let trials = self.rows(self.layout().trials + usize::from(movement), 1);
+        trials.map(move |row| row.first().copied().filter(|_| is_there).unwrap_or(0))
+    }
+
+    /// What lies at `at` and in the same place of each of the other textures, `bytes` of them at each movement.
+    fn rows(&self, at: usize, bytes: usize) -> impl Iterator<Item = &'a [u8]> + use<'a> {
+        let stride = bytes * usize::from(self.movements);
+        let rows = self.bytes.get(at..).unwrap_or_default();
+        // a table has movements, and they have bytes
+        rows.chunks(stride.max(1)).take(self.textures.into())
+    }
+
+    /// The bytes of the whitened means at a movement, the first of them at the beginning, and how far one is from the next;
+    /// none in a table of Gaussians and outside the table.
+    pub fn white_means(&self, movement: u8) -> (&'a [u8], usize) {
+        let (_, cell) = self.contents.sizes();
+        let at = self.layout().cells + usize::from(movement) * cell;
+        let means = match self.contents {
+            Contents::Fused(..) if movement < self.movements => {
+                self.bytes.get(at..self.layout().trials)
+            }
+            _ => None,
+        };
+        (
+            means.unwrap_or_default(),
+            cell * usize::from(self.movements),
+        )
+    }
+
     /// What was learned of a texture at a movement, to go on from; what is in the table is rounded.
     pub fn experience(&self, texture: u16, movement: u8) -> Experience {
         let trials = self.trials(texture, movement);

@@ -8,6 +8,7 @@
 
 mod board;
 pub mod campaign;
+pub mod cycles;
 mod driver;
 pub mod exploration;
 mod flash;
@@ -18,6 +19,7 @@ pub mod pins;
 mod record;
 mod rig;
 mod serial;
+mod spent;
 mod stack;
 pub mod talk;
 
@@ -26,6 +28,7 @@ pub use flash::{FLASH, STORE};
 pub use record::Slide;
 pub use rig::{Output, Rig};
 pub use rigless::device::ResetCause;
+pub use spent::Spent;
 pub use stack::{StackLayout, StackLevel, StackUse};
 pub use tactus::sim::faults::Fault;
 pub use tactus::sim::world::Setup;

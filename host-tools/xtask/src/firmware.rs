@@ -8,6 +8,9 @@ use sha2::{Digest as _, Sha256};
 
 use crate::{root, toolchain};
 
+/// The images that are flashed. The bench image is for the emulated board only.
+const FLASHED: [&str; 2] = ["tactus-rig", "tactus-selftest"];
+
 /// Builds every image of the firmware and says what came out; the ELFs.
 pub(crate) fn build() -> Result<Vec<PathBuf>> {
     let elves = elves()?;
@@ -19,10 +22,18 @@ pub(crate) fn build() -> Result<Vec<PathBuf>> {
 
 /// Builds every image of the firmware: the ELFs, by name. Leaves stdout to who asks.
 pub(crate) fn elves() -> Result<Vec<PathBuf>> {
+    compile(&FLASHED)
+}
+
+/// Builds these images of the firmware: the ELFs, by name.
+pub(crate) fn compile(images: &[&str]) -> Result<Vec<PathBuf>> {
     let toolchain = toolchain::get()?;
     eprintln!("Building with {}", toolchain.version());
     let mut cargo = toolchain.cargo_build();
     cargo.args(["--package", "tactus-firmware", "--profile", "firmware"]);
+    for image in images {
+        cargo.args(["--bin", image]);
+    }
     // progress and diagnostics go to stderr; stdout says where the ELFs are
     cargo.arg("--message-format=json-render-diagnostics");
     let output = cargo

@@ -761,7 +761,7 @@ fn cycling_goes_through_the_movements_in_turn() {
         strategy: Strategy::Random,
         ..OPEN
     };
-    let mut explorer = fused(&bytes, random);
+    let explorer = fused(&bytes, random);
     let outlook = explorer.outlook();
     let drawn = [0, u32::MAX / 2, u32::MAX].map(|random| explorer.choose(&outlook, random));
     assert_eq!(drawn, [look(0), look(1), look(2)]);

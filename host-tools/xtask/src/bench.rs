@@ -1,0 +1,73 @@
+//! `cargo xtask bench`: what the kernels cost, counted on the emulated chip; with `--pc`, how long they take on this PC.
+use std::ffi::OsString;
+use std::process::Command;
+
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+
+use crate::{cargo, emulate, firmware, run};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask bench                  the table for people
+  cargo xtask bench --format json    a list of {kernel, unit, instructions, gate, ok}
+  cargo xtask bench --pc spectrum    times on this PC of benches with `spectrum` in their name";
+
+/// The image that counts.
+const IMAGE: &str = "tactus-bench";
+/// The one whose load is measured.
+const RIG: &str = "tactus-rig";
+
+#[derive(Args)]
+pub(crate) struct Options {
+    /// For people, or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+    /// Measure times on this PC instead: good for comparing two versions on one PC
+    #[arg(long)]
+    pc: bool,
+    /// Tell how table and decision grow with the number of textures instead
+    #[arg(long, conflicts_with = "format")]
+    growth: bool,
+    /// With --pc, filter and options for the benches (divan's)
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, requires = "pc")]
+    options: Vec<OsString>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    Text,
+    Json,
+}
+
+pub(crate) fn bench(options: &Options) -> Result<()> {
+    if options.pc {
+        // by target: `cargo bench` alone would hand divan's options to every unit test binary too
+        let mut cargo = cargo();
+        cargo.args(["bench", "--package", "tactus-tests", "--bench", "*", "--"]);
+        return run(cargo.args(&options.options));
+    }
+    let mut program = program()?;
+    if options.format == Format::Json {
+        program.args(["--format", "json"]);
+    }
+    if options.growth {
+        program.arg("--growth");
+    }
+    run(&mut program)
+}
+
+/// The table, and an error if a gate is missed.
+pub(crate) fn gates() -> Result<()> {
+    run(&mut program()?)
+}
+
+/// Builds the bench image, the rig's, and what counts their instructions.
+fn program() -> Result<Command> {
+    let elves = firmware::compile(&[IMAGE, RIG])?;
+    run(emulate::build().args(["--bin", IMAGE]))?;
+    let mut program = Command::new(emulate::folder().join("release").join(IMAGE));
+    program.arg(firmware::image(&elves, IMAGE)?);
+    program.arg("--rig").arg(firmware::image(&elves, RIG)?);
+    Ok(program)
+}
