@@ -26,18 +26,13 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// One that is not compared yet, from the bytes of its mean.
-    pub fn new(known: &[u8], probability: f32, slides: u8) -> Self {
-        let mut mean = [0; MAX_FEATURES];
-        let mut square = 0;
-        for (to, from) in mean.iter_mut().zip(known.as_chunks().0) {
-            *to = i16::from_le_bytes(*from);
-            square += i64::from(*to) * i64::from(*to);
-        }
+    /// One that is not compared yet.
+    pub fn new(mean: [i16; MAX_FEATURES], probability: f32, slides: u8) -> Self {
+        let squares = mean.iter().map(|&m| i64::from(m) * i64::from(m));
         Self {
             mean,
             probability,
-            square: square as u64,
+            square: squares.sum::<i64>() as u64,
             distance: 0,
             confused: 0.0,
             slides,
@@ -91,7 +86,12 @@ impl Kernels for Plain {
     // with this crate, which is compiled for speed
     #[inline(never)]
     fn add_frame(window: &[f32; FRAME], frame: &[i16; FRAME], sum: &mut FrameSum) {
-        sum.add(window, frame);
+        let mut x = [0.0; FRAME];
+        for ((x, &sample), &w) in x.iter_mut().zip(frame).zip(window) {
+            *x = f32::from(sample) * w;
+        }
+        let bins = microfft::real::rfft_512(&mut x);
+        sum.add(bins.iter().map(|bin| (bin.re, bin.im)));
     }
 
     fn distances(from: &[i16], means: &[u8], stride: usize, distances: &mut [u64]) {

@@ -13,7 +13,6 @@ extern crate std;
 pub mod biotac;
 pub mod explorer;
 pub mod features;
-mod fft;
 pub mod fir;
 pub mod fixed;
 pub mod fused;

@@ -7,7 +7,6 @@
 
 use core::ops::Range;
 
-use crate::fft;
 use crate::kernels::Kernels;
 use crate::pressure::RATE_HZ;
 
@@ -36,23 +35,31 @@ pub fn hann() -> [f32; FRAME] {
     window
 }
 
-/// Sums over frames: the power of every bin, and the two complex bins that the mean of the slide reaches. All of samples
-/// that are twice as large: the transform is cheaper so.
+/// Sums over frames: the power of every bin, and the two complex bins that the mean of the slide reaches.
 #[derive(Clone, Debug)]
 pub struct FrameSum {
-    /// Sum of |2 X|^2 of every bin, in counts^2.
+    /// Sum of |X|^2 of every bin, in counts^2.
     power: [f32; BINS],
-    /// Sum of twice the real parts of bins 0 and 1 (the Hann window's own bins are real).
+    /// Sum of the real parts of bins 0 and 1 (the Hann window's own bins are real).
     real: [f32; 2],
     frames: u32,
 }
 
 impl FrameSum {
-    /// Adds one frame.
-    pub fn add(&mut self, window: &[f32; FRAME], frame: &[i16; FRAME]) {
-        let real = fft::add_power(window, frame, &mut self.power);
-        for (sum, real) in self.real.iter_mut().zip(real) {
-            *sum += real;
+    /// Adds one transformed frame: (real, imaginary) of bins 0 to 255, with bin 256, which is real, in place of bin 0's
+    /// imaginary part.
+    pub fn add(&mut self, mut bins: impl Iterator<Item = (f32, f32)>) {
+        let [first, rest @ .., last] = &mut self.power;
+        if let Some((re, nyquist)) = bins.next() {
+            *first += re * re;
+            *last += nyquist * nyquist;
+            self.real[0] += re;
+        }
+        for (k, (sum, (re, im))) in rest.iter_mut().zip(bins).enumerate() {
+            *sum += re * re + im * im;
+            if k == 0 {
+                self.real[1] += re;
+            }
         }
         self.frames += 1;
     }
@@ -131,19 +138,19 @@ impl SpectrumSum {
         let frames = self.sum.frames as f32;
         let mean = (self.total as f64 / f64::from(self.samples)) as f32;
         let mut psd = self.sum.power;
-        // |2 X - 2 m W|^2 summed over frames, for the two bins where W is not 0
+        // |X - m W|^2 summed over frames, for the two bins where W is not 0
         let [first, second, ..] = &mut psd;
         for ((power, real), w) in [first, second]
             .into_iter()
             .zip(self.sum.real)
             .zip([WINDOW_BIN_0, WINDOW_BIN_1])
         {
-            let m = 2.0 * mean * w;
+            let m = mean * w;
             // rounding must not leave a negative power
             *power = (*power - 2.0 * m * real + frames * m * m).max(0.0);
         }
         for power in &mut psd {
-            *power /= 4.0 * frames * WINDOW_POWER;
+            *power /= frames * WINDOW_POWER;
         }
         Some(Spectrum { psd })
     }
