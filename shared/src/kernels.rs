@@ -26,13 +26,18 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// One that is not compared yet.
-    pub fn new(mean: [i16; MAX_FEATURES], probability: f32, slides: u8) -> Self {
-        let squares = mean.iter().map(|&m| i64::from(m) * i64::from(m));
+    /// One that is not compared yet, from the bytes of its mean.
+    pub fn new(known: &[u8], probability: f32, slides: u8) -> Self {
+        let mut mean = [0; MAX_FEATURES];
+        let mut square = 0;
+        for (to, from) in mean.iter_mut().zip(known.as_chunks().0) {
+            *to = i16::from_le_bytes(*from);
+            square += i64::from(*to) * i64::from(*to);
+        }
         Self {
             mean,
             probability,
-            square: squares.sum::<i64>() as u64,
+            square: square as u64,
             distance: 0,
             confused: 0.0,
             slides,
