@@ -624,10 +624,11 @@ fn the_page_is_whole() {
         }
     }
     // what it was made by
-    let words: String = elements()
+    let words: String = document
+        .descendants()
+        .filter(|n| n.is_text())
         .filter_map(|n| n.text())
-        .collect::<Vec<_>>()
-        .join(" ");
+        .collect();
     for said in [
         "0.0.0-test",
         "tactus study all --seed 5 --out <here> & now",

@@ -251,20 +251,22 @@ impl Identification {
 
 /// The first simulations of the four kinds that fig. 10 shows.
 fn examples(outcomes: &[Outcome]) -> Vec<(&'static str, u64)> {
-    let right = |o: &Outcome| o.identified == o.unknown;
-    let kinds: [(&str, &dyn Fn(&Outcome) -> bool); 4] = [
-        ("identified at once", &|o| {
+    fn right(o: &Outcome) -> bool {
+        o.identified == o.unknown
+    }
+    type Is = fn(&Outcome) -> bool;
+    let kinds: [(&str, Is); 4] = [
+        ("identified at once", |o| {
             right(o) && o.sure && o.slides <= 3
         }),
-        ("identified late", &|o| right(o) && o.sure && o.slides >= 6),
-        ("taken for another", &|o| !right(o)),
-        ("right, but not sure after 10 movements", &|o| {
+        ("identified late", |o| right(o) && o.sure && o.slides >= 6),
+        ("taken for another", |o| !right(o)),
+        ("right, but not sure after 10 movements", |o| {
             right(o) && !o.sure
         }),
     ];
-    let first = |(example, is): (&'static str, &dyn Fn(&Outcome) -> bool)| {
-        Some((example, outcomes.iter().position(is)? as u64))
-    };
+    let first =
+        |(example, is): (&'static str, Is)| Some((example, outcomes.iter().position(is)? as u64));
     kinds.into_iter().filter_map(first).collect()
 }
 
