@@ -26,6 +26,9 @@ With a folder of recordings, such as ../shared/data/biotac:
   tactus identify --recordings DIR --material 3    a real texture is recognised from its slides
   tactus features --recordings DIR                 what was felt of every slide
   tactus evaluate --recordings DIR                 how often the answers are right, and how sure
+With a probe, or with the emulated board that `cargo xtask emulate` builds:
+  tactus device list                               which port it is at
+  tactus device monitor [--emulated]               what it feels, live
 
 No recordings are shipped. The publisher of the BioTac's has them at
 https://github.com/dexrob/BioTac_slide_20_50; `tactus import` reads them. `tactus simulate` makes some.";
@@ -114,6 +117,21 @@ Try:
   tactus study all --out study
   tactus study identify --seeds 11-20 --out worlds     the same in ten worlds")]
     Study(Study),
+    /// Work with a probe at its serial port, or with the emulated board
+    #[command(subcommand, after_help = crate::device::EXAMPLES)]
+    Device(crate::device::Device),
+    /// Print completions for a shell
+    #[command(after_help = crate::manual::COMPLETIONS)]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Write the manual pages
+    Man {
+        /// The folder to write; without it the first page is printed
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
     /// Convert recordings into the project's format (.npy files and a CSV manifest)
     Import {
         /// A folder in the layout of data/biotac, or the publisher's folders of CSV files
@@ -272,8 +290,8 @@ impl Stop {
 
 fn probability(text: &str) -> Result<f32, String> {
     match text.parse() {
-        Ok(p) if 0.0 < p && p < 1.0 => Ok(p),
-        _ => Err("a probability between 0 and 1, such as 0.99".to_owned()),
+        Ok(p) if 0.0 < p && p <= 1.0 => Ok(p),
+        _ => Err("a probability between 0 and 1, such as 0.99; 1 is never exceeded".to_owned()),
     }
 }
 

@@ -85,6 +85,9 @@ pub(crate) fn run() -> anyhow::Result<()> {
         Some(Command::Evaluate(args)) => run_evaluation(&args, out)?,
         Some(Command::Study(args)) => study(&args, out)?,
         Some(Command::Import { from, to }) => import(&from, &to, out)?,
+        Some(Command::Device(device)) => crate::device::run(&device, out)?,
+        Some(Command::Completions { shell }) => crate::manual::completions(shell, out),
+        Some(Command::Man { out: folder }) => crate::manual::pages(folder.as_deref(), out)?,
     }
     out.flush()?;
     Ok(())
@@ -231,7 +234,7 @@ pub(crate) fn learn_first(
 }
 
 /// An old table is replaced whole or not at all.
-fn write_table(file: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+pub(crate) fn write_table(file: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     let mut part = file.as_os_str().to_owned();
     part.push(".part");
     std::fs::write(&part, bytes)
