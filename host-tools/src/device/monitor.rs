@@ -402,6 +402,9 @@ fn watch(
             drawn = Some(Instant::now());
             terminal.draw(|frame| view::draw(monitor, frame))?;
         }
+        if is_gone(&io::stdin()) {
+            return Ok(End::Interrupt);
+        }
         while event::poll(Duration::ZERO)? {
             let Event::Key(key) = event::read()? else {
                 continue;
@@ -439,6 +442,21 @@ fn watch(
             }
         }
     }
+}
+
+/// Whether the terminal has been closed: crossterm would read its end for ever.
+#[cfg(unix)]
+fn is_gone(terminal: &impl std::os::fd::AsFd) -> bool {
+    use rustix::event::{PollFd, PollFlags, Timespec, poll};
+    let mut polled = [PollFd::new(terminal, PollFlags::IN)];
+    let now = Timespec::default();
+    poll(&mut polled, Some(&now)).is_ok()
+        && polled.iter().any(|p| p.revents().intersects(PollFlags::HUP))
+}
+
+#[cfg(not(unix))]
+fn is_gone(_: &io::Stdin) -> bool {
+    false
 }
 
 #[cfg(test)]

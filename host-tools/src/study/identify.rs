@@ -307,8 +307,8 @@ fn evolution(
     }
 }
 
-/// What would explain that cycling does better here than in the paper: a world in which each movement tells something of its
-/// own.
+/// What may explain that cycling does better here than in the paper: a world in which each movement tells something of its
+/// own, and trials differ more.
 ///
 /// The slides are those of a world of more variation, but each movement's are dealt out to the textures anew: what a texture
 /// feels like at one movement then says nothing of another, while each property at each movement stays as it was.

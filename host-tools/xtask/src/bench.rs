@@ -2,8 +2,9 @@
 use std::ffi::OsString;
 use std::process::Command;
 
-use anyhow::Result;
+use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
+use serde_json::Value;
 
 use crate::{cargo, emulate, firmware, run};
 
@@ -57,9 +58,49 @@ pub(crate) fn bench(options: &Options) -> Result<()> {
     run(&mut program)
 }
 
-/// The table, and an error if a gate is missed.
+/// Gates that are not met yet, by kernel, and what its figure is now: it may only become smaller, give or take what another
+/// compiler does ([`COMPILERS`]). A gate that is met is to be taken out of here.
+const NOT_YET: [(&str, f64); 0] = [];
+/// How much compilers differ.
+const COMPILERS: f64 = 1.05;
+
+/// An error if a gate is missed that was met, or one that is not met yet has become worse.
 pub(crate) fn gates() -> Result<()> {
-    run(&mut program()?)
+    let output = program()?.args(["--format", "json"]).output()?;
+    eprint!("{}", String::from_utf8_lossy(&output.stderr));
+    let rows: Vec<Value> =
+        serde_json::from_slice(&output.stdout).context("the bench program told no figures")?;
+    let mut wrong = Vec::new();
+    for row in &rows {
+        let kernel = row["kernel"].as_str().unwrap_or_default();
+        let is = row["instructions"].as_f64().unwrap_or(f64::NAN);
+        let verdict = judge(kernel, is, row["ok"] == true);
+        println!(
+            "{kernel:48} {:16} {is:>12.1} {:>10}  {}",
+            row["unit"].as_str().unwrap_or_default(),
+            row["gate"].to_string(),
+            verdict
+                .as_ref()
+                .map_or_else(|why| why.as_str(), |said| said),
+        );
+        wrong.extend(verdict.err().map(|why| format!("{kernel}: {is:.1}: {why}")));
+    }
+    if rows.is_empty() || !wrong.is_empty() {
+        bail!("{} figures; {}", rows.len(), wrong.join("; "));
+    }
+    Ok(())
+}
+
+/// What a figure is worth, good or bad.
+fn judge(kernel: &str, is: f64, ok: bool) -> Result<&'static str, String> {
+    let not_yet = NOT_YET.iter().find(|(name, _)| *name == kernel);
+    match (ok, not_yet) {
+        (true, None) => Ok("ok"),
+        (true, Some(_)) => Err("its gate is met: take it out of NOT_YET".into()),
+        (false, None) => Err("its gate is missed, or its result is not the plain kernels'".into()),
+        (false, Some((_, was))) if is <= was * COMPILERS => Ok("not met yet"),
+        (false, Some((_, was))) => Err(format!("was {was}, and has become worse")),
+    }
 }
 
 /// Builds the bench image, the rig's, and what counts their instructions.

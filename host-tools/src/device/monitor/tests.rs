@@ -225,3 +225,12 @@ fn any_size_of_terminal_is_drawn_on() {
     }
     assert_eq!(monitor.notes.len(), NOTES);
 }
+
+#[cfg(unix)]
+#[test]
+fn a_terminal_that_is_closed_is_noticed() {
+    let (terminal, other) = std::io::pipe().unwrap();
+    assert!(!is_gone(&terminal));
+    drop(other);
+    assert!(is_gone(&terminal));
+}

@@ -914,16 +914,19 @@ most probable texture. Cycling goes through {}.",
             c.map_or(Cell::Empty, |c| Cell::Number(of(c), 1))
         };
         blocks.push(text(format!(
-            "Why cycling does so well here: what the simulated textures feel like at one movement tells nearly all of what they \
-feel like at another (see the correlations between movements under Training), so the six pairs of movement and property that \
-cycling leaves out have little to add. The real textures were otherwise: cycling never found three of the 16, and Bayesian \
-exploration found them. To see whether this is the reason, the slides of each movement were dealt out to the textures anew, so \
-that every movement tells something of its own, with trials that differ {} times as much as usual:",
+            "A reason why cycling may do so well here: what the simulated textures feel like at one movement tells nearly all of what \
+they feel like at another (see the correlations between movements under Training), so the six pairs of movement and property \
+that cycling leaves out have little to add. The real textures were otherwise: cycling never found three of the 16, and Bayesian \
+exploration found them. Below, the slides of each movement were dealt out to the textures anew, so that every movement tells \
+something of its own. That is not enough by itself: with the usual variation cycling stays ahead of random choice in such a \
+world. With trials that differ {} times as much as the rig's usual ones the order is the paper's:",
             exchanged.variation
         )));
         blocks.push(Block::Table(Table {
             id: "exchanged-movements",
-            title: "The same identification where movements are independent".to_owned(),
+            title:
+                "The same identification where movements are independent, and trials differ more"
+                    .to_owned(),
             header: header(&[
                 "%",
                 "cycling, paper",
