@@ -394,3 +394,13 @@ pub(crate) enum Format {
     /// One object, for programs
     Json,
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        super::Tactus::command().debug_assert();
+    }
+}

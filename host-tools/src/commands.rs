@@ -27,7 +27,7 @@ use tactus_core::table::Table;
 
 use crate::cli::{Command, Evaluate, Features, Format, Rows, TableCommand, Tactus};
 use crate::identify::{demonstrate, identify, identify_simulated};
-use crate::study::study;
+use crate::study_command::study;
 
 /// Runs what the arguments ask for.
 pub(crate) fn run() -> anyhow::Result<()> {

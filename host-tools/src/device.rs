@@ -136,7 +136,7 @@ Examples:
         #[command(flatten)]
         at: Where,
         #[command(flatten)]
-        how: Calibrate,
+        how: Constants,
     },
     /// End a fault and find the limit switches
     Home {
@@ -225,7 +225,7 @@ pub(crate) enum TableCommand {
 }
 
 #[derive(Args)]
-pub(crate) struct Calibrate {
+pub(crate) struct Constants {
     /// Print what is in use, and change nothing
     #[arg(long, conflicts_with_all = ["drifted", "date", "newton_per_ampere", "force_mn_per_count"])]
     show: bool,
@@ -643,7 +643,7 @@ fn run_table(command: &TableCommand, out: &mut impl Write) -> anyhow::Result<()>
     Ok(())
 }
 
-fn calibrate(at: &Where, how: &Calibrate, out: &mut impl Write) -> anyhow::Result<()> {
+fn calibrate(at: &Where, how: &Constants, out: &mut impl Write) -> anyhow::Result<()> {
     let (mut bench, _) = Bench::open(at)?;
     let mut calibration: RigCalibration = bench.run(Question::read_calibration(), |_| Ok(()))?;
     if how.show {

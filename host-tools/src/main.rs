@@ -5,8 +5,7 @@ mod commands;
 mod device;
 mod identify;
 mod manual;
-#[path = "study_command.rs"]
-mod study;
+mod study_command;
 
 use std::process::ExitCode;
 

@@ -9,11 +9,11 @@ use tactus::evaluate::Method;
 use tactus::link::{Question, ReadTable};
 use tactus_core::table::Table;
 use tactus_core::wire::{Identify, Report, Tell, Train};
+use tactus_emulator::Setup;
 use tactus_emulator::campaign;
 use tactus_emulator::exploration::explore;
 use tactus_emulator::lessons::{self, Known, Unknown};
 use tactus_emulator::talk::{PATIENCE_S, Talk};
-use tactus_emulator::Setup;
 
 mod common;
 

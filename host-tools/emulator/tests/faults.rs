@@ -503,7 +503,7 @@ fn check(name: &str) {
         talk.board().run_ms(200).unwrap();
         talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
     }
-    talk.ask(identify(1), 30.0, |_, _| ()).unwrap();
+    talk.ask(identify(1), 80.0, |_, _| ()).unwrap();
 }
 
 /// A flash that never says that it is done: the session waits for it, and everything else works.

@@ -451,7 +451,9 @@ fn is_gone(terminal: &impl std::os::fd::AsFd) -> bool {
     let mut polled = [PollFd::new(terminal, PollFlags::IN)];
     let now = Timespec::default();
     poll(&mut polled, Some(&now)).is_ok()
-        && polled.iter().any(|p| p.revents().intersects(PollFlags::HUP))
+        && polled
+            .iter()
+            .any(|p| p.revents().intersects(PollFlags::HUP))
 }
 
 #[cfg(not(unix))]

@@ -212,7 +212,7 @@ fn slide_mm(movement: Movement) -> f64 {
 pub struct Recorded {
     /// All 117.
     pub training: Vec<TextureTrials>,
-    /// Those of [`IDENTIFIED`](super::published::IDENTIFIED), with a new skin.
+    /// Those of [`IDENTIFIED`], with a new skin.
     pub validation: Vec<TextureTrials>,
 }
 
