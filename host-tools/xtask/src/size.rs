@@ -19,6 +19,11 @@ const KB: u64 = 1024;
 /// Flash of an image, without the table that comes with it. An image that is not listed is not gated.
 const MAX_FLASH: [(&str, u64); 2] = [(RIG, 160 * KB), ("tactus-handheld", 128 * KB)];
 const MAX_VARIABLES: u64 = 64 * KB;
+/// Limits that are not kept yet, by image, and what was measured: it may become smaller, but not larger ([`LEEWAY`]). A limit
+/// that is kept is to be taken out of here.
+const NOT_YET: [(&str, &str, u64); 1] = [(RIG, FLASH, 233_256)];
+/// The part of it that a compiler's next version may add.
+const LEEWAY: u64 = 100;
 /// Twice the deepest stack has to fit into what the variables leave.
 const MARGIN: u64 = 2;
 /// RAM in memory.x; stack and variables are both in it.
@@ -62,20 +67,37 @@ struct Measured {
     stack: Option<Value>,
 }
 
-/// The sizes, without the stack, and an error if one is over its limit.
+/// The sizes, without the stack, and an error if one is over its limit that was not, or has grown further.
 pub(crate) fn gates() -> Result<()> {
-    size(&Options {
-        no_stack: true,
-        format: Format::Text,
-    })
+    let images = measure(true)?;
+    print!("{}", text(&images));
+    let wrong = wrong(&images, &NOT_YET);
+    ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
+    Ok(())
 }
 
 pub(crate) fn size(options: &Options) -> Result<()> {
+    let images = measure(options.no_stack)?;
+    match options.format {
+        Format::Text => print!("{}", text(&images)),
+        Format::Json => println!("{}", Value::from_iter(images.iter().map(json))),
+    }
+    let too_much: Vec<String> = images
+        .iter()
+        .flat_map(limits)
+        .filter_map(|l| l.missed())
+        .collect();
+    ensure!(too_much.is_empty(), "{}", too_much.join("\n"));
+    Ok(())
+}
+
+/// Builds the images and measures them.
+fn measure(no_stack: bool) -> Result<Vec<Measured>> {
     let mut images = Vec::new();
     for elf in firmware::elves()? {
         let name = firmware::name(&elf)?.to_owned();
         let bytes = std::fs::read(&elf).with_context(|| elf.display().to_string())?;
-        let stack = if name == RIG && !options.no_stack {
+        let stack = if name == RIG && !no_stack {
             Some(stack(&elf)?)
         } else {
             None
@@ -90,13 +112,7 @@ pub(crate) fn size(options: &Options) -> Result<()> {
             stack,
         });
     }
-    match options.format {
-        Format::Text => print!("{}", text(&images)),
-        Format::Json => println!("{}", Value::from_iter(images.iter().map(json))),
-    }
-    let too_much: Vec<String> = images.iter().flat_map(too_much).collect();
-    ensure!(too_much.is_empty(), "{}", too_much.join("\n"));
-    Ok(())
+    Ok(images)
 }
 
 /// Measures the stack on the emulated board.
@@ -243,26 +259,82 @@ fn max_flash(image: &Measured) -> Option<u64> {
     Some(most + image.table)
 }
 
-/// Why an image is too big.
-fn too_much(image: &Measured) -> Vec<String> {
+/// What an image may take, and takes.
+struct Limit {
+    image: String,
+    what: &'static str,
+    bytes: u64,
+    most: u64,
+}
+
+impl Limit {
+    /// What is said if it is missed.
+    fn missed(&self) -> Option<String> {
+        let Self {
+            image,
+            what,
+            bytes,
+            most,
+        } = self;
+        (bytes > most)
+            .then(|| format!("{image}: {what} take {bytes} bytes, at most {most} are allowed"))
+    }
+}
+
+const FLASH: &str = "code and constants";
+const VARIABLES: &str = "variables";
+
+/// The limits of an image, as far as they were measured.
+fn limits(image: &Measured) -> Vec<Limit> {
     let Size { flash, ram, .. } = image.size;
-    let mut why = Vec::new();
-    let mut gate = |what: &str, bytes: u64, most: u64| {
-        if bytes > most {
-            why.push(format!(
-                "{}: {what} take {bytes} bytes, at most {most} are allowed",
-                image.name
-            ));
-        }
+    let mut limits = Vec::new();
+    let mut limit = |what, bytes, most| {
+        limits.push(Limit {
+            image: image.name.clone(),
+            what,
+            bytes,
+            most,
+        });
     };
     if let Some(most) = max_flash(image) {
-        gate("code and constants", flash, most);
+        limit(FLASH, flash, most);
     }
-    gate("variables", ram, MAX_VARIABLES);
+    limit(VARIABLES, ram, MAX_VARIABLES);
     if let Some(stack) = worst_stack(image) {
-        gate("variables and twice the stack", ram + MARGIN * stack, RAM);
+        limit("variables and twice the stack", ram + MARGIN * stack, RAM);
     }
-    why
+    limits
+}
+
+/// What is wrong with the images: limits that are missed, but those that are not met yet and have not become worse.
+fn wrong(images: &[Measured], not_yet: &[(&str, &str, u64)]) -> Vec<String> {
+    let mut wrong = Vec::new();
+    let limits: Vec<Limit> = images.iter().flat_map(limits).collect();
+    for limit in &limits {
+        let known = not_yet
+            .iter()
+            .find(|(image, what, _)| *image == limit.image && *what == limit.what);
+        match (limit.missed(), known) {
+            (None, None) => {}
+            (None, Some(_)) => wrong.push(format!(
+                "{}: {}: the limit is kept: take it out of NOT_YET",
+                limit.image, limit.what
+            )),
+            (Some(missed), None) => wrong.push(missed),
+            (Some(missed), Some((_, _, was))) if limit.bytes <= was + was / LEEWAY => {
+                println!("missed, was {was}: {missed}");
+            }
+            (Some(missed), Some((_, _, was))) => {
+                wrong.push(format!("{missed}; was {was}, and has become worse"));
+            }
+        }
+    }
+    for (image, what, _) in not_yet {
+        if !limits.iter().any(|l| l.image == *image && l.what == *what) {
+            wrong.push(format!("{image}: {what}: in NOT_YET, and not measured"));
+        }
+    }
+    wrong
 }
 
 fn json(image: &Measured) -> Value {
@@ -384,15 +456,34 @@ mod tests {
     #[test]
     fn each_limit_is_a_limit() {
         let most = 160 * KB + 1000;
-        assert!(too_much(&image(most, MAX_VARIABLES, Some(64 * KB))).is_empty());
-        assert!(too_much(&image(0, 0, None)).is_empty());
-        let error = |image: Measured| too_much(&image).join("");
+        let too_much = |image: Measured| wrong(&[image], &[]);
+        assert!(too_much(image(most, MAX_VARIABLES, Some(64 * KB))).is_empty());
+        assert!(too_much(image(0, 0, None)).is_empty());
+        let error = |image: Measured| too_much(image).join("");
         assert!(error(image(most + 1, 0, None)).contains("code and constants"));
         assert!(error(image(0, MAX_VARIABLES + 1, None)).contains("variables take 65537"));
         assert!(error(image(0, 64 * KB, Some(64 * KB + 1))).contains("twice the stack"));
         let mut other = image(most + 1, 0, None);
         other.name = "tactus-selftest".into();
-        assert!(too_much(&other).is_empty());
+        assert!(too_much(other).is_empty());
+    }
+
+    #[test]
+    fn a_limit_that_is_not_kept_yet_may_not_be_missed_by_more() {
+        let was = [(RIG, FLASH, 200 * KB)];
+        let error = |flash| wrong(&[image(flash, 0, None)], &was).join("");
+        assert_eq!(error(200 * KB), "");
+        assert_eq!(error(170 * KB), "");
+        assert!(error(203 * KB).contains("has become worse"));
+        assert!(error(160 * KB).contains("take it out of NOT_YET"));
+        // the others are as strict as before
+        let fat = image(200 * KB, MAX_VARIABLES + 1, None);
+        assert!(
+            wrong(&[fat], &was)
+                .join("")
+                .contains("variables take 65537")
+        );
+        assert!(wrong(&[], &was).join("").contains("not measured"));
     }
 
     #[test]
