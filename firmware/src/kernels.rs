@@ -1,13 +1,14 @@
 //! The core's inner loops for this chip. Their plain twins are `tactus_core::kernels::Plain`: `cargo xtask bench` compares
 //! them, to the bit.
 
-use core::arch::global_asm;
-use core::mem::offset_of;
+use core::arch::{asm, global_asm};
+use core::mem::{MaybeUninit, offset_of};
 
 use tactus_core::fir::{TAPS, Taps};
 use tactus_core::fused::MAX_FEATURES;
-use tactus_core::kernels::{Candidate, Kernels, Plain};
+use tactus_core::kernels::{Candidate, EXP2, FAR, Kernels, Live, Plain, ROUND, add_windowed};
 use tactus_core::spectrum::{FRAME, FrameSum};
+use tactus_core::table::Gaussian;
 
 /// Outputs of the band-pass that are computed at once.
 const AT_ONCE: usize = 6;
@@ -230,6 +231,157 @@ unsafe extern "C" {
     safe fn tactus_sqrt(x: f32) -> f32;
 }
 
+/// A frame times the window, eight at a time, in room that need not be zeros first.
+#[inline(never)]
+fn windowed<'x>(
+    window: &[f32; FRAME],
+    frame: &[i16; FRAME],
+    x: &'x mut MaybeUninit<[f32; FRAME]>,
+) -> &'x mut [f32; FRAME] {
+    let begin: *mut f32 = x.as_mut_ptr().cast();
+    // SAFETY: all three have as many numbers, in whole eights; all of `x` is written.
+    unsafe {
+        asm!(
+            "2:",
+            "vldmia {w}!, {{s0-s7}}",
+            "ldrsh {a}, [{f}]",
+            "ldrsh {b}, [{f}, #2]",
+            "vmov s8, s9, {a}, {b}",
+            "ldrsh {a}, [{f}, #4]",
+            "ldrsh {b}, [{f}, #6]",
+            "vmov s10, s11, {a}, {b}",
+            "ldrsh {a}, [{f}, #8]",
+            "ldrsh {b}, [{f}, #10]",
+            "vmov s12, s13, {a}, {b}",
+            "ldrsh {a}, [{f}, #12]",
+            "ldrsh {b}, [{f}, #14]",
+            "vmov s14, s15, {a}, {b}",
+            "add {f}, {f}, #16",
+            "vcvt.f32.s32 s8, s8",
+            "vcvt.f32.s32 s9, s9",
+            "vcvt.f32.s32 s10, s10",
+            "vcvt.f32.s32 s11, s11",
+            "vcvt.f32.s32 s12, s12",
+            "vcvt.f32.s32 s13, s13",
+            "vcvt.f32.s32 s14, s14",
+            "vcvt.f32.s32 s15, s15",
+            "vmul.f32 s8, s8, s0",
+            "vmul.f32 s9, s9, s1",
+            "vmul.f32 s10, s10, s2",
+            "vmul.f32 s11, s11, s3",
+            "vmul.f32 s12, s12, s4",
+            "vmul.f32 s13, s13, s5",
+            "vmul.f32 s14, s14, s6",
+            "vmul.f32 s15, s15, s7",
+            "vstmia {x}!, {{s8-s15}}",
+            "cmp {x}, {end}",
+            "bne 2b",
+            w = inout(reg) window.as_ptr() => _,
+            f = inout(reg) frame.as_ptr() => _,
+            x = inout(reg) begin => _,
+            end = in(reg) begin.add(FRAME),
+            a = out(reg) _,
+            b = out(reg) _,
+            out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
+            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
+            options(nostack),
+        );
+        x.assume_init_mut()
+    }
+}
+
+/// What [`confuse`] keeps in registers, from s16 on.
+static CONFUSE: [f32; 11] = {
+    let [c0, c1, c2, c3, c4, c5] = EXP2;
+    let octave = -core::f32::consts::LOG2_E;
+    [FAR, octave, ROUND, c0, c1, c2, c3, c4, c5, 1.0, 0.25]
+};
+
+// one load for all of a texture
+const _: () = assert!(
+    offset_of!(Live, probability) == 0
+        && offset_of!(Live, confused) == 4
+        && offset_of!(Live, expected) == 8
+        && offset_of!(Gaussian, mean) == 0
+        && offset_of!(Gaussian, sd) == 4
+);
+
+/// [`Kernels::confuse`] of one texture at least, up to `behind`. The same operations in the same order as
+/// `tactus_core::kernels::confused` and `exp_neg` have them (VMLA rounds the product), but for the comparison of the confusion
+/// with 0: adding that changes nothing.
+///
+/// # Safety
+/// `others` begin and end there.
+#[inline(never)]
+unsafe fn confuse(a: &mut Live, others: *mut Live, behind: *const Live) {
+    // SAFETY: it reads and writes `a`, the others and nothing else.
+    unsafe {
+        asm!(
+            "vldmia {constants}, {{s16-s26}}",
+            // its probability, what it is confused with, mean and standard deviation
+            "vldmia {a}, {{s0-s3}}",
+            "vmul.f32 s4, s3, s3",
+            "vadd.f32 s5, s3, s3",
+            "2:",
+            "vldmia {b}, {{s8-s11}}",
+            "vmul.f32 s12, s11, s11",
+            "vadd.f32 s12, s4, s12",
+            "vdiv.f32 s12, s25, s12",
+            "vsub.f32 s13, s2, s10",
+            "vmul.f32 s13, s13, s13",
+            "vmul.f32 s14, s26, s12",
+            "vmul.f32 s13, s13, s14",
+            "vcmp.f32 s13, s16",
+            "vmrs APSR_nzcv, fpscr",
+            "bgt 3f",
+            "vmul.f32 s14, s5, s11",
+            "vmul.f32 s14, s14, s12",
+            "vsqrt.f32 s14, s14",
+            "vmul.f32 s13, s13, s17",
+            "vadd.f32 s12, s13, s18",
+            "vsub.f32 s15, s12, s18",
+            "vsub.f32 s13, s13, s15",
+            "vmul.f32 s15, s19, s13",
+            "vadd.f32 s15, s15, s20",
+            "vmul.f32 s15, s15, s13",
+            "vadd.f32 s15, s15, s21",
+            "vmul.f32 s15, s15, s13",
+            "vadd.f32 s15, s15, s22",
+            "vmul.f32 s15, s15, s13",
+            "vadd.f32 s15, s15, s23",
+            "vmul.f32 s15, s15, s13",
+            "vadd.f32 s15, s15, s24",
+            "vmul.f32 s15, s15, s13",
+            "vadd.f32 s15, s15, s25",
+            "vmov {x}, s12",
+            "vmov {y}, s15",
+            "add {y}, {y}, {x}, lsl #23",
+            "vmov s15, {y}",
+            "vmul.f32 s14, s14, s15",
+            "vmla.f32 s1, s14, s8",
+            "vmla.f32 s9, s14, s0",
+            "vstr s9, [{b}, #4]",
+            "3:",
+            "add {b}, {b}, #{size}",
+            "cmp {b}, {behind}",
+            "bne 2b",
+            "vstr s1, [{a}, #4]",
+            constants = in(reg) &raw const CONFUSE,
+            a = in(reg) a,
+            b = inout(reg) others => _,
+            behind = in(reg) behind,
+            x = out(reg) _,
+            y = out(reg) _,
+            size = const size_of::<Live>(),
+            out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s8") _, out("s9") _,
+            out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _, out("s16") _, out("s17") _,
+            out("s18") _, out("s19") _, out("s20") _, out("s21") _, out("s22") _, out("s23") _, out("s24") _, out("s25") _,
+            out("s26") _,
+            options(nostack),
+        );
+    }
+}
+
 /// Cortex-M4F.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Chip;
@@ -247,7 +399,7 @@ impl Kernels for Chip {
     }
 
     fn add_frame(window: &[f32; FRAME], frame: &[i16; FRAME], sum: &mut FrameSum) {
-        Plain::add_frame(window, frame, sum);
+        add_windowed(windowed(window, frame, &mut MaybeUninit::uninit()), sum);
     }
 
     fn distances(from: &[i16], means: &[u8], stride: usize, distances: &mut [u64]) {
@@ -283,6 +435,14 @@ impl Kernels for Chip {
             unsafe {
                 tactus_candidates(from.mean.as_ptr(), range.start, from.square, range.end);
             }
+        }
+    }
+
+    fn confuse(a: &mut Live, others: &mut [Live]) {
+        let others = others.as_mut_ptr_range();
+        if !others.is_empty() {
+            // SAFETY: there is one at least, and the others end where it is said.
+            unsafe { confuse(a, others.start, others.end) };
         }
     }
 

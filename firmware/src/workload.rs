@@ -204,7 +204,8 @@ fn explore<K: Kernels, const N: usize>(
         begin().ok()?
     };
     let choose = |explorer: &Explorer<'_, N, K>| {
-        let outlook = explorer.outlook();
+        let mut outlook = Vec::new();
+        explorer.look_out(&mut outlook);
         black_box(explorer.choose(black_box(&outlook), 0))
     };
     let chosen = match workload {

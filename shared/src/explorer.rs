@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::features::{Property, PropertySet};
 use crate::fused::{FeatureSet, Observation, Vector};
-use crate::kernels::{Kernels, Plain, exp_neg};
+use crate::kernels::{Kernels, Live, Plain, confused, exp_neg};
 use crate::table::{Action, Contents, Gaussian, MAX_ACTIONS, MAX_MOVEMENTS, Table, mean_step};
 
 mod fused;
@@ -229,41 +229,6 @@ pub struct Outlook {
 /// Degree of confusion of two textures by one property (eq. 7): 1 for equal, 0 for disjoint distributions.
 pub fn confusion<K: Kernels>(a: Gaussian, b: Gaussian) -> f32 {
     confused(a, b, K::sqrt)
-}
-
-#[inline]
-fn confused(a: Gaussian, b: Gaussian, sqrt: fn(f32) -> f32) -> f32 {
-    // a division takes 14 cycles
-    let narrowness = 1.0 / (a.sd * a.sd + b.sd * b.sd);
-    let apart = a.mean - b.mean;
-    let exponent = apart * apart * (0.25 * narrowness);
-    if exponent > FAR {
-        return 0.0;
-    }
-    sqrt(2.0 * a.sd * b.sd * narrowness) * exp_neg(exponent)
-}
-
-/// Textures that far apart are not confused: 25 ln 2, where the exponential is half of the last place of a number near 1.
-const FAR: f32 = 17.33;
-
-/// A texture that is still likely, while an expected uncertainty is computed from Gaussians.
-#[derive(Clone, Copy, Debug)]
-struct Live {
-    /// What is expected of the properties looked at, those first.
-    expected: [Gaussian; Property::ALL.len()],
-    probability: f32,
-    /// Sum over all others of confusion times probability: the numerator of eq. 8.
-    confused: f32,
-}
-
-impl Live {
-    fn new(probability: f32) -> Self {
-        Self {
-            expected: [Gaussian { mean: 0.0, sd: 1.0 }; Property::ALL.len()],
-            probability,
-            confused: 0.0,
-        }
-    }
 }
 
 /// One exploration after another with the same table and candidates; room for `N` textures.
@@ -711,10 +676,15 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     }
 
     /// What every action promises now, in their order.
-    // its result is large: where it is wanted, and not moved there
-    #[inline(always)]
     pub fn outlook(&self) -> Vec<Outlook, MAX_ACTIONS> {
         let mut promises = Vec::new();
+        self.look_out(&mut promises);
+        promises
+    }
+
+    /// As [`Explorer::outlook`], for those who have room for it: it is large, and not moved then.
+    pub fn look_out(&self, promises: &mut Vec<Outlook, MAX_ACTIONS>) {
+        promises.clear();
         let actions = self.actions.iter().zip(&self.made).zip(&self.at_first);
         for ((&action, &made), &at_first) in actions {
             let uncertainty = match self.slides {
@@ -728,7 +698,6 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 benefit: benefit(uncertainty, made),
             });
         }
-        promises
     }
 
     /// What cycling goes through: the best action of each property when nothing is known, properties in their order; where all
@@ -780,7 +749,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 }
             }
         }
-        uncertainty_of(&mut live, looked_at.iter().count(), K::sqrt)
+        uncertainty_of(&mut live, looked_at.iter().count(), K::confuse, K::sqrt)
     }
 }
 
@@ -789,10 +758,11 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
 /// The textures that are still likely, with what is expected of the property that is looked at.
 #[inline(never)]
 fn gather(table: &Table<'_>, action: Action, posterior: &[f32], live: &mut VecView<Live>) {
-    for (&probability, known) in posterior.iter().zip(table.gaussians(action)) {
+    let known = table.gaussians(action);
+    for (&probability, texture) in posterior.iter().zip(0..) {
         if probability >= NEGLIGIBLE {
             let mut candidate = Live::new(probability);
-            if let ([slot, ..], Some(known)) = (&mut candidate.expected, known) {
+            if let ([slot, ..], Some(known)) = (&mut candidate.expected, known.get(texture)) {
                 *slot = known;
             }
             // there is room: as much as for the posterior
@@ -803,11 +773,16 @@ fn gather(table: &Table<'_>, action: Action, posterior: &[f32], live: &mut VecVi
 
 /// Expected uncertainty (eq. 11) of these textures, of which so many properties are looked at.
 #[inline(never)]
-fn uncertainty_of(live: &mut [Live], properties: usize, sqrt: fn(f32) -> f32) -> f32 {
+fn uncertainty_of(
+    live: &mut [Live],
+    properties: usize,
+    confuse: fn(&mut Live, &mut [Live]),
+    sqrt: fn(f32) -> f32,
+) -> f32 {
     let mut rest = &mut *live;
     while let Some((a, others)) = rest.split_first_mut() {
         if properties == 1 {
-            confuse_by_one(a, others, sqrt);
+            confuse(a, others);
         } else {
             for b in others.iter_mut() {
                 let pairs = a.expected.iter().zip(&b.expected).take(properties);
@@ -822,26 +797,12 @@ fn uncertainty_of(live: &mut [Live], properties: usize, sqrt: fn(f32) -> f32) ->
     live.iter().map(left).sum()
 }
 
-/// Confusion of one texture with all others by the first property that is looked at.
-fn confuse_by_one(a: &mut Live, others: &mut [Live], sqrt: fn(f32) -> f32) {
-    let [of_a, ..] = a.expected;
-    let mut sum = a.confused;
-    for b in others {
-        let [of_b, ..] = b.expected;
-        let confusion = confused(of_a, of_b, sqrt);
-        if confusion > 0.0 {
-            sum += confusion * b.probability;
-            b.confused += confusion * a.probability;
-        }
-    }
-    a.confused = sum;
-}
-
 /// Adds the likelihood of every texture when a property is `x` (eq. 4).
 #[inline(never)]
 fn add_likelihoods(table: &Table<'_>, action: Action, x: f32, log: &mut [f32]) {
-    for (log, expected) in log.iter_mut().zip(table.gaussians(action)) {
-        if let Some(expected) = expected {
+    let known = table.gaussians(action);
+    for (log, texture) in log.iter_mut().zip(0..) {
+        if let Some(expected) = known.get(texture) {
             let z = (x - expected.mean) / expected.sd;
             *log += -(libm::logf(expected.sd) + 0.5 * z * z);
         }
@@ -851,7 +812,8 @@ fn add_likelihoods(table: &Table<'_>, action: Action, x: f32, log: &mut [f32]) {
 /// The posterior (eq. 3) from its logarithms.
 #[inline(never)]
 fn normalise(log: &mut [f32], posterior: &mut [f32]) {
-    let top = log.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let larger = |top, &log: &f32| if log > top { log } else { top };
+    let top = log.iter().fold(f32::NEG_INFINITY, larger);
     let mut total = 0.0;
     for (log, posterior) in log.iter_mut().zip(&mut *posterior) {
         // a slide takes at most 1e12 from a candidate: however improbable, it stays one

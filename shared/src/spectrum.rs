@@ -7,6 +7,8 @@
 
 use core::ops::Range;
 
+use microfft::Complex32;
+
 use crate::kernels::Kernels;
 use crate::pressure::RATE_HZ;
 
@@ -46,19 +48,21 @@ pub struct FrameSum {
 }
 
 impl FrameSum {
-    /// Adds one transformed frame: (real, imaginary) of bins 0 to 255, with bin 256, which is real, in place of bin 0's
-    /// imaginary part.
-    pub fn add(&mut self, mut bins: impl Iterator<Item = (f32, f32)>) {
+    /// Adds one transformed frame: bins 0 to 255, with bin 256, which is real, in place of bin 0's imaginary part.
+    pub fn add(&mut self, bins: &[Complex32; FRAME / 2]) {
         let [first, rest @ .., last] = &mut self.power;
-        if let Some((re, nyquist)) = bins.next() {
-            *first += re * re;
-            *last += nyquist * nyquist;
-            self.real[0] += re;
-        }
-        for (k, (sum, (re, im))) in rest.iter_mut().zip(bins).enumerate() {
-            *sum += re * re + im * im;
-            if k == 0 {
-                self.real[1] += re;
+        let [ends, bins @ ..] = bins;
+        let [second, ..] = bins;
+        *first += ends.re * ends.re;
+        *last += ends.im * ends.im;
+        let [real_0, real_1] = &mut self.real;
+        *real_0 += ends.re;
+        *real_1 += second.re;
+        let add = |sum: &mut f32, bin: &Complex32| *sum += bin.re * bin.re + bin.im * bin.im;
+        let (fives, _) = rest.as_chunks_mut::<5>();
+        for (sums, bins) in fives.iter_mut().zip(bins.as_chunks::<5>().0) {
+            for (sum, bin) in sums.iter_mut().zip(bins) {
+                add(sum, bin);
             }
         }
         self.frames += 1;

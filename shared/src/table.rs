@@ -224,6 +224,33 @@ impl fmt::Display for TableError {
 
 impl core::error::Error for TableError {}
 
+/// What one action is expected to feel like, texture by texture.
+#[derive(Clone, Copy, Debug)]
+pub struct Gaussians<'a> {
+    /// Each begins `stride` bytes after the one before.
+    cells: &'a [u8],
+    stride: usize,
+    /// Each `movements` after the one before.
+    trials: &'a [u8],
+    movements: usize,
+    /// Of the means.
+    step: f32,
+}
+
+impl Gaussians<'_> {
+    /// As [`Table::gaussian`].
+    #[inline]
+    pub fn get(&self, texture: usize) -> Option<Gaussian> {
+        let trials = *self.trials.get(texture * self.movements)?;
+        let cell = self.cells.get(texture * self.stride..)?;
+        let &[m0, m1, s0, s1] = cell.first_chunk()?;
+        (trials >= 2).then(|| Gaussian {
+            mean: f32::from(i16::from_le_bytes([m0, m1])) * self.step,
+            sd: f32::from(u16::from_le_bytes([s0, s1])) * SD_STEP,
+        })
+    }
+}
+
 /// A checked texture table, borrowed from where it is stored.
 #[derive(Clone, Copy, Debug)]
 pub struct Table<'a> {
@@ -564,40 +591,35 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// [`Table::gaussian`] of every texture, in their order.
-    pub fn gaussians(&self, action: Action) -> impl Iterator<Item = Option<Gaussian>> + use<'a> {
-        let property = action
-            .property
-            .filter(|p| self.measured().contains(*p) && action.movement < self.movements);
-        let step = property.map_or(0.0, mean_step);
-        let (_, cell) = self.contents.sizes();
+    /// [`Table::gaussian`] of every texture, for those who ask for many.
+    pub fn gaussians(&self, action: Action) -> Gaussians<'a> {
         let movement = usize::from(action.movement);
-        let at = property.map_or(0, |p| movement * cell + p.index() * CELL_BYTES);
-        let cells = self.rows(self.layout().cells + at, cell);
-        let trials = self.rows(self.layout().trials + movement, 1);
-        cells.zip(trials).map(move |(cell, trials)| {
-            let &[m0, m1, s0, s1] = cell.first_chunk()?;
-            let learned = property.is_some() && trials.first().is_some_and(|t| *t >= 2);
-            learned.then(|| Gaussian {
-                mean: f32::from(i16::from_le_bytes([m0, m1])) * step,
-                sd: f32::from(u16::from_le_bytes([s0, s1])) * SD_STEP,
-            })
-        })
+        let measured = action.property.filter(|p| self.measured().contains(*p));
+        let measured = measured.filter(|_| action.movement < self.movements);
+        let (_, cell) = self.contents.sizes();
+        let layout = self.layout();
+        let cells = measured.and_then(|property| {
+            let at = layout.cells + movement * cell + property.index() * CELL_BYTES;
+            self.bytes.get(at..layout.trials)
+        });
+        let (trials, movements) = self.trials_at(action.movement);
+        Gaussians {
+            cells: cells.unwrap_or_default(),
+            trials,
+            movements,
+            stride: cell * movements,
+            step: measured.map_or(0.0, mean_step),
+        }
     }
 
-    /// [`Table::trials`] of every texture, in their order.
-    pub fn trials_at(&self, movement: u8) -> impl Iterator<Item = u8> + use<'a> {
-        let is_there = movement < self.movements;
-        let trials = self.rows(self.layout().trials + usize::from(movement), 1);
-        trials.map(move |row| row.first().copied().filter(|_| is_there).unwrap_or(0))
-    }
-
-    /// What lies at `at` and in the same place of each of the other textures, `bytes` of them at each movement.
-    fn rows(&self, at: usize, bytes: usize) -> impl Iterator<Item = &'a [u8]> + use<'a> {
-        let stride = bytes * usize::from(self.movements);
-        let rows = self.bytes.get(at..).unwrap_or_default();
-        // a table has movements, and they have bytes
-        rows.chunks(stride.max(1)).take(self.textures.into())
+    /// [`Table::trials`] of every texture, the first at the beginning, and how far one is from the next; none outside the
+    /// table.
+    pub fn trials_at(&self, movement: u8) -> (&'a [u8], usize) {
+        let layout = self.layout();
+        let at = layout.trials + usize::from(movement);
+        let trials = self.bytes.get(at..layout.lineage);
+        let trials = trials.filter(|_| movement < self.movements);
+        (trials.unwrap_or_default(), self.movements.into())
     }
 
     /// The bytes of the whitened means at a movement, the first of them at the beginning, and how far one is from the next;

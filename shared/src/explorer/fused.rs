@@ -205,7 +205,9 @@ fn add_likelihoods(
         let mut spread = Spread::new(visit.slides, 1, features);
         let (means, stride) = table.white_means(visit.movement);
         measure(&mean, means, stride, distances);
-        let trials = table.trials_at(visit.movement);
+        let (trials, trials_stride) = table.trials_at(visit.movement);
+        // a table has movements
+        let trials = trials.iter().step_by(trials_stride.max(1)).copied();
         for ((log, distance), trials) in log.iter_mut().zip(&*distances).zip(trials) {
             let likelihood = if trials == 0 {
                 // as little is known of it here as of a texture that the table does not have
@@ -291,15 +293,13 @@ fn gather(table: &Table<'_>, movement: u8, posterior: &[f32], live: &mut VecView
     let Contents::Fused(_, features) = table.contents() else {
         return;
     };
-    let bytes = 2 * usize::from(features);
-    for ((&probability, slides), texture) in
-        posterior.iter().zip(table.trials_at(movement)).zip(0..)
-    {
+    let (trials, trials_stride) = table.trials_at(movement);
+    for (&probability, texture) in posterior.iter().zip(0..) {
         if probability >= super::NEGLIGIBLE {
-            let row = means.get(texture * stride..).unwrap_or_default();
-            let mean = row.get(..bytes).unwrap_or_default();
+            let mean = means.get(texture * stride..).unwrap_or_default();
+            let slides = trials.get(texture * trials_stride).copied().unwrap_or(0);
             // there is room: as much as for the posterior
-            let _ = live.push(Candidate::new(mean, probability, slides));
+            let _ = live.push(Candidate::new(mean, features.into(), probability, slides));
         }
     }
 }
