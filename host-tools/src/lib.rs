@@ -5,6 +5,7 @@ pub mod evaluate;
 pub mod experiment;
 pub mod fabricslide;
 pub mod follow;
+pub mod handheld;
 pub mod import;
 pub mod learn;
 pub mod lifelong;
