@@ -76,6 +76,11 @@ async fn due(what: u8) {
     .await;
 }
 
+/// Stops the slots, or lets them go on where they stopped.
+pub(crate) fn listen(on: bool) {
+    TIM2.cr1().modify(|w| w.set_cen(on));
+}
+
 #[embassy_executor::task]
 pub(crate) async fn acquire(pins: board::Acquire, mut words: Producer<'static, Word>) {
     let mut config = spi::Config::default();

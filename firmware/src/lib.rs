@@ -6,8 +6,11 @@
 
 mod acquire;
 mod board;
+mod display;
+mod handheld;
 mod lever;
 mod link;
+mod memory;
 mod probe;
 mod rescue;
 mod rig;
@@ -15,6 +18,7 @@ mod selftest;
 mod servo;
 mod session;
 
+pub use handheld::handheld;
 pub use rig::rig;
 pub use selftest::selftest;
 

@@ -391,8 +391,8 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 
     /// What the display shows.
-    pub fn screen<'s>(&'s self, table: &Table<'s>, about: &About) -> Screen<'s> {
-        let name = |texture: u16| table.name(texture).unwrap_or("?");
+    pub fn screen<'s>(&'s self, table: Option<&Table<'s>>, about: &About) -> Screen<'s> {
+        let name = |texture: u16| table.and_then(|table| table.name(texture)).unwrap_or("?");
         let rows = |judgement: &Judgement| {
             let leading = judgement.leading.iter();
             leading
@@ -407,7 +407,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         match &self.page {
             Page::Ready if !self.touch.has_zero() => Screen::Air,
             Page::Ready => Screen::Ready {
-                textures: table.textures(),
+                textures: self.textures,
             },
             Page::Touching => Screen::touching(&self.touch.view(), slide, of),
             Page::Again(why) => Screen::Again {
@@ -472,13 +472,22 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 
     /// The entries about one of them, as they are shown.
-    fn around<'s>(&self, at: u16, table: &Table<'s>) -> Vec<screens::Entry<'s>, { screens::LINES }> {
+    fn around<'s>(
+        &self,
+        at: u16,
+        table: Option<&Table<'s>>,
+    ) -> Vec<screens::Entry<'s>, { screens::LINES }> {
         let first = screens::first_line(at, self.entries());
         let shown = (first..self.entries()).take(screens::LINES);
         shown
             .map(|at| match self.entry(at) {
-                Entry::Known(texture) => screens::Entry::Known(table.name(texture).unwrap_or("?")),
-                Entry::Numbered => screens::Entry::Numbered(free_name(table)),
+                Entry::Known(texture) => {
+                    let name = table.and_then(|table| table.name(texture));
+                    screens::Entry::Known(name.unwrap_or("?"))
+                }
+                Entry::Numbered => {
+                    screens::Entry::Numbered(table.map_or(Name::new(), free_name))
+                }
                 Entry::Spell => screens::Entry::Spell,
                 Entry::Nothing => screens::Entry::Nothing,
             })

@@ -107,7 +107,12 @@ impl Driver {
         let encoder = pins::ENCODER
             .iter()
             .all(|pin| board.function(*pin) == Some(pins::TIM3_4_FUNCTION));
-        lock(&self.rig).wire(sensor, encoder);
+        let display = pins::DISPLAY_I2C
+            .iter()
+            .all(|pin| board.function(*pin) == Some(pins::I2C1_FUNCTION));
+        let mut rig = lock(&self.rig);
+        rig.wire(sensor, encoder);
+        rig.display_mut().wire(display);
     }
 
     /// The chip is as after a reset: its pins are let go, what drives them from outside must do it again.
@@ -287,7 +292,13 @@ impl emulator::Driver<Board> for Driver {
         let now = stop.at;
         if now.0 >= self.next_tick_ns && stop.reason != StopReason::Reset {
             self.next_tick_ns = now.0 + self.tick_ns;
-            lock(&self.rig).tick(now.0);
+            let buzzes = session.board_mut().function(pins::BUZZER) == Some(pins::TIM8_FUNCTION);
+            let tone = buzzes.then(|| session.board_mut().tone()).flatten();
+            {
+                let mut rig = lock(&self.rig);
+                rig.tick(now.0);
+                rig.buzzer(now.0, tone);
+            }
             self.switch(session.board_mut(), now);
             if let Some(log) = &mut self.log {
                 log.drain(now.0, host);

@@ -8,6 +8,7 @@
 
 mod board;
 pub mod campaign;
+mod display;
 mod driver;
 pub mod exploration;
 mod flash;
@@ -17,11 +18,13 @@ mod part;
 pub mod pins;
 mod record;
 mod rig;
+pub mod scenario;
 mod serial;
 mod stack;
 pub mod talk;
 
 pub use board::{Emulator, Error, Options};
+pub use display::Display;
 pub use flash::{FLASH, STORE};
 pub use record::Slide;
 pub use rig::{Output, Rig};

@@ -68,9 +68,10 @@ enum Cli {
         #[arg(long, value_name = "DIR", default_value = "target/bundle")]
         out: PathBuf,
     },
-    /// Make the table that comes with the firmware, firmware/factory.tact
+    /// Make the tables that come with the firmware, firmware/factory.tact and firmware/handheld.tact
     ///
-    /// Simulates 5 trials of 3 movements on each of the 117 textures of world 1 and learns them, which takes a minute or two.
+    /// Simulates 5 trials of 3 movements on each of the 117 textures of world 1 and learns them, and 5 slides of a hand for
+    /// the handheld probe, which takes a minute or two.
     Factory {
         /// Leave the committed file alone; an error if it is not byte for byte what is made now
         #[arg(long)]

@@ -57,11 +57,13 @@ pub enum Entry<'a> {
 pub struct About {
     /// Version of the firmware.
     pub version: &'static str,
-    /// Share of time that the core was awake, 0 to 1: since it listens, and while it rested.
-    pub awake: f32,
+    /// Share of time that the core was awake while the sensor's words were wanted, 0 to 1.
+    pub awake: Option<f32>,
+    /// The same while they were not.
     pub awake_at_rest: Option<f32>,
-    /// Sensor slots that came too late, and words that were lost.
+    /// Sensor slots that came too late.
     pub late: u32,
+    /// Words that were lost.
     pub lost: u32,
 }
 
@@ -77,8 +79,9 @@ pub enum Screen<'a> {
     },
     /// The finger is to be pressed.
     Press {
-        /// The slide it is for, and how many there can be.
+        /// The slide it is for.
         slide: u8,
+        /// How many there can be.
         of: u8,
         /// Contact force, mN.
         force_mn: f32,
@@ -89,7 +92,9 @@ pub enum Screen<'a> {
     Slide {
         /// As in `Press`.
         slide: u8,
+        /// As in `Press`.
         of: u8,
+        /// As in `Press`.
         force_mn: f32,
         /// How much is done, 0 to 1; `None` before it begins.
         progress: Option<f32>,
@@ -120,8 +125,9 @@ pub enum Screen<'a> {
     },
     /// What is it?
     Choose {
-        /// Which of how many is chosen.
+        /// Which is chosen.
         at: u16,
+        /// How many there are.
         count: u16,
         /// Those about it.
         entries: Vec<Entry<'a>, LINES>,
@@ -574,14 +580,16 @@ fn about_probe<D: DrawTarget<Color = BinaryColor>>(
 ) -> Done<D> {
     brush.title("About", &say(format_args!("Tactus {}", about.version)))?;
     brush.left("Core awake", 1, 14)?;
-    let share = |p: f32| say(format_args!("{:.1} %", 100.0 * p));
+    let share = |p: Option<f32>| match p {
+        Some(p) => say(format_args!("{:.1} %", 100.0 * p)),
+        None => say(format_args!("-")),
+    };
     brush.left("listening", 7, 24)?;
     let right = |y| Point::new(WIDTH, y);
     let (font, side) = (&FONT_6X10, Alignment::Right);
     brush.write(&share(about.awake), right(24), font, side, false)?;
     brush.left("at rest", 7, 34)?;
-    let at_rest = about.awake_at_rest.map_or(say(format_args!("-")), share);
-    brush.write(&at_rest, right(34), font, side, false)?;
+    brush.write(&share(about.awake_at_rest), right(34), font, side, false)?;
     let slots = say(format_args!("late {}, lost {}", about.late, about.lost));
     brush.left("Slots", 1, 44)?;
     brush.write(&cut(&slots, 15), right(44), font, side, false)?;

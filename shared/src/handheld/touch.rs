@@ -603,3 +603,6 @@ fn deviation(values: &[f32]) -> f32 {
     let squares: f32 = values.iter().map(|x| (x - mean) * (x - mean)).sum();
     libm::sqrtf(squares / (n - 1.0))
 }
+
+#[cfg(test)]
+mod tests;

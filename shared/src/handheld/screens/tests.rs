@@ -114,7 +114,7 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
     each("fault-memory", &Screen::Fault(&memory));
     let about = About {
         version: "0.1.0",
-        awake: 0.1234,
+        awake: Some(0.1234),
         awake_at_rest: Some(0.0021),
         late: 0,
         lost: 0,

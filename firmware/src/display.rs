@@ -1,0 +1,73 @@
+//! The handheld's display: an SSD1306 on I2C1, told of a whole picture at a time, by DMA while the core sleeps.
+use embassy_stm32::i2c::{self, I2c};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::{bind_interrupts, dma, peripherals};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use embassy_time::{Duration, Timer};
+use ssd1306::command::AddrMode;
+use ssd1306::prelude::DisplayRotation;
+use ssd1306::size::DisplaySize128x64;
+use ssd1306::{I2CDisplayInterface, Ssd1306Async};
+use tactus_core::handheld::picture::{HEIGHT, Picture, WIDTH};
+
+use crate::board;
+
+bind_interrupts!(struct Irqs {
+    I2C1_EV => i2c::EventInterruptHandler<peripherals::I2C1>;
+    I2C1_ER => i2c::ErrorInterruptHandler<peripherals::I2C1>;
+    DMA1_STREAM6 => dma::InterruptHandler<peripherals::DMA1_CH6>;
+    DMA1_STREAM0 => dma::InterruptHandler<peripherals::DMA1_CH0>;
+});
+
+/// What is to be shown next; `None` switches the display off. A picture that comes too early takes the place of the one
+/// before it.
+pub(crate) static SHOW: Signal<CriticalSectionRawMutex, Option<Picture>> = Signal::new();
+
+/// A display that does not answer is looked for again after this.
+const AGAIN: Duration = Duration::from_secs(1);
+
+#[embassy_executor::task]
+pub(crate) async fn show(pins: board::Display) {
+    let mut config = i2c::Config::default();
+    config.frequency = Hertz(400_000);
+    config.timeout = Duration::from_millis(50);
+    let bus = I2c::new(pins.i2c, pins.scl, pins.sda, pins.tx, pins.rx, Irqs, config);
+    let mut display = Ssd1306Async::new(
+        I2CDisplayInterface::new(bus),
+        DisplaySize128x64,
+        DisplayRotation::Rotate0,
+    );
+    loop {
+        // its power may come late, or its plug be loose
+        if let Err(why) = run(&mut display).await {
+            defmt::warn!("no display: {}", defmt::Debug2Format(&why));
+        }
+        Timer::after(AGAIN).await;
+    }
+}
+
+/// Shows one picture after the other until the display does not answer.
+async fn run<D>(
+    display: &mut Ssd1306Async<D, DisplaySize128x64, ssd1306::mode::BasicMode>,
+) -> Result<(), display_interface::DisplayError>
+where
+    D: display_interface::AsyncWriteOnlyDataCommand,
+{
+    display.init_with_addr_mode(AddrMode::Horizontal).await?;
+    let (mut lit, mut shown) = (true, None);
+    loop {
+        let next = SHOW.wait().await;
+        if next.is_some() != lit {
+            lit = next.is_some();
+            display.set_display_on(lit).await?;
+        }
+        let Some(picture) = next.filter(|next| shown.as_ref() != Some(next)) else {
+            continue;
+        };
+        let end = (WIDTH as u8, HEIGHT as u8);
+        display.set_draw_area((0, 0), end).await?;
+        display.draw(picture.bytes()).await?;
+        shown = Some(picture);
+    }
+}
