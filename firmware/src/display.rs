@@ -4,7 +4,7 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::{bind_interrupts, dma, peripherals};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use embassy_time::{Duration, Timer};
+use embassy_time::{Duration, Instant, Timer, with_timeout};
 use ssd1306::command::AddrMode;
 use ssd1306::prelude::DisplayRotation;
 use ssd1306::size::DisplaySize128x64;
@@ -38,36 +38,49 @@ pub(crate) async fn show(pins: board::Display) {
         DisplaySize128x64,
         DisplayRotation::Rotate0,
     );
+    let mut last = None;
     loop {
         // its power may come late, or its plug be loose
-        if let Err(why) = run(&mut display).await {
+        if let Err(why) = run(&mut display, &mut last).await {
             defmt::warn!("no display: {}", defmt::Debug2Format(&why));
         }
         Timer::after(AGAIN).await;
     }
 }
 
-/// Shows one picture after the other until the display does not answer.
+/// Shows one picture after the other, beginning with the last one, until the display does not answer.
 async fn run<D>(
     display: &mut Ssd1306Async<D, DisplaySize128x64, ssd1306::mode::BasicMode>,
+    last: &mut Option<Picture>,
 ) -> Result<(), display_interface::DisplayError>
 where
     D: display_interface::AsyncWriteOnlyDataCommand,
 {
+    const END: (u8, u8) = (WIDTH as u8, HEIGHT as u8);
     display.init_with_addr_mode(AddrMode::Horizontal).await?;
-    let (mut lit, mut shown) = (true, None);
+    let (mut lit, mut due) = (true, last.is_some());
+    let mut answered = Instant::now();
     loop {
-        let next = SHOW.wait().await;
-        if next.is_some() != lit {
-            lit = next.is_some();
-            display.set_display_on(lit).await?;
+        if let Some(picture) = last.as_ref().filter(|_| due) {
+            display.set_draw_area((0, 0), END).await?;
+            display.draw(picture.bytes()).await?;
+            answered = Instant::now();
         }
-        let Some(picture) = next.filter(|next| shown.as_ref() != Some(next)) else {
-            continue;
-        };
-        let end = (WIDTH as u8, HEIGHT as u8);
-        display.set_draw_area((0, 0), end).await?;
-        display.draw(picture.bytes()).await?;
-        shown = Some(picture);
+        due = false;
+        if let Ok(next) = with_timeout(AGAIN, SHOW.wait()).await {
+            if next.is_some() != lit {
+                lit = next.is_some();
+                display.set_display_on(lit).await?;
+            }
+            if next.is_some() && next != *last {
+                *last = next;
+                due = true;
+            }
+        }
+        if !due && answered.elapsed() >= AGAIN {
+            // nothing new: is it still there?
+            display.set_display_on(lit).await?;
+            answered = Instant::now();
+        }
     }
 }

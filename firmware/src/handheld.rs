@@ -41,6 +41,8 @@ static FACTORY: &[u8] = include_bytes!("../handheld.tact");
 const OPENING: Duration = Duration::from_secs(10);
 /// Ticks from one picture to the next: 20 a second.
 const PICTURE: u32 = TICKS_HZ / 20;
+/// Ticks from one word in the log about sleep to the next.
+const SAY: u32 = 5 * TICKS_HZ;
 /// `hand` gets on at least this often; the longest that it does is to erase two sectors, ms.
 const PATIENCE_MS: u32 = 5000;
 
@@ -157,6 +159,15 @@ impl Awake {
         share.all_us += all_us;
         share.awake_us += all_us.saturating_sub(slept_us);
     }
+
+    fn say(&self) {
+        if let Some(share) = self.listening.get() {
+            defmt::info!("awake listening: {=f32}", share);
+        }
+        if let Some(share) = self.resting.get() {
+            defmt::info!("awake at rest: {=f32}", share);
+        }
+    }
 }
 
 type Buzzer = SimplePwm<'static, peripherals::TIM8>;
@@ -223,7 +234,7 @@ async fn hand(
             sound(&mut buzzer, tone);
         }
         let job = probe.job();
-        if job.is_some() || tick.is_multiple_of(PICTURE) {
+        if (job.is_some() || tick.is_multiple_of(PICTURE)) && probe.is_new() {
             show(&probe, &memory, &awake);
         }
         if let Some(job) = job {
@@ -241,12 +252,20 @@ async fn hand(
             awake.was(same.then_some(listens));
             same = true;
         }
+        if tick.is_multiple_of(SAY) {
+            awake.say();
+        }
     }
 }
 
 /// Draws what the probe shows.
 fn show(probe: &Handheld<'_, Plain>, memory: &Memory, awake: &Awake) {
-    let table = Table::read(memory.in_force()).ok();
+    // reading a table means checking it, which takes milliseconds
+    let table = if probe.names_textures() {
+        Table::read(memory.in_force()).ok()
+    } else {
+        None
+    };
     let about = About {
         version: env!("CARGO_PKG_VERSION"),
         awake: awake.listening.get(),

@@ -244,6 +244,8 @@ pub struct Handheld<'p, K> {
     job: Option<Job>,
     melody: &'static [Note],
     note: u8,
+    /// The page was changed and not looked at since.
+    fresh: bool,
 }
 
 const CLICK: &[Note] = &[(2000, 2)];
@@ -271,6 +273,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             job: None,
             melody: &[],
             note: 0,
+            fresh: true,
         }
     }
 
@@ -390,6 +393,17 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         (*hz > 0).then_some(*hz)
     }
 
+    /// Whether the display is to be drawn anew since this was asked last.
+    pub fn is_new(&mut self) -> bool {
+        let moves = matches!(self.page, Page::Ready | Page::Touching | Page::Again(_));
+        core::mem::take(&mut self.fresh) || moves
+    }
+
+    /// Whether the display names textures, so that [`Handheld::screen`] needs the table.
+    pub fn names_textures(&self) -> bool {
+        matches!(self.page, Page::Verdict(_) | Page::Choose(_))
+    }
+
     /// What the display shows.
     pub fn screen<'s>(&'s self, table: Option<&Table<'s>>, about: &About) -> Screen<'s> {
         let name = |texture: u16| table.and_then(|table| table.name(texture)).unwrap_or("?");
@@ -497,6 +511,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     fn show(&mut self, page: Page) {
         let listened = self.listens();
         self.page = page;
+        self.fresh = true;
         self.shown = 0;
         self.silent = 0;
         if self.listens() && !listened {
@@ -589,6 +604,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 
     fn pressed(&mut self, press: Press) {
+        self.fresh = true;
         match (&mut self.page, press) {
             // nothing to be said while the table is at work
             (Page::Thinking | Page::Saving, _) => return,
