@@ -11,9 +11,7 @@ use embedded_graphics::geometry::{Point, Size};
 use embedded_graphics::mono_font::ascii::{FONT_6X10, FONT_7X13_BOLD, FONT_9X18_BOLD, FONT_10X20};
 use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
 use embedded_graphics::pixelcolor::BinaryColor;
-use embedded_graphics::primitives::{
-    Circle, Line, Primitive as _, PrimitiveStyle, Rectangle, RoundedRectangle, Triangle,
-};
+use embedded_graphics::primitives::Rectangle;
 use embedded_graphics::text::{Alignment, Baseline, Text as Writing, TextStyleBuilder};
 use heapless::{String, Vec};
 
@@ -246,22 +244,39 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
 
     fn fill(&mut self, x: i32, y: i32, width: i32, height: i32, inverted: bool) -> Done<D> {
         let size = Size::new(width.max(0) as u32, height.max(0) as u32);
-        Rectangle::new(Point::new(x, y), size)
-            .into_styled(PrimitiveStyle::with_fill(ink(inverted)))
-            .draw(self.0)
+        let area = Rectangle::new(Point::new(x, y), size);
+        self.0.fill_solid(&area, ink(inverted))
     }
 
-    fn frame(&mut self, x: i32, y: i32, width: u32, height: u32) -> Done<D> {
-        let frame = Rectangle::new(Point::new(x, y), Size::new(width, height));
-        RoundedRectangle::with_equal_corners(frame, Size::new(2, 2))
-            .into_styled(PrimitiveStyle::with_stroke(BinaryColor::On, 1))
-            .draw(self.0)
+    /// A frame one point wide, without its corners.
+    fn frame(&mut self, x: i32, y: i32, width: i32, height: i32) -> Done<D> {
+        for y in [y, y + height - 1] {
+            self.fill(x + 1, y, width - 2, 1, false)?;
+        }
+        for x in [x, x + width - 1] {
+            self.fill(x, y + 1, 1, height - 2, false)?;
+        }
+        Ok(())
     }
 
-    fn line(&mut self, from: (i32, i32), to: (i32, i32)) -> Done<D> {
-        Line::new(Point::new(from.0, from.1), Point::new(to.0, to.1))
-            .into_styled(PrimitiveStyle::with_stroke(BinaryColor::On, 1))
-            .draw(self.0)
+    fn disc(&mut self, x: i32, y: i32, radius: i32, inverted: bool) -> Done<D> {
+        for up in -radius..=radius {
+            let most = radius * radius + radius / 2 - up * up;
+            let half = (0..=radius).rev().find(|half| half * half <= most);
+            if let Some(half) = half {
+                self.fill(x - half, y + up, 2 * half + 1, 1, inverted)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A triangle on its point, or on its base, of this height; twice as wide but for a point.
+    fn triangle(&mut self, x: i32, y: i32, height: i32, on_base: bool) -> Done<D> {
+        for row in 0..height {
+            let half = if on_base { row } else { height - 1 - row };
+            self.fill(x - half, y + row, 2 * half + 1, 1, false)?;
+        }
+        Ok(())
     }
 
     /// Where one is.
@@ -275,9 +290,8 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
     /// What the button does: pressed, and held.
     fn button(&mut self, press: &str, hold: &str) -> Done<D> {
         if !press.is_empty() {
-            Circle::new(Point::new(2, 57), 5)
-                .into_styled(PrimitiveStyle::with_stroke(BinaryColor::On, 1))
-                .draw(self.0)?;
+            self.disc(4, 59, 2, false)?;
+            self.fill(3, 58, 3, 3, true)?;
             self.left(press, 10, 54)?;
         }
         if !hold.is_empty() {
@@ -293,7 +307,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
     fn force(&mut self, force_mn: f32, y: i32) -> Done<D> {
         const INSIDE: i32 = WIDTH - 4;
         let x = |mn: f32| 2 + (INSIDE as f32 * (mn / BAR_MN).clamp(0.0, 1.0)) as i32;
-        self.frame(0, y, WIDTH as u32, 12)?;
+        self.frame(0, y, WIDTH, 12)?;
         self.fill(2, y + 2, x(force_mn) - 2, 8, false)?;
         let (low, high) = (x(*ZONE_MN.start()), x(*ZONE_MN.end()));
         for edge in [low, high] {
@@ -301,7 +315,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
             self.fill(edge - 2, y + 1, 4, 10, true)?;
             self.fill(edge - 1, y - 4, 2, 20, false)?;
         }
-        self.line((low, y - 4), (high, y - 4))
+        self.fill(low, y - 4, high - low, 1, false)
     }
 
     /// The three leading textures.
@@ -309,7 +323,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         for (row, y) in rows.iter().zip((y..).step_by(11)) {
             self.left(&cut(row.name, 11), 0, y)?;
             let p = row.probability.clamp(0.0, 1.0);
-            self.line((69, y + 8), (100, y + 8))?;
+            self.fill(69, y + 8, 32, 1, false)?;
             self.fill(69, y + 2, (32.0 * p) as i32, 7, false)?;
             let at = Point::new(WIDTH, y);
             self.write(&percent(p), at, &FONT_6X10, Alignment::Right, false)?;
@@ -397,10 +411,8 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
         }
         Screen::Thinking { slide } => {
             brush.title("Thinking", &say(format_args!("slide {slide}")))?;
-            for (x, diameter) in [(44, 9), (64, 13), (84, 9)] {
-                Circle::with_center(Point::new(x, 38), diameter)
-                    .into_styled(PrimitiveStyle::with_fill(BinaryColor::On))
-                    .draw(brush.0)?;
+            for (x, radius) in [(44, 4), (64, 6), (84, 4)] {
+                brush.disc(x, 38, radius, false)?;
             }
             Ok(())
         }
@@ -433,9 +445,11 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             brush.title("Learned", "")?;
             brush.headline(name, 16)?;
             // a tick
-            for shift in 0..3 {
-                brush.line((54, 48 + shift), (61, 55 + shift))?;
-                brush.line((61, 55 + shift), (75, 41 + shift))?;
+            for step in 0..=7 {
+                brush.fill(54 + step, 48 + step, 1, 3, false)?;
+            }
+            for step in 0..=14 {
+                brush.fill(61 + step, 55 - step, 1, 3, false)?;
             }
             Ok(())
         }
@@ -452,14 +466,13 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
 fn ready<D: DrawTarget<Color = BinaryColor>>(brush: &mut Brush<'_, D>, textures: u16) -> Done<D> {
     brush.title("Tactus", &say(format_args!("{textures} textures")))?;
     // a finger on a surface
-    let tip = Rectangle::new(Point::new(8, 13), Size::new(20, 30));
-    RoundedRectangle::with_equal_corners(tip, Size::new(10, 12))
-        .into_styled(PrimitiveStyle::with_stroke(BinaryColor::On, 2))
-        .draw(brush.0)?;
-    brush.fill(8, 12, 20, 10, true)?;
-    brush.line((0, 45), (40, 45))?;
-    for x in (0..40).step_by(8) {
-        brush.line((x, 49), (x + 4, 46))?;
+    brush.fill(8, 16, 21, 17, false)?;
+    brush.disc(18, 32, 10, false)?;
+    brush.fill(10, 16, 17, 17, true)?;
+    brush.disc(18, 32, 8, true)?;
+    brush.fill(0, 44, 40, 1, false)?;
+    for (x, step) in (0..40).step_by(8).flat_map(|x| (0..4).map(move |step| (x, step))) {
+        brush.fill(x + step, 49 - step, 1, 1, false)?;
     }
     let at = |y| Point::new(44, y);
     brush.write("Press", at(13), &FONT_10X20, Alignment::Left, false)?;
@@ -476,20 +489,14 @@ fn pace<D: DrawTarget<Color = BinaryColor>>(
         brush.centre("Slide", 12, &FONT_10X20)?;
         return brush.centre("5 cm in 2 s", 31, &FONT_6X10);
     };
-    let end = 4 + (112.0 * progress.clamp(0.0, 1.0)) as i32;
+    let end = 10 + (107.0 * progress.clamp(0.0, 1.0)) as i32;
     brush.fill(0, 26, WIDTH, 3, false)?;
     // centimetres
     for x in (4..=124).step_by(24) {
-        brush.line((x, 29), (x, 33))?;
+        brush.fill(x, 29, 1, 5, false)?;
     }
     // the finger's place
-    Triangle::new(
-        Point::new(end, 24),
-        Point::new(end - 5, 14),
-        Point::new(end + 5, 14),
-    )
-    .into_styled(PrimitiveStyle::with_fill(BinaryColor::On))
-    .draw(brush.0)?;
+    brush.triangle(end, 14, 11, false)?;
     brush.left("on, on", if end > 60 { 4 } else { 84 }, 14)
 }
 
@@ -563,11 +570,9 @@ fn fault<D: DrawTarget<Color = BinaryColor>>(
             return brush.button("go on", "");
         }
     };
-    Triangle::new(Point::new(12, 16), Point::new(2, 35), Point::new(22, 35))
-        .into_styled(PrimitiveStyle::with_stroke(BinaryColor::On, 2))
-        .draw(brush.0)?;
-    brush.fill(12, 22, 2, 7, false)?;
-    brush.fill(12, 31, 2, 2, false)?;
+    brush.triangle(12, 16, 13, true)?;
+    brush.fill(11, 19, 3, 5, true)?;
+    brush.fill(11, 26, 3, 2, true)?;
     let at = Point::new(28, 19);
     brush.write(what, at, &FONT_7X13_BOLD, Alignment::Left, false)?;
     brush.centre(first, 41, &FONT_6X10)?;
@@ -581,7 +586,11 @@ fn about_probe<D: DrawTarget<Color = BinaryColor>>(
     brush.title("About", &say(format_args!("Tactus {}", about.version)))?;
     brush.left("Core awake", 1, 14)?;
     let share = |p: Option<f32>| match p {
-        Some(p) => say(format_args!("{:.1} %", 100.0 * p)),
+        // whole numbers: code to write others takes 9 kB
+        Some(p) => {
+            let tenths = libm::roundf(1000.0 * p) as u32;
+            say(format_args!("{}.{} %", tenths / 10, tenths % 10))
+        }
         None => say(format_args!("-")),
     };
     brush.left("listening", 7, 24)?;
