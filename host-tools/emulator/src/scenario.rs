@@ -1,6 +1,6 @@
 //! Scenarios for the handheld probe: what a person does, and what must be seen, as files in `scenarios/`.
 //!
-//! A scenario is TOML: the texture under the finger, how the hand is kept, and steps, each of which does one thing
+//! A scenario is JSON: the texture under the finger, how the hand is kept, and steps, each of which does one thing
 //! ([`Step`]). The person sees the display and nothing else, as it is decoded from the bytes on the wire.
 
 use std::path::{Path, PathBuf};
@@ -23,8 +23,6 @@ const OVER: &str = "next";
 const REACTION_MS: u64 = 300;
 /// Longest that anything is waited for, s, unless a step says otherwise.
 const PATIENCE_S: f64 = 8.0;
-/// Instructions a second: enough for the firmware, and quicker to run than the chip's 168 million.
-const SPEED: u64 = 84_000_000;
 
 /// A scenario.
 #[derive(Clone, Debug, Deserialize)]
@@ -82,6 +80,11 @@ impl Default for Kept {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Step {
+    /// Nothing: a word to the reader.
+    Note {
+        /// What it says.
+        text: String,
+    },
     /// All of this is on the display within so many seconds.
     See {
         /// Parts of lines.
@@ -189,7 +192,7 @@ pub enum ScenarioError {
         /// Its path.
         path: PathBuf,
         /// Why.
-        source: Box<toml::de::Error>,
+        source: serde_json::Error,
     },
     /// No such texture.
     #[error("no texture {0} in Table 1")]
@@ -224,9 +227,9 @@ impl Scenario {
             path: path.into(),
             source,
         })?;
-        toml::from_str(&text).map_err(|source| ScenarioError::Parse {
+        serde_json::from_str(&text).map_err(|source| ScenarioError::Parse {
             path: path.into(),
-            source: Box::new(source),
+            source,
         })
     }
 
@@ -292,7 +295,6 @@ impl Played<'_> {
         let setup = collection.setup(self.texture, trial);
         let options = Options {
             store,
-            instructions_per_second: SPEED.try_into().expect("it is not 0"),
             ..Options::default()
         };
         let board = Emulator::start(self.elf, setup, options)?;
@@ -355,6 +357,7 @@ impl Played<'_> {
             text.iter().all(|text| display.shows(text))
         };
         match step {
+            Step::Note { .. } => {}
             Step::See { text, within_s } => {
                 if !self.until(*within_s, |display| shows(display, text))? {
                     return Ok(Err(format!("{text:?} is not seen within {within_s} s")));

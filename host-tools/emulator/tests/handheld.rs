@@ -25,7 +25,7 @@ fn play(name: &str) -> Option<(Emulator, Vec<String>)> {
         return None;
     };
     assert!(SCENARIOS.contains(&name));
-    let scenario = Scenario::read(&folder().join(format!("{name}.toml"))).unwrap();
+    let scenario = Scenario::read(&folder().join(format!("{name}.json"))).unwrap();
     let mut board = scenario
         .play(Path::new(&elf), None)
         .unwrap_or_else(|why| panic!("{name}: {why}"));
