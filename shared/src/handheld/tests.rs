@@ -24,12 +24,12 @@ fn table() -> List<u8> {
     fused_of(FEATURES, &[straight(14)], &textures)
 }
 
-/// A slide that feels like one of them; `None`: like none.
+/// A slide that feels like one of them; `None`: like none, as far from each as they are from each other.
 fn slide(texture: Option<usize>) -> Observation {
     let mut features = [0; 14];
     match texture {
         Some(texture) => features[texture] = 12 * 1024,
-        None => features[9] = 25 * 1024,
+        None => features[..4].fill(12 * 1024),
     }
     Observation {
         pressure: Some([features[0], features[1]]),
