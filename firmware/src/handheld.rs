@@ -186,11 +186,7 @@ fn sound(buzzer: &mut Buzzer, tone: Option<u16>) {
 }
 
 #[embassy_executor::task]
-async fn hand(
-    flash: board::Storage,
-    handle: board::Handle,
-    mut words: Consumer<'static, Word>,
-) {
+async fn hand(flash: board::Storage, handle: board::Handle, mut words: Consumer<'static, Word>) {
     static PLAN: StaticCell<Plan> = StaticCell::new();
     static ROOM: ConstStaticCell<[u8; 16 * 1024]> = ConstStaticCell::new([0; 16 * 1024]);
     let plan: &'static Plan = PLAN.init_with(Plan::new);

@@ -190,7 +190,12 @@ pub fn learn(collection: &Collection) -> Result<(Vec<u8>, Vec<u8>), TableError> 
         })
         .collect();
     let (mut names, mut known, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
-    for ((name, &texture), felt) in collection.names().into_iter().zip(&collection.textures).zip(felt) {
+    for ((name, &texture), felt) in collection
+        .names()
+        .into_iter()
+        .zip(&collection.textures)
+        .zip(felt)
+    {
         match felt {
             Ok((good, _)) => {
                 names.push(name);
@@ -231,7 +236,8 @@ mod tests {
                 continue;
             };
             all += 1;
-            let mut judged = (1..=MAX_SLIDES).map(|n| (n, judge::<Plain>(table, &felt[..n]).unwrap().0));
+            let mut judged =
+                (1..=MAX_SLIDES).map(|n| (n, judge::<Plain>(table, &felt[..n]).unwrap().0));
             let (n, judged) = judged.find(|(_, judged)| !judged.open).unwrap();
             made += n;
             let is = judged.leading[0].0 == index;
@@ -239,7 +245,9 @@ mod tests {
             unknown += usize::from(judged.unknown);
             wrong += usize::from(judged.sure && !is);
         }
-        eprintln!("{all} textures: right {right}, unknown {unknown}, sure and wrong {wrong}, slides {made}");
+        eprintln!(
+            "{all} textures: right {right}, unknown {unknown}, sure and wrong {wrong}, slides {made}"
+        );
         [all, right, unknown, wrong, made]
     }
 
@@ -250,7 +258,10 @@ mod tests {
         assert_eq!(left_out, [0u8; 0]);
         let [all, right, _, wrong, made] = explore(&collection, &table);
         assert_eq!(all, 12);
-        assert!(right >= 11 && wrong == 0 && made <= 3 * 12, "{right} {wrong} {made}");
+        assert!(
+            right >= 11 && wrong == 0 && made <= 3 * 12,
+            "{right} {wrong} {made}"
+        );
     }
 
     #[test]
@@ -265,17 +276,29 @@ mod tests {
             .par_iter()
             .map(|&t| (t, slides(collection.setup(t, 0), Manner::default(), 5)))
             .collect();
-        let bad: u32 = felt.iter().filter_map(|(_, r)| r.as_ref().ok()).map(|r| r.1).sum();
+        let bad: u32 = felt
+            .iter()
+            .filter_map(|(_, r)| r.as_ref().ok())
+            .map(|r| r.1)
+            .sum();
         eprintln!("{bad} slides rejected");
         let (table, left_out) = learn(&collection).unwrap();
         eprintln!("not felt: {left_out:?}; {} bytes", table.len());
         explore(&collection, &table);
         // none of another world's textures is known
-        let other = Collection { seed: 2, ..collection };
+        let other = Collection {
+            seed: 2,
+            ..collection
+        };
         let read = Table::read(&table).unwrap();
         for &texture in &other.textures {
-            let Ok((felt, _)) = slides(other.setup(texture, 1), Manner::default(), 5) else { continue };
-            let said: Vec<_> = (1..=MAX_SLIDES).map(|n| judge::<Plain>(read, &felt[..n]).unwrap().0).map(|j| (j.open, j.unknown, j.leading[0].1)).collect();
+            let Ok((felt, _)) = slides(other.setup(texture, 1), Manner::default(), 5) else {
+                continue;
+            };
+            let said: Vec<_> = (1..=MAX_SLIDES)
+                .map(|n| judge::<Plain>(read, &felt[..n]).unwrap().0)
+                .map(|j| (j.open, j.unknown, j.leading[0].1))
+                .collect();
             eprintln!("{texture} {said:?}");
         }
     }

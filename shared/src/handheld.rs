@@ -102,17 +102,14 @@ pub fn judge<K: Kernels>(
         max_slides: MAX_SLIDES as u8,
         open: true,
     };
-    let mut explorer =
-        Explorer::<'_, MAX_TEXTURES, K>::new(table, PropertySet::default(), config)
-            .map_err(JudgeError::Table)?;
+    let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::new(table, PropertySet::default(), config)
+        .map_err(JudgeError::Table)?;
     let action = Action {
         movement: movement(&table).ok_or(JudgeError::Movement)?,
         property: None,
     };
     for slide in slides {
-        explorer
-            .observe(action, slide)
-            .map_err(JudgeError::Slide)?;
+        explorer.observe(action, slide).map_err(JudgeError::Slide)?;
     }
     let best = explorer.best();
     let mut leading: Vec<(u16, f32), LEADING> = Vec::new();
@@ -499,9 +496,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                     let name = table.and_then(|table| table.name(texture));
                     screens::Entry::Known(name.unwrap_or("?"))
                 }
-                Entry::Numbered => {
-                    screens::Entry::Numbered(table.map_or(Name::new(), free_name))
-                }
+                Entry::Numbered => screens::Entry::Numbered(table.map_or(Name::new(), free_name)),
                 Entry::Spell => screens::Entry::Spell,
                 Entry::Nothing => screens::Entry::Nothing,
             })

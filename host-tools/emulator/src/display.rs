@@ -204,7 +204,11 @@ impl Display {
         let (column, page) = self.at;
         self.ram[usize::from(page) * WIDTH + usize::from(column)] = byte;
         let step = |at: u8, (from, to): (u8, u8), most: u8| {
-            if at == to { (from, true) } else { ((at + 1) & most, false) }
+            if at == to {
+                (from, true)
+            } else {
+                ((at + 1) & most, false)
+            }
         };
         match self.mode {
             // along the row, then the next page
@@ -243,9 +247,8 @@ fn is_in(whole: &Picture, part: &Picture, width: usize, height: usize) -> bool {
             (0..width).all(|x| (whole.is_lit(left + x, top + y) != inverted) == part.is_lit(x, y))
         })
     };
-    (0..=WIDTH - width).any(|x| {
-        (0..=HEIGHT - height).any(|y| is_at(x, y, false) || is_at(x, y, true))
-    })
+    (0..=WIDTH - width)
+        .any(|x| (0..=HEIGHT - height).any(|y| is_at(x, y, false) || is_at(x, y, true)))
 }
 
 /// The display's end of I2C1.
@@ -287,7 +290,10 @@ mod tests {
         display.wire(true);
         assert!(!display.start(0x3D, false) && !display.start(ADDRESS, true));
         assert_eq!(display.picture(), None);
-        send(&mut display, &[0x00, 0x8D, 0x14, 0xA1, 0xC8, 0x20, 0x00, 0xAF]);
+        send(
+            &mut display,
+            &[0x00, 0x8D, 0x14, 0xA1, 0xC8, 0x20, 0x00, 0xAF],
+        );
         send(&mut display, &[0x00, 0x21, 0, 127, 0x22, 0, 7]);
         let text = write("Tactus", &FONT_7X13_BOLD);
         send(&mut display, &[&[0x40], &text.bytes()[..500]].concat());

@@ -353,9 +353,8 @@ impl Played<'_> {
     }
 
     fn act(&mut self, step: &Step) -> Done {
-        let shows = |display: &crate::Display, text: &[String]| {
-            text.iter().all(|text| display.shows(text))
-        };
+        let shows =
+            |display: &crate::Display, text: &[String]| text.iter().all(|text| display.shows(text));
         match step {
             Step::Note { .. } => {}
             Step::See { text, within_s } => {

@@ -29,7 +29,12 @@ fn play(name: &str) -> Option<(Emulator, Vec<String>)> {
     let mut board = scenario
         .play(Path::new(&elf), None)
         .unwrap_or_else(|why| panic!("{name}: {why}"));
-    let log: Vec<String> = board.log().unwrap().into_iter().map(|(_, line)| line).collect();
+    let log: Vec<String> = board
+        .log()
+        .unwrap()
+        .into_iter()
+        .map(|(_, line)| line)
+        .collect();
     log.iter().for_each(|line| eprintln!("{line}"));
     assert_eq!(board.resets().unwrap(), []);
     assert_eq!(board.unmapped().unwrap(), [0u64; 0]);
@@ -90,7 +95,9 @@ fn it_sleeps_between_samples_and_when_nobody_wants_any() {
     let Some((_, log)) = play("rest") else { return };
     let shares = |what: &str| -> Vec<f32> {
         let lines = log.iter().filter_map(|line| line.split_once(what));
-        lines.map(|(_, share)| share.trim().parse().unwrap()).collect()
+        lines
+            .map(|(_, share)| share.trim().parse().unwrap())
+            .collect()
     };
     let (listening, resting) = (shares("awake listening:"), shares("awake at rest:"));
     let (Some(listening), Some(resting)) = (listening.last(), resting.last()) else {

@@ -5,9 +5,9 @@
 
 use std::f64::consts::TAU;
 
+use super::TICK_S;
 use super::noise::Noise;
 use super::surface::LENGTH_MM;
-use super::TICK_S;
 
 /// Stream of the seed that hands draw from.
 const STREAM: u64 = 0x4a4d;

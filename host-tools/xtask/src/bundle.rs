@@ -8,8 +8,8 @@ use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{ElfFile, ProgramHeader as _};
 use object::{Endianness, elf};
 
-use crate::firmware::{self, hash, shown};
 use crate::factory::TABLES;
+use crate::firmware::{self, hash, shown};
 use crate::root;
 
 /// Where the chip's flash begins, and how much of it an image has (memory.x).
@@ -250,7 +250,13 @@ mod tests {
     #[test]
     fn a_release_can_be_written_twice_and_leaves_other_files_alone() {
         let folder = tempfile::tempdir().unwrap();
-        let release = || files(Vec::new(), [("factory.tact".to_owned(), b"table".to_vec())].into()).unwrap();
+        let release = || {
+            files(
+                Vec::new(),
+                [("factory.tact".to_owned(), b"table".to_vec())].into(),
+            )
+            .unwrap()
+        };
         let names: Vec<_> = release().into_keys().collect();
         assert_eq!(names, ["FLASHING.md", SUMS, "factory.tact"]);
         write(folder.path(), &release()).unwrap();

@@ -35,9 +35,7 @@ impl Picture {
 
     /// Whether a point is lit; outside, none is.
     pub fn is_lit(&self, x: usize, y: usize) -> bool {
-        let byte = (x < WIDTH)
-            .then(|| self.0.get(y / 8 * WIDTH + x))
-            .flatten();
+        let byte = (x < WIDTH).then(|| self.0.get(y / 8 * WIDTH + x)).flatten();
         byte.is_some_and(|byte| byte >> (y % 8) & 1 == 1)
     }
 }

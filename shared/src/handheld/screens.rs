@@ -471,7 +471,10 @@ fn ready<D: DrawTarget<Color = BinaryColor>>(brush: &mut Brush<'_, D>, textures:
     brush.fill(10, 16, 17, 17, true)?;
     brush.disc(18, 32, 8, true)?;
     brush.fill(0, 44, 40, 1, false)?;
-    for (x, step) in (0..40).step_by(8).flat_map(|x| (0..4).map(move |step| (x, step))) {
+    for (x, step) in (0..40)
+        .step_by(8)
+        .flat_map(|x| (0..4).map(move |step| (x, step)))
+    {
         brush.fill(x + step, 49 - step, 1, 1, false)?;
     }
     let at = |y| Point::new(44, y);
@@ -532,7 +535,13 @@ fn spell<D: DrawTarget<Color = BinaryColor>>(
     wheel: &[Place; WHEEL],
 ) -> Done<D> {
     brush.title("Spell it", "")?;
-    brush.write(text, Point::new(1, 13), &FONT_9X18_BOLD, Alignment::Left, false)?;
+    brush.write(
+        text,
+        Point::new(1, 13),
+        &FONT_9X18_BOLD,
+        Alignment::Left,
+        false,
+    )?;
     let cursor = 1 + 9 * text.chars().count() as i32;
     brush.fill(cursor, 29, 8.min(WIDTH - cursor), 2, false)?;
     for (place, n) in wheel.iter().zip(0..) {

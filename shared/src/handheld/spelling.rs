@@ -125,7 +125,10 @@ mod tests {
         assert_eq!(spelling.text(), "silk");
         assert_eq!(spelling.wheel()[WHEEL / 2], Place::Rub);
         to(&mut spelling, Place::Done);
-        assert_eq!(spelling.take(), Taken::Done(Name::try_from("silk").unwrap()));
+        assert_eq!(
+            spelling.take(),
+            Taken::Done(Name::try_from("silk").unwrap())
+        );
         let mut nothing = Spelling::default();
         to(&mut nothing, Place::Letter(' '));
         assert_eq!(nothing.take(), Taken::Letter);

@@ -3,9 +3,9 @@
 use super::picture::Picture;
 use super::screens::draw;
 use super::*;
-use crate::session::Random;
 use crate::kernels::Plain;
 use crate::pressure::{Channel, Counts};
+use crate::session::Random;
 use crate::table::tests::{fused_of, known, straight};
 use proptest::prelude::*;
 use proptest::strategy::Strategy;

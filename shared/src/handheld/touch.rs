@@ -499,7 +499,11 @@ impl<'p, K: Kernels> Touch<'p, K> {
 
     fn waiting(&mut self, still: u16, sum: f32, begins: u8, lively: f32) -> Option<Event> {
         let mean = sum / f32::from(still.max(1));
-        let begins = if lively > LIVELY * mean { begins + 1 } else { 0 };
+        let begins = if lively > LIVELY * mean {
+            begins + 1
+        } else {
+            0
+        };
         if begins >= BEGINS {
             self.slide.start(COMING_UP..COMING_UP + STEADY);
             self.tenths.clear();

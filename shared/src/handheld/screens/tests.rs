@@ -57,17 +57,29 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
     }
     each("thinking", &Screen::Thinking { slide: 2 });
     let sure = Screen::Verdict {
-        rows: rows(&[row("bath towel", 0.9984), row("felt", 0.0011), row("burlap", 0.0001)]),
+        rows: rows(&[
+            row("bath towel", 0.9984),
+            row("felt", 0.0011),
+            row("burlap", 0.0001),
+        ]),
         sure: true,
     };
     each("verdict", &sure);
     let unsure = Screen::Verdict {
-        rows: rows(&[row("Cardboard", 0.61), row("Copy paper", 0.33), row("Balsa wood", 0.06)]),
+        rows: rows(&[
+            row("Cardboard", 0.61),
+            row("Copy paper", 0.33),
+            row("Balsa wood", 0.06),
+        ]),
         sure: false,
     };
     each("verdict-unsure", &unsure);
     let long = Screen::Verdict {
-        rows: rows(&[row(LONG, 1.0), row("White Art Board, smooth", 0.0), row("1", 0.0)]),
+        rows: rows(&[
+            row(LONG, 1.0),
+            row("White Art Board, smooth", 0.0),
+            row("1", 0.0),
+        ]),
         sure: true,
     };
     each("verdict-long", &long);
@@ -82,25 +94,37 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
         Entry::Spell,
     ])
     .unwrap();
-    each("choose", &Screen::Choose {
-        at: 0,
-        count: 120,
-        entries: entries.clone(),
-    });
+    each(
+        "choose",
+        &Screen::Choose {
+            at: 0,
+            count: 120,
+            entries: entries.clone(),
+        },
+    );
     // the chosen one is the second that is shown
-    each("choose-later", &Screen::Choose {
-        at: 70,
-        count: 120,
-        entries,
-    });
-    each("spell", &Screen::Spell {
-        text: "velve",
-        wheel: wheel(19),
-    });
-    each("spell-full", &Screen::Spell {
-        text: "fourteen chars",
-        wheel: wheel(37),
-    });
+    each(
+        "choose-later",
+        &Screen::Choose {
+            at: 70,
+            count: 120,
+            entries,
+        },
+    );
+    each(
+        "spell",
+        &Screen::Spell {
+            text: "velve",
+            wheel: wheel(19),
+        },
+    );
+    each(
+        "spell-full",
+        &Screen::Spell {
+            text: "fourteen chars",
+            wheel: wheel(37),
+        },
+    );
     each("saving", &Screen::Saving);
     let name = Name::try_from("velvet").unwrap();
     each("taught", &Screen::Taught(Ok(&name)));
@@ -110,7 +134,9 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
     );
     each("fault-silent", &Screen::Fault(&Trouble::Silent));
     each("fault-frozen", &Screen::Fault(&Trouble::Frozen));
-    let memory = Trouble::Memory(crate::session::text("the flash does not keep what was written: its sector is worn out"));
+    let memory = Trouble::Memory(crate::session::text(
+        "the flash does not keep what was written: its sector is worn out",
+    ));
     each("fault-memory", &Screen::Fault(&memory));
     let about = About {
         version: "0.1.0",

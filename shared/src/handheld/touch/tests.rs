@@ -1,9 +1,9 @@
 //! Touches of made-up signals: a finger on a spring, vibrations of noise.
 
 use super::*;
-use crate::session::Random;
 use crate::kernels::Plain;
 use crate::pressure::Counts;
+use crate::session::Random;
 use proptest::prelude::*;
 use std::vec::Vec as List;
 
@@ -84,16 +84,29 @@ fn again(events: &[Event]) -> Option<Again> {
 fn a_good_slide_is_a_slide_and_says_what_was_felt() {
     let slide = with(
         pressed(500.0),
-        std::vec![part(1.6, 520.0, 40.0), part(0.3, 500.0, 0.0), part(0.3, 0.0, 0.0)],
+        std::vec![
+            part(1.6, 520.0, 40.0),
+            part(0.3, 500.0, 0.0),
+            part(0.3, 0.0, 0.0)
+        ],
     );
     let events = feel(&words(&slide));
-    let [Event::Zeroed, Event::Down, Event::Still, Event::Slid(felt), Event::Up] = &events[..]
+    let [
+        Event::Zeroed,
+        Event::Down,
+        Event::Still,
+        Event::Slid(felt),
+        Event::Up,
+    ] = &events[..]
     else {
         panic!("{events:?}");
     };
     // 45 counts of P_DC, in hundreds, in 1024ths
     let [mean, sd] = felt.pressure.unwrap();
-    assert!((mean - (0.52e3 / 11.5 / 100.0 * 1024.0) as i16).abs() < 12, "{mean}");
+    assert!(
+        (mean - (0.52e3 / 11.5 / 100.0 * 1024.0) as i16).abs() < 12,
+        "{mean}"
+    );
     assert!(sd < 10, "{sd}");
     // white noise: the same power in every bin
     let power = f64::from(felt.bands[5]) / 1024.0;
@@ -103,14 +116,30 @@ fn a_good_slide_is_a_slide_and_says_what_was_felt() {
 #[test]
 fn slides_that_are_no_good_say_why() {
     for (why, parts) in [
-        (Again::TooHard, std::vec![part(1.0, 520.0, 40.0), part(0.6, 900.0, 40.0)]),
-        (Again::TooLight, std::vec![part(1.0, 520.0, 40.0), part(0.6, 200.0, 40.0)]),
+        (
+            Again::TooHard,
+            std::vec![part(1.0, 520.0, 40.0), part(0.6, 900.0, 40.0)],
+        ),
+        (
+            Again::TooLight,
+            std::vec![part(1.0, 520.0, 40.0), part(0.6, 200.0, 40.0)],
+        ),
         // it stops, or is lifted
-        (Again::TooShort, std::vec![part(0.9, 520.0, 40.0), part(0.5, 520.0, 0.0)]),
-        (Again::TooShort, std::vec![part(0.9, 520.0, 40.0), part(0.5, 0.0, 0.0)]),
+        (
+            Again::TooShort,
+            std::vec![part(0.9, 520.0, 40.0), part(0.5, 520.0, 0.0)],
+        ),
+        (
+            Again::TooShort,
+            std::vec![part(0.9, 520.0, 40.0), part(0.5, 0.0, 0.0)],
+        ),
         (
             Again::TooUneven,
-            std::vec![part(0.6, 520.0, 100.0), part(0.6, 520.0, 14.0), part(0.6, 520.0, 60.0)],
+            std::vec![
+                part(0.6, 520.0, 100.0),
+                part(0.6, 520.0, 14.0),
+                part(0.6, 520.0, 60.0)
+            ],
         ),
     ] {
         let events = feel(&words(&with(pressed(500.0), parts)));
@@ -153,7 +182,12 @@ fn a_lost_word_spoils_a_slide_and_only_delays_a_press() {
 
 #[test]
 fn only_a_press_in_the_zone_that_is_kept_still_may_slide() {
-    for (mn, rms, may) in [(200.0, 0.0, false), (900.0, 0.0, false), (500.0, 20.0, false), (500.0, 0.0, true)] {
+    for (mn, rms, may) in [
+        (200.0, 0.0, false),
+        (900.0, 0.0, false),
+        (500.0, 20.0, false),
+        (500.0, 0.0, true),
+    ] {
         let parts = std::vec![part(0.4, 0.0, 0.0), part(1.0, mn, rms)];
         let events = feel(&words(&parts));
         assert_eq!(events.contains(&Event::Still), may, "{mn} {rms} {events:?}");
