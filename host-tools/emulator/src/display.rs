@@ -305,9 +305,9 @@ mod tests {
         assert!(!display.shows("Tactus"));
         send(&mut display, &[0x00, 0xA1]);
         assert!(display.shows("Tactus"));
-        assert_eq!(display.unknown(), []);
+        assert_eq!(display.unknown(), [0u8; 0]);
         send(&mut display, &[0x00, 0xFF]);
-        assert_eq!(display.unknown(), [0xFF]);
+        assert_eq!(display.unknown(), [0xFF_u8]);
         display.plug(false);
         assert!(!display.start(ADDRESS, false) && !display.shows("Tactus"));
     }
