@@ -78,7 +78,7 @@ impl Default for Kept {
 
 /// One thing that is done or must be seen.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Step {
     /// Nothing: a word to the reader.
     Note {
