@@ -242,13 +242,17 @@ fn write(text: &str, font: &MonoFont<'_>) -> Picture {
 
 /// Whether that corner of `part` is somewhere in `whole`, inverted or not.
 fn is_in(whole: &Picture, part: &Picture, width: usize, height: usize) -> bool {
-    let is_at = |left: usize, top: usize, inverted: bool| {
+    // headlines begin a row above the glass, with a row of the font that is empty
+    let is_at = |left: usize, rows_above: usize, top: usize, inverted: bool| {
         (0..height).all(|y| {
-            (0..width).all(|x| (whole.is_lit(left + x, top + y) != inverted) == part.is_lit(x, y))
+            (0..width).all(|x| match (top + y).checked_sub(rows_above) {
+                Some(row) => (whole.is_lit(left + x, row) != inverted) == part.is_lit(x, y),
+                None => !part.is_lit(x, y),
+            })
         })
     };
     (0..=WIDTH - width)
-        .any(|x| (0..=HEIGHT - height).any(|y| is_at(x, y, false) || is_at(x, y, true)))
+        .any(|x| (0..=HEIGHT - height + 1).any(|y| is_at(x, 1, y, false) || is_at(x, 1, y, true)))
 }
 
 /// The display's end of I2C1.
