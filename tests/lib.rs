@@ -20,13 +20,19 @@ pub fn data(name: &str) -> Option<PathBuf> {
         "TACTUS_REQUIRE_DATA=1, but there is no folder {}",
         folder.display()
     );
+    skipped(&format!("no folder {}", folder.display()));
+    None
+}
+
+/// Says that this test is skipped, and why: where it is run, and in the file that `TACTUS_SKIP_LOG` names.
+pub fn skipped(why: &str) {
     let test = std::thread::current()
         .name()
         .unwrap_or("unnamed test")
         .to_owned();
-    eprintln!("SKIPPED {test}: no folder {}", folder.display());
+    eprintln!("SKIPPED {test}: {why}");
     if let Some(log) = std::env::var_os("TACTUS_SKIP_LOG") {
-        let line = format!("{test}: no folder {}\n", folder.display());
+        let line = format!("{test}: {why}\n");
         // one write per line, so that parallel tests do not mix
         std::fs::OpenOptions::new()
             .create(true)
@@ -35,5 +41,4 @@ pub fn data(name: &str) -> Option<PathBuf> {
             .and_then(|mut f| f.write_all(line.as_bytes()))
             .expect("the file named by TACTUS_SKIP_LOG can be written");
     }
-    None
 }

@@ -26,6 +26,9 @@ With a folder of recordings, such as ../shared/data/biotac:
   tactus identify --recordings DIR --material 3    a real texture is recognised from its slides
   tactus features --recordings DIR                 what was felt of every slide
   tactus evaluate --recordings DIR                 how often the answers are right, and how sure
+With a probe, or with the emulated board that `cargo xtask emulate` builds:
+  tactus device list                               which port it is at
+  tactus device monitor [--emulated]               what it feels, live
 
 No recordings are shipped. The publisher of the BioTac's has them at
 https://github.com/dexrob/BioTac_slide_20_50; `tactus import` reads them. `tactus simulate` makes some.";
@@ -114,6 +117,36 @@ Try:
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
+    /// Make the paper's whole study on the simulated rig, and report it beside the published numbers
+    #[command(after_help = "\
+pilot     ten textures, 36 movements: which three movements are most useful (figs. 5, 6, 7)
+train     117 textures, three movements: the table, correlations, confusion, wear of the skin (Table 3, figs. 8, 9)
+pairs     eight pairs of similar textures at 99.9 % (Table 4)
+identify  16 textures among 117 at 99 %: cycling, random, Bayesian exploration, fused (Table 5, figs. 3, 4, 10)
+all       all of it
+
+The folder gets report.html, which needs nothing else, every figure as .svg, every table as .csv, the tables in the chip's
+format, and study.json. The same command gives the same files on any number of cores.
+
+Try:
+  tactus study all --out study
+  tactus study identify --seeds 11-20 --out worlds     the same in ten worlds")]
+    Study(Study),
+    /// Work with a probe at its serial port, or with the emulated board
+    #[command(subcommand, after_help = crate::device::EXAMPLES)]
+    Device(crate::device::Device),
+    /// Print completions for a shell
+    #[command(after_help = crate::manual::COMPLETIONS)]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Write the manual pages
+    Man {
+        /// The folder to write; without it the first page is printed
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
     /// Convert recordings into the project's format (.npy files and a CSV manifest)
     Import {
         /// A folder in the layout of data/biotac, or the publisher's folders of CSV files
@@ -142,6 +175,67 @@ pub(crate) enum TableCommand {
         /// The table
         file: PathBuf,
     },
+}
+
+#[derive(Args)]
+pub(crate) struct Study {
+    /// Which part of it
+    #[arg(value_enum)]
+    pub(crate) stage: Stage,
+    /// The folder to write: new, or empty
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Another seed is another world: other textures of the same names, another finger and rig
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Pairs and identification in these worlds, too
+    #[arg(long, value_name = "A-B", value_parser = seeds)]
+    pub(crate) seeds: Option<Seeds>,
+    /// Virtual explorations of each way of exploring; each of the eight pairs has an eighth of them
+    #[arg(long, value_name = "N", default_value_t = 8000, value_parser = clap::value_parser!(u64).range(16..=1_000_000))]
+    pub(crate) simulations: u64,
+    /// How much one touch of a texture differs from the next, 0 to 3: the world's one free knob
+    #[arg(long, value_name = "X", default_value_t = tactus::study::VARIATION, value_parser = variation)]
+    pub(crate) variation: f64,
+    /// How to print the figures; json is what study.json holds
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub(crate) format: Format,
+}
+
+/// Parts of the study.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub(crate) enum Stage {
+    Pilot,
+    Train,
+    Pairs,
+    Identify,
+    All,
+}
+
+/// Worlds from the first to the last.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Seeds(pub(crate) u64, pub(crate) u64);
+
+/// Most worlds of one study: each takes minutes.
+const MAX_WORLDS: u64 = 100;
+
+fn seeds(text: &str) -> Result<Seeds, String> {
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    match (first.parse(), last.parse()) {
+        (Ok(first), Ok(last)) if first <= last && last - first < MAX_WORLDS => {
+            Ok(Seeds(first, last))
+        }
+        _ => Err(format!(
+            "the first and the last seed, at most {MAX_WORLDS} of them, such as 11-20"
+        )),
+    }
+}
+
+fn variation(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(x) if (0.0..=3.0).contains(&x) => Ok(x),
+        _ => Err("a factor from 0 to 3, such as 1".to_owned()),
+    }
 }
 
 #[derive(Args)]
@@ -211,8 +305,8 @@ impl Stop {
 
 fn probability(text: &str) -> Result<f32, String> {
     match text.parse() {
-        Ok(p) if 0.0 < p && p < 1.0 => Ok(p),
-        _ => Err("a probability between 0 and 1, such as 0.99".to_owned()),
+        Ok(p) if 0.0 < p && p <= 1.0 => Ok(p),
+        _ => Err("a probability between 0 and 1, such as 0.99; 1 is never exceeded".to_owned()),
     }
 }
 
@@ -314,4 +408,14 @@ pub(crate) enum Format {
     Text,
     /// One object, for programs
     Json,
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        super::Tactus::command().debug_assert();
+    }
 }

@@ -180,18 +180,38 @@ pub fn record_texture(
     movements: &[Movement],
     trials: u32,
 ) -> Result<Vec<recordings::Slide>, SimError> {
-    let mut rig = SimRig::new(setup);
-    rig.control().calibrate(calibration)?;
-    rig.home()?;
     let mut slides = Vec::new();
+    let mut rig = SimRig::new(setup);
+    record_trials(&mut rig, calibration, movements, trials, |_, slide| {
+        slides.push(recordings::Slide {
+            number: slides.len() as u32 + 1,
+            ..slide
+        });
+        Ok::<_, SimError>(())
+    })?;
+    Ok(slides)
+}
+
+/// Powers up a rig and makes trials of what lies under it, movement by movement; `each` gets every slide.
+///
+/// # Errors
+/// See [`SimError`], and what `each` returns.
+pub fn record_trials<E: From<SimError>>(
+    rig: &mut SimRig,
+    calibration: RigCalibration,
+    movements: &[Movement],
+    trials: u32,
+    mut each: impl FnMut(&mut SimRig, recordings::Slide) -> Result<(), E>,
+) -> Result<(), E> {
+    rig.control()
+        .calibrate(calibration)
+        .map_err(SimError::from)?;
+    rig.home()?;
     for &movement in movements {
         for _ in 0..trials {
             let slide = rig.record(movement)?;
-            slides.push(recordings::Slide {
-                number: slides.len() as u32 + 1,
-                ..slide
-            });
+            each(rig, slide)?;
         }
     }
-    Ok(slides)
+    Ok(())
 }

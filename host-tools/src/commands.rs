@@ -28,6 +28,7 @@ use tactus_core::table::Table;
 
 use crate::cli::{Command, Evaluate, Features, Format, Rows, TableCommand, Tactus};
 use crate::identify::{demonstrate, identify, identify_simulated};
+use crate::study_command::study;
 
 /// Runs what the arguments ask for.
 pub(crate) fn run() -> anyhow::Result<()> {
@@ -103,7 +104,11 @@ pub(crate) fn run() -> anyhow::Result<()> {
             simulate(&folder, &textures, trials, seed, out)?;
         }
         Some(Command::Evaluate(args)) => run_evaluation(&args, out)?,
+        Some(Command::Study(args)) => study(&args, out)?,
         Some(Command::Import { from, to }) => import(&from, &to, out)?,
+        Some(Command::Device(device)) => crate::device::run(&device, out)?,
+        Some(Command::Completions { shell }) => crate::manual::completions(shell, out),
+        Some(Command::Man { out: folder }) => crate::manual::pages(folder.as_deref(), out)?,
     }
     out.flush()?;
     Ok(())
@@ -250,7 +255,7 @@ pub(crate) fn learn_first(
 }
 
 /// An old table is replaced whole or not at all.
-fn write_table(file: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+pub(crate) fn write_table(file: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     let mut part = file.as_os_str().to_owned();
     part.push(".part");
     std::fs::write(&part, bytes)
@@ -472,7 +477,7 @@ fn experiment(args: &Evaluate) -> anyhow::Result<(Experiment, &'static str)> {
     Ok((experiment, protocol))
 }
 
-fn print_json(figures: &impl Serialize, out: &mut impl Write) -> anyhow::Result<()> {
+pub(crate) fn print_json(figures: &impl Serialize, out: &mut impl Write) -> anyhow::Result<()> {
     writeln!(out, "{}", serde_json::to_string_pretty(figures)?)?;
     Ok(())
 }

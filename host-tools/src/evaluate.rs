@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::{self, Config, Explorer, ExplorerError, Strategy};
 use tactus_core::features::PropertySet;
-use tactus_core::table::{Table, TableError};
+use tactus_core::table::{Action, Table, TableError};
 
 use crate::experiment::{Experiment, Run};
 use crate::learn;
@@ -101,7 +101,17 @@ pub enum EvaluateError {
 pub fn play<const N: usize>(
     explorer: &mut Explorer<'_, N>,
     strategy: Strategy,
+    run: Run<'_>,
+) -> Outcome {
+    play_and_tell(explorer, strategy, run, |_, _| ())
+}
+
+/// As [`play`]; `tell` hears of every action and the posterior after it.
+pub fn play_and_tell<const N: usize>(
+    explorer: &mut Explorer<'_, N>,
+    strategy: Strategy,
     mut run: Run<'_>,
+    mut tell: impl FnMut(Action, &[f32]),
 ) -> Outcome {
     explorer.restart();
     let verdict = loop {
@@ -119,6 +129,7 @@ pub fn play<const N: usize>(
         explorer
             .observe(action, &slide)
             .expect("every slide has the properties that the explorer was told of");
+        tell(action, explorer.posterior());
     };
     Outcome {
         unknown: run.unknown,
@@ -148,7 +159,7 @@ pub fn evaluate(
         None
     };
     let shared = match &bytes {
-        Some(bytes) => Some(explorer(bytes, measured, config)?),
+        Some(bytes) => Some(explorer(bytes, measured, config, experiment.candidates())?),
         None => None,
     };
     (0..runs)
@@ -161,7 +172,8 @@ pub fn evaluate(
                     Some(explorer) => play(explorer, config.strategy, run),
                     None => {
                         let bytes = run.learn(config.method)?;
-                        let mut explorer = explorer(&bytes, measured, config)?;
+                        let candidates = experiment.candidates();
+                        let mut explorer = explorer(&bytes, measured, config, candidates)?;
                         play(&mut explorer, config.strategy, run)
                     }
                 };
@@ -172,21 +184,22 @@ pub fn evaluate(
         .collect()
 }
 
-/// An explorer on the heap: it is large, and the threads' stacks are not.
+/// An explorer on the heap: it is large, and the threads' stacks are not. Without `candidates`, all textures are.
 ///
 /// # Errors
 /// The table does not read, or cannot be explored.
 #[inline(never)]
-pub fn explorer(
-    bytes: &[u8],
+pub fn explorer<'b>(
+    bytes: &'b [u8],
     measured: PropertySet,
     config: Config,
-) -> Result<Box<Explorer<'_, MAX_TEXTURES>>, EvaluateError> {
-    Ok(Box::new(Explorer::new(
-        Table::read(bytes)?,
-        measured,
-        config,
-    )?))
+    candidates: Option<&[u16]>,
+) -> Result<Box<Explorer<'b, MAX_TEXTURES>>, EvaluateError> {
+    let table = Table::read(bytes)?;
+    Ok(Box::new(match candidates {
+        Some(candidates) => Explorer::among(table, measured, config, candidates.iter().copied())?,
+        None => Explorer::new(table, measured, config)?,
+    }))
 }
 
 /// Two textures, and how often the first was taken for the second.

@@ -99,6 +99,8 @@ pub struct Experiment {
     pools: Vec<Vec<Pool>>,
     /// Textures that can be the unknown one.
     unknowns: Vec<usize>,
+    /// Textures that the unknown one can be, as far as the explorer knows; all, unless given.
+    candidates: Option<Vec<u16>>,
     /// Training slides per texture and movement.
     train_slides: usize,
     /// Training slides are drawn; otherwise they are the first.
@@ -200,6 +202,7 @@ impl Experiment {
             names,
             movements,
             pools,
+            candidates: None,
             train_slides,
             drawn: protocol != Protocol::Drift,
             measured,
@@ -224,50 +227,66 @@ impl Experiment {
         if set.movements.len() > table::MAX_MOVEMENTS {
             return Err(ExperimentError::Movements(set.movements.len()));
         }
+        let wrap = |sets: &[Vec<Vec<[f32; 3]>>]| -> Vec<Vec<Vec<Observation>>> {
+            let slide = |t: &[f32; 3]| Observation::from(Properties::new(t.map(Some)));
+            let slides = |trials: &Vec<[f32; 3]>| trials.iter().map(slide).collect();
+            sets.iter()
+                .map(|texture| texture.iter().map(slides).collect())
+                .collect()
+        };
         let there = set.train.iter().flatten().map(Vec::len).min().unwrap_or(0);
-        let train_slides = train_slides.unwrap_or(there);
+        Self::collected(
+            set.textures.clone(),
+            Movement::grid().take(set.movements.len()).collect(),
+            wrap(&set.train),
+            wrap(&set.validate),
+            train_slides.unwrap_or(there),
+            seed,
+        )
+    }
+
+    /// Slides that were divided when they were collected: per texture and movement, those to train from, of which the first
+    /// `train_slides` are used, and those to test with. Textures without test slides are never the unknown one. A table holds
+    /// [`table::MAX_MOVEMENTS`] movements.
+    ///
+    /// # Errors
+    /// See [`ExperimentError`].
+    pub fn collected(
+        names: Vec<String>,
+        movements: Vec<Movement>,
+        train: Vec<Vec<Vec<Observation>>>,
+        test: Vec<Vec<Vec<Observation>>>,
+        train_slides: usize,
+        seed: u64,
+    ) -> Result<Self, ExperimentError> {
         if train_slides < 2 {
             return Err(ExperimentError::One(train_slides));
         }
-        let movements: Vec<Movement> = Movement::grid().take(set.movements.len()).collect();
-        if let (true, [texture, ..], [movement, ..]) =
-            (train_slides > there, &set.textures[..], &movements[..])
-        {
-            let (texture, movement) = (texture.clone(), *movement);
-            return Err(ExperimentError::Training {
-                texture,
-                movement,
-                there,
-                wanted: train_slides,
-            });
+        for (texture, row) in names.iter().zip(&train) {
+            let short = |(_, trials): &(_, &Vec<_>)| trials.len() < train_slides;
+            if let Some((&movement, trials)) = movements.iter().zip(row).find(short) {
+                return Err(ExperimentError::Training {
+                    texture: texture.clone(),
+                    movement,
+                    there: trials.len(),
+                    wanted: train_slides,
+                });
+            }
         }
-        let wrap = |trials: &[[f32; 3]]| {
-            trials
-                .iter()
-                .map(|t| Observation::from(Properties::new(t.map(Some))))
-                .collect::<Vec<_>>()
+        let tested = |slides: &Vec<Vec<_>>| slides.iter().all(|trials| !trials.is_empty());
+        let unknowns = (0..names.len()).filter(|&t| tested(&test[t])).collect();
+        let pool = |(train, test)| Pool {
+            train,
+            test: Some(test),
         };
-        let pools = set
-            .train
-            .iter()
-            .zip(&set.validate)
-            .map(|(train, validate)| {
-                let pairs = train.iter().zip(validate);
-                pairs
-                    .map(|(train, test)| Pool {
-                        train: wrap(train),
-                        test: Some(wrap(test)),
-                    })
-                    .collect()
-            });
-        let tested = |validate: &[Vec<[f32; 3]>]| validate.iter().all(|trials| !trials.is_empty());
+        let pools = train.into_iter().zip(test);
+        let pools = pools.map(|(train, test)| train.into_iter().zip(test).map(pool).collect());
         Ok(Self {
-            names: set.textures.clone(),
+            names,
             movements,
             pools: pools.collect(),
-            unknowns: (0..set.textures.len())
-                .filter(|&t| tested(&set.validate[t]))
-                .collect(),
+            unknowns,
+            candidates: None,
             train_slides,
             drawn: false,
             measured: PropertySet::ALL,
@@ -315,6 +334,7 @@ impl Experiment {
             names: set.fabrics.clone(),
             movements: set.movements.clone(),
             pools,
+            candidates: None,
             train_slides,
             drawn: false,
             measured: PropertySet::ALL,
@@ -327,6 +347,21 @@ impl Experiment {
     #[must_use]
     pub fn with_features(self, features: Option<FeatureSet>) -> Self {
         Self { features, ..self }
+    }
+
+    /// The same among a few textures only: one of them is unknown, and the explorer knows that it is one of them.
+    #[must_use]
+    pub fn among(self, textures: &[u16]) -> Self {
+        Self {
+            unknowns: textures.iter().copied().map(usize::from).collect(),
+            candidates: Some(textures.to_vec()),
+            ..self
+        }
+    }
+
+    /// Textures that the unknown one can be; `None` for all.
+    pub fn candidates(&self) -> Option<&[u16]> {
+        self.candidates.as_deref()
     }
 
     /// All slides of a texture in the order of time, by movement: those to learn from, and those after them.

@@ -1,9 +1,10 @@
 //! The PC follows the probe: from the reports of one exploration with streaming on, it computes everything anew with the
 //! same core, and compares.
 
-use tactus_core::explorer::{Config, Explorer, ExplorerError, Method, Strategy};
+use tactus_core::explorer::{Config, Explorer, ExplorerError, Method};
 use tactus_core::features::{Plan, PropertySet, Slide, SlideError};
 use tactus_core::fused::FEATURE_STEPS;
+use tactus_core::session::Random;
 use tactus_core::table::{Action, Contents, Table};
 use tactus_core::wire::{Block, Felt, Identify, MAX_OUTLOOK, MAX_TEXTURES, Promise, Tell};
 
@@ -78,7 +79,7 @@ pub struct Agreement {
     pub posteriors: u32,
     /// Of posterior probabilities, the verdict's too, and of its log-odds.
     pub posterior: f32,
-    /// Choices compared; random ones are not.
+    /// Choices compared.
     pub choices: u32,
     /// Of the promised uncertainties and benefits.
     pub outlook: f32,
@@ -113,7 +114,8 @@ impl Agreement {
 pub struct Follower<'t> {
     explorer: Explorer<'t, MAX_TEXTURES>,
     plan: &'t Plan,
-    random: bool,
+    /// the same numbers as the probe's
+    random: Random,
     /// The slide as far as its samples have come, and the number of the next block; `None` once a block is missing.
     samples: Option<(Slide<'t>, u16)>,
     agreement: Agreement,
@@ -145,7 +147,7 @@ impl<'t> Follower<'t> {
         Ok(Self {
             explorer,
             plan,
-            random: asked.strategy == Strategy::Random,
+            random: Random::new(asked.seed),
             samples: Some((Slide::new(plan), 0)),
             agreement: Agreement::default(),
         })
@@ -226,6 +228,7 @@ impl<'t> Follower<'t> {
 
     fn chosen(&mut self, slide: u8, there: Action, told: &[Promise]) -> Result<(), FollowError> {
         self.samples = Some((Slide::new(self.plan), 0));
+        let random = self.random.next_u32();
         self.in_order(slide)?;
         let outlook = self.explorer.outlook();
         let agreement = &mut self.agreement;
@@ -241,14 +244,12 @@ impl<'t> Follower<'t> {
                 widen(&mut agreement.outlook, apart(here, Some(there)));
             }
         }
-        if !self.random {
-            agreement.choices += 1;
-            let here = self.explorer.choose(&outlook, 0);
-            if here != there {
-                agreement
-                    .other_choices
-                    .push(OtherChoice { slide, there, here });
-            }
+        agreement.choices += 1;
+        let here = self.explorer.choose(&outlook, random);
+        if here != there {
+            agreement
+                .other_choices
+                .push(OtherChoice { slide, there, here });
         }
         Ok(())
     }

@@ -19,3 +19,4 @@ pub mod rows;
 pub mod show;
 pub mod sim;
 pub mod simulated;
+pub mod study;

@@ -128,7 +128,7 @@ fn look(
     movement: u8,
     slide: &Observation,
 ) -> Result<(usize, bool), EvaluateError> {
-    let mut explorer = explorer(bytes, experiment.measured(), config)?;
+    let mut explorer = explorer(bytes, experiment.measured(), config, None)?;
     let action = Action {
         movement,
         property: None,

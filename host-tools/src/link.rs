@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 use tactus_core::rig::calibration::{RigCalibration, RigCalibrationError};
 use tactus_core::table::{Table, TableError};
 use tactus_core::wire::{
-    self, Ask, Forget, Identify, MAX_FRAME, MAX_TEXTURES, Name, PART, PROTOCOL, Receiver, Report,
-    Request, Reset, Status, Tell, TooLong, Train,
+    self, Ask, Forget, FrameError, Identify, MAX_FRAME, MAX_TEXTURES, Name, PART, PROTOCOL,
+    Receiver, Report, Request, Reset, Status, Tell, TooLong, Train,
 };
 
 /// A request that may be made twice is made so often before the line is given up.
@@ -34,7 +34,7 @@ pub enum LinkError {
     },
     /// The other end is of another version.
     #[error(
-        "the probe speaks version {0} of the messages, this program version {PROTOCOL}: flash the firmware of this version"
+        "the probe speaks version {0} of the messages, this program version {PROTOCOL}: flash the firmware of this version, `tactus device flash`"
     )]
     Protocol(u8),
     /// The request was damaged on its way, and nobody but the user may repeat it.
@@ -45,6 +45,11 @@ pub enum LinkError {
         "no answer got through in {MAX_TRIES} tries: check the cable and that both ends have the same baud rate"
     )]
     Disturbed,
+    /// Whole frames come, and none of them is a message that is known here.
+    #[error(
+        "the other end speaks another version of the messages than this program (version {PROTOCOL}): flash the firmware of this version, `tactus device flash`"
+    )]
+    Foreign,
     /// The request is over, and what was asked for was not told.
     #[error(
         "the probe was done without an answer: it was stopped, or the answer was lost; ask again"
@@ -82,6 +87,7 @@ pub struct Session {
     /// number of the report that should come next
     expected: Option<u16>,
     damaged: u64,
+    foreign: u64,
     missing: u64,
 }
 
@@ -106,7 +112,10 @@ impl Session {
         for &byte in bytes {
             match self.receiver.push::<Report>(byte) {
                 None => {}
-                Some(Err(_)) => self.damaged += 1,
+                Some(Err(why)) => {
+                    self.damaged += 1;
+                    self.foreign += u64::from(why == FrameError::Message);
+                }
                 Some(Ok(report)) => {
                     // a probe that boots counts anew
                     if let (Some(expected), false) =
@@ -125,6 +134,11 @@ impl Session {
     /// Frames that were damaged so far.
     pub fn damaged(&self) -> u64 {
         self.damaged
+    }
+
+    /// Of these, frames that are whole and no message known here.
+    pub fn foreign(&self) -> u64 {
+        self.foreign
     }
 
     /// Reports that never came, by the gaps in their numbers; damaged ones are among them.
@@ -221,16 +235,25 @@ impl<E: Errand> Job<E> {
     /// Makes the last request again, if it may be made twice, and says whether: for whoever has heard nothing for long.
     ///
     /// # Errors
-    /// [`LinkError::Disturbed`] after [`MAX_TRIES`].
+    /// [`LinkError::Disturbed`] or [`LinkError::Foreign`] after [`MAX_TRIES`].
     pub fn repeat(&mut self, session: &mut Session, send: &mut Vec<u8>) -> Result<bool, LinkError> {
         let Some(asked) = self.asked.as_mut().filter(|a| may_repeat(&a.ask)) else {
             return Ok(false);
         };
         if asked.ids.len() >= MAX_TRIES.into() {
-            return Err(LinkError::Disturbed);
+            return Err(if session.foreign() > 0 {
+                LinkError::Foreign
+            } else {
+                LinkError::Disturbed
+            });
         }
         asked.ids.push(session.request(asked.ask.clone(), send)?);
         Ok(true)
+    }
+
+    /// The request that is under way.
+    pub fn asking(&self) -> Option<&Ask> {
+        self.asked.as_ref().map(|asked| &asked.ask)
     }
 
     fn last_id(&self) -> Option<u16> {
@@ -672,6 +695,11 @@ pub enum PortError {
     /// The probe says nothing.
     #[error("the probe said nothing for {0:?}: check that it has power and that this is its port")]
     Silent(Duration),
+    /// Bytes come, and none of them is a report.
+    #[error(
+        "{0} bytes came and not one report: this is not the probe's port, or not its baud rate, or another firmware runs there"
+    )]
+    Garbage(u64),
     /// See [`LinkError`].
     #[error(transparent)]
     Link(#[from] LinkError),
@@ -684,6 +712,13 @@ pub struct Port<S> {
     stream: S,
     session: Session,
     patience: Duration,
+    /// to be sent with the next step
+    send: Vec<u8>,
+    /// when something came last, or was waited for from then on
+    heard: Instant,
+    /// bytes that came, and reports
+    bytes: u64,
+    reports: u64,
 }
 
 impl<S: Read + Write> Port<S> {
@@ -693,7 +728,16 @@ impl<S: Read + Write> Port<S> {
             stream,
             session: Session::default(),
             patience,
+            send: Vec::new(),
+            heard: Instant::now(),
+            bytes: 0,
+            reports: 0,
         }
+    }
+
+    /// Silence is taken for a loss after `patience` from now on.
+    pub fn set_patience(&mut self, patience: Duration) {
+        self.patience = patience;
     }
 
     /// What was damaged and lost so far.
@@ -710,44 +754,113 @@ impl<S: Read + Write> Port<S> {
         errand: E,
         mut each: impl FnMut(&Report),
     ) -> Result<E::Outcome, PortError> {
-        let mut send = Vec::new();
-        let mut job = Job::begin(errand, &mut self.session, &mut send)?;
-        let mut bytes = [0; 4096];
-        let mut heard = Instant::now();
+        let mut job = self.begin(errand)?;
         loop {
-            self.stream.write_all(&send)?;
-            self.stream.flush()?;
-            send.clear();
-            match self.stream.read(&mut bytes) {
-                Ok(0) => return Err(PortError::Closed),
-                Ok(n) => {
-                    heard = Instant::now();
-                    let received = bytes.get(..n).unwrap_or_default();
-                    if let Poll::Ready(outcome) =
-                        job.poll(&mut self.session, received, &mut send, &mut each)
-                    {
-                        return Ok(outcome?);
-                    }
-                }
-                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-                Err(e)
-                    if matches!(
-                        e.kind(),
-                        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
-                    ) =>
-                {
-                    if heard.elapsed() >= self.patience {
-                        match job.repeat(&mut self.session, &mut send) {
-                            Ok(true) => heard = Instant::now(),
-                            Ok(false) | Err(LinkError::Disturbed) => {
-                                return Err(PortError::Silent(self.patience));
-                            }
-                            Err(why) => return Err(why.into()),
-                        }
-                    }
-                }
-                Err(e) => return Err(e.into()),
+            if let Poll::Ready(outcome) = self.step(&mut job, &mut each)? {
+                return Ok(outcome);
             }
+        }
+    }
+
+    /// Begins an errand, for whoever has something else to do between its [steps](Port::step).
+    ///
+    /// # Errors
+    /// See [`PortError`].
+    pub fn begin<E: Errand>(&mut self, errand: E) -> Result<Job<E>, PortError> {
+        self.heard = Instant::now();
+        Ok(Job::begin(errand, &mut self.session, &mut self.send)?)
+    }
+
+    /// Goes on with an errand: sends what is due, and reads once. Not to be called again once it is ready.
+    ///
+    /// # Errors
+    /// See [`PortError`].
+    pub fn step<E: Errand>(
+        &mut self,
+        job: &mut Job<E>,
+        mut each: impl FnMut(&Report),
+    ) -> Result<Poll<E::Outcome>, PortError> {
+        let mut bytes = [0; 4096];
+        let received = self.exchange(&mut bytes)?;
+        if !received.is_empty() {
+            let reports = &mut self.reports;
+            let polled = job.poll(&mut self.session, received, &mut self.send, |report| {
+                *reports += 1;
+                each(report);
+            });
+            return match polled {
+                Poll::Ready(Err(LinkError::Disturbed)) if self.reports == 0 => {
+                    Err(PortError::Garbage(self.bytes))
+                }
+                Poll::Ready(outcome) => Ok(Poll::Ready(outcome?)),
+                Poll::Pending => Ok(Poll::Pending),
+            };
+        }
+        if self.heard.elapsed() >= self.patience {
+            match job.repeat(&mut self.session, &mut self.send) {
+                Ok(true) => self.heard = Instant::now(),
+                Ok(false) | Err(LinkError::Disturbed) if self.bytes > 0 && self.reports == 0 => {
+                    return Err(PortError::Garbage(self.bytes));
+                }
+                Ok(false) => return Err(PortError::Silent(self.patience)),
+                Err(LinkError::Disturbed) => {
+                    return Err(PortError::Silent(self.patience * MAX_TRIES.into()));
+                }
+                Err(why) => return Err(why.into()),
+            }
+        }
+        Ok(Poll::Pending)
+    }
+
+    /// Makes a request beside the errand under way, or without one; its answer is among the reports.
+    ///
+    /// # Errors
+    /// See [`PortError`].
+    pub fn ask(&mut self, ask: Ask) -> Result<(), PortError> {
+        self.session
+            .request(ask, &mut self.send)
+            .map_err(LinkError::from)?;
+        Ok(())
+    }
+
+    /// Sends what is due, and reads once, while there is no errand.
+    ///
+    /// # Errors
+    /// See [`PortError`].
+    pub fn listen(&mut self, each: impl FnMut(&Report)) -> Result<(), PortError> {
+        let mut bytes = [0; 4096];
+        let received = self.exchange(&mut bytes)?;
+        let reports = self.session.receive(received);
+        self.reports += reports.len() as u64;
+        reports.iter().for_each(each);
+        Ok(())
+    }
+
+    /// Sends what is due and reads what has come, which may be nothing.
+    fn exchange<'b>(&mut self, bytes: &'b mut [u8]) -> Result<&'b [u8], PortError> {
+        if !self.send.is_empty() {
+            self.stream.write_all(&self.send)?;
+            self.stream.flush()?;
+            self.send.clear();
+        }
+        match self.stream.read(bytes) {
+            Ok(0) => Err(PortError::Closed),
+            Ok(n) => {
+                self.heard = Instant::now();
+                self.bytes += n as u64;
+                Ok(bytes.get(..n).unwrap_or_default())
+            }
+            Err(e)
+                if matches!(
+                    e.kind(),
+                    io::ErrorKind::WouldBlock
+                        | io::ErrorKind::TimedOut
+                        | io::ErrorKind::Interrupted
+                ) =>
+            {
+                Ok(&[])
+            }
+            Err(e) => Err(e.into()),
         }
     }
 }

@@ -2,9 +2,15 @@
 
 mod cli;
 mod commands;
+mod device;
 mod identify;
+mod manual;
+mod study_command;
 
 use std::process::ExitCode;
+
+/// As a shell has it for Ctrl-C: 128 and the number of SIGINT.
+const INTERRUPTED: u8 = 130;
 
 fn main() -> ExitCode {
     match commands::run() {
@@ -13,7 +19,10 @@ fn main() -> ExitCode {
         Err(why) if is_broken_pipe(&why) => ExitCode::SUCCESS,
         Err(why) => {
             eprintln!("error: {why:#}");
-            ExitCode::FAILURE
+            match why.downcast_ref::<device::BenchError>() {
+                Some(why) if why.is_interrupt() => ExitCode::from(INTERRUPTED),
+                _ => ExitCode::FAILURE,
+            }
         }
     }
 }

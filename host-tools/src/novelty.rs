@@ -66,7 +66,7 @@ fn visit(
     left_out: usize,
 ) -> Result<[bool; SLIDES], EvaluateError> {
     let bytes = run.learn_without(config.method, left_out)?;
-    let mut explorer = explorer(&bytes, experiment.measured(), config)?;
+    let mut explorer = explorer(&bytes, experiment.measured(), config, None)?;
     let mut flagged = [false; SLIDES];
     for flag in &mut flagged {
         let outlook = explorer.outlook();

@@ -7,6 +7,7 @@ use tactus_core::features::{Properties, Property};
 use tactus_core::fused::white;
 use tactus_core::rig::Event;
 use tactus_core::table::{Action, Contents, Table};
+use tactus_core::wire::Tell;
 
 const BAR: usize = 24;
 /// Most candidates listed after a slide.
@@ -119,6 +120,60 @@ impl<'t, W: Write> Show<'t, W> {
         self.out.flush()
     }
 
+    /// Shows what a probe says of an exploration, up to its answer; anything else shows nothing.
+    ///
+    /// # Errors
+    /// A failure to write.
+    pub fn tell(&mut self, tell: &Tell) -> io::Result<()> {
+        match tell {
+            Tell::Chosen {
+                action, outlook, ..
+            } => {
+                let outlook: Vec<Outlook> = outlook
+                    .iter()
+                    .map(|promise| Outlook {
+                        action: promise.action,
+                        uncertainty: promise.uncertainty,
+                        benefit: promise.benefit,
+                    })
+                    .collect();
+                self.chosen(*action, &outlook)
+            }
+            Tell::Felt {
+                action,
+                felt,
+                posterior,
+                ..
+            } => self.felt(
+                *action,
+                &felt.properties(),
+                felt.roughness_is_bound,
+                posterior,
+            ),
+            Tell::Rejected { why, .. } => self.line(&format!("  rejected: {why}")),
+            Tell::Fault(fault) => self.line(&format!("  fault: {fault}")),
+            Tell::Verdict {
+                texture,
+                probability,
+                sure,
+                unknown,
+                log_odds,
+                slides,
+                ..
+            } => {
+                let verdict = Verdict {
+                    texture: *texture,
+                    probability: *probability,
+                    sure: *sure,
+                    unknown: *unknown,
+                    log_odds: *log_odds,
+                };
+                self.answer(verdict, *slides)
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// What an action looks at: "fineness", "all features".
     fn looked_at(&self, action: Action) -> &'static str {
         match (action.property, self.table.contents()) {
@@ -128,8 +183,8 @@ impl<'t, W: Write> Show<'t, W> {
         }
     }
 
-    /// "fineness at 0.80 N, 25.0 mm/s"
-    fn name(&self, action: Action) -> String {
+    /// An action in words: "fineness at 0.80 N, 25.0 mm/s".
+    pub fn name(&self, action: Action) -> String {
         let looked_at = self.looked_at(action);
         match self.table.movement(action.movement) {
             Some(movement) => format!("{looked_at} at {movement}"),
@@ -212,7 +267,19 @@ impl<'t, W: Write> Show<'t, W> {
     /// # Errors
     /// The first failure to write.
     pub fn finish(mut self, verdict: Verdict, slides: u8, truth: &str) -> io::Result<()> {
-        self.failed?;
+        std::mem::replace(&mut self.failed, Ok(()))?;
+        self.answer(verdict, slides)?;
+        let name = self.table.name(verdict.texture).unwrap_or("?");
+        let is_known = self.table.find(truth).is_some();
+        if (verdict.unknown && !is_known) || (!verdict.unknown && name == truth) {
+            writeln!(self.out, "Right.")
+        } else {
+            writeln!(self.out, "Wrong: it was {truth}.")
+        }
+    }
+
+    /// Shows the answer.
+    fn answer(&mut self, verdict: Verdict, slides: u8) -> io::Result<()> {
         let name = self.table.name(verdict.texture).unwrap_or("?");
         let p = verdict.probability * 100.0;
         let slides = format!("{slides} slide{}", if slides == 1 { "" } else { "s" });
@@ -224,20 +291,14 @@ impl<'t, W: Write> Show<'t, W> {
                 self.out,
                 "\nIt is not one of the {} textures I know{odds} after {slides}; it is most like {name}.",
                 self.table.textures()
-            )?;
+            )
         } else if verdict.sure {
-            writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}.")?;
+            writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}.")
         } else {
             writeln!(
                 self.out,
                 "\nNot sure after {slides}; most likely {name}, {p:.1} %."
-            )?;
-        }
-        let is_known = self.table.find(truth).is_some();
-        if (verdict.unknown && !is_known) || (!verdict.unknown && name == truth) {
-            writeln!(self.out, "Right.")
-        } else {
-            writeln!(self.out, "Wrong: it was {truth}.")
+            )
         }
     }
 }

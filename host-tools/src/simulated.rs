@@ -21,6 +21,7 @@ use tactus_core::rig::{MAX_REJECTED, Rig};
 use tactus_core::sensor::PressureSensor as _;
 
 use crate::recordings::{self, Background};
+use crate::sim::Conditions;
 use crate::sim::world::{Setup, World};
 
 const TICK_NS: u64 = 1_000_000;
@@ -100,6 +101,15 @@ impl SimRig {
 
     /// As [`SimRig::new`], with a guard switched off: for tests.
     pub fn unguarded(setup: Setup, unguarded: Unguarded) -> Self {
+        Self::of(World::new(setup), setup.trial_seed, unguarded)
+    }
+
+    /// As [`SimRig::unguarded`], in a world under these conditions.
+    pub fn under(setup: Setup, conditions: Conditions, unguarded: Unguarded) -> Self {
+        Self::of(World::under(setup, conditions), setup.trial_seed, unguarded)
+    }
+
+    fn of(world: World, seed: u64, unguarded: Unguarded) -> Self {
         let calibration = RigCalibration {
             pressure: Calibration::PAPER,
             unloaded_a: (0.037, 0.0),
@@ -108,9 +118,9 @@ impl SimRig {
             serial: [0; 16],
         };
         Self {
-            world: World::new(setup),
+            world,
             control: Control::new(StageConstants::REFERENCE, calibration, unguarded),
-            random: ChaCha8Rng::seed_from_u64(setup.trial_seed),
+            random: ChaCha8Rng::seed_from_u64(seed),
             now_ns: 0,
             slot: 0,
             words: Vec::new(),

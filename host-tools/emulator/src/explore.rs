@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context as _, bail};
 use indicatif::ProgressBar;
 use tactus::show::Show;
-use tactus_core::explorer::{Outlook, Verdict};
+use tactus_core::explorer::Verdict;
 use tactus_core::table::Table;
 use tactus_core::wire::{Identify, Phase, Report, Tell};
 use tactus_emulator::lessons::RECORDED_LIMITS;
@@ -99,36 +99,15 @@ pub(crate) fn explore(cli: &Cli, chosen: &Chosen, sha256: &str) -> anyhow::Resul
                 return;
             }
             let shown = bar.suspend(|| match tell {
-                Tell::Chosen {
-                    action, outlook, ..
-                } => {
-                    let outlook: Vec<Outlook> = outlook
-                        .iter()
-                        .map(|promise| Outlook {
-                            action: promise.action,
-                            uncertainty: promise.uncertainty,
-                            benefit: promise.benefit,
-                        })
-                        .collect();
-                    show.chosen(*action, &outlook)
-                }
-                Tell::Felt {
-                    action,
-                    felt,
-                    posterior,
-                    ..
-                } => show.line(&pressed(&forces)).and_then(|()| {
-                    let properties = felt.properties();
-                    show.felt(*action, &properties, felt.roughness_is_bound, posterior)
-                }),
                 // from here on the force is about the still finger's
                 Tell::Phase(Phase::Pressing) => {
                     forces.clear();
                     Ok(())
                 }
-                Tell::Rejected { why, .. } => show.line(&format!("  rejected: {why}")),
-                Tell::Fault(fault) => show.line(&format!("  fault: {fault}")),
-                _ => Ok(()),
+                // shown at the end, with whether it is right
+                Tell::Verdict { .. } => Ok(()),
+                Tell::Felt { .. } => show.line(&pressed(&forces)).and_then(|()| show.tell(tell)),
+                _ => show.tell(tell),
             });
             if failed.is_ok() {
                 failed = shown;

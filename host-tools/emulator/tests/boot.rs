@@ -1,22 +1,16 @@
 //! The real ELF on the board.
 
-use std::path::PathBuf;
-
 use tactus_core::wire::{Ask, Phase, Tell};
 use tactus_emulator::talk::Talk;
 use tactus_emulator::{Emulator, Options, Output, Setup};
 
-/// The firmware's ELF, which `cargo xtask emulate` names; without it these tests have nothing to run.
-fn elf() -> Option<PathBuf> {
-    std::env::var_os("TACTUS_ELF").map(PathBuf::from)
-}
+mod common;
+
+use common::elf;
 
 #[test]
 fn the_firmware_boots_and_uses_only_what_is_modelled() {
-    let Some(elf) = elf() else {
-        eprintln!("skipped: TACTUS_ELF is not set");
-        return;
-    };
+    let Some(elf) = elf() else { return };
     let mut emulator = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
     let began = std::time::Instant::now();
     emulator.run_ms(1000).unwrap();
@@ -35,10 +29,7 @@ fn the_firmware_boots_and_uses_only_what_is_modelled() {
 
 #[test]
 fn code_that_is_broken_on_purpose_hangs_until_the_watchdog_resets_the_chip() {
-    let Some(elf) = elf() else {
-        eprintln!("skipped: TACTUS_ELF is not set");
-        return;
-    };
+    let Some(elf) = elf() else { return };
     let mut emulator = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
     emulator.run_ms(150).unwrap();
     assert_eq!(emulator.resets().unwrap(), []);
@@ -55,10 +46,7 @@ fn code_that_is_broken_on_purpose_hangs_until_the_watchdog_resets_the_chip() {
 /// The words that a board without the debug probe's 8 MHz says, and whether it works all the same.
 #[test]
 fn a_board_without_the_probes_clock_runs_by_its_own() {
-    let Some(elf) = elf() else {
-        eprintln!("skipped: TACTUS_ELF is not set");
-        return;
-    };
+    let Some(elf) = elf() else { return };
     for clock in [true, false] {
         let options = Options {
             clock,
@@ -88,10 +76,7 @@ fn a_board_without_the_probes_clock_runs_by_its_own() {
 /// Whatever becomes of the start-up, the watchdog is there.
 #[test]
 fn a_start_up_that_hangs_is_ended_by_the_watchdog() {
-    let Some(elf) = elf() else {
-        eprintln!("skipped: TACTUS_ELF is not set");
-        return;
-    };
+    let Some(elf) = elf() else { return };
     let mut emulator = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
     // where embassy waits for the PLL, without end
     let (address, _) = emulator.symbol("rcc8__version8init_pll").unwrap();
@@ -105,10 +90,7 @@ fn a_start_up_that_hangs_is_ended_by_the_watchdog() {
 /// A flash that never says that it is ready keeps neither the finger down nor the rest of the rig from working.
 #[test]
 fn a_store_that_does_not_open_does_not_keep_the_finger_down() {
-    let Some(elf) = elf() else {
-        eprintln!("skipped: TACTUS_ELF is not set");
-        return;
-    };
+    let Some(elf) = elf() else { return };
     // a power cut while a page was erased: the store goes on with it when it is opened
     let mut store = vec![0xFF; 64 << 10];
     store[0xBFF0..0xBFF4].copy_from_slice(b"eras");

@@ -1,6 +1,5 @@
 //! Explorations by the real ELF, judged by the rig's truth, and what it keeps of what it was told and taught.
 
-use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
@@ -10,35 +9,15 @@ use tactus::evaluate::Method;
 use tactus::link::{Question, ReadTable};
 use tactus_core::table::Table;
 use tactus_core::wire::{Identify, Report, Tell, Train};
+use tactus_emulator::Setup;
 use tactus_emulator::campaign;
 use tactus_emulator::exploration::explore;
 use tactus_emulator::lessons::{self, Known, Unknown};
 use tactus_emulator::talk::{PATIENCE_S, Talk};
-use tactus_emulator::{Options, Setup};
 
-/// The firmware's ELF, which `cargo xtask test` names; without it these tests have nothing to run.
-fn elf() -> Option<PathBuf> {
-    let elf = std::env::var_os("TACTUS_ELF").map(PathBuf::from);
-    if elf.is_none() {
-        assert!(
-            std::env::var("TACTUS_REQUIRE_ELF").as_deref() != Ok("1"),
-            "TACTUS_REQUIRE_ELF=1, but TACTUS_ELF is not set"
-        );
-        eprintln!("skipped: TACTUS_ELF is not set (run `cargo xtask test`)");
-    }
-    elf
-}
+mod common;
 
-/// A board that has homed.
-fn ready(elf: &Path, unknown: &Unknown, store: Option<Vec<u8>>) -> Talk {
-    let options = Options {
-        store,
-        ..Options::default()
-    };
-    let mut talk = Talk::new(unknown.start(elf, options).unwrap());
-    assert_eq!(talk.ready(|_, _| ()).unwrap(), None);
-    talk
-}
+use common::{boot, elf};
 
 /// A simulated world of six textures.
 fn world() -> &'static (Collection, Known) {
@@ -86,7 +65,7 @@ fn two_textures_that_change_places_change_the_verdicts() {
                     setup,
                     ..lessons::mounted(collection, texture, 1)
                 };
-                let mut talk = ready(elf, &unknown, None);
+                let mut talk = boot(elf, &unknown, None);
                 talk.teach(&known.calibration, &known.table, |_, _| ())
                     .unwrap();
                 let asked = identify(&pair, 0.999);
@@ -141,7 +120,7 @@ fn a_texture_taught_on_the_probe_is_kept() {
     let name = "Taught here";
     let new = (1..=117).find(|number| !collection.textures.contains(number));
     let unknown = lessons::mounted(collection, new.unwrap(), 1);
-    let mut talk = ready(&elf, &unknown, None);
+    let mut talk = boot(&elf, &unknown, None);
     talk.teach(&known.calibration, &known.table, |_, _| ())
         .unwrap();
     let before = Table::read(&known.table).unwrap();
@@ -175,7 +154,7 @@ fn a_texture_taught_on_the_probe_is_kept() {
     };
     let taught = check(&mut talk);
     let store = talk.board().store().unwrap();
-    let mut again = ready(&elf, &unknown, Some(store));
+    let mut again = boot(&elf, &unknown, Some(store));
     assert_eq!(check(&mut again), taught);
 }
 
@@ -184,7 +163,7 @@ fn a_corrupt_table_gives_way_to_the_factorys_until_another_comes() {
     let Some(elf) = elf() else { return };
     let (collection, known) = world();
     let unknown = lessons::mounted(collection, 47, 1);
-    let mut talk = ready(&elf, &unknown, None);
+    let mut talk = boot(&elf, &unknown, None);
     talk.teach(&known.calibration, &known.table, |_, _| ())
         .unwrap();
     assert!(!status(&mut talk).factory);
@@ -200,7 +179,7 @@ fn a_corrupt_table_gives_way_to_the_factorys_until_another_comes() {
         let byte = at + random.random_range(0..known.table.len());
         store[byte] ^= 1 << random.random_range(0..8);
     }
-    let mut talk = ready(&elf, &unknown, Some(store));
+    let mut talk = boot(&elf, &unknown, Some(store));
     let factory = status(&mut talk);
     assert!(factory.factory && factory.textures > 0, "{factory:?}");
     assert_eq!(talk.board().resets().unwrap(), []);
@@ -220,7 +199,7 @@ fn garbage_on_the_line_is_told_and_believed_by_nobody() {
     let Some(elf) = elf() else { return };
     let (collection, known) = world();
     let unknown = lessons::mounted(collection, collection.textures[3], 2);
-    let mut talk = ready(&elf, &unknown, None);
+    let mut talk = boot(&elf, &unknown, None);
     talk.teach(&known.calibration, &known.table, |_, _| ())
         .unwrap();
     let mut random = ChaCha8Rng::seed_from_u64(20);

@@ -1,8 +1,6 @@
 //! Faults of the rig and of the firmware itself, from seeded instants, on the emulated board: judged by the pins and by the
 //! world behind them, not by what the firmware says of itself.
 
-use std::path::PathBuf;
-
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus::sim::encoder::Cut;
@@ -11,14 +9,9 @@ use tactus_core::wire::{Ask, Identify, MAX_FRAME, Phase, Request, Reset, Tell, e
 use tactus_emulator::talk::{Talk, TalkError};
 use tactus_emulator::{Emulator, Fault, Options, Output, Setup};
 
-/// The firmware's ELF, which `cargo xtask test` names; without it these tests have nothing to run.
-fn elf() -> Option<PathBuf> {
-    let elf = std::env::var_os("TACTUS_ELF").map(PathBuf::from);
-    if elf.is_none() {
-        eprintln!("skipped: TACTUS_ELF is not set (run `cargo xtask test`)");
-    }
-    elf
-}
+mod common;
+
+use common::elf;
 
 /// Unused flash.
 const NOWHERE: u64 = 0x080F_FF00;
@@ -510,7 +503,7 @@ fn check(name: &str) {
         talk.board().run_ms(200).unwrap();
         talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
     }
-    talk.ask(Ask::Calibrate, 80.0, |_, _| ()).unwrap();
+    talk.ask(identify(1), 80.0, |_, _| ()).unwrap();
 }
 
 /// A flash that never says that it is done: the session waits for it, and everything else works.

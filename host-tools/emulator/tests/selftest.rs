@@ -2,10 +2,12 @@
 //!
 //! TACTUS_SELFTEST_ELF names the ELF, which `cargo xtask build` makes; without it there is nothing to run.
 
-use std::path::PathBuf;
-
 use tactus::sim::encoder::Cut;
 use tactus_emulator::{Emulator, Fault, Options, Output, ResetCause, Setup};
+
+mod common;
+
+use common::elf_of;
 
 /// How a run of the self-test ended.
 struct Run {
@@ -27,10 +29,7 @@ impl Run {
 
 /// Runs the self-test with these faults from these times on, ns.
 fn run(faults: &[(u64, Fault)]) -> Option<Run> {
-    let Some(elf) = std::env::var_os("TACTUS_SELFTEST_ELF").map(PathBuf::from) else {
-        eprintln!("skipped: TACTUS_SELFTEST_ELF is not set");
-        return None;
-    };
+    let elf = elf_of("TACTUS_SELFTEST_ELF")?;
     let options = Options {
         trace_s: 60,
         ..Options::default()

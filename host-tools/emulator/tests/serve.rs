@@ -9,6 +9,10 @@ use tactus::link::{LinkError, Port, PortError, Question, ReadTable};
 use tactus_core::table::Table;
 use tactus_core::wire::Status;
 
+mod common;
+
+use common::elf;
+
 /// Ends the emulator, however the test ends.
 struct Running(Child);
 
@@ -21,10 +25,7 @@ impl Drop for Running {
 
 #[test]
 fn the_probe_answers_on_the_tcp_port() {
-    let Some(elf) = std::env::var_os("TACTUS_ELF") else {
-        eprintln!("skipped: TACTUS_ELF is not set");
-        return;
-    };
+    let Some(elf) = elf() else { return };
     let child = Command::new(env!("CARGO_BIN_EXE_tactus-emulator"))
         .arg("--elf")
         .arg(elf)

@@ -1,12 +1,14 @@
 //! The store of the real firmware, over many writes: its pages turn in time, and it loses nothing.
 
-use std::path::PathBuf;
-
 use tactus_core::pressure::Calibration;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::{Ask, Phase, Tell, Train};
 use tactus_emulator::talk::{Talk, TalkError};
 use tactus_emulator::{Emulator, Options, Setup};
+
+mod common;
+
+use common::elf;
 
 /// The tasks of thread mode are taken for hung after 2 s: half of it is the most that a write may keep them.
 const LONGEST_MS: u64 = 1000;
@@ -34,10 +36,7 @@ fn boot(elf: &std::path::Path, store: Option<Vec<u8>>) -> Talk {
 
 #[test]
 fn pages_turn_in_time_and_nothing_is_lost() {
-    let Some(elf) = std::env::var_os("TACTUS_ELF").map(PathBuf::from) else {
-        eprintln!("skipped: TACTUS_ELF is not set");
-        return;
-    };
+    let Some(elf) = elf() else { return };
     let mut talk = boot(&elf, None);
     // a calibration takes 84 bytes of a page of 16 KB: two pages and some
     let mut longest_ms = (0, 0);

@@ -1,7 +1,7 @@
 //! What the real ELF learns on the go: from teaching, from the host's answers, and by itself; asked over the link, judged by
 //! the texture that really lies under the finger.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::OnceLock;
 
 use tactus::collection::Collection;
@@ -9,10 +9,13 @@ use tactus::link::{Found, Question, ReadTable};
 use tactus_core::explorer::Method;
 use tactus_core::table::{Table, Tally};
 use tactus_core::wire::{Forget, Identify, Name, Status, Tell, Train};
-use tactus_emulator::Options;
 use tactus_emulator::exploration::{Exploration, explore};
 use tactus_emulator::lessons::{self, Known, Unknown};
 use tactus_emulator::talk::{PATIENCE_S, Talk, TalkError};
+
+mod common;
+
+use common::{boot, elf};
 
 /// A texture that the table does not have.
 const NEW: u8 = 31;
@@ -20,18 +23,6 @@ const NEW: u8 = 31;
 const OLD: u8 = 47;
 /// Longest exploration or training, virtual seconds.
 const LONG_S: f64 = 300.0;
-
-fn elf() -> Option<PathBuf> {
-    let elf = std::env::var_os("TACTUS_ELF").map(PathBuf::from);
-    if elf.is_none() {
-        assert!(
-            std::env::var("TACTUS_REQUIRE_ELF").as_deref() != Ok("1"),
-            "TACTUS_REQUIRE_ELF=1, but TACTUS_ELF is not set"
-        );
-        eprintln!("skipped: TACTUS_ELF is not set (run `cargo xtask test`)");
-    }
-    elf
-}
 
 /// A simulated world of eight textures without [`NEW`].
 fn world() -> &'static (Collection, Known) {
@@ -52,17 +43,6 @@ fn world() -> &'static (Collection, Known) {
 /// A trial of a texture that nothing was learned from.
 fn under(texture: u8, trial: u64) -> Unknown {
     lessons::mounted(&world().0, texture, trial)
-}
-
-/// A board that has homed.
-fn boot(elf: &Path, unknown: &Unknown, store: Option<Vec<u8>>) -> Talk {
-    let options = Options {
-        store,
-        ..Options::default()
-    };
-    let mut talk = Talk::new(unknown.start(elf, options).unwrap());
-    assert_eq!(talk.ready(|_, _| ()).unwrap(), None);
-    talk
 }
 
 /// A board that was given the world's table.

@@ -1,6 +1,7 @@
 use std::cell::RefCell;
 use std::sync::OnceLock;
 
+use tactus_core::explorer::Strategy;
 use tactus_core::features;
 use tactus_core::kernels::Kernels;
 use tactus_core::movement::Movement;

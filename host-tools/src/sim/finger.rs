@@ -10,7 +10,8 @@ mod vibration;
 use super::noise::Noise;
 use super::played::{PlayCounts, Playback, Played};
 use super::surface::Surface;
-use super::{TICK_S, TRIAL_VARIATION};
+use super::textures::Texture;
+use super::{Conditions, TICK_S};
 use amplifier::Amplifiers;
 use skin::Skin;
 use vibration::Vibrations;
@@ -21,7 +22,7 @@ pub use skin::N_PER_COUNT;
 /// Pressure of the fluid for each newton on the skin, Pa/N: a P_DC count (PAPER: 36.96 Pa) is 11.5 mN (PAPER fig. 3).
 pub const PA_PER_N: f64 = PDC_PA_PER_COUNT / N_PER_COUNT;
 
-/// Deviations of the contact's state, drawn at every touch and multiplied by [`TRIAL_VARIATION`]; all chosen.
+/// Deviations of the contact's state, drawn at every touch and multiplied by [`Conditions::variation`]; all chosen.
 mod touch {
     /// Of ln(friction) at rest: moisture, dust, how the skin has landed.
     pub(super) const FRICTION: f64 = 0.02;
@@ -59,6 +60,18 @@ const SKIN_LIFE_J: f64 = 200.0;
 /// 12.6 mW times the coefficient of friction, wear little; those it avoided for wear are above 20 mW).
 const WEAR_POWER_MW: f64 = 25.0;
 
+/// Wear in a second of sliding with this power.
+fn wear_per_s(power_mw: f64) -> f64 {
+    let excess = power_mw / WEAR_POWER_MW;
+    1e-3 * power_mw / SKIN_LIFE_J * (1.0 + excess * excess)
+}
+
+/// Wear that sliding over a texture takes, for each mm: what [`Finger::wear`] will grow by, but for the variation of touches.
+pub fn wear_per_mm(texture: &Texture, force_n: f64, speed_mm_s: f64) -> f64 {
+    let power_mw = texture.mean_friction(speed_mm_s, force_n) * force_n * speed_mm_s;
+    wear_per_s(power_mw) / speed_mm_s
+}
+
 /// What the finger touches and how it moves.
 #[derive(Clone, Copy)]
 pub struct Contact<'a> {
@@ -87,6 +100,7 @@ struct Touch {
 /// A BioTac.
 pub struct Finger {
     noise: Noise,
+    variation: f64,
     skin: Skin,
     vibrations: Vibrations,
     amplifiers: Amplifiers,
@@ -107,8 +121,14 @@ pub struct Finger {
 impl Finger {
     /// A finger with a new skin.
     pub fn new(seed: u64) -> Self {
+        Self::under(seed, Conditions::default())
+    }
+
+    /// A finger under other conditions than the usual ones.
+    pub fn under(seed: u64, conditions: Conditions) -> Self {
         let mut noise = Noise::new(seed, 500);
         Self {
+            variation: conditions.variation,
             skin: Skin::default(),
             vibrations: Vibrations::default(),
             amplifiers: Amplifiers::new(&mut noise),
@@ -118,7 +138,7 @@ impl Finger {
             look_again: 0,
             slipping: false,
             shear_n: 0.0,
-            wear: 0.0,
+            wear: conditions.wear.clamp(0.0, 1.0),
             playback: None,
             noise,
         }
@@ -206,9 +226,7 @@ impl Finger {
 
         let sliding = if self.slipping { speed } else { 0.0 };
         let power_mw = self.shear_n.abs() * sliding;
-        let excess = power_mw / WEAR_POWER_MW;
-        self.wear =
-            (self.wear + 1e-3 * power_mw * TICK_S / SKIN_LIFE_J * (1.0 + excess * excess)).min(1.0);
+        self.wear = (self.wear + wear_per_s(power_mw) * TICK_S).min(1.0);
 
         self.vibrations
             .sliding_pa(surface, contact.x_mm, sliding, self.shear_n.abs(), white)
@@ -216,7 +234,7 @@ impl Finger {
 
     /// Draws the state of a new contact.
     fn land(&mut self) -> Touch {
-        let mut draw = || TRIAL_VARIATION * self.noise.normal();
+        let mut draw = || self.variation * self.noise.normal();
         let touch = Touch {
             friction: draw(),
             adhesion: draw(),

@@ -2,7 +2,6 @@
 
 use std::f64::consts::TAU;
 
-use super::TRIAL_VARIATION;
 use super::noise::Noise;
 use super::textures::Texture;
 
@@ -31,6 +30,20 @@ pub const FRICTION_AT: (f64, f64) = (0.5, 25.1);
 /// Lowest load and speed of the friction law, N and mm/s (chosen: below them it stays as it is there).
 const FRICTION_FROM: (f64, f64) = (0.01, 0.5);
 
+impl Texture {
+    /// Coefficient of kinetic friction of the skin, mean over a sample: see [`Surface::friction`].
+    pub(super) fn mean_friction(&self, speed_mm_s: f64, load_n: f64) -> f64 {
+        self.friction * self.law(speed_mm_s, load_n)
+    }
+
+    /// Friction relative to that at [`FRICTION_AT`].
+    fn law(&self, speed_mm_s: f64, load_n: f64) -> f64 {
+        let load = (load_n.max(FRICTION_FROM.0) / FRICTION_AT.0).ln();
+        let speed = (speed_mm_s.abs().max(FRICTION_FROM.1) / FRICTION_AT.1).ln();
+        (self.friction_load * load + self.friction_speed * speed).exp()
+    }
+}
+
 /// One sample of a texture, 75 mm long in the direction of the slide.
 #[derive(Clone, Debug)]
 pub struct Surface {
@@ -48,10 +61,10 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Cuts a sample of `texture`.
-    pub fn new(texture: &Texture, seed: u64) -> Self {
+    /// Cuts a sample of `texture`, as heterogeneous as [`Conditions::variation`](super::Conditions::variation) has it.
+    pub fn new(texture: &Texture, seed: u64, variation: f64) -> Self {
         let mut noise = Noise::new(seed, 1000 + u64::from(texture.number));
-        let deviation = TRIAL_VARIATION * texture.heterogeneity;
+        let deviation = variation * texture.heterogeneity;
         let amplitude = wandering(&mut noise, deviation);
         // friction varies less than heights do: chosen
         let friction = wandering(&mut noise, 0.4 * deviation);
@@ -104,10 +117,7 @@ impl Surface {
 
     /// Coefficient of kinetic friction of the skin at `x_mm`, sliding at `speed_mm_s` under `load_n`: a power law of both.
     pub fn friction(&self, x_mm: f64, speed_mm_s: f64, load_n: f64) -> f64 {
-        let load = (load_n.max(FRICTION_FROM.0) / FRICTION_AT.0).ln();
-        let speed = (speed_mm_s.abs().max(FRICTION_FROM.1) / FRICTION_AT.1).ln();
-        let law = self.texture.friction_load * load + self.texture.friction_speed * speed;
-        self.texture.friction * slow(&self.friction, x_mm) * law.exp()
+        self.texture.friction * slow(&self.friction, x_mm) * self.texture.law(speed_mm_s, load_n)
     }
 
     /// Thickness of the sample, mm.

@@ -10,6 +10,7 @@
 //!
 //! A world is its [`Setup`] and its inputs: the same give the same words, on any thread.
 
+use super::Conditions;
 use super::encoder::{Edge, Encoder};
 use super::faults::{Fault, Faults, Miso};
 use super::finger::{Contact, Finger};
@@ -96,6 +97,7 @@ pub struct NotLifted {
 /// The rig.
 pub struct World {
     setup: Setup,
+    variation: f64,
     now_ns: u64,
     ticks: u64,
     tick_began_ns: u64,
@@ -128,12 +130,18 @@ impl World {
 
     /// A rig just powered up: no current in either motor, the finger in the air.
     pub fn new(setup: Setup) -> Self {
+        Self::under(setup, Conditions::default())
+    }
+
+    /// The same under other conditions than the usual ones.
+    pub fn under(setup: Setup, conditions: Conditions) -> Self {
         let mut trial = Noise::new(setup.trial_seed, 0x3071d);
         // the finger draws its landings and its noise from one seed: another trial, other ones
         let finger_noise = setup.finger_seed.rotate_left(32) ^ trial.uniform().to_bits();
         let [tip_mm, stage_mm] = Self::POWER_UP_MM.map(|(low, high)| trial.between(low, high));
         let mut world = Self {
             setup,
+            variation: conditions.variation,
             now_ns: 0,
             ticks: 0,
             tick_began_ns: 0,
@@ -141,8 +149,8 @@ impl World {
             lever: Lever::new(tip_mm, setup.world_seed, setup.trial_seed),
             stage: Stage::new(stage_mm, setup.world_seed, setup.trial_seed),
             encoder: Encoder::new(stage_mm, setup.keep_edges),
-            surface: sample(setup.texture, setup.world_seed),
-            finger: Finger::new(finger_noise),
+            surface: sample(setup.texture, setup.world_seed, conditions.variation),
+            finger: Finger::under(finger_noise, conditions),
             sensor: SensorPeer::new(setup.finger_seed),
             selected: None,
             miso: Miso::new(setup.trial_seed),
@@ -284,7 +292,7 @@ impl World {
     /// # Errors
     /// If the finger touches the one that is there or would touch the other, which may be thicker by millimetres.
     pub fn place(&mut self, texture: u8) -> Result<(), NotLifted> {
-        let surface = sample(texture, self.setup.world_seed);
+        let surface = sample(texture, self.setup.world_seed, self.variation);
         self.must_be_over(&self.surface)?;
         self.must_be_over(&surface)?;
         self.setup.texture = texture;
@@ -482,8 +490,8 @@ impl World {
 }
 
 /// The sample of a texture that belongs to a world.
-fn sample(texture: u8, world_seed: u64) -> Surface {
-    Surface::new(&textures::draw(texture, world_seed), world_seed)
+fn sample(texture: u8, world_seed: u64, variation: f64) -> Surface {
+    Surface::new(&textures::draw(texture, world_seed), world_seed, variation)
 }
 
 #[cfg(test)]

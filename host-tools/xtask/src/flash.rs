@@ -1,13 +1,12 @@
 //! The firmware onto a board, by probe-rs.
 use std::ffi::OsString;
-use std::io::ErrorKind;
 use std::path::Path;
 use std::process::Command;
 
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::Result;
 use clap::Args;
 
-use crate::{firmware, run};
+use crate::{cargo, firmware, run};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -32,9 +31,6 @@ pub(crate) struct Options {
 }
 
 pub(crate) fn flash(options: &Options) -> Result<()> {
-    if !options.dry_run {
-        look_for_probe("probe-rs")?;
-    }
     let wanted = if options.self_test {
         "tactus-selftest"
     } else {
@@ -42,14 +38,7 @@ pub(crate) fn flash(options: &Options) -> Result<()> {
     };
     let elves = firmware::elves()?;
     let elf = firmware::image(&elves, wanted)?;
-    for mut command in commands(options.self_test, elf, &options.options) {
-        println!("{}", line(&command));
-        if !options.dry_run {
-            run(&mut command).context(
-                "is the board's USB plug at CN1, and no other program at its probe? LD4 must be lit",
-            )?;
-        }
-    }
+    run(&mut command(options, elf))?;
     if !options.self_test && !options.dry_run {
         println!(
             "The firmware runs. Its log: probe-rs attach --chip {CHIP} {}",
@@ -59,47 +48,23 @@ pub(crate) fn flash(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// What is run: the self-test stays attached for its report, the rig is left alone.
-fn commands(self_test: bool, elf: &Path, options: &[OsString]) -> Vec<Command> {
-    let probe_rs = |verb: &str| {
-        let mut command = Command::new("probe-rs");
-        command.args([verb, "--chip", CHIP]).args(options);
-        command
-    };
-    if self_test {
-        let mut test = probe_rs("run");
-        test.arg(elf);
-        vec![test]
-    } else {
-        let mut download = probe_rs("download");
-        download.arg("--verify").arg(elf);
-        vec![download, probe_rs("reset")]
+/// `tactus device flash` does it: the self-test stays attached for its report, the rig is left alone.
+fn command(options: &Options, elf: &Path) -> Command {
+    let mut tactus = cargo();
+    tactus.args(["run", "--quiet", "--release", "--package", "tactus", "--"]);
+    tactus.args(["device", "flash"]).arg(elf);
+    for (flag, wanted) in [
+        ("--attach", options.self_test),
+        ("--dry-run", options.dry_run),
+    ] {
+        if wanted {
+            tactus.arg(flag);
+        }
     }
-}
-
-fn line(command: &Command) -> String {
-    let words = std::iter::once(command.get_program()).chain(command.get_args());
-    let words: Vec<_> = words.map(|word| word.to_string_lossy()).collect();
-    words.join(" ")
-}
-
-/// That the program is here, and a probe.
-fn look_for_probe(program: &str) -> Result<()> {
-    let list = match Command::new(program).arg("list").output() {
-        Err(e) if e.kind() == ErrorKind::NotFound => bail!(
-            "probe-rs is not installed. Install it with
-  cargo install probe-rs-tools --locked
-or as https://probe.rs/docs/getting-started/installation says. Without it: cargo xtask bundle, and see FLASHING.md there"
-        ),
-        list => list.context("probe-rs does not start")?,
-    };
-    let said = String::from_utf8_lossy(&list.stdout);
-    ensure!(
-        list.status.success() && !said.contains("No debug probes"),
-        "no debug probe found. Plug the board's USB socket CN1 into this PC. On Linux the user needs the right to use it:
-https://probe.rs/docs/getting-started/probe-setup (udev rules)"
-    );
-    Ok(())
+    if !options.options.is_empty() {
+        tactus.arg("--").args(&options.options);
+    }
+    tactus
 }
 
 #[cfg(test)]
@@ -107,32 +72,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_rig_is_written_and_started_and_the_self_test_is_watched() {
-        let lines = |self_test, options: &[OsString]| {
-            let commands = commands(self_test, Path::new("t/elf"), options);
-            commands.iter().map(line).collect::<Vec<_>>()
+    fn the_rig_is_left_alone_and_the_self_test_is_watched() {
+        let line = |self_test, options: &[&str]| {
+            let options = Options {
+                self_test,
+                dry_run: false,
+                options: options.iter().map(OsString::from).collect(),
+            };
+            let command = command(&options, Path::new("t/elf"));
+            let words: Vec<_> = command.get_args().map(|w| w.to_string_lossy()).collect();
+            words.join(" ")
         };
+        let run = "run --quiet --release --package tactus -- device flash t/elf";
+        assert_eq!(line(false, &[]), run);
         assert_eq!(
-            lines(false, &[]),
-            [
-                "probe-rs download --chip STM32F429ZITx --verify t/elf",
-                "probe-rs reset --chip STM32F429ZITx"
-            ]
+            line(true, &["--probe", "0483:374b"]),
+            format!("{run} --attach -- --probe 0483:374b")
         );
-        let probe = ["--probe".into(), "0483:374b".into()];
-        assert_eq!(
-            lines(true, &probe),
-            ["probe-rs run --chip STM32F429ZITx --probe 0483:374b t/elf"]
-        );
-    }
-
-    #[test]
-    fn what_is_missing_is_said_with_what_to_do() {
-        let error = |program| look_for_probe(program).unwrap_err().to_string();
-        assert!(error("no-such-probe-rs").contains("cargo install probe-rs-tools"));
-        // a program that lists nothing and fails
-        assert!(error("false").contains("no debug probe found"));
-        assert!(look_for_probe("true").is_ok());
     }
 
     #[test]

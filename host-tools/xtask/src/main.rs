@@ -4,6 +4,7 @@ mod emulate;
 mod factory;
 mod firmware;
 mod flash;
+mod fuzz;
 mod size;
 mod test;
 mod toolchain;
@@ -102,6 +103,15 @@ enum Cli {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
+    /// Attack the parsers with libFuzzer: frames, tables, the store's flash, recordings
+    ///
+    /// Runs on stable Rust; wants a C++ compiler. What breaks a target is kept in target/fuzz and named: copy it to
+    /// tests/fuzz/corpus, where every later run begins with it.
+    #[command(after_help = "Examples:
+  cargo xtask fuzz                       ten minutes each
+  cargo xtask fuzz table --seconds 60    one of them
+  cargo xtask fuzz --planted             with a bug in each, which must be found")]
+    Fuzz(fuzz::Options),
     /// Time the core's functions on this PC
     ///
     /// Good for comparing two versions on one PC. What the chip needs is another matter.
@@ -125,6 +135,7 @@ fn main() -> ExitCode {
         Cli::Bundle { out } => bundle::bundle(&out),
         Cli::Factory { check } => factory::factory(check),
         Cli::Mutants { options } => mutants(options),
+        Cli::Fuzz(options) => fuzz::fuzz(&options),
         Cli::Bench { options } => bench(options),
     };
     match done {

@@ -6,7 +6,12 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo, emulate, firmware, has_subcommand, run as run_command, target};
+use crate::{cargo, emulate, firmware, fuzz, has_subcommand, run as run_command, target};
+
+/// How long each parser is attacked ...
+const FUZZ_S: u64 = 20;
+/// ... and how long the bugs that are there on purpose may stay hidden.
+const PLANTED_S: u64 = 60;
 
 /// How a step ended.
 enum Outcome {
@@ -57,8 +62,12 @@ pub(crate) fn run(quick: bool) -> ExitCode {
         announce_and_run(doc.env("RUSTDOCFLAGS", "-Dwarnings"))
     }));
     if quick {
-        steps.extend(["firmware", "emulator"].map(|name| skipped(name, "--quick")));
+        steps.extend(["fuzz", "firmware", "emulator"].map(|name| skipped(name, "--quick")));
     } else {
+        steps.push(step("fuzz", || {
+            fuzz::fuzz(&fuzz::Options::all(FUZZ_S, false))?;
+            fuzz::fuzz(&fuzz::Options::all(PLANTED_S, true))
+        }));
         let mut elves = None;
         steps.push(step("firmware", || {
             println!("\n== cargo xtask build");

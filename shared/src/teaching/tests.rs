@@ -86,6 +86,27 @@ fn recipe(mut mean: f64, mut n: f64, slides: u8, z: i16) -> (f64, f64) {
     (mean, n)
 }
 
+fn taught(name: &str, slides: u8, itself: bool) -> Tell {
+    let name = Name::try_from(name).unwrap();
+    Tell::Taught {
+        name,
+        slides,
+        itself,
+    }
+}
+
+/// What is known of these textures is the same to the bit, and from whom.
+fn same(new: &Table<'_>, old: &Table<'_>, textures: &[u16]) {
+    for &texture in textures {
+        assert_eq!(new.tally(texture), old.tally(texture));
+        assert_eq!(new.number(texture), old.number(texture));
+        for movement in 0..3 {
+            let of = |table: &Table<'_>| table.whitened(texture, movement);
+            assert_eq!(of(new), of(old));
+        }
+    }
+}
+
 #[test]
 fn without_anything_learned_the_table_in_force_is_the_stored_one() {
     let bytes = base();
@@ -143,16 +164,7 @@ fn it_learns_by_itself_by_the_recipe() {
                 (*mean, counts[at]) = recipe(*mean, before, count, z);
             }
         }
-        let name = Name::try_from("t2").unwrap();
-        let itself = true;
-        assert_eq!(
-            told,
-            Some(Tell::Taught {
-                name,
-                slides,
-                itself
-            })
-        );
+        assert_eq!(told, Some(taught("t2", slides, true)));
         total += slides;
         let table = Table::read(&force).unwrap();
         for movement in 0..3 {
@@ -169,15 +181,7 @@ fn it_learns_by_itself_by_the_recipe() {
         let tally = table.tally(2);
         assert_eq!((tally.factory, tally.user, tally.itself), (15, 0, total));
         assert_eq!(table.lineage(), old.crc());
-        for texture in [0, 1, 3] {
-            assert_eq!(table.tally(texture), old.tally(texture));
-            for movement in 0..3 {
-                assert_eq!(
-                    table.whitened(texture, movement),
-                    old.whitened(texture, movement)
-                );
-            }
-        }
+        same(&table, &old, &[0, 1, 3]);
         // and so it is after a reset
         store = again(store);
         assert_eq!(in_force(&mut store), table.as_bytes());
@@ -247,12 +251,7 @@ fn an_answer_teaches_a_known_texture() {
     // the most probable one was another
     let visit = visited(&force, 3, &felt);
     let told = block_on(answer(&visit, "t1", &old, &mut store, &mut force)).unwrap();
-    let taught = Tell::Taught {
-        name: Name::try_from("t1").unwrap(),
-        slides: 4,
-        itself: false,
-    };
-    assert_eq!(told, taught);
+    assert_eq!(told, taught("t1", 4, false));
     let mut store = again(store);
     let new = stored(&mut store);
     let new = Table::read(&new).unwrap();
@@ -277,15 +276,7 @@ fn an_answer_teaches_a_known_texture() {
     }
     let tally = new.tally(1);
     assert_eq!((tally.factory, tally.user, tally.itself), (15, 4, 0));
-    for texture in [0, 2, 3] {
-        assert_eq!(new.tally(texture), old.tally(texture));
-        for movement in 0..3 {
-            assert_eq!(
-                new.whitened(texture, movement),
-                old.whitened(texture, movement)
-            );
-        }
-    }
+    same(&new, &old, &[0, 2, 3]);
     // what it had learned by itself goes the same way, and is still in force
     let force = in_force(&mut store);
     let force = Table::read(&force).unwrap();
@@ -313,12 +304,7 @@ fn an_answer_teaches_a_new_texture() {
     let felt = [(0, 3, [700, -701, 5]), (2, 1, [-3, 4, 9000])];
     let visit = visited(&force, 3, &felt);
     let told = block_on(answer(&visit, "elm", &old, &mut store, &mut force)).unwrap();
-    let taught = Tell::Taught {
-        name: Name::try_from("elm").unwrap(),
-        slides: 4,
-        itself: false,
-    };
-    assert_eq!(told, taught);
+    assert_eq!(told, taught("elm", 4, false));
     let mut store = again(store);
     let new = stored(&mut store);
     assert_eq!(in_force(&mut store), new, "nothing is left of the other");
@@ -339,16 +325,7 @@ fn an_answer_teaches_a_new_texture() {
     assert_eq!(new.whitened(4, 1), Whitened::default());
     let tally = new.tally(4);
     assert_eq!((tally.factory, tally.user, tally.itself), (0, 4, 0));
-    for texture in 0..4 {
-        assert_eq!(new.tally(texture), old.tally(texture));
-        assert_eq!(new.number(texture), old.number(texture));
-        for movement in 0..3 {
-            assert_eq!(
-                new.whitened(texture, movement),
-                old.whitened(texture, movement)
-            );
-        }
-    }
+    same(&new, &old, &[0, 1, 2, 3]);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use crate::sim::finger::{Contact, Finger};
 use crate::sim::noise::Noise;
 use crate::sim::surface::Surface;
 use crate::sim::textures::draw;
-use crate::sim::{TICK_S, TICKS_PER_S};
+use crate::sim::{TICK_S, TICKS_PER_S, TRIAL_VARIATION};
 
 /// Samples of P_AC a second.
 pub(super) const RATE: f64 = 2200.0;
@@ -144,7 +144,7 @@ impl Slide {
 
 /// A new sample of a texture of world `seed`.
 pub(super) fn sample(number: u8, seed: u64) -> Surface {
-    Surface::new(&draw(number, seed), seed)
+    Surface::new(&draw(number, seed), seed, TRIAL_VARIATION)
 }
 
 /// Power of each bin, counts^2, averaged over Hann sections that overlap by half; they add up to the signal's variance.

@@ -1,6 +1,7 @@
 //! Textures and their samples.
 
 use super::bench::{band, deviation, line, mean, sample, slide, spectrum};
+use crate::sim::TRIAL_VARIATION;
 use crate::sim::finger::Finger;
 use crate::sim::surface::Surface;
 use crate::sim::textures::{Group, TEXTURES, Weave, draw};
@@ -80,7 +81,7 @@ fn every_texture_of_every_world_is_one_that_could_be() {
 fn a_profile_has_the_heights_and_the_periods_of_its_texture() {
     let mut texture = draw(20, 1);
     texture.heterogeneity = 0.0;
-    let surface = Surface::new(&texture, 3);
+    let surface = Surface::new(&texture, 3, TRIAL_VARIATION);
     let heights: Vec<f64> = (0..7500)
         .map(|i| surface.height_um(0.01 * f64::from(i)))
         .collect();
@@ -151,7 +152,7 @@ fn gratings_give_lines_at_v_over_lambda_and_its_harmonics() {
         wavelength_mm: 1.3,
         ..texture.weave.unwrap()
     });
-    let surface = Surface::new(&texture, 1);
+    let surface = Surface::new(&texture, 1, TRIAL_VARIATION);
     let mut finger = Finger::new(1);
     for speed in [25.1, 39.8, 63.1] {
         let slide = slide(&mut finger, &surface, 0.2, speed, 1);

@@ -280,7 +280,8 @@ fn samples_and_skins_are_changed_with_the_finger_lifted() {
     bench.world.replace_skin().unwrap();
     let [thick, thin] = [true, false].map(|thick| {
         let over = bench.world.truth().tip_mm - 0.1;
-        let fits = |number: &u8| sample(*number, 1).thickness_mm() < over;
+        let fits =
+            |number: &u8| sample(*number, 1, crate::sim::TRIAL_VARIATION).thickness_mm() < over;
         (1..=117).find(|number| fits(number) != thick).unwrap()
     });
     assert!(

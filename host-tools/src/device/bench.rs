@@ -1,0 +1,442 @@
+//! A probe that somebody works with: its line, the log of what is said, and Ctrl-C, which leaves the rig lifted and stopped.
+
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::task::Poll;
+use std::time::{Duration, Instant};
+
+use tactus::link::{Errand, Job, LinkError, Port, PortError, Question, ReadTable};
+use tactus_core::rig::guard::Fault;
+use tactus_core::table::{Table, TableError};
+use tactus_core::wire::{Ask, Phase, Report, Status, Tell};
+
+use super::log::Log;
+use super::port::{Emulator, Line, OpenError, Where};
+
+/// A probe that says nothing for so long is taken for gone: its longest silence is an erase of its flash, 2 s.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Whether anybody is there is known sooner: a status is told at once.
+const GREETING: Duration = Duration::from_secs(1);
+/// An emulated board may go slower than real time.
+const EMULATED: Duration = Duration::from_secs(30);
+/// A probe opens its store within 10 s of its start.
+const BOOTING: Duration = Duration::from_secs(90);
+/// Longest way up, and some: 10 mm at 2 mm/s.
+const LIFTING: Duration = Duration::from_secs(30);
+/// A faulted rig tells where it is 20 times a second until it is at rest.
+const AT_REST: Duration = Duration::from_millis(500);
+
+/// What went wrong at the bench, and what to do.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum BenchError {
+    /// There is no line.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// The line, or what the probe said.
+    #[error("{name}: {why}{}", after(.why, *.moving))]
+    Port {
+        /// The port.
+        name: String,
+        /// What is wrong.
+        why: PortError,
+        /// Something that moves was asked for and not over.
+        moving: bool,
+    },
+    /// Ctrl-C.
+    #[error("stopped: the finger is lifted and the stage stands")]
+    Stopped,
+    /// Ctrl-C, and the fault is that the lever does not find its top.
+    #[error("stopped, but the lever is not home: the finger may still be down. Lift it by hand")]
+    NotHome,
+    /// Ctrl-C twice, or the probe did not answer.
+    #[error(
+        "the probe has not said that the finger is lifted: it may still be down. Look at the rig; its emergency stop lifts it"
+    )]
+    NotLifted,
+    /// The probe holds a table that is none.
+    #[error("the probe's table cannot be read: {0}")]
+    Table(#[from] TableError),
+    /// The log cannot be written.
+    #[error("{}: {why}; the rig was stopped and lifted", path.display())]
+    Log {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        why: io::Error,
+    },
+    /// What is shown cannot be written.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}
+
+fn after(why: &PortError, moving: bool) -> &'static str {
+    match why {
+        PortError::Link(_) => "",
+        _ if moving => {
+            ".\nThe rig was moving: the probe goes on and lifts the finger at the end. To stop it now, press its emergency stop"
+        }
+        _ => "",
+    }
+}
+
+impl BenchError {
+    /// Whether the user had it stopped: what a shell takes for Ctrl-C.
+    pub(crate) fn is_interrupt(&self) -> bool {
+        matches!(self, Self::Stopped | Self::NotHome | Self::NotLifted)
+    }
+}
+
+/// Ctrl-C, a closed terminal, `kill`: seen when somebody looks.
+#[derive(Clone, Default)]
+pub(crate) struct Interrupt(Arc<AtomicBool>);
+
+impl Interrupt {
+    /// From now on they do not end the program by themselves.
+    pub(crate) fn catch() -> io::Result<Self> {
+        let interrupt = Self::default();
+        use signal_hook::consts::{SIGINT, SIGTERM};
+        #[cfg(unix)]
+        let signals = [SIGINT, SIGTERM, signal_hook::consts::SIGHUP];
+        #[cfg(not(unix))]
+        let signals = [SIGINT, SIGTERM];
+        for signal in signals {
+            signal_hook::flag::register(signal, Arc::clone(&interrupt.0))?;
+        }
+        Ok(interrupt)
+    }
+
+    /// Whether there was one since this was asked last.
+    pub(crate) fn take(&self) -> bool {
+        self.0.swap(false, Relaxed)
+    }
+}
+
+/// A probe that somebody works with.
+pub(crate) struct Bench {
+    port: Port<Box<dyn Line>>,
+    pub(crate) name: String,
+    log: Option<Log>,
+    interrupt: Interrupt,
+    /// what the rig did last, and when it told where it is
+    phase: Option<Phase>,
+    lived: Instant,
+    /// ends last
+    _emulator: Option<Emulator>,
+}
+
+impl Bench {
+    /// Opens the line and waits until the probe has its table: it may have had its power just now.
+    ///
+    /// # Errors
+    /// See [`BenchError`].
+    pub(crate) fn open(place: &Where) -> Result<(Self, Status), BenchError> {
+        let interrupt = Interrupt::catch()?;
+        let open = place.open()?;
+        let log = match &place.log {
+            Some(path) => Some(
+                Log::create(path, &open.name).map_err(|why| BenchError::Log {
+                    path: path.clone(),
+                    why,
+                })?,
+            ),
+            None => None,
+        };
+        let (greeting, patience) = if open.emulator.is_some() {
+            (EMULATED, EMULATED)
+        } else {
+            (GREETING, PATIENCE)
+        };
+        let mut bench = Self {
+            port: Port::new(open.line, greeting),
+            name: open.name,
+            log,
+            interrupt,
+            phase: None,
+            lived: Instant::now(),
+            _emulator: open.emulator,
+        };
+        let status = bench.hello()?;
+        bench.port.set_patience(patience);
+        Ok((bench, status))
+    }
+
+    /// The status of a probe that has come up.
+    fn hello(&mut self) -> Result<Status, BenchError> {
+        let began = Instant::now();
+        loop {
+            let status = self.run(Question::status(), |_| Ok(()));
+            let is_up = match &status {
+                // a probe without a table has not opened its store yet
+                Ok(status) => status.textures > 0 && status.phase != Phase::Homing,
+                // it had its power just now
+                Err(BenchError::Port {
+                    why: PortError::Link(LinkError::Rebooted { .. }),
+                    ..
+                }) => false,
+                Err(_) => true,
+            };
+            if is_up || began.elapsed() > BOOTING {
+                return status;
+            }
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    }
+
+    /// What was damaged and lost on the line: frames, reports.
+    pub(crate) fn losses(&self) -> (u64, u64) {
+        let session = self.port.session();
+        (session.damaged(), session.missing())
+    }
+
+    /// Whether the user wants to end.
+    pub(crate) fn interrupt(&self) -> &Interrupt {
+        &self.interrupt
+    }
+
+    /// Sees an errand through; `each` is shown all reports. Whatever ends it early leaves the rig stopped and lifted.
+    ///
+    /// # Errors
+    /// See [`BenchError`].
+    pub(crate) fn run<E: Errand>(
+        &mut self,
+        errand: E,
+        mut each: impl FnMut(&Report) -> io::Result<()>,
+    ) -> Result<E::Outcome, BenchError> {
+        let mut job = self.begin(errand)?;
+        loop {
+            let mut shown = Ok(());
+            let polled = self.step(&mut job, |report| {
+                if shown.is_ok() {
+                    shown = each(report);
+                }
+            });
+            match (polled, shown) {
+                (Ok(Poll::Ready(outcome)), Ok(())) => return Ok(outcome),
+                (Ok(Poll::Pending), Ok(())) if !self.interrupt.take() => {}
+                (Ok(Poll::Pending), Ok(())) => {
+                    eprintln!("\nStopping and lifting the finger (Ctrl-C again: do not wait) ...");
+                    return Err(self.lift());
+                }
+                (Ok(_), Err(why)) => {
+                    // what could not be shown goes before what came of stopping
+                    self.lift();
+                    return Err(why.into());
+                }
+                (Err(why @ BenchError::Log { .. }), _) => {
+                    self.lift();
+                    return Err(why);
+                }
+                (Err(why), _) => return Err(why),
+            }
+        }
+    }
+
+    /// Begins an errand, for whoever looks at something else between its [steps](Bench::step).
+    ///
+    /// # Errors
+    /// See [`BenchError`].
+    pub(crate) fn begin<E: Errand>(&mut self, errand: E) -> Result<Job<E>, BenchError> {
+        let begun = self.port.begin(errand);
+        let job = begun.map_err(|why| self.error(why, false))?;
+        if let (Some(log), Some(ask)) = (&mut self.log, job.asking()) {
+            log.asked(ask);
+        }
+        Ok(job)
+    }
+
+    /// Goes on with an errand: reads once.
+    ///
+    /// # Errors
+    /// See [`BenchError`]. What moves is told to stop, should the probe still hear it.
+    pub(crate) fn step<E: Errand>(
+        &mut self,
+        job: &mut Job<E>,
+        each: impl FnMut(&Report),
+    ) -> Result<Poll<E::Outcome>, BenchError> {
+        let moving = job.asking().is_some_and(moves);
+        let Self {
+            port,
+            log,
+            phase,
+            lived,
+            ..
+        } = self;
+        let polled = port.step(job, heard(log, phase, lived, each));
+        self.log_failure()?;
+        polled.map_err(|why| {
+            if moving && !matches!(why, PortError::Link(LinkError::Refused(_))) {
+                // there may be nobody to hear it
+                let _ = self.port.ask(Ask::Stop);
+                let _ = self.port.listen(|_| ());
+            }
+            self.error(why, moving)
+        })
+    }
+
+    /// Asks for something beside the errand under way.
+    ///
+    /// # Errors
+    /// See [`BenchError`].
+    pub(crate) fn ask(&mut self, ask: Ask) -> Result<(), BenchError> {
+        if let Some(log) = &mut self.log {
+            log.asked(&ask);
+        }
+        let asked = self.port.ask(ask);
+        asked.map_err(|why| self.error(why, false))
+    }
+
+    /// Reads once, without an errand.
+    ///
+    /// # Errors
+    /// See [`BenchError`].
+    pub(crate) fn listen(&mut self, each: impl FnMut(&Report)) -> Result<(), BenchError> {
+        let Self {
+            port,
+            log,
+            phase,
+            lived,
+            ..
+        } = self;
+        let listened = port.listen(heard(log, phase, lived, each));
+        self.log_failure()?;
+        listened.map_err(|why| self.error(why, false))
+    }
+
+    /// The table that the probe uses; all of it is in the log then.
+    ///
+    /// # Errors
+    /// See [`BenchError`].
+    pub(crate) fn table(&mut self) -> Result<Vec<u8>, BenchError> {
+        self.run(ReadTable::default(), |_| Ok(()))
+    }
+
+    /// The names of the textures that the probe knows.
+    ///
+    /// # Errors
+    /// See [`BenchError`].
+    pub(crate) fn names(&mut self) -> Result<Vec<String>, BenchError> {
+        let bytes = self.table()?;
+        Ok(Table::read(&bytes)?.names().map(str::to_owned).collect())
+    }
+
+    /// Stops whatever is done and waits until the finger is lifted and nothing moves: what came of it. A second Ctrl-C ends
+    /// the waiting.
+    pub(crate) fn lift(&mut self) -> BenchError {
+        match self.try_lift() {
+            Ok(None) => BenchError::Stopped,
+            Ok(Some(Fault::LeverNotHome)) => BenchError::NotHome,
+            Ok(Some(_)) => BenchError::Stopped,
+            Err(why) => why,
+        }
+    }
+
+    fn try_lift(&mut self) -> Result<Option<Fault>, BenchError> {
+        let began = Instant::now();
+        let mut asked: Option<Instant> = None;
+        let mut fault = None;
+        self.phase = None;
+        while began.elapsed() < LIFTING {
+            if self.interrupt.take() {
+                return Err(BenchError::NotLifted);
+            }
+            if asked.is_none_or(|at| at.elapsed() > Duration::from_millis(200)) {
+                asked = Some(Instant::now());
+                // again and again: a request may be damaged, and stopping twice does no harm
+                for ask in [Ask::Stop, Ask::Stream(false), Ask::Status] {
+                    self.ask(ask)?;
+                }
+            }
+            self.listen(|report| {
+                if let Tell::Status(status) = &report.tell {
+                    fault = status.fault;
+                }
+            })?;
+            match self.phase {
+                Some(Phase::Ready | Phase::Parked) => return Ok(None),
+                Some(Phase::Faulted) if self.lived.elapsed() > AT_REST && fault.is_some() => {
+                    return Ok(fault);
+                }
+                _ => {}
+            }
+        }
+        Err(BenchError::NotLifted)
+    }
+
+    fn log_failure(&mut self) -> Result<(), BenchError> {
+        match self.log.as_mut().map(Log::flush) {
+            Some(Err(why)) => {
+                let path = self.log.take().map(Log::into_path).unwrap_or_default();
+                Err(BenchError::Log { path, why })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn error(&self, why: PortError, moving: bool) -> BenchError {
+        BenchError::Port {
+            name: self.name.clone(),
+            why,
+            moving,
+        }
+    }
+}
+
+/// Takes notes of what is heard, and passes it on.
+fn heard(
+    log: &mut Option<Log>,
+    phase: &mut Option<Phase>,
+    lived: &mut Instant,
+    mut each: impl FnMut(&Report),
+) -> impl FnMut(&Report) {
+    move |report| {
+        if let Some(log) = log {
+            log.told(report);
+        }
+        match &report.tell {
+            Tell::Phase(now) => *phase = Some(*now),
+            Tell::Status(status) => *phase = Some(status.phase),
+            Tell::Live(_) => *lived = Instant::now(),
+            _ => {}
+        }
+        each(report);
+    }
+}
+
+/// Whether a request has the rig move.
+fn moves(ask: &Ask) -> bool {
+    matches!(
+        ask,
+        Ask::Home | Ask::Identify(_) | Ask::Train(_) | Ask::Calibrate
+    )
+}
+
+/// Waits for Enter, or for Ctrl-C.
+pub(crate) fn wait_for_enter(interrupt: &Interrupt, prompt: &str) -> Result<(), BenchError> {
+    let mut err = io::stderr();
+    write!(err, "{prompt}")?;
+    err.flush()?;
+    let (entered, enter) = std::sync::mpsc::channel();
+    // a blocking read does not see Ctrl-C; the thread ends with the program
+    std::thread::spawn(move || {
+        let mut line = String::new();
+        let _ = entered.send(io::stdin().read_line(&mut line));
+    });
+    loop {
+        if interrupt.take() {
+            return Err(BenchError::Stopped);
+        }
+        match enter.recv_timeout(Duration::from_millis(100)) {
+            Ok(read) => {
+                return if read? == 0 {
+                    Err(BenchError::Stopped)
+                } else {
+                    Ok(())
+                };
+            }
+            Err(std::sync::mpsc::RecvTimeoutError::Timeout) => {}
+            Err(_) => return Err(BenchError::Stopped),
+        }
+    }
+}

@@ -1,0 +1,236 @@
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use tactus_core::features::Property;
+use tactus_core::wire::{Block, Counts, Promise, Text};
+
+use super::*;
+
+fn status() -> Status {
+    Status {
+        phase: Phase::Ready,
+        fault: None,
+        textures: 4,
+        table_bytes: 900,
+        table_crc: 7,
+        factory: true,
+        calibrated: 0,
+        counts: Counts::default(),
+        skin_mj: (1500, 250),
+    }
+}
+
+/// A monitor that has heard these.
+fn heard(tells: impl IntoIterator<Item = Tell>) -> Monitor {
+    let names = ["Burlap", "Oak wood", "Velcro", "Felt"].map(str::to_owned);
+    let mut monitor = Monitor::new("/dev/ttyACM0", status(), names.to_vec());
+    for (tell, number) in tells.into_iter().zip(1u16..) {
+        let at_ms = 1000 * u32::from(number);
+        monitor.hear(&Report {
+            number,
+            at_ms,
+            tell,
+        });
+    }
+    monitor
+}
+
+/// The screen, its lines without the blanks at their ends.
+fn screen(monitor: &Monitor, width: u16, height: u16) -> Vec<String> {
+    let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+    terminal.draw(|frame| view::draw(monitor, frame)).unwrap();
+    let buffer = terminal.backend().buffer();
+    buffer
+        .content()
+        .chunks(width.into())
+        .map(|row| {
+            let line: String = row.iter().map(|cell| cell.symbol()).collect();
+            line.trim_end().to_owned()
+        })
+        .collect()
+}
+
+fn exploration() -> Vec<Tell> {
+    let action = Action {
+        movement: 0,
+        property: Some(Property::Roughness),
+    };
+    vec![
+        Tell::Chosen {
+            slide: 1,
+            movement: Movement::FOR_TRACTION,
+            action,
+            outlook: [Promise {
+                action,
+                uncertainty: 0.125,
+                benefit: 0.9,
+            }]
+            .into_iter()
+            .collect(),
+        },
+        Tell::Phase(Phase::Sliding),
+        Tell::Felt {
+            slide: 1,
+            action,
+            felt: Felt {
+                properties: [Some(0.512), Some(5.25), None],
+                roughness_is_bound: false,
+                background: 1.0,
+                bands: Default::default(),
+                pressure: None,
+            },
+            posterior: [0.05, 0.75, 0.15, 0.05].into_iter().collect(),
+        },
+        Tell::Live(Live {
+            force_mn: 1050,
+            steps: 1600,
+            stage_um: 31_250,
+            speed_um_s: 10_040,
+            current_ma: 132,
+        }),
+    ]
+}
+
+#[test]
+fn a_slide_looks_like_this() {
+    let screen = screen(&heard(exploration()), 80, 24);
+    let golden = "\
+╭ Rig ─────────────────╮╭ Slide 1 ───────────╮╭ What it may be ────────────────╮
+│phase   sliding       ││1.26 N, 10.0 mm/s   ││Oak wood       ██████░░  75.0 % │
+│force   1.050 N       ││for roughness       ││Velcro         █░░░░░░░  15.0 % │
+│████████░░┃░░░░░ 2.1 N││to leave 12.5 %     ││Burlap         ░░░░░░░░   5.0 % │
+│speed    10.0 mm/s    ││last felt           ││Felt           ░░░░░░░░   5.0 % │
+│stage    31.3 mm      ││traction    0.512 N ││                                │
+│lever    1.00 mm      ││roughness   5.250   ││                                │
+│motor     132 mA      ││fineness        -   ││                                │
+╰──────────────────────╯╰────────────────────╯╰────────────────────────────────╯
+╭ Said ────────────────────────────────────────────────────────────────────────╮
+│0:00:03 slide 1: most likely Oak wood, 75.0 %                                 │";
+    assert_eq!(screen[10..21].join("\n"), golden);
+    assert_eq!(
+        screen[0],
+        " Tactus  /dev/ttyACM0  4 textures (factory)            nothing lost, up 0:00:04"
+    );
+}
+
+#[test]
+fn an_answer_a_fault_and_silence_are_said_in_words() {
+    let mut tells = exploration();
+    tells.push(Tell::Verdict {
+        texture: 1,
+        name: "Oak wood".try_into().unwrap(),
+        probability: 0.995,
+        sure: true,
+        unknown: false,
+        log_odds: None,
+        slides: 1,
+        asks: false,
+    });
+    let mut monitor = heard(tells.clone());
+    assert!(
+        screen(&monitor, 80, 24)
+            .join("\n")
+            .contains("it is Oak wood: 99.5 % after 1 slide")
+    );
+    tells.push(Tell::Fault(Fault::EStop));
+    monitor = heard(tells);
+    let faulted = screen(&monitor, 80, 24);
+    assert!(
+        faulted[0].ends_with("FAULT: emergency stop"),
+        "{}",
+        faulted[0]
+    );
+    assert!(
+        faulted
+            .iter()
+            .any(|line| line.contains("release it, then reset (key h)"))
+    );
+    monitor.silent = Some(Duration::from_secs(4));
+    assert!(screen(&monitor, 80, 24)[0].ends_with("SILENT for 4 s"));
+    // it is over when the rig has found its switches again
+    monitor.hear(&Report {
+        number: 9,
+        at_ms: 9000,
+        tell: Tell::Phase(Phase::Homing),
+    });
+    assert_eq!(monitor.fault, None);
+    // what is lost on the line stands where everybody looks
+    monitor.silent = None;
+    monitor.losses = (2, 3);
+    assert!(screen(&monitor, 80, 24)[0].contains("line 2 damaged 3 lost"));
+}
+
+#[test]
+fn a_sine_is_a_peak_at_its_frequency() {
+    let mut tells = Vec::new();
+    for number in 0..40u16 {
+        let sample = |n: u16| {
+            let t = f64::from(number * 64 + n) / 2200.0;
+            (200.0 * (std::f64::consts::TAU * 100.0 * t).sin()) as i16
+        };
+        tells.push(Tell::Block(Block {
+            number,
+            still: false,
+            steady: None,
+            pac: (0..64).map(sample).collect(),
+            shear_mn: Default::default(),
+            lost: 0,
+        }));
+    }
+    let monitor = heard(tells);
+    assert_eq!(monitor.pac.len(), SHOWN);
+    let screen = screen(&monitor, 80, 24);
+    let cells = |line: &str| line.chars().collect::<Vec<char>>();
+    let axis = screen.iter().find(|line| line.contains("1000 Hz")).unwrap();
+    let mark: Vec<char> = "100 ".chars().collect();
+    let hundred = cells(axis)
+        .windows(4)
+        .position(|cells| cells == mark)
+        .unwrap();
+    // the highest bar stands over the 100
+    let top = screen
+        .iter()
+        .skip(2)
+        .find(|line| cells(line)[41..79].iter().any(|c| ('▁'..='█').contains(c)))
+        .unwrap();
+    let peak = (41..79)
+        .find(|&column| ('▁'..='█').contains(&cells(top)[column]))
+        .unwrap();
+    assert!(
+        peak.abs_diff(hundred) <= 2,
+        "{peak} {hundred}\n{}",
+        screen.join("\n")
+    );
+    // and the trace reaches both ends of its scale
+    assert!(
+        screen.iter().any(|line| line.contains(" 256│"))
+            && screen.iter().any(|line| line.contains("-256│"))
+    );
+}
+
+#[test]
+fn any_size_of_terminal_is_drawn_on() {
+    let mut tells = exploration();
+    tells.extend((0..60).map(|n| {
+        Tell::Rejected {
+            slide: n,
+            why: Text::try_from(
+                "a reason that is much too long for a narrow terminal, and goes on",
+            )
+            .unwrap(),
+        }
+    }));
+    let monitor = heard(tells);
+    for (width, height) in [(1, 1), (10, 5), (40, 12), (80, 24), (140, 40), (300, 90)] {
+        assert_eq!(screen(&monitor, width, height).len(), usize::from(height));
+    }
+    assert_eq!(monitor.notes.len(), NOTES);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_terminal_that_is_closed_is_noticed() {
+    let (terminal, other) = std::io::pipe().unwrap();
+    assert!(!is_gone(&terminal));
+    drop(other);
+    assert!(is_gone(&terminal));
+}

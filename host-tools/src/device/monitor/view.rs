@@ -1,0 +1,430 @@
+//! What the monitor looks like. Colours are the ones that colour-blind people tell apart (blue, orange, vermillion), and say
+//! nothing that is not also said in words.
+
+use ratatui::Frame;
+use ratatui::layout::{Alignment, Constraint, Layout, Rect};
+use ratatui::style::{Color, Modifier, Style, Stylize as _};
+use ratatui::symbols::Marker;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Axis, Block, BorderType, Chart, Dataset, GraphType, Paragraph, Sparkline};
+use tactus_core::features::Property;
+use tactus_core::kernels::Plain;
+use tactus_core::spectrum::{BIN_HZ, SpectrumSum, hann};
+use tactus_core::wire::Phase;
+
+use super::super::phase_name;
+use super::{Monitor, SHOWN, Weight};
+
+// of the 256 colours that every terminal has, the nearest to Okabe's and Ito's
+const BLUE: Color = Color::Indexed(39);
+const ORANGE: Color = Color::Indexed(214);
+const VERMILLION: Color = Color::Indexed(202);
+const DIM: Color = Color::Indexed(245);
+
+/// The force guard trips here, N.
+const MOST_N: f32 = 2.1;
+/// The spectrum that is shown, Hz: the bands' range.
+const SPECTRUM_HZ: (f32, f32) = (17.0, 1000.0);
+/// And its power per bin: 1 to 10^6 counts^2.
+const SPECTRUM_DB: f32 = 60.0;
+/// Textures less probable than this are not listed.
+const WORTH_LISTING: f32 = 0.001;
+/// The lever's step, mm (the reference rig's).
+const STEP_MM: f32 = 0.000_625;
+
+/// Draws all.
+pub(super) fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
+    let area = frame.area();
+    let roomy = area.height >= 34;
+    let [header, charts, panels, notes, keys] = Layout::vertical([
+        Constraint::Length(1),
+        Constraint::Min(6),
+        Constraint::Length(if roomy { 13 } else { 9 }),
+        Constraint::Length(if roomy { 8 } else { 4 }),
+        Constraint::Length(1),
+    ])
+    .areas(area);
+    let [trace, spectrum] = Layout::horizontal([Constraint::Fill(1); 2]).areas(charts);
+    let [rig, slide, textures] = Layout::horizontal([
+        Constraint::Length(24),
+        Constraint::Length(22),
+        Constraint::Fill(1),
+    ])
+    .areas(panels);
+    draw_header(monitor, frame, header);
+    draw_trace(monitor, frame, trace);
+    draw_spectrum(monitor, frame, spectrum);
+    draw_rig(monitor, frame, rig);
+    draw_slide(monitor, frame, slide);
+    draw_textures(monitor, frame, textures);
+    draw_notes(monitor, frame, notes);
+    frame.render_widget(key_line(), keys);
+}
+
+fn panel(title: impl Into<Line<'static>>) -> Block<'static> {
+    Block::bordered()
+        .border_type(BorderType::Rounded)
+        .border_style(Style::new().fg(DIM))
+        .title(title)
+}
+
+fn dim(text: impl Into<String>) -> Span<'static> {
+    Span::styled(text.into(), Style::new().fg(DIM))
+}
+
+fn draw_header(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
+    let status = &monitor.status;
+    let left = Line::from(vec![
+        Span::from(" Tactus ").bold().reversed(),
+        Span::from(format!(" {}  ", monitor.place)),
+        dim(format!(
+            "{} textures{}",
+            status.textures,
+            if status.factory { " (factory)" } else { "" }
+        )),
+    ]);
+    let (damaged, missing) = monitor.losses;
+    let late = status.counts.late_slots;
+    let lost = status.counts.lost_samples;
+    let right = match (monitor.silent, monitor.fault) {
+        (Some(silent), _) => warning(format!(" SILENT for {} s ", silent.as_secs())),
+        (None, Some(fault)) => warning(format!(" FAULT: {fault} ")),
+        (None, None) if damaged + missing > 0 || late + lost > 0 => Span::styled(
+            format!("line {damaged} damaged {missing} lost, slots {late} late {lost} lost "),
+            Style::new().fg(ORANGE),
+        ),
+        (None, None) => dim(format!("nothing lost, up {} ", clock(monitor.at_ms))),
+    };
+    frame.render_widget(left, area);
+    frame.render_widget(Line::from(right).alignment(Alignment::Right), area);
+}
+
+fn warning(text: String) -> Span<'static> {
+    let style = Style::new().fg(Color::Black).bg(VERMILLION);
+    Span::styled(text, style.add_modifier(Modifier::BOLD))
+}
+
+fn clock(at_ms: u32) -> String {
+    let s = at_ms / 1000;
+    format!("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
+}
+
+fn draw_trace(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
+    let pac: Vec<i16> = monitor.pac.iter().copied().collect();
+    let largest = pac.iter().map(|s| s.unsigned_abs()).max().unwrap_or(0);
+    // a scale that does not jump with every sample
+    let top = f64::from(largest.next_power_of_two().max(32));
+    // the extremes of a column, so that no peak is lost
+    let columns = usize::from(area.width.max(8)) * 2;
+    let chunk = SHOWN.div_ceil(columns);
+    let points: Vec<(f64, f64)> = pac
+        .chunks(chunk)
+        .zip(0..)
+        .flat_map(|(part, n)| {
+            let x = f64::from(n) * chunk as f64;
+            let low = part.iter().min().copied().unwrap_or(0);
+            let high = part.iter().max().copied().unwrap_or(0);
+            [(x, f64::from(low)), (x, f64::from(high))]
+        })
+        .collect();
+    let line = Dataset::default()
+        .marker(Marker::Braille)
+        .graph_type(GraphType::Line)
+        .style(Style::new().fg(BLUE))
+        .data(&points);
+    let label = |text: String| Span::styled(text, Style::new().fg(DIM));
+    let chart = Chart::new(vec![line])
+        .block(panel(" P_AC, counts, 1 s "))
+        .x_axis(
+            Axis::default()
+                .bounds([0.0, SHOWN as f64])
+                .style(Style::new().fg(DIM)),
+        )
+        .y_axis(
+            Axis::default()
+                .bounds([-top, top])
+                .style(Style::new().fg(DIM))
+                .labels([
+                    label(format!("{:>5}", -top)),
+                    label(format!("{:>5}", 0)),
+                    label(format!("{top:>5}")),
+                ]),
+        );
+    frame.render_widget(chart, area);
+    if pac.is_empty() && area.height > 4 {
+        let hint = Rect {
+            x: area.x + 8,
+            y: area.y + area.height / 2 - 1,
+            width: area.width.saturating_sub(9),
+            height: 1,
+        };
+        let text = Line::from(dim("comes while the finger measures"));
+        frame.render_widget(text, hint);
+    }
+}
+
+fn draw_spectrum(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
+    let block = panel(format!(" Spectrum, 0 to {SPECTRUM_DB} dB "));
+    let inner = block.inner(area);
+    frame.render_widget(block, area);
+    if inner.height < 2 || inner.width < 20 {
+        return;
+    }
+    let [bars, axis] = Layout::vertical([Constraint::Min(1), Constraint::Length(1)]).areas(inner);
+    let pac: Vec<i16> = monitor.pac.iter().copied().collect();
+    let mut sum = SpectrumSum::default();
+    sum.push::<Plain>(&hann(), &pac);
+    let (low, high) = SPECTRUM_HZ;
+    // columns are equal ratios of frequency
+    let hz = |column: u16| low * (high / low).powf(f32::from(column) / f32::from(inner.width));
+    if let Some(spectrum) = sum.finish() {
+        let power = |column: u16| {
+            let first = (hz(column) / BIN_HZ) as usize;
+            let end = (hz(column + 1) / BIN_HZ) as usize;
+            spectrum.band(first..end.max(first + 1))
+        };
+        let height: Vec<u64> = (0..inner.width)
+            .map(|column| (power(column).max(1.0).log10() * 10.0) as u64)
+            .collect();
+        let line = Sparkline::default()
+            .data(height)
+            .max(SPECTRUM_DB as u64)
+            .style(Style::new().fg(ORANGE));
+        frame.render_widget(line, bars);
+    }
+    let mut labels = vec![' '; inner.width.into()];
+    for mark in [17.0f32, 50.0, 100.0, 200.0, 500.0] {
+        let at = (mark / low).ln() / (high / low).ln() * f32::from(inner.width);
+        for (place, digit) in labels
+            .iter_mut()
+            .skip(at as usize)
+            .zip(format!("{mark}").chars())
+        {
+            *place = digit;
+        }
+    }
+    let end = "1000 Hz";
+    let from = labels.len().saturating_sub(end.len());
+    for (place, character) in labels.iter_mut().skip(from).zip(end.chars()) {
+        *place = character;
+    }
+    frame.render_widget(Line::from(dim(String::from_iter(labels))), axis);
+}
+
+/// "force   0.998 N"
+fn row(name: &str, value: String) -> Line<'static> {
+    Line::from(vec![dim(format!("{name:<7} ")), Span::from(value)])
+}
+
+fn draw_rig(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
+    let block = panel(" Rig ");
+    let inner = block.inner(area);
+    let phase = match monitor.phase {
+        Phase::Parked => "parked",
+        phase => phase_name(phase),
+    };
+    let moving = !matches!(phase, "ready" | "parked");
+    let mut lines = vec![Line::from(vec![
+        dim("phase   "),
+        Span::from(phase.to_owned()).style(if moving {
+            Style::new().fg(ORANGE).add_modifier(Modifier::BOLD)
+        } else {
+            Style::new().add_modifier(Modifier::BOLD)
+        }),
+    ])];
+    match &monitor.live {
+        Some(live) => {
+            let force_n = f32::from(live.force_mn) * 1e-3;
+            lines.push(row("force", format!("{force_n:5.3} N")));
+            lines.push(gauge(
+                force_n,
+                monitor.chosen.map(|c| c.movement.force_n()),
+                inner.width,
+            ));
+            lines.push(row(
+                "speed",
+                format!("{:5.1} mm/s", live.speed_um_s as f32 * 1e-3),
+            ));
+            lines.push(row(
+                "stage",
+                format!("{:5.1} mm", live.stage_um as f32 * 1e-3),
+            ));
+            lines.push(row(
+                "lever",
+                format!("{:5.2} mm", live.steps as f32 * STEP_MM),
+            ));
+            lines.push(row("motor", format!("{:5} mA", live.current_ma)));
+        }
+        None => {
+            lines.push(row("force", "at rest".into()));
+            lines.push(Line::default());
+            let (joule, wear) = monitor.status.skin_mj;
+            lines.push(row("skin", format!("{:.1} J", f64::from(joule) * 1e-3)));
+            lines.push(row("wear", format!("{:.1} J", f64::from(wear) * 1e-3)));
+        }
+    }
+    // where there is room, what was counted since the probe has power
+    if inner.height > 8 {
+        let counts = &monitor.status.counts;
+        lines.resize(7, Line::default());
+        lines.push(Line::default());
+        for (name, count) in [
+            ("late", counts.late_slots),
+            ("parity", counts.parity_errors),
+            ("lost", counts.lost_samples),
+        ] {
+            lines.push(row(name, format!("{count:5}")));
+        }
+    }
+    frame.render_widget(Paragraph::new(lines).block(block), area);
+}
+
+/// The force as a bar up to where the guard trips, with a mark at what the movement wants.
+fn gauge(force_n: f32, wanted_n: Option<f32>, width: u16) -> Line<'static> {
+    let width = usize::from(width.saturating_sub(6));
+    let place = |n: f32| ((n / MOST_N).clamp(0.0, 1.0) * width as f32).round() as usize;
+    let full = place(force_n);
+    let mark = wanted_n.map(|n| place(n).min(width.saturating_sub(1)));
+    let bar = |range: std::ops::Range<usize>| -> String {
+        range
+            .map(|n| match n {
+                n if Some(n) == mark => '┃',
+                n if n < full => '█',
+                _ => '░',
+            })
+            .collect()
+    };
+    Line::from(vec![
+        Span::styled(bar(0..full), Style::new().fg(BLUE)),
+        Span::styled(bar(full..width), Style::new().fg(DIM)),
+        dim(format!(" {MOST_N} N")),
+    ])
+}
+
+fn draw_slide(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
+    let title = monitor
+        .chosen
+        .map_or_else(|| " Slide ".to_owned(), |c| format!(" Slide {} ", c.slide));
+    let mut lines = Vec::new();
+    if let Some(chosen) = monitor.chosen {
+        lines.push(Line::from(chosen.movement.to_string()));
+        let looked_at = chosen
+            .action
+            .property
+            .map_or("all it feels", Property::name);
+        lines.push(Line::from(dim(format!("for {looked_at}"))));
+        lines.push(match chosen.leaves {
+            Some(leaves) => Line::from(dim(format!("to leave {:.1} %", leaves * 100.0))),
+            None => Line::default(),
+        });
+    }
+    if let Some(felt) = &monitor.felt {
+        lines.push(Line::from(dim("last felt")));
+        for property in Property::ALL {
+            let unit = match property {
+                Property::Traction => " N",
+                _ => "",
+            };
+            let value = match felt.properties().get(property) {
+                Some(value) => format!("{value:6.3}{unit}"),
+                None => "     -".to_owned(),
+            };
+            lines.push(Line::from(vec![
+                dim(format!("{:<10} ", property.name())),
+                Span::from(value),
+            ]));
+        }
+    }
+    frame.render_widget(Paragraph::new(lines).block(panel(title)), area);
+}
+
+fn draw_textures(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
+    let block = panel(" What it may be ");
+    let inner = block.inner(area);
+    let mut lines = Vec::new();
+    if let Some(answer) = &monitor.answer {
+        lines.push(Line::from(answer.clone()).bold());
+    }
+    let room = usize::from(inner.height).saturating_sub(lines.len());
+    let width = usize::from(inner.width);
+    // a name may be cut, a bar too short says nothing
+    let name_width = width.saturating_sub(18).clamp(8, 24);
+    let bar_width = width.saturating_sub(name_width + 10);
+    let ranked = monitor.ranked();
+    if ranked.is_empty() {
+        let hint = if monitor.chosen.is_some() {
+            "the first slide is made ..."
+        } else {
+            "i: find out what lies under the finger"
+        };
+        lines.push(Line::from(dim(hint)));
+    }
+    // the rest takes a line
+    let most = if ranked.len() > room {
+        room.saturating_sub(1)
+    } else {
+        room
+    };
+    let worth = ranked.iter().filter(|(p, _)| *p >= WORTH_LISTING).count();
+    let listed = worth.max(1).min(most).min(ranked.len());
+    let (listed, others) = ranked.split_at(listed);
+    for ((probability, texture), place) in listed.iter().zip(0..) {
+        let full = ((probability * bar_width as f32).round() as usize).min(bar_width);
+        let name: String = monitor.name(*texture).chars().take(name_width).collect();
+        let color = if place == 0 { BLUE } else { DIM };
+        lines.push(Line::from(vec![
+            Span::from(format!("{name:<name_width$} ")),
+            Span::styled("█".repeat(full), Style::new().fg(color)),
+            dim("░".repeat(bar_width - full)),
+            Span::from(format!(" {:5.1} %", probability * 100.0)),
+        ]));
+    }
+    if !others.is_empty() {
+        let rest: f32 = others.iter().map(|(p, _)| p).sum();
+        let text = format!("{} others", others.len());
+        let space = name_width + 1 + bar_width;
+        lines.push(Line::from(dim(format!(
+            "{text:<space$} {:5.1} %",
+            rest * 100.0
+        ))));
+    }
+    frame.render_widget(Paragraph::new(lines).block(block), area);
+}
+
+fn draw_notes(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
+    let block = panel(" Said ");
+    let room = usize::from(block.inner(area).height);
+    let from = monitor.notes.len().saturating_sub(room);
+    let lines: Vec<Line<'_>> = monitor
+        .notes
+        .iter()
+        .skip(from)
+        .map(|note| {
+            let time = dim(format!("{} ", clock(note.at_ms)));
+            let mut line = vec![time];
+            if note.weight == Weight::Fault {
+                line.push(warning(" ! ".into()));
+                line.push(Span::from(" "));
+            }
+            line.push(Span::from(note.text.clone()));
+            Line::from(line)
+        })
+        .collect();
+    frame.render_widget(Paragraph::new(lines).block(block), area);
+}
+
+fn key_line() -> Line<'static> {
+    let key = |key: &'static str, what: &'static str| {
+        [
+            Span::from(format!(" {key} ")).bold().reversed(),
+            Span::from(format!(" {what}   ")),
+        ]
+    };
+    let keys = [
+        key("i", "identify"),
+        key("h", "home"),
+        key("s", "stop and lift"),
+        key("q", "quit"),
+    ];
+    Line::from(keys.into_iter().flatten().collect::<Vec<_>>())
+}

@@ -1,0 +1,471 @@
+//! Where the probe is: serial ports, TCP ports, and an emulated board that is started for it.
+
+use std::fmt;
+use std::io::{self, BufRead as _, BufReader, Read, Write};
+use std::net::{TcpStream, ToSocketAddrs as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc;
+use std::time::{Duration, SystemTime};
+
+use clap::Args;
+use serialport::{SerialPortInfo, SerialPortType, UsbPortInfo};
+
+/// The probe's line.
+const BAUD: u32 = 921_600;
+/// Reads come back after that, so that somebody looks at the keyboard; writes may take as long.
+const READ: Duration = Duration::from_millis(50);
+/// USB vendor of the NUCLEO's ST-LINK.
+const ST: u16 = 0x0483;
+/// Longest that the emulator takes to build its world: recordings are read.
+const STARTING: Duration = Duration::from_secs(120);
+
+/// Which probe.
+#[derive(Args, Clone, Debug, Default)]
+pub(crate) struct Where {
+    /// Its serial port, or tcp:HOST:PORT; the only NUCLEO that is plugged in, unless given
+    #[arg(long, value_name = "PORT", conflicts_with = "emulated")]
+    pub(crate) port: Option<String>,
+    /// Start the emulated board with the real firmware, and end it afterwards
+    #[arg(long)]
+    pub(crate) emulated: bool,
+    /// What lies under the emulated finger: a texture of Table 1, its name or number
+    #[arg(long, value_name = "NAME", requires = "emulated")]
+    pub(crate) texture: Option<String>,
+    /// Let the emulated finger feel slides of a real BioTac: a material of data/biotac
+    #[arg(
+        long,
+        value_name = "MATERIAL",
+        requires = "emulated",
+        conflicts_with = "texture"
+    )]
+    pub(crate) recording: Option<String>,
+    /// Write all that is asked and told to this file, for `tactus device log`
+    #[arg(long, value_name = "FILE")]
+    pub(crate) log: Option<PathBuf>,
+}
+
+/// Why there is no line to the probe, and what to do.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum OpenError {
+    /// Nothing is plugged in.
+    #[error(
+        "no serial port of a NUCLEO here: plug in the board's USB socket CN1 (LD4 must be lit), give --port, or try --emulated"
+    )]
+    None,
+    /// More than one.
+    #[error("several boards are plugged in: choose one with --port\n{}", lines(.0))]
+    Several(Vec<Found>),
+    /// No such port.
+    #[error("{port}: there is no such port. {}", others(.found))]
+    NotThere {
+        /// The port.
+        port: String,
+        /// Those that are there.
+        found: Vec<Found>,
+    },
+    /// Another program has it.
+    #[error(
+        "{port} is busy: another program has it open (another tactus, a terminal such as minicom, ModemManager). Close that; \
+         `fuser -v {port}` names it"
+    )]
+    Busy {
+        /// The port.
+        port: String,
+    },
+    /// The user may not.
+    #[error(
+        "{port}: you may not open this port. On Linux: sudo usermod -aG dialout $USER, then log in again"
+    )]
+    Denied {
+        /// The port.
+        port: String,
+    },
+    /// Something else.
+    #[error("{port} cannot be opened: {why}; is it a serial port?")]
+    Serial {
+        /// The port.
+        port: String,
+        /// What the system says.
+        why: serialport::Error,
+    },
+    /// No such address, or nobody there.
+    #[error(
+        "{address}: {why}. Is the emulated board running there (`cargo xtask emulate --port N`)?"
+    )]
+    Tcp {
+        /// HOST:PORT.
+        address: String,
+        /// What the system says.
+        why: io::Error,
+    },
+    /// The emulator or the firmware is not built.
+    #[error(
+        "{what} is not built: run `cargo xtask emulate` once, which builds it (or name it with {variable})"
+    )]
+    NotBuilt {
+        /// What is missing.
+        what: &'static str,
+        /// The variable that can name it.
+        variable: &'static str,
+    },
+    /// The emulator ended, or did not start.
+    #[error("the emulated board does not start: {0}")]
+    Emulator(String),
+}
+
+/// A serial port of this PC.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Found {
+    name: String,
+    usb: Option<UsbPortInfo>,
+}
+
+impl Found {
+    fn is_nucleo(&self) -> bool {
+        self.usb.as_ref().is_some_and(|usb| usb.vid == ST)
+    }
+}
+
+impl From<SerialPortInfo> for Found {
+    fn from(port: SerialPortInfo) -> Self {
+        Self {
+            name: port.port_name,
+            usb: match port.port_type {
+                SerialPortType::UsbPort(usb) => Some(usb),
+                _ => None,
+            },
+        }
+    }
+}
+
+impl fmt::Display for Found {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:<16}", self.name)?;
+        let Some(usb) = &self.usb else {
+            return f.write_str("  no USB device");
+        };
+        write!(f, "  {:04x}:{:04x}", usb.vid, usb.pid)?;
+        for text in [&usb.manufacturer, &usb.product, &usb.serial_number]
+            .into_iter()
+            .flatten()
+        {
+            write!(f, "  {text}")?;
+        }
+        if self.is_nucleo() {
+            f.write_str("  <- a NUCLEO: try this one")?;
+        }
+        Ok(())
+    }
+}
+
+fn lines(ports: &[Found]) -> String {
+    let lines: Vec<String> = ports.iter().map(|port| format!("  {port}")).collect();
+    lines.join("\n")
+}
+
+fn others(found: &[Found]) -> String {
+    if found.is_empty() {
+        "This PC has no serial port now: plug in the board's USB socket CN1, or try --emulated"
+            .to_owned()
+    } else {
+        format!("There are:\n{}", lines(found))
+    }
+}
+
+/// The serial ports of this PC; boards first. Those of the mainboard that no chip answers at are left out.
+pub(crate) fn found() -> Vec<Found> {
+    let ports = serialport::available_ports().unwrap_or_default();
+    let mut ports: Vec<Found> = ports
+        .into_iter()
+        .map(Found::from)
+        // every Linux has 32 of these, there or not
+        .filter(|port| port.usb.is_some() || !port.name.starts_with("/dev/ttyS"))
+        .collect();
+    ports.sort_by(|a, b| {
+        b.is_nucleo()
+            .cmp(&a.is_nucleo())
+            .then_with(|| a.name.cmp(&b.name))
+    });
+    ports
+}
+
+/// Prints the ports, and what to do with them.
+pub(crate) fn list(out: &mut impl Write) -> io::Result<()> {
+    let found = found();
+    match found.as_slice() {
+        [] => writeln!(
+            out,
+            "No serial port here. Plug in the board's USB socket CN1 (LD4 must be lit), or try the emulated board:\n  \
+             tactus device monitor --emulated"
+        ),
+        ports => {
+            writeln!(out, "{}", lines(ports))?;
+            let name = ports.first().map_or("", |port| port.name.as_str());
+            writeln!(out, "\nTry: tactus device status --port {name}")
+        }
+    }
+}
+
+/// What carries bytes to the probe and back; reads come back soon, with or without any.
+pub(crate) trait Line: Read + Write + Send {}
+impl<T: Read + Write + Send> Line for T {}
+
+/// A line that is open.
+pub(crate) struct Open {
+    pub(crate) line: Box<dyn Line>,
+    pub(crate) name: String,
+    /// ends with it
+    pub(crate) emulator: Option<Emulator>,
+}
+
+impl Where {
+    /// Opens the line.
+    ///
+    /// # Errors
+    /// See [`OpenError`].
+    pub(crate) fn open(&self) -> Result<Open, OpenError> {
+        if self.emulated {
+            let emulator = Emulator::start(self)?;
+            return Ok(Open {
+                line: tcp(&emulator.address)?,
+                name: "the emulated board".to_owned(),
+                emulator: Some(emulator),
+            });
+        }
+        let name = match &self.port {
+            Some(port) => port.clone(),
+            None => only_nucleo(found())?,
+        };
+        let line = match name.strip_prefix("tcp:") {
+            Some(address) => tcp(address)?,
+            None => serial(&name)?,
+        };
+        Ok(Open {
+            line,
+            name,
+            emulator: None,
+        })
+    }
+}
+
+fn only_nucleo(found: Vec<Found>) -> Result<String, OpenError> {
+    let mut nucleos: Vec<Found> = found.into_iter().filter(Found::is_nucleo).collect();
+    match nucleos.len() {
+        0 => Err(OpenError::None),
+        1 => Ok(nucleos.remove(0).name),
+        _ => Err(OpenError::Several(nucleos)),
+    }
+}
+
+fn serial(port: &str) -> Result<Box<dyn Line>, OpenError> {
+    use io::ErrorKind as Io;
+    use serialport::ErrorKind as Serial;
+    let opened = serialport::new(port, BAUD).timeout(READ).open();
+    let port = port.to_owned();
+    match opened {
+        Ok(line) => Ok(Box::new(line)),
+        Err(why) => Err(match why.kind() {
+            Serial::Io(Io::PermissionDenied) => OpenError::Denied { port },
+            Serial::Io(Io::NotFound) => OpenError::NotThere {
+                found: found(),
+                port,
+            },
+            // serialport's word for a port that somebody else has, or one that Windows does not know
+            Serial::NoDevice if Path::new(&port).exists() || cfg!(windows) => {
+                OpenError::Busy { port }
+            }
+            Serial::NoDevice => OpenError::NotThere {
+                found: found(),
+                port,
+            },
+            _ => OpenError::Serial { port, why },
+        }),
+    }
+}
+
+fn tcp(address: &str) -> Result<Box<dyn Line>, OpenError> {
+    let error = |why| OpenError::Tcp {
+        address: address.to_owned(),
+        why,
+    };
+    let to = address.to_socket_addrs().map_err(error)?.next();
+    let to = to.ok_or_else(|| error(io::ErrorKind::NotFound.into()))?;
+    let stream = TcpStream::connect_timeout(&to, Duration::from_secs(5)).map_err(error)?;
+    stream
+        .set_read_timeout(Some(READ))
+        .and_then(|()| stream.set_nodelay(true))
+        .map_err(error)?;
+    Ok(Box::new(stream))
+}
+
+/// An emulated board, in a process of its own.
+pub(crate) struct Emulator {
+    child: Child,
+    address: String,
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        // it may be gone already
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Emulator {
+    fn start(options: &Where) -> Result<Self, OpenError> {
+        let program = built(
+            "the emulator",
+            "TACTUS_EMULATOR",
+            &["emulator/release/tactus-emulator"],
+        )?;
+        let elf = built(
+            "the firmware",
+            "TACTUS_ELF",
+            &[
+                "chip/thumbv7em-none-eabihf/firmware/tactus-rig",
+                "debian/thumbv7em-none-eabihf/firmware/tactus-rig",
+            ],
+        )?;
+        let mut command = Command::new(&program);
+        command.arg("--elf").arg(&elf).args(["--port", "0"]);
+        for (option, value) in [
+            ("--texture", &options.texture),
+            ("--recording", &options.recording),
+        ] {
+            if let Some(value) = value {
+                command.arg(option).arg(value);
+            }
+        }
+        command.stdin(Stdio::null());
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        // a Ctrl-C of the terminal is ours alone: the board must live until its finger is lifted
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        let error = |why: io::Error| OpenError::Emulator(format!("{}: {why}", program.display()));
+        let child = command.spawn().map_err(error)?;
+        let mut emulator = Self {
+            child,
+            address: String::new(),
+        };
+        emulator.address = emulator.find_address()?;
+        Ok(emulator)
+    }
+
+    /// Where it serves, as it says; it is read in threads of their own for as long as it lives, so that it never waits.
+    fn find_address(&mut self) -> Result<String, OpenError> {
+        let (found, address) = mpsc::channel();
+        if let Some(stdout) = self.child.stdout.take() {
+            std::thread::spawn(move || {
+                for line in BufReader::new(stdout).lines().map_while(Result::ok) {
+                    if let Some((_, at)) = line.split_once("serial port at ") {
+                        let at = at.split(',').next().unwrap_or(at).trim();
+                        // nobody waits any more when it has taken too long
+                        let _ = found.send(at.to_owned());
+                    }
+                }
+            });
+        }
+        let stderr = self.child.stderr.take();
+        let complaint = std::thread::spawn(move || {
+            let lines = stderr
+                .into_iter()
+                .flat_map(|e| BufReader::new(e).lines().map_while(Result::ok));
+            lines
+                .filter(|line| !line.trim().is_empty())
+                .last()
+                .unwrap_or_default()
+        });
+        match address.recv_timeout(STARTING) {
+            Ok(address) => Ok(address),
+            Err(mpsc::RecvTimeoutError::Timeout) => Err(OpenError::Emulator(format!(
+                "it said nothing for {STARTING:?}; is this machine very busy?"
+            ))),
+            // it has ended, and so has what it complains
+            Err(mpsc::RecvTimeoutError::Disconnected) => {
+                let _ = self.child.wait();
+                Err(OpenError::Emulator(complaint.join().unwrap_or_default()))
+            }
+        }
+    }
+}
+
+/// A program that is built here: named by `variable`, or the newest of these files in a target folder.
+fn built(what: &'static str, variable: &'static str, files: &[&str]) -> Result<PathBuf, OpenError> {
+    if let Some(named) = std::env::var_os(variable) {
+        return Ok(named.into());
+    }
+    let modified = |path: &PathBuf| {
+        std::fs::metadata(path)
+            .and_then(|meta| meta.modified())
+            .unwrap_or(SystemTime::UNIX_EPOCH)
+    };
+    let exe = std::env::current_exe().ok();
+    let here = std::env::current_dir().ok();
+    // target/release/tactus, and wherever in the repository the user stands
+    let beside = exe.as_deref().and_then(|exe| exe.ancestors().nth(2));
+    let above = here.iter().flat_map(|here| here.ancestors());
+    std::env::var_os("CARGO_TARGET_DIR")
+        .map(PathBuf::from)
+        .into_iter()
+        .chain(beside.map(Path::to_owned))
+        .chain(above.map(|folder| folder.join("target")))
+        .find_map(|target| {
+            let there = files.iter().map(|file| target.join(file));
+            there.filter(|path| path.is_file()).max_by_key(modified)
+        })
+        .ok_or(OpenError::NotBuilt { what, variable })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn port(name: &str, vid: u16) -> Found {
+        let usb = UsbPortInfo {
+            vid,
+            pid: 0x374b,
+            serial_number: Some("066EFF".into()),
+            manufacturer: None,
+            product: Some("STM32 STLink".into()),
+        };
+        Found {
+            name: name.into(),
+            usb: Some(usb),
+        }
+    }
+
+    #[test]
+    fn the_only_board_is_taken_and_of_two_the_user_chooses() {
+        let other = port("/dev/ttyUSB0", 0x1a86);
+        let [a, b] = ["/dev/ttyACM0", "/dev/ttyACM1"].map(|name| port(name, ST));
+        assert_eq!(
+            only_nucleo(vec![other.clone(), a.clone()]).unwrap(),
+            "/dev/ttyACM0"
+        );
+        let none = only_nucleo(vec![other]).unwrap_err().to_string();
+        assert!(
+            none.contains("CN1") && none.contains("--emulated"),
+            "{none}"
+        );
+        let both = only_nucleo(vec![a, b]).unwrap_err().to_string();
+        assert!(
+            both.contains("--port") && both.contains("ttyACM0") && both.contains("ttyACM1"),
+            "{both}"
+        );
+    }
+
+    #[test]
+    fn a_board_is_pointed_out_in_the_list() {
+        assert_eq!(
+            port("/dev/ttyACM0", ST).to_string(),
+            "/dev/ttyACM0      0483:374b  STM32 STLink  066EFF  <- a NUCLEO: try this one"
+        );
+        let plain = Found {
+            name: "/dev/ttyAMA0".into(),
+            usb: None,
+        };
+        assert_eq!(plain.to_string(), "/dev/ttyAMA0      no USB device");
+    }
+}

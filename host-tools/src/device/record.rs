@@ -1,0 +1,152 @@
+//! Slides of a real finger in the project's format, from the raw samples that the probe streams while it explores.
+//!
+//! The probe is asked for an exploration that takes one movement after the other and is never sure. P_AC and shear are the
+//! very samples that went into its features. P_DC is not streamed: it is computed back from the contact force, which is told
+//! 20 times a second.
+
+use tactus::recordings::{Background, PAC_RATE_HZ, Slide};
+use tactus_core::movement::Movement;
+use tactus_core::pressure::Calibration;
+use tactus_core::wire::{Block, Live, Phase, Report, Tell};
+
+/// How often the force is told while the rig moves.
+const LIVE_HZ: u32 = 20;
+/// Rate of the shear samples.
+const SHEAR_HZ: u32 = 1000;
+
+/// Why a slide that counted is not recorded.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub(crate) enum RecordError {
+    /// A report was lost on the line.
+    #[error("block {0} of its samples is missing")]
+    MissingBlock(u16),
+    /// No samples came.
+    #[error("its samples did not come")]
+    NoSamples,
+}
+
+/// Puts slides together from reports.
+#[derive(Debug)]
+pub(crate) struct Recorder {
+    calibration: Calibration,
+    movement: Option<Movement>,
+    slide: Vec<Block>,
+    missing: Option<u16>,
+    /// when the slide began by the probe's clock, ms, and the force since then
+    began_ms: Option<u32>,
+    sliding: bool,
+    forces: Vec<(u32, i16)>,
+    numbers: u32,
+}
+
+impl Recorder {
+    /// A recorder of slides of one texture, with the probe's calibration.
+    pub(crate) fn new(calibration: Calibration) -> Self {
+        Self {
+            calibration,
+            movement: None,
+            slide: Vec::new(),
+            missing: None,
+            began_ms: None,
+            sliding: false,
+            forces: Vec::new(),
+            numbers: 0,
+        }
+    }
+
+    /// Takes in a report; the slide that counts from now on, for the texture of this index.
+    pub(crate) fn hear(
+        &mut self,
+        texture: usize,
+        report: &Report,
+    ) -> Option<Result<Slide, RecordError>> {
+        match &report.tell {
+            Tell::Chosen { movement, .. } => {
+                self.movement = Some(*movement);
+                self.restart();
+            }
+            Tell::Rejected { .. } => self.restart(),
+            Tell::Phase(Phase::Sliding) => {
+                self.began_ms = Some(report.at_ms);
+                self.sliding = true;
+            }
+            Tell::Live(Live { force_mn, .. }) if self.sliding => {
+                self.forces.push((report.at_ms, *force_mn));
+            }
+            // what is told while it is lifted is no force of the slide
+            Tell::Phase(_) if self.began_ms.is_some() => self.sliding = false,
+            Tell::Block(block) => {
+                let expected = self.slide.len() as u16;
+                if block.number != expected {
+                    self.missing.get_or_insert(expected);
+                }
+                self.slide.push(block.clone());
+            }
+            Tell::Felt { .. } => {
+                let slide = self.finish(texture);
+                self.restart();
+                return Some(slide);
+            }
+            _ => {}
+        }
+        None
+    }
+
+    fn restart(&mut self) {
+        self.slide.clear();
+        self.missing = None;
+        self.began_ms = None;
+        self.sliding = false;
+        self.forces.clear();
+    }
+
+    fn finish(&mut self, texture: usize) -> Result<Slide, RecordError> {
+        if let Some(block) = self.missing {
+            return Err(RecordError::MissingBlock(block));
+        }
+        let (still, moving): (Vec<&Block>, Vec<&Block>) = self.slide.iter().partition(|b| b.still);
+        let steady = moving.iter().find_map(|block| block.steady);
+        let (Some((from, to)), Some(movement), Some(began_ms)) =
+            (steady, self.movement, self.began_ms)
+        else {
+            return Err(RecordError::NoSamples);
+        };
+        let pac: Vec<i16> = moving.iter().flat_map(|b| b.pac.iter().copied()).collect();
+        if pac.len() < to as usize || still.is_empty() {
+            return Err(RecordError::NoSamples);
+        }
+        let seconds = |sample: u32| sample as f32 / PAC_RATE_HZ as f32;
+        let samples =
+            |rate_hz: u32| (pac.len() as u64 * u64::from(rate_hz)).div_ceil(2200) as usize;
+        // shear comes at constant speed only
+        let mut shear_mn = vec![0; (seconds(from) * SHEAR_HZ as f32).round() as usize];
+        shear_mn.extend(moving.iter().flat_map(|b| b.shear_mn.iter().copied()));
+        shear_mn.resize(samples(SHEAR_HZ).max(shear_mn.len()), 0);
+        let pdc = (0..=samples(LIVE_HZ))
+            .map(|n| {
+                let at_ms = began_ms + n as u32 * 1000 / LIVE_HZ;
+                let nearest = self
+                    .forces
+                    .iter()
+                    .min_by_key(|(told, _)| told.abs_diff(at_ms));
+                let (_, force_mn) = nearest.ok_or(RecordError::NoSamples)?;
+                Ok((f32::from(*force_mn) / self.calibration.force_mn_per_count).round() as i16)
+            })
+            .collect::<Result<_, RecordError>>()?;
+        self.numbers += 1;
+        Ok(Slide {
+            texture,
+            number: self.numbers,
+            movement,
+            pac,
+            pdc,
+            pdc_rate_hz: LIVE_HZ,
+            shear_mn: Some(shear_mn),
+            shear_rate_hz: SHEAR_HZ,
+            window: (seconds(from), seconds(to)),
+            background: Background::Still(
+                still.iter().flat_map(|b| b.pac.iter().copied()).collect(),
+            ),
+        })
+    }
+}

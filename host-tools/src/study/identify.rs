@@ -1,0 +1,421 @@
+//! Identification among all textures (Table 5), and discrimination of pairs (Table 4): thousands of virtual explorations,
+//! each slide drawn from the validation trials.
+
+use rand::SeedableRng as _;
+use rand::seq::SliceRandom as _;
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+use tactus_core::explorer::{Config, Explorer};
+use tactus_core::features::Property;
+
+use super::published::{IDENTIFIED, PAIRS};
+use super::slides::{Recorded, StudyWorld};
+use super::{Named, StudyError};
+use crate::collection::{Collection, texture_name};
+use crate::evaluate::{MAX_TEXTURES, Method, Outcome, Summary, evaluate, explorer, play_and_tell};
+use crate::experiment::Experiment;
+
+/// The ways of exploring that are compared, the paper's three and the project's own.
+pub const METHODS: [Method; 4] = [Method::Cycle, Method::Random, Method::Paper, Method::Fused];
+/// Movements after which there is an answer, sure or not (paper).
+pub const MAX_SLIDES: u8 = 10;
+/// Most movements for a pair. The paper gives no limit; no pair comes near this one.
+const MAX_PAIR_SLIDES: u8 = 254;
+
+/// How a way of exploring did: a column of Table 5.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Column {
+    /// Right answers, %.
+    pub correct: f64,
+    /// Explorations that were right and sure, %.
+    pub converged: f64,
+    /// Of the sure, those that were wrong, %.
+    pub wrong_when_sure: f64,
+    /// Median number of movements; one that did not converge counts 11.
+    pub median: f64,
+    /// Mean number of movements.
+    pub mean: f64,
+    /// Right answers for each texture of [`IDENTIFIED`], %.
+    pub textures: Vec<f64>,
+}
+
+/// All textures with the slides to learn from, and those of [`IDENTIFIED`] with slides to test with.
+///
+/// # Errors
+/// See [`StudyError`].
+pub fn experiment(recorded: &Recorded, seed: u64) -> Result<Experiment, StudyError> {
+    let Recorded {
+        training,
+        validation,
+    } = recorded;
+    let names = training.iter().map(|t| texture_name(t.texture).to_owned());
+    let movements = Collection::MOVEMENTS.to_vec();
+    let tested = training.iter().map(|t| {
+        let validation = validation.iter().find(|v| v.texture == t.texture);
+        validation.map_or_else(|| vec![Vec::new(); movements.len()], |v| v.slides.clone())
+    });
+    let (tested, trained) = (
+        tested.collect(),
+        training.iter().map(|t| t.slides.clone()).collect(),
+    );
+    let trials = training.iter().flat_map(|t| &t.slides).map(Vec::len).min();
+    Ok(Experiment::collected(
+        names.collect(),
+        movements,
+        trained,
+        tested,
+        trials.unwrap_or(0),
+        seed,
+    )?)
+}
+
+fn config(method: Method) -> Config {
+    Config {
+        method: method.method(),
+        strategy: method.strategy(),
+        max_slides: MAX_SLIDES,
+        ..Config::default()
+    }
+}
+
+/// Identification at 99 % by one way of exploring.
+///
+/// # Errors
+/// See [`StudyError`].
+pub fn identify(
+    experiment: &Experiment,
+    method: Method,
+    simulations: u64,
+    done: impl Fn() + Sync,
+) -> Result<(Column, Vec<Outcome>), StudyError> {
+    let outcomes = evaluate(experiment, config(method), simulations, done)?;
+    let summary = Summary::new(&outcomes, experiment.names(), MAX_SLIDES);
+    let right = |o: &&Outcome| o.identified == o.unknown;
+    let textures = IDENTIFIED.iter().map(|&number| {
+        let of: Vec<&Outcome> = outcomes
+            .iter()
+            .filter(|o| o.unknown + 1 == usize::from(number))
+            .collect();
+        percent(of.iter().copied().filter(right).count(), of.len())
+    });
+    let column = Column {
+        correct: 100.0 * summary.accuracy,
+        converged: percent(
+            outcomes.iter().filter(right).filter(|o| o.sure).count(),
+            outcomes.len(),
+        ),
+        wrong_when_sure: 100.0 * summary.wrong_when_sure,
+        median: summary.median_slides,
+        mean: summary.mean_slides,
+        textures: textures.collect(),
+    };
+    Ok((column, outcomes))
+}
+
+/// A row of Table 4.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct PairRow {
+    /// The textures.
+    pub textures: [Named; 2],
+    /// Right answers, %.
+    pub correct: f64,
+    /// Explorations that came to 99.9 %, in %.
+    pub converged: f64,
+    /// Median number of movements.
+    pub median: f64,
+    /// Mean number of movements.
+    pub mean: f64,
+    /// What the paper has: right answers of people and of its machine, %.
+    pub paper: [f64; 2],
+}
+
+/// The pairs of Table 4 at 99.9 %, by Bayesian exploration: `simulations` of each.
+///
+/// # Errors
+/// See [`StudyError`].
+pub fn pairs(
+    experiment: &Experiment,
+    simulations: u64,
+    done: impl Fn() + Sync,
+) -> Result<Vec<PairRow>, StudyError> {
+    let config = Config {
+        method: Method::Paper.method(),
+        strategy: Method::Paper.strategy(),
+        threshold: Config::PAIR_THRESHOLD,
+        max_slides: MAX_PAIR_SLIDES,
+        open: false,
+    };
+    let row = |pair: &super::published::Pair| {
+        let candidates = pair.textures.map(|number| u16::from(number) - 1);
+        let among = experiment.clone().among(&candidates);
+        let outcomes = evaluate(&among, config, simulations, &done)?;
+        let summary = Summary::new(&outcomes, among.names(), MAX_PAIR_SLIDES);
+        Ok(PairRow {
+            textures: pair.textures.map(Named::new),
+            correct: 100.0 * summary.accuracy,
+            converged: 100.0 * summary.converged,
+            median: summary.median_slides,
+            mean: summary.mean_slides,
+            paper: [pair.human, pair.machine],
+        })
+    };
+    PAIRS.iter().map(row).collect()
+}
+
+/// Share in %; of nothing, 0.
+pub(super) fn percent(part: usize, of: usize) -> f64 {
+    100.0 * part as f64 / of.max(1) as f64
+}
+
+/// Identification in one world: Table 5.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Identification {
+    /// Virtual explorations of each way of exploring.
+    pub simulations: u64,
+    /// The textures, in the order of Table 5.
+    pub textures: Vec<Named>,
+    /// What cycling went through: the best movement of each property.
+    pub cycled: Vec<(usize, Property)>,
+    /// The ways of exploring, as [`METHODS`].
+    pub columns: Vec<Column>,
+    /// Explorations by Bayesian exploration, as in fig. 10.
+    pub evolutions: Vec<Evolution>,
+}
+
+/// One exploration, step by step.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Evolution {
+    /// What it is an example of.
+    pub example: &'static str,
+    /// Which of the simulations it is.
+    pub simulation: u64,
+    /// The unknown texture.
+    pub unknown: Named,
+    /// The answer.
+    pub identified: Named,
+    /// Whether it came to 99 %.
+    pub sure: bool,
+    /// Movement (from 0) and property of each step.
+    pub steps: Vec<(u8, Property)>,
+    /// Textures that were ever likely, with their probability before the first step and after each.
+    pub probabilities: Vec<(Named, Vec<f32>)>,
+}
+
+/// A texture less probable than this at all times is not shown.
+const LIKELY: f32 = 0.1;
+
+impl Identification {
+    /// Explores by every way.
+    ///
+    /// # Errors
+    /// See [`StudyError`].
+    pub fn run(
+        experiment: &Experiment,
+        simulations: u64,
+        done: impl Fn() + Sync,
+    ) -> Result<Self, StudyError> {
+        let mut columns = Vec::new();
+        let mut evolutions = Vec::new();
+        let mut cycled = Vec::new();
+        for method in METHODS {
+            let (column, outcomes) = identify(experiment, method, simulations, &done)?;
+            columns.push(column);
+            if method == Method::Paper {
+                let bytes = experiment.run(0).learn(method.method())?;
+                let mut explorer = explorer(&bytes, experiment.measured(), config(method), None)?;
+                cycled = explorer
+                    .turns()
+                    .filter_map(|a| Some((usize::from(a.movement), a.property?)))
+                    .collect();
+                evolutions = examples(&outcomes)
+                    .into_iter()
+                    .map(|(example, n)| evolution(experiment, &mut explorer, example, n))
+                    .collect();
+            }
+        }
+        Ok(Self {
+            simulations,
+            textures: IDENTIFIED.map(Named::new).to_vec(),
+            cycled,
+            columns,
+            evolutions,
+        })
+    }
+
+    /// The column of a way of exploring.
+    pub fn column(&self, method: Method) -> Option<&Column> {
+        let at = METHODS.iter().position(|m| *m == method)?;
+        self.columns.get(at)
+    }
+}
+
+/// The first simulations of the four kinds that fig. 10 shows.
+fn examples(outcomes: &[Outcome]) -> Vec<(&'static str, u64)> {
+    fn right(o: &Outcome) -> bool {
+        o.identified == o.unknown
+    }
+    type Is = fn(&Outcome) -> bool;
+    let kinds: [(&str, Is); 4] = [
+        ("identified at once", |o| {
+            right(o) && o.sure && o.slides <= 3
+        }),
+        ("identified late", |o| right(o) && o.sure && o.slides >= 6),
+        ("taken for another", |o| !right(o)),
+        ("right, but not sure after 10 movements", |o| {
+            right(o) && !o.sure
+        }),
+    ];
+    let first =
+        |(example, is): (&'static str, Is)| Some((example, outcomes.iter().position(is)? as u64));
+    kinds.into_iter().filter_map(first).collect()
+}
+
+/// Plays a simulation again, and keeps what was thought at each step.
+fn evolution(
+    experiment: &Experiment,
+    explorer: &mut Explorer<'_, MAX_TEXTURES>,
+    example: &'static str,
+    simulation: u64,
+) -> Evolution {
+    let run = experiment.run(simulation);
+    let mut steps = Vec::new();
+    let mut posteriors = vec![vec![
+        1.0 / experiment.names().len() as f32;
+        experiment.names().len()
+    ]];
+    let outcome = play_and_tell(
+        explorer,
+        Method::Paper.strategy(),
+        run,
+        |action, posterior| {
+            steps.extend(action.property.map(|property| (action.movement, property)));
+            posteriors.push(posterior.to_vec());
+        },
+    );
+    let named = |index: usize| Named::new(index as u8 + 1);
+    let of = |texture: usize| posteriors.iter().map(move |p| p[texture]);
+    let likely = (0..experiment.names().len())
+        .filter(|&texture| of(texture).any(|p| p >= LIKELY) || texture == outcome.unknown);
+    Evolution {
+        example,
+        simulation,
+        unknown: named(outcome.unknown),
+        identified: named(outcome.identified),
+        sure: outcome.sure,
+        steps,
+        probabilities: likely.map(|t| (named(t), of(t).collect())).collect(),
+    }
+}
+
+/// What may explain that cycling does better here than in the paper: a world in which each movement tells something of its
+/// own, and trials differ more.
+///
+/// The slides are those of a world of more variation, but each movement's are dealt out to the textures anew: what a texture
+/// feels like at one movement then says nothing of another, while each property at each movement stays as it was.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Exchanged {
+    /// Variation of the trials.
+    pub variation: f64,
+    /// The paper's ways of exploring, the first three of [`METHODS`].
+    pub columns: Vec<Column>,
+}
+
+impl Exchanged {
+    /// Variation of the trials: chosen so that Bayesian exploration is about as good as in the paper.
+    const VARIATION: f64 = 1.5;
+
+    /// Records such a world, and explores in it.
+    ///
+    /// # Errors
+    /// See [`StudyError`].
+    pub fn run(
+        world: StudyWorld,
+        simulations: u64,
+        recorded: impl Fn() + Sync,
+    ) -> Result<Self, StudyError> {
+        let variation = Self::VARIATION;
+        let mut slides = StudyWorld { variation, ..world }.train_and_validate(recorded)?;
+        exchange(&mut slides, world.seed);
+        let experiment = experiment(&slides, world.seed)?;
+        let columns = METHODS[..3]
+            .iter()
+            .map(|&method| Ok(identify(&experiment, method, simulations, || ())?.0));
+        Ok(Self {
+            variation,
+            columns: columns.collect::<Result<_, StudyError>>()?,
+        })
+    }
+}
+
+/// Deals out the slides of all movements but the first to the textures anew: those of the textures with validation trials
+/// among these, those of the others among the others.
+fn exchange(recorded: &mut Recorded, seed: u64) {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let Recorded {
+        training,
+        validation,
+    } = recorded;
+    let tested = |texture: u8| validation.iter().position(|v| v.texture == texture);
+    let (with, without): (Vec<usize>, Vec<usize>) =
+        (0..training.len()).partition(|&t| tested(training[t].texture).is_some());
+    let in_validation: Vec<Option<usize>> = training.iter().map(|t| tested(t.texture)).collect();
+    for movement in 1..Collection::MOVEMENTS.len() {
+        let (old, old_validation) = (training.clone(), validation.clone());
+        for group in [&with, &without] {
+            let mut from = group.clone();
+            from.shuffle(&mut random);
+            for (&to, &from) in group.iter().zip(&from) {
+                training[to].slides[movement] = old[from].slides[movement].clone();
+                if let (Some(to), Some(from)) = (in_validation[to], in_validation[from]) {
+                    validation[to].slides[movement] = old_validation[from].slides[movement].clone();
+                }
+            }
+        }
+    }
+}
+
+/// What came out in one of several worlds.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct WorldRow {
+    /// The world.
+    pub seed: u64,
+    /// The ways of exploring, as [`METHODS`].
+    pub columns: Vec<Column>,
+    /// Mean of the pairs' right answers, %.
+    pub pairs: f64,
+}
+
+impl WorldRow {
+    /// Identification and pairs in a world whose slides are recorded.
+    ///
+    /// # Errors
+    /// See [`StudyError`].
+    pub fn run(
+        world: StudyWorld,
+        recorded: &Recorded,
+        simulations: u64,
+        done: impl Fn() + Sync,
+    ) -> Result<Self, StudyError> {
+        let experiment = experiment(recorded, world.seed)?;
+        let columns = METHODS
+            .iter()
+            .map(|&method| Ok(identify(&experiment, method, simulations, &done)?.0))
+            .collect::<Result<_, StudyError>>()?;
+        let rows = pairs(&experiment, of_pair(simulations), &done)?;
+        Ok(Self {
+            seed: world.seed,
+            columns,
+            pairs: rows.iter().map(|row| row.correct).sum::<f64>() / rows.len() as f64,
+        })
+    }
+
+    /// Explorations of [`WorldRow::run`], for a progress bar.
+    pub fn explorations(simulations: u64) -> u64 {
+        METHODS.len() as u64 * simulations + PAIRS.len() as u64 * of_pair(simulations)
+    }
+}
+
+/// Simulations of each pair: the eight pairs together have as many as a way of exploring, 1000 each of 8000 (paper).
+pub fn of_pair(simulations: u64) -> u64 {
+    (simulations / PAIRS.len() as u64).max(1)
+}

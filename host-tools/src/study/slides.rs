@@ -1,0 +1,242 @@
+//! The slides of the study: textures one after the other under one finger, whose skin wears and is changed.
+//!
+//! Every slide is made by the whole simulated rig: the core's control presses and slides, the world answers in sensor words,
+//! and the core decodes them and computes the features, as the chip does.
+
+use rayon::prelude::*;
+use tactus_core::features::Plan;
+use tactus_core::fused::Observation;
+use tactus_core::movement::{Movement, SlidePath};
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::guard::{Fault, Unguarded};
+
+use super::StudyError;
+use super::published::{IDENTIFIED, TRIALS};
+use crate::collection::{Collection, calibrated, record_trials};
+use crate::replay::measure;
+use crate::sim::Conditions;
+use crate::sim::finger::wear_per_mm;
+use crate::sim::textures;
+use crate::simulated::SimRig;
+
+/// Wear at which the ridges look worn: the skin is changed before the next texture (paper: at any visible sign). Chosen, so
+/// that the 1755 slides of the training take about the two changes that they took in the paper.
+pub const VISIBLE_WEAR: f64 = 0.05;
+
+/// Numbers of the sessions of a world: trials of different sessions differ.
+const TRAINING: u64 = 1;
+const VALIDATION: u64 = 2;
+
+/// One of the study's worlds: its textures, its finger, and the knob.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct StudyWorld {
+    /// The world's seed.
+    pub seed: u64,
+    /// How much trials differ: [`Conditions::variation`].
+    pub variation: f64,
+}
+
+/// All trials of one texture.
+#[derive(Clone, PartialEq, Debug)]
+pub struct TextureTrials {
+    /// Number of the texture.
+    pub texture: u8,
+    /// Slides by movement and trial.
+    pub slides: Vec<Vec<Observation>>,
+    /// Wear of the skin before the first slide, and after the last of each movement.
+    pub wear: Vec<f64>,
+    /// Whether the skin was changed before the first slide.
+    pub new_skin: bool,
+}
+
+/// What is slid over in one go: the same finger, movement by movement on each texture.
+#[derive(Clone, Debug)]
+pub struct Session<'a> {
+    /// Numbers of the textures, in the order of time.
+    pub textures: &'a [u8],
+    /// The movements.
+    pub movements: &'a [Movement],
+    /// Trials of each movement.
+    pub trials: u32,
+    /// Tells sessions of one world apart: their trials differ.
+    pub number: u64,
+    /// Whether the guard of the force watches. The paper's rig had none, and its pilot study needs forces up to 2 N, where
+    /// the shear on a sticky texture alone takes P_DC over the guard's limit.
+    pub force_guard: bool,
+}
+
+impl StudyWorld {
+    fn collection(self) -> Collection {
+        Collection {
+            seed: self.seed,
+            textures: Vec::new(),
+            trials: 0,
+        }
+    }
+
+    /// A rig with a texture under it, and a finger that is so worn.
+    pub fn rig(self, texture: u8, session: u64, wear: f64) -> SimRig {
+        self.guarded_rig(texture, session, wear, true)
+    }
+
+    fn guarded_rig(self, texture: u8, session: u64, wear: f64, force_guard: bool) -> SimRig {
+        let setup = self.collection().setup(texture, session);
+        let variation = self.variation;
+        let unguarded = if force_guard {
+            Unguarded::default()
+        } else {
+            Unguarded::against(Fault::ForceHigh)
+        };
+        SimRig::under(setup, Conditions { variation, wear }, unguarded)
+    }
+
+    /// What the rigs of this world have in common.
+    ///
+    /// # Errors
+    /// See [`StudyError`].
+    pub fn calibration(self) -> Result<RigCalibration, StudyError> {
+        Ok(calibrated(self.collection().setup(1, 0))?)
+    }
+
+    /// Makes all slides of a session, textures side by side; `done` hears of each texture.
+    ///
+    /// # Errors
+    /// The first fault of a rig, or slide without properties.
+    pub fn record(
+        self,
+        session: &Session<'_>,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<TextureTrials>, StudyError> {
+        let plan = Plan::new();
+        self.skins(session)
+            .into_par_iter()
+            .map(|(texture, wear, new_skin)| {
+                let trials = self.record_texture(session, texture, wear, calibration, &plan)?;
+                done();
+                Ok(TextureTrials { new_skin, ..trials })
+            })
+            .collect()
+    }
+
+    /// Makes slides of textures with a skin that is so worn before each of them.
+    ///
+    /// # Errors
+    /// See [`StudyWorld::record`].
+    pub fn record_worn(
+        self,
+        session: &Session<'_>,
+        wear: f64,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<TextureTrials>, StudyError> {
+        let plan = Plan::new();
+        session
+            .textures
+            .par_iter()
+            .map(|&texture| {
+                let trials = self.record_texture(session, texture, wear, calibration, &plan)?;
+                done();
+                Ok(trials)
+            })
+            .collect()
+    }
+
+    fn record_texture(
+        self,
+        session: &Session<'_>,
+        texture: u8,
+        wear: f64,
+        calibration: RigCalibration,
+        plan: &Plan,
+    ) -> Result<TextureTrials, StudyError> {
+        let Session {
+            movements, trials, ..
+        } = *session;
+        let mut rig = self.guarded_rig(texture, session.number, wear, session.force_guard);
+        rig.control().allow_high_force(!session.force_guard);
+        let mut felt = TextureTrials {
+            texture,
+            slides: Vec::with_capacity(movements.len()),
+            wear: vec![wear],
+            new_skin: false,
+        };
+        let mut trial = 0;
+        record_trials(&mut rig, calibration, movements, trials, |rig, slide| {
+            if trial % trials == 0 {
+                felt.slides.push(Vec::with_capacity(trials as usize));
+                felt.wear.push(0.0);
+            }
+            trial += 1;
+            let observation = Observation::from(&measure(plan, &slide)?);
+            if let (Some(slides), Some(wear)) = (felt.slides.last_mut(), felt.wear.last_mut()) {
+                slides.push(observation);
+                *wear = rig.world().truth().wear;
+            }
+            Ok::<_, StudyError>(())
+        })?;
+        Ok(felt)
+    }
+
+    /// The skin before each texture: its wear, and whether it is new.
+    ///
+    /// Wear only grows with sliding, so what the textures before take of it is known from their friction, and all can be
+    /// recorded side by side. A test holds it against the wear that comes.
+    pub fn skins(self, session: &Session<'_>) -> Vec<(u8, f64, bool)> {
+        let mut wear = 0.0;
+        let next = session.textures.iter().map(|&number| {
+            let new_skin = wear >= VISIBLE_WEAR;
+            if new_skin {
+                wear = 0.0;
+            }
+            let before = (number, wear, new_skin);
+            let texture = textures::draw(number, self.seed);
+            for movement in session.movements {
+                let (force_n, speed) = (movement.force_n().into(), movement.speed_mm_s().into());
+                let way = f64::from(session.trials) * slide_mm(*movement);
+                wear += way * wear_per_mm(&texture, force_n, speed);
+            }
+            before
+        });
+        next.collect()
+    }
+}
+
+/// About how long the rig slides with a movement, mm: 3 s, or what the sample has room for.
+fn slide_mm(movement: Movement) -> f64 {
+    f64::from((3.0 * movement.speed_mm_s()).min(SlidePath::LONGEST_MM))
+}
+
+/// What a world's identification needs: the training of all textures, and the validation trials of those of Tables 4 and 5.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Recorded {
+    /// All 117.
+    pub training: Vec<TextureTrials>,
+    /// Those of [`IDENTIFIED`], with a new skin.
+    pub validation: Vec<TextureTrials>,
+}
+
+impl StudyWorld {
+    /// Textures of [`StudyWorld::train_and_validate`], for a progress bar.
+    pub const RECORDED: u64 = 117 + IDENTIFIED.len() as u64;
+
+    /// Makes the slides of training and validation; `done` hears of each texture.
+    ///
+    /// # Errors
+    /// See [`StudyError`].
+    pub fn train_and_validate(self, done: impl Fn() + Sync) -> Result<Recorded, StudyError> {
+        let calibration = self.calibration()?;
+        let all: Vec<u8> = (1..=117).collect();
+        let session = |textures, number| Session {
+            textures,
+            movements: &Collection::MOVEMENTS,
+            trials: TRIALS,
+            number,
+            force_guard: true,
+        };
+        Ok(Recorded {
+            training: self.record(&session(&all, TRAINING), calibration, &done)?,
+            validation: self.record(&session(&IDENTIFIED, VALIDATION), calibration, &done)?,
+        })
+    }
+}

@@ -1,0 +1,1086 @@
+//! `tactus device` as a user meets it, at a probe in software: the simulated rig and the core's own session behind the
+//! frames of the link, on a TCP port or a pseudo terminal; and at lines that are no probe's.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::fs;
+use std::io::{ErrorKind, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::sync::OnceLock;
+use std::sync::mpsc::{self, Receiver as Told, Sender};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use tactus::collection::{Collection, calibrated};
+use tactus::simulated::{SimError, SimRig, feel};
+use tactus_core::explorer::Method;
+use tactus_core::features::{Plan, PropertySet, Slide};
+use tactus_core::kernels::{Kernels, Plain};
+use tactus_core::movement::Movement;
+use tactus_core::rig::control::Phase as RigPhase;
+use tactus_core::rig::{Rig, calibration::RigCalibration};
+use tactus_core::session::{self, Blocks, text};
+use tactus_core::table::Table;
+use tactus_core::wire::{
+    self, Ask, Counts, Forget, Live, MAX_FRAME, Name, PART, PROTOCOL, Phase, Receiver, Report,
+    Request, Reset, Status, Tell,
+};
+
+const UNKNOWN: u8 = 47;
+
+fn world() -> Collection {
+    Collection {
+        seed: 5,
+        textures: vec![10, UNKNOWN, 100],
+        trials: 3,
+    }
+}
+
+/// Calibration and table of a probe for that world; learned once.
+fn known() -> &'static (RigCalibration, Vec<u8>) {
+    static KNOWN: OnceLock<(RigCalibration, Vec<u8>)> = OnceLock::new();
+    KNOWN.get_or_init(|| {
+        let calibration = calibrated(world().setup(10, 0)).unwrap();
+        let table = world().learn(Method::Fused, calibration, || ()).unwrap();
+        (calibration, table)
+    })
+}
+
+trait Line: Read + Write + Send {}
+impl<T: Read + Write + Send> Line for T {}
+
+/// The probe's end of the line.
+struct Wire {
+    line: Box<dyn Line>,
+    receiver: Receiver,
+    number: u16,
+    at_ms: u32,
+    phase: RigPhase,
+    table: Vec<u8>,
+    calibration: RigCalibration,
+    streams: bool,
+    stopped: bool,
+    busy: bool,
+    requests: VecDeque<Request>,
+    /// all that was asked, for the test
+    asked: Sender<Ask>,
+    gone: bool,
+}
+
+impl Wire {
+    fn tell(&mut self, tell: Tell) {
+        let report = Report {
+            number: self.number,
+            at_ms: self.at_ms,
+            tell,
+        };
+        self.number = self.number.wrapping_add(1);
+        let mut room = [0; MAX_FRAME + 1];
+        let frame = wire::encode(&report, &mut room).unwrap();
+        self.gone |= self.line.write_all(frame).is_err();
+    }
+
+    fn enter(&mut self, phase: RigPhase) {
+        if phase != self.phase {
+            self.phase = phase;
+            if let RigPhase::Faulted(fault) = phase {
+                self.tell(Tell::Fault(fault));
+            }
+            self.tell(Tell::Phase(phase.into()));
+        }
+    }
+
+    /// Takes in what has come, and answers what can be answered at any time.
+    fn look(&mut self) {
+        let mut bytes = [0; 1024];
+        let length = match self.line.read(&mut bytes) {
+            Ok(0) => return self.gone = true,
+            Ok(length) => length,
+            Err(why) => {
+                let nothing = [ErrorKind::WouldBlock, ErrorKind::TimedOut];
+                return self.gone |= !nothing.contains(&why.kind());
+            }
+        };
+        for &byte in &bytes[..length] {
+            let Some(request) = self.receiver.push::<Request>(byte) else {
+                continue;
+            };
+            let Request { id, ask } = request.unwrap();
+            let _ = self.asked.send(ask.clone());
+            match ask {
+                Ask::Status => {
+                    let table = Table::read(&self.table).unwrap();
+                    let status = Status {
+                        phase: self.phase.into(),
+                        fault: None,
+                        textures: table.textures(),
+                        table_bytes: self.table.len() as u32,
+                        table_crc: table.crc(),
+                        factory: self.table == known().1,
+                        calibrated: self.calibration.date,
+                        counts: Counts::default(),
+                        skin_mj: (1500, 250),
+                    };
+                    self.tell(Tell::Status(status));
+                }
+                Ask::Stop => self.stopped = self.busy,
+                Ask::Stream(on) => self.streams = on,
+                Ask::ReadCalibration => {
+                    let bytes = self.calibration.to_bytes();
+                    self.tell(Tell::Calibration(bytes.into_iter().collect()));
+                }
+                _ if self.busy => {
+                    let why = text("busy: wait, or stop what is being done");
+                    self.tell(Tell::Refused { id, why });
+                    continue;
+                }
+                ask => {
+                    self.requests.push_back(Request { id, ask });
+                    continue;
+                }
+            }
+            self.tell(Tell::Done(id));
+        }
+    }
+}
+
+/// The simulated rig, with everything told that happens.
+struct Streamed<'w> {
+    rig: SimRig,
+    wire: &'w RefCell<Wire>,
+    /// ms of the rig's time between two looks at the line, each of which takes a real one
+    hurry: u64,
+}
+
+impl Rig for Streamed<'_> {
+    type Error = SimError;
+
+    fn measures(&self) -> PropertySet {
+        PropertySet::ALL
+    }
+
+    async fn perform<K: Kernels>(
+        &mut self,
+        movement: Movement,
+        slide: &mut Slide<'_, K>,
+    ) -> Result<(), SimError> {
+        if self.rig.control().phase() == RigPhase::Parked {
+            self.rig.home()?;
+        }
+        self.rig.control().start(movement, 0.5)?;
+        let mut blocks = Blocks::default();
+        for ms in 0u64.. {
+            let outputs = self.rig.tick().clone();
+            feel(&outputs, slide);
+            let mut wire = self.wire.borrow_mut();
+            wire.at_ms = self.rig.now().as_millis() as u32;
+            if let Some(block) = blocks.put(&outputs.felt, &outputs.pac, outputs.shear_mn)
+                && wire.streams
+            {
+                wire.tell(Tell::Block(block));
+            }
+            let control = self.rig.control();
+            wire.enter(control.phase());
+            if ms % 50 == 0 {
+                wire.tell(Tell::Live(Live {
+                    force_mn: control.force_mn() as i16,
+                    steps: 0,
+                    stage_um: (control.stage_mm() * 1e3) as i32,
+                    speed_um_s: 0,
+                    current_ma: 0,
+                }));
+            }
+            if ms % self.hurry == 0 {
+                wire.look();
+                thread::sleep(Duration::from_millis(1));
+            }
+            if wire.stopped {
+                control.stop();
+            }
+            if control.is_at_rest() {
+                break;
+            }
+        }
+        let mut wire = self.wire.borrow_mut();
+        if wire.streams {
+            wire.tell(Tell::Block(blocks.end(0)));
+        }
+        // its finger really is in the air
+        assert!(self.rig.world().truth().force_n == 0.0);
+        if std::mem::take(&mut wire.stopped) {
+            return Err(SimError::Stopped);
+        }
+        Ok(())
+    }
+}
+
+/// Serves one line until the host is gone.
+fn serve(line: Box<dyn Line>, hurry: u64, asked: Sender<Ask>) {
+    let (calibration, table) = known();
+    let wire = RefCell::new(Wire {
+        line,
+        receiver: Receiver::default(),
+        number: 0,
+        at_ms: 0,
+        phase: RigPhase::Ready,
+        table: table.clone(),
+        calibration: *calibration,
+        streams: false,
+        stopped: false,
+        busy: false,
+        requests: VecDeque::new(),
+        asked,
+        gone: false,
+    });
+    let mut rig = Streamed {
+        rig: SimRig::new(world().setup(UNKNOWN, 100)),
+        wire: &wire,
+        hurry,
+    };
+    rig.rig.control().calibrate(*calibration).unwrap();
+    rig.rig.home().unwrap();
+    let mut pushed = Vec::new();
+    while !wire.borrow().gone {
+        wire.borrow_mut().look();
+        thread::sleep(Duration::from_millis(1));
+        let Some(Request { id, ask }) = wire.borrow_mut().requests.pop_front() else {
+            continue;
+        };
+        wire.borrow_mut().busy = true;
+        let done = obey(ask, &mut rig, &mut pushed);
+        let mut wire = wire.borrow_mut();
+        wire.busy = false;
+        wire.tell(match done {
+            Ok(()) => Tell::Done(id),
+            Err(why) => Tell::Refused { id, why: *why },
+        });
+    }
+}
+
+fn obey(ask: Ask, rig: &mut Streamed<'_>, pushed: &mut Vec<u8>) -> Result<(), Box<wire::Text>> {
+    let wire = rig.wire;
+    let tell = |tell| wire.borrow_mut().tell(tell);
+    match ask {
+        Ask::Identify(wanted) => {
+            let bytes = wire.borrow().table.clone();
+            let table = Table::read(&bytes).map_err(text)?;
+            let plan = Plan::new();
+            let exploring = session::identify::<_, Plain>(&wanted, rig, table, &plan, tell);
+            embassy_futures::block_on(exploring)?;
+        }
+        Ask::ReadTable(from) => {
+            let table = wire.borrow().table.clone();
+            tell(Tell::TablePart {
+                offset: from,
+                length: table.len() as u32,
+                bytes: table[from as usize..].iter().copied().take(PART).collect(),
+            });
+        }
+        Ask::BeginTable(_) => pushed.clear(),
+        Ask::WriteTable { bytes, .. } => pushed.extend_from_slice(&bytes),
+        Ask::CommitTable => wire.borrow_mut().table = pushed.clone(),
+        Ask::FactoryTable => wire.borrow_mut().table = known().1.clone(),
+        Ask::WriteCalibration(bytes) => {
+            let bytes = bytes.as_slice().try_into().unwrap();
+            wire.borrow_mut().calibration = RigCalibration::from_bytes(bytes).map_err(text)?;
+        }
+        Ask::Calibrate => {
+            let mut calibration = wire.borrow().calibration;
+            calibration.unloaded_a.0 += 0.001;
+            wire.borrow_mut().calibration = calibration;
+            let bytes = calibration.to_bytes();
+            tell(Tell::Calibration(bytes.into_iter().collect()));
+        }
+        Ask::Answer(name) => tell(Tell::Taught {
+            name,
+            slides: 2,
+            itself: false,
+        }),
+        Ask::Rename { from, .. } if from == "cheese" => {
+            return Err(Box::new(text("there is no cheese")));
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+/// A probe on a TCP port of its own: where, and what it is asked.
+fn probe(hurry: u64) -> (String, Told<Ask>) {
+    // before anybody waits for it
+    known();
+    let (asked, told) = mpsc::channel();
+    let at = line(move |stream| {
+        let wait = Some(Duration::from_millis(1));
+        stream.set_read_timeout(wait).unwrap();
+        serve(Box::new(stream), hurry, asked.clone());
+    });
+    (at, told)
+}
+
+/// Somebody on a TCP port of its own, one host after the other.
+fn line(answer: impl Fn(TcpStream) + Send + 'static) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let at = format!("tcp:{}", listener.local_addr().unwrap());
+    thread::spawn(move || {
+        for stream in listener.incoming() {
+            answer(stream.unwrap());
+        }
+    });
+    at
+}
+
+fn device(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    command.arg("device").args(arguments);
+    command.stdin(Stdio::null());
+    command
+}
+
+fn printed(arguments: &[&str]) -> String {
+    let Output {
+        status,
+        stdout,
+        stderr,
+    } = device(arguments).output().unwrap();
+    let said = String::from_utf8(stderr).unwrap();
+    assert!(status.success(), "{arguments:?}: {said}");
+    String::from_utf8(stdout).unwrap()
+}
+
+fn complaint(arguments: &[&str]) -> String {
+    let out = device(arguments).output().unwrap();
+    let said = String::from_utf8(out.stderr).unwrap();
+    assert_eq!(out.status.code(), Some(1), "{arguments:?}: {said}");
+    assert!(!said.contains("panicked"), "{said}");
+    said
+}
+
+fn assert_says(said: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+}
+
+fn path(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+#[test]
+fn a_probe_says_how_it_is() {
+    let (at, _) = probe(1000);
+    let status = printed(&["status", "--port", &at]);
+    assert_says(
+        &status,
+        &[
+            "rig             ready",
+            "3 textures",
+            "0 parity errors",
+            "1.5 J of sliding",
+            "N/A",
+        ],
+    );
+    let json: serde_json::Value =
+        serde_json::from_str(&printed(&["status", "--port", &at, "--format", "json"])).unwrap();
+    assert_eq!(
+        (json["textures"].as_u64(), json["phase"].as_str()),
+        (Some(3), Some("Ready"))
+    );
+}
+
+#[test]
+fn every_decision_of_a_session_is_computed_again_from_its_log() {
+    let (at, asked) = probe(1000);
+    let temp = tempfile::tempdir().unwrap();
+    let log = temp.path().join("visit.jsonl");
+    let identify = [
+        "identify",
+        "--port",
+        &at,
+        "--threshold",
+        "1",
+        "--max-slides",
+        "3",
+        "--seed",
+        "7",
+        "--method",
+        "fused-random",
+        "--log",
+        path(&log),
+    ];
+    let live = printed(&identify);
+    assert_says(
+        &live,
+        &["one of 3 (seed 7)", "Slide 1:", "felt", "█", "after"],
+    );
+    let asked: Vec<Ask> = asked.try_iter().collect();
+    assert!(asked.contains(&Ask::Stream(true)) && asked.last() == Some(&Ask::Stream(false)));
+    // a log is never written over
+    assert_says(&complaint(&identify), &["visit.jsonl", "another name"]);
+
+    let replayed = printed(&["log", "replay", path(&log)]);
+    assert_says(
+        &replayed,
+        &[
+            "chosen here too",
+            "features the same, posterior the same",
+            "the same here",
+            "largest difference 0e0",
+        ],
+    );
+    // the same lines as live, but for the first and what follows the answer
+    let shown = printed(&["log", "show", path(&log)]);
+    let slides: Vec<&str> = live.lines().skip(1).collect();
+    for line in slides
+        .iter()
+        .filter(|line| line.contains("Slide") || line.contains('█'))
+    {
+        assert!(shown.contains(line), "{line}: {shown}");
+    }
+
+    let lines = fs::read_to_string(&log).unwrap();
+    let changed = |from: &str, nth: usize, change: &dyn Fn(&str) -> String| {
+        let mut places = lines
+            .lines()
+            .zip(0..)
+            .filter(|(line, _)| line.contains(from));
+        let at = places.nth(nth).unwrap().1;
+        let lines = lines.lines().zip(0..);
+        let file = temp.path().join("changed.jsonl");
+        let new = lines.map(|(line, n)| if n == at { change(line) } else { line.to_owned() } + "\n");
+        fs::write(&file, new.collect::<String>()).unwrap();
+        let out = device(&["log", "replay", path(&file)]).output().unwrap();
+        assert_eq!(out.status.code(), Some(1), "{from}");
+        String::from_utf8([out.stdout, out.stderr].concat()).unwrap()
+    };
+    let gone = |_: &str| String::from("{\"ask\":\"Status\"}");
+    // another seed makes other random choices
+    let seed = |line: &str| line.replace("\"seed\":7", "\"seed\":11");
+    let other = changed("{\"ask\":{\"Identify\"", 0, &seed);
+    assert_says(&other, &["IS CHOSEN", "not every decision is the same"]);
+    let sample = |line: &str| {
+        let mut line: serde_json::Value = serde_json::from_str(line).unwrap();
+        line["report"]["tell"]["Block"]["pac"][7] = 900.into();
+        line.to_string()
+    };
+    let other = changed("\"still\":false", 30, &sample);
+    assert_says(&other, &["apart", "not every decision is the same"]);
+    let other = changed("\"TablePart\"", 0, &gone);
+    assert_says(&other, &["does not have the table"]);
+    assert_says(&changed("\"still\":false", 30, &gone), &["is missing"]);
+    let other = changed("\"Felt\"", 0, &|_| "nonsense".into());
+    assert_says(&other, &["no line of a session's log"]);
+    let version = format!("\"protocol\":{PROTOCOL}");
+    let other = changed("session", 0, &|line| {
+        line.replace(&version, "\"protocol\":99")
+    });
+    assert_says(&other, &["version 99"]);
+    assert_says(
+        &complaint(&["log", "replay", "no/such/log"]),
+        &["no/such/log"],
+    );
+}
+
+#[test]
+fn recorded_slides_are_felt_again_as_the_probe_felt_them() {
+    let (at, _) = probe(1000);
+    let temp = tempfile::tempdir().unwrap();
+    let (folder, log) = (temp.path().join("slides"), temp.path().join("log"));
+    let said = printed(&[
+        "record",
+        "Burlap",
+        "--port",
+        &at,
+        "--slides",
+        "3",
+        "--out",
+        path(&folder),
+        "--log",
+        path(&log),
+    ]);
+    assert_says(&said, &["slide 3 of 3", "3 slides of 1 textures"]);
+    let told: Vec<[f64; 3]> = fs::read_to_string(&log)
+        .unwrap()
+        .lines()
+        .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap())
+        .filter_map(|line| {
+            let felt = line["report"]["tell"]["Felt"]["felt"]["properties"]
+                .as_array()?
+                .clone();
+            Some([0, 1, 2].map(|n| felt[n].as_f64().unwrap()))
+        })
+        .collect();
+    let out = Command::new(env!("CARGO_BIN_EXE_tactus"))
+        .args(["features", "--format", "csv", "--recordings", path(&folder)])
+        .output()
+        .unwrap();
+    let rows = String::from_utf8(out.stdout).unwrap();
+    let rows: Vec<Vec<&str>> = rows
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').collect())
+        .collect();
+    assert_eq!((rows.len(), told.len()), (3, 3));
+    for (row, told) in rows.iter().zip(told) {
+        for (here, there) in row[2..5].iter().zip(told) {
+            let here: f64 = here.parse().unwrap();
+            assert!((here - there).abs() < 2e-6, "{row:?} {told:?}");
+        }
+    }
+    let manifest = fs::read_to_string(folder.join("manifest.csv")).unwrap();
+    assert_says(&manifest, &["Burlap", "t001_s003_pdc.npy", ",20,"]);
+    assert_says(
+        &complaint(&["record", "x", "--port", &at, "--out", path(&folder)]),
+        &["already holds recordings"],
+    );
+}
+
+#[test]
+fn a_table_is_checked_pushed_and_pulled() {
+    let (at, asked) = probe(1000);
+    let temp = tempfile::tempdir().unwrap();
+    let [pulled, other, bad] = ["pulled", "other", "bad"].map(|name| temp.path().join(name));
+    assert_says(
+        &printed(&["table", "pull", "--port", &at, path(&pulled)]),
+        &["3 textures"],
+    );
+    assert_eq!(fs::read(&pulled).unwrap(), known().1);
+    assert_says(
+        &printed(&["table", "show", "--port", &at]),
+        &["came with the firmware", "movement 3: "],
+    );
+    let felt = [0.4f32, 0.6].map(|x| {
+        let properties =
+            tactus_core::features::Properties::new([Some(x), Some(3.0 + x), Some(5.0 + x)]);
+        tactus_core::fused::Observation::from(properties)
+    });
+    let table = tactus::learn::learn(
+        Method::Paper,
+        None,
+        &["a".to_owned(), "b".to_owned()],
+        &[Movement::FOR_TRACTION],
+        &vec![vec![felt.to_vec()]; 2],
+    );
+    fs::write(&other, table.unwrap()).unwrap();
+    while asked.try_recv().is_ok() {}
+    assert_says(
+        &printed(&["table", "push", "--port", &at, path(&other)]),
+        &["the probe uses it now: 2 textures"],
+    );
+    assert!(asked.try_iter().any(|ask| ask == Ask::CommitTable));
+    // what is damaged is never begun
+    let mut bytes = fs::read(&other).unwrap();
+    bytes[40] ^= 1;
+    fs::write(&bad, bytes).unwrap();
+    assert_says(
+        &complaint(&["table", "push", "--port", &at, path(&bad)]),
+        &["checksum"],
+    );
+    assert!(
+        asked
+            .try_iter()
+            .all(|ask| !matches!(ask, Ask::BeginTable(_)))
+    );
+    assert_says(
+        &printed(&["table", "factory", "--port", &at]),
+        &["3 textures"],
+    );
+}
+
+#[test]
+fn teaching_and_calibrating_ask_for_what_was_meant() {
+    let (at, asked) = probe(1000);
+    let name = |name: &str| Name::try_from(name).unwrap();
+    let last = |arguments: &[&str], ask: Ask| {
+        let said = printed(&[arguments, &["--port", &at]].concat());
+        assert!(asked.try_iter().any(|asked| asked == ask), "{ask:?}");
+        said
+    };
+    assert_says(
+        &last(&["teach", "felt"], Ask::Answer(name("felt"))),
+        &["learned felt from 2 slides"],
+    );
+    let rename = Ask::Rename {
+        from: name("a"),
+        to: name("b"),
+    };
+    last(&["rename", "a", "b"], rename);
+    last(
+        &["forget", "--name", "a"],
+        Ask::Forget(Forget::Texture(name("a"))),
+    );
+    last(
+        &["forget", "--training", "a"],
+        Ask::Forget(Forget::Training(name("a"))),
+    );
+    last(
+        &["forget", "--self-taught"],
+        Ask::Forget(Forget::SelfTaught),
+    );
+    last(&["home"], Ask::Home);
+    last(&["stop"], Ask::Stop);
+    assert_says(
+        &complaint(&["rename", "cheese", "felt", "--port", &at]),
+        &["the probe refused: there is no cheese"],
+    );
+    let long = "x".repeat(41);
+    assert_says(&complaint(&["teach", &long, "--port", &at]), &["40 bytes"]);
+
+    let measured = last(
+        &[
+            "calibrate",
+            "--date",
+            "20261121",
+            "--newton-per-ampere",
+            "16.25",
+        ],
+        Ask::Calibrate,
+    );
+    assert_says(&measured, &["2026-11-21", "16.25 N/A"]);
+    let shown = printed(&["calibrate", "--show", "--port", &at]);
+    assert!(!asked.try_iter().any(|ask| ask == Ask::Calibrate));
+    assert_says(&shown, &["counts in the air"]);
+    let nonsense = ["calibrate", "--newton-per-ampere", "NaN", "--port", &at];
+    assert_says(&complaint(&nonsense), &["above 0"]);
+}
+
+/// Frames of these reports, and a reader of what the host says, which is thrown away.
+fn says(tells: &'static [fn() -> Tell]) -> String {
+    line(move |mut stream| {
+        let mut bytes = [0; 256];
+        let mut number = 0;
+        while stream.read(&mut bytes).is_ok_and(|length| length > 0) {
+            for tell in tells {
+                let report = Report {
+                    number,
+                    at_ms: 0,
+                    tell: tell(),
+                };
+                number += 1;
+                let mut room = [0; MAX_FRAME + 1];
+                let frame = wire::encode(&report, &mut room).unwrap();
+                let _ = stream.write_all(frame);
+            }
+        }
+    })
+}
+
+#[test]
+fn what_is_no_probe_is_told_and_what_to_do() {
+    let garbage = line(|mut stream| {
+        let noise: Vec<u8> = (0..4000u32)
+            .map(|n| (n.wrapping_mul(2_654_435_761) >> 13) as u8)
+            .collect();
+        while stream.write_all(&noise).is_ok() {
+            thread::sleep(Duration::from_millis(5));
+        }
+    });
+    assert_says(
+        &complaint(&["status", "--port", &garbage]),
+        &["not one report", "not the probe's port"],
+    );
+    // a terminal's greeting, without any 0
+    let greeting = line(|mut stream| {
+        let _ = stream.write_all(b"login: ");
+        thread::sleep(Duration::from_secs(30));
+    });
+    assert_says(
+        &complaint(&["status", "--port", &greeting]),
+        &["7 bytes came and not one report"],
+    );
+    let silent = line(|_stream| thread::sleep(Duration::from_secs(30)));
+    assert_says(
+        &complaint(&["status", "--port", &silent]),
+        &["said nothing", "has power"],
+    );
+    let closed = line(drop);
+    assert_says(
+        &complaint(&["status", "--port", &closed]),
+        &["port", "open it again"],
+    );
+    let booted = says(&[|| Tell::Booted {
+        protocol: 1,
+        version: Default::default(),
+        reset: Reset::Power,
+        last_words: None,
+    }]);
+    assert_says(
+        &complaint(&["status", "--port", &booted]),
+        &["version 1", "tactus device flash"],
+    );
+    // whole frames with a message that nobody knows
+    let foreign = line(|mut stream| {
+        let mut bytes = [0; 256];
+        while stream.read(&mut bytes).is_ok_and(|length| length > 0) {
+            let mut room = [0; MAX_FRAME + 1];
+            let _ = stream.write_all(wire::encode(&[250u8; 30], &mut room).unwrap());
+        }
+    });
+    assert_says(
+        &complaint(&["status", "--port", &foreign]),
+        &["another version", "tactus device flash"],
+    );
+    let nobody = complaint(&["status", "--port", "tcp:127.0.0.1:1"]);
+    assert_says(&nobody, &["127.0.0.1:1", "cargo xtask emulate"]);
+    assert_says(
+        &complaint(&["status", "--port", "tcp:nonsense"]),
+        &["nonsense"],
+    );
+    assert_says(
+        &complaint(&["status", "--port", "/dev/no-such-port"]),
+        &["there is no such port"],
+    );
+    assert_says(
+        &complaint(&["status", "--port", "/dev/null"]),
+        &["is it a serial port?"],
+    );
+    let unbuilt = device(&["status", "--emulated"])
+        .env("TACTUS_EMULATOR", "/no/such/emulator")
+        .env("TACTUS_ELF", "/no/such/elf")
+        .output()
+        .unwrap();
+    assert_says(
+        &String::from_utf8_lossy(&unbuilt.stderr),
+        &["emulated board does not start", "/no/such/emulator"],
+    );
+}
+
+#[test]
+fn a_slow_line_is_waited_for_and_one_that_vanishes_is_told() {
+    known();
+    /// Gives its bytes one at a time.
+    struct Slow(TcpStream);
+    impl Read for Slow {
+        fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+            self.0.read(&mut bytes[..1])
+        }
+    }
+    impl Write for Slow {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            thread::sleep(Duration::from_micros(300));
+            self.0.write(&bytes[..1])
+        }
+        fn flush(&mut self) -> std::io::Result<()> {
+            self.0.flush()
+        }
+    }
+    let slow = line(|stream| {
+        let wait = Some(Duration::from_millis(1));
+        stream.set_read_timeout(wait).unwrap();
+        serve(Box::new(Slow(stream)), 1000, mpsc::channel().0);
+    });
+    assert_says(&printed(&["status", "--port", &slow]), &["3 textures"]);
+
+    // the cable is pulled while the finger slides
+    let vanishing = line(|stream| {
+        let (asked, told) = mpsc::channel();
+        let wait = Some(Duration::from_millis(1));
+        stream.set_read_timeout(wait).unwrap();
+        let cable = stream.try_clone().unwrap();
+        thread::spawn(move || {
+            while !matches!(told.recv(), Ok(Ask::Identify(_)) | Err(_)) {}
+            thread::sleep(Duration::from_millis(100));
+            let _ = cable.shutdown(std::net::Shutdown::Both);
+        });
+        serve(Box::new(stream), 10, asked);
+    });
+    let said = complaint(&["identify", "--port", &vanishing]);
+    assert_says(&said, &["port", "The rig was moving", "emergency stop"]);
+}
+
+#[cfg(unix)]
+mod unix {
+    use serialport::{SerialPort as _, TTYPort};
+
+    use super::*;
+
+    fn interrupt(child: &std::process::Child) {
+        let id = child.id().to_string();
+        let killed = Command::new("kill").args(["-INT", &id]).status().unwrap();
+        assert!(killed.success());
+    }
+
+    /// Waits for a request.
+    fn wait_for(asked: &Told<Ask>, is: impl Fn(&Ask) -> bool) {
+        let until = Instant::now() + Duration::from_secs(60);
+        while let Ok(ask) = asked.recv_timeout(until.saturating_duration_since(Instant::now())) {
+            if is(&ask) {
+                return;
+            }
+        }
+        panic!("never asked");
+    }
+
+    #[test]
+    fn ctrl_c_leaves_the_rig_lifted_and_stopped() {
+        // slow enough to be in the middle of it
+        let (at, asked) = probe(5);
+        let identify = ["identify", "--port", &at];
+        let child = device(&identify)
+            .stderr(Stdio::piped())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        wait_for(&asked, |ask| matches!(ask, Ask::Identify(_)));
+        thread::sleep(Duration::from_millis(300));
+        interrupt(&child);
+        let out = child.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(130), "{said}");
+        assert_says(
+            &said,
+            &[
+                "lifting the finger",
+                "the finger is lifted and the stage stands",
+            ],
+        );
+        wait_for(&asked, |ask| *ask == Ask::Stop);
+        // the next host finds it so
+        assert_says(
+            &printed(&["status", "--port", &at]),
+            &["rig             ready"],
+        );
+    }
+
+    #[test]
+    fn a_second_ctrl_c_says_that_the_finger_may_be_down() {
+        let sliding = says(&[
+            || {
+                Tell::Status(Status {
+                    phase: Phase::Sliding,
+                    fault: None,
+                    textures: 3,
+                    table_bytes: 0,
+                    table_crc: 0,
+                    factory: true,
+                    calibrated: 0,
+                    counts: Counts::default(),
+                    skin_mj: (0, 0),
+                })
+            },
+            || Tell::Done(0),
+        ]);
+        let mut stop = device(&["stop", "--port", &sliding]);
+        let child = stop.stderr(Stdio::piped()).spawn().unwrap();
+        thread::sleep(Duration::from_secs(1));
+        interrupt(&child);
+        let out = child.wait_with_output().unwrap();
+        assert_eq!(out.status.code(), Some(130));
+        assert_says(
+            &String::from_utf8_lossy(&out.stderr),
+            &["may still be down", "emergency stop"],
+        );
+    }
+
+    #[test]
+    fn a_serial_port_is_opened_and_a_busy_one_is_told() {
+        known();
+        // the other end of the terminal stays open, so that it lives on while nobody else has it
+        let (mut master, slave) = TTYPort::pair().unwrap();
+        let name = slave.name().unwrap();
+        let mut holder = serialport::new(&name, 921_600).open_native().unwrap();
+        assert_says(
+            &complaint(&["status", "--port", &name]),
+            &[&name, "is busy", "fuser"],
+        );
+        holder.set_exclusive(false).unwrap();
+        drop(holder);
+        master.set_timeout(Duration::from_millis(1)).unwrap();
+        thread::spawn(move || serve(Box::new(master), 1000, mpsc::channel().0));
+        let status = printed(&["status", "--port", &name]);
+        assert_says(&status, &[&name, "3 textures", "0 frames damaged"]);
+    }
+
+    /// Says why a test is skipped, where xtask looks for it.
+    fn skip(test: &str, why: &str) {
+        eprintln!("SKIPPED {test}: {why}");
+        if let Some(log) = std::env::var_os("TACTUS_SKIP_LOG") {
+            let mut log = fs::OpenOptions::new()
+                .create(true)
+                .append(true)
+                .open(log)
+                .unwrap();
+            log.write_all(format!("{test}: {why}\n").as_bytes())
+                .unwrap();
+        }
+    }
+
+    /// A terminal that ends with the test.
+    struct Tmux(String);
+
+    impl Drop for Tmux {
+        fn drop(&mut self) {
+            self.run(&["kill-server"]);
+        }
+    }
+
+    impl Tmux {
+        fn run(&self, arguments: &[&str]) -> String {
+            let out = Command::new("tmux")
+                .args(["-L", &self.0, "-f", "/dev/null"])
+                .args(arguments)
+                .output()
+                .unwrap();
+            String::from_utf8_lossy(&out.stdout).into_owned()
+        }
+
+        /// Waits until all of these are on the screen.
+        fn shows(&self, parts: &[&str]) -> String {
+            let until = Instant::now() + Duration::from_secs(60);
+            loop {
+                let screen = self.run(&["capture-pane", "-p", "-t", "probe"]);
+                if parts.iter().all(|part| screen.contains(part)) {
+                    return screen;
+                }
+                assert!(Instant::now() < until, "{parts:?} not on\n{screen}");
+                thread::sleep(Duration::from_millis(100));
+            }
+        }
+    }
+
+    #[test]
+    fn the_monitor_is_driven_in_a_terminal() {
+        if Command::new("tmux").arg("-V").output().is_err() {
+            return skip(
+                "the_monitor_is_driven_in_a_terminal",
+                "tmux is not installed",
+            );
+        }
+        let (at, asked) = probe(20);
+        let tmux = Tmux(format!("tactus-test-{}", std::process::id()));
+        let command = format!(
+            "{} device monitor --port {at} --threshold 1 --max-slides 200; echo ended with $?; sleep 60",
+            env!("CARGO_BIN_EXE_tactus")
+        );
+        tmux.run(&[
+            "new-session",
+            "-d",
+            "-s",
+            "probe",
+            "-x",
+            "80",
+            "-y",
+            "24",
+            &command,
+        ]);
+        let screen = tmux.shows(&[
+            "Tactus",
+            "phase   ready",
+            "i: find out",
+            "nothing lost",
+            "stop and lift",
+        ]);
+        assert!(
+            screen.lines().all(|line| line.chars().count() <= 80),
+            "{screen}"
+        );
+        tmux.run(&["send-keys", "-t", "probe", "i"]);
+        tmux.shows(&["P_AC", "sliding", "Slide 1", "to leave"]);
+        let screen = tmux.shows(&["Slide 2", "traction", "█", "%", "slide 1: most likely"]);
+        assert!(
+            screen.contains("Burlap") || screen.contains(" N"),
+            "{screen}"
+        );
+        // the trace has dots
+        assert!(
+            screen
+                .chars()
+                .any(|c| ('\u{2801}'..='\u{28ff}').contains(&c)),
+            "{screen}"
+        );
+        tmux.run(&["resize-window", "-t", "probe", "-x", "140", "-y", "40"]);
+        let screen = tmux.shows(&["1000 Hz", "parity", "q  quit"]);
+        assert!(
+            screen.lines().count() >= 39 && screen.lines().any(|line| line.chars().count() > 130)
+        );
+        tmux.run(&["send-keys", "-t", "probe", "i"]);
+        tmux.shows(&["it is busy: wait, or stop it with s"]);
+        tmux.run(&["send-keys", "-t", "probe", "s"]);
+        tmux.shows(&["the probe refused", "phase   ready"]);
+        tmux.run(&["send-keys", "-t", "probe", "i"]);
+        tmux.shows(&["phase   pressing"]);
+        tmux.run(&["send-keys", "-t", "probe", "C-c"]);
+        tmux.shows(&[
+            "the finger is lifted and the stage stands",
+            "ended with 130",
+        ]);
+        let stops = |asked: &Told<Ask>| asked.try_iter().filter(|ask| *ask == Ask::Stop).count();
+        assert!(stops(&asked) >= 2);
+        // and so does quitting, which is no failure
+        tmux.run(&["respawn-pane", "-k", "-t", "probe", &command]);
+        tmux.shows(&["phase   ready"]);
+        tmux.run(&["send-keys", "-t", "probe", "q"]);
+        tmux.shows(&["the finger is lifted and the stage stands", "ended with 0"]);
+        assert!(stops(&asked) >= 1);
+        drop(tmux);
+    }
+}
+
+#[test]
+fn the_monitor_wants_a_terminal() {
+    let (at, _) = probe(1000);
+    assert_says(
+        &complaint(&["monitor", "--port", &at]),
+        &["needs a terminal", "tactus device identify"],
+    );
+}
+
+#[test]
+fn flash_says_what_it_runs_and_what_is_missing() {
+    let lines = |options: &[&str]| printed(&[&["flash", "--dry-run", "t/elf"], options].concat());
+    assert_eq!(
+        lines(&[]),
+        "probe-rs download --chip STM32F429ZITx --verify t/elf\nprobe-rs reset --chip STM32F429ZITx\n"
+    );
+    assert_eq!(
+        lines(&["--attach", "--", "--probe", "0483:374b"]),
+        "probe-rs run --chip STM32F429ZITx --probe 0483:374b t/elf\n"
+    );
+    assert_says(
+        &complaint(&["flash", "no/such/elf"]),
+        &["no/such/elf", "cargo xtask build"],
+    );
+    let temp = tempfile::tempdir().unwrap();
+    let elf = temp.path().join("elf");
+    fs::write(&elf, "").unwrap();
+    let bare = |folder: &Path| {
+        let out = device(&["flash", path(&elf)])
+            .env("PATH", folder)
+            .output()
+            .unwrap();
+        String::from_utf8(out.stderr).unwrap()
+    };
+    assert_says(&bare(temp.path()), &["cargo install probe-rs-tools"]);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        let program = temp.path().join("probe-rs");
+        fs::write(&program, "#!/bin/sh\necho No debug probes were found.\n").unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+        assert_says(&bare(temp.path()), &["no debug probe found", "CN1"]);
+    }
+}
+
+#[test]
+fn completions_and_manual_pages_know_the_commands() {
+    let tactus = |arguments: &[&str]| {
+        let out = Command::new(env!("CARGO_BIN_EXE_tactus"))
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert!(out.status.success(), "{arguments:?}");
+        String::from_utf8(out.stdout).unwrap()
+    };
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        assert_says(
+            &tactus(&["completions", shell]),
+            &["device", "monitor", "emulated"],
+        );
+    }
+    assert_says(&tactus(&["man"]), &[".TH tactus 1", "touching it"]);
+    let temp = tempfile::tempdir().unwrap();
+    tactus(&["man", "--out", path(temp.path())]);
+    let page = fs::read_to_string(temp.path().join("tactus-device-monitor.1")).unwrap();
+    assert_says(&page, &["emulated", "serial port"]);
+}

@@ -1,0 +1,181 @@
+//! Recordings and property tables: files that anybody may have written.
+
+use std::fs;
+use std::io::Write as _;
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use sha2::{Digest as _, Sha256};
+use tactus::experiment::Experiment;
+use tactus::fabricslide::FabricSet;
+use tactus::properties::PropertyTable;
+use tactus::recordings::{RecordingError, RecordingSet};
+
+/// Between manifest and file.
+const RULE: &[u8] = b"\n---\n";
+
+/// A folder of recordings in one of the formats, or a table of properties: the first byte says which.
+///
+/// The rest is the manifest; what follows a line `---` in it is the content of the file `a`, which is there as `a.npy`, and
+/// compressed as `a.gz`. `HASH`, `PACKED_HASH`, `SIZE` and `PACKED_SIZE` in the manifest become theirs.
+pub fn recordings(data: &[u8]) {
+    drop(read(data));
+}
+
+/// Why it is refused, as it is told to people.
+fn read(data: &[u8]) -> Result<(), String> {
+    let Some((&kind, body)) = data.split_first() else {
+        return Ok(());
+    };
+    let at = body.windows(RULE.len()).position(|w| w == RULE);
+    let (manifest, file) = match at {
+        Some(at) => (&body[..at], &body[at + RULE.len()..]),
+        None => (body, &[][..]),
+    };
+    let mut packer = GzEncoder::new(Vec::new(), Compression::fast());
+    packer.write_all(file).expect("memory");
+    let packed = packer.finish().expect("memory");
+    let sha256 = |bytes: &[u8]| -> String {
+        let digest = Sha256::digest(bytes);
+        digest.iter().map(|b| format!("{b:02x}")).collect()
+    };
+    // the longer words first
+    let told = [
+        ("PACKED_HASH", sha256(&packed)),
+        ("PACKED_SIZE", packed.len().to_string()),
+        ("HASH", sha256(file)),
+        ("SIZE", file.len().to_string()),
+    ];
+    // what is no text stays what it is
+    let manifest = match std::str::from_utf8(manifest) {
+        Ok(text) => told
+            .iter()
+            .fold(text.to_owned(), |text, (word, is)| text.replace(word, is))
+            .into_bytes(),
+        Err(_) => manifest.to_vec(),
+    };
+    let folder = Folder::new();
+    let path = &folder.0;
+    let manifest_is = |name: &str| {
+        let file = path.join(name);
+        fs::write(&file, &manifest).expect("a file in RAM");
+        file
+    };
+    fs::write(path.join("a.npy"), file).expect("a file in RAM");
+    fs::write(path.join("a.gz"), packed).expect("a file in RAM");
+    match kind % 4 {
+        0 => {
+            manifest_is("manifest.csv");
+            opened(path).map_err(|e| e.to_string())
+        }
+        1 => {
+            manifest_is("manifest.json");
+            opened(path).map_err(|e| e.to_string())
+        }
+        2 => {
+            let file = manifest_is("properties.csv");
+            let table = PropertyTable::read(&file).map_err(|e| e.to_string())?;
+            let experiment = Experiment::given(&table, None, 1);
+            experiment.map(drop).map_err(|e| e.to_string())
+        }
+        _ => {
+            manifest_is("manifest.json");
+            FabricSet::open(path).map(drop).map_err(|e| e.to_string())
+        }
+    }
+}
+
+fn opened(folder: &Path) -> Result<(), RecordingError> {
+    let set = RecordingSet::open(folder)?;
+    for texture in 0..set.textures().len().min(4) {
+        for slide in set.load_texture(texture)? {
+            let steady = slide.steady(2200);
+            assert!(steady.end <= slide.pac.len(), "the steady part lies in it");
+            // samples of more than the sensor's 12 bits
+            #[cfg(feature = "planted")]
+            assert!(slide.pac.iter().all(|s| s.abs_diff(0) < 2048), "planted");
+            let plan = tactus_core::features::Plan::new();
+            drop(tactus::replay::measure(&plan, &slide));
+        }
+    }
+    Ok(())
+}
+
+/// Gone at the end, in RAM where there is such a file system.
+struct Folder(std::path::PathBuf);
+
+impl Folder {
+    fn new() -> Self {
+        let root = [Path::new("/dev/shm"), &std::env::temp_dir()]
+            .into_iter()
+            .find(|root| root.is_dir())
+            .map(|root| root.join(format!("tactus-fuzz-{}", std::process::id())));
+        let root = root.expect("a folder for temporary files");
+        fs::create_dir_all(&root).expect("a folder of our own");
+        Self(root)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Folders that are whole, one of each kind.
+pub(crate) fn seeds() -> Vec<Vec<u8>> {
+    let columns = tactus::recordings::own::COLUMNS.join(",");
+    let own = format!(
+        "{columns}\n3,felt,1,0.5,25,0.02,0.1,2.2,,,a.npy,2200,HASH,a.npy,100,HASH,,100,\n\
+         3,felt,2,0.5,25,0.02,0.1,,a.npy,HASH,a.npy,2200,HASH,a.npy,100,HASH,a.npy,110,HASH\n"
+    );
+    let biotac = r#"{"slides":[1,2],"record":[{"name":"pac","count":220,"rate_hz":2200},{"name":"pdc","count":10,"rate_hz":100},
+{"name":"f_tangential","count":10,"rate_hz":100}],"motion":{"speed_mm_s":25.0},"steady_window_s":[0.02,0.1],
+"files":[{"file":"a.gz","material":1,"name":"felt","n_slides":2,"bytes_gz":PACKED_SIZE,"bytes_raw":SIZE,
+"sha256_gz":"PACKED_HASH","sha256_raw":"HASH"}]}"#;
+    let properties = "texture,movement,trial,set,traction,roughness,fineness\n1,1,1,train,0.5,3.2,5.1\n\
+        1,1,2,train,0.6,3.1,5.2\n2,1,1,train,0.9,2.2,4.1\n2,1,2,train,0.8,2.4,4.0\n1,1,1,validate,0.5,3.2,5.1\n";
+    let recording = |rep: u8, at: usize| {
+        format!(
+            r#"{{"pressure_setpoint":500,"speed_mm_s":25.0,"direction":1,"rep":{rep},"n":72,"offset_values":{at}}}"#
+        )
+    };
+    let fabrics = format!(
+        r#"{{"files":[{{"file":"a.gz","fabric":"A","sha256_gz":"PACKED_HASH","sha256_raw":"HASH","slides":[{},{}]}}]}}"#,
+        recording(0, 0),
+        recording(1, 72 * 16),
+    );
+    let wave = |n: usize| -> Vec<u8> {
+        (0..n)
+            .flat_map(|i| ((i * 37 % 100) as i16).to_le_bytes())
+            .collect()
+    };
+    let mut npy =
+        b"\x93NUMPY\x01\x00v\x00{'descr': '<i2', 'fortran_order': False, 'shape': (220,), }"
+            .to_vec();
+    npy.resize(127, b' ');
+    npy.push(b'\n');
+    npy.extend(wave(220));
+    [
+        (0u8, own.as_str(), npy),
+        (1, biotac, wave(2 * 240)),
+        (2, properties, Vec::new()),
+        (3, &fabrics, wave(144 * 16)),
+    ]
+    .into_iter()
+    .map(|(kind, manifest, file)| [&[kind], manifest.as_bytes(), RULE, &file].concat())
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_seeds_are_right() {
+        for seed in seeds() {
+            assert_eq!(read(&seed), Ok(()), "{}", String::from_utf8_lossy(&seed));
+        }
+    }
+}
