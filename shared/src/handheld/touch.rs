@@ -392,8 +392,14 @@ impl<'p, K: Kernels> Touch<'p, K> {
     /// A block with a gap.
     fn broken(&mut self, first: bool) -> Option<Event> {
         match self.state {
-            State::Press { .. } | State::Slide { .. } => {
+            State::Press { .. } => {
                 self.press();
+                None
+            }
+            State::Slide { .. } => {
+                // the person was told to slide and may have begun: what was still before the gap is background enough, and
+                // nothing of a slide has been taken yet
+                self.latest.clear();
                 None
             }
             State::Sliding { .. } if !first => Some(self.again(Again::Disturbed)),

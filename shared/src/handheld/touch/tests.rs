@@ -181,6 +181,31 @@ fn a_lost_word_spoils_a_slide_and_only_delays_a_press() {
 }
 
 #[test]
+fn a_slide_that_begins_at_a_lost_word_is_noticed() {
+    let slide = with(
+        pressed(500.0),
+        std::vec![part(1.6, 520.0, 40.0), part(0.3, 520.0, 0.0)],
+    );
+    let whole = words(&slide);
+    // the slide begins 1.15 s after the start
+    let begins = (1.15 * 4400.0) as usize;
+    for at in (begins - 440..begins + 440).step_by(20) {
+        let mut lost = whole.clone();
+        lost[at] = None;
+        let events = feel(&lost);
+        let [.., Event::Still, last] = &events[..] else {
+            panic!("{at}: {events:?}");
+        };
+        let may = matches!(last, Event::Slid(_)) || *last == Event::Again(Again::Disturbed);
+        assert!(may, "{at}: {events:?}");
+        // before it begins, nothing of it is lost
+        if at + 44 < begins {
+            assert!(matches!(last, Event::Slid(_)), "{at}: {events:?}");
+        }
+    }
+}
+
+#[test]
 fn only_a_press_in_the_zone_that_is_kept_still_may_slide() {
     for (mn, rms, may) in [
         (200.0, 0.0, false),
