@@ -3,6 +3,7 @@ use embassy_stm32::i2c::{self, I2c};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{bind_interrupts, dma, peripherals};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::mutex::Mutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 use ssd1306::command::AddrMode;
@@ -20,9 +21,23 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM0 => dma::InterruptHandler<peripherals::DMA1_CH0>;
 });
 
-/// What is to be shown next; `None` switches the display off. A picture that comes too early takes the place of the one
-/// before it.
-pub(crate) static SHOW: Signal<CriticalSectionRawMutex, Option<Picture>> = Signal::new();
+/// Whether [`NEXT`] is to be shown, or the display is to be off.
+static SHOW: Signal<CriticalSectionRawMutex, bool> = Signal::new();
+/// What is to be shown next. It is copied with interrupts on: a signal would move its 1 KB with them off, and for longer than
+/// a sensor slot may be late.
+static NEXT: Mutex<CriticalSectionRawMutex, Picture> = Mutex::new(Picture::new());
+
+/// Has a picture shown; `None` switches the display off. A picture that comes too early takes the place of the one before it.
+pub(crate) fn picture(picture: Option<&Picture>) {
+    if let Some(picture) = picture {
+        // who shows it copies it at once, and runs where those run who call this: nobody else has it now
+        let Ok(mut next) = NEXT.try_lock() else {
+            return;
+        };
+        next.clone_from(picture);
+    }
+    SHOW.signal(picture.is_some());
+}
 
 /// A display that does not answer is looked for again after this.
 const AGAIN: Duration = Duration::from_secs(1);
@@ -68,12 +83,13 @@ where
         }
         due = false;
         if let Ok(next) = with_timeout(AGAIN, SHOW.wait()).await {
-            if next.is_some() != lit {
-                lit = next.is_some();
+            if next != lit {
+                lit = next;
                 display.set_display_on(lit).await?;
             }
-            if next.is_some() && next != *last {
-                *last = next;
+            let picture = NEXT.lock().await;
+            if lit && last.as_ref() != Some(&*picture) {
+                *last = Some(picture.clone());
                 due = true;
             }
         }

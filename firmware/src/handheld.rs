@@ -75,6 +75,8 @@ pub fn handheld() -> ! {
     irq::DMA1_STREAM6.set_priority(Priority::P6);
     irq::UART7.set_priority(Priority::P7);
     let hands = HAND.start(interrupt::UART7);
+    // until `hand` can take them
+    acquire::listen(false);
     let slots = ACQUIRE.start(interrupt::UART4);
     match acquire::acquire(r.acquire, words_in) {
         Ok(task) => slots.spawn(task),
@@ -167,6 +169,11 @@ impl Awake {
         if let Some(share) = self.resting.get() {
             defmt::info!("awake at rest: {=f32}", share);
         }
+        defmt::info!(
+            "sensor slots: {=u32} late, {=u32} lost",
+            acquire::LATE.load(Relaxed),
+            acquire::LOST.load(Relaxed)
+        );
     }
 }
 
@@ -210,17 +217,13 @@ async fn hand(flash: board::Storage, handle: board::Handle, mut words: Consumer<
     }
     let mut awake = Awake::default();
     awake.was(None);
-    let (mut listens, mut same, mut tone, mut lost, mut tick) = (true, false, None, 0, 0u32);
+    let (mut listens, mut same, mut tone, mut tick, mut say) = (true, false, None, 0u32, 0);
     let mut ticker = Ticker::every(Duration::from_hz(TICKS_HZ.into()));
+    acquire::listen(true);
     loop {
         ticker.next().await;
         PROGRESS_MS.store(Instant::now().as_millis() as u32, Relaxed);
         tick = tick.wrapping_add(1);
-        let lost_now = acquire::LOST.load(Relaxed);
-        if lost_now != lost {
-            probe.lose(lost_now.wrapping_sub(lost));
-            lost = lost_now;
-        }
         while let Some(word) = words.dequeue() {
             probe.word(word);
         }
@@ -234,10 +237,19 @@ async fn hand(flash: board::Storage, handle: board::Handle, mut words: Consumer<
             show(&probe, &memory, &awake);
         }
         if let Some(job) = job {
+            // nobody takes words meanwhile: they are not asked for, and what comes next does not follow what came
+            acquire::listen(false);
+            while let Some(word) = words.dequeue() {
+                probe.word(word);
+            }
+            probe.lose(1);
             // the picture goes out meanwhile
             Timer::after_millis(1).await;
             work(job, &mut probe, &mut memory).await;
             ticker.reset();
+            same = false;
+            listens = probe.listens();
+            acquire::listen(listens);
         }
         if probe.listens() != listens {
             listens = probe.listens();
@@ -248,8 +260,11 @@ async fn hand(flash: board::Storage, handle: board::Handle, mut words: Consumer<
             awake.was(same.then_some(listens));
             same = true;
         }
-        if tick.is_multiple_of(SAY) {
+        say += 1;
+        // the log is written with interrupts off, which may cost a slide a sensor slot
+        if say >= SAY && !probe.is_touched() {
             awake.say();
+            say = 0;
         }
     }
 }
@@ -270,12 +285,12 @@ fn show(probe: &Handheld<'_, Plain>, memory: &Memory, awake: &Awake) {
         lost: acquire::LOST.load(Relaxed),
     };
     let screen = probe.screen(table.as_ref(), &about);
-    let picture = (screen != Screen::Dark).then(|| {
-        let mut picture = Picture::new();
-        let Ok(()) = draw(&screen, &mut picture);
-        picture
-    });
-    display::SHOW.signal(picture);
+    if screen == Screen::Dark {
+        return display::picture(None);
+    }
+    let mut picture = Picture::new();
+    let Ok(()) = draw(&screen, &mut picture);
+    display::picture(Some(&picture));
 }
 
 /// Does what the probe wants to be done with the table.

@@ -384,6 +384,11 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         }
     }
 
+    /// Whether the finger is on something.
+    pub fn is_touched(&self) -> bool {
+        self.touch.is_down()
+    }
+
     /// What the buzzer sounds now, Hz.
     pub fn tone(&self) -> Option<u16> {
         let (hz, _) = self.melody.first()?;
