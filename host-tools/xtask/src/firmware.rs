@@ -8,6 +8,12 @@ use sha2::{Digest as _, Sha256};
 
 use crate::{root, toolchain};
 
+/// The images by the profile that each is built with: the rig for speed, the handheld for a small chip.
+const PROFILES: [(&str, &[&str]); 2] = [
+    ("firmware", &["tactus-rig", "tactus-selftest"]),
+    ("handheld", &["tactus-handheld"]),
+];
+
 /// Builds every image of the firmware and says what came out; the ELFs.
 pub(crate) fn build() -> Result<Vec<PathBuf>> {
     let elves = elves()?;
@@ -21,21 +27,31 @@ pub(crate) fn build() -> Result<Vec<PathBuf>> {
 pub(crate) fn elves() -> Result<Vec<PathBuf>> {
     let toolchain = toolchain::get()?;
     eprintln!("Building with {}", toolchain.version());
-    let mut cargo = toolchain.cargo_build();
-    cargo.args(["--package", "tactus-firmware", "--profile", "firmware"]);
-    // progress and diagnostics go to stderr; stdout says where the ELFs are
-    cargo.arg("--message-format=json-render-diagnostics");
-    let output = cargo
-        .stderr(Stdio::inherit())
-        .output()
-        .context("cannot start cargo")?;
-    ensure!(
-        output.status.success(),
-        "the firmware does not build (warnings are errors here)"
-    );
-    let mut elves = executables(&String::from_utf8_lossy(&output.stdout));
-    ensure!(!elves.is_empty(), "cargo named no firmware binary");
-    elves.sort();
+    let mut elves = Vec::new();
+    for (profile, images) in PROFILES {
+        let mut cargo = toolchain.cargo_build();
+        cargo.args(["--package", "tactus-firmware", "--profile", profile]);
+        cargo.args(images.iter().flat_map(|image| ["--bin", image]));
+        // progress and diagnostics go to stderr; stdout says where the ELFs are
+        cargo.arg("--message-format=json-render-diagnostics");
+        let output = cargo
+            .stderr(Stdio::inherit())
+            .output()
+            .context("cannot start cargo")?;
+        ensure!(
+            output.status.success(),
+            "the firmware does not build (warnings are errors here)"
+        );
+        let built = executables(&String::from_utf8_lossy(&output.stdout));
+        ensure!(
+            built.len() == images.len(),
+            "cargo named {} of {} firmware binaries",
+            built.len(),
+            images.len()
+        );
+        elves.extend(built);
+    }
+    elves.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
     Ok(elves)
 }
 
