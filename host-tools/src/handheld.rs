@@ -16,7 +16,7 @@ use tactus_core::sensor::PressureSensor as _;
 use crate::collection::Collection;
 use crate::learn::{self, TableError};
 use crate::sim::hand::{Hand, Manner};
-use crate::sim::world::{Setup, World};
+use crate::sim::world::{Setup, Truth, World};
 
 /// Two bytes at 5.25 MHz, and the sensor's gap.
 const TRANSFER_NS: u64 = 3_048;
@@ -87,6 +87,11 @@ impl Person {
         if let Some(hand) = self.world.hand() {
             hand.intend(force_n, pace_mm_s);
         }
+    }
+
+    /// What is really so.
+    pub fn truth(&self) -> Truth {
+        self.world.truth()
     }
 
     fn normal(&mut self) -> f64 {

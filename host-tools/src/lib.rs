@@ -16,6 +16,7 @@ pub mod properties;
 pub mod recordings;
 pub mod replay;
 pub mod rows;
+pub mod scenario;
 pub mod show;
 pub mod sim;
 pub mod simulated;

@@ -35,6 +35,8 @@ pub(crate) struct Standing<'a> {
     pub(crate) log: Option<&'a mut Log>,
     pub(crate) stack: &'a mut Option<Stack>,
     pub(crate) clock: &'a mut bool,
+    /// that the core has executed
+    pub(crate) instructions: u64,
 }
 
 /// What the owner wants.
@@ -60,6 +62,8 @@ pub(crate) struct Driver {
     pub(crate) switches: [Option<bool>; 4],
     /// the debug probe gives its 8 MHz
     pub(crate) clock: bool,
+    /// that the core has executed
+    pub(crate) instructions: u64,
 }
 
 impl Driver {
@@ -245,6 +249,7 @@ impl Driver {
                     log: self.log.as_mut(),
                     stack: &mut self.stack,
                     clock: &mut self.clock,
+                    instructions: self.instructions,
                 }),
             }
         }
@@ -290,6 +295,7 @@ impl emulator::Driver<Board> for Driver {
         host: &mut dyn Host,
     ) -> Option<VirtualNanos> {
         let now = stop.at;
+        self.instructions = stop.instruction_count;
         if now.0 >= self.next_tick_ns && stop.reason != StopReason::Reset {
             self.next_tick_ns = now.0 + self.tick_ns;
             let buzzes = session.board_mut().function(pins::BUZZER) == Some(pins::TIM8_FUNCTION);

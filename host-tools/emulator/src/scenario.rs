@@ -1,14 +1,12 @@
-//! Scenarios for the handheld probe: what a person does, and what must be seen, as files in `scenarios/`.
+//! Plays scenarios for the handheld probe, those in `scenarios/` and others: see [`tactus::scenario`].
 //!
-//! A scenario is JSON: the texture under the finger, how the hand is kept, and steps, each of which does one thing
-//! ([`Step`]). The person sees the display and nothing else, as it is decoded from the bytes on the wire.
+//! The person sees the display and nothing else, as it is decoded from the bytes on the wire.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use serde::Deserialize;
-use tactus::collection::{Collection, texture_number};
+use tactus::scenario::{InvalidScenario, PATIENCE_S, Scenario, Step, texture};
 use tactus::sim::faults::Fault;
-use tactus::sim::hand::{Hand, Manner};
+use tactus::sim::hand::Hand;
 use tactus::sim::world::NotLifted;
 
 use crate::board::{Emulator, Error, Options};
@@ -19,184 +17,14 @@ const LOOK_NS: u64 = 20_000_000;
 /// What the display says when it wants a slide, and when it wants none any more.
 const SLIDE: &str = "5 cm in 2 s";
 const OVER: &str = "next";
-/// From what is seen to what is done, ms.
-const REACTION_MS: u64 = 300;
-/// Longest that anything is waited for, s, unless a step says otherwise.
-const PATIENCE_S: f64 = 8.0;
-
-/// A scenario.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Scenario {
-    /// What it shows.
-    pub about: String,
-    /// What lies under the finger: a texture of Table 1, by name or number.
-    pub texture: String,
-    /// The world it is of; the firmware's table is of world 1.
-    #[serde(default = "one")]
-    pub world: u64,
-    /// The hand, and all other chance.
-    #[serde(default = "one")]
-    pub seed: u64,
-    /// How the hand is kept; as a careful adult's unless said.
-    #[serde(default)]
-    pub hand: Kept,
-    /// What is done and seen, one after the other.
-    pub step: Vec<Step>,
-}
-
-fn one() -> u64 {
-    1
-}
-
-/// See [`Manner`].
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Kept {
-    /// Relative to the force, rms.
-    pub tremor: f64,
-    /// Relative to the force, rms.
-    pub wander: f64,
-    /// Relative to the pace, rms.
-    pub uneven: f64,
-}
-
-impl Default for Kept {
-    fn default() -> Self {
-        let Manner {
-            tremor,
-            wander,
-            uneven,
-        } = Manner::default();
-        Self {
-            tremor,
-            wander,
-            uneven,
-        }
-    }
-}
-
-/// One thing that is done or must be seen.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Step {
-    /// Nothing: a word to the reader.
-    Note {
-        /// What it says.
-        text: String,
-    },
-    /// All of this is on the display within so many seconds.
-    See {
-        /// Parts of lines.
-        text: Vec<String>,
-        /// s.
-        #[serde(default = "patience")]
-        within_s: f64,
-    },
-    /// None of this is on the display now.
-    Miss {
-        /// Parts of lines.
-        text: Vec<String>,
-    },
-    /// The display is off within so many seconds.
-    Dark {
-        /// s.
-        within_s: f64,
-    },
-    /// The buzzer has sounded about this within the last two seconds.
-    Hear {
-        /// Hz.
-        hz: u32,
-    },
-    /// The hand means to do this from now on; without force it lifts the finger.
-    Hand {
-        /// N.
-        force_n: f64,
-        /// mm/s.
-        #[serde(default)]
-        pace_mm_s: f64,
-    },
-    /// The hand presses until the display wants a slide, slides for so long, and lifts the finger.
-    Slide {
-        /// N.
-        force_n: f64,
-        /// mm/s.
-        pace_mm_s: f64,
-        /// s.
-        seconds: f64,
-    },
-    /// Slides like that until the display wants none any more.
-    Explore {
-        /// N.
-        force_n: f64,
-        /// mm/s.
-        pace_mm_s: f64,
-        /// At most so many.
-        slides: u32,
-    },
-    /// The button is pressed so many times, for so long each.
-    Press {
-        /// ms; 600 and more is a long press.
-        ms: u64,
-        /// How often.
-        #[serde(default = "once")]
-        times: u32,
-    },
-    /// Time passes.
-    Wait {
-        /// s.
-        seconds: f64,
-    },
-    /// Another sample is put under the finger, which is up.
-    Place {
-        /// A texture of Table 1.
-        texture: String,
-    },
-    /// The power is off and on again; the store stays.
-    PowerCycle,
-    /// The sensor's plug is out, or in again.
-    Sensor {
-        /// Which.
-        plugged: bool,
-    },
-    /// The display's plug is out, or in again.
-    Display {
-        /// Which.
-        plugged: bool,
-    },
-}
-
-fn patience() -> f64 {
-    PATIENCE_S
-}
-
-fn once() -> u32 {
-    1
-}
 
 /// Why a scenario did not come out as it says.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum ScenarioError {
-    /// It cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
-    Read {
-        /// Its path.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// It is no scenario.
-    #[error("{}: {source}", path.display())]
-    Parse {
-        /// Its path.
-        path: PathBuf,
-        /// Why.
-        source: serde_json::Error,
-    },
-    /// No such texture.
-    #[error("no texture {0} in Table 1")]
-    Texture(String),
+pub enum PlayError {
+    /// A texture that is none.
+    #[error(transparent)]
+    Texture(#[from] InvalidScenario),
     /// The emulator.
     #[error(transparent)]
     Emulator(#[from] Error),
@@ -217,52 +45,35 @@ pub enum ScenarioError {
     },
 }
 
-impl Scenario {
-    /// Reads a scenario.
-    ///
-    /// # Errors
-    /// See [`ScenarioError`].
-    pub fn read(path: &Path) -> Result<Self, ScenarioError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Read {
-            path: path.into(),
-            source,
-        })?;
-        serde_json::from_str(&text).map_err(|source| ScenarioError::Parse {
-            path: path.into(),
-            source,
-        })
-    }
-
-    /// Plays it on a board with this ELF, which may hold a store from before. Gives the board as it is in the end.
-    ///
-    /// # Errors
-    /// See [`ScenarioError`].
-    pub fn play(&self, elf: &Path, store: Option<Vec<u8>>) -> Result<Emulator, ScenarioError> {
-        let mut played = Played {
-            scenario: self,
-            elf,
-            texture: number(&self.texture)?,
-            starts: 0,
-            board: None,
-        };
-        played.power_up(store)?;
-        for (step, number) in self.step.iter().zip(1..) {
-            let done = played.act(step)?;
-            if let Err(what) = done {
-                return Err(ScenarioError::Step {
-                    number,
-                    at_s: played.board().now_ns() as f64 * 1e-9,
-                    what,
-                    display: played.seen(),
-                });
-            }
+/// Plays a scenario on a board with this ELF, which may hold a store from before. Gives the board as it is in the end.
+///
+/// # Errors
+/// See [`PlayError`].
+pub fn play(
+    scenario: &Scenario,
+    elf: &Path,
+    store: Option<Vec<u8>>,
+) -> Result<Emulator, PlayError> {
+    let mut played = Played {
+        scenario,
+        elf,
+        texture: texture(&scenario.texture)?,
+        starts: 0,
+        board: None,
+    };
+    played.power_up(store)?;
+    for (step, number) in scenario.step.iter().zip(1..) {
+        let done = played.act(step)?;
+        if let Err(what) = done {
+            return Err(PlayError::Step {
+                number,
+                at_s: played.board().now_ns() as f64 * 1e-9,
+                what,
+                display: played.seen(),
+            });
         }
-        Ok(played.board.take().expect("it was switched on"))
     }
-}
-
-fn number(texture: &str) -> Result<u8, ScenarioError> {
-    texture_number(texture).ok_or_else(|| ScenarioError::Texture(texture.into()))
+    Ok(played.board.take().expect("it was switched on"))
 }
 
 /// A scenario on a board.
@@ -276,38 +87,22 @@ struct Played<'s> {
 }
 
 /// What a step comes to: what was wrong.
-type Done = Result<Result<(), String>, ScenarioError>;
+type Done = Result<Result<(), String>, PlayError>;
 
 impl Played<'_> {
     fn board(&mut self) -> &mut Emulator {
         self.board.as_mut().expect("it was switched on")
     }
 
-    fn power_up(&mut self, store: Option<Vec<u8>>) -> Result<(), ScenarioError> {
-        let collection = Collection {
-            seed: self.scenario.world,
-            textures: Vec::new(),
-            trials: 1,
-        };
-        // trials that nothing was learned from
-        let trial = 100 * self.scenario.seed + self.starts;
+    fn power_up(&mut self, store: Option<Vec<u8>>) -> Result<(), PlayError> {
+        let setup = self.scenario.setup(self.texture, self.starts);
         self.starts += 1;
-        let setup = collection.setup(self.texture, trial);
         let options = Options {
             store,
             ..Options::default()
         };
         let board = Emulator::start(self.elf, setup, options)?;
-        let Kept {
-            tremor,
-            wander,
-            uneven,
-        } = self.scenario.hand;
-        let manner = Manner {
-            tremor,
-            wander,
-            uneven,
-        };
+        let manner = self.scenario.hand.into();
         board
             .rig()
             .world()
@@ -342,13 +137,13 @@ impl Played<'_> {
         if !self.until(PATIENCE_S, |display| display.shows(SLIDE))? {
             return Ok(Err("the display does not want a slide".into()));
         }
-        self.board().run_ms(REACTION_MS)?;
+        self.board().run_ms(Step::REACTION_MS)?;
         self.intend(force_n, pace_mm_s);
         self.run_s(seconds)?;
         self.intend(force_n, 0.0);
-        self.run_s(0.15)?;
+        self.run_s(Step::HELD_S)?;
         self.intend(0.0, 0.0);
-        self.run_s(0.5)?;
+        self.run_s(Step::LIFTED_S)?;
         Ok(Ok(()))
     }
 
@@ -400,10 +195,10 @@ impl Played<'_> {
                 slides,
             } => {
                 for _ in 0..*slides {
-                    if let Err(what) = self.slide(*force_n, *pace_mm_s, 1.8)? {
+                    if let Err(what) = self.slide(*force_n, *pace_mm_s, Step::EXPLORED_S)? {
                         return Ok(Err(what));
                     }
-                    if self.until(1.0, |display| display.shows(OVER))? {
+                    if self.until(Step::VERDICT_S, |display| display.shows(OVER))? {
                         return Ok(Ok(()));
                     }
                 }
@@ -414,12 +209,12 @@ impl Played<'_> {
                     self.board().press(true)?;
                     self.board().run_ms(*ms)?;
                     self.board().press(false)?;
-                    self.board().run_ms(100)?;
+                    self.board().run_ms(Step::RELEASED_MS)?;
                 }
             }
             Step::Wait { seconds } => self.run_s(*seconds)?,
             Step::Place { texture } => {
-                self.texture = number(texture)?;
+                self.texture = self::texture(texture)?;
                 let texture = self.texture;
                 self.board().rig().world().place(texture)?;
             }

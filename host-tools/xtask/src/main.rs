@@ -103,7 +103,7 @@ enum Cli {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
-    /// Attack the parsers with libFuzzer: frames, tables, the store's flash, recordings
+    /// Attack the parsers with libFuzzer: frames, tables, the store's flash, recordings, scenarios
     ///
     /// Runs on stable Rust; wants a C++ compiler. What breaks a target is kept in target/fuzz and named: copy it to
     /// tests/fuzz/corpus, where every later run begins with it.
