@@ -1,4 +1,5 @@
 //! The handheld's display: an SSD1306 on I2C1, told of a whole picture at a time, by DMA while the core sleeps.
+use display_interface::DisplayError;
 use embassy_stm32::i2c::{self, I2c};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{bind_interrupts, dma, peripherals};
@@ -57,7 +58,11 @@ pub(crate) async fn show(pins: board::Display) {
     loop {
         // its power may come late, or its plug be loose
         if let Err(why) = run(&mut display, &mut last).await {
-            defmt::warn!("no display: {}", defmt::Debug2Format(&why));
+            let why = match why {
+                DisplayError::BusWriteError => "it does not answer",
+                _ => "it is told what no display is",
+            };
+            defmt::warn!("no display: {=str}", why);
         }
         Timer::after(AGAIN).await;
     }
@@ -67,7 +72,7 @@ pub(crate) async fn show(pins: board::Display) {
 async fn run<D>(
     display: &mut Ssd1306Async<D, DisplaySize128x64, ssd1306::mode::BasicMode>,
     last: &mut Option<Picture>,
-) -> Result<(), display_interface::DisplayError>
+) -> Result<(), DisplayError>
 where
     D: display_interface::AsyncWriteOnlyDataCommand,
 {

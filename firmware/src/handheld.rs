@@ -285,7 +285,7 @@ fn show(probe: &Handheld<'_, Plain>, memory: &Memory, awake: &Awake) {
         lost: acquire::LOST.load(Relaxed),
     };
     let screen = probe.screen(table.as_ref(), &about);
-    if screen == Screen::Dark {
+    if matches!(screen, Screen::Dark) {
         return display::picture(None);
     }
     let mut picture = Picture::new();

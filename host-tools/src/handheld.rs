@@ -216,6 +216,7 @@ pub fn learn(collection: &Collection) -> Result<(Vec<u8>, Vec<u8>), TableError> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::collection::texture_number;
     use tactus_core::handheld::{MAX_SLIDES, judge};
     use tactus_core::table::Table;
 
@@ -267,6 +268,26 @@ mod tests {
             right >= 11 && wrong == 0 && made <= 3 * 12,
             "{right} {wrong} {made}"
         );
+    }
+
+    /// The hand of the scenario `uneven`.
+    #[test]
+    fn a_slide_that_nearly_stops_is_too_uneven() {
+        let burlap = texture_number("burlap").unwrap();
+        let plan = Plan::new();
+        for trial in 100..108 {
+            let mut touch = Touch::<Plain>::new(&plan);
+            let mut person = Person::new(world(1).setup(burlap, trial), Manner::default());
+            person.intend(0.5, 0.0);
+            let still = person.feel(&mut touch, 5.0, |event| *event == Event::Still);
+            assert!(still.is_some(), "{trial}");
+            person.feel(&mut touch, 0.3, |_| false);
+            person.intend(0.5, 70.0);
+            person.feel(&mut touch, 0.6, |_| false);
+            person.intend(0.5, 8.0);
+            let over = person.feel(&mut touch, 2.0, |_| true);
+            assert_eq!(over, Some(Event::Again(Again::TooUneven)), "{trial}");
+        }
     }
 
     #[test]

@@ -320,7 +320,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
 
     /// What came of [`Job::Judge`].
     pub fn judged(&mut self, judged: Result<Judgement, JudgeError>) {
-        if self.page != Page::Thinking {
+        if !matches!(self.page, Page::Thinking) {
             return;
         }
         let judgement = match judged {
@@ -355,7 +355,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     /// What came of [`Job::Teach`]: the name that was learned, or why none was. The table has so many textures now.
     pub fn taught(&mut self, taught: Result<Name, Text>, textures: u16) {
         self.textures = textures;
-        if self.page != Page::Saving {
+        if !matches!(self.page, Page::Saving) {
             return;
         }
         self.sound(if taught.is_ok() { SURE_IT_IS } else { ALARM });
@@ -521,7 +521,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 
     fn fail(&mut self, trouble: Trouble) {
-        if self.page != Page::Fault(trouble.clone()) {
+        if !matches!(&self.page, Page::Fault(shown) if *shown == trouble) {
             self.sound(ALARM);
             self.forget_visit();
             self.job = None;
@@ -588,14 +588,14 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 _ => {}
             },
             Event::Again(why) => {
-                if self.page == Page::Touching {
+                if matches!(self.page, Page::Touching) {
                     self.sound(BAD);
                     self.show(Page::Again(why));
                 }
             }
             Event::Slid(observation) => {
                 // there is room: a visit ends with its last slide
-                if self.page == Page::Touching && self.visit.push(observation).is_ok() {
+                if matches!(self.page, Page::Touching) && self.visit.push(observation).is_ok() {
                     self.job = Some(Job::Judge(self.visit.clone()));
                     self.show(Page::Thinking);
                 }

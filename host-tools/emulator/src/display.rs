@@ -3,7 +3,7 @@
 
 use embedded_graphics::Drawable as _;
 use embedded_graphics::geometry::Point;
-use embedded_graphics::mono_font::ascii::{FONT_6X10, FONT_7X13_BOLD, FONT_9X18_BOLD, FONT_10X20};
+use embedded_graphics::mono_font::ascii::{FONT_6X10, FONT_7X13_BOLD, FONT_10X20};
 use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
 use embedded_graphics::pixelcolor::BinaryColor;
 use embedded_graphics::text::{Baseline, Text};
@@ -16,7 +16,7 @@ use crate::rig::{SharedRig, lock};
 /// SA0 to ground.
 const ADDRESS: u8 = 0x3C;
 /// The fonts of the screens.
-const FONTS: [&MonoFont<'_>; 4] = [&FONT_6X10, &FONT_7X13_BOLD, &FONT_9X18_BOLD, &FONT_10X20];
+const FONTS: [&MonoFont<'_>; 3] = [&FONT_6X10, &FONT_7X13_BOLD, &FONT_10X20];
 
 /// What the next byte of a transfer is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

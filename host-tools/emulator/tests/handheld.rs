@@ -123,7 +123,7 @@ fn the_share_of_time_awake_is_true() {
     let ready = Scenario::parse(ready).unwrap();
     let mut board = tactus_emulator::scenario::play(&ready, &elf, None).unwrap();
     let clock_hz = tactus_emulator::Options::default().instructions_per_second;
-    let mut awake = |board: &mut Emulator, what: &str| {
+    let awake = |board: &mut Emulator, what: &str| {
         board.run_ms(1000).unwrap();
         let (from, from_ns) = (board.instructions().unwrap(), board.now_ns());
         board.run_ms(12_000).unwrap();

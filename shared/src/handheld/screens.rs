@@ -8,7 +8,7 @@ use core::fmt::Write as _;
 use embedded_graphics::Drawable;
 use embedded_graphics::draw_target::DrawTarget;
 use embedded_graphics::geometry::{Point, Size};
-use embedded_graphics::mono_font::ascii::{FONT_6X10, FONT_7X13_BOLD, FONT_9X18_BOLD, FONT_10X20};
+use embedded_graphics::mono_font::ascii::{FONT_6X10, FONT_7X13_BOLD, FONT_10X20};
 use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
 use embedded_graphics::pixelcolor::BinaryColor;
 use embedded_graphics::primitives::Rectangle;
@@ -236,8 +236,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
     fn headline(&mut self, text: &str, y: i32) -> Done<D> {
         match text.chars().count() {
             0..=12 => self.centre(text, y, &FONT_10X20),
-            13..=14 => self.centre(text, y + 1, &FONT_9X18_BOLD),
-            15..=18 => self.centre(text, y + 3, &FONT_7X13_BOLD),
+            13..=18 => self.centre(text, y + 3, &FONT_7X13_BOLD),
             _ => self.centre(&cut(text, 21), y + 5, &FONT_6X10),
         }
     }
@@ -537,13 +536,13 @@ fn spell<D: DrawTarget<Color = BinaryColor>>(
     brush.title("Spell it", "")?;
     brush.write(
         text,
-        Point::new(1, 13),
-        &FONT_9X18_BOLD,
+        Point::new(1, 15),
+        &FONT_7X13_BOLD,
         Alignment::Left,
         false,
     )?;
-    let cursor = 1 + 9 * text.chars().count() as i32;
-    brush.fill(cursor, 29, 8.min(WIDTH - cursor), 2, false)?;
+    let cursor = 1 + 7 * text.chars().count() as i32;
+    brush.fill(cursor, 29, 6.min(WIDTH - cursor), 2, false)?;
     for (place, n) in wheel.iter().zip(0..) {
         let chosen = n == WHEEL as i32 / 2;
         let x = MIDDLE + (n - WHEEL as i32 / 2) * 19;
