@@ -105,10 +105,10 @@ fn sleep() -> ! {
         let from = Instant::now();
         cortex_m::asm::dsb();
         cortex_m::asm::wfi();
-        let slept = from.elapsed();
+        // before the interrupt runs: it may be the one in which the time is read
+        ASLEEP_US.fetch_add(from.elapsed().as_micros() as u32, Relaxed);
         // SAFETY: they were on before, and nothing here is in their way.
         unsafe { cortex_m::interrupt::enable() };
-        ASLEEP_US.fetch_add(slept.as_micros() as u32, Relaxed);
     }
 }
 

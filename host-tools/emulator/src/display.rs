@@ -242,16 +242,19 @@ fn write(text: &str, font: &MonoFont<'_>) -> Picture {
 
 /// Whether that corner of `part` is somewhere in `whole`, inverted or not.
 fn is_in(whole: &Picture, part: &Picture, width: usize, height: usize) -> bool {
-    // headlines begin a row above the glass, with a row of the font that is empty
+    // headlines begin a row above the glass, with a row of the font that is empty, and what ends at its right edge leaves
+    // the gap to the next letter, a column, beyond it
     let is_at = |left: usize, rows_above: usize, top: usize, inverted: bool| {
         (0..height).all(|y| {
             (0..width).all(|x| match (top + y).checked_sub(rows_above) {
-                Some(row) => (whole.is_lit(left + x, row) != inverted) == part.is_lit(x, y),
-                None => !part.is_lit(x, y),
+                Some(row) if left + x < WIDTH => {
+                    (whole.is_lit(left + x, row) != inverted) == part.is_lit(x, y)
+                }
+                _ => !part.is_lit(x, y),
             })
         })
     };
-    (0..=WIDTH - width)
+    (0..=WIDTH - width + 1)
         .any(|x| (0..=HEIGHT - height + 1).any(|y| is_at(x, 1, y, false) || is_at(x, 1, y, true)))
 }
 
@@ -304,6 +307,16 @@ mod tests {
         send(&mut display, &[&[0x40], &text.bytes()[500..]].concat());
         assert_eq!(display.picture(), Some(text));
         assert!(display.shows("Tactus") && display.shows("act") && !display.shows("cat"));
+        // at the edges
+        let mut edges = Picture::new();
+        let style = MonoTextStyle::new(&FONT_6X10, BinaryColor::On);
+        let end = Point::new(WIDTH as i32 + 1 - 6 * 6, 20);
+        let Ok(_) = Text::with_baseline("lost 0", end, style, Baseline::Top).draw(&mut edges);
+        let other = Display {
+            ram: *edges.bytes(),
+            ..display.clone()
+        };
+        assert!(other.shows("lost 0") && !other.shows("lost 8") && !other.shows("lost 0 "));
         // turned round, nobody reads it; inverted, everybody
         send(&mut display, &[0x80, 0xA0, 0x80, 0xA7]);
         assert!(!display.shows("Tactus"));
