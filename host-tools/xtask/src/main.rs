@@ -57,7 +57,8 @@ enum Cli {
     /// Say what each image takes of the chip, and how deep the rig's stack gets
     ///
     /// The stack is measured on the emulated board, during an exploration. An error if an image takes more than 256 KB of
-    /// flash or 128 KB of RAM, or its variables and its stack together more than the 192 KB there are.
+    /// flash (the handheld's more than 128 KB without its table) or 128 KB of RAM, or its variables and its stack together
+    /// more than the 192 KB there are.
     #[command(after_help = size::EXAMPLES)]
     Size(size::Options),
     /// Make a release: images, hash sums, and how to flash them without a checkout
