@@ -277,10 +277,10 @@ impl<'p, K: Kernels> Touch<'p, K> {
                     }
                     Channel::Pdc => self.pdc.push(counts),
                 };
-                self.missing += u32::from(room.is_err());
+                self.missing = self.missing.saturating_add(room.is_err().into());
             }
             None => {
-                self.missing += 1;
+                self.missing = self.missing.saturating_add(1);
                 self.unreadable = self.unreadable.saturating_add(1);
                 if self.unreadable == SILENT {
                     self.restart();
