@@ -7,9 +7,12 @@
 mod acquire;
 mod bench;
 mod board;
+mod display;
+mod handheld;
 mod kernels;
 mod lever;
 mod link;
+mod memory;
 mod probe;
 mod rescue;
 mod rig;
@@ -19,6 +22,7 @@ mod session;
 pub mod workload;
 
 pub use bench::bench;
+pub use handheld::handheld;
 pub use rig::rig;
 pub use selftest::selftest;
 

@@ -3,7 +3,7 @@
 //! Samples and coefficients are 16-bit integers and the sums are exact, so the power does not depend on how the samples
 //! were cut into blocks, nor on the machine.
 
-use core::f64::consts::PI;
+use core::f64::consts::{PI, TAU};
 
 use crate::kernels::Kernels;
 use crate::pressure::RATE_HZ;
@@ -41,15 +41,16 @@ impl Taps {
                 if m == 0.0 {
                     2.0 * f
                 } else {
-                    libm::sin(2.0 * PI * f * m) / (PI * m)
+                    // a sine is a cosine a quarter of a turn later
+                    cos_of_turns(f * m - 0.25) / (PI * m)
                 }
             };
-            let hamming = 0.54 - 0.46 * libm::cos(2.0 * PI * n as f64 / HISTORY as f64);
+            let hamming = 0.54 - 0.46 * cos_of_turns(n as f64 / HISTORY as f64);
             ((ideal(high) - ideal(low)) * hamming, m)
         };
         let gain: f64 = (0..TAPS)
             .map(windowed)
-            .map(|(h, m)| h * libm::cos(PI * middle * m))
+            .map(|(h, m)| h * cos_of_turns(middle * m / 2.0))
             .sum();
         let mut taps = [0; TAPS];
         for (n, tap) in taps.iter_mut().enumerate() {
@@ -88,6 +89,32 @@ impl Taps {
     }
 }
 
+/// Cosine of an angle in turns, fewer than 2^31 of them. That of `libm` takes angles of any size in radians, and 5 KB of flash
+/// to tell how many turns they are.
+pub(crate) fn cos_of_turns(turns: f64) -> f64 {
+    let turns = if turns < 0.0 { -turns } else { turns };
+    let part = turns - f64::from(turns as u32);
+    // to an eighth of a turn, where the series below are as good as f64 is
+    let half = if part > 0.5 { 1.0 - part } else { part };
+    let (quarter, sign) = if half > 0.25 {
+        (0.5 - half, -1.0)
+    } else {
+        (half, 1.0)
+    };
+    let series = |x: f64, first: u32| {
+        // 1 - x^2 / ((first + 1) (first + 2)) (1 - x^2 / ((first + 3) (first + 4)) (1 - ...
+        (0..9).rev().fold(1.0, |sum, term| {
+            let n = f64::from(first + 2 * term);
+            1.0 - x * x / ((n + 1.0) * (n + 2.0)) * sum
+        })
+    };
+    if quarter <= 0.125 {
+        sign * series(TAU * quarter, 0)
+    } else {
+        let x = TAU * (0.25 - quarter);
+        sign * x * series(x, 1)
+    }
+}
 /// Samples that begin at a whole word, for kernels that read two at once.
 #[derive(Clone, Debug)]
 #[repr(align(4))]
@@ -185,6 +212,44 @@ mod tests {
             },
         );
         re.hypot(im)
+    }
+
+    #[test]
+    fn cosine_of_turns_is_libms() {
+        for n in -4000..4000 {
+            let turns = f64::from(n) / 1024.0 + 1e-3;
+            let cos = libm::cos(TAU * turns);
+            assert!((cos_of_turns(turns) - cos).abs() < 4e-15, "{turns}");
+        }
+        for (turns, cos) in [
+            (0.0, 1.0),
+            (0.25, 0.0),
+            (-0.5, -1.0),
+            (0.75, 0.0),
+            (7.0, 1.0),
+        ] {
+            assert_eq!(cos_of_turns(turns), cos);
+        }
+    }
+
+    #[test]
+    fn the_taps_are_those_of_the_formula_with_libm() {
+        let [low, high] = [20.0 / 2200.0, 700.0 / 2200.0];
+        let response = |n: i32| {
+            let m = f64::from(n) - 33.0;
+            let ideal = |f: f64| match n {
+                33 => 2.0 * f,
+                _ => libm::sin(2.0 * PI * f * m) / (PI * m),
+            };
+            (ideal(high) - ideal(low)) * (0.54 - 0.46 * libm::cos(2.0 * PI * f64::from(n) / 66.0))
+        };
+        let gain: f64 = (0..67)
+            .map(|n| response(n) * libm::cos(PI * (low + high) * (f64::from(n) - 33.0)))
+            .sum();
+        let taps: Vec<i16> = (0..67)
+            .map(|n| libm::round(response(n) / gain * 32768.0) as i16)
+            .collect();
+        assert_eq!(Taps::band_pass().as_slice()[..], taps[..]);
     }
 
     #[test]

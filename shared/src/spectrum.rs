@@ -9,6 +9,7 @@ use core::ops::Range;
 
 use microfft::Complex32;
 
+use crate::fir::cos_of_turns;
 use crate::kernels::Kernels;
 use crate::pressure::RATE_HZ;
 
@@ -31,8 +32,7 @@ const WINDOW_BIN_1: f32 = -(FRAME as f32) / 4.0;
 pub fn hann() -> [f32; FRAME] {
     let mut window = [0.0; FRAME];
     for (n, w) in window.iter_mut().enumerate() {
-        let phase = 2.0 * core::f64::consts::PI * n as f64 / FRAME as f64;
-        *w = (0.5 - 0.5 * libm::cos(phase)) as f32;
+        *w = (0.5 - 0.5 * cos_of_turns(n as f64 / FRAME as f64)) as f32;
     }
     window
 }
@@ -218,6 +218,14 @@ mod tests {
                 .round() as i16
             })
             .collect()
+    }
+
+    #[test]
+    fn the_window_is_that_of_libms_cosine() {
+        let turn = 2.0 * core::f64::consts::PI / FRAME as f64;
+        for (n, w) in hann().into_iter().enumerate() {
+            assert_eq!(w, (0.5 - 0.5 * libm::cos(turn * n as f64)) as f32, "{n}");
+        }
     }
 
     #[test]

@@ -170,9 +170,10 @@ impl fmt::Display for TableError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Truncated { got, wanted } => write!(f, "truncated: {got} bytes of {wanted}"),
-            Self::Magic(found) => write!(
+            // by hand: printing lists for debugging takes the chip 1 KB
+            Self::Magic([a, b, c, d]) => write!(
                 f,
-                "not a texture table: it begins with {found:02x?}, not `TACT`"
+                "not a texture table: it begins with [{a:02x}, {b:02x}, {c:02x}, {d:02x}], not `TACT`"
             ),
             Self::Version(found) => {
                 write!(

@@ -39,6 +39,8 @@ pub(crate) struct Standing<'a> {
     /// instructions since power-up, without the time that the core slept
     pub(crate) instructions: u64,
     pub(crate) clock: &'a mut bool,
+    /// that the core has executed
+    pub(crate) instructions: u64,
 }
 
 /// What the owner wants.
@@ -66,6 +68,8 @@ pub(crate) struct Driver {
     pub(crate) switches: [Option<bool>; 4],
     /// the debug probe gives its 8 MHz
     pub(crate) clock: bool,
+    /// that the core has executed
+    pub(crate) instructions: u64,
 }
 
 impl Driver {
@@ -113,7 +117,12 @@ impl Driver {
         let encoder = pins::ENCODER
             .iter()
             .all(|pin| board.function(*pin) == Some(pins::TIM3_4_FUNCTION));
-        lock(&self.rig).wire(sensor, encoder);
+        let display = pins::DISPLAY_I2C
+            .iter()
+            .all(|pin| board.function(*pin) == Some(pins::I2C1_FUNCTION));
+        let mut rig = lock(&self.rig);
+        rig.wire(sensor, encoder);
+        rig.display_mut().wire(display);
     }
 
     /// The chip is as after a reset: its pins are let go, what drives them from outside must do it again.
@@ -248,6 +257,7 @@ impl Driver {
                     spending: &mut self.spending,
                     instructions: self.instructions,
                     clock: &mut self.clock,
+                    instructions: self.instructions,
                 }),
             }
         }
@@ -299,7 +309,13 @@ impl emulator::Driver<Board> for Driver {
         self.instructions = stop.instruction_count;
         if now.0 >= self.next_tick_ns && stop.reason != StopReason::Reset {
             self.next_tick_ns = now.0 + self.tick_ns;
-            lock(&self.rig).tick(now.0);
+            let buzzes = session.board_mut().function(pins::BUZZER) == Some(pins::TIM8_FUNCTION);
+            let tone = buzzes.then(|| session.board_mut().tone()).flatten();
+            {
+                let mut rig = lock(&self.rig);
+                rig.tick(now.0);
+                rig.buzzer(now.0, tone);
+            }
             self.switch(session.board_mut(), now);
             if let Some(log) = &mut self.log {
                 log.drain(now.0, host);

@@ -9,6 +9,7 @@
 mod board;
 pub mod campaign;
 pub mod cycles;
+mod display;
 mod driver;
 pub mod exploration;
 mod flash;
@@ -18,12 +19,14 @@ mod part;
 pub mod pins;
 mod record;
 mod rig;
+pub mod scenario;
 mod serial;
 mod spent;
 mod stack;
 pub mod talk;
 
 pub use board::{Emulator, Error, Options};
+pub use display::Display;
 pub use flash::{FLASH, STORE};
 pub use record::Slide;
 pub use rig::{Output, Rig};

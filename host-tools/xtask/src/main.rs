@@ -58,7 +58,7 @@ enum Cli {
     /// Say what each image takes of the chip, and how deep the rig's stack gets
     ///
     /// The stack is measured on the emulated board, during an exploration. An error if the rig's image takes more than 160 KB
-    /// of flash without its table (a handheld's 128 KB), if variables take more than 64 KB, or if twice the stack does not fit
+    /// of flash without its table (the handheld's 128 KB), if variables take more than 64 KB, or if twice the stack does not fit
     /// beside them into the 192 KB there are. Lists the largest symbols, and the functions that panic with their callers.
     #[command(after_help = size::EXAMPLES)]
     Size(size::Options),
@@ -71,9 +71,10 @@ enum Cli {
         #[arg(long, value_name = "DIR", default_value = "target/bundle")]
         out: PathBuf,
     },
-    /// Make the table that comes with the firmware, firmware/factory.tact
+    /// Make the tables that come with the firmware, firmware/factory.tact and firmware/handheld.tact
     ///
-    /// Simulates 5 trials of 3 movements on each of the 117 textures of world 1 and learns them, which takes a minute or two.
+    /// Simulates 5 trials of 3 movements on each of the 117 textures of world 1 and learns them, and 5 slides of a hand for
+    /// the handheld probe, which takes a minute or two.
     Factory {
         /// Leave the committed file alone; an error if it is not byte for byte what is made now
         #[arg(long)]
@@ -104,7 +105,7 @@ enum Cli {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
-    /// Attack the parsers with libFuzzer: frames, tables, the store's flash, recordings
+    /// Attack the parsers with libFuzzer: frames, tables, the store's flash, recordings, scenarios
     ///
     /// Runs on stable Rust; wants a C++ compiler. What breaks a target is kept in target/fuzz and named: copy it to
     /// tests/fuzz/corpus, where every later run begins with it.
