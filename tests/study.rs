@@ -106,7 +106,6 @@ fn study(simulations: u64) -> Study {
         training: Some(Training::of(&recorded.training, &worn).unwrap()),
         pairs: Some(pairs(&experiment, 20, || ()).unwrap()),
         identification: Some(Identification::run(&experiment, simulations, || ()).unwrap()),
-        exchanged: None,
         signals: Some(Signals::run(world()).unwrap()),
         worlds: (11..=13).map(row).collect(),
     }

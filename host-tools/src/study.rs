@@ -9,7 +9,7 @@ pub mod signals;
 pub mod slides;
 pub mod training;
 
-use self::identify::{Exchanged, Identification, PairRow, WorldRow};
+use self::identify::{Identification, PairRow, WorldRow};
 use self::pilot::Pilot;
 use self::signals::Signals;
 use self::training::Training;
@@ -76,9 +76,6 @@ pub struct Study {
     /// The identification among all textures.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub identification: Option<Identification>,
-    /// What would explain its cycling.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub exchanged: Option<Exchanged>,
     /// What the sensor says.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub signals: Option<Signals>,

@@ -4,9 +4,7 @@ use std::io::Write;
 use std::time::Instant;
 
 use tactus::evaluate::Method;
-use tactus::study::identify::{
-    Exchanged, Identification, METHODS, WorldRow, experiment, of_pair, pairs,
-};
+use tactus::study::identify::{Identification, METHODS, WorldRow, experiment, of_pair, pairs};
 use tactus::study::pilot::Pilot;
 use tactus::study::published::PAIRS;
 use tactus::study::report;
@@ -58,7 +56,6 @@ pub(crate) fn study(args: &cli::Study, out: &mut impl Write) -> anyhow::Result<(
         training: None,
         pairs: None,
         identification: None,
-        exchanged: None,
         signals: None,
         worlds: Vec::new(),
     };
@@ -124,10 +121,6 @@ fn explore(
             Identification::run(&experiment, simulations, done)
         })?;
         study.identification = Some(identification);
-        let exchanged = times.stage("independent movements", StudyWorld::RECORDED, |done| {
-            Exchanged::run(world, simulations, done)
-        })?;
-        study.exchanged = Some(exchanged);
         study.signals = Some(times.stage("signals", 0, |_| Signals::run(world))?);
     }
     Ok(())

@@ -35,7 +35,12 @@ impl Noise {
 
     /// `median` times a log-normal factor of deviation `spread`, at most two and a half of which are drawn.
     pub(super) fn about(&mut self, median: f64, spread: f64) -> f64 {
-        median * (spread * self.normal().clamp(-2.5, 2.5)).exp()
+        median * self.within(spread).exp()
+    }
+
+    /// Normal with mean 0, cut at two and a half deviations.
+    pub(super) fn within(&mut self, deviation: f64) -> f64 {
+        deviation * self.normal().clamp(-2.5, 2.5)
     }
 
     /// Two independent numbers of mean 0 and variance 1 for noise at every tick: sums of two uniform ones, which filters

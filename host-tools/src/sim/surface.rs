@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::noise::Noise;
-use super::textures::Texture;
+use super::textures::{CLAMPED_N, Texture};
 
 /// Length of a sample, mm (PAPER: squares of 75 mm).
 pub const LENGTH_MM: f64 = 75.0;
@@ -25,10 +25,15 @@ const SLOW_POINTS: usize = 83;
 /// Distance of those points, mm.
 const SLOW_MM: f64 = 1.0;
 
-/// Load and speed at which a texture's friction is quoted, N and mm/s (chosen: the paper's second movement).
-pub const FRICTION_AT: (f64, f64) = (0.5, 25.1);
-/// Lowest load and speed of the friction law, N and mm/s (chosen: below them it stays as it is there).
-const FRICTION_FROM: (f64, f64) = (0.01, 0.5);
+/// Load and speed at which a texture's friction is quoted, N and mm/s (chosen: the force that suits traction best in the
+/// paper, and the middle of its speeds).
+pub const FRICTION_AT: (f64, f64) = (1.26, 25.1);
+/// Load and speed at which its vibrations are, N and mm/s (chosen: the paper's movement between the others).
+pub const VIBRATIONS_AT: (f64, f64) = (0.5, 25.1);
+/// Lowest load and speed of the laws of both, N and mm/s (chosen: below them they stay as they are there).
+const LAWS_FROM: (f64, f64) = (0.05, 5.0);
+/// How far from where they are quoted the laws bend, in ln(speed) (chosen: about over the speeds of the paper's three movements).
+const BENDS: f64 = 1.0;
 
 impl Texture {
     /// Coefficient of kinetic friction of the skin, mean over a sample: see [`Surface::friction`].
@@ -38,10 +43,43 @@ impl Texture {
 
     /// Friction relative to that at [`FRICTION_AT`].
     fn law(&self, speed_mm_s: f64, load_n: f64) -> f64 {
-        let load = (load_n.max(FRICTION_FROM.0) / FRICTION_AT.0).ln();
-        let speed = (speed_mm_s.abs().max(FRICTION_FROM.1) / FRICTION_AT.1).ln();
-        (self.friction_load * load + self.friction_speed * speed).exp()
+        let load = (load_n.max(LAWS_FROM.0) / FRICTION_AT.0).ln();
+        let speed = (speed_mm_s.abs().max(LAWS_FROM.1) / FRICTION_AT.1).ln();
+        let of_speed = bent(self.friction_speed, self.friction_bend, speed);
+        (self.friction_load * load + of_speed).exp()
     }
+
+    /// Vibrations relative to those at [`VIBRATIONS_AT`], but for what speed does to those of all textures.
+    pub(super) fn vibrations(&self, speed_mm_s: f64) -> f64 {
+        let (_, speed) = relative(0.0, speed_mm_s);
+        bent(self.vibration_speed, self.vibration_bend, speed).exp()
+    }
+
+    /// What of the vibrations passes under a load, the skin being clamped the more it is pressed: at [`VIBRATIONS_AT`] all
+    /// textures' alike.
+    pub(super) fn passed(&self, load_n: f64) -> f64 {
+        let of = |clamped_n: f64, load_n: f64| 1.0 / (1.0 + load_n / clamped_n);
+        let here = of(self.clamped_n, load_n) / of(self.clamped_n, VIBRATIONS_AT.0);
+        here * of(CLAMPED_N.0, VIBRATIONS_AT.0)
+    }
+
+    /// Centre of the spectrum of the impulses, Hz.
+    pub(super) fn impulse_centre_hz(&self, speed_mm_s: f64, load_n: f64) -> f64 {
+        let (load, speed) = relative(load_n, speed_mm_s);
+        self.impulse_hz * (self.impulse_load * load + bent(0.0, self.impulse_bend, speed)).exp()
+    }
+}
+
+/// ln of load and speed relative to those at which vibrations are quoted.
+fn relative(load_n: f64, speed_mm_s: f64) -> (f64, f64) {
+    let load = load_n.max(LAWS_FROM.0) / VIBRATIONS_AT.0;
+    let speed = speed_mm_s.max(LAWS_FROM.1) / VIBRATIONS_AT.1;
+    (load.ln(), speed.ln())
+}
+
+/// A power law that bends up to [`BENDS`] from where it is quoted: ln of its value at ln(speed).
+fn bent(power: f64, bend: f64, speed: f64) -> f64 {
+    power * speed + bend * speed.clamp(-BENDS, BENDS).powi(2)
 }
 
 /// One sample of a texture, 75 mm long in the direction of the slide.

@@ -37,10 +37,12 @@ pub struct Texture {
     pub number: u8,
     /// Coefficient of kinetic friction against the skin's silicone at [`super::surface::FRICTION_AT`].
     pub friction: f64,
-    /// Friction goes with load to this power: towards -1/3 for smooth surfaces (Hertz), near 0 for rough ones (Amontons).
+    /// Friction goes with load to this power: about -1/3 for smooth surfaces (Hertz), 0 for rough ones (Amontons).
     pub friction_load: f64,
     /// Friction goes with speed to this power.
     pub friction_speed: f64,
+    /// Half the curvature of ln(friction) over ln(speed).
+    pub friction_bend: f64,
     /// By how much static friction exceeds kinetic friction, relative.
     pub stiction: f64,
     /// Rms of the 1/f fluctuation of friction, relative to it.
@@ -49,8 +51,13 @@ pub struct Texture {
     pub fine_um: f64,
     /// Wavelength about which they lie, mm.
     pub fine_mm: f64,
-    /// Centre of the spectrum of the impulses with which those asperities catch and release, Hz: hard ones are short.
+    /// Centre of the spectrum of the impulses with which those asperities catch and release at the load of
+    /// [`super::surface::VIBRATIONS_AT`], Hz: hard ones are short.
     pub impulse_hz: f64,
+    /// It goes with load to this power: the contact of an asperity grows as it is pressed, or its edge gets steeper.
+    pub impulse_load: f64,
+    /// Half the curvature of its ln over ln(speed): at other speeds others of the asperities catch.
+    pub impulse_bend: f64,
     /// Rms height of the random relief, um.
     pub relief_um: f64,
     /// Wavelength above which its spectrum is flat, mm.
@@ -61,6 +68,12 @@ pub struct Texture {
     pub weave: Option<Weave>,
     /// How much of the vibrations the material swallows, 0..1.
     pub damping: f64,
+    /// Vibrations fall as 1 / (1 + F / this), N: soon where the skin is soon clamped, later where it sinks in.
+    pub clamped_n: f64,
+    /// Vibrations of catching asperities and of friction go with speed to this power beyond what all textures' do.
+    pub vibration_speed: f64,
+    /// Half the curvature of ln(vibrations) over ln(speed).
+    pub vibration_bend: f64,
     /// Deviation of ln(local height amplitude) over the sample.
     pub heterogeneity: f64,
     /// Thickness, mm.
@@ -84,6 +97,8 @@ struct Spread {
     friction: f64,
     height: f64,
     wavelength: f64,
+    /// of what load and speed do, relative to the deviations below
+    movement: f64,
 }
 
 /// Of a texture of which only the group is known (chosen).
@@ -91,15 +106,32 @@ const GROUP_SPREAD: Spread = Spread {
     friction: 0.22,
     height: 0.45,
     wavelength: 0.25,
+    movement: 1.0,
 };
 /// Of a texture of which the paper or its name says more (chosen).
 const HINTED_SPREAD: Spread = Spread {
     friction: 0.08,
     height: 0.15,
     wavelength: 0.10,
+    movement: 0.6,
 };
+/// Deviation of the powers with which friction goes with load and with speed, and of the curvature of ln(friction) over
+/// ln(speed): an elastomer's friction on a dry surface rises or falls towards a peak at a speed of that surface (chosen).
+const FRICTION_POWERS: (f64, f64, f64) = (0.15, 0.18, 0.12);
+/// Friction goes with the heights of a texture, relative to its kind's, to this power (chosen; PAPER Table 3: the rougher,
+/// the less traction).
+const SMOOTHER: f64 = -0.4;
+/// That load of an ordinary texture, N (chosen; PAPER: "greater forces tend to dampen vibrations"), and the
+/// deviation of its ln.
+pub(super) const CLAMPED_N: (f64, f64) = (0.6, 0.8);
+/// Deviation of the power with which vibrations go with speed, and of how that power changes with ln(speed): what catches
+/// at one speed is skipped at another (chosen).
+const VIBRATION_SPEED: (f64, f64) = (0.45, 0.2);
 /// Deviation of ln(centre of the impulses' spectrum) (chosen).
 const IMPULSE_SPREAD: f64 = 0.3;
+/// Deviation of the power with which that centre goes with load, and of its bend over speed (chosen; PAPER: by and large
+/// it does not scale with speed).
+const IMPULSE_POWERS: (f64, f64) = (0.25, 0.15);
 /// Deviation of a period from the next in cloth (chosen).
 const CLOTH_JITTER: f64 = 0.03;
 /// The same in what is moulded, machined or extruded (chosen).
@@ -135,23 +167,42 @@ pub fn draw(number: u8, seed: u64) -> Texture {
     });
     // smooth surfaces touch all over (Hertz: -1/3), rough ones at points whose number grows with load (Amontons: 0)
     let smoothness = 1.0 / (1.0 + fine_um);
-    Texture {
+    let drawn = Texture {
         number,
-        friction: noise.about(medians.friction, spread.friction),
+        // the smoother of two surfaces of a kind has the more contact
+        friction: noise.about(medians.friction, spread.friction) * height.powf(SMOOTHER),
         friction_load: -0.15 * smoothness * noise.between(0.7, 1.3),
-        friction_speed: 0.04 + 0.04 * noise.normal(),
+        friction_speed: 0.04 + noise.within(spread.movement * FRICTION_POWERS.1),
+        friction_bend: 0.0,
         stiction: noise.between(0.05, 0.25),
         friction_noise: noise.about(medians.friction_noise, 0.2),
         fine_um,
         fine_mm: noise.about(medians.fine.1, spread.wavelength),
         impulse_hz: noise.about(medians.impulse_hz, IMPULSE_SPREAD),
+        impulse_load: 0.0,
+        impulse_bend: 0.0,
         relief_um,
         relief_mm: noise.about(medians.relief.1, spread.wavelength),
         relief_exponent: medians.relief_exponent + noise.between(-0.4, 0.4),
         weave,
         damping: medians.damping,
+        clamped_n: CLAMPED_N.0,
+        vibration_speed: 0.0,
+        vibration_bend: 0.0,
         heterogeneity: noise.about(medians.heterogeneity, 0.3),
         thickness_mm: noise.about(medians.thickness_mm, 0.2),
         compliance_mm_per_n: noise.about(medians.compliance_mm_per_n, 0.2),
+    };
+    // what load and speed do to it
+    let mut within = |deviation| noise.within(spread.movement * deviation);
+    Texture {
+        friction_load: drawn.friction_load + within(FRICTION_POWERS.0),
+        friction_bend: within(FRICTION_POWERS.2),
+        impulse_load: within(IMPULSE_POWERS.0),
+        impulse_bend: within(IMPULSE_POWERS.1),
+        clamped_n: drawn.clamped_n * within(CLAMPED_N.1).exp(),
+        vibration_speed: within(VIBRATION_SPEED.0),
+        vibration_bend: within(VIBRATION_SPEED.1),
+        ..drawn
     }
 }

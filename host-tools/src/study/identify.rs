@@ -1,9 +1,6 @@
 //! Identification among all textures (Table 5), and discrimination of pairs (Table 4): thousands of virtual explorations,
 //! each slide drawn from the validation trials.
 
-use rand::SeedableRng as _;
-use rand::seq::SliceRandom as _;
-use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use tactus_core::explorer::{Config, Explorer};
 use tactus_core::features::Property;
@@ -304,73 +301,6 @@ fn evolution(
         sure: outcome.sure,
         steps,
         probabilities: likely.map(|t| (named(t), of(t).collect())).collect(),
-    }
-}
-
-/// What may explain that cycling does better here than in the paper: a world in which each movement tells something of its
-/// own, and trials differ more.
-///
-/// The slides are those of a world of more variation, but each movement's are dealt out to the textures anew: what a texture
-/// feels like at one movement then says nothing of another, while each property at each movement stays as it was.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Exchanged {
-    /// Variation of the trials.
-    pub variation: f64,
-    /// The paper's ways of exploring, the first three of [`METHODS`].
-    pub columns: Vec<Column>,
-}
-
-impl Exchanged {
-    /// Variation of the trials: chosen so that Bayesian exploration is about as good as in the paper.
-    const VARIATION: f64 = 1.5;
-
-    /// Records such a world, and explores in it.
-    ///
-    /// # Errors
-    /// See [`StudyError`].
-    pub fn run(
-        world: StudyWorld,
-        simulations: u64,
-        recorded: impl Fn() + Sync,
-    ) -> Result<Self, StudyError> {
-        let variation = Self::VARIATION;
-        let mut slides = StudyWorld { variation, ..world }.train_and_validate(recorded)?;
-        exchange(&mut slides, world.seed);
-        let experiment = experiment(&slides, world.seed)?;
-        let columns = METHODS[..3]
-            .iter()
-            .map(|&method| Ok(identify(&experiment, method, simulations, || ())?.0));
-        Ok(Self {
-            variation,
-            columns: columns.collect::<Result<_, StudyError>>()?,
-        })
-    }
-}
-
-/// Deals out the slides of all movements but the first to the textures anew: those of the textures with validation trials
-/// among these, those of the others among the others.
-fn exchange(recorded: &mut Recorded, seed: u64) {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let Recorded {
-        training,
-        validation,
-    } = recorded;
-    let tested = |texture: u8| validation.iter().position(|v| v.texture == texture);
-    let (with, without): (Vec<usize>, Vec<usize>) =
-        (0..training.len()).partition(|&t| tested(training[t].texture).is_some());
-    let in_validation: Vec<Option<usize>> = training.iter().map(|t| tested(t.texture)).collect();
-    for movement in 1..Collection::MOVEMENTS.len() {
-        let (old, old_validation) = (training.clone(), validation.clone());
-        for group in [&with, &without] {
-            let mut from = group.clone();
-            from.shuffle(&mut random);
-            for (&to, &from) in group.iter().zip(&from) {
-                training[to].slides[movement] = old[from].slides[movement].clone();
-                if let (Some(to), Some(from)) = (in_validation[to], in_validation[from]) {
-                    validation[to].slides[movement] = old_validation[from].slides[movement].clone();
-                }
-            }
-        }
     }
 }
 

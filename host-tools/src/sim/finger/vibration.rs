@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use super::PA_PER_N;
 use crate::sim::TICK_S;
-use crate::sim::surface::Surface;
+use crate::sim::surface::{Surface, VIBRATIONS_AT};
 
 /// Distance of the ridges, mm (PAPER).
 const RIDGE_MM: f64 = 0.4;
@@ -21,9 +21,6 @@ const PATCH_MAX_MM: f64 = 3.4;
 /// Vibrations with the ridges gone, relative to new (chosen; PAPER: ridges "greatly enhance" them).
 const WITHOUT_RIDGES: f64 = 0.3;
 
-/// Vibrations fall as 1 / (1 + F / this), N, the skin being clamped the more it is pressed (chosen; PAPER: "greater forces
-/// tend to dampen vibrations").
-const DAMPING_N: f64 = 0.6;
 /// Impulses of unresolved asperities: Pa for each um of height and each root of an asperity in a millisecond, as noise of
 /// one value a tick (chosen, for the levels of P_AC that sliding fingers show).
 const IMPULSE_PA: f64 = 70.0;
@@ -31,10 +28,8 @@ const IMPULSE_PA: f64 = 70.0;
 const IMPULSE_WIDTH: f64 = 1.25;
 /// The skin comes to skip asperities that follow each other faster than this, 1/ms (chosen).
 const IMPULSES_PER_MS: f64 = 1.5;
-/// Fluctuations of friction grow with speed to this power ...
-const FRICTION_SPEED_POWER: f64 = 0.4;
-/// ... and are the texture's at this speed, mm/s. Both chosen.
-const FRICTION_SPEED_MM_S: f64 = 25.0;
+/// Fluctuations of friction grow with speed to this power (chosen).
+const FRICTION_SPEED_POWER: f64 = 0.5;
 /// They average out over the contact, relative to friction: as its length, the root of its area. The texture's are those at
 /// 0.2 N, with a patch of this half length, mm.
 const FRICTION_PATCH_MM: f64 = 1.46;
@@ -66,9 +61,11 @@ const GAIN: f64 = 0.6;
 /// State of the vibrations.
 #[derive(Default)]
 pub(super) struct Vibrations {
-    /// part of the vibrations that passes
+    /// part of the vibrations that passes under this load, N
     passed: f64,
-    /// the impulses' band-pass
+    load_n: f64,
+    /// centre of the impulses' band-pass, radians a tick, and its state
+    centre: f64,
     impulse: [f64; 2],
     pink: [f64; 5],
     /// the fluid's pressure, Pa, and its rate, Pa/s
@@ -92,8 +89,9 @@ impl Vibrations {
         wear: f64,
     ) -> f64 {
         let ridges = 1.0 - (1.0 - WITHOUT_RIDGES) * wear;
-        let swallowed = 1.0 - surface.texture().damping;
-        self.passed = amplitude * ridges * swallowed / (1.0 + load_n / DAMPING_N);
+        let texture = surface.texture();
+        self.passed = amplitude * ridges * (1.0 - texture.damping) * texture.passed(load_n);
+        self.load_n = load_n;
         // a point on every ridge and one between, which carries nothing while the ridges stand
         self.passed * surface.contact_um(x_mm, self.patch_mm(), RIDGE_MM / 2.0, 1.0 - wear)
     }
@@ -114,9 +112,13 @@ impl Vibrations {
         white: [f64; 2],
     ) -> f64 {
         let texture = surface.texture();
-        let centre = (TAU * TICK_S * texture.impulse_hz).min(1.0);
-        self.impulse[0] += centre * self.impulse[1];
-        self.impulse[1] += centre * (white[1] - self.impulse[0] - IMPULSE_WIDTH * self.impulse[1]);
+        if self.tune_in == 0 {
+            let hz = texture.impulse_centre_hz(speed, self.load_n);
+            self.centre = (TAU * TICK_S * hz).min(1.0);
+        }
+        self.impulse[0] += self.centre * self.impulse[1];
+        self.impulse[1] +=
+            self.centre * (white[1] - self.impulse[0] - IMPULSE_WIDTH * self.impulse[1]);
         let pink = self.pink(white[0]);
         if speed == 0.0 {
             return 0.0;
@@ -128,10 +130,10 @@ impl Vibrations {
             * surface.amplitude(x_mm)
             * rate.sqrt()
             * self.impulse[1];
-        let speeding = (speed / FRICTION_SPEED_MM_S).powf(FRICTION_SPEED_POWER);
+        let speeding = (speed / VIBRATIONS_AT.1).powf(FRICTION_SPEED_POWER);
         let relative = texture.friction_noise * speeding * FRICTION_PATCH_MM / self.patch_mm();
         let friction = PA_PER_N * shear_n * relative * pink;
-        self.passed * (impulses + friction)
+        self.passed * texture.vibrations(speed) * (impulses + friction)
     }
 
     /// The next value of 1/f noise of rms 1.

@@ -3,7 +3,8 @@
 use super::bench::{correlation, deviation, mean, sample, slide};
 use crate::sim::finger::{Contact, Finger, N_PER_COUNT, PAC_NOISE_FIELD_COUNTS, PAC_PA_PER_COUNT};
 use crate::sim::surface::Surface;
-use crate::sim::{TICK_S, TICKS_PER_S};
+use crate::sim::textures::draw;
+use crate::sim::{Conditions, TICK_S, TICKS_PER_S};
 
 /// Away from everything.
 const FREE: Contact<'static> = Contact {
@@ -248,6 +249,55 @@ fn sliding_changes_p_dc_modestly() {
     let sliding = counts(&mut finger, &mut contact) - free;
     println!("{still:.1} counts pressed, {sliding:.1} sliding");
     assert!((0.01..0.10).contains(&(sliding / still - 1.0).abs()));
+}
+
+#[test]
+fn textures_differ_in_what_load_and_speed_do_to_their_vibrations() {
+    // what catches and what clings, nothing that the ridges follow: its level goes with load and speed alone
+    let texture = |clamped_n, vibration_speed, vibration_bend| {
+        let mut texture = draw(2, 1);
+        (texture.relief_um, texture.weave, texture.heterogeneity) = (0.0, None, 0.0);
+        (texture.friction_load, texture.damping) = (0.0, 0.0);
+        texture.clamped_n = clamped_n;
+        (texture.vibration_speed, texture.vibration_bend) = (vibration_speed, vibration_bend);
+        Surface::new(&texture, 1, 0.0)
+    };
+    let usual = texture(0.6, 0.0, 0.0);
+    let level = |surface: &Surface, force: f64, speed: f64| {
+        let mut finger = Finger::under(
+            3,
+            Conditions {
+                variation: 0.0,
+                ..Conditions::default()
+            },
+        );
+        // roughness is ln of power: half of it is that of amplitude
+        0.5 * slide(&mut finger, surface, force, speed, 1)
+            .properties()
+            .roughness
+    };
+    let gain = |surface, force, speed| level(surface, force, speed) - level(&usual, force, speed);
+    let soon = texture(0.3, 0.0, 0.0);
+    for force in [0.2_f64, 1.26] {
+        // alike at 0.5 N
+        let of = |clamped: f64| (1.0 + 0.5 / clamped) / (1.0 + force / clamped);
+        let expected = f64::ln(of(0.3) / of(0.6));
+        let gain = gain(&soon, force, 25.0);
+        assert!(
+            (gain - expected).abs() < 0.05,
+            "{force} N: {gain:.3}, {expected:.3}"
+        );
+    }
+    let rising = texture(0.6, 0.5, -0.3);
+    for speed in [10.0_f64, 25.0, 63.1] {
+        let faster = (speed / 25.1).ln();
+        let expected = 0.5 * faster - 0.3 * faster * faster;
+        let gain = gain(&rising, 0.5, speed);
+        assert!(
+            (gain - expected).abs() < 0.05,
+            "{speed} mm/s: {gain:.3}, {expected:.3}"
+        );
+    }
 }
 
 #[test]
