@@ -178,6 +178,7 @@ pub enum Choice {
 
 /// Something to be done with the table, by whoever owns it.
 #[derive(Clone, PartialEq, Debug)]
+#[allow(clippy::large_enum_variant)] // no allocation here, and only one at a time
 pub enum Job {
     /// Compare these slides with it: [`judge`], and tell [`Handheld::judged`].
     Judge(Vec<Observation, MAX_SLIDES>),

@@ -5,6 +5,10 @@ use std::path::{Path, PathBuf};
 use tactus::scenario::Scenario;
 use tactus_emulator::Emulator;
 
+mod common;
+
+use common::elf_of;
+
 /// Every scenario has a test here.
 const SCENARIOS: [&str; 7] = [
     "again", "faults", "known", "rest", "spell", "teach", "uneven",
@@ -14,17 +18,9 @@ fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
 }
 
-/// The image; `None` if there is none, which is said.
+/// The handheld's firmware.
 fn elf() -> Option<PathBuf> {
-    let elf = std::env::var_os("TACTUS_HANDHELD_ELF");
-    if elf.is_none() {
-        assert!(
-            std::env::var("TACTUS_REQUIRE_ELF").as_deref() != Ok("1"),
-            "TACTUS_REQUIRE_ELF=1, but TACTUS_HANDHELD_ELF is not set"
-        );
-        eprintln!("skipped: TACTUS_HANDHELD_ELF is not set (run `cargo xtask test`)");
-    }
-    elf.map(PathBuf::from)
+    elf_of("TACTUS_HANDHELD_ELF")
 }
 
 /// Plays a scenario; what holds of all of them is looked at here. `None` without an ELF.
