@@ -60,7 +60,8 @@ impl Texture {
     pub(super) fn passed(&self, load_n: f64) -> f64 {
         let of = |clamped_n: f64, load_n: f64| 1.0 / (1.0 + load_n / clamped_n);
         let here = of(self.clamped_n, load_n) / of(self.clamped_n, VIBRATIONS_AT.0);
-        here * of(CLAMPED_N.0, VIBRATIONS_AT.0)
+        // never higher than the surface is
+        (here * of(CLAMPED_N.0, VIBRATIONS_AT.0)).min(1.0)
     }
 
     /// Centre of the spectrum of the impulses, Hz.

@@ -123,7 +123,7 @@ const FRICTION_POWERS: (f64, f64, f64) = (0.15, 0.18, 0.12);
 const SMOOTHER: f64 = -0.4;
 /// That load of an ordinary texture, N (chosen; PAPER: "greater forces tend to dampen vibrations"), and the
 /// deviation of its ln.
-pub(super) const CLAMPED_N: (f64, f64) = (0.6, 0.8);
+pub(super) const CLAMPED_N: (f64, f64) = (0.6, 0.5);
 /// Deviation of the power with which vibrations go with speed, and of how that power changes with ln(speed): what catches
 /// at one speed is skipped at another (chosen).
 const VIBRATION_SPEED: (f64, f64) = (0.45, 0.2);

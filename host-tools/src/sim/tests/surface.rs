@@ -173,8 +173,10 @@ fn gratings_give_lines_at_v_over_lambda_and_its_harmonics() {
         wavelength_mm: 1.3,
         ..texture.weave.unwrap()
     });
-    // whose asperities do with speed what they do on most
+    // load and speed do what they do on an ordinary texture
     (texture.vibration_speed, texture.vibration_bend) = (0.0, 0.0);
+    (texture.impulse_load, texture.impulse_bend) = (0.0, 0.0);
+    texture.clamped_n = 0.6;
     let surface = Surface::new(&texture, 1, TRIAL_VARIATION);
     let mut finger = Finger::new(1);
     for speed in [25.1, 39.8, 63.1] {
