@@ -22,7 +22,7 @@ const HANDHELD: &str = "tactus-handheld";
 const MAX_VARIABLES: u64 = 64 * KB;
 /// Limits that are not kept yet, by image, and what was measured: it may become smaller, but not larger ([`LEEWAY`]). A limit
 /// that is kept is to be taken out of here.
-const NOT_YET: [(&str, &str, u64); 1] = [(RIG, FLASH, 233_256)];
+const NOT_YET: [(&str, &str, u64); 1] = [(RIG, FLASH, 229_444)];
 /// The part of it that a compiler's next version may add.
 const LEEWAY: u64 = 100;
 /// Twice the deepest stack has to fit into what the variables leave.
