@@ -172,7 +172,6 @@ impl Emulator {
             resets: 0,
             switches: [None; 4],
             clock: options.clock,
-            instructions: 0,
         };
         let shared = rig.clone();
         let thread = std::thread::spawn(move || {
@@ -308,14 +307,6 @@ impl Emulator {
             return Ok(answer);
         }
         Err(self.end())
-    }
-
-    /// Instructions that the core has executed since power-up; while it sleeps it executes none.
-    ///
-    /// # Errors
-    /// The run is over.
-    pub fn instructions(&mut self) -> Result<u64, Error> {
-        self.with(|standing| standing.instructions)
     }
 
     /// Lines of the firmware's log since the last call, with the time at which they were read, ns.

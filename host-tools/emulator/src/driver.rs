@@ -39,8 +39,6 @@ pub(crate) struct Standing<'a> {
     /// instructions since power-up, without the time that the core slept
     pub(crate) instructions: u64,
     pub(crate) clock: &'a mut bool,
-    /// that the core has executed
-    pub(crate) instructions: u64,
 }
 
 /// What the owner wants.
@@ -68,8 +66,6 @@ pub(crate) struct Driver {
     pub(crate) switches: [Option<bool>; 4],
     /// the debug probe gives its 8 MHz
     pub(crate) clock: bool,
-    /// that the core has executed
-    pub(crate) instructions: u64,
 }
 
 impl Driver {
@@ -257,7 +253,6 @@ impl Driver {
                     spending: &mut self.spending,
                     instructions: self.instructions,
                     clock: &mut self.clock,
-                    instructions: self.instructions,
                 }),
             }
         }
