@@ -30,20 +30,8 @@ fn short(code: u16) -> u32 {
         0b0100 if code >> 8 == 0b0100_0111 => 1 + REFILL,
         // from the literal pool
         0b0100 if code >> 11 == 0b01001 => 2,
-        0b0101 => {
-            if (code >> 9) & 0b111 >= 3 {
-                2
-            } else {
-                1
-            }
-        }
-        0b0110..=0b1001 => {
-            if code & 1 << 11 != 0 {
-                2
-            } else {
-                1
-            }
-        }
+        0b0101 if (code >> 9) & 0b111 >= 3 => 2,
+        0b0110..=0b1001 if code & 1 << 11 != 0 => 2,
         0b1011 => match code >> 8 {
             0b1011_0100 | 0b1011_0101 => 1 + (code & 0x1ff).count_ones(),
             0b1011_1100 => 1 + (code & 0xff).count_ones(),
@@ -112,13 +100,7 @@ fn long(first: u16, second: u16) -> u32 {
                 1 + REFILL
             }
         }
-        0b1111_1000 | 0b1111_1001 => {
-            if is_load {
-                2
-            } else {
-                1
-            }
-        }
+        0b1111_1000 | 0b1111_1001 if is_load => 2,
         0b1111_1011 if first & 0xffd0 == 0xfb90 && second & 0xf0 == 0xf0 => DIVIDE,
         _ => 1,
     }
