@@ -151,20 +151,20 @@ impl Hand {
 mod tests {
     use super::*;
 
-    /// A hand against a spring of 1 N/mm: force and speed of every tick after the first second.
+    /// A hand against a spring of 1 N/mm: force and speed of every tick once it has come down, within 3 s, and slides.
     fn held(manner: Manner, seed: u64) -> (Vec<f64>, Vec<f64>) {
         let mut hand = Hand::new(seed, manner);
         let (mut forces, mut speeds) = (Vec::new(), Vec::new());
-        for tick in 0..(13_200.0 * 3.5) as u32 {
+        for tick in 0..(13_200.0 * 5.5) as u32 {
             if tick == 1320 {
                 hand.intend(0.5, 0.0);
             }
-            if tick == 13_200 {
+            if tick == 3 * 13_200 {
                 hand.intend(0.5, 20.0);
             }
             let force = hand.indentation_mm().max(0.0);
             hand.tick(force);
-            if tick > 17_000 {
+            if tick > 43_400 {
                 forces.push(force);
                 speeds.push(hand.speed_mm_s());
             }
