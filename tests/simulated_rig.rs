@@ -238,20 +238,10 @@ fn the_skin_is_reported_worn_before_its_roughness_goes() {
         (felt.properties.get(Property::Roughness).unwrap(), worn)
     };
     let new: Vec<f32> = (0..15).map(|_| roughness().0).collect();
-    let warned: Vec<f32> = {
-        let mut last = std::collections::VecDeque::new();
-        for _ in 0..400 {
-            let (r, worn) = roughness();
-            last.push_back(r);
-            if last.len() > 15 {
-                last.pop_front();
-            }
-            if worn {
-                break;
-            }
-        }
-        last.into()
-    };
+    // the slides from the warning on: they have somewhat more wear, and are as many as the new ones
+    let warning = (0..400).find(|_| roughness().1);
+    assert!(warning.is_some(), "no warning");
+    let warned: Vec<f32> = (0..15).map(|_| roughness().0).collect();
     let (energy, truth) = (
         f64::from(rig.control().skin().energy_j()),
         rig.world().truth(),

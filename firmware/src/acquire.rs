@@ -1,7 +1,7 @@
 //! Sensor words, alone in the highest executor: a slot every 227 us from TIM2, P_AC and P_DC in turn. The command goes out
 //! at the timer's update and the answer is read at its compare, so that the sensor's 50 us are not waited for.
 use core::future::poll_fn;
-use core::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering::Relaxed};
 use core::task::Poll;
 
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
@@ -76,6 +76,18 @@ async fn due(what: u8) {
     .await;
 }
 
+/// Whether words are wanted, and whether the timer is set up.
+static WANTED: AtomicBool = AtomicBool::new(true);
+static SET_UP: AtomicBool = AtomicBool::new(false);
+
+/// Stops the slots, or lets them go on where they stopped. Before the sensor has started it is heard, too.
+pub(crate) fn listen(on: bool) {
+    WANTED.store(on, Relaxed);
+    if SET_UP.load(Relaxed) {
+        TIM2.cr1().modify(|w| w.set_cen(on));
+    }
+}
+
 #[embassy_executor::task]
 pub(crate) async fn acquire(pins: board::Acquire, mut words: Producer<'static, Word>) {
     let mut config = spi::Config::default();
@@ -96,12 +108,19 @@ pub(crate) async fn acquire(pins: board::Acquire, mut words: Producer<'static, W
     });
     // SAFETY: the handler is above, its state is ready.
     unsafe { interrupt::InterruptExt::enable(interrupt::TIM2) };
-    timer.start();
+    // nobody who listens runs before this does
+    SET_UP.store(true, Relaxed);
+    if WANTED.load(Relaxed) {
+        timer.start();
+    }
 
     let mut stats = WordStats::default();
     let mut slot: u32 = 0;
+    let mut gap = false;
     let mut put = |word: Word| {
-        if words.enqueue(word).is_err() {
+        // who takes the words sees where some are missing: the next one is no good
+        gap = words.enqueue(if gap { None } else { word }).is_err();
+        if gap {
             LOST.fetch_add(1, Relaxed);
         }
     };

@@ -67,6 +67,20 @@ assign_resources! {
         blue: PB7,
         red: PB14,
     }
+    /// Of the handheld probe.
+    display: Display {
+        i2c: I2C1,
+        scl: PB8,
+        sda: PB9,
+        tx: DMA1_CH6,
+        rx: DMA1_CH0,
+    }
+    handle: Handle {
+        /// High is pressed.
+        button: PC13,
+        buzzer: PC9,
+        tones: TIM8,
+    }
     errata: Errata {
         pa12: PA12,
     }

@@ -5,16 +5,24 @@
 #![cfg(target_os = "none")]
 
 mod acquire;
+mod bench;
 mod board;
+mod display;
+mod handheld;
+mod kernels;
 mod lever;
 mod link;
+mod memory;
 mod probe;
 mod rescue;
 mod rig;
 mod selftest;
 mod servo;
 mod session;
+pub mod workload;
 
+pub use bench::bench;
+pub use handheld::handheld;
 pub use rig::rig;
 pub use selftest::selftest;
 

@@ -2,6 +2,7 @@
 use core::sync::atomic::Ordering::Relaxed;
 
 use embassy_time::Timer;
+use heapless::Vec;
 use heapless::spsc::Consumer;
 use tactus_core::features::{PropertySet, Slide};
 use tactus_core::kernels::Kernels;
@@ -20,6 +21,8 @@ use crate::servo::{self, Command, Samples, Snapshot};
 
 /// How often the samples are looked after.
 const LOOK_MS: u64 = 10;
+/// Samples of a slide that are given to the core at once: those between two looks, and some more after a late one.
+const GATHERED: usize = 32;
 
 /// Why a movement of this probe failed.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -161,8 +164,9 @@ impl Rig for Probe {
         let mut blocks = STREAM.load(Relaxed).then(Blocks::default);
         let ended = self
             .rest(|queue| {
+                let mut gathered = Vec::new();
                 while let Some(samples) = queue.dequeue() {
-                    feel(&samples, slide);
+                    feel(&samples, &mut gathered, slide);
                     let block = blocks
                         .as_mut()
                         .and_then(|b| b.put(&samples.felt, &samples.pac, samples.shear_mn));
@@ -170,6 +174,7 @@ impl Rig for Probe {
                         tell(Tell::Block(block));
                     }
                 }
+                slide.push(&gathered);
             })
             .await
             .map(|rig| rig.ended);
@@ -191,14 +196,25 @@ impl Rig for Probe {
     }
 }
 
-/// Gives what a tick felt to the core.
-fn feel<K: Kernels>(samples: &Samples, slide: &mut Slide<'_, K>) {
+/// Gives what a tick felt to the core. Samples of a slide are gathered first: the core takes many at once for little more
+/// than a few. Whoever has no more of them gives it the last.
+fn feel<K: Kernels>(
+    samples: &Samples,
+    gathered: &mut Vec<i16, GATHERED>,
+    slide: &mut Slide<'_, K>,
+) {
+    let is_slide = samples.felt == Felt::Slide;
+    if !is_slide || gathered.len() + samples.pac.len() > GATHERED {
+        slide.push(gathered);
+        gathered.clear();
+    }
     match &samples.felt {
         Felt::Nothing => return,
         Felt::Still => return slide.push_still(&samples.pac),
         Felt::Begin(steady) => slide.start(steady.clone()),
         Felt::Slide => {}
     }
-    slide.push(&samples.pac);
+    // there is room
+    let _ = gathered.extend_from_slice(&samples.pac);
     slide.push_shear(samples.shear_mn.as_slice());
 }

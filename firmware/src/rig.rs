@@ -22,7 +22,7 @@ use crate::acquire::{self, WORDS, Word};
 use crate::servo::{self, SAMPLES, Samples};
 use crate::{board, link, rescue, session};
 
-static ACQUIRE: InterruptExecutor = InterruptExecutor::new();
+pub(crate) static ACQUIRE: InterruptExecutor = InterruptExecutor::new();
 static SERVO: InterruptExecutor = InterruptExecutor::new();
 
 #[interrupt]

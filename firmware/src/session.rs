@@ -1,51 +1,34 @@
 //! What the host asks for, one thing after the other: explorations, training, calibration, tables. Owns the store.
 use core::sync::atomic::Ordering::Relaxed;
 
-use embassy_stm32::flash::{Async, Bank2Region1, Flash};
 use embassy_time::{Duration, Timer, with_timeout};
 use heapless::Vec;
 use heapless::spsc::Consumer;
 use static_cell::ConstStaticCell;
 use tactus_core::features::Plan;
-use tactus_core::kernels::Plain;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::control::Phase;
 use tactus_core::rig::unloaded::UnloadedRuns;
 use tactus_core::session::{self, Visited, text};
-use tactus_core::store::{Store, StoreError};
+use tactus_core::store::StoreError;
 use tactus_core::table::Table;
 use tactus_core::teaching;
 use tactus_core::wire::{Ask, PART, Tell, Text};
 
 use crate::board;
+use crate::kernels::Chip;
 use crate::link::{self, BUSY, JOBS, TABLE, TableInUse, refuse, tell};
+use crate::memory::{self, Memory, Storage, broken};
 use crate::probe::Probe;
 use crate::servo::{self, Command, Samples};
 
 /// The table that comes with the firmware: textures of a simulated world, good for the emulated board. A real rig is
 /// taught, or given a table.
 static FACTORY: &[u8] = include_bytes!("../factory.tact");
-/// Bank 2 in the chip's memory: memory.x, STORE.
-const STORE_AT: usize = 0x0810_0000;
-const STORE_LENGTH: usize = 64 * 1024;
 /// The store is open by now, or will never be: two of its sectors erased take less than 2 s.
 const OPENING: Duration = Duration::from_secs(10);
 /// The sensor's first words are there by now.
 const HEARD_MS: u64 = 150;
-
-type Storage = Store<Bank2Region1<'static, Async>>;
-
-/// What the probe knows.
-struct Memory {
-    store: Option<Storage>,
-    /// Begins with the table in force: the stored one or the factory's, with what the probe has learned by itself. A new
-    /// table is made here too; afterwards [`Memory::reload`] is due.
-    room: &'static mut [u8],
-    /// Bytes of the table in force.
-    length: usize,
-    /// What the last exploration felt, until the rig moves again.
-    visited: Option<Visited>,
-}
 
 #[embassy_executor::task]
 pub(crate) async fn session(flash: board::Storage, samples: Consumer<'static, Samples>) {
@@ -53,9 +36,6 @@ pub(crate) async fn session(flash: board::Storage, samples: Consumer<'static, Sa
     static ROOM: ConstStaticCell<[u8; 16 * 1024]> = ConstStaticCell::new([0; 16 * 1024]);
     let room = ROOM.take();
     let plan: &'static Plan = PLAN.init_with(Plan::new);
-    let flash = Flash::new(flash.flash, board::Irqs)
-        .into_regions()
-        .bank2_region1;
     let mut probe = Probe::new(samples);
     // Whatever was before the reset, the finger is lifted first, and waits for nothing but the sensor. The stage does not
     // move before the calibration is there, which says whether the finger is in the air.
@@ -67,12 +47,7 @@ pub(crate) async fn session(flash: board::Storage, samples: Consumer<'static, Sa
             defmt::error!("the store does not answer");
             None
         });
-    let mut memory = Memory {
-        store,
-        room,
-        length: 0,
-        visited: None,
-    };
+    let mut memory = Memory::new(store, FACTORY, room, tell_link);
     memory.reload().await;
     let _ = probe.home().await;
     loop {
@@ -92,14 +67,8 @@ pub(crate) async fn session(flash: board::Storage, samples: Consumer<'static, Sa
 }
 
 /// The store, its settings in use.
-async fn open(flash: Bank2Region1<'static, Async>) -> Option<Storage> {
-    let mut store = match Store::open(flash).await {
-        Ok(store) => store,
-        Err(why) => {
-            defmt::error!("the store cannot be opened: {=str}", text(&why).as_str());
-            return None;
-        }
-    };
+async fn open(flash: board::Storage) -> Option<Storage> {
+    let mut store = memory::open(flash).await?;
     if let Err(why) = restore(&mut store).await {
         defmt::error!("settings are not read: {=str}", text(&why).as_str());
     }
@@ -118,74 +87,22 @@ async fn restore(store: &mut Storage) -> Result<(), StoreError<embassy_stm32::fl
     skin.map(|_| ())
 }
 
-/// The table that all learning begins with: the stored one, or the factory's.
-fn base_bytes(store: Option<&Storage>) -> &'static [u8] {
-    let stored = store.and_then(Storage::table).and_then(|table| {
-        let at = table.offset as usize;
-        // SAFETY: the store's sectors are mapped at this address and are nothing else; the slot in use is erased only when
-        // the one after next is begun, and no reader of this slice lives that long.
-        let store = unsafe { core::slice::from_raw_parts(STORE_AT as *const u8, STORE_LENGTH) };
-        store.get(at..at.checked_add(table.length)?)
+/// Tells the link of the table in force.
+fn tell_link(memory: &Memory) {
+    let Ok(table) = Table::read(memory.in_force()) else {
+        return;
+    };
+    TABLE.lock(|cell| {
+        cell.set(TableInUse {
+            textures: table.textures(),
+            bytes: memory.in_force().len() as u32,
+            crc: table.crc(),
+            factory: memory.is_factory(),
+        });
     });
-    // one that another version of this firmware wrote is not understood
-    stored
-        .filter(|bytes| Table::read(bytes).is_ok())
-        .unwrap_or(FACTORY)
-}
-
-fn broken() -> Text {
-    text("the store is broken: see the log")
 }
 
 impl Memory {
-    /// Puts the table in force, and tells the link of it.
-    async fn reload(&mut self) {
-        let bytes = base_bytes(self.store.as_ref());
-        self.length = match Table::read(bytes) {
-            Ok(base) => teaching::put_in_force(&base, self.store.as_mut(), self.room)
-                .await
-                .unwrap_or_else(|why| {
-                    defmt::error!("no table in force: {=str}", text(why).as_str());
-                    0
-                }),
-            Err(why) => {
-                defmt::error!("no table: {=str}", text(why).as_str());
-                0
-            }
-        };
-        self.tell_link();
-    }
-
-    /// The bytes of the table in force.
-    fn in_force(&self) -> &[u8] {
-        self.room.get(..self.length).unwrap_or_default()
-    }
-
-    fn tell_link(&self) {
-        let Ok(table) = Table::read(self.in_force()) else {
-            return;
-        };
-        TABLE.lock(|cell| {
-            cell.set(TableInUse {
-                textures: table.textures(),
-                bytes: self.length as u32,
-                crc: table.crc(),
-                factory: core::ptr::eq(base_bytes(self.store.as_ref()), FACTORY),
-            });
-        });
-    }
-
-    fn store(&mut self) -> Result<&mut Storage, Text> {
-        self.store.as_mut().ok_or_else(broken)
-    }
-
-    /// The store, the table that learning begins with, and the room for a new one.
-    fn to_learn(&mut self) -> Result<(&mut Storage, Table<'static>, &mut [u8]), Text> {
-        let base = Table::read(base_bytes(self.store.as_ref())).map_err(text)?;
-        let store = self.store.as_mut().ok_or_else(broken)?;
-        Ok((store, base, self.room))
-    }
-
     /// What the skin has been through is worth keeping, but no reason to fail.
     async fn keep_skin(&mut self) {
         if let Some(store) = &mut self.store {
@@ -200,7 +117,7 @@ impl Memory {
         };
         match teaching::learn_by_itself(visited, store, self.room).await {
             Ok(Some(taught)) => {
-                self.tell_link();
+                tell_link(self);
                 tell(taught);
             }
             Ok(None) => {}
@@ -223,7 +140,7 @@ async fn work(ask: Ask, probe: &mut Probe, memory: &mut Memory, plan: &Plan) -> 
             memory.visited = None;
             probe.begin(wanted.seed).await;
             let table = Table::read(memory.in_force()).map_err(text)?;
-            let done = session::identify::<_, Plain>(&wanted, probe, table, plan, tell).await;
+            let done = session::identify::<_, Chip>(&wanted, probe, table, plan, tell).await;
             memory.keep_skin().await;
             let visited = done?;
             if wanted.learn {
@@ -269,7 +186,7 @@ async fn work(ask: Ask, probe: &mut Probe, memory: &mut Memory, plan: &Plan) -> 
             probe.begin(wanted.seed).await;
             let (store, base, room) = memory.to_learn()?;
             let done =
-                session::train::<_, _, Plain>(&wanted, probe, store, base, plan, room, tell).await;
+                session::train::<_, _, Chip>(&wanted, probe, store, base, plan, room, tell).await;
             memory.reload().await;
             memory.keep_skin().await;
             done

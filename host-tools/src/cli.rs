@@ -102,6 +102,21 @@ Try:
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
+    /// Learn a handheld probe's table from slides of a simulated hand
+    LearnByHand {
+        /// The file to write
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+        /// Textures of Table 1, by number or name; all 117 unless given
+        #[arg(long, value_name = "T,T,...", value_delimiter = ',')]
+        textures: Vec<String>,
+        /// Slides per texture
+        #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(2..=255))]
+        trials: u32,
+        /// Another seed is another world, and another hand
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+    },
     /// Make the paper's whole study on the simulated rig, and report it beside the published numbers
     #[command(after_help = "\
 pilot     ten textures, 36 movements: which three movements are most useful (figs. 5, 6, 7)

@@ -12,6 +12,7 @@ use tactus::collection::{Collection, calibrated, texture_name, texture_number};
 use tactus::evaluate::{Method, Summary, evaluate};
 use tactus::experiment::{Experiment, Protocol};
 use tactus::fabricslide::FabricSet;
+use tactus::handheld;
 use tactus::learn;
 use tactus::lifelong::{Learning, Lifelong, lifelong};
 use tactus::novelty::{After, leave_one_out};
@@ -53,6 +54,26 @@ pub(crate) fn run() -> anyhow::Result<()> {
                 set.textures().len(),
                 bytes.len()
             )?;
+        }
+        Some(Command::LearnByHand {
+            out: file,
+            textures,
+            trials,
+            seed,
+        }) => {
+            let collection = collection(&textures, trials, seed)?;
+            let (bytes, left_out) = handheld::learn(&collection)?;
+            write_table(&file, &bytes)?;
+            writeln!(
+                out,
+                "{}: {} textures learned from {trials} slides of each by hand, {} bytes",
+                file.display(),
+                collection.textures.len() - left_out.len(),
+                bytes.len()
+            )?;
+            for number in left_out {
+                writeln!(out, "not felt: {}", texture_name(number))?;
+            }
         }
         Some(Command::Table(TableCommand::Show { file })) => {
             show_table(read_table(&file, &mut Vec::new())?, out)?
@@ -274,6 +295,18 @@ pub(crate) fn find_textures(wanted: &[String]) -> anyhow::Result<Vec<u8>> {
         .collect()
 }
 
+/// The textures that are named, each once.
+fn collection(wanted: &[String], trials: u32, seed: u64) -> anyhow::Result<Collection> {
+    let mut textures = find_textures(wanted)?;
+    textures.sort_unstable();
+    textures.dedup();
+    Ok(Collection {
+        seed,
+        textures,
+        trials,
+    })
+}
+
 fn simulate(
     folder: &Path,
     wanted: &[String],
@@ -281,14 +314,7 @@ fn simulate(
     seed: u64,
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
-    let mut textures = find_textures(wanted)?;
-    textures.sort_unstable();
-    textures.dedup();
-    let collection = Collection {
-        seed,
-        textures,
-        trials,
-    };
+    let collection = collection(wanted, trials, seed)?;
     let named = collection.textures.iter().map(|&number| Texture {
         id: number.into(),
         name: texture_name(number).to_owned(),

@@ -9,6 +9,7 @@
 pub mod encoder;
 pub mod faults;
 pub mod finger;
+pub mod hand;
 pub mod lever;
 mod noise;
 pub mod played;

@@ -7,18 +7,18 @@
 use core::fmt;
 use core::marker::PhantomData;
 
-use heapless::Vec;
+use heapless::{Vec, VecView};
 use serde::{Deserialize, Serialize};
 
 use crate::features::{Property, PropertySet};
 use crate::fused::{FeatureSet, Observation, Vector};
-use crate::kernels::{Kernels, Plain};
-use crate::table::{Action, Contents, Gaussian, MAX_ACTIONS, Table, mean_step};
+use crate::kernels::{Kernels, Live, Plain, confused, exp_neg};
+use crate::table::{Action, Contents, Gaussian, MAX_ACTIONS, MAX_MOVEMENTS, Table, mean_step};
 
 mod fused;
 mod student;
 
-use fused::Visits;
+use fused::{Background, Visits};
 use student::{Shrunk, Student};
 
 /// Textures less probable than this are left out of the expected uncertainty: each changes it by at most about twice its
@@ -228,20 +228,7 @@ pub struct Outlook {
 
 /// Degree of confusion of two textures by one property (eq. 7): 1 for equal, 0 for disjoint distributions.
 pub fn confusion<K: Kernels>(a: Gaussian, b: Gaussian) -> f32 {
-    let variances = a.sd * a.sd + b.sd * b.sd;
-    let apart = a.mean - b.mean;
-    K::sqrt(2.0 * a.sd * b.sd / variances) * libm::expf(-apart * apart / (4.0 * variances))
-}
-
-/// A texture that is still likely, while an expected uncertainty is computed.
-#[derive(Clone, Copy, Debug)]
-struct Candidate {
-    texture: u16,
-    probability: f32,
-    /// What is expected of the properties looked at.
-    expected: [Gaussian; Property::ALL.len()],
-    /// Sum over all others of confusion times probability: the numerator of eq. 8.
-    confused: f32,
+    confused(a, b, K::sqrt)
 }
 
 /// One exploration after another with the same table and candidates; room for `N` textures.
@@ -266,7 +253,8 @@ pub struct Explorer<'t, const N: usize, K = Plain> {
     log_odds: Option<f32>,
     /// For Student's t: movement by movement, properties in their order.
     shrunk: Vec<Shrunk, MAX_ACTIONS>,
-    work: Vec<Candidate, N>,
+    /// For the fused method: what a texture that is not in the table is like, at every movement.
+    backgrounds: Vec<Background, MAX_MOVEMENTS>,
     kernels: PhantomData<K>,
 }
 
@@ -351,6 +339,10 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 shrunk.extend(of);
             }
         }
+        let mut backgrounds = Vec::new();
+        if method == Method::Fused {
+            backgrounds.extend(actions.iter().map(|a| Background::new(&table, a.movement)));
+        }
         let mut explorer = Self {
             table,
             config,
@@ -365,16 +357,12 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             visits: Vec::new(),
             log_odds: None,
             shrunk,
-            work: Vec::new(),
+            backgrounds,
             kernels: PhantomData,
         };
         explorer.restart();
-        explorer.at_first = explorer
-            .actions
-            .clone()
-            .into_iter()
-            .map(|a| explorer.uncertainty(a))
-            .collect();
+        let actions = explorer.actions.iter();
+        explorer.at_first = actions.map(|a| explorer.uncertainty(*a)).collect();
         Ok(explorer)
     }
 
@@ -514,25 +502,21 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         slide: &Observation,
     ) -> Result<(), ObserveError> {
         let x = Self::value(slide, property)?;
-        let mut student: Option<Student> = None;
-        for texture in 0..self.table.textures() {
-            let Some(expected) = self.expected(texture, action.movement, property) else {
-                continue;
-            };
-            let likelihood = match self.config.method {
-                Method::Paper => {
-                    let z = (x - expected.mean) / expected.sd;
-                    -(libm::logf(expected.sd) + 0.5 * z * z)
+        if self.config.method == Method::Paper {
+            add_likelihoods(&self.table, action, x, &mut self.log);
+        } else {
+            let mut student: Option<Student> = None;
+            for texture in 0..self.table.textures() {
+                let Some(expected) = self.expected(texture, action.movement, property) else {
+                    continue;
+                };
+                let student = self.student(&mut student, texture, action.movement, property);
+                if let Some(log) = self.log.get_mut(usize::from(texture)) {
+                    *log += student.log(x, expected);
                 }
-                _ => self
-                    .student(&mut student, texture, action.movement, property)
-                    .log(x, expected),
-            };
-            if let Some(log) = self.log.get_mut(usize::from(texture)) {
-                *log += likelihood;
             }
         }
-        self.normalise();
+        normalise(&mut self.log, &mut self.posterior);
         Ok(())
     }
 
@@ -579,7 +563,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 }
             }
         }
-        self.normalise();
+        normalise(&mut self.log, &mut self.posterior);
         Ok(())
     }
 
@@ -605,34 +589,14 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 *sum += i32::from(*z);
             }
         }
-        let log = &self.log;
-        let is_candidate = |texture: u16| {
-            let log = log.get(usize::from(texture));
-            log.is_some_and(|&log| log > f32::NEG_INFINITY)
-        };
-        self.log_odds = fused::decide(
+        self.log_odds = fused::decide::<K, N>(
             &self.table,
-            features,
             &self.visits,
-            is_candidate,
+            &self.backgrounds,
+            &self.log,
             &mut self.posterior,
         );
         Ok(())
-    }
-
-    /// The posterior (eq. 3) from its logarithms.
-    fn normalise(&mut self) {
-        let top = self.log.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        let mut total = 0.0;
-        for (log, posterior) in self.log.iter_mut().zip(&mut self.posterior) {
-            // a slide takes at most 1e12 from a candidate: however improbable, it stays one
-            *log -= top;
-            *posterior = libm::expf(*log);
-            total += *posterior;
-        }
-        for posterior in &mut self.posterior {
-            *posterior /= total;
-        }
     }
 
     /// What a property of a texture is expected to be in one slide.
@@ -712,23 +676,27 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     }
 
     /// What every action promises now, in their order.
-    pub fn outlook(&mut self) -> Vec<Outlook, MAX_ACTIONS> {
-        let actions = self.actions.clone().into_iter().zip(self.made.clone());
-        let promise = |action, made, uncertainty| Outlook {
-            action,
-            uncertainty,
-            benefit: benefit(uncertainty, made),
-        };
-        if self.slides == 0 {
-            let known = self.at_first.iter();
-            actions
-                .zip(known)
-                .map(|((action, made), &u)| promise(action, made, u))
-                .collect()
-        } else {
-            actions
-                .map(|(action, made)| promise(action, made, self.uncertainty(action)))
-                .collect()
+    pub fn outlook(&self) -> Vec<Outlook, MAX_ACTIONS> {
+        let mut promises = Vec::new();
+        self.look_out(&mut promises);
+        promises
+    }
+
+    /// As [`Explorer::outlook`], for those who have room for it: it is large, and not moved then.
+    pub fn look_out(&self, promises: &mut Vec<Outlook, MAX_ACTIONS>) {
+        promises.clear();
+        let actions = self.actions.iter().zip(&self.made).zip(&self.at_first);
+        for ((&action, &made), &at_first) in actions {
+            let uncertainty = match self.slides {
+                0 => at_first,
+                _ => self.uncertainty(action),
+            };
+            // there is room: as many as there are actions
+            let _ = promises.push(Outlook {
+                action,
+                uncertainty,
+                benefit: benefit(uncertainty, made),
+            });
         }
     }
 
@@ -756,54 +724,105 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     /// Expected uncertainty after `action` (eq. 11).
     ///
     /// Computed as eq. 10: 1 minus a sum that is close to 1 would lose the digits that decide late in an exploration.
-    fn uncertainty(&mut self, action: Action) -> f32 {
-        self.work.clear();
+    fn uncertainty(&self, action: Action) -> f32 {
+        let movement = action.movement;
+        if self.config.method == Method::Fused {
+            return fused::uncertainty::<K, N>(&self.table, movement, &self.posterior);
+        }
         let looked_at: PropertySet = match action.property {
             Some(property) => [property].into_iter().collect(),
             None => self.measured,
         };
-        let nothing = Gaussian { mean: 0.0, sd: 1.0 };
-        for (&probability, texture) in self.posterior.iter().zip(0..) {
-            if probability < NEGLIGIBLE {
-                continue;
-            }
-            let mut expected = [nothing; Property::ALL.len()];
-            for property in looked_at.iter() {
-                let of = self.expected(texture, action.movement, property);
-                if let (Some(slot), Some(of)) = (expected.get_mut(property.index()), of) {
-                    *slot = of;
+        let mut live: Vec<Live, N> = Vec::new();
+        if self.config.method == Method::Paper {
+            gather(&self.table, action, &self.posterior, &mut live);
+        } else {
+            let expect = |texture, property| self.expected(texture, movement, property);
+            for (&probability, texture) in self.posterior.iter().zip(0..) {
+                if probability >= NEGLIGIBLE {
+                    let mut candidate = Live::new(probability);
+                    for (slot, property) in candidate.expected.iter_mut().zip(looked_at.iter()) {
+                        *slot = expect(texture, property).unwrap_or(*slot);
+                    }
+                    // there is room: `posterior` is no longer than N
+                    let _ = live.push(candidate);
                 }
             }
-            // there is room: `work` is as long as `posterior`
-            let _ = self.work.push(Candidate {
-                texture,
-                probability,
-                expected,
-                confused: 0.0,
-            });
         }
-        let is_fused = self.config.method == Method::Fused;
-        let mut rest = self.work.as_mut_slice();
-        while let Some((a, others)) = rest.split_first_mut() {
+        uncertainty_of(&mut live, looked_at.iter().count(), K::confuse, K::sqrt)
+    }
+}
+
+// The loops over all textures are not generic: so they are compiled with this crate, for speed.
+
+/// The textures that are still likely, with what is expected of the property that is looked at.
+#[inline(never)]
+fn gather(table: &Table<'_>, action: Action, posterior: &[f32], live: &mut VecView<Live>) {
+    let known = table.gaussians(action);
+    for (&probability, texture) in posterior.iter().zip(0..) {
+        if probability >= NEGLIGIBLE {
+            let mut candidate = Live::new(probability);
+            if let ([slot, ..], Some(known)) = (&mut candidate.expected, known.get(texture)) {
+                *slot = known;
+            }
+            // there is room: as much as for the posterior
+            let _ = live.push(candidate);
+        }
+    }
+}
+
+/// Expected uncertainty (eq. 11) of these textures, of which so many properties are looked at.
+#[inline(never)]
+fn uncertainty_of(
+    live: &mut [Live],
+    properties: usize,
+    confuse: fn(&mut Live, &mut [Live]),
+    sqrt: fn(f32) -> f32,
+) -> f32 {
+    let mut rest = &mut *live;
+    while let Some((a, others)) = rest.split_first_mut() {
+        if properties == 1 {
+            confuse(a, others);
+        } else {
             for b in others.iter_mut() {
-                let confusion = if is_fused {
-                    fused::confusion(&self.table, action.movement, a.texture, b.texture)
-                } else {
-                    let pairs = a.expected.iter().zip(&b.expected).zip(Property::ALL);
-                    pairs
-                        .filter(|(_, property)| looked_at.contains(*property))
-                        .map(|((a, b), _)| confusion::<K>(*a, *b))
-                        .product()
-                };
+                let pairs = a.expected.iter().zip(&b.expected).take(properties);
+                let confusion: f32 = pairs.map(|(a, b)| confused(*a, *b, sqrt)).product();
                 a.confused += confusion * b.probability;
                 b.confused += confusion * a.probability;
             }
-            rest = others;
         }
-        self.work
-            .iter()
-            .map(|c| c.probability * c.confused / (c.probability + c.confused))
-            .sum()
+        rest = others;
+    }
+    let left = |c: &Live| c.probability * c.confused / (c.probability + c.confused);
+    live.iter().map(left).sum()
+}
+
+/// Adds the likelihood of every texture when a property is `x` (eq. 4).
+#[inline(never)]
+fn add_likelihoods(table: &Table<'_>, action: Action, x: f32, log: &mut [f32]) {
+    let known = table.gaussians(action);
+    for (log, texture) in log.iter_mut().zip(0..) {
+        if let Some(expected) = known.get(texture) {
+            let z = (x - expected.mean) / expected.sd;
+            *log += -(libm::logf(expected.sd) + 0.5 * z * z);
+        }
+    }
+}
+
+/// The posterior (eq. 3) from its logarithms.
+#[inline(never)]
+fn normalise(log: &mut [f32], posterior: &mut [f32]) {
+    let larger = |top, &log: &f32| if log > top { log } else { top };
+    let top = log.iter().fold(f32::NEG_INFINITY, larger);
+    let mut total = 0.0;
+    for (log, posterior) in log.iter_mut().zip(&mut *posterior) {
+        // a slide takes at most 1e12 from a candidate: however improbable, it stays one
+        *log -= top;
+        *posterior = exp_neg(-*log);
+        total += *posterior;
+    }
+    for posterior in posterior {
+        *posterior /= total;
     }
 }
 
@@ -812,6 +831,9 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
 /// Eq. 13 reads alpha = 1/n, which has no value for an action that was never made; taken as infinity, all untried actions
 /// would tie. Here alpha = 1/(n+1).
 pub fn benefit(uncertainty: f32, made: u8) -> f32 {
+    if made == 0 {
+        return 1.0 - uncertainty.clamp(0.0, 1.0);
+    }
     1.0 - libm::powf(uncertainty.clamp(0.0, 1.0), 1.0 / (f32::from(made) + 1.0))
 }
 

@@ -176,6 +176,16 @@ impl Plan {
             window: hann(),
         }
     }
+
+    /// The filter's coefficients.
+    pub fn taps(&self) -> &Taps {
+        &self.taps
+    }
+
+    /// The window of the spectrum.
+    pub fn window(&self) -> &[f32; FRAME] {
+        &self.window
+    }
 }
 
 impl Default for Plan {

@@ -49,6 +49,9 @@ const EXP2: [u32; PARTS + 1] = {
 /// more than a step of Q16 above it.
 pub const fn ln_q16(x: u64) -> i32 {
     let x = if x == 0 { 1 } else { x };
+    if x >> 32 == 0 {
+        return ln_q16_short(x as u32);
+    }
     let exponent = 63 - x.leading_zeros() as i64;
     // 1 to 2 in Q63; the first bit is the one
     let mantissa = (x << x.leading_zeros()) & (u64::MAX >> 1);
@@ -56,6 +59,19 @@ pub const fn ln_q16(x: u64) -> i32 {
     let between = ((mantissa >> 26) & 0xffff_ffff) as i64;
     let (low, high) = (LN[part & (PARTS - 1)], LN[(part & (PARTS - 1)) + 1]);
     let ln = low + ((((high - low) >> 8) * (between >> 8)) >> 16) + (exponent - 16) * LN_2;
+    ((ln + (1 << 15)) >> 16) as i32
+}
+
+/// As [`ln_q16`], of what 32 bits hold and is not 0: the same numbers by shorter products.
+const fn ln_q16_short(x: u32) -> i32 {
+    let zeros = x.leading_zeros();
+    // 1 to 2 in Q31
+    let mantissa = x << zeros;
+    let part = (mantissa >> 26) as usize & (PARTS - 1);
+    let between = (mantissa << 6) >> 8;
+    let (low, high) = (LN[part] as u32, LN[part + 1] as u32);
+    let step = (((high - low) >> 8) as u64 * between as u64) >> 16;
+    let ln = (low + step as u32) as i64 + (31 - zeros as i64 - 16) * LN_2;
     ((ln + (1 << 15)) >> 16) as i32
 }
 
@@ -85,6 +101,16 @@ mod tests {
         assert_eq!(exp_neg_q30(0), 1 << 30);
         assert_eq!(exp_neg_q30(45_426) >> 10, (1 << 29) >> 10);
         assert_eq!(exp_neg_q30(u32::MAX), 0);
+    }
+
+    /// Just below and above the numbers that 32 bits hold, and in the range of each: one logarithm.
+    #[test]
+    fn both_lengths_are_one_logarithm() {
+        for x in (1..=u64::from(u32::MAX)).step_by(9_999_991).chain(1..2000) {
+            // the same mantissa, 32 octaves higher
+            let octaves = f64::from(ln_q16(x << 32) - ln_q16(x)) - 32.0 * LN_2 as f64 / 65536.0;
+            assert!(octaves.abs() <= 1.0, "{x}: {octaves}");
+        }
     }
 
     proptest! {

@@ -16,6 +16,7 @@ pub mod features;
 pub mod fir;
 pub mod fixed;
 pub mod fused;
+pub mod handheld;
 pub mod kernels;
 pub mod mcp3202;
 pub mod movement;

@@ -117,7 +117,8 @@ pub async fn explore<R: Rig, const N: usize, K: Kernels>(
         if let Some(verdict) = explorer.verdict() {
             return Ok(verdict);
         }
-        let outlook = explorer.outlook();
+        let mut outlook = heapless::Vec::new();
+        explorer.look_out(&mut outlook);
         let action = explorer.choose(&outlook, random());
         tell(Event::Chosen(action, &outlook));
         let movement = explorer

@@ -7,6 +7,9 @@
 
 use core::ops::Range;
 
+use microfft::Complex32;
+
+use crate::fir::cos_of_turns;
 use crate::kernels::Kernels;
 use crate::pressure::RATE_HZ;
 
@@ -29,8 +32,7 @@ const WINDOW_BIN_1: f32 = -(FRAME as f32) / 4.0;
 pub fn hann() -> [f32; FRAME] {
     let mut window = [0.0; FRAME];
     for (n, w) in window.iter_mut().enumerate() {
-        let phase = 2.0 * core::f64::consts::PI * n as f64 / FRAME as f64;
-        *w = (0.5 - 0.5 * libm::cos(phase)) as f32;
+        *w = (0.5 - 0.5 * cos_of_turns(n as f64 / FRAME as f64)) as f32;
     }
     window
 }
@@ -46,19 +48,21 @@ pub struct FrameSum {
 }
 
 impl FrameSum {
-    /// Adds one transformed frame: (real, imaginary) of bins 0 to 255, with bin 256, which is real, in place of bin 0's
-    /// imaginary part.
-    pub fn add(&mut self, mut bins: impl Iterator<Item = (f32, f32)>) {
+    /// Adds one transformed frame: bins 0 to 255, with bin 256, which is real, in place of bin 0's imaginary part.
+    pub fn add(&mut self, bins: &[Complex32; FRAME / 2]) {
         let [first, rest @ .., last] = &mut self.power;
-        if let Some((re, nyquist)) = bins.next() {
-            *first += re * re;
-            *last += nyquist * nyquist;
-            self.real[0] += re;
-        }
-        for (k, (sum, (re, im))) in rest.iter_mut().zip(bins).enumerate() {
-            *sum += re * re + im * im;
-            if k == 0 {
-                self.real[1] += re;
+        let [ends, bins @ ..] = bins;
+        let [second, ..] = bins;
+        *first += ends.re * ends.re;
+        *last += ends.im * ends.im;
+        let [real_0, real_1] = &mut self.real;
+        *real_0 += ends.re;
+        *real_1 += second.re;
+        let add = |sum: &mut f32, bin: &Complex32| *sum += bin.re * bin.re + bin.im * bin.im;
+        let (fives, _) = rest.as_chunks_mut::<5>();
+        for (sums, bins) in fives.iter_mut().zip(bins.as_chunks::<5>().0) {
+            for (sum, bin) in sums.iter_mut().zip(bins) {
+                add(sum, bin);
             }
         }
         self.frames += 1;
@@ -95,21 +99,34 @@ impl Default for SpectrumSum {
 impl SpectrumSum {
     /// Takes samples, in blocks of any size.
     pub fn push<K: Kernels>(&mut self, window: &[f32; FRAME], samples: &[i16]) {
-        let mut samples = samples.iter();
-        while samples.len() > 0 {
-            let room = self.frame.get_mut(self.filled..).unwrap_or_default();
-            for (slot, &sample) in room.iter_mut().zip(samples.by_ref()) {
-                *slot = sample;
-                self.filled += 1;
-                self.total += i64::from(sample);
-                self.samples += 1;
-            }
+        let mut samples = samples;
+        self.samples += samples.len() as u32;
+        while !samples.is_empty() {
+            samples = self.fill(samples);
             if self.filled >= FRAME {
                 K::add_frame(window, &self.frame, &mut self.sum);
                 self.frame.copy_within(HOP.., 0);
                 self.filled = FRAME - HOP;
             }
         }
+    }
+
+    /// Takes as many samples as the frame has room for; the others.
+    // not generic: compiled with this crate, for speed
+    #[inline(never)]
+    fn fill<'s>(&mut self, samples: &'s [i16]) -> &'s [i16] {
+        let room = self.frame.get_mut(self.filled..).unwrap_or_default();
+        let many = samples.len().min(room.len());
+        let (now, later) = samples.split_at_checked(many).unwrap_or_default();
+        // a frame's sum is in 32 bits
+        let mut total = 0;
+        for (slot, &sample) in room.iter_mut().zip(now) {
+            *slot = sample;
+            total += i32::from(sample);
+        }
+        self.total += i64::from(total);
+        self.filled += many;
+        later
     }
 
     /// Number of samples taken.
@@ -201,6 +218,14 @@ mod tests {
                 .round() as i16
             })
             .collect()
+    }
+
+    #[test]
+    fn the_window_is_that_of_libms_cosine() {
+        let turn = 2.0 * core::f64::consts::PI / FRAME as f64;
+        for (n, w) in hann().into_iter().enumerate() {
+            assert_eq!(w, (0.5 - 0.5 * libm::cos(turn * n as f64)) as f32, "{n}");
+        }
     }
 
     #[test]

@@ -170,9 +170,10 @@ impl fmt::Display for TableError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Truncated { got, wanted } => write!(f, "truncated: {got} bytes of {wanted}"),
-            Self::Magic(found) => write!(
+            // by hand: printing lists for debugging takes the chip 1 KB
+            Self::Magic([a, b, c, d]) => write!(
                 f,
-                "not a texture table: it begins with {found:02x?}, not `TACT`"
+                "not a texture table: it begins with [{a:02x}, {b:02x}, {c:02x}, {d:02x}], not `TACT`"
             ),
             Self::Version(found) => {
                 write!(
@@ -223,6 +224,33 @@ impl fmt::Display for TableError {
 }
 
 impl core::error::Error for TableError {}
+
+/// What one action is expected to feel like, texture by texture.
+#[derive(Clone, Copy, Debug)]
+pub struct Gaussians<'a> {
+    /// Each begins `stride` bytes after the one before.
+    cells: &'a [u8],
+    stride: usize,
+    /// Each `movements` after the one before.
+    trials: &'a [u8],
+    movements: usize,
+    /// Of the means.
+    step: f32,
+}
+
+impl Gaussians<'_> {
+    /// As [`Table::gaussian`].
+    #[inline]
+    pub fn get(&self, texture: usize) -> Option<Gaussian> {
+        let trials = *self.trials.get(texture * self.movements)?;
+        let cell = self.cells.get(texture * self.stride..)?;
+        let &[m0, m1, s0, s1] = cell.first_chunk()?;
+        (trials >= 2).then(|| Gaussian {
+            mean: f32::from(i16::from_le_bytes([m0, m1])) * self.step,
+            sd: f32::from(u16::from_le_bytes([s0, s1])) * SD_STEP,
+        })
+    }
+}
 
 /// A checked texture table, borrowed from where it is stored.
 #[derive(Clone, Copy, Debug)]
@@ -562,6 +590,54 @@ impl<'a> Table<'a> {
             mean: f32::from(mean) * mean_step(property),
             sd: f32::from(sd) * SD_STEP,
         })
+    }
+
+    /// [`Table::gaussian`] of every texture, for those who ask for many.
+    pub fn gaussians(&self, action: Action) -> Gaussians<'a> {
+        let movement = usize::from(action.movement);
+        let measured = action.property.filter(|p| self.measured().contains(*p));
+        let measured = measured.filter(|_| action.movement < self.movements);
+        let (_, cell) = self.contents.sizes();
+        let layout = self.layout();
+        let cells = measured.and_then(|property| {
+            let at = layout.cells + movement * cell + property.index() * CELL_BYTES;
+            self.bytes.get(at..layout.trials)
+        });
+        let (trials, movements) = self.trials_at(action.movement);
+        Gaussians {
+            cells: cells.unwrap_or_default(),
+            trials,
+            movements,
+            stride: cell * movements,
+            step: measured.map_or(0.0, mean_step),
+        }
+    }
+
+    /// [`Table::trials`] of every texture, the first at the beginning, and how far one is from the next; none outside the
+    /// table.
+    pub fn trials_at(&self, movement: u8) -> (&'a [u8], usize) {
+        let layout = self.layout();
+        let at = layout.trials + usize::from(movement);
+        let trials = self.bytes.get(at..layout.lineage);
+        let trials = trials.filter(|_| movement < self.movements);
+        (trials.unwrap_or_default(), self.movements.into())
+    }
+
+    /// The bytes of the whitened means at a movement, the first of them at the beginning, and how far one is from the next;
+    /// none in a table of Gaussians and outside the table.
+    pub fn white_means(&self, movement: u8) -> (&'a [u8], usize) {
+        let (_, cell) = self.contents.sizes();
+        let at = self.layout().cells + usize::from(movement) * cell;
+        let means = match self.contents {
+            Contents::Fused(..) if movement < self.movements => {
+                self.bytes.get(at..self.layout().trials)
+            }
+            _ => None,
+        };
+        (
+            means.unwrap_or_default(),
+            cell * usize::from(self.movements),
+        )
     }
 
     /// What was learned of a texture at a movement, to go on from; what is in the table is rounded.

@@ -22,7 +22,8 @@ use crate::log::Log;
 use crate::part::Board;
 use crate::pins;
 use crate::rig::{Rig, SharedRig, lock};
-use crate::stack::{Stack, StackLayout, StackUse};
+use crate::spent::{Spending, Spent};
+use crate::stack::{Stack, StackLayout, StackUse, register};
 
 /// What else a run is made from.
 #[derive(Clone, Debug)]
@@ -163,6 +164,8 @@ impl Emulator {
             reached: reaches,
             log,
             stack: None,
+            spending: None,
+            instructions: 0,
             tick_ns: options.tick_ns.max(1),
             next_tick_ns: 0,
             until_ns: 0,
@@ -442,6 +445,43 @@ impl Emulator {
         self.read(flash::STORE.start, flash::STORE.end - flash::STORE.start)
     }
 
+    /// Where the core stands: the address of its next instruction.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn program_counter(&mut self) -> Result<Option<u32>, Error> {
+        self.with(|standing| register(standing.host, 15))
+    }
+
+    /// Instructions since power-up; a core that sleeps makes none.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn instructions(&mut self) -> Result<u64, Error> {
+        self.with(|standing| standing.instructions)
+    }
+
+    /// Counts from now on the instructions of the handlers at these addresses.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn count_handlers(&mut self, addresses: Vec<u64>) -> Result<(), Error> {
+        self.with(move |standing| {
+            *standing.spending = Some(Spending::new(&addresses, standing.host));
+        })
+    }
+
+    /// What was counted since [`Emulator::count_handlers`], in the order of the addresses.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn handlers(&mut self) -> Result<Vec<Spent>, Error> {
+        self.with(|standing| {
+            let spending = standing.spending.as_ref();
+            spending.map_or_else(Vec::new, |spending| spending.handlers.clone())
+        })
+    }
+
     /// Measures from now on how deep the stack gets. To be called at time 0: it paints the whole stack. Costs most of the
     /// speed.
     ///
@@ -487,6 +527,16 @@ impl Emulator {
                     .join(", "),
             }),
         }
+    }
+
+    /// The function that an address is in, as the ELF names it.
+    pub fn function_at(&self, address: u64) -> Option<&str> {
+        let is_in =
+            |&&(_, begin, size): &&(String, u64, u64)| (begin..begin + size).contains(&address);
+        self.symbols
+            .iter()
+            .find(is_in)
+            .map(|(name, ..)| name.as_str())
     }
 
     /// Reads memory.

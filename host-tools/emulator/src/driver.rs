@@ -15,6 +15,7 @@ use crate::log::Log;
 use crate::part::Board;
 use crate::pins::{self, PinId};
 use crate::rig::{SharedRig, lock};
+use crate::spent::Spending;
 use crate::stack::Stack;
 
 const SPI1_CR1: u64 = 0x4001_3000;
@@ -34,6 +35,9 @@ pub(crate) struct Standing<'a> {
     pub(crate) host: &'a mut dyn Host,
     pub(crate) log: Option<&'a mut Log>,
     pub(crate) stack: &'a mut Option<Stack>,
+    pub(crate) spending: &'a mut Option<Spending>,
+    /// instructions since power-up, without the time that the core slept
+    pub(crate) instructions: u64,
     pub(crate) clock: &'a mut bool,
 }
 
@@ -52,6 +56,8 @@ pub(crate) struct Driver {
     pub(crate) reached: Sender<u64>,
     pub(crate) log: Option<Log>,
     pub(crate) stack: Option<Stack>,
+    pub(crate) spending: Option<Spending>,
+    pub(crate) instructions: u64,
     pub(crate) tick_ns: u64,
     pub(crate) next_tick_ns: u64,
     pub(crate) until_ns: u64,
@@ -107,7 +113,12 @@ impl Driver {
         let encoder = pins::ENCODER
             .iter()
             .all(|pin| board.function(*pin) == Some(pins::TIM3_4_FUNCTION));
-        lock(&self.rig).wire(sensor, encoder);
+        let display = pins::DISPLAY_I2C
+            .iter()
+            .all(|pin| board.function(*pin) == Some(pins::I2C1_FUNCTION));
+        let mut rig = lock(&self.rig);
+        rig.wire(sensor, encoder);
+        rig.display_mut().wire(display);
     }
 
     /// The chip is as after a reset: its pins are let go, what drives them from outside must do it again.
@@ -239,6 +250,8 @@ impl Driver {
                     host,
                     log: self.log.as_mut(),
                     stack: &mut self.stack,
+                    spending: &mut self.spending,
+                    instructions: self.instructions,
                     clock: &mut self.clock,
                 }),
             }
@@ -273,6 +286,9 @@ impl emulator::Driver<Board> for Driver {
                 if let Some(stack) = &mut self.stack {
                     stack.hit(&hit, host);
                 }
+                if let Some(spending) = &mut self.spending {
+                    spending.hit(&hit, host);
+                }
             }
             _ => {}
         }
@@ -285,9 +301,16 @@ impl emulator::Driver<Board> for Driver {
         host: &mut dyn Host,
     ) -> Option<VirtualNanos> {
         let now = stop.at;
+        self.instructions = stop.instruction_count;
         if now.0 >= self.next_tick_ns && stop.reason != StopReason::Reset {
             self.next_tick_ns = now.0 + self.tick_ns;
-            lock(&self.rig).tick(now.0);
+            let buzzes = session.board_mut().function(pins::BUZZER) == Some(pins::TIM8_FUNCTION);
+            let tone = buzzes.then(|| session.board_mut().tone()).flatten();
+            {
+                let mut rig = lock(&self.rig);
+                rig.tick(now.0);
+                rig.buzzer(now.0, tone);
+            }
             self.switch(session.board_mut(), now);
             if let Some(log) = &mut self.log {
                 log.drain(now.0, host);

@@ -8,6 +8,8 @@
 
 mod board;
 pub mod campaign;
+pub mod cycles;
+mod display;
 mod driver;
 pub mod exploration;
 mod flash;
@@ -17,15 +19,19 @@ mod part;
 pub mod pins;
 mod record;
 mod rig;
+pub mod scenario;
 mod serial;
+mod spent;
 mod stack;
 pub mod talk;
 
 pub use board::{Emulator, Error, Options};
+pub use display::Display;
 pub use flash::{FLASH, STORE};
 pub use record::Slide;
 pub use rig::{Output, Rig};
 pub use rigless::device::ResetCause;
+pub use spent::Spent;
 pub use stack::{StackLayout, StackLevel, StackUse};
 pub use tactus::sim::faults::Fault;
 pub use tactus::sim::world::Setup;

@@ -28,6 +28,9 @@ const RESET_HZ: u64 = rcc::HSI_HZ;
 /// USART3's place among rigless' serial ports.
 const USART3: usize = 2;
 
+/// TIM8's place among rigless' advanced timers.
+const TIM8: usize = 1;
+
 /// EXTI's lines 0 to 15 (RM0090 12.2).
 #[derive(Debug, Default)]
 struct Exti {
@@ -350,6 +353,7 @@ impl Part {
         ];
         f427.usart[USART3].attach(Serial::new(rig.clone()));
         f427.spi[0].attach(crate::rig::SensorPins(rig.clone()));
+        f427.i2c[0].attach(crate::display::DisplayPins(rig.clone()));
         Ok(Self {
             exti: Exti::default(),
             step: Tapped {
@@ -524,6 +528,13 @@ impl Board {
     pub(crate) fn level(&mut self, pin: PinId) -> bool {
         let (gpio, registers) = self.part.f427.port(pin.port());
         gpio.level(pin.pin(), registers) == Level::High
+    }
+
+    /// The tone that TIM8's channel 4 makes, Hz.
+    pub(crate) fn tone(&mut self) -> Option<u32> {
+        let (tim, registers) = self.part.f427.advanced_timer(TIM8);
+        let pulse = tim.pulse(channel(4), registers)?;
+        (pulse.period.0 > 0 && pulse.width.0 > 0).then(|| (1_000_000_000 / pulse.period.0) as u32)
     }
 
     /// The alternate function that a pin carries, if it does.

@@ -59,6 +59,12 @@ pub const E_STOP: PinId = PinId(F, 13);
 pub const STAGE_LOWER: PinId = PinId(F, 14);
 /// As [`LEVER_TOP`].
 pub const STAGE_UPPER: PinId = PinId(F, 15);
+/// Clock and data of the handheld's display, with I2C1's alternate function.
+pub(crate) const DISPLAY_I2C: [PinId; 2] = [PinId(B, 8), PinId(B, 9)];
+pub(crate) const I2C1_FUNCTION: u8 = 4;
+/// The handheld's buzzer, with TIM8's.
+pub(crate) const BUZZER: PinId = PinId(C, 9);
+pub(crate) const TIM8_FUNCTION: u8 = 3;
 /// High is pressed.
 pub const BUTTON: PinId = PinId(C, 13);
 /// LD1 green, LD2 blue, LD3 red.

@@ -7,6 +7,7 @@ use rigless::chip::{Timeline, spi};
 use rigless::snapshot::Store;
 use tactus::sim::world::{Setup, World};
 
+use crate::display::Display;
 use crate::record::{Recorder, Slide};
 
 /// Shortest byte of a 10 MHz clock, the sensor's fastest, ns.
@@ -36,6 +37,8 @@ pub enum Output {
     StageDuty(f64),
     /// Level of the stage's EN.
     StageEnable(bool),
+    /// What the handheld's buzzer sounds, Hz.
+    Buzzer(Option<u32>),
 }
 
 /// The rig and the wires between it and the chip.
@@ -67,6 +70,8 @@ pub struct Rig {
     trace: VecDeque<(u64, Output)>,
     recorder: Recorder,
     commands: u64,
+    display: Display,
+    tone: Option<u32>,
     /// From the firmware, with the time at which each byte was over.
     pub(crate) heard: Vec<(u64, u8)>,
     /// To the firmware.
@@ -111,6 +116,8 @@ impl Rig {
             trace: VecDeque::new(),
             recorder: Recorder::default(),
             commands: 0,
+            display: Display::default(),
+            tone: None,
             heard: Vec::new(),
             to_say: VecDeque::new(),
         }
@@ -125,6 +132,23 @@ impl Rig {
     /// ([`Options::trace_s`](crate::Options::trace_s)).
     pub fn trace(&self) -> impl Iterator<Item = &(u64, Output)> {
         self.trace.iter()
+    }
+
+    /// The handheld's display.
+    pub fn display(&self) -> &Display {
+        &self.display
+    }
+
+    pub(crate) fn display_mut(&mut self) -> &mut Display {
+        &mut self.display
+    }
+
+    /// What the buzzer sounds now, Hz.
+    pub(crate) fn buzzer(&mut self, now_ns: u64, tone: Option<u32>) {
+        if tone != self.tone {
+            self.tone = tone;
+            self.note(now_ns, Output::Buzzer(tone));
+        }
     }
 
     /// How every slide so far was really made.

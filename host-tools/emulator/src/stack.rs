@@ -273,7 +273,7 @@ impl Stack {
     }
 }
 
-fn word(address: u32, host: &mut dyn Host) -> u32 {
+pub(crate) fn word(address: u32, host: &mut dyn Host) -> u32 {
     host.read(address.into(), Width::W32).unwrap_or_default() as u32
 }
 
@@ -285,12 +285,16 @@ fn painted(from: u32, to: u32, host: &mut dyn Host) -> u32 {
     gone.unwrap_or(to) - from
 }
 
-/// The stack pointer. rigless shows no registers, but its saved state, of which the exact version in Cargo.toml has this
-/// form: postcard's, the length of the core's part and R0 to R15 first.
 fn stack_pointer(host: &mut dyn Host) -> Option<u32> {
+    register(host, 13)
+}
+
+/// A register of the core, R0 to R15. rigless shows none, but its saved state, of which the exact version in Cargo.toml has
+/// this form: postcard's, the length of the core's part and R0 to R15 first.
+pub(crate) fn register(host: &mut dyn Host, number: usize) -> Option<u32> {
     let state = host.save_state().ok()?;
     let mut numbers = Numbers(&state);
-    numbers.nth(1 + 13)
+    numbers.nth(1 + number)
 }
 
 /// Numbers as postcard writes them: 7 bits a byte, the lowest first.

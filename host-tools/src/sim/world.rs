@@ -14,6 +14,7 @@ use super::Conditions;
 use super::encoder::{Edge, Encoder};
 use super::faults::{Fault, Faults, Miso};
 use super::finger::{Contact, Finger};
+use super::hand::Hand;
 use super::lever::Lever;
 use super::played::{PlayCounts, Played};
 use super::sensor::SensorPeer;
@@ -118,6 +119,8 @@ pub struct World {
     sliding_j: f64,
     /// a weight on the inclined stage, N
     pull_n: f64,
+    /// holds the finger in place of lever and stage
+    hand: Option<Hand>,
 }
 
 impl World {
@@ -157,6 +160,7 @@ impl World {
             stage_reach_mm: (stage_mm, stage_mm),
             sliding_j: 0.0,
             pull_n: 0.0,
+            hand: None,
         };
         world.advance_to(0);
         world
@@ -302,6 +306,16 @@ impl World {
         self.pull_n = -pull_n;
     }
 
+    /// Has a hand hold the finger from now on, in place of lever and stage: they stand still.
+    pub fn hold(&mut self, hand: Hand) {
+        self.hand = Some(hand);
+    }
+
+    /// The hand that holds the finger.
+    pub fn hand(&mut self) -> Option<&mut Hand> {
+        self.hand.as_mut()
+    }
+
     /// Has the finger feel recorded slides instead of the mounted sample: each press-and-slide is the next one of an order
     /// that `seed` gives, over and over. Without any, the sample is felt again.
     ///
@@ -381,6 +395,7 @@ impl World {
 
     /// What is really so.
     pub fn truth(&self) -> Truth {
+        let hand = self.hand.as_ref();
         Truth {
             at_ns: self.tick_ends_ns,
             texture: self.setup.texture,
@@ -393,8 +408,8 @@ impl World {
             lever_bad_pulses: self.lever.bad_pulses(),
             stage_mm: self.stage.position_mm(),
             stage_reach_mm: self.stage_reach_mm,
-            sample_mm: self.stage.on_sample_mm(),
-            speed_mm_s: self.stage.speed_mm_s(),
+            sample_mm: hand.map_or_else(|| self.stage.on_sample_mm(), Hand::x_mm),
+            speed_mm_s: hand.map_or_else(|| self.stage.speed_mm_s(), Hand::speed_mm_s),
             current_a: self.stage.current_a(),
             sliding_j: self.sliding_j,
             wear: self.finger.wear(),
@@ -418,6 +433,18 @@ impl World {
         self.tick_ends_ns = (u128::from(self.ticks) * 2_500_000 / 33) as u64;
 
         let shear_n = self.finger.shear_n();
+        if let Some(hand) = &mut self.hand {
+            hand.tick(self.finger.force_n());
+            self.finger.tick(&Contact {
+                indentation_mm: hand.indentation_mm(),
+                surface: Some(&self.surface),
+                x_mm: hand.x_mm(),
+                speed_mm_s: hand.speed_mm_s(),
+                lever_vibration: 0.0,
+            });
+            self.force_max_n = self.force_max_n.max(self.finger.force_n());
+            return;
+        }
         self.lever.tick(self.tick_ends_ns, self.finger.force_n());
         let from_mm = self.stage.position_mm();
         self.stage.tick(shear_n + self.pull_n);
@@ -446,11 +473,15 @@ impl World {
     }
 
     fn indentation_mm(&self) -> f64 {
+        if let Some(hand) = &self.hand {
+            return hand.indentation_mm();
+        }
         self.surface.thickness_mm() - self.lever.height_mm()
     }
 
     fn must_be_over(&self, surface: &Surface) -> Result<(), NotLifted> {
-        let indentation_mm = surface.thickness_mm() - self.lever.height_mm();
+        let over_mm = surface.thickness_mm() - self.lever.height_mm();
+        let indentation_mm = self.hand.as_ref().map_or(over_mm, Hand::indentation_mm);
         if indentation_mm > 0.0 {
             return Err(NotLifted { indentation_mm });
         }

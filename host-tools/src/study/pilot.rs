@@ -134,7 +134,7 @@ fn uncertainty(
     let names: Vec<String> = names.collect();
     let bytes = learn(Method::Paper, None, &names, movements, &slides)?;
     let table = Table::read(&bytes).map_err(EvaluateError::from)?;
-    let mut explorer = Explorer::<128>::new(table, PropertySet::ALL, Config::default())
+    let explorer = Explorer::<128>::new(table, PropertySet::ALL, Config::default())
         .map_err(EvaluateError::from)?;
     let mut left = vec![[1.0; 3]; movements.len()];
     for promise in explorer.outlook() {

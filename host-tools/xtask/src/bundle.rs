@@ -8,6 +8,7 @@ use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{ElfFile, ProgramHeader as _};
 use object::{Endianness, elf};
 
+use crate::factory::TABLES;
 use crate::firmware::{self, hash, shown};
 use crate::root;
 
@@ -27,9 +28,13 @@ pub(crate) fn bundle(out: &Path) -> Result<()> {
         let bytes = std::fs::read(&elf).with_context(|| elf.display().to_string())?;
         images.push((firmware::name(&elf)?.to_owned(), bytes));
     }
-    let factory = root().join("firmware/factory.tact");
-    let factory = std::fs::read(&factory).with_context(|| factory.display().to_string())?;
-    let files = files(images, factory)?;
+    let mut tables = Files::new();
+    for name in TABLES {
+        let table = root().join("firmware").join(name);
+        let bytes = std::fs::read(&table).with_context(|| table.display().to_string())?;
+        tables.insert(name.to_owned(), bytes);
+    }
+    let files = files(images, tables)?;
     write(&out, &files)?;
     for (name, bytes) in &files {
         println!("{:>9}  {}", bytes.len(), shown(&out.join(name)));
@@ -38,7 +43,7 @@ pub(crate) fn bundle(out: &Path) -> Result<()> {
 }
 
 /// Everything that is in a release.
-fn files(images: Vec<(String, Vec<u8>)>, factory: Vec<u8>) -> Result<Files> {
+fn files(images: Vec<(String, Vec<u8>)>, tables: Files) -> Result<Files> {
     let mut files = Files::new();
     for (name, elf) in images {
         let flat = flat(&loads(&elf)?).with_context(|| name.clone())?;
@@ -46,7 +51,7 @@ fn files(images: Vec<(String, Vec<u8>)>, factory: Vec<u8>) -> Result<Files> {
         files.insert(format!("{name}.bin"), flat);
         files.insert(format!("{name}.elf"), elf);
     }
-    files.insert("factory.tact".into(), factory);
+    files.extend(tables);
     files.insert(
         "FLASHING.md".into(),
         flashing(env!("CARGO_PKG_VERSION")).into(),
@@ -163,8 +168,9 @@ fn flashing(version: &str) -> String {
 | file | what it is |
 |---|---|
 | tactus-rig.elf, .bin, .hex | the rig's firmware |
+| tactus-handheld.elf, .bin, .hex | the handheld probe's firmware |
 | tactus-selftest.elf, .bin, .hex | a test of board and rig: flash it first |
-| factory.tact | the texture table inside the firmware, of a simulated world |
+| factory.tact, handheld.tact | the texture tables inside the firmware, of a simulated world |
 | {SUMS} | hash sums |
 
 An ELF has the symbols that the log is read with; .bin and .hex hold the same image without them.
@@ -244,7 +250,13 @@ mod tests {
     #[test]
     fn a_release_can_be_written_twice_and_leaves_other_files_alone() {
         let folder = tempfile::tempdir().unwrap();
-        let release = || files(Vec::new(), b"table".to_vec()).unwrap();
+        let release = || {
+            files(
+                Vec::new(),
+                [("factory.tact".to_owned(), b"table".to_vec())].into(),
+            )
+            .unwrap()
+        };
         let names: Vec<_> = release().into_keys().collect();
         assert_eq!(names, ["FLASHING.md", SUMS, "factory.tact"]);
         write(folder.path(), &release()).unwrap();

@@ -56,6 +56,8 @@ pub(crate) fn tests(elves: &[PathBuf]) -> Result<Command> {
     tests.env("TACTUS_ELF", firmware::image(elves, "tactus-rig")?);
     let selftest = firmware::image(elves, "tactus-selftest")?;
     tests.env("TACTUS_SELFTEST_ELF", selftest);
+    let handheld = firmware::image(elves, "tactus-handheld")?;
+    tests.env("TACTUS_HANDHELD_ELF", handheld);
     tests.env("TACTUS_REQUIRE_ELF", "1");
     Ok(tests)
 }

@@ -1,4 +1,4 @@
-//! The table that comes with the firmware, made anew from the simulated world.
+//! The tables that come with the firmware, made anew from the simulated world.
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
@@ -10,30 +10,36 @@ use crate::{cargo, root, run, target};
 const SEED: &str = "1";
 const TRIALS: &str = "5";
 
-/// Makes the table and writes it, or compares it with the one that is committed.
+/// The rig's table and the handheld's.
+pub(crate) const TABLES: [&str; 2] = ["factory.tact", "handheld.tact"];
+
+/// Makes the tables and writes them, or compares them with those that are committed.
 pub(crate) fn factory(check: bool) -> Result<()> {
     let work = target().join(format!("factory-{}", std::process::id()));
     let made = make(&work);
     // half a gigabyte of recordings
     let _ = std::fs::remove_dir_all(&work);
-    let made = made?;
-    let file = root().join("firmware/factory.tact");
-    if check {
-        let committed =
-            std::fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
-        same(&committed, &made)?;
-        println!("firmware/factory.tact is what world {SEED} gives");
-    } else {
-        std::fs::write(&file, &made).with_context(|| format!("cannot write {}", file.display()))?;
-        println!("firmware/factory.tact is written");
+    for (name, made) in TABLES.into_iter().zip(made?) {
+        let file = root().join("firmware").join(name);
+        if check {
+            let committed =
+                std::fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
+            same(name, &committed, &made)?;
+            println!("firmware/{name} is what world {SEED} gives");
+        } else {
+            std::fs::write(&file, &made)
+                .with_context(|| format!("cannot write {}", file.display()))?;
+            println!("firmware/{name} is written");
+        }
+        println!("bytes    {}\nSHA-256  {}", made.len(), hash(&made));
     }
-    println!("bytes    {}\nSHA-256  {}", made.len(), hash(&made));
     Ok(())
 }
 
-fn make(work: &Path) -> Result<Vec<u8>> {
+fn make(work: &Path) -> Result<[Vec<u8>; 2]> {
     std::fs::create_dir_all(work).with_context(|| format!("cannot make {}", work.display()))?;
-    let (recordings, table) = (work.join("recordings"), work.join("factory.tact"));
+    let recordings = work.join("recordings");
+    let [table, by_hand] = TABLES.map(|name| work.join(name));
     let tactus = || {
         let mut cargo = cargo();
         cargo.args(["run", "--quiet", "--release", "--package", "tactus", "--"]);
@@ -46,14 +52,20 @@ fn make(work: &Path) -> Result<Vec<u8>> {
     learn.args(["learn", "--train-slides", TRIALS, "--recordings"]);
     learn.arg(&recordings).arg("--out").arg(&table);
     run(&mut learn).context("the learning failed")?;
-    std::fs::read(&table).with_context(|| format!("cannot read {}", table.display()))
+    let mut learn = tactus();
+    learn.args(["learn-by-hand", "--seed", SEED, "--trials", TRIALS, "--out"]);
+    run(learn.arg(&by_hand)).context("the learning by hand failed")?;
+    let read = |file: &Path| {
+        std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))
+    };
+    Ok([read(&table)?, read(&by_hand)?])
 }
 
-fn same(committed: &[u8], made: &[u8]) -> Result<()> {
+fn same(name: &str, committed: &[u8], made: &[u8]) -> Result<()> {
     let at = committed.iter().zip(made).position(|(a, b)| a != b);
     ensure!(
         at.is_none() && committed.len() == made.len(),
-        "firmware/factory.tact is not what world {SEED} gives: {} bytes there, {} made, first difference at byte {}.\n\
+        "firmware/{name} is not what world {SEED} gives: {} bytes there, {} made, first difference at byte {}.\n\
          If simulator, features or table were changed on purpose: cargo xtask factory, and commit the file",
         committed.len(),
         made.len(),
@@ -68,8 +80,8 @@ mod tests {
 
     #[test]
     fn a_table_that_differs_says_where() {
-        assert!(same(b"TACT1", b"TACT1").is_ok());
-        let error = |made| same(b"TACT1", made).unwrap_err().to_string();
+        assert!(same("x", b"TACT1", b"TACT1").is_ok());
+        let error = |made| same("x", b"TACT1", made).unwrap_err().to_string();
         assert!(error(b"TACT2").contains("first difference at byte 4"));
         assert!(error(b"TACT").contains("5 bytes there, 4 made, first difference at byte 4"));
     }

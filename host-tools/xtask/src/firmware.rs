@@ -8,6 +8,17 @@ use sha2::{Digest as _, Sha256};
 
 use crate::{root, toolchain};
 
+/// The images by the profile that each is built with: the rig for speed, the handheld for a small chip.
+const PROFILES: [(&str, &[&str]); 2] = [
+    (
+        "firmware",
+        &["tactus-rig", "tactus-selftest", "tactus-bench"],
+    ),
+    ("handheld", &["tactus-handheld"]),
+];
+/// The images that are flashed. The bench image is for the emulated board only.
+const FLASHED: [&str; 3] = ["tactus-rig", "tactus-selftest", "tactus-handheld"];
+
 /// Builds every image of the firmware and says what came out; the ELFs.
 pub(crate) fn build() -> Result<Vec<PathBuf>> {
     let elves = elves()?;
@@ -19,23 +30,41 @@ pub(crate) fn build() -> Result<Vec<PathBuf>> {
 
 /// Builds every image of the firmware: the ELFs, by name. Leaves stdout to who asks.
 pub(crate) fn elves() -> Result<Vec<PathBuf>> {
+    compile(&FLASHED)
+}
+
+/// Builds these images of the firmware: the ELFs, by name.
+pub(crate) fn compile(images: &[&str]) -> Result<Vec<PathBuf>> {
     let toolchain = toolchain::get()?;
     eprintln!("Building with {}", toolchain.version());
-    let mut cargo = toolchain.cargo_build();
-    cargo.args(["--package", "tactus-firmware", "--profile", "firmware"]);
-    // progress and diagnostics go to stderr; stdout says where the ELFs are
-    cargo.arg("--message-format=json-render-diagnostics");
-    let output = cargo
-        .stderr(Stdio::inherit())
-        .output()
-        .context("cannot start cargo")?;
+    let mut elves = Vec::new();
+    for (profile, all) in PROFILES {
+        let wanted = || images.iter().filter(|image| all.contains(image));
+        if wanted().count() == 0 {
+            continue;
+        }
+        let mut cargo = toolchain.cargo_build();
+        cargo.args(["--package", "tactus-firmware", "--profile", profile]);
+        cargo.args(wanted().flat_map(|image| ["--bin", image]));
+        // progress and diagnostics go to stderr; stdout says where the ELFs are
+        cargo.arg("--message-format=json-render-diagnostics");
+        let output = cargo
+            .stderr(Stdio::inherit())
+            .output()
+            .context("cannot start cargo")?;
+        ensure!(
+            output.status.success(),
+            "the firmware does not build (warnings are errors here)"
+        );
+        elves.extend(executables(&String::from_utf8_lossy(&output.stdout)));
+    }
     ensure!(
-        output.status.success(),
-        "the firmware does not build (warnings are errors here)"
+        elves.len() == images.len(),
+        "cargo named {} of {} firmware binaries",
+        elves.len(),
+        images.len()
     );
-    let mut elves = executables(&String::from_utf8_lossy(&output.stdout));
-    ensure!(!elves.is_empty(), "cargo named no firmware binary");
-    elves.sort();
+    elves.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
     Ok(elves)
 }
 

@@ -12,7 +12,7 @@ use clap::Args;
 use crate::{cargo, root, run, target};
 
 /// What is attacked: the binaries of tests/fuzz.
-const TARGETS: [&str; 4] = ["wire", "table", "store", "recordings"];
+const TARGETS: [&str; 5] = ["wire", "table", "store", "recordings", "scenario"];
 /// Longest input, bytes.
 const MAX_LEN: usize = 8192;
 

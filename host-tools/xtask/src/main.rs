@@ -1,4 +1,5 @@
 //! The project's own commands: `cargo xtask --help` lists them.
+mod bench;
 mod bundle;
 mod emulate;
 mod factory;
@@ -56,8 +57,9 @@ enum Cli {
     Flash(flash::Options),
     /// Say what each image takes of the chip, and how deep the rig's stack gets
     ///
-    /// The stack is measured on the emulated board, during an exploration. An error if an image takes more than 256 KB of
-    /// flash or 128 KB of RAM, or its variables and its stack together more than the 192 KB there are.
+    /// The stack is measured on the emulated board, during an exploration. An error if the rig's image takes more than 160 KB
+    /// of flash without its table (the handheld's 128 KB), if variables take more than 64 KB, or if twice the stack does not fit
+    /// beside them into the 192 KB there are. Lists the largest symbols, and the functions that panic with their callers.
     #[command(after_help = size::EXAMPLES)]
     Size(size::Options),
     /// Make a release: images, hash sums, and how to flash them without a checkout
@@ -69,9 +71,10 @@ enum Cli {
         #[arg(long, value_name = "DIR", default_value = "target/bundle")]
         out: PathBuf,
     },
-    /// Make the table that comes with the firmware, firmware/factory.tact
+    /// Make the tables that come with the firmware, firmware/factory.tact and firmware/handheld.tact
     ///
-    /// Simulates 5 trials of 3 movements on each of the 117 textures of world 1 and learns them, which takes a minute or two.
+    /// Simulates 5 trials of 3 movements on each of the 117 textures of world 1 and learns them, and 5 slides of a hand for
+    /// the handheld probe, which takes a minute or two.
     Factory {
         /// Leave the committed file alone; an error if it is not byte for byte what is made now
         #[arg(long)]
@@ -102,7 +105,7 @@ enum Cli {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
-    /// Attack the parsers with libFuzzer: frames, tables, the store's flash, recordings
+    /// Attack the parsers with libFuzzer: frames, tables, the store's flash, recordings, scenarios
     ///
     /// Runs on stable Rust; wants a C++ compiler. What breaks a target is kept in target/fuzz and named: copy it to
     /// tests/fuzz/corpus, where every later run begins with it.
@@ -111,16 +114,12 @@ enum Cli {
   cargo xtask fuzz table --seconds 60    one of them
   cargo xtask fuzz --planted             with a bug in each, which must be found")]
     Fuzz(fuzz::Options),
-    /// Time the core's functions on this PC
+    /// Count what the core's kernels cost on the chip
     ///
-    /// Good for comparing two versions on one PC. What the chip needs is another matter.
-    #[command(after_help = "Example:
-  cargo xtask bench spectrum             only benches with `spectrum` in their name")]
-    Bench {
-        /// Filter and options for the benches (divan's)
-        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-        options: Vec<OsString>,
-    },
+    /// Instructions of the bench image on the emulated board, the same code as in the rig's image, on a slide of a real finger
+    /// where there is one; every result is compared with the plain kernels' on this PC. An error if a kernel misses its gate.
+    #[command(after_help = bench::EXAMPLES)]
+    Bench(bench::Options),
 }
 
 fn main() -> ExitCode {
@@ -135,7 +134,7 @@ fn main() -> ExitCode {
         Cli::Factory { check } => factory::factory(check),
         Cli::Mutants { options } => mutants(options),
         Cli::Fuzz(options) => fuzz::fuzz(&options),
-        Cli::Bench { options } => bench(options),
+        Cli::Bench(options) => bench::bench(&options),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -157,13 +156,6 @@ fn mutants(options: Vec<OsString>) -> Result<()> {
         cargo.args(["--file", &format!("shared/src/{module}*")]);
         cargo.args(["--file", &format!("shared/src/{module}*/**")]);
     }
-    run(cargo.args(options))
-}
-
-fn bench(options: Vec<OsString>) -> Result<()> {
-    // by target: `cargo bench` alone would hand divan's options to every unit test binary too
-    let mut cargo = cargo();
-    cargo.args(["bench", "--package", "tactus-tests", "--bench", "*", "--"]);
     run(cargo.args(options))
 }
 
@@ -216,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn options_behind_mutants_and_bench_go_through() {
+    fn options_behind_mutants_go_through() {
         let Cli::Mutants { options } = Cli::parse_from(["xtask", "mutants", "--jobs", "2"]) else {
             panic!("not mutants");
         };

@@ -3,11 +3,11 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
 use clap::{Args, ValueEnum};
-use object::{Object as _, ObjectSymbol as _, SymbolKind};
+use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SymbolKind};
 use serde_json::{Value, json};
 
 use crate::firmware::{self, Size};
-use crate::{emulate, run};
+use crate::{emulate, root, run};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -16,11 +16,20 @@ Examples:
   cargo xtask size --format json     everything on one line, for programs";
 
 const KB: u64 = 1024;
-const MAX_FLASH: u64 = 256 * KB;
-const MAX_VARIABLES: u64 = 128 * KB;
+/// Flash of an image, without the table that comes with it. An image that is not listed is not gated.
+const MAX_FLASH: [(&str, u64); 2] = [(RIG, 160 * KB), (HANDHELD, 128 * KB)];
+const HANDHELD: &str = "tactus-handheld";
+const MAX_VARIABLES: u64 = 64 * KB;
+/// Limits that are not kept yet, by image, and what was measured: it may become smaller, but not larger ([`LEEWAY`]). A limit
+/// that is kept is to be taken out of here.
+const NOT_YET: [(&str, &str, u64); 1] = [(RIG, FLASH, 229_444)];
+/// The part of it that a compiler's next version may add.
+const LEEWAY: u64 = 100;
+/// Twice the deepest stack has to fit into what the variables leave.
+const MARGIN: u64 = 2;
 /// RAM in memory.x; stack and variables are both in it.
 const RAM: u64 = 192 * KB;
-const SYMBOLS: usize = 20;
+const SYMBOLS: usize = 10;
 /// The image whose stack is measured.
 const RIG: &str = "tactus-rig";
 
@@ -51,35 +60,59 @@ struct Symbol {
 struct Measured {
     name: String,
     size: Size,
+    /// bytes of the table in it
+    table: u64,
     symbols: Vec<Symbol>,
+    panics: Vec<Panics>,
     /// what the emulator's stack-depth says
     stack: Option<Value>,
 }
 
+/// The sizes, without the stack, and an error if one is over its limit that was not, or has grown further.
+pub(crate) fn gates() -> Result<()> {
+    let images = measure(true)?;
+    print!("{}", text(&images));
+    let wrong = wrong(&images, &NOT_YET);
+    ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
+    Ok(())
+}
+
 pub(crate) fn size(options: &Options) -> Result<()> {
+    let images = measure(options.no_stack)?;
+    match options.format {
+        Format::Text => print!("{}", text(&images)),
+        Format::Json => println!("{}", Value::from_iter(images.iter().map(json))),
+    }
+    let too_much: Vec<String> = images
+        .iter()
+        .flat_map(limits)
+        .filter_map(|l| l.missed())
+        .collect();
+    ensure!(too_much.is_empty(), "{}", too_much.join("\n"));
+    Ok(())
+}
+
+/// Builds the images and measures them.
+fn measure(no_stack: bool) -> Result<Vec<Measured>> {
     let mut images = Vec::new();
     for elf in firmware::elves()? {
         let name = firmware::name(&elf)?.to_owned();
         let bytes = std::fs::read(&elf).with_context(|| elf.display().to_string())?;
-        let stack = if name == RIG && !options.no_stack {
+        let stack = if name == RIG && !no_stack {
             Some(stack(&elf)?)
         } else {
             None
         };
         images.push(Measured {
+            panics: panics(&bytes).with_context(|| name.clone())?,
             size: Size::of(&bytes).with_context(|| name.clone())?,
             symbols: symbols(&bytes).with_context(|| name.clone())?,
+            table: table(&name)?,
             name,
             stack,
         });
     }
-    match options.format {
-        Format::Text => print!("{}", text(&images)),
-        Format::Json => println!("{}", Value::from_iter(images.iter().map(json))),
-    }
-    let too_much: Vec<String> = images.iter().flat_map(too_much).collect();
-    ensure!(too_much.is_empty(), "{}", too_much.join("\n"));
-    Ok(())
+    Ok(images)
 }
 
 /// Measures the stack on the emulated board.
@@ -93,6 +126,111 @@ fn stack(elf: &Path) -> Result<Value> {
         .context("cannot start stack-depth")?;
     ensure!(output.status.success(), "the stack was not measured");
     serde_json::from_slice(&output.stdout).context("stack-depth does not answer in JSON")
+}
+
+/// Bytes of the table that comes with an image.
+fn table(image: &str) -> Result<u64> {
+    let name = match image {
+        RIG => "factory.tact",
+        HANDHELD => "handheld.tact",
+        _ => return Ok(0),
+    };
+    let file = root().join("firmware").join(name);
+    let table = std::fs::metadata(&file).with_context(|| file.display().to_string())?;
+    Ok(table.len())
+}
+
+/// A function that panics, and those that call it.
+struct Panics {
+    name: String,
+    callers: Vec<String>,
+}
+
+/// Parts of the names of functions that do nothing but panic.
+const PANICKING: [&str; 12] = [
+    "panicking::panic",
+    "panicking::assert_failed",
+    "panic_already",
+    "panic_const",
+    "panic_bounds_check",
+    "panic_display",
+    "slice_index_fail",
+    "panic_on_ord_violation",
+    "do_panic",
+    "unwrap_failed",
+    "expect_failed",
+    "_defmt_panic",
+];
+
+/// Functions that panic, and who calls them, by the calls and jumps in the code.
+fn panics(elf: &[u8]) -> Result<Vec<Panics>> {
+    let file = object::File::parse(elf)?;
+    let mut functions = Vec::new();
+    for symbol in file.symbols() {
+        if symbol.kind() == SymbolKind::Text && symbol.is_definition() && symbol.size() > 0 {
+            let name = format!("{:#}", rustc_demangle::demangle(symbol.name()?));
+            functions.push((symbol.address() & !1, symbol.size(), name));
+        }
+    }
+    functions.sort();
+    let does = |name: &str| PANICKING.iter().any(|part| name.contains(part));
+    let mut panics: std::collections::BTreeMap<u64, Panics> = functions
+        .iter()
+        .filter(|(_, _, name)| does(name))
+        .map(|(address, _, name)| {
+            let panics = Panics {
+                name: name.clone(),
+                callers: Vec::new(),
+            };
+            (*address, panics)
+        })
+        .collect();
+    for (address, size, name) in &functions {
+        let code = file
+            .sections()
+            .find_map(|section| section.data_range(*address, *size).ok().flatten());
+        for target in targets(*address, code.unwrap_or_default()) {
+            // one that panics for another is its way, not its reason
+            if let Some(panics) = panics.get_mut(&target)
+                && !does(name)
+                && !panics.callers.contains(name)
+            {
+                panics.callers.push(name.clone());
+            }
+        }
+    }
+    Ok(panics.into_values().collect())
+}
+
+/// Where the long calls and jumps (BL and B.W) of code at an address go.
+fn targets(address: u64, code: &[u8]) -> impl Iterator<Item = u64> + '_ {
+    let (halves, _) = code.as_chunks();
+    let halves: Vec<u32> = halves
+        .iter()
+        .map(|half| u32::from(u16::from_le_bytes(*half)))
+        .collect();
+    let mut at = 0;
+    std::iter::from_fn(move || {
+        while let Some(&first) = halves.get(at) {
+            let here = address + 2 * at as u64;
+            if first >> 11 < 0b11101 {
+                at += 1;
+                continue;
+            }
+            let second = halves.get(at + 1).copied().unwrap_or_default();
+            at += 2;
+            // BL, or B without a condition
+            if first >> 11 == 0b11110 && second & 0x9000 == 0x9000 {
+                let sign = first >> 10 & 1;
+                let (j1, j2) = (second >> 13 & 1, second >> 11 & 1);
+                let high = (sign ^ j1 ^ 1) << 23 | (sign ^ j2 ^ 1) << 22;
+                let offset = high | (first & 0x3ff) << 12 | (second & 0x7ff) << 1;
+                let offset = offset | if sign == 1 { 0xff00_0000 } else { 0 };
+                return Some((here + 4).wrapping_add_signed(i64::from(offset as i32)));
+            }
+        }
+        None
+    })
 }
 
 /// The biggest symbols.
@@ -120,24 +258,88 @@ fn worst_stack(image: &Measured) -> Option<u64> {
     image.stack.as_ref()?.get("bound")?.as_u64()
 }
 
-/// Why an image is too big.
-fn too_much(image: &Measured) -> Vec<String> {
-    let Size { flash, ram, .. } = image.size;
-    let mut why = Vec::new();
-    let mut gate = |what: &str, bytes: u64, most: u64| {
-        if bytes > most {
-            why.push(format!(
-                "{}: {what} take {bytes} bytes, at most {most} are allowed",
-                image.name
-            ));
-        }
-    };
-    gate("code and constants", flash, MAX_FLASH);
-    gate("variables", ram, MAX_VARIABLES);
-    if let Some(stack) = worst_stack(image) {
-        gate("variables and stack", ram + stack, RAM);
+/// Most flash that an image may take, the table that comes with it included.
+fn max_flash(image: &Measured) -> Option<u64> {
+    let (_, most) = MAX_FLASH.iter().find(|(name, _)| *name == image.name)?;
+    Some(most + image.table)
+}
+
+/// What an image may take, and takes.
+struct Limit {
+    image: String,
+    what: &'static str,
+    bytes: u64,
+    most: u64,
+}
+
+impl Limit {
+    /// What is said if it is missed.
+    fn missed(&self) -> Option<String> {
+        let Self {
+            image,
+            what,
+            bytes,
+            most,
+        } = self;
+        (bytes > most)
+            .then(|| format!("{image}: {what} take {bytes} bytes, at most {most} are allowed"))
     }
-    why
+}
+
+const FLASH: &str = "code and constants";
+const VARIABLES: &str = "variables";
+
+/// The limits of an image, as far as they were measured.
+fn limits(image: &Measured) -> Vec<Limit> {
+    let Size { flash, ram, .. } = image.size;
+    let mut limits = Vec::new();
+    let mut limit = |what, bytes, most| {
+        limits.push(Limit {
+            image: image.name.clone(),
+            what,
+            bytes,
+            most,
+        });
+    };
+    if let Some(most) = max_flash(image) {
+        limit(FLASH, flash, most);
+    }
+    limit(VARIABLES, ram, MAX_VARIABLES);
+    if let Some(stack) = worst_stack(image) {
+        limit("variables and twice the stack", ram + MARGIN * stack, RAM);
+    }
+    limits
+}
+
+/// What is wrong with the images: limits that are missed, but those that are not met yet and have not become worse.
+fn wrong(images: &[Measured], not_yet: &[(&str, &str, u64)]) -> Vec<String> {
+    let mut wrong = Vec::new();
+    let limits: Vec<Limit> = images.iter().flat_map(limits).collect();
+    for limit in &limits {
+        let known = not_yet
+            .iter()
+            .find(|(image, what, _)| *image == limit.image && *what == limit.what);
+        match (limit.missed(), known) {
+            (None, None) => {}
+            (None, Some(_)) => wrong.push(format!(
+                "{}: {}: the limit is kept: take it out of NOT_YET",
+                limit.image, limit.what
+            )),
+            (Some(missed), None) => wrong.push(missed),
+            (Some(missed), Some((_, _, was))) if limit.bytes <= was + was / LEEWAY => {
+                println!("missed, was {was}: {missed}");
+            }
+            (Some(missed), Some((_, _, was))) => {
+                wrong.push(format!("{missed}; was {was}, and has become worse"));
+            }
+        }
+    }
+    for (image, what, _) in not_yet {
+        if !limits.iter().any(|l| l.image == *image && l.what == *what) {
+            wrong.push(format!("{image}: {what}: in NOT_YET, and not measured"));
+        }
+    }
+    wrong
 }
 
 fn json(image: &Measured) -> Value {
@@ -148,6 +350,9 @@ fn json(image: &Measured) -> Value {
         "ram": image.size.ram,
         "ccm": image.size.ccm,
         "symbols": Value::from_iter(symbols.map(|s| json!({"bytes": s.bytes, "name": s.name}))),
+        "table": image.table,
+        "flash_allowed": max_flash(image),
+        "panics": Value::from_iter(image.panics.iter().map(|p| json!({"name": p.name, "callers": p.callers}))),
         "stack": image.stack,
     })
 }
@@ -171,10 +376,20 @@ fn text(images: &[Measured]) -> String {
             image.name
         ));
     }
-    line(format_args!(
-        "{:20} {MAX_FLASH:>10} {MAX_VARIABLES:>10} {:>10} {RAM:>10} with the variables",
-        "allowed", "-"
-    ));
+    for image in images {
+        if let Some(flash) = max_flash(image) {
+            let allowed = format!("allowed, {}", image.name.trim_start_matches("tactus-"));
+            line(format_args!(
+                "{allowed:20} {flash:>10} {MAX_VARIABLES:>10} {:>10} {:>10}",
+                "-",
+                RAM.saturating_sub(image.size.ram) / MARGIN
+            ));
+            line(format_args!(
+                "flash includes a table of {} bytes, the stack's share is half of what the variables leave",
+                image.table
+            ));
+        }
+    }
     for image in images {
         if let Some(stack) = &image.stack {
             line(format_args!("\n{}'s stack, bytes", image.name));
@@ -183,6 +398,18 @@ fn text(images: &[Measured]) -> String {
         line(format_args!("\n{}'s biggest symbols, bytes", image.name));
         for symbol in &image.symbols {
             line(format_args!("{:>7}  {}", symbol.bytes, symbol.name));
+        }
+        if image.name == RIG {
+            line(format_args!(
+                "\n{}'s functions that panic, and who calls them",
+                image.name
+            ));
+            for Panics { name, callers } in &image.panics {
+                line(format_args!("{name}"));
+                for caller in callers {
+                    line(format_args!("    {caller}"));
+                }
+            }
         }
     }
     text
@@ -215,9 +442,14 @@ mod tests {
         Measured {
             name: RIG.into(),
             size: Size { flash, ram, ccm: 0 },
+            table: 1000,
             symbols: vec![Symbol {
                 bytes: 4086,
                 name: "session::work".into(),
+            }],
+            panics: vec![Panics {
+                name: "panic_bounds_check".into(),
+                callers: vec!["rcc::init".into()],
             }],
             stack: bound.map(|bound| {
                 let servo = json!({"name": "UART5", "deepest": 1200, "runs": 9});
@@ -228,12 +460,52 @@ mod tests {
 
     #[test]
     fn each_limit_is_a_limit() {
-        assert!(too_much(&image(MAX_FLASH, MAX_VARIABLES, Some(64 * KB))).is_empty());
-        assert!(too_much(&image(0, 0, None)).is_empty());
-        let error = |image: Measured| too_much(&image).join("");
-        assert!(error(image(MAX_FLASH + 1, 0, None)).contains("code and constants"));
-        assert!(error(image(0, MAX_VARIABLES + 1, None)).contains("variables take 131073"));
-        assert!(error(image(0, 128 * KB, Some(64 * KB + 1))).contains("variables and stack"));
+        let most = 160 * KB + 1000;
+        let too_much = |image: Measured| wrong(&[image], &[]);
+        assert!(too_much(image(most, MAX_VARIABLES, Some(64 * KB))).is_empty());
+        assert!(too_much(image(0, 0, None)).is_empty());
+        let error = |image: Measured| too_much(image).join("");
+        assert!(error(image(most + 1, 0, None)).contains("code and constants"));
+        assert!(error(image(0, MAX_VARIABLES + 1, None)).contains("variables take 65537"));
+        assert!(error(image(0, 64 * KB, Some(64 * KB + 1))).contains("twice the stack"));
+        let handheld = |flash| Measured {
+            name: HANDHELD.into(),
+            ..image(flash, 0, None)
+        };
+        assert!(too_much(handheld(128 * KB + 1000)).is_empty());
+        assert!(error(handheld(128 * KB + 1001)).contains("tactus-handheld: code and constants"));
+        let mut other = image(most + 1, 0, None);
+        other.name = "tactus-selftest".into();
+        assert!(too_much(other).is_empty());
+    }
+
+    #[test]
+    fn a_limit_that_is_not_kept_yet_may_not_be_missed_by_more() {
+        let was = [(RIG, FLASH, 200 * KB)];
+        let error = |flash| wrong(&[image(flash, 0, None)], &was).join("");
+        assert_eq!(error(200 * KB), "");
+        assert_eq!(error(170 * KB), "");
+        assert!(error(203 * KB).contains("has become worse"));
+        assert!(error(160 * KB).contains("take it out of NOT_YET"));
+        // the others are as strict as before
+        let fat = image(200 * KB, MAX_VARIABLES + 1, None);
+        assert!(
+            wrong(&[fat], &was)
+                .join("")
+                .contains("variables take 65537")
+        );
+        assert!(wrong(&[], &was).join("").contains("not measured"));
+    }
+
+    #[test]
+    fn calls_are_found_where_they_go() {
+        // nop; bl +8; bl -4 from its end; b.w +4; a short branch
+        let code = [
+            0xbf00u16, 0xf000, 0xf804, 0xf7ff, 0xfffe, 0xf000, 0xb802, 0xe7fe,
+        ];
+        let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
+        let found: Vec<u64> = targets(0x0800_0000, &bytes).collect();
+        assert_eq!(found, [0x0800_000e, 0x0800_0006, 0x0800_0012]);
     }
 
     #[test]
@@ -247,6 +519,7 @@ mod tests {
             "9000",
             "4086  session::work",
             "1200  UART5, 9 runs",
+            "    rcc::init",
         ] {
             assert!(text.contains(part), "{part} is not in\n{text}");
         }

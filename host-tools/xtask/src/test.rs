@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo, emulate, firmware, fuzz, has_subcommand, run as run_command, target};
+use crate::{
+    bench, cargo, emulate, firmware, fuzz, has_subcommand, run as run_command, size, target,
+};
 
 /// How long each parser is attacked ...
 const FUZZ_S: u64 = 20;
@@ -62,7 +64,9 @@ pub(crate) fn run(quick: bool) -> ExitCode {
         announce_and_run(doc.env("RUSTDOCFLAGS", "-Dwarnings"))
     }));
     if quick {
-        steps.extend(["fuzz", "firmware", "emulator"].map(|name| skipped(name, "--quick")));
+        steps.extend(
+            ["fuzz", "firmware", "emulator", "bench", "size"].map(|name| skipped(name, "--quick")),
+        );
     } else {
         steps.push(step("fuzz", || {
             fuzz::fuzz(&fuzz::Options::all(FUZZ_S, false))?;
@@ -86,6 +90,14 @@ pub(crate) fn run(quick: bool) -> ExitCode {
             }),
             None => skipped("emulator", "there is no firmware to run on it"),
         });
+        steps.push(step("bench", || {
+            println!("\n== cargo xtask bench");
+            bench::gates()
+        }));
+        steps.push(step("size", || {
+            println!("\n== cargo xtask size --no-stack");
+            size::gates()
+        }));
     }
 
     let log = std::fs::read_to_string(&skip_log).unwrap_or_default();

@@ -105,14 +105,22 @@ impl fmt::Display for EncodeError {
                 texture,
                 action,
                 mean,
-            } => write!(
-                f,
-                "texture {}, movement {}: {} {mean} is beyond the table's +-{}",
-                texture + 1,
-                action.movement + 1,
-                action.what(),
-                action.property.map_or(0.0, mean_step) * 32768.0
-            ),
+            } => {
+                // in whole numbers: the chip has better use for the 9 KB that printing any f32 takes
+                let tenths = libm::roundf(10.0 * mean) as i32;
+                let most = action.property.map_or(0.0, mean_step) * 32768.0;
+                write!(
+                    f,
+                    "texture {}, movement {}: {} {}{}.{} is beyond the table's +-{}",
+                    texture + 1,
+                    action.movement + 1,
+                    action.what(),
+                    if tenths < 0 { "-" } else { "" },
+                    tenths.unsigned_abs() / 10,
+                    tenths.unsigned_abs() % 10,
+                    most as u16
+                )
+            }
             Self::Invalid(why) => why.fmt(f),
         }
     }

@@ -64,8 +64,9 @@ impl Experience {
     }
 }
 
-/// What one property of a texture is expected to be (eq. 4).
+/// What one property of a texture is expected to be (eq. 4). The order of the fields is fixed: [`crate::kernels`].
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[repr(C)]
 pub struct Gaussian {
     /// Mean, in the unit of the property.
     pub mean: f32,

@@ -238,7 +238,10 @@ fn outside_the_table_there_is_nothing() {
         );
         assert_eq!(table.cell(texture, movement, Property::Roughness), None);
         assert_eq!(table.experience(texture, movement), Experience::default());
+        let all = table.gaussians(act(movement, Property::Roughness));
+        assert_eq!(all.get(texture.into()), None);
     }
+    assert!(table.trials_at(2).0.is_empty());
 }
 
 #[test]
@@ -385,10 +388,14 @@ proptest! {
         for (texture, row) in (0..).zip(&trials) {
             for (movement, trials) in (0..).zip(row) {
                 prop_assert_eq!(usize::from(table.trials(texture, movement)), trials.len());
+                let (all, stride) = table.trials_at(movement);
+                prop_assert_eq!(usize::from(all[usize::from(texture) * stride]), trials.len());
                 let again = table.experience(texture, movement);
                 prop_assert_eq!(usize::from(again.trials()), trials.len());
                 for property in Property::ALL {
                     let gaussian = table.gaussian(texture, act(movement, property));
+                    let all = table.gaussians(act(movement, property));
+                    prop_assert_eq!(all.get(texture.into()), gaussian);
                     prop_assert_eq!(gaussian.is_some(), trials.len() >= 2);
                     let Some(gaussian) = gaussian else { continue };
                     let (mean, sd) = two_passes(&column(trials, property));

@@ -760,7 +760,7 @@ fn cycling_goes_through_the_movements_in_turn() {
         strategy: Strategy::Random,
         ..OPEN
     };
-    let mut explorer = fused(&bytes, random);
+    let explorer = fused(&bytes, random);
     let outlook = explorer.outlook();
     let drawn = [0, u32::MAX / 2, u32::MAX].map(|random| explorer.choose(&outlook, random));
     assert_eq!(drawn, [look(0), look(1), look(2)]);
@@ -844,4 +844,22 @@ fn a_slide_without_the_features_teaches_nothing() {
     let mut new = fused(&bytes, OPEN);
     assert_eq!(state(&mut explorer), state(&mut new));
     assert_eq!((explorer.log_odds(), explorer.felt().count()), (None, 0));
+}
+
+/// The last texture of a table has fewer bytes behind its mean than a kernel reads at once.
+#[test]
+fn what_lies_behind_a_mean_does_not_count() {
+    use crate::fused::MAX_FEATURES;
+    use crate::kernels::Candidate;
+    let mean = [3i16, -400, 5000, -32768];
+    let mut bytes: Vec<u8> = mean.iter().flat_map(|m| m.to_le_bytes()).collect();
+    let last = Candidate::new(&bytes, mean.len(), 0.5, 7);
+    bytes.extend([0xa5; 60]);
+    let first = Candidate::new(&bytes, mean.len(), 0.5, 7);
+    let square: i64 = mean.iter().map(|&m| i64::from(m) * i64::from(m)).sum();
+    for candidate in [last, first] {
+        assert_eq!(candidate.mean[..4], mean);
+        assert_eq!(candidate.mean[4..], [0; MAX_FEATURES - 4]);
+        assert_eq!(candidate.square, square as u64);
+    }
 }

@@ -131,7 +131,7 @@ fn cycling_takes_the_best_action_of_each_property_in_turn() {
 #[test]
 fn random_takes_every_action_equally_often() {
     let bytes = plain(&[0.0, 0.2], 3);
-    let mut explorer = explorer(&bytes, Strategy::Random);
+    let explorer = explorer(&bytes, Strategy::Random);
     let outlook = explorer.outlook();
     let mut count = BTreeMap::new();
     for n in 0..1u32 << 16 {
@@ -178,7 +178,7 @@ fn what_the_rig_cannot_measure_is_never_chosen() {
     // nor what the table was not learned from
     let trials = [vec![around([(0.0, 0.1); 3])], vec![around([(1.0, 0.1); 3])]];
     let bytes = table_of(only(Property::Fineness), &trials);
-    let mut explorer = explorer(&bytes, Strategy::Bayesian);
+    let explorer = explorer(&bytes, Strategy::Bayesian);
     assert!(
         explorer
             .outlook()
@@ -202,7 +202,7 @@ fn movements_that_not_every_candidate_was_trained_at_are_left_out() {
     );
     let table = Table::read(&bytes).unwrap();
     let movements = |candidates: &[u16]| {
-        let mut explorer = Eight::among(
+        let explorer = Eight::among(
             table,
             PropertySet::ALL,
             Config::default(),
@@ -231,7 +231,7 @@ fn movements_that_not_every_candidate_was_trained_at_are_left_out() {
 #[test]
 fn the_whole_grid_fits() {
     let bytes = plain(&[0.0, 1.0], 36);
-    let mut explorer = explorer(&bytes, Strategy::Random);
+    let explorer = explorer(&bytes, Strategy::Random);
     let outlook = explorer.outlook();
     assert_eq!(outlook.len(), 108);
     assert_eq!(

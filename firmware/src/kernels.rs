@@ -1,0 +1,452 @@
+//! The core's inner loops for this chip. Their plain twins are `tactus_core::kernels::Plain`: `cargo xtask bench` compares
+//! them, to the bit.
+
+use core::arch::{asm, global_asm};
+use core::mem::{MaybeUninit, offset_of};
+
+use tactus_core::fir::{TAPS, Taps};
+use tactus_core::fused::MAX_FEATURES;
+use tactus_core::kernels::{Candidate, EXP2, FAR, Kernels, Live, Plain, ROUND, add_windowed};
+use tactus_core::spectrum::{FRAME, FrameSum};
+use tactus_core::table::Gaussian;
+
+/// Outputs of the band-pass that are computed at once.
+const AT_ONCE: usize = 6;
+
+// Six outputs at once, two products an instruction: r2, r4 and r6 are those that begin with the first sample of a pair, r3, r5
+// and r7 those between them; r8 to r10 are pairs of samples, r11 and r12 pairs of coefficients. Six of the 34 steps make the
+// loop: it has to fit into the flash accelerator's 1 KB, and an inline assembly block leaves too few registers.
+global_asm!(
+    ".macro tactus_fir_step a, b, c",
+    "ldrd r11, r12, [r0], #8",
+    "smlad r2, \\a, r11, r2",
+    "smlad r3, \\a, r12, r3",
+    "ldr \\a, [r1], #4",
+    "smlad r4, \\b, r11, r4",
+    "smlad r5, \\b, r12, r5",
+    "smlad r6, \\c, r11, r6",
+    "smlad r7, \\c, r12, r7",
+    ".endm",
+    ".macro tactus_fir_square y",
+    "asr \\y, \\y, #8",
+    "smlal r8, r9, \\y, \\y",
+    ".endm",
+    ".section .text.tactus_band_energy,\"ax\",%progbits",
+    ".global tactus_band_energy",
+    ".type tactus_band_energy,%function",
+    ".thumb_func",
+    // r0: pairs of coefficients; r1: samples; r2: how many sixes, not 0. Sum of squares in r0 and r1.
+    "tactus_band_energy:",
+    "push {{r4-r11, lr}}",
+    "mov r8, #0",
+    "mov r9, #0",
+    // 0: sum of squares; 8: sixes to go
+    "push {{r2, r3}}",
+    "push {{r8, r9}}",
+    "1:",
+    "ldr r8, [r1], #4",
+    "ldr r9, [r1], #4",
+    "ldr r10, [r1], #4",
+    // half of what is shifted out: rounded
+    "mov r2, #128",
+    "mov r3, #128",
+    "mov r4, #128",
+    "mov r5, #128",
+    "mov r6, #128",
+    "mov r7, #128",
+    "mov lr, #5",
+    "2:",
+    "tactus_fir_step r8, r9, r10",
+    "tactus_fir_step r9, r10, r8",
+    "tactus_fir_step r10, r8, r9",
+    "tactus_fir_step r8, r9, r10",
+    "tactus_fir_step r9, r10, r8",
+    "tactus_fir_step r10, r8, r9",
+    "subs lr, lr, #1",
+    "bne 2b",
+    "tactus_fir_step r8, r9, r10",
+    "tactus_fir_step r9, r10, r8",
+    "tactus_fir_step r10, r8, r9",
+    // the last step, without the pair behind the samples
+    "ldrd r11, r12, [r0], #-264",
+    "smlad r2, r8, r11, r2",
+    "smlad r3, r8, r12, r3",
+    "smlad r4, r9, r11, r4",
+    "smlad r5, r9, r12, r5",
+    "smlad r6, r10, r11, r6",
+    "smlad r7, r10, r12, r7",
+    "ldrd r8, r9, [sp]",
+    "tactus_fir_square r2",
+    "tactus_fir_square r3",
+    "tactus_fir_square r4",
+    "tactus_fir_square r5",
+    "tactus_fir_square r6",
+    "tactus_fir_square r7",
+    "ldr r2, [sp, #8]",
+    "strd r8, r9, [sp]",
+    // 36 pairs were read, the next six outputs begin with the fourth of them
+    "sub r1, r1, #132",
+    "subs r2, r2, #1",
+    "str r2, [sp, #8]",
+    "bne 1b",
+    "pop {{r0, r1, r2, r3}}",
+    "pop {{r4-r11, pc}}",
+    ".size tactus_band_energy, . - tactus_band_energy",
+    ".section .text.tactus_distances,\"ax\",%progbits",
+    ".global tactus_distances",
+    ".type tactus_distances,%function",
+    ".thumb_func",
+    // r0: the one mean; r1: the first of the others; r2: distances; r3: how many, not 0; on the stack the stride, the number
+    // of features, 14 at most, and the sum of squares of the one mean, 64 bits. |a - b|^2 = a.a + b.b - 2 a.b, two products an
+    // instruction.
+    "tactus_distances:",
+    "push {{r4-r11, lr}}",
+    "ldr r4, [sp, #36]",
+    "ldr r6, [sp, #40]",
+    "ldrd r8, r9, [sp, #44]",
+    "push {{r8, r9}}",
+    // bit 0 of the count: an odd number of features
+    "and r7, r6, #1",
+    "orr r3, r7, r3, lsl #1",
+    // where the pairs of so many features begin, 16 bytes each
+    "lsr r6, r6, #1",
+    "rsb r6, r6, #7",
+    "adr r5, 3f",
+    "add r5, r5, r6, lsl #4",
+    "orr r5, r5, #1",
+    "2:",
+    "ldrd r8, r9, [sp]",
+    "mov r10, #0",
+    "mov r11, #0",
+    "mov r6, r0",
+    "mov r7, r1",
+    "add r1, r1, r4",
+    "tst r3, #1",
+    "it eq",
+    "bxeq r5",
+    // the odd one first; the upper halves are 0
+    "ldrh r12, [r7], #2",
+    "ldrh lr, [r6], #2",
+    "smlald r8, r9, r12, r12",
+    "smlald r10, r11, r12, lr",
+    "bx r5",
+    ".balign 4",
+    "3:",
+    ".rept 7",
+    "ldr.w r12, [r7], #4",
+    "ldr.w lr, [r6], #4",
+    "smlald r8, r9, r12, r12",
+    "smlald r10, r11, r12, lr",
+    ".endr",
+    "subs r8, r8, r10",
+    "sbc r9, r9, r11",
+    "subs r8, r8, r10",
+    "sbc r9, r9, r11",
+    "strd r8, r9, [r2], #8",
+    "sub r3, r3, #2",
+    "cmp r3, #1",
+    "bhi 2b",
+    "pop {{r8, r9}}",
+    "pop {{r4-r11, pc}}",
+    ".size tactus_distances, . - tactus_distances",
+    ".section .text.tactus_candidates,\"ax\",%progbits",
+    ".global tactus_candidates",
+    ".type tactus_candidates,%function",
+    ".thumb_func",
+    // r0: the one mean, 14 numbers, and r2 and r3 its sum of squares; r1: the others, and the first behind them on the stack.
+    // r1 is then where the distance is.
+    "tactus_candidates:",
+    "push {{r4-r11, lr}}",
+    "push {{r2, r3}}",
+    "ldr lr, [sp, #44]",
+    "add lr, lr, #{distance}",
+    "add r1, r1, #{distance}",
+    "ldm r0, {{r4-r10}}",
+    "2:",
+    "mov r2, #0",
+    "mov r3, #0",
+    "ldrd r0, r11, [r1, #-{distance}]",
+    "smlald r2, r3, r0, r4",
+    "smlald r2, r3, r11, r5",
+    "ldrd r0, r11, [r1, #8-{distance}]",
+    "smlald r2, r3, r0, r6",
+    "smlald r2, r3, r11, r7",
+    "ldrd r0, r11, [r1, #16-{distance}]",
+    "smlald r2, r3, r0, r8",
+    "smlald r2, r3, r11, r9",
+    "ldr r0, [r1, #24-{distance}]",
+    "smlald r2, r3, r0, r10",
+    "ldrd r11, r12, [r1, #{square}-{distance}]",
+    "subs r11, r11, r2",
+    "sbc r12, r12, r3",
+    "subs r11, r11, r2",
+    "sbc r12, r12, r3",
+    "ldrd r2, r3, [sp]",
+    "adds r11, r11, r2",
+    "adc r12, r12, r3",
+    "strd r11, r12, [r1], #{size}",
+    "cmp r1, lr",
+    "bne 2b",
+    "pop {{r2, r3}}",
+    "pop {{r4-r11, pc}}",
+    ".size tactus_candidates, . - tactus_candidates",
+    ".section .text.tactus_sqrt,\"ax\",%progbits",
+    ".global tactus_sqrt",
+    ".type tactus_sqrt,%function",
+    ".thumb_func",
+    // as `extern "C"` has it on a target with floating-point registers: s0 to s0
+    "tactus_sqrt:",
+    // vsqrt.f32 s0, s0: the assembler is not told of the FPU here
+    ".inst.w 0xeeb10ac0",
+    "bx lr",
+    ".size tactus_sqrt, . - tactus_sqrt",
+    ".text",
+    square = const offset_of!(Candidate, square),
+    distance = const offset_of!(Candidate, distance),
+    size = const size_of::<Candidate>(),
+);
+
+unsafe extern "C" {
+    /// `samples` has [`TAPS`] - 1 and 6 `sixes` samples, of which none is outside -4096..=4095.
+    fn tactus_band_energy(pairs: *const [u32; 2], samples: *const i16, sixes: usize) -> u64;
+    /// `from` has `features` numbers, 14 at most, and so has what begins at `means` and, `many` times in all, each `stride`
+    /// bytes after it. `square` is the sum of squares of `from`. There are `many` distances, and that is not 0.
+    fn tactus_distances(
+        from: *const i16,
+        means: *const u8,
+        distances: *mut u64,
+        many: usize,
+        stride: usize,
+        features: usize,
+        square: u64,
+    );
+    /// `from` has 14 numbers and begins at a whole word, `square` is the sum of their squares; there is at least one of
+    /// `others`, and `behind` is where the last of them ends.
+    fn tactus_candidates(
+        from: *const i16,
+        others: *mut Candidate,
+        square: u64,
+        behind: *const Candidate,
+    );
+    safe fn tactus_sqrt(x: f32) -> f32;
+}
+
+/// A frame times the window, eight at a time, in room that need not be zeros first.
+#[inline(never)]
+fn windowed<'x>(
+    window: &[f32; FRAME],
+    frame: &[i16; FRAME],
+    x: &'x mut MaybeUninit<[f32; FRAME]>,
+) -> &'x mut [f32; FRAME] {
+    let begin: *mut f32 = x.as_mut_ptr().cast();
+    // SAFETY: all three have as many numbers, in whole eights; all of `x` is written.
+    unsafe {
+        asm!(
+            "2:",
+            "vldmia {w}!, {{s0-s7}}",
+            "ldrsh {a}, [{f}]",
+            "ldrsh {b}, [{f}, #2]",
+            "vmov s8, s9, {a}, {b}",
+            "ldrsh {a}, [{f}, #4]",
+            "ldrsh {b}, [{f}, #6]",
+            "vmov s10, s11, {a}, {b}",
+            "ldrsh {a}, [{f}, #8]",
+            "ldrsh {b}, [{f}, #10]",
+            "vmov s12, s13, {a}, {b}",
+            "ldrsh {a}, [{f}, #12]",
+            "ldrsh {b}, [{f}, #14]",
+            "vmov s14, s15, {a}, {b}",
+            "add {f}, {f}, #16",
+            "vcvt.f32.s32 s8, s8",
+            "vcvt.f32.s32 s9, s9",
+            "vcvt.f32.s32 s10, s10",
+            "vcvt.f32.s32 s11, s11",
+            "vcvt.f32.s32 s12, s12",
+            "vcvt.f32.s32 s13, s13",
+            "vcvt.f32.s32 s14, s14",
+            "vcvt.f32.s32 s15, s15",
+            "vmul.f32 s8, s8, s0",
+            "vmul.f32 s9, s9, s1",
+            "vmul.f32 s10, s10, s2",
+            "vmul.f32 s11, s11, s3",
+            "vmul.f32 s12, s12, s4",
+            "vmul.f32 s13, s13, s5",
+            "vmul.f32 s14, s14, s6",
+            "vmul.f32 s15, s15, s7",
+            "vstmia {x}!, {{s8-s15}}",
+            "cmp {x}, {end}",
+            "bne 2b",
+            w = inout(reg) window.as_ptr() => _,
+            f = inout(reg) frame.as_ptr() => _,
+            x = inout(reg) begin => _,
+            end = in(reg) begin.add(FRAME),
+            a = out(reg) _,
+            b = out(reg) _,
+            out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
+            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
+            options(nostack),
+        );
+        x.assume_init_mut()
+    }
+}
+
+/// What [`confuse`] keeps in registers, from s16 on.
+static CONFUSE: [f32; 11] = {
+    let [c0, c1, c2, c3, c4, c5] = EXP2;
+    let octave = -core::f32::consts::LOG2_E;
+    [FAR, octave, ROUND, c0, c1, c2, c3, c4, c5, 1.0, 0.25]
+};
+
+// one load for all of a texture
+const _: () = assert!(
+    offset_of!(Live, probability) == 0
+        && offset_of!(Live, confused) == 4
+        && offset_of!(Live, expected) == 8
+        && offset_of!(Gaussian, mean) == 0
+        && offset_of!(Gaussian, sd) == 4
+);
+
+/// [`Kernels::confuse`] of one texture at least, up to `behind`. The same operations in the same order as
+/// `tactus_core::kernels::confused` and `exp_neg` have them (VMLA rounds the product), but for the comparison of the confusion
+/// with 0: adding that changes nothing.
+///
+/// # Safety
+/// `others` begin and end there.
+#[inline(never)]
+unsafe fn confuse(a: &mut Live, others: *mut Live, behind: *const Live) {
+    // SAFETY: it reads and writes `a`, the others and nothing else.
+    unsafe {
+        asm!(
+            "vldmia {constants}, {{s16-s26}}",
+            // its probability, what it is confused with, mean and standard deviation
+            "vldmia {a}, {{s0-s3}}",
+            "vmul.f32 s4, s3, s3",
+            "vadd.f32 s5, s3, s3",
+            "2:",
+            "vldmia {b}, {{s8-s11}}",
+            "vmul.f32 s12, s11, s11",
+            "vadd.f32 s12, s4, s12",
+            "vdiv.f32 s12, s25, s12",
+            "vsub.f32 s13, s2, s10",
+            "vmul.f32 s13, s13, s13",
+            "vmul.f32 s14, s26, s12",
+            "vmul.f32 s13, s13, s14",
+            "vcmp.f32 s13, s16",
+            "vmrs APSR_nzcv, fpscr",
+            "bgt 3f",
+            "vmul.f32 s14, s5, s11",
+            "vmul.f32 s14, s14, s12",
+            "vsqrt.f32 s14, s14",
+            "vmul.f32 s13, s13, s17",
+            "vadd.f32 s12, s13, s18",
+            "vsub.f32 s15, s12, s18",
+            "vsub.f32 s13, s13, s15",
+            "vmul.f32 s15, s19, s13",
+            "vadd.f32 s15, s15, s20",
+            "vmul.f32 s15, s15, s13",
+            "vadd.f32 s15, s15, s21",
+            "vmul.f32 s15, s15, s13",
+            "vadd.f32 s15, s15, s22",
+            "vmul.f32 s15, s15, s13",
+            "vadd.f32 s15, s15, s23",
+            "vmul.f32 s15, s15, s13",
+            "vadd.f32 s15, s15, s24",
+            "vmul.f32 s15, s15, s13",
+            "vadd.f32 s15, s15, s25",
+            "vmov {x}, s12",
+            "vmov {y}, s15",
+            "add {y}, {y}, {x}, lsl #23",
+            "vmov s15, {y}",
+            "vmul.f32 s14, s14, s15",
+            "vmla.f32 s1, s14, s8",
+            "vmla.f32 s9, s14, s0",
+            "vstr s9, [{b}, #4]",
+            "3:",
+            "add {b}, {b}, #{size}",
+            "cmp {b}, {behind}",
+            "bne 2b",
+            "vstr s1, [{a}, #4]",
+            constants = in(reg) &raw const CONFUSE,
+            a = in(reg) a,
+            b = inout(reg) others => _,
+            behind = in(reg) behind,
+            x = out(reg) _,
+            y = out(reg) _,
+            size = const size_of::<Live>(),
+            out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s8") _, out("s9") _,
+            out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _, out("s16") _, out("s17") _,
+            out("s18") _, out("s19") _, out("s20") _, out("s21") _, out("s22") _, out("s23") _, out("s24") _, out("s25") _,
+            out("s26") _,
+            options(nostack),
+        );
+    }
+}
+
+/// Cortex-M4F.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Chip;
+
+impl Kernels for Chip {
+    fn band_energy(taps: &Taps, samples: &[i16]) -> u64 {
+        let sixes = samples.len().saturating_sub(TAPS - 1) / AT_ONCE;
+        let rest = samples.get(sixes * AT_ONCE..).unwrap_or_default();
+        let rest = Plain::band_energy(taps, rest);
+        if sixes == 0 {
+            return rest;
+        }
+        // SAFETY: it reads all pairs and, as `sixes` was computed, no sample that is not there; words need not be aligned.
+        rest + unsafe { tactus_band_energy(taps.pairs().as_ptr(), samples.as_ptr(), sixes) }
+    }
+
+    fn add_frame(window: &[f32; FRAME], frame: &[i16; FRAME], sum: &mut FrameSum) {
+        add_windowed(windowed(window, frame, &mut MaybeUninit::uninit()), sum);
+    }
+
+    fn distances(from: &[i16], means: &[u8], stride: usize, distances: &mut [u64]) {
+        let bytes = 2 * from.len();
+        let there = match means.len().checked_sub(bytes) {
+            Some(rest) if stride >= bytes && stride > 0 => rest / stride + 1,
+            _ => 0,
+        };
+        let many = there.min(distances.len());
+        if many == 0 || from.len() > MAX_FEATURES {
+            return Plain::distances(from, means, stride, distances);
+        }
+        let squares = from.iter().map(|&a| i64::from(a) * i64::from(a));
+        let square = squares.sum::<i64>() as u64;
+        // SAFETY: `many` means were found to be there, and as many distances; words need not be aligned, but distances are.
+        unsafe {
+            tactus_distances(
+                from.as_ptr(),
+                means.as_ptr(),
+                distances.as_mut_ptr(),
+                many,
+                stride,
+                from.len(),
+                square,
+            );
+        }
+    }
+
+    fn candidate_distances(from: &Candidate, others: &mut [Candidate]) {
+        let range = others.as_mut_ptr_range();
+        if !range.is_empty() {
+            // SAFETY: there is one at least, and the others end where it is said.
+            unsafe {
+                tactus_candidates(from.mean.as_ptr(), range.start, from.square, range.end);
+            }
+        }
+    }
+
+    fn confuse(a: &mut Live, others: &mut [Live]) {
+        let others = others.as_mut_ptr_range();
+        if !others.is_empty() {
+            // SAFETY: there is one at least, and the others end where it is said.
+            unsafe { confuse(a, others.start, others.end) };
+        }
+    }
+
+    fn sqrt(x: f32) -> f32 {
+        tactus_sqrt(x)
+    }
+}

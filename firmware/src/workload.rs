@@ -1,0 +1,271 @@
+//! What `cargo xtask bench` counts: the core's functions as the rig calls them, on what the host gives. The emulator's bench
+//! compiles this file too and runs the same with the plain kernels; results must be equal to the bit.
+
+use core::hint::black_box;
+
+use heapless::Vec;
+use tactus_core::explorer::{Config, Explorer, Method};
+use tactus_core::features::{Plan, Properties, PropertySet, Slide};
+use tactus_core::fused::Observation;
+use tactus_core::kernels::Kernels;
+use tactus_core::spectrum::{FRAME, HOP, SpectrumSum};
+use tactus_core::table::{Action, Table};
+use tactus_core::{features::Property, fir::BandPower};
+
+/// Samples of P_AC in the 10 ms after which the rig's probe looks after them.
+const LOOK: usize = 22;
+/// Forces in them: one each tick of the servo's.
+const SHEARS: usize = 10;
+/// Room for textures: the firmware's own, and as many as fit at all.
+const ROOM: usize = tactus_core::wire::MAX_TEXTURES;
+const MOST_ROOM: usize = 2000;
+
+/// What is counted.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Workload {
+    /// What counting itself takes.
+    Nothing,
+    /// Band-pass and mean power of the samples, in parts of 10 ms.
+    BandPower,
+    /// One frame of the spectrum: window, FFT, power accumulated.
+    Frame,
+    /// All features of a slide, in parts of 10 ms.
+    Slide,
+    /// An explorer for a table, with all that is a constant of the table.
+    Begin,
+    /// The first choice.
+    FirstChoice,
+    /// The posterior of a slide.
+    Observe,
+    /// The choice after it.
+    Choice,
+    /// From the last sample of a slide to the next choice.
+    Decision,
+}
+
+impl Workload {
+    /// All, by their codes.
+    pub const ALL: [Self; 9] = [
+        Self::Nothing,
+        Self::BandPower,
+        Self::Frame,
+        Self::Slide,
+        Self::Begin,
+        Self::FirstChoice,
+        Self::Observe,
+        Self::Choice,
+        Self::Decision,
+    ];
+}
+
+/// Counts what something takes.
+pub trait Counter {
+    /// Does it, and counts.
+    fn count<T>(&mut self, work: impl FnOnce() -> T) -> T;
+}
+
+/// A slide that was felt, and the action that looks at it, in words.
+pub struct Felt {
+    /// The method that decides.
+    pub method: Method,
+    /// What is looked at.
+    pub action: Action,
+    /// What was felt.
+    pub slide: Observation,
+}
+
+impl Felt {
+    const METHODS: [Method; 4] = [
+        Method::Paper,
+        Method::Student,
+        Method::StudentAll,
+        Method::Fused,
+    ];
+
+    /// As words, of which there are as many as bands, and a few.
+    pub fn write(&self, mut put: impl FnMut(i16)) {
+        let at = |found: Option<usize>| found.map_or(-1, |at| at as i16);
+        put(at(Self::METHODS.iter().position(|m| *m == self.method)));
+        put(self.action.movement.into());
+        put(at(self.action.property.map(Property::index)));
+        for property in Property::ALL {
+            let bits = self.slide.properties.get(property).unwrap_or(f32::NAN);
+            let bits = bits.to_bits();
+            put(bits as i16);
+            put((bits >> 16) as i16);
+        }
+        put(self.slide.bands.len() as i16);
+        self.slide.bands.iter().for_each(|band| put(*band));
+    }
+
+    /// From words, and what follows them.
+    pub fn read(words: &[i16]) -> Option<(Self, &[i16])> {
+        let (&[method, movement, property], words) = words.split_first_chunk()?;
+        let (values, words) = words.split_first_chunk::<6>()?;
+        let (&bands, words) = words.split_first()?;
+        let (bands, rest) = words.split_at_checked(usize::try_from(bands).ok()?)?;
+        let mut properties = [None; 3];
+        for (property, pair) in properties.iter_mut().zip(values.as_chunks::<2>().0) {
+            let [low, high] = pair.map(|word| u32::from(word as u16));
+            let value = f32::from_bits(high << 16 | low);
+            *property = Some(value).filter(|value| !value.is_nan());
+        }
+        let property = usize::try_from(property).ok();
+        let felt = Self {
+            method: *Self::METHODS.get(usize::try_from(method).ok()?)?,
+            action: Action {
+                movement: u8::try_from(movement).ok()?,
+                property: property.and_then(|at| Property::ALL.get(at).copied()),
+            },
+            slide: Observation {
+                properties: Properties::new(properties),
+                bands: Vec::from_slice(bands).ok()?,
+                pressure: None,
+            },
+        };
+        Some((felt, rest))
+    }
+}
+
+/// Does a workload with the samples or the felt slide in `words`, the background before them, and puts its results; `None` if
+/// they do not make sense.
+pub fn run<K: Kernels>(
+    workload: Workload,
+    plan: &Plan,
+    table: &[u8],
+    words: &[i16],
+    counter: &mut impl Counter,
+    put: &mut impl FnMut(&[u8]),
+) -> Option<()> {
+    match workload {
+        Workload::Nothing => counter.count(|| ()),
+        Workload::BandPower => {
+            let mut power = BandPower::default();
+            let mean = counter.count(|| {
+                for samples in black_box(words).chunks(LOOK) {
+                    power.push::<K>(plan.taps(), samples);
+                }
+                power.mean::<K>(plan.taps())
+            });
+            put(&mean?.to_le_bytes());
+        }
+        Workload::Frame => {
+            let mut spectrum = SpectrumSum::default();
+            let (first, rest) = words.split_at_checked(FRAME - HOP)?;
+            spectrum.push::<K>(plan.window(), first);
+            let frame = rest.get(..HOP)?;
+            counter.count(|| spectrum.push::<K>(plan.window(), black_box(frame)));
+            let psd = spectrum.finish()?;
+            psd.psd().iter().for_each(|p| put(&p.to_le_bytes()));
+        }
+        Workload::Slide => {
+            let mut slide = Slide::<K>::new(plan);
+            slide.set_background(2.0);
+            slide.start(0..words.len() as u32);
+            let felt = counter.count(|| {
+                for samples in black_box(words).chunks(LOOK) {
+                    look(&mut slide, samples);
+                }
+                slide.finish().map(|slide| Observation::from(&slide))
+            });
+            put_observation(&felt.ok()?, put);
+        }
+        _ => {
+            let table = Table::read(table).ok()?;
+            if usize::from(table.textures()) <= ROOM {
+                explore::<K, ROOM>(workload, plan, table, words, counter, put)?;
+            } else {
+                explore::<K, MOST_ROOM>(workload, plan, table, words, counter, put)?;
+            }
+        }
+    }
+    Some(())
+}
+
+// a frame of its own: that of the larger room would not fit beside anything else
+#[inline(never)]
+fn explore<K: Kernels, const N: usize>(
+    workload: Workload,
+    plan: &Plan,
+    table: Table<'_>,
+    words: &[i16],
+    counter: &mut impl Counter,
+    put: &mut impl FnMut(&[u8]),
+) -> Option<()> {
+    let (felt, samples) = Felt::read(words)?;
+    let config = Config {
+        method: felt.method,
+        ..Config::default()
+    };
+    let begin = || Explorer::<N, K>::new(table, PropertySet::ALL, config);
+    let mut explorer = if workload == Workload::Begin {
+        counter.count(begin).ok()?
+    } else {
+        begin().ok()?
+    };
+    let choose = |explorer: &Explorer<'_, N, K>| {
+        let mut outlook = Vec::new();
+        explorer.look_out(&mut outlook);
+        black_box(explorer.choose(black_box(&outlook), 0))
+    };
+    let chosen = match workload {
+        Workload::FirstChoice => Some(counter.count(|| choose(black_box(&explorer)))),
+        Workload::Observe => {
+            let slide = black_box(&felt.slide);
+            let done = counter.count(|| explorer.observe(felt.action, slide));
+            done.ok()?;
+            None
+        }
+        Workload::Choice => {
+            explorer.observe(felt.action, &felt.slide).ok()?;
+            Some(counter.count(|| choose(black_box(&explorer))))
+        }
+        Workload::Decision => {
+            let mut slide = Slide::<K>::new(plan);
+            slide.set_background(2.0);
+            slide.start(0..samples.len() as u32);
+            let (last, before) = samples.split_last()?;
+            slide.push(before);
+            let decided = counter.count(|| {
+                slide.push(&[*last]);
+                let measured = slide.finish().map(|slide| Observation::from(&slide));
+                // the posterior is of the other slide, which leaves as many textures as are wanted
+                let seen = explorer.observe(felt.action, black_box(&felt.slide));
+                (measured, seen, explorer.verdict(), choose(&explorer))
+            });
+            let (measured, seen, _, chosen) = decided;
+            seen.ok()?;
+            put_observation(&measured.ok()?, put);
+            Some(chosen)
+        }
+        _ => None,
+    };
+    for p in explorer.posterior() {
+        put(&p.to_le_bytes());
+    }
+    let log_odds = explorer.log_odds().unwrap_or(f32::NAN);
+    put(&log_odds.to_bits().to_le_bytes());
+    let action = chosen.unwrap_or_else(|| choose(&explorer));
+    put(&[action.movement]);
+    for promise in &explorer.outlook() {
+        put(&promise.uncertainty.to_le_bytes());
+        put(&promise.benefit.to_le_bytes());
+    }
+    Some(())
+}
+
+/// 10 ms of a slide, with the tangential force of each ms, as the rig's probe gives them.
+fn look<K: Kernels>(slide: &mut Slide<'_, K>, samples: &[i16]) {
+    for _ in 0..SHEARS {
+        slide.push_shear(&[700]);
+    }
+    slide.push(samples);
+}
+
+fn put_observation(felt: &Observation, put: &mut impl FnMut(&[u8])) {
+    for property in Property::ALL {
+        let value = felt.properties.get(property).unwrap_or(f32::NAN);
+        put(&value.to_le_bytes());
+    }
+    felt.bands.iter().for_each(|band| put(&band.to_le_bytes()));
+}

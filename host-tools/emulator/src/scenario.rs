@@ -1,0 +1,254 @@
+//! Plays scenarios for the handheld probe, those in `scenarios/` and others: see [`tactus::scenario`].
+//!
+//! The person sees the display and nothing else, as it is decoded from the bytes on the wire.
+
+use std::path::Path;
+
+use tactus::scenario::{InvalidScenario, PATIENCE_S, Scenario, Step, texture};
+use tactus::sim::faults::Fault;
+use tactus::sim::hand::Hand;
+use tactus::sim::world::NotLifted;
+
+use crate::board::{Emulator, Error, Options};
+use crate::rig::Output;
+
+/// How often the person looks, ns.
+const LOOK_NS: u64 = 20_000_000;
+/// What the display says when it wants a slide, and when it wants none any more.
+const SLIDE: &str = "5 cm in 2 s";
+const OVER: &str = "next";
+
+/// Why a scenario did not come out as it says.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlayError {
+    /// A texture that is none.
+    #[error(transparent)]
+    Texture(#[from] InvalidScenario),
+    /// The emulator.
+    #[error(transparent)]
+    Emulator(#[from] Error),
+    /// A sample cannot be changed.
+    #[error(transparent)]
+    NotLifted(#[from] NotLifted),
+    /// A step did not come out.
+    #[error("step {number}, at {at_s:.2} s: {what}. The display:\n{display}")]
+    Step {
+        /// Which, from 1.
+        number: usize,
+        /// When, s of virtual time.
+        at_s: f64,
+        /// What was wrong.
+        what: String,
+        /// What was seen.
+        display: String,
+    },
+}
+
+/// Plays a scenario on a board with this ELF, which may hold a store from before. Gives the board as it is in the end.
+///
+/// # Errors
+/// See [`PlayError`].
+pub fn play(
+    scenario: &Scenario,
+    elf: &Path,
+    store: Option<Vec<u8>>,
+) -> Result<Emulator, PlayError> {
+    let mut played = Played {
+        scenario,
+        elf,
+        texture: texture(&scenario.texture)?,
+        starts: 0,
+        board: None,
+    };
+    played.power_up(store)?;
+    for (step, number) in scenario.step.iter().zip(1..) {
+        let done = played.act(step)?;
+        if let Err(what) = done {
+            return Err(PlayError::Step {
+                number,
+                at_s: played.board().now_ns() as f64 * 1e-9,
+                what,
+                display: played.seen(),
+            });
+        }
+    }
+    Ok(played.board.take().expect("it was switched on"))
+}
+
+/// A scenario on a board.
+struct Played<'s> {
+    scenario: &'s Scenario,
+    elf: &'s Path,
+    texture: u8,
+    /// How often the board was switched on: every time is another trial.
+    starts: u64,
+    board: Option<Emulator>,
+}
+
+/// What a step comes to: what was wrong.
+type Done = Result<Result<(), String>, PlayError>;
+
+impl Played<'_> {
+    fn board(&mut self) -> &mut Emulator {
+        self.board.as_mut().expect("it was switched on")
+    }
+
+    fn power_up(&mut self, store: Option<Vec<u8>>) -> Result<(), PlayError> {
+        let setup = self.scenario.setup(self.texture, self.starts);
+        self.starts += 1;
+        let options = Options {
+            store,
+            ..Options::default()
+        };
+        let board = Emulator::start(self.elf, setup, options)?;
+        let manner = self.scenario.hand.into();
+        board
+            .rig()
+            .world()
+            .hold(Hand::new(setup.trial_seed, manner));
+        self.board = Some(board);
+        Ok(())
+    }
+
+    fn intend(&mut self, force_n: f64, pace_mm_s: f64) {
+        if let Some(hand) = self.board().rig().world().hand() {
+            hand.intend(force_n, pace_mm_s);
+        }
+    }
+
+    /// Looks until it is so.
+    fn until(
+        &mut self,
+        within_s: f64,
+        seen: impl Fn(&crate::Display) -> bool,
+    ) -> Result<bool, Error> {
+        let limit_ns = self.board().now_ns() + (within_s * 1e9) as u64;
+        self.board()
+            .run_to(limit_ns, LOOK_NS, |rig| seen(rig.display()))
+    }
+
+    fn run_s(&mut self, seconds: f64) -> Result<(), Error> {
+        self.board().run_ms((seconds * 1e3) as u64)
+    }
+
+    fn slide(&mut self, force_n: f64, pace_mm_s: f64, seconds: f64) -> Done {
+        self.intend(force_n, 0.0);
+        if !self.until(PATIENCE_S, |display| display.shows(SLIDE))? {
+            return Ok(Err("the display does not want a slide".into()));
+        }
+        self.board().run_ms(Step::REACTION_MS)?;
+        self.intend(force_n, pace_mm_s);
+        self.run_s(seconds)?;
+        self.intend(force_n, 0.0);
+        self.run_s(Step::HELD_S)?;
+        self.intend(0.0, 0.0);
+        self.run_s(Step::LIFTED_S)?;
+        Ok(Ok(()))
+    }
+
+    fn act(&mut self, step: &Step) -> Done {
+        let shows =
+            |display: &crate::Display, text: &[String]| text.iter().all(|text| display.shows(text));
+        match step {
+            Step::Note { .. } => {}
+            Step::See { text, within_s } => {
+                if !self.until(*within_s, |display| shows(display, text))? {
+                    return Ok(Err(format!("{text:?} is not seen within {within_s} s")));
+                }
+            }
+            Step::Miss { text } => {
+                let rig = self.board().rig();
+                if let Some(text) = text.iter().find(|text| rig.display().shows(text)) {
+                    return Ok(Err(format!("{text:?} is seen")));
+                }
+            }
+            Step::Dark { within_s } => {
+                if !self.until(*within_s, |display| display.picture().is_none())? {
+                    return Ok(Err("the display is not off".into()));
+                }
+            }
+            Step::Hear { hz } => {
+                let now_ns = self.board().now_ns();
+                let rig = self.board().rig();
+                let heard: Vec<u32> = rig
+                    .trace()
+                    .filter(|(at_ns, _)| at_ns + 2_000_000_000 > now_ns)
+                    .filter_map(|(_, output)| match output {
+                        Output::Buzzer(tone) => *tone,
+                        _ => None,
+                    })
+                    .collect();
+                if !heard.iter().any(|tone| tone.abs_diff(*hz) * 50 <= *hz) {
+                    return Ok(Err(format!("{hz} Hz are not heard, but {heard:?}")));
+                }
+            }
+            Step::Hand { force_n, pace_mm_s } => self.intend(*force_n, *pace_mm_s),
+            Step::Slide {
+                force_n,
+                pace_mm_s,
+                seconds,
+            } => return self.slide(*force_n, *pace_mm_s, *seconds),
+            Step::Explore {
+                force_n,
+                pace_mm_s,
+                slides,
+            } => {
+                for _ in 0..*slides {
+                    if let Err(what) = self.slide(*force_n, *pace_mm_s, Step::EXPLORED_S)? {
+                        return Ok(Err(what));
+                    }
+                    if self.until(Step::VERDICT_S, |display| display.shows(OVER))? {
+                        return Ok(Ok(()));
+                    }
+                }
+                return Ok(Err(format!("{slides} slides were not enough")));
+            }
+            Step::Press { ms, times } => {
+                for _ in 0..*times {
+                    self.board().press(true)?;
+                    self.board().run_ms(*ms)?;
+                    self.board().press(false)?;
+                    self.board().run_ms(Step::RELEASED_MS)?;
+                }
+            }
+            Step::Wait { seconds } => self.run_s(*seconds)?,
+            Step::Place { texture } => {
+                self.texture = self::texture(texture)?;
+                let texture = self.texture;
+                self.board().rig().world().place(texture)?;
+            }
+            Step::PowerCycle => {
+                let store = self.board().store()?;
+                // one board at a time
+                self.board = None;
+                self.power_up(Some(store))?;
+            }
+            Step::Sensor { plugged: false } => self.board().inject(Fault::SensorUnplugged),
+            Step::Sensor { plugged: true } => self.board().rig().world().clear(),
+            Step::Display { plugged } => self.board().rig().display_mut().plug(*plugged),
+        }
+        Ok(Ok(()))
+    }
+
+    /// The display in letters: two rows of points in each.
+    fn seen(&mut self) -> String {
+        let rig = self.board().rig();
+        let Some(picture) = rig.display().picture() else {
+            return "(off)".into();
+        };
+        let mut text = String::new();
+        for y in (0..64).step_by(2) {
+            text.extend(
+                (0..128).map(|x| match (picture.is_lit(x, y), picture.is_lit(x, y + 1)) {
+                    (true, true) => '█',
+                    (true, false) => '▀',
+                    (false, true) => '▄',
+                    (false, false) => ' ',
+                }),
+            );
+            text.push('\n');
+        }
+        text
+    }
+}

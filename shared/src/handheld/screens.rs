@@ -1,0 +1,649 @@
+//! What the display shows, and how it is drawn: the same on chip and PC.
+//!
+//! The display is 22 mm wide and read at arm's length: nothing is smaller than 6 x 10 points, and what matters is twice
+//! that. A line on top says where one is; a line at the bottom what the button does.
+
+use core::fmt::Write as _;
+
+use embedded_graphics::Drawable;
+use embedded_graphics::draw_target::DrawTarget;
+use embedded_graphics::geometry::{Point, Size};
+use embedded_graphics::mono_font::ascii::{FONT_6X10, FONT_7X13_BOLD, FONT_10X20};
+use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
+use embedded_graphics::pixelcolor::BinaryColor;
+use embedded_graphics::primitives::Rectangle;
+use embedded_graphics::text::{Alignment, Baseline, Text as Writing, TextStyleBuilder};
+use heapless::{String, Vec};
+
+use super::touch::{Again, Phase, View, ZONE_MN};
+use super::{LEADING, Trouble};
+use crate::wire::Name;
+
+pub use super::spelling::{Place, WHEEL};
+
+/// Entries of a list that are shown at once.
+pub const LINES: usize = 4;
+/// The bar's end, mN.
+const BAR_MN: f32 = 1200.0;
+const WIDTH: i32 = super::picture::WIDTH as i32;
+const MIDDLE: i32 = WIDTH / 2;
+
+/// A texture and its probability.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Row<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// 0 to 1.
+    pub probability: f32,
+}
+
+/// A line of the list of names.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Entry<'a> {
+    /// A texture of the table.
+    Known(&'a str),
+    /// A new one, with this name.
+    Numbered(Name),
+    /// A new one, to be spelled.
+    Spell,
+    /// None.
+    Nothing,
+}
+
+/// What the page about the probe says.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct About {
+    /// Version of the firmware.
+    pub version: &'static str,
+    /// Share of time that the core was awake while the sensor's words were wanted, 0 to 1.
+    pub awake: Option<f32>,
+    /// The same while they were not.
+    pub awake_at_rest: Option<f32>,
+    /// Sensor slots that came too late.
+    pub late: u32,
+    /// Words that were lost.
+    pub lost: u32,
+}
+
+/// What the display shows.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Screen<'a> {
+    /// The finger is to be held in the air: P_DC's zero is taken.
+    Air,
+    /// A visit may begin.
+    Ready {
+        /// Textures that are known.
+        textures: u16,
+    },
+    /// The finger is to be pressed.
+    Press {
+        /// The slide it is for.
+        slide: u8,
+        /// How many there can be.
+        of: u8,
+        /// Contact force, mN.
+        force_mn: f32,
+        /// It is down.
+        down: bool,
+    },
+    /// The finger is to be slid, or slides.
+    Slide {
+        /// As in `Press`.
+        slide: u8,
+        /// As in `Press`.
+        of: u8,
+        /// As in `Press`.
+        force_mn: f32,
+        /// How much is done, 0 to 1; `None` before it begins.
+        progress: Option<f32>,
+    },
+    /// A slide was no good.
+    Again {
+        /// Why.
+        why: Again,
+        /// The finger is still down.
+        lift: bool,
+    },
+    /// The slides are compared.
+    Thinking {
+        /// How many.
+        slide: u8,
+    },
+    /// What it is.
+    Verdict {
+        /// The leading candidates.
+        rows: Vec<Row<'a>, LEADING>,
+        /// The first one is 99 % sure.
+        sure: bool,
+    },
+    /// It is none of those known.
+    Unknown {
+        /// What it is most like.
+        like: Vec<Row<'a>, LEADING>,
+    },
+    /// What is it?
+    Choose {
+        /// Which is chosen.
+        at: u16,
+        /// How many there are.
+        count: u16,
+        /// Those about it.
+        entries: Vec<Entry<'a>, LINES>,
+    },
+    /// A name is spelled.
+    Spell {
+        /// So far.
+        text: &'a str,
+        /// The letters about the one that is taken next, in the middle.
+        wheel: [Place; WHEEL],
+    },
+    /// The table is written.
+    Saving,
+    /// What was learned, or why nothing was.
+    Taught(Result<&'a Name, &'a str>),
+    /// What keeps the probe from working.
+    Fault(&'a Trouble),
+    /// The probe.
+    About(About),
+    /// Nothing: the display is off.
+    Dark,
+}
+
+impl Screen<'_> {
+    /// The screen of a touch that is for slide `slide` of at most `of`.
+    pub fn touching(view: &View, slide: u8, of: u8) -> Self {
+        let force_mn = view.force_mn;
+        match view.phase {
+            Phase::Slide | Phase::Sliding => Self::Slide {
+                slide,
+                of,
+                force_mn,
+                progress: (view.phase == Phase::Sliding).then_some(view.progress),
+            },
+            phase => Self::Press {
+                slide,
+                of,
+                force_mn,
+                down: phase != Phase::Air,
+            },
+        }
+    }
+}
+
+/// The first entry that is shown of a list, so that the chosen one is.
+pub fn first_line(at: u16, count: u16) -> u16 {
+    let lines = LINES as u16;
+    at.saturating_sub(1).min(count.saturating_sub(lines))
+}
+
+/// The brush: errors are the display's.
+struct Brush<'d, D>(&'d mut D);
+
+type Done<D> = Result<(), <D as DrawTarget>::Error>;
+
+fn ink(inverted: bool) -> BinaryColor {
+    if inverted {
+        BinaryColor::Off
+    } else {
+        BinaryColor::On
+    }
+}
+
+/// `text`, cut to so many letters, two points in place of what is missing.
+fn cut(text: &str, most: usize) -> String<40> {
+    let letters = text.chars().count();
+    let mut cut = String::new();
+    let kept = if letters > most {
+        most.saturating_sub(2)
+    } else {
+        letters
+    };
+    // 40 letters are more than any line has
+    text.chars().take(kept).all(|c| cut.push(c).is_ok());
+    if letters > most {
+        let _ = cut.push_str("..");
+    }
+    cut
+}
+
+impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
+    fn write(
+        &mut self,
+        text: &str,
+        at: Point,
+        font: &MonoFont<'_>,
+        alignment: Alignment,
+        inverted: bool,
+    ) -> Done<D> {
+        let style = TextStyleBuilder::new()
+            .alignment(alignment)
+            .baseline(Baseline::Top)
+            .build();
+        let character = MonoTextStyle::new(font, ink(inverted));
+        Writing::with_text_style(text, at, character, style).draw(self.0)?;
+        Ok(())
+    }
+
+    fn left(&mut self, text: &str, x: i32, y: i32) -> Done<D> {
+        self.write(text, Point::new(x, y), &FONT_6X10, Alignment::Left, false)
+    }
+
+    fn centre(&mut self, text: &str, y: i32, font: &MonoFont<'_>) -> Done<D> {
+        self.write(text, Point::new(MIDDLE, y), font, Alignment::Center, false)
+    }
+
+    /// In the middle, in the largest of three fonts that it fits.
+    fn headline(&mut self, text: &str, y: i32) -> Done<D> {
+        match text.chars().count() {
+            0..=12 => self.centre(text, y, &FONT_10X20),
+            13..=18 => self.centre(text, y + 3, &FONT_7X13_BOLD),
+            _ => self.centre(&cut(text, 21), y + 5, &FONT_6X10),
+        }
+    }
+
+    fn fill(&mut self, x: i32, y: i32, width: i32, height: i32, inverted: bool) -> Done<D> {
+        let size = Size::new(width.max(0) as u32, height.max(0) as u32);
+        let area = Rectangle::new(Point::new(x, y), size);
+        self.0.fill_solid(&area, ink(inverted))
+    }
+
+    /// A frame one point wide, without its corners.
+    fn frame(&mut self, x: i32, y: i32, width: i32, height: i32) -> Done<D> {
+        for y in [y, y + height - 1] {
+            self.fill(x + 1, y, width - 2, 1, false)?;
+        }
+        for x in [x, x + width - 1] {
+            self.fill(x, y + 1, 1, height - 2, false)?;
+        }
+        Ok(())
+    }
+
+    fn disc(&mut self, x: i32, y: i32, radius: i32, inverted: bool) -> Done<D> {
+        for up in -radius..=radius {
+            let most = radius * radius + radius / 2 - up * up;
+            let half = (0..=radius).rev().find(|half| half * half <= most);
+            if let Some(half) = half {
+                self.fill(x - half, y + up, 2 * half + 1, 1, inverted)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A triangle on its point, or on its base, of this height; twice as wide but for a point.
+    fn triangle(&mut self, x: i32, y: i32, height: i32, on_base: bool) -> Done<D> {
+        for row in 0..height {
+            let half = if on_base { row } else { height - 1 - row };
+            self.fill(x - half, y + row, 2 * half + 1, 1, false)?;
+        }
+        Ok(())
+    }
+
+    /// Where one is.
+    fn title(&mut self, title: &str, right: &str) -> Done<D> {
+        self.fill(0, 0, WIDTH, 12, false)?;
+        self.write(title, Point::new(3, 1), &FONT_6X10, Alignment::Left, true)?;
+        let at = Point::new(WIDTH - 3, 1);
+        self.write(right, at, &FONT_6X10, Alignment::Right, true)
+    }
+
+    /// What the button does: pressed, and held.
+    fn button(&mut self, press: &str, hold: &str) -> Done<D> {
+        if !press.is_empty() {
+            self.disc(4, 59, 2, false)?;
+            self.fill(3, 58, 3, 3, true)?;
+            self.left(press, 10, 54)?;
+        }
+        if !hold.is_empty() {
+            let width = 6 * hold.chars().count() as i32;
+            let x = WIDTH - 2 - width - 11;
+            self.fill(x, 58, 8, 3, false)?;
+            self.left(hold, x + 11, 54)?;
+        }
+        Ok(())
+    }
+
+    /// The force, and where it is to be.
+    fn force(&mut self, force_mn: f32, y: i32) -> Done<D> {
+        const INSIDE: i32 = WIDTH - 4;
+        let x = |mn: f32| 2 + (INSIDE as f32 * (mn / BAR_MN).clamp(0.0, 1.0)) as i32;
+        self.frame(0, y, WIDTH, 12)?;
+        self.fill(2, y + 2, x(force_mn) - 2, 8, false)?;
+        let (low, high) = (x(*ZONE_MN.start()), x(*ZONE_MN.end()));
+        for edge in [low, high] {
+            // posts that stand out above and below, and from the bar
+            self.fill(edge - 2, y + 1, 4, 10, true)?;
+            self.fill(edge - 1, y - 4, 2, 20, false)?;
+        }
+        self.fill(low, y - 4, high - low, 1, false)
+    }
+
+    /// The three leading textures.
+    fn rows(&mut self, rows: &[Row<'_>], y: i32) -> Done<D> {
+        for (row, y) in rows.iter().zip((y..).step_by(11)) {
+            self.left(&cut(row.name, 11), 0, y)?;
+            let p = row.probability.clamp(0.0, 1.0);
+            self.fill(69, y + 8, 32, 1, false)?;
+            self.fill(69, y + 2, (32.0 * p) as i32, 7, false)?;
+            let at = Point::new(WIDTH, y);
+            self.write(&percent(p), at, &FONT_6X10, Alignment::Right, false)?;
+        }
+        Ok(())
+    }
+}
+
+/// Whole percents; what is not all is not 100, and what is not nothing not 0.
+fn percent(p: f32) -> String<8> {
+    let mut text = String::new();
+    // eight letters are enough
+    let _ = if p > 0.995 && p < 1.0 {
+        text.push_str(">99%")
+    } else if p > 0.0 && p < 0.005 {
+        text.push_str("<1%")
+    } else {
+        write!(text, "{}%", libm::roundf(100.0 * p) as u8).map_err(|_| Default::default())
+    };
+    text
+}
+
+/// Writes a short text.
+fn say(text: core::fmt::Arguments<'_>) -> String<40> {
+    let mut said = String::new();
+    // cut off where it is too long
+    let _ = said.write_fmt(text);
+    said
+}
+
+/// Draws a screen onto a dark display.
+///
+/// # Errors
+/// The display's.
+pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &mut D) -> Done<D> {
+    let brush = &mut Brush(display);
+    match screen {
+        Screen::Dark => Ok(()),
+        Screen::Air => {
+            brush.title("Tactus", "")?;
+            brush.centre("Hold it", 18, &FONT_10X20)?;
+            brush.centre("in the air", 38, &FONT_10X20)
+        }
+        Screen::Ready { textures } => ready(brush, *textures),
+        Screen::Press {
+            slide,
+            of,
+            force_mn,
+            down,
+        } => {
+            brush.title("Press", &say(format_args!("slide {slide} of {of}")))?;
+            let order = match *force_mn {
+                _ if !down => "Press",
+                mn if mn < *ZONE_MN.start() => "Harder",
+                mn if mn > *ZONE_MN.end() => "Lighter",
+                _ => "Hold still",
+            };
+            brush.centre(order, 15, &FONT_10X20)?;
+            brush.force(*force_mn, 42)
+        }
+        Screen::Slide {
+            slide,
+            of,
+            force_mn,
+            progress,
+        } => {
+            brush.title("Slide", &say(format_args!("slide {slide} of {of}")))?;
+            pace(brush, *progress)?;
+            brush.force(*force_mn, 48)
+        }
+        Screen::Again { why, lift } => {
+            brush.title("Again", "")?;
+            brush.headline(why.why(), 17)?;
+            let (first, second) = match why {
+                Again::TooHard | Again::TooLight => ("Keep the bar", "between the posts"),
+                Again::TooShort => ("Slide on until", "the bar is full"),
+                Again::TooUneven => ("Slide at one pace,", "as the bar fills"),
+                Again::Disturbed => ("A sample was lost", ""),
+            };
+            if *lift {
+                return brush.centre("Lift the finger", 46, &FONT_7X13_BOLD);
+            }
+            brush.centre(first, 40, &FONT_6X10)?;
+            brush.centre(second, 51, &FONT_6X10)
+        }
+        Screen::Thinking { slide } => {
+            brush.title("Thinking", &say(format_args!("slide {slide}")))?;
+            for (x, radius) in [(44, 4), (64, 6), (84, 4)] {
+                brush.disc(x, 38, radius, false)?;
+            }
+            Ok(())
+        }
+        Screen::Verdict { rows, sure } => {
+            let name = rows.first().map_or("?", |row| row.name);
+            if *sure {
+                brush.headline(name, -1)?;
+            } else {
+                brush.headline(&say(format_args!("{}?", cut(name, 20))), -1)?;
+            }
+            brush.rows(rows, 20)?;
+            brush.button("next", "teach")
+        }
+        Screen::Unknown { like } => {
+            brush.headline("Unknown", -1)?;
+            brush.left("none of those known,", 1, 19)?;
+            brush.left("most like", 1, 30)?;
+            let name = like.first().map_or("?", |row| row.name);
+            brush.left(&cut(name, 20), 7, 41)?;
+            brush.button("next", "teach")
+        }
+        Screen::Choose { at, count, entries } => choose(brush, *at, *count, entries),
+        Screen::Spell { text, wheel } => spell(brush, text, wheel),
+        Screen::Saving => {
+            brush.title("Teach", "")?;
+            brush.headline("Learning", 18)?;
+            brush.centre("Leave it on", 42, &FONT_6X10)
+        }
+        Screen::Taught(Ok(name)) => {
+            brush.title("Learned", "")?;
+            brush.headline(name, 16)?;
+            // a tick
+            for step in 0..=7 {
+                brush.fill(54 + step, 48 + step, 1, 3, false)?;
+            }
+            for step in 0..=14 {
+                brush.fill(61 + step, 55 - step, 1, 3, false)?;
+            }
+            Ok(())
+        }
+        Screen::Taught(Err(why)) => {
+            brush.title("Not learned", "")?;
+            paragraph(brush, why, 14, 4)?;
+            brush.button("go on", "")
+        }
+        Screen::Fault(trouble) => fault(brush, trouble),
+        Screen::About(about) => about_probe(brush, about),
+    }
+}
+
+fn ready<D: DrawTarget<Color = BinaryColor>>(brush: &mut Brush<'_, D>, textures: u16) -> Done<D> {
+    brush.title("Tactus", &say(format_args!("{textures} textures")))?;
+    // a finger on a surface
+    brush.fill(8, 16, 21, 17, false)?;
+    brush.disc(18, 32, 10, false)?;
+    brush.fill(10, 16, 17, 17, true)?;
+    brush.disc(18, 32, 8, true)?;
+    brush.fill(0, 44, 40, 1, false)?;
+    for (x, step) in (0..40)
+        .step_by(8)
+        .flat_map(|x| (0..4).map(move |step| (x, step)))
+    {
+        brush.fill(x + step, 49 - step, 1, 1, false)?;
+    }
+    let at = |y| Point::new(44, y);
+    brush.write("Press", at(13), &FONT_10X20, Alignment::Left, false)?;
+    brush.write("and hold", at(31), &FONT_10X20, Alignment::Left, false)?;
+    brush.button("about", "teach")
+}
+
+/// How far the slide is, and how far it ought to be: 5 cm while the bar fills.
+fn pace<D: DrawTarget<Color = BinaryColor>>(
+    brush: &mut Brush<'_, D>,
+    progress: Option<f32>,
+) -> Done<D> {
+    let Some(progress) = progress else {
+        brush.centre("Slide", 12, &FONT_10X20)?;
+        return brush.centre("5 cm in 2 s", 31, &FONT_6X10);
+    };
+    let end = 10 + (107.0 * progress.clamp(0.0, 1.0)) as i32;
+    brush.fill(0, 26, WIDTH, 3, false)?;
+    // centimetres
+    for x in (4..=124).step_by(24) {
+        brush.fill(x, 29, 1, 5, false)?;
+    }
+    // the finger's place
+    brush.triangle(end, 14, 11, false)?;
+    brush.left("on, on", if end > 60 { 4 } else { 84 }, 14)
+}
+
+fn choose<D: DrawTarget<Color = BinaryColor>>(
+    brush: &mut Brush<'_, D>,
+    at: u16,
+    count: u16,
+    entries: &[Entry<'_>],
+) -> Done<D> {
+    let place = say(format_args!("{} of {count}", at.saturating_add(1)));
+    brush.title("What is it?", &place)?;
+    let first = first_line(at, count);
+    for ((entry, number), y) in entries.iter().zip(first..).zip((13..).step_by(10)) {
+        let chosen = number == at;
+        if chosen {
+            brush.fill(0, y - 1, WIDTH, 10, false)?;
+        }
+        let text = match entry {
+            Entry::Known(name) => cut(name, 21),
+            Entry::Numbered(name) => say(format_args!("new: {name}")),
+            Entry::Spell => say(format_args!("new: spell it")),
+            Entry::Nothing => say(format_args!("nothing, go back")),
+        };
+        let place = Point::new(1, y - 1);
+        brush.write(&text, place, &FONT_6X10, Alignment::Left, chosen)?;
+    }
+    brush.button("next", "take")
+}
+
+fn spell<D: DrawTarget<Color = BinaryColor>>(
+    brush: &mut Brush<'_, D>,
+    text: &str,
+    wheel: &[Place; WHEEL],
+) -> Done<D> {
+    brush.title("Spell it", "")?;
+    brush.write(
+        text,
+        Point::new(1, 15),
+        &FONT_7X13_BOLD,
+        Alignment::Left,
+        false,
+    )?;
+    let cursor = 1 + 7 * text.chars().count() as i32;
+    brush.fill(cursor, 29, 6.min(WIDTH - cursor), 2, false)?;
+    for (place, n) in wheel.iter().zip(0..) {
+        let chosen = n == WHEEL as i32 / 2;
+        let x = MIDDLE + (n - WHEEL as i32 / 2) * 19;
+        if chosen {
+            brush.fill(x - 10, 33, 20, 20, false)?;
+        }
+        let mut letter: String<4> = String::new();
+        let (text, font, y) = match place {
+            Place::Done => ("OK", &FONT_7X13_BOLD, 36),
+            Place::Rub => ("<-", &FONT_7X13_BOLD, 36),
+            Place::Letter(' ') => ("_", &FONT_10X20, 32),
+            Place::Letter(c) => {
+                // a letter fits
+                let _ = letter.push(*c);
+                (letter.as_str(), &FONT_10X20, 33)
+            }
+        };
+        brush.write(text, Point::new(x, y), font, Alignment::Center, chosen)?;
+    }
+    brush.button("next", "take")
+}
+
+fn fault<D: DrawTarget<Color = BinaryColor>>(
+    brush: &mut Brush<'_, D>,
+    trouble: &Trouble,
+) -> Done<D> {
+    brush.title("Fault", "")?;
+    let (what, first, second) = match trouble {
+        Trouble::Silent => ("No sensor", "Check its cable", "and its power"),
+        Trouble::Frozen => ("Sensor hangs", "Switch it off", "and on again"),
+        Trouble::Memory(why) => {
+            paragraph(brush, why, 14, 4)?;
+            return brush.button("go on", "");
+        }
+    };
+    brush.triangle(12, 16, 13, true)?;
+    brush.fill(11, 19, 3, 5, true)?;
+    brush.fill(11, 26, 3, 2, true)?;
+    let at = Point::new(28, 19);
+    brush.write(what, at, &FONT_7X13_BOLD, Alignment::Left, false)?;
+    brush.centre(first, 41, &FONT_6X10)?;
+    brush.centre(second, 52, &FONT_6X10)
+}
+
+fn about_probe<D: DrawTarget<Color = BinaryColor>>(
+    brush: &mut Brush<'_, D>,
+    about: &About,
+) -> Done<D> {
+    brush.title("About", &say(format_args!("Tactus {}", about.version)))?;
+    brush.left("Core awake", 1, 14)?;
+    let share = |p: Option<f32>| match p {
+        // whole numbers: code to write others takes 9 kB
+        Some(p) => {
+            let tenths = libm::roundf(1000.0 * p) as u32;
+            say(format_args!("{}.{} %", tenths / 10, tenths % 10))
+        }
+        None => say(format_args!("-")),
+    };
+    brush.left("listening", 7, 24)?;
+    let right = |y| Point::new(WIDTH, y);
+    let (font, side) = (&FONT_6X10, Alignment::Right);
+    brush.write(&share(about.awake), right(24), font, side, false)?;
+    brush.left("at rest", 7, 34)?;
+    brush.write(&share(about.awake_at_rest), right(34), font, side, false)?;
+    let slots = say(format_args!("late {}, lost {}", about.late, about.lost));
+    brush.left("Slots", 1, 44)?;
+    brush.write(&cut(&slots, 15), right(44), font, side, false)?;
+    brush.button("go on", "")
+}
+
+/// A sentence over so many lines, broken at blanks.
+fn paragraph<D: DrawTarget<Color = BinaryColor>>(
+    brush: &mut Brush<'_, D>,
+    text: &str,
+    y: i32,
+    lines: usize,
+) -> Done<D> {
+    const LETTERS: usize = 21;
+    let mut line: String<LETTERS> = String::new();
+    let mut at = (y..).step_by(10).take(lines);
+    for word in text.split(' ') {
+        let blank = usize::from(!line.is_empty());
+        if line.len() + blank + word.len() > LETTERS && !line.is_empty() {
+            let Some(y) = at.next() else {
+                return Ok(());
+            };
+            brush.left(&line, 1, y)?;
+            line.clear();
+        }
+        if !line.is_empty() {
+            // there is room, as was looked at
+            let _ = line.push(' ');
+        }
+        let word = cut(word, LETTERS);
+        word.chars().all(|c| line.push(c).is_ok());
+    }
+    match at.next() {
+        Some(y) => brush.left(&line, 1, y),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests;

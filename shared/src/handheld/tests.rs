@@ -1,0 +1,342 @@
+//! The probe's states, whatever happens to them; with made-up slides, since touches have tests of their own.
+
+use super::picture::Picture;
+use super::screens::draw;
+use super::*;
+use crate::kernels::Plain;
+use crate::pressure::{Channel, Counts};
+use crate::session::Random;
+use crate::table::tests::{fused_of, known, straight};
+use proptest::prelude::*;
+use proptest::strategy::Strategy;
+use std::vec;
+use std::vec::Vec as List;
+
+/// Four textures far apart, of all the features that a handheld has.
+fn table() -> List<u8> {
+    let textures: List<_> = (0..4)
+        .map(|texture| {
+            let mut mean = [0.0; 14];
+            mean[texture] = 12.0;
+            vec![known(5, &mean)]
+        })
+        .collect();
+    fused_of(FEATURES, &[straight(14)], &textures)
+}
+
+/// A slide that feels like one of them; `None`: like none, as far from each as they are from each other.
+fn slide(texture: Option<usize>) -> Observation {
+    let mut features = [0; 14];
+    match texture {
+        Some(texture) => features[texture] = 12 * 1024,
+        None => features[..4].fill(12 * 1024),
+    }
+    Observation {
+        pressure: Some([features[0], features[1]]),
+        bands: Vec::from_slice(&features[2..]).unwrap(),
+        ..Observation::default()
+    }
+}
+
+/// A probe, its table, and what was taught.
+struct Bench<'p> {
+    probe: Handheld<'p, Plain>,
+    table: List<u8>,
+    taught: List<(Choice, u8)>,
+    visited: Option<Visited>,
+}
+
+impl<'p> Bench<'p> {
+    fn new(plan: &'p Plan) -> Self {
+        Self {
+            probe: Handheld::new(plan, 4),
+            table: table(),
+            taught: List::new(),
+            visited: None,
+        }
+    }
+
+    fn work(&mut self) {
+        let table = Table::read(&self.table).unwrap();
+        match self.probe.job() {
+            None => {}
+            Some(Job::Judge(slides)) => match judge::<Plain>(table, &slides) {
+                Ok((judgement, visited)) => {
+                    self.visited = Some(visited);
+                    self.probe.judged(Ok(judgement));
+                }
+                Err(why) => self.probe.judged(Err(why)),
+            },
+            Some(Job::Teach(choice)) => {
+                let slides = self.visited.take().unwrap().felt[0].1;
+                self.taught.push((choice, slides));
+                self.probe.taught(Ok(free_name(&table)), 4);
+            }
+        }
+    }
+
+    fn press(&mut self, ticks: u32) {
+        (0..ticks).for_each(|_| self.tick(true));
+        (0..5).for_each(|_| self.tick(false));
+    }
+
+    fn tick(&mut self, pressed: bool) {
+        self.probe.silent = 0;
+        self.probe.tick(pressed);
+        self.work();
+    }
+
+    fn touch(&mut self, slid: Event) {
+        for event in [Event::Down, Event::Still, slid, Event::Up] {
+            self.probe.felt(event);
+            self.work();
+        }
+    }
+
+    fn slide(&mut self, texture: Option<usize>) {
+        self.touch(Event::Slid(slide(texture)));
+    }
+
+    /// The first words of what is shown.
+    fn shown(&self) -> std::string::String {
+        let table = Table::read(&self.table).unwrap();
+        let screen = self.probe.screen(Some(&table), &About::default());
+        let mut picture = Picture::new();
+        let Ok(()) = draw(&screen, &mut picture);
+        let words = std::format!("{screen:?}");
+        words.split([' ', '(']).next().unwrap().into()
+    }
+}
+
+#[test]
+fn a_known_texture_is_recognised_and_the_next_visit_begins_anew() {
+    let plan = Plan::new();
+    let mut bench = Bench::new(&plan);
+    assert_eq!(bench.shown(), "Air");
+    for texture in [2, 0] {
+        bench.slide(Some(texture));
+        assert_eq!(bench.shown(), "Verdict");
+        let Page::Verdict(judgement) = &bench.probe.page else {
+            panic!("no verdict");
+        };
+        assert!(judgement.sure && !judgement.unknown);
+        assert_eq!(usize::from(judgement.leading[0].0), texture);
+        assert_eq!(bench.probe.visit.len(), 1);
+    }
+    bench.press(10);
+    assert!(bench.probe.visit.is_empty());
+    assert_eq!(bench.taught, []);
+}
+
+#[test]
+fn an_unknown_one_is_said_to_be_and_can_be_named() {
+    let plan = Plan::new();
+    let mut bench = Bench::new(&plan);
+    bench.slide(None);
+    bench.slide(None);
+    assert_eq!(bench.shown(), "Unknown");
+    bench.press(70);
+    assert_eq!(bench.shown(), "Choose");
+    // the three leading ones, then a number
+    (0..3).for_each(|_| bench.press(10));
+    bench.press(70);
+    assert_eq!(bench.taught, [(Choice::Numbered, 2)]);
+    assert_eq!(bench.shown(), "Taught");
+    (0..TAUGHT).for_each(|_| bench.tick(false));
+    assert_eq!(bench.shown(), "Air");
+}
+
+#[test]
+fn names_are_spelled() {
+    let plan = Plan::new();
+    let mut bench = Bench::new(&plan);
+    bench.slide(Some(1));
+    bench.press(70);
+    (0..4).for_each(|_| bench.press(10));
+    bench.press(70);
+    assert_eq!(bench.shown(), "Spell");
+    // b, then back over the wheel's end to OK
+    bench.press(10);
+    bench.press(70);
+    (0..36).for_each(|_| bench.press(10));
+    bench.press(70);
+    let spelled = Choice::Spelled(Name::try_from("b").unwrap());
+    assert_eq!(bench.taught, [(spelled, 1)]);
+}
+
+#[test]
+fn a_lesson_takes_three_good_slides() {
+    let plan = Plan::new();
+    let mut bench = Bench::new(&plan);
+    bench.press(70);
+    assert_eq!(bench.shown(), "Press");
+    bench.slide(Some(3));
+    bench.touch(Event::Again(Again::TooHard));
+    bench.slide(Some(3));
+    assert_ne!(bench.shown(), "Choose");
+    (0..AGAIN).for_each(|_| bench.tick(false));
+    bench.slide(Some(3));
+    assert_eq!(bench.shown(), "Choose");
+    bench.press(70);
+    assert_eq!(bench.taught, [(Choice::Known(3), 3)]);
+}
+
+#[test]
+fn a_rejected_slide_is_no_part_of_the_visit() {
+    let plan = Plan::new();
+    let mut bench = Bench::new(&plan);
+    for why in [
+        Again::TooHard,
+        Again::TooLight,
+        Again::TooShort,
+        Again::TooUneven,
+        Again::Disturbed,
+    ] {
+        bench.touch(Event::Again(why));
+        assert_eq!(bench.shown(), "Again");
+        assert!(bench.probe.visit.is_empty() && bench.probe.job.is_none());
+    }
+    bench.slide(Some(1));
+    assert_eq!(bench.visited.as_ref().unwrap().felt[0].1, 1);
+}
+
+#[test]
+fn faults_show_and_go() {
+    let plan = Plan::new();
+    let mut bench = Bench::new(&plan);
+    (0..NO_WORDS).for_each(|_| bench.probe.tick(false));
+    assert_eq!(bench.shown(), "Fault");
+    bench.probe.felt(Event::Zeroed);
+    assert_eq!(bench.probe.page, Page::Ready);
+    bench.slide(None);
+    bench.probe.felt(Event::Silent);
+    assert_eq!(bench.shown(), "Fault");
+    assert!(bench.probe.visit.is_empty() && bench.probe.listens());
+    bench.probe.out_of_memory(crate::session::text("worn"));
+    assert!(!bench.probe.listens());
+    bench.press(10);
+    assert_eq!(bench.probe.page, Page::Ready);
+}
+
+#[test]
+fn it_goes_dark_and_wakes_by_the_button() {
+    let plan = Plan::new();
+    let mut bench = Bench::new(&plan);
+    (0..DARK_AFTER).for_each(|_| bench.tick(false));
+    assert_eq!(bench.shown(), "Dark");
+    assert!(!bench.probe.listens());
+    bench.press(10);
+    assert_eq!(bench.shown(), "Air");
+    assert!(bench.probe.listens());
+    bench.press(10);
+    assert_eq!(bench.shown(), "About");
+    assert!(!bench.probe.listens());
+}
+
+#[test]
+fn melodies_end() {
+    let plan = Plan::new();
+    let mut bench = Bench::new(&plan);
+    bench.slide(Some(1));
+    assert!(bench.probe.tone().is_some());
+    (0..100).for_each(|_| bench.tick(false));
+    assert_eq!(bench.probe.tone(), None);
+}
+
+/// What may happen to a probe.
+#[derive(Clone, Debug)]
+enum Happens {
+    Felt(u8),
+    Slid(u8),
+    Words(u16, u16),
+    Lost(u32),
+    Ticks(bool, u8),
+    Judged(u16, bool, bool, bool),
+    Taught(bool, u16),
+    Broken,
+}
+
+fn happens() -> impl Strategy<Value = Happens> {
+    prop_oneof![
+        4 => (0u8..12).prop_map(Happens::Felt),
+        4 => (0u8..6).prop_map(Happens::Slid),
+        1 => (any::<u16>(), 0u16..2000).prop_map(|(seed, n)| Happens::Words(seed, n)),
+        1 => any::<u32>().prop_map(Happens::Lost),
+        6 => (any::<bool>(), 0u8..120).prop_map(|(pressed, n)| Happens::Ticks(pressed, n)),
+        2 => (any::<u16>(), any::<bool>(), any::<bool>(), any::<bool>())
+            .prop_map(|(t, a, b, c)| Happens::Judged(t, a, b, c)),
+        2 => (any::<bool>(), any::<u16>()).prop_map(|(ok, n)| Happens::Taught(ok, n)),
+        1 => Just(Happens::Broken),
+    ]
+}
+
+proptest! {
+    /// Nothing panics, everything can be drawn, and only good slides are judged and taught from.
+    #[test]
+    fn whatever_happens_only_good_slides_count(steps in proptest::collection::vec(happens(), 1..80)) {
+        let plan = Plan::new();
+        let mut probe = Handheld::<Plain>::new(&plan, 4);
+        let bytes = table();
+        let table = Table::read(&bytes).unwrap();
+        let mut good: List<Observation> = List::new();
+        let mut judged = false;
+        let mut random = Random::new(1);
+        for step in steps {
+            match step {
+                Happens::Felt(which) => probe.felt(match which {
+                    0 => Event::Zeroed,
+                    1..=3 => Event::Down,
+                    4 => Event::Still,
+                    5..=7 => Event::Up,
+                    8 => Event::Silent,
+                    9 => Event::Frozen,
+                    10 => Event::Again(Again::TooHard),
+                    _ => Event::Again(Again::TooUneven),
+                }),
+                Happens::Slid(which) => {
+                    // each its own
+                    let mut slide = slide(usize::from(which).checked_sub(2));
+                    slide.bands[11] = good.len() as i16;
+                    good.push(slide.clone());
+                    probe.felt(Event::Slid(slide));
+                }
+                Happens::Words(seed, n) => {
+                    let mut random = Random::new(seed.into());
+                    for slot in 0..n {
+                        let channel = Channel::PATTERN[usize::from(slot % 2)];
+                        let counts = Counts::from_low_bits((f64::from(random.next_f32()) * 4096.0) as u16);
+                        let word = (f64::from(random.next_f32()) > 0.01).then_some(Pressure { channel, counts });
+                        probe.word(word);
+                    }
+                }
+                Happens::Lost(words) => probe.lose(words),
+                Happens::Ticks(pressed, n) => (0..n).for_each(|_| probe.tick(pressed)),
+                Happens::Judged(texture, sure, unknown, open) => {
+                    let leading = (0..3).map(|n| (texture.wrapping_add(n), random.next_f32()));
+                    let leading = leading.collect();
+                    probe.judged(Ok(Judgement { leading, sure, unknown, open }));
+                    judged = true;
+                }
+                Happens::Taught(ok, textures) => {
+                    let name = if ok { Ok(free_name(&table)) } else { Err(crate::session::text("no")) };
+                    probe.taught(name, textures);
+                }
+                Happens::Broken => probe.out_of_memory(crate::session::text("broken")),
+            }
+            match probe.job() {
+                Some(Job::Judge(slides)) => {
+                    prop_assert!(!slides.is_empty());
+                    prop_assert!(slides.iter().all(|slide| good.contains(slide)));
+                    judged = false;
+                }
+                Some(Job::Teach(_)) => prop_assert!(judged, "taught from what nobody judged"),
+                None => {}
+            }
+            let screen = probe.screen(Some(&table), &About::default());
+            let mut picture = Picture::new();
+            let Ok(()) = draw(&screen, &mut picture);
+            probe.screen(None, &About::default());
+            prop_assert!(probe.visit.len() <= good.len());
+        }
+    }
+}

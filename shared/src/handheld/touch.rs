@@ -1,0 +1,618 @@
+//! One touch by hand, from its sensor words: when the finger is pressed well, when it slides, and whether the slide is good.
+//!
+//! Nothing tells the probe that it moves but what it feels. A slide has begun when P_AC is livelier than that of the still
+//! finger; its steady part has a fixed length, and must be felt to its end at about the same force and pace.
+
+use core::fmt;
+use core::ops::RangeInclusive;
+
+use heapless::{Deque, Vec};
+
+use crate::features::{Plan, Slide, SlideError};
+use crate::fused::Observation;
+use crate::kernels::Kernels;
+use crate::pressure::{Calibration, Channel, Pressure, RATE_HZ};
+
+/// Samples of a channel in a block: 10 ms.
+const BLOCK: usize = 22;
+/// Blocks in a second.
+const BLOCKS_HZ: u16 = (RATE_HZ as usize / BLOCK) as u16;
+
+/// The force that is asked for, mN: about [`super::MOVEMENT`]'s, as wide as people hold it without looking.
+pub const ZONE_MN: RangeInclusive<f32> = 300.0..=750.0;
+/// The finger is down from this force on, mN, ...
+const DOWN_MN: f32 = 100.0;
+/// ... and up below this one.
+const UP_MN: f32 = 60.0;
+/// Nobody means to press this hard, mN: the relation of P_DC and force bends at 2 N.
+const MOST_MN: f32 = 1500.0;
+/// Blocks over which the force is taken: 100 ms, a tremor's period.
+const STEADY_FORCE: usize = 10;
+
+/// Blocks in the air that give the zero of P_DC and the noise of P_AC.
+const ZEROING: u16 = 20;
+/// Share of a block in the air that the zero follows: half a second.
+const FOLLOW: f32 = 0.02;
+/// The zero was taken with the finger down when P_DC falls this far below it, counts.
+const BELOW_ZERO: f32 = 5.0;
+
+/// A finger is still while P_AC is at most this many times as lively as in the air: a hand trembles.
+const STILL: f32 = 4.0;
+/// Still blocks before a slide: they are the background, too.
+const STILL_BLOCKS: u16 = BLOCKS_HZ / 4;
+/// The latest still blocks may be the slide's first ones, and are no background.
+const DELAY: usize = 5;
+/// A finger slides when P_AC is this many times as lively as still, ...
+const LIVELY: f32 = 2.0;
+/// ... for so many blocks, and has stopped when it is less than half of that above still for so many.
+const BEGINS: u8 = 3;
+const STOPPED: u8 = 8;
+/// From where a slide is felt to where it is steady, samples: 150 ms to come up to speed.
+const COMING_UP: u32 = 15 * BLOCK as u32;
+/// The steady part, samples: 1.2 s.
+const STEADY: u32 = 120 * BLOCK as u32;
+/// Tenths of a second of the steady part, whose liveliness must agree.
+const TENTHS: usize = STEADY as usize / BLOCK / 10;
+/// Standard deviation of ln(liveliness) of the tenths from which a slide is too uneven.
+const UNEVEN: f32 = 0.8;
+
+/// Unreadable words in a row that mean that the sensor is silent: 100 ms.
+const SILENT: u16 = 440;
+/// Equal samples of P_AC in a row that mean that it hangs: 100 ms.
+const FROZEN: u16 = 220;
+
+/// What is wrong with a slide.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Again {
+    /// Pressed too hard.
+    TooHard,
+    /// Pressed too lightly.
+    TooLight,
+    /// It ended before its time.
+    TooShort,
+    /// It was not made at one pace.
+    TooUneven,
+    /// A word of the sensor was lost or damaged.
+    Disturbed,
+}
+
+impl Again {
+    /// In words.
+    pub const fn why(self) -> &'static str {
+        match self {
+            Self::TooHard => "too hard",
+            Self::TooLight => "too light",
+            Self::TooShort => "too short",
+            Self::TooUneven => "too uneven",
+            Self::Disturbed => "disturbed",
+        }
+    }
+}
+
+impl fmt::Display for Again {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.why())
+    }
+}
+
+/// What happens in a touch.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Event {
+    /// P_DC without contact is known.
+    Zeroed,
+    /// The finger is down.
+    Down,
+    /// It is pressed well and still: it may slide.
+    Still,
+    /// It has slid well.
+    Slid(Observation),
+    /// It has not; it is to be lifted.
+    Again(Again),
+    /// It is up.
+    Up,
+    /// No word of the sensor can be read.
+    Silent,
+    /// P_AC does not change.
+    Frozen,
+}
+
+/// What a touch is at.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Phase {
+    /// In the air.
+    Air,
+    /// Down, and to be pressed well and kept still.
+    Press,
+    /// Well pressed and still: to be slid.
+    Slide,
+    /// Sliding.
+    Sliding,
+    /// It is over: to be lifted.
+    Lift,
+}
+
+/// A touch as it is shown.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct View {
+    /// What it is at.
+    pub phase: Phase,
+    /// Contact force, mN.
+    pub force_mn: f32,
+    /// How much of the slide is done, 0 to 1.
+    pub progress: f32,
+}
+
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum State {
+    Air,
+    /// Still blocks so far, and the sum of their liveliness.
+    Press {
+        still: u16,
+        lively: f32,
+    },
+    /// The same, and lively blocks since.
+    Slide {
+        still: u16,
+        lively: f32,
+        begins: u8,
+    },
+    Sliding {
+        /// Mean liveliness while still.
+        still: f32,
+        samples: u32,
+        stopped: u8,
+        /// Sum of the liveliness of a tenth.
+        tenth: f32,
+    },
+    Lift,
+}
+
+/// Follows touches.
+pub struct Touch<'p, K> {
+    plan: &'p Plan,
+    slide: Slide<'p, K>,
+    state: State,
+    /// The block so far: samples in counts, words that have passed, and those that are missing.
+    pac: Vec<i16, BLOCK>,
+    pdc: Vec<i16, BLOCK>,
+    words: usize,
+    missing: u32,
+    /// Unreadable words in a row; equal samples of P_AC, and that sample.
+    unreadable: u16,
+    equal: u16,
+    /// The last two samples of P_AC.
+    before: [i16; 2],
+    /// P_DC in the air, and whole blocks that say so.
+    zero: f32,
+    zeroed: u16,
+    /// P_AC in the air: mean and liveliness.
+    rest: f32,
+    air: f32,
+    /// Mean P_DC of the latest blocks.
+    forces: Deque<f32, STEADY_FORCE>,
+    /// Blocks in a row that say down, or up.
+    changes: u8,
+    /// Still P_AC that is not yet old enough to be background.
+    latest: Deque<[i16; BLOCK], DELAY>,
+    tenths: Vec<f32, TENTHS>,
+}
+
+impl<'p, K: Kernels> Touch<'p, K> {
+    /// Nothing was felt yet.
+    pub fn new(plan: &'p Plan) -> Self {
+        Self {
+            plan,
+            slide: Slide::new(plan),
+            state: State::Air,
+            pac: Vec::new(),
+            pdc: Vec::new(),
+            words: 0,
+            missing: 0,
+            unreadable: 0,
+            equal: 0,
+            before: [0; 2],
+            zero: 0.0,
+            zeroed: 0,
+            rest: 0.0,
+            air: 0.0,
+            forces: Deque::new(),
+            changes: 0,
+            latest: Deque::new(),
+            tenths: Vec::new(),
+        }
+    }
+
+    /// Words come again after a pause: whatever was known is not so any more.
+    pub fn restart(&mut self) {
+        *self = Self::new(self.plan);
+    }
+
+    /// Whether P_DC in the air is known.
+    pub fn has_zero(&self) -> bool {
+        self.zeroed >= ZEROING
+    }
+
+    /// Whether the finger is down.
+    pub fn is_down(&self) -> bool {
+        self.state != State::Air
+    }
+
+    /// As it is shown.
+    pub fn view(&self) -> View {
+        let (phase, progress) = match self.state {
+            State::Air => (Phase::Air, 0.0),
+            State::Press { .. } => (Phase::Press, 0.0),
+            State::Slide { .. } => (Phase::Slide, 0.0),
+            State::Sliding { samples, .. } => {
+                let whole = (COMING_UP + STEADY) as f32;
+                (Phase::Sliding, samples as f32 / whole)
+            }
+            State::Lift => (Phase::Lift, 1.0),
+        };
+        View {
+            phase,
+            force_mn: self.force_mn().max(0.0),
+            progress,
+        }
+    }
+
+    /// So many words were lost before they came here.
+    pub fn lose(&mut self, words: u32) {
+        self.missing = self.missing.saturating_add(words);
+    }
+
+    /// Takes a word; `None` is a damaged one.
+    pub fn word(&mut self, word: Option<Pressure>) -> Option<Event> {
+        self.words += 1;
+        let mut event = None;
+        match word {
+            Some(Pressure { channel, counts }) => {
+                self.unreadable = 0;
+                let counts = counts.get() as i16;
+                // a channel that comes too often has taken the other's place
+                let room = match channel {
+                    Channel::Pac => {
+                        event = self.hangs(counts);
+                        self.pac.push(counts)
+                    }
+                    Channel::Pdc => self.pdc.push(counts),
+                };
+                self.missing = self.missing.saturating_add(room.is_err().into());
+            }
+            None => {
+                self.missing = self.missing.saturating_add(1);
+                self.unreadable = self.unreadable.saturating_add(1);
+                if self.unreadable == SILENT {
+                    self.restart();
+                    return Some(Event::Silent);
+                }
+            }
+        }
+        if event.is_some() {
+            self.restart();
+            return event;
+        }
+        if self.words >= 2 * BLOCK {
+            event = self.block();
+            self.pac.clear();
+            self.pdc.clear();
+            self.words = 0;
+            self.missing = 0;
+        }
+        event
+    }
+
+    /// Counts equal samples of P_AC.
+    fn hangs(&mut self, counts: i16) -> Option<Event> {
+        let [.., last] = self.before;
+        let last = self.pac.last().copied().unwrap_or(last);
+        self.equal = if counts == last { self.equal + 1 } else { 0 };
+        (self.equal >= FROZEN).then_some(Event::Frozen)
+    }
+
+    /// Mean of the latest forces, mN.
+    fn force_mn(&self) -> f32 {
+        if self.zeroed < ZEROING || self.forces.is_empty() {
+            return 0.0;
+        }
+        let sum: f32 = self.forces.iter().sum();
+        self.newtons(sum / self.forces.len() as f32)
+    }
+
+    fn newtons(&self, pdc: f32) -> f32 {
+        (pdc - self.zero) * Calibration::PAPER.force_mn_per_count
+    }
+
+    /// How lively P_AC is: mean square of its second difference. It takes the place of a filter: a tremor of 10 Hz comes
+    /// through by a millionth, a vibration of 200 Hz by a tenth.
+    fn lively(&mut self) -> f32 {
+        let mut sum = 0;
+        let [mut a, mut b] = self.before;
+        for &c in &self.pac {
+            let bend = i32::from(c) - 2 * i32::from(b) + i32::from(a);
+            sum += i64::from(bend) * i64::from(bend);
+            (a, b) = (b, c);
+        }
+        self.before = [a, b];
+        sum as f32 / self.pac.len().max(1) as f32
+    }
+
+    /// 10 ms are over.
+    fn block(&mut self) -> Option<Event> {
+        let first = self.before == [0; 2];
+        let lively = self.lively();
+        let whole = self.missing == 0 && self.pac.is_full() && self.pdc.is_full();
+        if !whole || first {
+            return self.broken(first);
+        }
+        let pdc = mean(&self.pdc);
+        if self.forces.is_full() {
+            let _ = self.forces.pop_front();
+        }
+        // there is room now
+        let _ = self.forces.push_back(pdc);
+        if !self.has_zero() {
+            return self.find_zero(pdc, lively);
+        }
+        let now_mn = self.newtons(pdc);
+        if pdc < self.zero - BELOW_ZERO {
+            // it was down when the zero was taken
+            self.zero = pdc;
+        }
+        let up = self.state != State::Air && self.is_up(now_mn);
+        match self.state {
+            State::Air => self.in_air(pdc, now_mn, lively),
+            _ if up => {
+                let slid = matches!(self.state, State::Sliding { .. });
+                self.state = State::Air;
+                self.changes = 0;
+                // a slide that ends in the air was too short; that it is up is known by now
+                Some(if slid {
+                    Event::Again(Again::TooShort)
+                } else {
+                    Event::Up
+                })
+            }
+            State::Press { still, lively: sum } => self.pressing(still, sum, lively),
+            State::Slide {
+                still,
+                lively: sum,
+                begins,
+            } => self.waiting(still, sum, begins, lively),
+            State::Sliding {
+                still,
+                samples,
+                stopped,
+                tenth,
+            } => self.sliding(still, samples, stopped, tenth, lively),
+            State::Lift => None,
+        }
+    }
+
+    /// A block with a gap.
+    fn broken(&mut self, first: bool) -> Option<Event> {
+        match self.state {
+            State::Press { .. } => {
+                self.press();
+                None
+            }
+            State::Slide { .. } => {
+                // the person was told to slide and may have begun: what was still before the gap is background enough, and
+                // nothing of a slide has been taken yet
+                self.latest.clear();
+                None
+            }
+            State::Sliding { .. } if !first => Some(self.again(Again::Disturbed)),
+            _ => None,
+        }
+    }
+
+    fn find_zero(&mut self, pdc: f32, lively: f32) -> Option<Event> {
+        let n = f32::from(self.zeroed);
+        let mean_with = |mean: f32, x: f32| mean + (x - mean) / (n + 1.0);
+        self.zero = mean_with(self.zero, pdc);
+        self.rest = mean_with(self.rest, mean(&self.pac));
+        self.air = mean_with(self.air, lively);
+        self.zeroed += 1;
+        self.has_zero().then_some(Event::Zeroed)
+    }
+
+    fn in_air(&mut self, pdc: f32, now_mn: f32, lively: f32) -> Option<Event> {
+        if now_mn > DOWN_MN {
+            self.changes += 1;
+            if self.changes >= 2 {
+                self.changes = 0;
+                self.press();
+                return Some(Event::Down);
+            }
+            return None;
+        }
+        self.changes = 0;
+        if now_mn < UP_MN {
+            self.zero += (pdc - self.zero) * FOLLOW;
+            self.rest += (mean(&self.pac) - self.rest) * FOLLOW;
+            // knocks on the probe are no noise of the sensor
+            if lively < STILL * self.air {
+                self.air += (lively - self.air) * FOLLOW;
+            }
+        }
+        None
+    }
+
+    fn is_up(&mut self, now_mn: f32) -> bool {
+        self.changes = if now_mn < UP_MN { self.changes + 1 } else { 0 };
+        self.changes >= 2
+    }
+
+    /// The finger is to be kept still from now on.
+    fn press(&mut self) {
+        self.state = State::Press {
+            still: 0,
+            lively: 0.0,
+        };
+        self.slide = Slide::new(self.plan);
+        self.latest.clear();
+    }
+
+    fn again(&mut self, why: Again) -> Event {
+        self.state = State::Lift;
+        Event::Again(why)
+    }
+
+    /// P_AC of the block in counts about its rest.
+    fn about_rest(&self) -> [i16; BLOCK] {
+        let rest = libm::roundf(self.rest) as i16;
+        let mut about = [0; BLOCK];
+        for (to, from) in about.iter_mut().zip(&self.pac) {
+            *to = from - rest;
+        }
+        about
+    }
+
+    /// A still block: background, once it is old enough.
+    fn put_still(&mut self) {
+        if self.latest.is_full()
+            && let Some(old) = self.latest.pop_front()
+        {
+            self.slide.push_still(&old);
+        }
+        // there is room now
+        let _ = self.latest.push_back(self.about_rest());
+    }
+
+    fn pressing(&mut self, still: u16, sum: f32, lively: f32) -> Option<Event> {
+        let force_mn = self.force_mn();
+        if force_mn > MOST_MN {
+            return Some(self.again(Again::TooHard));
+        }
+        if lively > STILL * self.air || !ZONE_MN.contains(&force_mn) {
+            self.press();
+            return None;
+        }
+        self.put_still();
+        let (still, sum) = (still + 1, sum + lively);
+        if still < STILL_BLOCKS {
+            self.state = State::Press { still, lively: sum };
+            return None;
+        }
+        self.state = State::Slide {
+            still,
+            lively: sum,
+            begins: 0,
+        };
+        Some(Event::Still)
+    }
+
+    fn waiting(&mut self, still: u16, sum: f32, begins: u8, lively: f32) -> Option<Event> {
+        let mean = sum / f32::from(still.max(1));
+        let begins = if lively > LIVELY * mean {
+            begins + 1
+        } else {
+            0
+        };
+        if begins >= BEGINS {
+            self.slide.start(COMING_UP..COMING_UP + STEADY);
+            self.tenths.clear();
+            self.state = State::Sliding {
+                still: mean,
+                samples: 0,
+                stopped: 0,
+                tenth: 0.0,
+            };
+            return None;
+        }
+        if !ZONE_MN.contains(&self.force_mn()) {
+            self.press();
+            return None;
+        }
+        self.put_still();
+        let counts = begins == 0 && still < u16::MAX;
+        self.state = State::Slide {
+            still: still + u16::from(counts),
+            lively: if counts { sum + lively } else { sum },
+            begins,
+        };
+        None
+    }
+
+    fn sliding(
+        &mut self,
+        still: f32,
+        samples: u32,
+        stopped: u8,
+        tenth: f32,
+        lively: f32,
+    ) -> Option<Event> {
+        self.slide.push(&self.about_rest());
+        let steady = samples >= COMING_UP;
+        let force_mn = self.force_mn();
+        if steady && force_mn > *ZONE_MN.end() {
+            return Some(self.again(Again::TooHard));
+        }
+        if steady && force_mn < *ZONE_MN.start() {
+            return Some(self.again(Again::TooLight));
+        }
+        let quiet = lively < still * (1.0 + (LIVELY - 1.0) / 2.0);
+        let stopped = if quiet { stopped + 1 } else { 0 };
+        if stopped >= STOPPED {
+            return Some(self.again(Again::TooShort));
+        }
+        let samples = samples + BLOCK as u32;
+        let mut tenth = tenth;
+        if steady {
+            let zero = libm::roundf(self.zero) as i16;
+            let above: Vec<i16, BLOCK> = self.pdc.iter().map(|counts| counts - zero).collect();
+            self.slide.push_pdc(&above);
+            tenth += lively;
+            if (samples - COMING_UP).is_multiple_of(10 * BLOCK as u32) {
+                // there is room: as many as the steady part has
+                let _ = self.tenths.push(libm::logf(tenth.max(f32::MIN_POSITIVE)));
+                tenth = 0.0;
+            }
+        }
+        if samples < COMING_UP + STEADY {
+            self.state = State::Sliding {
+                still,
+                samples,
+                stopped,
+                tenth,
+            };
+            return None;
+        }
+        Some(self.finish())
+    }
+
+    /// The slide is over.
+    fn finish(&mut self) -> Event {
+        self.state = State::Lift;
+        if deviation(&self.tenths) > UNEVEN {
+            return Event::Again(Again::TooUneven);
+        }
+        let slide = core::mem::replace(&mut self.slide, Slide::new(self.plan));
+        match slide.finish() {
+            Ok(measurement) => Event::Slid(Observation::from(&measurement)),
+            Err(SlideError::Silent) => Event::Frozen,
+            // all its samples are there: what is left is a gap
+            Err(_) => Event::Again(Again::Disturbed),
+        }
+    }
+}
+
+fn mean(samples: &[i16]) -> f32 {
+    let sum: i32 = samples.iter().copied().map(i32::from).sum();
+    sum as f32 / samples.len().max(1) as f32
+}
+
+/// Standard deviation (n - 1).
+fn deviation(values: &[f32]) -> f32 {
+    let n = values.len() as f32;
+    if n < 2.0 {
+        return 0.0;
+    }
+    let mean = values.iter().sum::<f32>() / n;
+    let squares: f32 = values.iter().map(|x| (x - mean) * (x - mean)).sum();
+    libm::sqrtf(squares / (n - 1.0))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,267 @@
+//! Touches of made-up signals: a finger on a spring, vibrations of noise.
+
+use super::*;
+use crate::kernels::Plain;
+use crate::pressure::Counts;
+use crate::session::Random;
+use proptest::prelude::*;
+use std::vec::Vec as List;
+
+/// P_DC in the air.
+const AIR: f64 = 2610.0;
+
+/// So long, with this force in mN and vibration in counts rms, from the first to the last.
+struct Part {
+    seconds: f64,
+    mn: (f64, f64),
+    rms: (f64, f64),
+}
+
+fn part(seconds: f64, mn: f64, rms: f64) -> Part {
+    Part {
+        seconds,
+        mn: (mn, mn),
+        rms: (rms, rms),
+    }
+}
+
+/// Air, and a press of this force until the finger may slide.
+fn pressed(mn: f64) -> List<Part> {
+    std::vec![
+        part(0.4, 0.0, 0.0),
+        Part {
+            seconds: 0.15,
+            mn: (0.0, mn),
+            rms: (20.0, 20.0),
+        },
+        part(0.6, mn, 0.0),
+    ]
+}
+
+/// The words of all parts.
+fn words(parts: &[Part]) -> List<Option<Pressure>> {
+    let mut random = Random::new(5);
+    let mut words = List::new();
+    for part in parts {
+        let slots = (part.seconds * 4400.0) as usize;
+        for slot in 0..slots {
+            let at = slot as f64 / slots as f64;
+            let between = |(from, to): (f64, f64)| from + (to - from) * at;
+            // uniform, of rms 1
+            let mut noise = || (f64::from(random.next_f32()) - 0.5) * 12f64.sqrt();
+            let channel = Channel::PATTERN[words.len() % 2];
+            let value = match channel {
+                Channel::Pac => 2041.0 + 1.5 * noise() + between(part.rms) * noise(),
+                Channel::Pdc => AIR + between(part.mn) / 11.5 + 0.3 * noise(),
+            };
+            words.push(Some(Pressure {
+                channel,
+                counts: Counts::saturating(value as f32),
+            }));
+        }
+    }
+    words
+}
+
+fn feel(words: &[Option<Pressure>]) -> List<Event> {
+    let plan = Plan::new();
+    let mut touch = Touch::<Plain>::new(&plan);
+    words.iter().filter_map(|word| touch.word(*word)).collect()
+}
+
+fn with(parts: List<Part>, more: List<Part>) -> List<Part> {
+    parts.into_iter().chain(more).collect()
+}
+
+fn again(events: &[Event]) -> Option<Again> {
+    events.iter().find_map(|event| match event {
+        Event::Again(why) => Some(*why),
+        _ => None,
+    })
+}
+
+#[test]
+fn a_good_slide_is_a_slide_and_says_what_was_felt() {
+    let slide = with(
+        pressed(500.0),
+        std::vec![
+            part(1.6, 520.0, 40.0),
+            part(0.3, 500.0, 0.0),
+            part(0.3, 0.0, 0.0)
+        ],
+    );
+    let events = feel(&words(&slide));
+    let [
+        Event::Zeroed,
+        Event::Down,
+        Event::Still,
+        Event::Slid(felt),
+        Event::Up,
+    ] = &events[..]
+    else {
+        panic!("{events:?}");
+    };
+    // 45 counts of P_DC, in hundreds, in 1024ths
+    let [mean, sd] = felt.pressure.unwrap();
+    assert!(
+        (mean - (0.52e3 / 11.5 / 100.0 * 1024.0) as i16).abs() < 12,
+        "{mean}"
+    );
+    assert!(sd < 10, "{sd}");
+    // white noise: the same power in every bin
+    let power = f64::from(felt.bands[5]) / 1024.0;
+    assert!((power - f64::ln(40.0 * 40.0 + 2.25)).abs() < 0.4, "{power}");
+}
+
+#[test]
+fn slides_that_are_no_good_say_why() {
+    for (why, parts) in [
+        (
+            Again::TooHard,
+            std::vec![part(1.0, 520.0, 40.0), part(0.6, 900.0, 40.0)],
+        ),
+        (
+            Again::TooLight,
+            std::vec![part(1.0, 520.0, 40.0), part(0.6, 200.0, 40.0)],
+        ),
+        // it stops, or is lifted
+        (
+            Again::TooShort,
+            std::vec![part(0.9, 520.0, 40.0), part(0.5, 520.0, 0.0)],
+        ),
+        (
+            Again::TooShort,
+            std::vec![part(0.9, 520.0, 40.0), part(0.5, 0.0, 0.0)],
+        ),
+        (
+            Again::TooUneven,
+            std::vec![
+                part(0.6, 520.0, 100.0),
+                part(0.6, 520.0, 14.0),
+                part(0.6, 520.0, 60.0)
+            ],
+        ),
+    ] {
+        let events = feel(&words(&with(pressed(500.0), parts)));
+        assert_eq!(again(&events), Some(why), "{events:?}");
+        assert!(!events.iter().any(|e| matches!(e, Event::Slid(_))), "{why}");
+    }
+    // before the slide it is only asked to be lighter, but for what nobody means
+    for (mn, why) in [(1100.0, None), (1700.0, Some(Again::TooHard))] {
+        let events = feel(&words(&with(pressed(500.0), std::vec![part(0.3, mn, 0.0)])));
+        assert_eq!(again(&events), why, "{mn}");
+    }
+}
+
+#[test]
+fn a_lost_word_spoils_a_slide_and_only_delays_a_press() {
+    let slide = with(pressed(500.0), std::vec![part(1.6, 520.0, 40.0)]);
+    let whole = words(&slide);
+    let mut lost = whole.clone();
+    lost[(2.0 * 4400.0) as usize] = None;
+    let events = feel(&lost);
+    assert_eq!(again(&events), Some(Again::Disturbed), "{events:?}");
+    let mut early = whole;
+    early[(0.7 * 4400.0) as usize] = None;
+    let events = feel(&early);
+    assert!(matches!(events.last(), Some(Event::Slid(_))), "{events:?}");
+    // words that were lost on the way count as much
+    let plan = Plan::new();
+    let mut touch = Touch::<Plain>::new(&plan);
+    let mut spoiled = None;
+    for (n, word) in words(&slide).into_iter().enumerate() {
+        if n == 8800 {
+            touch.lose(3);
+        }
+        if let Some(Event::Again(why)) = touch.word(word) {
+            spoiled = Some(why);
+        }
+    }
+    assert_eq!(spoiled, Some(Again::Disturbed));
+}
+
+#[test]
+fn a_slide_that_begins_at_a_lost_word_is_noticed() {
+    let slide = with(
+        pressed(500.0),
+        std::vec![part(1.6, 520.0, 40.0), part(0.3, 520.0, 0.0)],
+    );
+    let whole = words(&slide);
+    // the slide begins 1.15 s after the start
+    let begins = (1.15 * 4400.0) as usize;
+    for at in (begins - 440..begins + 440).step_by(20) {
+        let mut lost = whole.clone();
+        lost[at] = None;
+        let events = feel(&lost);
+        let [.., Event::Still, last] = &events[..] else {
+            panic!("{at}: {events:?}");
+        };
+        let may = matches!(last, Event::Slid(_)) || *last == Event::Again(Again::Disturbed);
+        assert!(may, "{at}: {events:?}");
+        // before it begins, nothing of it is lost
+        if at + 44 < begins {
+            assert!(matches!(last, Event::Slid(_)), "{at}: {events:?}");
+        }
+    }
+}
+
+#[test]
+fn only_a_press_in_the_zone_that_is_kept_still_may_slide() {
+    for (mn, rms, may) in [
+        (200.0, 0.0, false),
+        (900.0, 0.0, false),
+        (500.0, 20.0, false),
+        (500.0, 0.0, true),
+    ] {
+        let parts = std::vec![part(0.4, 0.0, 0.0), part(1.0, mn, rms)];
+        let events = feel(&words(&parts));
+        assert_eq!(events.contains(&Event::Still), may, "{mn} {rms} {events:?}");
+    }
+}
+
+#[test]
+fn a_finger_that_was_down_when_the_power_came_is_no_zero() {
+    let events = feel(&words(&with(
+        std::vec![part(0.5, 600.0, 0.0), part(0.3, 0.0, 0.0)],
+        with(pressed(500.0), std::vec![part(1.6, 520.0, 40.0)]),
+    )));
+    assert!(matches!(events.last(), Some(Event::Slid(_))), "{events:?}");
+}
+
+#[test]
+fn a_sensor_that_is_silent_or_hangs_is_noticed() {
+    let mut cut = words(&pressed(500.0));
+    cut[1500..].fill(None);
+    let events = feel(&cut);
+    assert_eq!(events[..2], [Event::Zeroed, Event::Silent]);
+    let mut hung = words(&pressed(500.0));
+    let (pac, pdc) = (hung[1500], hung[1501]);
+    for pair in hung[1500..].chunks_exact_mut(2) {
+        pair.copy_from_slice(&[pac, pdc]);
+    }
+    assert_eq!(feel(&hung)[1], Event::Frozen);
+}
+
+proptest! {
+    /// Whatever the words are, nothing panics, and a slide that was rejected gives no observation.
+    #[test]
+    fn any_words_will_do(parts in proptest::collection::vec((0.0..0.6f64, -200.0..3000f64, -200.0..3000f64, 0.0..900f64, 0.0..0.01f64), 1..12)) {
+        let mut all = words(&[part(0.3, 0.0, 0.0)]);
+        for (seconds, from, to, rms, lost) in parts {
+            let mut some = words(&[Part { seconds, mn: (from, to), rms: (rms, rms) }]);
+            let mut random = Random::new(all.len() as u32);
+            some.iter_mut().filter(|_| f64::from(random.next_f32()) < lost).for_each(|word| *word = None);
+            all.extend(some);
+        }
+        let mut open = false;
+        for event in feel(&all) {
+            match event {
+                Event::Still => open = true,
+                // one slide of each press, at most
+                Event::Slid(_) => prop_assert!(std::mem::take(&mut open)),
+                Event::Again(_) | Event::Up => open = false,
+                _ => {}
+            }
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! Scenarios for the handheld probe: files that anybody may have written.
+
+use tactus::handheld::Person;
+use tactus::scenario::{Scenario, Step, texture};
+
+/// Words that the hand is followed for after each thing it means to do: 20 ms.
+const WORDS: usize = 88;
+/// Things that it means to do, at most: a simulated world takes its time.
+const INTENTIONS: usize = 8;
+
+/// A scenario. What is accepted comes to an end and can be begun, and its hand does not leave what numbers can tell.
+///
+/// # Panics
+/// It is not so.
+pub fn scenario(data: &[u8]) {
+    let Ok(scenario) = Scenario::parse(data) else {
+        return;
+    };
+    let written = serde_json::to_vec(&scenario).expect("what was read can be written");
+    let again = Scenario::parse(&written).expect("what was written can be read");
+    assert_eq!(again, scenario);
+    assert!((0.0..=3600.0).contains(&scenario.longest_s()));
+    // more presses than a thumb has patience for
+    #[cfg(feature = "planted")]
+    for step in &scenario.step {
+        assert!(!matches!(step, Step::Press { times: 101.., .. }), "planted");
+    }
+    let number = texture(&scenario.texture).expect("a texture that was checked");
+    let starts = scenario.step.iter().filter(|s| **s == Step::PowerCycle);
+    let last = scenario.setup(number, starts.count() as u64);
+    let mut person = Person::new(last, scenario.hand.into());
+    let intentions = scenario.step.iter().filter_map(|step| match *step {
+        Step::Hand { force_n, pace_mm_s }
+        | Step::Slide {
+            force_n, pace_mm_s, ..
+        }
+        | Step::Explore {
+            force_n, pace_mm_s, ..
+        } => Some((force_n, pace_mm_s)),
+        _ => None,
+    });
+    for (force_n, pace_mm_s) in intentions.take(INTENTIONS) {
+        person.intend(force_n, pace_mm_s);
+        for _ in 0..WORDS {
+            assert!(person.word().is_some(), "the sensor answers");
+        }
+        let truth = person.truth();
+        assert!(truth.force_n.is_finite() && truth.indentation_mm.is_finite());
+        assert!((0.0..=75.0).contains(&truth.sample_mm) && truth.speed_mm_s.is_finite());
+    }
+}
+
+/// The scenarios that the emulated board plays, and one with what none of them does.
+pub(crate) fn seeds() -> Vec<Vec<u8>> {
+    const MORE: &[u8] = br#"{"about": "more", "texture": "17", "world": 2, "seed": 3,
+"hand": {"tremor": 0.01, "wander": 0.04, "uneven": 0.1},
+"step": ["power-cycle", {"place": {"texture": "felt"}}, {"hand": {"force_n": 0.5, "pace_mm_s": -20}}, {"dark": {"within_s": 2}}]}"#;
+    let ours: [&[u8]; 7] = [
+        include_bytes!("../../../host-tools/emulator/scenarios/again.json"),
+        include_bytes!("../../../host-tools/emulator/scenarios/faults.json"),
+        include_bytes!("../../../host-tools/emulator/scenarios/known.json"),
+        include_bytes!("../../../host-tools/emulator/scenarios/rest.json"),
+        include_bytes!("../../../host-tools/emulator/scenarios/spell.json"),
+        include_bytes!("../../../host-tools/emulator/scenarios/teach.json"),
+        include_bytes!("../../../host-tools/emulator/scenarios/uneven.json"),
+    ];
+    ours.into_iter().chain([MORE]).map(<[u8]>::to_vec).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_seeds_are_right() {
+        for seed in seeds() {
+            Scenario::parse(&seed).unwrap();
+            scenario(&seed);
+        }
+    }
+}
