@@ -64,8 +64,8 @@ const NOT_YET: [(&str, f64); 6] = [
     ("window, FFT, power accumulated", 30_859.0),
     ("all features of a slide", 1_193_752.0),
     ("posterior, paper", 16_176.0),
-    ("posterior, fused", 28_670.0),
-    ("choice among 20 live textures, fused", 55_284.0),
+    ("posterior, fused", 29_241.0),
+    ("choice among 20 live textures, fused", 53_706.0),
     ("last sample to the verdict on the link", 777.0),
 ];
 /// What a compiler's next version may do to a figure.
