@@ -3,6 +3,7 @@
 mod cuts;
 pub(crate) mod ram;
 mod self_taught;
+mod wear;
 
 use super::*;
 use crate::movement::Movement;

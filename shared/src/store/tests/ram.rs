@@ -42,6 +42,8 @@ pub(crate) struct Ram<const S: usize = SECTOR> {
     /// Words programmed and sectors erased.
     pub(crate) operations: usize,
     pub(crate) erases: usize,
+    /// Erases of each sector.
+    pub(crate) worn: [u32; 4],
     /// The operation that the power is cut in.
     pub(crate) cut: Option<(usize, Torn)>,
     dead: bool,
@@ -53,6 +55,7 @@ impl<const S: usize> Ram<S> {
             bytes: vec![0xFF; 4 * S],
             operations: 0,
             erases: 0,
+            worn: [0; 4],
             cut: None,
             dead: false,
         }
@@ -121,6 +124,7 @@ impl<const S: usize> NorFlash for Ram<S> {
         assert!(from.is_multiple_of(S) && to == from + S, "sectors");
         let torn = self.operate()?;
         self.erases += 1;
+        self.worn[from / S] += 1;
         let sector = &mut self.bytes[from..to];
         match torn {
             None | Some(Torn::All) => sector.fill(0xFF),

@@ -6,9 +6,9 @@ use crate::wire::MAX_TEXTURES;
 
 const CHIP: usize = 16 * 1024;
 
-type Chip = Store<Ram<CHIP>>;
+pub(super) type Chip = Store<Ram<CHIP>>;
 
-fn chip() -> Chip {
+pub(super) fn chip() -> Chip {
     block_on(Store::open(Ram::new())).unwrap()
 }
 
@@ -17,7 +17,13 @@ fn again(store: Chip) -> Chip {
 }
 
 /// So many movements with a mean of `features` features, all of this size.
-fn taught(lineage: u32, number: u16, movements: u8, features: usize, size: i16) -> SelfTaught {
+pub(super) fn taught(
+    lineage: u32,
+    number: u16,
+    movements: u8,
+    features: usize,
+    size: i16,
+) -> SelfTaught {
     let mut whitened = Whitened {
         slides: 200,
         ..Whitened::default()
