@@ -213,7 +213,7 @@ async fn hand(flash: board::Storage, handle: board::Handle, mut words: Consumer<
     let textures = Table::read(memory.in_force()).map_or(0, |table| table.textures());
     let mut probe = Handheld::<Plain>::new(plan, textures);
     if let Err(why) = Table::read(memory.in_force()) {
-        probe.out_of_memory(text(why));
+        probe.memory_failed(text(why));
     }
     let mut awake = Awake::default();
     awake.was(None);
@@ -299,7 +299,7 @@ async fn work(job: Job, probe: &mut Handheld<'_, Plain>, memory: &mut Memory) {
         Job::Judge(slides) => {
             let table = match Table::read(memory.in_force()) {
                 Ok(table) => table,
-                Err(why) => return probe.out_of_memory(text(why)),
+                Err(why) => return probe.memory_failed(text(why)),
             };
             let judged = judge::<Plain>(table, &slides).map(|(judgement, visited)| {
                 if let Some((texture, p)) = judgement.leading.first() {

@@ -9,7 +9,7 @@ use core::fmt;
 
 use heapless::Vec;
 
-use crate::explorer::{Config, Explorer, ExplorerError, Method, ObserveError, Strategy};
+use crate::explorer::{Config, Explorer, ExplorerError, Method, ObserveError};
 use crate::features::{Plan, PropertySet};
 use crate::fused::{FeatureSet, Observation};
 use crate::kernels::Kernels;
@@ -38,8 +38,6 @@ pub const TICKS_HZ: u32 = 100;
 pub const MAX_SLIDES: usize = 5;
 /// Slides that a texture is taught from when teaching is what the person began with.
 const LESSON: usize = 3;
-/// A texture more probable than this is the answer.
-const SURE: f32 = 0.99;
 /// Textures that a verdict shows.
 pub const LEADING: usize = 3;
 /// Nothing happens for this long: the display goes dark and the sensor rests, ticks.
@@ -97,10 +95,9 @@ pub fn judge<K: Kernels>(
 ) -> Result<(Judgement, Visited), JudgeError> {
     let config = Config {
         method: Method::Fused,
-        strategy: Strategy::Bayesian,
-        threshold: SURE,
         max_slides: MAX_SLIDES as u8,
         open: true,
+        ..Config::default()
     };
     let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::new(table, PropertySet::default(), config)
         .map_err(JudgeError::Table)?;
@@ -364,7 +361,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 
     /// The store or the table cannot be used.
-    pub fn out_of_memory(&mut self, why: Text) {
+    pub fn memory_failed(&mut self, why: Text) {
         self.fail(Trouble::Memory(why));
     }
 

@@ -2,7 +2,7 @@
 
 use rigless::emulator::{Hit, Host, Watch};
 
-use crate::stack::{register, word};
+use crate::stack::{is_over, register, word};
 
 /// Where an exception frame holds the address to return to (ARM DDI 0403, B1.5.6), bytes above the stack pointer.
 const RETURN: u32 = 24;
@@ -58,13 +58,8 @@ impl Spending {
         };
         let of = |handler: &Spent| handler.address == hit.address;
         let begins = self.handlers.iter().position(of);
-        // it is over when its frame is gone, or when another begins upon the same one
         let over = |running: &mut Running| {
-            if begins.is_some() {
-                running.sp <= sp
-            } else {
-                running.sp < sp && running.returns_to == hit.address
-            }
+            is_over((running.sp, running.returns_to), begins.is_some(), sp, hit)
         };
         while let Some(ended) = self.running.pop_if(over) {
             let all = hit.instruction_count - ended.begun;

@@ -198,13 +198,8 @@ impl Stack {
         };
         let of = |level: &StackLevel| level.address == hit.address;
         let begins = self.found.levels.iter().position(of);
-        // it is over when its frame is gone, or when another begins upon the same one
         let over = |running: &mut Running| {
-            if begins.is_some() {
-                running.sp <= sp
-            } else {
-                running.sp < sp && running.returns_to == hit.address
-            }
+            is_over((running.sp, running.returns_to), begins.is_some(), sp, hit)
         };
         while let Some(running) = self.running.pop_if(over) {
             self.end(&running, host);
@@ -275,6 +270,21 @@ impl Stack {
 
 pub(crate) fn word(address: u32, host: &mut dyn Host) -> u32 {
     host.read(address.into(), Width::W32).unwrap_or_default() as u32
+}
+
+/// Whether a handler, which began at this stack pointer and returns to this address, is over at a hit: its frame is gone, or
+/// another handler `begins` upon the same one.
+pub(crate) fn is_over(
+    (began_at, returns_to): (u32, u64),
+    begins: bool,
+    sp: u32,
+    hit: &Hit,
+) -> bool {
+    if begins {
+        began_at <= sp
+    } else {
+        began_at < sp && returns_to == hit.address
+    }
 }
 
 /// Bytes of paint from an address on.

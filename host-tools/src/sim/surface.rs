@@ -43,15 +43,14 @@ impl Texture {
 
     /// Friction relative to that at [`FRICTION_AT`].
     fn law(&self, speed_mm_s: f64, load_n: f64) -> f64 {
-        let load = (load_n.max(LAWS_FROM.0) / FRICTION_AT.0).ln();
-        let speed = (speed_mm_s.abs().max(LAWS_FROM.1) / FRICTION_AT.1).ln();
+        let [load, speed] = relative([load_n, speed_mm_s.abs()], FRICTION_AT);
         let of_speed = bent(self.friction_speed, self.friction_bend, speed);
         (self.friction_load * load + of_speed).exp()
     }
 
     /// Vibrations relative to those at [`VIBRATIONS_AT`], but for what speed does to those of all textures.
     pub(super) fn vibrations(&self, speed_mm_s: f64) -> f64 {
-        let (_, speed) = relative(0.0, speed_mm_s);
+        let [_, speed] = relative([0.0, speed_mm_s], VIBRATIONS_AT);
         bent(self.vibration_speed, self.vibration_bend, speed).exp()
     }
 
@@ -66,16 +65,17 @@ impl Texture {
 
     /// Centre of the spectrum of the impulses, Hz.
     pub(super) fn impulse_centre_hz(&self, speed_mm_s: f64, load_n: f64) -> f64 {
-        let (load, speed) = relative(load_n, speed_mm_s);
+        let [load, speed] = relative([load_n, speed_mm_s], VIBRATIONS_AT);
         self.impulse_hz * (self.impulse_load * load + bent(0.0, self.impulse_bend, speed)).exp()
     }
 }
 
-/// ln of load and speed relative to those at which vibrations are quoted.
-fn relative(load_n: f64, speed_mm_s: f64) -> (f64, f64) {
-    let load = load_n.max(LAWS_FROM.0) / VIBRATIONS_AT.0;
-    let speed = speed_mm_s.max(LAWS_FROM.1) / VIBRATIONS_AT.1;
-    (load.ln(), speed.ln())
+/// ln of load and speed relative to those at which something is quoted.
+fn relative([load_n, speed_mm_s]: [f64; 2], at: (f64, f64)) -> [f64; 2] {
+    [
+        (load_n.max(LAWS_FROM.0) / at.0).ln(),
+        (speed_mm_s.max(LAWS_FROM.1) / at.1).ln(),
+    ]
 }
 
 /// A power law that bends up to [`BENDS`] from where it is quoted: ln of its value at ln(speed).

@@ -121,8 +121,8 @@ const FRICTION_POWERS: (f64, f64, f64) = (0.15, 0.18, 0.12);
 /// Friction goes with the heights of a texture, relative to its kind's, to this power (chosen; PAPER Table 3: the rougher,
 /// the less traction).
 const SMOOTHER: f64 = -0.4;
-/// That load of an ordinary texture, N (chosen; PAPER: "greater forces tend to dampen vibrations"), and the
-/// deviation of its ln.
+/// Load at which the vibrations of an ordinary texture have fallen to half, N (chosen; PAPER: "greater forces tend to dampen
+/// vibrations"), and the deviation of its ln among textures.
 pub(super) const CLAMPED_N: (f64, f64) = (0.6, 0.5);
 /// Deviation of the power with which vibrations go with speed, and of how that power changes with ln(speed): what catches
 /// at one speed is skipped at another (chosen).
@@ -167,42 +167,33 @@ pub fn draw(number: u8, seed: u64) -> Texture {
     });
     // smooth surfaces touch all over (Hertz: -1/3), rough ones at points whose number grows with load (Amontons: 0)
     let smoothness = 1.0 / (1.0 + fine_um);
-    let drawn = Texture {
+    // the smoother of two surfaces of a kind has the more contact
+    let friction = noise.about(medians.friction, spread.friction) * height.powf(SMOOTHER);
+    let friction_load = -0.15 * smoothness * noise.between(0.7, 1.3);
+    let movement = spread.movement;
+    Texture {
         number,
-        // the smoother of two surfaces of a kind has the more contact
-        friction: noise.about(medians.friction, spread.friction) * height.powf(SMOOTHER),
-        friction_load: -0.15 * smoothness * noise.between(0.7, 1.3),
-        friction_speed: 0.04 + noise.within(spread.movement * FRICTION_POWERS.1),
-        friction_bend: 0.0,
+        friction,
+        friction_speed: 0.04 + noise.within(movement * FRICTION_POWERS.1),
         stiction: noise.between(0.05, 0.25),
         friction_noise: noise.about(medians.friction_noise, 0.2),
         fine_um,
         fine_mm: noise.about(medians.fine.1, spread.wavelength),
         impulse_hz: noise.about(medians.impulse_hz, IMPULSE_SPREAD),
-        impulse_load: 0.0,
-        impulse_bend: 0.0,
         relief_um,
         relief_mm: noise.about(medians.relief.1, spread.wavelength),
         relief_exponent: medians.relief_exponent + noise.between(-0.4, 0.4),
         weave,
         damping: medians.damping,
-        clamped_n: CLAMPED_N.0,
-        vibration_speed: 0.0,
-        vibration_bend: 0.0,
         heterogeneity: noise.about(medians.heterogeneity, 0.3),
         thickness_mm: noise.about(medians.thickness_mm, 0.2),
         compliance_mm_per_n: noise.about(medians.compliance_mm_per_n, 0.2),
-    };
-    // what load and speed do to it
-    let mut within = |deviation| noise.within(spread.movement * deviation);
-    Texture {
-        friction_load: drawn.friction_load + within(FRICTION_POWERS.0),
-        friction_bend: within(FRICTION_POWERS.2),
-        impulse_load: within(IMPULSE_POWERS.0),
-        impulse_bend: within(IMPULSE_POWERS.1),
-        clamped_n: drawn.clamped_n * within(CLAMPED_N.1).exp(),
-        vibration_speed: within(VIBRATION_SPEED.0),
-        vibration_bend: within(VIBRATION_SPEED.1),
-        ..drawn
+        friction_load: friction_load + noise.within(movement * FRICTION_POWERS.0),
+        friction_bend: noise.within(movement * FRICTION_POWERS.2),
+        impulse_load: noise.within(movement * IMPULSE_POWERS.0),
+        impulse_bend: noise.within(movement * IMPULSE_POWERS.1),
+        clamped_n: noise.about(CLAMPED_N.0, movement * CLAMPED_N.1),
+        vibration_speed: noise.within(movement * VIBRATION_SPEED.0),
+        vibration_bend: noise.within(movement * VIBRATION_SPEED.1),
     }
 }

@@ -212,7 +212,7 @@ fn faults_show_and_go() {
     bench.probe.felt(Event::Silent);
     assert_eq!(bench.shown(), "Fault");
     assert!(bench.probe.visit.is_empty() && bench.probe.listens());
-    bench.probe.out_of_memory(crate::session::text("worn"));
+    bench.probe.memory_failed(crate::session::text("worn"));
     assert!(!bench.probe.listens());
     bench.press(10);
     assert_eq!(bench.probe.page, Page::Ready);
@@ -321,7 +321,7 @@ proptest! {
                     let name = if ok { Ok(free_name(&table)) } else { Err(crate::session::text("no")) };
                     probe.taught(name, textures);
                 }
-                Happens::Broken => probe.out_of_memory(crate::session::text("broken")),
+                Happens::Broken => probe.memory_failed(crate::session::text("broken")),
             }
             match probe.job() {
                 Some(Job::Judge(slides)) => {
