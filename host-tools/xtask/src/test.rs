@@ -13,7 +13,7 @@ use crate::{
 /// How long each parser is attacked ...
 const FUZZ_S: u64 = 20;
 /// ... and how long the bugs that are there on purpose may stay hidden.
-const PLANTED_S: u64 = 60;
+const PLANTED_S: u64 = 150;
 
 /// How a step ended.
 enum Outcome {

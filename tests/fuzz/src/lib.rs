@@ -26,7 +26,7 @@ use tactus_core::wire::{Ask, MAX_FRAME, Receiver, Request, Tell};
 
 pub use flash::{Flash, images};
 pub use folder::recordings;
-pub use played::scenario;
+pub use played::{another_scenario, scenario};
 
 const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// More textures than any table for the probe has.

@@ -1,5 +1,7 @@
 //! Scenarios for the handheld probe: files that anybody may have written.
 
+use fastrand::Rng;
+use serde_json::{Value, json};
 use tactus::handheld::Person;
 use tactus::scenario::{Scenario, Step, texture};
 
@@ -47,6 +49,72 @@ pub fn scenario(data: &[u8]) {
         let truth = person.truth();
         assert!(truth.force_n.is_finite() && truth.indentation_mm.is_finite());
         assert!((0.0..=75.0).contains(&truth.sample_mm) && truth.speed_mm_s.is_finite());
+    }
+}
+
+/// What a scenario may become by one change that leaves it JSON: bytes changed at random seldom are, and would try
+/// the parser of JSON, which is not ours. None when bytes shall be changed, as every fourth time.
+pub fn another_scenario(data: &[u8], max_size: usize, seed: u32) -> Option<Vec<u8>> {
+    let mut rng = Rng::with_seed(seed.into());
+    let mut scenario: Value = serde_json::from_slice(data).ok()?;
+    if rng.u8(..4) == 0 {
+        return None;
+    }
+    let mut values = 0;
+    each(&mut scenario, &mut |_| values += 1);
+    let mut left = rng.usize(..values);
+    each(&mut scenario, &mut |value| {
+        if left == 0 {
+            change(value, &mut rng);
+        }
+        left = left.wrapping_sub(1);
+    });
+    let other = serde_json::to_vec(&scenario).ok()?;
+    (other.len() <= max_size).then_some(other)
+}
+
+/// A value and all in it, the inner ones first.
+fn each(value: &mut Value, what: &mut impl FnMut(&mut Value)) {
+    match value {
+        Value::Array(inner) => inner.iter_mut().for_each(|v| each(v, what)),
+        Value::Object(inner) => inner.values_mut().for_each(|v| each(v, what)),
+        _ => (),
+    }
+    what(value);
+}
+
+fn change(value: &mut Value, rng: &mut Rng) {
+    match value {
+        Value::Number(number) => {
+            let whole = rng.u64(..) >> rng.u32(..64);
+            let others = match (number.as_u64(), number.as_f64().unwrap_or_default()) {
+                (Some(is), _) => [is.wrapping_mul(10), is.wrapping_add(1), whole].map(|n| json!(n)),
+                (None, is) => [json!(is * 10.0), json!(-is), json!(whole)],
+            };
+            *value = rng.choice(others).unwrap_or_default();
+        }
+        Value::String(text) => {
+            let at = rng.usize(..=text.chars().count());
+            let bytes = text
+                .char_indices()
+                .nth(at)
+                .map_or(text.len(), |(byte, _)| byte);
+            text.insert(bytes, rng.char(..));
+        }
+        Value::Array(inner) if !inner.is_empty() => {
+            let (one, other) = (rng.usize(..inner.len()), rng.usize(..inner.len()));
+            match rng.u8(..3) {
+                0 => inner.swap(one, other),
+                1 => drop(inner.remove(one)),
+                _ => inner.insert(other, inner[one].clone()),
+            }
+        }
+        Value::Object(inner) => {
+            let key = rng.choice(inner.keys()).cloned();
+            key.and_then(|key| inner.remove(&key));
+        }
+        Value::Bool(is) => *is = !*is,
+        Value::Null | Value::Array(_) => (),
     }
 }
 
