@@ -165,17 +165,6 @@ pub(crate) fn seeds() -> Vec<Vec<u8>> {
     ]
     .into_iter()
     .map(|(kind, manifest, file)| [&[kind], manifest.as_bytes(), RULE, &file].concat())
+    .inspect(|seed| assert_eq!(read(seed), Ok(()), "{}", String::from_utf8_lossy(seed)))
     .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_seeds_are_right() {
-        for seed in seeds() {
-            assert_eq!(read(&seed), Ok(()), "{}", String::from_utf8_lossy(&seed));
-        }
-    }
 }

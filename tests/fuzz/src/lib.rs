@@ -100,7 +100,7 @@ where
         panic!("not understood again");
     };
     let mut other = [0; MAX_FRAME + 1];
-    assert_eq!(tactus_core::wire::encode(again, &mut other), Ok(&*frame));
+    assert_eq!(tactus_core::wire::encode(again, &mut other), Ok(frame));
 }
 
 fn cobs_of(bytes: &[u8]) -> Vec<u8> {
