@@ -393,7 +393,7 @@ fn a_bad_table_is_refused_with_the_check_that_failed() {
         (flipped, "checksum"),
         (other_version, "version 9"),
         (longer, "3 bytes follow"),
-        (good[..200].to_vec(), "truncated: 200 bytes of 1153"),
+        (good[..200].to_vec(), "truncated: 200 bytes of 1309"),
         (b"texture,movement".to_vec(), "not a texture table"),
         (Vec::new(), "truncated: 0 bytes"),
     ] {

@@ -18,7 +18,7 @@
 //! | 1 | number of movements M |
 //! | 1 | Gaussians: 0; fused: number of features d |
 //! | 6 M | per movement: force in mN (2), speed in um/s (4) |
-//! | M (3 d + d (d + 1)) | fused only, per movement a [`Whitening`]: d means of the features (i16, 1/1024), binary places of d rows (u8), the rows of W up to the diagonal (i16) |
+//! | M (3 d + 2 d d) | fused only, per movement a [`Whitening`]: d means of the features (i16, 1/1024), binary places of d rows (u8), the rows of W (i16) |
 //! | 12 T M | Gaussians: per texture, movement and property: mean (i16, see [`mean_step`]), standard deviation (u16, [`SD_STEP`]); 0 and 0 for a property not measured |
 //! | 2 d T M | fused: per texture and movement: mean of the d whitened features (i16, 1/256) |
 //! | T M | per texture and movement: number of trials, 255 for more |
@@ -46,7 +46,7 @@ pub use experience::{Experience, Gaussian};
 
 const MAGIC: [u8; 4] = *b"TACT";
 /// Version of the binary form that this code reads and writes.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;
 const GAUSSIANS: u8 = 0;
 const FUSED: u8 = 1;
 const HEADER: usize = 16;

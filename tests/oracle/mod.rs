@@ -21,8 +21,9 @@ pub const STRICT: f64 = 0.999;
 pub const LIMIT: u32 = 10;
 /// Slides of trust that the average over movements has against one movement's own covariance.
 pub const BLEND: f64 = 15.0;
-/// Novelty log-odds that flag an unknown texture after one slide; later ones need 0.
+/// Novelty log-odds that flag an unknown texture after one slide, and after more.
 pub const NOVEL_AT_ONCE: f64 = 2.0;
+pub const NOVEL_LATER: f64 = 1.5;
 /// When a visit's best guess is learned without asking, and how much of it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Learning {
@@ -475,19 +476,44 @@ impl Visit {
         let textures = table.textures() as f64;
         let background = self.movements_made().map(|(movement, k, mean)| {
             let centre = mean_of(table.means.iter().map(|m| &m[movement]));
-            let (mut ln, mut q) = (0.0, 0.0);
-            for (i, (z, centre)) in mean.iter().zip(&centre).enumerate() {
-                // reading: the variance over the number of textures
-                let about = table
-                    .means
-                    .iter()
-                    .map(|m| (m[movement][i] - centre).powi(2));
-                let variance = about.sum::<f64>() / textures + 1.0 / k;
-                ln += variance.ln();
-                q += (z - centre).powi(2) / variance;
+            // all of the covariance of means, drawn towards a sphere (OAS, Chen et al. 2010, eq. 23)
+            let d = mean.len();
+            let about: Vec<Vec<f64>> = table
+                .means
+                .iter()
+                .map(|m| {
+                    m[movement]
+                        .iter()
+                        .zip(&centre)
+                        .map(|(m, c)| m - c)
+                        .collect()
+                })
+                .collect();
+            let mut s: Matrix = vec![vec![0.0; d]; d];
+            for about in &about {
+                for (row, x) in s.iter_mut().zip(about) {
+                    for (s, y) in row.iter_mut().zip(about) {
+                        *s += x * y / textures;
+                    }
+                }
             }
-            let d = mean.len() as f64;
-            -ln / 2.0 - (FREEDOM + d) / 2.0 * (q / FREEDOM).ln_1p()
+            let trace: f64 = (0..d).map(|i| s[i][i]).sum();
+            let of_square: f64 = s.iter().flatten().map(|s| s * s).sum();
+            let df = d as f64;
+            let rho = ((1.0 - 2.0 / df) * of_square + trace * trace)
+                / ((textures + 1.0 - 2.0 / df) * (of_square - trace * trace / df));
+            let rho = if (0.0..1.0).contains(&rho) { rho } else { 1.0 };
+            for (i, row) in s.iter_mut().enumerate() {
+                row.iter_mut().for_each(|s| *s *= 1.0 - rho);
+                row[i] += rho * trace / df + 1.0 / k;
+            }
+            // its inverse Cholesky factor gives distance and determinant
+            let w = inverse_lower(&cholesky(&s));
+            let z: Vec<f64> = mean.iter().zip(&centre).map(|(z, c)| z - c).collect();
+            let row = |row: &Vec<f64>| row.iter().zip(&z).map(|(w, z)| w * z).sum::<f64>();
+            let q: f64 = w.iter().map(row).map(|x| x * x).sum();
+            let ln: f64 = (0..d).map(|i| -2.0 * w[i][i].ln()).sum();
+            -ln / 2.0 - (FREEDOM + df) / 2.0 * (q / FREEDOM).ln_1p()
         });
         background.sum::<f64>() - (ln_sum_exp(&self.log_likelihoods(table)) - textures.ln())
     }
@@ -497,7 +523,7 @@ impl Visit {
         let bar = if self.slides() <= 1 {
             NOVEL_AT_ONCE
         } else {
-            0.0
+            NOVEL_LATER
         };
         self.novelty(table) > bar
     }

@@ -9,6 +9,8 @@ use crate::{cargo, root, run, target};
 /// The world, and the trials of each texture and movement, that the firmware's table is learned from.
 const SEED: &str = "1";
 const TRIALS: &str = "5";
+/// Slides of each texture that the handheld's table is learned from: a hand scatters more than a rig.
+const SLIDES_BY_HAND: &str = "15";
 
 /// The rig's table and the handheld's.
 pub(crate) const TABLES: [&str; 2] = ["factory.tact", "handheld.tact"];
@@ -53,7 +55,14 @@ fn make(work: &Path) -> Result<[Vec<u8>; 2]> {
     learn.arg(&recordings).arg("--out").arg(&table);
     run(&mut learn).context("the learning failed")?;
     let mut learn = tactus();
-    learn.args(["learn-by-hand", "--seed", SEED, "--trials", TRIALS, "--out"]);
+    learn.args([
+        "learn-by-hand",
+        "--seed",
+        SEED,
+        "--trials",
+        SLIDES_BY_HAND,
+        "--out",
+    ]);
     run(learn.arg(&by_hand)).context("the learning by hand failed")?;
     let read = |file: &Path| {
         std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))

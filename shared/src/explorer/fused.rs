@@ -136,6 +136,11 @@ impl Background {
                 let above = squares * count as i64 - sum * sum;
                 *variance = above as f32 / (n * n) * step * step;
             }
+            let Contents::Fused(_, features) = table.contents() else {
+                return background;
+            };
+            let variances = background.variance.get_mut(..features.into());
+            shrink(variances.unwrap_or_default(), n);
         }
         background
     }
@@ -152,6 +157,20 @@ impl Background {
         }
         let tail = (FREEDOM as f32 + mean.len() as f32) / 2.0;
         -0.5 * norm - tail * libm::log1pf(distance / FREEDOM as f32)
+    }
+}
+
+/// Draws the variances along the axes of a covariance of `n` towards their mean, by as much as so few deserve (OAS, Chen et al.
+/// 2010): textures differ in more directions than a few of them show.
+fn shrink(variances: &mut [f32], n: f32) {
+    let d = variances.len() as f32;
+    let sum: f32 = variances.iter().sum();
+    let squares: f32 = variances.iter().map(|v| v * v).sum();
+    let above = (1.0 - 2.0 / d) * squares + sum * sum;
+    let below = (n + 1.0 - 2.0 / d) * (squares - sum * sum / d);
+    let weight = if above < below { above / below } else { 1.0 };
+    for variance in variances {
+        *variance += weight * (sum / d - *variance);
     }
 }
 

@@ -248,15 +248,24 @@ fn whitens_by_the_recipe() {
         for (movement, (whitening, (w, g))) in whitenings.iter().zip(&recipe).enumerate() {
             for n in 0..100 {
                 let x = world.slide(noise, n % textures, movement);
-                let z = whitening.apply(&x);
-                assert_eq!(z.len(), features);
-                for (i, z) in z.iter().enumerate() {
-                    // g in whole steps
-                    let apart = |j: usize| f64::from(x[j]) - (g[j] * 1024.0).round();
-                    let exact: f64 = (0..=i).map(|j| w[i][j] * apart(j) / 1024.0).sum();
-                    let steps = (exact * 256.0).clamp(-32768.0, 32767.0);
-                    let error = (f64::from(*z) - steps).abs();
-                    assert!(error <= 2.0 + 1e-3 * steps.abs(), "{seed}: {z} {steps}");
+                let other = world.slide(noise, (n + 1) % textures, movement);
+                // g in whole steps
+                let mean: Vector = g.iter().map(|g| (g * 1024.0).round() as i16).collect();
+                assert!(whitening.apply(&mean).iter().all(|&z| z == 0));
+                // canonical variates are the recipe's, turned: all distances are the same
+                for from in [&mean, &other] {
+                    let white = whitening.apply(&x).into_iter().zip(whitening.apply(from));
+                    let turned = white.map(|(z, from)| f64::from(z) - f64::from(from));
+                    let row = |i: usize| -> f64 {
+                        let apart = |j: usize| f64::from(x[j]) - f64::from(from[j]);
+                        (0..=i).map(|j| w[i][j] * apart(j) / 4.0).sum()
+                    };
+                    let distance = (0..features).map(row).map(|z| z * z).sum::<f64>().sqrt();
+                    let error = turned.map(|z| z * z).sum::<f64>().sqrt() - distance;
+                    assert!(
+                        error.abs() <= 2.0 * (features as f64).sqrt() + 1e-3 * distance,
+                        "{seed}: {error} {distance}"
+                    );
                 }
             }
         }
@@ -274,17 +283,58 @@ fn features_without_scatter_of_their_own_are_bounded() {
     let whitening = learned(&[textures]).remove(0);
     let z = whitening.apply(&slide(2000, 0));
     let other = whitening.apply(&slide(2000, 100));
-    assert_eq!(z[1], other[1]);
-    // 100 steps of a standard deviation of 50 sqrt(10/4)
-    let apart = f64::from(other[0] - z[0]) / 256.0;
-    assert!(
-        (apart - 100.0 / (50.0 * 2.5f64.sqrt())).abs() < 0.02,
-        "{apart}"
-    );
+    let apart = |a: &[i16], b: &[i16]| {
+        let squares = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2));
+        squares.sum::<f64>().sqrt() / 256.0
+    };
+    // 100 steps of a standard deviation of 50 sqrt(10/4), and what follows them says hardly more
+    let apart_1 = f64::from(other[0] - z[0]) / 256.0;
+    let alone = 100.0 / (50.0 * 2.5f64.sqrt());
+    assert!((1.0..1.03).contains(&(apart_1 / alone)), "{apart_1}");
     let off = whitening.apply(&[2000, 8, 4000]);
     // one step of a standard deviation of sqrt(1/12)
-    let apart = f64::from(off[1] - z[1]) / 256.0;
-    assert!((apart - 12f64.sqrt()).abs() < 0.1, "{apart}");
+    let apart_2 = apart(&off, &z);
+    assert!((apart_2 - 12f64.sqrt()).abs() < 0.1, "{apart_2}");
+}
+
+/// What textures are apart in one canonical variate says nothing of the others, and the first says the most.
+#[test]
+fn canonical_variates_of_textures_are_uncorrelated() {
+    for (seed, textures, features) in [(7, 117, 14), (8, 20, 13), (9, 6, 13), (10, 2, 3)] {
+        let noise = &mut Noise(seed);
+        let world = World::new(noise, textures, 1, features);
+        let slides = world.slides(noise, 5);
+        let whitening = learned(&slides).remove(0);
+        let means: List<List<f64>> = slides[0]
+            .iter()
+            .map(|slides| {
+                let turned: List<Vector> = slides.iter().map(|x| whitening.apply(x)).collect();
+                let mean = |i: usize| turned.iter().map(|z| f64::from(white(z[i]))).sum::<f64>();
+                (0..features)
+                    .map(|i| mean(i) / slides.len() as f64)
+                    .collect()
+            })
+            .collect();
+        let k = textures as f64;
+        let centre = |i: usize| means.iter().map(|m| m[i]).sum::<f64>() / k;
+        let centre: List<f64> = (0..features).map(centre).collect();
+        let covariance = |i: usize, j: usize| {
+            let products = means
+                .iter()
+                .map(|m| (m[i] - centre[i]) * (m[j] - centre[j]));
+            products.sum::<f64>() / k
+        };
+        let largest = covariance(0, 0);
+        for i in 0..features {
+            // but for the rounding of weights
+            assert!(i == 0 || covariance(i, i) <= covariance(i - 1, i - 1) + 1e-3 * largest);
+            for j in 0..i {
+                let off = covariance(i, j).abs();
+                let most = 2e-3 * largest;
+                assert!(off <= most, "{seed}: {i} {j}: {off} of {largest}");
+            }
+        }
+    }
 }
 
 /// But for what the shrinking takes from directions that hardly scatter: little of four features, more of thirteen.
@@ -323,42 +373,39 @@ fn the_scatter_of_a_texture_is_1_in_every_direction() {
     }
 }
 
-/// W = ((1, 0), (-1, 2)) and g = (1, -1/2), written down by hand.
-pub(crate) fn by_hand() -> [u8; 12] {
+/// W = ((1, -1), (-1, 2)) and g = (1, -1/2), written down by hand.
+pub(crate) fn by_hand() -> [u8; 14] {
     [
         0x00, 0x04, 0x00, 0xfe, // g: 1024, -512
         4, 3, // places
-        16, 0, // 1 of 4 places
+        16, 0, 0xf0, 0xff, // 1 and -1 of 4 places
         0xf8, 0xff, 16, 0, // -1 and 2 of 3 places
     ]
 }
 
 #[test]
 fn a_whitening_is_applied_as_it_is_documented() {
-    assert_eq!((Whitening::bytes(2), Whitening::bytes(13)), (12, 221));
+    assert_eq!((Whitening::bytes(2), Whitening::bytes(13)), (14, 377));
     let whitening = Whitening::read(&by_hand(), 2).unwrap();
     assert_eq!(whitening.features(), 2);
-    let mut written = List::new();
-    whitening.write(|bytes| written.extend_from_slice(bytes));
-    assert_eq!(written, by_hand());
+    assert_eq!(whitening.as_bytes(), by_hand());
     assert_eq!(whitening.apply(&[1024, -512]), [0, 0]);
-    // x - g = (1, 2): z = (1, 3)
-    assert_eq!(whitening.apply(&[2048, 1536]), [256, 768]);
+    // x - g = (1, 2): z = (-1, 3)
+    assert_eq!(whitening.apply(&[2048, 1536]), [-256, 768]);
     // to the nearest step, halves upwards: 4 steps of a feature are 1
     assert_eq!(whitening.apply(&[1025, -512]), [0, 0]);
     assert_eq!(whitening.apply(&[1026, -512]), [1, 0]);
     assert_eq!(whitening.apply(&[1022, -512]), [0, 1]);
     assert_eq!(whitening.apply(&[1021, -512]), [-1, 1]);
-    // fewer in, fewer out
-    assert_eq!(whitening.apply(&[2048]), [256]);
-    assert_eq!(whitening.apply(&[]), []);
-    assert_eq!(whitening.apply(&[2048, 1536, 5]), [256, 768]);
-    // -64 at the least
-    assert_eq!(whitening.apply(&[i16::MAX, i16::MIN]), [7936, -24_064]);
+    // what is missing is the mean
+    assert_eq!(whitening.apply(&[2048]), [256, -256]);
+    assert_eq!(whitening.apply(&[]), [0, 0]);
+    assert_eq!(whitening.apply(&[2048, 1536, 5]), [-256, 768]);
+    assert_eq!(whitening.apply(&[i16::MAX, i16::MIN]), [16_000, -24_064]);
 
-    assert_eq!(Whitening::read(&by_hand()[..11], 2), None);
+    assert_eq!(Whitening::read(&by_hand()[..13], 2), None);
     assert_eq!(Whitening::read(&by_hand(), 3), None);
-    assert_eq!(Whitening::read(&[0; 3 * 15 + 15 * 16], 15), None);
+    assert_eq!(Whitening::read(&[0; 3 * 15 + 2 * 15 * 15], 15), None);
     let mut places = by_hand();
     places[5] = 30;
     assert!(Whitening::read(&places, 2).is_some());
@@ -374,7 +421,7 @@ fn the_farthest_values_do_not_overflow() {
             let mut bytes = List::new();
             (0..d).for_each(|_| bytes.extend(mean.to_le_bytes()));
             bytes.extend(vec![0; d]);
-            (0..d * (d + 1) / 2).for_each(|_| bytes.extend(weight.to_le_bytes()));
+            (0..d * d).for_each(|_| bytes.extend(weight.to_le_bytes()));
             let whitening = Whitening::read(&bytes, d).unwrap();
             for x in [i16::MAX, i16::MIN] {
                 let apart = i64::from(x) - i64::from(mean);
@@ -398,10 +445,9 @@ fn what_was_learned_reads_back() {
     for features in 1..=MAX_FEATURES {
         let world = World::new(noise, 4, 2, features);
         for whitening in learned(&world.slides(noise, 3)) {
-            let mut bytes = List::new();
-            whitening.write(|some| bytes.extend_from_slice(some));
+            let bytes = whitening.as_bytes();
             assert_eq!(bytes.len(), Whitening::bytes(features));
-            assert_eq!(Whitening::read(&bytes, features), Some(whitening));
+            assert_eq!(Whitening::read(bytes, features).as_ref(), Some(&whitening));
         }
     }
 }

@@ -8,33 +8,31 @@ use serde::{Deserialize, Serialize};
 use super::{FEATURE_STEPS, MAX_FEATURES, Vector, WHITE_STEPS};
 use crate::table::MAX_MOVEMENTS;
 
-/// Elements of a lower triangle.
-const TRIANGLE: usize = MAX_FEATURES * (MAX_FEATURES + 1) / 2;
 /// Weight of the average over all movements, in trials: with few trials of its own a movement's covariance is mostly that.
 const SHARED_TRIALS: f64 = 15.0;
 /// Variance of what rounding to whole steps adds, in steps^2: no feature is more certain than that.
 const ROUNDING: f64 = 1.0 / 12.0;
+/// Rounds of rotations for the axes along which textures differ.
+const SWEEPS: usize = 12;
 /// Least part of a feature's variance that the features before it may leave unexplained.
 const LEAST_PIVOT: f64 = 1e-6;
 
-/// From features to whitened ones, z = W (x - g): W is the inverse of the covariance's Cholesky factor.
+/// From features to whitened ones, z = W (x - g): canonical variates. W' W is the inverse of the covariance of slides within a
+/// texture, and the means of different textures are uncorrelated in z, those that scatter most first.
 ///
 /// W is kept in whole numbers, row by row with a power of two of its own; means are learned through the same numbers, so
 /// their rounding adds no error.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Whitening {
-    /// g, as features are.
-    mean: Vector,
-    /// Binary places of each row.
-    places: Vec<u8, MAX_FEATURES>,
-    /// The rows of W up to their diagonal, one after the other.
-    rows: Vec<i16, TRIANGLE>,
+    features: usize,
+    /// As a table has them: g, as features are (i16); binary places of each row (u8); the rows of W (i16).
+    bytes: Vec<u8, { Self::bytes(MAX_FEATURES) }>,
 }
 
 impl Whitening {
     /// Bytes that it takes in a table.
     pub const fn bytes(features: usize) -> usize {
-        3 * features + features * (features + 1)
+        3 * features + 2 * features * features
     }
 
     /// Reads it from a table; `None` if these are not the bytes of one of so many features.
@@ -42,59 +40,55 @@ impl Whitening {
         if bytes.len() != Self::bytes(features) || features > MAX_FEATURES {
             return None;
         }
-        let (mean, rest) = bytes.split_at_checked(2 * features)?;
-        let (places, rows) = rest.split_at_checked(features)?;
-        let words = |bytes: &[u8]| {
-            let words = bytes.chunks_exact(2);
-            words
-                .map(|pair| i16::from_le_bytes([pair[0], pair[1]]))
-                .collect::<Vec<i16, TRIANGLE>>()
-        };
-        Some(Self {
-            mean: Vector::from_slice(&words(mean)).ok()?,
-            places: Vec::from_slice(places).ok()?,
-            rows: words(rows),
-        })
-        .filter(|w| w.places.iter().all(|&p| p <= 30))
+        let bytes = Vec::from_slice(bytes).ok()?;
+        let whitening = Self { features, bytes };
+        let [_, places, _] = whitening.parts();
+        places.iter().all(|&p| p <= 30).then_some(whitening)
     }
 
-    /// Its bytes, in order.
-    pub fn write(&self, mut put: impl FnMut(&[u8])) {
-        self.mean.iter().for_each(|g| put(&g.to_le_bytes()));
-        put(&self.places);
-        self.rows.iter().for_each(|w| put(&w.to_le_bytes()));
+    /// g, places and rows.
+    fn parts(&self) -> [&[u8]; 3] {
+        let (mean, rest) = self
+            .bytes
+            .split_at_checked(2 * self.features)
+            .unwrap_or_default();
+        let (places, rows) = rest.split_at_checked(self.features).unwrap_or_default();
+        [mean, places, rows]
+    }
+
+    /// Its bytes.
+    pub fn as_bytes(&self) -> &[u8] {
+        &self.bytes
     }
 
     /// Number of features.
     pub fn features(&self) -> usize {
-        self.mean.len()
+        self.features
     }
 
-    /// Whitens the features of a slide, as many as there are in the table; the fewer they are, the fewer come out.
+    /// Whitens the features of a slide; those that are missing count as the mean, those beyond the table's not at all.
     pub fn apply(&self, features: &[i16]) -> Vector {
-        let mut rows = self.rows.as_slice();
-        let mut white = Vector::new();
-        for (row, (_, &places)) in (1..).zip(features.iter().zip(&self.places)) {
-            let Some((weights, rest)) = rows.split_at_checked(row) else {
-                break;
-            };
-            rows = rest;
-            let apart = features
-                .iter()
-                .zip(&self.mean)
-                .map(|(x, g)| i64::from(*x) - i64::from(*g));
-            let sum: i64 = weights
-                .iter()
-                .zip(apart)
-                .map(|(w, x)| i64::from(*w) * x)
-                .sum();
-            // from 1/1024 of a unit, and the row's places, to 1/256
-            let places = u32::from(places) + 2;
-            let z = (sum + (1 << (places - 1))) >> places;
-            // there is room: both are as long as the features
-            let _ = white.push(z.clamp(i16::MIN.into(), i16::MAX.into()) as i16);
+        let [mean, places, rows] = self.parts();
+        let word = |pair: &[u8; 2]| i32::from(i16::from_le_bytes(*pair));
+        let mut apart = [0; MAX_FEATURES];
+        let (mean, _) = mean.as_chunks();
+        for (apart, (x, g)) in apart.iter_mut().zip(features.iter().zip(mean)) {
+            *apart = i32::from(*x) - word(g);
         }
-        white
+        let rows = rows.chunks_exact((2 * self.features).max(1));
+        rows.zip(places)
+            .map(|(row, &places)| {
+                let (weights, _) = row.as_chunks();
+                let products = weights.iter().zip(&apart);
+                let sum: i64 = products
+                    .map(|(w, x)| i64::from(word(w)) * i64::from(*x))
+                    .sum();
+                // from 1/1024 of a unit, and the row's places, to 1/256
+                let places = u32::from(places) + 2;
+                let z = (sum + (1 << (places - 1))) >> places;
+                z.clamp(i16::MIN.into(), i16::MAX.into()) as i16
+            })
+            .collect()
     }
 }
 
@@ -127,7 +121,7 @@ impl core::error::Error for WhitenError {}
 
 type Square = [[f64; MAX_FEATURES]; MAX_FEATURES];
 
-/// How the slides of each texture differ at one movement, all textures taken together.
+/// How the slides of each texture differ at one movement, all textures taken together, and how textures differ.
 #[derive(Clone, Debug)]
 pub struct Scatter {
     features: usize,
@@ -137,6 +131,10 @@ pub struct Scatter {
     /// Sum of products of deviations from the mean of the own texture, and its degrees of freedom.
     products: Square,
     freedom: u32,
+    /// Sum of the means of all textures and of their products, and the number of textures.
+    means: [f64; MAX_FEATURES],
+    mean_products: Square,
+    textures: u32,
 }
 
 impl Scatter {
@@ -148,6 +146,9 @@ impl Scatter {
             slides: 0,
             products: [[0.0; MAX_FEATURES]; MAX_FEATURES],
             freedom: 0,
+            means: [0.0; MAX_FEATURES],
+            mean_products: [[0.0; MAX_FEATURES]; MAX_FEATURES],
+            textures: 0,
         }
     }
 
@@ -176,6 +177,20 @@ impl Scatter {
                 }
             }
         }
+        if !slides.is_empty() {
+            for ((sum, row), x) in self
+                .means
+                .iter_mut()
+                .zip(&mut self.mean_products)
+                .zip(&mean)
+            {
+                *sum += x;
+                row.iter_mut()
+                    .zip(&mean)
+                    .for_each(|(product, y)| *product += x * y);
+            }
+            self.textures += 1;
+        }
         self.slides += slides.len() as u32;
         self.freedom += (slides.len() as u32).saturating_sub(1);
         Ok(())
@@ -185,6 +200,18 @@ impl Scatter {
     fn covariance(&self) -> Square {
         self.products
             .map(|row| row.map(|p| p / f64::from(self.freedom.max(1))))
+    }
+
+    /// Covariance of the means of textures, in steps^2.
+    fn between(&self) -> Square {
+        let textures = f64::from(self.textures.max(1));
+        let mut between = self.mean_products;
+        for (row, x) in between.iter_mut().zip(&self.means) {
+            for (product, y) in row.iter_mut().zip(&self.means) {
+                *product = (*product - x * y / textures) / textures;
+            }
+        }
+        between
     }
 }
 
@@ -228,16 +255,24 @@ pub fn whiten(scatters: &[Scatter]) -> Result<Vec<Whitening, MAX_MOVEMENTS>, Whi
         }
         shrink(&mut correlation, features, freedom);
         let inverse = inverse_cholesky(&correlation, features);
+        let mut between = scatter.between();
+        for (row, sd_row) in between.iter_mut().zip(&deviations) {
+            row.iter_mut()
+                .zip(&deviations)
+                .for_each(|(c, sd)| *c /= sd_row * sd);
+        }
+        let axes = principal_axes(
+            &product(&product(&inverse, &between), &transposed(&inverse)),
+            features,
+        );
+        let canonical = product(&axes, &inverse);
         let mean = scatter.sum.iter().take(features);
         let mean = mean.map(|sum| libm::round(sum / f64::from(scatter.slides.max(1))) as i16);
-        let mut whitening = Whitening {
-            mean: mean.collect(),
-            places: Vec::new(),
-            rows: Vec::new(),
-        };
-        for (row, length) in inverse.iter().zip(1..=features) {
+        let mut bytes: Vec<u8, _> = mean.flat_map(i16::to_le_bytes).collect();
+        let mut words: Vec<i16, { MAX_FEATURES * MAX_FEATURES }> = Vec::new();
+        for row in canonical.iter().take(features) {
             // per unit of the feature, not per step
-            let weights = row.iter().zip(&deviations).take(length);
+            let weights = row.iter().zip(&deviations).take(features);
             let weights = weights.map(|(w, sd)| w / sd * f64::from(FEATURE_STEPS));
             let largest = weights.clone().fold(0.0, |most: f64, w| most.max(w.abs()));
             let places = (0..=30u8)
@@ -245,14 +280,13 @@ pub fn whiten(scatters: &[Scatter]) -> Result<Vec<Whitening, MAX_MOVEMENTS>, Whi
                 .find(|&p| largest * f64::from(1u32 << p) < f64::from(i16::MAX))
                 .unwrap_or(0);
             let scale = f64::from(1u32 << places);
-            // there is room: a triangle of so many features at most
-            let _ = whitening.places.push(places);
-            whitening
-                .rows
-                .extend(weights.map(|w| libm::round(w * scale) as i16));
+            // there is room: a square of so many features at most
+            bytes.extend([places]);
+            words.extend(weights.map(|w| libm::round(w * scale) as i16));
         }
+        bytes.extend(words.into_iter().flat_map(i16::to_le_bytes));
         whitenings
-            .push(whitening)
+            .push(Whitening { features, bytes })
             .map_err(|_| WhitenError::Movements)?;
     }
     Ok(whitenings)
@@ -311,6 +345,89 @@ fn inverse_cholesky(matrix: &Square, features: usize) -> Square {
         inverse[i][i] = 1.0 / lower[i][i];
     }
     inverse
+}
+
+fn transposed(matrix: &Square) -> Square {
+    let mut other = [[0.0; MAX_FEATURES]; MAX_FEATURES];
+    for (row, at) in matrix.iter().zip(0..) {
+        for (c, other) in row.iter().zip(&mut other) {
+            if let Some(other) = other.get_mut::<usize>(at) {
+                *other = *c;
+            }
+        }
+    }
+    other
+}
+
+fn product(left: &Square, right: &Square) -> Square {
+    left.map(|row| {
+        let mut sum = [0.0; MAX_FEATURES];
+        for (weight, other) in row.iter().zip(right) {
+            sum.iter_mut()
+                .zip(other)
+                .for_each(|(sum, c)| *sum += weight * c);
+        }
+        sum
+    })
+}
+
+/// The eigenvectors of a symmetric matrix as rows, that of the largest eigenvalue first (Jacobi's rotations; Golub and Van Loan,
+/// Matrix Computations, 8.5). Of the two directions of each, that in which its largest element is positive.
+fn principal_axes(matrix: &Square, features: usize) -> Square {
+    let features = features.min(MAX_FEATURES);
+    let mut rest = *matrix;
+    let mut axes = [[0.0; MAX_FEATURES]; MAX_FEATURES];
+    // indices, as in every book; all are below `features`, which is at most the matrices' size
+    #[allow(clippy::indexing_slicing, clippy::needless_range_loop)]
+    {
+        for i in 0..features {
+            axes[i][i] = 1.0;
+        }
+        // each sweep squares what is left beside the diagonal: a few do
+        for _ in 0..SWEEPS {
+            for p in 0..features {
+                for q in p + 1..features {
+                    if rest[p][q] == 0.0 {
+                        continue;
+                    }
+                    let tau = (rest[q][q] - rest[p][p]) / (2.0 * rest[p][q]);
+                    let t = 1.0 / (libm::fabs(tau) + libm::sqrt(1.0 + tau * tau));
+                    let t = if tau < 0.0 { -t } else { t };
+                    let c = 1.0 / libm::sqrt(1.0 + t * t);
+                    let s = t * c;
+                    for k in 0..features {
+                        let (a, b) = (rest[k][p], rest[k][q]);
+                        (rest[k][p], rest[k][q]) = (c * a - s * b, s * a + c * b);
+                    }
+                    for k in 0..features {
+                        let (a, b) = (rest[p][k], rest[q][k]);
+                        (rest[p][k], rest[q][k]) = (c * a - s * b, s * a + c * b);
+                        let (a, b) = (axes[p][k], axes[q][k]);
+                        (axes[p][k], axes[q][k]) = (c * a - s * b, s * a + c * b);
+                    }
+                }
+            }
+        }
+        // the rows beyond the features stay last, and 0
+        let mut order: [usize; MAX_FEATURES] = core::array::from_fn(|i| i);
+        order[..features]
+            .sort_unstable_by(|&i, &j| rest[j][j].total_cmp(&rest[i][i]).then(i.cmp(&j)));
+        order.map(|i| {
+            let axis = axes[i];
+            let largest = axis.iter().fold(0.0, |most: f64, &c| {
+                if libm::fabs(c) > libm::fabs(most) {
+                    c
+                } else {
+                    most
+                }
+            });
+            if largest < 0.0 {
+                axis.map(|c| -c)
+            } else {
+                axis
+            }
+        })
+    }
 }
 
 /// What a table knows of a texture at one movement: the mean of its whitened slides, and how many they were.

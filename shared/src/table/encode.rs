@@ -185,7 +185,7 @@ pub fn encode_fused<'o, 'a>(
         });
     let whitenings = |writer: &mut Writer<'_>| {
         for (_, whitening) in movements {
-            whitening.write(|bytes| writer.put(bytes));
+            writer.put(whitening.as_bytes());
         }
     };
     let contents = Contents::Fused(set, features as u8);

@@ -113,7 +113,7 @@ fn every_check_names_what_is_wrong() {
     let at = |at: usize, byte: u8| error(&wrong(|bytes| bytes[at] = byte));
     let length = |header, contents| TableError::Length { header, contents };
     assert_eq!(at(3, b'Z'), TableError::Magic(*b"TACZ"));
-    assert_eq!(at(5, 1), TableError::Version(258));
+    assert_eq!(at(5, 1), TableError::Version(259));
     assert_eq!(at(6, 2), TableError::Method(2));
     assert_eq!(
         at(8, 200),
@@ -217,7 +217,7 @@ fn what_is_wrong_is_told() {
         ),
         (
             TableError::Version(1),
-            "version 1, and this program reads version 2: learn the table anew",
+            "version 1, and this program reads version 3: learn the table anew",
         ),
         (TableError::Method(7), "method 7 is unknown"),
         (
