@@ -565,11 +565,9 @@ fn by_bands(
         return None;
     }
     let movement = random.random_range(0..table.movements().len() as u8);
-    let mut bytes = Vec::new();
-    table
-        .whitening(movement)?
-        .write(|part| bytes.extend_from_slice(part));
-    let mean: Vec<i16> = bytes
+    let whitening = table.whitening(movement)?;
+    let mean: Vec<i16> = whitening
+        .as_bytes()
         .chunks_exact(2)
         .take(features.into())
         .map(|pair| i16::from_le_bytes([pair[0], pair[1]]))
