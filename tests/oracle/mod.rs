@@ -139,15 +139,18 @@ pub type Matrix = Vec<Vec<f64>>;
 /// Slides to train from, as `[texture][movement][slide][feature]`.
 pub type Training = Vec<Vec<Vec<Vec<f64>>>>;
 
-/// The share lambda of the identity that OAS mixes into a correlation matrix estimated with `freedom` degrees of freedom.
-pub fn oas(correlation: &Matrix, freedom: f64) -> f64 {
-    let d = correlation.len() as f64;
-    let t: f64 = correlation.iter().flatten().map(|c| c * c).sum();
-    // the identity already: any share gives the same (and one feature is always that)
-    if t - d <= 0.0 {
+/// The share of a sphere that OAS mixes into a covariance estimated with `freedom` degrees of freedom.
+pub fn oas(covariance: &Matrix, freedom: f64) -> f64 {
+    let d = covariance.len() as f64;
+    let of_square: f64 = covariance.iter().flatten().map(|c| c * c).sum();
+    let trace: f64 = covariance.iter().enumerate().map(|(i, row)| row[i]).sum();
+    let apart = of_square - trace * trace / d;
+    // a sphere already: any share gives the same (and one feature is always that)
+    if apart <= 0.0 {
         return 1.0;
     }
-    (((1.0 - 2.0 / d) * t + d * d) / ((freedom + 1.0 - 2.0 / d) * (t - d))).min(1.0)
+    let above = (1.0 - 2.0 / d) * of_square + trace * trace;
+    (above / ((freedom + 1.0 - 2.0 / d) * apart)).min(1.0)
 }
 
 /// Lower triangular L with L L' = `s`.
@@ -498,11 +501,8 @@ impl Visit {
                 }
             }
             let trace: f64 = (0..d).map(|i| s[i][i]).sum();
-            let of_square: f64 = s.iter().flatten().map(|s| s * s).sum();
             let df = d as f64;
-            let rho = ((1.0 - 2.0 / df) * of_square + trace * trace)
-                / ((textures + 1.0 - 2.0 / df) * (of_square - trace * trace / df));
-            let rho = if (0.0..1.0).contains(&rho) { rho } else { 1.0 };
+            let rho = oas(&s, textures);
             for (i, row) in s.iter_mut().enumerate() {
                 row.iter_mut().for_each(|s| *s *= 1.0 - rho);
                 row[i] += rho * trace / df + 1.0 / k;

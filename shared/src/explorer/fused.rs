@@ -7,7 +7,7 @@
 use heapless::{Vec, VecView};
 
 use crate::fixed::{exp_neg_q30, ln_q16};
-use crate::fused::{MAX_FEATURES, Vector, white};
+use crate::fused::{MAX_FEATURES, Vector, oas, white};
 use crate::kernels::{Candidate, Kernels};
 use crate::table::{Contents, MAX_MOVEMENTS, Table};
 
@@ -160,15 +160,13 @@ impl Background {
     }
 }
 
-/// Draws the variances along the axes of a covariance of `n` towards their mean, by as much as so few deserve (OAS, Chen et al.
-/// 2010): textures differ in more directions than a few of them show.
+/// Draws the variances along the axes of a covariance of `n` towards their mean, by as much as so few deserve ([`oas`]):
+/// textures differ in more directions than a few of them show.
 fn shrink(variances: &mut [f32], n: f32) {
     let d = variances.len() as f32;
     let sum: f32 = variances.iter().sum();
     let squares: f32 = variances.iter().map(|v| v * v).sum();
-    let above = (1.0 - 2.0 / d) * squares + sum * sum;
-    let below = (n + 1.0 - 2.0 / d) * (squares - sum * sum / d);
-    let weight = if above < below { above / below } else { 1.0 };
+    let weight = oas(sum.into(), squares.into(), d.into(), n.into()) as f32;
     for variance in variances {
         *variance += weight * (sum / d - *variance);
     }

@@ -216,7 +216,7 @@ impl Scatter {
 }
 
 /// The whitening of every movement, from how slides scatter there: pooled covariance, blended with the average over all
-/// movements, its correlations shrunk towards none (OAS, Chen et al. 2010).
+/// movements, its correlations shrunk towards none (OAS), and turned so that means of textures are uncorrelated.
 ///
 /// # Errors
 /// See [`WhitenError`].
@@ -300,6 +300,14 @@ fn add(sum: &mut Square, more: &Square, weight: f64) {
     }
 }
 
+/// Weight of a sphere beside a covariance of `d` features from `n` degrees of freedom, by its trace and that of its square (OAS,
+/// Chen et al. 2010, eq. 23).
+pub(crate) fn oas(trace: f64, of_square: f64, d: f64, n: f64) -> f64 {
+    let above = (1.0 - 2.0 / d) * of_square + trace * trace;
+    let below = (n + 1.0 - 2.0 / d) * (of_square - trace * trace / d);
+    if above < below { above / below } else { 1.0 }
+}
+
 /// Draws correlations towards 0 by as much as so few degrees of freedom deserve.
 fn shrink(correlation: &mut Square, features: usize, freedom: f64) {
     let d = features as f64;
@@ -307,10 +315,7 @@ fn shrink(correlation: &mut Square, features: usize, freedom: f64) {
         .iter()
         .take(features)
         .flat_map(|row| row.iter().take(features));
-    let t: f64 = squares.map(|c| c * c).sum();
-    let above = (1.0 - 2.0 / d) * t + d * d;
-    let below = (freedom + 1.0 - 2.0 / d) * (t - d);
-    let lambda = if above < below { above / below } else { 1.0 };
+    let lambda = oas(d, squares.map(|c| c * c).sum(), d, freedom);
     for (at, row) in correlation.iter_mut().enumerate() {
         for (other, c) in row.iter_mut().enumerate() {
             *c = if at == other {
