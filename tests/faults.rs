@@ -601,6 +601,40 @@ fn a_stuck_switch_and_a_stubborn_operator_do_not_let_the_lever_creep_down() {
     assert!(truth.indentation_mm < 0.0, "{} mm", truth.indentation_mm);
 }
 
+/// What makes the count of steps wrong, either way, and many times over: once it is repaired and homed, the rig presses as before.
+#[test]
+fn steps_that_were_lost_do_not_add_up() {
+    let causes = [
+        // up into the hard stop, by 10 s of steps
+        Cause::LeverTopStuck { closed: false },
+        // down, and nobody counts
+        Cause::LeverRunaway,
+        // fewer than were counted, most of them down
+        Cause::LeverLosesSteps { share: 0.9 },
+        // none at all: it never left the switch
+        Cause::LeverLosesSteps { share: 1.0 },
+    ];
+    causes.par_iter().for_each(|cause| {
+        let mut rig = pressed(Unguarded::default());
+        let _ = rig.rest(|_| ());
+        for round in 0..8 {
+            rig.home().unwrap();
+            rig.world().inject(*cause);
+            let _ = rig.slide(Movement::FOR_TRACTION, 0.5, |_, _| ());
+            let _ = rig.rest(|_| ());
+            // somebody tries before it is repaired
+            let _ = rig.control().reset();
+            let _ = rig.home();
+            rig.world().clear();
+            let _ = rig.control().reset();
+            let sound = rig
+                .home()
+                .and_then(|()| rig.slide(Movement::FOR_TRACTION, 0.5, |_, _| ()));
+            assert!(sound.is_ok(), "{cause:?}, round {round}: {sound:?}");
+        }
+    });
+}
+
 /// A force over the limit that lasts while the lever goes up, because somebody leans on it: it must go on, and it did not
 /// even begin where another fault had come first. One that rises while it goes up is the lever's own: it must stop.
 #[test]

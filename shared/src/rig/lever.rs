@@ -24,6 +24,8 @@ const CONTACT_COUNTS: f32 = 3.0;
 /// Nearer to the top than this the limit switch may be closed, further down it must be open: 1 mm, the switch's
 /// own way and the half millimetre from it to the hard stop.
 const NEAR_TOP_STEPS: i32 = 1600;
+/// The switch closes at the same place each time, this exactly: one sixteenth of a millimetre.
+const SWITCH_STEPS: i32 = 100;
 /// From contact to 2 N the finger gives way by less than 3 mm; more steps than that without the force are lost steps.
 const PRESS_STEPS: i32 = 4800;
 /// The skin creeps after it was pressed, and P_DC with it.
@@ -165,7 +167,7 @@ impl Lever {
     }
 
     /// Goes up to the limit switch. This is also what lifts the finger whatever has happened: a lever that knows where it
-    /// is believes the switch only near the top, for a switch that sticks must not leave the finger down.
+    /// is believes the switch only at the top, for a switch that sticks must not leave the finger down.
     pub fn home(&mut self) {
         self.enter(LeverState::Homing);
     }
@@ -222,12 +224,15 @@ impl Lever {
         match self.state {
             LeverState::Unknown | LeverState::Lifted | LeverState::Holding => Ok(0),
             LeverState::Homing => {
-                if at_top && (!self.known || steps - self.top <= NEAR_TOP_STEPS) {
-                    // a top once found is the top: a switch that is stuck would else move it down each time
-                    if !self.known {
-                        self.top = steps;
-                        self.known = true;
-                    }
+                // Lower than it was, the lever goes on: if the switch is stuck, that is right; if steps were lost, it stands at
+                // its hard stop until the count is right again. Higher, and steps up were lost: there the top is now.
+                if at_top && (!self.known || steps - self.top <= SWITCH_STEPS) {
+                    self.top = if self.known {
+                        self.top.min(steps)
+                    } else {
+                        steps
+                    };
+                    self.known = true;
                     self.contact = None;
                     self.zero = None;
                     self.enter(LeverState::Lifted);
