@@ -100,8 +100,10 @@ impl Probe {
         self.rest(|_| ()).await.map(|_| ())
     }
 
-    /// Finds the limit switches, the lever's first.
+    /// Finds the limit switches, the lever's first; after a fault once the finger is lifted.
     pub(crate) async fn home(&mut self) -> Result<(), ProbeError> {
+        // the fault is what the user homes after
+        let _ = self.rest(|_| ()).await;
         self.command(Command::Home).await?;
         match self.rest(|_| ()).await?.phase {
             Phase::Ready => Ok(()),

@@ -570,6 +570,13 @@ fn a_stop_holds_whenever_it_comes() {
     assert_eq!(chosen_after, 0, "the finger came down again");
     // and what comes after it is not stopped
     talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
+    talk.ask(identify(1), 80.0, |_, _| ()).unwrap();
+    // an emergency stop while nothing is done: homing waits for the finger, which hangs low
+    talk.board().inject(Fault::EStop);
+    talk.board().run_ms(10).unwrap();
+    assert!(!talk.board().rig().world().lever_top());
+    talk.board().rig().world().clear();
+    talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
 }
 
 macro_rules! faults {
