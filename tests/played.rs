@@ -126,7 +126,7 @@ fn explore_all(set: &RecordingSet, method: Method, train: usize, seed: u64) -> T
             |event| match event {
                 Event::Felt(..) => slides += 1,
                 Event::Rejected(_, why) => panic!("{}: {why}", lesson.names[texture]),
-                Event::Chosen(..) => {}
+                Event::Chosen(..) | Event::Decided { .. } => {}
             },
         );
         let verdict = embassy_futures::block_on(exploration).unwrap();

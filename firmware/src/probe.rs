@@ -1,7 +1,7 @@
 //! The rig that the servo moves, as an exploration sees it: one movement after the other, its samples into the features.
 use core::sync::atomic::Ordering::Relaxed;
 
-use embassy_time::Timer;
+use embassy_time::{Duration, with_timeout};
 use heapless::Vec;
 use heapless::spsc::Consumer;
 use tactus_core::features::{PropertySet, Slide};
@@ -70,19 +70,25 @@ impl Probe {
         let _ = servo::command(Command::SampleChanged).await;
     }
 
-    /// Waits until the rig is at rest; `each` is called every [`LOOK_MS`], and once more at the end.
-    async fn rest(
+    /// Waits until the rig is at rest.
+    async fn rest(&mut self) -> Result<Snapshot, ProbeError> {
+        self.until(|rig| rig.at_rest, |_| ()).await
+    }
+
+    /// Waits until the rig is as it is to be; `each` is called at least every [`LOOK_MS`], and once more at the end.
+    async fn until(
         &mut self,
+        over: impl Fn(&Snapshot) -> bool,
         mut each: impl FnMut(&mut Consumer<'static, Samples>),
     ) -> Result<Snapshot, ProbeError> {
         let mut patience = Patience::default();
         loop {
-            Timer::after_millis(LOOK_MS).await;
+            let _ = with_timeout(Duration::from_millis(LOOK_MS), servo::ended()).await;
             // before the samples, so that none of a movement that is over is left behind
             let rig = servo::snapshot();
             each(&mut self.samples);
             servo::progress();
-            match (patience.wait(LOOK_MS as u32, rig.at_rest), rig.phase) {
+            match (patience.wait(LOOK_MS as u32, over(&rig)), rig.phase) {
                 (Wait::On, _) => {}
                 (Wait::Stop, _) => servo::stop(),
                 (Wait::Over | Wait::Hangs, Phase::Faulted(fault)) if rig.at_rest => {
@@ -97,15 +103,15 @@ impl Probe {
     /// Lifts the finger to its limit switch; the stage stays where it is.
     pub(crate) async fn lift(&mut self) -> Result<(), ProbeError> {
         self.command(Command::Lift).await?;
-        self.rest(|_| ()).await.map(|_| ())
+        self.rest().await.map(|_| ())
     }
 
     /// Finds the limit switches, the lever's first; after a fault once the finger is lifted.
     pub(crate) async fn home(&mut self) -> Result<(), ProbeError> {
         // the fault is what the user homes after
-        let _ = self.rest(|_| ()).await;
+        let _ = self.rest().await;
         self.command(Command::Home).await?;
-        match self.rest(|_| ()).await?.phase {
+        match self.rest().await?.phase {
             Phase::Ready => Ok(()),
             _ => Err(ProbeError::Stopped),
         }
@@ -131,7 +137,7 @@ impl Probe {
     ) -> Result<(f32, f32, Option<f32>), ProbeError> {
         let from_mm = servo::snapshot().stage_mm;
         self.command(Command::StartUnloaded(speed_um_s)).await?;
-        let rig = self.rest(|_| ()).await?;
+        let rig = self.rest().await?;
         match rig.ended {
             Some(Ended::Whole) => Ok((from_mm, rig.stage_mm, rig.mean_current_a)),
             _ => Err(ProbeError::Stopped),
@@ -165,19 +171,22 @@ impl Rig for Probe {
         self.command(Command::Start(movement, start)).await?;
         let mut blocks = STREAM.load(Relaxed).then(Blocks::default);
         let ended = self
-            .rest(|queue| {
-                let mut gathered = Vec::new();
-                while let Some(samples) = queue.dequeue() {
-                    feel(&samples, &mut gathered, slide);
-                    let block = blocks
-                        .as_mut()
-                        .and_then(|b| b.put(&samples.felt, &samples.pac, samples.shear_mn));
-                    if let Some(block) = block {
-                        tell(Tell::Block(block));
+            .until(
+                |rig| rig.at_rest || rig.ended.is_some(),
+                |queue| {
+                    let mut gathered = Vec::new();
+                    while let Some(samples) = queue.dequeue() {
+                        feel(&samples, &mut gathered, slide);
+                        let block = blocks
+                            .as_mut()
+                            .and_then(|b| b.put(&samples.felt, &samples.pac, samples.shear_mn));
+                        if let Some(block) = block {
+                            tell(Tell::Block(block));
+                        }
                     }
-                }
-                slide.push(&gathered);
-            })
+                    slide.push(&gathered);
+                },
+            )
             .await
             .map(|rig| rig.ended);
         let gap = match ended {
@@ -193,8 +202,15 @@ impl Rig for Probe {
         }
         match ended? {
             Some(Ended::Whole | Ended::Gap(_)) => Ok(()),
-            Some(Ended::Stopped) | None => Err(ProbeError::Stopped),
+            Some(Ended::Stopped) | None => {
+                self.rest().await?;
+                Err(ProbeError::Stopped)
+            }
         }
+    }
+
+    async fn lifted(&mut self) -> Result<(), ProbeError> {
+        self.rest().await.map(|_| ())
     }
 }
 

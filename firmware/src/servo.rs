@@ -78,6 +78,8 @@ pub(crate) struct Snapshot {
 
 static COMMAND: Signal<CriticalSectionRawMutex, Command> = Signal::new();
 static ANSWER: Signal<CriticalSectionRawMutex, Result<(), Refused>> = Signal::new();
+/// A slide has ended; its finger is being lifted.
+static ENDED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 /// Stop and lift, whatever is being done.
 static STOP: AtomicBool = AtomicBool::new(false);
 /// The session was told to stop: between two movements the rig has nothing to stop.
@@ -155,6 +157,11 @@ pub(crate) fn forget_stop() {
 /// What the rig is at.
 pub(crate) fn snapshot() -> Snapshot {
     SNAPSHOT.lock(Cell::get)
+}
+
+/// Waits for the end of a slide.
+pub(crate) async fn ended() {
+    ENDED.wait().await;
 }
 
 /// The tasks in thread mode are alive.
@@ -281,7 +288,10 @@ pub(crate) async fn servo(
         bridge.set_level(outputs.stage_enabled.into());
 
         pass_on(&outputs, &mut samples);
-        ended = control.take_ended().or(ended);
+        if let now @ Some(_) = control.take_ended() {
+            ended = now;
+            ENDED.signal(());
+        }
         SNAPSHOT.lock(|cell| {
             cell.set(Snapshot {
                 phase: control.phase(),

@@ -53,6 +53,8 @@ impl<'t, W: Write> Show<'t, W> {
                 posterior,
             ),
             Event::Rejected(_, why) => self.line(&format!("  rejected: {why}")),
+            // shown with the truth: see `finish`
+            Event::Decided { .. } => Ok(()),
         }
     }
 

@@ -35,8 +35,8 @@ pub trait Rig {
     /// The properties that this rig can measure.
     fn measures(&self) -> PropertySet;
 
-    /// Presses, measures the still finger, slides, lifts, and gives all samples to `slide`, in the order that [`Slide`]
-    /// asks for.
+    /// Presses, measures the still finger, slides, and gives all samples to `slide`, in the order that [`Slide`] asks for.
+    /// The finger may still be on its way up: see [`Rig::lifted`].
     ///
     /// # Errors
     /// The movement failed. The stage then stands still and the finger is lifted.
@@ -45,6 +45,15 @@ pub trait Rig {
         movement: Movement,
         slide: &mut Slide<'_, K>,
     ) -> Result<(), Self::Error>;
+
+    /// Waits until the finger is lifted, which takes longer than it takes to judge what was felt. For a rig whose movements
+    /// end with that, or that has no finger, there is nothing to wait for.
+    ///
+    /// # Errors
+    /// The finger was not lifted as it should; it is now, unless that is what fails.
+    async fn lifted(&mut self) -> Result<(), Self::Error> {
+        Ok(())
+    }
 }
 
 /// What an exploration does, as it does it.
@@ -57,6 +66,15 @@ pub enum Event<'a> {
     /// The slide was made, but has no value of the property. It does not count: the choice is made again, and is the same
     /// unless it is random.
     Rejected(Action, Rejection),
+    /// The answer, while the finger is still being lifted.
+    Decided {
+        /// The answer.
+        verdict: &'a Verdict,
+        /// Slides that counted.
+        slides: u8,
+        /// See [`Explorer::is_certain`].
+        certain: bool,
+    },
 }
 
 /// Why a slide does not count.
@@ -108,6 +126,21 @@ pub async fn explore<R: Rig, const N: usize, K: Kernels>(
     rig: &mut R,
     explorer: &mut Explorer<'_, N, K>,
     plan: &Plan,
+    random: impl FnMut() -> u32,
+    tell: impl FnMut(Event<'_>),
+) -> Result<Verdict, ExploreError<R::Error>> {
+    let answer = slides(rig, explorer, plan, random, tell).await;
+    if !matches!(answer, Err(ExploreError::Rig(_))) {
+        rig.lifted().await.map_err(ExploreError::Rig)?;
+    }
+    answer
+}
+
+/// As [`explore`]; after the last slide the finger may still be on its way up.
+async fn slides<R: Rig, const N: usize, K: Kernels>(
+    rig: &mut R,
+    explorer: &mut Explorer<'_, N, K>,
+    plan: &Plan,
     mut random: impl FnMut() -> u32,
     mut tell: impl FnMut(Event<'_>),
 ) -> Result<Verdict, ExploreError<R::Error>> {
@@ -115,6 +148,11 @@ pub async fn explore<R: Rig, const N: usize, K: Kernels>(
     let mut rejected = 0;
     loop {
         if let Some(verdict) = explorer.verdict() {
+            tell(Event::Decided {
+                verdict: &verdict,
+                slides: explorer.slides(),
+                certain: explorer.is_certain(),
+            });
             return Ok(verdict);
         }
         let mut outlook = heapless::Vec::new();
@@ -126,6 +164,7 @@ pub async fn explore<R: Rig, const N: usize, K: Kernels>(
             .movement(action.movement)
             .ok_or(ExploreError::Movement(action.movement))?;
         let mut slide = Slide::<K>::new(plan);
+        rig.lifted().await.map_err(ExploreError::Rig)?;
         rig.perform(movement, &mut slide)
             .await
             .map_err(ExploreError::Rig)?;
@@ -162,6 +201,7 @@ mod tests {
     use crate::table::Table;
     use crate::table::tests::{around, table_of};
     use embassy_futures::block_on;
+    use std::cell::RefCell;
     use std::format;
     use std::string::{String, ToString};
     use std::vec;
@@ -245,6 +285,7 @@ mod tests {
             || random.next().unwrap(),
             |event| {
                 told.push(match event {
+                    Event::Decided { .. } => return,
                     Event::Chosen(action, outlook) => {
                         assert!(outlook.iter().any(|o| o.action == action));
                         format!("{} {}", action.what(), action.movement)
@@ -293,6 +334,90 @@ mod tests {
         assert_eq!(made, [grid[1], grid[0], grid[1]]);
         let odds = (2.5f32 + 0.78125 + 3.125).exp();
         assert!((verdict.probability - odds / (1.0 + odds)).abs() < 1e-4);
+    }
+
+    /// A rig whose finger is down after a slide until somebody waits for it; what happens is noted.
+    struct Slow<'a>(Script, &'a RefCell<Vec<&'static str>>);
+
+    impl Rig for Slow<'_> {
+        type Error = &'static str;
+
+        fn measures(&self) -> PropertySet {
+            self.0.measures()
+        }
+
+        async fn perform<K: Kernels>(
+            &mut self,
+            movement: Movement,
+            slide: &mut Slide<'_, K>,
+        ) -> Result<(), Self::Error> {
+            self.1.borrow_mut().push("performed");
+            self.0.perform(movement, slide).await
+        }
+
+        async fn lifted(&mut self) -> Result<(), Self::Error> {
+            let jams = self.0.felt.len() == self.0.made.len();
+            self.1.borrow_mut().push("lifted");
+            if jams { Err("it jams") } else { Ok(()) }
+        }
+    }
+
+    #[test]
+    fn a_slide_is_judged_while_the_finger_is_lifted() {
+        let outcome = |felt: &[Felt], config| {
+            let (bytes, noted) = (bytes(), RefCell::default());
+            let script = Script {
+                felt: felt.to_vec(),
+                made: Vec::new(),
+            };
+            let mut rig = Slow(script, &noted);
+            let table = Table::read(&bytes).unwrap();
+            let mut explorer = Explorer::<'_, 2>::new(table, rig.measures(), config).unwrap();
+            let plan = Plan::new();
+            let exploration = explore(
+                &mut rig,
+                &mut explorer,
+                &plan,
+                || 0,
+                |event| {
+                    noted.borrow_mut().push(match event {
+                        Event::Chosen(..) => "chosen",
+                        Event::Felt(..) => "felt",
+                        Event::Rejected(..) => "rejected",
+                        Event::Decided { slides, .. } => {
+                            assert_eq!(slides, 2);
+                            "decided"
+                        }
+                    });
+                },
+            );
+            let outcome = block_on(exploration);
+            (outcome.map(|verdict| verdict.texture), noted.into_inner())
+        };
+        let all = [
+            "chosen",
+            "lifted",
+            "performed",
+            "felt",
+            "chosen",
+            "lifted",
+            "performed",
+            "felt",
+            "decided",
+            "lifted",
+        ];
+        let felt = [Traction(1900), Traction(2000), Traction(0)];
+        assert_eq!(outcome(&felt, config(1.0, 2)), (Ok(1), all.to_vec()));
+        // the answer stands, and is told; that the finger is down is told as well
+        let (failed, noted) = outcome(&felt[..2], config(1.0, 2));
+        assert_eq!(
+            (failed, noted),
+            (Err(ExploreError::Rig("it jams")), all.to_vec())
+        );
+        // three that are no good end it with the finger up
+        let (failed, noted) = outcome(&[Stuck, Stuck, Stuck, Stuck], config(1.0, 2));
+        assert_eq!(failed, Err(ExploreError::Rejected(STUCK)));
+        assert_eq!(noted.last(), Some(&"lifted"));
     }
 
     #[test]

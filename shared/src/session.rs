@@ -146,21 +146,25 @@ where
                 slide,
                 why: text(why),
             }),
+            Event::Decided {
+                verdict,
+                slides,
+                certain,
+            } => tell(Tell::Verdict {
+                texture: verdict.texture,
+                name: Name::try_from(table.name(verdict.texture).unwrap_or_default())
+                    .unwrap_or_default(),
+                probability: verdict.probability,
+                sure: verdict.sure,
+                unknown: verdict.unknown,
+                log_odds: verdict.log_odds,
+                slides,
+                asks: matches!(contents, Contents::Fused(..)) && !certain,
+            }),
         },
     )
     .await
     .map_err(text)?;
-    let name = table.name(verdict.texture).unwrap_or_default();
-    tell(Tell::Verdict {
-        texture: verdict.texture,
-        name: Name::try_from(name).unwrap_or_default(),
-        probability: verdict.probability,
-        sure: verdict.sure,
-        unknown: verdict.unknown,
-        log_odds: verdict.log_odds,
-        slides: explorer.slides(),
-        asks: matches!(contents, Contents::Fused(..)) && !explorer.is_certain(),
-    });
     Ok(Visited {
         table: table.crc(),
         texture: verdict.texture,
@@ -214,6 +218,7 @@ where
     while let Some(movement) = training.next() {
         let mut slide = Slide::<K>::new(plan);
         rig.perform(movement, &mut slide).await.map_err(text)?;
+        rig.lifted().await.map_err(text)?;
         let felt = match slide.finish() {
             Ok(measurement) => {
                 match training.took(Some(&table), movement, &Observation::from(&measurement)) {

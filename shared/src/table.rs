@@ -5,7 +5,7 @@
 //! [`encode`]; or the mean of all features of a slide in whitened space, learned as [`Whitened`] and written by
 //! [`encode_fused`]. [`amend`] teaches, renames and forgets textures of either kind.
 //!
-//! # Binary form, version 2, little-endian
+//! # Binary form, version 3, little-endian
 //!
 //! | bytes | what |
 //! |---|---|

@@ -19,7 +19,7 @@ use crate::rig::guard::Fault;
 use crate::table::Action;
 
 /// Version of the messages. The two ends must have the same.
-pub const PROTOCOL: u8 = 2;
+pub const PROTOCOL: u8 = 3;
 /// Most textures in one message; the probe's table holds no more.
 pub const MAX_TEXTURES: usize = 128;
 /// Longest message, bytes.
@@ -206,7 +206,8 @@ pub enum Tell {
         action: Action,
         /// What was felt.
         felt: Felt,
-        /// Probability of every texture of the table.
+        /// Probability of every texture of the table. On the line only those that are not 0: most are soon.
+        #[serde(with = "sparse")]
         posterior: Vec<f32, MAX_TEXTURES>,
     },
     /// The slide was made and does not count; it is repeated.
@@ -383,6 +384,52 @@ pub struct Promise {
     pub uncertainty: f32,
     /// Its benefit (eq. 12).
     pub benefit: f32,
+}
+
+/// Numbers most of which are 0: how many there are, and the others with their places, ascending.
+mod sparse {
+    use serde::de::Error as _;
+    use serde::ser::Error as _;
+    use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer};
+
+    use super::{MAX_TEXTURES, Vec};
+
+    const _: () = assert!(MAX_TEXTURES <= 1 << u8::BITS);
+
+    type OnLine = (u16, Vec<(u8, f32), MAX_TEXTURES>);
+
+    pub(super) fn serialize<S: Serializer>(
+        numbers: &Vec<f32, MAX_TEXTURES>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        let others = numbers
+            .iter()
+            .zip(0..)
+            .filter(|(number, _)| number.to_bits() != 0)
+            .map(|(number, place)| (place, *number))
+            .collect();
+        let count = u16::try_from(numbers.len()).map_err(S::Error::custom)?;
+        OnLine::from((count, others)).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Vec<f32, MAX_TEXTURES>, D::Error> {
+        let (count, others) = OnLine::deserialize(deserializer)?;
+        let mut numbers = Vec::new();
+        numbers
+            .resize(count.into(), 0.0)
+            .map_err(|_| D::Error::custom("too many textures"))?;
+        let mut next = 0;
+        for (place, number) in others {
+            match numbers.get_mut(usize::from(place)) {
+                Some(there) if place >= next => *there = number,
+                _ => return Err(D::Error::custom("textures out of order")),
+            }
+            next = place.saturating_add(1);
+        }
+        Ok(numbers)
+    }
 }
 
 /// What one slide says.

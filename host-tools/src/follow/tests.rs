@@ -192,21 +192,25 @@ fn exploration(method: Method) -> (Vec<u8>, Vec<Tell>) {
                         posterior: posterior.iter().copied().collect(),
                     }
                 }
+                Event::Decided {
+                    verdict,
+                    slides,
+                    certain,
+                } => Tell::Verdict {
+                    texture: verdict.texture,
+                    name: Name::try_from(table.name(verdict.texture).unwrap()).unwrap(),
+                    probability: verdict.probability,
+                    sure: verdict.sure,
+                    unknown: verdict.unknown,
+                    log_odds: verdict.log_odds,
+                    slides,
+                    asks: method == Method::Fused && !certain,
+                },
                 Event::Rejected(..) => panic!("{event:?}"),
             });
         },
     );
-    let verdict = embassy_futures::block_on(exploration).unwrap();
-    tells.push(Tell::Verdict {
-        texture: verdict.texture,
-        name: Name::try_from(table.name(verdict.texture).unwrap()).unwrap(),
-        probability: verdict.probability,
-        sure: verdict.sure,
-        unknown: verdict.unknown,
-        log_odds: verdict.log_odds,
-        slides: slide - 1,
-        asks: method == Method::Fused && !explorer.is_certain(),
-    });
+    embassy_futures::block_on(exploration).unwrap();
     let tells = tells.0.into_inner();
     (bytes, tells)
 }

@@ -8,7 +8,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-pub use draw::DrawError;
+pub use draw::{DrawError, curves};
 
 use super::Study;
 

@@ -295,6 +295,33 @@ fn a_message_too_long_is_an_error() {
 }
 
 #[test]
+fn a_posterior_has_only_its_textures_that_are_possible() {
+    let mut posterior = Vec::<f32, MAX_TEXTURES>::new();
+    posterior.resize(117, 0.0).unwrap();
+    posterior[3] = 0.75;
+    posterior[116] = 0.25;
+    #[derive(PartialEq, Debug, Serialize, Deserialize)]
+    struct Posterior(#[serde(with = "sparse")] Vec<f32, MAX_TEXTURES>);
+    let posterior = Posterior(posterior);
+    let mut room = [0; 16];
+    let bytes = postcard::to_slice(&posterior, &mut room).unwrap();
+    // how many textures, how many possible ones, and each of these with its place
+    assert_eq!(bytes, [117, 2, 3, 0, 0, 0x40, 0x3F, 116, 0, 0, 0x80, 0x3E]);
+    assert_eq!(postcard::from_bytes(bytes), Ok(posterior));
+    let read = |count: u8, places: [u8; 2]| {
+        let [a, b] = places;
+        let bytes = [count, 2, a, 0, 0, 0x40, 0x3F, b, 0, 0, 0x80, 0x3E];
+        postcard::from_bytes::<Posterior>(&bytes).is_ok()
+    };
+    assert!(read(100, [3, 99]));
+    assert!(!read(100, [3, 100]), "more than there are");
+    assert!(!read(100, [3, 3]), "one twice");
+    assert!(!read(100, [99, 3]), "in another order");
+    let many = [129, 1, 0];
+    assert!(postcard::from_bytes::<Posterior>(&many).is_err());
+}
+
+#[test]
 fn values_that_cannot_be_are_no_message() {
     // a movement of 50 N: whole frame, right CRC
     let wrong = (7_u16, 1234_u32, (7_u8, 1_u8, (50_000_u16, 10_000_u32)));

@@ -15,15 +15,17 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 use tactus::learn;
 use tactus::recordings::{PAC_RATE_HZ, RecordingSet};
+use tactus::study::report;
 use tactus_core::explorer::{Config, Explorer, Method, Strategy};
 use tactus_core::features::{Plan, Properties, Property, PropertySet};
 use tactus_core::fused::{FeatureSet, MAX_FEATURES, Observation};
 use tactus_core::kernels::Plain;
 use tactus_core::movement::Movement;
+use tactus_core::rig::lever::RETRACT_STEPS_S;
 use tactus_core::table::{Action, Contents, Table};
 use tactus_core::wire::{Ask, Identify, Phase, Tell};
 use tactus_emulator::talk::Talk;
-use tactus_emulator::{Emulator, Options, Setup, cycles};
+use tactus_emulator::{Emulator, Options, Output, Setup, cycles};
 use workload::{Counter, Felt, Workload};
 
 /// Counts the instructions of the core's kernels on the emulated chip
@@ -43,6 +45,9 @@ struct Cli {
     /// Tell how table and decision grow with the number of textures instead
     #[arg(long)]
     growth: bool,
+    /// With --growth, draw that as SVG, too
+    #[arg(long, value_name = "FILE", requires = "growth")]
+    plot: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -94,7 +99,7 @@ impl Row {
 fn run(cli: &Cli) -> anyhow::Result<bool> {
     let mut bench = Bench::start(cli)?;
     if cli.growth {
-        return growth(&mut bench);
+        return growth(&mut bench, cli.plot.as_deref());
     }
     let mut rows = rows(&mut bench)?;
     if let Some(rig) = &cli.rig {
@@ -322,13 +327,19 @@ fn rows(bench: &mut Bench) -> anyhow::Result<Vec<Row>> {
 }
 
 /// Table bytes, and instructions of a fused decision of three movements after a typical slide.
-fn growth(bench: &mut Bench) -> anyhow::Result<bool> {
+fn growth(bench: &mut Bench, plot: Option<&Path>) -> anyhow::Result<bool> {
     bench.model = false;
     println!(
         "{:>8} {:>12} {:>12} {:>6} {:>12}",
         "textures", "table bytes", "posterior", "live", "choice"
     );
     let mut equal = true;
+    let mut curves = [
+        "table, KB",
+        "posterior, thousands of instructions",
+        "choice among up to 50 live, thousands",
+    ]
+    .map(|name| (name, Vec::new()));
     for textures in [20, 117, 500, 2000] {
         let table = synthetic(Method::Fused, textures)?;
         let felt = felt(&table, Method::Fused, textures.min(50))?;
@@ -342,6 +353,19 @@ fn growth(bench: &mut Bench) -> anyhow::Result<bool> {
             felt.live,
             choice.instructions
         );
+        let counts = [
+            table.len() as f64 / 1024.0,
+            posterior.instructions as f64 * 1e-3,
+            choice.instructions as f64 * 1e-3,
+        ];
+        for ((_, points), y) in curves.iter_mut().zip(counts) {
+            points.push((textures as f64, y));
+        }
+    }
+    if let Some(file) = plot {
+        let title = "A fused decision after a slide, three movements";
+        let svg = report::curves(title, "textures of the table", "", &curves)?;
+        std::fs::write(file, svg).with_context(|| format!("cannot write {}", file.display()))?;
     }
     ensure!(equal, "the chip's kernels are wrong");
     Ok(true)
@@ -351,9 +375,25 @@ fn growth(bench: &mut Bench) -> anyhow::Result<bool> {
 const PATIENCE_S: f64 = 120.0;
 const CORE_HZ: f64 = 168e6;
 
+/// The last sample is up to a tick of 1 ms old when the servo has the lever step up, and the first step comes a period of its rate
+/// later.
+const BEFORE_STEP_NS: u64 = 1_000_000 + 1_000_000_000 / RETRACT_STEPS_S.unsigned_abs() as u64;
+
+/// When the lever's driver got its first step since the slide began: the end of the slide, as the pins show it.
+fn first_step_up(board: &mut Emulator, since_ns: u64) -> Option<u64> {
+    let rig = board.rig();
+    rig.trace().find_map(|&(at_ns, output)| {
+        (output == Output::LeverStep(true) && at_ns > since_ns).then_some(at_ns)
+    })
+}
+
 /// Load and latency of the rig's image while it makes a slide.
 fn on_the_rig(elf: &Path) -> anyhow::Result<Vec<Row>> {
-    let emulator = Emulator::start(elf, Setup::default(), Options::default())?;
+    let options = Options {
+        trace_s: 2,
+        ..Options::default()
+    };
+    let emulator = Emulator::start(elf, Setup::default(), options)?;
     let handlers = ["TIM2", "UART4"].map(|name| emulator.symbol(name).map(|(address, _)| address));
     let handlers = handlers.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut talk = Talk::new(emulator);
@@ -370,6 +410,7 @@ fn on_the_rig(elf: &Path) -> anyhow::Result<Vec<Row>> {
     };
     // times in ns and instructions so far
     let (mut begun, mut over, mut told) = (None, None, None);
+    let mut lifts_ns = None;
     let mut failed = None;
     talk.ask(Ask::Identify(identify), PATIENCE_S, |board, report| {
         let mut now = |board: &mut Emulator| {
@@ -384,7 +425,10 @@ fn on_the_rig(elf: &Path) -> anyhow::Result<Vec<Row>> {
                 failed = counted.err();
             }
             Some(Tell::Phase(Phase::Lifting)) if over.is_none() => over = now(board),
-            Some(Tell::Verdict { .. }) => told = now(board),
+            Some(Tell::Verdict { .. }) => {
+                told = now(board);
+                lifts_ns = begun.and_then(|(from_ns, _)| first_step_up(board, from_ns));
+            }
             _ => {}
         }
     })?;
@@ -397,7 +441,8 @@ fn on_the_rig(elf: &Path) -> anyhow::Result<Vec<Row>> {
     };
     let begun = begun.context("the rig says nothing of a slide")?;
     let over = over.context("the slide does not end")?;
-    let told = told.context("there is no verdict")?;
+    let (told_ns, _) = told.context("there is no verdict")?;
+    let lifts_ns = lifts_ns.context("the finger is not lifted before the verdict")?;
     // the timer's update and its compare
     let slots = timer.runs as f64 / 2.0;
     let seconds = (over.0 - begun.0) as f64 * 1e-9;
@@ -424,7 +469,7 @@ fn on_the_rig(elf: &Path) -> anyhow::Result<Vec<Row>> {
         row(
             "last sample to the verdict on the link",
             "ms",
-            (told.0 - over.0) as f64 * 1e-6,
+            (told_ns + BEFORE_STEP_NS - lifts_ns) as f64 * 1e-6,
             5.0,
         ),
     ])

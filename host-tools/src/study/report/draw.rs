@@ -100,6 +100,41 @@ pub(super) fn plain(value: f64) -> String {
     format!("{}", rounded + 0.0)
 }
 
+/// Draws curves over the same x as SVG, each with its name: for what is measured outside of a study.
+///
+/// # Errors
+/// See [`DrawError`].
+pub fn curves(
+    title: &str,
+    x: &str,
+    y: &str,
+    curves: &[(&str, Vec<(f64, f64)>)],
+) -> Result<String, DrawError> {
+    let marks = [Mark::Circle, Mark::Triangle, Mark::Square, Mark::Cross];
+    let looks = COLOURS.into_iter().zip(marks).cycle();
+    let series = curves.iter().zip(looks);
+    let series = series.map(|((name, points), (colour, mark))| Series {
+        name: (*name).to_owned(),
+        colour,
+        mark,
+        line: Some(Line::Whole),
+        points: points.clone(),
+    });
+    let all = || curves.iter().flat_map(|(_, points)| points);
+    chart(&Chart {
+        title: title.to_owned(),
+        x,
+        y,
+        x_range: room(all().map(|(x, _)| *x)),
+        y_range: room(all().map(|(_, y)| *y)),
+        x_marks: 6,
+        x_text: &plain,
+        named_at_end: false,
+        size: (640, 400),
+        series: series.collect(),
+    })
+}
+
 /// Draws a chart.
 pub(super) fn chart(chart: &Chart<'_>) -> Result<String, DrawError> {
     let mut svg = String::new();
