@@ -139,6 +139,16 @@ impl SimRig {
         &self.performed
     }
 
+    /// How every slide was really made since this was asked for last.
+    pub fn take_performed(&mut self) -> Vec<Performed> {
+        std::mem::take(&mut self.performed)
+    }
+
+    /// Sensor slots since power-up.
+    pub fn slots(&self) -> u64 {
+        self.slot
+    }
+
     /// The world behind the pins: its truth, its faults.
     pub fn world(&mut self) -> &mut World {
         &mut self.world

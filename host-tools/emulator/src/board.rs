@@ -17,7 +17,7 @@ use tactus::sim::faults::Fault;
 use tactus::sim::world::Setup;
 
 use crate::driver::{Command, Driver, Standing};
-use crate::flash;
+use crate::flash::{self, FlashWrite};
 use crate::log::Log;
 use crate::part::Board;
 use crate::pins;
@@ -172,6 +172,7 @@ impl Emulator {
             resets: 0,
             switches: [None; 4],
             clock: options.clock,
+            stored: Vec::new(),
         };
         let shared = rig.clone();
         let thread = std::thread::spawn(move || {
@@ -443,6 +444,14 @@ impl Emulator {
     /// The run is over.
     pub fn store(&mut self) -> Result<Vec<u8>, Error> {
         self.read(flash::STORE.start, flash::STORE.end - flash::STORE.start)
+    }
+
+    /// What the firmware did to its store since the last call, in the order of time.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn store_writes(&mut self) -> Result<Vec<FlashWrite>, Error> {
+        self.with(|standing| std::mem::take(standing.stored))
     }
 
     /// Where the core stands: the address of its next instruction.

@@ -10,7 +10,7 @@ use rigless::soc::Width;
 use rigless::soc::stm32f427::generated::flash::Register as FlashRegister;
 use rigless::time::VirtualNanos;
 
-use crate::flash;
+use crate::flash::{self, FlashWrite};
 use crate::log::Log;
 use crate::part::Board;
 use crate::pins::{self, PinId};
@@ -39,6 +39,8 @@ pub(crate) struct Standing<'a> {
     /// instructions since power-up, without the time that the core slept
     pub(crate) instructions: u64,
     pub(crate) clock: &'a mut bool,
+    /// what the firmware did to the store's sectors
+    pub(crate) stored: &'a mut Vec<FlashWrite>,
 }
 
 /// What the owner wants.
@@ -66,6 +68,7 @@ pub(crate) struct Driver {
     pub(crate) switches: [Option<bool>; 4],
     /// the debug probe gives its 8 MHz
     pub(crate) clock: bool,
+    pub(crate) stored: Vec<FlashWrite>,
 }
 
 impl Driver {
@@ -181,12 +184,15 @@ impl Driver {
                     let old = host.read(access.address, access.width)?;
                     let new = old & access.value & access.width.mask();
                     host.program(access.address, access.width, new)?;
+                    let stored = FlashWrite::program(access.address, access.width, new);
+                    self.stored.extend(stored);
                 }
                 flags => registers.set(FlashRegister::Sr, sr | flags),
             }
         } else if access.value >> 16 & 1 == 1
             && let Some(addresses) = flash::erased(cr, sr)
         {
+            self.stored.extend(FlashWrite::erase(&addresses));
             for address in addresses.step_by(8) {
                 host.program(address, Width::W64, u64::MAX)?;
             }
@@ -253,6 +259,7 @@ impl Driver {
                     spending: &mut self.spending,
                     instructions: self.instructions,
                     clock: &mut self.clock,
+                    stored: &mut self.stored,
                 }),
             }
         }

@@ -22,6 +22,44 @@ const PGSERR: u64 = 1 << 7;
 const PGPERR: u64 = 1 << 6;
 const BSY: u64 = 1 << 16;
 
+/// What the firmware did to its store.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum FlashWrite {
+    /// It programmed a word.
+    Program {
+        /// Where, from the store's first byte on.
+        at: usize,
+        /// What is there afterwards.
+        word: u32,
+    },
+    /// It erased a sector.
+    Erase {
+        /// Its number in the store.
+        sector: usize,
+    },
+}
+
+/// Bytes of a sector of the store.
+pub(crate) const SECTOR: usize = 16 * 1024;
+
+impl FlashWrite {
+    /// A store to the array that left this there; `None` outside of the store's sectors, which are programmed by words.
+    pub(crate) fn program(address: u64, width: Width, new: u64) -> Option<Self> {
+        let inside = STORE.contains(&address) && width == Width::W32;
+        inside.then(|| Self::Program {
+            at: (address - STORE.start) as usize,
+            word: new as u32,
+        })
+    }
+
+    /// The erase of these addresses.
+    pub(crate) fn erase(addresses: &Range<u64>) -> Option<Self> {
+        STORE.contains(&addresses.start).then(|| Self::Erase {
+            sector: (addresses.start - STORE.start) as usize / SECTOR,
+        })
+    }
+}
+
 /// The flags of SR that a store to the array raises in vain; 0 if the store programs it.
 pub(crate) fn refusal(cr: u64, width: Width) -> u64 {
     let parallelism = match width {
@@ -85,6 +123,23 @@ mod tests {
         assert_eq!(refusal(PG, Width::W8), 0);
         assert_eq!(refusal(2 << PSIZE_SHIFT, Width::W32), PGSERR);
         assert_eq!(refusal(word | LOCK, Width::W32), PGSERR);
+    }
+
+    #[test]
+    fn what_happens_to_the_store_is_noted_by_its_place_in_it() {
+        assert_eq!(
+            FlashWrite::program(0x0810_4008, Width::W32, 7),
+            Some(FlashWrite::Program {
+                at: SECTOR + 8,
+                word: 7
+            })
+        );
+        assert_eq!(FlashWrite::program(0x080F_FFFC, Width::W32, 7), None);
+        assert_eq!(
+            FlashWrite::erase(&(0x0810_C000..0x0811_0000)),
+            Some(FlashWrite::Erase { sector: 3 })
+        );
+        assert_eq!(FlashWrite::erase(&(0x0800_0000..0x0800_4000)), None);
     }
 
     #[test]

@@ -8,6 +8,7 @@
 
 mod board;
 pub mod campaign;
+pub mod cuts;
 pub mod cycles;
 mod display;
 mod driver;
@@ -21,13 +22,14 @@ mod record;
 mod rig;
 pub mod scenario;
 mod serial;
+pub mod soak;
 mod spent;
 mod stack;
 pub mod talk;
 
 pub use board::{Emulator, Error, Options};
 pub use display::Display;
-pub use flash::{FLASH, STORE};
+pub use flash::{FLASH, FlashWrite, STORE};
 pub use record::Slide;
 pub use rig::{Output, Rig};
 pub use rigless::device::ResetCause;

@@ -67,6 +67,11 @@ impl Talk {
         &mut self.emulator
     }
 
+    /// The time it has reached, ns.
+    pub fn now_ns(&self) -> u64 {
+        self.emulator.now_ns()
+    }
+
     /// What was damaged and lost on the way from the firmware.
     pub fn session(&self) -> &Session {
         &self.session
