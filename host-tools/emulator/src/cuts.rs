@@ -33,6 +33,8 @@ const VISITS: u64 = 8;
 const CALIBRATIONS: u32 = 400;
 /// The firmware has its store open by then: two erases and the lever's way up, virtual s.
 const OPEN_S: f64 = 20.0;
+/// Nothing here is as quick as the line.
+const LOOK_MS: u64 = 10;
 /// After so many cuts of an operation the probe homes and identifies as well.
 const PROBED: usize = 2;
 
@@ -273,7 +275,7 @@ fn boot(elf: &Path, unknown: &Unknown, store: Option<Vec<u8>>) -> Result<Talk, C
         store,
         ..Options::default()
     };
-    Ok(Talk::new(unknown.start(elf, options)?))
+    Ok(Talk::new(unknown.start(elf, options)?).look_every(LOOK_MS))
 }
 
 fn visit(talk: &mut Talk, unknown: &Unknown, seed: u32, learn: bool) -> Result<Found, CutError> {
@@ -350,14 +352,15 @@ fn noted_update(
 
 /// Stores calibrations until a page turns; the store from before the one that turned it.
 fn fill(talk: &mut Talk, calibration: &RigCalibration) -> Result<Vec<u8>, CutError> {
-    for date in 1..=CALIBRATIONS {
+    for number in 1..=CALIBRATIONS {
         let before = talk.board().store()?;
         talk.board().store_writes()?;
-        let dated = RigCalibration {
-            date: 20_260_000 + date,
-            ..*calibration
-        };
-        let write = Question::write_calibration(&dated).map_err(TalkError::from)?;
+        // nothing that the rig goes by
+        let mut next = *calibration;
+        for (byte, digit) in next.serial.iter_mut().zip(format!("{number:016}").bytes()) {
+            *byte = digit;
+        }
+        let write = Question::write_calibration(&next).map_err(TalkError::from)?;
         talk.run(write, PATIENCE_S, |_, _| ())?;
         if erases(&talk.board().store_writes()?).next().is_some() {
             return Ok(before);

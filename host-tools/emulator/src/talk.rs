@@ -9,7 +9,7 @@ use tactus_core::wire::{Ask, Phase, Report, Reset, Tell};
 
 use crate::board::{Emulator, Error};
 
-/// How far the board runs between two looks at the line, ns.
+/// How far the board runs between two looks at the line, ns, unless told otherwise.
 const STEP_NS: u64 = 1_000_000;
 /// Longest that anything but explorations and training takes, virtual seconds.
 pub const PATIENCE_S: f64 = 60.0;
@@ -51,6 +51,7 @@ impl From<LinkError> for TalkError {
 pub struct Talk {
     emulator: Emulator,
     session: Session,
+    step_ns: u64,
 }
 
 impl Talk {
@@ -59,7 +60,14 @@ impl Talk {
         Self {
             emulator,
             session: Session::default(),
+            step_ns: STEP_NS,
         }
+    }
+
+    /// Looks at the line every so many ms instead of every one: two threads take turns at every look.
+    pub fn look_every(mut self, ms: u64) -> Self {
+        self.step_ns = ms.max(1) * STEP_NS;
+        self
     }
 
     /// The board.
@@ -78,12 +86,13 @@ impl Talk {
     }
 
     fn bytes(&mut self) -> Result<Vec<u8>, Error> {
-        self.emulator.run_until(self.emulator.now_ns() + STEP_NS)?;
+        let until_ns = self.emulator.now_ns() + self.step_ns;
+        self.emulator.run_until(until_ns)?;
         let received = self.emulator.received();
         Ok(received.into_iter().map(|(_, byte)| byte).collect())
     }
 
-    /// Runs the board for a millisecond and gives what the firmware said in it.
+    /// Runs the board to the next look and gives what the firmware said in it.
     ///
     /// # Errors
     /// See [`Emulator::run_until`].
@@ -92,7 +101,7 @@ impl Talk {
         Ok(self.session.receive(&bytes))
     }
 
-    /// Runs the board until `pick` makes something of a report; `each` sees all of them, and after every millisecond none.
+    /// Runs the board until `pick` makes something of a report; `each` sees all of them, and after every look none.
     ///
     /// # Errors
     /// [`TalkError::Silent`] if that takes longer than `patience_s` of virtual time; see also [`TalkError`].
@@ -119,7 +128,7 @@ impl Talk {
         Err(TalkError::Silent(patience_s))
     }
 
-    /// Sees an errand through; `each` sees all reports meanwhile, and after every millisecond none.
+    /// Sees an errand through; `each` sees all reports meanwhile, and after every look none.
     ///
     /// # Errors
     /// [`TalkError::Silent`] if that takes longer than `patience_s` of virtual time; see also [`TalkError`].

@@ -80,16 +80,32 @@ enum Cli {
         #[arg(long)]
         check: bool,
     },
-    /// Run many explorations on emulated boards and hold them against the bars
+    /// Run many explorations and power cuts on emulated boards and hold them against the bars
     ///
-    /// In a simulated world and on recordings of a real finger, side by side on all cores. Exit code 1 if a bar is missed.
+    /// In a simulated world and on recordings of a real finger, side by side on all cores; then the power is cut at every word
+    /// of what the firmware stores. Exit code 1 if a bar is missed.
     #[command(after_help = "Examples:
-  cargo xtask campaign                                  20 of each; some ten minutes on two cores
-  cargo xtask campaign --simulated 4 --recordings 0     fewer
+  cargo xtask campaign                                  20 of each, and cuts; some twenty minutes on two cores
+  cargo xtask campaign --simulated 4 --recordings 0 --cuts 0     fewer
+  cargo xtask campaign --simulated 0 --recordings 0     power cuts only
   cargo xtask campaign --format json --out result.json  for programs")]
     #[command(disable_help_flag = true)]
     Campaign {
         /// Options for the campaign
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
+    /// Have the probe work for a day on the simulated rig and for an hour on the emulated board, with random faults
+    ///
+    /// It is taught, forgets and explores, and in every fourth visit something breaks. Judged are its clock, its slots, its stack,
+    /// its restarts, what it has stored, and the force on the finger. Exit code 1 if a bar is missed.
+    #[command(after_help = "Examples:
+  cargo xtask soak                                  some 40 minutes on an idle core, 5 of them for the PC's 24 hours
+  cargo xtask soak --pc-hours 1 --board-hours 0     the simulated rig only
+  cargo xtask soak --help                           what is judged, and all options")]
+    #[command(disable_help_flag = true)]
+    Soak {
+        /// Options for the soak
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
@@ -127,6 +143,7 @@ fn main() -> ExitCode {
         Cli::Build => firmware::build().map(|_| ()),
         Cli::Emulate { options } => emulate::start("tactus-emulator", &options),
         Cli::Campaign { options } => emulate::start("tactus-campaign", &options),
+        Cli::Soak { options } => emulate::start("tactus-soak", &options),
         Cli::Test { quick } => return test::run(quick),
         Cli::Flash(options) => flash::flash(&options),
         Cli::Size(options) => size::size(&options),

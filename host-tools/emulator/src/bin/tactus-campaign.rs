@@ -12,13 +12,19 @@ use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
 use tactus::evaluate::Method;
 use tactus_emulator::campaign::{self, Bars, Group, Results};
+use tactus_emulator::cuts::{self, Outcome};
 use tactus_emulator::exploration::{Exploration, FORCE_N, FORCE_SHARE, JITTER_US, SPEED_SHARE};
 use tactus_emulator::lessons::{self, RECORDED_LIMITS};
 
 /// Has the firmware identify many textures on emulated boards, several at once, and holds the results against the bars.
 ///
 /// One half feels the textures of a simulated world, the other recordings of a real BioTac; each knows 20 textures. Every
-/// exploration is followed by the PC from the raw samples. The exit code is 1 if a bar is missed.
+/// exploration is followed by the PC from the raw samples.
+///
+/// Then the power is cut: at every word that the firmware programs when it is taught and when it learns by itself, and at seeded
+/// moments of an update that turns a page of its settings. It boots on what is left of the flash, in which the last word or erase is torn,
+/// and must hold the old or the new; where it repairs the flash first, the power is cut in that too. The exit code is 1 if a bar is
+/// missed.
 #[derive(Parser)]
 #[command(name = "cargo xtask campaign", version)]
 struct Cli {
@@ -31,6 +37,9 @@ struct Cli {
     /// Explorations on recordings
     #[arg(long, value_name = "N", default_value_t = 20)]
     recordings: usize,
+    /// Power cuts of the sector change; 0 leaves all power cuts out
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    cuts: usize,
     /// How the firmware decides, and what its table is learned for
     #[arg(long, value_enum, default_value_t = Method::Fused)]
     method: Method,
@@ -66,6 +75,90 @@ fn main() -> ExitCode {
 struct Part {
     name: &'static str,
     results: Results,
+}
+
+/// What became of the power cuts.
+struct Cuts {
+    outcomes: Vec<Outcome>,
+    /// A firmware that erases before it has copied is told from this one.
+    planted_seen: bool,
+}
+
+impl Cuts {
+    fn make(cli: &Cli) -> anyhow::Result<Self> {
+        let bar = ProgressBar::new_spinner();
+        bar.enable_steady_tick(Duration::from_millis(200));
+        let prepared = cuts::prepare(&cli.elf, cli.seed, |what| bar.set_message(what.to_owned()))
+            .context("what is to be cut")?;
+        bar.finish_and_clear();
+        let style = ProgressStyle::with_template("cutting {wide_bar} {pos}/{len}, {eta} left")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+        let count = cuts::count(&prepared, cli.cuts);
+        let bar = ProgressBar::new(count as u64).with_style(style);
+        bar.enable_steady_tick(Duration::from_millis(200));
+        let outcomes = cuts::run(&cli.elf, &prepared, cli.cuts, cli.seed, || bar.inc(1))?;
+        let planted_seen = cuts::planted_is_seen(&cli.elf, &prepared);
+        bar.finish_and_clear();
+        Ok(Self {
+            outcomes,
+            planted_seen,
+        })
+    }
+
+    fn missed(&self) -> Vec<String> {
+        let wrong = self.outcomes.iter().flat_map(|outcome| {
+            let named = |wrong| format!("{}: {wrong}", outcome.name);
+            outcome.wrong.iter().map(named)
+        });
+        let planted = (!self.planted_seen)
+            .then(|| "a flash that was erased before it was copied is taken for a good one".into());
+        wrong.chain(planted).collect()
+    }
+
+    fn json(&self) -> Value {
+        json!({
+            "operations": self.outcomes.iter().map(Outcome::json).collect::<Vec<_>>(),
+            "planted_error_seen": self.planted_seen,
+            "missed": self.missed(),
+        })
+    }
+
+    fn text(&self) -> String {
+        let mut lines = vec![format!(
+            "\npower cuts\n{:14} {:>6} {:>6} {:>5} {:>5} {:>8} {:>5} {:>12} {:>7} {:>6}",
+            "stored",
+            "words",
+            "erases",
+            "cuts",
+            "old",
+            "between",
+            "new",
+            "in recovery",
+            "probed",
+            "WRONG"
+        )];
+        lines.extend(self.outcomes.iter().map(|o| {
+            format!(
+                "{:14} {:6} {:6} {:5} {:5} {:8} {:5} {:12} {:7} {:6}",
+                o.name,
+                o.writes - o.erases,
+                o.erases,
+                o.cuts(),
+                o.old,
+                o.between,
+                o.new,
+                o.in_recovery,
+                o.probed,
+                o.wrong.len()
+            )
+        }));
+        lines.extend(
+            self.missed()
+                .iter()
+                .map(|missed| format!("MISSED: {missed}")),
+        );
+        lines.join("\n") + "\n"
+    }
 }
 
 /// Whether all bars are met.
@@ -111,14 +204,19 @@ fn run(cli: &Cli) -> anyhow::Result<bool> {
         .zip(results)
         .map(|((name, _), results)| Part { name, results })
         .collect();
+    let cuts = (cli.cuts > 0).then(|| Cuts::make(cli)).transpose()?;
     let bars = Bars::of(cli.method);
     let met = parts
         .iter()
-        .all(|part| campaign::missed(&part.results, bars).is_empty());
+        .all(|part| campaign::missed(&part.results, bars).is_empty())
+        && cuts.as_ref().is_none_or(|cuts| cuts.missed().is_empty());
     let wall_s = began.elapsed().as_secs_f64();
     let report = match cli.format {
-        Format::Text => text(&parts, bars, met, wall_s)?,
-        Format::Json => format!("{}\n", object(cli, &sha256, &parts, met, wall_s)),
+        Format::Text => text(&parts, cuts.as_ref(), bars, met, wall_s)?,
+        Format::Json => format!(
+            "{}\n",
+            object(cli, &sha256, &parts, cuts.as_ref(), met, wall_s)
+        ),
     };
     match &cli.out {
         Some(file) => std::fs::write(file, report)
@@ -128,7 +226,14 @@ fn run(cli: &Cli) -> anyhow::Result<bool> {
     Ok(met)
 }
 
-fn object(cli: &Cli, sha256: &str, parts: &[Part], met: bool, wall_s: f64) -> Value {
+fn object(
+    cli: &Cli,
+    sha256: &str,
+    parts: &[Part],
+    cuts: Option<&Cuts>,
+    met: bool,
+    wall_s: f64,
+) -> Value {
     let bars = Bars::of(cli.method);
     let mut object = json!({
         "elf_sha256": sha256,
@@ -165,10 +270,19 @@ fn object(cli: &Cli, sha256: &str, parts: &[Part], met: bool, wall_s: f64) -> Va
             object[part.name]["limits"] = RECORDED_LIMITS.into();
         }
     }
+    if let Some(cuts) = cuts {
+        object["power_cuts"] = cuts.json();
+    }
     object
 }
 
-fn text(parts: &[Part], bars: Bars, met: bool, wall_s: f64) -> Result<String, std::fmt::Error> {
+fn text(
+    parts: &[Part],
+    cuts: Option<&Cuts>,
+    bars: Bars,
+    met: bool,
+    wall_s: f64,
+) -> Result<String, std::fmt::Error> {
     let mut out = String::new();
     for part in parts {
         writeln!(
@@ -260,6 +374,9 @@ fn text(parts: &[Part], bars: Bars, met: bool, wall_s: f64) -> Result<String, st
         for missed in campaign::missed(&part.results, bars) {
             writeln!(out, "MISSED: {missed}")?;
         }
+    }
+    if let Some(cuts) = cuts {
+        out += &cuts.text();
     }
     writeln!(
         out,
