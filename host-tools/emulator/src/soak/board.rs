@@ -177,6 +177,37 @@ impl Hour {
     }
 }
 
+/// What is done to the firmware in the end.
+struct OnPurpose {
+    what: &'static str,
+    /// The function by its mangled name, and what its first instruction is instead; the reset pin without any.
+    code: Option<(&'static str, [u8; 2])>,
+}
+
+/// A branch to itself, and an undefined instruction.
+const HANGS: [u8; 2] = [0xFE, 0xE7];
+/// See [`HANGS`].
+const CRASHES: [u8; 2] = [0x00, 0xDE];
+
+const ON_PURPOSE: [OnPurpose; 4] = [
+    OnPurpose {
+        what: "the tasks of thread mode hang",
+        code: Some(("___watch_task_inner_function0E4poll", HANGS)),
+    },
+    OnPurpose {
+        what: "the servo hangs",
+        code: Some(("___servo_task_inner_function0E4poll", HANGS)),
+    },
+    OnPurpose {
+        what: "the servo crashes",
+        code: Some(("___servo_task_inner_function0E4poll", CRASHES)),
+    },
+    OnPurpose {
+        what: "the reset pin",
+        code: None,
+    },
+];
+
 /// What the firmware says of its time and its restarts.
 #[derive(Default)]
 struct Ear {
@@ -501,23 +532,7 @@ impl Soak<'_> {
 
     /// Breaks the firmware, and has it reset by its pin: it must say so, and work again as it did.
     fn restarts(&mut self) -> Result<(), HourError> {
-        // the session's tasks and the servo, by their mangled names: a branch to itself, an undefined instruction
-        let broken: [(&str, Option<(&str, [u8; 2])>); 4] = [
-            (
-                "the tasks of thread mode hang",
-                Some(("___watch_task_inner_function0E4poll", [0xFE, 0xE7])),
-            ),
-            (
-                "the servo hangs",
-                Some(("___servo_task_inner_function0E4poll", [0xFE, 0xE7])),
-            ),
-            (
-                "the servo crashes",
-                Some(("___servo_task_inner_function0E4poll", [0x00, 0xDE])),
-            ),
-            ("the reset pin", None),
-        ];
-        for (what, code) in broken {
+        for OnPurpose { what, code } in ON_PURPOSE {
             let table = self.status()?.table_crc;
             self.over()?;
             let heard = self.ear.booted.len();
