@@ -474,7 +474,7 @@ impl Soak<'_> {
                 .map(|why| format!("{at_s:.0} s: {truth}: {why}"));
             self.hour.visits.rejected.extend(rejected);
         }
-        if drawn.fault.is_some() {
+        if drawn.fault.is_some() || explored.is_none() {
             self.recover()?;
         }
         if let (Some(explored), None) = (explored, came) {

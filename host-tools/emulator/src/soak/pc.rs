@@ -345,7 +345,7 @@ fn visit(
             .map(|why| format!("{at_s:.0} s: {truth}: {why}"));
         day.visits.rejected.extend(rejected);
     }
-    if drawn.fault.is_some() {
+    if drawn.fault.is_some() || done.is_err() {
         recover(day, rig)?;
     }
     block_on(memory.store.set_skin(rig.control().skin()))?;
