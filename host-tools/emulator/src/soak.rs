@@ -79,12 +79,16 @@ impl Plan {
 pub struct Visits {
     /// Explorations that were begun.
     pub made: u32,
-    /// Those in which nothing broke, and of these the right ones.
+    /// Those in which nothing broke.
     pub sound: u32,
-    /// See [`Visits::sound`].
-    pub right: u32,
+    /// Of these the ones of textures that the probe knew, and the right verdicts on them.
+    pub known: (u32, u32),
+    /// Those of textures that it had forgotten, and how often it said that it does not know them.
+    pub unknown: (u32, u32),
     /// What was taken for what, and when, virtual s.
     pub wrong: Vec<String>,
+    /// Wrong verdicts of which the probe was sure, on textures that it knew and on others.
+    pub sure_and_wrong: (u32, u32),
     /// Slides that were made again, and why, in visits in which nothing broke.
     pub rejected: Vec<String>,
     /// Textures that were taught, by the user and by the probe itself.
@@ -105,15 +109,29 @@ pub struct Broken {
 }
 
 impl Visits {
-    /// Takes a verdict in.
-    fn judge(&mut self, at_s: f64, truth: &str, known: bool, found: Option<&str>) {
+    /// Takes a verdict in: the texture that was named, unless it is said to be unknown, and whether the probe is sure.
+    fn judge(&mut self, at_s: f64, truth: &str, known: bool, found: Option<&str>, sure: bool) {
         self.sound += 1;
         let right = found.map_or(!known, |name| name == truth);
-        self.right += u32::from(right);
+        let (all, good) = if known {
+            &mut self.known
+        } else {
+            &mut self.unknown
+        };
+        *all += 1;
+        *good += u32::from(right);
         if !right {
+            let surely = if sure { "surely " } else { "" };
+            let forgotten = if known {
+                ""
+            } else {
+                ", which it had forgotten,"
+            };
             let found = found.unwrap_or("an unknown one");
-            self.wrong
-                .push(format!("{at_s:.0} s: {truth} was taken for {found}"));
+            let wrong = format!("{at_s:.0} s: {truth}{forgotten} was {surely}taken for {found}");
+            self.wrong.push(wrong);
+            let (of_known, of_others) = &mut self.sure_and_wrong;
+            *if known { of_known } else { of_others } += u32::from(sure);
         }
     }
 
@@ -143,12 +161,13 @@ impl Visits {
         json!({
             "visits": self.made,
             "without_fault": self.sound,
-            "right": self.right,
+            "known": { "visits": self.known.0, "right": self.known.1, "sure_and_wrong": self.sure_and_wrong.0 },
+            "forgotten": { "visits": self.unknown.0, "noticed": self.unknown.1, "sure_and_wrong": self.sure_and_wrong.1 },
             "wrong": self.wrong,
             "slides_rejected": self.rejected,
             "taught": self.taught.0,
             "taught_itself": self.taught.1,
-            "forgotten": self.forgotten,
+            "forgot": self.forgotten,
             "faults": self.faults.iter().map(kind).collect::<serde_json::Map<_, _>>(),
         })
     }
@@ -157,11 +176,17 @@ impl Visits {
     pub fn text(&self) -> String {
         let broken = self.broken();
         format!(
-            "{} visits, {} without a fault: {} right, {} slides made again; {} faults, {} ended the visit; taught {} times, \
-             itself {} times, forgot {} times",
+            "{} visits, {} without a fault; of textures that it knew {} of {} right, {} wrong though sure; of those it had forgotten {} \
+             of {} noticed, {} wrong though sure; {} slides made again\n  {} faults, {} ended the visit; taught {} times, itself {} \
+             times, forgot {} times",
             self.made,
             self.sound,
-            self.right,
+            self.known.1,
+            self.known.0,
+            self.sure_and_wrong.0,
+            self.unknown.1,
+            self.unknown.0,
+            self.sure_and_wrong.1,
             self.rejected.len(),
             broken.came,
             broken.noticed,
@@ -181,13 +206,16 @@ mod tests {
     #[test]
     fn an_unknown_texture_is_right_only_where_the_table_lacks_it() {
         let mut visits = Visits::default();
-        visits.judge(1.0, "elm", true, Some("elm"));
-        visits.judge(2.0, "elm", false, None);
-        assert_eq!((visits.sound, visits.right), (2, 2));
-        visits.judge(3.0, "elm", true, None);
-        visits.judge(4.0, "elm", true, Some("oak"));
-        assert_eq!((visits.sound, visits.right), (4, 2));
-        assert!(visits.wrong[1].contains("elm was taken for oak"));
+        visits.judge(1.0, "elm", true, Some("elm"), true);
+        visits.judge(2.0, "elm", false, None, false);
+        assert_eq!(visits.wrong, [""; 0]);
+        visits.judge(3.0, "elm", true, None, false);
+        visits.judge(4.0, "elm", true, Some("oak"), true);
+        visits.judge(5.0, "elm", false, Some("oak"), true);
+        assert_eq!((visits.known, visits.unknown), ((3, 1), (2, 1)));
+        assert_eq!(visits.sure_and_wrong, (1, 1));
+        assert!(visits.wrong[1].contains("elm was surely taken for oak"));
+        assert!(visits.wrong[2].contains("forgotten"));
     }
 
     #[test]

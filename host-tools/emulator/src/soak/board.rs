@@ -493,7 +493,7 @@ impl Soak<'_> {
         let found = &explored.found;
         let named = (!found.unknown).then_some(found.name.as_str());
         let visits = &mut self.hour.visits;
-        visits.judge(at_s, truth, explored.known, named);
+        visits.judge(at_s, truth, explored.known, named, found.sure);
         visits.taught.1 += u32::from(found.learned > 0);
         self.hour.missed_slots += explored.missed_slots() as u64;
         let missed = explored.missed().into_iter();
