@@ -13,6 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 use tactus::collection::Collection;
 use tactus::link::{Found, Question, ReadTable};
+use tactus::sim::world::{Setup, World};
 use tactus_core::explorer::{Method, Strategy};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::{Identify, Name, Reset, Tell};
@@ -35,6 +36,8 @@ const CALIBRATIONS: u32 = 400;
 const OPEN_S: f64 = 20.0;
 /// Nothing here is as quick as the line.
 const LOOK_MS: u64 = 10;
+/// Places at power-up among which the highest is looked for.
+const TRIALS: u64 = 100;
 /// After so many cuts of an operation the probe homes and identifies as well.
 const PROBED: usize = 2;
 
@@ -260,8 +263,22 @@ pub fn prepare(elf: &Path, seed: u64, mut each: impl FnMut(&str)) -> Result<Prep
     })?;
     Ok(Prepared {
         operations: vec![teach, update, turned],
-        unknown,
+        unknown: lifted(unknown),
     })
+}
+
+/// The same with the finger as high as it may be when the power comes: it was lifted when it was cut, and every boot lifts it first.
+fn lifted(unknown: Unknown) -> Unknown {
+    let setups = (0..TRIALS).map(|trial_seed| Setup {
+        trial_seed,
+        ..unknown.setup
+    });
+    let height = |setup: &Setup| World::new(*setup).truth().tip_mm;
+    let highest = setups.max_by(|a, b| height(a).total_cmp(&height(b)));
+    Unknown {
+        setup: highest.unwrap_or(unknown.setup),
+        ..unknown
+    }
 }
 
 fn erases(writes: &[FlashWrite]) -> impl Iterator<Item = usize> {
