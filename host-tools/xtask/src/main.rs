@@ -100,7 +100,7 @@ enum Cli {
     /// It is taught, forgets and explores, and in every fourth visit something breaks. Judged are its clock, its slots, its stack,
     /// its restarts, what it has stored, and the force on the finger. Exit code 1 if a bar is missed.
     #[command(after_help = "Examples:
-  cargo xtask soak                                  some 40 minutes on an idle core, 5 of them for the PC's 24 hours
+  cargo xtask soak                                  some 25 minutes on an idle core, 3 of them for the PC's 24 hours
   cargo xtask soak --pc-hours 1 --board-hours 0     the simulated rig only
   cargo xtask soak --help                           what is judged, and all options")]
     #[command(disable_help_flag = true)]
