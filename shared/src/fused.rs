@@ -11,6 +11,7 @@ use crate::features::{FUSED_BANDS, Measurement, Properties, Property, PropertySe
 
 mod whitening;
 
+pub(crate) use whitening::View;
 pub use whitening::{Scatter, WhitenError, Whitened, Whitening, white, whiten};
 
 /// Most features of a slide.

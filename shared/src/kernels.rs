@@ -17,7 +17,7 @@ pub struct Candidate {
     pub mean: [i16; MAX_FEATURES],
     /// Its probability.
     pub probability: f32,
-    /// Sum of squares of the mean, which [`Candidate::new`] computes.
+    /// Sum of squares of the mean.
     pub square: u64,
     /// Squared distance from the texture that it is compared with.
     pub distance: u64,
@@ -28,25 +28,38 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// One that is not compared yet. Its mean begins where `known` does and has so many features; what lies behind them does
-    /// not count.
-    pub fn new(known: &[u8], features: usize, probability: f32, slides: u8) -> Self {
+    /// One that is not compared yet. Its mean begins where `known` does, and `mask` is of its features; what lies behind them
+    /// does not count.
+    // words, not bytes: copying these would take longer than all else
+    #[inline]
+    pub(crate) fn new(known: &[u8], mask: &Mask, probability: f32, slides: u8) -> Self {
         let mut mean = [0; MAX_FEATURES];
+        let mut square = 0;
+        let mut take = |pair: &mut [i16; 2], word: u32, mask: u32| {
+            let word = word & mask;
+            *pair = [word as i16, (word >> 16) as i16];
+            square += pair
+                .map(|m| i64::from(m) * i64::from(m))
+                .iter()
+                .sum::<i64>();
+        };
+        let pairs = mean.as_chunks_mut().0.iter_mut().zip(mask);
         if let Some(known) = known.first_chunk::<{ 2 * MAX_FEATURES }>() {
             // all of them, in steps that the compiler knows the number of
-            for (to, from) in mean.iter_mut().zip(known.as_chunks().0) {
-                *to = i16::from_le_bytes(*from);
+            for ((pair, mask), word) in pairs.zip(known.as_chunks().0) {
+                take(pair, u32::from_le_bytes(*word), *mask);
             }
-            mean.iter_mut().skip(features).for_each(|to| *to = 0);
         } else {
             // the last of a table
-            let known = known.as_chunks().0.iter().take(features);
-            for (to, from) in mean.iter_mut().zip(known) {
-                *to = i16::from_le_bytes(*from);
+            for ((pair, mask), bytes) in pairs.zip(known.chunks(4)) {
+                let bytes = bytes.iter().rev();
+                take(
+                    pair,
+                    bytes.fold(0, |word, byte| word << 8 | u32::from(*byte)),
+                    *mask,
+                );
             }
         }
-        let squares = mean.iter().map(|&m| i64::from(m) * i64::from(m));
-        let square: i64 = squares.sum();
         Self {
             mean,
             probability,
@@ -56,6 +69,22 @@ impl Candidate {
             slides,
         }
     }
+}
+
+/// Which features of whitened means count, two to a word.
+pub(crate) type Mask = [u32; MAX_FEATURES / 2];
+
+/// The first `features` of them.
+pub(crate) fn mask(features: usize) -> Mask {
+    let mut mask = [0; MAX_FEATURES / 2];
+    for (word, at) in mask.iter_mut().zip((0..features).step_by(2)) {
+        *word = if at + 1 < features {
+            u32::MAX
+        } else {
+            u32::from(u16::MAX)
+        };
+    }
+    mask
 }
 
 /// A texture that is still likely, while an expected uncertainty is computed from Gaussians. The order of the fields is fixed,
