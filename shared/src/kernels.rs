@@ -2,10 +2,14 @@
 //!
 //! [`Plain`] is the reference. Another implementation must give the same integers, and the same floats to the bit.
 
+use core::mem::MaybeUninit;
+
+use microfft::Complex32;
+
 use crate::features::Property;
 use crate::fir::{TAPS, Taps};
 use crate::fused::MAX_FEATURES;
-use crate::spectrum::{FRAME, FrameSum};
+use crate::spectrum::{Angles, FRAME, Folded};
 use crate::table::Gaussian;
 
 /// A texture that is still likely, while a movement is weighed. The order of the fields is fixed, for kernels that are not
@@ -137,8 +141,21 @@ pub trait Kernels {
     /// the sum of products inside i32.
     fn band_energy(taps: &Taps, samples: &[i16]) -> u64;
 
-    /// Multiplies one frame by the window, transforms it and adds its power to `sum`.
-    fn add_frame(window: &[f32; FRAME], frame: &[i16; FRAME], sum: &mut FrameSum);
+    /// Multiplies a frame by twice the Hann window, 1 - cos(2 pi n / N), and folds it as [`Kernels::fold`] does. No sample is
+    /// outside -16384..=16383, so that sums of two are 16 bits.
+    fn fold_frame<'r>(
+        angles: &Angles,
+        frame: &[i16; FRAME],
+        room: &'r mut MaybeUninit<Folded>,
+    ) -> &'r mut Folded;
+
+    /// Halves the transform of reals, of which each of `reals` has one and that half of them later: the first half of `folded`,
+    /// transformed, is bins 1, 5, 9 and so on, and the other one has the reals, in such pairs again, whose bins are 0, 2, 4 and
+    /// so on (decimation in frequency). Both are as long as each other, a power of 2 from 8 to 128.
+    fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]);
+
+    /// Adds |X|^2 of each bin to its sum.
+    fn add_power(bins: &[Complex32], sums: &mut [f32]);
 
     /// Squared distances of `from` to whitened means: `means` has one at the beginning of every `stride` bytes, numbers of 16
     /// bits, little-endian, as many as `from` has. Where there are fewer means than distances, the others stay.
@@ -174,12 +191,46 @@ impl Kernels for Plain {
             .sum()
     }
 
-    fn add_frame(window: &[f32; FRAME], frame: &[i16; FRAME], sum: &mut FrameSum) {
-        let mut x = [0.0; FRAME];
-        for ((x, &sample), &w) in x.iter_mut().zip(frame).zip(window) {
-            *x = f32::from(sample) * w;
+    fn fold_frame<'r>(
+        angles: &Angles,
+        frame: &[i16; FRAME],
+        room: &'r mut MaybeUninit<Folded>,
+    ) -> &'r mut Folded {
+        let folded = room.write([Complex32::new(0.0, 0.0); FRAME / 2]);
+        let ([odd, even], _) = folded.as_chunks_mut::<{ FRAME / 4 }>() else {
+            return folded;
+        };
+        let ([a, b, c, d], _) = frame.as_chunks::<{ FRAME / 4 }>() else {
+            return folded;
+        };
+        let x = a.iter().zip(b).zip(c.iter().zip(d)).zip(angles);
+        for ((((a, b), (c, d)), &[cos, sin]), (odd, even)) in x.zip(odd.iter_mut().zip(even)) {
+            let [a, b, c, d] = [a, b, c, d].map(|x| i32::from(*x));
+            let [sum, apart, sum_1, apart_1] = [a + c, a - c, b + d, b - d].map(|x| x as f32);
+            // the windows of a, b, c and d are 1 - cos, 1 + sin, 1 + cos and 1 - sin
+            even.re = sum - cos * apart;
+            even.im = sum_1 + sin * apart_1;
+            *odd = turned(apart - cos * sum, apart_1 + sin * sum_1, [cos, sin]);
         }
-        add_windowed(&mut x, sum);
+        folded
+    }
+
+    fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]) {
+        let half = reals.len() / 2;
+        let (a, b) = reals.split_at_checked(half).unwrap_or_default();
+        let (odd, even) = folded.split_at_mut_checked(half).unwrap_or_default();
+        let angles = angles.iter().step_by((angles.len() / half.max(1)).max(1));
+        let x = a.iter().zip(b).zip(angles);
+        for (((a, b), angle), (odd, even)) in x.zip(odd.iter_mut().zip(even)) {
+            *even = Complex32::new(a.re + a.im, b.re + b.im);
+            *odd = turned(a.re - a.im, b.re - b.im, *angle);
+        }
+    }
+
+    fn add_power(bins: &[Complex32], sums: &mut [f32]) {
+        for (sum, bin) in sums.iter_mut().zip(bins) {
+            *sum = *sum + bin.re * bin.re + bin.im * bin.im;
+        }
     }
 
     fn distances(from: &[i16], means: &[u8], stride: usize, distances: &mut [u64]) {
@@ -222,11 +273,10 @@ impl Kernels for Plain {
     }
 }
 
-/// Transforms a frame that was multiplied by the window, and adds its power to `sum`.
-// with this crate, which is compiled for speed
-#[inline(never)]
-pub fn add_windowed(x: &mut [f32; FRAME], sum: &mut FrameSum) {
-    sum.add(microfft::real::rfft_512(x));
+/// (p - iq) (cos - i sin), each product and sum rounded.
+#[inline]
+fn turned(p: f32, q: f32, [cos, sin]: [f32; 2]) -> Complex32 {
+    Complex32::new(p * cos - q * sin, -(p * sin) - q * cos)
 }
 
 /// 1.5 * 2^23: adding it leaves a number's whole part in the lowest bits.
