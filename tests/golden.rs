@@ -158,7 +158,7 @@ fn spectra_of_made_up_signals_are_those_of_f64() {
             })
             .collect();
         let mut sum = tactus_core::spectrum::SpectrumSum::default();
-        sum.push::<tactus_core::kernels::Plain>(&tactus_core::spectrum::hann(), &samples);
+        sum.push::<tactus_core::kernels::Plain>(&tactus_core::spectrum::angles(), &samples);
         assert_near_oracle(
             &samples,
             &sum.finish().unwrap(),

@@ -6,8 +6,8 @@ use core::mem::{MaybeUninit, offset_of};
 
 use tactus_core::fir::{TAPS, Taps};
 use tactus_core::fused::MAX_FEATURES;
-use tactus_core::kernels::{Candidate, EXP2, FAR, Kernels, Live, Plain, ROUND, add_windowed};
-use tactus_core::spectrum::{FRAME, FrameSum};
+use tactus_core::kernels::{Candidate, EXP2, FAR, Kernels, Live, Plain, ROUND};
+use tactus_core::spectrum::{Angles, Complex32, FRAME, Folded};
 use tactus_core::table::Gaussian;
 
 /// Outputs of the band-pass that are computed at once.
@@ -231,62 +231,183 @@ unsafe extern "C" {
     safe fn tactus_sqrt(x: f32) -> f32;
 }
 
-/// A frame times the window, eight at a time, in room that need not be zeros first.
+/// [`Kernels::fold_frame`], two angles at a time: sums of two samples by one instruction, and then what `Plain` does, in its
+/// order (VMLA rounds the product).
 #[inline(never)]
-fn windowed<'x>(
-    window: &[f32; FRAME],
+fn fold_frame<'r>(
+    angles: &Angles,
     frame: &[i16; FRAME],
-    x: &'x mut MaybeUninit<[f32; FRAME]>,
-) -> &'x mut [f32; FRAME] {
-    let begin: *mut f32 = x.as_mut_ptr().cast();
-    // SAFETY: all three have as many numbers, in whole eights; all of `x` is written.
+    room: &'r mut MaybeUninit<Folded>,
+) -> &'r mut Folded {
+    let begin: *mut Complex32 = room.as_mut_ptr().cast();
+    // SAFETY: it reads all angles, an even number, and the whole frame, whose words need not be aligned; all of `room` is
+    // written.
     unsafe {
         asm!(
             "2:",
-            "vldmia {w}!, {{s0-s7}}",
-            "ldrsh {a}, [{f}]",
-            "ldrsh {b}, [{f}, #2]",
-            "vmov s8, s9, {a}, {b}",
-            "ldrsh {a}, [{f}, #4]",
-            "ldrsh {b}, [{f}, #6]",
-            "vmov s10, s11, {a}, {b}",
-            "ldrsh {a}, [{f}, #8]",
-            "ldrsh {b}, [{f}, #10]",
-            "vmov s12, s13, {a}, {b}",
-            "ldrsh {a}, [{f}, #12]",
-            "ldrsh {b}, [{f}, #14]",
-            "vmov s14, s15, {a}, {b}",
-            "add {f}, {f}, #16",
-            "vcvt.f32.s32 s8, s8",
-            "vcvt.f32.s32 s9, s9",
+            "ldr {c}, [{f}, #{half}]",
+            "ldr {b}, [{f}, #{quarter}]",
+            "ldr {d}, [{f}, #{three_quarters}]",
+            "ldr {a}, [{f}], #4",
+            "vldmia {angles}!, {{s16-s19}}",
+            "sadd16 {x}, {a}, {c}",
+            "ssub16 {a}, {a}, {c}",
+            "sadd16 {c}, {b}, {d}",
+            "ssub16 {b}, {b}, {d}",
+            "vmov s8, s9, {x}, {c}",
+            "asr {x}, {x}, #16",
+            "asr {c}, {c}, #16",
+            "vmov s10, s11, {x}, {c}",
+            "vmov s0, s1, {a}, {b}",
+            "asr {a}, {a}, #16",
+            "asr {b}, {b}, #16",
+            "vmov s2, s3, {a}, {b}",
+            "vcvt.f32.s16 s8, s8, #0",
+            "vcvt.f32.s16 s9, s9, #0",
+            "vcvt.f32.s16 s0, s0, #0",
+            "vcvt.f32.s16 s1, s1, #0",
             "vcvt.f32.s32 s10, s10",
             "vcvt.f32.s32 s11, s11",
-            "vcvt.f32.s32 s12, s12",
-            "vcvt.f32.s32 s13, s13",
-            "vcvt.f32.s32 s14, s14",
-            "vcvt.f32.s32 s15, s15",
-            "vmul.f32 s8, s8, s0",
-            "vmul.f32 s9, s9, s1",
-            "vmul.f32 s10, s10, s2",
-            "vmul.f32 s11, s11, s3",
-            "vmul.f32 s12, s12, s4",
-            "vmul.f32 s13, s13, s5",
-            "vmul.f32 s14, s14, s6",
-            "vmul.f32 s15, s15, s7",
-            "vstmia {x}!, {{s8-s15}}",
-            "cmp {x}, {end}",
+            "vcvt.f32.s32 s2, s2",
+            "vcvt.f32.s32 s3, s3",
+            // even bins from s8 on, p and q of the odd ones from s0 on
+            "vmul.f32 s4, s16, s8",
+            "vmls.f32 s8, s16, s0",
+            "vsub.f32 s0, s0, s4",
+            "vmul.f32 s5, s17, s9",
+            "vmla.f32 s9, s17, s1",
+            "vadd.f32 s1, s1, s5",
+            "vmul.f32 s4, s18, s10",
+            "vmls.f32 s10, s18, s2",
+            "vsub.f32 s2, s2, s4",
+            "vmul.f32 s5, s19, s11",
+            "vmla.f32 s11, s19, s3",
+            "vadd.f32 s3, s3, s5",
+            "vmul.f32 s12, s0, s16",
+            "vmls.f32 s12, s1, s17",
+            "vnmul.f32 s13, s0, s17",
+            "vmls.f32 s13, s1, s16",
+            "vmul.f32 s14, s2, s18",
+            "vmls.f32 s14, s3, s19",
+            "vnmul.f32 s15, s2, s19",
+            "vmls.f32 s15, s3, s18",
+            "vstmia {odd}!, {{s12-s15}}",
+            "vstmia {even}!, {{s8-s11}}",
+            "cmp {odd}, {end}",
             "bne 2b",
-            w = inout(reg) window.as_ptr() => _,
+            quarter = const 2 * FRAME / 4,
+            half = const 2 * FRAME / 2,
+            three_quarters = const 2 * FRAME / 4 * 3,
+            angles = inout(reg) angles.as_ptr() => _,
             f = inout(reg) frame.as_ptr() => _,
-            x = inout(reg) begin => _,
-            end = in(reg) begin.add(FRAME),
+            odd = inout(reg) begin => _,
+            even = inout(reg) begin.add(FRAME / 4) => _,
+            end = in(reg) begin.add(FRAME / 4),
             a = out(reg) _,
             b = out(reg) _,
+            c = out(reg) _,
+            d = out(reg) _,
+            x = out(reg) _,
             out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
             out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
+            out("s16") _, out("s17") _, out("s18") _, out("s19") _,
             options(nostack),
         );
-        x.assume_init_mut()
+        room.assume_init_mut()
+    }
+}
+
+/// [`Kernels::fold`] of so many in both, a multiple of 4.
+///
+/// # Safety
+/// They are there.
+#[inline(never)]
+unsafe fn fold(angles: &Angles, reals: *const Complex32, folded: *mut Complex32, many: usize) {
+    let half = many / 2;
+    // SAFETY: it reads all of `reals`, writes all of `folded`, and takes as many angles as half of that, two at a time.
+    unsafe {
+        asm!(
+            "2:",
+            "vldmia {a}!, {{s0-s3}}",
+            "vldmia {b}!, {{s4-s7}}",
+            "vldr d8, [{angle}]",
+            "add {angle}, {angle}, {step}",
+            "vldr d9, [{angle}]",
+            "add {angle}, {angle}, {step}",
+            "vadd.f32 s8, s0, s1",
+            "vadd.f32 s9, s4, s5",
+            "vadd.f32 s10, s2, s3",
+            "vadd.f32 s11, s6, s7",
+            "vsub.f32 s0, s0, s1",
+            "vsub.f32 s4, s4, s5",
+            "vsub.f32 s2, s2, s3",
+            "vsub.f32 s6, s6, s7",
+            "vmul.f32 s12, s0, s16",
+            "vmls.f32 s12, s4, s17",
+            "vnmul.f32 s13, s0, s17",
+            "vmls.f32 s13, s4, s16",
+            "vmul.f32 s14, s2, s18",
+            "vmls.f32 s14, s6, s19",
+            "vnmul.f32 s15, s2, s19",
+            "vmls.f32 s15, s6, s18",
+            "vstmia {odd}!, {{s12-s15}}",
+            "vstmia {even}!, {{s8-s11}}",
+            "cmp {odd}, {end}",
+            "bne 2b",
+            angle = inout(reg) angles.as_ptr() => _,
+            step = in(reg) size_of_val(angles) / half,
+            a = inout(reg) reals => _,
+            b = inout(reg) reals.add(half) => _,
+            odd = inout(reg) folded => _,
+            even = inout(reg) folded.add(half) => _,
+            end = in(reg) folded.add(half),
+            out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
+            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
+            out("s16") _, out("s17") _, out("s18") _, out("s19") _,
+            options(nostack),
+        );
+    }
+}
+
+/// [`Kernels::add_power`] of so many, a multiple of 8 and not 0.
+///
+/// # Safety
+/// They are there.
+#[inline(never)]
+unsafe fn add_power(bins: *const Complex32, sums: *mut f32, many: usize) {
+    // SAFETY: it reads and writes as many.
+    unsafe {
+        asm!(
+            "2:",
+            "vldmia {bins}!, {{s0-s15}}",
+            "vldmia {sums}, {{s16-s23}}",
+            "vmla.f32 s16, s0, s0",
+            "vmla.f32 s17, s2, s2",
+            "vmla.f32 s18, s4, s4",
+            "vmla.f32 s19, s6, s6",
+            "vmla.f32 s20, s8, s8",
+            "vmla.f32 s21, s10, s10",
+            "vmla.f32 s22, s12, s12",
+            "vmla.f32 s23, s14, s14",
+            "vmla.f32 s16, s1, s1",
+            "vmla.f32 s17, s3, s3",
+            "vmla.f32 s18, s5, s5",
+            "vmla.f32 s19, s7, s7",
+            "vmla.f32 s20, s9, s9",
+            "vmla.f32 s21, s11, s11",
+            "vmla.f32 s22, s13, s13",
+            "vmla.f32 s23, s15, s15",
+            "vstmia {sums}!, {{s16-s23}}",
+            "cmp {sums}, {end}",
+            "bne 2b",
+            bins = inout(reg) bins => _,
+            sums = inout(reg) sums => _,
+            end = in(reg) sums.add(many),
+            out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
+            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
+            out("s16") _, out("s17") _, out("s18") _, out("s19") _, out("s20") _, out("s21") _, out("s22") _, out("s23") _,
+            options(nostack),
+        );
     }
 }
 
@@ -398,8 +519,30 @@ impl Kernels for Chip {
         rest + unsafe { tactus_band_energy(taps.pairs().as_ptr(), samples.as_ptr(), sixes) }
     }
 
-    fn add_frame(window: &[f32; FRAME], frame: &[i16; FRAME], sum: &mut FrameSum) {
-        add_windowed(windowed(window, frame, &mut MaybeUninit::uninit()), sum);
+    fn fold_frame<'r>(
+        angles: &Angles,
+        frame: &[i16; FRAME],
+        room: &'r mut MaybeUninit<Folded>,
+    ) -> &'r mut Folded {
+        fold_frame(angles, frame, room)
+    }
+
+    fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]) {
+        let many = reals.len();
+        if many != folded.len() || many % 4 != 0 || many == 0 || many > FRAME / 4 {
+            return Plain::fold(angles, reals, folded);
+        }
+        // SAFETY: there are so many.
+        unsafe { fold(angles, reals.as_ptr(), folded.as_mut_ptr(), many) };
+    }
+
+    fn add_power(bins: &[Complex32], sums: &mut [f32]) {
+        let many = bins.len();
+        if many != sums.len() || many % 8 != 0 || many == 0 {
+            return Plain::add_power(bins, sums);
+        }
+        // SAFETY: there are so many.
+        unsafe { add_power(bins.as_ptr(), sums.as_mut_ptr(), many) };
     }
 
     fn distances(from: &[i16], means: &[u8], stride: usize, distances: &mut [u64]) {

@@ -152,9 +152,9 @@ pub fn run<K: Kernels>(
         Workload::Frame => {
             let mut spectrum = SpectrumSum::default();
             let (first, rest) = words.split_at_checked(FRAME - HOP)?;
-            spectrum.push::<K>(plan.window(), first);
+            spectrum.push::<K>(plan.angles(), first);
             let frame = rest.get(..HOP)?;
-            counter.count(|| spectrum.push::<K>(plan.window(), black_box(frame)));
+            counter.count(|| spectrum.push::<K>(plan.angles(), black_box(frame)));
             let psd = spectrum.finish()?;
             psd.psd().iter().for_each(|p| put(&p.to_le_bytes()));
         }

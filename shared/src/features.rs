@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::fir::{BandPower, TAPS, Taps};
 use crate::kernels::{Kernels, Plain};
-use crate::spectrum::{FRAME, Spectrum, SpectrumSum, hann};
+use crate::spectrum::{Angles, FRAME, Spectrum, SpectrumSum, angles};
 
 /// A property of texture, one of the paper's three.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
@@ -161,11 +161,11 @@ pub fn roughness(power: f32, background: f32) -> (f32, bool) {
     (libm::logf(above.max(least)), above < least)
 }
 
-/// What every slide needs and no slide changes: the filter's coefficients and the window.
+/// What every slide needs and no slide changes: the filter's coefficients, and the angles of window and transform.
 #[derive(Clone, Debug)]
 pub struct Plan {
     taps: Taps,
-    window: [f32; FRAME],
+    angles: Angles,
 }
 
 impl Plan {
@@ -173,7 +173,7 @@ impl Plan {
     pub fn new() -> Self {
         Self {
             taps: Taps::band_pass(),
-            window: hann(),
+            angles: angles(),
         }
     }
 
@@ -182,9 +182,9 @@ impl Plan {
         &self.taps
     }
 
-    /// The window of the spectrum.
-    pub fn window(&self) -> &[f32; FRAME] {
-        &self.window
+    /// What the spectrum takes.
+    pub fn angles(&self) -> &Angles {
+        &self.angles
     }
 }
 
@@ -322,7 +322,7 @@ impl<'p, K: Kernels> Slide<'p, K> {
             self.power.prime::<K>(&self.plan.taps, before);
         }
         self.power.push::<K>(&self.plan.taps, steady);
-        self.spectrum.push::<K>(&self.plan.window, steady);
+        self.spectrum.push::<K>(&self.plan.angles, steady);
         self.position = end;
     }
 

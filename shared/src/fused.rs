@@ -11,8 +11,8 @@ use crate::features::{FUSED_BANDS, Measurement, Properties, Property, PropertySe
 
 mod whitening;
 
-pub(crate) use whitening::oas;
 pub use whitening::{Scatter, WhitenError, Whitened, Whitening, white, whiten};
+pub(crate) use whitening::{View, oas};
 
 /// Most features of a slide.
 pub const MAX_FEATURES: usize = 14;

@@ -2,10 +2,14 @@
 //!
 //! [`Plain`] is the reference. Another implementation must give the same integers, and the same floats to the bit.
 
+use core::mem::MaybeUninit;
+
+use microfft::Complex32;
+
 use crate::features::Property;
 use crate::fir::{TAPS, Taps};
 use crate::fused::MAX_FEATURES;
-use crate::spectrum::{FRAME, FrameSum};
+use crate::spectrum::{Angles, FRAME, Folded};
 use crate::table::Gaussian;
 
 /// A texture that is still likely, while a movement is weighed. The order of the fields is fixed, for kernels that are not
@@ -17,7 +21,7 @@ pub struct Candidate {
     pub mean: [i16; MAX_FEATURES],
     /// Its probability.
     pub probability: f32,
-    /// Sum of squares of the mean, which [`Candidate::new`] computes.
+    /// Sum of squares of the mean.
     pub square: u64,
     /// Squared distance from the texture that it is compared with.
     pub distance: u64,
@@ -28,25 +32,38 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// One that is not compared yet. Its mean begins where `known` does and has so many features; what lies behind them does
-    /// not count.
-    pub fn new(known: &[u8], features: usize, probability: f32, slides: u8) -> Self {
+    /// One that is not compared yet. Its mean begins where `known` does, and `mask` is of its features; what lies behind them
+    /// does not count.
+    // words, not bytes: copying these would take longer than all else
+    #[inline]
+    pub(crate) fn new(known: &[u8], mask: &Mask, probability: f32, slides: u8) -> Self {
         let mut mean = [0; MAX_FEATURES];
+        let mut square = 0;
+        let mut take = |pair: &mut [i16; 2], word: u32, mask: u32| {
+            let word = word & mask;
+            *pair = [word as i16, (word >> 16) as i16];
+            square += pair
+                .map(|m| i64::from(m) * i64::from(m))
+                .iter()
+                .sum::<i64>();
+        };
+        let pairs = mean.as_chunks_mut().0.iter_mut().zip(mask);
         if let Some(known) = known.first_chunk::<{ 2 * MAX_FEATURES }>() {
             // all of them, in steps that the compiler knows the number of
-            for (to, from) in mean.iter_mut().zip(known.as_chunks().0) {
-                *to = i16::from_le_bytes(*from);
+            for ((pair, mask), word) in pairs.zip(known.as_chunks().0) {
+                take(pair, u32::from_le_bytes(*word), *mask);
             }
-            mean.iter_mut().skip(features).for_each(|to| *to = 0);
         } else {
             // the last of a table
-            let known = known.as_chunks().0.iter().take(features);
-            for (to, from) in mean.iter_mut().zip(known) {
-                *to = i16::from_le_bytes(*from);
+            for ((pair, mask), bytes) in pairs.zip(known.chunks(4)) {
+                let bytes = bytes.iter().rev();
+                take(
+                    pair,
+                    bytes.fold(0, |word, byte| word << 8 | u32::from(*byte)),
+                    *mask,
+                );
             }
         }
-        let squares = mean.iter().map(|&m| i64::from(m) * i64::from(m));
-        let square: i64 = squares.sum();
         Self {
             mean,
             probability,
@@ -56,6 +73,22 @@ impl Candidate {
             slides,
         }
     }
+}
+
+/// Which features of whitened means count, two to a word.
+pub(crate) type Mask = [u32; MAX_FEATURES / 2];
+
+/// The first `features` of them.
+pub(crate) fn mask(features: usize) -> Mask {
+    let mut mask = [0; MAX_FEATURES / 2];
+    for (word, at) in mask.iter_mut().zip((0..features).step_by(2)) {
+        *word = if at + 1 < features {
+            u32::MAX
+        } else {
+            u32::from(u16::MAX)
+        };
+    }
+    mask
 }
 
 /// A texture that is still likely, while an expected uncertainty is computed from Gaussians. The order of the fields is fixed,
@@ -108,8 +141,21 @@ pub trait Kernels {
     /// the sum of products inside i32.
     fn band_energy(taps: &Taps, samples: &[i16]) -> u64;
 
-    /// Multiplies one frame by the window, transforms it and adds its power to `sum`.
-    fn add_frame(window: &[f32; FRAME], frame: &[i16; FRAME], sum: &mut FrameSum);
+    /// Multiplies a frame by twice the Hann window, 1 - cos(2 pi n / N), and folds it as [`Kernels::fold`] does. No sample is
+    /// outside -16384..=16383, so that sums of two are 16 bits.
+    fn fold_frame<'r>(
+        angles: &Angles,
+        frame: &[i16; FRAME],
+        room: &'r mut MaybeUninit<Folded>,
+    ) -> &'r mut Folded;
+
+    /// Halves the transform of reals, of which each of `reals` has one and that half of them later: the first half of `folded`,
+    /// transformed, is bins 1, 5, 9 and so on, and the other one has the reals, in such pairs again, whose bins are 0, 2, 4 and
+    /// so on (decimation in frequency). Both are as long as each other, a power of 2 from 8 to 128.
+    fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]);
+
+    /// Adds |X|^2 of each bin to its sum.
+    fn add_power(bins: &[Complex32], sums: &mut [f32]);
 
     /// Squared distances of `from` to whitened means: `means` has one at the beginning of every `stride` bytes, numbers of 16
     /// bits, little-endian, as many as `from` has. Where there are fewer means than distances, the others stay.
@@ -145,12 +191,46 @@ impl Kernels for Plain {
             .sum()
     }
 
-    fn add_frame(window: &[f32; FRAME], frame: &[i16; FRAME], sum: &mut FrameSum) {
-        let mut x = [0.0; FRAME];
-        for ((x, &sample), &w) in x.iter_mut().zip(frame).zip(window) {
-            *x = f32::from(sample) * w;
+    fn fold_frame<'r>(
+        angles: &Angles,
+        frame: &[i16; FRAME],
+        room: &'r mut MaybeUninit<Folded>,
+    ) -> &'r mut Folded {
+        let folded = room.write([Complex32::new(0.0, 0.0); FRAME / 2]);
+        let ([odd, even], _) = folded.as_chunks_mut::<{ FRAME / 4 }>() else {
+            return folded;
+        };
+        let ([a, b, c, d], _) = frame.as_chunks::<{ FRAME / 4 }>() else {
+            return folded;
+        };
+        let x = a.iter().zip(b).zip(c.iter().zip(d)).zip(angles);
+        for ((((a, b), (c, d)), &[cos, sin]), (odd, even)) in x.zip(odd.iter_mut().zip(even)) {
+            let [a, b, c, d] = [a, b, c, d].map(|x| i32::from(*x));
+            let [sum, apart, sum_1, apart_1] = [a + c, a - c, b + d, b - d].map(|x| x as f32);
+            // the windows of a, b, c and d are 1 - cos, 1 + sin, 1 + cos and 1 - sin
+            even.re = sum - cos * apart;
+            even.im = sum_1 + sin * apart_1;
+            *odd = turned(apart - cos * sum, apart_1 + sin * sum_1, [cos, sin]);
         }
-        add_windowed(&mut x, sum);
+        folded
+    }
+
+    fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]) {
+        let half = reals.len() / 2;
+        let (a, b) = reals.split_at_checked(half).unwrap_or_default();
+        let (odd, even) = folded.split_at_mut_checked(half).unwrap_or_default();
+        let angles = angles.iter().step_by((angles.len() / half.max(1)).max(1));
+        let x = a.iter().zip(b).zip(angles);
+        for (((a, b), angle), (odd, even)) in x.zip(odd.iter_mut().zip(even)) {
+            *even = Complex32::new(a.re + a.im, b.re + b.im);
+            *odd = turned(a.re - a.im, b.re - b.im, *angle);
+        }
+    }
+
+    fn add_power(bins: &[Complex32], sums: &mut [f32]) {
+        for (sum, bin) in sums.iter_mut().zip(bins) {
+            *sum = *sum + bin.re * bin.re + bin.im * bin.im;
+        }
     }
 
     fn distances(from: &[i16], means: &[u8], stride: usize, distances: &mut [u64]) {
@@ -193,11 +273,10 @@ impl Kernels for Plain {
     }
 }
 
-/// Transforms a frame that was multiplied by the window, and adds its power to `sum`.
-// with this crate, which is compiled for speed
-#[inline(never)]
-pub fn add_windowed(x: &mut [f32; FRAME], sum: &mut FrameSum) {
-    sum.add(microfft::real::rfft_512(x));
+/// (p - iq) (cos - i sin), each product and sum rounded.
+#[inline]
+fn turned(p: f32, q: f32, [cos, sin]: [f32; 2]) -> Complex32 {
+    Complex32::new(p * cos - q * sin, -(p * sin) - q * cos)
 }
 
 /// 1.5 * 2^23: adding it leaves a number's whole part in the lowest bits.

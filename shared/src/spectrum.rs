@@ -1,17 +1,26 @@
 //! The averaged spectrum of the unfiltered P_AC (Hann windows of 512 samples, hop 256), its centroid (eq. 18) and its band
 //! powers.
 //!
+//! Only powers are wanted, so a frame need not be transformed as a whole and unpacked. The odd bins of n reals are a complex
+//! transform of n/4 values, each bin or its mirror image; the even ones are the transform of n/2 reals. [`Kernels::fold`] makes
+//! these of those, and after three times what is left is short. The transforms themselves are microfft's.
+//!
 //! The mean of the slide is to be removed before the windows, but it is known only at the end. A Hann window has three
 //! non-zero bins, so the mean only reaches bins 0 and 1 of each frame, and [`SpectrumSum::finish`] takes it out again by
 //! linearity.
 
+use core::array;
+use core::mem::MaybeUninit;
 use core::ops::Range;
 
-use microfft::Complex32;
+use microfft::complex::{cfft_32, cfft_64, cfft_128};
+use microfft::real::rfft_64;
 
 use crate::fir::cos_of_turns;
 use crate::kernels::Kernels;
 use crate::pressure::RATE_HZ;
+
+pub use microfft::Complex32;
 
 /// Samples in a frame.
 pub const FRAME: usize = 512;
@@ -22,52 +31,133 @@ pub const BINS: usize = FRAME / 2 + 1;
 /// Width of a bin in Hz.
 pub const BIN_HZ: f32 = RATE_HZ as f32 / FRAME as f32;
 
-/// Sum of the squares of the Hann window: 3/8 of its length.
-const WINDOW_POWER: f32 = FRAME as f32 * 3.0 / 8.0;
-/// Transform of the Hann window itself at bins 0 and 1; it is 0 from bin 2 on.
-const WINDOW_BIN_0: f32 = FRAME as f32 / 2.0;
-const WINDOW_BIN_1: f32 = -(FRAME as f32) / 4.0;
+/// Sum of the squares of the window, which is twice Hann's: his is 3/8 of its length.
+const WINDOW_POWER: f32 = 4.0 * FRAME as f32 * 3.0 / 8.0;
+/// Transform of the window itself at bins 0 and 1; it is 0 from bin 2 on.
+const WINDOW_BIN_0: f32 = FRAME as f32;
+const WINDOW_BIN_1: f32 = -(FRAME as f32) / 2.0;
 
-/// The Hann window of [`FRAME`] samples, periodic: 0.5 - 0.5 cos(2 pi n / N).
-pub fn hann() -> [f32; FRAME] {
-    let mut window = [0.0; FRAME];
-    for (n, w) in window.iter_mut().enumerate() {
-        *w = (0.5 - 0.5 * cos_of_turns(n as f64 / FRAME as f64)) as f32;
-    }
-    window
+/// Cosine and sine of every 512th part of a turn in its first quarter: what the window and folding take.
+pub type Angles = [[f32; 2]; FRAME / 4];
+
+/// See [`Angles`].
+pub fn angles() -> Angles {
+    array::from_fn(|n| {
+        let turns = n as f64 / FRAME as f64;
+        // a sine is a cosine a quarter of a turn later
+        [turns, turns - 0.25].map(|turns| cos_of_turns(turns) as f32)
+    })
 }
 
-/// Sums over frames: the power of every bin, and the two complex bins that the mean of the slide reaches.
+/// A frame that was folded: a complex number for every odd bin, then the reals that the even ones are the transform of, each
+/// with that half of them later.
+pub type Folded = [Complex32; FRAME / 2];
+
+/// Sums over frames: the power of every bin in counts^2, and the two complex bins that the mean of the slide reaches.
 #[derive(Clone, Debug)]
 pub struct FrameSum {
-    /// Sum of |X|^2 of every bin, in counts^2.
-    power: [f32; BINS],
+    /// Bins 1, 5, 9 and so on; those beyond the last are the mirror images of 255, 251 and so on.
+    odd: [f32; FRAME / 4],
+    /// Bins 2, 10, 18 and so on.
+    twice_odd: [f32; FRAME / 8],
+    /// Bins 4, 20, 36 and so on.
+    four_times_odd: [f32; FRAME / 16],
+    /// Bins 0, 8, 16 and so on.
+    eights: [f32; FRAME / 16],
+    last: f32,
     /// Sum of the real parts of bins 0 and 1 (the Hann window's own bins are real).
     real: [f32; 2],
     frames: u32,
 }
 
 impl FrameSum {
-    /// Adds one transformed frame: bins 0 to 255, with bin 256, which is real, in place of bin 0's imaginary part.
-    pub fn add(&mut self, bins: &[Complex32; FRAME / 2]) {
-        let [first, rest @ .., last] = &mut self.power;
-        let [ends, bins @ ..] = bins;
-        let [second, ..] = bins;
-        *first += ends.re * ends.re;
-        *last += ends.im * ends.im;
+    const ZERO: Self = Self {
+        odd: [0.0; FRAME / 4],
+        twice_odd: [0.0; FRAME / 8],
+        four_times_odd: [0.0; FRAME / 16],
+        eights: [0.0; FRAME / 16],
+        last: 0.0,
+        real: [0.0; 2],
+        frames: 0,
+    };
+
+    /// Adds the power of a frame that was folded once.
+    // not generic: compiled with this crate, for speed, and microfft with it
+    #[inline(never)]
+    fn add(&mut self, angles: &Angles, folded: &mut Folded, fold: Fold, add_power: AddPower) {
+        let ([odd, reals], _) = folded.as_chunks_mut::<{ FRAME / 4 }>() else {
+            return;
+        };
+        let odd = cfft_128(odd);
         let [real_0, real_1] = &mut self.real;
-        *real_0 += ends.re;
-        *real_1 += second.re;
-        let add = |sum: &mut f32, bin: &Complex32| *sum += bin.re * bin.re + bin.im * bin.im;
-        let (fives, _) = rest.as_chunks_mut::<5>();
-        for (sums, bins) in fives.iter_mut().zip(bins.as_chunks::<5>().0) {
-            for (sum, bin) in sums.iter_mut().zip(bins) {
-                add(sum, bin);
-            }
+        *real_1 += odd.first().map_or(0.0, |first| first.re);
+        add_power(odd, &mut self.odd);
+
+        fold(angles, reals, odd);
+        let ([odd, reals_2], _) = odd.as_chunks_mut::<{ FRAME / 8 }>() else {
+            return;
+        };
+        add_power(cfft_64(odd), &mut self.twice_odd);
+
+        let ([folded, ..], _) = reals.as_chunks_mut::<{ FRAME / 8 }>() else {
+            return;
+        };
+        fold(angles, reals_2, folded);
+        let ([odd, reals], _) = folded.as_chunks_mut::<{ FRAME / 16 }>() else {
+            return;
+        };
+        add_power(cfft_32(odd), &mut self.four_times_odd);
+
+        let mut rest = [0.0; FRAME / 8];
+        let ([early, late], _) = rest.as_chunks_mut::<{ FRAME / 16 }>() else {
+            return;
+        };
+        for ((early, late), pair) in early.iter_mut().zip(late).zip(reals) {
+            (*early, *late) = (pair.re, pair.im);
         }
+        let eights = rfft_64(&mut rest);
+        // the first of them has that of the last bin, which is real as well, in place of its imaginary part
+        if let Some(ends) = eights.first_mut() {
+            *real_0 += ends.re;
+            self.last += ends.im * ends.im;
+            ends.im = 0.0;
+        }
+        add_power(eights, &mut self.eights);
         self.frames += 1;
     }
+
+    /// By bins in their order.
+    fn power(&self) -> [f32; BINS] {
+        let mut power = [0.0; BINS];
+        // one loop for all, because a handheld has little room
+        let folds = [
+            &self.odd[..],
+            &self.twice_odd,
+            &self.four_times_odd,
+            &self.eights,
+        ];
+        for (sums, apart) in folds.into_iter().zip([1, 2, 4, 8]) {
+            for (place, sum) in sums.iter().enumerate() {
+                let bin = match apart {
+                    8 => 8 * place,
+                    _ => apart * (4 * place + 1),
+                };
+                // or its mirror image
+                if let Some(to) = power.get_mut(bin.min(FRAME - bin)) {
+                    *to = *sum;
+                }
+            }
+        }
+        let [.., last] = &mut power;
+        *last = self.last;
+        power
+    }
 }
+
+/// [`Kernels::fold`].
+type Fold = fn(&Angles, &[Complex32], &mut [Complex32]);
+/// [`Kernels::add_power`].
+type AddPower = fn(&[Complex32], &mut [f32]);
 
 /// The spectrum of a slide while its samples arrive.
 #[derive(Clone, Debug)]
@@ -85,11 +175,7 @@ impl Default for SpectrumSum {
         Self {
             frame: [0; FRAME],
             filled: 0,
-            sum: FrameSum {
-                power: [0.0; BINS],
-                real: [0.0; 2],
-                frames: 0,
-            },
+            sum: FrameSum::ZERO,
             total: 0,
             samples: 0,
         }
@@ -97,14 +183,16 @@ impl Default for SpectrumSum {
 }
 
 impl SpectrumSum {
-    /// Takes samples, in blocks of any size.
-    pub fn push<K: Kernels>(&mut self, window: &[f32; FRAME], samples: &[i16]) {
+    /// Takes samples, in blocks of any size. None is outside -16384..=16383.
+    pub fn push<K: Kernels>(&mut self, angles: &Angles, samples: &[i16]) {
         let mut samples = samples;
         self.samples += samples.len() as u32;
         while !samples.is_empty() {
             samples = self.fill(samples);
             if self.filled >= FRAME {
-                K::add_frame(window, &self.frame, &mut self.sum);
+                let mut room = MaybeUninit::uninit();
+                let folded = K::fold_frame(angles, &self.frame, &mut room);
+                self.sum.add(angles, folded, K::fold, K::add_power);
                 self.frame.copy_within(HOP.., 0);
                 self.filled = FRAME - HOP;
             }
@@ -141,7 +229,7 @@ impl SpectrumSum {
         }
         let frames = self.sum.frames as f32;
         let mean = (self.total as f64 / f64::from(self.samples)) as f32;
-        let mut psd = self.sum.power;
+        let mut psd = self.sum.power();
         // |X - m W|^2 summed over frames, for the two bins where W is not 0
         let [first, second, ..] = &mut psd;
         for ((power, real), w) in [first, second]
@@ -204,7 +292,7 @@ mod tests {
 
     fn spectrum(samples: &[i16]) -> Spectrum {
         let mut sum = SpectrumSum::default();
-        sum.push::<Plain>(&hann(), samples);
+        sum.push::<Plain>(&angles(), samples);
         sum.finish().unwrap()
     }
 
@@ -221,29 +309,24 @@ mod tests {
     }
 
     #[test]
-    fn the_window_is_that_of_libms_cosine() {
+    fn angles_are_those_of_libm() {
         let turn = 2.0 * core::f64::consts::PI / FRAME as f64;
-        for (n, w) in hann().into_iter().enumerate() {
-            assert_eq!(w, (0.5 - 0.5 * libm::cos(turn * n as f64)) as f32, "{n}");
+        for (n, angle) in angles().into_iter().enumerate() {
+            let (sin, cos) = (turn * n as f64).sin_cos();
+            assert_eq!(angle, [cos as f32, sin as f32], "{n}");
         }
     }
 
     #[test]
     fn window_constants_are_those_of_the_window() {
-        let w = hann();
-        let dot = |f: &dyn Fn(usize) -> f64| {
-            w.iter()
-                .enumerate()
-                .map(|(n, &w)| f64::from(w) * f(n))
-                .sum::<f64>()
-        };
-        assert!((dot(&|n| f64::from(w[n])) - f64::from(WINDOW_POWER)).abs() < 1e-4);
-        assert!((dot(&|_| 1.0) - f64::from(WINDOW_BIN_0)).abs() < 1e-4);
-        let turn = |k: f64| {
-            move |n: usize| (2.0 * core::f64::consts::PI * k * n as f64 / FRAME as f64).cos()
-        };
-        assert!((dot(&turn(1.0)) - f64::from(WINDOW_BIN_1)).abs() < 1e-4);
-        assert!(dot(&turn(2.0)).abs() < 1e-4);
+        let turn = 2.0 * core::f64::consts::PI / FRAME as f64;
+        let w: Vec<f64> = (0..FRAME).map(|n| 1.0 - (turn * n as f64).cos()).collect();
+        let dot = |f: &dyn Fn(usize) -> f64| (0..FRAME).map(|n| w[n] * f(n)).sum::<f64>();
+        assert!((dot(&|n| w[n]) - f64::from(WINDOW_POWER)).abs() < 1e-9);
+        assert!((dot(&|_| 1.0) - f64::from(WINDOW_BIN_0)).abs() < 1e-9);
+        let turn = |k: f64| move |n: usize| (turn * k * n as f64).cos();
+        assert!((dot(&turn(1.0)) - f64::from(WINDOW_BIN_1)).abs() < 1e-9);
+        assert!(dot(&turn(2.0)).abs() < 1e-9);
     }
 
     #[test]
@@ -297,7 +380,7 @@ mod tests {
     fn silence_has_no_centroid_and_less_than_a_frame_no_spectrum() {
         assert_eq!(spectrum(&[0; FRAME]).centroid_hz(), None);
         let mut sum = SpectrumSum::default();
-        sum.push::<Plain>(&hann(), &[1; FRAME - 1]);
+        sum.push::<Plain>(&angles(), &[1; FRAME - 1]);
         assert_eq!(sum.finish(), None);
         assert_eq!(sum.samples(), 511);
     }
@@ -310,7 +393,7 @@ mod tests {
             for n in cuts.iter().cycle() {
                 if rest.is_empty() { break; }
                 let (now, later) = rest.split_at((*n).min(rest.len()));
-                cut.push::<Plain>(&hann(), now);
+                cut.push::<Plain>(&angles(), now);
                 rest = later;
             }
             prop_assert_eq!(cut.finish(), Some(spectrum(&samples)));

@@ -33,7 +33,7 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 use serde::{Deserialize, Serialize};
 
 use crate::features::{Property, PropertySet};
-use crate::fused::{FeatureSet, MAX_FEATURES, Vector, Whitened, Whitening};
+use crate::fused::{FeatureSet, MAX_FEATURES, Vector, View, Whitened, Whitening};
 use crate::movement::{Movement, MovementError};
 
 mod encode;
@@ -664,6 +664,12 @@ impl<'a> Table<'a> {
 
     /// How features are whitened at a movement; `None` in a table of Gaussians and outside the table.
     pub fn whitening(&self, movement: u8) -> Option<Whitening> {
+        let (bytes, features) = self.whitening_bytes(movement)?;
+        Whitening::read(bytes, features)
+    }
+
+    /// The bytes of the whitening at a movement, and of how many features it is.
+    fn whitening_bytes(&self, movement: u8) -> Option<(&'a [u8], usize)> {
         let Contents::Fused(_, features) = self.contents else {
             return None;
         };
@@ -672,7 +678,7 @@ impl<'a> Table<'a> {
         }
         let length = Whitening::bytes(features.into());
         let at = self.layout().whitenings + usize::from(movement) * length;
-        Whitening::read(self.bytes.get(at..)?.get(..length)?, features.into())
+        Some((self.bytes.get(at..)?.get(..length)?, features.into()))
     }
 
     /// The whitened mean of a texture at a movement, in steps of 1/256 standard deviation; none in a table of Gaussians and
@@ -710,7 +716,8 @@ impl<'a> Table<'a> {
 
     /// Whitens features at a movement; `None` as [`Table::whitening`].
     pub fn whiten(&self, movement: u8, features: &[i16]) -> Option<Vector> {
-        Some(self.whitening(movement)?.apply(features))
+        let (bytes, known) = self.whitening_bytes(movement)?;
+        Some(View::new(bytes, known)?.apply(features))
     }
 
     fn label(&self, texture: u16) -> [u8; LABEL_BYTES] {

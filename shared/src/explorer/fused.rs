@@ -8,7 +8,7 @@ use heapless::{Vec, VecView};
 
 use crate::fixed::{exp_neg_q30, ln_q16};
 use crate::fused::{MAX_FEATURES, Vector, oas, white};
-use crate::kernels::{Candidate, Kernels};
+use crate::kernels::{Candidate, Kernels, mask};
 use crate::table::{Contents, MAX_MOVEMENTS, Table};
 
 /// Degrees of freedom of Student's t.
@@ -311,12 +311,13 @@ fn gather(table: &Table<'_>, movement: u8, posterior: &[f32], live: &mut VecView
         return;
     };
     let (trials, trials_stride) = table.trials_at(movement);
+    let mask = mask(features.into());
     for (&probability, texture) in posterior.iter().zip(0..) {
         if probability >= super::NEGLIGIBLE {
             let mean = means.get(texture * stride..).unwrap_or_default();
             let slides = trials.get(texture * trials_stride).copied().unwrap_or(0);
             // there is room: as much as for the posterior
-            let _ = live.push(Candidate::new(mean, features.into(), probability, slides));
+            let _ = live.push(Candidate::new(mean, &mask, probability, slides));
         }
     }
 }
@@ -326,14 +327,14 @@ fn gather(table: &Table<'_>, movement: u8, posterior: &[f32], live: &mut VecView
 fn confuse_with(a: &mut Candidate, others: &mut [Candidate]) {
     let mut confused = a.confused;
     for b in others {
-        let fewer = a.slides.min(b.slides);
         // the last factor of the exponent is 2 at most
-        let apart = match u32::try_from(b.distance) {
-            Ok(apart) if apart < 16 * FAR => apart,
-            _ if fewer == 0 => 0,
-            _ => continue,
-        };
-        let confusion = confusion(apart, fewer);
+        let far = b.distance >= u64::from(16 * FAR);
+        if far && a.slides > 0 && b.slides > 0 {
+            continue;
+        }
+        // no distance counts where one was never learned
+        let apart = if far { 0 } else { b.distance as u32 };
+        let confusion = confusion(apart, a.slides.min(b.slides));
         confused += confusion * b.probability;
         b.confused += confusion * a.probability;
     }

@@ -37,23 +37,9 @@ impl Whitening {
 
     /// Reads it from a table; `None` if these are not the bytes of one of so many features.
     pub fn read(bytes: &[u8], features: usize) -> Option<Self> {
-        if bytes.len() != Self::bytes(features) || features > MAX_FEATURES {
-            return None;
-        }
+        View::new(bytes, features)?;
         let bytes = Vec::from_slice(bytes).ok()?;
-        let whitening = Self { features, bytes };
-        let [_, places, _] = whitening.parts();
-        places.iter().all(|&p| p <= 30).then_some(whitening)
-    }
-
-    /// g, places and rows.
-    fn parts(&self) -> [&[u8]; 3] {
-        let (mean, rest) = self
-            .bytes
-            .split_at_checked(2 * self.features)
-            .unwrap_or_default();
-        let (places, rows) = rest.split_at_checked(self.features).unwrap_or_default();
-        [mean, places, rows]
+        Some(Self { features, bytes })
     }
 
     /// Its bytes.
@@ -66,8 +52,46 @@ impl Whitening {
         self.features
     }
 
-    /// Whitens the features of a slide; those that are missing count as the mean, those beyond the table's not at all.
+    /// As [`View::apply`].
     pub fn apply(&self, features: &[i16]) -> Vector {
+        let view = View {
+            features: self.features,
+            bytes: &self.bytes,
+        };
+        view.apply(features)
+    }
+}
+
+/// A [`Whitening`] where its table lies: copying it takes as long as applying it.
+#[derive(Clone, Copy)]
+pub(crate) struct View<'b> {
+    features: usize,
+    bytes: &'b [u8],
+}
+
+impl<'b> View<'b> {
+    /// `None` if these are not the bytes of one of so many features.
+    pub(crate) fn new(bytes: &'b [u8], features: usize) -> Option<Self> {
+        if bytes.len() != Whitening::bytes(features) || features > MAX_FEATURES {
+            return None;
+        }
+        let view = Self { features, bytes };
+        let [_, places, _] = view.parts();
+        places.iter().all(|&p| p <= 30).then_some(view)
+    }
+
+    /// g, places and rows.
+    fn parts(&self) -> [&'b [u8]; 3] {
+        let (mean, rest) = self
+            .bytes
+            .split_at_checked(2 * self.features)
+            .unwrap_or_default();
+        let (places, rows) = rest.split_at_checked(self.features).unwrap_or_default();
+        [mean, places, rows]
+    }
+
+    /// Whitens the features of a slide; those that are missing count as the mean, those beyond the table's not at all.
+    pub(crate) fn apply(&self, features: &[i16]) -> Vector {
         let [mean, places, rows] = self.parts();
         let word = |pair: &[u8; 2]| i32::from(i16::from_le_bytes(*pair));
         let mut apart = [0; MAX_FEATURES];

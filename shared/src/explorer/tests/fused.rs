@@ -862,12 +862,12 @@ fn a_slide_without_the_features_teaches_nothing() {
 #[test]
 fn what_lies_behind_a_mean_does_not_count() {
     use crate::fused::MAX_FEATURES;
-    use crate::kernels::Candidate;
+    use crate::kernels::{Candidate, mask};
     let mean = [3i16, -400, 5000, -32768];
     let mut bytes: Vec<u8> = mean.iter().flat_map(|m| m.to_le_bytes()).collect();
-    let last = Candidate::new(&bytes, mean.len(), 0.5, 7);
+    let last = Candidate::new(&bytes, &mask(mean.len()), 0.5, 7);
     bytes.extend([0xa5; 60]);
-    let first = Candidate::new(&bytes, mean.len(), 0.5, 7);
+    let first = Candidate::new(&bytes, &mask(mean.len()), 0.5, 7);
     let square: i64 = mean.iter().map(|&m| i64::from(m) * i64::from(m)).sum();
     for candidate in [last, first] {
         assert_eq!(candidate.mean[..4], mean);
