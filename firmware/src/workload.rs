@@ -16,9 +16,10 @@ use tactus_core::{features::Property, fir::BandPower};
 const LOOK: usize = 22;
 /// Forces in them: one each tick of the servo's.
 const SHEARS: usize = 10;
-/// Room for textures: the firmware's own, and as many as fit at all.
+/// Room for textures: the firmware's own.
 const ROOM: usize = tactus_core::wire::MAX_TEXTURES;
-const MOST_ROOM: usize = 2000;
+/// About as many as fit at all: a choice takes 64 bytes of stack for each, and posterior and distances 20.
+pub const MOST_ROOM: usize = 1500;
 
 /// What is counted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

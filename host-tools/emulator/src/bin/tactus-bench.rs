@@ -340,8 +340,18 @@ fn growth(bench: &mut Bench, plot: Option<&Path>) -> anyhow::Result<bool> {
         "choice among up to 50 live, thousands",
     ]
     .map(|name| (name, Vec::new()));
-    for textures in [20, 117, 500, 2000] {
+    for textures in [20, 117, 500, workload::MOST_ROOM, 2000] {
         let table = synthetic(Method::Fused, textures)?;
+        curves[0]
+            .1
+            .push((textures as f64, table.len() as f64 / 1024.0));
+        if textures > workload::MOST_ROOM {
+            println!(
+                "{textures:>8} {:>12}   more than the chip's RAM has room for",
+                table.len()
+            );
+            continue;
+        }
         let felt = felt(&table, Method::Fused, textures.min(50))?;
         let posterior = bench.count(Workload::Observe, &table, &felt.words)?;
         let choice = bench.count(Workload::Choice, &table, &felt.words)?;
@@ -353,12 +363,8 @@ fn growth(bench: &mut Bench, plot: Option<&Path>) -> anyhow::Result<bool> {
             felt.live,
             choice.instructions
         );
-        let counts = [
-            table.len() as f64 / 1024.0,
-            posterior.instructions as f64 * 1e-3,
-            choice.instructions as f64 * 1e-3,
-        ];
-        for ((_, points), y) in curves.iter_mut().zip(counts) {
+        let counts = [posterior, choice].map(|counted| counted.instructions as f64 * 1e-3);
+        for ((_, points), y) in curves.iter_mut().skip(1).zip(counts) {
             points.push((textures as f64, y));
         }
     }
