@@ -1,6 +1,7 @@
 //! `evaluate` beside the reference program of the protocols (numpy, seed 1).
 
 use std::path::Path;
+use std::process::Command;
 
 use tactus::evaluate::{Method, Summary, evaluate};
 use tactus::experiment::{Experiment, Protocol};
@@ -11,7 +12,7 @@ use tactus::properties::PropertyTable;
 use tactus::recordings::RecordingSet;
 use tactus::replay::feel;
 use tactus_core::explorer::Config;
-use tactus_tests::data;
+use tactus_tests::{data, skipped};
 
 const RUNS: u64 = 8000;
 
@@ -130,6 +131,51 @@ fn property_worlds_give_the_reference_figures() {
             );
             assert_eq!(s.median_slides, median, "world {world}, {method:?}");
         }
+    }
+}
+
+/// The same exploration written for numpy, without a fixed point or the core's kernels.
+#[test]
+fn numpy_finds_the_same_in_the_worlds() {
+    let Some(folder) = data("worlds") else { return };
+    let oracle = concat!(env!("CARGO_MANIFEST_DIR"), "/oracle/evaluate.py");
+    let has = Command::new("python3")
+        .args(["-c", "import numpy"])
+        .output();
+    if !has.is_ok_and(|has| has.status.success()) {
+        return skipped("no python3 with numpy (apt-get install python3-numpy)");
+    }
+    for world in 1..=3 {
+        let file = folder.join(format!("world_{world}.csv"));
+        let python = Command::new("python3")
+            .arg(oracle)
+            .arg(&file)
+            .arg(RUNS.to_string())
+            .output()
+            .unwrap();
+        assert!(python.status.success(), "{python:?}");
+        let told = String::from_utf8(python.stdout).unwrap();
+        let told: Vec<&str> = told.split_whitespace().collect();
+        let of = |what| {
+            let at = told.iter().position(|word| *word == what).unwrap();
+            told[at + 1].parse::<f64>().unwrap()
+        };
+        let set = PropertyTable::read(&file).unwrap();
+        let s = summary(
+            &Experiment::given(&set, None, 1).unwrap(),
+            Method::Paper,
+            RUNS,
+        );
+        println!("world {world}: {:.4}, {told:?}", s.accuracy);
+        // four standard errors of the difference of two such shares
+        for (is, numpys) in [(s.accuracy, of("accuracy")), (s.converged, of("sure"))] {
+            let error = 4.0 * (2.0 * numpys * (1.0 - numpys) / RUNS as f64).sqrt();
+            assert!(
+                (is - numpys).abs() <= error,
+                "world {world}: {is} for {numpys}"
+            );
+        }
+        assert_eq!(s.median_slides, of("median"));
     }
 }
 

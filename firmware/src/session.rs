@@ -1,4 +1,5 @@
 //! What the host asks for, one thing after the other: explorations, training, calibration, tables. Owns the store.
+use core::pin::pin;
 use core::sync::atomic::Ordering::Relaxed;
 
 use embassy_time::{Duration, Timer, with_timeout};
@@ -140,7 +141,13 @@ async fn work(ask: Ask, probe: &mut Probe, memory: &mut Memory, plan: &Plan) -> 
             memory.visited = None;
             probe.begin(wanted.seed).await;
             let table = Table::read(memory.in_force()).map_err(text)?;
-            let done = session::identify::<_, Chip>(&wanted, probe, table, plan, tell).await;
+            // awaited where it lies: moving it would take its size of the stack, twice
+            let done = {
+                let exploration = pin!(session::identify::<_, Chip>(
+                    &wanted, probe, table, plan, tell
+                ));
+                exploration.await
+            };
             memory.keep_skin().await;
             let visited = done?;
             if wanted.learn {

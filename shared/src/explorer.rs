@@ -284,16 +284,56 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         config: Config,
         candidates: impl IntoIterator<Item = u16>,
     ) -> Result<Self, ExplorerError> {
+        let mut explorer = Self::empty(table);
+        explorer.consider(measured, config, candidates)?;
+        Ok(explorer)
+    }
+
+    /// One without candidates, for [`Explorer::consider`].
+    pub(crate) fn empty(table: Table<'t>) -> Self {
+        Self {
+            table,
+            config: Config::default(),
+            measured: PropertySet::default(),
+            log: Vec::new(),
+            posterior: Vec::new(),
+            candidates: 0,
+            actions: Vec::new(),
+            made: Vec::new(),
+            at_first: Vec::new(),
+            slides: 0,
+            visits: Vec::new(),
+            log_odds: None,
+            shrunk: Vec::new(),
+            backgrounds: Vec::new(),
+            kernels: PhantomData,
+        }
+    }
+
+    /// Makes an empty one what [`Explorer::among`] gives, where it lies: it is too large for a chip's stack to hold twice.
+    ///
+    /// # Errors
+    /// See [`ExplorerError`]; it is of no use then.
+    // with a method that is known while compiling, what the others take is left out
+    #[inline(always)]
+    pub(crate) fn consider(
+        &mut self,
+        measured: PropertySet,
+        config: Config,
+        candidates: impl IntoIterator<Item = u16>,
+    ) -> Result<(), ExplorerError> {
+        self.config = config;
+        let table = self.table;
         let textures = table.textures();
-        let mut log = Vec::new();
+        let log = &mut self.log;
         log.resize(textures.into(), f32::NEG_INFINITY)
             .map_err(|_| ExplorerError::Room { textures, room: N })?;
         for texture in candidates {
             *log.get_mut(usize::from(texture))
                 .ok_or(ExplorerError::Candidates)? = 0.0;
         }
-        let candidates = log.iter().filter(|&&l| l == 0.0).count() as u16;
-        if candidates == 0 {
+        self.candidates = log.iter().filter(|&&l| l == 0.0).count() as u16;
+        if self.candidates == 0 {
             return Err(ExplorerError::Candidates);
         }
         let method = config.method;
@@ -306,6 +346,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             return Err(ExplorerError::Features(set));
         }
         let measured = measured.and(table.measured());
+        self.measured = measured;
         let learned_by = |movement, most: fn(u8) -> bool| {
             let mut candidates = log.iter().zip(0..).filter(|(l, _)| **l == 0.0);
             candidates.all(|(_, texture)| most(table.trials(texture, movement)))
@@ -315,7 +356,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             movement,
             property: None,
         };
-        let actions: Vec<Action, MAX_ACTIONS> = match method {
+        self.actions = match method {
             Method::Paper | Method::Student => table
                 .actions()
                 .filter(|a| a.property.is_some_and(|p| measured.contains(p)))
@@ -331,41 +372,25 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 .map(all_of)
                 .collect(),
         };
-        if actions.is_empty() {
+        if self.actions.is_empty() {
             return Err(ExplorerError::NothingToMeasure);
         }
-        let mut shrunk = Vec::new();
         if let Method::Student | Method::StudentAll = method {
             for movement in 0..table.movements().len() as u8 {
                 let of = Property::ALL.map(|property| Shrunk::new(&table, movement, property));
-                shrunk.extend(of);
+                self.shrunk.extend(of);
             }
         }
-        let mut backgrounds = Vec::new();
         if method == Method::Fused {
-            backgrounds.extend(actions.iter().map(|a| Background::new(&table, a.movement)));
+            let backgrounds = self.actions.iter();
+            let backgrounds = backgrounds.map(|a| Background::new(&table, a.movement));
+            self.backgrounds.extend(backgrounds);
         }
-        let mut explorer = Self {
-            table,
-            config,
-            measured,
-            posterior: log.clone(),
-            log,
-            candidates,
-            made: Vec::new(),
-            at_first: Vec::new(),
-            actions,
-            slides: 0,
-            visits: Vec::new(),
-            log_odds: None,
-            shrunk,
-            backgrounds,
-            kernels: PhantomData,
-        };
-        explorer.restart();
-        let actions = explorer.actions.iter();
-        explorer.at_first = actions.map(|a| explorer.uncertainty(*a)).collect();
-        Ok(explorer)
+        self.posterior = log.clone();
+        self.restart();
+        let actions = self.actions.iter();
+        self.at_first = actions.map(|a| self.uncertainty(method, *a)).collect();
+        Ok(())
     }
 
     /// Forgets all slides: the next exploration begins, with the same candidates equally probable.
@@ -693,7 +718,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         for ((&action, &made), &at_first) in actions {
             let uncertainty = match self.slides {
                 0 => at_first,
-                _ => self.uncertainty(action),
+                _ => self.uncertainty(self.config.method, action),
             };
             // there is room: as many as there are actions
             let _ = promises.push(Outlook {
@@ -728,9 +753,9 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     /// Expected uncertainty after `action` (eq. 11).
     ///
     /// Computed as eq. 10: 1 minus a sum that is close to 1 would lose the digits that decide late in an exploration.
-    fn uncertainty(&self, action: Action) -> f32 {
+    fn uncertainty(&self, method: Method, action: Action) -> f32 {
         let movement = action.movement;
-        if self.config.method == Method::Fused {
+        if method == Method::Fused {
             return fused::uncertainty::<K, N>(&self.table, movement, &self.posterior);
         }
         let looked_at: PropertySet = match action.property {
@@ -738,7 +763,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             None => self.measured,
         };
         let mut live: Vec<Live, N> = Vec::new();
-        if self.config.method == Method::Paper {
+        if method == Method::Paper {
             gather(&self.table, action, &self.posterior, &mut live);
         } else {
             let expect = |texture, property| self.expected(texture, movement, property);

@@ -99,7 +99,9 @@ pub fn judge<K: Kernels>(
         open: true,
         ..Config::default()
     };
-    let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::new(table, PropertySet::default(), config)
+    let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
+    explorer
+        .consider(PropertySet::default(), config, 0..table.textures())
         .map_err(JudgeError::Table)?;
     let action = Action {
         movement: movement(&table).ok_or(JudgeError::Movement)?,

@@ -99,13 +99,16 @@ where
         max_slides: wanted.max_slides,
         open: wanted.open,
     };
-    let mut explorer = if wanted.among.is_empty() {
-        Explorer::<'_, MAX_TEXTURES, K>::new(table, rig.measures(), config)
+    let all = if wanted.among.is_empty() {
+        0..table.textures()
     } else {
-        let candidates = wanted.among.iter().copied();
-        Explorer::among(table, rig.measures(), config, candidates)
-    }
-    .map_err(text)?;
+        0..0
+    };
+    let candidates = wanted.among.iter().copied().chain(all);
+    let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
+    explorer
+        .consider(rig.measures(), config, candidates)
+        .map_err(text)?;
     let mut random = Random::new(wanted.seed);
     let mut slide: u8 = 1;
     let verdict = explore(

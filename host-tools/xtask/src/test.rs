@@ -95,7 +95,7 @@ pub(crate) fn run(quick: bool) -> ExitCode {
             bench::gates()
         }));
         steps.push(step("size", || {
-            println!("\n== cargo xtask size --no-stack");
+            println!("\n== cargo xtask size");
             size::gates()
         }));
     }
