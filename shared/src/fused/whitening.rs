@@ -52,7 +52,7 @@ impl Whitening {
         self.features
     }
 
-    /// As [`View::apply`].
+    /// Whitens the features of a slide; those that are missing count as the mean, those beyond the table's not at all.
     pub fn apply(&self, features: &[i16]) -> Vector {
         let view = View {
             features: self.features,
@@ -90,7 +90,7 @@ impl<'b> View<'b> {
         [mean, places, rows]
     }
 
-    /// Whitens the features of a slide; those that are missing count as the mean, those beyond the table's not at all.
+    /// As [`Whitening::apply`].
     pub(crate) fn apply(&self, features: &[i16]) -> Vector {
         let [mean, places, rows] = self.parts();
         let word = |pair: &[u8; 2]| i32::from(i16::from_le_bytes(*pair));
