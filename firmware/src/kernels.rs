@@ -5,10 +5,11 @@ use core::arch::{asm, global_asm};
 use core::mem::{MaybeUninit, offset_of};
 
 use tactus_core::fir::{TAPS, Taps};
+use tactus_core::fixed::{EXP2 as EXP2_PARTS, LN, LN_2, LOG2_E, PARTS};
 use tactus_core::fused::MAX_FEATURES;
-use tactus_core::kernels::{Candidate, EXP2, FAR, Kernels, Live, Plain, ROUND};
+use tactus_core::kernels::{Candidate, EXP2, FAR, Kernels, Live, NEVER, Plain, ROUND, Spread};
 use tactus_core::spectrum::{Angles, Complex32, FRAME, Folded};
-use tactus_core::table::Gaussian;
+use tactus_core::table::{Column, Gaussian, Gaussians};
 
 /// Outputs of the band-pass that are computed at once.
 const AT_ONCE: usize = 6;
@@ -17,6 +18,8 @@ const AT_ONCE: usize = 6;
 // and r7 those between them; r8 to r10 are pairs of samples, r11 and r12 pairs of coefficients. Six of the 34 steps make the
 // loop: it has to fit into the flash accelerator's 1 KB, and an inline assembly block leaves too few registers.
 global_asm!(
+    // the assembler is not told of the FPU otherwise
+    ".fpu fpv4-sp-d16",
     ".macro tactus_fir_step a, b, c",
     "ldrd r11, r12, [r0], #8",
     "smlad r2, \\a, r11, r2",
@@ -92,63 +95,222 @@ global_asm!(
     "pop {{r0, r1, r2, r3}}",
     "pop {{r4-r11, pc}}",
     ".size tactus_band_energy, . - tactus_band_energy",
-    ".section .text.tactus_distances,\"ax\",%progbits",
-    ".global tactus_distances",
-    ".type tactus_distances,%function",
-    ".thumb_func",
-    // r0: the one mean; r1: the first of the others; r2: distances; r3: how many, not 0; on the stack the stride, the number
-    // of features, 14 at most, and the sum of squares of the one mean, 64 bits. |a - b|^2 = a.a + b.b - 2 a.b, two products an
-    // instruction.
-    "tactus_distances:",
-    "push {{r4-r11, lr}}",
-    "ldr r4, [sp, #36]",
-    "ldr r6, [sp, #40]",
-    "ldrd r8, r9, [sp, #44]",
-    "push {{r8, r9}}",
-    // bit 0 of the count: an odd number of features
-    "and r7, r6, #1",
-    "orr r3, r7, r3, lsl #1",
-    // where the pairs of so many features begin, 16 bytes each
-    "lsr r6, r6, #1",
-    "rsb r6, r6, #7",
-    "adr r5, 3f",
-    "add r5, r5, r6, lsl #4",
-    "orr r5, r5, #1",
+    // One texture: r4 to r10 are the mean that the others are compared with, two numbers each, r1 where the next texture's begins,
+    // r2 the next logarithm, r3 its number of slides.
+    ".macro tactus_likelihood last",
     "2:",
-    "ldrd r8, r9, [sp]",
-    "mov r10, #0",
-    "mov r11, #0",
-    "mov r6, r0",
-    "mov r7, r1",
-    "add r1, r1, r4",
-    "tst r3, #1",
-    "it eq",
-    "bxeq r5",
-    // the odd one first; the upper halves are 0
-    "ldrh r12, [r7], #2",
-    "ldrh lr, [r6], #2",
-    "smlald r8, r9, r12, r12",
-    "smlald r10, r11, r12, lr",
-    "bx r5",
-    ".balign 4",
+    "ldrb r0, [r3]",
+    "ldrd r11, r12, [sp, #36]",
+    "cmp r0, r11",
+    "bne 3f",
+    "add r3, r3, r12",
+    // the squared distance to r11 and r12
+    "mov r12, #0",
+    "ldr r0, [r1]",
+    "qsub16 r0, r4, r0",
+    "smuad r11, r0, r0",
+    "tactus_square r5, 4",
+    "tactus_square r6, 8",
+    "tactus_square r7, 12",
+    "tactus_square r8, 16",
+    "tactus_square r9, 20",
+    "\\last r0, [r1, #24]",
+    "qsub16 r0, r10, r0",
+    "smlald r11, r12, r0, r0",
+    "ldr lr, [sp, #44]",
+    "add r1, r1, lr",
+    // the odds to r0, if they are below 2^30
+    "ldr lr, [sp, #48]",
+    "umull r0, lr, r11, lr",
+    "orr r12, lr, r12, lsl #30",
+    "cmp r12, #0x3f000000",
+    "bhs 3f",
+    "add r0, lr, #65536",
+    // their logarithm: octaves in r11, the mantissa in r12
+    "clz r11, r0",
+    "lsl r12, r0, r11",
+    "rsb r11, r11, #15",
+    "lsr r0, r12, #26",
+    "ldr lr, [sp, #52]",
+    "add r0, lr, r0, lsl #3",
+    "ldrd r0, lr, [r0]",
+    "lsl r12, r12, #6",
+    "umull r12, lr, r12, lr",
+    "add r0, r0, lr",
+    "mov lr, #32768",
+    "ldr r12, [sp, #56]",
+    "umaal r0, lr, r11, r12",
+    "lsr r0, r0, #16",
+    "orr r0, r0, lr, lsl #16",
+    // half of twice the norm and 1 less the weighted logarithm: the norm less its half, rounded down
+    "ldrd r11, r12, [sp, #60]",
+    "mls r0, r0, r11, r12",
+    "ldr lr, [r2]",
+    "add lr, lr, r0, asr #1",
+    "str lr, [r2], #4",
+    "ldr r0, [sp, #68]",
+    "cmp r2, r0",
+    "bne 2b",
     "3:",
-    ".rept 7",
-    "ldr.w r12, [r7], #4",
-    "ldr.w lr, [r6], #4",
-    "smlald r8, r9, r12, r12",
-    "smlald r10, r11, r12, lr",
-    ".endr",
-    "subs r8, r8, r10",
-    "sbc r9, r9, r11",
-    "subs r8, r8, r10",
-    "sbc r9, r9, r11",
-    "strd r8, r9, [r2], #8",
-    "sub r3, r3, #2",
-    "cmp r3, #1",
-    "bhi 2b",
-    "pop {{r8, r9}}",
+    "mov r0, r2",
     "pop {{r4-r11, pc}}",
-    ".size tactus_distances, . - tactus_distances",
+    ".endm",
+    ".macro tactus_square a, at",
+    "ldr r0, [r1, #\\at]",
+    "qsub16 r0, \\a, r0",
+    "smlald r11, r12, r0, r0",
+    ".endm",
+    ".section .text.tactus_likelihoods,\"ax\",%progbits",
+    ".global tactus_likelihoods",
+    ".type tactus_likelihoods,%function",
+    ".thumb_func",
+    // r0: the mean; r1: the first texture's; r2: logarithms; r3: numbers of slides. On the stack: the one number of slides that
+    // is wanted (36), how far one is from the next (40), and means are (44); narrowness in Q32 (48); [`LN`], as if it
+    // began 32 parts before (52); ln 2 in Q32 (56); weight (60), twice the norm and 1 (64), where the logarithms end (68).
+    "tactus_likelihoods:",
+    "push {{r4-r11, lr}}",
+    "ldm r0, {{r4-r10}}",
+    // the upper half of the last: whether there is a fourteenth number
+    "ldr r0, [sp, #72]",
+    "cmp r0, #0",
+    "beq 1f",
+    "tactus_likelihood ldr",
+    "1:",
+    "tactus_likelihood ldrh",
+    ".size tactus_likelihoods, . - tactus_likelihoods",
+    ".section .text.tactus_gaussians,\"ax\",%progbits",
+    ".global tactus_gaussians",
+    ".type tactus_gaussians,%function",
+    ".thumb_func",
+    // s0: the property, in steps of the means; s1: what its distance is multiplied with; r0: cells, r3 from one to the next; r1:
+    // logarithms, r2 where they end; on the stack [`LN`], as if it began 32 parts before, and ln 2 in Q32.
+    "tactus_gaussians:",
+    "push {{r4-r11, lr}}",
+    "ldrd r4, r5, [sp, #36]",
+    "2:",
+    "ldr r6, [r0]",
+    "add r0, r0, r3",
+    "lsrs r7, r6, #16",
+    "beq 3f",
+    "vmov s2, s3, r6, r7",
+    "vcvt.f32.s16 s2, s2, #0",
+    "vcvt.f32.u16 s3, s3, #0",
+    "vsub.f32 s2, s0, s2",
+    "vdiv.f32 s2, s2, s3",
+    // while that goes on: the logarithm of the standard deviation, as of the odds above
+    "clz r8, r6",
+    "bfc r6, #0, #16",
+    "lsl r6, r6, r8",
+    "rsb r8, r8, #15",
+    "lsr r10, r6, #26",
+    "add r10, r4, r10, lsl #3",
+    "ldrd r10, r11, [r10]",
+    "lsl r6, r6, #6",
+    "umull r6, r11, r6, r11",
+    "add r10, r10, r11",
+    "mov r11, #32768",
+    "umaal r10, r11, r8, r5",
+    "lsr r10, r10, #16",
+    "orr r10, r10, r11, lsl #16",
+    "ldr r6, [r1]",
+    "sub r6, r6, r10",
+    "vmul.f32 s2, s2, s1",
+    "vmul.f32 s2, s2, s2",
+    "vcvt.s32.f32 s2, s2",
+    "vmov r9, s2",
+    "usat r9, #26, r9",
+    "sub r6, r6, r9",
+    "str r6, [r1], #4",
+    "cmp r1, r2",
+    "bne 2b",
+    "pop {{r4-r11, pc}}",
+    "3:",
+    "add r1, r1, #4",
+    "cmp r1, r2",
+    "bne 2b",
+    "pop {{r4-r11, pc}}",
+    ".size tactus_gaussians, . - tactus_gaussians",
+    ".section .text.tactus_top,\"ax\",%progbits",
+    ".global tactus_top",
+    ".type tactus_top,%function",
+    ".thumb_func",
+    // r0: numbers, a multiple of 4; r1: where they end, behind the first; r2: the least that it is
+    "tactus_top:",
+    "push {{r4-r6, lr}}",
+    "2:",
+    "ldm r0!, {{r3-r6}}",
+    ".irp next, r3, r4, r5, r6",
+    "cmp \\next, r2",
+    "it gt",
+    "movgt r2, \\next",
+    ".endr",
+    "cmp r0, r1",
+    "bne 2b",
+    "mov r0, r2",
+    "pop {{r4-r6, pc}}",
+    ".size tactus_top, . - tactus_top",
+    ".section .text.tactus_weigh,\"ax\",%progbits",
+    ".global tactus_weigh",
+    ".type tactus_weigh,%function",
+    ".thumb_func",
+    // r0: logarithms, r3 the greatest; r1: probabilities, r2 where they end, behind the first; on the stack [`EXP2`] and 1 / ln 2
+    // in Q31. The sum in r0 and r1.
+    "tactus_weigh:",
+    "push {{r4-r11, lr}}",
+    "ldrd r4, r5, [sp, #36]",
+    "mov r6, #0",
+    "mov r7, #0",
+    "vmov s1, r6",
+    "2:",
+    "ldr r8, [r0], #4",
+    "sub r8, r3, r8",
+    "cmp r8, #{never}",
+    "bhs 3f",
+    // octaves in Q21: whole ones, 5 bits of a part, 16 between
+    "lsl r8, r8, #6",
+    "umull r9, r8, r8, r5",
+    "ubfx r9, r8, #16, #5",
+    "add r9, r4, r9, lsl #3",
+    "ldrd r9, r10, [r9]",
+    "lsl r11, r8, #16",
+    "umull r12, r11, r11, r10",
+    "sub r9, r9, r11",
+    "lsr r8, r8, #21",
+    "lsr r9, r9, r8",
+    "adds r6, r6, r9",
+    "adc r7, r7, #0",
+    "vmov s0, r9",
+    "vcvt.f32.u32 s0, s0",
+    "vstmia r1!, {{s0}}",
+    "cmp r1, r2",
+    "bne 2b",
+    "4:",
+    "mov r0, r6",
+    "mov r1, r7",
+    "pop {{r4-r11, pc}}",
+    "3:",
+    "vstmia r1!, {{s1}}",
+    "cmp r1, r2",
+    "bne 2b",
+    "b 4b",
+    ".size tactus_weigh, . - tactus_weigh",
+    ".section .text.tactus_divide,\"ax\",%progbits",
+    ".global tactus_divide",
+    ".type tactus_divide,%function",
+    ".thumb_func",
+    // r0: numbers, a multiple of 8; r1: where they end, behind the first; s0: what they are divided by
+    "tactus_divide:",
+    "vmov.f32 s8, s0",
+    "2:",
+    "vldmia r0, {{s0-s7}}",
+    ".irp next, s0, s1, s2, s3, s4, s5, s6, s7",
+    "vdiv.f32 \\next, \\next, s8",
+    ".endr",
+    "vstmia r0!, {{s0-s7}}",
+    "cmp r0, r1",
+    "bne 2b",
+    "bx lr",
+    ".size tactus_divide, . - tactus_divide",
     ".section .text.tactus_candidates,\"ax\",%progbits",
     ".global tactus_candidates",
     ".type tactus_candidates,%function",
@@ -196,30 +358,62 @@ global_asm!(
     ".thumb_func",
     // as `extern "C"` has it on a target with floating-point registers: s0 to s0
     "tactus_sqrt:",
-    // vsqrt.f32 s0, s0: the assembler is not told of the FPU here
-    ".inst.w 0xeeb10ac0",
+    "vsqrt.f32 s0, s0",
     "bx lr",
     ".size tactus_sqrt, . - tactus_sqrt",
     ".text",
     square = const offset_of!(Candidate, square),
     distance = const offset_of!(Candidate, distance),
     size = const size_of::<Candidate>(),
+    never = const NEVER,
 );
 
 unsafe extern "C" {
     /// `samples` has [`TAPS`] - 1 and 6 `sixes` samples, of which none is outside -4096..=4095.
     fn tactus_band_energy(pairs: *const [u32; 2], samples: *const i16, sixes: usize) -> u64;
-    /// `from` has `features` numbers, 14 at most, and so has what begins at `means` and, `many` times in all, each `stride`
-    /// bytes after it. `square` is the sum of squares of `from`. There are `many` distances, and that is not 0.
-    fn tactus_distances(
-        from: *const i16,
+    /// There are as many `means`, with 13 numbers each, 14 if `even`, and numbers of slides, so many bytes after each other, as
+    /// logarithms up to `end`, one at least. `from` has zeros where it has no number; `ln` is 256 bytes before [`LN`].
+    fn tactus_likelihoods(
+        from: &[u32; 7],
         means: *const u8,
-        distances: *mut u64,
-        many: usize,
+        logs: *mut i32,
+        slides: *const u8,
+        wanted: u32,
+        slides_stride: usize,
         stride: usize,
-        features: usize,
-        square: u64,
+        narrowness: u32,
+        ln: *const u32,
+        ln_2: u32,
+        weight: i32,
+        norm: i32,
+        end: *const i32,
+        even: bool,
+    ) -> *mut i32;
+    /// There are as many `cells`, 4 bytes, `stride` after each other, as logarithms up to `end`, one at least; `ln` is 256 bytes
+    /// before [`LN`].
+    fn tactus_gaussians(
+        cells: *const u8,
+        logs: *mut i32,
+        end: *const i32,
+        stride: usize,
+        ln: *const u32,
+        ln_2: u32,
+        x: f32,
+        scale: f32,
     );
+    /// There are 4, 8, 12... numbers up to `end`.
+    fn tactus_top(numbers: *const i32, end: *const i32, least: i32) -> i32;
+    /// There are as many logarithms as probabilities up to `end`, one at least.
+    fn tactus_weigh(
+        logs: *const i32,
+        posterior: *mut f32,
+        end: *const f32,
+        top: i32,
+        exp2: *const [u32; 2],
+        log2_e: u32,
+    ) -> u64;
+    /// There are 8, 16, 24... numbers up to `end`.
+    fn tactus_divide(numbers: *mut f32, end: *const f32, by: f32);
     /// `from` has 14 numbers and begins at a whole word, `square` is the sum of their squares; there is at least one of
     /// `others`, and `behind` is where the last of them ends.
     fn tactus_candidates(
@@ -503,6 +697,19 @@ unsafe fn confuse(a: &mut Live, others: *mut Live, behind: *const Live) {
     }
 }
 
+/// How many parts of a column there are, each so many bytes and so far from the next.
+fn there(column: &[u8], stride: usize, bytes: usize) -> usize {
+    match column.len().checked_sub(bytes) {
+        Some(rest) if stride >= bytes => rest.checked_div(stride).map_or(0, |others| others + 1),
+        _ => 0,
+    }
+}
+
+/// [`LN`] as if it began 32 parts before: the first bit of a mantissa is the one.
+fn before_ln() -> *const u32 {
+    LN.as_ptr().cast::<u32>().wrapping_sub(2 * PARTS)
+}
+
 /// Cortex-M4F.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Chip;
@@ -545,30 +752,108 @@ impl Kernels for Chip {
         unsafe { add_power(bins.as_ptr(), sums.as_mut_ptr(), many) };
     }
 
-    fn distances(from: &[i16], means: &[u8], stride: usize, distances: &mut [u64]) {
-        let bytes = 2 * from.len();
-        let there = match means.len().checked_sub(bytes) {
-            Some(rest) if stride >= bytes && stride > 0 => rest / stride + 1,
-            _ => 0,
-        };
-        let many = there.min(distances.len());
-        if many == 0 || from.len() > MAX_FEATURES {
-            return Plain::distances(from, means, stride, distances);
+    fn add_likelihoods(
+        from: &[i16],
+        column: &Column<'_>,
+        spread: &Spread,
+        logs: &mut [i32],
+    ) -> usize {
+        let (means, stride) = column.bytes();
+        let (slides, slides_stride) = column.slides_bytes();
+        let many = logs
+            .len()
+            .min(there(means, stride, 2 * from.len()))
+            .min(there(slides, slides_stride, 1));
+        let even = from.len() == MAX_FEATURES;
+        if many == 0 || !even && from.len() != MAX_FEATURES - 1 || spread.narrowness >= 1 << 16 {
+            return Plain::add_likelihoods(from, column, spread, logs);
         }
-        let squares = from.iter().map(|&a| i64::from(a) * i64::from(a));
-        let square = squares.sum::<i64>() as u64;
-        // SAFETY: `many` means were found to be there, and as many distances; words need not be aligned, but distances are.
+        let mut pairs = [0; MAX_FEATURES / 2];
+        for (pair, numbers) in pairs.iter_mut().zip(from.chunks(2)) {
+            let halves = numbers.iter().rev();
+            *pair = halves.fold(0, |pair, half| pair << 16 | u32::from(*half as u16));
+        }
+        let logs = logs.as_mut_ptr();
+        // SAFETY: `many` means and numbers of slides were found to be there, and as many logarithms; they need not be aligned.
         unsafe {
-            tactus_distances(
-                from.as_ptr(),
+            let done = tactus_likelihoods(
+                &pairs,
                 means.as_ptr(),
-                distances.as_mut_ptr(),
-                many,
+                logs,
+                slides.as_ptr(),
+                spread.slides.into(),
+                slides_stride,
                 stride,
-                from.len(),
-                square,
+                spread.narrowness << 16,
+                before_ln(),
+                LN_2,
+                spread.weight,
+                2 * spread.norm + 1,
+                logs.add(many),
+                even,
             );
+            done.offset_from_unsigned(logs)
         }
+    }
+
+    fn add_gaussians(x: f32, known: &Gaussians<'_>, logs: &mut [i32]) {
+        let (cells, stride) = known.bytes();
+        let many = logs.len().min(there(cells, stride, 4));
+        if many > 0 {
+            let logs = logs.as_mut_ptr();
+            // SAFETY: `many` cells were found to be there, and as many logarithms; words need not be aligned.
+            unsafe {
+                let (cells, end) = (cells.as_ptr(), logs.add(many));
+                tactus_gaussians(
+                    cells,
+                    logs,
+                    end,
+                    stride,
+                    before_ln(),
+                    LN_2,
+                    x,
+                    known.scale(),
+                );
+            }
+        }
+    }
+
+    fn posterior(logs: &[i32], posterior: &mut [f32]) -> (i32, u64) {
+        let many = logs.len().min(posterior.len());
+        if many == 0 {
+            return (0, 0);
+        }
+        let (fours, rest) = logs.as_chunks::<4>();
+        let mut top = rest.iter().copied().max().unwrap_or(i32::MIN);
+        let fours = fours.as_flattened().as_ptr_range();
+        if !fours.is_empty() {
+            // SAFETY: they are whole fours.
+            top = unsafe { tactus_top(fours.start, fours.end, top) };
+        }
+        let begin = posterior.as_mut_ptr();
+        // SAFETY: there are `many` of both.
+        let sum = unsafe {
+            let end = begin.add(many);
+            tactus_weigh(
+                logs.as_ptr(),
+                begin,
+                end,
+                top,
+                EXP2_PARTS.as_ptr(),
+                2 * LOG2_E,
+            )
+        };
+        let total = sum as f32;
+        let (eights, rest) = posterior.as_chunks_mut::<8>();
+        let eights = eights.as_flattened_mut().as_mut_ptr_range();
+        if !eights.is_empty() {
+            // SAFETY: they are whole eights.
+            unsafe { tactus_divide(eights.start, eights.end, total) };
+        }
+        for p in rest {
+            *p /= total;
+        }
+        (top, sum)
     }
 
     fn candidate_distances(from: &Candidate, others: &mut [Candidate]) {

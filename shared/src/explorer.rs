@@ -1,8 +1,8 @@
 //! Bayesian exploration: the posterior of every texture (eq. 1-4), and the next movement, which is the one that should
 //! leave the least confusion among the textures that are still likely (eq. 7, 11-13).
 //!
-//! Probabilities are kept as logarithms and in f32. Host and chip use the same operations in the same order, so they
-//! agree to the bit.
+//! Probabilities are kept as logarithms in fixed point, and in f32. Host and chip use the same operations in the same order, so
+//! they agree to the bit.
 
 use core::fmt;
 use core::marker::PhantomData;
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::features::{Property, PropertySet};
 use crate::fused::{FeatureSet, Observation, Vector};
-use crate::kernels::{Kernels, Live, Plain, confused, exp_neg};
+use crate::kernels::{Kernels, Live, Plain, confused};
 use crate::table::{Action, Contents, Gaussian, MAX_ACTIONS, MAX_MOVEMENTS, Table, mean_step};
 
 mod fused;
@@ -24,6 +24,18 @@ use student::{Shrunk, Student};
 /// Textures less probable than this are left out of the expected uncertainty: each changes it by at most about twice its
 /// probability, all of 117 by about 2e-4.
 const NEGLIGIBLE: f32 = 1e-6;
+
+/// Logarithm of the posterior, Q16, of a texture that is no candidate. The slides of an exploration make it neither a candidate's
+/// nor overflow: at most 1024 are taken from it by each, and it is set again after four.
+const OUT: i32 = -(5 << 28);
+/// Logarithms of candidates are never below, those of others always.
+const LEAST: i32 = -(1 << 30);
+/// What is left of a candidate's when the greatest is 0: however improbable, it stays one.
+const FLOOR: i32 = -(1 << 28);
+/// Most that the likelihood of a slide takes from a logarithm.
+const MOST: i32 = 1 << 26;
+/// Slides after which the greatest logarithm is made 0 again. Four times [`MOST`] below [`FLOOR`] is not [`LEAST`] yet.
+const SLIDES: u8 = 4;
 
 /// Log-odds for "none of these" over which a texture counts as unknown, after one slide and after more (the recipe has 2 and
 /// 0). In simulated worlds 21 to 24 a limit of 0 takes one in fifteen known textures for a new one; 1.5 rather than 1 or 2 was
@@ -239,9 +251,8 @@ pub struct Explorer<'t, const N: usize, K = Plain> {
     table: Table<'t>,
     config: Config,
     measured: PropertySet,
-    /// Logarithm of the posterior, up to a constant, for the methods that add it up; minus infinity for textures that are no
-    /// candidates.
-    log: Vec<f32, N>,
+    /// Logarithm of the posterior, Q16, up to a constant; below [`LEAST`] for textures that are no candidates.
+    log: Vec<i32, N>,
     posterior: Vec<f32, N>,
     candidates: u16,
     actions: Vec<Action, MAX_ACTIONS>,
@@ -326,13 +337,13 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         let table = self.table;
         let textures = table.textures();
         let log = &mut self.log;
-        log.resize(textures.into(), f32::NEG_INFINITY)
+        log.resize(textures.into(), OUT)
             .map_err(|_| ExplorerError::Room { textures, room: N })?;
         for texture in candidates {
             *log.get_mut(usize::from(texture))
-                .ok_or(ExplorerError::Candidates)? = 0.0;
+                .ok_or(ExplorerError::Candidates)? = 0;
         }
-        self.candidates = log.iter().filter(|&&l| l == 0.0).count() as u16;
+        self.candidates = log.iter().filter(|&&l| l == 0).count() as u16;
         if self.candidates == 0 {
             return Err(ExplorerError::Candidates);
         }
@@ -348,7 +359,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         let measured = measured.and(table.measured());
         self.measured = measured;
         let learned_by = |movement, most: fn(u8) -> bool| {
-            let mut candidates = log.iter().zip(0..).filter(|(l, _)| **l == 0.0);
+            let mut candidates = log.iter().zip(0..).filter(|(l, _)| **l == 0);
             candidates.all(|(_, texture)| most(table.trials(texture, movement)))
         };
         let movements = 0..table.movements().len() as u8;
@@ -386,7 +397,8 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             let backgrounds = backgrounds.map(|a| Background::new(&table, a.movement));
             self.backgrounds.extend(backgrounds);
         }
-        self.posterior = log.clone();
+        // as many
+        self.posterior = log.iter().map(|_| 0.0).collect();
         self.restart();
         let actions = self.actions.iter();
         self.at_first = actions.map(|a| self.uncertainty(method, *a)).collect();
@@ -396,13 +408,9 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     /// Forgets all slides: the next exploration begins, with the same candidates equally probable.
     pub fn restart(&mut self) {
         let prior = 1.0 / f32::from(self.candidates);
-        for (log, posterior) in self.log.iter_mut().zip(&mut self.posterior) {
-            if *log > f32::NEG_INFINITY {
-                *log = 0.0;
-                *posterior = prior;
-            } else {
-                *posterior = 0.0;
-            }
+        self.forget();
+        for (posterior, log) in self.posterior.iter_mut().zip(&self.log) {
+            *posterior = if *log < LEAST { 0.0 } else { prior };
         }
         self.made = self.actions.iter().map(|_| 0).collect();
         self.slides = 0;
@@ -523,6 +531,24 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             .ok_or(ObserveError::Missing(property))
     }
 
+    /// Logarithms as before the first slide.
+    fn forget(&mut self) {
+        if usize::from(self.candidates) == self.log.len() {
+            self.log.fill(0);
+        } else {
+            for log in &mut self.log {
+                *log = if *log < LEAST { OUT } else { 0 };
+            }
+        }
+    }
+
+    /// The posterior from its logarithms; the logarithm of the candidates' mean likelihood.
+    fn settle(&mut self) -> f32 {
+        let (top, sum) = K::posterior(&self.log, &mut self.posterior);
+        let mean = sum as f32 / (1 << 30) as f32 / f32::from(self.candidates);
+        top as f32 / 65536.0 + libm::logf(mean)
+    }
+
     /// One property: its likelihood is added to what was there.
     fn observe_property(
         &mut self,
@@ -531,22 +557,33 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         slide: &Observation,
     ) -> Result<(), ObserveError> {
         let x = Self::value(slide, property)?;
+        if self.slides.is_multiple_of(SLIDES) || self.slides == u8::MAX {
+            draw_near(&mut self.log);
+        }
         if self.config.method == Method::Paper {
-            add_likelihoods(&self.table, action, x, &mut self.log);
+            let known = self.table.gaussians(action);
+            K::add_gaussians(x / mean_step(property), &known, &mut self.log);
         } else {
-            let mut student: Option<Student> = None;
-            for texture in 0..self.table.textures() {
-                let Some(expected) = self.expected(texture, action.movement, property) else {
-                    continue;
-                };
-                let student = self.student(&mut student, texture, action.movement, property);
-                if let Some(log) = self.log.get_mut(usize::from(texture)) {
-                    *log += student.log(x, expected);
-                }
+            self.add_students(x, action.movement, property, 1);
+        }
+        self.settle();
+        Ok(())
+    }
+
+    /// Adds the likelihood of the mean `x` of so many slides to every logarithm.
+    fn add_students(&mut self, x: f32, movement: u8, property: Property, slides: u8) {
+        let mut student: Option<Student> = None;
+        for texture in 0..self.table.textures() {
+            let Some((shrunk, known, trials)) = self.shrunk_of(texture, movement, property) else {
+                continue;
+            };
+            let expected = shrunk.expect(known, trials, slides);
+            let student = self.student(&mut student, texture, movement, property);
+            let likelihood = (student.log(x, expected) * 65536.0) as i32;
+            if let Some(log) = self.log.get_mut(usize::from(texture)) {
+                *log += likelihood.clamp(-MOST, MOST);
             }
         }
-        normalise(&mut self.log, &mut self.posterior);
-        Ok(())
     }
 
     /// All properties: the means of the slides of every movement are compared anew.
@@ -566,9 +603,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 *sum += Self::value(slide, property).unwrap_or(0.0);
             }
         }
-        for log in self.log.iter_mut().filter(|log| **log > f32::NEG_INFINITY) {
-            *log = 0.0;
-        }
+        self.forget();
         for at in 0..self.visits.len() {
             let Some(visit) = self.visits.get(at).copied() else {
                 continue;
@@ -577,22 +612,16 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 let Some(sum) = visit.properties.get(property.index()) else {
                     continue;
                 };
-                let x = sum / f32::from(visit.slides);
-                let mut student: Option<Student> = None;
-                for texture in 0..self.table.textures() {
-                    let known = self.shrunk_of(texture, visit.movement, property);
-                    let Some((shrunk, known, trials)) = known else {
-                        continue;
-                    };
-                    let expected = shrunk.expect(known, trials, visit.slides);
-                    let student = self.student(&mut student, texture, visit.movement, property);
-                    if let Some(log) = self.log.get_mut(usize::from(texture)) {
-                        *log += student.log(x, expected);
-                    }
-                }
+                self.add_students(
+                    sum / f32::from(visit.slides),
+                    visit.movement,
+                    property,
+                    visit.slides,
+                );
             }
+            draw_near(&mut self.log);
         }
-        normalise(&mut self.log, &mut self.posterior);
+        self.settle();
         Ok(())
     }
 
@@ -618,13 +647,17 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 *sum += i32::from(*z);
             }
         }
-        self.log_odds = fused::decide::<K, N>(
+        self.forget();
+        let elsewhere = fused::add_likelihoods(
             &self.table,
             &self.visits,
             &self.backgrounds,
-            &self.log,
-            &mut self.posterior,
+            &mut self.log,
+            K::add_likelihoods,
         );
+        let average = self.settle();
+        self.log_odds =
+            elsewhere.and_then(|(elsewhere, can_tell)| can_tell.then_some(elsewhere - average));
         Ok(())
     }
 
@@ -826,32 +859,16 @@ fn uncertainty_of(
     live.iter().map(left).sum()
 }
 
-/// Adds the likelihood of every texture when a property is `x` (eq. 4).
+/// Makes the greatest logarithm 0, so that there is room for slides to come.
 #[inline(never)]
-fn add_likelihoods(table: &Table<'_>, action: Action, x: f32, log: &mut [f32]) {
-    let known = table.gaussians(action);
-    for (log, texture) in log.iter_mut().zip(0..) {
-        if let Some(expected) = known.get(texture) {
-            let z = (x - expected.mean) / expected.sd;
-            *log += -(libm::logf(expected.sd) + 0.5 * z * z);
-        }
-    }
-}
-
-/// The posterior (eq. 3) from its logarithms.
-#[inline(never)]
-fn normalise(log: &mut [f32], posterior: &mut [f32]) {
-    let larger = |top, &log: &f32| if log > top { log } else { top };
-    let top = log.iter().fold(f32::NEG_INFINITY, larger);
-    let mut total = 0.0;
-    for (log, posterior) in log.iter_mut().zip(&mut *posterior) {
-        // a slide takes at most 1e12 from a candidate: however improbable, it stays one
-        *log -= top;
-        *posterior = exp_neg(-*log);
-        total += *posterior;
-    }
-    for posterior in posterior {
-        *posterior /= total;
+fn draw_near(log: &mut [i32]) {
+    let top = log.iter().copied().max().unwrap_or(0);
+    for log in log {
+        *log = if *log < LEAST {
+            OUT
+        } else {
+            (*log - top).max(FLOOR)
+        };
     }
 }
 

