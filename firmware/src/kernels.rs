@@ -7,9 +7,9 @@ use core::mem::{MaybeUninit, offset_of};
 use tactus_core::fir::{TAPS, Taps};
 use tactus_core::fixed::{EXP2 as EXP2_PARTS, LN, LN_2, LOG2_E, PARTS};
 use tactus_core::fused::MAX_FEATURES;
-use tactus_core::kernels::{Candidate, EXP2, FAR, Kernels, Live, NEVER, Plain, ROUND, Spread};
+use tactus_core::kernels::{Candidate, EXP2, FAR, Kernels, Live, Plain, ROUND, Spread};
 use tactus_core::spectrum::{Angles, Complex32, FRAME, Folded};
-use tactus_core::table::{Column, Gaussian, Gaussians};
+use tactus_core::table::{Gaussian, Gaussians};
 
 /// Outputs of the band-pass that are computed at once.
 const AT_ONCE: usize = 6;
@@ -96,14 +96,9 @@ global_asm!(
     "pop {{r4-r11, pc}}",
     ".size tactus_band_energy, . - tactus_band_energy",
     // One texture: r4 to r10 are the mean that the others are compared with, two numbers each, r1 where the next texture's begins,
-    // r2 the next logarithm, r3 its number of slides.
+    // r2 the next logarithm, r3 where they end.
     ".macro tactus_likelihood last",
     "2:",
-    "ldrb r0, [r3]",
-    "ldrd r11, r12, [sp, #36]",
-    "cmp r0, r11",
-    "bne 3f",
-    "add r3, r3, r12",
     // the squared distance to r11 and r12
     "mov r12, #0",
     "ldr r0, [r1]",
@@ -117,10 +112,10 @@ global_asm!(
     "\\last r0, [r1, #24]",
     "qsub16 r0, r10, r0",
     "smlald r11, r12, r0, r0",
-    "ldr lr, [sp, #44]",
+    "ldr lr, [sp, #36]",
     "add r1, r1, lr",
     // the odds to r0, if they are below 2^30
-    "ldr lr, [sp, #48]",
+    "ldr lr, [sp, #40]",
     "umull r0, lr, r11, lr",
     "orr r12, lr, r12, lsl #30",
     "cmp r12, #0x3f000000",
@@ -131,25 +126,24 @@ global_asm!(
     "lsl r12, r0, r11",
     "rsb r11, r11, #15",
     "lsr r0, r12, #26",
-    "ldr lr, [sp, #52]",
+    "ldr lr, [sp, #44]",
     "add r0, lr, r0, lsl #3",
     "ldrd r0, lr, [r0]",
     "lsl r12, r12, #6",
     "umull r12, lr, r12, lr",
     "add r0, r0, lr",
-    "mov lr, #32768",
-    "ldr r12, [sp, #56]",
+    // ln 2, and half of what is shifted out
+    "ldrd r12, lr, [sp, #48]",
     "umaal r0, lr, r11, r12",
     "lsr r0, r0, #16",
     "orr r0, r0, lr, lsl #16",
     // half of twice the norm and 1 less the weighted logarithm: the norm less its half, rounded down
-    "ldrd r11, r12, [sp, #60]",
+    "ldrd r11, r12, [sp, #56]",
     "mls r0, r0, r11, r12",
     "ldr lr, [r2]",
     "add lr, lr, r0, asr #1",
     "str lr, [r2], #4",
-    "ldr r0, [sp, #68]",
-    "cmp r2, r0",
+    "cmp r2, r3",
     "bne 2b",
     "3:",
     "mov r0, r2",
@@ -164,14 +158,13 @@ global_asm!(
     ".global tactus_likelihoods",
     ".type tactus_likelihoods,%function",
     ".thumb_func",
-    // r0: the mean; r1: the first texture's; r2: logarithms; r3: numbers of slides. On the stack: the one number of slides that
-    // is wanted (36), how far one is from the next (40), and means are (44); narrowness in Q32 (48); [`LN`], as if it
-    // began 32 parts before (52); ln 2 in Q32 (56); weight (60), twice the norm and 1 (64), where the logarithms end (68).
+    // r0: the mean; r1: the first texture's; r2: logarithms; r3: where they end. On the stack how far one mean is from the next
+    // (36), narrowness in Q32 (40); [`LN`], as if it began 32 parts before (44); ln 2 in Q32 (48) and 2^15 (52); weight (56), twice
+    // the norm and 1 (60), and whether there is a fourteenth number (64).
     "tactus_likelihoods:",
     "push {{r4-r11, lr}}",
     "ldm r0, {{r4-r10}}",
-    // the upper half of the last: whether there is a fourteenth number
-    "ldr r0, [sp, #72]",
+    "ldr r0, [sp, #64]",
     "cmp r0, #0",
     "beq 1f",
     "tactus_likelihood ldr",
@@ -253,57 +246,63 @@ global_asm!(
     ".global tactus_weigh",
     ".type tactus_weigh,%function",
     ".thumb_func",
-    // r0: logarithms, r3 the greatest; r1: probabilities, r2 where they end, behind the first; on the stack [`EXP2`] and 1 / ln 2
-    // in Q31. The sum in r0 and r1.
+    // r0: logarithms, r3 the greatest; r1: parts of that one's probability, in whole numbers, r2 where they end, behind the first;
+    // on the stack [`EXP2`] and 1 / ln 2 in Q31. The sum of the parts in r0 and r1.
+    ".macro tactus_weigh_one x",
+    "sub \\x, r3, \\x",
+    // 2^-46 at the least, which is 0
+    "usat \\x, #21, \\x",
+    // octaves in Q21: whole ones, 5 bits of a part, 16 between
+    "lsl \\x, \\x, #6",
+    "umull r10, \\x, \\x, r5",
+    "ubfx r10, \\x, #16, #5",
+    "add r10, r4, r10, lsl #3",
+    "ldrd r10, r11, [r10]",
+    "lsl r12, \\x, #16",
+    "umull lr, r12, r12, r11",
+    "sub r10, r10, r12",
+    "lsr \\x, \\x, #21",
+    "lsr \\x, r10, \\x",
+    "adds r6, r6, \\x",
+    "adc r7, r7, #0",
+    ".endm",
     "tactus_weigh:",
     "push {{r4-r11, lr}}",
     "ldrd r4, r5, [sp, #36]",
     "mov r6, #0",
     "mov r7, #0",
-    "vmov s1, r6",
-    "2:",
+    // an odd one first
+    "sub r8, r2, r1",
+    "tst r8, #4",
+    "beq 2f",
     "ldr r8, [r0], #4",
-    "sub r8, r3, r8",
-    "cmp r8, #{never}",
-    "bhs 3f",
-    // octaves in Q21: whole ones, 5 bits of a part, 16 between
-    "lsl r8, r8, #6",
-    "umull r9, r8, r8, r5",
-    "ubfx r9, r8, #16, #5",
-    "add r9, r4, r9, lsl #3",
-    "ldrd r9, r10, [r9]",
-    "lsl r11, r8, #16",
-    "umull r12, r11, r11, r10",
-    "sub r9, r9, r11",
-    "lsr r8, r8, #21",
-    "lsr r9, r9, r8",
-    "adds r6, r6, r9",
-    "adc r7, r7, #0",
-    "vmov s0, r9",
-    "vcvt.f32.u32 s0, s0",
-    "vstmia r1!, {{s0}}",
+    "tactus_weigh_one r8",
+    "str r8, [r1], #4",
+    "cmp r1, r2",
+    "beq 3f",
+    "2:",
+    "ldrd r8, r9, [r0], #8",
+    "tactus_weigh_one r8",
+    "tactus_weigh_one r9",
+    "strd r8, r9, [r1], #8",
     "cmp r1, r2",
     "bne 2b",
-    "4:",
+    "3:",
     "mov r0, r6",
     "mov r1, r7",
     "pop {{r4-r11, pc}}",
-    "3:",
-    "vstmia r1!, {{s1}}",
-    "cmp r1, r2",
-    "bne 2b",
-    "b 4b",
     ".size tactus_weigh, . - tactus_weigh",
     ".section .text.tactus_divide,\"ax\",%progbits",
     ".global tactus_divide",
     ".type tactus_divide,%function",
     ".thumb_func",
-    // r0: numbers, a multiple of 8; r1: where they end, behind the first; s0: what they are divided by
+    // r0: whole numbers, a multiple of 8, which become floats; r1: where they end, behind the first; s0: what they are divided by
     "tactus_divide:",
     "vmov.f32 s8, s0",
     "2:",
     "vldmia r0, {{s0-s7}}",
     ".irp next, s0, s1, s2, s3, s4, s5, s6, s7",
+    "vcvt.f32.u32 \\next, \\next",
     "vdiv.f32 \\next, \\next, s8",
     ".endr",
     "vstmia r0!, {{s0-s7}}",
@@ -311,6 +310,23 @@ global_asm!(
     "bne 2b",
     "bx lr",
     ".size tactus_divide, . - tactus_divide",
+    ".section .text.tactus_forget,\"ax\",%progbits",
+    ".global tactus_forget",
+    ".type tactus_forget,%function",
+    ".thumb_func",
+    // r0: numbers, a multiple of 8; r1: where they end, behind the first
+    "tactus_forget:",
+    "push {{r4-r9}}",
+    ".irp next, r2, r3, r4, r5, r6, r7, r8, r9",
+    "mov \\next, #0",
+    ".endr",
+    "2:",
+    "stm r0!, {{r2-r9}}",
+    "cmp r0, r1",
+    "bne 2b",
+    "pop {{r4-r9}}",
+    "bx lr",
+    ".size tactus_forget, . - tactus_forget",
     ".section .text.tactus_candidates,\"ax\",%progbits",
     ".global tactus_candidates",
     ".type tactus_candidates,%function",
@@ -365,28 +381,25 @@ global_asm!(
     square = const offset_of!(Candidate, square),
     distance = const offset_of!(Candidate, distance),
     size = const size_of::<Candidate>(),
-    never = const NEVER,
 );
 
 unsafe extern "C" {
     /// `samples` has [`TAPS`] - 1 and 6 `sixes` samples, of which none is outside -4096..=4095.
     fn tactus_band_energy(pairs: *const [u32; 2], samples: *const i16, sixes: usize) -> u64;
-    /// There are as many `means`, with 13 numbers each, 14 if `even`, and numbers of slides, so many bytes after each other, as
-    /// logarithms up to `end`, one at least. `from` has zeros where it has no number; `ln` is 256 bytes before [`LN`].
+    /// There are as many `means`, with 13 numbers each, 14 if `even`, `stride` bytes after each other, as logarithms up to
+    /// `end`, one at least. `from` has zeros where it has no number; `ln` is 256 bytes before [`LN`].
     fn tactus_likelihoods(
         from: &[u32; 7],
         means: *const u8,
         logs: *mut i32,
-        slides: *const u8,
-        wanted: u32,
-        slides_stride: usize,
+        end: *const i32,
         stride: usize,
         narrowness: u32,
         ln: *const u32,
         ln_2: u32,
+        half: u32,
         weight: i32,
         norm: i32,
-        end: *const i32,
         even: bool,
     ) -> *mut i32;
     /// There are as many `cells`, 4 bytes, `stride` after each other, as logarithms up to `end`, one at least; `ln` is 256 bytes
@@ -403,17 +416,19 @@ unsafe extern "C" {
     );
     /// There are 4, 8, 12... numbers up to `end`.
     fn tactus_top(numbers: *const i32, end: *const i32, least: i32) -> i32;
-    /// There are as many logarithms as probabilities up to `end`, one at least.
+    /// There are as many logarithms as parts up to `end`, one at least.
     fn tactus_weigh(
         logs: *const i32,
-        posterior: *mut f32,
-        end: *const f32,
+        parts: *mut u32,
+        end: *const u32,
         top: i32,
         exp2: *const [u32; 2],
         log2_e: u32,
     ) -> u64;
-    /// There are 8, 16, 24... numbers up to `end`.
+    /// There are 8, 16, 24... numbers up to `end`, the bits of whole ones.
     fn tactus_divide(numbers: *mut f32, end: *const f32, by: f32);
+    /// There are 8, 16, 24... numbers up to `end`.
+    fn tactus_forget(numbers: *mut i32, end: *const i32);
     /// `from` has 14 numbers and begins at a whole word, `square` is the sum of their squares; there is at least one of
     /// `others`, and `behind` is where the last of them ends.
     fn tactus_candidates(
@@ -752,21 +767,29 @@ impl Kernels for Chip {
         unsafe { add_power(bins.as_ptr(), sums.as_mut_ptr(), many) };
     }
 
+    fn forget(logs: &mut [i32]) {
+        let (eights, rest) = logs.as_chunks_mut::<8>();
+        let eights = eights.as_flattened_mut().as_mut_ptr_range();
+        if !eights.is_empty() {
+            // SAFETY: they are whole eights.
+            unsafe { tactus_forget(eights.start, eights.end) };
+        }
+        for log in rest {
+            *log = 0;
+        }
+    }
+
     fn add_likelihoods(
         from: &[i16],
-        column: &Column<'_>,
+        means: &[u8],
+        stride: usize,
         spread: &Spread,
         logs: &mut [i32],
     ) -> usize {
-        let (means, stride) = column.bytes();
-        let (slides, slides_stride) = column.slides_bytes();
-        let many = logs
-            .len()
-            .min(there(means, stride, 2 * from.len()))
-            .min(there(slides, slides_stride, 1));
+        let many = logs.len().min(there(means, stride, 2 * from.len()));
         let even = from.len() == MAX_FEATURES;
         if many == 0 || !even && from.len() != MAX_FEATURES - 1 || spread.narrowness >= 1 << 16 {
-            return Plain::add_likelihoods(from, column, spread, logs);
+            return Plain::add_likelihoods(from, means, stride, spread, logs);
         }
         let mut pairs = [0; MAX_FEATURES / 2];
         for (pair, numbers) in pairs.iter_mut().zip(from.chunks(2)) {
@@ -774,22 +797,20 @@ impl Kernels for Chip {
             *pair = halves.fold(0, |pair, half| pair << 16 | u32::from(*half as u16));
         }
         let logs = logs.as_mut_ptr();
-        // SAFETY: `many` means and numbers of slides were found to be there, and as many logarithms; they need not be aligned.
+        // SAFETY: `many` means were found to be there, and as many logarithms; words need not be aligned.
         unsafe {
             let done = tactus_likelihoods(
                 &pairs,
                 means.as_ptr(),
                 logs,
-                slides.as_ptr(),
-                spread.slides.into(),
-                slides_stride,
+                logs.add(many),
                 stride,
                 spread.narrowness << 16,
                 before_ln(),
                 LN_2,
+                1 << 15,
                 spread.weight,
                 2 * spread.norm + 1,
-                logs.add(many),
                 even,
             );
             done.offset_from_unsigned(logs)
@@ -818,10 +839,10 @@ impl Kernels for Chip {
         }
     }
 
-    fn posterior(logs: &[i32], posterior: &mut [f32]) -> (i32, u64) {
+    fn posterior(logs: &[i32], posterior: &mut [f32]) -> (i32, f32) {
         let many = logs.len().min(posterior.len());
         if many == 0 {
-            return (0, 0);
+            return (0, 0.0);
         }
         let (fours, rest) = logs.as_chunks::<4>();
         let mut top = rest.iter().copied().max().unwrap_or(i32::MIN);
@@ -830,7 +851,7 @@ impl Kernels for Chip {
             // SAFETY: they are whole fours.
             top = unsafe { tactus_top(fours.start, fours.end, top) };
         }
-        let begin = posterior.as_mut_ptr();
+        let begin = posterior.as_mut_ptr().cast::<u32>();
         // SAFETY: there are `many` of both.
         let sum = unsafe {
             let end = begin.add(many);
@@ -851,9 +872,9 @@ impl Kernels for Chip {
             unsafe { tactus_divide(eights.start, eights.end, total) };
         }
         for p in rest {
-            *p /= total;
+            *p = p.to_bits() as f32 / total;
         }
-        (top, sum)
+        (top, total)
     }
 
     fn candidate_distances(from: &Candidate, others: &mut [Candidate]) {

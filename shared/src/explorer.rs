@@ -534,7 +534,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     /// Logarithms as before the first slide.
     fn forget(&mut self) {
         if usize::from(self.candidates) == self.log.len() {
-            self.log.fill(0);
+            K::forget(&mut self.log);
         } else {
             for log in &mut self.log {
                 *log = if *log < LEAST { OUT } else { 0 };
@@ -545,7 +545,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     /// The posterior from its logarithms; the logarithm of the candidates' mean likelihood.
     fn settle(&mut self) -> f32 {
         let (top, sum) = K::posterior(&self.log, &mut self.posterior);
-        let mean = sum as f32 / (1 << 30) as f32 / f32::from(self.candidates);
+        let mean = sum / (1 << 30) as f32 / f32::from(self.candidates);
         top as f32 / 65536.0 + libm::logf(mean)
     }
 
@@ -557,7 +557,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         slide: &Observation,
     ) -> Result<(), ObserveError> {
         let x = Self::value(slide, property)?;
-        if self.slides.is_multiple_of(SLIDES) || self.slides == u8::MAX {
+        if self.slides > 0 && (self.slides.is_multiple_of(SLIDES) || self.slides == u8::MAX) {
             draw_near(&mut self.log);
         }
         if self.config.method == Method::Paper {
@@ -635,10 +635,12 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             return Err(ObserveError::Action(action));
         };
         let features = usize::from(features);
-        let white = slide
-            .vector(set, features)
-            .and_then(|vector| self.table.whiten(action.movement, &vector))
-            .ok_or(ObserveError::Features(set))?;
+        let Some(vector) = slide.vector(set, features) else {
+            return Err(ObserveError::Features(set));
+        };
+        let Some(white) = self.table.whiten(action.movement, &vector) else {
+            return Err(ObserveError::Features(set));
+        };
         let visit = fused::visit(&mut self.visits, action.movement);
         // beyond 255 slides nothing new is learned
         if let Some(visit) = visit.filter(|visit| visit.slides < u8::MAX) {

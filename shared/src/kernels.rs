@@ -11,7 +11,7 @@ use crate::fir::{TAPS, Taps};
 use crate::fixed::{exp_neg_q30, ln_q16};
 use crate::fused::MAX_FEATURES;
 use crate::spectrum::{Angles, FRAME, Folded};
-use crate::table::{Column, Gaussian, Gaussians};
+use crate::table::{Gaussian, Gaussians};
 
 /// A texture that is still likely, while a movement is weighed. The order of the fields is fixed, for kernels that are not
 /// written in Rust.
@@ -189,9 +189,6 @@ pub(crate) fn distance(from: &[i16], mean: &[u8]) -> u64 {
 
 /// A property this many standard deviations off, squared and halved, counts as no farther: 1024 in Q16.
 const MOST_OFF: i32 = (1 << 26) - 1;
-/// e^(-x) is 0 from here on, Q16: [`exp_neg_q30`].
-pub const NEVER: u32 = 22 << 16;
-
 /// What costs the time of a slide and of a decision.
 pub trait Kernels {
     /// Filters `samples` and returns the sum of the squared outputs, in Q14 counts^2: each output is the sum of products
@@ -218,12 +215,16 @@ pub trait Kernels {
     /// Adds |X|^2 of each bin to its sum.
     fn add_power(bins: &[Complex32], sums: &mut [f32]);
 
-    /// Adds the likelihood (ln, Q16, up to a constant) of every texture of a column when the mean of some slides is `from`, to
-    /// `logs`, one texture after another: as long as they were learned from as many slides as `spread` is of. Returns how many
-    /// these were. It may be fewer, if the next one is too far away for a short way.
+    /// Makes logarithms 0.
+    fn forget(logs: &mut [i32]);
+
+    /// Adds the likelihood (ln, Q16, up to a constant) of textures when the mean of some slides is `from`, to `logs`, one
+    /// texture after another. `means` has their whitened means, one at the beginning of every `stride` bytes, learned from as
+    /// many slides as `spread` is of. Returns for how many: it may stop at one that is too far away for a short way.
     fn add_likelihoods(
         from: &[i16],
-        column: &Column<'_>,
+        means: &[u8],
+        stride: usize,
         spread: &Spread,
         logs: &mut [i32],
     ) -> usize;
@@ -234,7 +235,7 @@ pub trait Kernels {
 
     /// The posterior (eq. 3) from its logarithms, Q16, of which there are as many, at least one. Returns the greatest of them,
     /// and the sum of the probabilities in parts of that one's, Q30. No two logarithms are 2^31 apart.
-    fn posterior(logs: &[i32], posterior: &mut [f32]) -> (i32, u64);
+    fn posterior(logs: &[i32], posterior: &mut [f32]) -> (i32, f32);
 
     /// Sets the squared distance of each of `others` from the mean of `from`.
     fn candidate_distances(from: &Candidate, others: &mut [Candidate]);
@@ -308,18 +309,20 @@ impl Kernels for Plain {
         }
     }
 
+    fn forget(logs: &mut [i32]) {
+        logs.fill(0);
+    }
+
     fn add_likelihoods(
         from: &[i16],
-        column: &Column<'_>,
+        means: &[u8],
+        stride: usize,
         spread: &Spread,
         logs: &mut [i32],
     ) -> usize {
-        let known = column.means().zip(column.slides());
-        let same = logs
-            .iter_mut()
-            .zip(known)
-            .take_while(|(_, (_, slides))| *slides == spread.slides);
-        same.map(|(log, (mean, _))| *log += spread.likelihood(distance(from, mean)))
+        let known = logs.iter_mut().zip(means.chunks(stride.max(1)));
+        known
+            .map(|(log, mean)| *log += spread.likelihood(distance(from, mean)))
             .count()
     }
 
@@ -336,12 +339,11 @@ impl Kernels for Plain {
         }
     }
 
-    fn posterior(logs: &[i32], posterior: &mut [f32]) -> (i32, u64) {
+    fn posterior(logs: &[i32], posterior: &mut [f32]) -> (i32, f32) {
         let top = logs.iter().copied().max().unwrap_or(0);
-        let mut sum = 0;
+        let mut sum = 0u64;
         for (p, log) in posterior.iter_mut().zip(logs) {
-            let less = top.abs_diff(*log);
-            let likely = if less < NEVER { exp_neg_q30(less) } else { 0 };
+            let likely = exp_neg_q30(top.abs_diff(*log));
             sum += u64::from(likely);
             *p = likely as f32;
         }
@@ -349,7 +351,7 @@ impl Kernels for Plain {
         for p in posterior {
             *p /= total;
         }
-        (top, sum)
+        (top, total)
     }
 
     fn candidate_distances(from: &Candidate, others: &mut [Candidate]) {

@@ -281,7 +281,7 @@ impl<'t> Gaussians<'t> {
 
 /// What all textures are like at a movement, whitened.
 #[derive(Clone, Copy, Debug)]
-pub struct Column<'t> {
+pub(crate) struct Column<'t> {
     /// Means, the first at the beginning, numbers of 16 bits, little-endian; each begins `stride` bytes after the one before.
     pub(crate) means: &'t [u8],
     pub(crate) stride: usize,
@@ -291,37 +291,19 @@ pub struct Column<'t> {
 }
 
 impl<'t> Column<'t> {
-    /// The means, each at the beginning of some bytes.
-    pub fn means(&self) -> impl Iterator<Item = &'t [u8]> + use<'t> {
-        self.means.chunks(self.stride.max(1))
+    /// The bytes from the mean of a texture on.
+    #[inline]
+    pub(crate) fn mean(&self, texture: usize) -> &'t [u8] {
+        self.means.get(texture * self.stride..).unwrap_or_default()
     }
 
-    /// The bytes of the means, and how far one is from the next.
-    pub fn bytes(&self) -> (&'t [u8], usize) {
-        (self.means, self.stride)
-    }
-
-    /// How many slides each texture was learned from.
-    pub fn slides(&self) -> impl Iterator<Item = u8> + use<'t> {
-        self.slides.iter().step_by(self.movements.max(1)).copied()
-    }
-
-    /// The bytes of these, and how far one is from the next.
-    pub fn slides_bytes(&self) -> (&'t [u8], usize) {
-        (self.slides, self.movements)
-    }
-
-    /// The column without so many textures at its beginning.
-    pub(crate) fn skip(&self, texture: usize) -> Self {
-        let behind = |bytes: &'t [u8], stride: usize| {
-            let at = texture.saturating_mul(stride);
-            bytes.get(at..).unwrap_or_default()
-        };
-        Self {
-            means: behind(self.means, self.stride),
-            slides: behind(self.slides, self.movements),
-            ..*self
-        }
+    /// How many slides a texture was learned from.
+    #[inline]
+    pub(crate) fn slides(&self, texture: usize) -> u8 {
+        self.slides
+            .get(texture * self.movements)
+            .copied()
+            .unwrap_or(0)
     }
 }
 
@@ -697,7 +679,7 @@ impl<'a> Table<'a> {
     }
 
     /// The whitened means at a movement; none in a table of Gaussians and outside the table.
-    pub fn column(&self, movement: u8) -> Column<'a> {
+    pub(crate) fn column(&self, movement: u8) -> Column<'a> {
         let (_, cell) = self.contents.sizes();
         let at = self.layout().cells + usize::from(movement) * cell;
         let means = match self.contents {
@@ -792,7 +774,7 @@ impl<'a> Table<'a> {
     /// Whitens features at a movement; `None` as [`Table::whitening`].
     pub fn whiten(&self, movement: u8, features: &[i16]) -> Option<Vector> {
         let (bytes, known) = self.whitening_bytes(movement)?;
-        Some(View::new(bytes, known)?.apply(features))
+        Some(View::checked(bytes, known).apply(features))
     }
 
     fn label(&self, texture: u16) -> [u8; LABEL_BYTES] {

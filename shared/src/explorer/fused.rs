@@ -8,8 +8,8 @@ use heapless::{Vec, VecView};
 
 use crate::fixed::exp_neg_q30;
 use crate::fused::{MAX_FEATURES, Vector, oas, white};
-use crate::kernels::{Candidate, FREEDOM, Kernels, NEVER, Spread, distance, mask};
-use crate::table::{Column, Contents, MAX_MOVEMENTS, Table};
+use crate::kernels::{Candidate, FREEDOM, Kernels, Spread, distance, mask};
+use crate::table::{Contents, MAX_MOVEMENTS, Table};
 
 /// Fewest textures whose means say what textures are like.
 const POPULATION: usize = 3;
@@ -51,6 +51,11 @@ pub(super) fn visit(visits: &mut Visits, movement: u8) -> Option<&mut Visit> {
 impl Visit {
     /// Mean of so many whitened features, to the nearest step.
     pub(super) fn mean(&self, features: usize) -> Vector {
+        if self.slides == 1 {
+            // without divisions
+            let slide = self.white.iter().take(features);
+            return slide.map(|&z| z as i16).collect();
+        }
         let n = i32::from(self.slides.max(1));
         let rounded = |sum: i32| sum.saturating_mul(2).saturating_add(n).div_euclid(2 * n);
         // a mean of i16
@@ -67,6 +72,8 @@ pub(super) struct Background {
     variance: [f32; MAX_FEATURES],
     /// Whether there are textures enough to tell.
     known: bool,
+    /// From how many slides all textures were learned, if it was as many.
+    slides: Option<u8>,
 }
 
 impl Background {
@@ -84,12 +91,15 @@ impl Background {
         }
         let n = count.max(1) as f32;
         let known = count >= POPULATION;
+        let slides = table.trials(0, movement);
+        let same = (0..table.textures()).all(|texture| table.trials(texture, movement) == slides);
         let step = white(1);
         let mut background = Self {
             movement,
             mean: sum.map(|sum| sum as f32 / n * step),
             variance: [WIDE; MAX_FEATURES],
             known,
+            slides: same.then_some(slides),
         };
         if known {
             for ((variance, sum), squares) in background.variance.iter_mut().zip(sum).zip(squares) {
@@ -110,11 +120,18 @@ impl Background {
     fn likelihood(&self, mean: &Vector, k: u8) -> f32 {
         let v = 1.0 / f32::from(k);
         let (mut norm, mut distance) = (0.0, 0.0);
-        for ((z, m), variance) in mean.iter().zip(&self.mean).zip(&self.variance) {
-            let total = variance + v;
-            let apart = white(*z) - m;
-            norm += libm::logf(total);
-            distance += apart * apart / total;
+        // two logarithms for all: variances are 2^-8 to 2^14, and products of seven numbers still
+        const HALF: usize = MAX_FEATURES / 2;
+        let known = self.mean.chunks(HALF).zip(self.variance.chunks(HALF));
+        for (means, (known, variances)) in mean.chunks(HALF).zip(known) {
+            let mut product = 1.0;
+            for ((z, m), variance) in means.iter().zip(known).zip(variances) {
+                let total = variance + v;
+                let apart = white(*z) - m;
+                product *= total;
+                distance += apart * apart / total;
+            }
+            norm += libm::logf(product);
         }
         let freedom = f32::from(FREEDOM);
         let tail = (freedom + mean.len() as f32) / 2.0;
@@ -135,7 +152,7 @@ fn shrink(variances: &mut [f32], n: f32) {
 }
 
 /// [`Kernels::add_likelihoods`].
-type AddLikelihoods = fn(&[i16], &Column<'_>, &Spread, &mut [i32]) -> usize;
+type AddLikelihoods = fn(&[i16], &[u8], usize, &Spread, &mut [i32]) -> usize;
 
 /// Adds the logarithms of the likelihoods (Q16, up to a constant) of all textures after the slides of a visit to `logs`; that of
 /// a texture that the table does not have, and whether the table has textures enough to tell it.
@@ -159,39 +176,50 @@ pub(super) fn add_likelihoods(
         let unknown = background.likelihood(&mean, visit.slides);
         elsewhere += unknown;
         can_tell &= background.known;
+        // as little is known of a texture that was never felt here as of one that the table does not have
+        let untaught = (unknown * 65536.0) as i32;
         let column = table.column(visit.movement);
-        let Some(slides) = column.slides().next() else {
-            continue;
-        };
-        let mut spread = Spread::new(visit.slides, slides, features);
-        let mut done = 0;
-        while let Some(rest) = logs.get_mut(done..).filter(|rest| !rest.is_empty()) {
-            let same = if spread.slides > 0 {
-                add(&mean, &column.skip(done), &spread, rest)
+        let mut rest = &mut *logs;
+        let mut texture = 0;
+        while !rest.is_empty() {
+            let slides = column.slides(texture);
+            let same = if background.slides.is_some() {
+                rest.len()
             } else {
-                0
+                let others = (texture..).zip(&*rest);
+                others
+                    .take_while(|(other, _)| column.slides(*other) == slides)
+                    .count()
             };
-            done += same;
-            // one that was learned from another number of slides, or is very far away
-            let column = column.skip(done);
-            let next = column.means().zip(column.slides()).next();
-            let (Some(log), Some((known, slides))) = (rest.get_mut(same), next) else {
+            let Some((these, others)) = rest.split_at_mut_checked(same) else {
                 break;
             };
-            if spread.slides != slides {
-                spread = Spread::new(visit.slides, slides, features);
-            }
-            *log += if slides == 0 {
-                // as little is known of it here as of a texture that the table does not have
-                (unknown * 65536.0) as i32
+            if slides == 0 {
+                these.iter_mut().for_each(|log| *log += untaught);
             } else {
-                spread.likelihood(distance(&mean, known))
-            };
-            done += 1;
+                let spread = Spread::new(visit.slides, slides, features);
+                let mut done = 0;
+                loop {
+                    let to_do = these.get_mut(done..).unwrap_or_default();
+                    let means = column.mean(texture + done);
+                    done += add(&mean, means, column.stride, &spread, to_do);
+                    // one that is too far away
+                    let Some(log) = these.get_mut(done) else {
+                        break;
+                    };
+                    *log += spread.likelihood(distance(&mean, column.mean(texture + done)));
+                    done += 1;
+                }
+            }
+            rest = others;
+            texture += same;
         }
     }
     Some((elsewhere, can_tell))
 }
+
+/// e^(-x) is 0 from here on, Q16: [`exp_neg_q30`].
+const FAR: u32 = 22 << 16;
 
 /// Degree of confusion of two textures (eq. 7, of the means of whitened slides) whose means are so far apart, Q16: 1 where
 /// one was never learned. `fewer` is the smaller number of slides of the two.
@@ -233,13 +261,10 @@ fn gather(table: &Table<'_>, movement: u8, posterior: &[f32], live: &mut VecView
         return;
     };
     let column = table.column(movement);
-    let (means, stride) = column.bytes();
-    let (slides, movements) = column.slides_bytes();
     let mask = mask(features.into());
     for (&probability, texture) in posterior.iter().zip(0..) {
         if probability >= super::NEGLIGIBLE {
-            let mean = means.get(texture * stride..).unwrap_or_default();
-            let slides = slides.get(texture * movements).copied().unwrap_or(0);
+            let (mean, slides) = (column.mean(texture), column.slides(texture));
             // there is room: as much as for the posterior
             let _ = live.push(Candidate::new(mean, &mask, probability, slides));
         }
@@ -252,7 +277,7 @@ fn confuse_with(a: &mut Candidate, others: &mut [Candidate]) {
     let mut confused = a.confused;
     for b in others {
         // the last factor of the exponent is 2 at most
-        let far = b.distance >= u64::from(16 * NEVER);
+        let far = b.distance >= u64::from(16 * FAR);
         if far && a.slides > 0 && b.slides > 0 {
             continue;
         }

@@ -80,6 +80,11 @@ impl<'b> View<'b> {
         places.iter().all(|&p| p <= 30).then_some(view)
     }
 
+    /// Of bytes that [`View::new`] has found to be one.
+    pub(crate) fn checked(bytes: &'b [u8], features: usize) -> Self {
+        Self { features, bytes }
+    }
+
     /// g, places and rows.
     fn parts(&self) -> [&'b [u8]; 3] {
         let (mean, rest) = self
@@ -93,26 +98,68 @@ impl<'b> View<'b> {
     /// As [`Whitening::apply`].
     pub(crate) fn apply(&self, features: &[i16]) -> Vector {
         let [mean, places, rows] = self.parts();
-        let word = |pair: &[u8; 2]| i32::from(i16::from_le_bytes(*pair));
-        let mut apart = [0; MAX_FEATURES];
-        let (mean, _) = mean.as_chunks();
-        for (apart, (x, g)) in apart.iter_mut().zip(features.iter().zip(mean)) {
-            *apart = i32::from(*x) - word(g);
+        // beyond 32 units all features are alike; those that the table does not have are 0
+        let mut apart = [[0; 2]; MAX_FEATURES / 2];
+        let known = features.iter().zip(mean.as_chunks().0);
+        for (apart, (x, g)) in apart.as_flattened_mut().iter_mut().zip(known) {
+            *apart = x.saturating_sub(i16::from_le_bytes(*g));
         }
-        let rows = rows.chunks_exact((2 * self.features).max(1));
-        rows.zip(places)
-            .map(|(row, &places)| {
-                let (weights, _) = row.as_chunks();
-                let products = weights.iter().zip(&apart);
-                let sum: i64 = products
-                    .map(|(w, x)| i64::from(word(w)) * i64::from(*x))
-                    .sum();
-                // from 1/1024 of a unit, and the row's places, to 1/256
-                let places = u32::from(places) + 2;
-                let z = (sum + (1 << (places - 1))) >> places;
-                z.clamp(i16::MIN.into(), i16::MAX.into()) as i16
-            })
-            .collect()
+        let apart = apart.map(pair);
+        let mut white = Vector::new();
+        let mut rest = rows;
+        for &places in places {
+            let sum = match rest.first_chunk::<{ 2 * MAX_FEATURES }>() {
+                // in steps that the compiler knows the number of; what follows the row is multiplied by 0
+                Some(row) => {
+                    let row = row.as_chunks().0.iter().map(|w| u32::from_le_bytes(*w));
+                    row.zip(apart).map(|(w, x)| dot(w, x)).sum()
+                }
+                // the last of a table
+                None => {
+                    let row = rest.chunks(4).map(|w| match *w {
+                        [a, b, c, d] => u32::from_le_bytes([a, b, c, d]),
+                        [a, b, ..] => u16::from_le_bytes([a, b]).into(),
+                        _ => 0,
+                    });
+                    row.zip(apart).map(|(w, x)| dot(w, x)).sum()
+                }
+            };
+            // there is room
+            let _ = white.push(rounded(sum, places));
+            rest = rest.get(2 * self.features..).unwrap_or_default();
+        }
+        white
+    }
+}
+
+/// Two numbers of 16 bits in a word, as the chip multiplies them.
+#[inline]
+fn pair([low, high]: [i16; 2]) -> u32 {
+    u32::from(high as u16) << 16 | u32::from(low as u16)
+}
+
+/// Sum of the products of two pairs.
+#[inline]
+fn dot(a: u32, b: u32) -> i64 {
+    let low = i32::from(a as i16) * i32::from(b as i16);
+    let high = ((a as i32) >> 16) * ((b as i32) >> 16);
+    i64::from(low) + i64::from(high)
+}
+
+/// Products of features, in 1/1024 of a unit, and weights of so many binary places, 30 at most, to the nearest 1/256.
+#[inline]
+fn rounded(sum: i64, places: u8) -> i16 {
+    // twice that, by shifts of 32 bits: those of 64 take the chip several
+    let twice = u32::from(places & 31) + 1;
+    let (low, high) = (sum as u32, (sum >> 32) as i32);
+    let low = (low >> twice | (high as u32) << (32 - twice)) as i32;
+    let high = high >> twice;
+    if high == low >> 31 {
+        ((low >> 1) + (low & 1)).clamp(i16::MIN.into(), i16::MAX.into()) as i16
+    } else if high < 0 {
+        i16::MIN
+    } else {
+        i16::MAX
     }
 }
 
