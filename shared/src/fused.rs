@@ -112,7 +112,9 @@ impl Observation {
             }
         }
         if set != FeatureSet::Properties {
-            vector.extend_from_slice(&self.bands).ok()?;
+            for band in &self.bands {
+                vector.push(*band).ok()?;
+            }
         }
         (vector.len() == length).then_some(vector)
     }
