@@ -95,6 +95,9 @@ impl Felt {
             put(bits as i16);
             put((bits >> 16) as i16);
         }
+        put(self.slide.pressure.is_some().into());
+        let pressure = self.slide.pressure.unwrap_or_default();
+        pressure.into_iter().for_each(&mut put);
         put(self.slide.bands.len() as i16);
         self.slide.bands.iter().for_each(|band| put(*band));
     }
@@ -103,7 +106,7 @@ impl Felt {
     pub fn read(words: &[i16]) -> Option<(Self, &[i16])> {
         let (&[method, movement, property], words) = words.split_first_chunk()?;
         let (values, words) = words.split_first_chunk::<6>()?;
-        let (&bands, words) = words.split_first()?;
+        let (&[has_pressure, mean, sd, bands], words) = words.split_first_chunk()?;
         let (bands, rest) = words.split_at_checked(usize::try_from(bands).ok()?)?;
         let mut properties = [None; 3];
         for (property, pair) in properties.iter_mut().zip(values.as_chunks::<2>().0) {
@@ -121,7 +124,7 @@ impl Felt {
             slide: Observation {
                 properties: Properties::new(properties),
                 bands: Vec::from_slice(bands).ok()?,
-                pressure: None,
+                pressure: (has_pressure != 0).then_some([mean, sd]),
             },
         };
         Some((felt, rest))

@@ -101,6 +101,9 @@ fn run(cli: &Cli) -> anyhow::Result<bool> {
     if cli.growth {
         return growth(&mut bench, cli.plot.as_deref());
     }
+    let model = std::mem::take(&mut bench.model);
+    corners(&mut bench)?;
+    bench.model = model;
     let mut rows = rows(&mut bench)?;
     if let Some(rig) = &cli.rig {
         rows.extend(on_the_rig(rig)?);
@@ -537,6 +540,118 @@ fn synthetic(method: Method, textures: usize) -> anyhow::Result<Vec<u8>> {
         })
         .collect();
     Ok(learn::learn(method, None, &names, &MOVEMENTS, &slides)?)
+}
+
+/// Posteriors that the figures below do not go through: few textures and odd numbers of them, all numbers of features, textures
+/// too far away for the chip's short way, learned from different numbers of slides, or not at all, and values far from all.
+fn corners(bench: &mut Bench) -> anyhow::Result<()> {
+    let mut random = ChaCha8Rng::seed_from_u64(4);
+    for textures in [3, 8, 21] {
+        for (set, far) in FeatureSet::ALL
+            .into_iter()
+            .zip([false, true].iter().cycle())
+        {
+            for uneven in [false, true] {
+                let slides = corner(&mut random, textures, set, *far || uneven, uneven);
+                let what = format!("{textures} textures by {}, uneven: {uneven}", set.name());
+                for method in [Method::Fused, Method::Paper] {
+                    let names: Vec<String> = (0..textures).map(|t| format!("t{t}")).collect();
+                    let set = (method == Method::Fused).then_some(set);
+                    if set.is_none()
+                        && slides
+                            .iter()
+                            .flatten()
+                            .flatten()
+                            .any(|s| s.properties == Properties::default())
+                    {
+                        continue;
+                    }
+                    let table = learn::learn(method, set, &names, &MOVEMENTS, &slides)?;
+                    for _ in 0..3 {
+                        // where one was never felt, the paper's method does not look
+                        let movement = match (uneven, method) {
+                            (true, Method::Fused) => 1,
+                            (true, _) => 0,
+                            (false, _) => random.random_range(0..3),
+                        };
+                        let texture = random.random_range(0..textures);
+                        let felt = slides[texture][movement].first();
+                        let mut slide = felt.or(slides[0][0].first()).context("no slide")?.clone();
+                        if set.is_none() && random.random() {
+                            slide.properties = Properties::new([Some(1e6), Some(-1e6), Some(0.0)]);
+                        }
+                        let action = Action {
+                            movement: movement as u8,
+                            property: set
+                                .is_none()
+                                .then_some(Property::ALL[random.random_range(0..3)]),
+                        };
+                        let mut words = Vec::new();
+                        Felt {
+                            method,
+                            action,
+                            slide,
+                        }
+                        .write(|word| words.push(word));
+                        let counted = bench.count(Workload::Observe, &table, &words);
+                        let counted = counted.with_context(|| what.clone())?;
+                        ensure!(
+                            counted.equal,
+                            "{what}: {method:?} is not what the plain kernels give"
+                        );
+                    }
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Slides of textures, movement by movement; some from fewer where they are `uneven`, one from none.
+fn corner(
+    random: &mut ChaCha8Rng,
+    textures: usize,
+    set: FeatureSet,
+    far: bool,
+    uneven: bool,
+) -> Vec<Vec<Vec<Observation>>> {
+    let (reach, scatter) = if far { (15.0, 0.02) } else { (3.0, 0.5) };
+    let mut texture = |texture: usize| {
+        let mut slides_at = |movement: usize| {
+            let centres: Vec<f32> = (0..17)
+                .map(|_| random.random_range(-reach..reach))
+                .collect();
+            let slides = match (uneven, movement, texture) {
+                (true, 1, 1) => 0,
+                (true, _, _) => 2 + texture % 3,
+                _ => 5,
+            };
+            let mut slide = |_| {
+                let felt: Vec<f32> = centres
+                    .iter()
+                    .map(|c| c + random.random_range(-scatter..scatter))
+                    .collect();
+                let fixed = |x: &f32| tactus_core::fused::fixed(*x).unwrap_or(0);
+                let properties = match set {
+                    FeatureSet::Pressure | FeatureSet::Bands => [None; 3],
+                    _ => [
+                        Some(felt[0] / 4.0),
+                        Some(felt[1] / 2.0),
+                        Some(felt[2] / 4.0),
+                    ],
+                };
+                Observation {
+                    properties: Properties::new(properties),
+                    pressure: (set == FeatureSet::Pressure)
+                        .then(|| [fixed(&felt[3]), fixed(&felt[4])]),
+                    bands: felt[5..].iter().map(fixed).collect(),
+                }
+            };
+            (0..slides).map(&mut slide).collect()
+        };
+        (0..MOVEMENTS.len()).map(&mut slides_at).collect()
+    };
+    (0..textures).map(&mut texture).collect()
 }
 
 /// What was felt, as words, and how many textures it leaves.
