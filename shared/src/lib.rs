@@ -30,3 +30,14 @@ pub mod table;
 pub mod teaching;
 pub mod training;
 pub mod wire;
+
+/// As many of them as there is room for: `collect` would panic at more.
+fn up_to<T, const N: usize>(items: impl Iterator<Item = T>) -> heapless::Vec<T, N> {
+    let mut room = heapless::Vec::new();
+    for item in items {
+        if room.push(item).is_err() {
+            break;
+        }
+    }
+    room
+}

@@ -285,6 +285,7 @@ impl Contents {
         }
     }
 
+    #[inline(never)]
     const fn layout(self, textures: usize, movements: usize) -> Layout {
         let (whitening, cell) = self.sizes();
         let whitenings = HEADER + movements * MOVEMENT_BYTES;

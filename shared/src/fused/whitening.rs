@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{FEATURE_STEPS, MAX_FEATURES, Vector, WHITE_STEPS};
 use crate::table::MAX_MOVEMENTS;
+use crate::up_to;
 
 /// Weight of the average over all movements, in trials: with few trials of its own a movement's covariance is mostly that.
 const SHARED_TRIALS: f64 = 15.0;
@@ -100,19 +101,17 @@ impl<'b> View<'b> {
             *apart = i32::from(*x) - word(g);
         }
         let rows = rows.chunks_exact((2 * self.features).max(1));
-        rows.zip(places)
-            .map(|(row, &places)| {
-                let (weights, _) = row.as_chunks();
-                let products = weights.iter().zip(&apart);
-                let sum: i64 = products
-                    .map(|(w, x)| i64::from(word(w)) * i64::from(*x))
-                    .sum();
-                // from 1/1024 of a unit, and the row's places, to 1/256
-                let places = u32::from(places) + 2;
-                let z = (sum + (1 << (places - 1))) >> places;
-                z.clamp(i16::MIN.into(), i16::MAX.into()) as i16
-            })
-            .collect()
+        up_to(rows.zip(places).map(|(row, &places)| {
+            let (weights, _) = row.as_chunks();
+            let products = weights.iter().zip(&apart);
+            let sum: i64 = products
+                .map(|(w, x)| i64::from(word(w)) * i64::from(*x))
+                .sum();
+            // from 1/1024 of a unit, and the row's places, to 1/256
+            let places = u32::from(places) + 2;
+            let z = (sum + (1 << (places - 1))) >> places;
+            z.clamp(i16::MIN.into(), i16::MAX.into()) as i16
+        }))
     }
 }
 

@@ -104,6 +104,7 @@ impl RigCalibration {
     ///
     /// # Errors
     /// See [`RigCalibrationError`].
+    #[inline(never)]
     pub fn check(&self) -> Result<(), RigCalibrationError> {
         self.pressure
             .check()

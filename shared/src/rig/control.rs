@@ -105,11 +105,7 @@ impl core::fmt::Display for Refused {
             Self::NotHomed => {
                 f.write_str("lever and stage do not know where they are; home them first")
             }
-            Self::Fault(fault) => write!(
-                f,
-                "{fault}: {}",
-                fault.row().map_or("reset", |row| row.recovery)
-            ),
+            Self::Fault(fault) => write!(f, "{fault}: {}", fault.recovery()),
             Self::Force(mn) => write!(
                 f,
                 "{mn} mN is more than this rig may press; {HIGH_FORCE_MN} mN unless high forces are allowed"
