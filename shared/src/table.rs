@@ -167,6 +167,7 @@ pub enum TableError {
 }
 
 impl fmt::Display for TableError {
+    #[inline]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Truncated { got, wanted } => write!(f, "truncated: {got} bytes of {wanted}"),
@@ -285,7 +286,6 @@ impl Contents {
         }
     }
 
-    #[inline(never)]
     const fn layout(self, textures: usize, movements: usize) -> Layout {
         let (whitening, cell) = self.sizes();
         let whitenings = HEADER + movements * MOVEMENT_BYTES;
@@ -335,6 +335,7 @@ impl<'a> Table<'a> {
     ///
     /// # Errors
     /// The first check that failed.
+    #[inline]
     pub fn read(bytes: &'a [u8]) -> Result<Self, TableError> {
         let truncated = |wanted| TableError::Truncated {
             got: bytes.len(),
@@ -391,6 +392,7 @@ impl<'a> Table<'a> {
         Ok(table)
     }
 
+    #[inline]
     fn check(&self) -> Result<(), TableError> {
         let mut at = self.layout().names;
         let length = |end| TableError::Length {
@@ -439,6 +441,7 @@ impl<'a> Table<'a> {
         Ok(())
     }
 
+    #[inline]
     fn check_deviations(&self, measured: PropertySet) -> Result<(), TableError> {
         for texture in 0..self.textures {
             for movement in (0..self.movements).filter(|&m| self.trials(texture, m) >= 2) {

@@ -15,6 +15,7 @@ use super::skin::SkinCare;
 use super::stage::{MARGIN_MM, Stage, StageConstants, StageState};
 use crate::movement::{Movement, SlidePath};
 use crate::pressure::{Calibration, Channel, RATE_HZ};
+use crate::up_to;
 
 /// The still finger is measured for so long.
 pub const BACKGROUND_MS: u32 = 1000;
@@ -718,9 +719,8 @@ impl Control {
             .flatten()
             .filter(|w| w.channel == Channel::Pac);
         self.slide_words = self.slide_words.saturating_add(pac.clone().count() as u32);
-        outputs.pac = pac
-            .map(|w| (i32::from(w.counts.get()) - self.baseline) as i16)
-            .collect();
+        let baseline = self.baseline;
+        outputs.pac = up_to(pac.map(|w| (i32::from(w.counts.get()) - baseline) as i16));
     }
 }
 

@@ -414,7 +414,7 @@ impl<F: NorFlash> Store<F> {
         let is_its = |record: &SelfTaught| {
             of.is_none_or(|(lineage, number)| record.lineage == lineage && record.number == number)
         };
-        for key in self.self_keys(&is_its).await? {
+        for &key in &self.self_keys(&is_its).await? {
             self.encode(key, &None::<SelfTaught>).await?;
         }
         Ok(())
