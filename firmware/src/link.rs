@@ -108,9 +108,14 @@ pub(crate) async fn send(mut uart: BufferedUartTx<'static>) {
     let mut chunk = [0; CHUNK];
     loop {
         let length = OUTBOX.read(&mut chunk).await;
-        let chunk = chunk.get(..length).unwrap_or_default();
-        // the line itself reports no error while sending
-        let _ = uart.write_all(chunk).await;
+        let mut rest = chunk.get(..length).unwrap_or_default();
+        // the line itself reports no error while sending; not `write_all`, which panics at a write of nothing
+        while !rest.is_empty() {
+            let Ok(written @ 1..) = uart.write(rest).await else {
+                break;
+            };
+            rest = rest.get(written..).unwrap_or_default();
+        }
         let _ = uart.flush().await;
     }
 }

@@ -38,8 +38,7 @@ impl core::fmt::Display for ProbeError {
         match self {
             Self::Refused(why) => why.fmt(f),
             Self::Fault(fault) => {
-                let recovery = fault.row().map_or("reset", |row| row.recovery);
-                write!(f, "{fault}: {recovery}")
+                write!(f, "{fault}: {}", fault.recovery())
             }
             Self::Stopped => f.write_str("stopped"),
             Self::Hangs => f.write_str("the rig does not come to an end: home it"),

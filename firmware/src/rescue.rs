@@ -2,7 +2,7 @@
 use core::fmt::Write as _;
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
-use core::ptr::addr_of_mut;
+use core::ptr::{addr_of, addr_of_mut};
 use core::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use cortex_m::peripheral::SCB;
@@ -16,6 +16,8 @@ use crate::lever;
 
 const MAGIC: u32 = 0x7ac7_1a57;
 const LEVER_TOP: usize = 12;
+/// So many callers have room in the last words.
+const CALLERS: usize = 10;
 
 /// Last words that survive a reset; RAM that the start-up code leaves alone.
 struct LastWords {
@@ -122,15 +124,44 @@ fn give_up(why: &str) -> ! {
     SCB::sys_reset()
 }
 
+/// Says where from, and not what: the sentences and places of all panics would take 10 KB of flash. `addr2line` and the ELF
+/// know the lines.
 #[panic_handler]
-fn panic(info: &PanicInfo<'_>) -> ! {
+fn panic(_: &PanicInfo<'_>) -> ! {
     let mut text: String<120> = String::new();
-    // cut off where it is too long
-    let _ = match info.location() {
-        Some(at) => write!(text, "{}:{} {}", at.file(), at.line(), info.message()),
-        None => write!(text, "{}", info.message()),
-    };
+    let _ = text.push_str("panic, called from");
+    callers(|at| {
+        let _ = write!(text, " {at:#x}");
+    });
     give_up(&text)
+}
+
+/// Where functions on the stack return to, the last one first. What looks like it and is left over of others is among them.
+fn callers(mut each: impl FnMut(usize)) {
+    unsafe extern "C" {
+        static __stext: u32;
+        static __etext: u32;
+        static _stack_start: u32;
+    }
+    let code = addr_of!(__stext) as usize..addr_of!(__etext) as usize;
+    let top = addr_of!(_stack_start) as usize;
+    let mut at = cortex_m::register::msp::read() as usize;
+    let mut found = 0;
+    while found < CALLERS && at < top {
+        // SAFETY: it is the stack, down from where it begins.
+        let word = unsafe { (at as *const usize).read_volatile() };
+        let is_thumb = word % 2 == 1;
+        if is_thumb && code.contains(&word) && code.contains(&(word - 5)) {
+            // SAFETY: it is code, in flash.
+            let [first, second] = unsafe { ((word - 5) as *const [u16; 2]).read_volatile() };
+            let is_bl = first & 0xf800 == 0xf000 && second & 0xd000 == 0xd000;
+            if is_bl || second & 0xff87 == 0x4780 {
+                each(word);
+                found += 1;
+            }
+        }
+        at += size_of::<usize>();
+    }
 }
 
 /// The clock security system: the probe's 8 MHz have stopped, the chip goes on at 16 MHz by itself.

@@ -14,6 +14,7 @@ use crate::features::{Property, PropertySet};
 use crate::fused::{FeatureSet, Observation, Vector};
 use crate::kernels::{Kernels, Live, Plain, confused};
 use crate::table::{Action, Contents, Gaussian, MAX_ACTIONS, MAX_MOVEMENTS, Table, mean_step};
+use crate::up_to;
 
 mod fused;
 mod student;
@@ -398,7 +399,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             self.backgrounds.extend(backgrounds);
         }
         // as many
-        self.posterior = log.iter().map(|_| 0.0).collect();
+        self.posterior = up_to(log.iter().map(|_| 0.0));
         self.restart();
         let actions = self.actions.iter();
         self.at_first = actions.map(|a| self.uncertainty(method, *a)).collect();

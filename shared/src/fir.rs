@@ -159,19 +159,24 @@ impl BandPower {
     pub fn push<K: Kernels>(&mut self, taps: &Taps, samples: &[i16]) {
         let mut samples = samples;
         while !samples.is_empty() {
-            let room = self.samples.0.get_mut(HISTORY + self.filled..);
-            let room = room.unwrap_or_default();
-            let many = samples.len().min(room.len());
-            let (now, later) = samples.split_at_checked(many).unwrap_or_default();
-            for (slot, &sample) in room.iter_mut().zip(now) {
-                *slot = sample.clamp(-4096, 4095);
-            }
-            self.filled += many;
-            samples = later;
+            samples = self.take(samples);
             if self.filled >= BLOCK {
                 self.flush::<K>(taps);
             }
         }
+    }
+
+    /// Takes as many samples as the block has room for, and gives the others back.
+    fn take<'s>(&mut self, samples: &'s [i16]) -> &'s [i16] {
+        let room = self.samples.0.get_mut(HISTORY + self.filled..);
+        let room = room.unwrap_or_default();
+        let many = samples.len().min(room.len());
+        let (now, later) = samples.split_at_checked(many).unwrap_or_default();
+        for (slot, &sample) in room.iter_mut().zip(now) {
+            *slot = sample.clamp(-4096, 4095);
+        }
+        self.filled += many;
+        later
     }
 
     /// Sum of squares of all outputs in Q14 counts^2, and their number.

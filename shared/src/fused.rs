@@ -8,6 +8,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::features::{FUSED_BANDS, Measurement, Properties, Property, PropertySet};
+use crate::up_to;
 
 mod whitening;
 
@@ -137,7 +138,7 @@ impl From<&Measurement> for Observation {
         });
         Self {
             properties: slide.properties,
-            bands: slide.fused_bands().into_iter().filter_map(fixed).collect(),
+            bands: up_to(slide.fused_bands().into_iter().filter_map(fixed)),
             pressure,
         }
     }

@@ -4,6 +4,9 @@
 //!
 //! The crate has no std, no allocation, no unsafe code, no clock and no statics: the same functions run on the chip and on
 //! a PC, and give the same bits.
+//!
+//! For the chip it is compiled for speed, and what is generic or `#[inline]` with the firmware, for size (`Cargo.toml`):
+//! large functions that nobody waits for are `#[inline]`.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -30,3 +33,19 @@ pub mod table;
 pub mod teaching;
 pub mod training;
 pub mod wire;
+
+/// Adds as many of them as there is room for: `extend` would panic at more.
+fn fill<T, const N: usize>(room: &mut heapless::Vec<T, N>, items: impl Iterator<Item = T>) {
+    for item in items {
+        if room.push(item).is_err() {
+            break;
+        }
+    }
+}
+
+/// As many of them as there is room for: `collect` would panic at more.
+fn up_to<T, const N: usize>(items: impl Iterator<Item = T>) -> heapless::Vec<T, N> {
+    let mut room = heapless::Vec::new();
+    fill(&mut room, items);
+    room
+}

@@ -79,6 +79,7 @@ impl Movement {
     ///
     /// # Errors
     /// The first value that is out of its range.
+    #[inline(never)]
     pub const fn new(force_mn: u16, speed_um_s: u32) -> Result<Self, MovementError> {
         if force_mn < *Self::FORCE_MN.start() || force_mn > *Self::FORCE_MN.end() {
             return Err(MovementError::Force(force_mn as u32));
@@ -174,7 +175,18 @@ impl Movement {
 
 impl fmt::Display for Movement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:.2} N, {:.1} mm/s", self.force_n(), self.speed_mm_s())
+        // as core prints an f32, to the nearest and then the even one: with core that takes the chip 9 KB
+        let nearest = |value: f32, parts: f64| libm::rint(f64::from(value) * parts) as u32;
+        let hundredths_n = nearest(self.force_n(), 100.0);
+        let tenths_mm_s = nearest(self.speed_mm_s(), 10.0);
+        write!(
+            f,
+            "{}.{:02} N, {}.{} mm/s",
+            hundredths_n / 100,
+            hundredths_n % 100,
+            tenths_mm_s / 10,
+            tenths_mm_s % 10
+        )
     }
 }
 
@@ -237,6 +249,17 @@ impl SlidePath {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn is_printed_as_the_numbers_would_be() {
+        use std::{format, string::ToString as _};
+        let forces = Movement::FORCE_MN.map(|mn| Movement::new(mn, 5_000));
+        let speeds = Movement::SPEED_UM_S.map(|um_s| Movement::new(100, um_s));
+        for movement in forces.chain(speeds).map(Result::unwrap) {
+            let (n, mm_s) = (movement.force_n(), movement.speed_mm_s());
+            assert_eq!(movement.to_string(), format!("{n:.2} N, {mm_s:.1} mm/s"));
+        }
+    }
 
     #[test]
     fn grid_is_the_geometric_series_of_eq_20_and_21() {

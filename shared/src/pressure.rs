@@ -126,6 +126,7 @@ impl Calibration {
     /// The first value that cannot be: a scale that is not above 0, a rest value outside the converter's range, or a
     /// no-contact value that leaves less than the linear range below full scale, so that the finger would press on and
     /// P_DC never say so.
+    #[inline(never)]
     pub fn check(&self) -> Result<(), CalibrationError> {
         let scales = [
             self.pac_pa_per_count,

@@ -6,7 +6,7 @@ use core::fmt::{self, Write as _};
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
-use crate::explorer::{Config, Explorer, Method};
+use crate::explorer::{Config, Explorer, Method, Outlook};
 use crate::features::{Plan, Slide};
 use crate::fused::{Observation, Vector};
 use crate::kernels::Kernels;
@@ -15,13 +15,20 @@ use crate::rig::guard::Fault;
 use crate::rig::pins::Felt;
 use crate::rig::{Event, MAX_REJECTED, Rig, explore};
 use crate::store::Store;
-use crate::table::{Contents, MAX_ACTIONS, MAX_MOVEMENTS, Table};
+use crate::table::{Contents, MAX_MOVEMENTS, Table};
 use crate::teaching::forget_stale;
 use crate::training::{Training, Wanted};
+use crate::up_to;
 use crate::wire::{Block, Identify, MAX_OUTLOOK, MAX_TEXTURES, Name, Promise, Tell, Text, Train};
 
 /// A sentence, cut off where it is too long.
 pub fn text(sentence: impl fmt::Display) -> Text {
+    cut(&sentence)
+}
+
+/// Once, whatever is said.
+#[inline(never)]
+fn cut(sentence: &dyn fmt::Display) -> Text {
     /// Takes what fits.
     struct Cut(Text);
     impl fmt::Write for Cut {
@@ -118,21 +125,12 @@ where
         || random.next_u32(),
         |event| match event {
             Event::Chosen(action, outlook) => {
-                let mut best: Vec<Promise, MAX_ACTIONS> = outlook
-                    .iter()
-                    .map(|o| Promise {
-                        action: o.action,
-                        uncertainty: o.uncertainty,
-                        benefit: o.benefit,
-                    })
-                    .collect();
-                best.sort_unstable_by(|a, b| b.benefit.total_cmp(&a.benefit));
                 if let Some(movement) = table.movement(action.movement) {
                     tell(Tell::Chosen {
                         slide,
                         movement,
                         action,
-                        outlook: best.into_iter().take(MAX_OUTLOOK).collect(),
+                        outlook: best(outlook),
                     });
                 }
             }
@@ -172,8 +170,36 @@ where
         table: table.crc(),
         texture: verdict.texture,
         certain: explorer.is_certain(),
-        felt: explorer.felt().collect(),
+        felt: up_to(explorer.felt()),
     })
+}
+
+/// The most useful actions, best first. One after the other, for sorting them all takes the chip 2 KB.
+fn best(outlook: &[Outlook]) -> Vec<Promise, MAX_OUTLOOK> {
+    let mut best: Vec<Promise, MAX_OUTLOOK> = Vec::new();
+    for o in outlook {
+        let better = |p: &Promise| p.benefit.total_cmp(&o.benefit).is_ge();
+        if best.is_full() {
+            if best.last().is_some_and(better) {
+                continue;
+            }
+            best.pop();
+        }
+        // there is room
+        let _ = best.push(Promise {
+            action: o.action,
+            uncertainty: o.uncertainty,
+            benefit: o.benefit,
+        });
+        let mut rest = best.as_mut_slice();
+        while let [.., before, last] = rest
+            && !better(before)
+        {
+            core::mem::swap(before, last);
+            (rest, _) = rest.split_at_mut(rest.len().saturating_sub(1));
+        }
+    }
+    best
 }
 
 /// Learns the texture under the finger on top of `table`, and goes on where an earlier training of it stopped: every trial
@@ -209,9 +235,8 @@ where
         Store::<F>::MAX_TABLE.min(room.len()),
     )
     .map_err(text)?;
-    let movements: Vec<Movement, MAX_MOVEMENTS> =
-        training.learned().iter().map(|(m, _)| *m).collect();
-    for movement in movements {
+    let movements: Vec<Movement, MAX_MOVEMENTS> = up_to(training.learned().iter().map(|(m, _)| *m));
+    for &movement in &movements {
         let before = store.trained(name, movement, training.table()).await;
         if let Some(lesson) = before.map_err(text)? {
             training.resume(movement, lesson).map_err(text)?;

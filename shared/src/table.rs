@@ -167,6 +167,7 @@ pub enum TableError {
 }
 
 impl fmt::Display for TableError {
+    #[inline]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Truncated { got, wanted } => write!(f, "truncated: {got} bytes of {wanted}"),
@@ -389,6 +390,7 @@ impl<'a> Table<'a> {
     ///
     /// # Errors
     /// The first check that failed.
+    #[inline]
     pub fn read(bytes: &'a [u8]) -> Result<Self, TableError> {
         let truncated = |wanted| TableError::Truncated {
             got: bytes.len(),
@@ -445,6 +447,7 @@ impl<'a> Table<'a> {
         Ok(table)
     }
 
+    #[inline]
     fn check(&self) -> Result<(), TableError> {
         let mut at = self.layout().names;
         let length = |end| TableError::Length {
@@ -493,6 +496,7 @@ impl<'a> Table<'a> {
         Ok(())
     }
 
+    #[inline]
     fn check_deviations(&self, measured: PropertySet) -> Result<(), TableError> {
         for texture in 0..self.textures {
             for movement in (0..self.movements).filter(|&m| self.trials(texture, m) >= 2) {

@@ -12,6 +12,7 @@ use crate::fused::{Vector, Whitened};
 use crate::session::{Visited, commit, text};
 use crate::store::{SelfTaught, Store};
 use crate::table::{Change, EncodeError, Known, MAX_MOVEMENTS, Table, Tally, amend, retell};
+use crate::up_to;
 use crate::wire::{Forget, MAX_TEXTURES, Name, Tell, Text};
 
 /// Copies the stored table into `room`, with what the probe has learned by itself in its place: the table in force. Gives its
@@ -70,12 +71,13 @@ pub async fn learn_by_itself<F: NorFlash>(
         number,
         movements: Vec::new(),
     };
-    let kept = store.self_taught(lineage, |kept| {
+    let mut each = |kept: SelfTaught| {
         if kept.number == number {
             record = kept;
         }
-    });
-    kept.await.map_err(text)?;
+    };
+    let kept = store.self_taught(lineage, &mut each).await;
+    kept.map_err(text)?;
     let mut learned = 0u8;
     for (movement, slides, mean) in &visited.felt {
         let known = table.whitened(texture, *movement);
@@ -154,9 +156,10 @@ pub async fn answer<F: NorFlash>(
     if known.is_none() && usize::from(base.textures()) >= MAX_TEXTURES {
         return Err(text("the table is full: forget a texture first"));
     }
-    let mut whitened: Vec<Whitened, MAX_MOVEMENTS> = (0..base.movements().len() as u8)
-        .map(|movement| known.map_or(Whitened::default(), |t| base.whitened(t, movement)))
-        .collect();
+    let mut whitened: Vec<Whitened, MAX_MOVEMENTS> = up_to(
+        (0..base.movements().len() as u8)
+            .map(|movement| known.map_or(Whitened::default(), |t| base.whitened(t, movement))),
+    );
     let mut slides = 0u8;
     for (movement, count, mean) in &visited.felt {
         let Some(at) = whitened.get_mut(usize::from(*movement)) else {
@@ -188,12 +191,13 @@ pub async fn answer<F: NorFlash>(
         // what the probe had learned by itself goes the same way
         let (lineage, number) = (base.lineage(), base.number(texture));
         let mut record = None;
-        let kept = store.self_taught(lineage, |kept| {
+        let mut each = |kept: SelfTaught| {
             if kept.number == number {
                 record = Some(kept);
             }
-        });
-        kept.await.map_err(text)?;
+        };
+        let kept = store.self_taught(lineage, &mut each).await;
+        kept.map_err(text)?;
         if let Some(mut record) = record {
             for (movement, count, mean) in &visited.felt {
                 let of_movement = record.movements.iter_mut().find(|m| m.0 == *movement);

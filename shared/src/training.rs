@@ -18,6 +18,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::features::{Property, PropertySet};
+use crate::fill;
 use crate::fused::{FeatureSet, Observation, Whitened};
 use crate::movement::Movement;
 use crate::store::Trained;
@@ -93,6 +94,7 @@ pub enum TrainingError {
 }
 
 impl fmt::Display for TrainingError {
+    #[inline]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Name(length) => write!(
@@ -172,6 +174,7 @@ impl Training {
     ///
     /// # Errors
     /// Everything that would keep the texture out of the table in the end: see [`TrainingError`].
+    #[inline]
     pub fn new(
         wanted: Wanted<'_>,
         table: Option<&Table<'_>>,
@@ -223,15 +226,20 @@ impl Training {
             .and_then(|table| Some((table, table.find(&name)?)));
         let mut learned = Vec::new();
         match table.filter(|_| makes_table) {
-            Some(table) => learned.extend(table.movements().zip(0..).map(|(movement, index)| {
-                let known = known.map(|(table, texture)| match contents {
-                    Contents::Gaussians(_) => Lesson::Gaussians(table.experience(texture, index)),
-                    Contents::Fused(..) => Lesson::Fused(table.whitened(texture, index)),
-                });
-                (movement, known.unwrap_or(untouched(movement).1))
-            })),
-            None if wanted.pilot => learned.extend(pilot_movements().map(untouched)),
-            None => learned.extend(FIRST_MOVEMENTS.into_iter().map(untouched)),
+            Some(table) => fill(
+                &mut learned,
+                table.movements().zip(0..).map(|(movement, index)| {
+                    let known = known.map(|(table, texture)| match contents {
+                        Contents::Gaussians(_) => {
+                            Lesson::Gaussians(table.experience(texture, index))
+                        }
+                        Contents::Fused(..) => Lesson::Fused(table.whitened(texture, index)),
+                    });
+                    (movement, known.unwrap_or(untouched(movement).1))
+                }),
+            ),
+            None if wanted.pilot => fill(&mut learned, pilot_movements().map(untouched)),
+            None => fill(&mut learned, FIRST_MOVEMENTS.into_iter().map(untouched)),
         }
         if makes_table && known.is_none() {
             let textures = table.map_or(0, |table| usize::from(table.textures())) + 1;
@@ -284,6 +292,7 @@ impl Training {
     ///
     /// # Errors
     /// [`TrainingError::Movement`], [`TrainingError::Lesson`].
+    #[inline]
     pub fn resume(&mut self, movement: Movement, lesson: Lesson) -> Result<(), TrainingError> {
         let fits = matches!(
             (lesson, self.contents),
@@ -317,6 +326,7 @@ impl Training {
     ///
     /// # Errors
     /// [`TrainingError::Movement`], [`TrainingError::Missing`], [`TrainingError::Features`]: the slide does not count.
+    #[inline]
     pub fn took(
         &mut self,
         table: Option<&Table<'_>>,
@@ -353,6 +363,7 @@ impl Training {
     ///
     /// # Errors
     /// [`TrainingError::Unfinished`], [`TrainingError::Pilot`], [`TrainingError::Table`], [`TrainingError::Encode`].
+    #[inline]
     pub fn encode<'r>(
         &self,
         table: Option<&Table<'_>>,

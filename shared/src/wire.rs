@@ -393,6 +393,7 @@ mod sparse {
     use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer};
 
     use super::{MAX_TEXTURES, Vec};
+    use crate::up_to;
 
     const _: () = assert!(MAX_TEXTURES <= 1 << u8::BITS);
 
@@ -402,12 +403,9 @@ mod sparse {
         numbers: &Vec<f32, MAX_TEXTURES>,
         serializer: S,
     ) -> Result<S::Ok, S::Error> {
-        let others = numbers
-            .iter()
-            .zip(0..)
-            .filter(|(number, _)| number.to_bits() != 0)
-            .map(|(number, place)| (place, *number))
-            .collect();
+        let others = numbers.iter().zip(0..);
+        let others = others.filter(|(number, _)| number.to_bits() != 0);
+        let others = up_to(others.map(|(number, place)| (place, *number)));
         let count = u16::try_from(numbers.len()).map_err(S::Error::custom)?;
         OnLine::from((count, others)).serialize(serializer)
     }

@@ -6,6 +6,7 @@ mod factory;
 mod firmware;
 mod flash;
 mod fuzz;
+mod reasons;
 mod size;
 mod test;
 mod toolchain;

@@ -10,6 +10,7 @@ use crate::fixed::exp_neg_q30;
 use crate::fused::{MAX_FEATURES, Vector, oas, white};
 use crate::kernels::{Candidate, FREEDOM, Kernels, Spread, distance, mask};
 use crate::table::{Contents, MAX_MOVEMENTS, Table};
+use crate::up_to;
 
 /// Fewest textures whose means say what textures are like.
 const POPULATION: usize = 3;
@@ -54,13 +55,13 @@ impl Visit {
         if self.slides == 1 {
             // without divisions
             let slide = self.white.iter().take(features);
-            return slide.map(|&z| z as i16).collect();
+            return up_to(slide.map(|&z| z as i16));
         }
         let n = i32::from(self.slides.max(1));
         let rounded = |sum: i32| sum.saturating_mul(2).saturating_add(n).div_euclid(2 * n);
         // a mean of i16
         let means = self.white.iter().take(features);
-        means.map(|&sum| rounded(sum) as i16).collect()
+        up_to(means.map(|&sum| rounded(sum) as i16))
     }
 }
 

@@ -50,6 +50,7 @@ impl RigCalibration {
     ///
     /// # Errors
     /// [`RigCalibrationError::Damaged`], or what [`RigCalibration::check`] says.
+    #[inline]
     pub fn from_bytes(bytes: &[u8; Self::BYTES]) -> Result<Self, RigCalibrationError> {
         let (body, crc) = bytes
             .split_last_chunk::<4>()
@@ -104,6 +105,7 @@ impl RigCalibration {
     ///
     /// # Errors
     /// See [`RigCalibrationError`].
+    #[inline(never)]
     pub fn check(&self) -> Result<(), RigCalibrationError> {
         self.pressure
             .check()

@@ -15,6 +15,7 @@ use super::skin::SkinCare;
 use super::stage::{MARGIN_MM, Stage, StageConstants, StageState};
 use crate::movement::{Movement, SlidePath};
 use crate::pressure::{Calibration, Channel, RATE_HZ};
+use crate::up_to;
 
 /// The still finger is measured for so long.
 pub const BACKGROUND_MS: u32 = 1000;
@@ -105,11 +106,7 @@ impl core::fmt::Display for Refused {
             Self::NotHomed => {
                 f.write_str("lever and stage do not know where they are; home them first")
             }
-            Self::Fault(fault) => write!(
-                f,
-                "{fault}: {}",
-                fault.row().map_or("reset", |row| row.recovery)
-            ),
+            Self::Fault(fault) => write!(f, "{fault}: {}", fault.recovery()),
             Self::Force(mn) => write!(
                 f,
                 "{mn} mN is more than this rig may press; {HIGH_FORCE_MN} mN unless high forces are allowed"
@@ -722,9 +719,8 @@ impl Control {
             .flatten()
             .filter(|w| w.channel == Channel::Pac);
         self.slide_words = self.slide_words.saturating_add(pac.clone().count() as u32);
-        outputs.pac = pac
-            .map(|w| (i32::from(w.counts.get()) - self.baseline) as i16)
-            .collect();
+        let baseline = self.baseline;
+        outputs.pac = up_to(pac.map(|w| (i32::from(w.counts.get()) - baseline) as i16));
     }
 }
 

@@ -85,6 +85,9 @@ macro_rules! rows {
             refused: $refused,
             recovery: $recovery,
         }),*];
+
+        const NAMES: &[&str] = &[$($name),*];
+        const RECOVERIES: &[&str] = &[$($recovery),*];
     };
 }
 
@@ -124,6 +127,16 @@ rows! {
 }
 
 impl Fault {
+    /// Its name on the link and on the display. By itself, for the whole table would be in the chip's flash.
+    pub fn name(self) -> &'static str {
+        NAMES.get(self as usize).copied().unwrap_or("unknown fault")
+    }
+
+    /// What the user does. By itself as well.
+    pub fn recovery(self) -> &'static str {
+        RECOVERIES.get(self as usize).copied().unwrap_or("reset")
+    }
+
     /// The fault's row of the table.
     pub fn row(self) -> Option<&'static Row> {
         FAULTS.iter().find(|row| row.fault == self)
@@ -136,7 +149,7 @@ impl Fault {
 
 impl core::fmt::Display for Fault {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(self.row().map_or("unknown fault", |row| row.name))
+        f.write_str(self.name())
     }
 }
 
@@ -556,6 +569,8 @@ mod tests {
         for (at, row) in FAULTS.iter().enumerate() {
             assert_eq!(row.fault as usize, at, "{}", row.name);
             assert_eq!(row.fault.row(), Some(row));
+            let said = (row.fault.name(), row.fault.recovery());
+            assert_eq!(said, (row.name, row.recovery));
             assert!(!FAULTS[..at].iter().any(|other| other.name == row.name));
         }
         assert_eq!(Fault::StageNotHome as usize + 1, FAULTS.len());

@@ -222,7 +222,9 @@ impl Stage {
         if self.state != StageState::Standing {
             return None;
         }
-        let to_mm = to_mm.clamp(MARGIN_MM, self.constants.travel_mm - MARGIN_MM);
+        let to_mm = to_mm
+            .min(self.constants.travel_mm - MARGIN_MM)
+            .max(MARGIN_MM);
         let profile = Profile::new(
             self.position_mm(),
             to_mm,

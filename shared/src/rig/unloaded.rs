@@ -40,6 +40,7 @@ impl UnloadedRuns {
     /// # Errors
     /// [`RigCalibrationError::Points`] also before all runs are made; [`RigCalibrationError::NoLine`], and what
     /// [`RigCalibration::check`] says.
+    #[inline]
     pub fn finish(
         &self,
         calibration: &RigCalibration,

@@ -4,6 +4,7 @@ use crate::fused::FeatureSet;
 use crate::rig::pins::MAX_WORDS;
 use crate::store::SelfTaught;
 use crate::store::tests::ram::Ram;
+use crate::table::Action;
 use crate::table::tests::{around, fused_of, known, straight, table_of};
 use embassy_futures::block_on;
 use std::format;
@@ -343,9 +344,35 @@ fn training_a_fused_texture_ends_in_the_store() {
         assert_eq!((new.tally(texture).user, new.lineage()), (2, table.crc()));
         let number = new.number(texture);
         let mut left = vec::Vec::new();
-        block_on(store.self_taught(table.lineage(), |r| left.push(r.number))).unwrap();
+        block_on(store.self_taught(table.lineage(), &mut |r| left.push(r.number))).unwrap();
         assert!(!left.contains(&number) && left.contains(&1), "{left:?}");
         let unfinished = block_on(store.trained(name, table.movement(0).unwrap(), None));
         assert_eq!(unfinished, Ok(None));
+    }
+}
+
+#[test]
+fn the_outlook_has_the_best_first_and_no_more_than_its_room() {
+    let mut random = Random::new(5);
+    for length in [0, 1, 5, MAX_OUTLOOK, 50] {
+        let outlook: vec::Vec<Outlook> = (0..length)
+            .map(|n| Outlook {
+                action: Action {
+                    movement: n as u8,
+                    property: None,
+                },
+                uncertainty: random.next_f32(),
+                // some are equal
+                benefit: (random.next_u32() % 20) as f32,
+            })
+            .collect();
+        let mut sorted = outlook.clone();
+        sorted.sort_by(|a, b| b.benefit.total_cmp(&a.benefit));
+        let told = best(&outlook);
+        assert_eq!(told.len(), length.min(MAX_OUTLOOK));
+        for (told, sorted) in told.iter().zip(&sorted) {
+            assert_eq!((told.action, told.benefit), (sorted.action, sorted.benefit));
+            assert_eq!(told.uncertainty, sorted.uncertainty);
+        }
     }
 }

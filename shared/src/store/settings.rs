@@ -16,6 +16,7 @@ use crate::movement::Movement;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::training::Lesson;
+use crate::up_to;
 use crate::wire::{MAX_TEXTURES, Name};
 
 /// Version of the records and of the map they are in (`sequential-storage` 8).
@@ -140,11 +141,29 @@ impl<'m, 'f, F: NorFlash> Records<'m, 'f, F> {
     async fn next<T: for<'b> Deserialize<'b>>(
         &mut self,
     ) -> Result<Option<(u8, Option<T>)>, StoreError<F::Error>> {
+        let mut record = None;
+        let place = self
+            .look(&mut |bytes| {
+                record = postcard::from_bytes(bytes).ok();
+                record.is_some()
+            })
+            .await?;
+        Ok(place.zip(record))
+    }
+
+    /// As [`Records::next`], whatever its type is: `decode` says whether the bytes are a record.
+    async fn look(
+        &mut self,
+        decode: &mut dyn FnMut(&[u8]) -> bool,
+    ) -> Result<Option<u8>, StoreError<F::Error>> {
         let mut buffer = [0; RECORD];
         while let Some((key, bytes)) = self.items.next::<&[u8]>(&mut buffer).await? {
             let place = key.checked_sub(self.first);
             if let Some(place) = place.filter(|&place| place < self.places) {
-                return Ok(Some((place, decode(bytes)?)));
+                return match decode(bytes) {
+                    true => Ok(Some(place)),
+                    false => Err(StoreError::Settings(SettingsError::Corrupt)),
+                };
             }
         }
         Ok(None)
@@ -331,7 +350,7 @@ impl<F: NorFlash> Store<F> {
     pub async fn self_taught(
         &mut self,
         lineage: u32,
-        mut each: impl FnMut(SelfTaught),
+        each: &mut dyn FnMut(SelfTaught),
     ) -> Result<(), StoreError<F::Error>> {
         self.settings.map_err(StoreError::Settings)?;
         // which record of every place is the last: only that one counts
@@ -366,8 +385,8 @@ impl<F: NorFlash> Store<F> {
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
     pub async fn set_self_taught(&mut self, new: &SelfTaught) -> Result<(), StoreError<F::Error>> {
         let same = |old: &SelfTaught| old.lineage == new.lineage && old.number == new.number;
-        let used = self.self_keys(|_| true).await?;
-        let place = match self.self_keys(same).await?.first() {
+        let used = self.self_keys(&|_| true).await?;
+        let place = match self.self_keys(&same).await?.first() {
             Some(key) => Some(*key),
             None => (KEY_SELF..)
                 .take(MAX_TEXTURES)
@@ -376,7 +395,7 @@ impl<F: NorFlash> Store<F> {
         let place = match place {
             Some(key) => Some(key),
             None => {
-                let stale = self.self_keys(|old| old.lineage != new.lineage).await?;
+                let stale = self.self_keys(&|old| old.lineage != new.lineage).await?;
                 stale.first().copied()
             }
         };
@@ -395,7 +414,7 @@ impl<F: NorFlash> Store<F> {
         let is_its = |record: &SelfTaught| {
             of.is_none_or(|(lineage, number)| record.lineage == lineage && record.number == number)
         };
-        for key in self.self_keys(is_its).await? {
+        for &key in &self.self_keys(&is_its).await? {
             self.encode(key, &None::<SelfTaught>).await?;
         }
         Ok(())
@@ -404,7 +423,7 @@ impl<F: NorFlash> Store<F> {
     /// The keys whose newest record is such a one.
     async fn self_keys(
         &mut self,
-        is_wanted: impl Fn(&SelfTaught) -> bool,
+        is_wanted: &dyn Fn(&SelfTaught) -> bool,
     ) -> Result<heapless::Vec<u8, MAX_TEXTURES>, StoreError<F::Error>> {
         self.settings.map_err(StoreError::Settings)?;
         let mut wanted = [false; MAX_TEXTURES];
@@ -417,10 +436,9 @@ impl<F: NorFlash> Store<F> {
             }
         }
         let keys = (KEY_SELF..).zip(wanted);
-        Ok(keys
-            .filter(|(_, wanted)| *wanted)
-            .map(|(key, _)| key)
-            .collect())
+        Ok(up_to(
+            keys.filter(|(_, wanted)| *wanted).map(|(key, _)| key),
+        ))
     }
 
     /// Brings the pages into order, and looks whether they can be read.

@@ -80,6 +80,7 @@ pub enum EncodeError {
 }
 
 impl fmt::Display for EncodeError {
+    #[inline]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Empty => write!(
@@ -197,6 +198,7 @@ pub fn encode_fused<'o, 'a>(
 ///
 /// # Errors
 /// As [`encode`], and [`EncodeError::Texture`].
+#[inline]
 pub fn amend<'o>(
     out: &'o mut [u8],
     old: &Table<'_>,
@@ -255,6 +257,7 @@ pub fn amend<'o>(
 ///
 /// # Errors
 /// The bytes are no fused table, or have no such texture or movement.
+#[inline]
 pub fn retell(
     bytes: &mut [u8],
     texture: u16,
@@ -378,6 +381,7 @@ impl<'a> Row<'a> {
     }
 }
 
+#[inline]
 fn put_gaussians(
     writer: &mut Writer<'_>,
     measured: PropertySet,

@@ -54,7 +54,7 @@ fn in_force(store: &mut Store<Ram>) -> List<u8> {
 
 fn selves(store: &mut Store<Ram>, lineage: u32) -> List<SelfTaught> {
     let mut all = List::new();
-    block_on(store.self_taught(lineage, |record| all.push(record))).unwrap();
+    block_on(store.self_taught(lineage, &mut |record| all.push(record))).unwrap();
     all
 }
 

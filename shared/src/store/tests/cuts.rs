@@ -99,12 +99,12 @@ impl Model {
                 }
             }
             let mut selves = [None, None];
-            let each = |record: SelfTaught| {
+            let mut each = |record: SelfTaught| {
                 let of = (record.lineage, record.number);
                 let texture = SELVES.iter().position(|s| *s == of).unwrap();
                 assert_eq!(selves[texture].replace(record), None, "once only");
             };
-            store.self_taught(SELVES[0].0, each).await.unwrap();
+            store.self_taught(SELVES[0].0, &mut each).await.unwrap();
             Self {
                 self_taught: selves,
                 table,

@@ -39,7 +39,7 @@ pub(super) fn taught(
 /// All that is stored for this lineage, by number.
 fn all(store: &mut Chip, lineage: u32) -> Vec<SelfTaught> {
     let mut all = Vec::new();
-    block_on(store.self_taught(lineage, |record| all.push(record))).unwrap();
+    block_on(store.self_taught(lineage, &mut |record| all.push(record))).unwrap();
     all.sort_by_key(|record| record.number);
     all
 }
