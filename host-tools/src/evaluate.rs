@@ -127,7 +127,7 @@ pub fn play_and_tell<const N: usize>(
         let action = explorer.choose(&outlook, run.random.next_u32());
         let slide = run.slide(action.movement.into());
         explorer
-            .observe(action, &slide)
+            .observe(action, slide)
             .expect("every slide has the properties that the explorer was told of");
         tell(action, explorer.posterior());
     };
