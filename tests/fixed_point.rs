@@ -34,7 +34,7 @@ impl Oracle {
                     .map(|s| f64::from(s.properties.get(p).unwrap()))
                     .collect()
             };
-            run.training
+            run.training()
                 .iter()
                 .map(|movements| {
                     movements
@@ -155,7 +155,7 @@ fn explore_fused(
         // the core draws for the random strategy at every step
         let _ = run.random.next_u32();
         let slide = run.slide(movement);
-        visit.slide(trained, movement, &x(&slide));
+        visit.slide(trained, movement, &x(slide));
         let (best, p) = visit.best(trained);
         let sure = p > f64::from(config.threshold);
         if sure || visit.slides() == u32::from(config.max_slides) {
@@ -190,7 +190,7 @@ fn oracle(experiment: &Experiment, set: FeatureSet, config: Config, runs: u64) -
     let trained = |run: &Run<'_>| {
         let of = |slides: &Vec<Observation>| slides.iter().map(|s| features(set, s)).collect();
         let of = |texture: &Vec<Vec<Observation>>| texture.iter().map(of).collect();
-        Trained::train(&run.training.iter().map(of).collect())
+        Trained::train(&run.training().iter().map(of).collect())
     };
     let one = |kept: &mut (Option<Vec<f64>>, Option<Trained>), index| {
         let run = experiment.run(index);

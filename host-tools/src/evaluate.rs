@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use rand::Rng as _;
 use rayon::prelude::*;
 use serde::Serialize;
-use tactus_core::explorer::{self, Config, Explorer, ExplorerError, Strategy};
+use tactus_core::explorer::{self, Config, Confusions, Degrees, Explorer, ExplorerError, Strategy};
 use tactus_core::features::PropertySet;
 use tactus_core::table::{Action, Table, TableError};
 
@@ -97,18 +97,45 @@ pub enum EvaluateError {
     Explorer(#[from] ExplorerError),
 }
 
-/// Plays one run to its end.
+/// Most memory for degrees of confusion that are kept, bytes.
+const MAX_KEPT: usize = 256 << 20;
+
+/// What all runs with the same table share.
+#[derive(Clone, Debug)]
+pub struct Shared<'b> {
+    /// The explorer before its first slide.
+    pub explorer: Box<Explorer<'b, MAX_TEXTURES>>,
+    /// Where they are asked for at every step, and there is memory for them.
+    pub confusions: Option<Confusions<Vec<Degrees>>>,
+}
+
+impl<'b> Shared<'b> {
+    /// Of an explorer that moves on so.
+    pub fn new(explorer: Box<Explorer<'b, MAX_TEXTURES>>, strategy: Strategy) -> Self {
+        let room = Confusions::<Vec<_>>::room(&explorer);
+        let keep = strategy == Strategy::Bayesian && room <= MAX_KEPT / size_of::<Degrees>();
+        let kept = || Confusions::new(&explorer, vec![Degrees::default(); room]);
+        Self {
+            confusions: keep.then(kept).flatten(),
+            explorer,
+        }
+    }
+}
+
+/// Plays one run to its end, with the degrees of confusion of [`Shared`] or computing them where they are asked for.
 pub fn play<const N: usize>(
     explorer: &mut Explorer<'_, N>,
+    confusions: Option<&Confusions<Vec<Degrees>>>,
     strategy: Strategy,
     run: Run<'_>,
 ) -> Outcome {
-    play_and_tell(explorer, strategy, run, |_, _| ())
+    play_and_tell(explorer, confusions, strategy, run, |_, _| ())
 }
 
 /// As [`play`]; `tell` hears of every action and the posterior after it.
 pub fn play_and_tell<const N: usize>(
     explorer: &mut Explorer<'_, N>,
+    confusions: Option<&Confusions<Vec<Degrees>>>,
     strategy: Strategy,
     mut run: Run<'_>,
     mut tell: impl FnMut(Action, &[f32]),
@@ -119,15 +146,19 @@ pub fn play_and_tell<const N: usize>(
             break verdict;
         }
         // only Bayesian exploration looks ahead
-        let outlook = if strategy == Strategy::Bayesian {
-            explorer.outlook()
-        } else {
-            Default::default()
+        let outlook = match (strategy, confusions) {
+            (Strategy::Bayesian, Some(confusions)) => {
+                #[cfg(test)]
+                tests::KEPT.set(tests::KEPT.get() + 1);
+                explorer.outlook_by(confusions)
+            }
+            (Strategy::Bayesian, None) => explorer.outlook(),
+            _ => Default::default(),
         };
         let action = explorer.choose(&outlook, run.random.next_u32());
         let slide = run.slide(action.movement.into());
         explorer
-            .observe(action, &slide)
+            .observe(action, slide)
             .expect("every slide has the properties that the explorer was told of");
         tell(action, explorer.posterior());
     };
@@ -151,34 +182,45 @@ pub fn evaluate(
     runs: u64,
     done: impl Fn() + Sync,
 ) -> Result<Vec<Outcome>, EvaluateError> {
-    let measured: PropertySet = experiment.measured();
     // where every run learns from the same slides, one table serves all
-    let bytes = if experiment.is_fixed() {
-        Some(experiment.run(0).learn(config.method)?)
-    } else {
-        None
-    };
-    let shared = match &bytes {
-        Some(bytes) => Some(explorer(bytes, measured, config, experiment.candidates())?),
-        None => None,
-    };
+    if experiment.is_fixed() {
+        let bytes = experiment.run(0).learn(config.method)?;
+        let candidates = experiment.candidates();
+        let explorer = explorer(&bytes, experiment.measured(), config, candidates)?;
+        let shared = Shared::new(explorer, config.strategy);
+        return Ok(play_all(experiment, config.strategy, &shared, runs, done));
+    }
+    (0..runs)
+        .into_par_iter()
+        .map(|index| {
+            let run = experiment.run(index);
+            let bytes = run.learn(config.method)?;
+            let candidates = experiment.candidates();
+            let mut explorer = explorer(&bytes, experiment.measured(), config, candidates)?;
+            let outcome = play(&mut explorer, None, config.strategy, run);
+            done();
+            Ok(outcome)
+        })
+        .collect()
+}
+
+/// Runs that all begin with the same.
+fn play_all(
+    experiment: &Experiment,
+    strategy: Strategy,
+    shared: &Shared<'_>,
+    runs: u64,
+    done: impl Fn() + Sync,
+) -> Vec<Outcome> {
     (0..runs)
         .into_par_iter()
         .map_init(
-            || shared.clone(),
-            |shared, index| {
+            || shared.explorer.clone(),
+            |explorer, index| {
                 let run = experiment.run(index);
-                let outcome = match shared {
-                    Some(explorer) => play(explorer, config.strategy, run),
-                    None => {
-                        let bytes = run.learn(config.method)?;
-                        let candidates = experiment.candidates();
-                        let mut explorer = explorer(&bytes, measured, config, candidates)?;
-                        play(&mut explorer, config.strategy, run)
-                    }
-                };
+                let outcome = play(explorer, shared.confusions.as_ref(), strategy, run);
                 done();
-                Ok(outcome)
+                outcome
             },
         )
         .collect()
@@ -297,7 +339,70 @@ impl Summary {
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+
     use super::*;
+    use crate::properties::PropertyTable;
+
+    thread_local! {
+        /// Steps of this thread that took degrees of confusion that were kept.
+        pub(super) static KEPT: Cell<u64> = const { Cell::new(0) };
+    }
+
+    /// Thirty textures in the plane of roughness and fineness, their neighbours much alike.
+    fn experiment() -> Experiment {
+        let slide = |texture: u16, trial: u16| {
+            let [column, row, trial] = [texture % 6, texture / 6, trial].map(f32::from);
+            let off = (column + 2.0 * row + 3.0 * trial) % 5.0 - 2.0;
+            [
+                1.0,
+                4.0 + 0.3 * column + 0.1 * off,
+                2.0 + 0.3 * row - 0.1 * off,
+            ]
+        };
+        let slides = |trials: std::ops::Range<u16>| -> Vec<Vec<_>> {
+            let texture = |t| vec![trials.clone().map(|trial| slide(t, trial)).collect()];
+            (0..30).map(texture).collect()
+        };
+        let table = PropertyTable {
+            textures: (0..30).map(|t| t.to_string()).collect(),
+            movements: vec!["only".to_owned()],
+            train: slides(0..4),
+            validate: slides(4..9),
+        };
+        Experiment::given(&table, None, 1).unwrap()
+    }
+
+    #[test]
+    fn runs_with_one_table_share_its_degrees_of_confusion() {
+        let experiment = experiment();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
+        let pool = pool.build().unwrap();
+        for (strategy, keeps) in [
+            (Strategy::Bayesian, true),
+            (Strategy::Cycling, false),
+            (Strategy::Random, false),
+        ] {
+            let config = Config {
+                strategy,
+                ..Config::default()
+            };
+            let all = || {
+                let before = KEPT.get();
+                let outcomes = evaluate(&experiment, config, 100, || ()).unwrap();
+                (outcomes, KEPT.get() - before)
+            };
+            let (outcomes, kept) = pool.install(all);
+            let steps = outcomes.iter().map(|o| u64::from(o.slides)).sum::<u64>();
+            assert!(steps > 200, "{steps}");
+            assert_eq!(kept, if keeps { steps } else { 0 });
+            // as without
+            let bytes = experiment.run(0).learn(config.method).unwrap();
+            let mut explorer = explorer(&bytes, experiment.measured(), config, None).unwrap();
+            let computed = (0..100).map(|n| play(&mut explorer, None, strategy, experiment.run(n)));
+            assert!(computed.eq(outcomes));
+        }
+    }
 
     #[test]
     fn summary_counts_as_the_protocols_say() {

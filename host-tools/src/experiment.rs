@@ -406,41 +406,23 @@ impl Experiment {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         random.set_stream(run);
         let unknown = self.unknowns[(run % self.unknowns.len() as u64) as usize];
-        let mut shown: Vec<Vec<Observation>> = Vec::new();
         // As in the reference program, the same places in the session are drawn for all textures: slides of one place share
         // what the session did to them.
         let mut orders: HashMap<(usize, usize), Vec<usize>> = HashMap::new();
-        let mut training = Vec::with_capacity(self.pools.len());
-        for (texture, pools) in self.pools.iter().enumerate() {
-            let mut of_texture = Vec::with_capacity(pools.len());
-            for (movement, pool) in pools.iter().enumerate() {
-                let order = orders
-                    .entry((movement, pool.train.len()))
-                    .or_insert_with(|| {
-                        let mut order: Vec<usize> = (0..pool.train.len()).collect();
-                        if self.drawn {
-                            order.shuffle(&mut random);
-                        }
-                        order
-                    });
-                let (learned, rest) = order.split_at(self.train_slides);
-                let slides = |at: &[usize]| {
-                    at.iter()
-                        .map(|&i| pool.train[i].clone())
-                        .collect::<Vec<_>>()
-                };
-                if texture == unknown {
-                    shown.push(pool.test.clone().unwrap_or_else(|| slides(rest)));
-                }
-                of_texture.push(slides(learned));
+        if self.drawn {
+            for (movement, pool) in self.pools.iter().flat_map(|pools| pools.iter().enumerate()) {
+                let slides = pool.train.len();
+                orders.entry((movement, slides)).or_insert_with(|| {
+                    let mut order: Vec<usize> = (0..slides).collect();
+                    order.shuffle(&mut random);
+                    order
+                });
             }
-            training.push(of_texture);
         }
         Run {
             experiment: self,
-            training,
+            orders,
             unknown,
-            shown,
             random,
         }
     }
@@ -450,17 +432,34 @@ impl Experiment {
 #[derive(Clone, Debug)]
 pub struct Run<'e> {
     experiment: &'e Experiment,
-    /// Training slides per texture and movement.
-    pub training: Vec<Vec<Vec<Observation>>>,
+    /// In which order slides are taken, by movement and how many there are; that of time, where nothing is drawn.
+    orders: HashMap<(usize, usize), Vec<usize>>,
     /// The texture to be identified.
     pub unknown: usize,
-    /// Its test slides, per movement.
-    shown: Vec<Vec<Observation>>,
     /// Drawn from for the slides; an explorer's own random choices go through it too.
     pub random: ChaCha8Rng,
 }
 
-impl Run<'_> {
+impl<'e> Run<'e> {
+    /// Training slides per texture and movement.
+    pub fn training(&self) -> Vec<Vec<Vec<Observation>>> {
+        let of = |(movement, pool): (usize, &Pool)| {
+            let learned = 0..self.experiment.train_slides;
+            let slides = learned.map(|n| pool.train[self.place(movement, pool, n)].clone());
+            slides.collect()
+        };
+        let pools = self.experiment.pools.iter();
+        pools
+            .map(|pools| pools.iter().enumerate().map(of).collect())
+            .collect()
+    }
+
+    /// Where the `n`th slide of a pool is: the training slides come first, then those to test with.
+    fn place(&self, movement: usize, pool: &Pool, n: usize) -> usize {
+        let order = self.orders.get(&(movement, pool.train.len()));
+        order.map_or(n, |order| order[n])
+    }
+
     /// The texture table learned from the training slides, as bytes.
     ///
     /// # Errors
@@ -472,7 +471,7 @@ impl Run<'_> {
             features,
             ..
         } = self.experiment;
-        learn(method, *features, names, movements, &self.training)
+        learn(method, *features, names, movements, &self.training())
     }
 
     /// As [`Run::learn`], without one of the textures.
@@ -486,15 +485,22 @@ impl Run<'_> {
             features,
             ..
         } = self.experiment;
-        let (mut names, mut training) = (names.clone(), self.training.clone());
+        let (mut names, mut training) = (names.clone(), self.training());
         names.remove(texture);
         training.remove(texture);
         learn(method, *features, &names, movements, &training)
     }
 
     /// One more slide of the unknown texture.
-    pub fn slide(&mut self, movement: usize) -> Observation {
-        let slides = &self.shown[movement];
-        slides[self.random.random_range(0..slides.len())].clone()
+    pub fn slide(&mut self, movement: usize) -> &'e Observation {
+        let pool = &self.experiment.pools[self.unknown][movement];
+        match &pool.test {
+            Some(test) => &test[self.random.random_range(0..test.len())],
+            None => {
+                let learned = self.experiment.train_slides;
+                let n = self.random.random_range(0..pool.train.len() - learned);
+                &pool.train[self.place(movement, pool, learned + n)]
+            }
+        }
     }
 }

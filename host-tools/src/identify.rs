@@ -73,7 +73,7 @@ pub(crate) fn identify(
             )?;
             let run = experiment.run(index as u64);
             bytes = run.learn(args.method.unwrap_or(Method::Fused).method())?;
-            let learned = &run.training[index];
+            let learned = &run.training()[index];
             let unseen = |slide: &Slide, felt: &Felt| {
                 let felt_now = Observation::from(&felt.measurement);
                 slide.number == felt.number && !learned.iter().flatten().any(|l| *l == felt_now)

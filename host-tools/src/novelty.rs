@@ -73,7 +73,7 @@ fn visit(
         let action = explorer.choose(&outlook, 0);
         let slide = run.slide(action.movement.into());
         explorer
-            .observe(action, &slide)
+            .observe(action, slide)
             .expect("every slide has the features that the table was learned from");
         *flag = explorer.is_unknown();
     }

@@ -183,8 +183,10 @@ impl SimRig {
     pub fn tick(&mut self) -> &Outputs {
         let end = self.now_ns + TICK_NS;
         loop {
-            // slots from a timer of 4400 Hz: no drift
-            let slot_ns = (u128::from(self.slot) * 1_000_000_000 / u128::from(SLOTS_HZ)) as u64;
+            // slots from a timer of 4400 Hz: no drift, and no overflow
+            let hz = u64::from(SLOTS_HZ);
+            let (seconds, slot) = (self.slot / hz, self.slot % hz);
+            let slot_ns = seconds * 1_000_000_000 + slot * 1_000_000_000 / hz;
             let step_ns = if self.rate == 0 {
                 u64::MAX
             } else {

@@ -16,9 +16,11 @@ use crate::kernels::{Kernels, Live, Plain, confused};
 use crate::table::{Action, Contents, Gaussian, MAX_ACTIONS, MAX_MOVEMENTS, Table, mean_step};
 use crate::up_to;
 
+mod confusions;
 mod fused;
 mod student;
 
+pub use confusions::{Confusions, Degrees};
 use fused::{Background, Visits};
 use student::{Shrunk, Student};
 
@@ -794,16 +796,30 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         if method == Method::Fused {
             return fused::uncertainty::<K, N>(&self.table, movement, &self.posterior);
         }
+        let mut live: Vec<Live, N> = Vec::new();
+        let properties = self.gather(method, action, &self.posterior, &mut live);
+        uncertainty_of(&mut live, properties, K::confuse, K::sqrt)
+    }
+
+    /// The textures that are still likely, with what is expected of the properties that `action` looks at; how many these are.
+    // where a method is known while compiling, what the others take is left out here as well
+    #[inline(always)]
+    fn gather(
+        &self,
+        method: Method,
+        action: Action,
+        posterior: &[f32],
+        live: &mut Vec<Live, N>,
+    ) -> usize {
         let looked_at: PropertySet = match action.property {
             Some(property) => [property].into_iter().collect(),
             None => self.measured,
         };
-        let mut live: Vec<Live, N> = Vec::new();
         if method == Method::Paper {
-            gather(&self.table, action, &self.posterior, &mut live);
+            gather(&self.table, action, posterior, live);
         } else {
-            let expect = |texture, property| self.expected(texture, movement, property);
-            for (&probability, texture) in self.posterior.iter().zip(0..) {
+            let expect = |texture, property| self.expected(texture, action.movement, property);
+            for (&probability, texture) in posterior.iter().zip(0..) {
                 if probability >= NEGLIGIBLE {
                     let mut candidate = Live::new(probability);
                     for (slot, property) in candidate.expected.iter_mut().zip(looked_at.iter()) {
@@ -814,7 +830,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
                 }
             }
         }
-        uncertainty_of(&mut live, looked_at.iter().count(), K::confuse, K::sqrt)
+        looked_at.iter().count()
     }
 }
 
@@ -846,20 +862,31 @@ fn uncertainty_of(
 ) -> f32 {
     let mut rest = &mut *live;
     while let Some((a, others)) = rest.split_first_mut() {
-        if properties == 1 {
-            confuse(a, others);
-        } else {
-            for b in others.iter_mut() {
-                let pairs = a.expected.iter().zip(&b.expected).take(properties);
-                let confusion: f32 = pairs.map(|(a, b)| confused(*a, *b, sqrt)).product();
-                a.confused += confusion * b.probability;
-                b.confused += confusion * a.probability;
-            }
-        }
+        confuse_with(a, others, properties, confuse, sqrt);
         rest = others;
     }
     let left = |c: &Live| c.probability * c.confused / (c.probability + c.confused);
     live.iter().map(left).sum()
+}
+
+/// Confusion of one texture with all others (eq. 7), by so many properties.
+#[inline(always)]
+fn confuse_with(
+    a: &mut Live,
+    others: &mut [Live],
+    properties: usize,
+    confuse: fn(&mut Live, &mut [Live]),
+    sqrt: fn(f32) -> f32,
+) {
+    if properties == 1 {
+        return confuse(a, others);
+    }
+    for b in others {
+        let pairs = a.expected.iter().zip(&b.expected).take(properties);
+        let confusion: f32 = pairs.map(|(a, b)| confused(*a, *b, sqrt)).product();
+        a.confused += confusion * b.probability;
+        b.confused += confusion * a.probability;
+    }
 }
 
 /// Makes the greatest logarithm 0, so that there is room for slides to come.

@@ -88,6 +88,15 @@ pub struct Stage {
     adc_offset: f64,
     adc_gain: f64,
     noise_seed: u64,
+    along: Along,
+}
+
+/// What depends on the position alone: sines, which take longer than the rest of a tick, and the stage often stands.
+#[derive(Clone, Copy, Default, Debug)]
+struct Along {
+    force_n_per_a: f64,
+    /// of sliding, relative to its mean
+    friction: f64,
 }
 
 impl Stage {
@@ -112,7 +121,9 @@ impl Stage {
             adc_offset: stage.between(-ADC_ERRORS.0, ADC_ERRORS.0),
             adc_gain: 1.0 + stage.between(-ADC_ERRORS.1, ADC_ERRORS.1),
             noise_seed: trial.uniform().to_bits(),
+            along: Along::default(),
         };
+        stage.along = stage.along();
         stage.switch_limits();
         stage
     }
@@ -138,7 +149,7 @@ impl Stage {
 
     /// Lets one tick pass, the finger pushing the stage with `shear_n` (positive to higher positions).
     pub fn tick(&mut self, shear_n: f64) {
-        let force_n_per_a = self.force_n_per_a();
+        let force_n_per_a = self.along.force_n_per_a;
         let (drive_v, conductance) = if self.enabled {
             (self.duty * SUPPLY_V, 1.0 / RESISTANCE_OHM)
         } else {
@@ -164,6 +175,9 @@ impl Stage {
         if !(0.0..=TRAVEL_MM).contains(&self.position_mm) {
             self.position_mm = self.position_mm.clamp(0.0, TRAVEL_MM);
             self.speed_mm_s = 0.0;
+        }
+        if self.position_mm != self.position_before_mm {
+            self.along = self.along();
         }
         self.switch_limits();
     }
@@ -209,12 +223,9 @@ impl Stage {
         reading.round().clamp(0.0, 4095.0) as u16
     }
 
-    fn force_n_per_a(&self) -> f64 {
+    fn along(&self) -> Along {
         let turns = self.position_mm / LEAD_MM;
-        FORCE_N_PER_A * (1.0 + RIPPLE * (turns * RIPPLES_PER_TURN * TAU + self.ripple_phase).sin())
-    }
-
-    fn dry_friction_n(&self) -> f64 {
+        let ripple = (turns * RIPPLES_PER_TURN * TAU + self.ripple_phase).sin();
         let over_travel: f64 = FRICTION_WAVES
             .iter()
             .zip(self.friction_phase)
@@ -222,8 +233,15 @@ impl Stage {
                 share * (self.position_mm / wave_mm * TAU + phase).sin()
             })
             .sum();
+        Along {
+            force_n_per_a: FORCE_N_PER_A * (1.0 + RIPPLE * ripple),
+            friction: 1.0 + over_travel,
+        }
+    }
+
+    fn dry_friction_n(&self) -> f64 {
         let slow = (-self.speed_mm_s.abs() / STRIBECK_MM_S).exp();
-        COULOMB_N * self.friction_scale * (1.0 + over_travel) * (1.0 + (BREAKAWAY - 1.0) * slow)
+        COULOMB_N * self.friction_scale * self.along.friction * (1.0 + (BREAKAWAY - 1.0) * slow)
     }
 
     fn switch_limits(&mut self) {

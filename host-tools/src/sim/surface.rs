@@ -89,8 +89,8 @@ pub struct Surface {
     texture: Texture,
     /// heights, um
     height: Vec<f32>,
-    /// what of them the skin follows, um
-    followed: Vec<f32>,
+    /// what of them the skin follows, um: looked up all the time, so that its length is known while compiling
+    followed: Box<[f32; POINTS]>,
     /// rms of what it does not follow, um
     unresolved_um: f64,
     /// friction relative to the texture's, every [`SLOW_MM`]
@@ -135,7 +135,7 @@ impl Surface {
         Self {
             texture: texture.clone(),
             height,
-            followed,
+            followed: followed.try_into().expect("a profile has so many points"),
             unresolved_um,
             friction,
             amplitude,

@@ -429,8 +429,9 @@ impl World {
             self.inject_at(fault, began_ns, self.stage.position_mm());
         }
         self.ticks += 1;
-        // 1 s / 13 200 is 2 500 000 / 33 ns
-        self.tick_ends_ns = (u128::from(self.ticks) * 2_500_000 / 33) as u64;
+        // 1 s / 13 200 is 2 500 000 / 33 ns: exact, and no overflow
+        let (whole, rest) = (self.ticks / 33, self.ticks % 33);
+        self.tick_ends_ns = whole * 2_500_000 + rest * 2_500_000 / 33;
 
         let shear_n = self.finger.shear_n();
         if let Some(hand) = &mut self.hand {

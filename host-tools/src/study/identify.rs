@@ -282,6 +282,7 @@ fn evolution(
     ]];
     let outcome = play_and_tell(
         explorer,
+        None,
         Method::Paper.strategy(),
         run,
         |action, posterior| {

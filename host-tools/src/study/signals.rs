@@ -1,11 +1,13 @@
 //! What the sensor says while it is pressed (fig. 3) and while it slides (fig. 4).
 
+use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::biotac::BioTac;
 use tactus_core::features::Plan;
 use tactus_core::fir::{TAPS, Taps};
 use tactus_core::movement::Movement;
 use tactus_core::pressure::{Calibration, Channel, RATE_HZ};
+use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::PressureSensor as _;
 use tactus_core::spectrum::BIN_HZ;
 
@@ -97,10 +99,13 @@ impl Signals {
     /// # Errors
     /// See [`StudyError`].
     pub fn run(world: StudyWorld) -> Result<Self, StudyError> {
-        let slides = SHOWN.map(|(texture, movement)| example(world, texture, movement));
+        let calibration = world.calibration()?;
+        let slide = |(texture, movement)| example(world, calibration, texture, movement);
+        let slides = || SHOWN.into_par_iter().map(slide).collect::<Result<_, _>>();
+        let (press, slides) = rayon::join(|| press(world), slides);
         Ok(Self {
-            press: press(world),
-            slides: slides.into_iter().collect::<Result<_, _>>()?,
+            press,
+            slides: slides?,
         })
     }
 }
@@ -179,8 +184,12 @@ fn press(world: StudyWorld) -> Press {
     }
 }
 
-fn example(world: StudyWorld, texture: u8, movement: Movement) -> Result<Example, StudyError> {
-    let calibration = world.calibration()?;
+fn example(
+    world: StudyWorld,
+    calibration: RigCalibration,
+    texture: u8,
+    movement: Movement,
+) -> Result<Example, StudyError> {
     let mut rig = world.rig(texture, EXAMPLES, 0.0);
     rig.control()
         .calibrate(calibration)

@@ -234,9 +234,13 @@ impl StudyWorld {
             number,
             force_guard: true,
         };
+        let (training, validation) = rayon::join(
+            || self.record(&session(&all, TRAINING), calibration, &done),
+            || self.record(&session(&IDENTIFIED, VALIDATION), calibration, &done),
+        );
         Ok(Recorded {
-            training: self.record(&session(&all, TRAINING), calibration, &done)?,
-            validation: self.record(&session(&IDENTIFIED, VALIDATION), calibration, &done)?,
+            training: training?,
+            validation: validation?,
         })
     }
 }

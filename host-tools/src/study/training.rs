@@ -1,6 +1,7 @@
 //! Training: what 117 textures feel like, how their properties go together (Table 3), how they are confused (figs. 8, 9),
 //! and what a worn skin does to the data.
 
+use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::{Method, confusion};
 use tactus_core::features::Property;
@@ -362,7 +363,7 @@ impl Worn {
             let trials = world.record_worn(&session, wear, calibration, &done)?;
             Ok(Self { wear, trials })
         };
-        WEAR.iter().map(at).collect()
+        WEAR.par_iter().map(at).collect()
     }
 }
 

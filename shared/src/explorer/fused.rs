@@ -257,7 +257,12 @@ pub(super) fn uncertainty<K: Kernels, const N: usize>(
 
 /// The textures that are still likely.
 #[inline(never)]
-fn gather(table: &Table<'_>, movement: u8, posterior: &[f32], live: &mut VecView<Candidate>) {
+pub(super) fn gather(
+    table: &Table<'_>,
+    movement: u8,
+    posterior: &[f32],
+    live: &mut VecView<Candidate>,
+) {
     let Contents::Fused(_, features) = table.contents() else {
         return;
     };
@@ -274,7 +279,7 @@ fn gather(table: &Table<'_>, movement: u8, posterior: &[f32], live: &mut VecView
 
 /// Confusion of one texture with all others, whose distances from it are known.
 #[inline(never)]
-fn confuse_with(a: &mut Candidate, others: &mut [Candidate]) {
+pub(super) fn confuse_with(a: &mut Candidate, others: &mut [Candidate]) {
     let mut confused = a.confused;
     for b in others {
         // the last factor of the exponent is 2 at most

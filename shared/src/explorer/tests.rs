@@ -1,5 +1,6 @@
 //! The explorer against the paper's equations, written out in f64.
 
+mod confusions;
 mod fused;
 mod rules;
 mod student;

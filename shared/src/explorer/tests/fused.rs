@@ -239,6 +239,7 @@ fn explored(
     let mut recipe = Recipe::new(table, candidates);
     for slides in 1..=config.max_slides {
         let outlook = explorer.outlook();
+        super::confusions::promise_the_same_as_kept(&explorer);
         let p: Vec<f64> = candidates
             .iter()
             .map(|&c| explorer.posterior()[usize::from(c)].into())

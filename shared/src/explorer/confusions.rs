@@ -1,0 +1,184 @@
+//! Degrees of confusion that are kept: constants of table and candidates, computed once instead of at every decision. A PC has
+//! the memory for them; a chip has not, and its image has none of this.
+
+use heapless::Vec;
+
+use super::{Explorer, Method, Outlook, confuse_with, fused};
+use crate::kernels::{Candidate, Kernels, Live};
+use crate::table::{Action, MAX_ACTIONS};
+
+/// Actions side by side in [`Degrees`].
+const LANES: usize = 4;
+/// Textures side by side: their sums do not wait for each other.
+const ROWS: usize = 4;
+
+/// Degrees of confusion of two textures by some actions (eq. 7).
+pub type Degrees = [f32; LANES];
+
+/// Degrees of confusion of every two candidates of an explorer by each of its actions, in memory that the caller brings. They
+/// serve every explorer of the same table, candidates and method: [`Explorer::outlook_by`].
+#[derive(Clone, Copy, Debug)]
+pub struct Confusions<M> {
+    /// Square matrices, one for every few actions. A texture with itself has 0: eq. 10 leaves it out.
+    matrices: M,
+    textures: usize,
+}
+
+impl<M: AsRef<[Degrees]> + AsMut<[Degrees]>> Confusions<M> {
+    /// How much memory those of an explorer take.
+    pub fn room<const N: usize, K>(explorer: &Explorer<'_, N, K>) -> usize {
+        let textures = explorer.posterior.len();
+        explorer.actions.len().div_ceil(LANES) * textures * textures
+    }
+
+    /// Computes them; `None` where the memory is not as large as [`Confusions::room`] says.
+    pub fn new<const N: usize, K: Kernels>(
+        explorer: &Explorer<'_, N, K>,
+        mut memory: M,
+    ) -> Option<Self> {
+        let all = memory.as_mut();
+        if all.len() != Self::room(explorer) {
+            return None;
+        }
+        all.fill([0.0; LANES]);
+        let textures = explorer.posterior.len();
+        let matrices = all.chunks_exact_mut(textures * textures);
+        for (matrix, actions) in matrices.zip(explorer.actions.chunks(LANES)) {
+            for (lane, action) in actions.iter().enumerate() {
+                explorer.confuse_all(*action, |a, b, degree| {
+                    for at in [a * textures + b, b * textures + a] {
+                        let degrees = matrix.get_mut(at);
+                        if let Some(slot) = degrees.and_then(|degrees| degrees.get_mut(lane)) {
+                            *slot = degree;
+                        }
+                    }
+                });
+            }
+        }
+        Some(Self {
+            matrices: memory,
+            textures,
+        })
+    }
+}
+
+impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
+    /// As [`Explorer::outlook`], to the bit, by degrees of confusion that were computed before: of an explorer of the same
+    /// table, candidates and method.
+    pub fn outlook_by(
+        &self,
+        confusions: &Confusions<impl AsRef<[Degrees]>>,
+    ) -> Vec<Outlook, MAX_ACTIONS> {
+        if self.slides == 0 {
+            return self.outlook();
+        }
+        // filled where it lies, and not moved: it is large
+        let mut live: Vec<(u16, f32), N> = Vec::new();
+        for (&probability, texture) in self.posterior.iter().zip(0..) {
+            if probability >= super::NEGLIGIBLE {
+                // there is room: as much as for the posterior
+                let _ = live.push((texture, probability));
+            }
+        }
+        let textures = confusions.textures;
+        let matrices = confusions.matrices.as_ref();
+        let matrices = matrices.chunks_exact((textures * textures).max(1));
+        let uncertainty = matrices.flat_map(|matrix| uncertainty(matrix, textures, &live));
+        let actions = self.actions.iter().zip(&self.made).zip(uncertainty);
+        actions
+            .map(|((&action, &made), uncertainty)| Outlook {
+                action,
+                uncertainty,
+                benefit: super::benefit(uncertainty, made),
+            })
+            .collect()
+    }
+
+    /// Tells the degree of confusion of every two candidates by an action, as the kernels have it: these add it to both, times
+    /// a probability that is 1 here.
+    fn confuse_all(&self, action: Action, tell: impl FnMut(usize, usize, f32)) {
+        let is_candidate = |log: &i32| *log >= super::LEAST;
+        let certain: Vec<f32, N> = self
+            .log
+            .iter()
+            .map(|l| if is_candidate(l) { 1.0 } else { 0.0 })
+            .collect();
+        let candidates = self.log.iter().zip(0..).filter(|(l, _)| is_candidate(l));
+        let candidates: Vec<u16, N> = candidates.map(|(_, texture)| texture).collect();
+        let method = self.config.method;
+        if method == Method::Fused {
+            let mut live: Vec<Candidate, N> = Vec::new();
+            fused::gather(&self.table, action.movement, &certain, &mut live);
+            let confuse = |a: &mut Candidate, others: &mut [Candidate]| {
+                K::candidate_distances(a, others);
+                fused::confuse_with(a, others);
+            };
+            confuse_each(&mut live, &candidates, confuse, |c| &mut c.confused, tell);
+        } else {
+            let mut live: Vec<Live, N> = Vec::new();
+            let properties = self.gather(method, action, &certain, &mut live);
+            let confuse = |a: &mut Live, others: &mut [Live]| {
+                confuse_with(a, others, properties, K::confuse, K::sqrt);
+            };
+            confuse_each(&mut live, &candidates, confuse, |c| &mut c.confused, tell);
+        }
+    }
+}
+
+/// Confuses each of `live` with those after it, and tells by how much.
+fn confuse_each<L>(
+    live: &mut [L],
+    textures: &[u16],
+    confuse: impl Fn(&mut L, &mut [L]),
+    confused: impl Fn(&mut L) -> &mut f32,
+    mut tell: impl FnMut(usize, usize, f32),
+) {
+    let (mut rest, mut textures) = (live, textures);
+    while let (Some((a, others)), Some((of_a, after))) =
+        (rest.split_first_mut(), textures.split_first())
+    {
+        confuse(a, others);
+        for (b, of_b) in others.iter_mut().zip(after) {
+            let degree = core::mem::take(confused(b));
+            tell(usize::from(*of_a), usize::from(*of_b), degree);
+        }
+        (rest, textures) = (others, after);
+    }
+}
+
+/// Uncertainty that is expected to remain (eq. 10) by each of some actions, of which this is the matrix, when these textures
+/// are that probable.
+#[inline(never)]
+fn uncertainty(matrix: &[Degrees], textures: usize, live: &[(u16, f32)]) -> Degrees {
+    let mut left = [0.0; LANES];
+    for some in live.chunks(ROWS) {
+        let rows = core::array::from_fn(|row| {
+            // where there are fewer, the first of them again
+            let (texture, _) = some.get(row).or(some.first())?;
+            matrix
+                .get(usize::from(*texture) * textures..)?
+                .get(..textures)
+        });
+        let [Some(a), Some(b), Some(c), Some(d)] = rows else {
+            continue;
+        };
+        // What is added, and in which order, is as where degrees are computed: those before a texture, then those after it.
+        let mut confused = [[0.0; LANES]; ROWS];
+        for &(texture, probability) in live {
+            for (confused, row) in confused.iter_mut().zip([a, b, c, d]) {
+                let Some(degrees) = row.get(usize::from(texture)) else {
+                    continue;
+                };
+                for (sum, degree) in confused.iter_mut().zip(degrees) {
+                    *sum += degree * probability;
+                }
+            }
+        }
+        for ((_, probability), confused) in some.iter().zip(confused) {
+            for (left, confused) in left.iter_mut().zip(confused) {
+                *left += probability * confused / (probability + confused);
+            }
+        }
+    }
+    left
+}

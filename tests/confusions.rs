@@ -1,0 +1,80 @@
+//! Degrees of confusion that are kept, on the worlds and on recordings: they promise what computing them does, to the bit.
+
+use tactus::evaluate::{Method, Shared, explorer};
+use tactus::experiment::{Experiment, Protocol};
+use tactus::properties::PropertyTable;
+use tactus::recordings::RecordingSet;
+use tactus::replay::feel;
+use tactus_core::explorer::{Config, Outlook};
+use tactus_tests::data;
+
+/// Explores, and compares what every action promises at every step; the number of promises.
+fn compared(experiment: &Experiment, method: Method, candidates: Option<&[u16]>) -> usize {
+    let config = Config {
+        method: method.method(),
+        strategy: method.strategy(),
+        // beyond what a run takes: late steps have few textures that are likely
+        threshold: 1.0,
+        ..Config::default()
+    };
+    let bytes = experiment.run(0).learn(config.method).unwrap();
+    let explorer = explorer(&bytes, experiment.measured(), config, candidates).unwrap();
+    let shared = Shared::new(explorer, config.strategy);
+    let confusions = shared.confusions.expect("there is memory for so few");
+    let mut explorer = shared.explorer;
+    let bits = |o: &Outlook| (o.action, o.uncertainty.to_bits(), o.benefit.to_bits());
+    let mut promises = 0;
+    for number in 0..150 {
+        let mut run = experiment.run(number);
+        explorer.restart();
+        while explorer.verdict().is_none() {
+            let computed = explorer.outlook();
+            let kept = explorer.outlook_by(&confusions);
+            assert!(
+                kept.iter().map(bits).eq(computed.iter().map(bits)),
+                "{method:?}, run {number}: {kept:?} for {computed:?}"
+            );
+            promises += kept.len();
+            let action = explorer.choose(&kept, 0);
+            let slide = run.slide(action.movement.into());
+            explorer.observe(action, slide).unwrap();
+        }
+    }
+    promises
+}
+
+const METHODS: [(Method, usize); 4] = [
+    (Method::Paper, 9),
+    (Method::Student, 9),
+    (Method::StudentAll, 3),
+    (Method::Fused, 3),
+];
+
+#[test]
+fn kept_degrees_promise_the_same_in_the_worlds() {
+    let Some(folder) = data("worlds") else { return };
+    for world in 1..=3 {
+        let set = PropertyTable::read(&folder.join(format!("world_{world}.csv"))).unwrap();
+        let experiment = Experiment::given(&set, None, 1).unwrap();
+        let few: Vec<u16> = (0..117).step_by(3).collect();
+        for (method, actions) in METHODS {
+            for candidates in [None, Some(few.as_slice())] {
+                let promises = compared(&experiment, method, candidates);
+                assert_eq!(promises, 150 * 10 * actions, "world {world}, {method:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn kept_degrees_promise_the_same_on_recordings() {
+    let Some(folder) = data("biotac") else { return };
+    let set = RecordingSet::open(&folder).unwrap();
+    let names = set.textures().iter().map(|t| t.name.clone()).collect();
+    let felt = feel(&set, |_| ()).unwrap();
+    let experiment = Experiment::recorded(names, &felt, None, Protocol::Drift, 5, 1).unwrap();
+    for (method, actions) in METHODS {
+        let promises = compared(&experiment, method, None);
+        assert_eq!(promises, 150 * 10 * actions / 3, "{method:?}");
+    }
+}
