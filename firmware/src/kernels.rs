@@ -163,12 +163,17 @@ global_asm!(
     // the norm and 1 (60), and whether there is a fourteenth number (64).
     "tactus_likelihoods:",
     "push {{r4-r11, lr}}",
-    "ldm r0, {{r4-r10}}",
-    "ldr r0, [sp, #64]",
-    "cmp r0, #0",
+    // a word at a time, which need not be aligned
+    ".irp pair, 4, 5, 6, 7, 8, 9",
+    "ldr r\\pair, [r0, #(\\pair - 4) * 4]",
+    ".endr",
+    "ldr r10, [sp, #64]",
+    "cmp r10, #0",
     "beq 1f",
+    "ldr r10, [r0, #24]",
     "tactus_likelihood ldr",
     "1:",
+    "ldrh r10, [r0, #24]",
     "tactus_likelihood ldrh",
     ".size tactus_likelihoods, . - tactus_likelihoods",
     ".section .text.tactus_gaussians,\"ax\",%progbits",
@@ -386,10 +391,10 @@ global_asm!(
 unsafe extern "C" {
     /// `samples` has [`TAPS`] - 1 and 6 `sixes` samples, of which none is outside -4096..=4095.
     fn tactus_band_energy(pairs: *const [u32; 2], samples: *const i16, sixes: usize) -> u64;
-    /// There are as many `means`, with 13 numbers each, 14 if `even`, `stride` bytes after each other, as logarithms up to
-    /// `end`, one at least. `from` has zeros where it has no number; `ln` is 256 bytes before [`LN`].
+    /// `from` has 13 numbers, 14 if `even`, and so has each of the `means`, `stride` bytes after each other, of which there are
+    /// as many as logarithms up to `end`, one at least; `ln` is 256 bytes before [`LN`].
     fn tactus_likelihoods(
-        from: &[u32; 7],
+        from: *const i16,
         means: *const u8,
         logs: *mut i32,
         end: *const i32,
@@ -791,16 +796,11 @@ impl Kernels for Chip {
         if many == 0 || !even && from.len() != MAX_FEATURES - 1 || spread.narrowness >= 1 << 16 {
             return Plain::add_likelihoods(from, means, stride, spread, logs);
         }
-        let mut pairs = [0; MAX_FEATURES / 2];
-        for (pair, numbers) in pairs.iter_mut().zip(from.chunks(2)) {
-            let halves = numbers.iter().rev();
-            *pair = halves.fold(0, |pair, half| pair << 16 | u32::from(*half as u16));
-        }
         let logs = logs.as_mut_ptr();
         // SAFETY: `many` means were found to be there, and as many logarithms; words need not be aligned.
         unsafe {
             let done = tactus_likelihoods(
-                &pairs,
+                from.as_ptr(),
                 means.as_ptr(),
                 logs,
                 logs.add(many),
