@@ -27,7 +27,11 @@ pub async fn put_in_force<F: NorFlash>(
 ) -> Result<usize, EncodeError> {
     let length = base.as_bytes().len();
     let table = room.get_mut(..length).ok_or(EncodeError::Room(length))?;
-    table.copy_from_slice(base.as_bytes());
+    // as long: `copy_from_slice` would panic if it were not
+    table
+        .iter_mut()
+        .zip(base.as_bytes())
+        .for_each(|(to, from)| *to = *from);
     let Some(store) = store else {
         return Ok(length);
     };

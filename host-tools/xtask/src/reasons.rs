@@ -128,11 +128,6 @@ const REASONS: &[Reason] = &[
         callers: &["explorer::Explorer<", "session::identify<"],
         why: "gathers what a table has of movements, actions and textures, which is checked to fit when the table is read",
     },
-    Reason {
-        panics: &["copy_from_slice", "len_mismatch"],
-        callers: &["memory::Memory>::reload"],
-        why: "the room was cut to the table's length",
-    },
 ];
 
 /// Why this caller does not panic this way; `None` if nobody says.
