@@ -6,6 +6,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use embassy_stm32::Peri;
 use embassy_stm32::adc::{Adc, SampleTime};
 use embassy_stm32::gpio::{AnyPin, Input, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::pac::ADC1;
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::qei::Qei;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
@@ -222,7 +223,8 @@ pub(crate) async fn servo(
         Default::default(),
     );
     let mut adc = Adc::new(stage.adc);
-    let mut current = stage.current;
+    // Chooses the channel and how long it is sampled; the driver would wait for every conversion where it is started.
+    adc.blocking_read(&mut { stage.current }, SampleTime::CYCLES56);
     let switch = |pin: Peri<'static, AnyPin>| Input::new(pin, Pull::Up);
     let switches = Switches {
         lever_top: switch(switches.lever_top.into()),
@@ -241,6 +243,8 @@ pub(crate) async fn servo(
     let mut ticker = Ticker::every(Duration::from_millis(1));
     loop {
         ticker.next().await;
+        // read below, some 3.2 us later
+        ADC1.cr2().modify(|w| w.set_swstart(true));
         if STOP.swap(false, Relaxed) {
             control.stop();
         }
@@ -271,7 +275,6 @@ pub(crate) async fn servo(
         inputs.steps = lever.steps();
         count += i32::from(encoder.count().wrapping_sub(count as u16) as i16);
         inputs.encoder = count;
-        inputs.current_a = amperes(adc.blocking_read(&mut current, SampleTime::CYCLES56));
         inputs.lever_top = switches.lever_top.is_high();
         inputs.stage_limits = (
             switches.stage_left.is_high(),
@@ -279,6 +282,11 @@ pub(crate) async fn servo(
         );
         inputs.e_stop = switches.e_stop.is_high();
         inputs.hung = hung.is_some();
+        while !ADC1.sr().read().eoc() {
+            cortex_m::asm::delay(10);
+        }
+        // which clears EOC
+        inputs.current_a = amperes(ADC1.dr().read().data());
 
         let outputs = control.tick(&inputs);
         lever.drive(outputs.lever_enabled, outputs.lever_steps_s);
