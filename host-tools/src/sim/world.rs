@@ -119,6 +119,8 @@ pub struct World {
     sliding_j: f64,
     /// a weight on the inclined stage, N
     pull_n: f64,
+    /// where shims bring the top of samples that are thinner
+    shimmed_mm: f64,
     /// holds the finger in place of lever and stage
     hand: Option<Hand>,
 }
@@ -160,6 +162,7 @@ impl World {
             stage_reach_mm: (stage_mm, stage_mm),
             sliding_j: 0.0,
             pull_n: 0.0,
+            shimmed_mm: 0.0,
             hand: None,
         };
         world.advance_to(0);
@@ -297,6 +300,20 @@ impl World {
         self.must_be_over(&surface)?;
         self.setup.texture = texture;
         self.surface = surface;
+        Ok(())
+    }
+
+    /// Puts shims under the samples from now on, so that those that are thinner end at one height over the plate: the finger's
+    /// way down is as much shorter. At power-up the tip is at 12 mm or more.
+    ///
+    /// # Errors
+    /// If the sample would touch the finger then.
+    pub fn shim_to(&mut self, height_mm: f64) -> Result<(), NotLifted> {
+        let was_mm = std::mem::replace(&mut self.shimmed_mm, height_mm);
+        if height_mm > self.surface.thickness_mm() {
+            let fits = self.must_be_over(&self.surface);
+            fits.inspect_err(|_| self.shimmed_mm = was_mm)?;
+        }
         Ok(())
     }
 
@@ -477,11 +494,16 @@ impl World {
         if let Some(hand) = &self.hand {
             return hand.indentation_mm();
         }
-        self.surface.thickness_mm() - self.lever.height_mm()
+        self.over_tip_mm(&self.surface)
+    }
+
+    /// How far a sample reaches over the undeformed tip, mm.
+    fn over_tip_mm(&self, surface: &Surface) -> f64 {
+        surface.thickness_mm().max(self.shimmed_mm) - self.lever.height_mm()
     }
 
     fn must_be_over(&self, surface: &Surface) -> Result<(), NotLifted> {
-        let over_mm = surface.thickness_mm() - self.lever.height_mm();
+        let over_mm = self.over_tip_mm(surface);
         let indentation_mm = self.hand.as_ref().map_or(over_mm, Hand::indentation_mm);
         if indentation_mm > 0.0 {
             return Err(NotLifted { indentation_mm });
