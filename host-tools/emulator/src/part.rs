@@ -15,7 +15,10 @@ use rigless::soc::stm32f427::peripherals::adc::{self, Adc};
 use rigless::soc::stm32f427::peripherals::gpio::Gpio;
 use rigless::soc::stm32f427::peripherals::tim::{Advanced, Channel, Counter, General, Tim};
 use rigless::soc::stm32f427::peripherals::{Stm32f427, rcc};
-use rigless::soc::stm32f427::{CPU, MEMORY, generated, generated::exti::Register as ExtiRegister};
+use rigless::soc::stm32f427::{
+    CPU, MEMORY, generated, generated::exti::Register as ExtiRegister,
+    generated::tim3::Register as TimRegister,
+};
 use rigless::soc::{Bus, Region, RegisterSpec};
 use rigless::time::{EventId, VirtualNanos};
 
@@ -106,6 +109,12 @@ impl Device for Exti {
 trait Tap<M> {
     /// Before the model is read, written or woken: what comes in by its pins up to now.
     fn before(&mut self, _: &mut M, _: &mut RegisterFile, _: &mut DeviceContext<'_>) {}
+    /// Something was written, or its clock has changed: before [`Tap::after`].
+    fn touched(&mut self, _: VirtualNanos) {}
+    /// Whether it has to act on its own event now: a timer that does not catches up when it is looked at next.
+    fn heeds(&mut self, _: &RegisterFile, _: VirtualNanos) -> bool {
+        true
+    }
     /// After it: what its pins say now.
     fn after(&mut self, _: &mut M, _: &RegisterFile, _: VirtualNanos) {}
 }
@@ -145,6 +154,7 @@ impl<M: ErasedDevice, T: Tap<M>> ErasedDevice for Tapped<M, T> {
     ) {
         self.tap.before(&mut self.model, registers, context);
         self.model.write(row, value, registers, context);
+        self.tap.touched(context.now());
         self.tap.after(&mut self.model, registers, context.now());
     }
 
@@ -154,6 +164,9 @@ impl<M: ErasedDevice, T: Tap<M>> ErasedDevice for Tapped<M, T> {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) {
+        if !self.tap.heeds(registers, context.now()) {
+            return;
+        }
         self.tap.before(&mut self.model, registers, context);
         self.model.on_event(event, registers, context);
         self.tap.after(&mut self.model, registers, context.now());
@@ -166,11 +179,13 @@ impl<M: ErasedDevice, T: Tap<M>> ErasedDevice for Tapped<M, T> {
         context: &mut DeviceContext<'_>,
     ) {
         self.model.on_request(request, registers, context);
+        self.tap.touched(context.now());
         self.tap.after(&mut self.model, registers, context.now());
     }
 
     fn on_clock(&mut self, hz: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         self.model.on_clock(hz, registers, context);
+        self.tap.touched(context.now());
         self.tap.after(&mut self.model, registers, context.now());
     }
 
@@ -182,6 +197,7 @@ impl<M: ErasedDevice, T: Tap<M>> ErasedDevice for Tapped<M, T> {
         context: &mut DeviceContext<'_>,
     ) {
         self.model.on_clock_input(input, hz, registers, context);
+        self.tap.touched(context.now());
         self.tap.after(&mut self.model, registers, context.now());
     }
 
@@ -195,6 +211,7 @@ impl<M: ErasedDevice, T: Tap<M>> ErasedDevice for Tapped<M, T> {
 
     fn reset_line(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         self.model.reset_line(registers, context);
+        self.tap.touched(context.now());
         self.tap.after(&mut self.model, registers, context.now());
     }
 
@@ -235,17 +252,41 @@ impl Tap<Tim<Advanced>> for Step {
 
 /// TIM3's channel 1: the stage's PWM. Its duty is that of the shadow registers, which hold for a whole period.
 #[derive(Debug)]
-struct Pwm(SharedRig);
+struct Pwm {
+    rig: SharedRig,
+    touched: Option<VirtualNanos>,
+    period: u64,
+    /// What was written has come into force by then, ns.
+    settled: u64,
+}
 
 impl Tap<Tim<General>> for Pwm {
+    fn touched(&mut self, now: VirtualNanos) {
+        self.touched = Some(now);
+    }
+
+    /// Its edges would stop the core 40 000 times a second. Nobody waits for them but by DIER, and the duty changes only where
+    /// a period begins after something was written.
+    fn heeds(&mut self, registers: &RegisterFile, now: VirtualNanos) -> bool {
+        now.0 <= self.settled || registers.get(TimRegister::Dier) != 0
+    }
+
     fn after(&mut self, tim: &mut Tim<General>, registers: &RegisterFile, now: VirtualNanos) {
-        let duty = match tim.pulse(channel(1), registers) {
+        let pulse = tim.pulse(channel(1), registers);
+        let duty = match &pulse {
             Some(pulse) if pulse.period.0 > 0 => pulse.width.0 as f64 / pulse.period.0 as f64,
             _ => f64::from(u8::from(
                 tim.output(channel(1), registers) == Some(Level::High),
             )),
         };
-        lock(&self.0).stage_duty(now.0, duty);
+        if let Some(at) = self.touched.take() {
+            // the period under way and the next, by the longer of the old and the new; without a pulse every event counts
+            let period = pulse.map_or(u64::MAX, |pulse| pulse.period.0);
+            let longest = period.max(self.period);
+            self.settled = at.0.saturating_add(longest.saturating_mul(2));
+            self.period = period;
+        }
+        lock(&self.rig).stage_duty(now.0, duty);
     }
 }
 
@@ -362,7 +403,12 @@ impl Part {
             },
             pwm: Tapped {
                 model: narrow(),
-                tap: Pwm(rig.clone()),
+                tap: Pwm {
+                    rig: rig.clone(),
+                    touched: None,
+                    period: 0,
+                    settled: u64::MAX,
+                },
             },
             encoder: Tapped {
                 model: narrow(),
@@ -397,6 +443,7 @@ impl Mcu for Part {
         self.exti = Exti::default();
         self.step.model = advanced();
         self.pwm.model = narrow();
+        self.pwm.tap.settled = u64::MAX;
         self.encoder.model = narrow();
         self.current.model = converter();
         // the fresh timer believes both lines low, until somebody looks

@@ -308,3 +308,48 @@ fn every_pulse_of_tim1_is_a_step_with_its_instant() {
         "{moved_mm}"
     );
 }
+
+#[test]
+fn the_stages_duty_changes_where_a_period_begins_and_nothing_stops_the_core_in_between() {
+    const TIM3: u64 = 0x4000_0400;
+    const PERIOD: u64 = 50_000;
+    let mut bench = Bench::new();
+    lock(&bench.rig).stage_port(0, None);
+    lock(&bench.rig).stage_dir(0, true);
+    // 16 MHz, 20 kHz; PWM mode 1 on channel 1, compare and reload with shadows
+    for (register, value) in [
+        (0x2C, 799),
+        (0x18, 0b1101 << 3),
+        (0x20, 1),
+        (0x14, 1),
+        (0x00, 0x81),
+    ] {
+        bench.write(TIM3 + register, value);
+    }
+    let mut expected = Vec::new();
+    for (n, compare) in [200, 600, 600, 0, 799, 801, 1].into_iter().enumerate() {
+        // at the beginning of a period, and later and later in it
+        bench.pass_until(n as u64 * (2 * MS + 7_310) + MS);
+        bench.write(TIM3 + 0x34, compare);
+        let duty = (compare as f64 / 800.0).min(1.0);
+        if expected.last().is_none_or(|(_, last)| *last != duty) {
+            expected.push(((bench.now + 1).next_multiple_of(PERIOD), duty));
+        }
+    }
+    bench.pass_until(20 * MS);
+    assert_eq!(bench.board.part.next_event(), None);
+    let rig = lock(&bench.rig);
+    let duties: Vec<(u64, f64)> = rig
+        .trace()
+        .filter_map(|(at, output)| match output {
+            crate::rig::Output::StageDuty(duty) => Some((*at, *duty)),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(duties.len(), expected.len(), "{duties:?}");
+    for (seen, expected) in duties.iter().zip(expected) {
+        // widths are whole ns
+        let off = (seen.1 - expected.1).abs();
+        assert!(seen.0 == expected.0 && off < 2e-5, "{seen:?} {expected:?}");
+    }
+}
