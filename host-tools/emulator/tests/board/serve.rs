@@ -9,9 +9,7 @@ use tactus::link::{LinkError, Port, PortError, Question, ReadTable};
 use tactus_core::table::Table;
 use tactus_core::wire::Status;
 
-mod common;
-
-use common::elf;
+use crate::common::elf;
 
 /// Ends the emulator, however the test ends.
 struct Running(Child);

@@ -5,9 +5,7 @@
 use tactus::sim::encoder::Cut;
 use tactus_emulator::{Emulator, Fault, Options, Output, ResetCause, Setup};
 
-mod common;
-
-use common::elf_of;
+use crate::common::elf_of;
 
 /// How a run of the self-test ended.
 struct Run {

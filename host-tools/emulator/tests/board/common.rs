@@ -1,5 +1,4 @@
 //! What the tests of the firmware share: where it is, and boards that run it.
-#![allow(dead_code)] // each test takes a part of it
 
 use std::path::{Path, PathBuf};
 

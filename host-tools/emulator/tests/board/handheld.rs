@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 use tactus::scenario::Scenario;
 use tactus_emulator::Emulator;
 
-mod common;
-
-use common::elf_of;
+use crate::common::elf_of;
 
 /// Every scenario has a test here.
 const SCENARIOS: [&str; 7] = [

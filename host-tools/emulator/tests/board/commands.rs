@@ -12,9 +12,7 @@ use tactus_core::wire::{Ask, Forget, Identify, MAX_FRAME, Name, Request, Train, 
 use tactus_emulator::talk::{Talk, TalkError};
 use tactus_emulator::{Emulator, Options, Setup};
 
-mod common;
-
-use common::elf;
+use crate::common::elf;
 
 /// More force than this is never on the finger, N: see the guard of the core's `rig`.
 const MOST_N: f64 = 2.2;

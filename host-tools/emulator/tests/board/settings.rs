@@ -6,9 +6,7 @@ use tactus_core::wire::{Ask, Phase, Tell, Train};
 use tactus_emulator::talk::{Talk, TalkError};
 use tactus_emulator::{Emulator, Options, Setup};
 
-mod common;
-
-use common::elf;
+use crate::common::elf;
 
 /// The tasks of thread mode are taken for hung after 2 s: half of it is the most that a write may keep them.
 const LONGEST_MS: u64 = 1000;

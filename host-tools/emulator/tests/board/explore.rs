@@ -15,9 +15,7 @@ use tactus_emulator::exploration::explore;
 use tactus_emulator::lessons::{self, Known, Unknown};
 use tactus_emulator::talk::{PATIENCE_S, Talk};
 
-mod common;
-
-use common::{boot, elf};
+use crate::common::{boot, elf};
 
 /// A simulated world of six textures.
 fn world() -> &'static (Collection, Known) {

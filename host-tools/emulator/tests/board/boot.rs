@@ -4,9 +4,7 @@ use tactus_core::wire::{Ask, Phase, Tell};
 use tactus_emulator::talk::Talk;
 use tactus_emulator::{Emulator, Options, Output, Setup};
 
-mod common;
-
-use common::elf;
+use crate::common::elf;
 
 #[test]
 fn the_firmware_boots_and_uses_only_what_is_modelled() {
@@ -67,8 +65,10 @@ fn a_board_without_the_probes_clock_runs_by_its_own() {
         eprintln!("clock {clock}: {words:?}");
         let said = words.is_some_and(|words| words.contains("8 MHz"));
         assert_eq!(said, !clock);
-        // the line, the stage, the sensor's slots and the motor's current, at their rates
-        talk.ask(Ask::Calibrate, 80.0, |_, _| ()).unwrap();
+        if !clock {
+            // the line, the stage, the sensor's slots and the motor's current, at their rates
+            talk.ask(Ask::Calibrate, 80.0, |_, _| ()).unwrap();
+        }
         assert_eq!(talk.board().resets().unwrap(), []);
     }
 }

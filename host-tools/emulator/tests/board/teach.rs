@@ -13,9 +13,7 @@ use tactus_emulator::exploration::{Exploration, explore};
 use tactus_emulator::lessons::{self, Known, Unknown};
 use tactus_emulator::talk::{PATIENCE_S, Talk, TalkError};
 
-mod common;
-
-use common::{boot, elf};
+use crate::common::{boot, elf};
 
 /// A texture that the table does not have.
 const NEW: u8 = 31;

@@ -1,0 +1,13 @@
+//! The tests that run firmware on the emulated board, as one program: its threads share the machine's cores to the end.
+//! By name: `cargo test --test board faults::`.
+
+mod boot;
+mod commands;
+mod common;
+mod explore;
+mod faults;
+mod handheld;
+mod selftest;
+mod serve;
+mod settings;
+mod teach;
