@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// How long each parser is attacked ...
-const FUZZ_S: u64 = 20;
+const FUZZ_S: u64 = 10;
 /// ... and how long the bugs that are there on purpose may stay hidden.
 const PLANTED_S: u64 = 150;
 
