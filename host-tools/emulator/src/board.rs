@@ -14,7 +14,7 @@ use rigless::session::Session;
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 use tactus::sim::faults::Fault;
-use tactus::sim::world::{NotLifted, Setup};
+use tactus::sim::world::{NotLifted, SHIMMED_MM, Setup};
 
 use crate::driver::{Command, Driver, Standing};
 use crate::flash::{self, FlashWrite};
@@ -50,8 +50,7 @@ impl Default for Options {
             tick_ns: 100_000,
             trace_s: 2,
             clock: true,
-            // a millimetre below the lowest tip at power-up
-            shimmed_mm: 11.0,
+            shimmed_mm: SHIMMED_MM,
             store: None,
         }
     }

@@ -94,6 +94,9 @@ pub struct NotLifted {
     pub indentation_mm: f64,
 }
 
+/// Where shims may bring every sample that is thinner, mm over the plate: a millimetre below the lowest tip at power-up.
+pub const SHIMMED_MM: f64 = 11.0;
+
 /// The rig.
 pub struct World {
     setup: Setup,
