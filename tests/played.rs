@@ -67,7 +67,7 @@ fn every_sample_of_a_recording_is_felt_once() {
 
 #[test]
 fn what_is_cut_is_counted() {
-    let mut rig = Lesson::rig(1);
+    let mut rig = SimRig::new(Lesson::setup(1));
     rig.home().unwrap();
     let loud = Played {
         pac: [0, 3000].repeat(500),
@@ -225,7 +225,7 @@ fn the_stage_keeps_its_speed_under_recorded_forces() {
     let worst: Vec<(f64, f64, &str)> = (0..lesson.names.len())
         .into_par_iter()
         .map(|texture| {
-            let mut rig = Lesson::rig(texture as u64);
+            let mut rig = SimRig::new(Lesson::setup(texture as u64));
             rig.control().calibrate(calibration).unwrap();
             rig.home().unwrap();
             rig.world().play(lesson.test[texture].clone(), 1);
@@ -262,7 +262,7 @@ fn played_recordings_have_the_properties_of_the_recordings() {
     let off: Vec<[f64; 3]> = (0..lesson.names.len())
         .into_par_iter()
         .map(|texture| {
-            let mut rig = Lesson::rig(texture as u64);
+            let mut rig = SimRig::new(Lesson::setup(texture as u64));
             rig.control().calibrate(calibration).unwrap();
             rig.home().unwrap();
             let recorded = set.load_texture(texture).unwrap();

@@ -83,8 +83,8 @@ async fn due(what: u8) {
 
 /// Sends two bytes as one frame, while select is low, and gives what came in meanwhile.
 ///
-/// embassy's transfers look at the status register all the time, 104 times a slot. Here it is first looked at when the frame
-/// may be over: such a look takes an emulator longer than a hundred instructions do, and was half of all that it did.
+/// embassy's transfers look at the status register all the time, 104 times a slot; here it is first looked at when the frame may
+/// be over. To the chip that is the same; of the emulator's accesses to registers it was more than half.
 fn transfer(bytes: [u8; 2]) -> [u8; 2] {
     // the last frame has been read: there is room, and what comes in is this one's
     SPI1.dr().write(|w| w.set_dr(u16::from_be_bytes(bytes)));

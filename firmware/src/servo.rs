@@ -283,6 +283,7 @@ pub(crate) async fn servo(
         inputs.e_stop = switches.e_stop.is_high();
         inputs.hung = hung.is_some();
         while !ADC1.sr().read().eoc() {
+            // a look costs the emulator more than these few instructions
             cortex_m::asm::delay(10);
         }
         // which clears EOC

@@ -57,7 +57,7 @@ impl Collection {
                 .wrapping_mul(1009)
                 + trial,
             finger_seed: self.seed,
-            keep_edges: false,
+            ..Setup::default()
         }
     }
 

@@ -15,7 +15,7 @@ use crate::learn;
 use crate::recordings::{PAC_RATE_HZ, RecordingError, RecordingSet, Slide};
 use crate::replay::measure;
 use crate::sim::played::{Played, SHEAR_HZ};
-use crate::sim::world::{SHIMMED_MM, Setup};
+use crate::sim::world::Setup;
 use crate::simulated::SimRig;
 
 /// Why recordings cannot be played.
@@ -108,26 +108,19 @@ impl Lesson {
         })
     }
 
-    /// The rig that all recordings are played on; trials differ by `seed`.
+    /// The rig that all recordings are played on; trials differ by `seed`. Its sample only carries the press.
     pub fn setup(seed: u64) -> Setup {
         Setup {
             trial_seed: seed,
+            shimmed: true,
             ..Setup::default()
         }
-    }
-
-    /// That rig on the PC, its sample on shims: it only carries the press, and the way down to it is time that nobody needs.
-    pub fn rig(seed: u64) -> SimRig {
-        let mut rig = SimRig::new(Self::setup(seed));
-        // below the lowest tip at power-up: it fits
-        let _ = rig.world().shim_to(SHIMMED_MM);
-        rig
     }
 
     /// A rig whose unknown texture is this one: its test slides, in an order that `seed` gives.
     pub fn unknown(&self, texture: usize, seed: u64) -> SimRig {
         // other trials than those that were learned
-        let mut rig = Self::rig(1000 * (seed + 1) + texture as u64);
+        let mut rig = SimRig::new(Self::setup(1000 * (seed + 1) + texture as u64));
         let slides = self.test.get(texture).cloned().unwrap_or_default();
         rig.world().play(slides, seed);
         rig
@@ -149,7 +142,7 @@ impl Lesson {
             .enumerate()
             .map(|(texture, slides)| {
                 let seed = texture as u64;
-                let mut rig = Self::rig(seed);
+                let mut rig = SimRig::new(Self::setup(seed));
                 rig.world().play(slides.clone(), seed);
                 rig.control()
                     .calibrate(calibration)

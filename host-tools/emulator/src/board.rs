@@ -14,7 +14,7 @@ use rigless::session::Session;
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 use tactus::sim::faults::Fault;
-use tactus::sim::world::{NotLifted, SHIMMED_MM, Setup};
+use tactus::sim::world::Setup;
 
 use crate::driver::{Command, Driver, Standing};
 use crate::flash::{self, FlashWrite};
@@ -36,9 +36,6 @@ pub struct Options {
     pub trace_s: u64,
     /// Whether the debug probe gives its 8 MHz at power-up.
     pub clock: bool,
-    /// Where shims bring the top of the sample, mm over the plate: at 0 the finger comes down for up to half a minute of
-    /// virtual time.
-    pub shimmed_mm: f64,
     /// What the firmware's store holds at power-up, from [`Emulator::store`]; blank otherwise.
     pub store: Option<Vec<u8>>,
 }
@@ -50,7 +47,6 @@ impl Default for Options {
             tick_ns: 100_000,
             trace_s: 2,
             clock: true,
-            shimmed_mm: SHIMMED_MM,
             store: None,
         }
     }
@@ -85,9 +81,6 @@ pub enum Error {
     /// rigless' description of the chip is wrong.
     #[error(transparent)]
     Chip(#[from] rigless::soc::Error),
-    /// The sample would touch the finger at power-up.
-    #[error(transparent)]
-    Sample(#[from] NotLifted),
     /// The run is over.
     #[error("the run has ended")]
     Ended,
@@ -162,9 +155,7 @@ impl Emulator {
             let at = Some(flash::STORE.start);
             images.push(Image::new(Path::new("store"), store.clone(), at)?);
         }
-        let mut rig = Rig::new(setup, options.trace_s * 1_000_000_000);
-        rig.world().shim_to(options.shimmed_mm)?;
-        let rig = Arc::new(Mutex::new(rig));
+        let rig = Arc::new(Mutex::new(Rig::new(setup, options.trace_s * 1_000_000_000)));
         let (commands, commanded) = channel();
         let (reaches, reached) = channel();
         let mut driver = Driver {

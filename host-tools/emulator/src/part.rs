@@ -1,30 +1,28 @@
 //! The chip: rigless' STM32F427 with what it lacks as the firmware's STM32F429, and with the rig on its pins.
 //!
 //! Added are the edge lines of EXTI and the programmable flash array. Models whose pins the rig needs to the nanosecond
-//! (TIM1, TIM3, TIM4, ADC1) are wrapped: [`Tapped`] lets the rig act before and after whatever happens in them.
+//! (TIM1, TIM3, TIM4, ADC1) are wrapped: [`taps::Tapped`] lets the rig act before and after whatever happens in them.
+
+mod taps;
 
 use std::num::{NonZeroU32, NonZeroU64};
 
-use rigless::device::{
-    Device, DeviceContext, ErasedDevice, Level, RegisterFile, RequestChange, ResetCause,
-};
+use rigless::device::{Device, DeviceContext, ErasedDevice, Level, RegisterFile, ResetCause};
 use rigless::machine::{Board as Machine, Target, armv7m};
 use rigless::mcu::{Mcu, Operate};
 use rigless::snapshot::Store;
-use rigless::soc::stm32f427::peripherals::adc::{self, Adc};
+use rigless::soc::stm32f427::peripherals::adc::Adc;
 use rigless::soc::stm32f427::peripherals::gpio::Gpio;
-use rigless::soc::stm32f427::peripherals::tim::{Advanced, Channel, Counter, General, Tim};
+use rigless::soc::stm32f427::peripherals::tim::{Advanced, Counter, General, Tim};
 use rigless::soc::stm32f427::peripherals::{Stm32f427, rcc};
-use rigless::soc::stm32f427::{
-    CPU, MEMORY, generated, generated::exti::Register as ExtiRegister,
-    generated::tim3::Register as TimRegister,
-};
-use rigless::soc::{Bus, Region, RegisterSpec};
-use rigless::time::{EventId, VirtualNanos};
+use rigless::soc::stm32f427::{CPU, MEMORY, generated, generated::exti::Register as ExtiRegister};
+use rigless::soc::{Bus, Region};
+use rigless::time::VirtualNanos;
 
 use crate::pins::{PinId, REST_LEVELS};
-use crate::rig::{SharedRig, lock};
+use crate::rig::SharedRig;
 use crate::serial::Serial;
+use taps::{Current, Encoder, Pwm, Step, Tapped, channel};
 
 /// Timers run on the internal oscillator after a reset.
 const RESET_HZ: u64 = rcc::HSI_HZ;
@@ -105,251 +103,6 @@ impl Device for Exti {
     }
 }
 
-/// What the rig does round a model.
-trait Tap<M> {
-    /// Before the model is read, written or woken: what comes in by its pins up to now.
-    fn before(&mut self, _: &mut M, _: &mut RegisterFile, _: &mut DeviceContext<'_>) {}
-    /// Something was written, or its clock has changed: before [`Tap::after`].
-    fn touched(&mut self, _: VirtualNanos) {}
-    /// Whether it has to act on its own event now: a timer that does not catches up when it is looked at next.
-    fn heeds(&mut self, _: &RegisterFile, _: VirtualNanos) -> bool {
-        true
-    }
-    /// After it: what its pins say now.
-    fn after(&mut self, _: &mut M, _: &RegisterFile, _: VirtualNanos) {}
-}
-
-/// A model with the rig on its pins.
-#[derive(Debug)]
-struct Tapped<M, T> {
-    model: M,
-    tap: T,
-}
-
-impl<M: ErasedDevice, T: Tap<M>> ErasedDevice for Tapped<M, T> {
-    fn layout(&self) -> &'static [RegisterSpec] {
-        self.model.layout()
-    }
-
-    fn read(
-        &mut self,
-        row: usize,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) -> Option<u64> {
-        self.tap.before(&mut self.model, registers, context);
-        self.model.read(row, registers, context)
-    }
-
-    fn peek(&self, row: usize, registers: &RegisterFile, now: VirtualNanos) -> Option<u64> {
-        self.model.peek(row, registers, now)
-    }
-
-    fn write(
-        &mut self,
-        row: usize,
-        value: u64,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) {
-        self.tap.before(&mut self.model, registers, context);
-        self.model.write(row, value, registers, context);
-        self.tap.touched(context.now());
-        self.tap.after(&mut self.model, registers, context.now());
-    }
-
-    fn on_event(
-        &mut self,
-        event: EventId,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) {
-        if !self.tap.heeds(registers, context.now()) {
-            return;
-        }
-        self.tap.before(&mut self.model, registers, context);
-        self.model.on_event(event, registers, context);
-        self.tap.after(&mut self.model, registers, context.now());
-    }
-
-    fn on_request(
-        &mut self,
-        request: RequestChange,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) {
-        self.model.on_request(request, registers, context);
-        self.tap.touched(context.now());
-        self.tap.after(&mut self.model, registers, context.now());
-    }
-
-    fn on_clock(&mut self, hz: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        self.model.on_clock(hz, registers, context);
-        self.tap.touched(context.now());
-        self.tap.after(&mut self.model, registers, context.now());
-    }
-
-    fn on_clock_input(
-        &mut self,
-        input: usize,
-        hz: u64,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) {
-        self.model.on_clock_input(input, hz, registers, context);
-        self.tap.touched(context.now());
-        self.tap.after(&mut self.model, registers, context.now());
-    }
-
-    fn poll(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        self.model.poll(registers, context);
-    }
-
-    fn reset(&mut self) {
-        self.model.reset();
-    }
-
-    fn reset_line(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        self.model.reset_line(registers, context);
-        self.tap.touched(context.now());
-        self.tap.after(&mut self.model, registers, context.now());
-    }
-
-    fn on_access(
-        &mut self,
-        token: u64,
-        value: u64,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) {
-        self.model.on_access(token, value, registers, context);
-    }
-
-    fn on_refused(
-        &mut self,
-        token: u64,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) {
-        self.model.on_refused(token, registers, context);
-    }
-}
-
-fn channel(number: u8) -> Channel {
-    Channel::new(number).expect("timers have channels 1 to 4")
-}
-
-/// TIM1's channel 1: the lever's STEP.
-#[derive(Debug)]
-struct Step(SharedRig);
-
-impl Tap<Tim<Advanced>> for Step {
-    fn after(&mut self, tim: &mut Tim<Advanced>, registers: &RegisterFile, now: VirtualNanos) {
-        let high = tim.output(channel(1), registers) == Some(Level::High);
-        lock(&self.0).step_timer(now.0, high);
-    }
-}
-
-/// TIM3's channel 1: the stage's PWM. Its duty is that of the shadow registers, which hold for a whole period.
-#[derive(Debug)]
-struct Pwm {
-    rig: SharedRig,
-    touched: Option<VirtualNanos>,
-    period: u64,
-    /// What was written has come into force by then, ns.
-    settled: u64,
-}
-
-impl Tap<Tim<General>> for Pwm {
-    fn touched(&mut self, now: VirtualNanos) {
-        self.touched = Some(now);
-    }
-
-    /// Its edges would stop the core 40 000 times a second. Nobody waits for them but by DIER, and the duty changes only where
-    /// a period begins after something was written.
-    fn heeds(&mut self, registers: &RegisterFile, now: VirtualNanos) -> bool {
-        now.0 <= self.settled || registers.get(TimRegister::Dier) != 0
-    }
-
-    fn after(&mut self, tim: &mut Tim<General>, registers: &RegisterFile, now: VirtualNanos) {
-        let pulse = tim.pulse(channel(1), registers);
-        let duty = match &pulse {
-            Some(pulse) if pulse.period.0 > 0 => pulse.width.0 as f64 / pulse.period.0 as f64,
-            _ => f64::from(u8::from(
-                tim.output(channel(1), registers) == Some(Level::High),
-            )),
-        };
-        if let Some(at) = self.touched.take() {
-            // the period under way and the next, by the longer of the old and the new; without a pulse every event counts
-            let period = pulse.map_or(u64::MAX, |pulse| pulse.period.0);
-            let longest = period.max(self.period);
-            self.settled = at.0.saturating_add(longest.saturating_mul(2));
-            self.period = period;
-        }
-        lock(&self.rig).stage_duty(now.0, duty);
-    }
-}
-
-/// TIM4's channels 1 and 2: the stage's encoder. Its edges up to now are counted before anybody looks.
-#[derive(Debug)]
-struct Encoder {
-    rig: SharedRig,
-    lines: (bool, bool),
-}
-
-impl Encoder {
-    fn show(
-        shown: &mut (bool, bool),
-        (a, b): (bool, bool),
-        tim: &mut Tim<General>,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) {
-        if a != shown.0 {
-            tim.drive_input(channel(1), a.into(), registers, context);
-        }
-        if b != shown.1 {
-            tim.drive_input(channel(2), b.into(), registers, context);
-        }
-        *shown = (a, b);
-    }
-}
-
-impl Tap<Tim<General>> for Encoder {
-    fn before(
-        &mut self,
-        tim: &mut Tim<General>,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) {
-        let mut rig = lock(&self.rig);
-        rig.advance_to(context.now().0);
-        while let Some(lines) = rig.next_encoder_lines() {
-            Self::show(&mut self.lines, lines, tim, registers, context);
-        }
-        let lines = rig.encoder_lines();
-        Self::show(&mut self.lines, lines, tim, registers, context);
-    }
-}
-
-/// ADC1's channel 3: the motor's current, at the end of each conversion.
-#[derive(Debug)]
-struct Current(SharedRig);
-
-impl Current {
-    /// rigless makes code = input x 4095 / reference, both in whole mV: with this reference the input is the code.
-    const REFERENCE: u32 = 4095;
-}
-
-impl Tap<Adc> for Current {
-    fn before(&mut self, adc: &mut Adc, _: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        let mut rig = lock(&self.0);
-        rig.advance_to(context.now().0);
-        let pa3 = adc::Channel::new(3).expect("the converter has channels 0 to 15");
-        adc.set_input(pa3, rig.world().motor_adc().into());
-    }
-}
-
 /// The part.
 #[derive(Debug)]
 pub(crate) struct Part {
@@ -403,12 +156,7 @@ impl Part {
             },
             pwm: Tapped {
                 model: narrow(),
-                tap: Pwm {
-                    rig: rig.clone(),
-                    touched: None,
-                    period: 0,
-                    settled: u64::MAX,
-                },
+                tap: Pwm::new(rig.clone()),
             },
             encoder: Tapped {
                 model: narrow(),
@@ -443,7 +191,7 @@ impl Mcu for Part {
         self.exti = Exti::default();
         self.step.model = advanced();
         self.pwm.model = narrow();
-        self.pwm.tap.settled = u64::MAX;
+        self.pwm.tap.restart();
         self.encoder.model = narrow();
         self.current.model = converter();
         // the fresh timer believes both lines low, until somebody looks

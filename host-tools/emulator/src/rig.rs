@@ -91,6 +91,8 @@ impl Rig {
         Self {
             world: World::new(Setup {
                 keep_edges: true,
+                // virtual time is the PC's
+                shimmed: true,
                 ..setup
             }),
             step_timer: false,

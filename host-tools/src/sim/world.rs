@@ -35,6 +35,9 @@ pub struct Setup {
     pub finger_seed: u64,
     /// Whether [`World::next_encoder_edge`] is going to be asked: edges are kept until then.
     pub keep_edges: bool,
+    /// Whether samples lie on shims: those that are thinner than [`World::SHIMMED_MM`] end at that height. The finger's way
+    /// down, at 0.5 mm/s, then takes 9 s at most and not up to half a minute.
+    pub shimmed: bool,
 }
 
 impl Default for Setup {
@@ -45,6 +48,7 @@ impl Default for Setup {
             trial_seed: 1,
             finger_seed: 1,
             keep_edges: false,
+            shimmed: false,
         }
     }
 }
@@ -94,9 +98,6 @@ pub struct NotLifted {
     pub indentation_mm: f64,
 }
 
-/// Where shims may bring every sample that is thinner, mm over the plate: a millimetre below the lowest tip at power-up.
-pub const SHIMMED_MM: f64 = 11.0;
-
 /// The rig.
 pub struct World {
     setup: Setup,
@@ -122,8 +123,6 @@ pub struct World {
     sliding_j: f64,
     /// a weight on the inclined stage, N
     pull_n: f64,
-    /// where shims bring the top of samples that are thinner
-    shimmed_mm: f64,
     /// holds the finger in place of lever and stage
     hand: Option<Hand>,
 }
@@ -132,6 +131,8 @@ impl World {
     /// Where the tip may be at power-up, mm over the plate, and the stage, mm (chosen): a controller has to find its
     /// switches.
     const POWER_UP_MM: [(f64, f64); 2] = [(12.0, 15.0), (20.0, 65.0)];
+    /// Where shims bring a sample that is thinner, mm over the plate: a millimetre below the lowest tip at power-up.
+    pub const SHIMMED_MM: f64 = 11.0;
 
     /// A rig just powered up: no current in either motor, the finger in the air.
     pub fn new(setup: Setup) -> Self {
@@ -165,7 +166,6 @@ impl World {
             stage_reach_mm: (stage_mm, stage_mm),
             sliding_j: 0.0,
             pull_n: 0.0,
-            shimmed_mm: 0.0,
             hand: None,
         };
         world.advance_to(0);
@@ -303,20 +303,6 @@ impl World {
         self.must_be_over(&surface)?;
         self.setup.texture = texture;
         self.surface = surface;
-        Ok(())
-    }
-
-    /// Puts shims under the samples from now on, so that those that are thinner end at one height over the plate: the finger's
-    /// way down is as much shorter. At power-up the tip is at 12 mm or more.
-    ///
-    /// # Errors
-    /// If the sample would touch the finger then.
-    pub fn shim_to(&mut self, height_mm: f64) -> Result<(), NotLifted> {
-        let was_mm = std::mem::replace(&mut self.shimmed_mm, height_mm);
-        if height_mm > self.surface.thickness_mm() {
-            let fits = self.must_be_over(&self.surface);
-            fits.inspect_err(|_| self.shimmed_mm = was_mm)?;
-        }
         Ok(())
     }
 
@@ -502,7 +488,13 @@ impl World {
 
     /// How far a sample reaches over the undeformed tip, mm.
     fn over_tip_mm(&self, surface: &Surface) -> f64 {
-        surface.thickness_mm().max(self.shimmed_mm) - self.lever.height_mm()
+        let thickness_mm = surface.thickness_mm();
+        let top_mm = if self.setup.shimmed {
+            thickness_mm.max(Self::SHIMMED_MM)
+        } else {
+            thickness_mm
+        };
+        top_mm - self.lever.height_mm()
     }
 
     fn must_be_over(&self, surface: &Surface) -> Result<(), NotLifted> {

@@ -10,7 +10,7 @@ use tactus::sim::world::{Setup, World};
 
 use super::*;
 use crate::pins;
-use crate::rig::Rig;
+use crate::rig::{Rig, lock};
 
 const MS: u64 = 1_000_000;
 
@@ -39,6 +39,7 @@ const SETUP: Setup = Setup {
     trial_seed: 4,
     finger_seed: 5,
     keep_edges: true,
+    shimmed: false,
 };
 
 impl Bench {

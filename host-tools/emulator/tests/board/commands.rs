@@ -12,7 +12,7 @@ use tactus_core::wire::{Ask, Forget, Identify, MAX_FRAME, Name, Request, Train, 
 use tactus_emulator::talk::{Talk, TalkError};
 use tactus_emulator::{Emulator, Options, Setup};
 
-use crate::common::elf;
+use crate::common::{elf, ready};
 
 /// More force than this is never on the finger, N: see the guard of the core's `rig`.
 const MOST_N: f64 = 2.2;
@@ -119,7 +119,7 @@ fn survives(elf: &Path, seed: u64) {
         ..Setup::default()
     };
     let mut talk = Talk::new(Emulator::start(elf, setup, Options::default()).unwrap());
-    talk.ready(|_, _| ()).unwrap();
+    ready(&mut talk);
     let board = talk.board();
     let mut pressed_n = 0.0_f64;
     let mut after = String::new();

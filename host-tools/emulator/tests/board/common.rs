@@ -32,6 +32,11 @@ pub(crate) fn boot(elf: &Path, unknown: &Unknown, store: Option<Vec<u8>>) -> Tal
         ..Options::default()
     };
     let mut talk = Talk::new(unknown.start(elf, options).unwrap());
-    assert_eq!(talk.ready(|_, _| ()).unwrap(), None);
+    ready(&mut talk);
     talk
+}
+
+/// Waits until a board has homed, without a fault.
+pub(crate) fn ready(talk: &mut Talk) {
+    assert_eq!(talk.ready(|_, _| ()).unwrap(), None);
 }

@@ -9,7 +9,7 @@ use tactus_core::wire::{Ask, Identify, MAX_FRAME, Phase, Request, Reset, Tell, e
 use tactus_emulator::talk::{Talk, TalkError};
 use tactus_emulator::{Emulator, Fault, Options, Output, Setup};
 
-use crate::common::elf;
+use crate::common::{elf, ready};
 
 /// Unused flash.
 const NOWHERE: u64 = 0x080F_FF00;
@@ -258,16 +258,6 @@ fn board(elf: &std::path::Path, seed: u64, texture: u8) -> Talk {
     talk
 }
 
-fn ready(talk: &mut Talk) {
-    use tactus_core::wire::Phase::Ready;
-    talk.wait(
-        30.0,
-        |_, _| (),
-        |tell| matches!(tell, Tell::Phase(Ready)).then_some(Ok(())),
-    )
-    .unwrap();
-}
-
 /// Never sure: an exploration of so many slides.
 fn identify(slides: u8) -> Ask {
     Ask::Identify(Identify {
@@ -285,7 +275,7 @@ fn identify(slides: u8) -> Ask {
 fn is_time(when: When, board: &mut Emulator) -> bool {
     let truth = board.rig().world().truth();
     match when {
-        // three quarters of a second of the way down, the delay below among them, are left at least
+        // 0.8 s of the way down are left at least
         When::Approaching => truth.force_n == 0.0 && (-0.75..-0.4).contains(&truth.indentation_mm),
         When::Pressing => truth.force_n > 0.15 && truth.speed_mm_s.abs() < 1.0,
         When::Sliding => truth.force_n > 0.15 && truth.speed_mm_s > 5.0,

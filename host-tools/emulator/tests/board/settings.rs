@@ -2,11 +2,11 @@
 
 use tactus_core::pressure::Calibration;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::wire::{Ask, Phase, Tell, Train};
+use tactus_core::wire::{Ask, Tell, Train};
 use tactus_emulator::talk::{Talk, TalkError};
 use tactus_emulator::{Emulator, Options, Setup};
 
-use crate::common::elf;
+use crate::common::{elf, ready};
 
 /// The tasks of thread mode are taken for hung after 2 s: half of it is the most that a write may keep them.
 const LONGEST_MS: u64 = 1000;
@@ -27,8 +27,7 @@ fn boot(elf: &std::path::Path, store: Option<Vec<u8>>) -> Talk {
         ..Options::default()
     };
     let mut talk = Talk::new(Emulator::start(elf, Setup::default(), options).unwrap());
-    let ready = |tell: &Tell| matches!(tell, Tell::Phase(Phase::Ready)).then_some(Ok(()));
-    talk.wait(30.0, |_, _| (), ready).unwrap();
+    ready(&mut talk);
     talk
 }
 
