@@ -1,7 +1,7 @@
 //! What a host asks a probe for, from beginning to end: an exploration, a training. Every step of it is told in the words
 //! of [`crate::wire`], so that the host can follow each decision.
 
-use core::fmt::{self, Write as _};
+use core::fmt;
 
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
@@ -21,28 +21,7 @@ use crate::training::{Training, Wanted};
 use crate::up_to;
 use crate::wire::{Block, Identify, MAX_OUTLOOK, MAX_TEXTURES, Name, Promise, Tell, Text, Train};
 
-/// A sentence, cut off where it is too long.
-pub fn text(sentence: impl fmt::Display) -> Text {
-    cut(&sentence)
-}
-
-/// Once, whatever is said.
-#[inline(never)]
-fn cut(sentence: &dyn fmt::Display) -> Text {
-    /// Takes what fits.
-    struct Cut(Text);
-    impl fmt::Write for Cut {
-        fn write_str(&mut self, part: &str) -> fmt::Result {
-            part.chars()
-                .try_for_each(|c| self.0.push(c))
-                .map_err(|_| fmt::Error)
-        }
-    }
-    let mut text = Cut(Text::new());
-    // an error is its end
-    let _ = write!(text, "{sentence}");
-    text.0
-}
+pub use crate::wire::text;
 
 /// Random numbers for choices and for where slides begin (xorshift, Marsaglia 2003); not for secrets.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -1,6 +1,13 @@
 use super::*;
-use crate::features::PropertySet;
+use crate::explorer::Method;
+use crate::features::{FUSED_BANDS, Properties, Property, PropertySet};
+use crate::movement::Movement;
+use crate::rig::guard::Fault;
+use crate::table::Action;
+use heapless::{String, Vec};
 use proptest::prelude::*;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::vec;
 
 fn frame(message: &impl Serialize) -> std::vec::Vec<u8> {

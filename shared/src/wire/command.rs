@@ -1,0 +1,118 @@
+//! What the host asks of the probe.
+
+use heapless::{String, Vec};
+use serde::{Deserialize, Serialize};
+
+use crate::explorer::{Method, Strategy};
+
+/// Most textures in one message; the probe's table holds no more.
+pub const MAX_TEXTURES: usize = 128;
+/// Bytes of a table in one message.
+pub const PART: usize = 256;
+/// Name of a texture.
+pub type Name = String<40>;
+
+/// From the host.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Request {
+    /// Comes back in the answer.
+    pub id: u16,
+    /// What is asked for.
+    pub ask: Ask,
+}
+
+/// What the host may ask for. Every request is answered with [`super::Tell::Done`] or [`super::Tell::Refused`] when it is over; what it
+/// does in between, and what it was asked for, is told before that.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub enum Ask {
+    /// How are you? [`super::Tell::Status`].
+    Status,
+    /// Ends a fault, then finds the limit switches.
+    Home,
+    /// Stops what is being done and lifts the finger.
+    Stop,
+    /// Finds out what lies under the finger.
+    Identify(Identify),
+    /// What lay under the finger in the last exploration: one of the textures known, or a new one. The probe learns it from
+    /// the slides of that exploration.
+    Answer(Name),
+    /// Learns what lies under the finger.
+    Train(Train),
+    /// Gives a texture another name.
+    Rename {
+        /// Its name.
+        from: Name,
+        /// Its new name.
+        to: Name,
+    },
+    /// Forgets what was learned.
+    Forget(Forget),
+    /// Measures the motor's current without load, takes and keeps it. [`super::Tell::Calibration`].
+    Calibrate,
+    /// [`super::Tell::Calibration`].
+    ReadCalibration,
+    /// Takes and keeps these constants: [`crate::rig::calibration::RigCalibration::to_bytes`].
+    WriteCalibration(Vec<u8, 64>),
+    /// Whether raw samples are told: [`super::Tell::Block`].
+    Stream(bool),
+    /// The table in use from this byte on. [`super::Tell::TablePart`].
+    ReadTable(u32),
+    /// A table of so many bytes follows.
+    BeginTable(u32),
+    /// The next bytes of it.
+    WriteTable {
+        /// Where they belong.
+        offset: u32,
+        /// The bytes.
+        bytes: Vec<u8, PART>,
+    },
+    /// The table is complete: from now on it is the one in use, if it is whole.
+    CommitTable,
+    /// Goes back to the table that came with the firmware.
+    FactoryTable,
+}
+
+/// An exploration.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Identify {
+    /// Indices of the textures that it may be; none stands for all.
+    pub among: Vec<u16, MAX_TEXTURES>,
+    /// A texture more probable than this is the answer.
+    pub threshold: f32,
+    /// After this many slides the most probable texture is the answer.
+    pub max_slides: u8,
+    /// How what was felt is compared with what is known; the best one for the table, unless given.
+    pub method: Option<Method>,
+    /// How the next movement is chosen.
+    pub strategy: Strategy,
+    /// Whether the answer may be that it is none of them.
+    pub open: bool,
+    /// Whether the probe learns from a verdict that is certain.
+    pub learn: bool,
+    /// For random choices, and for where on the sample slides begin.
+    pub seed: u32,
+}
+
+/// What is to be forgotten.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum Forget {
+    /// A texture, whoever taught it.
+    Texture(Name),
+    /// All that the probe has learned by itself: the table is again as it was taught.
+    SelfTaught,
+    /// The unfinished training of a texture, or a finished pilot.
+    Training(Name),
+}
+
+/// A texture to learn.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Train {
+    /// Its name. One that is known already goes on where it stood.
+    pub name: Name,
+    /// How often each movement is to have been made in the end.
+    pub trials: u8,
+    /// All movements of the grid up to 1.26 N, instead of those of the table.
+    pub pilot: bool,
+    /// For where on the sample slides begin.
+    pub seed: u32,
+}

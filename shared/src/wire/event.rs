@@ -1,0 +1,338 @@
+//! What the probe tells the host.
+
+use heapless::{String, Vec};
+use serde::{Deserialize, Serialize};
+
+use super::command::{MAX_TEXTURES, Name, PART};
+use super::sparse;
+use super::text::Text;
+use crate::features::{FUSED_BANDS, Measurement, Properties, Property};
+use crate::fused::Observation;
+use crate::movement::Movement;
+use crate::rig::guard::Fault;
+use crate::table::Action;
+
+/// Most actions of an outlook that are told, the best ones.
+pub const MAX_OUTLOOK: usize = 16;
+/// P_AC samples in one block.
+pub const BLOCK: usize = 64;
+
+/// From the probe.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Report {
+    /// One more than the last one's: a gap is a lost frame.
+    pub number: u16,
+    /// Since the probe booted, ms.
+    pub at_ms: u32,
+    /// What there is to say.
+    pub tell: Tell,
+}
+
+/// What the probe may say.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[allow(clippy::large_enum_variant)] // no allocation here, and only one at a time
+pub enum Tell {
+    /// The probe has booted.
+    Booted {
+        /// [`PROTOCOL`](super::PROTOCOL) of the probe.
+        protocol: u8,
+        /// Version of the firmware.
+        version: String<16>,
+        /// Why.
+        reset: Reset,
+        /// What the firmware had to say before it gave up, if it did.
+        last_words: Option<Text>,
+    },
+    /// Answer to [`super::Ask::Status`].
+    Status(Status),
+    /// The request of this number is over.
+    Done(u16),
+    /// The request of this number is refused or came to nothing.
+    Refused {
+        /// Its number.
+        id: u16,
+        /// Why, and what to do.
+        why: Text,
+    },
+    /// A frame was damaged; so many were since the probe booted.
+    Damaged(u32),
+    /// The rig does something else now.
+    Phase(Phase),
+    /// This comes next.
+    Chosen {
+        /// Number of the slide, from 1.
+        slide: u8,
+        /// The movement.
+        movement: Movement,
+        /// What is looked at.
+        action: Action,
+        /// What the best actions promise, best first.
+        outlook: Vec<Promise, MAX_OUTLOOK>,
+    },
+    /// The slide was made and taken in.
+    Felt {
+        /// Number of the slide, from 1.
+        slide: u8,
+        /// What was looked at.
+        action: Action,
+        /// What was felt.
+        felt: Felt,
+        /// Probability of every texture of the table. On the line only those that are not 0: most are soon.
+        #[serde(with = "sparse")]
+        posterior: Vec<f32, MAX_TEXTURES>,
+    },
+    /// The slide was made and does not count; it is repeated.
+    Rejected {
+        /// Number of the slide, from 1.
+        slide: u8,
+        /// Why.
+        why: Text,
+    },
+    /// What lies under the finger.
+    Verdict {
+        /// Index in the table.
+        texture: u16,
+        /// Name in the table.
+        name: Name,
+        /// Posterior probability.
+        probability: f32,
+        /// Whether it is over the threshold.
+        sure: bool,
+        /// Whether it is rather none of the textures known; the one named is the most alike.
+        unknown: bool,
+        /// Log-odds of that, where they can be told.
+        log_odds: Option<f32>,
+        /// Slides that counted.
+        slides: u8,
+        /// Whether the probe would learn from [`super::Ask::Answer`]: it is not certain.
+        asks: bool,
+    },
+    /// The probe has learned from what it felt: so many slides.
+    Taught {
+        /// Name of the texture.
+        name: Name,
+        /// How many slides.
+        slides: u8,
+        /// Whether by itself; otherwise from the user.
+        itself: bool,
+    },
+    /// A movement of a texture that is learned was made.
+    Learned {
+        /// The movement.
+        movement: Movement,
+        /// Its trial, from 1.
+        trial: u8,
+        /// Trials to come after it, of all movements.
+        left: u16,
+        /// What was felt.
+        felt: Felt,
+    },
+    /// What the rig is at, 20 times a second while it moves.
+    Live(Live),
+    /// A fault: the motors are stopped, and the finger is being lifted.
+    Fault(Fault),
+    /// Samples as they went into the features.
+    Block(Block),
+    /// The constants in use.
+    Calibration(Vec<u8, 64>),
+    /// A part of the table in use.
+    TablePart {
+        /// Where it belongs.
+        offset: u32,
+        /// Bytes of the whole table.
+        length: u32,
+        /// The bytes.
+        bytes: Vec<u8, PART>,
+    },
+}
+
+/// Why the chip started.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum Reset {
+    /// Power came on.
+    Power,
+    /// The reset pin.
+    Pin,
+    /// The watchdog: the firmware hung.
+    Watchdog,
+    /// The firmware itself, after it gave up.
+    Software,
+    /// Something else.
+    Other,
+}
+
+/// What the rig does: [`crate::rig::control::Phase`] without its fault.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum Phase {
+    /// It does not know where it is.
+    Parked,
+    /// It looks for its limit switches.
+    Homing,
+    /// Lifted and waiting.
+    Ready,
+    /// The stage goes to where the slide begins.
+    Positioning,
+    /// The lever comes down.
+    Pressing,
+    /// The still finger is measured.
+    Background,
+    /// The slide.
+    Sliding,
+    /// The finger is lifted.
+    Lifting,
+    /// The stage moves without load.
+    Unloaded,
+    /// A fault was seen.
+    Faulted,
+}
+
+impl From<crate::rig::control::Phase> for Phase {
+    fn from(phase: crate::rig::control::Phase) -> Self {
+        use crate::rig::control::Phase as Rig;
+        match phase {
+            Rig::Parked => Self::Parked,
+            Rig::Homing => Self::Homing,
+            Rig::Ready => Self::Ready,
+            Rig::Positioning => Self::Positioning,
+            Rig::Pressing => Self::Pressing,
+            Rig::Background => Self::Background,
+            Rig::Sliding => Self::Sliding,
+            Rig::Lifting => Self::Lifting,
+            Rig::Unloaded => Self::Unloaded,
+            Rig::Faulted(_) => Self::Faulted,
+        }
+    }
+}
+
+/// How the probe is.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Status {
+    /// What the rig does.
+    pub phase: Phase,
+    /// Why it does nothing, if it does not.
+    pub fault: Option<Fault>,
+    /// Textures of the table in use.
+    pub textures: u16,
+    /// Bytes of it.
+    pub table_bytes: u32,
+    /// The last four bytes of it: its CRC-32.
+    pub table_crc: u32,
+    /// Whether it came with the firmware.
+    pub factory: bool,
+    /// Day of the calibration, as 20261121; 0 for constants that nobody measured.
+    pub calibrated: u32,
+    /// What was counted since boot.
+    pub counts: Counts,
+    /// Work that the skin has seen, mJ, and that part of it that wears.
+    pub skin_mj: (u32, u32),
+}
+
+/// What the acquisition and the link count, since boot.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
+pub struct Counts {
+    /// Slots, of 1/4400 s.
+    pub slots: u32,
+    /// Slots that came too late; they have no word.
+    pub late_slots: u32,
+    /// Words with a parity or padding error.
+    pub parity_errors: u32,
+    /// Error frames of the sensor, and words of no sensor.
+    pub error_frames: u32,
+    /// Words that found no room on their way to the features.
+    pub lost_samples: u32,
+    /// Reports that found no room on their way to the host.
+    pub lost_reports: u32,
+    /// Frames from the host that were damaged.
+    pub damaged_frames: u32,
+}
+
+/// What an action promises.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Promise {
+    /// The action.
+    pub action: Action,
+    /// Uncertainty that is expected to remain (eq. 11).
+    pub uncertainty: f32,
+    /// Its benefit (eq. 12).
+    pub benefit: f32,
+}
+
+/// What one slide says.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Felt {
+    /// Values in the order of [`Property::ALL`].
+    pub properties: [Option<f32>; 3],
+    /// The roughness is an upper bound.
+    pub roughness_is_bound: bool,
+    /// Power of the still finger, counts^2.
+    pub background: f32,
+    /// Natural logarithms of the band powers, in steps of 1/1024.
+    pub bands: Vec<i16, FUSED_BANDS>,
+    /// Mean and standard deviation of P_DC, in steps of 1/1024 of 100 counts.
+    pub pressure: Option<[i16; 2]>,
+}
+
+impl Felt {
+    /// The properties.
+    pub const fn properties(&self) -> Properties {
+        Properties::new(self.properties)
+    }
+
+    /// What an exploration makes of it.
+    pub fn observation(&self) -> Observation {
+        Observation {
+            properties: self.properties(),
+            bands: self.bands.clone(),
+            pressure: self.pressure,
+        }
+    }
+}
+
+impl From<&Measurement> for Felt {
+    fn from(slide: &Measurement) -> Self {
+        let Observation {
+            properties,
+            bands,
+            pressure,
+        } = slide.into();
+        Self {
+            properties: Property::ALL.map(|p| properties.get(p)),
+            roughness_is_bound: slide.roughness_is_bound,
+            background: slide.background,
+            bands,
+            pressure,
+        }
+    }
+}
+
+/// What the rig is at.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Live {
+    /// Contact force by P_DC, mN.
+    pub force_mn: i16,
+    /// Steps of the lever, downwards positive.
+    pub steps: i32,
+    /// Place of the stage, um.
+    pub stage_um: i32,
+    /// Speed of the stage, um/s.
+    pub speed_um_s: i32,
+    /// Motor current, mA.
+    pub current_ma: i16,
+}
+
+/// Raw samples of the still finger or of a slide, gap-free: `number` says the order.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Block {
+    /// One more than the last block's of the same movement, from 0.
+    pub number: u16,
+    /// The still finger: the background. Otherwise the slide.
+    pub still: bool,
+    /// With the first block of a slide: which of its P_AC samples are at constant speed, from and to.
+    pub steady: Option<(u32, u32)>,
+    /// P_AC, counts about the still finger's baseline.
+    pub pac: Vec<i16, BLOCK>,
+    /// Shear at constant speed, mN.
+    pub shear_mn: Vec<i16, BLOCK>,
+    /// Samples that were lost, so that the slide does not count.
+    pub lost: u32,
+}
