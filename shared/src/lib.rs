@@ -24,6 +24,7 @@ pub mod kernels;
 pub mod mcp3202;
 pub mod movement;
 pub mod pressure;
+pub mod probe;
 pub mod rig;
 pub mod sensor;
 pub mod session;

@@ -1,0 +1,150 @@
+//! An exploration: slide by slide, the explorer chooses, the rig moves, and the explorer takes in what was measured.
+
+use core::fmt;
+
+use crate::explorer::{Explorer, ObserveError, Outlook, Verdict};
+use crate::features::{Measurement, Plan, Slide, SlideError};
+use crate::fused::Observation;
+use crate::kernels::Kernels;
+use crate::rig::{MAX_REJECTED, Rig};
+use crate::table::Action;
+
+/// What an exploration does, as it does it.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Event<'a> {
+    /// This action comes next; it and the others promised this.
+    Chosen(Action, &'a [Outlook]),
+    /// The slide was made and taken in; the posterior of every texture.
+    Felt(Action, &'a Measurement, &'a [f32]),
+    /// The slide was made, but has no value of the property. It does not count: the choice is made again, and is the same
+    /// unless it is random.
+    Rejected(Action, Rejection),
+    /// The answer, while the finger is still being lifted.
+    Decided {
+        /// The answer.
+        verdict: &'a Verdict,
+        /// Slides that counted.
+        slides: u8,
+        /// See [`Explorer::is_certain`].
+        certain: bool,
+    },
+}
+
+/// Why a slide does not count.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Rejection {
+    /// Its samples give no properties.
+    Slide(SlideError),
+    /// Its properties say nothing to the explorer.
+    Observe(ObserveError),
+}
+
+impl fmt::Display for Rejection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Slide(why) => why.fmt(f),
+            Self::Observe(why) => why.fmt(f),
+        }
+    }
+}
+
+/// Why an exploration ended without an answer.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum ExploreError<E> {
+    /// The rig failed.
+    Rig(E),
+    /// [`MAX_REJECTED`] slides in a row were no good, the last one for this reason.
+    Rejected(Rejection),
+    /// The table has no such movement.
+    Movement(u8),
+}
+
+impl<E: fmt::Display> fmt::Display for ExploreError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Rig(why) => why.fmt(f),
+            Self::Rejected(why) => write!(f, "{MAX_REJECTED} slides in a row were no good: {why}"),
+            Self::Movement(index) => write!(f, "the table has no movement {}", index + 1),
+        }
+    }
+}
+
+impl<E: fmt::Debug + fmt::Display> core::error::Error for ExploreError<E> {}
+
+/// Explores from the beginning until there is an answer. `random` serves [`crate::explorer::Strategy::Random`]; `tell` hears of everything.
+///
+/// # Errors
+/// See [`ExploreError`].
+pub async fn explore<R: Rig, const N: usize, K: Kernels>(
+    rig: &mut R,
+    explorer: &mut Explorer<'_, N, K>,
+    plan: &Plan,
+    random: impl FnMut() -> u32,
+    tell: impl FnMut(Event<'_>),
+) -> Result<Verdict, ExploreError<R::Error>> {
+    let answer = slides(rig, explorer, plan, random, tell).await;
+    if !matches!(answer, Err(ExploreError::Rig(_))) {
+        rig.lifted().await.map_err(ExploreError::Rig)?;
+    }
+    answer
+}
+
+/// As [`explore`]; after the last slide the finger may still be on its way up.
+async fn slides<R: Rig, const N: usize, K: Kernels>(
+    rig: &mut R,
+    explorer: &mut Explorer<'_, N, K>,
+    plan: &Plan,
+    mut random: impl FnMut() -> u32,
+    mut tell: impl FnMut(Event<'_>),
+) -> Result<Verdict, ExploreError<R::Error>> {
+    explorer.restart();
+    let mut rejected = 0;
+    loop {
+        if let Some(verdict) = explorer.verdict() {
+            tell(Event::Decided {
+                verdict: &verdict,
+                slides: explorer.slides(),
+                certain: explorer.is_certain(),
+            });
+            return Ok(verdict);
+        }
+        let mut outlook = heapless::Vec::new();
+        explorer.look_out(&mut outlook);
+        let action = explorer.choose(&outlook, random());
+        tell(Event::Chosen(action, &outlook));
+        let movement = explorer
+            .table()
+            .movement(action.movement)
+            .ok_or(ExploreError::Movement(action.movement))?;
+        let mut slide = Slide::<K>::new(plan);
+        rig.lifted().await.map_err(ExploreError::Rig)?;
+        rig.perform(movement, &mut slide)
+            .await
+            .map_err(ExploreError::Rig)?;
+        let felt = slide
+            .finish()
+            .map_err(Rejection::Slide)
+            .and_then(|measurement| {
+                explorer
+                    .observe(action, &Observation::from(&measurement))
+                    .map_err(Rejection::Observe)?;
+                Ok(measurement)
+            });
+        match felt {
+            Ok(measurement) => {
+                rejected = 0;
+                tell(Event::Felt(action, &measurement, explorer.posterior()));
+            }
+            Err(why) => {
+                rejected += 1;
+                tell(Event::Rejected(action, why));
+                if rejected == MAX_REJECTED {
+                    return Err(ExploreError::Rejected(why));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,347 @@
+use super::*;
+use crate::explorer::{Config, Explorer, Strategy};
+use crate::features::{Property, PropertySet};
+use crate::movement::Movement;
+use crate::table::Table;
+use crate::table::tests::{around, table_of};
+use embassy_futures::block_on;
+use std::cell::RefCell;
+use std::format;
+use std::string::{String, ToString};
+use std::vec;
+use std::vec::Vec;
+
+/// What the finger feels next.
+#[derive(Clone, Copy)]
+enum Felt {
+    /// A slide with this tangential force in mN.
+    Traction(i16),
+    /// A slide without force sensing.
+    NoForce,
+    /// A slide that never reaches its steady part.
+    Stuck,
+    /// The movement fails.
+    Fault(&'static str),
+}
+use Felt::{Fault, NoForce, Stuck, Traction};
+
+/// A rig that feels one thing after the other, and notes its movements.
+struct Script {
+    felt: Vec<Felt>,
+    made: Vec<Movement>,
+}
+
+impl Rig for Script {
+    type Error = &'static str;
+
+    fn measures(&self) -> PropertySet {
+        [Property::Traction].into_iter().collect()
+    }
+
+    async fn perform<K: Kernels>(
+        &mut self,
+        movement: Movement,
+        slide: &mut Slide<'_, K>,
+    ) -> Result<(), Self::Error> {
+        let felt = self
+            .felt
+            .get(self.made.len())
+            .copied()
+            .unwrap_or(Fault("script over"));
+        self.made.push(movement);
+        match felt {
+            Fault(why) => return Err(why),
+            Stuck => return Ok(()),
+            Traction(mn) => slide.push_shear(&[mn; 10]),
+            NoForce => {}
+        }
+        slide.set_background(2.0);
+        slide.start(0..600);
+        let sample = |n: usize| ((n * 37) % 101) as i16;
+        slide.push(&(0..600).map(sample).collect::<Vec<_>>());
+        Ok(())
+    }
+}
+
+/// Two textures, tractions 1 N and 2 N, told apart better at the second of two movements.
+fn bytes() -> Vec<u8> {
+    let row = |mean, wide, narrow| vec![around([(mean, wide); 3]), around([(mean, narrow); 3])];
+    table_of(PropertySet::ALL, &[row(1.0, 0.8, 0.4), row(2.0, 0.8, 0.4)])
+}
+
+type Outcome = Result<Verdict, ExploreError<&'static str>>;
+
+/// Explores by this script; the outcome, what was told, and the movements that were made.
+fn explored(felt: &[Felt], config: Config) -> (Outcome, Vec<String>, Vec<Movement>) {
+    let bytes = bytes();
+    let mut rig = Script {
+        felt: felt.to_vec(),
+        made: Vec::new(),
+    };
+    let table = Table::read(&bytes).unwrap();
+    let mut explorer = Explorer::<'_, 2>::new(table, rig.measures(), config).unwrap();
+    let mut told = Vec::new();
+    let mut random = [0, u32::MAX].into_iter().cycle();
+    let outcome = block_on(explore(
+        &mut rig,
+        &mut explorer,
+        &Plan::new(),
+        || random.next().unwrap(),
+        |event| {
+            told.push(match event {
+                Event::Decided { .. } => return,
+                Event::Chosen(action, outlook) => {
+                    assert!(outlook.iter().any(|o| o.action == action));
+                    format!("{} {}", action.what(), action.movement)
+                }
+                Event::Felt(action, slide, posterior) => {
+                    let x = slide.properties.get(action.property.unwrap()).unwrap();
+                    format!("felt {} {x:.1}: {:.2}", action.movement, posterior[1])
+                }
+                Event::Rejected(action, why) => format!("rejected {}: {why}", action.movement),
+            });
+        },
+    ));
+    (outcome, told, rig.made)
+}
+
+fn config(threshold: f32, max_slides: u8) -> Config {
+    Config {
+        threshold,
+        max_slides,
+        ..Config::default()
+    }
+}
+
+const STUCK: Rejection = Rejection::Slide(SlideError::NotStarted);
+
+#[test]
+fn explores_until_it_is_sure() {
+    let felt = [1900, 2000, 2000, 2000].map(Traction);
+    let (outcome, told, made) = explored(&felt, config(0.99, 10));
+    let verdict = outcome.unwrap();
+    assert_eq!((verdict.texture, verdict.sure), (1, true));
+    // by hand: log odds +2.5, +0.78 and +3.125; uncertainty after the first 0.128 at the first movement and 0.098 at
+    // the second, which was made once: 0.098^(1/2)
+    assert_eq!(
+        told,
+        [
+            "traction 1",
+            "felt 1 1.9: 0.92",
+            "traction 0",
+            "felt 0 2.0: 0.96",
+            "traction 1",
+            "felt 1 2.0: 1.00"
+        ]
+    );
+    let grid: Vec<Movement> = Movement::grid().take(2).collect();
+    assert_eq!(made, [grid[1], grid[0], grid[1]]);
+    let odds = (2.5f32 + 0.78125 + 3.125).exp();
+    assert!((verdict.probability - odds / (1.0 + odds)).abs() < 1e-4);
+}
+
+/// A rig whose finger is down after a slide until somebody waits for it; what happens is noted.
+struct Slow<'a>(Script, &'a RefCell<Vec<&'static str>>);
+
+impl Rig for Slow<'_> {
+    type Error = &'static str;
+
+    fn measures(&self) -> PropertySet {
+        self.0.measures()
+    }
+
+    async fn perform<K: Kernels>(
+        &mut self,
+        movement: Movement,
+        slide: &mut Slide<'_, K>,
+    ) -> Result<(), Self::Error> {
+        self.1.borrow_mut().push("performed");
+        self.0.perform(movement, slide).await
+    }
+
+    async fn lifted(&mut self) -> Result<(), Self::Error> {
+        let jams = self.0.felt.len() == self.0.made.len();
+        self.1.borrow_mut().push("lifted");
+        if jams { Err("it jams") } else { Ok(()) }
+    }
+}
+
+#[test]
+fn a_slide_is_judged_while_the_finger_is_lifted() {
+    let outcome = |felt: &[Felt], config| {
+        let (bytes, noted) = (bytes(), RefCell::default());
+        let script = Script {
+            felt: felt.to_vec(),
+            made: Vec::new(),
+        };
+        let mut rig = Slow(script, &noted);
+        let table = Table::read(&bytes).unwrap();
+        let mut explorer = Explorer::<'_, 2>::new(table, rig.measures(), config).unwrap();
+        let plan = Plan::new();
+        let exploration = explore(
+            &mut rig,
+            &mut explorer,
+            &plan,
+            || 0,
+            |event| {
+                noted.borrow_mut().push(match event {
+                    Event::Chosen(..) => "chosen",
+                    Event::Felt(..) => "felt",
+                    Event::Rejected(..) => "rejected",
+                    Event::Decided { slides, .. } => {
+                        assert_eq!(slides, 2);
+                        "decided"
+                    }
+                });
+            },
+        );
+        let outcome = block_on(exploration);
+        (outcome.map(|verdict| verdict.texture), noted.into_inner())
+    };
+    let all = [
+        "chosen",
+        "lifted",
+        "performed",
+        "felt",
+        "chosen",
+        "lifted",
+        "performed",
+        "felt",
+        "decided",
+        "lifted",
+    ];
+    let felt = [Traction(1900), Traction(2000), Traction(0)];
+    assert_eq!(outcome(&felt, config(1.0, 2)), (Ok(1), all.to_vec()));
+    // the answer stands, and is told; that the finger is down is told as well
+    let (failed, noted) = outcome(&felt[..2], config(1.0, 2));
+    assert_eq!(
+        (failed, noted),
+        (Err(ExploreError::Rig("it jams")), all.to_vec())
+    );
+    // three that are no good end it with the finger up
+    let (failed, noted) = outcome(&[Stuck, Stuck, Stuck, Stuck], config(1.0, 2));
+    assert_eq!(failed, Err(ExploreError::Rejected(STUCK)));
+    assert_eq!(noted.last(), Some(&"lifted"));
+}
+
+#[test]
+fn names_the_best_after_the_last_slide() {
+    let (outcome, told, made) = explored(
+        &[Traction(1900), Traction(1400), Traction(1700)],
+        config(1.0, 3),
+    );
+    let verdict = outcome.unwrap();
+    assert_eq!((verdict.texture, verdict.sure), (1, false));
+    assert_eq!((told.len(), made.len()), (6, 3));
+    assert!(told[5].starts_with("felt"));
+    let (outcome, told, made) = explored(&[], config(1.0, 0));
+    assert_eq!(outcome.unwrap().probability, 0.5, "without a slide");
+    assert!(told.is_empty() && made.is_empty());
+}
+
+#[test]
+fn a_rejected_slide_is_repeated_and_teaches_nothing() {
+    let straight = explored(&[Traction(1900), Traction(2000)], config(0.99, 2));
+    let (outcome, told, made) = explored(
+        &[Stuck, Traction(1900), NoForce, Traction(2000)],
+        config(0.99, 2),
+    );
+    assert_eq!(outcome, straight.0);
+    assert_eq!(made.len(), 4);
+    assert_eq!(
+        told,
+        [
+            "traction 1",
+            "rejected 1: the slide never reached its steady part",
+            "traction 1",
+            "felt 1 1.9: 0.92",
+            "traction 0",
+            "rejected 0: the slide did not give a value of traction",
+            "traction 0",
+            "felt 0 2.0: 0.96",
+        ]
+    );
+}
+
+#[test]
+fn three_rejected_in_a_row_end_it() {
+    let (outcome, told, made) =
+        explored(&[Stuck, NoForce, Stuck, Traction(1900)], config(0.99, 10));
+    assert_eq!(outcome, Err(ExploreError::Rejected(STUCK)));
+    assert_eq!((told.len(), made.len()), (6, 3));
+    assert_eq!(
+        told[5],
+        "rejected 1: the slide never reached its steady part"
+    );
+    let missing = Rejection::Observe(ObserveError::Missing(Property::Traction));
+    assert_eq!(
+        explored(&[NoForce; 3], config(0.99, 10)).0,
+        Err(ExploreError::Rejected(missing))
+    );
+}
+
+#[test]
+fn a_good_slide_in_between_resets_the_count() {
+    let felt = [
+        Stuck,
+        Stuck,
+        Traction(1500),
+        Stuck,
+        Stuck,
+        Traction(1500),
+        Stuck,
+        Stuck,
+        Stuck,
+        Traction(1500),
+    ];
+    let (outcome, told, made) = explored(&felt, config(0.99, 10));
+    assert_eq!(outcome, Err(ExploreError::Rejected(STUCK)));
+    assert_eq!((told.len(), made.len()), (18, 9));
+}
+
+#[test]
+fn a_fault_of_the_rig_ends_it() {
+    let (outcome, told, made) =
+        explored(&[Stuck, Fault("e-stop"), Traction(2000)], config(0.99, 10));
+    assert_eq!(outcome, Err(ExploreError::Rig("e-stop")));
+    assert_eq!((told.len(), made.len()), (3, 2));
+    assert_eq!(
+        told[2], "traction 1",
+        "nothing is told of the slide that failed"
+    );
+}
+
+#[test]
+fn a_random_choice_takes_what_it_is_given() {
+    let random = Config {
+        strategy: Strategy::Random,
+        ..config(1.0, 4)
+    };
+    let (outcome, told, made) = explored(&[Traction(1500); 4], random);
+    assert_eq!(outcome.unwrap().probability, 0.5);
+    let grid: Vec<Movement> = Movement::grid().take(2).collect();
+    assert_eq!(made, [grid[0], grid[1], grid[0], grid[1]]);
+    assert_eq!(
+        (told[0].as_str(), told[2].as_str()),
+        ("traction 0", "traction 1")
+    );
+}
+
+#[test]
+fn the_errors_say_why() {
+    let error = |error: ExploreError<&str>| error.to_string();
+    assert_eq!(error(ExploreError::Rig("e-stop")), "e-stop");
+    assert_eq!(
+        error(ExploreError::Rejected(STUCK)),
+        "3 slides in a row were no good: the slide never reached its steady part"
+    );
+    assert_eq!(
+        error(ExploreError::Movement(2)),
+        "the table has no movement 3"
+    );
+    let missing = Rejection::Observe(ObserveError::Missing(Property::Fineness));
+    assert_eq!(
+        missing.to_string(),
+        "the slide did not give a value of fineness"
+    );
+}
