@@ -7,7 +7,7 @@
 
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 
-use super::WORD;
+use super::layout::WORD;
 
 /// The other page is being erased.
 const ERASING: [u8; WORD] = *b"eras";

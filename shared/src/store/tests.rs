@@ -11,7 +11,7 @@ use crate::pressure::Calibration;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::table::tests::{around, table_of};
-use crate::table::{Experience, Table};
+use crate::table::{Experience, Table, TableError};
 use crate::training::Lesson;
 use crate::wire::Name;
 use embassy_futures::block_on;

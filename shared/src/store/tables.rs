@@ -2,73 +2,15 @@
 
 use embedded_storage_async::nor_flash::NorFlash;
 
-use super::{CRC32, Store, StoreError, WORD};
+use super::error::StoreError;
+use super::layout::{
+    COMMIT, COMMIT_AT, CRC32, HEADER, Push, Slot, StoredTable, TABLE_AT, WORD, header,
+};
+use super::sectors::Store;
 use crate::table::Table;
 
-const MAGIC: u32 = u32::from_le_bytes(*b"SLOT");
-const LAYOUT: u32 = 1;
-const COMMIT: u32 = u32::from_le_bytes(*b"COMM");
-/// Header without the commit word.
-const HEADER: usize = 24;
-const COMMIT_AT: u32 = 28;
-/// Where the table begins in its sector.
-const TABLE_AT: u32 = 32;
 /// Bytes read at a time.
 const CHUNK: usize = 128;
-
-/// A table that is stored whole.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct StoredTable {
-    /// Where its bytes begin in the store, a multiple of 4.
-    pub offset: u32,
-    /// Bytes it has.
-    pub length: usize,
-    /// Its checksum, as [`Table::crc`] gives it.
-    pub crc: u32,
-    /// Larger than that of every table before it.
-    pub generation: u32,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub(super) enum Slot {
-    A,
-    #[default]
-    B,
-}
-
-impl Slot {
-    fn other(self) -> Self {
-        match self {
-            Self::A => Self::B,
-            Self::B => Self::A,
-        }
-    }
-
-    fn start<F: NorFlash>(self) -> u32 {
-        match self {
-            Self::A => 0,
-            Self::B => F::ERASE_SIZE as u32,
-        }
-    }
-}
-
-/// A table on its way into the flash.
-struct Push {
-    slot: Slot,
-    length: usize,
-    /// Bytes taken; those of an unfinished word are in `word`.
-    at: usize,
-    word: [u8; WORD],
-}
-
-#[derive(Default)]
-pub(super) struct Slots {
-    /// The slot in use, and the table in it.
-    active: Option<(Slot, StoredTable)>,
-    /// Largest generation that either slot has had.
-    generation: u32,
-    push: Option<Push>,
-}
 
 impl<F: NorFlash> Store<F> {
     /// Bytes that a table may have at most.
@@ -233,6 +175,23 @@ impl<F: NorFlash> Store<F> {
         Ok((stored, table))
     }
 
+    /// Makes the table of `length` bytes at the beginning of `buffer` the one to be used; the buffer is then read back from
+    /// the flash. The former table stays in use until the new one is whole.
+    ///
+    /// # Errors
+    /// See [`Store::begin_table`], [`Store::write_table`] and [`Store::commit_table`].
+    pub async fn replace_table(
+        &mut self,
+        buffer: &mut [u8],
+        length: usize,
+    ) -> Result<(), StoreError<F::Error>> {
+        self.begin_table(length).await?;
+        let table = buffer.get(..length).unwrap_or_default();
+        self.write_table(0, table).await?;
+        self.commit_table(buffer).await?;
+        Ok(())
+    }
+
     /// Gives the stored tables up: from here on the factory's is to be used.
     ///
     /// # Errors
@@ -339,35 +298,4 @@ impl<F: NorFlash> Store<F> {
         }
         Table::read(room).map_err(StoreError::Table)
     }
-
-    async fn read(&mut self, offset: u32, room: &mut [u8]) -> Result<(), StoreError<F::Error>> {
-        self.flash
-            .read(offset, room)
-            .await
-            .map_err(StoreError::Flash)
-    }
-
-    async fn program(&mut self, offset: u32, words: &[u8]) -> Result<(), StoreError<F::Error>> {
-        self.flash
-            .write(offset, words)
-            .await
-            .map_err(StoreError::Flash)
-    }
-}
-
-fn header(table: &StoredTable) -> [u8; HEADER] {
-    let mut bytes = [0; HEADER];
-    let (body, end) = bytes.split_at_mut(HEADER - WORD);
-    let fields = [
-        MAGIC,
-        LAYOUT,
-        table.generation,
-        table.length as u32,
-        table.crc,
-    ];
-    for (room, field) in body.chunks_exact_mut(WORD).zip(fields) {
-        room.copy_from_slice(&field.to_le_bytes());
-    }
-    end.copy_from_slice(&CRC32.checksum(body).to_le_bytes());
-    bytes
 }

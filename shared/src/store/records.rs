@@ -1,0 +1,127 @@
+//! The records of the settings: their keys, their sizes, and how they are read.
+
+use embedded_storage_async::nor_flash::NorFlash;
+use sequential_storage::cache::key_pointers::ArrayKeyPointers;
+use sequential_storage::cache::{Cache, Uncached};
+use sequential_storage::map::{self, MapStorage};
+use serde::{Deserialize, Serialize};
+
+use super::error::{SettingsError, StoreError};
+use super::pages::Pages;
+use crate::fused::Whitened;
+use crate::movement::Movement;
+use crate::training::Lesson;
+use crate::wire::{MAX_TEXTURES, Name};
+
+/// Most records of training: a pilot of 30 movements and three textures of three. With all of them in use, 108 bytes each,
+/// and everything self-taught besides, 84 bytes a texture, a page of 16 KB is not full.
+pub const MAX_RECORDS: u8 = 40;
+/// Movements of a texture that a probe learns by itself: an exploration rarely makes more.
+pub const SELF_MOVEMENTS: usize = 2;
+
+pub(super) const KEY_SCHEMA: u8 = 0;
+pub(super) const KEY_CALIBRATION: u8 = 1;
+pub(super) const KEY_SKIN: u8 = 2;
+pub(super) const KEY_TRAINED: u8 = 16;
+pub(super) const KEY_SELF: u8 = 64;
+/// One past the last key.
+pub(super) const KEYS: usize = KEY_SELF as usize + MAX_TEXTURES;
+/// The longest record with its key, in whole words: one of training takes 99 bytes, a self-taught one 106.
+pub(super) const RECORD: usize = 112;
+
+/// How far the training of a texture at one movement has come.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Trained {
+    /// The texture.
+    pub name: Name,
+    /// The movement.
+    pub movement: Movement,
+    /// Checksum of the table whose trials of this texture are counted in; `None` for trials of its own only.
+    pub table: Option<u32>,
+    /// What was learned.
+    pub lesson: Lesson,
+}
+
+impl Trained {
+    pub(super) fn is(&self, name: &str, movement: Movement, table: Option<u32>) -> bool {
+        self.name == name && self.movement == movement && self.table == table
+    }
+}
+
+/// What the probe has learned by itself of a texture, in place of what the table says of it at these movements.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct SelfTaught {
+    /// [`crate::table::Table::lineage`] of the table: what was taught since does not change it.
+    pub lineage: u32,
+    /// [`crate::table::Table::number`] of the texture.
+    pub number: u16,
+    /// Per movement, slides that the probe learned by itself, and what it knows now.
+    pub movements: heapless::Vec<(u8, u8, Whitened), SELF_MOVEMENTS>,
+}
+
+/// Remembers where the newest record of every key is while one call lasts. Without it, turning a page looks through the
+/// whole page for every record in it.
+pub(super) type Places = Cache<Uncached, Uncached, ArrayKeyPointers<u8, KEYS>, u8>;
+
+pub(super) type Map<'f, F> = MapStorage<u8, Pages<'f, F>, Places>;
+
+/// One pass over all records with keys from `first` on, oldest first: what a key held last counts.
+pub(super) struct Records<'m, 'f, F: NorFlash> {
+    items: map::MapItemIter<'m, u8, Pages<'f, F>, Places>,
+    first: u8,
+    places: u8,
+}
+
+impl<'m, 'f, F: NorFlash> Records<'m, 'f, F> {
+    pub(super) fn trained(items: map::MapItemIter<'m, u8, Pages<'f, F>, Places>) -> Self {
+        Self {
+            items,
+            first: KEY_TRAINED,
+            places: MAX_RECORDS,
+        }
+    }
+
+    pub(super) fn self_taught(items: map::MapItemIter<'m, u8, Pages<'f, F>, Places>) -> Self {
+        Self {
+            items,
+            first: KEY_SELF,
+            places: MAX_TEXTURES as u8,
+        }
+    }
+
+    /// Place and record, `None` for a place that was cleared.
+    pub(super) async fn next<T: for<'b> Deserialize<'b>>(
+        &mut self,
+    ) -> Result<Option<(u8, Option<T>)>, StoreError<F::Error>> {
+        let mut record = None;
+        let place = self
+            .look(&mut |bytes| {
+                record = postcard::from_bytes(bytes).ok();
+                record.is_some()
+            })
+            .await?;
+        Ok(place.zip(record))
+    }
+
+    /// As [`Records::next`], whatever its type is: `decode` says whether the bytes are a record.
+    async fn look(
+        &mut self,
+        decode: &mut dyn FnMut(&[u8]) -> bool,
+    ) -> Result<Option<u8>, StoreError<F::Error>> {
+        let mut buffer = [0; RECORD];
+        while let Some((key, bytes)) = self.items.next::<&[u8]>(&mut buffer).await? {
+            let place = key.checked_sub(self.first);
+            if let Some(place) = place.filter(|&place| place < self.places) {
+                return match decode(bytes) {
+                    true => Ok(Some(place)),
+                    false => Err(StoreError::Settings(SettingsError::Corrupt)),
+                };
+            }
+        }
+        Ok(None)
+    }
+}
+
+pub(super) fn decode<'b, T: Deserialize<'b>, E>(bytes: &'b [u8]) -> Result<T, StoreError<E>> {
+    postcard::from_bytes(bytes).map_err(|_| StoreError::Settings(SettingsError::Corrupt))
+}
