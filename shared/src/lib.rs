@@ -31,9 +31,17 @@ pub mod session;
 pub mod spectrum;
 pub mod store;
 pub mod table;
-pub mod teaching;
-pub mod training;
 pub mod wire;
+
+/// Former path.
+pub mod teaching {
+    pub use crate::probe::teach::*;
+}
+
+/// Former path.
+pub mod training {
+    pub use crate::probe::training::*;
+}
 
 /// Adds as many of them as there is room for: `extend` would panic at more.
 fn fill<T, const N: usize>(room: &mut heapless::Vec<T, N>, items: impl Iterator<Item = T>) {

@@ -9,6 +9,31 @@ use crate::kernels::Kernels;
 use crate::rig::{MAX_REJECTED, Rig};
 use crate::table::Action;
 
+/// Random numbers for choices and for where slides begin (xorshift, Marsaglia 2003); not for secrets.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Random(u32);
+
+impl Random {
+    /// A row of numbers.
+    pub const fn new(seed: u32) -> Self {
+        // 0 would stay 0
+        Self(if seed == 0 { 0x9E37_79B9 } else { seed })
+    }
+
+    /// The next number.
+    pub fn next_u32(&mut self) -> u32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 17;
+        self.0 ^= self.0 << 5;
+        self.0
+    }
+
+    /// The next number from 0 to 1, without 1.
+    pub fn next_f32(&mut self) -> f32 {
+        (self.next_u32() >> 8) as f32 / (1 << 24) as f32
+    }
+}
+
 /// What an exploration does, as it does it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Event<'a> {

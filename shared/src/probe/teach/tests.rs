@@ -2,10 +2,10 @@
 
 use super::*;
 use crate::fused::{FeatureSet, MAX_FEATURES};
+use crate::probe::training::Lesson;
 use crate::store::tests::ram::{Ram, RamError, Torn};
 use crate::store::{StoreError, Trained};
 use crate::table::tests::{fused_of, known, straight};
-use crate::training::Lesson;
 use embassy_futures::block_on;
 use std::vec;
 use std::vec::Vec as List;

@@ -1,0 +1,136 @@
+//! What a host asks a probe for, from beginning to end: an exploration. Every step of it is told in the words of
+//! [`crate::wire`], so that the host can follow each decision.
+
+use core::fmt;
+
+use heapless::Vec;
+
+use super::explore::{Event, Random, explore};
+use crate::explorer::{Config, Explorer, Method, Outlook};
+use crate::features::Plan;
+use crate::kernels::Kernels;
+use crate::rig::Rig;
+use crate::session::{Visited, text};
+use crate::table::{Contents, Table};
+use crate::up_to;
+use crate::wire::{Identify, MAX_OUTLOOK, MAX_TEXTURES, Name, Promise, Tell, Text};
+
+/// Explores what lies under the finger until there is an answer, which is told; the error is why there is none.
+///
+/// # Errors
+/// The request makes no sense with this table, or the exploration failed: see [`crate::rig::ExploreError`].
+pub async fn identify<R, K>(
+    wanted: &Identify,
+    rig: &mut R,
+    table: Table<'_>,
+    plan: &Plan,
+    mut tell: impl FnMut(Tell),
+) -> Result<Visited, Text>
+where
+    R: Rig,
+    R::Error: fmt::Display,
+    K: Kernels,
+{
+    let contents = table.contents();
+    let config = Config {
+        method: wanted.method.unwrap_or(Method::of(contents)),
+        strategy: wanted.strategy,
+        threshold: wanted.threshold,
+        max_slides: wanted.max_slides,
+        open: wanted.open,
+    };
+    let all = if wanted.among.is_empty() {
+        0..table.textures()
+    } else {
+        0..0
+    };
+    let candidates = wanted.among.iter().copied().chain(all);
+    let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
+    explorer
+        .consider(rig.measures(), config, candidates)
+        .map_err(text)?;
+    let mut random = Random::new(wanted.seed);
+    let mut slide: u8 = 1;
+    let verdict = explore(
+        rig,
+        &mut explorer,
+        plan,
+        || random.next_u32(),
+        |event| match event {
+            Event::Chosen(action, outlook) => {
+                if let Some(movement) = table.movement(action.movement) {
+                    tell(Tell::Chosen {
+                        slide,
+                        movement,
+                        action,
+                        outlook: best(outlook),
+                    });
+                }
+            }
+            Event::Felt(action, measurement, posterior) => {
+                tell(Tell::Felt {
+                    slide,
+                    action,
+                    felt: measurement.into(),
+                    posterior: Vec::from_slice(posterior).unwrap_or_default(),
+                });
+                slide = slide.saturating_add(1);
+            }
+            Event::Rejected(_, why) => tell(Tell::Rejected {
+                slide,
+                why: text(why),
+            }),
+            Event::Decided {
+                verdict,
+                slides,
+                certain,
+            } => tell(Tell::Verdict {
+                texture: verdict.texture,
+                name: Name::try_from(table.name(verdict.texture).unwrap_or_default())
+                    .unwrap_or_default(),
+                probability: verdict.probability,
+                sure: verdict.sure,
+                unknown: verdict.unknown,
+                log_odds: verdict.log_odds,
+                slides,
+                asks: matches!(contents, Contents::Fused(..)) && !certain,
+            }),
+        },
+    )
+    .await
+    .map_err(text)?;
+    Ok(Visited {
+        table: table.crc(),
+        texture: verdict.texture,
+        certain: explorer.is_certain(),
+        felt: up_to(explorer.felt()),
+    })
+}
+
+/// The most useful actions, best first. One after the other, for sorting them all takes the chip 2 KB.
+pub(super) fn best(outlook: &[Outlook]) -> Vec<Promise, MAX_OUTLOOK> {
+    let mut best: Vec<Promise, MAX_OUTLOOK> = Vec::new();
+    for o in outlook {
+        let better = |p: &Promise| p.benefit.total_cmp(&o.benefit).is_ge();
+        if best.is_full() {
+            if best.last().is_some_and(better) {
+                continue;
+            }
+            best.pop();
+        }
+        // there is room
+        let _ = best.push(Promise {
+            action: o.action,
+            uncertainty: o.uncertainty,
+            benefit: o.benefit,
+        });
+        let mut rest = best.as_mut_slice();
+        while let [.., before, last] = rest
+            && !better(before)
+        {
+            core::mem::swap(before, last);
+            (rest, _) = rest.split_at_mut(rest.len().saturating_sub(1));
+        }
+    }
+    best
+}
