@@ -1,9 +1,11 @@
-//! Exploratory movements: a contact force and a sliding speed (eq. 20-22), and what a slide takes of the sample and of the
-//! skin.
+//! Exploratory movements: a contact force and a sliding speed (eq. 20-22), and what a slide takes of the skin.
 
 use core::fmt;
 
 use serde::{Deserialize, Serialize};
+
+// until all users have the new path
+pub use crate::rig::slide_path::SlidePath;
 
 /// One exploratory movement: the contact force that is set before the slide and the speed of the slide.
 ///
@@ -190,62 +192,6 @@ impl fmt::Display for Movement {
     }
 }
 
-/// What a slide asks of the stage: constant speed over `length`, with a ramp before and one after.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct SlidePath {
-    /// Sliding speed in mm/s.
-    pub speed_mm_s: f32,
-    /// Distance at constant speed in mm.
-    pub length_mm: f32,
-    /// Acceleration of both ramps in mm/s^2.
-    pub acceleration_mm_s2: f32,
-}
-
-impl SlidePath {
-    /// Acceleration of the reference stage.
-    pub const ACCELERATION_MM_S2: f32 = 1000.0;
-    /// The square of texture is 75 mm wide (Methods, "Textures").
-    pub const SAMPLE_MM: f32 = 75.0;
-    /// Longest slide at constant speed: what is left of the sample is where its start may be drawn from.
-    pub const LONGEST_MM: f32 = 60.0;
-
-    /// A slide of `length_mm` at the speed of `movement`, with the reference stage's acceleration.
-    pub fn new(movement: Movement, length_mm: f32) -> Self {
-        Self {
-            speed_mm_s: movement.speed_mm_s(),
-            length_mm,
-            acceleration_mm_s2: Self::ACCELERATION_MM_S2,
-        }
-    }
-
-    /// Duration of one ramp in s.
-    pub fn ramp_s(&self) -> f32 {
-        self.speed_mm_s / self.acceleration_mm_s2
-    }
-
-    /// Duration of the part at constant speed in s.
-    pub fn steady_s(&self) -> f32 {
-        self.length_mm / self.speed_mm_s
-    }
-
-    /// Duration from rest to rest in s.
-    pub fn duration_s(&self) -> f32 {
-        self.steady_s() + 2.0 * self.ramp_s()
-    }
-
-    /// Travel from rest to rest in mm: each ramp takes v^2 / 2a.
-    pub fn travel_mm(&self) -> f32 {
-        self.length_mm + self.speed_mm_s * self.ramp_s()
-    }
-
-    /// Where the slide may start so that the finger stays on a sample of `sample_mm`, as the room in mm behind the first
-    /// possible start; `None` if the slide does not fit at all.
-    pub fn start_room_mm(&self, sample_mm: f32) -> Option<f32> {
-        let room = sample_mm - self.travel_mm();
-        (room >= 0.0).then_some(room)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -317,28 +263,5 @@ mod tests {
             Err(MovementError::Speed(0)),
             "negative speeds saturate to 0"
         );
-    }
-
-    #[test]
-    fn a_75_mm_sample_at_1000_mm_s2_gives_the_times_of_the_hardware_facts() {
-        for (speed, steady_s) in [(10.0, 7.49), (63.1, 1.126), (100.0, 0.65)] {
-            let length = 75.0 - speed * speed / 1000.0;
-            let path = SlidePath {
-                speed_mm_s: speed,
-                length_mm: length,
-                acceleration_mm_s2: 1000.0,
-            };
-            assert!((path.steady_s() - steady_s).abs() < 1e-3);
-            assert!((path.travel_mm() - 75.0).abs() < 1e-4);
-            assert!((path.duration_s() - (path.steady_s() + 2.0 * speed / 1000.0)).abs() < 1e-6);
-        }
-    }
-
-    #[test]
-    fn start_room_is_what_the_sample_leaves() {
-        let path = SlidePath::new(Movement::FOR_TRACTION, SlidePath::LONGEST_MM);
-        let room = path.start_room_mm(SlidePath::SAMPLE_MM).unwrap();
-        assert!((room - 14.9).abs() < 1e-4);
-        assert!(path.start_room_mm(60.0).is_none());
     }
 }

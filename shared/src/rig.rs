@@ -4,22 +4,30 @@
 
 pub mod calibration;
 pub mod control;
+pub mod fault;
 pub mod force;
 pub mod guard;
 pub mod lever;
-pub mod patience;
+pub mod phase;
 pub mod pins;
 pub mod skin;
+mod slide;
+pub mod slide_path;
 pub mod stage;
 pub mod steps;
+pub mod timeout;
 pub mod unloaded;
 
 use crate::features::{PropertySet, Slide};
 use crate::kernels::Kernels;
 use crate::movement::Movement;
 
+pub use fault::{FAULTS, Fault};
+pub use phase::{Ended, Phase, Refused, RigError};
+
 // until all users have the new path
 pub use crate::probe::explore::{Event, ExploreError, Rejection, explore};
+pub use timeout as patience;
 
 /// Slides in a row without properties, after which an exploration ends.
 pub const MAX_REJECTED: u8 = 3;

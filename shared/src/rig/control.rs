@@ -4,29 +4,26 @@
 //! No input or output of its own: [`Control::tick`] takes what the pins say and returns what they shall do, so that board
 //! and simulator run the same code.
 
-use core::ops::Range;
-
-use super::calibration::{RigCalibration, RigCalibrationError};
+use super::calibration::RigCalibration;
+use super::fault::Fault;
 use super::force::ForceMeter;
-use super::guard::{FORCE_LIMIT_MN, Fault, Guard, Seen, Unguarded};
+use super::guard::{FORCE_LIMIT_MN, Guard, Seen, Unguarded};
 use super::lever::{Lever, LeverState};
-use super::pins::{Felt, Inputs, Outputs};
+use super::phase::HIGH_FORCE_MN;
+use super::pins::{Inputs, Outputs};
 use super::skin::SkinCare;
+use super::slide::Run;
 use super::stage::{MARGIN_MM, Stage, StageConstants, StageState};
-use crate::movement::{Movement, SlidePath};
-use crate::pressure::{Calibration, Channel, RATE_HZ};
-use crate::up_to;
+use crate::movement::Movement;
+use crate::pressure::{Calibration, Channel};
+
+// until all users have the new path
+pub use super::phase::{Ended, Phase, Refused};
 
 /// The still finger is measured for so long.
 pub const BACKGROUND_MS: u32 = 1000;
-/// Longest slide at constant speed.
-const STEADY_S: f32 = 3.0;
-/// After the ramp the servo has this long to settle before samples count.
-const STEADY_MARGIN_S: f32 = 0.2;
 /// Speed of the stage while the finger is lifted.
 const RETURN_MM_S: f32 = 50.0;
-/// Forces over this are pressed only by a rig that was allowed to.
-const HIGH_FORCE_MN: u16 = Movement::FOR_TRACTION.force_mn();
 /// With the lever driver off the finger pushes it back; only then it is lifted.
 const RELEASE_MS: u32 = 20;
 /// Force that has risen by so many counts since the lever's driver was off rises because of the lifting.
@@ -41,84 +38,6 @@ const STANDS_MM_S: f32 = 0.5;
 const AIR_COUNTS: f32 = 40.0;
 /// A lifted finger shows no more than these counts above its zero.
 const LIFTED_COUNTS: f32 = 8.0;
-/// P_AC words of a slide may differ from what its time holds by so many.
-const WORDS_OFF: u32 = 4;
-
-/// What the rig is doing.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Phase {
-    /// Nothing; it does not know where lever and stage are.
-    Parked,
-    /// The lever, then the stage look for their limit switches.
-    Homing,
-    /// Lifted and waiting.
-    Ready,
-    /// The stage goes to where the slide begins.
-    Positioning,
-    /// The lever comes down until the force is right.
-    Pressing,
-    /// The still finger is measured.
-    Background,
-    /// Sliding.
-    Sliding,
-    /// The finger is lifted; then the slide is over.
-    Lifting,
-    /// The stage goes without load, its current is measured.
-    Unloaded,
-    /// A fault was seen; the finger is being lifted, or is. Nothing moves until [`Control::reset`].
-    Faulted(Fault),
-}
-
-/// How a movement ended.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Ended {
-    /// All samples are there.
-    Whole,
-    /// So many words were damaged or missing between the beginning of the background and the end of the slide.
-    Gap(u32),
-    /// It was stopped.
-    Stopped,
-}
-
-/// Why a command is refused.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Refused {
-    /// Something else is being done.
-    Busy,
-    /// Lever and stage do not know where they are: home first.
-    NotHomed,
-    /// A fault has to be reset first.
-    Fault(Fault),
-    /// The force is over what this rig may press.
-    Force(u16),
-    /// No speed of this stage, um/s.
-    Speed(u32),
-    /// The slide does not fit on the sample.
-    Length,
-    /// The calibration cannot be.
-    Calibration(RigCalibrationError),
-}
-
-impl core::fmt::Display for Refused {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Busy => f.write_str("the rig is busy; stop it first"),
-            Self::NotHomed => {
-                f.write_str("lever and stage do not know where they are; home them first")
-            }
-            Self::Fault(fault) => write!(f, "{fault}: {}", fault.recovery()),
-            Self::Force(mn) => write!(
-                f,
-                "{mn} mN is more than this rig may press; {HIGH_FORCE_MN} mN unless high forces are allowed"
-            ),
-            Self::Speed(um_s) => crate::movement::MovementError::Speed(*um_s).fmt(f),
-            Self::Length => f.write_str("the slide does not fit on the sample"),
-            Self::Calibration(why) => why.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for Refused {}
 
 /// The whole rig.
 #[derive(Clone, Debug)]
@@ -132,15 +51,7 @@ pub struct Control {
     phase: Phase,
     ms: u32,
     ended: Option<Ended>,
-    movement: Movement,
-    /// Where the slide begins and ends, mm.
-    path_mm: (f32, f32),
-    /// Constant speed, as ms since the slide began.
-    steady_ms: Range<u32>,
-    /// Sum and number of P_AC words since the lever last moved: the baseline.
-    pac: (u32, u32),
-    baseline: i32,
-    damaged: u32,
+    run: Run,
     allow_high_force: bool,
     /// The finger cannot be lifted: the lever's driver stays off.
     gave_up: bool,
@@ -154,12 +65,8 @@ pub struct Control {
     air: Option<f32>,
     /// For how many ms the lever's and the left limit switch have been closed.
     closed_ms: [u32; 2],
-    /// P_AC words of the slide so far.
-    slide_words: u32,
     /// Duty of the last tick.
     duty: f32,
-    /// Sum and number of motor currents at constant speed.
-    current: (f32, u32),
 }
 
 impl Control {
@@ -179,12 +86,7 @@ impl Control {
             phase: Phase::Parked,
             ms: 0,
             ended: None,
-            movement: Movement::FOR_ROUGHNESS,
-            path_mm: (0.0, 0.0),
-            steady_ms: 0..0,
-            pac: (0, 0),
-            baseline: 0,
-            damaged: 0,
+            run: Run::NONE,
             allow_high_force: false,
             gave_up: false,
             released: 0.0,
@@ -192,9 +94,7 @@ impl Control {
             compared: false,
             air: None,
             closed_ms: [0; 2],
-            slide_words: 0,
             duty: 0.0,
-            current: (0.0, 0),
         }
     }
 
@@ -312,29 +212,9 @@ impl Control {
         if !pressable || (movement.force_mn() > HIGH_FORCE_MN && !self.allow_high_force) {
             return Err(Refused::Force(movement.force_mn()));
         }
-        let speed = movement.speed_mm_s();
-        let sample = SlidePath::SAMPLE_MM.min(self.stage.constants().travel_mm - 2.0 * MARGIN_MM);
-        let ramps = speed * speed / self.stage.constants().acceleration_mm_s2;
-        let length = (speed * STEADY_S)
-            .min(SlidePath::LONGEST_MM)
-            .min(sample - ramps);
-        let path = SlidePath {
-            acceleration_mm_s2: self.stage.constants().acceleration_mm_s2,
-            ..SlidePath::new(movement, length)
-        };
-        let room = path.start_room_mm(sample).ok_or(Refused::Length)?;
-        // not-a-number clamps to itself, and is no start
-        let start = if start >= 0.0 { start.min(1.0) } else { 0.0 };
-        let from = MARGIN_MM + start * room;
-        self.path_mm = (from, from + path.travel_mm());
-        let steady = (path.ramp_s() + STEADY_MARGIN_S.min(0.2 * path.steady_s()))
-            ..(path.ramp_s() + path.steady_s());
-        self.steady_ms =
-            libm::ceilf(steady.start * 1e3) as u32..libm::floorf(steady.end * 1e3) as u32;
-        self.movement = movement;
-        self.damaged = 0;
-        self.current = (0.0, 0);
+        self.run = Run::slide(movement, start, self.stage.constants()).ok_or(Refused::Length)?;
         self.ended = None;
+        let (from, _) = self.run.path_mm();
         self.stage.go(from, RETURN_MM_S);
         self.enter(Phase::Positioning);
         Ok(())
@@ -358,10 +238,7 @@ impl Control {
             0.0
         };
         let profile = self.stage.go(to, speed_mm_s).ok_or(Refused::Busy)?;
-        let ramp_s = speed_mm_s / self.stage.constants().acceleration_mm_s2;
-        let steady_s = (ramp_s + STEADY_MARGIN_S)..(profile.duration_s() - ramp_s);
-        self.steady_ms = (steady_s.start * 1e3) as u32..(steady_s.end * 1e3) as u32;
-        self.current = (0.0, 0);
+        self.run = Run::unloaded(speed_mm_s, profile.duration_s(), self.stage.constants());
         self.ended = None;
         self.air = None;
         self.meter.begin_long();
@@ -371,8 +248,7 @@ impl Control {
 
     /// Mean motor current at constant speed of the last slide or unloaded run, A; positive drives to the right.
     pub fn mean_current_a(&self) -> Option<f32> {
-        let (sum, ticks) = self.current;
-        (ticks > 0).then(|| sum / ticks as f32)
+        self.run.mean_current_a()
     }
 
     /// P_DC in the air, mean over the last whole run without load, counts.
@@ -572,18 +448,8 @@ impl Control {
     }
 
     fn advance(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
-        if outputs.lever_steps_s != 0 || self.phase != Phase::Pressing {
-            self.pac = (0, 0);
-        }
-        for word in inputs
-            .words
-            .iter()
-            .flatten()
-            .filter(|w| w.channel == Channel::Pac)
-        {
-            self.pac.0 = self.pac.0.saturating_add(u32::from(word.counts.get()));
-            self.pac.1 = self.pac.1.saturating_add(1);
-        }
+        let moves = outputs.lever_steps_s != 0 || self.phase != Phase::Pressing;
+        self.run.press(inputs, moves);
         match self.phase {
             Phase::Parked | Phase::Ready | Phase::Faulted(_) => {}
             Phase::Homing => {
@@ -611,7 +477,7 @@ impl Control {
             }
             Phase::Positioning => {
                 if self.stage.state() == StageState::Standing {
-                    let target = f32::from(self.movement.force_mn())
+                    let target = f32::from(self.run.movement().force_mn())
                         / self.calibration.pressure.force_mn_per_count;
                     if self.lever.press(target) {
                         self.enter(Phase::Pressing);
@@ -632,55 +498,37 @@ impl Control {
                     }
                 }
                 if self.phase == Phase::Pressing && self.lever.state() == LeverState::Holding {
-                    let (sum, samples) = self.pac;
-                    self.baseline = ((sum + samples / 2) / samples.max(1)) as i32;
+                    self.run.hold();
                     self.enter(Phase::Background);
                 }
             }
             Phase::Background => {
-                self.feel(inputs, outputs);
-                outputs.felt = Felt::Still;
+                self.run.still(inputs, outputs);
                 if self.ms >= BACKGROUND_MS {
-                    self.slide_words = 0;
-                    self.stage.go(self.path_mm.1, self.movement.speed_mm_s());
+                    let (_, to) = self.run.path_mm();
+                    self.stage.go(to, self.run.movement().speed_mm_s());
                     self.enter(Phase::Sliding);
                 }
             }
             Phase::Sliding => {
-                self.feel(inputs, outputs);
-                // the stage started with the tick before the first one of this phase
-                let sample = |ms: u32| (u64::from(ms) * u64::from(RATE_HZ) / 1000) as u32;
-                outputs.felt = if self.ms == 1 {
-                    Felt::Begin(sample(self.steady_ms.start)..sample(self.steady_ms.end))
-                } else {
-                    Felt::Slide
-                };
-                self.weigh_current(inputs);
-                let shear_n = self
-                    .calibration
-                    .shear_n(inputs.current_a, self.movement.speed_mm_s());
-                if self.steady_ms.contains(&self.ms) {
-                    outputs.shear_mn = Some((shear_n * 1e3) as i16);
-                }
+                let speed_mm_s = self.run.movement().speed_mm_s();
+                let shear_n = self.calibration.shear_n(inputs.current_a, speed_mm_s);
+                self.run.slid(self.ms, shear_n, inputs, outputs);
                 self.skin
                     .slid(shear_n, self.force_mn() * 1e-3, self.stage.velocity_mm_s());
                 if self.stage.state() == StageState::Standing {
-                    let due = (u64::from(self.ms) * u64::from(RATE_HZ) / 1000) as u32;
-                    let missing = due.abs_diff(self.slide_words);
-                    self.damaged += if missing > WORDS_OFF { missing } else { 0 };
-                    self.ended = Some(
-                        if self.damaged == 0 || !self.guard.looks_for(Fault::SlideGap) {
-                            Ended::Whole
-                        } else {
-                            Ended::Gap(self.damaged)
-                        },
-                    );
+                    let ended = self.run.ended(self.ms);
+                    self.ended = Some(if self.guard.looks_for(Fault::SlideGap) {
+                        ended
+                    } else {
+                        Ended::Whole
+                    });
                     self.lever.lift(inputs.steps);
                     self.enter(Phase::Lifting);
                 }
             }
             Phase::Unloaded => {
-                self.weigh_current(inputs);
+                self.run.weigh_current(self.ms, inputs);
                 if self.stage.state() == StageState::Standing {
                     self.ended = Some(Ended::Whole);
                     self.air = self.meter.long_mean();
@@ -701,26 +549,6 @@ impl Control {
                 }
             }
         }
-    }
-
-    fn weigh_current(&mut self, inputs: &Inputs) {
-        if self.steady_ms.contains(&self.ms) {
-            self.current.0 += inputs.current_a;
-            self.current.1 += 1;
-        }
-    }
-
-    /// P_AC of this tick about the baseline.
-    fn feel(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
-        self.damaged += inputs.words.iter().filter(|w| w.is_none()).count() as u32;
-        let pac = inputs
-            .words
-            .iter()
-            .flatten()
-            .filter(|w| w.channel == Channel::Pac);
-        self.slide_words = self.slide_words.saturating_add(pac.clone().count() as u32);
-        let baseline = self.baseline;
-        outputs.pac = up_to(pac.map(|w| (i32::from(w.counts.get()) - baseline) as i16));
     }
 }
 

@@ -1,0 +1,203 @@
+use super::*;
+use crate::pressure::{Channel, Counts};
+
+fn word(channel: Channel, counts: u16) -> Option<Pressure> {
+    Some(Pressure {
+        channel,
+        counts: Counts::new(counts).unwrap(),
+    })
+}
+
+/// What a rig at rest shows; P_AC has its noise.
+fn at_rest(ms: u32) -> ([Option<Pressure>; 4], Seen<'static>) {
+    let pac = |n: u32| word(Channel::Pac, 2040 + (ms * 7 + n * 5) as u16 % 9);
+    let words = [
+        pac(0),
+        word(Channel::Pdc, 2593),
+        pac(1),
+        word(Channel::Pdc, 2593),
+    ];
+    let seen = Seen {
+        words: &[],
+        e_stop: false,
+        hung: false,
+        lever_top: false,
+        stage_limit: false,
+        stage_wanted_mm_s: 0.0,
+        stage_mm: 30.0,
+        emf_mm_s: 0.0,
+    };
+    (words, seen)
+}
+
+/// Runs a second of ms, each changed by `change`; returns the first fault and when.
+fn run(change: impl Fn(u32, &mut [Option<Pressure>; 4], &mut Seen<'_>)) -> Option<(u32, Fault)> {
+    let mut guard = Guard::default();
+    let meter = ForceMeter::new(2593.0);
+    (0..1000).find_map(|ms| {
+        let (mut words, mut seen) = at_rest(ms);
+        change(ms, &mut words, &mut seen);
+        Some((
+            ms,
+            guard.tick(
+                &Seen {
+                    words: &words,
+                    ..seen
+                },
+                &meter,
+                11.5,
+                2050.0,
+            )?,
+        ))
+    })
+}
+
+#[test]
+fn a_rig_at_rest_has_no_fault() {
+    assert_eq!(run(|_, _, _| ()), None);
+}
+
+#[test]
+fn faults_are_seen_when_the_table_says() {
+    assert_eq!(
+        run(|ms, _, s| s.e_stop = ms >= 500),
+        Some((500, Fault::EStop))
+    );
+    assert_eq!(
+        run(|ms, _, s| s.lever_top = ms >= 500),
+        Some((502, Fault::LeverLimit))
+    );
+    assert_eq!(
+        run(|ms, _, s| s.stage_limit = ms >= 500),
+        Some((502, Fault::StageLimit))
+    );
+    assert_eq!(
+        run(|ms, _, s| s.stage_limit = ms % 3 != 0),
+        None,
+        "two ms of a switch are its bouncing"
+    );
+    assert_eq!(
+        run(|ms, w, _| if ms >= 500 {
+            *w = [None; 4]
+        }),
+        Some((509, Fault::SensorSilent))
+    );
+    assert_eq!(
+        run(|ms, w, _| if ms >= 500 {
+            *w = at_rest(500).0;
+            w[2] = w[0]
+        }),
+        Some((600, Fault::SensorFrozen))
+    );
+}
+
+#[test]
+fn half_a_percent_of_damaged_words_is_too_many() {
+    // one of four words every 40 ms is 25 a second, every 50 ms 20
+    assert!(matches!(
+        run(|ms, w, _| if ms % 40 == 0 {
+            w[1] = None
+        }),
+        Some((880, Fault::SensorErrors))
+    ));
+    assert_eq!(
+        run(|ms, w, _| if ms % 50 == 0 {
+            w[1] = None
+        }),
+        None
+    );
+}
+
+#[test]
+fn a_standing_stage_is_blocked_or_its_encoder_silent() {
+    let moving = |ms: u32, s: &mut Seen<'_>| {
+        s.stage_wanted_mm_s = 10.0;
+        s.emf_mm_s = 10.0;
+        s.stage_mm = 30.0 + ms.min(500) as f32 * 0.01;
+    };
+    let blocked = run(|ms, _, s| {
+        moving(ms, s);
+        if ms > 500 {
+            s.emf_mm_s = 0.5;
+        }
+    });
+    let silent = run(|ms, _, s| moving(ms, s));
+    assert!(
+        matches!(blocked, Some((527..=531, Fault::StageStall))),
+        "{blocked:?}"
+    );
+    assert!(
+        matches!(silent, Some((527..=531, Fault::EncoderSilent))),
+        "{silent:?}"
+    );
+    let goes = run(|ms, _, s| {
+        moving(ms, s);
+        s.stage_mm = 30.0 + ms as f32 * 0.01;
+    });
+    assert_eq!(goes, None);
+}
+
+#[test]
+fn no_calibration_allows_more_than_the_papers() {
+    let mut meter = ForceMeter::new(2000.0);
+    for _ in 0..44 {
+        // 2.05 N are 178.3 counts of 11.5 mN
+        meter.push(Counts::new(2179).unwrap());
+    }
+    let (words, seen) = at_rest(0);
+    for mn_per_count in [1.0, 11.5, 12.0] {
+        let fault = Guard::default().tick(
+            &Seen {
+                words: &words,
+                ..seen
+            },
+            &meter,
+            mn_per_count,
+            2050.0,
+        );
+        assert_eq!(fault, Some(Fault::ForceHigh));
+    }
+    meter.zero();
+    assert_eq!(
+        Guard::default().tick(
+            &Seen {
+                words: &words,
+                ..seen
+            },
+            &ForceMeter::new(2000.0),
+            11.5,
+            2050.0
+        ),
+        None
+    );
+}
+
+#[test]
+fn the_table_has_every_fault_once_and_a_fault_can_be_ignored() {
+    for (at, row) in FAULTS.iter().enumerate() {
+        assert_eq!(row.fault as usize, at, "{}", row.name);
+        assert_eq!(row.fault.row(), Some(row));
+        let said = (row.fault.name(), row.fault.recovery());
+        assert_eq!(said, (row.name, row.recovery));
+        assert!(!FAULTS[..at].iter().any(|other| other.name == row.name));
+    }
+    assert_eq!(Fault::StageNotHome as usize + 1, FAULTS.len());
+    let mut guard = Guard::new(Unguarded::against(Fault::EStop));
+    let (words, seen) = at_rest(0);
+    let seen = Seen {
+        words: &words,
+        e_stop: true,
+        lever_top: true,
+        ..seen
+    };
+    let meter = ForceMeter::new(2593.0);
+    assert_eq!(guard.tick(&seen, &meter, 11.5, 2050.0), None);
+    guard.reset();
+    guard.tick(&seen, &meter, 11.5, 2050.0);
+    guard.tick(&seen, &meter, 11.5, 2050.0);
+    assert_eq!(
+        guard.tick(&seen, &meter, 11.5, 2050.0),
+        Some(Fault::LeverLimit),
+        "the others are still looked for"
+    );
+}

@@ -1,0 +1,184 @@
+//! The run of the stage that is being made, under the finger or without load: its path, when its speed is constant, and
+//! what its samples are. It knows nothing of the rest of the rig.
+
+use core::ops::Range;
+
+use super::phase::Ended;
+use super::pins::{Felt, Inputs, Outputs};
+use super::slide_path::SlidePath;
+use super::stage::{MARGIN_MM, StageConstants};
+use crate::movement::Movement;
+use crate::pressure::{Channel, RATE_HZ};
+use crate::up_to;
+
+/// Longest slide at constant speed, s.
+const STEADY_S: f32 = 3.0;
+/// After the ramp the servo has this long to settle before samples count, s.
+const STEADY_MARGIN_S: f32 = 0.2;
+/// P_AC words of a slide may differ from what its time holds by so many.
+const WORDS_OFF: u32 = 4;
+
+/// One run of the stage.
+#[derive(Clone, Debug)]
+pub(super) struct Run {
+    movement: Movement,
+    /// Where the slide begins and ends, mm.
+    path_mm: (f32, f32),
+    /// Constant speed, as ms since the run began.
+    steady_ms: Range<u32>,
+    /// Sum and number of P_AC words since the lever last moved: the baseline.
+    pac: (u32, u32),
+    baseline: i32,
+    /// Words that were damaged or missing, from the background on.
+    damaged: u32,
+    /// P_AC words of the slide so far.
+    words: u32,
+    /// Sum of the motor's currents at constant speed, A, and their number.
+    current: (f32, u32),
+}
+
+impl Run {
+    /// No run was made yet.
+    pub(super) const NONE: Self = Self {
+        movement: Movement::FOR_ROUGHNESS,
+        path_mm: (0.0, 0.0),
+        steady_ms: 0..0,
+        pac: (0, 0),
+        baseline: 0,
+        damaged: 0,
+        words: 0,
+        current: (0.0, 0),
+    };
+
+    /// The slide of a movement, beginning at `start`: 0 to 1 of the room that the sample leaves. `None`: it does not fit on
+    /// the sample.
+    pub(super) fn slide(movement: Movement, start: f32, stage: &StageConstants) -> Option<Self> {
+        let speed = movement.speed_mm_s();
+        let sample = SlidePath::SAMPLE_MM.min(stage.travel_mm - 2.0 * MARGIN_MM);
+        let ramps = speed * speed / stage.acceleration_mm_s2;
+        let length = (speed * STEADY_S)
+            .min(SlidePath::LONGEST_MM)
+            .min(sample - ramps);
+        let path = SlidePath {
+            acceleration_mm_s2: stage.acceleration_mm_s2,
+            ..SlidePath::new(movement, length)
+        };
+        let room = path.start_room_mm(sample)?;
+        // not-a-number clamps to itself, and is no start
+        let start = if start >= 0.0 { start.min(1.0) } else { 0.0 };
+        let from = MARGIN_MM + start * room;
+        let begin_s = path.ramp_s() + STEADY_MARGIN_S.min(0.2 * path.steady_s());
+        let end_s = path.ramp_s() + path.steady_s();
+        Some(Self {
+            movement,
+            path_mm: (from, from + path.travel_mm()),
+            steady_ms: libm::ceilf(begin_s * 1e3) as u32..libm::floorf(end_s * 1e3) as u32,
+            ..Self::NONE
+        })
+    }
+
+    /// A run with the finger lifted, which takes so many s at this speed.
+    pub(super) fn unloaded(speed_mm_s: f32, duration_s: f32, stage: &StageConstants) -> Self {
+        let ramp_s = speed_mm_s / stage.acceleration_mm_s2;
+        let (begin_s, end_s) = (ramp_s + STEADY_MARGIN_S, duration_s - ramp_s);
+        Self {
+            steady_ms: (begin_s * 1e3) as u32..(end_s * 1e3) as u32,
+            ..Self::NONE
+        }
+    }
+
+    /// The movement that is made.
+    pub(super) fn movement(&self) -> Movement {
+        self.movement
+    }
+
+    /// Where the slide begins and ends, mm.
+    pub(super) fn path_mm(&self) -> (f32, f32) {
+        self.path_mm
+    }
+
+    /// P_AC while the finger is pressed; the baseline is its mean since the finger last moved.
+    pub(super) fn press(&mut self, inputs: &Inputs, moves: bool) {
+        if moves {
+            self.pac = (0, 0);
+        }
+        for counts in pac(inputs) {
+            self.pac.0 = self.pac.0.saturating_add(u32::from(counts));
+            self.pac.1 = self.pac.1.saturating_add(1);
+        }
+    }
+
+    /// The finger is pressed well: from here on P_AC is taken about the baseline.
+    pub(super) fn hold(&mut self) {
+        let (sum, samples) = self.pac;
+        self.baseline = ((sum + samples / 2) / samples.max(1)) as i32;
+    }
+
+    /// A tick of the background.
+    pub(super) fn still(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
+        self.feel(inputs, outputs);
+        outputs.felt = Felt::Still;
+        // those of the slide are counted from its first tick on
+        self.words = 0;
+    }
+
+    /// The tick `ms` of the slide, from 1; `shear_n` is the tangential force.
+    pub(super) fn slid(&mut self, ms: u32, shear_n: f32, inputs: &Inputs, outputs: &mut Outputs) {
+        self.feel(inputs, outputs);
+        // the stage started with the tick before the first one of the slide
+        outputs.felt = if ms == 1 {
+            Felt::Begin(samples(self.steady_ms.start)..samples(self.steady_ms.end))
+        } else {
+            Felt::Slide
+        };
+        self.weigh_current(ms, inputs);
+        if self.steady_ms.contains(&ms) {
+            outputs.shear_mn = Some((shear_n * 1e3) as i16);
+        }
+    }
+
+    /// The tick `ms` of a run: its current counts where the speed is constant.
+    pub(super) fn weigh_current(&mut self, ms: u32, inputs: &Inputs) {
+        if self.steady_ms.contains(&ms) {
+            self.current.0 += inputs.current_a;
+            self.current.1 += 1;
+        }
+    }
+
+    /// Mean motor current at constant speed, A; `None` if there was no such time.
+    pub(super) fn mean_current_a(&self) -> Option<f32> {
+        let (sum, ticks) = self.current;
+        (ticks > 0).then(|| sum / ticks as f32)
+    }
+
+    /// How a slide of so many ms has ended.
+    pub(super) fn ended(&mut self, ms: u32) -> Ended {
+        let missing = samples(ms).abs_diff(self.words);
+        self.damaged += if missing > WORDS_OFF { missing } else { 0 };
+        match self.damaged {
+            0 => Ended::Whole,
+            damaged => Ended::Gap(damaged),
+        }
+    }
+
+    /// P_AC of this tick about the baseline.
+    fn feel(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
+        self.damaged += inputs.words.iter().filter(|w| w.is_none()).count() as u32;
+        self.words = self.words.saturating_add(pac(inputs).count() as u32);
+        let baseline = self.baseline;
+        outputs.pac = up_to(pac(inputs).map(|counts| (i32::from(counts) - baseline) as i16));
+    }
+}
+
+/// P_AC words of a tick, counts.
+fn pac(inputs: &Inputs) -> impl Iterator<Item = u16> {
+    let words = inputs.words.iter().flatten();
+    words
+        .filter(|word| word.channel == Channel::Pac)
+        .map(|word| word.counts.get())
+}
+
+/// Samples of a channel in so many ms.
+fn samples(ms: u32) -> u32 {
+    (u64::from(ms) * u64::from(RATE_HZ) / 1000) as u32
+}
