@@ -1,23 +1,21 @@
 //! Tactus on a PC: recordings, replays of them, virtual explorations, and what the command `tactus` shows.
 
-pub mod collection;
-pub mod evaluate;
-pub mod experiment;
-pub mod fabricslide;
-pub mod follow;
-pub mod handheld;
-pub mod import;
-pub mod learn;
-pub mod lifelong;
+pub mod data;
+pub mod eval;
 pub mod link;
-pub mod novelty;
-pub mod played;
-pub mod properties;
-pub mod recordings;
-pub mod replay;
-pub mod rows;
-pub mod scenario;
-pub mod show;
 pub mod sim;
-pub mod simulated;
+#[cfg(feature = "study")]
 pub mod study;
+
+#[cfg(feature = "fabrics")]
+pub use data::fabricslide;
+pub use data::{import, properties, replay, rows};
+pub use eval::{evaluate, experiment, learn, lifelong, novelty, show};
+pub use link::follow;
+pub use sim::{collection, handheld, recorded as played, rig as simulated, scenario};
+
+pub mod recordings {
+    //! The old path of [`crate::data::recordings`] and [`crate::data::recording`].
+    pub use crate::data::recording::*;
+    pub use crate::data::recordings::*;
+}

@@ -1,5 +1,7 @@
 use std::collections::VecDeque;
+use std::io::{self, Read, Write};
 use std::task::Poll;
+use std::time::Duration;
 
 use proptest::prelude::*;
 use tactus_core::explorer::Method;
@@ -10,8 +12,15 @@ use tactus_core::movement::Movement;
 use tactus_core::pressure::Calibration;
 use tactus_core::wire::{BLOCK, Block, Phase, Text};
 
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::table::{Table, TableError};
+use tactus_core::wire::{
+    self, Ask, Forget, Identify, MAX_FRAME, MAX_TEXTURES, Name, PART, PROTOCOL, Receiver, Report,
+    Request, Reset, Tell, Train,
+};
+
 use super::*;
-use crate::learn::learn;
+use crate::eval::learn::learn;
 
 /// A table of so many textures.
 fn table(textures: u16) -> Vec<u8> {

@@ -7,20 +7,19 @@ mod amplifier;
 mod skin;
 mod vibration;
 
+use super::conditions::{Conditions, TICK_S};
 use super::noise::Noise;
 use super::played::{PlayCounts, Playback, Played};
 use super::surface::Surface;
 use super::textures::Texture;
-use super::{Conditions, TICK_S};
 use amplifier::Amplifiers;
 use skin::Skin;
 use vibration::Vibrations;
 
-pub use amplifier::{PAC_NOISE_FIELD_COUNTS, PAC_NOISE_PA, PAC_PA_PER_COUNT, PDC_PA_PER_COUNT};
+pub use amplifier::{
+    PA_PER_N, PAC_NOISE_FIELD_COUNTS, PAC_NOISE_PA, PAC_PA_PER_COUNT, PDC_PA_PER_COUNT,
+};
 pub use skin::N_PER_COUNT;
-
-/// Pressure of the fluid for each newton on the skin, Pa/N: a P_DC count (PAPER: 36.96 Pa) is 11.5 mN (PAPER fig. 3).
-pub const PA_PER_N: f64 = PDC_PA_PER_COUNT / N_PER_COUNT;
 
 /// Deviations of the contact's state, drawn at every touch and multiplied by [`Conditions::variation`]; all chosen.
 mod touch {

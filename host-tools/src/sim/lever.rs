@@ -10,7 +10,7 @@
 
 use std::f64::consts::TAU;
 
-use super::TICK_S;
+use super::conditions::TICK_S;
 use super::noise::Noise;
 
 /// Movement of the tip per microstep: 2 mm / (200 x 16).

@@ -4,8 +4,8 @@
 //! force that the stage has to overcome. How the finger is pressed, and so P_DC, stays the simulated finger's, and so does
 //! everything while it is still.
 
+use super::conditions::{TICK_S, TICKS_PER_S};
 use super::noise::Noise;
-use super::{TICK_S, TICKS_PER_S};
 
 /// P_AC of a recording, Hz.
 pub const PAC_HZ: u32 = 2200;

@@ -13,7 +13,7 @@
 
 use std::f64::consts::TAU;
 
-use super::TICK_S;
+use super::conditions::TICK_S;
 use super::noise::Noise;
 
 /// Supply of the H-bridge, V (chosen).

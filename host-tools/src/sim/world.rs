@@ -10,12 +10,12 @@
 //!
 //! A world is its [`Setup`] and its inputs: the same give the same words, on any thread.
 
-use super::Conditions;
+use super::conditions::Conditions;
 use super::encoder::{Edge, Encoder};
 use super::faults::{Fault, Faults, Miso};
 use super::finger::{Contact, Finger};
-use super::hand::Hand;
 use super::lever::Lever;
+use super::person::Hand;
 use super::played::{PlayCounts, Played};
 use super::sensor::SensorPeer;
 use super::stage::Stage;

@@ -5,12 +5,14 @@ use serde::Serialize;
 use tactus_core::explorer::{Config, Explorer};
 use tactus_core::features::Property;
 
+use super::error::StudyError;
 use super::published::{IDENTIFIED, PAIRS};
-use super::slides::{Recorded, StudyWorld};
-use super::{Named, StudyError};
-use crate::collection::{Collection, texture_name};
-use crate::evaluate::{MAX_TEXTURES, Method, Outcome, Summary, evaluate, explorer, play_and_tell};
-use crate::experiment::Experiment;
+use super::slides::{Named, Recorded, StudyWorld};
+use crate::eval::evaluate::{
+    MAX_TEXTURES, Method, Outcome, Summary, evaluate, explorer, play_and_tell,
+};
+use crate::eval::experiment::Experiment;
+use crate::sim::collection::{Collection, texture_name};
 
 /// The ways of exploring that are compared, the paper's three and the project's own.
 pub const METHODS: [Method; 4] = [Method::Cycle, Method::Random, Method::Paper, Method::Fused];

@@ -6,12 +6,12 @@ use tactus_core::features::{Property, PropertySet};
 use tactus_core::movement::Movement;
 use tactus_core::table::Table;
 
+use super::error::StudyError;
 use super::published::{MOST_USEFUL, PILOT_TEXTURES, PILOT_TRIALS};
-use super::slides::{Session, StudyWorld, TextureTrials};
-use super::{Named, StudyError, properties};
-use crate::collection::texture_name;
-use crate::evaluate::EvaluateError;
-use crate::learn::learn;
+use super::slides::{Named, Session, StudyWorld, TextureTrials, properties};
+use crate::eval::evaluate::EvaluateError;
+use crate::eval::learn::learn;
+use crate::sim::collection::texture_name;
 
 /// Number of the pilot's session: see [`Session::number`].
 const SESSION: u64 = 3;

@@ -1,6 +1,7 @@
 //! The report of a study: one HTML page that needs nothing else, every figure as .svg, every table as .csv, and study.json.
 
 mod draw;
+mod model;
 mod page;
 mod sections;
 
@@ -9,87 +10,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 pub use draw::{DrawError, curves};
+use model::{Block, Cell, Table};
 
-use super::Study;
-
-/// A table of the report.
-#[derive(Clone, PartialEq, Debug)]
-pub struct Table {
-    /// Name of its file, without the ending.
-    pub id: &'static str,
-    /// What it shows.
-    pub title: String,
-    /// Names of the columns, with units.
-    pub header: Vec<String>,
-    /// The rows.
-    pub rows: Vec<Vec<Cell>>,
-}
-
-/// A cell of a table.
-#[derive(Clone, PartialEq, Debug)]
-pub enum Cell {
-    /// Words.
-    Text(String),
-    /// A number, and how many decimals of it people see; files have all.
-    Number(f64, usize),
-    /// Nothing.
-    Empty,
-}
-
-impl Cell {
-    fn text(text: impl ToString) -> Self {
-        Self::Text(text.to_string())
-    }
-
-    /// A number of single precision, with the digits that it has.
-    fn single(value: f32, decimals: usize) -> Self {
-        Self::Number(value.to_string().parse().unwrap_or(f64::NAN), decimals)
-    }
-
-    /// In a file.
-    fn exact(&self) -> String {
-        match self {
-            Self::Text(text) => text.clone(),
-            Self::Number(value, _) => value.to_string(),
-            Self::Empty => String::new(),
-        }
-    }
-}
-
-/// A figure, or a panel of one.
-#[derive(Clone, PartialEq, Debug)]
-pub struct Figure {
-    /// Name of its file, without the ending.
-    pub id: String,
-    /// What it shows, for those who cannot see it.
-    pub title: String,
-    /// The drawing.
-    pub svg: String,
-}
-
-/// A part of a section.
-#[derive(Clone, PartialEq, Debug)]
-pub enum Block {
-    /// A paragraph.
-    Text(String),
-    /// A table.
-    Table(Table),
-    /// The panels of a figure, and what they show.
-    Figure(Vec<Figure>, String),
-    /// A table that is too large to read: only its file is named.
-    File(Table),
-}
-
-/// A section of the report.
-#[derive(Clone, PartialEq, Debug)]
-pub struct Section {
-    /// Its place in the page.
-    pub id: &'static str,
-    /// Its heading.
-    pub title: String,
-    /// What is in it.
-    pub blocks: Vec<Block>,
-}
+use super::results::Study;
 
 /// Why a report cannot be written.
 #[derive(Debug, thiserror::Error)]

@@ -11,10 +11,10 @@ use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::PressureSensor as _;
 use tactus_core::spectrum::BIN_HZ;
 
-use super::slides::StudyWorld;
+use super::error::StudyError;
+use super::slides::{Named, StudyWorld, properties};
 use super::training::correlation;
-use super::{Named, StudyError};
-use crate::replay::measure;
+use crate::data::replay::measure;
 use crate::sim::finger::PAC_PA_PER_COUNT;
 
 /// Numbers of the sessions: see [`super::slides::Session::number`].
@@ -193,7 +193,7 @@ fn example(
     let mut rig = world.rig(texture, EXAMPLES, 0.0);
     rig.control()
         .calibrate(calibration)
-        .map_err(crate::simulated::SimError::from)?;
+        .map_err(crate::sim::rig::SimError::from)?;
     rig.home()?;
     let slide = rig.record(movement)?;
     let felt = measure(&Plan::new(), &slide)?;
@@ -234,7 +234,7 @@ fn example(
             .collect(),
         bin_hz: BIN_HZ,
         centroid_hz: felt.spectrum.centroid_hz().unwrap_or(0.0),
-        properties: super::properties(&[vec![(&felt).into()]])[0][0],
+        properties: properties(&[vec![(&felt).into()]])[0][0],
     })
 }
 

@@ -4,20 +4,21 @@
 //! and the core decodes them and computes the features, as the chip does.
 
 use rayon::prelude::*;
-use tactus_core::features::Plan;
+use serde::Serialize;
+use tactus_core::features::{Plan, Property};
 use tactus_core::fused::Observation;
 use tactus_core::movement::{Movement, SlidePath};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::guard::{Fault, Unguarded};
 
-use super::StudyError;
+use super::error::StudyError;
 use super::published::{IDENTIFIED, TRIALS};
-use crate::collection::{Collection, calibrated, record_trials};
-use crate::replay::measure;
+use crate::data::replay::measure;
 use crate::sim::Conditions;
+use crate::sim::collection::{Collection, calibrated, record_trials, texture_name};
 use crate::sim::finger::wear_per_mm;
+use crate::sim::rig::SimRig;
 use crate::sim::textures;
-use crate::simulated::SimRig;
 
 /// Wear at which the ridges look worn: the skin is changed before the next texture (paper: at any visible sign). Chosen, so
 /// that the 1755 slides of the training take about the two changes that they took in the paper.
@@ -243,4 +244,32 @@ impl StudyWorld {
             validation: validation?,
         })
     }
+}
+
+/// A texture by its number in Table 1 and its name.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Named {
+    /// The number.
+    pub number: u8,
+    /// The name.
+    pub name: &'static str,
+}
+
+impl Named {
+    /// The texture of this number.
+    pub fn new(number: u8) -> Self {
+        Self {
+            number,
+            name: texture_name(number),
+        }
+    }
+}
+
+/// The three properties of slides, by movement and trial. The simulated rig measures all three.
+pub(crate) fn properties(slides: &[Vec<Observation>]) -> Vec<Vec<[f32; 3]>> {
+    let of = |slide: &Observation| Property::ALL.map(|p| slide.properties.get(p).unwrap_or(0.0));
+    slides
+        .iter()
+        .map(|trials| trials.iter().map(of).collect())
+        .collect()
 }

@@ -7,12 +7,12 @@ use tactus_core::explorer::{Method, confusion};
 use tactus_core::features::Property;
 use tactus_core::table::{Action, Gaussian, Table};
 
+use super::error::StudyError;
 use super::published::{CORRELATIONS, MOST_USEFUL, PILOT_TEXTURES, SKIN_CHANGES};
-use super::slides::{Session, StudyWorld, TextureTrials, VISIBLE_WEAR};
-use super::{Named, StudyError, properties};
-use crate::collection::{Collection, texture_name};
-use crate::evaluate::EvaluateError;
-use crate::learn::learn;
+use super::slides::{Named, Session, StudyWorld, TextureTrials, VISIBLE_WEAR, properties};
+use crate::eval::evaluate::EvaluateError;
+use crate::eval::learn::learn;
+use crate::sim::collection::{Collection, texture_name};
 
 /// Wear at which the skin's effect is shown.
 const WEAR: [f64; 5] = [0.0, VISIBLE_WEAR, 0.25, 0.5, 1.0];

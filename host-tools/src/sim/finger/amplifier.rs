@@ -2,13 +2,16 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
+use super::skin::N_PER_COUNT;
+use crate::sim::conditions::{TICK_S, TICKS_PER_S};
 use crate::sim::noise::Noise;
-use crate::sim::{TICK_S, TICKS_PER_S};
 
 /// P_AC for each count, Pa (PAPER: 2.16 mV/Pa, 12 bits over 3.3 V).
 pub const PAC_PA_PER_COUNT: f64 = 3300.0 / 4096.0 / 2.16;
 /// P_DC for each count, Pa (PAPER: 21.8 mV/kPa).
 pub const PDC_PA_PER_COUNT: f64 = 3300.0 / 4096.0 / 21.8 * 1000.0;
+/// Pressure of the fluid for each newton on the skin, Pa/N: a P_DC count (PAPER: 36.96 Pa) is 11.5 mN (PAPER fig. 3).
+pub const PA_PER_N: f64 = PDC_PA_PER_COUNT / N_PER_COUNT;
 /// Noise of P_AC, Pa rms (PAPER: 1.2 mV; it says 0.52 Pa).
 pub const PAC_NOISE_PA: f64 = 0.52;
 /// Noise of P_AC in recordings of real devices, counts rms (OUT: 4.5 to 5.1).

@@ -1,6 +1,6 @@
 //! The skin as a spring: force for indentation.
 
-use crate::sim::TICK_S;
+use crate::sim::conditions::TICK_S;
 
 /// Contact force for each count of P_DC, N (PAPER fig. 3).
 pub const N_PER_COUNT: f64 = 0.0115;

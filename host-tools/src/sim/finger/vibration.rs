@@ -7,8 +7,8 @@
 
 use std::f64::consts::TAU;
 
-use super::PA_PER_N;
-use crate::sim::TICK_S;
+use super::amplifier::PA_PER_N;
+use crate::sim::conditions::TICK_S;
 use crate::sim::surface::{Surface, VIBRATIONS_AT};
 
 /// Distance of the ridges, mm (PAPER).

@@ -3,8 +3,8 @@
 
 use std::fmt::Write as _;
 
-use super::{Block, Cell, Figure, Section, Table};
-use crate::study::Study;
+use super::model::{Block, Cell, Figure, Section, Table};
+use crate::study::results::Study;
 
 /// Dark on white, one column on a phone, no shadows or colours that a printer would fill.
 const STYLE: &str = "\

@@ -3,16 +3,17 @@
 use tactus_core::features::Property;
 use tactus_core::movement::Movement;
 
+use super::draw::DrawError;
 use super::draw::{COLOURS, Chart, GREY, Line, Mark, PANEL, SHADES, Series, Tile};
 use super::draw::{chart, grid, matrix, plain, room};
-use super::{Block, Cell, DrawError, Figure, Section, Table};
-use crate::evaluate::Method;
+use super::model::{Block, Cell, Figure, Section, Table};
+use crate::eval::evaluate::Method;
 use crate::study::identify::{Column, Evolution, Identification, METHODS, PairRow, WorldRow};
 use crate::study::pilot::Pilot;
 use crate::study::published;
+use crate::study::results::{CALIBRATED, Study};
 use crate::study::signals::{PAPER_LINE, Signals};
 use crate::study::training::Training;
-use crate::study::{CALIBRATED, Study};
 
 type Drawn<T> = Result<T, DrawError>;
 
@@ -890,7 +891,7 @@ fn of_identification(identification: &Identification) -> Drawn<Section> {
         .cycled
         .iter()
         .map(|&(movement, property)| {
-            let movement = crate::collection::Collection::MOVEMENTS[movement];
+            let movement = crate::sim::collection::Collection::MOVEMENTS[movement];
             format!("{property} at {movement}")
         })
         .collect();

@@ -1,0 +1,10 @@
+//! Recordings of slides, tables of properties, and what is read from other formats.
+
+#[cfg(feature = "fabrics")]
+pub mod fabricslide;
+pub mod import;
+pub mod properties;
+pub mod recording;
+pub mod recordings;
+pub mod replay;
+pub mod rows;

@@ -1,0 +1,304 @@
+//! Import of recordings into the project's own format: from any folder that [`RecordingSet`] opens, and from the CSV files of
+//! the BioTac's publisher.
+//!
+//! # The publisher's files
+//! <https://github.com/dexrob/BioTac_slide_20_50> (Gao et al., IROS 2020) has `raw_data/matX/matX_N_bio.csv` and
+//! `matX_N_cw.csv` for slide N over material X; `_cp`, `_cv`, `_jp`, `_jt`, `_jv` and `.pt` are not wanted here.
+//!
+//! - `_bio`: `timestamp,tdc,tac,pdc,pac1..pac22,ele1..ele19`, one row about every 10 ms with the 22 samples of P_AC since the
+//!   row before; each row ends in a comma too many. P_DC and P_AC are |raw - baseline|, in counts.
+//! - `_cw`: `timestamp,fx,fy,fz,tx,ty,tz`, the wrench at the arm's hand in N and Nm, in bursts of about 150 Hz; the arm slides
+//!   along z, so that `fz` is the tangential force.
+//!
+//! What is made of them: `pac` row by row, `pdc` as it is, `shear` = `fz` at the times of the rows of `_bio`, interpolated, in
+//! mN. `data/biotac` was made in this way, and keeps the first 590 of some 600 rows: this was checked by hand on rows of its
+//! slide 10 over material 1.
+//!
+//! **The signs of P_AC are not in the files; they are rebuilt** ([`signs`]): magnitudes are exact, power is exact, spectra are
+//! good, zero crossings and the sign of the whole are not known. The sign of P_DC is not rebuilt.
+//!
+//! The files name neither material nor force nor a still record: textures are called `matX`, and movement, window and
+//! background are those of `data/biotac`.
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use tactus_core::movement::Movement;
+
+use crate::data::recording::{Background, Slide, Texture};
+use crate::data::recordings::biotac::{BACKGROUND_POWER, NOMINAL_FORCE_MN};
+use crate::data::recordings::{RecordingError, RecordingSet, RecordingWriter, Result};
+use crate::data::rows::Rows;
+
+pub mod signs;
+
+/// Sliding speed of the publisher's arm.
+const SPEED_UM_S: u32 = 25_000;
+/// The part at constant speed, in s.
+const WINDOW: (f32, f32) = (0.5, 5.5);
+/// Rate of the rows of a `_bio` file.
+const ROW_RATE_HZ: u32 = 100;
+/// Longest slide that is imported, in rows: a minute. The publisher's last six seconds.
+const MAX_ROWS: usize = 6000;
+
+/// What was imported.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct Imported {
+    /// Number of textures.
+    pub textures: usize,
+    /// Number of slides.
+    pub slides: usize,
+    /// Rows of 10 ms that the publisher's files lack, by their timestamps: the samples before and after are joined.
+    pub lost_rows: usize,
+}
+
+/// Converts the recordings in the folder `from` to the project's own format in the folder `to`. `progress` is called with
+/// the number of slides done, and of slides in all.
+///
+/// # Errors
+/// If there are no recordings in `from`, a file is damaged, or `to` already holds recordings or cannot be written.
+pub fn import(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) -> Result<Imported> {
+    match RecordingSet::open(from) {
+        Ok(set) => copy(&set, to, progress),
+        Err(RecordingError::NoManifest(_)) => import_csv(from, to, progress),
+        Err(e) => Err(e),
+    }
+}
+
+fn copy(set: &RecordingSet, to: &Path, progress: &mut dyn FnMut(usize, usize)) -> Result<Imported> {
+    let mut done = Imported {
+        textures: set.textures().len(),
+        ..Imported::default()
+    };
+    let total = (0..done.textures).map(|t| set.slides(t).len()).sum();
+    let mut writer = RecordingWriter::create(to, set.textures().to_vec())?;
+    for texture in 0..done.textures {
+        for slide in set.load_texture(texture)? {
+            writer.write(&slide)?;
+            done.slides += 1;
+            progress(done.slides, total);
+        }
+    }
+    writer.finish()?;
+    Ok(done)
+}
+
+fn import_csv(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) -> Result<Imported> {
+    let raw = from.join("raw_data");
+    let raw = if raw.is_dir() { raw } else { from.to_owned() };
+    let materials = materials(&raw)?;
+    if materials.is_empty() {
+        return Err(RecordingError::NothingToImport(from.to_owned()));
+    }
+    let mut done = Imported {
+        textures: materials.len(),
+        ..Imported::default()
+    };
+    let total = materials.values().map(BTreeSet::len).sum();
+    let textures = materials.keys().map(|&id| Texture {
+        id,
+        name: format!("mat{id}"),
+    });
+    let mut writer = RecordingWriter::create(to, textures.collect())?;
+    for (texture, (&material, numbers)) in materials.iter().enumerate() {
+        let folder = raw.join(format!("mat{material}"));
+        // a few slides at a time: rebuilding the signs takes most of a second each
+        let numbers: Vec<u32> = numbers.iter().copied().collect();
+        for some in numbers.chunks(2 * rayon::current_num_threads()) {
+            let slides: Vec<_> = some
+                .par_iter()
+                .map(|&number| read_slide(&folder, material, texture, number))
+                .collect::<Result<_>>()?;
+            for (slide, lost_rows) in slides {
+                writer.write(&slide)?;
+                done.slides += 1;
+                done.lost_rows += lost_rows;
+                progress(done.slides, total);
+            }
+        }
+    }
+    writer.finish()?;
+    Ok(done)
+}
+
+/// The slide numbers of each `matX` below `raw`. A slide of which only one file is there is listed too, so that reading it
+/// names the missing one.
+fn materials(raw: &Path) -> Result<BTreeMap<u32, BTreeSet<u32>>> {
+    let mut materials = BTreeMap::new();
+    for folder in names(raw)? {
+        let material = folder.strip_prefix("mat").and_then(number);
+        let Some(material) = material.filter(|_| raw.join(&folder).is_dir()) else {
+            continue;
+        };
+        let numbers: BTreeSet<u32> = names(&raw.join(&folder))?
+            .iter()
+            .filter_map(|file| {
+                let rest = file.strip_prefix(&folder)?.strip_prefix('_')?;
+                let stem = rest.strip_suffix(".csv")?;
+                number(stem.strip_suffix("_bio").or(stem.strip_suffix("_cw"))?)
+            })
+            .collect();
+        if !numbers.is_empty() {
+            materials.insert(material, numbers);
+        }
+    }
+    Ok(materials)
+}
+
+/// A number written without sign and leading zeros, as the publisher does.
+fn number(text: &str) -> Option<u32> {
+    text.parse().ok().filter(|n: &u32| n.to_string() == text)
+}
+
+fn names(folder: &Path) -> Result<Vec<String>> {
+    let io_error = |source| RecordingError::Io {
+        path: folder.to_owned(),
+        source,
+    };
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder).map_err(io_error)? {
+        // the publisher's names are ASCII: others are not his
+        names.extend(entry.map_err(io_error)?.file_name().into_string());
+    }
+    Ok(names)
+}
+
+/// One slide, and how many rows it lacks.
+fn read_slide(folder: &Path, material: u32, texture: usize, number: u32) -> Result<(Slide, usize)> {
+    let file = |kind| folder.join(format!("mat{material}_{number}_{kind}.csv"));
+    let (bio_path, cw_path) = (file("bio"), file("cw"));
+    let bio = read_bio(&bio_path)?;
+    let force = read_force(&cw_path)?;
+    let fault = |path: &PathBuf, cause| RecordingError::Samples {
+        path: path.clone(),
+        cause,
+    };
+    let shear = interpolate(&force, &bio.times).map_err(|cause| fault(&cw_path, cause))?;
+    let movement =
+        Movement::new(NOMINAL_FORCE_MN, SPEED_UM_S).map_err(|e| fault(&bio_path, e.to_string()))?;
+    let slide = Slide {
+        texture,
+        number,
+        movement,
+        pac: signs::rebuild(&bio.pac),
+        pdc: bio.pdc,
+        pdc_rate_hz: ROW_RATE_HZ,
+        shear_mn: Some(shear),
+        shear_rate_hz: ROW_RATE_HZ,
+        window: WINDOW,
+        background: Background::Power(BACKGROUND_POWER),
+    };
+    match slide.fault() {
+        None => Ok((slide, bio.lost_rows)),
+        Some(cause) => Err(fault(
+            &bio_path,
+            format!("{cause}; fetch the file again, or move it and its _cw away"),
+        )),
+    }
+}
+
+#[derive(Default)]
+struct Bio {
+    times: Vec<f64>,
+    /// magnitudes
+    pac: Vec<u16>,
+    pdc: Vec<i16>,
+    lost_rows: usize,
+}
+
+const PAC_COLUMNS: [&str; 22] = [
+    "pac1", "pac2", "pac3", "pac4", "pac5", "pac6", "pac7", "pac8", "pac9", "pac10", "pac11",
+    "pac12", "pac13", "pac14", "pac15", "pac16", "pac17", "pac18", "pac19", "pac20", "pac21",
+    "pac22",
+];
+
+fn read_bio(path: &Path) -> Result<Bio> {
+    const COUNT: &str = "a count of 0 to 4095";
+    let mut columns = vec!["timestamp", "pdc"];
+    columns.extend(PAC_COLUMNS);
+    let mut rows = Rows::open(path, &columns)?;
+    let mut bio = Bio::default();
+    while let Some(row) = rows.next_row()? {
+        let count = |column| -> Result<u16> {
+            let count = row.parse(column, COUNT)?;
+            if count > 4095 {
+                return Err(row
+                    .error(Some(column), format!("{count} is not {COUNT}"))
+                    .into());
+            }
+            Ok(count)
+        };
+        let time: f64 = row.number("timestamp")?;
+        if let Some(before) = bio.times.last() {
+            if time <= *before {
+                let cause = "not after the row before; fetch the file again".to_owned();
+                return Err(row.error(Some("timestamp"), cause).into());
+            }
+            // rows jitter by 2 ms
+            let steps = ((time - before) * f64::from(ROW_RATE_HZ)).round() as usize;
+            bio.lost_rows = bio.lost_rows.saturating_add(steps.saturating_sub(1));
+        }
+        if bio.times.len() == MAX_ROWS {
+            let cause = format!("more than {MAX_ROWS} rows are no slide");
+            return Err(row.error(None, cause).into());
+        }
+        bio.times.push(time);
+        bio.pdc.push(count("pdc")?.cast_signed());
+        for column in PAC_COLUMNS {
+            bio.pac.push(count(column)?);
+        }
+    }
+    Ok(bio)
+}
+
+/// Times in s and tangential forces in N.
+fn read_force(path: &Path) -> Result<Vec<(f64, f64)>> {
+    let mut rows = Rows::open(path, &["timestamp", "fz"])?;
+    let mut force: Vec<(f64, f64)> = Vec::new();
+    while let Some(row) = rows.next_row()? {
+        let time = row.number("timestamp")?;
+        if force.last().is_some_and(|(before, _)| time < *before) {
+            let cause = "before that of the row before; fetch the file again".to_owned();
+            return Err(row.error(Some("timestamp"), cause).into());
+        }
+        let newton: f64 = row.number("fz")?;
+        if newton.abs() > 32.0 {
+            let cause = format!("{newton} N would tear the finger off; fetch the file again");
+            return Err(row.error(Some("fz"), cause).into());
+        }
+        force.push((time, newton));
+    }
+    Ok(force)
+}
+
+/// The force at `times`, in mN: on a straight line between its neighbours, before the first and after the last as these.
+fn interpolate(force: &[(f64, f64)], times: &[f64]) -> std::result::Result<Vec<i16>, String> {
+    let span = |of: Option<f64>, to: Option<f64>| of.zip(to);
+    let measured = span(force.first().map(|f| f.0), force.last().map(|f| f.0));
+    let wanted = span(times.first().copied(), times.last().copied());
+    match (measured, wanted) {
+        (Some(m), Some(w)) if m.0 <= w.1 && w.0 <= m.1 => {}
+        _ => {
+            return Err(
+                "no force at the time of the slide; fetch it and its _bio again".to_owned(),
+            );
+        }
+    }
+    let at = |&time: &f64| {
+        let after = force.partition_point(|(t, _)| *t <= time);
+        let (before, after) = (after.saturating_sub(1), after.min(force.len() - 1));
+        let ((t0, f0), (t1, f1)) = (force[before], force[after]);
+        let part = if t1 > t0 {
+            ((time - t0) / (t1 - t0)).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        // at most 32 N: fits
+        ((f0 + part * (f1 - f0)) * 1e3).round() as i16
+    };
+    Ok(times.iter().map(at).collect())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,365 @@
+//! Tables of measured properties: the input of `tactus evaluate --properties`, and what the paper's own study worked on.
+//!
+//! A CSV table with the columns `texture,movement,trial,set,traction,roughness,fineness` in any order. `texture` and
+//! `movement` are names or numbers; `trial` is a number, once per texture, movement and set; `set` is `train` or `validate`.
+//! Every texture has training trials of every movement, the same number each. Textures may do without validation trials;
+//! one that has them has the same number of every movement.
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+
+use crate::data::rows::{RowError, Rows};
+
+const COLUMNS: [&str; 7] = [
+    "texture",
+    "movement",
+    "trial",
+    "set",
+    "traction",
+    "roughness",
+    "fineness",
+];
+
+/// Traction in N, roughness and fineness as logarithms, of one trial.
+pub type Properties = [f32; 3];
+
+/// A table of properties.
+#[derive(Clone, PartialEq, Debug)]
+pub struct PropertyTable {
+    /// Names of the textures, in the order in which they first come.
+    pub textures: Vec<String>,
+    /// Names of the movements, in the order in which they first come.
+    pub movements: Vec<String>,
+    /// Trials to learn from, by texture and movement, in the order of their numbers.
+    pub train: Vec<Vec<Vec<Properties>>>,
+    /// Trials to test on, by texture and movement; none for a texture that is only learned.
+    pub validate: Vec<Vec<Vec<Properties>>>,
+}
+
+/// Why a table of properties cannot be used.
+#[derive(thiserror::Error, Debug)]
+#[non_exhaustive]
+pub enum PropertyError {
+    /// The table cannot be read, or a row makes no sense.
+    #[error(transparent)]
+    Row(#[from] RowError),
+    /// A texture lacks trials of a movement.
+    #[error("{}: {cause}; every movement of a texture needs as many trials", path.display())]
+    Unbalanced {
+        /// The table.
+        path: PathBuf,
+        /// Which texture and movement, and how many trials there are and should be.
+        cause: String,
+    },
+    /// A set has no trials at all.
+    #[error("{}: no {set} rows; the table needs both train and validate", path.display())]
+    Empty {
+        /// The table.
+        path: PathBuf,
+        /// `train` or `validate`.
+        set: &'static str,
+    },
+}
+
+/// Trials with their numbers, by texture and movement.
+type Trials = HashMap<(usize, usize), Vec<(u32, Properties)>>;
+
+impl PropertyTable {
+    /// Reads and checks a table.
+    ///
+    /// # Errors
+    /// If it cannot be read, a row makes no sense, or trials are missing.
+    pub fn read(path: &Path) -> Result<Self, PropertyError> {
+        let mut rows = Rows::open(path, &COLUMNS)?;
+        let (mut textures, mut movements) = (Vec::new(), Vec::new());
+        let (mut train, mut validate) = (Trials::new(), Trials::new());
+        let mut seen = HashSet::new();
+        while let Some(row) = rows.next_row()? {
+            let index = |column, names: &mut Vec<String>| match row.text(column) {
+                "" => Err(row.error(Some(column), "is empty; give a name or number".to_owned())),
+                name => Ok(position_or_push(names, name)),
+            };
+            let texture = index("texture", &mut textures)?;
+            let movement = index("movement", &mut movements)?;
+            let trial: u32 = row.parse("trial", "the number of a trial")?;
+            let set = row.text("set");
+            let trials = match set {
+                "train" => &mut train,
+                "validate" => &mut validate,
+                other => {
+                    let cause = format!("{other:?} is neither train nor validate");
+                    return Err(row.error(Some("set"), cause).into());
+                }
+            };
+            if !seen.insert((texture, movement, trial, set == "train")) {
+                let cause = format!(
+                    "{set} trial {trial} of texture {}, movement {} comes twice; number the trials",
+                    textures[texture], movements[movement]
+                );
+                return Err(row.error(Some("trial"), cause).into());
+            }
+            let properties = [
+                row.number("traction")?,
+                row.number("roughness")?,
+                row.number("fineness")?,
+            ];
+            let key = (texture, movement);
+            trials.entry(key).or_default().push((trial, properties));
+        }
+        let mut set = Self {
+            textures,
+            movements,
+            train: Vec::new(),
+            validate: Vec::new(),
+        };
+        set.check(path, &train, &validate)?;
+        // from here on there is a row for every texture and movement: the lists are no longer than the table
+        set.train = set.lists(train);
+        set.validate = set.lists(validate);
+        Ok(set)
+    }
+
+    fn check(&self, path: &Path, train: &Trials, validate: &Trials) -> Result<(), PropertyError> {
+        for (set, trials) in [("train", train), ("validate", validate)] {
+            if trials.is_empty() {
+                return Err(PropertyError::Empty {
+                    path: path.to_owned(),
+                    set,
+                });
+            }
+        }
+        let movements = 0..self.movements.len();
+        let keys = |texture| movements.clone().map(move |movement| (texture, movement));
+        let count = |trials: &Trials, key| trials.get(&key).map_or(0, Vec::len);
+        let unbalanced = |set, key: (usize, usize), found, like: (usize, usize), expected| {
+            let name = |(texture, movement): (usize, usize)| {
+                let (texture, movement) = (&self.textures[texture], &self.movements[movement]);
+                format!("texture {texture}, movement {movement}")
+            };
+            PropertyError::Unbalanced {
+                path: path.to_owned(),
+                cause: format!(
+                    "{}: {found} {set} trials, where {} has {expected}",
+                    name(key),
+                    name(like)
+                ),
+            }
+        };
+        // as many as the first pair has that was trained at all
+        let textures = 0..self.textures.len();
+        let like = train.keys().min().copied().unwrap_or_default();
+        let expected = count(train, like);
+        for key in textures.clone().flat_map(keys) {
+            let found = count(train, key);
+            if found != expected {
+                return Err(unbalanced("train", key, found, like, expected));
+            }
+        }
+        for texture in textures {
+            let Some(like) = keys(texture).find(|key| count(validate, *key) > 0) else {
+                continue;
+            };
+            let expected = count(validate, like);
+            for key in keys(texture) {
+                let found = count(validate, key);
+                if found != expected {
+                    return Err(unbalanced("validate", key, found, like, expected));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The trials of each texture and movement, in the order of their numbers.
+    fn lists(&self, mut trials: Trials) -> Vec<Vec<Vec<Properties>>> {
+        let mut list = |key| {
+            let mut list = trials.remove(&key).unwrap_or_default();
+            list.sort_by_key(|(number, _)| *number);
+            list.into_iter().map(|(_, properties)| properties).collect()
+        };
+        let mut texture = |t| (0..self.movements.len()).map(|m| list((t, m))).collect();
+        (0..self.textures.len()).map(&mut texture).collect()
+    }
+}
+
+fn position_or_push(names: &mut Vec<String>, name: &str) -> usize {
+    names.iter().position(|n| n == name).unwrap_or_else(|| {
+        names.push(name.to_owned());
+        names.len() - 1
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const HEADER: &str = "texture,movement,trial,set,traction,roughness,fineness";
+
+    /// Textures silk and 7, movements fast and slow, two trials to train, one of silk to validate.
+    fn rows() -> Vec<String> {
+        let mut rows = vec![HEADER.to_owned()];
+        for (t, texture) in ["silk", "7"].iter().enumerate() {
+            for (m, movement) in ["fast", "slow"].iter().enumerate() {
+                for trial in 1..=2 {
+                    rows.push(format!(
+                        "{texture},{movement},{trial},train,{t}.5,{m},{trial}e-1"
+                    ));
+                }
+            }
+        }
+        rows.push("silk,slow,1,validate,8,8,8".to_owned());
+        rows.push("silk,fast,1,validate,9,9,9".to_owned());
+        rows
+    }
+
+    fn read(text: &str) -> Result<PropertyTable, PropertyError> {
+        let file = tempfile::NamedTempFile::with_suffix("_world.csv").unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        PropertyTable::read(file.path())
+    }
+
+    #[test]
+    fn a_table_is_read_in_any_order_of_rows() {
+        let set = read(&rows().join("\n")).unwrap();
+        assert_eq!(set.textures, ["silk", "7"]);
+        assert_eq!(set.movements, ["fast", "slow"]);
+        assert_eq!(set.train[1][0], [[1.5, 0.0, 0.1], [1.5, 0.0, 0.2]]);
+        assert_eq!(set.train[0][1], [[0.5, 1.0, 0.1], [0.5, 1.0, 0.2]]);
+        assert_eq!(
+            set.validate,
+            [vec![vec![[9.0; 3]], vec![[8.0; 3]]], vec![vec![], vec![]]]
+        );
+
+        let mut turned = rows();
+        turned[1..].reverse();
+        let turned = read(&turned.join("\r\n")).unwrap();
+        assert_eq!(turned, set);
+    }
+
+    #[test]
+    fn errors_name_line_and_cause() {
+        for (line, from, to, parts) in [
+            (1, "fineness", "finesse", [":1: ", "no column fineness"]),
+            (
+                3,
+                "2e-1",
+                "nan",
+                [":3: column fineness", "not a finite number"],
+            ),
+            (
+                3,
+                "0.5",
+                "inf",
+                [":3: column traction", "not a finite number"],
+            ),
+            (
+                3,
+                "0.5",
+                "",
+                [":3: column traction", "\"\" is not a number"],
+            ),
+            (3, ",0.5", "", [":3: ", "6 fields where the header has 7"]),
+            (
+                3,
+                "train",
+                "test",
+                [":3: column set", "\"test\" is neither train nor validate"],
+            ),
+            (
+                3,
+                ",2,",
+                ",two,",
+                [":3: column trial", "\"two\" is not the number of a trial"],
+            ),
+            (
+                3,
+                ",2,",
+                ",1,",
+                [
+                    ":3: column trial",
+                    "train trial 1 of texture silk, movement fast comes twice",
+                ],
+            ),
+            (3, "silk", "", [":3: column texture", "is empty"]),
+            (3, "fast", "", [":3: column movement", "is empty"]),
+            (
+                3,
+                "train",
+                "validate",
+                [
+                    "texture silk, movement slow: 2 train trials",
+                    "where texture silk, movement fast has 1",
+                ],
+            ),
+            (
+                3,
+                "fast",
+                "slew",
+                [
+                    "texture silk, movement slow: 2 train trials",
+                    "where texture silk, movement fast has 1",
+                ],
+            ),
+            (
+                9,
+                "7",
+                "8",
+                [
+                    "texture 7, movement slow: 1 train trials",
+                    "where texture silk, movement fast has 2",
+                ],
+            ),
+            (
+                10,
+                "silk",
+                "7",
+                [
+                    "texture silk, movement slow: 0 validate trials",
+                    "needs as many",
+                ],
+            ),
+        ] {
+            let mut rows = rows();
+            let changed = rows[line - 1].replacen(from, to, 1);
+            assert_ne!(changed, rows[line - 1]);
+            rows[line - 1] = changed;
+            let message = read(&rows.join("\n")).unwrap_err().to_string();
+            for part in ["_world.csv"].iter().chain(&parts) {
+                assert!(message.contains(part), "{part:?} is not in {message:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_set_without_rows_is_refused() {
+        for (kept, set) in [(0..9, "validate"), (9..11, "train"), (0..1, "train")] {
+            let rows = rows();
+            let mut lines = vec![HEADER];
+            lines.extend(
+                rows[kept]
+                    .iter()
+                    .map(String::as_str)
+                    .filter(|r| *r != HEADER),
+            );
+            let message = read(&lines.join("\n")).unwrap_err().to_string();
+            assert!(message.contains(&format!("no {set} rows")), "{message}");
+        }
+        let message = PropertyTable::read(Path::new("/nowhere/w.csv"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.contains("/nowhere/w.csv:1: No such file"),
+            "{message}"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn no_table_makes_the_reader_panic(
+            rows in proptest::collection::vec("[a-c]?,[12]?,[0-3],(train|validate|x)?,[0-9.]{0,3},1,(nan|2)", 0..30),
+        ) {
+            let _ = read(&[&[HEADER.to_owned()], rows.as_slice()].concat().join("\n"));
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! One recorded slide: its samples, the movement that made it, and its steady part.
+
+use std::ops::Range;
+
+use tactus_core::movement::Movement;
+
+/// Rate of P_AC in every recording: the BioTac's 2200 Hz.
+pub const PAC_RATE_HZ: u32 = 2200;
+/// Longest stream that is read, in samples: half an hour of P_AC. A slide lasts 15 s at most.
+pub const MAX_SAMPLES: usize = 1 << 22;
+/// One slide over one texture.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Slide {
+    /// Index of the texture in [`RecordingSet::textures`](crate::data::recordings::RecordingSet::textures).
+    pub texture: usize,
+    /// Number of the slide; slides of a texture were made in the order of their numbers.
+    pub number: u32,
+    /// The movement that made it.
+    pub movement: Movement,
+    /// P_AC at [`PAC_RATE_HZ`] in counts about the still baseline, from the start of the record.
+    pub pac: Vec<i16>,
+    /// P_DC in counts about the still baseline.
+    pub pdc: Vec<i16>,
+    /// Rate of [`pdc`](Self::pdc) in Hz.
+    pub pdc_rate_hz: u32,
+    /// Tangential force in mN, positive against the motion; `None` if the rig could not measure it.
+    pub shear_mn: Option<Vec<i16>>,
+    /// Rate of [`shear_mn`](Self::shear_mn) in Hz, also where there is none.
+    pub shear_rate_hz: u32,
+    /// Start and end of the steady part, in seconds from the start of the record.
+    pub window: (f32, f32),
+    /// What P_AC shows without any texture.
+    pub background: Background,
+}
+
+/// P_AC of a still finger: what is subtracted from the power of a slide.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Background {
+    /// Its power in counts^2 after the band-pass, measured elsewhere.
+    Power(f32),
+    /// P_AC of the finger at rest before this slide, like [`Slide::pac`].
+    Still(Vec<i16>),
+}
+
+/// One texture of a set.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Texture {
+    /// The number that the recordings give it.
+    pub id: u32,
+    /// Its name.
+    pub name: String,
+}
+
+/// What is known of a slide before its samples are read.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct SlideKey {
+    /// As [`Slide::number`].
+    pub number: u32,
+    /// As [`Slide::movement`].
+    pub movement: Movement,
+}
+
+impl Slide {
+    /// The steady window as sample numbers of a stream with `rate_hz`.
+    pub fn steady(&self, rate_hz: u32) -> Range<usize> {
+        // `as` saturates and turns not-a-number into 0
+        let sample = |s: f32| (f64::from(s) * f64::from(rate_hz)).round() as usize;
+        sample(self.window.0)..sample(self.window.1)
+    }
+
+    /// Says what makes this slide unusable, if anything: every reader and writer asks.
+    pub(crate) fn fault(&self) -> Option<String> {
+        let (start, end) = self.window;
+        if !(start.is_finite() && end.is_finite() && 0.0 <= start && start < end) {
+            return Some(format!(
+                "the steady window {start} s to {end} s is not a stretch of time"
+            ));
+        }
+        let streams = [
+            ("P_AC", PAC_RATE_HZ, Some(&self.pac)),
+            ("P_DC", self.pdc_rate_hz, Some(&self.pdc)),
+            ("shear", self.shear_rate_hz, self.shear_mn.as_ref()),
+        ];
+        for (name, rate, samples) in streams {
+            let Some(samples) = samples else { continue };
+            if rate == 0 || rate > 100_000 {
+                return Some(format!("a rate of {rate} Hz for {name} is impossible"));
+            }
+            if samples.len() > MAX_SAMPLES {
+                return Some(format!(
+                    "{} samples of {name} are more than a slide can have ({MAX_SAMPLES})",
+                    samples.len()
+                ));
+            }
+            if samples.len() < self.steady(rate).end {
+                return Some(format!(
+                    "{name} has {} samples at {rate} Hz and ends before the steady window does ({end} s)",
+                    samples.len()
+                ));
+            }
+        }
+        match &self.background {
+            Background::Power(power) if !power.is_finite() || *power < 0.0 => {
+                Some(format!("a background power of {power} is impossible"))
+            }
+            Background::Still(still) if still.is_empty() => {
+                Some("the record of the still finger is empty".to_owned())
+            }
+            _ => None,
+        }
+    }
+}

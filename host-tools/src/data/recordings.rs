@@ -1,0 +1,118 @@
+//! Recorded slides: the model in memory, and the folders it is read from.
+//!
+//! A folder holds either
+//! - `manifest.csv`: the project's own format, see [`own`];
+//! - `manifest.json`: the layout of `data/biotac`, see [`biotac`].
+//!
+//! Opening a folder reads its manifest only; the samples of one texture are read when they are asked for, and every file is
+//! checked against the SHA-256 that the manifest gives.
+pub mod biotac;
+pub mod files;
+pub mod npy;
+pub mod own;
+
+use std::path::{Path, PathBuf};
+
+use tactus_core::movement::Movement;
+
+use crate::data::recording::{Slide, SlideKey, Texture};
+pub use files::{RecordingError, Result};
+pub use own::RecordingWriter;
+
+/// The recordings of one folder.
+#[derive(Debug)]
+pub struct RecordingSet {
+    folder: PathBuf,
+    textures: Vec<Texture>,
+    /// per texture, in the order of numbers
+    slides: Vec<Vec<SlideKey>>,
+    source: Source,
+}
+
+#[derive(Debug)]
+enum Source {
+    Own(own::Manifest),
+    Biotac(biotac::Manifest),
+}
+
+impl RecordingSet {
+    /// Opens the recordings of `folder`: reads the manifest, not yet the samples. A `manifest.csv` goes before a
+    /// `manifest.json`.
+    ///
+    /// # Errors
+    /// If there is no such folder or manifest, or the manifest makes no sense.
+    pub fn open(folder: &Path) -> Result<Self> {
+        if !folder.is_dir() {
+            return Err(RecordingError::NoFolder(folder.to_owned()));
+        }
+        let (own, biotac) = (
+            folder.join(files::OWN_MANIFEST),
+            folder.join(files::BIOTAC_MANIFEST),
+        );
+        let (source, textures, slides) = if own.is_file() {
+            let manifest = own::Manifest::read(&own)?;
+            let (textures, slides) = manifest.contents();
+            (Source::Own(manifest), textures, slides)
+        } else if biotac.is_file() {
+            let manifest = biotac::Manifest::read(&biotac)?;
+            let (textures, slides) = manifest.contents();
+            (Source::Biotac(manifest), textures, slides)
+        } else {
+            return Err(RecordingError::NoManifest(folder.to_owned()));
+        };
+        Ok(Self {
+            folder: folder.to_owned(),
+            textures,
+            slides,
+            source,
+        })
+    }
+
+    /// The folder that was opened.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The textures; each has at least one slide.
+    pub fn textures(&self) -> &[Texture] {
+        &self.textures
+    }
+
+    /// The slides of texture number `index` of [`textures`](Self::textures) in the order of time; none if there is no such
+    /// texture.
+    pub fn slides(&self, index: usize) -> &[SlideKey] {
+        self.slides.get(index).map_or(&[], Vec::as_slice)
+    }
+
+    /// The movements of the set, in the order in which they are first seen.
+    pub fn movements(&self) -> Vec<Movement> {
+        let mut movements = Vec::new();
+        for key in self.slides.iter().flatten() {
+            if !movements.contains(&key.movement) {
+                movements.push(key.movement);
+            }
+        }
+        movements
+    }
+
+    /// Reads the samples of texture number `index` of [`textures`](Self::textures), slides in the order of time.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or its hash, size or format is wrong.
+    pub fn load_texture(&self, index: usize) -> Result<Vec<Slide>> {
+        if index >= self.textures.len() {
+            return Err(RecordingError::NoTexture {
+                folder: self.folder.clone(),
+                index,
+                count: self.textures.len(),
+            });
+        }
+        match &self.source {
+            Source::Own(manifest) => manifest.load(&self.folder, index),
+            Source::Biotac(manifest) => manifest.load(&self.folder, index),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

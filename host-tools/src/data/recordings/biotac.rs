@@ -1,0 +1,313 @@
+//! Reader of folders like `data/biotac`: `manifest.json` and, per material, the gzip of headerless little-endian 16-bit
+//! records, one per slide.
+//!
+//! What is taken from the manifest: `slides` (their numbers, the same for all materials), `record` (name, count and rate of
+//! each field of a record, in its order; wanted are `pac`, `pdc` and `f_tangential`), `motion.speed_mm_s`,
+//! `steady_window_s`, and per file its name, material, sizes and hashes. Nothing is assumed about how many materials, slides
+//! or samples there are.
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use tactus_core::movement::Movement;
+
+use super::files::{
+    BIOTAC_MANIFEST as MANIFEST, MAX_MANIFEST, RecordingError, Result, distinct_textures,
+    in_order_of_time, inside, read_bounded, unpack,
+};
+use super::npy;
+use crate::data::recording::{Background, MAX_SAMPLES, PAC_RATE_HZ, Slide, SlideKey, Texture};
+
+/// The pressing force is not in the manifest: the arm pressed with about 0.8 N, which fell to 0.3 N over the slide.
+pub const NOMINAL_FORCE_MN: u16 = 800;
+/// Background power in counts^2: the records start with the finger in motion, and this is what the golden roughness
+/// subtracts.
+pub const BACKGROUND_POWER: f32 = 2.2;
+
+/// Most bytes of samples of one material: it is read into memory as a whole.
+const MAX_RAW: u64 = 1 << 30;
+
+/// What the manifest says, checked.
+#[derive(Debug)]
+pub struct Manifest {
+    path: PathBuf,
+    movement: Movement,
+    window: (f32, f32),
+    /// (number, place in the file), in the order of numbers
+    slides: Vec<(u32, usize)>,
+    record: Record,
+    files: Vec<Entry>,
+}
+
+/// Where in a record the fields are.
+#[derive(Debug)]
+struct Record {
+    values: usize,
+    pac: Span,
+    pdc: Span,
+    shear: Option<Span>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    start: usize,
+    count: usize,
+    rate_hz: u32,
+}
+
+#[derive(Deserialize, Debug)]
+struct Json {
+    slides: Vec<u32>,
+    record: Vec<Field>,
+    motion: Motion,
+    steady_window_s: (f32, f32),
+    files: Vec<Entry>,
+}
+
+#[derive(Deserialize, Debug)]
+struct Field {
+    name: String,
+    count: usize,
+    rate_hz: u32,
+}
+
+#[derive(Deserialize, Debug)]
+struct Motion {
+    speed_mm_s: f32,
+}
+
+#[derive(Deserialize, Debug)]
+struct Entry {
+    file: String,
+    material: u32,
+    name: String,
+    n_slides: usize,
+    bytes_gz: u64,
+    bytes_raw: u64,
+    sha256_gz: String,
+    sha256_raw: String,
+}
+
+impl Manifest {
+    /// Reads and checks a manifest.
+    ///
+    /// # Errors
+    /// If it cannot be read, is no such manifest, or contradicts itself.
+    pub fn read(path: &Path) -> Result<Self> {
+        let fault = |place: &str, cause: String| RecordingError::Entry {
+            path: path.to_owned(),
+            place: place.to_owned(),
+            cause,
+        };
+        let bytes = read_bounded(path, MAX_MANIFEST)?;
+        let json: Json = serde_json::from_slice(&bytes).map_err(|e| RecordingError::Entry {
+            path: path.to_owned(),
+            place: format!("line {}, column {}", e.line(), e.column()),
+            cause: format!("{e}; the layout is that of data/biotac"),
+        })?;
+        let movement =
+            Movement::from_si(f32::from(NOMINAL_FORCE_MN) * 1e-3, json.motion.speed_mm_s)
+                .map_err(|e| fault("motion.speed_mm_s", e.to_string()))?;
+        let record = Record::of(&json.record).map_err(|cause| fault("record", cause))?;
+
+        let textures: Vec<Texture> = json.files.iter().map(Entry::texture).collect();
+        distinct_textures(path, &textures)?;
+        if textures.is_empty() {
+            return Err(fault("files", "no material is listed".to_owned()));
+        }
+        for entry in &json.files {
+            if entry.n_slides == 0 || json.slides.is_empty() {
+                return Err(RecordingError::EmptyTexture {
+                    manifest: path.to_owned(),
+                    id: entry.material,
+                    name: entry.name.clone(),
+                });
+            }
+            let place = format!("files, {}", entry.file);
+            if entry.n_slides != json.slides.len() {
+                return Err(fault(
+                    &place,
+                    format!(
+                        "n_slides is {}, but {} slides are listed under \"slides\"; they must agree",
+                        entry.n_slides,
+                        json.slides.len()
+                    ),
+                ));
+            }
+            let bytes = (entry.n_slides * 2).checked_mul(record.values);
+            if bytes.is_none_or(|n| n as u64 != entry.bytes_raw) {
+                return Err(fault(
+                    &place,
+                    format!(
+                        "bytes_raw is {}, but {} slides of {} 16-bit values are not that many bytes; they must agree",
+                        entry.bytes_raw, entry.n_slides, record.values
+                    ),
+                ));
+            }
+            if entry.bytes_raw > MAX_RAW {
+                return Err(fault(
+                    &place,
+                    format!(
+                        "bytes_raw is {}, more than the {MAX_RAW} bytes one material can have; split it",
+                        entry.bytes_raw
+                    ),
+                ));
+            }
+            // twice the raw size is more than gzip ever needs
+            if entry.bytes_gz > entry.bytes_raw.saturating_mul(2) + 4096 {
+                return Err(fault(
+                    &place,
+                    format!(
+                        "bytes_gz is {}, far more than the {} bytes that are in it; correct the manifest",
+                        entry.bytes_gz, entry.bytes_raw
+                    ),
+                ));
+            }
+        }
+        let mut slides: Vec<(u32, usize)> = json.slides.into_iter().zip(0..).collect();
+        in_order_of_time(
+            path,
+            textures[0].id,
+            &mut slides,
+            |s| s.0,
+            |s| format!("slides, entry {}", s.1 + 1),
+        )?;
+        Ok(Self {
+            path: path.to_owned(),
+            movement,
+            window: json.steady_window_s,
+            slides,
+            record,
+            files: json.files,
+        })
+    }
+
+    /// The textures, and the slides of each.
+    pub(super) fn contents(&self) -> (Vec<Texture>, Vec<Vec<SlideKey>>) {
+        let key = |&(number, _): &(u32, usize)| SlideKey {
+            number,
+            movement: self.movement,
+        };
+        let slides: Vec<SlideKey> = self.slides.iter().map(key).collect();
+        (
+            self.files.iter().map(Entry::texture).collect(),
+            vec![slides; self.files.len()],
+        )
+    }
+
+    /// Reads all slides of one texture.
+    pub(super) fn load(&self, folder: &Path, texture: usize) -> Result<Vec<Slide>> {
+        let entry = &self.files[texture];
+        let path = inside(folder, MANIFEST, &entry.file)?;
+        let values = entry.values(&path)?;
+        let records: Vec<&[i16]> = values.chunks_exact(self.record.values).collect();
+        self.slides
+            .iter()
+            .map(|&(number, place)| {
+                let record = records[place];
+                let field = |span: Span| record[span.start..][..span.count].to_vec();
+                let shear = self.record.shear;
+                let slide = Slide {
+                    texture,
+                    number,
+                    movement: self.movement,
+                    pac: field(self.record.pac),
+                    pdc: field(self.record.pdc),
+                    pdc_rate_hz: self.record.pdc.rate_hz,
+                    shear_mn: shear.map(field),
+                    shear_rate_hz: shear.map_or(self.record.pdc.rate_hz, |s| s.rate_hz),
+                    window: self.window,
+                    background: Background::Power(BACKGROUND_POWER),
+                };
+                match slide.fault() {
+                    None => Ok(slide),
+                    Some(cause) => Err(RecordingError::Entry {
+                        path: self.path.clone(),
+                        place: format!("slide {number} of {}", entry.file),
+                        cause,
+                    }),
+                }
+            })
+            .collect()
+    }
+}
+
+impl Record {
+    fn of(fields: &[Field]) -> std::result::Result<Self, String> {
+        let mut start = 0;
+        let (mut pac, mut pdc, mut shear) = (None, None, None);
+        for field in fields {
+            let Field {
+                ref name,
+                count,
+                rate_hz,
+            } = *field;
+            if count == 0 || count > MAX_SAMPLES {
+                return Err(format!(
+                    "{name} with {count} values; a slide has 1 to {MAX_SAMPLES}"
+                ));
+            }
+            let span = Some(Span {
+                start,
+                count,
+                rate_hz,
+            });
+            let slot = match name.as_str() {
+                "pac" => &mut pac,
+                "pdc" => &mut pdc,
+                "f_tangential" => &mut shear,
+                _ => &mut None,
+            };
+            if slot.is_some() {
+                return Err(format!("{name} is listed twice"));
+            }
+            *slot = span;
+            start += count;
+        }
+        let pac = pac.ok_or("there is no pac in it")?;
+        if pac.rate_hz != PAC_RATE_HZ {
+            return Err(format!(
+                "pac at {} Hz; all of Tactus counts on {PAC_RATE_HZ} Hz",
+                pac.rate_hz
+            ));
+        }
+        Ok(Self {
+            values: start,
+            pac,
+            pdc: pdc.ok_or("there is no pdc in it")?,
+            shear,
+        })
+    }
+}
+
+impl Entry {
+    fn texture(&self) -> Texture {
+        Texture {
+            id: self.material,
+            name: self.name.clone(),
+        }
+    }
+
+    /// All values of the file, hashes checked before and after decompression.
+    fn values(&self, path: &Path) -> Result<Vec<i16>> {
+        let fault = |cause| RecordingError::Samples {
+            path: path.to_owned(),
+            cause,
+        };
+        let packed = read_bounded(path, self.bytes_gz)?;
+        if (packed.len() as u64) < self.bytes_gz {
+            return Err(fault(format!(
+                "truncated: {} bytes, the manifest says {}; fetch it again",
+                packed.len(),
+                self.bytes_gz
+            )));
+        }
+        let raw = unpack(
+            path,
+            &packed,
+            &self.sha256_gz,
+            self.bytes_raw,
+            &self.sha256_raw,
+        )?;
+        Ok(npy::from_le_bytes(&raw))
+    }
+}

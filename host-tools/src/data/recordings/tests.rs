@@ -1,0 +1,404 @@
+//! Every way in which a folder of recordings can be wrong, each with the message that it must give.
+use std::fs;
+use std::path::Path;
+
+use tactus_core::movement::Movement;
+use tempfile::TempDir;
+
+use super::files::*;
+use super::*;
+use crate::data::recording::Background;
+
+mod biotac_layout;
+mod random;
+
+/// A short slide; its samples tell texture and number.
+fn slide(texture: usize, number: u32) -> Slide {
+    let base = texture as i16 * 1000 + number as i16 * 10;
+    Slide {
+        texture,
+        number,
+        movement: Movement::FOR_FINENESS,
+        pac: (0..220).map(|i| base - i).collect(),
+        pdc: vec![base; 10],
+        pdc_rate_hz: 100,
+        shear_mn: Some(vec![-base; 11]),
+        shear_rate_hz: 110,
+        window: (0.02, 0.1),
+        background: Background::Power(2.2),
+    }
+}
+
+fn texture(id: u32, name: &str) -> Texture {
+    Texture {
+        id,
+        name: name.to_owned(),
+    }
+}
+
+fn write_own(folder: &Path, slides: &[Slide]) {
+    let textures = vec![texture(7, "cotton, washed"), texture(3, "felt")];
+    let mut writer = RecordingWriter::create(folder, textures).unwrap();
+    for slide in slides {
+        writer.write(slide).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+/// Two textures with the slides 1 and 4, the first one without shear and with a still record.
+fn own() -> (TempDir, Vec<Slide>) {
+    let folder = TempDir::new().unwrap();
+    let mut slides = vec![slide(0, 1), slide(0, 4), slide(1, 1), slide(1, 4)];
+    slides[0].shear_mn = None;
+    slides[0].background = Background::Still(vec![1, -1, i16::MAX, i16::MIN]);
+    slides[0].movement = Movement::FOR_ROUGHNESS;
+    write_own(folder.path(), &slides);
+    (folder, slides)
+}
+
+fn edit(path: &Path, from: &str, to: &str) {
+    let text = fs::read_to_string(path).unwrap();
+    assert!(text.contains(from), "nothing to edit in {}", path.display());
+    fs::write(path, text.replacen(from, to, 1)).unwrap();
+}
+
+fn load(folder: &Path) -> Result<Vec<Slide>> {
+    let set = RecordingSet::open(folder)?;
+    let mut slides = Vec::new();
+    for index in 0..set.textures().len() {
+        slides.extend(set.load_texture(index)?);
+    }
+    Ok(slides)
+}
+
+/// The message of the error that reading `folder` gives must have all of `parts`.
+#[track_caller]
+fn fails(folder: &Path, parts: &[&str]) {
+    let message = load(folder).expect_err("must be refused").to_string();
+    for part in parts {
+        assert!(message.contains(part), "{part:?} is not in {message:?}");
+    }
+}
+
+#[test]
+fn own_format_gives_back_what_was_written() {
+    let (folder, slides) = own();
+    let set = RecordingSet::open(folder.path()).unwrap();
+    assert_eq!(
+        set.textures(),
+        [texture(7, "cotton, washed"), texture(3, "felt")]
+    );
+    assert_eq!(
+        set.slides(1).iter().map(|k| k.number).collect::<Vec<_>>(),
+        [1, 4]
+    );
+    assert_eq!(
+        set.movements(),
+        [Movement::FOR_ROUGHNESS, Movement::FOR_FINENESS]
+    );
+    assert_eq!(load(folder.path()).unwrap(), slides);
+}
+
+#[test]
+fn slides_come_in_the_order_of_numbers_whatever_the_order_of_rows() {
+    let folder = TempDir::new().unwrap();
+    let mut slides = vec![slide(1, 4), slide(0, 9), slide(1, 1), slide(0, 2)];
+    write_own(folder.path(), &slides);
+    // the texture of the first row is the first one
+    slides.sort_by_key(|s| (1 - s.texture, s.number));
+    let loaded = load(folder.path()).unwrap();
+    let pac = |slides: &[Slide]| slides.iter().map(|s| s.pac.clone()).collect::<Vec<_>>();
+    assert_eq!(pac(&loaded), pac(&slides));
+}
+
+#[test]
+fn a_folder_that_is_missing_or_empty_says_where_recordings_are() {
+    let folder = TempDir::new().unwrap();
+    fails(
+        &folder.path().join("nowhere"),
+        &[
+            "nowhere: no such folder",
+            "https://github.com/dexrob/BioTac_slide_20_50",
+            "tactus import",
+        ],
+    );
+    fails(
+        folder.path(),
+        &[
+            &folder.path().display().to_string(),
+            "neither manifest.csv nor manifest.json",
+            "tactus import",
+        ],
+    );
+}
+
+#[test]
+fn own_manifest_errors_name_line_and_column() {
+    for (from, to, parts) in [
+        ("force_n", "force", ["manifest.csv:1:", "no column force_n"]),
+        (
+            "pac_sha256",
+            "pac_file",
+            ["manifest.csv:1:", "two columns pac_file"],
+        ),
+        (
+            "0.200",
+            "NaN",
+            ["manifest.csv:2: column force_n", "not a finite number"],
+        ),
+        (
+            "0.200",
+            "-inf",
+            ["manifest.csv:2: column force_n", "not a finite number"],
+        ),
+        (
+            "0.200",
+            "9",
+            ["manifest.csv:2:", "contact force 9000 mN is outside"],
+        ),
+        (
+            "7,",
+            "seven,",
+            [
+                "manifest.csv:2: column texture",
+                "\"seven\" is not the number of a texture",
+            ],
+        ),
+        (
+            ",4,",
+            ",-4,",
+            [
+                "manifest.csv:3: column slide",
+                "\"-4\" is not the number of a slide",
+            ],
+        ),
+        (
+            ",4,",
+            ",4,,",
+            ["manifest.csv:3:", "20 fields where the header has 19"],
+        ),
+        (
+            ",2200,",
+            ",2000,",
+            ["manifest.csv:2: column pac_rate_hz", "2000 Hz"],
+        ),
+        (
+            ",100,",
+            ",0,",
+            ["manifest.csv: line 2", "0 Hz for P_DC is impossible"],
+        ),
+        (
+            "0.02,0.1,",
+            "0.1,0.1,",
+            ["manifest.csv: line 2", "is not a stretch of time"],
+        ),
+        (
+            "0.02,0.1,",
+            "0.02,0.2,",
+            ["manifest.csv: line 2", "P_AC has 220 samples"],
+        ),
+        (
+            ",2.2,",
+            ",-1,",
+            ["manifest.csv: line 3", "background power of -1"],
+        ),
+        (
+            ",,t007_s001_still",
+            ",1,t007_s001_still",
+            ["column background_power", "there is a background_file too"],
+        ),
+        (
+            "t007_s001_pdc.npy",
+            "",
+            ["manifest.csv:2: column pdc_file", "a hash, but no file"],
+        ),
+        (
+            "cotton, washed\",4",
+            "silk\",4",
+            ["manifest.csv: texture 7", "give each texture one number"],
+        ),
+        (
+            "\",4,",
+            "\",1,",
+            [
+                "manifest.csv: line 3",
+                "slide 1 of texture 7 is listed twice",
+            ],
+        ),
+        (
+            "t007_s001_pdc.npy",
+            "../x.npy",
+            [
+                "manifest.csv: names the file \"../x.npy\"",
+                "not inside this folder",
+            ],
+        ),
+        (
+            "t007_s001_pdc.npy",
+            "/etc/passwd",
+            ["\"/etc/passwd\"", "not inside this folder"],
+        ),
+        ("t007_s001_pdc.npy", "x.npy", ["x.npy: ", "No such file"]),
+    ] {
+        let (folder, _) = own();
+        edit(&folder.path().join(OWN_MANIFEST), from, to);
+        fails(folder.path(), &parts);
+    }
+}
+
+#[test]
+fn a_manifest_without_rows_or_that_is_no_text_is_refused() {
+    let (folder, _) = own();
+    let manifest = folder.path().join(OWN_MANIFEST);
+    fs::write(&manifest, own::COLUMNS.join(",")).unwrap();
+    fails(
+        folder.path(),
+        &["manifest.csv: line 1", "no slide is listed"],
+    );
+    fs::write(
+        &manifest,
+        [own::COLUMNS.join(",").as_bytes(), b"\n\xff\xfe\n"].concat(),
+    )
+    .unwrap();
+    fails(folder.path(), &["manifest.csv:2:", "not UTF-8"]);
+}
+
+#[test]
+fn damaged_npy_files_are_refused() {
+    let header = |text: &str| {
+        [
+            b"\x93NUMPY\x01\0",
+            &[text.len() as u8, 0][..],
+            text.as_bytes(),
+        ]
+        .concat()
+    };
+    let good = npy::write(&[1, 2, 3]);
+    let with = |from: &str, to: &str| {
+        let text = good.iter().map(|b| char::from(*b)).collect::<String>();
+        assert!(text.contains(from));
+        text.replace(from, to)
+            .chars()
+            .map(|c| c as u8)
+            .collect::<Vec<_>>()
+    };
+    for (bytes, cause) in [
+        (b"PK\x03\x04".to_vec(), "not a .npy file"),
+        (with("NUMPY\x01", "NUMPY\x09"), "version 9.0"),
+        (with("<i2", ">i2"), "the type is not '<i2'"),
+        (with("<i2", "<f2"), "the type is not '<i2'"),
+        (with("False", "True "), "the order is not C"),
+        (with("(3,", "(3,1,"), "the shape is not one number"),
+        (with("(3,", "("), "the shape is not one number"),
+        (with("(3,", "(9,"), "promises 9 samples, the file has 3"),
+        (
+            good[..good.len() - 1].to_vec(),
+            "5 bytes of samples are an odd number",
+        ),
+        (good[..40].to_vec(), "ends within its header"),
+        (
+            b"\x93NUMPY\x02\0\xff\xff\xff\xff".to_vec(),
+            "ends within its header",
+        ),
+        (
+            header("{'descr': '<i2', 'fortran_order': False, 'shape': (18446744073709551615,), }"),
+            "promises 18446744073709551615 samples",
+        ),
+        (header(&"{[(".repeat(60)), "the type is not '<i2'"),
+    ] {
+        // with a manifest that has the right hash of the wrong file
+        let (folder, _) = own();
+        let path = folder.path().join("t003_s004_pdc.npy");
+        let old = sha256(&fs::read(&path).unwrap());
+        edit(&folder.path().join(OWN_MANIFEST), &old, &sha256(&bytes));
+        fs::write(&path, &bytes).unwrap();
+        fails(folder.path(), &["t003_s004_pdc.npy: ", cause]);
+    }
+}
+
+#[test]
+fn a_changed_byte_is_a_wrong_hash() {
+    let (folder, _) = own();
+    let path = folder.path().join("t003_s004_pac.npy");
+    let mut bytes = fs::read(&path).unwrap();
+    *bytes.last_mut().unwrap() ^= 1;
+    fs::write(&path, bytes).unwrap();
+    fails(
+        folder.path(),
+        &["t003_s004_pac.npy: SHA-256", "damaged or changed"],
+    );
+}
+
+#[test]
+fn the_writer_refuses_what_the_reader_would() {
+    let folder = TempDir::new().unwrap();
+    let textures = vec![texture(1, "felt"), texture(2, "silk")];
+    let mut writer = RecordingWriter::create(folder.path(), textures.clone()).unwrap();
+    writer.write(&slide(0, 1)).unwrap();
+    let message = |e: RecordingError| e.to_string();
+    let twice = message(writer.write(&slide(0, 1)).unwrap_err());
+    assert!(
+        twice.contains("slide 1 of texture 1 is listed twice"),
+        "{twice}"
+    );
+    let third = message(writer.write(&slide(2, 1)).unwrap_err());
+    assert!(
+        third.contains("has 2 textures, there is none with index 2"),
+        "{third}"
+    );
+    let short = Slide {
+        pac: vec![0; 9],
+        ..slide(0, 2)
+    };
+    let short = message(writer.write(&short).unwrap_err());
+    assert!(short.contains("P_AC has 9 samples"), "{short}");
+    // a writer that ends here leaves no recordings
+    let empty = message(writer.finish().unwrap_err());
+    assert!(empty.contains("texture 2 (silk) has no slide"), "{empty}");
+    fails(folder.path(), &["neither manifest.csv nor manifest.json"]);
+
+    // and another one may take its place, once
+    let mut writer = RecordingWriter::create(folder.path(), textures.clone()).unwrap();
+    writer.write(&slide(0, 1)).unwrap();
+    writer.write(&slide(1, 1)).unwrap();
+    writer.finish().unwrap();
+    let taken = message(RecordingWriter::create(folder.path(), textures).unwrap_err());
+    assert!(
+        taken.contains("already holds recordings (manifest.csv)"),
+        "{taken}"
+    );
+    let twins = vec![texture(1, "felt"), texture(1, "silk")];
+    let twins = message(RecordingWriter::create(&folder.path().join("new"), twins).unwrap_err());
+    assert!(twins.contains("texture 1"), "{twins}");
+}
+
+#[test]
+fn a_texture_that_is_not_there_is_an_error_not_a_panic() {
+    let (folder, _) = own();
+    let set = RecordingSet::open(folder.path()).unwrap();
+    assert!(set.slides(2).is_empty());
+    let message = set.load_texture(2).unwrap_err().to_string();
+    assert!(
+        message.contains("has 2 textures, there is none with index 2"),
+        "{message}"
+    );
+}
+
+#[test]
+fn npyz_reads_what_is_written_and_writes_what_is_read() {
+    let samples = [0, 1, -1, i16::MAX, i16::MIN];
+    let bytes = npy::write(&samples);
+    let file = npyz::NpyFile::new(bytes.as_slice()).unwrap();
+    assert_eq!(file.shape(), [5]);
+    assert_eq!(file.into_vec::<i16>().unwrap(), samples);
+    // as numpy.save writes it, but in the format's version 2
+    let text = "{'descr': '<i2', 'fortran_order': False, 'shape': (1,), }         \n";
+    let bytes = [
+        b"\x93NUMPY\x02\0",
+        &(text.len() as u32).to_le_bytes()[..],
+        text.as_bytes(),
+        b"\x02\x01",
+    ]
+    .concat();
+    assert_eq!(npy::read(&bytes), Ok(vec![0x102]));
+}

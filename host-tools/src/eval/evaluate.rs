@@ -1,0 +1,440 @@
+//! Thousands of virtual explorations, and what they add up to.
+
+use std::collections::HashMap;
+
+use rand::Rng as _;
+use rayon::prelude::*;
+use serde::Serialize;
+use tactus_core::explorer::{self, Config, Confusions, Degrees, Explorer, ExplorerError, Strategy};
+use tactus_core::features::PropertySet;
+use tactus_core::table::{Action, Table, TableError};
+
+use crate::eval::experiment::{Experiment, Run};
+use crate::eval::learn;
+
+/// Most textures that a PC explores among.
+pub const MAX_TEXTURES: usize = 2048;
+
+/// How a run decides and moves on.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+#[cfg_attr(feature = "command", derive(clap::ValueEnum))]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// All features of every slide at once, whitened; the movement chosen by Bayesian exploration.
+    Fused,
+    /// As fused, one movement after the other.
+    FusedCycle,
+    /// As fused, any movement at random.
+    FusedRandom,
+    /// The three properties of every slide, Student's t.
+    StudentAll,
+    /// One property per slide, Student's t.
+    Student,
+    /// The paper's: one property per slide, the movement chosen by Bayesian exploration.
+    Paper,
+    /// The paper's likelihoods, the best movement of each property in turn.
+    Cycle,
+    /// The paper's likelihoods, any movement and property at random.
+    Random,
+}
+
+impl Method {
+    /// How the core's explorer compares.
+    pub fn method(self) -> explorer::Method {
+        match self {
+            Self::Fused | Self::FusedCycle | Self::FusedRandom => explorer::Method::Fused,
+            Self::StudentAll => explorer::Method::StudentAll,
+            Self::Student => explorer::Method::Student,
+            Self::Paper | Self::Cycle | Self::Random => explorer::Method::Paper,
+        }
+    }
+
+    /// How the core's explorer chooses.
+    pub fn strategy(self) -> Strategy {
+        match self {
+            Self::Fused | Self::StudentAll | Self::Student | Self::Paper => Strategy::Bayesian,
+            Self::FusedCycle | Self::Cycle => Strategy::Cycling,
+            Self::FusedRandom | Self::Random => Strategy::Random,
+        }
+    }
+
+    /// The best one for the contents of a table.
+    pub fn of(method: explorer::Method) -> Self {
+        match method {
+            explorer::Method::Fused => Self::Fused,
+            explorer::Method::StudentAll => Self::StudentAll,
+            explorer::Method::Student => Self::Student,
+            explorer::Method::Paper => Self::Paper,
+        }
+    }
+}
+
+/// How one run ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Outcome {
+    /// The texture that was to be identified.
+    pub unknown: usize,
+    /// The answer.
+    pub identified: usize,
+    /// Whether the threshold was exceeded.
+    pub sure: bool,
+    /// Slides made.
+    pub slides: u8,
+    /// Whether it would have been called unknown, had that been an answer.
+    pub unknown_like: bool,
+}
+
+/// Why an evaluation came to nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum EvaluateError {
+    /// The table cannot be learned.
+    #[error(transparent)]
+    Learn(#[from] learn::TableError),
+    /// The table cannot be read back.
+    #[error("the table does not read back")]
+    Table(#[from] TableError),
+    /// The table cannot be explored.
+    #[error("the table cannot be explored")]
+    Explorer(#[from] ExplorerError),
+}
+
+/// Most memory for degrees of confusion that are kept, bytes.
+const MAX_KEPT: usize = 256 << 20;
+
+/// What all runs with the same table share.
+#[derive(Clone, Debug)]
+pub struct Shared<'b> {
+    /// The explorer before its first slide.
+    pub explorer: Box<Explorer<'b, MAX_TEXTURES>>,
+    /// Where they are asked for at every step, and there is memory for them.
+    pub confusions: Option<Confusions<Vec<Degrees>>>,
+}
+
+impl<'b> Shared<'b> {
+    /// Of an explorer that moves on so.
+    pub fn new(explorer: Box<Explorer<'b, MAX_TEXTURES>>, strategy: Strategy) -> Self {
+        let room = Confusions::<Vec<_>>::room(&explorer);
+        let keep = strategy == Strategy::Bayesian && room <= MAX_KEPT / size_of::<Degrees>();
+        let kept = || Confusions::new(&explorer, vec![Degrees::default(); room]);
+        Self {
+            confusions: keep.then(kept).flatten(),
+            explorer,
+        }
+    }
+}
+
+/// Plays one run to its end, with the degrees of confusion of [`Shared`] or computing them where they are asked for.
+pub fn play<const N: usize>(
+    explorer: &mut Explorer<'_, N>,
+    confusions: Option<&Confusions<Vec<Degrees>>>,
+    strategy: Strategy,
+    run: Run<'_>,
+) -> Outcome {
+    play_and_tell(explorer, confusions, strategy, run, |_, _| ())
+}
+
+/// As [`play`]; `tell` hears of every action and the posterior after it.
+pub fn play_and_tell<const N: usize>(
+    explorer: &mut Explorer<'_, N>,
+    confusions: Option<&Confusions<Vec<Degrees>>>,
+    strategy: Strategy,
+    mut run: Run<'_>,
+    mut tell: impl FnMut(Action, &[f32]),
+) -> Outcome {
+    explorer.restart();
+    let verdict = loop {
+        if let Some(verdict) = explorer.verdict() {
+            break verdict;
+        }
+        // only Bayesian exploration looks ahead
+        let outlook = match (strategy, confusions) {
+            (Strategy::Bayesian, Some(confusions)) => {
+                #[cfg(test)]
+                tests::KEPT.set(tests::KEPT.get() + 1);
+                explorer.outlook_by(confusions)
+            }
+            (Strategy::Bayesian, None) => explorer.outlook(),
+            _ => Default::default(),
+        };
+        let action = explorer.choose(&outlook, run.random.next_u32());
+        let slide = run.slide(action.movement.into());
+        explorer
+            .observe(action, slide)
+            .expect("every slide has the properties that the explorer was told of");
+        tell(action, explorer.posterior());
+    };
+    Outcome {
+        unknown: run.unknown,
+        identified: verdict.texture.into(),
+        sure: verdict.sure,
+        slides: explorer.slides(),
+        unknown_like: explorer.is_unknown(),
+    }
+}
+
+/// Plays `runs` runs on all cores; `done` is called after each. The outcomes are in the order of the runs, and the same
+/// whatever the number of threads.
+///
+/// # Errors
+/// See [`EvaluateError`].
+pub fn evaluate(
+    experiment: &Experiment,
+    config: Config,
+    runs: u64,
+    done: impl Fn() + Sync,
+) -> Result<Vec<Outcome>, EvaluateError> {
+    // where every run learns from the same slides, one table serves all
+    if experiment.is_fixed() {
+        let bytes = experiment.run(0).learn(config.method)?;
+        let candidates = experiment.candidates();
+        let explorer = explorer(&bytes, experiment.measured(), config, candidates)?;
+        let shared = Shared::new(explorer, config.strategy);
+        return Ok(play_all(experiment, config.strategy, &shared, runs, done));
+    }
+    (0..runs)
+        .into_par_iter()
+        .map(|index| {
+            let run = experiment.run(index);
+            let bytes = run.learn(config.method)?;
+            let candidates = experiment.candidates();
+            let mut explorer = explorer(&bytes, experiment.measured(), config, candidates)?;
+            let outcome = play(&mut explorer, None, config.strategy, run);
+            done();
+            Ok(outcome)
+        })
+        .collect()
+}
+
+/// Runs that all begin with the same.
+fn play_all(
+    experiment: &Experiment,
+    strategy: Strategy,
+    shared: &Shared<'_>,
+    runs: u64,
+    done: impl Fn() + Sync,
+) -> Vec<Outcome> {
+    (0..runs)
+        .into_par_iter()
+        .map_init(
+            || shared.explorer.clone(),
+            |explorer, index| {
+                let run = experiment.run(index);
+                let outcome = play(explorer, shared.confusions.as_ref(), strategy, run);
+                done();
+                outcome
+            },
+        )
+        .collect()
+}
+
+/// An explorer on the heap: it is large, and the threads' stacks are not. Without `candidates`, all textures are.
+///
+/// # Errors
+/// The table does not read, or cannot be explored.
+#[inline(never)]
+pub fn explorer<'b>(
+    bytes: &'b [u8],
+    measured: PropertySet,
+    config: Config,
+    candidates: Option<&[u16]>,
+) -> Result<Box<Explorer<'b, MAX_TEXTURES>>, EvaluateError> {
+    let table = Table::read(bytes)?;
+    Ok(Box::new(match candidates {
+        Some(candidates) => Explorer::among(table, measured, config, candidates.iter().copied())?,
+        None => Explorer::new(table, measured, config)?,
+    }))
+}
+
+/// Two textures, and how often the first was taken for the second.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Confused {
+    /// The unknown texture.
+    pub texture: String,
+    /// The answer.
+    pub identified: String,
+    /// Share of all runs, 0 to 1.
+    pub share: f64,
+}
+
+/// The figures of an evaluation.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Summary {
+    /// Right answers over runs.
+    pub accuracy: f64,
+    /// Share of the runs that stopped by the threshold.
+    pub converged: f64,
+    /// Wrong answers among those.
+    pub wrong_when_sure: f64,
+    /// Median number of slides; a run that did not converge counts one more than the limit.
+    pub median_slides: f64,
+    /// Mean number of slides.
+    pub mean_slides: f64,
+    /// Share of the runs that would have been called unknown after their last slide, had that been an answer.
+    pub like_unknown: f64,
+    /// The most confused pairs, most often first, ten at most.
+    pub confused: Vec<Confused>,
+}
+
+impl Summary {
+    /// Sums up outcomes, of which there is at least one.
+    pub fn new(outcomes: &[Outcome], names: &[String], max_slides: u8) -> Self {
+        let share = |part: usize, of: usize| {
+            if of == 0 {
+                0.0
+            } else {
+                part as f64 / of as f64
+            }
+        };
+        let right = outcomes
+            .iter()
+            .filter(|o| o.identified == o.unknown)
+            .count();
+        let sure = outcomes.iter().filter(|o| o.sure).count();
+        let wrong = outcomes
+            .iter()
+            .filter(|o| o.sure && o.identified != o.unknown)
+            .count();
+        let mut slides: Vec<f64> = outcomes
+            .iter()
+            .map(|o| {
+                f64::from(if o.sure {
+                    o.slides
+                } else {
+                    max_slides.saturating_add(1)
+                })
+            })
+            .collect();
+        slides.sort_by(f64::total_cmp);
+        let middle = |at: usize| slides.get(at).copied().unwrap_or(0.0);
+        let made: f64 = outcomes.iter().map(|o| f64::from(o.slides)).sum();
+        let mut pairs: HashMap<(usize, usize), usize> = HashMap::new();
+        for o in outcomes.iter().filter(|o| o.identified != o.unknown) {
+            *pairs.entry((o.unknown, o.identified)).or_default() += 1;
+        }
+        let mut pairs: Vec<_> = pairs.into_iter().collect();
+        pairs.sort_by_key(|&(pair, count)| (std::cmp::Reverse(count), pair));
+        Self {
+            accuracy: share(right, outcomes.len()),
+            converged: share(sure, outcomes.len()),
+            wrong_when_sure: share(wrong, sure),
+            median_slides: (middle(outcomes.len().saturating_sub(1) / 2)
+                + middle(outcomes.len() / 2))
+                / 2.0,
+            mean_slides: made / outcomes.len().max(1) as f64,
+            like_unknown: share(
+                outcomes.iter().filter(|o| o.unknown_like).count(),
+                outcomes.len(),
+            ),
+            confused: pairs
+                .into_iter()
+                .take(10)
+                .map(|((unknown, identified), count)| Confused {
+                    texture: names[unknown].clone(),
+                    identified: names[identified].clone(),
+                    share: share(count, outcomes.len()),
+                })
+                .collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+    use crate::data::properties::PropertyTable;
+
+    thread_local! {
+        /// Steps of this thread that took degrees of confusion that were kept.
+        pub(super) static KEPT: Cell<u64> = const { Cell::new(0) };
+    }
+
+    /// Thirty textures in the plane of roughness and fineness, their neighbours much alike.
+    fn experiment() -> Experiment {
+        let slide = |texture: u16, trial: u16| {
+            let [column, row, trial] = [texture % 6, texture / 6, trial].map(f32::from);
+            let off = (column + 2.0 * row + 3.0 * trial) % 5.0 - 2.0;
+            [
+                1.0,
+                4.0 + 0.3 * column + 0.1 * off,
+                2.0 + 0.3 * row - 0.1 * off,
+            ]
+        };
+        let slides = |trials: std::ops::Range<u16>| -> Vec<Vec<_>> {
+            let texture = |t| vec![trials.clone().map(|trial| slide(t, trial)).collect()];
+            (0..30).map(texture).collect()
+        };
+        let table = PropertyTable {
+            textures: (0..30).map(|t| t.to_string()).collect(),
+            movements: vec!["only".to_owned()],
+            train: slides(0..4),
+            validate: slides(4..9),
+        };
+        Experiment::given(&table, None, 1).unwrap()
+    }
+
+    #[test]
+    fn runs_with_one_table_share_its_degrees_of_confusion() {
+        let experiment = experiment();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
+        let pool = pool.build().unwrap();
+        for (strategy, keeps) in [
+            (Strategy::Bayesian, true),
+            (Strategy::Cycling, false),
+            (Strategy::Random, false),
+        ] {
+            let config = Config {
+                strategy,
+                ..Config::default()
+            };
+            let all = || {
+                let before = KEPT.get();
+                let outcomes = evaluate(&experiment, config, 100, || ()).unwrap();
+                (outcomes, KEPT.get() - before)
+            };
+            let (outcomes, kept) = pool.install(all);
+            let steps = outcomes.iter().map(|o| u64::from(o.slides)).sum::<u64>();
+            assert!(steps > 200, "{steps}");
+            assert_eq!(kept, if keeps { steps } else { 0 });
+            // as without
+            let bytes = experiment.run(0).learn(config.method).unwrap();
+            let mut explorer = explorer(&bytes, experiment.measured(), config, None).unwrap();
+            let computed = (0..100).map(|n| play(&mut explorer, None, strategy, experiment.run(n)));
+            assert!(computed.eq(outcomes));
+        }
+    }
+
+    #[test]
+    fn summary_counts_as_the_protocols_say() {
+        let outcome = |unknown, identified, sure, slides| Outcome {
+            unknown,
+            identified,
+            sure,
+            slides,
+            unknown_like: slides == 4,
+        };
+        let names = ["a".to_owned(), "b".to_owned(), "c".to_owned()];
+        let outcomes = [
+            outcome(0, 0, true, 3),
+            outcome(1, 1, true, 5),
+            outcome(0, 1, true, 4),
+            outcome(2, 2, false, 10),
+            outcome(1, 0, false, 10),
+            outcome(0, 1, false, 10),
+        ];
+        let s = Summary::new(&outcomes, &names, 10);
+        assert_eq!((s.accuracy, s.converged), (0.5, 0.5));
+        assert_eq!(s.wrong_when_sure, 1.0 / 3.0, "of the sure ones only");
+        assert_eq!(s.median_slides, 8.0, "3 4 5 11 11 11");
+        assert_eq!(s.mean_slides, 7.0);
+        assert_eq!(s.like_unknown, 1.0 / 6.0);
+        let pairs: Vec<_> = s
+            .confused
+            .iter()
+            .map(|c| (c.texture.as_str(), c.identified.as_str(), c.share))
+            .collect();
+        assert_eq!(pairs, [("a", "b", 2.0 / 6.0), ("b", "a", 1.0 / 6.0)]);
+        assert_eq!(Summary::new(&outcomes[..3], &names, 10).median_slides, 4.0);
+    }
+}

@@ -1,0 +1,513 @@
+//! What every quoted figure means: which slides a table is learned from, and which the unknown texture shows.
+//!
+//! A run is one virtual exploration. Its training slides are drawn anew, one texture is unknown (in turn), and each slide
+//! that an explorer asks for is drawn with replacement from that texture's test slides.
+
+use std::collections::HashMap;
+
+use rand::seq::SliceRandom as _;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use tactus_core::explorer::Method;
+use tactus_core::features::{Properties, PropertySet};
+use tactus_core::fused::{FeatureSet, Observation};
+use tactus_core::movement::Movement;
+use tactus_core::table;
+
+#[cfg(feature = "fabrics")]
+use crate::data::fabricslide::{FabricSet, FabricSlide};
+use crate::data::properties::PropertyTable;
+use crate::data::replay::Felt;
+use crate::eval::learn::{TableError, learn};
+
+/// How slides are divided into training and test.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
+#[cfg_attr(feature = "command", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
+pub enum Protocol {
+    /// Training slides at random from all of a session, tested on the rest: optimistic.
+    Interleaved,
+    /// Training slides at random from the first 19 of 34 (of another number, the same share), tested on the later ones;
+    /// with --test, trained on slide numbers below 30 and tested on those above 34.
+    Blocked,
+    /// Trained on the first slides of a session, tested on all later ones; with --test, on all of that folder.
+    Drift,
+}
+
+/// Slides of a session that [`Protocol::Blocked`] trains from, out of [`SESSION`].
+const BLOCKED_TRAINING: usize = 19;
+/// Slides of a session in data/biotac.
+const SESSION: usize = 34;
+/// Where a second folder brings the test slides, blocked trains on slide numbers below this ...
+const BLOCKED_BELOW: u32 = 30;
+/// ... and tests on numbers above this.
+const BLOCKED_ABOVE: u32 = 34;
+
+/// Why an experiment cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ExperimentError {
+    /// Too few slides.
+    #[error(
+        "{texture}, {movement}: {there} slides to train from, and --train-slides is {wanted}; ask for fewer"
+    )]
+    Training {
+        /// Name of the texture.
+        texture: String,
+        /// The movement.
+        movement: Movement,
+        /// Slides there are.
+        there: usize,
+        /// Slides asked for.
+        wanted: usize,
+    },
+    /// Nothing left to test on.
+    #[error(
+        "{texture}, {movement}: no slide is left to test on; train on fewer slides or give more with --test"
+    )]
+    Test {
+        /// Name of the texture.
+        texture: String,
+        /// The movement.
+        movement: Movement,
+    },
+    /// A standard deviation needs two slides.
+    #[error("--train-slides {0}: how slides of one texture differ takes at least two slides")]
+    One(usize),
+    /// The folder of test slides lacks something.
+    #[error(
+        "the test folder has no {0}, which the training folder has; give a folder of the same textures"
+    )]
+    Missing(String),
+    /// More movements than a table holds.
+    #[error("{0} movements; a table holds {max} at most", max = table::MAX_MOVEMENTS)]
+    Movements(usize),
+}
+
+/// Slides of one texture and movement.
+#[derive(Clone, PartialEq, Debug, Default)]
+struct Pool {
+    /// What training slides are drawn from, in the order of time.
+    train: Vec<Observation>,
+    /// What the unknown texture shows; without it, what training has left over.
+    test: Option<Vec<Observation>>,
+}
+
+/// A set of textures with a way to divide their slides.
+#[derive(Clone, Debug)]
+pub struct Experiment {
+    names: Vec<String>,
+    movements: Vec<Movement>,
+    /// Per texture and movement.
+    pools: Vec<Vec<Pool>>,
+    /// Textures that can be the unknown one.
+    unknowns: Vec<usize>,
+    /// Textures that the unknown one can be, as far as the explorer knows; all, unless given.
+    candidates: Option<Vec<u16>>,
+    /// Training slides per texture and movement.
+    train_slides: usize,
+    /// Training slides are drawn; otherwise they are the first.
+    drawn: bool,
+    measured: PropertySet,
+    /// What the fused method learns from; the best there is, unless given.
+    features: Option<FeatureSet>,
+    seed: u64,
+}
+
+impl Experiment {
+    /// Recorded slides. Without a second folder the test slides come from the first.
+    ///
+    /// # Errors
+    /// See [`ExperimentError`].
+    pub fn recorded(
+        names: Vec<String>,
+        felt: &[Vec<Felt>],
+        test: Option<(&[String], &[Vec<Felt>])>,
+        protocol: Protocol,
+        train_slides: usize,
+        seed: u64,
+    ) -> Result<Self, ExperimentError> {
+        if train_slides < 2 {
+            return Err(ExperimentError::One(train_slides));
+        }
+        let mut movements: Vec<Movement> = Vec::new();
+        for slide in felt.iter().flatten() {
+            if !movements.contains(&slide.movement) {
+                movements.push(slide.movement);
+            }
+        }
+        let of = |slides: &[Felt], movement| -> Vec<(u32, Observation)> {
+            let same = slides.iter().filter(|s| s.movement == movement);
+            same.map(|s| (s.number, Observation::from(&s.measurement)))
+                .collect()
+        };
+        let properties =
+            |slides: &[(u32, Observation)]| slides.iter().map(|s| s.1.clone()).collect::<Vec<_>>();
+        let pool = |texture: usize, movement: Movement| {
+            let mut train = of(&felt[texture], movement);
+            let mut tested = match test {
+                None => None,
+                Some((others, slides)) => {
+                    let other = others.iter().position(|name| *name == names[texture]);
+                    let other =
+                        other.ok_or_else(|| ExperimentError::Missing(names[texture].clone()))?;
+                    Some(of(&slides[other], movement))
+                }
+            };
+            match (protocol, &mut tested) {
+                (Protocol::Interleaved, _) | (Protocol::Drift, Some(_)) => {}
+                (Protocol::Blocked, Some(tested)) => {
+                    train.retain(|s| s.0 < BLOCKED_BELOW);
+                    tested.retain(|s| s.0 > BLOCKED_ABOVE);
+                }
+                (Protocol::Blocked, None) => {
+                    let first = (train.len() * BLOCKED_TRAINING + SESSION / 2) / SESSION;
+                    tested = Some(train.split_off(first));
+                }
+                (Protocol::Drift, None) => {
+                    tested = Some(train.split_off(train_slides.min(train.len())));
+                }
+            }
+            let there = train.len();
+            let pool = Pool {
+                train: properties(&train),
+                test: tested.as_deref().map(properties),
+            };
+            let texture = || names[texture].clone();
+            if there < train_slides {
+                return Err(ExperimentError::Training {
+                    texture: texture(),
+                    movement,
+                    there,
+                    wanted: train_slides,
+                });
+            }
+            if pool.test.as_ref().map_or(there - train_slides, Vec::len) == 0 {
+                return Err(ExperimentError::Test {
+                    texture: texture(),
+                    movement,
+                });
+            }
+            Ok(pool)
+        };
+        let pools = (0..felt.len())
+            .map(|texture| movements.iter().map(|&m| pool(texture, m)).collect())
+            .collect::<Result<_, _>>()?;
+        let slides = felt
+            .iter()
+            .flatten()
+            .chain(test.iter().flat_map(|(_, slides)| slides.iter().flatten()));
+        let measured = slides.fold(PropertySet::ALL, |set, s| {
+            set.and(s.measurement.properties.measured())
+        });
+        Ok(Self {
+            unknowns: (0..names.len()).collect(),
+            names,
+            movements,
+            pools,
+            candidates: None,
+            train_slides,
+            drawn: protocol != Protocol::Drift,
+            measured,
+            features: None,
+            seed,
+        })
+    }
+
+    /// Slides that were cut into properties elsewhere: per texture and movement, those to train from and those to test
+    /// with. Textures without test slides are never the unknown one. Without `train_slides`, all training slides are used,
+    /// else the first so many.
+    ///
+    /// The movements have no force and speed; they stand in the table as the first cells of the grid.
+    ///
+    /// # Errors
+    /// See [`ExperimentError`].
+    pub fn given(
+        set: &PropertyTable,
+        train_slides: Option<usize>,
+        seed: u64,
+    ) -> Result<Self, ExperimentError> {
+        if set.movements.len() > table::MAX_MOVEMENTS {
+            return Err(ExperimentError::Movements(set.movements.len()));
+        }
+        let wrap = |sets: &[Vec<Vec<[f32; 3]>>]| -> Vec<Vec<Vec<Observation>>> {
+            let slide = |t: &[f32; 3]| Observation::from(Properties::new(t.map(Some)));
+            let slides = |trials: &Vec<[f32; 3]>| trials.iter().map(slide).collect();
+            sets.iter()
+                .map(|texture| texture.iter().map(slides).collect())
+                .collect()
+        };
+        let there = set.train.iter().flatten().map(Vec::len).min().unwrap_or(0);
+        Self::collected(
+            set.textures.clone(),
+            Movement::grid().take(set.movements.len()).collect(),
+            wrap(&set.train),
+            wrap(&set.validate),
+            train_slides.unwrap_or(there),
+            seed,
+        )
+    }
+
+    /// Slides that were divided when they were collected: per texture and movement, those to train from, of which the first
+    /// `train_slides` are used, and those to test with. Textures without test slides are never the unknown one. A table holds
+    /// [`table::MAX_MOVEMENTS`] movements.
+    ///
+    /// # Errors
+    /// See [`ExperimentError`].
+    pub fn collected(
+        names: Vec<String>,
+        movements: Vec<Movement>,
+        train: Vec<Vec<Vec<Observation>>>,
+        test: Vec<Vec<Vec<Observation>>>,
+        train_slides: usize,
+        seed: u64,
+    ) -> Result<Self, ExperimentError> {
+        if train_slides < 2 {
+            return Err(ExperimentError::One(train_slides));
+        }
+        for (texture, row) in names.iter().zip(&train) {
+            let short = |(_, trials): &(_, &Vec<_>)| trials.len() < train_slides;
+            if let Some((&movement, trials)) = movements.iter().zip(row).find(short) {
+                return Err(ExperimentError::Training {
+                    texture: texture.clone(),
+                    movement,
+                    there: trials.len(),
+                    wanted: train_slides,
+                });
+            }
+        }
+        let tested = |slides: &Vec<Vec<_>>| slides.iter().all(|trials| !trials.is_empty());
+        let unknowns = (0..names.len()).filter(|&t| tested(&test[t])).collect();
+        let pool = |(train, test)| Pool {
+            train,
+            test: Some(test),
+        };
+        let pools = train.into_iter().zip(test);
+        let pools = pools.map(|(train, test)| train.into_iter().zip(test).map(pool).collect());
+        Ok(Self {
+            names,
+            movements,
+            pools: pools.collect(),
+            unknowns,
+            candidates: None,
+            train_slides,
+            drawn: false,
+            measured: PropertySet::ALL,
+            features: None,
+            seed,
+        })
+    }
+
+    #[cfg(feature = "fabrics")]
+    /// Fabrics, learned from all slides of one repetition and tested on the other.
+    ///
+    /// # Errors
+    /// See [`ExperimentError`].
+    pub fn fabrics(set: &FabricSet, learned_from: u8, seed: u64) -> Result<Self, ExperimentError> {
+        if set.movements.len() > table::MAX_MOVEMENTS {
+            return Err(ExperimentError::Movements(set.movements.len()));
+        }
+        let of = |fabric: usize, movement: usize, learned: bool| -> Vec<Observation> {
+            let same = set.slides.iter().filter(|s| {
+                s.fabric == fabric
+                    && s.movement == movement
+                    && (s.repetition == learned_from) == learned
+            });
+            let observation = |s: &FabricSlide| Observation {
+                properties: Properties::new(s.properties.map(Some)),
+                bands: s
+                    .ln_bands
+                    .into_iter()
+                    .filter_map(tactus_core::fused::fixed)
+                    .collect(),
+                pressure: None,
+            };
+            same.map(observation).collect()
+        };
+        let pool = |fabric, movement| Pool {
+            train: of(fabric, movement, true),
+            test: Some(of(fabric, movement, false)),
+        };
+        let movements = 0..set.movements.len();
+        let pools: Vec<Vec<Pool>> = (0..set.fabrics.len())
+            .map(|fabric| movements.clone().map(|m| pool(fabric, m)).collect())
+            .collect();
+        let there = pools.iter().flatten().map(|pool| pool.train.len());
+        let train_slides = there.min().unwrap_or(0);
+        if train_slides < 2 {
+            return Err(ExperimentError::One(train_slides));
+        }
+        Ok(Self {
+            unknowns: (0..set.fabrics.len()).collect(),
+            names: set.fabrics.clone(),
+            movements: set.movements.clone(),
+            pools,
+            candidates: None,
+            train_slides,
+            drawn: false,
+            measured: PropertySet::ALL,
+            features: None,
+            seed,
+        })
+    }
+
+    /// The same with other features for the fused method.
+    #[must_use]
+    pub fn with_features(self, features: Option<FeatureSet>) -> Self {
+        Self { features, ..self }
+    }
+
+    /// The same among a few textures only: one of them is unknown, and the explorer knows that it is one of them.
+    #[must_use]
+    pub fn among(self, textures: &[u16]) -> Self {
+        Self {
+            unknowns: textures.iter().copied().map(usize::from).collect(),
+            candidates: Some(textures.to_vec()),
+            ..self
+        }
+    }
+
+    /// Textures that the unknown one can be; `None` for all.
+    pub fn candidates(&self) -> Option<&[u16]> {
+        self.candidates.as_deref()
+    }
+
+    /// All slides of a texture in the order of time, by movement: those to learn from, and those after them.
+    pub fn session(&self, texture: usize) -> Vec<(&[Observation], &[Observation])> {
+        let pools = self.pools.get(texture).map_or(&[][..], Vec::as_slice);
+        pools
+            .iter()
+            .map(|pool| {
+                let later = pool.test.as_deref().unwrap_or_default();
+                (pool.train.as_slice(), later)
+            })
+            .collect()
+    }
+
+    /// Names of the textures.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The movements.
+    pub fn movements(&self) -> &[Movement] {
+        &self.movements
+    }
+
+    /// The properties that every slide has.
+    pub fn measured(&self) -> PropertySet {
+        self.measured
+    }
+
+    /// Training slides per texture and movement.
+    pub fn train_slides(&self) -> usize {
+        self.train_slides
+    }
+
+    /// Whether every run learns from the same slides.
+    pub fn is_fixed(&self) -> bool {
+        !self.drawn
+    }
+
+    /// Draws run number `run`. The same number gives the same run, whichever thread asks for it.
+    pub fn run(&self, run: u64) -> Run<'_> {
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        random.set_stream(run);
+        let unknown = self.unknowns[(run % self.unknowns.len() as u64) as usize];
+        // As in the reference program, the same places in the session are drawn for all textures: slides of one place share
+        // what the session did to them.
+        let mut orders: HashMap<(usize, usize), Vec<usize>> = HashMap::new();
+        if self.drawn {
+            for (movement, pool) in self.pools.iter().flat_map(|pools| pools.iter().enumerate()) {
+                let slides = pool.train.len();
+                orders.entry((movement, slides)).or_insert_with(|| {
+                    let mut order: Vec<usize> = (0..slides).collect();
+                    order.shuffle(&mut random);
+                    order
+                });
+            }
+        }
+        Run {
+            experiment: self,
+            orders,
+            unknown,
+            random,
+        }
+    }
+}
+
+/// One virtual exploration, ready to begin.
+#[derive(Clone, Debug)]
+pub struct Run<'e> {
+    experiment: &'e Experiment,
+    /// In which order slides are taken, by movement and how many there are; that of time, where nothing is drawn.
+    orders: HashMap<(usize, usize), Vec<usize>>,
+    /// The texture to be identified.
+    pub unknown: usize,
+    /// Drawn from for the slides; an explorer's own random choices go through it too.
+    pub random: ChaCha8Rng,
+}
+
+impl<'e> Run<'e> {
+    /// Training slides per texture and movement.
+    pub fn training(&self) -> Vec<Vec<Vec<Observation>>> {
+        let of = |(movement, pool): (usize, &Pool)| {
+            let learned = 0..self.experiment.train_slides;
+            let slides = learned.map(|n| pool.train[self.place(movement, pool, n)].clone());
+            slides.collect()
+        };
+        let pools = self.experiment.pools.iter();
+        pools
+            .map(|pools| pools.iter().enumerate().map(of).collect())
+            .collect()
+    }
+
+    /// Where the `n`th slide of a pool is: the training slides come first, then those to test with.
+    fn place(&self, movement: usize, pool: &Pool, n: usize) -> usize {
+        let order = self.orders.get(&(movement, pool.train.len()));
+        order.map_or(n, |order| order[n])
+    }
+
+    /// The texture table learned from the training slides, as bytes.
+    ///
+    /// # Errors
+    /// See [`TableError`].
+    pub fn learn(&self, method: Method) -> Result<Vec<u8>, TableError> {
+        let Experiment {
+            names,
+            movements,
+            features,
+            ..
+        } = self.experiment;
+        learn(method, *features, names, movements, &self.training())
+    }
+
+    /// As [`Run::learn`], without one of the textures.
+    ///
+    /// # Errors
+    /// See [`TableError`].
+    pub fn learn_without(&self, method: Method, texture: usize) -> Result<Vec<u8>, TableError> {
+        let Experiment {
+            names,
+            movements,
+            features,
+            ..
+        } = self.experiment;
+        let (mut names, mut training) = (names.clone(), self.training());
+        names.remove(texture);
+        training.remove(texture);
+        learn(method, *features, &names, movements, &training)
+    }
+
+    /// One more slide of the unknown texture.
+    pub fn slide(&mut self, movement: usize) -> &'e Observation {
+        let pool = &self.experiment.pools[self.unknown][movement];
+        match &pool.test {
+            Some(test) => &test[self.random.random_range(0..test.len())],
+            None => {
+                let learned = self.experiment.train_slides;
+                let n = self.random.random_range(0..pool.train.len() - learned);
+                &pool.train[self.place(movement, pool, learned + n)]
+            }
+        }
+    }
+}

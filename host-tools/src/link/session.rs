@@ -1,0 +1,140 @@
+//! Requests become frames here, and received bytes reports; and why nothing came of a request.
+
+use tactus_core::rig::calibration::RigCalibrationError;
+use tactus_core::table::TableError;
+use tactus_core::wire::{
+    self, Ask, FrameError, MAX_FRAME, MAX_TEXTURES, PROTOCOL, Receiver, Report, Request, Reset,
+    Tell, TooLong,
+};
+
+/// A request that may be made twice is made so often before the line is given up.
+pub const MAX_TRIES: u8 = 5;
+
+/// Why an errand came to nothing, and what to do.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+pub enum LinkError {
+    /// The probe says why and what to do.
+    #[error("the probe refused: {0}")]
+    Refused(String),
+    /// The probe started anew before it answered.
+    #[error("the probe restarted ({reset:?}) before it answered{}: ask again", quoted(.last_words))]
+    Rebooted {
+        /// Why it did.
+        reset: Reset,
+        /// What the firmware had to say before it gave up.
+        last_words: Option<String>,
+    },
+    /// The other end is of another version.
+    #[error(
+        "the probe speaks version {0} of the messages, this program version {PROTOCOL}: flash the firmware of this version, `tactus device flash`"
+    )]
+    Protocol(u8),
+    /// The request was damaged on its way, and nobody but the user may repeat it.
+    #[error("the request did not arrive whole, nothing was begun: ask again")]
+    Unheard,
+    /// The request or its answer was damaged again and again.
+    #[error(
+        "no answer got through in {MAX_TRIES} tries: check the cable and that both ends have the same baud rate"
+    )]
+    Disturbed,
+    /// Whole frames come, and none of them is a message that is known here.
+    #[error(
+        "the other end speaks another version of the messages than this program (version {PROTOCOL}): flash the firmware of this version, `tactus device flash`"
+    )]
+    Foreign,
+    /// The request is over, and what was asked for was not told.
+    #[error(
+        "the probe was done without an answer: it was stopped, or the answer was lost; ask again"
+    )]
+    NoAnswer,
+    /// No table, or one that the probe does not hold.
+    #[error("this is no table for the probe: {0}")]
+    Table(#[from] TableError),
+    /// More textures than the probe holds.
+    #[error("the table has {0} textures, the probe holds {MAX_TEXTURES}: learn fewer")]
+    Textures(u16),
+    /// The table in use became another one while it was read.
+    #[error("the table was changed while it was read: read it again")]
+    Changed,
+    /// Constants that no rig has.
+    #[error("the calibration cannot be used: {0}")]
+    Calibration(#[from] RigCalibrationError),
+    /// A request too long for a frame; none that can be made is.
+    #[error(transparent)]
+    TooLong(#[from] TooLong),
+}
+
+fn quoted(words: &Option<String>) -> String {
+    words
+        .as_ref()
+        .map(|words| format!(", its last words: {words}"))
+        .unwrap_or_default()
+}
+
+/// Requests get their numbers here, and received bytes become reports.
+#[derive(Debug, Default)]
+pub struct Session {
+    receiver: Receiver,
+    next_id: u16,
+    /// number of the report that should come next
+    expected: Option<u16>,
+    damaged: u64,
+    foreign: u64,
+    missing: u64,
+}
+
+impl Session {
+    /// Appends the bytes of a request to `send`, and says its id. A 0 goes before it: what was on the line ends there.
+    ///
+    /// # Errors
+    /// [`TooLong`].
+    pub fn request(&mut self, ask: Ask, send: &mut Vec<u8>) -> Result<u16, TooLong> {
+        let id = self.next_id;
+        let mut room = [0; MAX_FRAME + 1];
+        let frame = wire::encode(&Request { id, ask }, &mut room)?;
+        self.next_id = id.wrapping_add(1);
+        send.push(0);
+        send.extend_from_slice(frame);
+        Ok(id)
+    }
+
+    /// Takes in bytes as they come; the reports that end in them.
+    pub fn receive(&mut self, bytes: &[u8]) -> Vec<Report> {
+        let mut reports = Vec::new();
+        for &byte in bytes {
+            match self.receiver.push::<Report>(byte) {
+                None => {}
+                Some(Err(why)) => {
+                    self.damaged += 1;
+                    self.foreign += u64::from(why == FrameError::Message);
+                }
+                Some(Ok(report)) => {
+                    // a probe that boots counts anew
+                    if let (Some(expected), false) =
+                        (self.expected, matches!(report.tell, Tell::Booted { .. }))
+                    {
+                        self.missing += u64::from(report.number.wrapping_sub(expected));
+                    }
+                    self.expected = Some(report.number.wrapping_add(1));
+                    reports.push(report);
+                }
+            }
+        }
+        reports
+    }
+
+    /// Frames that were damaged so far.
+    pub fn damaged(&self) -> u64 {
+        self.damaged
+    }
+
+    /// Of these, frames that are whole and no message known here.
+    pub fn foreign(&self) -> u64 {
+        self.foreign
+    }
+
+    /// Reports that never came, by the gaps in their numbers; damaged ones are among them.
+    pub fn missing(&self) -> u64 {
+        self.missing
+    }
+}

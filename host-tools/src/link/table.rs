@@ -1,0 +1,125 @@
+//! Texture tables on their way to the probe, and from it.
+
+use tactus_core::table::{Table, TableError};
+use tactus_core::wire::{Ask, MAX_TEXTURES, PART, Tell};
+
+use super::session::{LinkError, MAX_TRIES};
+use super::transaction::Errand;
+
+/// Gives the probe another table: begins, writes it in parts of [`PART`] bytes, each when the one before is done, and has
+/// it taken into use.
+#[derive(Clone, Debug)]
+pub struct PushTable {
+    bytes: Vec<u8>,
+    /// the next request: begin, then parts, then commit
+    next: usize,
+}
+
+impl PushTable {
+    /// The table at the beginning of `bytes`, checked.
+    ///
+    /// # Errors
+    /// [`LinkError::Table`], [`LinkError::Textures`].
+    pub fn new(bytes: &[u8]) -> Result<Self, LinkError> {
+        let table = Table::read(bytes)?;
+        if usize::from(table.textures()) > MAX_TEXTURES {
+            return Err(LinkError::Textures(table.textures()));
+        }
+        Ok(Self {
+            bytes: table.as_bytes().to_vec(),
+            next: 0,
+        })
+    }
+
+    /// Requests that are done or under way, and all there are.
+    pub fn progress(&self) -> (usize, usize) {
+        (self.next, self.bytes.len().div_ceil(PART) + 2)
+    }
+}
+
+impl Errand for PushTable {
+    type Outcome = ();
+
+    fn next(&mut self) -> Result<Option<Ask>, LinkError> {
+        let parts = self.bytes.len().div_ceil(PART);
+        let next = self.next;
+        self.next += 1;
+        Ok(match next {
+            0 => Some(Ask::BeginTable(self.bytes.len() as u32)),
+            n if n <= parts => {
+                let offset = (n - 1) * PART;
+                let rest = self.bytes.get(offset..).unwrap_or_default();
+                Some(Ask::WriteTable {
+                    offset: offset as u32,
+                    bytes: rest.iter().copied().take(PART).collect(),
+                })
+            }
+            n if n == parts + 1 => Some(Ask::CommitTable),
+            _ => None,
+        })
+    }
+
+    fn hear(&mut self, _: &Tell) -> Result<(), LinkError> {
+        Ok(())
+    }
+
+    fn outcome(&mut self) -> Result<(), LinkError> {
+        Ok(())
+    }
+}
+
+/// Reads the table that the probe uses; its bytes, checked. Whether the probe tells one part per request or all there are
+/// is its own choice.
+#[derive(Clone, Debug, Default)]
+pub struct ReadTable {
+    bytes: Vec<u8>,
+    /// of the whole table, once told
+    length: Option<u32>,
+    /// bytes there were when the request under way was made, and how often it was made
+    asked: (usize, u8),
+}
+
+impl Errand for ReadTable {
+    type Outcome = Vec<u8>;
+
+    fn next(&mut self) -> Result<Option<Ask>, LinkError> {
+        let got = self.bytes.len();
+        if self.length.is_some_and(|length| got as u32 >= length) {
+            return Ok(None);
+        }
+        // done, and not a byte came: it was damaged
+        let tries = if self.asked.0 == got { self.asked.1 } else { 0 };
+        if tries == MAX_TRIES {
+            return Err(LinkError::Disturbed);
+        }
+        self.asked = (got, tries + 1);
+        Ok(Some(Ask::ReadTable(got as u32)))
+    }
+
+    fn hear(&mut self, tell: &Tell) -> Result<(), LinkError> {
+        if let Tell::TablePart {
+            offset,
+            length,
+            bytes,
+        } = tell
+        {
+            if *self.length.get_or_insert(*length) != *length {
+                return Err(LinkError::Changed);
+            }
+            // another is one that came twice, or comes behind a lost one and will be asked for again
+            if *offset as usize == self.bytes.len() {
+                self.bytes.extend_from_slice(bytes);
+            }
+        }
+        Ok(())
+    }
+
+    fn outcome(&mut self) -> Result<Vec<u8>, LinkError> {
+        // two tables of one length, half of each: the checksum says so
+        match Table::read(&self.bytes) {
+            Err(TableError::Crc { .. }) => Err(LinkError::Changed),
+            Err(why) => Err(why.into()),
+            Ok(_) => Ok(std::mem::take(&mut self.bytes)),
+        }
+    }
+}

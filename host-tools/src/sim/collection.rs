@@ -1,0 +1,217 @@
+//! The textures of a simulated world: recorded trial by trial, and learned.
+
+use rayon::prelude::*;
+use tactus_core::explorer::Method;
+use tactus_core::features::{Plan, SlideError};
+use tactus_core::fused::Observation;
+use tactus_core::movement::Movement;
+use tactus_core::rig::calibration::RigCalibration;
+
+use crate::data::recording;
+use crate::data::replay::measure;
+use crate::eval::learn::{self, TableError};
+use crate::sim::rig::{SimError, SimRig};
+use crate::sim::textures::TEXTURES;
+use crate::sim::world::Setup;
+
+/// Textures of a simulated world, to record and to learn.
+#[derive(Clone, Debug)]
+pub struct Collection {
+    /// The world's seed: what its textures, motors and fingertip are like.
+    pub seed: u64,
+    /// Numbers of the textures in Table 1.
+    pub textures: Vec<u8>,
+    /// Trials of each texture and movement.
+    pub trials: u32,
+}
+
+impl Collection {
+    /// The movements of the study.
+    pub const MOVEMENTS: [Movement; 3] = [
+        Movement::FOR_TRACTION,
+        Movement::FOR_FINENESS,
+        Movement::FOR_ROUGHNESS,
+    ];
+
+    /// The textures of a collection of `among` that holds `unknown`: the others are spread over Table 1.
+    pub fn spread(unknown: u8, among: u8) -> Vec<u8> {
+        let others = u16::from(among.clamp(1, 117)) - 1;
+        let mut textures: Vec<u8> = (0..others)
+            .map(|n| (n * 116 / others) as u8 + 1)
+            .map(|number| number + u8::from(number >= unknown))
+            .collect();
+        textures.push(unknown);
+        textures.sort_unstable();
+        textures
+    }
+
+    /// A rig of this world with a texture under it. Different trials of one texture are `trial` apart.
+    pub fn setup(&self, texture: u8, trial: u64) -> Setup {
+        Setup {
+            texture,
+            world_seed: self.seed,
+            trial_seed: self
+                .seed
+                .wrapping_mul(1_000_003)
+                .wrapping_add(u64::from(texture))
+                .wrapping_mul(1009)
+                + trial,
+            finger_seed: self.seed,
+            ..Setup::default()
+        }
+    }
+
+    /// Names of the textures.
+    pub fn names(&self) -> Vec<String> {
+        self.textures
+            .iter()
+            .map(|&number| texture_name(number).to_owned())
+            .collect()
+    }
+
+    /// Records all trials of all textures, textures side by side; `done` hears of each. Per texture, its slides in the
+    /// order of time.
+    ///
+    /// # Errors
+    /// The first fault of a rig.
+    pub fn record(
+        &self,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<Vec<recording::Slide>>, SimError> {
+        self.textures
+            .par_iter()
+            .enumerate()
+            .map(|(index, &texture)| {
+                let mut slides = record_texture(
+                    self.setup(texture, 0),
+                    calibration,
+                    &Self::MOVEMENTS,
+                    self.trials,
+                )?;
+                for slide in &mut slides {
+                    slide.texture = index;
+                }
+                done();
+                Ok(slides)
+            })
+            .collect()
+    }
+
+    /// Learns a texture table for a method from trials of all textures.
+    ///
+    /// # Errors
+    /// The first fault of a rig, or slide without properties.
+    pub fn learn(
+        &self,
+        method: Method,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<u8>, LearnError> {
+        let plan = Plan::new();
+        let felt = self
+            .record(calibration, done)?
+            .iter()
+            .map(|slides| {
+                Self::MOVEMENTS
+                    .iter()
+                    .map(|movement| {
+                        let trials = slides.iter().filter(|s| s.movement == *movement);
+                        trials
+                            .map(|s| Ok(Observation::from(&measure(&plan, s)?)))
+                            .collect()
+                    })
+                    .collect::<Result<Vec<Vec<_>>, SlideError>>()
+            })
+            .collect::<Result<Vec<_>, SlideError>>()?;
+        let names = self.names();
+        Ok(learn::learn(method, None, &names, &Self::MOVEMENTS, &felt)?)
+    }
+}
+
+/// Why a simulated world taught nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum LearnError {
+    /// A rig failed.
+    #[error(transparent)]
+    Rig(#[from] SimError),
+    /// A slide has no properties.
+    #[error(transparent)]
+    Slide(#[from] SlideError),
+    /// The table cannot be learned.
+    #[error(transparent)]
+    Table(#[from] TableError),
+}
+
+/// Name of a texture by its number in Table 1.
+pub fn texture_name(number: u8) -> &'static str {
+    TEXTURES
+        .iter()
+        .find(|t| t.number == number)
+        .map_or("?", |t| t.name)
+}
+
+/// Number of a texture by its name in Table 1, whatever the case, or by its number.
+pub fn texture_number(name: &str) -> Option<u8> {
+    let number = name.trim_start_matches(['T', 't']).parse().ok();
+    TEXTURES
+        .iter()
+        .find(|t| t.name.eq_ignore_ascii_case(name) || Some(t.number) == number)
+        .map(|t| t.number)
+}
+
+/// Measures the unloaded current of the rig of a world once; all rigs of that world have the same motor.
+///
+/// # Errors
+/// See [`SimError`].
+pub fn calibrated(setup: Setup) -> Result<RigCalibration, SimError> {
+    let mut rig = SimRig::new(setup);
+    rig.home()?;
+    rig.calibrate_current()
+}
+
+/// Trials of one texture at every movement, movement by movement, numbered in the order of time.
+///
+/// # Errors
+/// See [`SimError`].
+pub fn record_texture(
+    setup: Setup,
+    calibration: RigCalibration,
+    movements: &[Movement],
+    trials: u32,
+) -> Result<Vec<recording::Slide>, SimError> {
+    let mut slides = Vec::new();
+    let mut rig = SimRig::new(setup);
+    record_trials(&mut rig, calibration, movements, trials, |_, slide| {
+        slides.push(recording::Slide {
+            number: slides.len() as u32 + 1,
+            ..slide
+        });
+        Ok::<_, SimError>(())
+    })?;
+    Ok(slides)
+}
+
+/// Powers up a rig and makes trials of what lies under it, movement by movement; `each` gets every slide.
+///
+/// # Errors
+/// See [`SimError`], and what `each` returns.
+pub fn record_trials<E: From<SimError>>(
+    rig: &mut SimRig,
+    calibration: RigCalibration,
+    movements: &[Movement],
+    trials: u32,
+    mut each: impl FnMut(&mut SimRig, recording::Slide) -> Result<(), E>,
+) -> Result<(), E> {
+    rig.control()
+        .calibrate(calibration)
+        .map_err(SimError::from)?;
+    rig.home()?;
+    for &movement in movements {
+        for _ in 0..trials {
+            let slide = rig.record(movement)?;
+            each(rig, slide)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,336 @@
+//! The handheld probe in the simulated world: a hand that does what the display says, and the table that is learned from it.
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use tactus_core::biotac::BioTac;
+use tactus_core::explorer::Method;
+use tactus_core::features::Plan;
+use tactus_core::fused::Observation;
+use tactus_core::handheld::touch::{Again, Event, Touch};
+use tactus_core::handheld::{FEATURES, MOVEMENT};
+use tactus_core::kernels::Plain;
+use tactus_core::pressure::{Channel, Pressure, SLOTS_HZ};
+use tactus_core::sensor::PressureSensor as _;
+
+use crate::eval::learn::{self, TableError};
+use crate::sim::collection::Collection;
+use crate::sim::person::{Hand, Manner};
+use crate::sim::world::{Setup, Truth, World};
+
+/// Two bytes at 5.25 MHz, and the sensor's gap.
+const TRANSFER_NS: u64 = 3_048;
+const GAP_NS: u64 = 55_000;
+/// Deviations of ln(force) and of ln(pace) from slide to slide of a person who looks at the display (chosen).
+const FORCE_SPREAD: f64 = 0.10;
+const PACE_SPREAD: f64 = 0.12;
+/// From the sound to the slide, s (chosen).
+const REACTION_S: (f64, f64) = (0.2, 0.5);
+/// How long a person slides, s: until the bar is full, and a little more.
+const SLIDE_S: f64 = 1.8;
+/// Attempts that a person makes before giving up on a texture.
+const ATTEMPTS: u32 = 10;
+
+/// Why a texture was not felt.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum HandError {
+    /// One attempt after the other was no good.
+    #[error("{} was felt in no slide of {ATTEMPTS}: {why:?}", crate::sim::collection::texture_name(*texture))]
+    NotFelt {
+        /// Number of the texture in Table 1.
+        texture: u8,
+        /// What the last slide was; `None` if none was noticed.
+        why: Option<Again>,
+    },
+}
+
+/// A person with a probe.
+pub struct Person {
+    world: World,
+    slot: u64,
+    random: ChaCha8Rng,
+}
+
+impl Person {
+    /// Somebody who holds the probe over the texture of `setup`.
+    pub fn new(setup: Setup, manner: Manner) -> Self {
+        let mut world = World::new(setup);
+        world.hold(Hand::new(setup.trial_seed, manner));
+        let mut random = ChaCha8Rng::seed_from_u64(setup.trial_seed);
+        random.set_stream(1);
+        Self {
+            world,
+            slot: 0,
+            random,
+        }
+    }
+
+    /// The next word of the sensor.
+    pub fn word(&mut self) -> Option<Pressure> {
+        let at = u128::from(self.slot) * 1_000_000_000 / u128::from(SLOTS_HZ);
+        // the sensor needs 100 ms to start
+        let at_ns = 150_000_000 + at as u64;
+        let channel = Channel::PATTERN[(self.slot % 2) as usize];
+        self.slot += 1;
+        let mut exchange = BioTac::exchange(channel);
+        let command = exchange.command?;
+        self.world.spi(at_ns, TRANSFER_NS, &command, &mut [0; 2]);
+        let read_ns = at_ns + TRANSFER_NS + GAP_NS;
+        let mosi = exchange.read;
+        self.world
+            .spi(read_ns, TRANSFER_NS, &mosi, &mut exchange.read);
+        BioTac::decode(channel, exchange.read).ok()
+    }
+
+    /// What the hand means to do from now on.
+    pub fn intend(&mut self, force_n: f64, pace_mm_s: f64) {
+        if let Some(hand) = self.world.hand() {
+            hand.intend(force_n, pace_mm_s);
+        }
+    }
+
+    /// What is really so.
+    pub fn truth(&self) -> Truth {
+        self.world.truth()
+    }
+
+    fn normal(&mut self) -> f64 {
+        // twelve uniform ones: a person is no mathematician
+        (0..12).map(|_| self.random.random::<f64>()).sum::<f64>() - 6.0
+    }
+
+    /// Lets so much time pass; the first event for which `until` holds ends it.
+    fn feel(
+        &mut self,
+        touch: &mut Touch<'_, Plain>,
+        seconds: f64,
+        until: impl Fn(&Event) -> bool,
+    ) -> Option<Event> {
+        for _ in 0..(seconds * f64::from(SLOTS_HZ)) as u32 {
+            let word = self.word();
+            if let Some(event) = touch.word(word)
+                && until(&event)
+            {
+                return Some(event);
+            }
+        }
+        None
+    }
+
+    /// Presses and slides as one is asked to: the slide, or what was wrong with it; `None` if nothing was noticed.
+    pub fn slide(&mut self, touch: &mut Touch<'_, Plain>) -> Option<Result<Observation, Again>> {
+        let target_n = f64::from(<(u16, u32)>::from(MOVEMENT).0) * 1e-3;
+        let pace_mm_s = f64::from(<(u16, u32)>::from(MOVEMENT).1) * 1e-3;
+        let force_n = target_n * (FORCE_SPREAD * self.normal()).exp();
+        let pace_mm_s = pace_mm_s * (PACE_SPREAD * self.normal()).exp();
+        self.intend(force_n, 0.0);
+        self.feel(touch, 5.0, |event| *event == Event::Still);
+        let reaction_s = self.random.random_range(REACTION_S.0..REACTION_S.1);
+        self.feel(touch, reaction_s, |_| false);
+        self.intend(force_n, pace_mm_s);
+        let over = |event: &Event| matches!(event, Event::Slid(_) | Event::Again(_));
+        let felt = self.feel(touch, SLIDE_S, over);
+        self.intend(force_n, 0.0);
+        self.feel(touch, 0.1, |_| false);
+        self.intend(0.0, 0.0);
+        let pause_s = self.random.random_range(0.3..0.5);
+        self.feel(touch, pause_s, |_| false);
+        match felt? {
+            Event::Slid(observation) => Some(Ok(observation)),
+            Event::Again(why) => Some(Err(why)),
+            _ => None,
+        }
+    }
+}
+
+/// So many good slides of a texture by one person, and how many others there were.
+///
+/// # Errors
+/// See [`HandError`].
+pub fn slides(
+    setup: Setup,
+    manner: Manner,
+    wanted: u32,
+) -> Result<(Vec<Observation>, u32), HandError> {
+    let plan = Plan::new();
+    let mut touch = Touch::<Plain>::new(&plan);
+    let mut person = Person::new(setup, manner);
+    person.feel(&mut touch, 0.5, |event| *event == Event::Zeroed);
+    let (mut good, mut bad, mut row) = (Vec::new(), 0, 0);
+    let mut last;
+    while (good.len() as u32) < wanted {
+        match person.slide(&mut touch) {
+            Some(Ok(observation)) => {
+                good.push(observation);
+                row = 0;
+                continue;
+            }
+            Some(Err(why)) => last = Some(why),
+            None => last = None,
+        }
+        bad += 1;
+        row += 1;
+        if row == ATTEMPTS {
+            return Err(HandError::NotFelt {
+                texture: setup.texture,
+                why: last,
+            });
+        }
+    }
+    Ok((good, bad))
+}
+
+/// Learns a handheld's table from a simulated hand: `collection.trials` slides of every texture. The numbers of those that
+/// a hand does not feel are given too; they are not in the table.
+///
+/// # Errors
+/// See [`TableError`].
+pub fn learn(collection: &Collection) -> Result<(Vec<u8>, Vec<u8>), TableError> {
+    let felt: Vec<_> = collection
+        .textures
+        .par_iter()
+        .map(|&texture| {
+            let setup = collection.setup(texture, 0);
+            slides(setup, Manner::default(), collection.trials)
+        })
+        .collect();
+    let (mut names, mut known, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
+    for ((name, &texture), felt) in collection
+        .names()
+        .into_iter()
+        .zip(&collection.textures)
+        .zip(felt)
+    {
+        match felt {
+            Ok((good, _)) => {
+                names.push(name);
+                known.push(vec![good]);
+            }
+            Err(HandError::NotFelt { .. }) => left_out.push(texture),
+        }
+    }
+    let table = learn::learn(Method::Fused, Some(FEATURES), &names, &[MOVEMENT], &known)?;
+    Ok((table, left_out))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::collection::texture_number;
+    use tactus_core::handheld::{MAX_SLIDES, judge};
+    use tactus_core::table::Table;
+
+    fn world(among: u8) -> Collection {
+        Collection {
+            seed: 1,
+            textures: Collection::spread(60, among),
+            trials: 5,
+        }
+    }
+
+    /// Explores fresh touches of all textures of a table: how many, right, unknown, sure and wrong, and slides.
+    fn explore(collection: &Collection, table: &[u8]) -> [usize; 5] {
+        let table = Table::read(table).unwrap();
+        let [mut all, mut right, mut unknown, mut wrong, mut made] = [0; 5];
+        let felt: Vec<_> = collection
+            .textures
+            .par_iter()
+            .map(|&texture| slides(collection.setup(texture, 7), Manner::default(), 5))
+            .collect();
+        for (texture, felt) in collection.names().iter().zip(felt) {
+            let (Some(index), Ok((felt, _))) = (table.find(texture), felt) else {
+                continue;
+            };
+            all += 1;
+            let mut judged =
+                (1..=MAX_SLIDES).map(|n| (n, judge::<Plain>(table, &felt[..n]).unwrap().0));
+            let (n, judged) = judged.find(|(_, judged)| !judged.open).unwrap();
+            made += n;
+            let is = judged.leading[0].0 == index;
+            right += usize::from(is && !judged.unknown);
+            unknown += usize::from(judged.unknown);
+            wrong += usize::from(judged.sure && !is);
+        }
+        eprintln!(
+            "{all} textures: right {right}, unknown {unknown}, sure and wrong {wrong}, slides {made}"
+        );
+        [all, right, unknown, wrong, made]
+    }
+
+    #[test]
+    fn what_a_hand_taught_a_hand_recognises() {
+        let collection = world(12);
+        let (table, left_out) = learn(&collection).unwrap();
+        assert_eq!(left_out, [0u8; 0]);
+        let [all, right, _, wrong, made] = explore(&collection, &table);
+        assert_eq!(all, 12);
+        assert!(
+            right >= 11 && wrong == 0 && made <= 3 * 12,
+            "{right} {wrong} {made}"
+        );
+    }
+
+    /// The hand of the scenario `uneven`.
+    #[test]
+    fn a_slide_that_nearly_stops_is_too_uneven() {
+        let burlap = texture_number("burlap").unwrap();
+        let plan = Plan::new();
+        for trial in 100..108 {
+            let mut touch = Touch::<Plain>::new(&plan);
+            let mut person = Person::new(world(1).setup(burlap, trial), Manner::default());
+            person.intend(0.5, 0.0);
+            let still = person.feel(&mut touch, 5.0, |event| *event == Event::Still);
+            assert!(still.is_some(), "{trial}");
+            person.feel(&mut touch, 0.3, |_| false);
+            person.intend(0.5, 70.0);
+            person.feel(&mut touch, 0.6, |_| false);
+            person.intend(0.5, 8.0);
+            let over = person.feel(&mut touch, 2.0, |_| true);
+            assert_eq!(over, Some(Event::Again(Again::TooUneven)), "{trial}");
+        }
+    }
+
+    #[test]
+    #[ignore = "the README's figures; a minute"]
+    fn all_textures_of_the_world() {
+        let collection = Collection {
+            textures: (1..=117).collect(),
+            // as the factory's table
+            trials: 15,
+            ..world(1)
+        };
+        let felt: Vec<_> = collection
+            .textures
+            .par_iter()
+            .map(|&t| (t, slides(collection.setup(t, 0), Manner::default(), 5)))
+            .collect();
+        let bad: u32 = felt
+            .iter()
+            .filter_map(|(_, r)| r.as_ref().ok())
+            .map(|r| r.1)
+            .sum();
+        eprintln!("{bad} slides rejected");
+        let (table, left_out) = learn(&collection).unwrap();
+        eprintln!("not felt: {left_out:?}; {} bytes", table.len());
+        explore(&collection, &table);
+        // none of another world's textures is known
+        let other = Collection {
+            seed: 2,
+            ..collection
+        };
+        let read = Table::read(&table).unwrap();
+        let [mut all, mut new, mut taken] = [0; 3];
+        for &texture in &other.textures {
+            let Ok((felt, _)) = slides(other.setup(texture, 1), Manner::default(), 5) else {
+                continue;
+            };
+            let mut judged = (1..=MAX_SLIDES).map(|n| judge::<Plain>(read, &felt[..n]).unwrap().0);
+            let judged = judged.find(|judged| !judged.open).unwrap();
+            all += 1;
+            new += usize::from(judged.unknown);
+            taken += usize::from(judged.sure);
+        }
+        let unsure = all - new - taken;
+        eprintln!("{all} of another world: unknown {new}, unsure {unsure}, taken for one {taken}");
+    }
+}

@@ -1,0 +1,201 @@
+//! A hand that holds the probe: it presses with about the force that it means to, slides at about the pace that it means
+//! to, and trembles.
+//!
+//! The hand feels the force and gives way to it, so that it is a spring and a damper to the finger rather than a place.
+
+use std::f64::consts::TAU;
+
+use super::conditions::TICK_S;
+use super::noise::Noise;
+use super::surface::LENGTH_MM;
+
+/// Stream of the seed that hands draw from.
+const STREAM: u64 = 0x4a4d;
+
+/// Force that a hand takes to be moved, N s/mm: with the skin's stiffness of about 1 N/mm it follows what it means within
+/// 0.15 s (chosen).
+const DRAG_N_S_MM: f64 = 0.15;
+/// Fastest that it lets the finger down and lifts it, mm/s (chosen).
+const APPROACH_MM_S: f64 = 12.0;
+const LIFT_MM_S: f64 = 60.0;
+/// Gap between two touches, mm.
+const AIR_MM: f64 = 5.0;
+/// A hand comes up to its pace, and stops, within about this, s (chosen).
+const PACE_S: f64 = 0.06;
+/// How slowly force and pace wander, s (chosen: what people do not notice).
+const WANDER_S: f64 = 0.5;
+/// The pace changes faster: an arm is not a rail (chosen), s.
+const UNEVEN_S: f64 = 0.2;
+/// Physiological tremor, Hz, and its relative bandwidth (8 to 12 Hz in every textbook).
+const TREMOR_HZ: f64 = 10.0;
+const TREMOR_WIDTH: f64 = 0.4;
+/// Where a touch begins on the sample, mm from its edge.
+const BEGINS_MM: (f64, f64) = (4.0, 16.0);
+
+/// How well a hand is kept.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Manner {
+    /// Tremor, relative to the force: rms.
+    pub tremor: f64,
+    /// Slow deviations of the force, relative to it: rms.
+    pub wander: f64,
+    /// Deviations of the pace within a slide, relative to it: rms.
+    pub uneven: f64,
+}
+
+impl Default for Manner {
+    /// A careful adult (chosen): force fluctuates by some per cent, a tenth of that at the tremor's frequency and above.
+    fn default() -> Self {
+        Self {
+            tremor: 0.005,
+            wander: 0.04,
+            uneven: 0.08,
+        }
+    }
+}
+
+/// A hand.
+#[derive(Clone, Debug)]
+pub struct Hand {
+    noise: Noise,
+    manner: Manner,
+    /// what it means to do
+    force_n: f64,
+    pace_mm_s: f64,
+    indentation_mm: f64,
+    x_mm: f64,
+    speed_mm_s: f64,
+    wander: f64,
+    uneven: f64,
+    /// a band-pass of noise
+    tremor: [f64; 2],
+}
+
+impl Hand {
+    /// A hand that holds the finger in the air.
+    pub fn new(seed: u64, manner: Manner) -> Self {
+        let mut noise = Noise::new(seed, STREAM);
+        let x_mm = noise.between(BEGINS_MM.0, BEGINS_MM.1);
+        Self {
+            noise,
+            manner,
+            force_n: 0.0,
+            pace_mm_s: 0.0,
+            indentation_mm: -AIR_MM,
+            x_mm,
+            speed_mm_s: 0.0,
+            wander: 0.0,
+            uneven: 0.0,
+            tremor: [0.0; 2],
+        }
+    }
+
+    /// From now on it means to press this hard, and to slide at this pace; without force the finger is lifted.
+    pub fn intend(&mut self, force_n: f64, pace_mm_s: f64) {
+        self.force_n = force_n;
+        self.pace_mm_s = pace_mm_s;
+    }
+
+    /// A tick against this force on the finger.
+    pub(super) fn tick(&mut self, force_n: f64) {
+        let [white, other] = self.noise.white();
+        let follow = |state: &mut f64, memory_s: f64, white: f64| {
+            let step = TICK_S / memory_s;
+            *state += (2.0 * step).sqrt() * white - step * *state;
+        };
+        follow(&mut self.wander, WANDER_S, white);
+        follow(&mut self.uneven, UNEVEN_S, other);
+        // of rms 1: the noise that a resonance lets through
+        let step = TAU * TREMOR_HZ * TICK_S;
+        self.tremor[0] += step * self.tremor[1];
+        self.tremor[1] += (2.0 * TREMOR_WIDTH * step).sqrt() * white
+            - step * (self.tremor[0] + TREMOR_WIDTH * self.tremor[1]);
+
+        let steady = 1.0 + self.manner.wander * self.wander + self.manner.tremor * self.tremor[0];
+        if self.force_n > 0.0 {
+            let push = self.force_n * steady - force_n;
+            let speed = (push / DRAG_N_S_MM).clamp(-LIFT_MM_S, APPROACH_MM_S);
+            self.indentation_mm += speed * TICK_S;
+        } else if self.indentation_mm > -AIR_MM {
+            self.indentation_mm -= LIFT_MM_S * TICK_S;
+            if self.indentation_mm <= -AIR_MM {
+                // somewhere else next time
+                self.x_mm = self.noise.between(BEGINS_MM.0, BEGINS_MM.1);
+            }
+        }
+        let pace = self.pace_mm_s * (self.manner.uneven * self.uneven).exp();
+        self.speed_mm_s += (pace - self.speed_mm_s) * TICK_S / PACE_S;
+        self.x_mm = (self.x_mm + self.speed_mm_s * TICK_S).clamp(0.0, LENGTH_MM);
+        if self.x_mm >= LENGTH_MM {
+            self.speed_mm_s = 0.0;
+        }
+    }
+
+    /// How deep the sample is in the fingertip, mm; negative is a gap.
+    pub fn indentation_mm(&self) -> f64 {
+        self.indentation_mm
+    }
+
+    /// Place of the finger on the sample, mm from its edge.
+    pub fn x_mm(&self) -> f64 {
+        self.x_mm
+    }
+
+    /// Its speed along the sample, mm/s.
+    pub fn speed_mm_s(&self) -> f64 {
+        self.speed_mm_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hand against a spring of 1 N/mm: force and speed of every tick once it has come down, within 3 s, and slides.
+    fn held(manner: Manner, seed: u64) -> (Vec<f64>, Vec<f64>) {
+        let mut hand = Hand::new(seed, manner);
+        let (mut forces, mut speeds) = (Vec::new(), Vec::new());
+        for tick in 0..(13_200.0 * 5.5) as u32 {
+            if tick == 1320 {
+                hand.intend(0.5, 0.0);
+            }
+            if tick == 3 * 13_200 {
+                hand.intend(0.5, 20.0);
+            }
+            let force = hand.indentation_mm().max(0.0);
+            hand.tick(force);
+            if tick > 43_400 {
+                forces.push(force);
+                speeds.push(hand.speed_mm_s());
+            }
+        }
+        (forces, speeds)
+    }
+
+    fn statistics(values: &[f64]) -> (f64, f64) {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let squares = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
+        (mean, (squares / values.len() as f64).sqrt())
+    }
+
+    #[test]
+    fn a_steady_hand_does_what_it_means_and_a_real_one_about_that() {
+        let none = Manner {
+            tremor: 0.0,
+            wander: 0.0,
+            uneven: 0.0,
+        };
+        let (forces, speeds) = held(none, 1);
+        let (force, speed) = (statistics(&forces), statistics(&speeds));
+        assert!((force.0 - 0.5).abs() < 1e-3 && force.1 < 1e-3, "{force:?}");
+        assert!((speed.0 - 20.0).abs() < 0.1 && speed.1 < 0.1, "{speed:?}");
+        let (mut force, mut speed) = (0.0, 0.0);
+        for seed in 0..20 {
+            let (forces, speeds) = held(Manner::default(), seed);
+            force += statistics(&forces).1 / 0.5 / 20.0;
+            speed += statistics(&speeds).1 / 20.0 / 20.0;
+        }
+        assert!((0.01..0.06).contains(&force), "{force}");
+        assert!((0.04..0.12).contains(&speed), "{speed}");
+    }
+}

@@ -1,0 +1,561 @@
+//! The simulated rig: the world of [`crate::sim`] at one end of the pins, the core's [`Control`] at the other, and what the
+//! board's timers do in between, in virtual time.
+
+use std::time::Duration;
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use tactus_core::biotac;
+use tactus_core::features::{PropertySet, Slide};
+use tactus_core::kernels::Kernels;
+use tactus_core::movement::Movement;
+use tactus_core::pressure::{Calibration, Channel, Pressure, RATE_HZ, SLOTS_HZ};
+use tactus_core::rig::calibration::{LineFit, RigCalibration, RigCalibrationError};
+use tactus_core::rig::control::{Control, Ended, Phase, Refused};
+use tactus_core::rig::guard::{Fault, Unguarded};
+use tactus_core::rig::patience::{Patience, Wait};
+use tactus_core::rig::pins::{Felt, Inputs, Outputs};
+use tactus_core::rig::stage::StageConstants;
+use tactus_core::rig::unloaded::UnloadedRuns;
+use tactus_core::rig::{MAX_REJECTED, Rig};
+use tactus_core::sensor::PressureSensor as _;
+
+use crate::data::recording::{self, Background};
+use crate::sim::conditions::Conditions;
+use crate::sim::world::{Setup, World};
+
+const TICK_NS: u64 = 1_000_000;
+/// Two bytes at 5.25 MHz.
+const TRANSFER_NS: u64 = 3_048;
+/// The answer is read this long after the command ended: the sensor's 50 us and some.
+const GAP_NS: u64 = 55_000;
+/// STEP stays high this long.
+const PULSE_NS: u64 = 5_000;
+/// DIR is set this long before STEP rises.
+const DIR_NS: u64 = 2_000;
+
+/// Motor current amplifier of the reference board: 1 V/A about half of 3.3 V, 12 bits.
+fn amperes(adc: u16) -> f32 {
+    (f32::from(adc) - 2048.0) * (3.3 / 4096.0)
+}
+
+/// Why the simulated rig did not make a movement.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum SimError {
+    /// It was refused.
+    #[error(transparent)]
+    Refused(#[from] Refused),
+    /// A fault was seen.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+    /// It was stopped.
+    #[error("stopped")]
+    Stopped,
+    /// Nothing came of it in two minutes of virtual time.
+    #[error("the rig hangs in {0:?}")]
+    Hangs(Phase),
+    /// A calibration came to nothing.
+    #[error(transparent)]
+    Calibration(#[from] RigCalibrationError),
+    /// The sensor does not say what it is.
+    #[error(transparent)]
+    Sensor(#[from] biotac::PropertyError),
+}
+
+/// The board's timers between control and world: sensor slots, step pulses, the 1 kHz tick.
+pub struct SimRig {
+    world: World,
+    control: Control,
+    random: ChaCha8Rng,
+    now_ns: u64,
+    slot: u64,
+    words: Vec<Option<Pressure>>,
+    steps: i32,
+    rate: i32,
+    down: bool,
+    next_step_ns: u64,
+    outputs: Outputs,
+    /// P_DC words of the last tick.
+    pdc: Vec<u16>,
+    performed: Vec<Performed>,
+}
+
+/// How a slide was really made: the world's truth, which the control does not know.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Performed {
+    /// Contact force when the slide began, N.
+    pub force_n: f64,
+    /// Largest contact force since the lever came down, N.
+    pub force_max_n: f64,
+    /// Mean speed of the steady part, mm/s.
+    pub speed_mm_s: f64,
+    /// Largest relative deviation of the mean speed of any 100 ms of the steady part.
+    pub speed_error: f64,
+}
+
+impl SimRig {
+    /// A rig at power-up, its guards all on, with the reference constants in place of measured ones.
+    pub fn new(setup: Setup) -> Self {
+        Self::unguarded(setup, Unguarded::default())
+    }
+
+    /// As [`SimRig::new`], with a guard switched off: for tests.
+    pub fn unguarded(setup: Setup, unguarded: Unguarded) -> Self {
+        Self::of(World::new(setup), setup.trial_seed, unguarded)
+    }
+
+    /// As [`SimRig::unguarded`], in a world under these conditions.
+    pub fn under(setup: Setup, conditions: Conditions, unguarded: Unguarded) -> Self {
+        Self::of(World::under(setup, conditions), setup.trial_seed, unguarded)
+    }
+
+    fn of(world: World, seed: u64, unguarded: Unguarded) -> Self {
+        let calibration = RigCalibration {
+            pressure: Calibration::PAPER,
+            unloaded_a: (0.037, 0.0),
+            newton_per_ampere: 16.4,
+            date: 0,
+            serial: [0; 16],
+        };
+        Self {
+            world,
+            control: Control::new(StageConstants::REFERENCE, calibration, unguarded),
+            random: ChaCha8Rng::seed_from_u64(seed),
+            now_ns: 0,
+            slot: 0,
+            words: Vec::new(),
+            steps: 0,
+            rate: 0,
+            down: true,
+            next_step_ns: 0,
+            outputs: Outputs::default(),
+            pdc: Vec::new(),
+            performed: Vec::new(),
+        }
+    }
+
+    /// How every slide so far was really made.
+    pub fn performed(&self) -> &[Performed] {
+        &self.performed
+    }
+
+    /// How every slide was really made since this was asked for last.
+    pub fn take_performed(&mut self) -> Vec<Performed> {
+        std::mem::take(&mut self.performed)
+    }
+
+    /// Sensor slots since power-up.
+    pub fn slots(&self) -> u64 {
+        self.slot
+    }
+
+    /// The world behind the pins: its truth, its faults.
+    pub fn world(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    /// The control at the other end.
+    pub fn control(&mut self) -> &mut Control {
+        &mut self.control
+    }
+
+    /// Virtual time since power-up.
+    pub fn now(&self) -> Duration {
+        Duration::from_nanos(self.now_ns)
+    }
+
+    /// What the control told the pins last.
+    pub fn outputs(&self) -> &Outputs {
+        &self.outputs
+    }
+
+    /// Puts another texture under the lifted finger.
+    ///
+    /// # Errors
+    /// [`Refused::Busy`] while the finger is down.
+    pub fn place(&mut self, texture: u8) -> Result<(), SimError> {
+        self.world.place(texture).map_err(|_| Refused::Busy)?;
+        self.control.sample_changed();
+        Ok(())
+    }
+
+    /// One millisecond: the slots and steps in it, then the control.
+    pub fn tick(&mut self) -> &Outputs {
+        let end = self.now_ns + TICK_NS;
+        loop {
+            // slots from a timer of 4400 Hz: no drift, and no overflow
+            let hz = u64::from(SLOTS_HZ);
+            let (seconds, slot) = (self.slot / hz, self.slot % hz);
+            let slot_ns = seconds * 1_000_000_000 + slot * 1_000_000_000 / hz;
+            let step_ns = if self.rate == 0 {
+                u64::MAX
+            } else {
+                self.next_step_ns
+            };
+            if slot_ns.min(step_ns) >= end {
+                break;
+            }
+            if slot_ns <= step_ns {
+                self.sample(slot_ns);
+            } else {
+                self.step(step_ns);
+            }
+        }
+        self.world.advance_to(end);
+        self.now_ns = end;
+        let pdc = self
+            .words
+            .iter()
+            .flatten()
+            .filter(|w| w.channel == Channel::Pdc);
+        self.pdc = pdc.map(|w| w.counts.get()).collect();
+        let stage_limits = self.world.stage_limits();
+        let inputs = Inputs {
+            words: self.words.drain(..).collect(),
+            steps: self.steps,
+            encoder: self.world.encoder(),
+            current_a: amperes(self.world.motor_adc()),
+            lever_top: self.world.lever_top(),
+            stage_limits,
+            e_stop: self.world.e_stop(),
+            hung: false,
+        };
+        self.outputs = self.control.tick(&inputs);
+        self.world.lever_enable(end, self.outputs.lever_enabled);
+        self.world.stage_enable(end, self.outputs.stage_enabled);
+        self.world.stage_pwm(end, self.outputs.stage_duty.into());
+        self.set_rate(self.outputs.lever_steps_s);
+        &self.outputs
+    }
+
+    /// A slot: the command, and its answer after the gap.
+    fn sample(&mut self, at_ns: u64) {
+        let channel = Channel::PATTERN[(self.slot % 2) as usize];
+        self.slot += 1;
+        let mut exchange = biotac::BioTac::exchange(channel);
+        if let Some(command) = exchange.command {
+            self.world.spi(at_ns, TRANSFER_NS, &command, &mut [0; 2]);
+        }
+        let read_ns = at_ns + TRANSFER_NS + GAP_NS;
+        // steps that fall due in the gap are made in it
+        while self.rate != 0 && self.next_step_ns < read_ns {
+            self.step(self.next_step_ns);
+        }
+        let mosi = exchange.read;
+        self.world
+            .spi(read_ns, TRANSFER_NS, &mosi, &mut exchange.read);
+        self.words
+            .push(biotac::BioTac::decode(channel, exchange.read).ok());
+    }
+
+    fn step(&mut self, at_ns: u64) {
+        let down = self.rate > 0;
+        if down != self.down {
+            self.down = down;
+            self.world.lever_dir(at_ns.saturating_sub(DIR_NS), down);
+        }
+        self.world.lever_step(at_ns, true);
+        self.world.lever_step(at_ns + PULSE_NS, false);
+        self.steps += if down { 1 } else { -1 };
+        self.next_step_ns = at_ns + 1_000_000_000 / u64::from(self.rate.unsigned_abs());
+    }
+
+    fn set_rate(&mut self, rate: i32) {
+        if rate != self.rate {
+            self.rate = rate;
+            if rate != 0 {
+                self.next_step_ns = self.now_ns + 1_000_000_000 / u64::from(rate.unsigned_abs());
+            }
+        }
+    }
+
+    /// Lets the rig go on until it is at rest: ready, parked or faulted with the finger off the sample.
+    ///
+    /// # Errors
+    /// The fault that it came to, or that it never came to rest.
+    pub fn rest(&mut self, mut each: impl FnMut(&Outputs)) -> Result<(), SimError> {
+        let mut patience = Patience::default();
+        let mut hung = Phase::Parked;
+        loop {
+            each(self.tick());
+            let phase = self.control.phase();
+            match (patience.wait(1, self.control.is_at_rest()), phase) {
+                (Wait::On, _) => {}
+                (Wait::Stop, _) => {
+                    hung = phase;
+                    self.control.stop();
+                }
+                (Wait::Over | Wait::Hangs, Phase::Faulted(fault)) if self.control.is_at_rest() => {
+                    return Err(fault.into());
+                }
+                (Wait::Over, _) => return Ok(()),
+                (Wait::Hangs, _) => return Err(SimError::Hangs(hung)),
+            }
+        }
+    }
+
+    /// Powers up: waits for the sensor, finds the limit switches.
+    ///
+    /// # Errors
+    /// See [`SimError`].
+    pub fn home(&mut self) -> Result<(), SimError> {
+        for _ in 0..=biotac::BioTac::POWER_UP_MS {
+            self.tick();
+        }
+        self.control.home()?;
+        self.rest(|_| ())
+    }
+
+    /// Measures this rig's motor current without load, and takes it into the calibration.
+    ///
+    /// # Errors
+    /// See [`SimError`].
+    pub fn calibrate_current(&mut self) -> Result<RigCalibration, SimError> {
+        let mut runs = UnloadedRuns::default();
+        while let Some(speed_um_s) = runs.next_speed() {
+            let (from, to, current_a) = self.run_unloaded(speed_um_s)?;
+            runs.took(from, to, current_a);
+        }
+        let calibration = runs.finish(self.control.calibration())?;
+        self.control.calibrate(calibration)?;
+        Ok(calibration)
+    }
+
+    /// Where the stage stood before a run over the sample and after it, and its mean motor current.
+    fn run_unloaded(&mut self, speed_um_s: u32) -> Result<(f32, f32, Option<f32>), SimError> {
+        let from = self.control.stage_mm();
+        self.control.start_unloaded(speed_um_s)?;
+        self.rest(|_| ())?;
+        Ok((from, self.control.stage_mm(), self.control.mean_current_a()))
+    }
+
+    /// The sensor's serial number, asked for between two slots.
+    ///
+    /// # Errors
+    /// It is not that of a BioTac.
+    pub fn serial(&mut self) -> Result<[u8; 16], SimError> {
+        let mut bytes = biotac::IdentityBytes::default();
+        for exchange in bytes.exchanges() {
+            if let Some(command) = exchange.command {
+                self.world
+                    .spi(self.now_ns, TRANSFER_NS, &command, &mut [0; 2]);
+            }
+            // the timer of the slots stands meanwhile
+            self.now_ns += TICK_NS / 4;
+            let mosi = exchange.read.to_vec();
+            let duration_ns = TRANSFER_NS / 2 * mosi.len() as u64;
+            self.world
+                .spi(self.now_ns, duration_ns, &mosi, exchange.read.as_mut());
+            self.now_ns += TICK_NS / 4;
+        }
+        let identity = bytes.decode()?;
+        let mut serial = [0; 16];
+        for (byte, character) in serial.iter_mut().zip(identity.serial.as_str().bytes()) {
+            *byte = character;
+        }
+        Ok(serial)
+    }
+
+    /// Measures everything that differs from rig to rig: the motor current without load, newtons per ampere on the
+    /// inclined stage, P_DC in the air, and its counts per newton on a force plate. `date` as 20261121.
+    ///
+    /// # Errors
+    /// See [`SimError`].
+    pub fn calibrate(&mut self, date: u32) -> Result<RigCalibration, SimError> {
+        let serial = self.serial()?;
+        let unloaded = self.calibrate_current()?;
+        let mut incline = LineFit::default();
+        for pull_n in [0.0f32, 1.0, 2.0, 3.0] {
+            self.world.incline(pull_n.into());
+            for _ in 0..2 {
+                // to the right: the way of every slide
+                if let (from, to, Some(current_a)) = self.run_unloaded(25_000)?
+                    && to > from
+                {
+                    incline.push(pull_n, current_a);
+                }
+            }
+        }
+        self.world.incline(0.0);
+        let (_, ampere_per_newton) = incline.line()?;
+        // the plate is what lies under the finger, and reads what really presses on it
+        let mut plate = LineFit::default();
+        for force_mn in [300, 600, 900, 1200] {
+            let Ok(movement) = Movement::new(force_mn, 10_000) else {
+                continue;
+            };
+            let mn_per_count = unloaded.pressure.force_mn_per_count;
+            self.control.start(movement, 0.0)?;
+            while self.control.phase() != Phase::Sliding {
+                self.tick();
+                if let Phase::Faulted(fault) = self.control.phase() {
+                    return Err(fault.into());
+                }
+            }
+            plate.push(
+                self.control.force_mn() / mn_per_count,
+                (self.world.truth().force_n * 1e3) as f32,
+            );
+            self.control.stop();
+            self.rest(|_| ())?;
+        }
+        let (_, force_mn_per_count) = plate.line()?;
+        let calibration = RigCalibration {
+            pressure: Calibration {
+                force_mn_per_count,
+                pdc_no_contact: self
+                    .control
+                    .air_counts()
+                    .unwrap_or(unloaded.pressure.pdc_no_contact),
+                ..unloaded.pressure
+            },
+            newton_per_ampere: 1.0 / ampere_per_newton,
+            date,
+            serial,
+            ..unloaded
+        };
+        self.control.calibrate(calibration)?;
+        Ok(calibration)
+    }
+
+    /// Makes one movement, beginning at `start` (0 to 1 of the room that the sample leaves); `each` sees what every tick
+    /// told the pins.
+    ///
+    /// # Errors
+    /// See [`SimError`]. The stage stands then, and the finger is lifted.
+    pub fn slide(
+        &mut self,
+        movement: Movement,
+        start: f32,
+        mut each: impl FnMut(&Outputs, &[u16]),
+    ) -> Result<Ended, SimError> {
+        self.control.start(movement, start)?;
+        self.world.reset_extremes();
+        let mut patience = Patience::default();
+        let mut truth = Performed::default();
+        let mut speeds = Vec::new();
+        loop {
+            self.tick();
+            each(&self.outputs, &self.pdc);
+            let now = self.world.truth();
+            truth.force_max_n = now.force_max_n;
+            match &self.outputs.felt {
+                Felt::Still => truth.force_n = now.force_n,
+                Felt::Begin(_) | Felt::Slide if self.outputs.shear_mn.is_some() => {
+                    speeds.push(now.speed_mm_s)
+                }
+                _ => {}
+            }
+            match self.control.phase() {
+                Phase::Ready => break,
+                Phase::Faulted(_) => self.rest(|_| ())?,
+                phase => {
+                    if patience.wait(1, false) == Wait::Stop {
+                        self.control.stop();
+                        self.rest(|_| ())?;
+                        return Err(SimError::Hangs(phase));
+                    }
+                }
+            }
+        }
+        if !speeds.is_empty() {
+            let mean = |speeds: &[f64]| speeds.iter().sum::<f64>() / speeds.len() as f64;
+            let wanted = f64::from(movement.speed_um_s()) * 1e-3;
+            truth.speed_mm_s = mean(&speeds);
+            let off = speeds
+                .windows(100.min(speeds.len()))
+                .map(|w| (mean(w) / wanted - 1.0).abs());
+            truth.speed_error = off.fold(0.0, f64::max);
+        }
+        self.performed.push(truth);
+        match self.control.take_ended() {
+            Some(Ended::Stopped) | None => Err(SimError::Stopped),
+            Some(ended) => Ok(ended),
+        }
+    }
+
+    /// Makes one movement and records it; a slide with a gap is repeated. Texture and number are left at 0.
+    ///
+    /// # Errors
+    /// See [`SimError`].
+    pub fn record(&mut self, movement: Movement) -> Result<recording::Slide, SimError> {
+        for _ in 0..MAX_REJECTED {
+            let mut slide = recording::Slide {
+                texture: 0,
+                number: 0,
+                movement,
+                pac: Vec::new(),
+                pdc: Vec::new(),
+                pdc_rate_hz: RATE_HZ,
+                // the first tick of a slide is its first millisecond
+                shear_mn: Some(vec![0]),
+                shear_rate_hz: 1000,
+                window: (0.0, 0.0),
+                background: Background::Power(0.0),
+            };
+            let mut still = Vec::new();
+            let start = self.random.random();
+            let no_contact = self.control.calibration().pressure.pdc_no_contact as i16;
+            let ended = self.slide(movement, start, |outputs, pdc| {
+                match &outputs.felt {
+                    Felt::Nothing => return,
+                    Felt::Still => return still.extend_from_slice(&outputs.pac),
+                    Felt::Begin(steady) => {
+                        let seconds = |sample: u32| sample as f32 / RATE_HZ as f32;
+                        slide.window = (seconds(steady.start), seconds(steady.end));
+                    }
+                    Felt::Slide => {}
+                }
+                slide.pac.extend_from_slice(&outputs.pac);
+                slide
+                    .pdc
+                    .extend(pdc.iter().map(|&counts| counts as i16 - no_contact));
+                slide
+                    .shear_mn
+                    .get_or_insert_default()
+                    .push(outputs.shear_mn.unwrap_or(0));
+            })?;
+            if ended == Ended::Whole {
+                slide.background = Background::Still(still);
+                return Ok(slide);
+            }
+        }
+        Err(Fault::Rejected.into())
+    }
+}
+
+impl Rig for SimRig {
+    type Error = SimError;
+
+    fn measures(&self) -> PropertySet {
+        PropertySet::ALL
+    }
+
+    async fn perform<K: Kernels>(
+        &mut self,
+        movement: Movement,
+        slide: &mut Slide<'_, K>,
+    ) -> Result<(), SimError> {
+        if self.control.phase() == Phase::Parked {
+            self.home()?;
+        }
+        let start = self.random.random();
+        let ended = self.slide(movement, start, |outputs, _| feel(outputs, slide))?;
+        if let Ended::Gap(samples) = ended {
+            slide.lose(samples);
+        }
+        Ok(())
+    }
+}
+
+/// Gives what a tick felt to the core.
+pub fn feel<K: Kernels>(outputs: &Outputs, slide: &mut Slide<'_, K>) {
+    match &outputs.felt {
+        Felt::Nothing => return,
+        Felt::Still => return slide.push_still(&outputs.pac),
+        Felt::Begin(steady) => slide.start(steady.clone()),
+        Felt::Slide => {}
+    }
+    slide.push(&outputs.pac);
+    slide.push_shear(outputs.shear_mn.as_slice());
+}
