@@ -1,13 +1,11 @@
 //! What explorations and trainings have in common.
 
-use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
 use crate::fused::Vector;
 use crate::rig::pins::Felt;
-use crate::store::Store;
 use crate::table::MAX_MOVEMENTS;
-use crate::wire::{Block, Text};
+use crate::wire::Block;
 
 pub use crate::probe::explore::Random;
 pub use crate::probe::{identify, train};
@@ -25,19 +23,6 @@ pub struct Visited {
     pub certain: bool,
     /// The movements made, with the number of slides and their whitened mean; none with a table of Gaussians.
     pub felt: Vec<(u8, u8, Vector), MAX_MOVEMENTS>,
-}
-
-/// Makes the table at the beginning of `room` the one in use.
-pub(crate) async fn commit<F: NorFlash>(
-    store: &mut Store<F>,
-    room: &mut [u8],
-    length: usize,
-) -> Result<(), Text> {
-    store.begin_table(length).await.map_err(text)?;
-    let table = room.get(..length).unwrap_or_default();
-    store.write_table(0, table).await.map_err(text)?;
-    store.commit_table(room).await.map_err(text)?;
-    Ok(())
 }
 
 /// The raw samples of one movement on their way to the host, in blocks.

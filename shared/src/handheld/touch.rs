@@ -3,11 +3,10 @@
 //! Nothing tells the probe that it moves but what it feels. A slide has begun when P_AC is livelier than that of the still
 //! finger; its steady part has a fixed length, and must be felt to its end at about the same force and pace.
 
-use core::fmt;
-use core::ops::RangeInclusive;
-
 use heapless::{Deque, Vec};
 
+// until all users have the new path
+pub use super::guidance::{Again, Event, Phase, View, ZONE_MN};
 use crate::features::{Plan, Slide, SlideError};
 use crate::fused::Observation;
 use crate::kernels::Kernels;
@@ -18,8 +17,6 @@ const BLOCK: usize = 22;
 /// Blocks in a second.
 const BLOCKS_HZ: u16 = (RATE_HZ as usize / BLOCK) as u16;
 
-/// The force that is asked for, mN: about [`super::MOVEMENT`]'s, as wide as people hold it without looking.
-pub const ZONE_MN: RangeInclusive<f32> = 300.0..=750.0;
 /// The finger is down from this force on, mN, ...
 const DOWN_MN: f32 = 100.0;
 /// ... and up below this one.
@@ -60,87 +57,6 @@ const UNEVEN: f32 = 0.8;
 const SILENT: u16 = 440;
 /// Equal samples of P_AC in a row that mean that it hangs: 100 ms.
 const FROZEN: u16 = 220;
-
-/// What is wrong with a slide.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Again {
-    /// Pressed too hard.
-    TooHard,
-    /// Pressed too lightly.
-    TooLight,
-    /// It ended before its time.
-    TooShort,
-    /// It was not made at one pace.
-    TooUneven,
-    /// A word of the sensor was lost or damaged.
-    Disturbed,
-}
-
-impl Again {
-    /// In words.
-    pub const fn why(self) -> &'static str {
-        match self {
-            Self::TooHard => "too hard",
-            Self::TooLight => "too light",
-            Self::TooShort => "too short",
-            Self::TooUneven => "too uneven",
-            Self::Disturbed => "disturbed",
-        }
-    }
-}
-
-impl fmt::Display for Again {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.why())
-    }
-}
-
-/// What happens in a touch.
-#[derive(Clone, PartialEq, Debug)]
-pub enum Event {
-    /// P_DC without contact is known.
-    Zeroed,
-    /// The finger is down.
-    Down,
-    /// It is pressed well and still: it may slide.
-    Still,
-    /// It has slid well.
-    Slid(Observation),
-    /// It has not; it is to be lifted.
-    Again(Again),
-    /// It is up.
-    Up,
-    /// No word of the sensor can be read.
-    Silent,
-    /// P_AC does not change.
-    Frozen,
-}
-
-/// What a touch is at.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Phase {
-    /// In the air.
-    Air,
-    /// Down, and to be pressed well and kept still.
-    Press,
-    /// Well pressed and still: to be slid.
-    Slide,
-    /// Sliding.
-    Sliding,
-    /// It is over: to be lifted.
-    Lift,
-}
-
-/// A touch as it is shown.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct View {
-    /// What it is at.
-    pub phase: Phase,
-    /// Contact force, mN.
-    pub force_mn: f32,
-    /// How much of the slide is done, 0 to 1.
-    pub progress: f32,
-}
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum State {

@@ -9,11 +9,11 @@ use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
 use crate::fused::{Vector, Whitened};
-use crate::session::{Visited, commit, text};
+use crate::session::Visited;
 use crate::store::{SelfTaught, Store};
 use crate::table::{Change, EncodeError, Known, MAX_MOVEMENTS, Table, Tally, amend, retell};
 use crate::up_to;
-use crate::wire::{Forget, MAX_TEXTURES, Name, Tell, Text};
+use crate::wire::{Forget, MAX_TEXTURES, Name, Tell, Text, text};
 
 /// Copies the stored table into `room`, with what the probe has learned by itself in its place: the table in force. Gives its
 /// length.
@@ -238,7 +238,7 @@ async fn change<F: NorFlash>(
     let most = Store::<F>::MAX_TABLE.min(room.len());
     let room = room.get_mut(..most).unwrap_or_default();
     let length = amend(room, base, change).map_err(text)?.as_bytes().len();
-    commit(store, room, length).await
+    store.replace_table(room, length).await.map_err(text)
 }
 
 /// Gives a texture of the stored table another name.

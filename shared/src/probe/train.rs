@@ -13,11 +13,10 @@ use crate::kernels::Kernels;
 use crate::movement::Movement;
 use crate::rig::guard::Fault;
 use crate::rig::{MAX_REJECTED, Rig};
-use crate::session::{commit, text};
 use crate::store::Store;
 use crate::table::{MAX_MOVEMENTS, Table};
 use crate::up_to;
-use crate::wire::{Tell, Text, Train};
+use crate::wire::{Tell, Text, Train, text};
 
 /// Learns the texture under the finger on top of `table`, and goes on where an earlier training of it stopped: every trial
 /// is stored at once. In the end the store has a new table, which is to be used from then on. `room` holds a whole table.
@@ -103,7 +102,7 @@ where
         if table.find(name).is_none() {
             forget_stale(&table, store).await?;
         }
-        commit(store, room, length).await?;
+        store.replace_table(room, length).await.map_err(text)?;
         if let Some(number) = number {
             // what the user teaches stands in place of what the probe had taught itself
             let self_taught = store.forget_self_taught(Some((lineage, number))).await;

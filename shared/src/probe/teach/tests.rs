@@ -27,7 +27,7 @@ fn base() -> List<u8> {
 fn store(bytes: &[u8]) -> Store<Ram> {
     let mut store = block_on(Store::open(Ram::new())).unwrap();
     let mut room = bytes.to_vec();
-    block_on(commit(&mut store, &mut room, bytes.len())).unwrap();
+    block_on(store.replace_table(&mut room, bytes.len())).unwrap();
     store
 }
 

@@ -6,9 +6,12 @@ use std::path::PathBuf;
 use std::string::String as Text;
 use std::vec::Vec as List;
 
-use super::super::picture::{HEIGHT, Picture, WIDTH};
 use super::*;
+use crate::handheld::picture::{HEIGHT, Picture, WIDTH};
+use crate::handheld::screen::LINES;
 use crate::handheld::spelling::Spelling;
+use crate::wire::Name;
+use heapless::Vec;
 
 const LONG: &str = "Corduroy, fine wale, well worn at the knee";
 
@@ -134,7 +137,7 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
     );
     each("fault-silent", &Screen::Fault(&Trouble::Silent));
     each("fault-frozen", &Screen::Fault(&Trouble::Frozen));
-    let memory = Trouble::Memory(crate::session::text(
+    let memory = Trouble::Memory(crate::wire::text(
         "the flash does not keep what was written: its sector is worn out",
     ));
     each("fault-memory", &Screen::Fault(&memory));

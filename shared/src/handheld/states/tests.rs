@@ -1,11 +1,13 @@
 //! The probe's states, whatever happens to them; with made-up slides, since touches have tests of their own.
 
-use super::picture::Picture;
-use super::screens::draw;
 use super::*;
+use crate::handheld::draw;
+use crate::handheld::judge::{FEATURES, judge};
+use crate::handheld::picture::Picture;
 use crate::kernels::Plain;
 use crate::pressure::{Channel, Counts};
-use crate::session::Random;
+use crate::probe::explore::Random;
+use crate::session::Visited;
 use crate::table::tests::{fused_of, known, straight};
 use proptest::prelude::*;
 use proptest::strategy::Strategy;
@@ -212,7 +214,7 @@ fn faults_show_and_go() {
     bench.probe.felt(Event::Silent);
     assert_eq!(bench.shown(), "Fault");
     assert!(bench.probe.visit.is_empty() && bench.probe.listens());
-    bench.probe.memory_failed(crate::session::text("worn"));
+    bench.probe.memory_failed(crate::wire::text("worn"));
     assert!(!bench.probe.listens());
     bench.press(10);
     assert_eq!(bench.probe.page, Page::Ready);
@@ -318,10 +320,10 @@ proptest! {
                     judged = true;
                 }
                 Happens::Taught(ok, textures) => {
-                    let name = if ok { Ok(free_name(&table)) } else { Err(crate::session::text("no")) };
+                    let name = if ok { Ok(free_name(&table)) } else { Err(crate::wire::text("no")) };
                     probe.taught(name, textures);
                 }
-                Happens::Broken => probe.memory_failed(crate::session::text("broken")),
+                Happens::Broken => probe.memory_failed(crate::wire::text("broken")),
             }
             match probe.job() {
                 Some(Job::Judge(slides)) => {

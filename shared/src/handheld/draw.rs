@@ -1,4 +1,4 @@
-//! What the display shows, and how it is drawn: the same on chip and PC.
+//! Draws what the display shows: the same on chip and PC.
 //!
 //! The display is 22 mm wide and read at arm's length: nothing is smaller than 6 x 10 points, and what matters is twice
 //! that. A line on top says where one is; a line at the bottom what the button does.
@@ -13,168 +13,16 @@ use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
 use embedded_graphics::pixelcolor::BinaryColor;
 use embedded_graphics::primitives::Rectangle;
 use embedded_graphics::text::{Alignment, Baseline, Text as Writing, TextStyleBuilder};
-use heapless::{String, Vec};
+use heapless::String;
 
-use super::touch::{Again, Phase, View, ZONE_MN};
-use super::{LEADING, Trouble};
-use crate::wire::Name;
+use super::guidance::{Again, ZONE_MN};
+use super::screen::{About, Entry, Row, Screen, Trouble, first_line};
+use super::spelling::{Place, WHEEL};
 
-pub use super::spelling::{Place, WHEEL};
-
-/// Entries of a list that are shown at once.
-pub const LINES: usize = 4;
 /// The bar's end, mN.
 const BAR_MN: f32 = 1200.0;
 const WIDTH: i32 = super::picture::WIDTH as i32;
 const MIDDLE: i32 = WIDTH / 2;
-
-/// A texture and its probability.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Row<'a> {
-    /// Its name.
-    pub name: &'a str,
-    /// 0 to 1.
-    pub probability: f32,
-}
-
-/// A line of the list of names.
-#[derive(Clone, PartialEq, Debug)]
-pub enum Entry<'a> {
-    /// A texture of the table.
-    Known(&'a str),
-    /// A new one, with this name.
-    Numbered(Name),
-    /// A new one, to be spelled.
-    Spell,
-    /// None.
-    Nothing,
-}
-
-/// What the page about the probe says.
-#[derive(Clone, PartialEq, Debug, Default)]
-pub struct About {
-    /// Version of the firmware.
-    pub version: &'static str,
-    /// Share of time that the core was awake while the sensor's words were wanted, 0 to 1.
-    pub awake: Option<f32>,
-    /// The same while they were not.
-    pub awake_at_rest: Option<f32>,
-    /// Sensor slots that came too late.
-    pub late: u32,
-    /// Words that were lost.
-    pub lost: u32,
-}
-
-/// What the display shows.
-#[derive(Clone, PartialEq, Debug)]
-pub enum Screen<'a> {
-    /// The finger is to be held in the air: P_DC's zero is taken.
-    Air,
-    /// A visit may begin.
-    Ready {
-        /// Textures that are known.
-        textures: u16,
-    },
-    /// The finger is to be pressed.
-    Press {
-        /// The slide it is for.
-        slide: u8,
-        /// How many there can be.
-        of: u8,
-        /// Contact force, mN.
-        force_mn: f32,
-        /// It is down.
-        down: bool,
-    },
-    /// The finger is to be slid, or slides.
-    Slide {
-        /// As in `Press`.
-        slide: u8,
-        /// As in `Press`.
-        of: u8,
-        /// As in `Press`.
-        force_mn: f32,
-        /// How much is done, 0 to 1; `None` before it begins.
-        progress: Option<f32>,
-    },
-    /// A slide was no good.
-    Again {
-        /// Why.
-        why: Again,
-        /// The finger is still down.
-        lift: bool,
-    },
-    /// The slides are compared.
-    Thinking {
-        /// How many.
-        slide: u8,
-    },
-    /// What it is.
-    Verdict {
-        /// The leading candidates.
-        rows: Vec<Row<'a>, LEADING>,
-        /// The first one is 99 % sure.
-        sure: bool,
-    },
-    /// It is none of those known.
-    Unknown {
-        /// What it is most like.
-        like: Vec<Row<'a>, LEADING>,
-    },
-    /// What is it?
-    Choose {
-        /// Which is chosen.
-        at: u16,
-        /// How many there are.
-        count: u16,
-        /// Those about it.
-        entries: Vec<Entry<'a>, LINES>,
-    },
-    /// A name is spelled.
-    Spell {
-        /// So far.
-        text: &'a str,
-        /// The letters about the one that is taken next, in the middle.
-        wheel: [Place; WHEEL],
-    },
-    /// The table is written.
-    Saving,
-    /// What was learned, or why nothing was.
-    Taught(Result<&'a Name, &'a str>),
-    /// What keeps the probe from working.
-    Fault(&'a Trouble),
-    /// The probe.
-    About(About),
-    /// Nothing: the display is off.
-    Dark,
-}
-
-impl Screen<'_> {
-    /// The screen of a touch that is for slide `slide` of at most `of`.
-    pub fn touching(view: &View, slide: u8, of: u8) -> Self {
-        let force_mn = view.force_mn;
-        match view.phase {
-            Phase::Slide | Phase::Sliding => Self::Slide {
-                slide,
-                of,
-                force_mn,
-                progress: (view.phase == Phase::Sliding).then_some(view.progress),
-            },
-            phase => Self::Press {
-                slide,
-                of,
-                force_mn,
-                down: phase != Phase::Air,
-            },
-        }
-    }
-}
-
-/// The first entry that is shown of a list, so that the chosen one is.
-pub fn first_line(at: u16, count: u16) -> u16 {
-    let lines = LINES as u16;
-    at.saturating_sub(1).min(count.saturating_sub(lines))
-}
 
 /// The brush: errors are the display's.
 struct Brush<'d, D>(&'d mut D);

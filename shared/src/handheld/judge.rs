@@ -1,0 +1,138 @@
+//! What the slides of a visit say: which textures of the table are the most probable.
+
+use core::fmt;
+
+use heapless::Vec;
+
+use crate::explorer::{Config, Explorer, ExplorerError, Method, ObserveError};
+use crate::features::PropertySet;
+use crate::fused::{FeatureSet, Observation};
+use crate::kernels::Kernels;
+use crate::movement::Movement;
+use crate::session::Visited;
+use crate::table::{Action, Table};
+use crate::wire::{MAX_TEXTURES, Name};
+
+/// What a person is asked to do: half a newton, 25 mm/s.
+pub const MOVEMENT: Movement = Movement::FOR_FINENESS;
+/// The features that a handheld's table is learned from.
+pub const FEATURES: FeatureSet = FeatureSet::Pressure;
+/// Slides after which the most probable texture is the answer, sure or not.
+pub const MAX_SLIDES: usize = 5;
+/// Textures that a verdict shows.
+pub const LEADING: usize = 3;
+
+/// What the probe makes of a visit.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Judgement {
+    /// The most probable textures and their probabilities, the first one leading.
+    pub leading: Vec<(u16, f32), LEADING>,
+    /// The first one is more probable than 99 %.
+    pub sure: bool,
+    /// It is rather none of them.
+    pub unknown: bool,
+    /// Further slides may tell more.
+    pub open: bool,
+}
+
+/// Why a visit cannot be judged.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum JudgeError {
+    /// The table cannot be used by a handheld probe.
+    Table(ExplorerError),
+    /// A slide lacks what the table compares.
+    Slide(ObserveError),
+    /// The table has no movement.
+    Movement,
+}
+
+impl fmt::Display for JudgeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Table(why) => why.fmt(f),
+            Self::Slide(why) => why.fmt(f),
+            Self::Movement => f.write_str("the table has no movement"),
+        }
+    }
+}
+
+impl core::error::Error for JudgeError {}
+
+/// Compares the slides of a visit with every texture of the table. Gives what is to be shown, and what the visit can teach.
+///
+/// # Errors
+/// The table is not one for a handheld probe, or a slide lacks a feature.
+pub fn judge<K: Kernels>(
+    table: Table<'_>,
+    slides: &[Observation],
+) -> Result<(Judgement, Visited), JudgeError> {
+    let config = Config {
+        method: Method::Fused,
+        max_slides: MAX_SLIDES as u8,
+        open: true,
+        ..Config::default()
+    };
+    let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
+    explorer
+        .consider(PropertySet::default(), config, 0..table.textures())
+        .map_err(JudgeError::Table)?;
+    let action = Action {
+        movement: movement(&table).ok_or(JudgeError::Movement)?,
+        property: None,
+    };
+    for slide in slides {
+        explorer.observe(action, slide).map_err(JudgeError::Slide)?;
+    }
+    let best = explorer.best();
+    let mut leading: Vec<(u16, f32), LEADING> = Vec::new();
+    for (&probability, texture) in explorer.posterior().iter().zip(0..) {
+        let place = leading
+            .iter()
+            .position(|(_, other)| probability > *other)
+            .unwrap_or(leading.len());
+        if place < LEADING {
+            leading.truncate(leading.len().min(LEADING - 1));
+            // there is room now, and the place is at most its end
+            let _ = leading.insert(place, (texture, probability));
+        }
+    }
+    let verdict = explorer.verdict();
+    let judgement = Judgement {
+        leading,
+        sure: verdict.is_some_and(|verdict| verdict.sure),
+        unknown: verdict.is_some_and(|verdict| verdict.unknown),
+        open: verdict.is_none(),
+    };
+    let visited = Visited {
+        table: table.crc(),
+        texture: best.texture,
+        certain: explorer.is_certain(),
+        felt: explorer.felt().collect(),
+    };
+    Ok((judgement, visited))
+}
+
+/// The movement of the table that the person makes: the one nearest to [`MOVEMENT`] is the only one in a handheld's table.
+fn movement(table: &Table<'_>) -> Option<u8> {
+    let mut movements = table.movements().zip(0u8..);
+    let first = movements.next();
+    movements
+        .find(|(movement, _)| *movement == MOVEMENT)
+        .or(first)
+        .map(|(_, index)| index)
+}
+
+/// A name for a texture that the person does not want to spell: the first of "sample 1", "sample 2" that is free.
+pub fn free_name(table: &Table<'_>) -> Name {
+    use core::fmt::Write as _;
+    let numbered = |number: u32| {
+        let mut name = Name::new();
+        // 40 bytes hold it
+        let _ = write!(name, "sample {number}");
+        name
+    };
+    (1..=MAX_TEXTURES as u32 + 1)
+        .map(numbered)
+        .find(|name| table.find(name).is_none())
+        .unwrap_or_default()
+}

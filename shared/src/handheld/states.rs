@@ -1,0 +1,520 @@
+//! What the probe is at: pages of the display, the button, the buzzer, and what is to be done with the table.
+
+use heapless::Vec;
+
+use super::button::{Button, Press};
+use super::guidance::{Again, Event};
+use super::judge::{JudgeError, Judgement, MAX_SLIDES, free_name};
+use super::screen::{self, About, Row, Screen, Trouble};
+use super::spelling::{Spelling, Taken};
+use super::touch::Touch;
+use crate::features::Plan;
+use crate::fused::Observation;
+use crate::kernels::Kernels;
+use crate::pressure::Pressure;
+use crate::table::Table;
+use crate::wire::{Name, Text, text};
+
+/// Ticks in a second.
+pub const TICKS_HZ: u32 = 100;
+/// Slides that a texture is taught from when teaching is what the person began with.
+const LESSON: usize = 3;
+/// Nothing happens for this long: the display goes dark and the sensor rests, ticks.
+const DARK_AFTER: u32 = 60 * TICKS_HZ;
+/// "Again" is shown at least this long, ticks.
+const AGAIN: u32 = 3 * TICKS_HZ / 2;
+/// That something was learned is shown this long, ticks.
+const TAUGHT: u32 = 3 * TICKS_HZ;
+/// No word for this long is a fault, ticks: the sensor needs 10 to start.
+const NO_WORDS: u32 = 50;
+
+/// What the visit felt like, by the person's word.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Choice {
+    /// The texture with this index.
+    Known(u16),
+    /// A new one, named by [`free_name`].
+    Numbered,
+    /// A new one, or a known one, of this name.
+    Spelled(Name),
+}
+
+/// Something to be done with the table, by whoever owns it.
+#[derive(Clone, PartialEq, Debug)]
+#[allow(clippy::large_enum_variant)] // no allocation here, and only one at a time
+pub enum Job {
+    /// Compare these slides with it: [`judge`], and tell [`Handheld::judged`].
+    Judge(Vec<Observation, MAX_SLIDES>),
+    /// Learn that the visit that was judged last is this, and tell [`Handheld::taught`].
+    Teach(Choice),
+}
+
+/// A page of what happens on the display.
+#[derive(Clone, PartialEq, Debug)]
+enum Page {
+    /// Nothing begun.
+    Ready,
+    /// A visit: the finger is to be pressed and slid.
+    Touching,
+    /// A slide was no good; the slides before it stand.
+    Again(Again),
+    /// The job is being done.
+    Thinking,
+    Verdict(Judgement),
+    /// What is it? An entry of [`Handheld::entries`].
+    Choose(u16),
+    Spell(Spelling),
+    Saving,
+    Taught(Result<Name, Text>),
+    Fault(Trouble),
+    About,
+    Dark,
+}
+
+/// A step of a melody: Hz, 0 for silence, and ticks.
+type Note = (u16, u8);
+
+/// The probe.
+pub struct Handheld<'p, K> {
+    touch: Touch<'p, K>,
+    button: Button,
+    page: Page,
+    /// Ticks since the page began, and since anything happened.
+    shown: u32,
+    idle: u32,
+    silent: u32,
+    /// The slides of this visit that were good.
+    visit: Vec<Observation, MAX_SLIDES>,
+    /// What was made of them last.
+    judgement: Option<Judgement>,
+    /// The visit is to teach, not to ask.
+    lesson: bool,
+    /// Textures of the table.
+    textures: u16,
+    job: Option<Job>,
+    melody: &'static [Note],
+    note: u8,
+    /// The page was changed and not looked at since.
+    fresh: bool,
+}
+
+const CLICK: &[Note] = &[(2000, 2)];
+const SLIDE: &[Note] = &[(2700, 8)];
+const GOOD: &[Note] = &[(2000, 6), (2700, 10)];
+const BAD: &[Note] = &[(900, 12), (0, 6), (900, 12)];
+const SURE_IT_IS: &[Note] = &[(2000, 8), (2400, 8), (2700, 16)];
+const NOT_KNOWN: &[Note] = &[(1800, 10), (0, 4), (1400, 16)];
+const ALARM: &[Note] = &[(700, 30), (0, 10), (700, 30)];
+
+impl<'p, K: Kernels> Handheld<'p, K> {
+    /// A probe that was just switched on, with a table of so many textures.
+    pub fn new(plan: &'p Plan, textures: u16) -> Self {
+        Self {
+            touch: Touch::new(plan),
+            button: Button::default(),
+            page: Page::Ready,
+            shown: 0,
+            idle: 0,
+            silent: 0,
+            visit: Vec::new(),
+            judgement: None,
+            lesson: false,
+            textures,
+            job: None,
+            melody: &[],
+            note: 0,
+            fresh: true,
+        }
+    }
+
+    /// A sensor word, 4400 a second while [`Handheld::listens`]; `None` is a damaged or late one.
+    pub fn word(&mut self, word: Option<Pressure>) {
+        if !self.listens() {
+            return;
+        }
+        self.silent = 0;
+        if let Some(event) = self.touch.word(word) {
+            self.felt(event);
+        }
+    }
+
+    /// So many words were lost on the way.
+    pub fn lose(&mut self, words: u32) {
+        self.touch.lose(words);
+    }
+
+    /// A hundredth of a second, and whether the button is pressed.
+    pub fn tick(&mut self, pressed: bool) {
+        self.shown = self.shown.saturating_add(1);
+        self.idle = self.idle.saturating_add(1);
+        self.play();
+        if self.listens() {
+            self.silent = self.silent.saturating_add(1);
+            if self.silent >= NO_WORDS && !matches!(self.page, Page::Fault(_)) {
+                self.fail(Trouble::Silent);
+            }
+        }
+        if let Some(press) = self.button.tick(pressed) {
+            self.idle = 0;
+            self.pressed(press);
+        }
+        match &self.page {
+            Page::Taught(_) if self.shown >= TAUGHT => self.begin(),
+            Page::Thinking | Page::Saving | Page::Fault(_) | Page::Dark => {}
+            _ if self.idle >= DARK_AFTER => self.show(Page::Dark),
+            _ => {}
+        }
+    }
+
+    /// Something to be done with the table; each is given once.
+    pub fn job(&mut self) -> Option<Job> {
+        self.job.take()
+    }
+
+    /// What came of [`Job::Judge`].
+    pub fn judged(&mut self, judged: Result<Judgement, JudgeError>) {
+        if !matches!(self.page, Page::Thinking) {
+            return;
+        }
+        let judgement = match judged {
+            Ok(judgement) => judgement,
+            Err(why) => return self.fail(Trouble::Memory(text(why))),
+        };
+        let (open, unknown, sure) = (judgement.open, judgement.unknown, judgement.sure);
+        self.judgement = Some(judgement.clone());
+        if self.lesson {
+            if self.visit.len() < LESSON {
+                self.sound(GOOD);
+                self.show(Page::Touching);
+            } else {
+                self.sound(SURE_IT_IS);
+                self.show(Page::Choose(0));
+            }
+        } else if open {
+            self.sound(GOOD);
+            self.show(Page::Touching);
+        } else {
+            self.sound(if unknown {
+                NOT_KNOWN
+            } else if sure {
+                SURE_IT_IS
+            } else {
+                GOOD
+            });
+            self.show(Page::Verdict(judgement));
+        }
+    }
+
+    /// What came of [`Job::Teach`]: the name that was learned, or why none was. The table has so many textures now.
+    pub fn taught(&mut self, taught: Result<Name, Text>, textures: u16) {
+        self.textures = textures;
+        if !matches!(self.page, Page::Saving) {
+            return;
+        }
+        self.sound(if taught.is_ok() { SURE_IT_IS } else { ALARM });
+        self.show(Page::Taught(taught));
+    }
+
+    /// The store or the table cannot be used.
+    pub fn memory_failed(&mut self, why: Text) {
+        self.fail(Trouble::Memory(why));
+    }
+
+    /// Whether the sensor's words are wanted.
+    pub fn listens(&self) -> bool {
+        match &self.page {
+            Page::Ready | Page::Touching | Page::Again(_) | Page::Thinking | Page::Verdict(_) => {
+                true
+            }
+            // it may come back
+            Page::Fault(trouble) => !matches!(trouble, Trouble::Memory(_)),
+            Page::Choose(_)
+            | Page::Spell(_)
+            | Page::Saving
+            | Page::Taught(_)
+            | Page::About
+            | Page::Dark => false,
+        }
+    }
+
+    /// Whether the finger is on something.
+    pub fn is_touched(&self) -> bool {
+        self.touch.is_down()
+    }
+
+    /// What the buzzer sounds now, Hz.
+    pub fn tone(&self) -> Option<u16> {
+        let (hz, _) = self.melody.first()?;
+        (*hz > 0).then_some(*hz)
+    }
+
+    /// Whether the display is to be drawn anew since this was asked last.
+    pub fn is_new(&mut self) -> bool {
+        let moves = matches!(self.page, Page::Ready | Page::Touching | Page::Again(_));
+        core::mem::take(&mut self.fresh) || moves
+    }
+
+    /// Whether the display names textures, so that [`Handheld::screen`] needs the table.
+    pub fn names_textures(&self) -> bool {
+        matches!(self.page, Page::Verdict(_) | Page::Choose(_))
+    }
+
+    /// What the display shows.
+    pub fn screen<'s>(&'s self, table: Option<&Table<'s>>, about: &About) -> Screen<'s> {
+        let name = |texture: u16| table.and_then(|table| table.name(texture)).unwrap_or("?");
+        let rows = |judgement: &Judgement| {
+            let leading = judgement.leading.iter();
+            leading
+                .map(|(texture, probability)| Row {
+                    name: name(*texture),
+                    probability: *probability,
+                })
+                .collect()
+        };
+        let slide = self.visit.len() as u8 + 1;
+        let of = if self.lesson { LESSON } else { MAX_SLIDES } as u8;
+        match &self.page {
+            Page::Ready if !self.touch.has_zero() => Screen::Air,
+            Page::Ready => Screen::Ready {
+                textures: self.textures,
+            },
+            Page::Touching => Screen::touching(&self.touch.view(), slide, of),
+            Page::Again(why) => Screen::Again {
+                why: *why,
+                lift: self.touch.is_down(),
+            },
+            Page::Thinking => Screen::Thinking { slide: slide - 1 },
+            Page::Verdict(judgement) if judgement.unknown => Screen::Unknown {
+                like: rows(judgement),
+            },
+            Page::Verdict(judgement) => Screen::Verdict {
+                rows: rows(judgement),
+                sure: judgement.sure,
+            },
+            Page::Choose(at) => Screen::Choose {
+                at: *at,
+                count: self.entries(),
+                entries: self.around(*at, table),
+            },
+            Page::Spell(spelling) => Screen::Spell {
+                text: spelling.text(),
+                wheel: spelling.wheel(),
+            },
+            Page::Saving => Screen::Saving,
+            Page::Taught(taught) => Screen::Taught(taught.as_ref().map_err(Text::as_str)),
+            Page::Fault(trouble) => Screen::Fault(trouble),
+            Page::About => Screen::About(about.clone()),
+            Page::Dark => Screen::Dark,
+        }
+    }
+
+    /// Entries of the page that asks for a name: the leading textures, a new one with a number, a new one that is spelled,
+    /// nothing, and all other textures.
+    fn entries(&self) -> u16 {
+        self.textures.saturating_add(3)
+    }
+
+    /// The leading textures of the last judgement.
+    fn leading(&self) -> impl Iterator<Item = u16> + Clone + '_ {
+        let leading = self.judgement.iter().flat_map(|j| j.leading.iter());
+        leading.map(|(texture, _)| *texture)
+    }
+
+    /// What an entry stands for; `None` is nothing.
+    fn entry(&self, at: u16) -> Entry {
+        let leading = self.leading().count() as u16;
+        if let Some(texture) = self.leading().nth(at.into()) {
+            return Entry::Known(texture);
+        }
+        match at.saturating_sub(leading) {
+            0 => Entry::Numbered,
+            1 => Entry::Spell,
+            2 => Entry::Nothing,
+            other => {
+                let mut others =
+                    (0..self.textures).filter(|t| self.leading().all(|leading| leading != *t));
+                others
+                    .nth(usize::from(other) - 3)
+                    .map_or(Entry::Nothing, Entry::Known)
+            }
+        }
+    }
+
+    /// The entries about one of them, as they are shown.
+    fn around<'s>(
+        &self,
+        at: u16,
+        table: Option<&Table<'s>>,
+    ) -> Vec<screen::Entry<'s>, { screen::LINES }> {
+        let first = screen::first_line(at, self.entries());
+        let shown = (first..self.entries()).take(screen::LINES);
+        shown
+            .map(|at| match self.entry(at) {
+                Entry::Known(texture) => {
+                    let name = table.and_then(|table| table.name(texture));
+                    screen::Entry::Known(name.unwrap_or("?"))
+                }
+                Entry::Numbered => screen::Entry::Numbered(table.map_or(Name::new(), free_name)),
+                Entry::Spell => screen::Entry::Spell,
+                Entry::Nothing => screen::Entry::Nothing,
+            })
+            .collect()
+    }
+
+    fn show(&mut self, page: Page) {
+        let listened = self.listens();
+        self.page = page;
+        self.fresh = true;
+        self.shown = 0;
+        self.silent = 0;
+        if self.listens() && !listened {
+            // the finger may have been put down meanwhile, and its words begin anew
+            self.touch.restart();
+        }
+    }
+
+    fn fail(&mut self, trouble: Trouble) {
+        if !matches!(&self.page, Page::Fault(shown) if *shown == trouble) {
+            self.sound(ALARM);
+            self.forget_visit();
+            self.job = None;
+            self.show(Page::Fault(trouble));
+        }
+    }
+
+    fn forget_visit(&mut self) {
+        self.visit.clear();
+        self.judgement = None;
+        self.lesson = false;
+    }
+
+    /// A new visit may begin.
+    fn begin(&mut self) {
+        self.forget_visit();
+        self.show(Page::Ready);
+    }
+
+    fn sound(&mut self, melody: &'static [Note]) {
+        self.melody = melody;
+        self.note = 0;
+    }
+
+    fn play(&mut self) {
+        let Some((_, ticks)) = self.melody.first() else {
+            return;
+        };
+        self.note += 1;
+        if self.note >= *ticks {
+            self.note = 0;
+            self.melody = self.melody.get(1..).unwrap_or_default();
+        }
+    }
+
+    fn felt(&mut self, event: Event) {
+        if event != Event::Still {
+            self.idle = 0;
+        }
+        match event {
+            Event::Silent => return self.fail(Trouble::Silent),
+            Event::Frozen => return self.fail(Trouble::Frozen),
+            _ => {}
+        }
+        if let Page::Fault(_) = self.page {
+            // words again, and good ones
+            return self.begin();
+        }
+        match event {
+            Event::Zeroed | Event::Silent | Event::Frozen => {}
+            Event::Down => match self.page {
+                Page::Ready | Page::Touching => self.show(Page::Touching),
+                Page::Again(_) => self.show(Page::Touching),
+                Page::Verdict(_) => {
+                    self.forget_visit();
+                    self.show(Page::Touching);
+                }
+                _ => {}
+            },
+            Event::Still => self.sound(SLIDE),
+            Event::Up => match self.page {
+                Page::Touching if self.visit.is_empty() && !self.lesson => self.begin(),
+                Page::Again(_) if self.shown >= AGAIN => self.show(Page::Touching),
+                _ => {}
+            },
+            Event::Again(why) => {
+                if matches!(self.page, Page::Touching) {
+                    self.sound(BAD);
+                    self.show(Page::Again(why));
+                }
+            }
+            Event::Slid(observation) => {
+                // there is room: a visit ends with its last slide
+                if matches!(self.page, Page::Touching) && self.visit.push(observation).is_ok() {
+                    self.job = Some(Job::Judge(self.visit.clone()));
+                    self.show(Page::Thinking);
+                }
+            }
+        }
+    }
+
+    fn pressed(&mut self, press: Press) {
+        self.fresh = true;
+        match (&mut self.page, press) {
+            // nothing to be said while the table is at work
+            (Page::Thinking | Page::Saving, _) => return,
+            (Page::Dark, _) => self.begin(),
+            (Page::Ready, Press::Short) => self.show(Page::About),
+            (Page::Ready, Press::Long) => {
+                self.forget_visit();
+                self.lesson = true;
+                self.show(Page::Touching);
+            }
+            (Page::Touching | Page::Again(_), Press::Short) => {}
+            (Page::Touching | Page::Again(_), Press::Long) => self.begin(),
+            (Page::Verdict(_), Press::Short) => self.begin(),
+            (Page::Verdict(_), Press::Long) => self.show(Page::Choose(0)),
+            (Page::Choose(at), Press::Short) => {
+                let next = at.saturating_add(1);
+                let at = if next < self.entries() { next } else { 0 };
+                self.show(Page::Choose(at));
+            }
+            (Page::Choose(at), Press::Long) => {
+                let at = *at;
+                match self.entry(at) {
+                    Entry::Known(texture) => self.teach(Choice::Known(texture)),
+                    Entry::Numbered => self.teach(Choice::Numbered),
+                    Entry::Spell => self.show(Page::Spell(Spelling::default())),
+                    Entry::Nothing => self.begin(),
+                }
+            }
+            (Page::Spell(spelling), Press::Short) => spelling.turn(),
+            (Page::Spell(spelling), Press::Long) => match spelling.take() {
+                Taken::Letter => {}
+                Taken::Done(name) => self.teach(Choice::Spelled(name)),
+                Taken::Back => self.show(Page::Choose(0)),
+            },
+            (Page::Fault(Trouble::Memory(_)) | Page::About | Page::Taught(_), _) => self.begin(),
+            (Page::Fault(_), _) => {}
+        }
+        self.sound(CLICK);
+    }
+
+    fn teach(&mut self, choice: Choice) {
+        if self.visit.is_empty() || self.judgement.is_none() {
+            // nothing was felt
+            return self.begin();
+        }
+        self.job = Some(Job::Teach(choice));
+        self.show(Page::Saving);
+    }
+}
+
+/// What can be chosen for a visit.
+enum Entry {
+    Known(u16),
+    Numbered,
+    Spell,
+    Nothing,
+}
+
+#[cfg(test)]
+mod tests;
