@@ -13,22 +13,15 @@
 #[cfg(test)]
 extern crate std;
 
-pub mod biotac;
+pub mod dsp;
 pub mod explorer;
 pub mod features;
-pub mod fir;
-pub mod fixed;
-pub mod fused;
 pub mod handheld;
 pub mod kernels;
-pub mod mcp3202;
-pub mod movement;
-pub mod pressure;
 pub mod probe;
 pub mod rig;
 pub mod sensor;
 pub mod session;
-pub mod spectrum;
 pub mod store;
 pub mod table;
 pub mod wire;
@@ -41,6 +34,36 @@ pub mod teaching {
 /// Former path.
 pub mod training {
     pub use crate::probe::training::*;
+}
+
+pub use dsp::fixed;
+pub use sensor::{biotac, mcp3202, pressure};
+
+/// See [`dsp`].
+pub mod fir {
+    pub use crate::dsp::{BandPower, PAIRS, PASS_BAND_HZ, TAPS, Taps};
+}
+
+/// See [`dsp`].
+pub mod spectrum {
+    pub use crate::dsp::{
+        Angles, BIN_HZ, BINS, Complex32, FRAME, Folded, FrameSum, HOP, Spectrum, SpectrumSum,
+        angles,
+    };
+}
+
+/// See [`features`] and [`rig::slide_path`].
+pub mod movement {
+    pub use crate::features::{Movement, MovementError};
+    pub use crate::rig::slide_path::SlidePath;
+}
+
+/// See [`features`] and [`table`].
+pub mod fused {
+    pub use crate::features::{
+        FEATURE_STEPS, FeatureSet, MAX_FEATURES, Observation, Vector, WHITE_STEPS, fixed,
+    };
+    pub use crate::table::{Scatter, WhitenError, Whitened, Whitening, white, whiten};
 }
 
 /// Adds as many of them as there is room for: `extend` would panic at more.

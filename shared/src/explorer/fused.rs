@@ -6,10 +6,11 @@
 
 use heapless::{Vec, VecView};
 
+use crate::features::{MAX_FEATURES, Vector};
 use crate::fixed::exp_neg_q30;
-use crate::fused::{MAX_FEATURES, Vector, oas, white};
 use crate::kernels::{Candidate, FREEDOM, Kernels, Spread, distance, mask};
 use crate::table::{Contents, MAX_MOVEMENTS, Table};
+use crate::table::{oas, white};
 use crate::up_to;
 
 /// Fewest textures whose means say what textures are like.

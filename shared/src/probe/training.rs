@@ -15,8 +15,6 @@ use core::fmt;
 
 use heapless::Vec;
 
-use serde::{Deserialize, Serialize};
-
 use crate::features::{Property, PropertySet};
 use crate::fill;
 use crate::fused::{FeatureSet, Observation, Whitened};
@@ -28,6 +26,8 @@ use crate::table::{
 };
 use crate::wire::{MAX_TEXTURES, Name};
 
+pub use crate::table::Lesson;
+
 /// The movements of a table that is begun: the three that the paper chose.
 pub const FIRST_MOVEMENTS: [Movement; 3] = [
     Movement::FOR_TRACTION,
@@ -37,25 +37,6 @@ pub const FIRST_MOVEMENTS: [Movement; 3] = [
 
 /// Fewest trials that a standard deviation can be had of. A fused table has those of all textures and needs one.
 pub const LEAST_TRIALS: u8 = 2;
-
-/// What was learned of a texture at one movement, as the table that it is for keeps it.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
-pub enum Lesson {
-    /// For a table of Gaussians.
-    Gaussians(Experience),
-    /// For a fused table.
-    Fused(Whitened),
-}
-
-impl Lesson {
-    /// Trials so far.
-    pub const fn trials(&self) -> u8 {
-        match self {
-            Self::Gaussians(experience) => experience.trials(),
-            Self::Fused(whitened) => whitened.slides,
-        }
-    }
-}
 
 /// Movements of a pilot: the grid up to 1.26 N; with more force the skin touches the core (fig. 3).
 pub fn pilot_movements() -> impl Iterator<Item = Movement> {

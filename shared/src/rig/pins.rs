@@ -1,11 +1,11 @@
 //! What goes in and out of the rig's control every millisecond: the one seam between the control logic and board or
 //! simulator.
 
-use core::ops::Range;
-
 use heapless::Vec;
 
 use crate::pressure::Pressure;
+
+pub use crate::features::Felt;
 
 /// Most words in one tick: 14 ms of slots, should a tick be late.
 pub const MAX_WORDS: usize = 64;
@@ -47,18 +47,4 @@ pub struct Outputs {
     pub pac: Vec<i16, MAX_WORDS>,
     /// Shear of this tick in mN, at constant speed.
     pub shear_mn: Option<i16>,
-}
-
-/// What the samples of a tick belong to.
-#[derive(Clone, PartialEq, Debug, Default)]
-pub enum Felt {
-    /// Nothing.
-    #[default]
-    Nothing,
-    /// The background: the finger is pressed and still.
-    Still,
-    /// The slide begins; these of its P_AC samples will be at constant speed.
-    Begin(Range<u32>),
-    /// The slide goes on.
-    Slide,
 }

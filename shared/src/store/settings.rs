@@ -17,9 +17,9 @@ use super::sectors::Store;
 use crate::movement::Movement;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
+use crate::table::MAX_TEXTURES;
 use crate::training::Lesson;
 use crate::up_to;
-use crate::wire::MAX_TEXTURES;
 
 impl<F: NorFlash> Store<F> {
     /// Whether the settings can be used. If not, [`Store::erase_settings`] makes them so; the tables are not concerned.

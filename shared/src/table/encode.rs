@@ -2,13 +2,15 @@
 
 use core::fmt;
 
-use super::{
-    Action, CELL_BYTES, CRC_BYTES, CRC32, Contents, Experience, LABEL_BYTES, MAGIC, MAX_MOVEMENTS,
-    SD_LEAST, SD_STEP, Table, TableError, Tally, VERSION, mean_step,
+use super::format::{
+    Action, CELL_BYTES, CRC_BYTES, CRC32, Contents, LABEL_BYTES, MAGIC, MAX_MOVEMENTS, TableError,
+    Tally, VERSION,
 };
-use crate::features::{Property, PropertySet};
-use crate::fused::{FeatureSet, Whitened, Whitening};
-use crate::movement::Movement;
+use super::gaussian::{SD_LEAST, SD_STEP, mean_step};
+use super::training_stats::{Experience, Whitened};
+use super::view::Table;
+use super::whitening::Whitening;
+use crate::features::{FeatureSet, Movement, Property, PropertySet};
 
 /// One texture of a table of Gaussians to be written.
 #[derive(Clone, Copy, Debug)]

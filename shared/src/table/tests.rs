@@ -3,9 +3,11 @@
 mod damage;
 mod fused;
 mod learning;
+pub(crate) mod whitening;
 
+use super::format::*;
 use super::*;
-use crate::features::Properties;
+use crate::features::{FeatureSet, Movement, Properties, Property, PropertySet};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::string::{String, ToString};

@@ -1,16 +1,13 @@
 //! What the host asks of the probe.
 
-use heapless::{String, Vec};
+use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::explorer::{Method, Strategy};
+use crate::table::{MAX_TEXTURES, Name};
 
-/// Most textures in one message; the probe's table holds no more.
-pub const MAX_TEXTURES: usize = 128;
 /// Bytes of a table in one message.
 pub const PART: usize = 256;
-/// Name of a texture.
-pub type Name = String<40>;
 
 /// From the host.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]

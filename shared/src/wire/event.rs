@@ -3,19 +3,17 @@
 use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
 
-use super::command::{MAX_TEXTURES, Name, PART};
+use super::command::PART;
 use super::sparse;
 use super::text::Text;
-use crate::features::{FUSED_BANDS, Measurement, Properties, Property};
+use crate::features::{Block, FUSED_BANDS, Measurement, Properties, Property};
 use crate::fused::Observation;
 use crate::movement::Movement;
 use crate::rig::guard::Fault;
-use crate::table::Action;
+use crate::table::{Action, MAX_TEXTURES, Name};
 
 /// Most actions of an outlook that are told, the best ones.
 pub const MAX_OUTLOOK: usize = 16;
-/// P_AC samples in one block.
-pub const BLOCK: usize = 64;
 
 /// From the probe.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -318,21 +316,4 @@ pub struct Live {
     pub speed_um_s: i32,
     /// Motor current, mA.
     pub current_ma: i16,
-}
-
-/// Raw samples of the still finger or of a slide, gap-free: `number` says the order.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct Block {
-    /// One more than the last block's of the same movement, from 0.
-    pub number: u16,
-    /// The still finger: the background. Otherwise the slide.
-    pub still: bool,
-    /// With the first block of a slide: which of its P_AC samples are at constant speed, from and to.
-    pub steady: Option<(u32, u32)>,
-    /// P_AC, counts about the still finger's baseline.
-    pub pac: Vec<i16, BLOCK>,
-    /// Shear at constant speed, mN.
-    pub shear_mn: Vec<i16, BLOCK>,
-    /// Samples that were lost, so that the slide does not count.
-    pub lost: u32,
 }

@@ -5,7 +5,7 @@ use serde::de::Error as _;
 use serde::ser::Error as _;
 use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer};
 
-use super::command::MAX_TEXTURES;
+use crate::table::MAX_TEXTURES;
 use crate::up_to;
 
 const _: () = assert!(MAX_TEXTURES <= 1 << u8::BITS);

@@ -1,8 +1,8 @@
 //! The fused way of deciding against its recipe, written out in f64.
 
 use super::*;
-use crate::fused::tests::{Noise, World, learned};
 use crate::fused::{Whitened, Whitening};
+use crate::table::tests::whitening::{Noise, World, learned};
 use crate::table::tests::{fused_of, known, straight};
 use std::string::ToString;
 

@@ -1,7 +1,7 @@
 //! Student's t with shrunk variances, and its product over properties, against their definitions in f64.
 
 use super::*;
-use crate::fused::tests::Noise;
+use crate::table::tests::whitening::Noise;
 
 /// Derivative of ln Gamma: the recurrence far up, then three terms.
 fn digamma(x: f64) -> f64 {

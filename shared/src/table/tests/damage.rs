@@ -1,7 +1,7 @@
 //! Damage of every kind, and the check that names it.
 
 use super::*;
-use crate::features::Properties;
+use crate::features::{MovementError, Properties};
 
 proptest! {
     #![proptest_config(fixed(256))]

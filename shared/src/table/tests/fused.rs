@@ -2,7 +2,7 @@
 
 use super::damage::{crc_of, read_all};
 use super::*;
-use crate::fused::tests::{Noise, World, by_hand, learned as whitenings};
+use crate::table::tests::whitening::{Noise, World, by_hand, learned as whitenings};
 
 const BANDS: FeatureSet = FeatureSet::Bands;
 

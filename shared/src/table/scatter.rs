@@ -1,12 +1,12 @@
-//! Whitening: learned from the slides of many textures, and frozen in the table.
+//! How slides and textures scatter, and the whitening that follows from it.
 
 use core::fmt;
 
 use heapless::Vec;
-use serde::{Deserialize, Serialize};
 
-use super::{FEATURE_STEPS, MAX_FEATURES, Vector, WHITE_STEPS};
-use crate::table::MAX_MOVEMENTS;
+use super::format::MAX_MOVEMENTS;
+use super::whitening::Whitening;
+use crate::features::{FEATURE_STEPS, MAX_FEATURES, Vector};
 
 /// Weight of the average over all movements, in trials: with few trials of its own a movement's covariance is mostly that.
 const SHARED_TRIALS: f64 = 15.0;
@@ -16,152 +16,6 @@ const ROUNDING: f64 = 1.0 / 12.0;
 const SWEEPS: usize = 12;
 /// Least part of a feature's variance that the features before it may leave unexplained.
 const LEAST_PIVOT: f64 = 1e-6;
-
-/// From features to whitened ones, z = W (x - g): canonical variates. W' W is the inverse of the covariance of slides within a
-/// texture, and the means of different textures are uncorrelated in z, those that scatter most first.
-///
-/// W is kept in whole numbers, row by row with a power of two of its own; means are learned through the same numbers, so
-/// their rounding adds no error.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Whitening {
-    features: usize,
-    /// As a table has them: g, as features are (i16); binary places of each row (u8); the rows of W (i16).
-    bytes: Vec<u8, { Self::bytes(MAX_FEATURES) }>,
-}
-
-impl Whitening {
-    /// Bytes that it takes in a table.
-    pub const fn bytes(features: usize) -> usize {
-        3 * features + 2 * features * features
-    }
-
-    /// Reads it from a table; `None` if these are not the bytes of one of so many features.
-    pub fn read(bytes: &[u8], features: usize) -> Option<Self> {
-        View::new(bytes, features)?;
-        let bytes = Vec::from_slice(bytes).ok()?;
-        Some(Self { features, bytes })
-    }
-
-    /// Its bytes.
-    pub fn as_bytes(&self) -> &[u8] {
-        &self.bytes
-    }
-
-    /// Number of features.
-    pub fn features(&self) -> usize {
-        self.features
-    }
-
-    /// Whitens the features of a slide; those that are missing count as the mean, those beyond the table's not at all.
-    pub fn apply(&self, features: &[i16]) -> Vector {
-        let view = View {
-            features: self.features,
-            bytes: &self.bytes,
-        };
-        view.apply(features)
-    }
-}
-
-/// A [`Whitening`] where its table lies: copying it takes as long as applying it.
-#[derive(Clone, Copy)]
-pub(crate) struct View<'b> {
-    features: usize,
-    bytes: &'b [u8],
-}
-
-impl<'b> View<'b> {
-    /// `None` if these are not the bytes of one of so many features.
-    pub(crate) fn new(bytes: &'b [u8], features: usize) -> Option<Self> {
-        if bytes.len() != Whitening::bytes(features) || features > MAX_FEATURES {
-            return None;
-        }
-        let view = Self { features, bytes };
-        let [_, places, _] = view.parts();
-        places.iter().all(|&p| p <= 30).then_some(view)
-    }
-
-    /// Of bytes that [`View::new`] has found to be one.
-    pub(crate) fn checked(bytes: &'b [u8], features: usize) -> Self {
-        Self { features, bytes }
-    }
-
-    /// g, places and rows.
-    fn parts(&self) -> [&'b [u8]; 3] {
-        let (mean, rest) = self
-            .bytes
-            .split_at_checked(2 * self.features)
-            .unwrap_or_default();
-        let (places, rows) = rest.split_at_checked(self.features).unwrap_or_default();
-        [mean, places, rows]
-    }
-
-    /// As [`Whitening::apply`].
-    pub(crate) fn apply(&self, features: &[i16]) -> Vector {
-        let [mean, places, rows] = self.parts();
-        // beyond 32 units all features are alike; those that the table does not have are 0
-        let mut apart = [[0; 2]; MAX_FEATURES / 2];
-        let known = features.iter().zip(mean.as_chunks().0);
-        for (apart, (x, g)) in apart.as_flattened_mut().iter_mut().zip(known) {
-            *apart = x.saturating_sub(i16::from_le_bytes(*g));
-        }
-        let apart = apart.map(pair);
-        let mut white = Vector::new();
-        let mut rest = rows;
-        for &places in places {
-            let sum = match rest.first_chunk::<{ 2 * MAX_FEATURES }>() {
-                // in steps that the compiler knows the number of; what follows the row is multiplied by 0
-                Some(row) => {
-                    let row = row.as_chunks().0.iter().map(|w| u32::from_le_bytes(*w));
-                    row.zip(apart).map(|(w, x)| dot(w, x)).sum()
-                }
-                // the last of a table
-                None => {
-                    let row = rest.chunks(4).map(|w| match *w {
-                        [a, b, c, d] => u32::from_le_bytes([a, b, c, d]),
-                        [a, b, ..] => u16::from_le_bytes([a, b]).into(),
-                        _ => 0,
-                    });
-                    row.zip(apart).map(|(w, x)| dot(w, x)).sum()
-                }
-            };
-            // there is room
-            let _ = white.push(rounded(sum, places));
-            rest = rest.get(2 * self.features..).unwrap_or_default();
-        }
-        white
-    }
-}
-
-/// Two numbers of 16 bits in a word, as the chip multiplies them.
-#[inline]
-fn pair([low, high]: [i16; 2]) -> u32 {
-    u32::from(high as u16) << 16 | u32::from(low as u16)
-}
-
-/// Sum of the products of two pairs.
-#[inline]
-fn dot(a: u32, b: u32) -> i64 {
-    let low = i32::from(a as i16) * i32::from(b as i16);
-    let high = ((a as i32) >> 16) * ((b as i32) >> 16);
-    i64::from(low) + i64::from(high)
-}
-
-/// Products of features, in 1/1024 of a unit, and weights of so many binary places, 30 at most, to the nearest 1/256.
-#[inline]
-fn rounded(sum: i64, places: u8) -> i16 {
-    // twice that, by shifts of 32 bits: those of 64 take the chip several
-    let twice = u32::from(places & 31) + 1;
-    let (low, high) = (sum as u32, (sum >> 32) as i32);
-    let low = (low >> twice | (high as u32) << (32 - twice)) as i32;
-    let high = high >> twice;
-    if high == low >> 31 {
-        ((low >> 1) + (low & 1)).clamp(i16::MIN.into(), i16::MAX.into()) as i16
-    } else if high < 0 {
-        i16::MIN
-    } else {
-        i16::MAX
-    }
-}
 
 /// Why a whitening cannot be learned.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -504,48 +358,4 @@ fn principal_axes(matrix: &Square, features: usize) -> Square {
             }
         })
     }
-}
-
-/// What a table knows of a texture at one movement: the mean of its whitened slides, and how many they were.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
-pub struct Whitened {
-    /// Slides, 255 for more.
-    pub slides: u8,
-    /// Their mean in steps of 1/256 standard deviation; 0 beyond the features of the table.
-    pub mean: [i16; MAX_FEATURES],
-}
-
-impl Whitened {
-    /// Slides that count at most when a texture is learned on the go: the mean follows what changes slowly. With the 8 of the
-    /// recipe it lags behind a real session's drift, until nothing passes the gate any more and the texture is lost; 3 was
-    /// chosen on one half of the materials and holds on the other (tests/fused_recipe.rs).
-    pub const MEMORY: u8 = 3;
-
-    /// Takes in a whitened slide in teaching: all have the same weight.
-    pub fn teach(&mut self, slide: &[i16]) {
-        self.follow(slide, self.slides);
-        self.slides = self.slides.saturating_add(1);
-    }
-
-    /// Takes in a whitened slide on the go.
-    pub fn adapt(&mut self, slide: &[i16]) {
-        self.follow(slide, self.slides.min(Self::MEMORY));
-        self.slides = self
-            .slides
-            .max(self.slides.saturating_add(1).min(Self::MEMORY));
-    }
-
-    fn follow(&mut self, slide: &[i16], before: u8) {
-        for (mean, z) in self.mean.iter_mut().zip(slide) {
-            let apart = f32::from(*z) - f32::from(*mean);
-            let step = libm::roundf(apart / (f32::from(before) + 1.0));
-            // between two numbers of the type
-            *mean = (f32::from(*mean) + step) as i16;
-        }
-    }
-}
-
-/// Steps of a whitened feature as standard deviations.
-pub fn white(steps: i16) -> f32 {
-    f32::from(steps) / WHITE_STEPS
 }

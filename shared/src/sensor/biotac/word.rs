@@ -4,7 +4,7 @@
 
 use core::fmt;
 
-use crate::pressure::Counts;
+use crate::sensor::pressure::Counts;
 
 /// Byte 0 of an error frame. Its parity is even, so no sample begins with it.
 const ERROR_FRAME: u8 = 0xA5;

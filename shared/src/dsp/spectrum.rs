@@ -9,21 +9,17 @@
 //! non-zero bins, so the mean only reaches bins 0 and 1 of each frame, and [`SpectrumSum::finish`] takes it out again by
 //! linearity.
 
-use core::array;
 use core::mem::MaybeUninit;
 use core::ops::Range;
 
+use microfft::Complex32;
 use microfft::complex::{cfft_32, cfft_64, cfft_128};
 use microfft::real::rfft_64;
 
-use crate::fir::cos_of_turns;
+use super::plan::{Angles, FRAME, Folded};
 use crate::kernels::Kernels;
-use crate::pressure::RATE_HZ;
+use crate::sensor::pressure::RATE_HZ;
 
-pub use microfft::Complex32;
-
-/// Samples in a frame.
-pub const FRAME: usize = 512;
 /// Samples from one frame to the next.
 pub const HOP: usize = 256;
 /// Bins of the single-sided spectrum, both ends included.
@@ -36,22 +32,6 @@ const WINDOW_POWER: f32 = 4.0 * FRAME as f32 * 3.0 / 8.0;
 /// Transform of the window itself at bins 0 and 1; it is 0 from bin 2 on.
 const WINDOW_BIN_0: f32 = FRAME as f32;
 const WINDOW_BIN_1: f32 = -(FRAME as f32) / 2.0;
-
-/// Cosine and sine of every 512th part of a turn in its first quarter: what the window and folding take.
-pub type Angles = [[f32; 2]; FRAME / 4];
-
-/// See [`Angles`].
-pub fn angles() -> Angles {
-    array::from_fn(|n| {
-        let turns = n as f64 / FRAME as f64;
-        // a sine is a cosine a quarter of a turn later
-        [turns, turns - 0.25].map(|turns| cos_of_turns(turns) as f32)
-    })
-}
-
-/// A frame that was folded: a complex number for every odd bin, then the reals that the even ones are the transform of, each
-/// with that half of them later.
-pub type Folded = [Complex32; FRAME / 2];
 
 /// Sums over frames: the power of every bin in counts^2, and the two complex bins that the mean of the slide reaches.
 #[derive(Clone, Debug)]
@@ -285,6 +265,7 @@ impl Spectrum {
 
 #[cfg(test)]
 mod tests {
+    use super::super::plan::angles;
     use super::*;
     use crate::kernels::Plain;
     use proptest::prelude::*;
@@ -306,15 +287,6 @@ mod tests {
                 .round() as i16
             })
             .collect()
-    }
-
-    #[test]
-    fn angles_are_those_of_libm() {
-        let turn = 2.0 * core::f64::consts::PI / FRAME as f64;
-        for (n, angle) in angles().into_iter().enumerate() {
-            let (sin, cos) = (turn * n as f64).sin_cos();
-            assert_eq!(angle, [cos as f32, sin as f32], "{n}");
-        }
     }
 
     #[test]

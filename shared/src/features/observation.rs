@@ -1,19 +1,11 @@
-//! All that a slide says at once: the features of the fused way of deciding, in fixed point, and the space in which their
-//! scatter within a texture is 1 in every direction.
-//!
-//! The paper looks at one property per slide. Taking all of them together, and the spectrum in bands beside them, needs
-//! their covariance; five trials of one texture do not give it, but those of all textures together do.
+//! All that a slide says at once: the features of the fused way of deciding, in fixed point.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::features::{FUSED_BANDS, Measurement, Properties, Property, PropertySet};
+use super::property::{Properties, Property, PropertySet};
+use super::slide::{FUSED_BANDS, Measurement};
 use crate::up_to;
-
-mod whitening;
-
-pub use whitening::{Scatter, WhitenError, Whitened, Whitening, white, whiten};
-pub(crate) use whitening::{View, oas};
 
 /// Most features of a slide.
 pub const MAX_FEATURES: usize = 14;
@@ -153,4 +145,4 @@ pub fn fixed(feature: f32) -> Option<i16> {
 }
 
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;

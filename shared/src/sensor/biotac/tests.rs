@@ -13,8 +13,8 @@ use embedded_hal_mock::eh1::delay::{CheckedDelay, Transaction as Delay};
 use embedded_hal_mock::eh1::spi::{Mock, Transaction as Spi};
 
 use super::*;
-use crate::pressure::{Calibration, Counts};
-use crate::sensor::{Driver, Error};
+use crate::sensor::driver::{Driver, Error, PressureSensor};
+use crate::sensor::pressure::{self, Calibration, Counts, Pressure};
 
 type MockDriver = Driver<BioTac, Mock<u8>, CheckedDelay>;
 
@@ -394,7 +394,7 @@ fn a_timer_can_split_the_exchange() {
         Spi::transaction_end(),
     ];
     let mut spi = Mock::new(&bus);
-    let samples = split::<crate::mcp3202::Mcp3202>(&mut spi, &[pdc]);
+    let samples = split::<crate::sensor::mcp3202::Mcp3202>(&mut spi, &[pdc]);
     spi.done();
     assert_eq!(samples[0].unwrap().counts.get(), 2593);
 }

@@ -1,11 +1,10 @@
-//! Exploratory movements: a contact force and a sliding speed (eq. 20-22), and what a slide takes of the skin.
+//! Exploratory movements: a contact force and a sliding speed (eq. 20-22), and how much it wears the skin.
 
 use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
 // until all users have the new path
-pub use crate::rig::slide_path::SlidePath;
 
 /// One exploratory movement: the contact force that is set before the slide and the speed of the slide.
 ///

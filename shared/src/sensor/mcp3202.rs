@@ -2,7 +2,7 @@
 //!
 //! A piezoresistive transducer, a gain of 10 for P_DC, a band-pass of 10-1040 Hz and a further gain of 99.1 for P_AC
 //! around 1.65 V (Methods, "BioTac"), and a Microchip MCP3202 on 3.3 V that measures both: P_AC on channel 0, P_DC on
-//! channel 1. Counts are then the BioTac's, and [`Calibration::PAPER`](crate::pressure::Calibration::PAPER) is where the
+//! channel 1. Counts are then the BioTac's, and [`Calibration::PAPER`](crate::sensor::pressure::Calibration::PAPER) is where the
 //! calibration starts.
 //!
 //! The converter samples while it is read (data sheet DS21034, 5.1), the BioTac when it is asked: in split use the two
@@ -11,8 +11,8 @@
 use core::fmt;
 use core::ops::RangeInclusive;
 
-use crate::pressure::{Channel, Counts, Pressure};
-use crate::sensor::{Exchange, PressureSensor};
+use crate::sensor::driver::{Exchange, PressureSensor};
+use crate::sensor::pressure::{Channel, Counts, Pressure};
 
 /// An MCP3202 as a [`PressureSensor`].
 #[derive(Clone, Copy, Debug)]
@@ -72,8 +72,8 @@ impl core::error::Error for NullBit {}
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pressure::Calibration;
-    use crate::sensor::{Driver, Error};
+    use crate::sensor::driver::{Driver, Error};
+    use crate::sensor::pressure::Calibration;
     use embedded_hal_mock::eh1::delay::{CheckedDelay, Transaction as Delay};
     use embedded_hal_mock::eh1::spi::{Mock, Transaction as Spi};
     use std::{string::ToString, vec, vec::Vec};
@@ -173,7 +173,7 @@ mod tests {
         let exchange = Mcp3202::exchange(Channel::Pac);
         assert_eq!(exchange.command, None);
         let read_us = 24 * 1_000_000 / Mcp3202::CLOCK_HZ.end();
-        let slot_us = 1_000_000 / crate::pressure::SLOTS_HZ;
+        let slot_us = 1_000_000 / crate::sensor::pressure::SLOTS_HZ;
         assert!(read_us + exchange.rest_us < slot_us);
     }
 }

@@ -1,8 +1,8 @@
 //! Sampling commands, their timing, and the order in which channels are sampled.
 
 use super::word::with_parity;
-use crate::pressure;
-use crate::sensor::Exchange;
+use crate::sensor::driver::Exchange;
+use crate::sensor::pressure;
 
 /// Shortest time between a command and the read of its answer, us (SPM 8.3.1.1). Earlier, the answer is an error frame.
 pub const GAP_US: u32 = 50;

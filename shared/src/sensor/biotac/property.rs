@@ -9,10 +9,10 @@ use embedded_hal::spi::SpiDevice;
 use embedded_hal_async::delay::DelayNs as AsyncDelayNs;
 use embedded_hal_async::spi::SpiDevice as AsyncSpiDevice;
 
-use super::BioTac;
 use super::command::{GAP_US, REST_US};
+use super::finger::BioTac;
 use super::word::{ErrorCode, WordError, decode};
-use crate::sensor::{Driver, Error, Exchange};
+use crate::sensor::driver::{Driver, Error, Exchange};
 
 /// A property that can be read (HDR). The discriminant is its code.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]

@@ -119,7 +119,7 @@ impl fmt::Display for Diagnosis {
 mod tests {
     use super::super::word::{BadParity, ErrorCode, decode, encode};
     use super::*;
-    use crate::pressure::Counts;
+    use crate::sensor::pressure::Counts;
     use std::string::ToString;
 
     const PARITY: WordError = WordError::Parity(BadParity::Byte0);

@@ -9,6 +9,7 @@
 //! command, at least 50 us with chip select high, and a two-byte read (SPM 8.3.1.1).
 
 mod command;
+mod finger;
 mod link;
 mod property;
 #[cfg(test)]
@@ -16,33 +17,7 @@ mod tests;
 mod word;
 
 pub use command::{Channel, FULL_FRAME, GAP_US, PRESSURE_SLOTS, READ_MOSI, REST_US};
+pub use finger::BioTac;
 pub use link::{Diagnosis, WordStats};
 pub use property::{Ascii, Identity, IdentityBytes, Property, PropertyError};
 pub use word::{BadParity, ErrorCode, WordError, decode, encode, encode_error};
-
-use core::ops::RangeInclusive;
-
-use crate::pressure::{self, Pressure};
-use crate::sensor::{Exchange, PressureSensor};
-
-/// A BioTac as a [`PressureSensor`]. Its other channels are read with [`Channel::exchange`] and [`decode`].
-#[derive(Clone, Copy, Debug)]
-pub struct BioTac;
-
-impl PressureSensor for BioTac {
-    type Reply = [u8; 2];
-    type Error = WordError;
-    /// SPM 8.2 and HDR; 1, 3 and 4.4 MHz are used in the field.
-    const CLOCK_HZ: RangeInclusive<u32> = 500_000..=10_000_000;
-    /// The maker's library waits this long (LIB).
-    const POWER_UP_MS: u32 = 100;
-
-    fn exchange(channel: pressure::Channel) -> Exchange<[u8; 2]> {
-        Channel::from(channel).exchange()
-    }
-
-    fn decode(channel: pressure::Channel, reply: [u8; 2]) -> Result<Pressure, WordError> {
-        let counts = decode(reply)?;
-        Ok(Pressure { channel, counts })
-    }
-}

@@ -1,0 +1,256 @@
+//! What every slide needs and no slide changes: the coefficients of the band-pass, and the angles of window and transform.
+
+use core::array;
+use core::f64::consts::{PI, TAU};
+
+use microfft::Complex32;
+
+use crate::sensor::pressure::RATE_HZ;
+
+/// Number of coefficients of the 66th-order filter.
+pub const TAPS: usize = 67;
+/// Edges of the pass band in Hz, the range of the Pacinian corpuscles that the paper imitates.
+pub const PASS_BAND_HZ: (f64, f64) = (20.0, 700.0);
+
+/// Samples before the one that an output is for.
+pub(crate) const HISTORY: usize = TAPS - 1;
+/// Pairs of coefficients that cover all of them from an even sample on, and from an odd one.
+pub const PAIRS: usize = TAPS.div_ceil(2);
+
+/// Samples in a frame.
+pub const FRAME: usize = 512;
+
+/// What every slide needs and no slide changes: the filter's coefficients, and the angles of window and transform.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    taps: Taps,
+    angles: Angles,
+}
+
+impl Plan {
+    /// Computes both; once per boot is enough.
+    pub fn new() -> Self {
+        Self {
+            taps: Taps::band_pass(),
+            angles: angles(),
+        }
+    }
+
+    /// The filter's coefficients.
+    pub fn taps(&self) -> &Taps {
+        &self.taps
+    }
+
+    /// What the spectrum takes.
+    pub fn angles(&self) -> &Angles {
+        &self.angles
+    }
+}
+
+impl Default for Plan {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Coefficients of the band-pass in Q15, newest sample first. They are symmetric: the filter has linear phase.
+#[derive(Clone, Debug)]
+pub struct Taps {
+    taps: [i16; TAPS],
+    pairs: [[u32; 2]; PAIRS],
+}
+
+impl Taps {
+    /// Designs the band-pass: the ideal response, cut by a Hamming window and scaled to gain 1 in the middle of the band.
+    pub fn band_pass() -> Self {
+        let (low, high) = (
+            PASS_BAND_HZ.0 / f64::from(RATE_HZ),
+            PASS_BAND_HZ.1 / f64::from(RATE_HZ),
+        );
+        let middle = low + high;
+        // both of one tap at `m` samples from the centre; frequencies in cycles per sample
+        let windowed = |n: usize| {
+            let m = n as f64 - HISTORY as f64 / 2.0;
+            let ideal = |f: f64| {
+                if m == 0.0 {
+                    2.0 * f
+                } else {
+                    // a sine is a cosine a quarter of a turn later
+                    cos_of_turns(f * m - 0.25) / (PI * m)
+                }
+            };
+            let hamming = 0.54 - 0.46 * cos_of_turns(n as f64 / HISTORY as f64);
+            ((ideal(high) - ideal(low)) * hamming, m)
+        };
+        let gain: f64 = (0..TAPS)
+            .map(windowed)
+            .map(|(h, m)| h * cos_of_turns(middle * m / 2.0))
+            .sum();
+        let mut taps = [0; TAPS];
+        for (n, tap) in taps.iter_mut().enumerate() {
+            *tap = libm::round(windowed(n).0 / gain * 32768.0) as i16;
+        }
+        let mut pairs = [[0; 2]; PAIRS];
+        let at = |n: Option<usize>| n.and_then(|n| taps.iter().rev().nth(n)).copied();
+        let word = |low: Option<i16>, high: Option<i16>| {
+            let half = |tap: Option<i16>| u32::from(tap.unwrap_or(0) as u16);
+            half(low) | half(high) << 16
+        };
+        for (pair, n) in pairs.iter_mut().zip((0..).step_by(2)) {
+            *pair = [
+                word(at(Some(n)), at(Some(n + 1))),
+                word(at(n.checked_sub(1)), at(Some(n))),
+            ];
+        }
+        Self { taps, pairs }
+    }
+
+    /// The coefficients in Q15, newest sample first.
+    pub fn as_slice(&self) -> &[i16; TAPS] {
+        &self.taps
+    }
+
+    /// The coefficients in Q15, oldest sample first.
+    pub(crate) fn reversed(&self) -> impl Iterator<Item = &i16> {
+        self.taps.iter().rev()
+    }
+
+    /// The same two to a word, the older sample's in the low half, for kernels that multiply pairs of samples. Of each two
+    /// words the first is for an output whose oldest sample is the first of a pair, the other for the output after it, which
+    /// begins with the second of that pair.
+    pub fn pairs(&self) -> &[[u32; 2]; PAIRS] {
+        &self.pairs
+    }
+}
+
+/// Cosine of an angle in turns, fewer than 2^31 of them. That of `libm` takes angles of any size in radians, and 5 KB of flash
+/// to tell how many turns they are.
+pub(crate) fn cos_of_turns(turns: f64) -> f64 {
+    let turns = if turns < 0.0 { -turns } else { turns };
+    let part = turns - f64::from(turns as u32);
+    // to an eighth of a turn, where the series below are as good as f64 is
+    let half = if part > 0.5 { 1.0 - part } else { part };
+    let (quarter, sign) = if half > 0.25 {
+        (0.5 - half, -1.0)
+    } else {
+        (half, 1.0)
+    };
+    let series = |x: f64, first: u32| {
+        // 1 - x^2 / ((first + 1) (first + 2)) (1 - x^2 / ((first + 3) (first + 4)) (1 - ...
+        (0..9).rev().fold(1.0, |sum, term| {
+            let n = f64::from(first + 2 * term);
+            1.0 - x * x / ((n + 1.0) * (n + 2.0)) * sum
+        })
+    };
+    if quarter <= 0.125 {
+        sign * series(TAU * quarter, 0)
+    } else {
+        let x = TAU * (0.25 - quarter);
+        sign * x * series(x, 1)
+    }
+}
+
+/// Cosine and sine of every 512th part of a turn in its first quarter: what the window and folding take.
+pub type Angles = [[f32; 2]; FRAME / 4];
+
+/// See [`Angles`].
+pub fn angles() -> Angles {
+    array::from_fn(|n| {
+        let turns = n as f64 / FRAME as f64;
+        // a sine is a cosine a quarter of a turn later
+        [turns, turns - 0.25].map(|turns| cos_of_turns(turns) as f32)
+    })
+}
+
+/// A frame that was folded: a complex number for every odd bin, then the reals that the even ones are the transform of, each
+/// with that half of them later.
+pub type Folded = [Complex32; FRAME / 2];
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    /// |H(f)|, from the definition of a filter's response.
+    pub(in crate::dsp) fn gain(f_hz: f64) -> f64 {
+        let w = 2.0 * PI * f_hz / f64::from(RATE_HZ);
+        let (re, im) = Taps::band_pass().as_slice().iter().enumerate().fold(
+            (0.0, 0.0),
+            |(re, im), (n, &h)| {
+                let h = f64::from(h) / 32768.0;
+                (re + h * (w * n as f64).cos(), im - h * (w * n as f64).sin())
+            },
+        );
+        re.hypot(im)
+    }
+
+    #[test]
+    fn angles_are_those_of_libm() {
+        let turn = 2.0 * core::f64::consts::PI / FRAME as f64;
+        for (n, angle) in angles().into_iter().enumerate() {
+            let (sin, cos) = (turn * n as f64).sin_cos();
+            assert_eq!(angle, [cos as f32, sin as f32], "{n}");
+        }
+    }
+
+    #[test]
+    fn cosine_of_turns_is_libms() {
+        for n in -4000..4000 {
+            let turns = f64::from(n) / 1024.0 + 1e-3;
+            let cos = libm::cos(TAU * turns);
+            assert!((cos_of_turns(turns) - cos).abs() < 4e-15, "{turns}");
+        }
+        for (turns, cos) in [
+            (0.0, 1.0),
+            (0.25, 0.0),
+            (-0.5, -1.0),
+            (0.75, 0.0),
+            (7.0, 1.0),
+        ] {
+            assert_eq!(cos_of_turns(turns), cos);
+        }
+    }
+
+    #[test]
+    fn the_taps_are_those_of_the_formula_with_libm() {
+        let [low, high] = [20.0 / 2200.0, 700.0 / 2200.0];
+        let response = |n: i32| {
+            let m = f64::from(n) - 33.0;
+            let ideal = |f: f64| match n {
+                33 => 2.0 * f,
+                _ => libm::sin(2.0 * PI * f * m) / (PI * m),
+            };
+            (ideal(high) - ideal(low)) * (0.54 - 0.46 * libm::cos(2.0 * PI * f64::from(n) / 66.0))
+        };
+        let gain: f64 = (0..67)
+            .map(|n| response(n) * libm::cos(PI * (low + high) * (f64::from(n) - 33.0)))
+            .sum();
+        let taps: Vec<i16> = (0..67)
+            .map(|n| libm::round(response(n) / gain * 32768.0) as i16)
+            .collect();
+        assert_eq!(Taps::band_pass().as_slice()[..], taps[..]);
+    }
+
+    #[test]
+    fn passes_20_to_700_hz() {
+        assert!((gain(360.0) - 1.0).abs() < 1e-3, "gain 1 in the middle");
+        for f in [100.0, 200.0, 330.0, 600.0] {
+            assert!((gain(f) - 1.0).abs() < 0.02, "{f} Hz: {}", gain(f));
+        }
+        for f in [770.0, 800.0, 1000.0, 1100.0] {
+            assert!(gain(f) < 0.01, "{f} Hz: {}", gain(f));
+        }
+        assert!((gain(700.0) - 0.5).abs() < 0.02, "half at the edge");
+        assert!(
+            (gain(0.0) - 0.41).abs() < 0.01,
+            "66th order is too short to stop DC: {}",
+            gain(0.0)
+        );
+    }
+
+    #[test]
+    fn coefficients_are_symmetric() {
+        let taps = Taps::band_pass();
+        assert!(taps.as_slice().iter().eq(taps.reversed()));
+    }
+}

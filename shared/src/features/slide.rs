@@ -1,0 +1,448 @@
+//! From the samples of one slide to its properties: traction (eq. 14), roughness (eq. 15, 16) and fineness (eq. 18, 19).
+//!
+//! Everything streams: a slide is taken in blocks of any size, and nothing but the final logarithms waits for its end.
+
+use core::fmt;
+use core::marker::PhantomData;
+use core::ops::Range;
+
+use super::property::Properties;
+use crate::dsp::{BandPower, FRAME, Plan, Spectrum, SpectrumSum, TAPS};
+use crate::kernels::{Kernels, Plain};
+
+/// Edges of eight bands from 20 to 1000 Hz in equal ratios, as half-open ranges of bins.
+pub const BAND_EDGES: [usize; 9] = [5, 8, 13, 21, 33, 54, 88, 143, 233];
+
+/// Number of bands of the fused way of deciding.
+pub const FUSED_BANDS: usize = 12;
+/// Their edges, from 17 to 1000 Hz in nearly equal ratios, as half-open ranges of bins.
+pub const FUSED_EDGES: [usize; FUSED_BANDS + 1] =
+    [4, 6, 8, 11, 16, 22, 31, 43, 60, 84, 118, 166, 233];
+/// Added to the mean power of a band of them, counts^2 per bin, before the logarithm: what rounding to whole counts adds to
+/// every bin, and a little more.
+const FUSED_FLOOR: f32 = 0.1;
+
+/// Least share of the background power that a texture's power can be told from it.
+///
+/// The power of noise measured over one second scatters by about 4 % (1360 degrees of freedom in the band), so what is
+/// left after the subtraction means nothing below that: 1/16 is one and a half standard deviations.
+const LEAST_OF_BACKGROUND: f32 = 1.0 / 16.0;
+/// Least power at all in counts^2: what rounding to whole counts adds.
+const LEAST_POWER: f32 = 1.0 / 12.0;
+
+/// Roughness (eq. 16) from the mean band-passed power of the slide and of the still finger, both in counts^2, and whether
+/// it is only an upper bound.
+///
+/// A smooth texture's power can come out below the background, where eq. 16 has no value. Power above the background is
+/// therefore taken to be at least a 16th of the background and at least 1/12 counts^2, the least that can be measured.
+pub fn roughness(power: f32, background: f32) -> (f32, bool) {
+    let least = (background * LEAST_OF_BACKGROUND).max(LEAST_POWER);
+    let above = power - background;
+    (libm::logf(above.max(least)), above < least)
+}
+
+/// Why a slide has no properties. A rig repeats such a slide.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum SlideError {
+    /// The steady window was never set.
+    NotStarted,
+    /// Samples arrived for only part of the steady window.
+    Unfinished {
+        /// Samples of P_AC inside the window.
+        got: u32,
+        /// Length of the window.
+        wanted: u32,
+    },
+    /// The steady window is shorter than one frame of the spectrum.
+    TooShort(u32),
+    /// The still finger was not measured before the slide, and its power is not known otherwise.
+    NoBackground,
+    /// P_AC does not move at all: no sensor, or one that hangs.
+    Silent,
+    /// So many samples between the background and the end of the slide were lost.
+    Gap(u32),
+}
+
+impl fmt::Display for SlideError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotStarted => f.write_str("the slide never reached its steady part"),
+            Self::Unfinished { got, wanted } => {
+                write!(
+                    f,
+                    "only {got} of {wanted} samples of the steady part arrived"
+                )
+            }
+            Self::TooShort(got) => {
+                write!(
+                    f,
+                    "the steady part has {got} samples, and the spectrum needs {FRAME}: slide longer or slower"
+                )
+            }
+            Self::NoBackground => {
+                f.write_str("the background of the still finger was not measured")
+            }
+            Self::Silent => f.write_str("P_AC never changed: is the sensor connected?"),
+            Self::Gap(lost) => write!(f, "{lost} samples were lost"),
+        }
+    }
+}
+
+impl core::error::Error for SlideError {}
+
+/// One slide while its samples arrive.
+///
+/// In this order: the still finger ([`Slide::push_still`], or [`Slide::set_background`] where its power is known), then
+/// [`Slide::start`], then the samples of the slide.
+#[derive(Clone, Debug)]
+pub struct Slide<'p, K = Plain> {
+    plan: &'p Plan,
+    still: BandPower,
+    still_samples: usize,
+    background: Option<f32>,
+    steady: Range<u32>,
+    position: u32,
+    power: BandPower,
+    spectrum: SpectrumSum,
+    shear_mn: i64,
+    shears: u32,
+    /// Sum of P_DC and of its squares, and their number.
+    pdc: (i64, u64, u32),
+    lost: u32,
+    kernels: PhantomData<K>,
+}
+
+impl<'p, K: Kernels> Slide<'p, K> {
+    /// A slide of which nothing has happened yet.
+    pub fn new(plan: &'p Plan) -> Self {
+        Self {
+            plan,
+            still: BandPower::default(),
+            still_samples: 0,
+            background: None,
+            steady: 0..0,
+            position: 0,
+            power: BandPower::default(),
+            spectrum: SpectrumSum::default(),
+            shear_mn: 0,
+            shears: 0,
+            pdc: (0, 0, 0),
+            lost: 0,
+            kernels: PhantomData,
+        }
+    }
+
+    /// P_AC of the pressed, still finger, in counts about its baseline: the background of eq. 16.
+    pub fn push_still(&mut self, samples: &[i16]) {
+        // the filter must have filled before its power counts
+        let fill = (TAPS - 1)
+            .saturating_sub(self.still_samples)
+            .min(samples.len());
+        let (fill, rest) = samples.split_at_checked(fill).unwrap_or((samples, &[]));
+        if !fill.is_empty() {
+            self.still.prime::<K>(self.plan.taps(), fill);
+        }
+        self.still.push::<K>(self.plan.taps(), rest);
+        self.still_samples = self.still_samples.saturating_add(samples.len());
+    }
+
+    /// The background in counts^2, where it is known from elsewhere.
+    pub fn set_background(&mut self, power: f32) {
+        self.background = Some(power);
+    }
+
+    /// The slide begins: the next P_AC sample has number 0, and those in `steady` are at constant speed.
+    pub fn start(&mut self, steady: Range<u32>) {
+        self.steady = steady;
+        self.position = 0;
+    }
+
+    /// P_AC of the slide in counts about the baseline of the still finger, gap-free from its start.
+    pub fn push(&mut self, samples: &[i16]) {
+        let end = self.position.saturating_add(samples.len() as u32);
+        let cut = |at: u32| at.clamp(self.position, end) - self.position;
+        let before = cut(self.steady.start) as usize;
+        let inside = cut(self.steady.end) as usize;
+        let steady = samples.get(before..inside).unwrap_or_default();
+        let before = samples.get(..before).unwrap_or_default();
+        if !before.is_empty() {
+            self.power.prime::<K>(self.plan.taps(), before);
+        }
+        self.power.push::<K>(self.plan.taps(), steady);
+        self.spectrum.push::<K>(self.plan.angles(), steady);
+        self.position = end;
+    }
+
+    /// Tangential force at constant speed in mN. A rig without force sensing never calls this.
+    pub fn push_shear(&mut self, samples_mn: &[i16]) {
+        self.shear_mn += samples_mn.iter().copied().map(i64::from).sum::<i64>();
+        self.shears += samples_mn.len() as u32;
+    }
+
+    /// P_DC at constant speed in counts about that of the lifted finger.
+    pub fn push_pdc(&mut self, samples: &[i16]) {
+        let (sum, squares, number) = &mut self.pdc;
+        for &counts in samples {
+            *sum += i64::from(counts);
+            *squares += u64::from(counts.unsigned_abs()) * u64::from(counts.unsigned_abs());
+        }
+        *number += samples.len() as u32;
+    }
+
+    /// So many samples were lost: nothing stands in for them, the slide has no properties.
+    pub fn lose(&mut self, samples: u32) {
+        self.lost = self.lost.saturating_add(samples);
+    }
+
+    /// The properties, when the steady part is over.
+    ///
+    /// # Errors
+    /// See [`SlideError`].
+    pub fn finish(mut self) -> Result<Measurement, SlideError> {
+        let wanted = self.steady.end.saturating_sub(self.steady.start);
+        let got = self.spectrum.samples();
+        if self.lost > 0 {
+            return Err(SlideError::Gap(self.lost));
+        }
+        if wanted == 0 {
+            return Err(SlideError::NotStarted);
+        }
+        if got < wanted {
+            return Err(SlideError::Unfinished { got, wanted });
+        }
+        let taps = self.plan.taps();
+        let (Some(power), Some(spectrum)) = (self.power.mean::<K>(taps), self.spectrum.finish())
+        else {
+            return Err(SlideError::TooShort(got));
+        };
+        let background = self
+            .background
+            .or_else(|| self.still.mean::<K>(taps))
+            .ok_or(SlideError::NoBackground)?;
+        let centroid_hz = spectrum.centroid_hz().ok_or(SlideError::Silent)?;
+        let (roughness, roughness_is_bound) = roughness(power, background);
+        let traction =
+            (self.shears > 0).then(|| (self.shear_mn as f64 / f64::from(self.shears) / 1e3) as f32);
+        Ok(Measurement {
+            properties: Properties::new([traction, Some(roughness), Some(libm::logf(centroid_hz))]),
+            roughness_is_bound,
+            pdc: mean_and_sd(self.pdc),
+            background,
+            spectrum,
+        })
+    }
+}
+
+/// Mean and standard deviation (n - 1) from sum, sum of squares and number; `None` of fewer than two.
+fn mean_and_sd((sum, squares, number): (i64, u64, u32)) -> Option<(f32, f32)> {
+    if number < 2 {
+        return None;
+    }
+    let (sum, squares, n) = (sum as f64, squares as f64, f64::from(number));
+    let variance = ((squares - sum * sum / n) / (n - 1.0)).max(0.0);
+    Some(((sum / n) as f32, libm::sqrt(variance) as f32))
+}
+
+/// What one slide says about a texture.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Measurement {
+    /// The paper's three properties.
+    pub properties: Properties,
+    /// The texture is at most this rough: its power is lost in the background (see [`roughness`]).
+    pub roughness_is_bound: bool,
+    /// Mean and standard deviation of P_DC during the slide in counts about the lifted finger's; `None` if it was not given.
+    pub pdc: Option<(f32, f32)>,
+    /// Power of the still finger in counts^2.
+    pub background: f32,
+    /// Averaged spectrum of the unfiltered P_AC, window mean removed.
+    pub spectrum: Spectrum,
+}
+
+impl Measurement {
+    /// Natural logarithms of the eight band powers of [`BAND_EDGES`] in counts^2 per bin, each with 0.001 added so that
+    /// silence has a value.
+    pub fn ln_bands(&self) -> [f32; BAND_EDGES.len() - 1] {
+        self.ln_powers(BAND_EDGES, 1e-3)
+    }
+
+    /// Natural logarithms of the twelve band powers of [`FUSED_EDGES`] in counts^2 per bin, each with 0.1 added: silence has
+    /// a value, and what is far below a count has hardly any.
+    pub fn fused_bands(&self) -> [f32; FUSED_BANDS] {
+        self.ln_powers(FUSED_EDGES, FUSED_FLOOR)
+    }
+
+    fn ln_powers<const EDGES: usize, const BANDS: usize>(
+        &self,
+        edges: [usize; EDGES],
+        floor: f32,
+    ) -> [f32; BANDS] {
+        let mut bands = [0.0; BANDS];
+        for (band, edges) in bands.iter_mut().zip(edges.windows(2)) {
+            if let &[low, high] = edges {
+                *band = libm::logf(self.spectrum.band(low..high) + floor);
+            }
+        }
+        bands
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::property::{Property, PropertySet};
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    /// Noise with a sine in it, as from a texture.
+    fn texture(n: usize) -> Vec<i16> {
+        let mut x = 7u32;
+        (0..n)
+            .map(|n| {
+                x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                ((x >> 26) as i16 - 32) + (200.0 * (n as f64 * 0.4).sin()) as i16
+            })
+            .collect()
+    }
+
+    fn measure(
+        samples: &[i16],
+        steady: Range<u32>,
+        cuts: &[usize],
+    ) -> Result<Measurement, SlideError> {
+        let plan = Plan::new();
+        let mut slide = Slide::<Plain>::new(&plan);
+        slide.set_background(2.0);
+        slide.start(steady);
+        let mut rest = samples;
+        for &n in cuts.iter().cycle() {
+            if rest.is_empty() {
+                break;
+            }
+            let (now, later) = rest.split_at(n.min(rest.len()));
+            slide.push(now);
+            rest = later;
+        }
+        slide.finish()
+    }
+
+    #[test]
+    fn band_edges_are_the_bins_of_equal_ratios() {
+        for (q, edge) in BAND_EDGES.into_iter().enumerate() {
+            let f = 20.0 * 50f64.powf(q as f64 / 8.0);
+            assert_eq!(edge, (f / (2200.0 / FRAME as f64)).ceil() as usize);
+        }
+    }
+
+    #[test]
+    fn roughness_below_the_background_is_a_bound() {
+        assert_eq!(roughness(102.0, 2.0), (libm::logf(100.0), false));
+        assert_eq!(
+            roughness(33.0, 32.0),
+            (libm::logf(2.0), true),
+            "a 16th of the background"
+        );
+        assert_eq!(roughness(1.0, 32.0), (libm::logf(2.0), true));
+        assert_eq!(roughness(34.0, 32.0), (libm::logf(2.0), false));
+        assert_eq!(roughness(0.0, 0.0), (libm::logf(1.0 / 12.0), true));
+        assert!(!roughness(0.1, 0.0).1);
+    }
+
+    #[test]
+    fn traction_is_the_mean_shear_and_missing_without_a_force_sensor() {
+        let samples = texture(1000);
+        assert_eq!(
+            measure(&samples, 100..900, &[100])
+                .unwrap()
+                .properties
+                .get(Property::Traction),
+            None
+        );
+        let plan = Plan::new();
+        let mut slide = Slide::<Plain>::new(&plan);
+        slide.set_background(0.0);
+        slide.start(0..1000);
+        slide.push(&samples);
+        slide.push_shear(&[100, 200]);
+        slide.push_shear(&[-30, 0]);
+        let p = slide.finish().unwrap().properties;
+        assert_eq!(p.get(Property::Traction), Some(0.0675));
+        assert_eq!(p.measured(), PropertySet::ALL);
+    }
+
+    #[test]
+    fn still_finger_gives_the_background_without_the_filters_start() {
+        let still = texture(2000);
+        let plan = Plan::new();
+        let background = |blocks: &[&[i16]]| {
+            let mut slide = Slide::<Plain>::new(&plan);
+            for block in blocks {
+                slide.push_still(block);
+            }
+            slide.start(0..1000);
+            slide.push(&texture(1000));
+            slide.finish().map(|m| m.background)
+        };
+        let whole = background(&[&still]).unwrap();
+        // the definition: outputs of the filter from the 67th sample on
+        let mut power = BandPower::default();
+        power.prime::<Plain>(plan.taps(), &still[..66]);
+        power.push::<Plain>(plan.taps(), &still[66..]);
+        assert_eq!(Some(whole), power.mean::<Plain>(plan.taps()));
+        assert_eq!(
+            background(&[&still[..20], &still[20..50], &still[50..]]),
+            Ok(whole)
+        );
+        assert_eq!(background(&[&still[..66]]), Err(SlideError::NoBackground));
+        assert_eq!(background(&[]), Err(SlideError::NoBackground));
+    }
+
+    #[test]
+    fn an_incomplete_slide_has_no_properties() {
+        let samples = texture(2000);
+        assert_eq!(
+            measure(&samples, 100..2001, &[2000]),
+            Err(SlideError::Unfinished {
+                got: 1900,
+                wanted: 1901
+            })
+        );
+        assert_eq!(
+            measure(&samples, 100..611, &[2000]),
+            Err(SlideError::TooShort(511))
+        );
+        assert!(measure(&samples, 100..612, &[2000]).is_ok());
+        assert_eq!(
+            measure(&samples, 0..0, &[2000]),
+            Err(SlideError::NotStarted)
+        );
+        assert_eq!(
+            measure(&[0; 2000], 0..2000, &[2000]),
+            Err(SlideError::Silent)
+        );
+    }
+
+    #[test]
+    fn what_lies_outside_the_steady_part_only_fills_the_filter() {
+        let mut samples = texture(3000);
+        let clean = measure(&samples, 500..2500, &[3000]).unwrap();
+        samples[..434].fill(2000);
+        samples[2500..].fill(-2000);
+        assert_eq!(measure(&samples, 500..2500, &[3000]).unwrap(), clean);
+        samples[434] = 2000;
+        assert_ne!(
+            measure(&samples, 500..2500, &[3000]).unwrap().properties,
+            clean.properties,
+            "66 samples of memory"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn properties_do_not_depend_on_the_blocks(cuts in proptest::collection::vec(1usize..700, 1..12), start in 0u32..600, length in 512u32..1400) {
+            let samples = texture(2000);
+            let whole = measure(&samples, start..start + length, &[2000]);
+            prop_assert!(whole.is_ok());
+            prop_assert_eq!(measure(&samples, start..start + length, &cuts), whole);
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! The binary form of a table (see the [room's page](crate::table)): its sizes, its contents, and what can be wrong with it.
+
+use core::fmt;
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+use heapless::String;
+use serde::{Deserialize, Serialize};
+
+use super::whitening::Whitening;
+use crate::features::{FeatureSet, MovementError, Property, PropertySet};
+
+pub(super) const MAGIC: [u8; 4] = *b"TACT";
+/// Version of the binary form that this code reads and writes.
+pub const VERSION: u16 = 3;
+pub(super) const GAUSSIANS: u8 = 0;
+pub(super) const FUSED: u8 = 1;
+pub(super) const HEADER: usize = 16;
+pub(super) const MOVEMENT_BYTES: usize = 6;
+pub(super) const PROPERTIES: usize = Property::ALL.len();
+pub(super) const CELL_BYTES: usize = 4;
+pub(super) const CRC_BYTES: usize = 4;
+pub(super) const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// Most movements in a table: the whole grid of the pilot study.
+pub const MAX_MOVEMENTS: usize = 36;
+/// Most actions of a table.
+pub const MAX_ACTIONS: usize = MAX_MOVEMENTS * PROPERTIES;
+/// Most textures of a probe's table.
+pub const MAX_TEXTURES: usize = 128;
+
+/// Name of a texture.
+pub type Name = String<40>;
+
+/// What an exploration does next: makes one of the table's movements and looks at one property of it, or at all that the
+/// slide says.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+pub struct Action {
+    /// Index of the movement in the table.
+    pub movement: u8,
+    /// The property looked at; `None` for all that the slide says.
+    pub property: Option<Property>,
+}
+
+impl Action {
+    /// The property looked at, in words.
+    pub const fn what(self) -> &'static str {
+        match self.property {
+            Some(property) => property.name(),
+            None => "all",
+        }
+    }
+}
+
+/// What a table knows of a texture.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Contents {
+    /// A Gaussian per (movement, property), of these properties.
+    Gaussians(PropertySet),
+    /// The whitened mean of this many features per movement.
+    Fused(FeatureSet, u8),
+}
+
+/// From whom a texture was learned, in slides; 255 for more.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+pub struct Tally {
+    /// From whoever made the table.
+    pub factory: u8,
+    /// From the user, by teaching or by an answer.
+    pub user: u8,
+    /// From the probe's own certain verdicts.
+    pub itself: u8,
+}
+
+/// Why bytes are no texture table.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum TableError {
+    /// Fewer bytes than the table needs.
+    Truncated {
+        /// Bytes there are.
+        got: usize,
+        /// Bytes that are needed.
+        wanted: usize,
+    },
+    /// It does not begin with `TACT`.
+    Magic([u8; 4]),
+    /// Written by another version.
+    Version(u16),
+    /// A way of deciding that this version does not know.
+    Method(u8),
+    /// The length in the header does not fit what it holds.
+    Length {
+        /// What the header says.
+        header: usize,
+        /// What the contents take.
+        contents: usize,
+    },
+    /// The checksum differs: the bytes have changed since they were written.
+    Crc {
+        /// Stored checksum.
+        stored: u32,
+        /// Checksum of the bytes.
+        computed: u32,
+    },
+    /// No texture, no movement or no property, too many movements or features, or a reserved byte that is not 0.
+    Header,
+    /// A movement that no rig makes.
+    Movement(u8, MovementError),
+    /// The same movement twice.
+    TwinMovement(u8),
+    /// A standard deviation of 0 where there are trials to have one.
+    Deviation {
+        /// Index of the texture.
+        texture: u16,
+        /// The action concerned.
+        action: Action,
+    },
+    /// A whitening that cannot be one.
+    Whitening(u8),
+    /// A name that is empty, not UTF-8, or another texture's as well.
+    Name(u16),
+    /// A texture has the number of another one.
+    Number(u16),
+}
+
+impl fmt::Display for TableError {
+    #[inline]
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Truncated { got, wanted } => write!(f, "truncated: {got} bytes of {wanted}"),
+            // by hand: printing lists for debugging takes the chip 1 KB
+            Self::Magic([a, b, c, d]) => write!(
+                f,
+                "not a texture table: it begins with [{a:02x}, {b:02x}, {c:02x}, {d:02x}], not `TACT`"
+            ),
+            Self::Version(found) => {
+                write!(
+                    f,
+                    "version {found}, and this program reads version {VERSION}: learn the table anew"
+                )
+            }
+            Self::Method(found) => write!(f, "method {found} is unknown to this program"),
+            Self::Length { header, contents } => {
+                write!(
+                    f,
+                    "the header says {header} bytes, the contents take {contents}"
+                )
+            }
+            Self::Crc { stored, computed } => {
+                write!(
+                    f,
+                    "damaged: checksum {computed:08x}, and {stored:08x} was written"
+                )
+            }
+            Self::Header => {
+                f.write_str("the header counts no textures, movements or properties, or too many")
+            }
+            Self::Movement(index, why) => write!(f, "movement {}: {why}", index + 1),
+            Self::TwinMovement(index) => write!(f, "movement {} is there twice", index + 1),
+            Self::Deviation { texture, action } => write!(
+                f,
+                "texture {}, movement {}, {}: trials, but no standard deviation",
+                texture + 1,
+                action.movement + 1,
+                action.what()
+            ),
+            Self::Whitening(index) => {
+                write!(f, "the whitening of movement {} is damaged", index + 1)
+            }
+            Self::Number(texture) => {
+                write!(f, "texture {} has another's number", texture + 1)
+            }
+            Self::Name(texture) => {
+                write!(
+                    f,
+                    "the name of texture {} is empty, not UTF-8, or another's as well",
+                    texture + 1
+                )
+            }
+        }
+    }
+}
+
+impl core::error::Error for TableError {}
+
+/// Bytes of a texture's number and tally.
+pub(super) const LABEL_BYTES: usize = 5;
+
+/// Where the parts of a table begin.
+pub(super) struct Layout {
+    pub(super) whitenings: usize,
+    pub(super) cells: usize,
+    pub(super) trials: usize,
+    pub(super) lineage: usize,
+    pub(super) labels: usize,
+    pub(super) names: usize,
+}
+
+impl Contents {
+    /// Bytes of a movement's whitening, and of a texture's cells at a movement.
+    pub(super) const fn sizes(self) -> (usize, usize) {
+        match self {
+            Self::Gaussians(_) => (0, PROPERTIES * CELL_BYTES),
+            Self::Fused(_, features) => {
+                (Whitening::bytes(features as usize), 2 * features as usize)
+            }
+        }
+    }
+
+    pub(super) const fn layout(self, textures: usize, movements: usize) -> Layout {
+        let (whitening, cell) = self.sizes();
+        let whitenings = HEADER + movements * MOVEMENT_BYTES;
+        let cells = whitenings + movements * whitening;
+        let trials = cells + textures * movements * cell;
+        let lineage = trials + textures * movements;
+        let labels = lineage + 4;
+        Layout {
+            whitenings,
+            cells,
+            trials,
+            lineage,
+            labels,
+            names: labels + textures * LABEL_BYTES,
+        }
+    }
+
+    /// The three bytes of the header that say so.
+    pub(super) const fn codes(self) -> [u8; 3] {
+        match self {
+            Self::Gaussians(measured) => [GAUSSIANS, measured.bits(), 0],
+            Self::Fused(set, features) => [FUSED, set as u8, features],
+        }
+    }
+
+    pub(super) fn from_codes([contents, what, features]: [u8; 3]) -> Result<Self, TableError> {
+        match contents {
+            GAUSSIANS => PropertySet::from_bits(what)
+                .filter(|set| !set.is_empty() && features == 0)
+                .map(Self::Gaussians),
+            FUSED => FeatureSet::ALL
+                .get(usize::from(what))
+                .filter(|set| set.allows(features.into()))
+                .map(|set| Self::Fused(*set, features)),
+            other => return Err(TableError::Method(other)),
+        }
+        .ok_or(TableError::Header)
+    }
+}
+
+pub(super) fn array<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {
+    bytes.get(at..)?.first_chunk().copied()
+}

@@ -1,0 +1,472 @@
+//! Reading a table where it is stored.
+
+use super::format::{
+    Action, CELL_BYTES, CRC_BYTES, CRC32, Contents, HEADER, LABEL_BYTES, Layout, MAGIC,
+    MAX_MOVEMENTS, MOVEMENT_BYTES, TableError, Tally, VERSION, array,
+};
+use super::gaussian::{Gaussian, Gaussians, SD_STEP, mean_step};
+use super::training_stats::{Experience, Whitened};
+use super::whitening::{Column, View, Whitening};
+use crate::features::{MAX_FEATURES, Movement, Property, PropertySet, Vector};
+
+/// A checked texture table, borrowed from where it is stored.
+#[derive(Clone, Copy, Debug)]
+pub struct Table<'a> {
+    pub(super) bytes: &'a [u8],
+    pub(super) textures: u16,
+    pub(super) movements: u8,
+    pub(super) contents: Contents,
+}
+
+impl<'a> Table<'a> {
+    /// Checks the table at the beginning of `bytes` and borrows it; what follows it is left alone.
+    ///
+    /// # Errors
+    /// The first check that failed.
+    #[inline]
+    pub fn read(bytes: &'a [u8]) -> Result<Self, TableError> {
+        let truncated = |wanted| TableError::Truncated {
+            got: bytes.len(),
+            wanted,
+        };
+        let header: &[u8; HEADER] = bytes.first_chunk().ok_or(truncated(HEADER))?;
+        let [
+            m0,
+            m1,
+            m2,
+            m3,
+            v0,
+            v1,
+            code,
+            what,
+            l0,
+            l1,
+            l2,
+            l3,
+            t0,
+            t1,
+            movements,
+            features,
+        ] = *header;
+        if [m0, m1, m2, m3] != MAGIC {
+            return Err(TableError::Magic([m0, m1, m2, m3]));
+        }
+        let version = u16::from_le_bytes([v0, v1]);
+        if version != VERSION {
+            return Err(TableError::Version(version));
+        }
+        let length = u32::from_le_bytes([l0, l1, l2, l3]) as usize;
+        let bytes = bytes.get(..length).ok_or(truncated(length))?;
+        let (body, stored) = bytes.split_last_chunk().ok_or(TableError::Length {
+            header: length,
+            contents: HEADER,
+        })?;
+        let (stored, computed) = (u32::from_le_bytes(*stored), CRC32.checksum(body));
+        if stored != computed {
+            return Err(TableError::Crc { stored, computed });
+        }
+        let contents = Contents::from_codes([code, what, features])?;
+        let textures = u16::from_le_bytes([t0, t1]);
+        if textures == 0 || movements == 0 || usize::from(movements) > MAX_MOVEMENTS {
+            return Err(TableError::Header);
+        }
+        let table = Self {
+            bytes,
+            textures,
+            movements,
+            contents,
+        };
+        table.check()?;
+        Ok(table)
+    }
+
+    #[inline]
+    fn check(&self) -> Result<(), TableError> {
+        let mut at = self.layout().names;
+        let length = |end| TableError::Length {
+            header: self.bytes.len(),
+            contents: end + CRC_BYTES,
+        };
+        if at + CRC_BYTES > self.bytes.len() {
+            return Err(length(at));
+        }
+        for index in 0..self.movements {
+            let (force_mn, speed_um_s) = self.stored_movement(index).ok_or(length(at))?;
+            let movement = Movement::new(force_mn, speed_um_s)
+                .map_err(|why| TableError::Movement(index, why))?;
+            if self.movements().take(index.into()).any(|m| m == movement) {
+                return Err(TableError::TwinMovement(index));
+            }
+        }
+        match self.contents {
+            Contents::Gaussians(measured) => self.check_deviations(measured)?,
+            Contents::Fused(..) => {
+                let broken = (0..self.movements).find(|&m| self.whitening(m).is_none());
+                broken.map_or(Ok(()), |m| Err(TableError::Whitening(m)))?;
+            }
+        }
+        for texture in 0..self.textures {
+            let number = self.number(texture);
+            if (0..texture).any(|other| self.number(other) == number) {
+                return Err(TableError::Number(texture));
+            }
+        }
+        for texture in 0..self.textures {
+            let (name, next) = self.name_at(at).map_err(length)?;
+            at = next;
+            let twin = || {
+                self.names()
+                    .take(texture.into())
+                    .any(|other| other.as_bytes() == name)
+            };
+            if name.is_empty() || core::str::from_utf8(name).is_err() || twin() {
+                return Err(TableError::Name(texture));
+            }
+        }
+        if at + CRC_BYTES != self.bytes.len() {
+            return Err(length(at));
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn check_deviations(&self, measured: PropertySet) -> Result<(), TableError> {
+        for texture in 0..self.textures {
+            for movement in (0..self.movements).filter(|&m| self.trials(texture, m) >= 2) {
+                for property in measured.iter() {
+                    let cell = self.cell(texture, movement, property);
+                    if cell.is_none_or(|(_, sd)| sd == 0) {
+                        let property = Some(property);
+                        let action = Action { movement, property };
+                        return Err(TableError::Deviation { texture, action });
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn layout(&self) -> Layout {
+        self.contents
+            .layout(self.textures.into(), self.movements.into())
+    }
+
+    fn stored_movement(&self, index: u8) -> Option<(u16, u32)> {
+        let at = HEADER + usize::from(index) * MOVEMENT_BYTES;
+        Some((
+            u16::from_le_bytes(array(self.bytes, at)?),
+            u32::from_le_bytes(array(self.bytes, at + 2)?),
+        ))
+    }
+
+    /// The bytes of a texture's cell at a movement.
+    pub(super) fn cell_bytes(&self, texture: u16, movement: u8) -> Option<&'a [u8]> {
+        if texture >= self.textures || movement >= self.movements {
+            return None;
+        }
+        let (_, cell) = self.contents.sizes();
+        let index = usize::from(texture) * usize::from(self.movements) + usize::from(movement);
+        self.bytes
+            .get(self.layout().cells + index * cell..)?
+            .get(..cell)
+    }
+
+    /// Stored mean and standard deviation of a property that was measured.
+    pub(super) fn cell(
+        &self,
+        texture: u16,
+        movement: u8,
+        property: Property,
+    ) -> Option<(i16, u16)> {
+        if !self.measured().contains(property) {
+            return None;
+        }
+        let cells = self.cell_bytes(texture, movement)?;
+        let [m0, m1, s0, s1] = array(cells, property.index() * CELL_BYTES)?;
+        Some((i16::from_le_bytes([m0, m1]), u16::from_le_bytes([s0, s1])))
+    }
+
+    /// The bytes of the name at `at`, and where the next one begins; the checksum is no name.
+    ///
+    /// # Errors
+    /// Where the name would end, were it there.
+    fn name_at(&self, at: usize) -> Result<(&'a [u8], usize), usize> {
+        let (body, _) = self.bytes.split_last_chunk::<CRC_BYTES>().ok_or(at)?;
+        let end = at + 1 + usize::from(*body.get(at).ok_or(at + 1)?);
+        Ok((body.get(at + 1..end).ok_or(end)?, end))
+    }
+
+    /// Number of textures.
+    pub fn textures(&self) -> u16 {
+        self.textures
+    }
+
+    /// What the table knows of a texture.
+    pub fn contents(&self) -> Contents {
+        self.contents
+    }
+
+    /// The properties that there are Gaussians of.
+    pub fn measured(&self) -> PropertySet {
+        match self.contents {
+            Contents::Gaussians(measured) => measured,
+            Contents::Fused(..) => PropertySet::default(),
+        }
+    }
+
+    /// The movements, in the order of [`Action::movement`].
+    pub fn movements(&self) -> impl ExactSizeIterator<Item = Movement> + use<'_, 'a> {
+        (0..self.movements).map(|index| {
+            self.movement(index).unwrap_or(Movement::FOR_ROUGHNESS) // `read` has checked them all
+        })
+    }
+
+    /// The movement with this index.
+    pub fn movement(&self, index: u8) -> Option<Movement> {
+        let (force_mn, speed_um_s) = self
+            .stored_movement(index)
+            .filter(|_| index < self.movements)?;
+        Movement::new(force_mn, speed_um_s).ok()
+    }
+
+    /// All (movement, property) pairs that there are Gaussians of, movement by movement, properties in the order of
+    /// [`Property::ALL`].
+    pub fn actions(&self) -> impl Iterator<Item = Action> + use<> {
+        let measured = self.measured();
+        (0..self.movements).flat_map(move |movement| {
+            measured.iter().map(move |property| Action {
+                movement,
+                property: Some(property),
+            })
+        })
+    }
+
+    /// The names, in the order of the textures' indices.
+    pub fn names(&self) -> impl Iterator<Item = &'a str> + Clone + use<'a> {
+        let table = *self;
+        let mut at = self.layout().names;
+        (0..self.textures).map_while(move |_| {
+            let (name, next) = table.name_at(at).ok()?;
+            at = next;
+            core::str::from_utf8(name).ok()
+        })
+    }
+
+    /// The name of a texture.
+    pub fn name(&self, texture: u16) -> Option<&'a str> {
+        self.names().nth(texture.into())
+    }
+
+    /// The texture with this name.
+    pub fn find(&self, name: &str) -> Option<u16> {
+        self.names()
+            .zip(0..)
+            .find_map(|(other, texture)| (other == name).then_some(texture))
+    }
+
+    /// Number of trials that a texture was learned from at a movement, 255 for more.
+    pub fn trials(&self, texture: u16, movement: u8) -> u8 {
+        if texture >= self.textures || movement >= self.movements {
+            return 0;
+        }
+        let at = self.layout().trials
+            + usize::from(texture) * usize::from(self.movements)
+            + usize::from(movement);
+        self.bytes.get(at).copied().unwrap_or(0)
+    }
+
+    /// What a property of a texture is expected to be; `None` where fewer than two trials were made, for a property that
+    /// was not measured, and outside the table.
+    pub fn gaussian(&self, texture: u16, action: Action) -> Option<Gaussian> {
+        if self.trials(texture, action.movement) < 2 {
+            return None;
+        }
+        let property = action.property?;
+        let (mean, sd) = self.cell(texture, action.movement, property)?;
+        Some(Gaussian {
+            mean: f32::from(mean) * mean_step(property),
+            sd: f32::from(sd) * SD_STEP,
+        })
+    }
+
+    /// [`Table::gaussian`] of every texture, for those who ask for many.
+    pub fn gaussians(&self, action: Action) -> Gaussians<'a> {
+        let movement = usize::from(action.movement);
+        let measured = action.property.filter(|p| self.measured().contains(*p));
+        let measured = measured.filter(|_| action.movement < self.movements);
+        let (_, cell) = self.contents.sizes();
+        let layout = self.layout();
+        let cells = measured.and_then(|property| {
+            let at = layout.cells + movement * cell + property.index() * CELL_BYTES;
+            self.bytes.get(at..layout.trials)
+        });
+        let (trials, movements) = self.trials_at(action.movement);
+        Gaussians {
+            cells: cells.unwrap_or_default(),
+            trials,
+            movements,
+            stride: cell * movements,
+            step: measured.map_or(0.0, mean_step),
+        }
+    }
+
+    /// [`Table::trials`] of every texture, the first at the beginning, and how far one is from the next; none outside the
+    /// table.
+    pub(super) fn trials_at(&self, movement: u8) -> (&'a [u8], usize) {
+        let layout = self.layout();
+        let at = layout.trials + usize::from(movement);
+        let trials = self.bytes.get(at..layout.lineage);
+        let trials = trials.filter(|_| movement < self.movements);
+        (trials.unwrap_or_default(), self.movements.into())
+    }
+
+    /// The whitened means at a movement; none in a table of Gaussians and outside the table.
+    pub(crate) fn column(&self, movement: u8) -> Column<'a> {
+        let (_, cell) = self.contents.sizes();
+        let at = self.layout().cells + usize::from(movement) * cell;
+        let means = match self.contents {
+            Contents::Fused(..) if movement < self.movements => {
+                self.bytes.get(at..self.layout().trials)
+            }
+            _ => None,
+        };
+        let (slides, movements) = self.trials_at(movement);
+        Column {
+            means: means.unwrap_or_default(),
+            stride: cell * movements,
+            slides,
+            movements,
+        }
+    }
+
+    /// What was learned of a texture at a movement, to go on from; what is in the table is rounded.
+    pub fn experience(&self, texture: u16, movement: u8) -> Experience {
+        let trials = self.trials(texture, movement);
+        if trials == 0 {
+            return Experience::default();
+        }
+        let mut experience = Experience {
+            trials,
+            ..Experience::default()
+        };
+        for (property, (mean, squares)) in Property::ALL
+            .into_iter()
+            .zip(experience.mean.iter_mut().zip(&mut experience.squares))
+        {
+            let (m, sd) = self.cell(texture, movement, property).unwrap_or_default();
+            let sd = f32::from(sd) * SD_STEP;
+            *mean = f32::from(m) * mean_step(property);
+            *squares = sd * sd * f32::from(trials - 1);
+        }
+        experience
+    }
+
+    /// How features are whitened at a movement; `None` in a table of Gaussians and outside the table.
+    pub fn whitening(&self, movement: u8) -> Option<Whitening> {
+        let (bytes, features) = self.whitening_bytes(movement)?;
+        Whitening::read(bytes, features)
+    }
+
+    /// The bytes of the whitening at a movement, and of how many features it is.
+    fn whitening_bytes(&self, movement: u8) -> Option<(&'a [u8], usize)> {
+        let Contents::Fused(_, features) = self.contents else {
+            return None;
+        };
+        if movement >= self.movements {
+            return None;
+        }
+        let length = Whitening::bytes(features.into());
+        let at = self.layout().whitenings + usize::from(movement) * length;
+        Some((self.bytes.get(at..)?.get(..length)?, features.into()))
+    }
+
+    /// The whitened mean of a texture at a movement, in steps of 1/256 standard deviation; none in a table of Gaussians and
+    /// outside the table.
+    pub fn white_mean(
+        &self,
+        texture: u16,
+        movement: u8,
+    ) -> impl ExactSizeIterator<Item = i16> + Clone + use<'a> {
+        let cells = match self.contents {
+            Contents::Fused(..) => self.cell_bytes(texture, movement).unwrap_or_default(),
+            Contents::Gaussians(_) => &[],
+        };
+        cells.chunks_exact(2).map(|pair| match pair {
+            &[low, high] => i16::from_le_bytes([low, high]),
+            _ => 0,
+        })
+    }
+
+    /// What was learned of a texture at a movement in a fused table, to go on from.
+    pub fn whitened(&self, texture: u16, movement: u8) -> Whitened {
+        let mut whitened = Whitened {
+            slides: self.trials(texture, movement),
+            mean: [0; MAX_FEATURES],
+        };
+        for (mean, stored) in whitened
+            .mean
+            .iter_mut()
+            .zip(self.white_mean(texture, movement))
+        {
+            *mean = stored;
+        }
+        whitened
+    }
+
+    /// Whitens features at a movement; `None` as [`Table::whitening`].
+    pub fn whiten(&self, movement: u8, features: &[i16]) -> Option<Vector> {
+        let (bytes, known) = self.whitening_bytes(movement)?;
+        Some(View::checked(bytes, known).apply(features))
+    }
+
+    fn label(&self, texture: u16) -> [u8; LABEL_BYTES] {
+        let at = self.layout().labels + usize::from(texture) * LABEL_BYTES;
+        let label = (texture < self.textures).then(|| array(self.bytes, at));
+        label.flatten().unwrap_or_default()
+    }
+
+    /// A texture's number, which stays its own when others are forgotten or it is renamed.
+    pub fn number(&self, texture: u16) -> u16 {
+        let [low, high, ..] = self.label(texture);
+        u16::from_le_bytes([low, high])
+    }
+
+    /// The number that one more texture gets.
+    pub fn next_number(&self) -> u16 {
+        let numbers = (0..self.textures).map(|texture| self.number(texture));
+        numbers.max().map_or(0, |most| most.wrapping_add(1))
+    }
+
+    /// The texture with this number.
+    pub fn numbered(&self, number: u16) -> Option<u16> {
+        (0..self.textures).find(|&texture| self.number(texture) == number)
+    }
+
+    /// From whom a texture was learned.
+    pub fn tally(&self, texture: u16) -> Tally {
+        let [_, _, factory, user, itself] = self.label(texture);
+        Tally {
+            factory,
+            user,
+            itself,
+        }
+    }
+
+    /// The checksum of the table that was in the beginning, before anything was taught: its own, if nothing was.
+    pub fn lineage(&self) -> u32 {
+        let stored = array(self.bytes, self.layout().lineage).map_or(0, u32::from_le_bytes);
+        if stored == 0 { self.crc() } else { stored }
+    }
+
+    /// The checksum, which also tells one table from another.
+    pub fn crc(&self) -> u32 {
+        self.bytes
+            .split_last_chunk()
+            .map_or(0, |(_, crc)| u32::from_le_bytes(*crc))
+    }
+
+    /// The table as stored.
+    pub fn as_bytes(&self) -> &'a [u8] {
+        self.bytes
+    }
+}

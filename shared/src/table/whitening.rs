@@ -1,0 +1,187 @@
+//! The space in which the slides of a texture scatter by 1 in every direction: from features to whitened features.
+//!
+//! The paper looks at one property per slide. Taking all features of a slide together needs their covariance; five trials of
+//! one texture do not give it, but those of all textures together do: [`super::whiten`].
+
+use heapless::Vec;
+
+use crate::features::{MAX_FEATURES, Vector, WHITE_STEPS};
+
+/// From features to whitened ones, z = W (x - g): canonical variates. W' W is the inverse of the covariance of slides within a
+/// texture, and the means of different textures are uncorrelated in z, those that scatter most first.
+///
+/// W is kept in whole numbers, row by row with a power of two of its own; means are learned through the same numbers, so
+/// their rounding adds no error.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Whitening {
+    pub(super) features: usize,
+    /// As a table has them: g, as features are (i16); binary places of each row (u8); the rows of W (i16).
+    pub(super) bytes: Vec<u8, { Self::bytes(MAX_FEATURES) }>,
+}
+
+impl Whitening {
+    /// Bytes that it takes in a table.
+    pub const fn bytes(features: usize) -> usize {
+        3 * features + 2 * features * features
+    }
+
+    /// Reads it from a table; `None` if these are not the bytes of one of so many features.
+    pub fn read(bytes: &[u8], features: usize) -> Option<Self> {
+        View::new(bytes, features)?;
+        let bytes = Vec::from_slice(bytes).ok()?;
+        Some(Self { features, bytes })
+    }
+
+    /// Its bytes.
+    pub fn as_bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// Number of features.
+    pub fn features(&self) -> usize {
+        self.features
+    }
+
+    /// Whitens the features of a slide; those that are missing count as the mean, those beyond the table's not at all.
+    pub fn apply(&self, features: &[i16]) -> Vector {
+        let view = View {
+            features: self.features,
+            bytes: &self.bytes,
+        };
+        view.apply(features)
+    }
+}
+
+/// A [`Whitening`] where its table lies: copying it takes as long as applying it.
+#[derive(Clone, Copy)]
+pub(crate) struct View<'b> {
+    features: usize,
+    bytes: &'b [u8],
+}
+
+impl<'b> View<'b> {
+    /// `None` if these are not the bytes of one of so many features.
+    pub(crate) fn new(bytes: &'b [u8], features: usize) -> Option<Self> {
+        if bytes.len() != Whitening::bytes(features) || features > MAX_FEATURES {
+            return None;
+        }
+        let view = Self { features, bytes };
+        let [_, places, _] = view.parts();
+        places.iter().all(|&p| p <= 30).then_some(view)
+    }
+
+    /// Of bytes that [`View::new`] has found to be one.
+    pub(crate) fn checked(bytes: &'b [u8], features: usize) -> Self {
+        Self { features, bytes }
+    }
+
+    /// g, places and rows.
+    fn parts(&self) -> [&'b [u8]; 3] {
+        let (mean, rest) = self
+            .bytes
+            .split_at_checked(2 * self.features)
+            .unwrap_or_default();
+        let (places, rows) = rest.split_at_checked(self.features).unwrap_or_default();
+        [mean, places, rows]
+    }
+
+    /// As [`Whitening::apply`].
+    pub(crate) fn apply(&self, features: &[i16]) -> Vector {
+        let [mean, places, rows] = self.parts();
+        // beyond 32 units all features are alike; those that the table does not have are 0
+        let mut apart = [[0; 2]; MAX_FEATURES / 2];
+        let known = features.iter().zip(mean.as_chunks().0);
+        for (apart, (x, g)) in apart.as_flattened_mut().iter_mut().zip(known) {
+            *apart = x.saturating_sub(i16::from_le_bytes(*g));
+        }
+        let apart = apart.map(pair);
+        let mut white = Vector::new();
+        let mut rest = rows;
+        for &places in places {
+            let sum = match rest.first_chunk::<{ 2 * MAX_FEATURES }>() {
+                // in steps that the compiler knows the number of; what follows the row is multiplied by 0
+                Some(row) => {
+                    let row = row.as_chunks().0.iter().map(|w| u32::from_le_bytes(*w));
+                    row.zip(apart).map(|(w, x)| dot(w, x)).sum()
+                }
+                // the last of a table
+                None => {
+                    let row = rest.chunks(4).map(|w| match *w {
+                        [a, b, c, d] => u32::from_le_bytes([a, b, c, d]),
+                        [a, b, ..] => u16::from_le_bytes([a, b]).into(),
+                        _ => 0,
+                    });
+                    row.zip(apart).map(|(w, x)| dot(w, x)).sum()
+                }
+            };
+            // there is room
+            let _ = white.push(rounded(sum, places));
+            rest = rest.get(2 * self.features..).unwrap_or_default();
+        }
+        white
+    }
+}
+
+/// Two numbers of 16 bits in a word, as the chip multiplies them.
+#[inline]
+fn pair([low, high]: [i16; 2]) -> u32 {
+    u32::from(high as u16) << 16 | u32::from(low as u16)
+}
+
+/// Sum of the products of two pairs.
+#[inline]
+fn dot(a: u32, b: u32) -> i64 {
+    let low = i32::from(a as i16) * i32::from(b as i16);
+    let high = ((a as i32) >> 16) * ((b as i32) >> 16);
+    i64::from(low) + i64::from(high)
+}
+
+/// Products of features, in 1/1024 of a unit, and weights of so many binary places, 30 at most, to the nearest 1/256.
+#[inline]
+fn rounded(sum: i64, places: u8) -> i16 {
+    // twice that, by shifts of 32 bits: those of 64 take the chip several
+    let twice = u32::from(places & 31) + 1;
+    let (low, high) = (sum as u32, (sum >> 32) as i32);
+    let low = (low >> twice | (high as u32) << (32 - twice)) as i32;
+    let high = high >> twice;
+    if high == low >> 31 {
+        ((low >> 1) + (low & 1)).clamp(i16::MIN.into(), i16::MAX.into()) as i16
+    } else if high < 0 {
+        i16::MIN
+    } else {
+        i16::MAX
+    }
+}
+
+/// Steps of a whitened feature as standard deviations.
+pub fn white(steps: i16) -> f32 {
+    f32::from(steps) / WHITE_STEPS
+}
+
+/// What all textures are like at a movement, whitened.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Column<'t> {
+    /// Means, the first at the beginning, numbers of 16 bits, little-endian; each begins `stride` bytes after the one before.
+    pub(crate) means: &'t [u8],
+    pub(crate) stride: usize,
+    /// Slides that they were learned from, each `movements` after the one before.
+    pub(crate) slides: &'t [u8],
+    pub(crate) movements: usize,
+}
+
+impl<'t> Column<'t> {
+    /// The bytes from the mean of a texture on.
+    #[inline]
+    pub(crate) fn mean(&self, texture: usize) -> &'t [u8] {
+        self.means.get(texture * self.stride..).unwrap_or_default()
+    }
+
+    /// How many slides a texture was learned from.
+    #[inline]
+    pub(crate) fn slides(&self, texture: usize) -> u8 {
+        self.slides
+            .get(texture * self.movements)
+            .copied()
+            .unwrap_or(0)
+    }
+}
