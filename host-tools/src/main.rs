@@ -1,11 +1,6 @@
 //! The command `tactus`.
 
-mod cli;
-mod commands;
-mod device;
-mod identify;
-mod manual;
-mod study_command;
+mod cmd;
 
 use std::process::ExitCode;
 
@@ -13,13 +8,13 @@ use std::process::ExitCode;
 const INTERRUPTED: u8 = 130;
 
 fn main() -> ExitCode {
-    match commands::run() {
+    match cmd::run() {
         Ok(()) => ExitCode::SUCCESS,
         // `tactus features | head` is no failure
         Err(why) if is_broken_pipe(&why) => ExitCode::SUCCESS,
         Err(why) => {
             eprintln!("error: {why:#}");
-            match why.downcast_ref::<device::BenchError>() {
+            match why.downcast_ref::<cmd::BenchError>() {
                 Some(why) if why.is_interrupt() => ExitCode::from(INTERRUPTED),
                 _ => ExitCode::FAILURE,
             }

@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
-use clap::Parser as _;
+use clap::Parser;
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus::collection::{Collection, calibrated, texture_name};
@@ -22,11 +22,81 @@ use tactus_core::movement::Movement;
 use tactus_core::rig::{Rig, explore};
 use tactus_core::table::Table;
 
-use crate::cli::{Command, FIRST_STEPS, Identify, Tactus};
-use crate::commands::{feel_folder, find_textures, learn_first, names, progress, read_table};
+use super::args::Stop;
+use super::learn::learn_first;
+use super::progress::progress;
+use super::table_file::read_table;
+use super::textures::{feel_folder, find_material, find_textures, names};
 
-pub(crate) fn identify(
-    args: &Identify,
+pub(crate) const FIRST_STEPS: &str = "\
+Try first:
+  tactus                                           a simulated probe recognises an unknown texture
+  tactus identify --simulated --texture burlap     another one
+With a folder of recordings, such as ../shared/data/biotac:
+  tactus identify --recordings DIR --material 3    a real texture is recognised from its slides
+  tactus features --recordings DIR                 what was felt of every slide
+  tactus evaluate --recordings DIR                 how often the answers are right, and how sure
+With a probe, or with the emulated board that `cargo xtask emulate` builds:
+  tactus device list                               which port it is at
+  tactus device monitor [--emulated]               what it feels, live
+
+No recordings are shipped. The publisher of the BioTac's has them at
+https://github.com/dexrob/BioTac_slide_20_50; `tactus import` reads them. `tactus simulate` makes some.";
+
+/// Recognise an unknown texture from its slides, and show every step
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder of recordings
+    #[arg(
+        long,
+        value_name = "DIR",
+        required_unless_present = "simulated",
+        conflicts_with = "simulated"
+    )]
+    recordings: Option<PathBuf>,
+    /// The recorded texture to present as unknown: its number or its name
+    #[arg(
+        long,
+        value_name = "M",
+        required_unless_present = "simulated",
+        conflicts_with = "simulated"
+    )]
+    material: Option<String>,
+    /// Explore live on the simulated rig, in place of recordings
+    #[arg(long)]
+    simulated: bool,
+    /// The texture to put under the simulated finger: its name in Table 1 or its number; drawn by the seed unless given
+    #[arg(long, value_name = "NAME", requires = "simulated")]
+    texture: Option<String>,
+    /// How many textures the simulated probe knows; the unknown one is among them
+    #[arg(long, value_name = "N", default_value_t = 20, requires = "simulated", value_parser = clap::value_parser!(u8).range(2..=117))]
+    among: u8,
+    /// Texture table to use; without it one is learned from slides drawn at random, and the rest are presented
+    #[arg(long, value_name = "FILE", conflicts_with = "simulated")]
+    table: Option<PathBuf>,
+    /// Slides per texture to learn from, where no table is given
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    train_slides: usize,
+    /// How to decide, and how the next movement is chosen: fused, or what the table is for
+    #[arg(long, value_enum)]
+    method: Option<Method>,
+    #[command(flatten)]
+    stop: Stop,
+    /// Another seed draws other slides; with --simulated also another world, and another texture unless one is given
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// Explores on recordings or on the simulated rig.
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    match (&args.recordings, &args.material) {
+        (Some(folder), Some(material)) => identify_recorded(args, folder, material, out),
+        _ => identify_simulated(args, out),
+    }
+}
+
+fn identify_recorded(
+    args: &Args,
     folder: &Path,
     material: &str,
     out: &mut impl Write,
@@ -107,7 +177,7 @@ pub(crate) fn identify(
 fn show_exploration<R>(
     rig: &mut R,
     table: Table<'_>,
-    args: &Identify,
+    args: &Args,
     random: &mut ChaCha8Rng,
     truth: &str,
     out: &mut impl Write,
@@ -134,6 +204,13 @@ where
     Ok(())
 }
 
+/// The arguments of the demonstration: those of the command.
+#[derive(Parser)]
+struct Demonstration {
+    #[command(flatten)]
+    args: Args,
+}
+
 /// What a newcomer sees first.
 pub(crate) fn demonstrate(out: &mut impl Write) -> anyhow::Result<()> {
     writeln!(
@@ -143,17 +220,13 @@ pub(crate) fn demonstrate(out: &mut impl Write) -> anyhow::Result<()> {
          one of them without being told which. It is felt, decided and controlled by the firmware's own core.\n"
     )?;
     out.flush()?;
-    let Some(Command::Identify(args)) =
-        Tactus::parse_from(["tactus", "identify", "--simulated"]).command
-    else {
-        bail!("the demonstration cannot be parsed");
-    };
+    let Demonstration { args } = Demonstration::parse_from(["identify", "--simulated"]);
     identify_simulated(&args, out)?;
     writeln!(out, "\n{FIRST_STEPS}\n\nAll commands: tactus --help")?;
     Ok(())
 }
 
-pub(crate) fn identify_simulated(args: &Identify, out: &mut impl Write) -> anyhow::Result<()> {
+fn identify_simulated(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let mut random = ChaCha8Rng::seed_from_u64(args.seed);
     let unknown = match &args.texture {
         Some(name) => find_textures(std::slice::from_ref(name))?[0],
@@ -205,26 +278,4 @@ pub(crate) fn identify_simulated(args: &Identify, out: &mut impl Write) -> anyho
         }
     )?;
     Ok(())
-}
-
-fn find_material(set: &RecordingSet, wanted: &str) -> anyhow::Result<usize> {
-    let number = wanted.trim_start_matches("mat").parse::<u32>().ok();
-    let by_name = set
-        .textures()
-        .iter()
-        .position(|t| t.name.eq_ignore_ascii_case(wanted));
-    by_name
-        .or_else(|| set.textures().iter().position(|t| Some(t.id) == number))
-        .with_context(|| {
-            let known: Vec<String> = set
-                .textures()
-                .iter()
-                .map(|t| format!("{} {}", t.id, t.name))
-                .collect();
-            format!(
-                "--material {wanted}: not in {}, which has: {}",
-                set.folder().display(),
-                known.join(", ")
-            )
-        })
 }

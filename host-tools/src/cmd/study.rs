@@ -1,8 +1,10 @@
 //! `tactus study`: the stages one after the other, with what they take.
 
 use std::io::Write;
+use std::path::PathBuf;
 use std::time::Instant;
 
+use clap::ValueEnum;
 use tactus::evaluate::Method;
 use tactus::study::identify::{Identification, METHODS, WorldRow, experiment, of_pair, pairs};
 use tactus::study::pilot::Pilot;
@@ -13,8 +15,83 @@ use tactus::study::slides::{Recorded, StudyWorld};
 use tactus::study::training::{Training, Worn};
 use tactus::study::{self, Study};
 
-use crate::cli::{self, Format, Seeds, Stage};
-use crate::commands::progress;
+use super::output::Format;
+use super::progress::progress;
+
+/// Make the paper's whole study on the simulated rig, and report it beside the published numbers
+#[derive(clap::Args)]
+#[command(after_help = "\
+pilot     ten textures, 36 movements: which three movements are most useful (figs. 5, 6, 7)
+train     117 textures, three movements: the table, correlations, confusion, wear of the skin (Table 3, figs. 8, 9)
+pairs     eight pairs of similar textures at 99.9 % (Table 4)
+identify  16 textures among 117 at 99 %: cycling, random, Bayesian exploration, fused (Table 5, figs. 3, 4, 10)
+all       all of it
+
+The folder gets report.html, which needs nothing else, every figure as .svg, every table as .csv, the tables in the chip's
+format, and study.json. The same command gives the same files on any number of cores.
+
+Try:
+  tactus study all --out study
+  tactus study identify --seeds 11-20 --out worlds     the same in ten worlds")]
+pub(crate) struct Args {
+    /// Which part of it
+    #[arg(value_enum)]
+    stage: Stage,
+    /// The folder to write: new, or empty
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Another seed is another world: other textures of the same names, another finger and rig
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Pairs and identification in these worlds, too
+    #[arg(long, value_name = "A-B", value_parser = seeds)]
+    seeds: Option<Seeds>,
+    /// Virtual explorations of each way of exploring; each of the eight pairs has an eighth of them
+    #[arg(long, value_name = "N", default_value_t = 8000, value_parser = clap::value_parser!(u64).range(16..=1_000_000))]
+    simulations: u64,
+    /// How much one touch of a texture differs from the next, 0 to 3: the world's one free knob
+    #[arg(long, value_name = "X", default_value_t = tactus::study::VARIATION, value_parser = variation)]
+    variation: f64,
+    /// How to print the figures; json is what study.json holds
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// Parts of the study.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+enum Stage {
+    Pilot,
+    Train,
+    Pairs,
+    Identify,
+    All,
+}
+
+/// Worlds from the first to the last.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+struct Seeds(u64, u64);
+
+/// Most worlds of one study: each takes minutes.
+const MAX_WORLDS: u64 = 100;
+
+fn seeds(text: &str) -> Result<Seeds, String> {
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    match (first.parse(), last.parse()) {
+        (Ok(first), Ok(last)) if first <= last && last - first < MAX_WORLDS => {
+            Ok(Seeds(first, last))
+        }
+        _ => Err(format!(
+            "the first and the last seed, at most {MAX_WORLDS} of them, such as 11-20"
+        )),
+    }
+}
+
+fn variation(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(x) if (0.0..=3.0).contains(&x) => Ok(x),
+        _ => Err("a factor from 0 to 3, such as 1".to_owned()),
+    }
+}
 
 /// What the stages took, for people to see: no part of the report, which is the same each time.
 #[derive(Default)]
@@ -38,7 +115,7 @@ impl Times {
 }
 
 /// Makes a study, or a part of one, and writes its report.
-pub(crate) fn study(args: &cli::Study, out: &mut impl Write) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     report::prepare(&args.out)?;
     let is = |stage| args.stage == stage || args.stage == Stage::All;
     let world = StudyWorld {
@@ -99,7 +176,7 @@ pub(crate) fn study(args: &cli::Study, out: &mut impl Write) -> anyhow::Result<(
 
 /// Pairs and identification.
 fn explore(
-    args: &cli::Study,
+    args: &Args,
     world: StudyWorld,
     recorded: &Recorded,
     study: &mut Study,
@@ -127,7 +204,7 @@ fn explore(
 }
 
 /// The command that was given, without what does not change the report.
-fn command(args: &cli::Study) -> String {
+fn command(args: &Args) -> String {
     let stage = format!("{:?}", args.stage).to_lowercase();
     let mut command = format!("tactus study {stage} --seed {}", args.seed);
     if let Some(Seeds(first, last)) = args.seeds {
@@ -142,12 +219,7 @@ fn command(args: &cli::Study) -> String {
         )
 }
 
-fn print(
-    args: &cli::Study,
-    study: &Study,
-    times: &Times,
-    out: &mut impl Write,
-) -> std::io::Result<()> {
+fn print(args: &Args, study: &Study, times: &Times, out: &mut impl Write) -> std::io::Result<()> {
     writeln!(
         out,
         "World {}, variation {}: {}",

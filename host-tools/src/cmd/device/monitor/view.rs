@@ -12,8 +12,8 @@ use tactus_core::kernels::Plain;
 use tactus_core::spectrum::{BIN_HZ, SpectrumSum, angles};
 use tactus_core::wire::Phase;
 
-use super::super::phase_name;
-use super::{Monitor, SHOWN, Weight};
+use super::state::{Monitor, SHOWN, Weight};
+use crate::cmd::device::status::phase_name;
 
 // of the 256 colours that every terminal has, the nearest to Okabe's and Ito's
 const BLUE: Color = Color::Indexed(39);
@@ -33,7 +33,7 @@ const WORTH_LISTING: f32 = 0.001;
 const STEP_MM: f32 = 0.000_625;
 
 /// Draws all.
-pub(super) fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
+pub(crate) fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
     let area = frame.area();
     let roomy = area.height >= 34;
     let [header, charts, panels, notes, keys] = Layout::vertical([

@@ -1,9 +1,15 @@
+use std::time::Duration;
+
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use tactus_core::features::Property;
-use tactus_core::wire::{Block, Counts, Promise, Text};
+use tactus_core::movement::Movement;
+use tactus_core::rig::guard::Fault;
+use tactus_core::table::Action;
+use tactus_core::wire::{Block, Counts, Felt, Live, Phase, Promise, Report, Status, Tell, Text};
 
-use super::*;
+use super::state::{Monitor, NOTES, SHOWN};
+use super::{is_gone, view};
 
 fn status() -> Status {
     Status {

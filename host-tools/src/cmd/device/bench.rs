@@ -1,6 +1,6 @@
 //! A probe that somebody works with: its line, the log of what is said, and Ctrl-C, which leaves the rig lifted and stopped.
 
-use std::io::{self, Write as _};
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -12,8 +12,8 @@ use tactus_core::rig::guard::Fault;
 use tactus_core::table::{Table, TableError};
 use tactus_core::wire::{Ask, Phase, Report, Status, Tell};
 
+use super::line::{Emulator, Line, OpenError, Where};
 use super::log::Log;
-use super::port::{Emulator, Line, OpenError, Where};
 
 /// A probe that says nothing for so long is taken for gone: its longest silence is an erase of its flash, 2 s.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -439,4 +439,14 @@ pub(crate) fn wait_for_enter(interrupt: &Interrupt, prompt: &str) -> Result<(), 
             Err(_) => return Err(BenchError::Stopped),
         }
     }
+}
+
+/// What a movement shows of a report: faults, and what they ask for.
+pub(crate) fn moved(report: &Report, out: &mut impl Write) -> io::Result<()> {
+    if let Tell::Fault(fault) = &report.tell {
+        let recovery = fault.row().map_or("reset", |row| row.recovery);
+        writeln!(out, "FAULT: {fault}. {recovery}: tactus device home")?;
+        out.flush()?;
+    }
+    Ok(())
 }

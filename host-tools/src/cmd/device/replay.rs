@@ -1,90 +1,40 @@
-//! The log of a session, a line of JSON for everything that was asked and told, and its replay: every decision of the
-//! session computed again from its events, by the same core.
-//!
-//! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":2,"port":"/dev/ttyACM0"}}`. Each other one is
-//! `{"ask":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log itself: the
-//! table in use (the parts that were read), the raw samples (blocks), what was felt, chosen and answered.
+//! `tactus device log`: the log of a session shown again, and replayed: every decision of the session computed again from
+//! its events, by the same core.
 
-use std::borrow::Cow;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, BufWriter, Write};
+use std::io::{self, BufRead as _, BufReader, Write};
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
+use clap::Subcommand;
 use tactus::follow::{ALLOWED, Agreement, Follower};
 use tactus::show::Show;
 use tactus_core::explorer::ExplorerError;
 use tactus_core::features::{Plan, PropertySet};
 use tactus_core::table::Table;
-use tactus_core::wire::{Ask, Forget, Identify, PROTOCOL, Report, Tell};
+use tactus_core::wire::{Ask, Forget, Identify, PROTOCOL, Tell};
 
-/// One line.
-#[derive(Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Line<'a> {
-    Session {
-        tactus: Cow<'a, str>,
-        protocol: u8,
-        port: Cow<'a, str>,
+use super::log::Line;
+
+/// Look into the log of a session (--log)
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// Compute every decision of the session again, and compare
+    Replay {
+        /// The log
+        file: PathBuf,
     },
-    Ask(Box<Cow<'a, Ask>>),
-    Report(Box<Cow<'a, Report>>),
+    /// Show the session's explorations as they were shown live
+    Show {
+        /// The log
+        file: PathBuf,
+    },
 }
 
-/// Writes the log. A failure is kept until somebody asks.
-#[derive(Debug)]
-pub(crate) struct Log {
-    path: PathBuf,
-    file: BufWriter<File>,
-    failed: io::Result<()>,
-}
-
-impl Log {
-    /// Begins a log; a file that is there already is left alone.
-    pub(crate) fn create(path: &Path, port: &str) -> io::Result<Self> {
-        let file = File::create_new(path).map_err(|why| match why.kind() {
-            io::ErrorKind::AlreadyExists => {
-                io::Error::new(why.kind(), "is there already: give the log another name")
-            }
-            _ => why,
-        })?;
-        let mut log = Self {
-            path: path.to_owned(),
-            file: BufWriter::new(file),
-            failed: Ok(()),
-        };
-        log.line(&Line::Session {
-            tactus: env!("CARGO_PKG_VERSION").into(),
-            protocol: PROTOCOL,
-            port: port.into(),
-        });
-        log.flush()?;
-        Ok(log)
-    }
-
-    pub(crate) fn asked(&mut self, ask: &Ask) {
-        self.line(&Line::Ask(Box::new(Cow::Borrowed(ask))));
-    }
-
-    pub(crate) fn told(&mut self, report: &Report) {
-        self.line(&Line::Report(Box::new(Cow::Borrowed(report))));
-    }
-
-    fn line(&mut self, line: &Line<'_>) {
-        if self.failed.is_ok() {
-            let written = serde_json::to_writer(&mut self.file, line).map_err(io::Error::from);
-            self.failed = written.and_then(|()| self.file.write_all(b"\n"));
-        }
-    }
-
-    /// Everything so far is in the file.
-    pub(crate) fn flush(&mut self) -> io::Result<()> {
-        std::mem::replace(&mut self.failed, Ok(()))?;
-        self.file.flush()
-    }
-
-    pub(crate) fn into_path(self) -> PathBuf {
-        self.path
+/// Shows or replays a log.
+pub(crate) fn run(command: &Command, out: &mut impl Write) -> Result<(), ReplayError> {
+    match command {
+        Command::Replay { file } => replay(file, out),
+        Command::Show { file } => show(file, out),
     }
 }
 
@@ -226,7 +176,7 @@ fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
 }
 
 /// Shows the explorations of a log as they were shown live.
-pub(crate) fn show(path: &Path, out: &mut impl Write) -> Result<(), ReplayError> {
+fn show(path: &Path, out: &mut impl Write) -> Result<(), ReplayError> {
     for (logged, number) in explorations(path)?.iter().zip(1..) {
         headline(number, logged, out)?;
         let Some(table) = logged.table.as_ref().ok().and_then(|t| Table::read(t).ok()) else {
@@ -243,7 +193,7 @@ pub(crate) fn show(path: &Path, out: &mut impl Write) -> Result<(), ReplayError>
 }
 
 /// Computes every decision of a log again and says what came of it.
-pub(crate) fn replay(path: &Path, out: &mut impl Write) -> Result<(), ReplayError> {
+fn replay(path: &Path, out: &mut impl Write) -> Result<(), ReplayError> {
     let mut total = Agreement::default();
     let mut same = true;
     for (logged, number) in explorations(path)?.iter().zip(1..) {

@@ -1,0 +1,84 @@
+//! The command `tactus`: a file for each of its commands, with the arguments, what is done and what is said.
+
+mod args;
+mod device;
+mod evaluate;
+mod features;
+mod identify;
+mod import;
+mod learn;
+mod manual;
+mod output;
+mod progress;
+mod simulate;
+mod study;
+mod table;
+mod table_file;
+mod textures;
+
+use std::io::{self, Write as _};
+
+use clap::{CommandFactory as _, Parser, Subcommand};
+
+pub(crate) use device::BenchError;
+
+/// Tactus tells what a surface is by touching it.
+#[derive(Parser)]
+#[command(version, about = "Tactus tells what a surface is by touching it", long_about = "Tactus tells what a surface is by touching it: it slides a BioTac fingertip, measures traction, roughness and \
+fineness, and chooses each next movement so as to tell the remaining candidates apart (Bayesian exploration, Fishel & \
+Loeb 2012).\n\nThis command runs the core of the firmware, the same code, on recordings and on a simulated rig.", after_help = identify::FIRST_STEPS)]
+struct Tactus {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+// what --help says of each is beside its arguments
+#[derive(Subcommand)]
+enum Command {
+    Features(features::Args),
+    Learn(learn::Args),
+    #[command(subcommand)]
+    Table(table::Command),
+    Identify(identify::Args),
+    Evaluate(evaluate::Args),
+    Simulate(simulate::Args),
+    LearnByHand(learn::ByHand),
+    Study(study::Args),
+    #[command(subcommand)]
+    Device(device::Command),
+    Completions(manual::Completions),
+    Man(manual::Man),
+    Import(import::Args),
+}
+
+/// Runs what the arguments ask for.
+pub(crate) fn run() -> anyhow::Result<()> {
+    let out = &mut io::BufWriter::new(io::stdout().lock());
+    match Tactus::parse().command {
+        None => identify::demonstrate(out)?,
+        Some(Command::Features(args)) => features::run(&args, out)?,
+        Some(Command::Learn(args)) => learn::run(&args, out)?,
+        Some(Command::Table(command)) => table::run(&command, out)?,
+        Some(Command::Identify(args)) => identify::run(&args, out)?,
+        Some(Command::Evaluate(args)) => evaluate::run(&args, out)?,
+        Some(Command::Simulate(args)) => simulate::run(&args, out)?,
+        Some(Command::LearnByHand(args)) => learn::by_hand(&args, out)?,
+        Some(Command::Study(args)) => study::run(&args, out)?,
+        Some(Command::Device(command)) => device::run(&command, out)?,
+        Some(Command::Completions(args)) => manual::completions(&args, Tactus::command(), out),
+        Some(Command::Man(args)) => manual::pages(&args, Tactus::command(), out)?,
+        Some(Command::Import(args)) => import::run(&args, out)?,
+    }
+    out.flush()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        super::Tactus::command().debug_assert();
+    }
+}

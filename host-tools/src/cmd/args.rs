@@ -1,0 +1,68 @@
+//! Arguments that several commands take.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use tactus::evaluate::Method;
+use tactus_core::explorer::Config;
+use tactus_core::fused::FeatureSet;
+
+#[derive(Args)]
+pub(crate) struct Recordings {
+    /// Folder of recordings
+    #[arg(long, value_name = "DIR")]
+    pub(crate) recordings: PathBuf,
+}
+
+#[derive(Args, Clone)]
+pub(crate) struct Stop {
+    /// Stop when a texture is more probable than this
+    #[arg(long, default_value_t = 0.99, value_parser = probability)]
+    pub(crate) threshold: f32,
+    /// Stop after this many slides
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u8).range(1..=254))]
+    pub(crate) max_slides: u8,
+}
+
+impl Stop {
+    pub(crate) fn config(&self, method: Method) -> Config {
+        Config {
+            method: method.method(),
+            strategy: method.strategy(),
+            threshold: self.threshold,
+            max_slides: self.max_slides,
+            open: false,
+        }
+    }
+}
+
+fn probability(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        Ok(p) if 0.0 < p && p <= 1.0 => Ok(p),
+        _ => Err("a probability between 0 and 1, such as 0.99; 1 is never exceeded".to_owned()),
+    }
+}
+
+/// What a fused table is learned from.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Features {
+    /// Traction and twelve band powers
+    Force,
+    /// Mean and standard deviation of P_DC, and the band powers: for a rig without force sensing
+    Pressure,
+    /// The band powers alone
+    Bands,
+    /// The three properties of the paper
+    Properties,
+}
+
+impl Features {
+    pub(crate) fn set(self) -> FeatureSet {
+        match self {
+            Self::Force => FeatureSet::Force,
+            Self::Pressure => FeatureSet::Pressure,
+            Self::Bands => FeatureSet::Bands,
+            Self::Properties => FeatureSet::Properties,
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! `tactus device`: the probe at the other end of the serial link, and everything that is done with it at the bench.
+
+mod bench;
+mod calibrate;
+mod flash;
+mod identify;
+mod line;
+mod log;
+mod monitor;
+mod record;
+mod recorder;
+mod replay;
+mod status;
+mod table;
+mod train;
+
+use std::io::Write;
+
+use clap::Subcommand;
+
+pub(crate) use bench::BenchError;
+
+/// Work with a probe at its serial port, or with the emulated board
+#[derive(Subcommand)]
+#[command(after_help = "\
+Try first:
+  tactus device list                         the serial ports, and which of them is a board
+  tactus device monitor --emulated           the emulated board, live (cargo xtask emulate builds it)
+  tactus device status                       how the probe is that is plugged in
+  tactus device identify --log visit.jsonl   what lies under its finger
+  tactus device log replay visit.jsonl       the same decisions, computed again on this PC
+
+Ctrl-C stops the rig and waits until the finger is lifted; the exit code is 130 then.")]
+pub(crate) enum Command {
+    /// List the serial ports, boards first
+    List,
+    Status(status::Args),
+    Monitor(monitor::Args),
+    Identify(identify::Args),
+    Train(train::Train),
+    Teach(train::Teach),
+    Rename(train::Rename),
+    Forget(train::Forget),
+    Record(record::Args),
+    #[command(subcommand)]
+    Table(table::Command),
+    Calibrate(calibrate::Args),
+    Home(calibrate::Home),
+    Stop(calibrate::Stop),
+    Flash(flash::Args),
+    #[command(subcommand)]
+    Log(replay::Command),
+}
+
+/// Does what is asked for.
+pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()> {
+    match command {
+        Command::List => Ok(line::list(out)?),
+        Command::Status(args) => status::run(args, out),
+        Command::Monitor(args) => monitor::run(args),
+        Command::Identify(args) => identify::run(args, out),
+        Command::Train(args) => train::train(args, out),
+        Command::Teach(args) => train::teach(args, out),
+        Command::Rename(args) => train::rename(args, out),
+        Command::Forget(args) => train::forget(args, out),
+        Command::Record(args) => record::run(args, out),
+        Command::Table(command) => table::run(command, out),
+        Command::Calibrate(args) => calibrate::run(args, out),
+        Command::Home(args) => calibrate::home(args, out),
+        Command::Stop(args) => calibrate::stop(args, out),
+        Command::Flash(args) => flash::run(args, out),
+        Command::Log(command) => Ok(replay::run(command, out)?),
+    }
+}

@@ -1,0 +1,94 @@
+//! `tactus device flash`: an image into the chip, by probe-rs.
+
+use std::ffi::OsString;
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::{Context as _, bail, ensure};
+
+/// Flash a firmware image with probe-rs
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus device flash target/debian/thumbv7em-none-eabihf/firmware/tactus-rig
+  tactus device flash ELF -- --probe 0483:374b:SER   if there are several: `probe-rs list` names them
+`cargo xtask flash` builds the firmware and flashes it.")]
+pub(crate) struct Args {
+    /// The image: what `cargo xtask build` names
+    elf: PathBuf,
+    /// Stay attached and show the image's log until Ctrl-C
+    #[arg(long)]
+    attach: bool,
+    /// Print what would be run
+    #[arg(long)]
+    dry_run: bool,
+    /// Options for probe-rs
+    #[arg(last = true)]
+    options: Vec<OsString>,
+}
+
+/// The chip's name in probe-rs.
+const CHIP: &str = "STM32F429ZITx";
+
+pub(crate) fn run(options: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    ensure!(
+        options.dry_run || options.elf.is_file(),
+        "{}: no such file; `cargo xtask build` builds the firmware and names it",
+        options.elf.display()
+    );
+    if !options.dry_run {
+        look_for_probe("probe-rs")?;
+    }
+    for mut command in flash_commands(options) {
+        let words = std::iter::once(command.get_program()).chain(command.get_args());
+        let words: Vec<_> = words.map(|word| word.to_string_lossy()).collect();
+        writeln!(out, "{}", words.join(" "))?;
+        out.flush()?;
+        if !options.dry_run {
+            let status = command.status().context("probe-rs does not start")?;
+            ensure!(
+                status.success(),
+                "probe-rs ended with {status}: is the board's USB plug at CN1, and no other program at its probe? LD4 must be lit"
+            );
+        }
+    }
+    Ok(())
+}
+
+/// What is run: an image to attach to is watched, others are left alone.
+fn flash_commands(options: &Args) -> Vec<Command> {
+    let probe_rs = |verb: &str| {
+        let mut command = Command::new("probe-rs");
+        command.args([verb, "--chip", CHIP]).args(&options.options);
+        command
+    };
+    if options.attach {
+        let mut run = probe_rs("run");
+        run.arg(&options.elf);
+        vec![run]
+    } else {
+        let mut download = probe_rs("download");
+        download.arg("--verify").arg(&options.elf);
+        vec![download, probe_rs("reset")]
+    }
+}
+
+/// That the program is here, and a debug probe.
+fn look_for_probe(program: &str) -> anyhow::Result<()> {
+    let list = match Command::new(program).arg("list").output() {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => bail!(
+            "probe-rs is not installed. Install it with
+  cargo install probe-rs-tools --locked
+or as https://probe.rs/docs/getting-started/installation says. Without it: cargo xtask bundle, and see FLASHING.md there"
+        ),
+        list => list.context("probe-rs does not start")?,
+    };
+    let said = String::from_utf8_lossy(&list.stdout);
+    ensure!(
+        list.status.success() && !said.contains("No debug probes"),
+        "no debug probe found. Plug the board's USB socket CN1 into this PC. On Linux the user needs the right to use it:
+https://probe.rs/docs/getting-started/probe-setup (udev rules)"
+    );
+    Ok(())
+}

@@ -1,0 +1,83 @@
+//! The log of a session: a line of JSON for everything that was asked and told.
+//!
+//! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":2,"port":"/dev/ttyACM0"}}`. Each other one is
+//! `{"ask":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log itself: the
+//! table in use (the parts that were read), the raw samples (blocks), what was felt, chosen and answered.
+
+use std::borrow::Cow;
+use std::fs::File;
+use std::io::{self, BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use tactus_core::wire::{Ask, PROTOCOL, Report};
+
+/// One line.
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Line<'a> {
+    Session {
+        tactus: Cow<'a, str>,
+        protocol: u8,
+        port: Cow<'a, str>,
+    },
+    Ask(Box<Cow<'a, Ask>>),
+    Report(Box<Cow<'a, Report>>),
+}
+
+/// Writes the log. A failure is kept until somebody asks.
+#[derive(Debug)]
+pub(crate) struct Log {
+    path: PathBuf,
+    file: BufWriter<File>,
+    failed: io::Result<()>,
+}
+
+impl Log {
+    /// Begins a log; a file that is there already is left alone.
+    pub(crate) fn create(path: &Path, port: &str) -> io::Result<Self> {
+        let file = File::create_new(path).map_err(|why| match why.kind() {
+            io::ErrorKind::AlreadyExists => {
+                io::Error::new(why.kind(), "is there already: give the log another name")
+            }
+            _ => why,
+        })?;
+        let mut log = Self {
+            path: path.to_owned(),
+            file: BufWriter::new(file),
+            failed: Ok(()),
+        };
+        log.line(&Line::Session {
+            tactus: env!("CARGO_PKG_VERSION").into(),
+            protocol: PROTOCOL,
+            port: port.into(),
+        });
+        log.flush()?;
+        Ok(log)
+    }
+
+    pub(crate) fn asked(&mut self, ask: &Ask) {
+        self.line(&Line::Ask(Box::new(Cow::Borrowed(ask))));
+    }
+
+    pub(crate) fn told(&mut self, report: &Report) {
+        self.line(&Line::Report(Box::new(Cow::Borrowed(report))));
+    }
+
+    fn line(&mut self, line: &Line<'_>) {
+        if self.failed.is_ok() {
+            let written = serde_json::to_writer(&mut self.file, line).map_err(io::Error::from);
+            self.failed = written.and_then(|()| self.file.write_all(b"\n"));
+        }
+    }
+
+    /// Everything so far is in the file.
+    pub(crate) fn flush(&mut self) -> io::Result<()> {
+        std::mem::replace(&mut self.failed, Ok(()))?;
+        self.file.flush()
+    }
+
+    pub(crate) fn into_path(self) -> PathBuf {
+        self.path
+    }
+}

@@ -1,0 +1,227 @@
+//! `tactus device monitor`: the probe live on a terminal.
+//!
+//! [`Monitor`] is all that is known, from the reports alone; [`view`] draws it; [`run`] brings keys, reports and time
+//! together.
+
+mod state;
+mod view;
+
+use std::collections::VecDeque;
+use std::io::{self, IsTerminal as _};
+use std::task::Poll;
+use std::time::{Duration, Instant};
+
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
+use tactus::link::{Job, LinkError, PortError, Question, ReadTable};
+use tactus_core::table::Table;
+use tactus_core::wire::{Ask, Identify, Report};
+
+use self::state::{Monitor, Weight};
+use super::bench::{Bench, BenchError};
+use super::identify::Exploration;
+use super::line::Where;
+
+/// How often the screen is drawn, and the probe asked how it is.
+const DRAWN: Duration = Duration::from_millis(100);
+const ASKED: Duration = Duration::from_secs(1);
+/// A probe that is asked every second and says nothing for so long is told to be silent.
+const SILENT: Duration = Duration::from_secs(3);
+
+/// Watch the probe live, and have it identify, home or stop by a key
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    at: Where,
+    #[command(flatten)]
+    how: Exploration,
+}
+
+/// What the probe is asked for, one after the other.
+enum Doing {
+    Asked(Box<Job<Question<()>>>),
+    Table(Box<Job<ReadTable>>),
+}
+
+/// How the user ended it.
+enum End {
+    Quit,
+    Interrupt,
+}
+
+/// Watches until the user has enough of it; the rig is stopped and lifted then.
+pub(crate) fn run(Args { at, how }: &Args) -> anyhow::Result<()> {
+    let (mut bench, status) = Bench::open(at)?;
+    let names = bench.names()?;
+    let wanted = how.wanted(&names)?;
+    if !io::stdout().is_terminal() {
+        return Err(io::Error::other(
+            "the monitor needs a terminal; `tactus device identify` writes lines, `--log FILE` a record",
+        )
+        .into());
+    }
+    let mut monitor = Monitor::new(&bench.name, status, names);
+    // whatever happens, a panic too, the terminal is given back as it was
+    let mut terminal = ratatui::try_init()?;
+    let ended = watch(&mut bench, &mut monitor, &mut terminal, &wanted);
+    ratatui::restore();
+    let end = match ended {
+        Ok(end) => end,
+        Err(why @ BenchError::Port { .. }) => return Err(why.into()),
+        Err(why) => {
+            // the line is good
+            bench.lift();
+            return Err(why.into());
+        }
+    };
+    eprintln!("Stopping and lifting the finger (Ctrl-C: do not wait) ...");
+    match (bench.lift(), end) {
+        (BenchError::Stopped, End::Quit) => {
+            eprintln!("Stopped: the finger is lifted and the stage stands.");
+            Ok(())
+        }
+        (why, _) => Err(why.into()),
+    }
+}
+
+fn watch(
+    bench: &mut Bench,
+    monitor: &mut Monitor,
+    terminal: &mut DefaultTerminal,
+    wanted: &Identify,
+) -> Result<End, BenchError> {
+    let mut wanted = wanted.clone();
+    let mut to_do: VecDeque<Ask> = VecDeque::new();
+    let mut doing: Option<Doing> = None;
+    let mut drawn: Option<Instant> = None;
+    let mut asked: Option<Instant> = None;
+    let mut heard = Instant::now();
+    bench.ask(Ask::Stream(true))?;
+    loop {
+        if bench.interrupt().take() {
+            return Ok(End::Interrupt);
+        }
+        let mut hear = |report: &Report| {
+            heard = Instant::now();
+            monitor.hear(report);
+        };
+        let polled = match &mut doing {
+            Some(Doing::Asked(job)) => bench.step(job, &mut hear),
+            Some(Doing::Table(job)) => {
+                let polled = bench.step(job, &mut hear)?;
+                Ok(match polled {
+                    Poll::Ready(bytes) => {
+                        let table = Table::read(&bytes)?;
+                        monitor.names = table.names().map(str::to_owned).collect();
+                        monitor.table_crc = table.crc();
+                        Poll::Ready(())
+                    }
+                    Poll::Pending => Poll::Pending,
+                })
+            }
+            None => bench.listen(&mut hear).map(|()| Poll::Pending),
+        };
+        match polled {
+            Ok(Poll::Ready(())) => doing = None,
+            Ok(Poll::Pending) => {}
+            Err(BenchError::Port {
+                why: PortError::Link(why),
+                ..
+            }) if !matches!(why, LinkError::Protocol(_) | LinkError::Foreign) => {
+                // the probe said why, and goes on
+                doing = None;
+                to_do.clear();
+                monitor.note(Weight::Said, why.to_string());
+            }
+            Err(why) => return Err(why),
+        }
+        if let Some(protocol) = monitor.protocol {
+            return Err(BenchError::Port {
+                name: bench.name.clone(),
+                why: PortError::Link(LinkError::Protocol(protocol)),
+                moving: false,
+            });
+        }
+        if std::mem::take(&mut monitor.rebooted) {
+            bench.ask(Ask::Stream(true))?;
+        }
+        if doing.is_none()
+            && let Some(ask) = to_do.pop_front()
+        {
+            let job = match ask {
+                Ask::ReadTable(_) => Doing::Table(Box::new(bench.begin(ReadTable::default())?)),
+                ask => Doing::Asked(Box::new(bench.begin(Question::command(ask))?)),
+            };
+            doing = Some(job);
+        }
+        if asked.is_none_or(|at| at.elapsed() >= ASKED) {
+            asked = Some(Instant::now());
+            bench.ask(Ask::Status)?;
+        }
+        monitor.silent = Some(heard.elapsed()).filter(|silent| *silent >= SILENT);
+        monitor.losses = bench.losses();
+        if drawn.is_none_or(|at| at.elapsed() >= DRAWN) {
+            drawn = Some(Instant::now());
+            terminal.draw(|frame| view::draw(monitor, frame))?;
+        }
+        if is_gone(&io::stdin()) {
+            return Ok(End::Interrupt);
+        }
+        while event::poll(Duration::ZERO)? {
+            let Event::Key(key) = event::read()? else {
+                continue;
+            };
+            if key.kind != KeyEventKind::Press {
+                continue;
+            }
+            let control = key.modifiers.contains(KeyModifiers::CONTROL);
+            let busy = doing.is_some() || !to_do.is_empty();
+            match key.code {
+                KeyCode::Char('c') if control => return Ok(End::Interrupt),
+                KeyCode::Char('q') => return Ok(End::Quit),
+                KeyCode::Char('s') | KeyCode::Esc => {
+                    to_do.clear();
+                    bench.ask(Ask::Stop)?;
+                    monitor.note(Weight::Said, "stopping");
+                }
+                KeyCode::Char('i' | 'h') if busy => {
+                    monitor.note(Weight::Said, "it is busy: wait, or stop it with s");
+                }
+                KeyCode::Char('i') => {
+                    if monitor.table_crc != monitor.status.table_crc {
+                        to_do.push_back(Ask::ReadTable(0));
+                    }
+                    to_do.push_back(Ask::Identify(wanted.clone()));
+                    // the next one begins elsewhere on the sample
+                    wanted.seed = wanted.seed.wrapping_add(1);
+                    monitor.note(Weight::Said, "identify");
+                }
+                KeyCode::Char('h') => {
+                    to_do.push_back(Ask::Home);
+                    monitor.note(Weight::Said, "home");
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Whether the terminal has been closed: crossterm would read its end for ever.
+#[cfg(unix)]
+fn is_gone(terminal: &impl std::os::fd::AsFd) -> bool {
+    use rustix::event::{PollFd, PollFlags, Timespec, poll};
+    let mut polled = [PollFd::new(terminal, PollFlags::IN)];
+    let now = Timespec::default();
+    poll(&mut polled, Some(&now)).is_ok()
+        && polled
+            .iter()
+            .any(|p| p.revents().intersects(PollFlags::HUP))
+}
+
+#[cfg(not(unix))]
+fn is_gone(_: &io::Stdin) -> bool {
+    false
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,106 @@
+//! `tactus device record`: slides of a real finger in the project's format.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use anyhow::ensure;
+use tactus::link::Question;
+use tactus::recordings::{RecordingWriter, Texture};
+use tactus_core::explorer::Strategy;
+use tactus_core::wire::{Ask, Identify};
+
+use super::bench::{Bench, moved, wait_for_enter};
+use super::line::Where;
+use super::recorder::Recorder;
+use super::train::seed_of_now;
+
+/// Record slides in the project's format, for `tactus learn` and `tactus evaluate`
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    at: Where,
+    /// The textures to record, in the order in which they are laid under the finger
+    #[arg(required = true)]
+    textures: Vec<String>,
+    /// The folder to write; it must not hold recordings yet
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Slides of each texture; movements of the probe's table take turns
+    #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u8).range(1..=254))]
+    slides: u8,
+    /// Where on the sample slides begin; drawn anew unless given
+    #[arg(long)]
+    seed: Option<u32>,
+}
+
+/// Records each texture in turn.
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    let Args {
+        textures, slides, ..
+    } = args;
+    let named = textures.iter().zip(1..).map(|(name, id)| Texture {
+        id,
+        name: name.trim().to_owned(),
+    });
+    // before anything moves
+    let mut writer = RecordingWriter::create(&args.out, named.collect())?;
+    let (mut bench, _) = Bench::open(&args.at)?;
+    let calibration = bench.run(Question::read_calibration(), |_| Ok(()))?;
+    bench.run(Question::command(Ask::Stream(true)), |_| Ok(()))?;
+    let mut written = 0;
+    for (index, name) in textures.iter().enumerate() {
+        if textures.len() > 1 {
+            let prompt = format!("Lay {name} under the finger and press Enter: ");
+            wait_for_enter(bench.interrupt(), &prompt)?;
+        }
+        // never sure: all slides are made
+        let wanted = Identify {
+            among: Default::default(),
+            threshold: 1.0,
+            max_slides: *slides,
+            method: None,
+            strategy: Strategy::Cycling,
+            open: false,
+            learn: false,
+            seed: args.seed.unwrap_or_else(seed_of_now),
+        };
+        let mut recorder = Recorder::new(calibration.pressure);
+        let mut lost = Vec::new();
+        let mut kept = Vec::new();
+        bench.run(Question::identify(wanted), |report| {
+            match recorder.hear(index, report) {
+                Some(Ok(slide)) => {
+                    writeln!(
+                        out,
+                        "{name}, slide {} of {slides}: {}",
+                        slide.number, slide.movement
+                    )?;
+                    kept.push(slide);
+                }
+                Some(Err(why)) => lost.push(why),
+                None => moved(report, out)?,
+            }
+            out.flush()
+        })?;
+        for slide in &kept {
+            writer.write(slide)?;
+            written += 1;
+        }
+        for why in &lost {
+            writeln!(out, "{name}: a slide is not recorded: {why}")?;
+        }
+        ensure!(
+            !kept.is_empty(),
+            "{name}: no slide arrived whole; check the cable, then record again"
+        );
+    }
+    bench.run(Question::command(Ask::Stream(false)), |_| Ok(()))?;
+    writer.finish()?;
+    writeln!(
+        out,
+        "{}: {written} slides of {} textures. Next: tactus features --recordings {0}",
+        args.out.display(),
+        textures.len()
+    )?;
+    Ok(())
+}

@@ -1,0 +1,170 @@
+//! `tactus device train`, `teach`, `rename` and `forget`: what the probe learns and forgets.
+
+use std::io::{self, Write};
+
+use anyhow::ensure;
+use tactus::link::Question;
+use tactus_core::wire::{self, Name, Report, Tell};
+
+use super::bench::{Bench, moved};
+use super::line::Where;
+
+/// Have the probe learn the texture under its finger from new slides; an unfinished training goes on where it stood
+#[derive(clap::Args)]
+pub(crate) struct Train {
+    #[command(flatten)]
+    at: Where,
+    /// What lies under the finger
+    name: String,
+    /// How often each movement is to have been made in the end
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u8).range(1..))]
+    trials: u8,
+    /// All movements of the grid up to 1.26 N instead of the table's: to find out which tell textures apart
+    #[arg(long)]
+    pilot: bool,
+    /// Where on the sample slides begin; drawn anew unless given
+    #[arg(long)]
+    seed: Option<u32>,
+}
+
+/// Tell the probe what it felt in its last exploration; it learns that
+#[derive(clap::Args)]
+pub(crate) struct Teach {
+    #[command(flatten)]
+    at: Where,
+    /// What lies under the finger: a texture that it knows, or a new one
+    name: String,
+}
+
+/// Give a texture of the probe another name
+#[derive(clap::Args)]
+pub(crate) struct Rename {
+    #[command(flatten)]
+    at: Where,
+    /// Its name
+    from: String,
+    /// Its new name
+    to: String,
+}
+
+/// Have the probe forget a texture, an unfinished training, or all that it learned by itself
+#[derive(clap::Args)]
+pub(crate) struct Forget {
+    #[command(flatten)]
+    at: Where,
+    #[command(flatten)]
+    what: What,
+}
+
+#[derive(clap::Args)]
+#[group(required = true, multiple = false)]
+struct What {
+    /// A texture, whoever taught it
+    #[arg(long, value_name = "NAME", id = "forgotten")]
+    name: Option<String>,
+    /// An unfinished training
+    #[arg(long, value_name = "NAME")]
+    training: Option<String>,
+    /// All that the probe has learned by itself: its table is again as it was taught
+    #[arg(long)]
+    self_taught: bool,
+}
+
+/// Has the probe make slides of a texture and learn it.
+pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
+    let wanted = wire::Train {
+        name: name_of(&args.name)?,
+        trials: args.trials,
+        pilot: args.pilot,
+        seed: args.seed.unwrap_or_else(seed_of_now),
+    };
+    let (mut bench, _) = Bench::open(&args.at)?;
+    let slides = bench.run(Question::train(wanted), |report| trained(report, out))?;
+    writeln!(out, "{}: {slides} slides made.", args.name)?;
+    Ok(())
+}
+
+/// Says what the probe felt.
+pub(crate) fn teach(args: &Teach, out: &mut impl Write) -> anyhow::Result<()> {
+    let question = Question::answer(name_of(&args.name)?);
+    let (mut bench, _) = Bench::open(&args.at)?;
+    let taught = bench.run(question, |_| Ok(()))?;
+    writeln!(
+        out,
+        "The probe has learned {} from {} slides.",
+        taught.name, taught.slides
+    )?;
+    Ok(())
+}
+
+/// Gives a texture another name.
+pub(crate) fn rename(Rename { at, from, to }: &Rename, out: &mut impl Write) -> anyhow::Result<()> {
+    let question = Question::rename(name_of(from)?, name_of(to)?);
+    let (mut bench, _) = Bench::open(at)?;
+    bench.run(question, |_| Ok(()))?;
+    writeln!(out, "{from} is {to} now.")?;
+    Ok(())
+}
+
+/// Has the probe forget something.
+pub(crate) fn forget(Forget { at, what }: &Forget, out: &mut impl Write) -> anyhow::Result<()> {
+    let (what, said) = match what {
+        What {
+            name: Some(name), ..
+        } => (wire::Forget::Texture(name_of(name)?), name.clone()),
+        What {
+            training: Some(name),
+            ..
+        } => (
+            wire::Forget::Training(name_of(name)?),
+            format!("the training of {name}"),
+        ),
+        What { .. } => (
+            wire::Forget::SelfTaught,
+            "what it learned by itself".to_owned(),
+        ),
+    };
+    let (mut bench, _) = Bench::open(at)?;
+    bench.run(Question::forget(what), |_| Ok(()))?;
+    writeln!(out, "The probe has forgotten {said}.")?;
+    Ok(())
+}
+
+fn name_of(name: &str) -> anyhow::Result<Name> {
+    let name = name.trim();
+    ensure!(!name.is_empty(), "a texture needs a name");
+    Name::try_from(name).map_err(|_| {
+        anyhow::anyhow!("{name:?} is longer than the 40 bytes that the probe keeps: shorten it")
+    })
+}
+
+/// Another number every time.
+pub(crate) fn seed_of_now() -> u32 {
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    now.map_or(1, |now| now.as_secs() as u32 ^ now.subsec_nanos())
+}
+
+/// What a training shows of a report.
+fn trained(report: &Report, out: &mut impl Write) -> io::Result<()> {
+    match &report.tell {
+        Tell::Learned {
+            movement,
+            trial,
+            left,
+            felt,
+        } => {
+            let properties: Vec<String> = tactus_core::features::Property::ALL
+                .into_iter()
+                .filter_map(|p| Some(format!("{p} {:.3}", felt.properties().get(p)?)))
+                .collect();
+            writeln!(
+                out,
+                "trial {trial} of {movement}: {}; {left} to go",
+                properties.join(", ")
+            )?;
+        }
+        Tell::Rejected { why, .. } => writeln!(out, "rejected, and made again: {why}")?,
+        _ => moved(report, out)?,
+    }
+    out.flush()
+}

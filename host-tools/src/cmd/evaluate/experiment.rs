@@ -1,0 +1,133 @@
+//! The arguments of `tactus evaluate`, and the experiment that they describe.
+
+use std::path::PathBuf;
+
+use anyhow::{Context as _, bail};
+use clap::ValueEnum;
+use tactus::evaluate::Method;
+use tactus::experiment::{Experiment, Protocol};
+use tactus::fabricslide::FabricSet;
+use tactus::properties::PropertyTable;
+
+use crate::cmd::args::{Features, Stop};
+use crate::cmd::output::Format;
+use crate::cmd::textures::{feel_folder, names};
+
+/// Play thousands of virtual explorations and count the right answers
+#[derive(clap::Args, Clone)]
+#[command(after_help = "\
+Every run learns from slides drawn anew (--protocol says from which), takes one texture as unknown and lets the method
+choose; each slide it asks for is drawn from the test slides of that texture. It stops when a texture is more probable
+than --threshold, or after --max-slides.
+
+With --properties FILE, slides are rows of texture,movement,trial,set,traction,roughness,fineness, where set is train or
+validate, and an action is any (movement, property) pair.
+
+With --fabrics DIR, the folder is one of FabricSlide: fabrics at many movements, learned from one repetition and tested on
+the other.
+
+--novelty leaves one texture after the other out of the table and counts how often it is noticed, and how often a known one
+is taken for new. --lifelong plays a session in time order: the first slides are learned, and every later one is a visit.
+Both need the method fused.
+
+Try:
+  tactus evaluate --recordings DIR --protocol drift
+  tactus evaluate --recordings DIR --method paper
+  tactus evaluate --recordings DIR --novelty leave-one-out
+  tactus evaluate --recordings DIR --lifelong")]
+pub(crate) struct Args {
+    /// Folder of recordings
+    #[arg(
+        long,
+        value_name = "DIR",
+        required_unless_present_any = ["properties", "fabrics"],
+        conflicts_with_all = ["properties", "fabrics"]
+    )]
+    pub(crate) recordings: Option<PathBuf>,
+    /// CSV file of properties in place of recordings
+    #[arg(long, value_name = "FILE")]
+    pub(crate) properties: Option<PathBuf>,
+    /// Folder of FabricSlide in place of recordings
+    #[arg(long, value_name = "DIR", conflicts_with = "properties")]
+    pub(crate) fabrics: Option<PathBuf>,
+    /// The repetition of the fabrics to learn from, 1 or 2; the other one is tested
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "fabrics", value_parser = clap::value_parser!(u8).range(1..=2))]
+    pub(crate) repetition: u8,
+    /// Folder to take the test slides from; training slides still come from --recordings
+    #[arg(long, value_name = "DIR", requires = "recordings")]
+    pub(crate) test: Option<PathBuf>,
+    /// How to decide and to choose the next movement
+    #[arg(long, value_enum, default_value_t = Method::Fused)]
+    pub(crate) method: Method,
+    /// What the method fused looks at; the best that every slide has, unless given
+    #[arg(long, value_enum)]
+    pub(crate) features: Option<Features>,
+    /// Count how textures that were not learned are noticed
+    #[arg(long, value_enum, conflicts_with = "lifelong")]
+    pub(crate) novelty: Option<Novelty>,
+    /// Play a session in time order, in which the probe goes on learning
+    #[arg(long)]
+    pub(crate) lifelong: bool,
+    /// Slides to learn from, per texture and movement: 5 unless given, or all training rows of --properties
+    #[arg(long, value_name = "N")]
+    pub(crate) train_slides: Option<usize>,
+    /// Which slides to learn from and which to test on; --properties says so itself, in its column set
+    #[arg(long, value_enum, default_value_t = Protocol::Interleaved)]
+    pub(crate) protocol: Protocol,
+    /// Number of virtual explorations
+    #[arg(long, default_value_t = 8000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    pub(crate) runs: u64,
+    #[command(flatten)]
+    pub(crate) stop: Stop,
+    /// The same seed gives the same figures, whatever the number of cores
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// How to print the figures
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub(crate) format: Format,
+}
+
+/// How novelty is tried.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Novelty {
+    /// One texture after the other is left out of the table
+    LeaveOneOut,
+}
+
+/// What is to be evaluated, and its name.
+pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
+    if let Some(folder) = &args.fabrics {
+        let set = FabricSet::open(folder)?;
+        let experiment = Experiment::fabrics(&set, args.repetition - 1, args.seed)?;
+        return Ok((experiment, "fabrics"));
+    }
+    if let Some(file) = &args.properties {
+        let set = PropertyTable::read(file)?;
+        let experiment = Experiment::given(&set, args.train_slides, args.seed)
+            .with_context(|| file.display().to_string())?;
+        return Ok((experiment, "properties"));
+    }
+    let Some(folder) = &args.recordings else {
+        bail!("give --recordings, --properties or --fabrics");
+    };
+    let (set, felt) = feel_folder(folder)?;
+    let test = args.test.as_deref().map(feel_folder).transpose()?;
+    let test = test.map(|(set, felt)| (names(&set), felt));
+    let test = test
+        .as_ref()
+        .map(|(names, felt)| (names.as_slice(), felt.as_slice()));
+    let experiment = Experiment::recorded(
+        names(&set),
+        &felt,
+        test,
+        args.protocol,
+        args.train_slides.unwrap_or(5),
+        args.seed,
+    )?;
+    let protocol = match args.protocol {
+        Protocol::Interleaved => "interleaved",
+        Protocol::Blocked => "blocked",
+        Protocol::Drift => "drift",
+    };
+    Ok((experiment, protocol))
+}

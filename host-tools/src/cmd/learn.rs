@@ -1,0 +1,131 @@
+//! `tactus learn` and `tactus learn-by-hand`: tables of textures from slides.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use anyhow::bail;
+use tactus::collection::texture_name;
+use tactus::evaluate::Method;
+use tactus::recordings::RecordingSet;
+use tactus::replay::Felt;
+use tactus_core::fused::{FeatureSet, Observation};
+
+use super::args::{Features, Recordings};
+use super::table_file::write_table;
+use super::textures::{collection, feel_folder, names};
+
+/// Learn a texture table from the first slides of every texture
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    from: Recordings,
+    /// Slides to learn from, per texture and movement: the first ones of the session
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    train_slides: usize,
+    /// The way of deciding that the table is for: fused, or the others, which share one kind of table
+    #[arg(long, value_enum, default_value_t = Method::Fused)]
+    method: Method,
+    /// What a fused table is learned from; the best that every slide has, unless given
+    #[arg(long, value_enum)]
+    features: Option<Features>,
+    /// The file to write
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+/// Learn a handheld probe's table from slides of a simulated hand
+#[derive(clap::Args)]
+pub(crate) struct ByHand {
+    /// The file to write
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Textures of Table 1, by number or name; all 117 unless given
+    #[arg(long, value_name = "T,T,...", value_delimiter = ',')]
+    textures: Vec<String>,
+    /// Slides per texture
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(2..=255))]
+    trials: u32,
+    /// Another seed is another world, and another hand
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// Learns a table from recordings.
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    let (set, felt) = feel_folder(&args.from.recordings)?;
+    let features = args.features.map(Features::set);
+    let bytes = learn_first(&set, &felt, args.train_slides, args.method, features)?;
+    write_table(&args.out, &bytes)?;
+    writeln!(
+        out,
+        "{}: {} textures learned from the first {} slides of each, {} bytes",
+        args.out.display(),
+        set.textures().len(),
+        args.train_slides,
+        bytes.len()
+    )?;
+    Ok(())
+}
+
+/// Learns a handheld probe's table.
+pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()> {
+    let collection = collection(&args.textures, args.trials, args.seed)?;
+    let (bytes, left_out) = tactus::handheld::learn(&collection)?;
+    write_table(&args.out, &bytes)?;
+    writeln!(
+        out,
+        "{}: {} textures learned from {} slides of each by hand, {} bytes",
+        args.out.display(),
+        collection.textures.len() - left_out.len(),
+        args.trials,
+        bytes.len()
+    )?;
+    for number in left_out {
+        writeln!(out, "not felt: {}", texture_name(number))?;
+    }
+    Ok(())
+}
+
+/// The first slides of every texture and movement, and the table that they teach.
+pub(crate) fn learn_first(
+    set: &RecordingSet,
+    felt: &[Vec<Felt>],
+    slides: usize,
+    method: Method,
+    features: Option<FeatureSet>,
+) -> anyhow::Result<Vec<u8>> {
+    if slides < 2 {
+        bail!(
+            "--train-slides {slides}: how slides of one texture differ takes at least two slides"
+        );
+    }
+    let movements = set.movements();
+    let mut first: Vec<Vec<Vec<Observation>>> = Vec::new();
+    for (texture, felt) in set.textures().iter().zip(felt) {
+        let mut of_texture = Vec::new();
+        for &movement in &movements {
+            let same = felt.iter().filter(|s| s.movement == movement);
+            let trials: Vec<Observation> = same
+                .take(slides)
+                .map(|s| Observation::from(&s.measurement))
+                .collect();
+            if trials.len() < slides {
+                bail!(
+                    "{}, {movement}: there are {} slides, and --train-slides is {slides}",
+                    texture.name,
+                    trials.len()
+                );
+            }
+            of_texture.push(trials);
+        }
+        first.push(of_texture);
+    }
+    let names = names(set);
+    Ok(tactus::learn::learn(
+        method.method(),
+        features,
+        &names,
+        &movements,
+        &first,
+    )?)
+}
