@@ -35,7 +35,8 @@ pub(crate) enum Command {
     /// List the serial ports, boards first
     List,
     Status(status::Args),
-    Monitor(monitor::Args),
+    /// Watch the probe live, and have it identify, home or stop by a key
+    Monitor(identify::Args),
     Identify(identify::Args),
     Train(train::Train),
     Teach(train::Teach),
@@ -45,8 +46,10 @@ pub(crate) enum Command {
     #[command(subcommand)]
     Table(table::Command),
     Calibrate(calibrate::Args),
-    Home(calibrate::Home),
-    Stop(calibrate::Stop),
+    /// End a fault and find the limit switches
+    Home(line::Where),
+    /// Stop what is being done and lift the finger
+    Stop(line::Where),
     Flash(flash::Args),
     #[command(subcommand)]
     Log(replay::Command),
@@ -66,9 +69,9 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
         Command::Record(args) => record::run(args, out),
         Command::Table(command) => table::run(command, out),
         Command::Calibrate(args) => calibrate::run(args, out),
-        Command::Home(args) => calibrate::home(args, out),
-        Command::Stop(args) => calibrate::stop(args, out),
+        Command::Home(at) => calibrate::home(at, out),
+        Command::Stop(at) => calibrate::stop(at, out),
         Command::Flash(args) => flash::run(args, out),
-        Command::Log(command) => Ok(replay::run(command, out)?),
+        Command::Log(command) => replay::run(command, out),
     }
 }

@@ -2,16 +2,15 @@
 
 use std::io::{self, Write};
 
-use anyhow::bail;
+use anyhow::ensure;
 use clap::ValueEnum as _;
 use serde::Serialize;
 use tactus::evaluate::{Method, Summary, evaluate};
 use tactus::experiment::Protocol;
 use tactus_core::explorer;
 
-use super::args::Features;
 use super::output::{Format, print_json};
-use super::progress::progress;
+use super::progress::with_progress;
 pub(crate) use experiment::Args;
 
 mod experiment;
@@ -42,14 +41,12 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         };
         return run(&drift, out);
     }
-    if (args.lifelong || args.novelty.is_some()) && args.method.method() != explorer::Method::Fused
-    {
-        bail!(
-            "--novelty and --lifelong need --method fused: the others cannot tell what they do not know"
-        );
-    }
+    let is_fused = args.method.method() == explorer::Method::Fused;
+    ensure!(
+        is_fused || !args.lifelong && args.novelty.is_none(),
+        "--novelty and --lifelong need --method fused: the others cannot tell what they do not know"
+    );
     let (experiment, protocol) = experiment::open(args)?;
-    let experiment = experiment.with_features(args.features.map(Features::set));
     let config = args.stop.config(args.method);
     if args.lifelong {
         return novelty::lifelong(args, &experiment, config, out);
@@ -57,9 +54,9 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if args.novelty.is_some() {
         return novelty::leave_one_out(args, &experiment, protocol, config, out);
     }
-    let bar = progress(args.runs, "exploring");
-    let outcomes = evaluate(&experiment, config, args.runs, || bar.inc(1))?;
-    bar.finish_and_clear();
+    let outcomes = with_progress(args.runs, "exploring", |done| {
+        evaluate(&experiment, config, args.runs, done)
+    })?;
     let evaluation = Evaluation {
         method: args.method,
         protocol,
@@ -72,20 +69,17 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         summary: Summary::new(&outcomes, experiment.names(), args.stop.max_slides),
     };
     match args.format {
-        Format::Json => print_json(&evaluation, out)?,
-        Format::Text => print_evaluation(&evaluation, out)?,
+        Format::Json => print_json(&evaluation, out),
+        Format::Text => Ok(print_evaluation(&evaluation, out)?),
     }
-    Ok(())
 }
 
 fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
-    let method = e
-        .method
-        .to_possible_value()
-        .map_or_else(String::new, |v| v.get_name().to_owned());
+    let name = e.method.to_possible_value();
     writeln!(
         out,
-        "{method}, {}, {} training slides: {} runs over {} textures, threshold {} %, at most {} slides, seed {}",
+        "{}, {}, {} training slides: {} runs over {} textures, threshold {} %, at most {} slides, seed {}",
+        name.as_ref().map_or("", |name| name.get_name()),
         e.protocol,
         e.train_slides,
         e.runs,
@@ -95,44 +89,26 @@ fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
         e.seed
     )?;
     let s = &e.summary;
-    writeln!(
-        out,
-        "  right answers              {:5.1} %",
-        s.accuracy * 100.0
-    )?;
-    writeln!(
-        out,
-        "  sure                       {:5.1} %",
-        s.converged * 100.0
-    )?;
-    writeln!(
-        out,
-        "  wrong among the sure       {:5.1} %",
-        s.wrong_when_sure * 100.0
-    )?;
-    writeln!(
-        out,
-        "  slides                     median {}, mean {:.2}",
-        s.median_slides, s.mean_slides
-    )?;
+    let percent = |share: f64| format!("{:5.1} %", share * 100.0);
+    let slides = format!("median {}, mean {:.2}", s.median_slides, s.mean_slides);
+    let mut rows = vec![
+        ("right answers", percent(s.accuracy)),
+        ("sure", percent(s.converged)),
+        ("wrong among the sure", percent(s.wrong_when_sure)),
+        ("slides", slides),
+    ];
     if e.method.method() == explorer::Method::Fused {
-        writeln!(
-            out,
-            "  most like a new texture    {:5.1} %",
-            s.like_unknown * 100.0
-        )?;
+        rows.push(("most like a new texture", percent(s.like_unknown)));
+    }
+    for (name, value) in rows {
+        writeln!(out, "  {name:<26} {value}")?;
     }
     if !s.confused.is_empty() {
         writeln!(out, "  most confused")?;
     }
     for pair in &s.confused {
-        writeln!(
-            out,
-            "    {:4.1} %  {} taken for {}",
-            pair.share * 100.0,
-            pair.texture,
-            pair.identified
-        )?;
+        let (share, right, wrong) = (pair.share * 100.0, &pair.texture, &pair.identified);
+        writeln!(out, "    {share:4.1} %  {right} taken for {wrong}")?;
     }
     Ok(())
 }

@@ -36,21 +36,21 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         .flat_map(|(texture, slides)| slides.iter().map(move |s| (texture, s)));
     match args.format {
         Rows::Csv => {
-            write!(
+            let bands = (0..BAND_EDGES.len() - 1).map(|band| format!(",ln_psd_band{band}"));
+            writeln!(
                 out,
-                "material,slide,traction_n,roughness_ln,fineness_unfiltered_ln"
+                "material,slide,traction_n,roughness_ln,fineness_unfiltered_ln{}",
+                bands.collect::<String>()
             )?;
-            for band in 0..BAND_EDGES.len() - 1 {
-                write!(out, ",ln_psd_band{band}")?;
-            }
-            writeln!(out)?;
             for (texture, slide) in rows {
                 write!(out, "{},{}", texture.id, slide.number)?;
                 for property in Property::ALL {
-                    match slide.measurement.properties.get(property) {
-                        Some(value) => write!(out, ",{value:.6}")?,
-                        None => write!(out, ",")?,
-                    }
+                    let value = slide.measurement.properties.get(property);
+                    write!(
+                        out,
+                        ",{}",
+                        value.map_or(String::new(), |value| format!("{value:.6}"))
+                    )?;
                 }
                 for band in slide.measurement.ln_bands() {
                     write!(out, ",{band:.6}")?;
@@ -61,32 +61,27 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         Rows::Text => {
             writeln!(
                 out,
-                "{:>3} {:<24} {:>5}  {:<20} {:>10} {:>10} {:>10}  ln of eight bands, 20 to 1000 Hz",
-                "no.", "texture", "slide", "movement", "traction N", "roughness", "fineness"
+                "no. {:<24} slide  {:<20} traction N  roughness   fineness  ln of eight bands, 20 to 1000 Hz",
+                "texture", "movement"
             )?;
             for (texture, slide) in rows {
-                write!(
-                    out,
-                    "{:>3} {:<24} {:>5}  {:<20}",
-                    texture.id,
-                    texture.name,
-                    slide.number,
-                    slide.movement.to_string()
-                )?;
+                let (id, name, number) = (texture.id, &texture.name, slide.number);
+                let movement = slide.movement.to_string();
+                write!(out, "{id:>3} {name:<24} {number:>5}  {movement:<20}")?;
                 for property in Property::ALL {
-                    match slide.measurement.properties.get(property) {
-                        Some(value) => write!(out, " {value:>10.3}")?,
-                        None => write!(out, " {:>10}", "-")?,
-                    }
+                    let value = slide.measurement.properties.get(property);
+                    let value = value.map_or("-".to_owned(), |value| format!("{value:.3}"));
+                    write!(out, " {value:>10}")?;
                 }
                 write!(out, " ")?;
                 for band in slide.measurement.ln_bands() {
                     write!(out, " {band:>5.1}")?;
                 }
+                let is_bound = slide.measurement.roughness_is_bound;
                 writeln!(
                     out,
                     "{}",
-                    if slide.measurement.roughness_is_bound {
+                    if is_bound {
                         "  (not rougher than this)"
                     } else {
                         ""

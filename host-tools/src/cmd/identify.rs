@@ -4,15 +4,15 @@ use std::collections::HashMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, ensure};
 use clap::Parser;
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus::collection::{Collection, calibrated, texture_name};
 use tactus::evaluate::{MAX_TEXTURES, Method};
 use tactus::experiment::{Experiment, Protocol};
-use tactus::recordings::{RecordingSet, Slide};
-use tactus::replay::{Felt, Replay};
+use tactus::recordings::RecordingSet;
+use tactus::replay::Replay;
 use tactus::show::Show;
 use tactus::simulated::SimRig;
 use tactus_core::explorer::{self, Config, Explorer};
@@ -23,8 +23,8 @@ use tactus_core::rig::{Rig, explore};
 use tactus_core::table::Table;
 
 use super::args::Stop;
-use super::learn::learn_first;
-use super::progress::progress;
+use super::learn::{at_least_two, learn_first};
+use super::progress::with_progress;
 use super::table_file::read_table;
 use super::textures::{feel_folder, find_material, find_textures, names};
 
@@ -105,56 +105,48 @@ fn identify_recorded(
     let index = find_material(&set, material)?;
     let name = &set.textures()[index].name;
     let mut random = ChaCha8Rng::seed_from_u64(args.seed);
-    let mut bytes = Vec::new();
-    let (table, shown): (Table<'_>, Vec<Slide>) = match &args.table {
-        Some(file) => {
-            let table = read_table(file, &mut bytes)?;
-            let mut shown = set.load_texture(index)?;
-            // a table learned from this very folder has seen the first slides of every movement
-            let trials = table.trials(0, 0).into();
-            let (_, felt) = feel_folder(folder)?;
-            let learned_as = Method::of(explorer::Method::of(table.contents()));
-            let own = learn_first(&set, &felt, trials, learned_as, None);
-            if own.is_ok_and(|own| own == table.as_bytes()) {
-                let mut seen: HashMap<Movement, usize> = HashMap::new();
-                shown.retain(|slide| {
-                    let before = seen.entry(slide.movement).or_default();
-                    *before += 1;
-                    *before > trials
-                });
-            }
-            if shown.is_empty() {
-                bail!(
-                    "{}: learned from every slide of {name} here; none is left to present",
-                    file.display()
-                );
-            }
-            (table, shown)
+    let mut given = Vec::new();
+    let learned;
+    let given = match &args.table {
+        Some(file) => Some((file, read_table(file, &mut given)?)),
+        None => None,
+    };
+    let (_, felt) = feel_folder(folder)?;
+    let mut shown = set.load_texture(index)?;
+    let table = if let Some((file, table)) = given {
+        // a table learned from this very folder has seen the first slides of every movement
+        let trials = table.trials(0, 0).into();
+        let learned_as = Method::of(explorer::Method::of(table.contents()));
+        let own = learn_first(&set, &felt, trials, learned_as, None);
+        if own.is_ok_and(|own| own == table.as_bytes()) {
+            let mut seen: HashMap<Movement, usize> = HashMap::new();
+            shown.retain(|slide| {
+                let before = seen.entry(slide.movement).or_default();
+                *before += 1;
+                *before > trials
+            });
         }
-        None => {
-            let (_, felt) = feel_folder(folder)?;
-            let experiment = Experiment::recorded(
-                names(&set),
-                &felt,
-                None,
-                Protocol::Interleaved,
-                args.train_slides,
-                args.seed,
-            )?;
-            let run = experiment.run(index as u64);
-            bytes = run.learn(args.method.unwrap_or(Method::Fused).method())?;
-            let learned = &run.training()[index];
-            let unseen = |slide: &Slide, felt: &Felt| {
+        ensure!(
+            !shown.is_empty(),
+            "{}: learned from every slide of {name} here; none is left to present",
+            file.display()
+        );
+        table
+    } else {
+        let (slides, interleaved) = (args.train_slides, Protocol::Interleaved);
+        let experiment =
+            Experiment::recorded(names(&set), &felt, None, interleaved, slides, args.seed)?;
+        let run = experiment.run(index as u64);
+        learned = run.learn(args.method.unwrap_or(Method::Fused).method())?;
+        let seen = &run.training()[index];
+        let mut felt = felt[index].iter();
+        shown.retain(|slide| {
+            felt.next().is_some_and(|felt| {
                 let felt_now = Observation::from(&felt.measurement);
-                slide.number == felt.number && !learned.iter().flatten().any(|l| *l == felt_now)
-            };
-            let slides = set.load_texture(index)?.into_iter().zip(&felt[index]);
-            let shown = slides
-                .filter(|(slide, felt)| unseen(slide, felt))
-                .map(|(slide, _)| slide)
-                .collect();
-            (Table::read(&bytes)?, shown)
-        }
+                slide.number == felt.number && !seen.iter().flatten().any(|l| *l == felt_now)
+            })
+        });
+        Table::read(&learned)?
     };
     if table.find(name).is_none() {
         writeln!(
@@ -232,50 +224,36 @@ fn identify_simulated(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         Some(name) => find_textures(std::slice::from_ref(name))?[0],
         None => random.random_range(1..=117),
     };
-    if args.train_slides < 2 {
-        bail!(
-            "--train-slides {}: how slides of one texture differ takes at least two slides",
-            args.train_slides
-        );
-    }
+    at_least_two(args.train_slides)?;
     let collection = Collection {
         seed: args.seed,
         textures: Collection::spread(unknown, args.among),
         trials: u32::try_from(args.train_slides).context("--train-slides")?,
     };
-    let bar = progress(collection.textures.len() as u64, "learning textures");
     let calibration = calibrated(collection.setup(unknown, 0))?;
     let method = args.method.unwrap_or(Method::Fused).method();
-    let bytes = collection.learn(method, calibration, || bar.inc(1))?;
-    bar.finish_and_clear();
+    let textures = collection.textures.len() as u64;
+    let bytes = with_progress(textures, "learning textures", |done| {
+        collection.learn(method, calibration, done)
+    })?;
     let table = Table::read(&bytes)?;
     let mut rig = SimRig::new(collection.setup(unknown, 1 + u64::from(random.next_u32() % 1000)));
     rig.control().calibrate(calibration)?;
+    let name = texture_name(unknown);
     writeln!(
         out,
-        "An unknown texture, one of {}. Under the finger: {} (seed {}).",
+        "An unknown texture, one of {}. Under the finger: {name} (seed {}).",
         table.textures(),
-        texture_name(unknown),
         args.seed
     )?;
-    show_exploration(
-        &mut rig,
-        table,
-        args,
-        &mut random,
-        texture_name(unknown),
-        out,
-    )?;
+    show_exploration(&mut rig, table, args, &mut random, name, out)?;
+    let seconds = rig.now().as_secs_f64();
+    let skin = rig.control().skin();
     writeln!(
         out,
-        "{:.0} s of the rig's time; skin: {:.2} J of sliding{}.",
-        rig.now().as_secs_f64(),
-        rig.control().skin().energy_j(),
-        if rig.control().skin().is_worn() {
-            ", look at it"
-        } else {
-            ""
-        }
+        "{seconds:.0} s of the rig's time; skin: {:.2} J of sliding{}.",
+        skin.energy_j(),
+        if skin.is_worn() { ", look at it" } else { "" }
     )?;
     Ok(())
 }

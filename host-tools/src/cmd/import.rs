@@ -22,13 +22,8 @@ pub(crate) fn run(Args { from, to }: &Args, out: &mut impl Write) -> anyhow::Res
         bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
-    writeln!(
-        out,
-        "{}: {} textures, {} slides",
-        to.display(),
-        imported.textures,
-        imported.slides
-    )?;
+    let (to, textures, slides) = (to.display(), imported.textures, imported.slides);
+    writeln!(out, "{to}: {textures} textures, {slides} slides")?;
     if imported.lost_rows > 0 {
         writeln!(
             out,

@@ -3,12 +3,13 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::bail;
+use anyhow::ensure;
 use tactus::collection::texture_name;
 use tactus::evaluate::Method;
 use tactus::recordings::RecordingSet;
 use tactus::replay::Felt;
 use tactus_core::fused::{FeatureSet, Observation};
+use tactus_core::movement::Movement;
 
 use super::args::{Features, Recordings};
 use super::table_file::write_table;
@@ -86,6 +87,15 @@ pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()>
     Ok(())
 }
 
+/// That slides to learn from are enough.
+pub(crate) fn at_least_two(slides: usize) -> anyhow::Result<()> {
+    ensure!(
+        slides >= 2,
+        "--train-slides {slides}: how slides of one texture differ takes at least two slides"
+    );
+    Ok(())
+}
+
 /// The first slides of every texture and movement, and the table that they teach.
 pub(crate) fn learn_first(
     set: &RecordingSet,
@@ -94,37 +104,33 @@ pub(crate) fn learn_first(
     method: Method,
     features: Option<FeatureSet>,
 ) -> anyhow::Result<Vec<u8>> {
-    if slides < 2 {
-        bail!(
-            "--train-slides {slides}: how slides of one texture differ takes at least two slides"
-        );
-    }
+    at_least_two(slides)?;
     let movements = set.movements();
-    let mut first: Vec<Vec<Vec<Observation>>> = Vec::new();
-    for (texture, felt) in set.textures().iter().zip(felt) {
-        let mut of_texture = Vec::new();
-        for &movement in &movements {
-            let same = felt.iter().filter(|s| s.movement == movement);
-            let trials: Vec<Observation> = same
-                .take(slides)
-                .map(|s| Observation::from(&s.measurement))
-                .collect();
-            if trials.len() < slides {
-                bail!(
-                    "{}, {movement}: there are {} slides, and --train-slides is {slides}",
-                    texture.name,
-                    trials.len()
-                );
-            }
-            of_texture.push(trials);
-        }
-        first.push(of_texture);
-    }
-    let names = names(set);
+    let first = |name: &str, felt: &[Felt], movement: Movement| {
+        let same = felt.iter().filter(|s| s.movement == movement);
+        let trials: Vec<_> = same
+            .map(|s| Observation::from(&s.measurement))
+            .take(slides)
+            .collect();
+        let there = trials.len();
+        ensure!(
+            there == slides,
+            "{name}, {movement}: there are {there} slides, and --train-slides is {slides}"
+        );
+        Ok(trials)
+    };
+    let first = set.textures().iter().zip(felt).map(|(texture, felt)| {
+        let trials = movements
+            .iter()
+            .map(|&movement| first(&texture.name, felt, movement));
+        trials.collect()
+    });
+    let first: Vec<Vec<Vec<Observation>>> = first.collect::<anyhow::Result<_>>()?;
+    let method = method.method();
     Ok(tactus::learn::learn(
-        method.method(),
+        method,
         features,
-        &names,
+        &names(set),
         &movements,
         &first,
     )?)

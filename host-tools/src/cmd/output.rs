@@ -18,3 +18,11 @@ pub(crate) fn print_json(figures: &impl Serialize, out: &mut impl Write) -> anyh
     writeln!(out, "{}", serde_json::to_string_pretty(figures)?)?;
     Ok(())
 }
+
+/// Prints values, each after its name.
+pub(crate) fn print_rows(rows: &[(&str, String)], out: &mut impl Write) -> anyhow::Result<()> {
+    for (name, value) in rows {
+        writeln!(out, "{name:<15} {value}")?;
+    }
+    Ok(())
+}

@@ -14,3 +14,15 @@ pub(crate) fn progress(length: u64, what: &'static str) -> ProgressBar {
     bar.enable_steady_tick(Duration::from_millis(200));
     bar
 }
+
+/// Does work with a bar: the work calls the function that it is given, `length` times.
+pub(crate) fn with_progress<T, E>(
+    length: u64,
+    what: &'static str,
+    work: impl FnOnce(&(dyn Fn() + Sync)) -> Result<T, E>,
+) -> Result<T, E> {
+    let bar = progress(length, what);
+    let done = work(&|| bar.inc(1))?;
+    bar.finish_and_clear();
+    Ok(done)
+}

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use tactus::collection::{Collection, calibrated, texture_name};
 use tactus::recordings::{RecordingWriter, Slide, Texture};
 
-use super::progress::progress;
+use super::progress::with_progress;
 use super::textures::collection;
 
 /// Record slides on the simulated rig, in the project's format
@@ -34,37 +34,30 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         name: texture_name(number).to_owned(),
     });
     let mut writer = RecordingWriter::create(&args.out, named.collect())?;
-    let bar = progress(collection.textures.len() as u64, "sliding over textures");
     let calibration = calibrated(collection.setup(collection.textures[0], 0))?;
-    let (mut done, mut slides) = (0, 0);
-    // a few textures at a time: a large set does not fit into memory
-    for textures in collection.textures.chunks(8) {
-        let part = Collection {
-            textures: textures.to_vec(),
-            ..collection.clone()
-        };
-        for (index, recorded) in part
-            .record(calibration, || bar.inc(1))?
-            .into_iter()
-            .enumerate()
-        {
-            for slide in recorded {
-                let texture = done + index;
-                writer.write(&Slide { texture, ..slide })?;
-                slides += 1;
+    let textures = collection.textures.len();
+    let mut slides = 0;
+    with_progress(textures as u64, "sliding over textures", |done| {
+        // a few textures at a time: a large set does not fit into memory
+        for (part, first) in collection.textures.chunks(8).zip((0..).step_by(8)) {
+            let part = Collection {
+                textures: part.to_vec(),
+                ..collection.clone()
+            };
+            for (recorded, texture) in part.record(calibration, done)?.into_iter().zip(first..) {
+                for slide in recorded {
+                    writer.write(&Slide { texture, ..slide })?;
+                    slides += 1;
+                }
             }
         }
-        done += textures.len();
-    }
+        anyhow::Ok(())
+    })?;
     writer.finish()?;
-    bar.finish_and_clear();
+    let (folder, seed) = (args.out.display(), args.seed);
     writeln!(
         out,
-        "{}: {} textures, {} slides, world {}",
-        args.out.display(),
-        collection.textures.len(),
-        slides,
-        args.seed
+        "{folder}: {textures} textures, {slides} slides, world {seed}"
     )?;
     Ok(())
 }

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::ValueEnum;
-use tactus::evaluate::Method;
-use tactus::study::identify::{Identification, METHODS, WorldRow, experiment, of_pair, pairs};
+use tactus::study::identify::{
+    Column, Identification, METHODS, WorldRow, experiment, of_pair, pairs,
+};
 use tactus::study::pilot::Pilot;
 use tactus::study::published::PAIRS;
 use tactus::study::report;
@@ -16,7 +17,7 @@ use tactus::study::training::{Training, Worn};
 use tactus::study::{self, Study};
 
 use super::output::Format;
-use super::progress::progress;
+use super::progress::with_progress;
 
 /// Make the paper's whole study on the simulated rig, and report it beside the published numbers
 #[derive(clap::Args)]
@@ -55,6 +56,12 @@ pub(crate) struct Args {
     /// How to print the figures; json is what study.json holds
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
+}
+
+impl Args {
+    fn includes(&self, stage: Stage) -> bool {
+        self.stage == stage || self.stage == Stage::All
+    }
 }
 
 /// Parts of the study.
@@ -105,10 +112,8 @@ impl Times {
         length: u64,
         work: impl FnOnce(&(dyn Fn() + Sync)) -> Result<T, study::StudyError>,
     ) -> Result<T, study::StudyError> {
-        let bar = progress(length, what);
         let begun = Instant::now();
-        let done = work(&|| bar.inc(1))?;
-        bar.finish_and_clear();
+        let done = with_progress(length, what, work)?;
         self.0.push((what, begun.elapsed().as_secs_f64()));
         Ok(done)
     }
@@ -117,7 +122,6 @@ impl Times {
 /// Makes a study, or a part of one, and writes its report.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     report::prepare(&args.out)?;
-    let is = |stage| args.stage == stage || args.stage == Stage::All;
     let world = StudyWorld {
         seed: args.seed,
         variation: args.variation,
@@ -136,7 +140,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         signals: None,
         worlds: Vec::new(),
     };
-    if is(Stage::Pilot) {
+    if args.includes(Stage::Pilot) {
         let pilot = times.stage("pilot study", Pilot::TEXTURES, |done| {
             Pilot::run(world, done)
         })?;
@@ -146,7 +150,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         let recorded = times.stage("training and validation", StudyWorld::RECORDED, |done| {
             world.train_and_validate(done)
         })?;
-        if is(Stage::Train) {
+        if args.includes(Stage::Train) {
             let worn = times.stage("worn skins", Worn::TEXTURES, |done| {
                 Worn::record(world, done)
             })?;
@@ -182,17 +186,16 @@ fn explore(
     study: &mut Study,
     times: &mut Times,
 ) -> anyhow::Result<()> {
-    let is = |stage| args.stage == stage || args.stage == Stage::All;
     let simulations = args.simulations;
     let experiment = experiment(recorded, world.seed)?;
-    if is(Stage::Pairs) {
+    if args.includes(Stage::Pairs) {
         let each = of_pair(simulations);
         let rows = times.stage("pairs", PAIRS.len() as u64 * each, |done| {
             pairs(&experiment, each, done)
         })?;
         study.pairs = Some(rows);
     }
-    if is(Stage::Identify) {
+    if args.includes(Stage::Identify) {
         let length = METHODS.len() as u64 * simulations;
         let identification = times.stage("identification", length, |done| {
             Identification::run(&experiment, simulations, done)
@@ -206,17 +209,17 @@ fn explore(
 /// The command that was given, without what does not change the report.
 fn command(args: &Args) -> String {
     let stage = format!("{:?}", args.stage).to_lowercase();
-    let mut command = format!("tactus study {stage} --seed {}", args.seed);
-    if let Some(Seeds(first, last)) = args.seeds {
-        command += &format!(" --seeds {first}-{last}");
-    }
-    command
-        + &format!(
-            " --simulations {} --variation {} --out {}",
-            args.simulations,
-            args.variation,
-            args.out.display()
-        )
+    let seeds = args
+        .seeds
+        .map(|Seeds(first, last)| format!(" --seeds {first}-{last}"));
+    format!(
+        "tactus study {stage} --seed {}{} --simulations {} --variation {} --out {}",
+        args.seed,
+        seeds.unwrap_or_default(),
+        args.simulations,
+        args.variation,
+        args.out.display()
+    )
 }
 
 fn print(args: &Args, study: &Study, times: &Times, out: &mut impl Write) -> std::io::Result<()> {
@@ -227,16 +230,13 @@ fn print(args: &Args, study: &Study, times: &Times, out: &mut impl Write) -> std
         study.variation,
         args.out.join("report.html").display()
     )?;
-    for useful in study.pilot.iter().flat_map(|p| &p.most_useful) {
-        let of = study
-            .pilot
-            .as_ref()
-            .and_then(|p| p.movements.get(useful.movement));
-        if let Some(m) = of {
+    if let Some(pilot) = &study.pilot {
+        for useful in &pilot.most_useful {
+            let (property, m) = (&useful.property, &pilot.movements[useful.movement]);
+            let (force_n, speed_mm_s) = (m.force_n, m.speed_mm_s);
             writeln!(
                 out,
-                "  {:<10} most useful at {:.2} N, {:.1} mm/s",
-                useful.property, m.force_n, m.speed_mm_s
+                "  {property:<10} most useful at {force_n:.2} N, {speed_mm_s:.1} mm/s"
             )?;
         }
     }
@@ -245,15 +245,11 @@ fn print(args: &Args, study: &Study, times: &Times, out: &mut impl Write) -> std
         writeln!(out, "  pairs      {mean:.1} % right, paper 99.6 %")?;
     }
     if let Some(identification) = &study.identification {
-        for (method, column) in METHODS.into_iter().zip(&identification.columns) {
-            print_column(method, column, out)?;
-        }
+        print_columns(&identification.columns, out)?;
     }
     for world in &study.worlds {
         writeln!(out, "World {}: pairs {:.1} %", world.seed, world.pairs)?;
-        for (method, column) in METHODS.into_iter().zip(&world.columns) {
-            print_column(method, column, out)?;
-        }
+        print_columns(&world.columns, out)?;
     }
     for (what, seconds) in &times.0 {
         writeln!(out, "{seconds:8.1} s  {what}")?;
@@ -264,19 +260,16 @@ fn print(args: &Args, study: &Study, times: &Times, out: &mut impl Write) -> std
     Ok(())
 }
 
-fn print_column(
-    method: Method,
-    column: &study::identify::Column,
-    out: &mut impl Write,
-) -> std::io::Result<()> {
-    writeln!(
-        out,
-        "  {:<10} {:5.1} % right, {:5.1} % right and sure, median {} movements",
-        format!("{method:?}").to_lowercase(),
-        column.correct,
-        column.converged,
-        column.median
-    )
+fn print_columns(columns: &[Column], out: &mut impl Write) -> std::io::Result<()> {
+    for (method, column) in METHODS.into_iter().zip(columns) {
+        let method = format!("{method:?}").to_lowercase();
+        writeln!(
+            out,
+            "  {method:<10} {:5.1} % right, {:5.1} % right and sure, median {} movements",
+            column.correct, column.converged, column.median
+        )?;
+    }
+    Ok(())
 }
 
 /// Most memory that this process has held, where the system tells.

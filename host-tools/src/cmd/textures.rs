@@ -8,15 +8,14 @@ use tactus::recordings::RecordingSet;
 use tactus::replay::{Felt, feel};
 use tactus::sim::textures::TEXTURES;
 
-use super::progress::progress;
+use super::progress::with_progress;
 
 /// Opens a folder and feels all of its slides.
 pub(crate) fn feel_folder(folder: &Path) -> anyhow::Result<(RecordingSet, Vec<Vec<Felt>>)> {
     let set = RecordingSet::open(folder)?;
-    let bar = progress(set.textures().len() as u64, "feeling slides");
-    let felt = feel(&set, |_| bar.inc(1))
+    let textures = set.textures().len() as u64;
+    let felt = with_progress(textures, "feeling slides", |done| feel(&set, |_| done()))
         .with_context(|| format!("recordings in {}", folder.display()))?;
-    bar.finish_and_clear();
     Ok((set, felt))
 }
 
@@ -24,26 +23,19 @@ pub(crate) fn names(set: &RecordingSet) -> Vec<String> {
     set.textures().iter().map(|t| t.name.clone()).collect()
 }
 
+/// Index of the texture that is meant by a number or a name.
 pub(crate) fn find_material(set: &RecordingSet, wanted: &str) -> anyhow::Result<usize> {
     let number = wanted.trim_start_matches("mat").parse::<u32>().ok();
-    let by_name = set
-        .textures()
+    let textures = set.textures();
+    let named = textures
         .iter()
         .position(|t| t.name.eq_ignore_ascii_case(wanted));
-    by_name
-        .or_else(|| set.textures().iter().position(|t| Some(t.id) == number))
-        .with_context(|| {
-            let known: Vec<String> = set
-                .textures()
-                .iter()
-                .map(|t| format!("{} {}", t.id, t.name))
-                .collect();
-            format!(
-                "--material {wanted}: not in {}, which has: {}",
-                set.folder().display(),
-                known.join(", ")
-            )
-        })
+    let numbered = || textures.iter().position(|t| Some(t.id) == number);
+    named.or_else(numbered).with_context(|| {
+        let known = textures.iter().map(|t| format!("{} {}", t.id, t.name));
+        let (folder, known) = (set.folder().display(), known.collect::<Vec<_>>().join(", "));
+        format!("--material {wanted}: not in {folder}, which has: {known}")
+    })
 }
 
 /// The textures asked for, by name or number; without any, all.
@@ -51,18 +43,14 @@ pub(crate) fn find_textures(wanted: &[String]) -> anyhow::Result<Vec<u8>> {
     if wanted.is_empty() {
         return Ok(TEXTURES.iter().map(|t| t.number).collect());
     }
-    wanted
-        .iter()
-        .map(|name| {
-            texture_number(name.trim()).with_context(|| {
-                let known: Vec<&str> = TEXTURES.iter().map(|t| t.name).collect();
-                format!(
-                    "no texture {name} in Table 1, which has: {}",
-                    known.join(", ")
-                )
-            })
+    let number = |name: &String| {
+        texture_number(name.trim()).with_context(|| {
+            let known: Vec<&str> = TEXTURES.iter().map(|t| t.name).collect();
+            let known = known.join(", ");
+            format!("no texture {name} in Table 1, which has: {known}")
         })
-        .collect()
+    };
+    wanted.iter().map(number).collect()
 }
 
 /// The textures that are named, each once.

@@ -1,9 +1,9 @@
 //! A probe that somebody works with: its line, the log of what is said, and Ctrl-C, which leaves the rig lifted and stopped.
 
 use std::io::{self, Write};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::task::Poll;
 use std::time::{Duration, Instant};
 
@@ -37,9 +37,7 @@ pub(crate) enum BenchError {
     /// The line, or what the probe said.
     #[error("{name}: {why}{}", after(.why, *.moving))]
     Port {
-        /// The port.
         name: String,
-        /// What is wrong.
         why: PortError,
         /// Something that moves was asked for and not over.
         moving: bool,
@@ -59,25 +57,18 @@ pub(crate) enum BenchError {
     #[error("the probe's table cannot be read: {0}")]
     Table(#[from] TableError),
     /// The log cannot be written.
-    #[error("{}: {why}; the rig was stopped and lifted", path.display())]
-    Log {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        why: io::Error,
-    },
-    /// What is shown cannot be written.
+    #[error("{0}; the rig was stopped and lifted")]
+    Log(io::Error),
+    /// There can be no log, or what is shown cannot be written.
     #[error(transparent)]
     Io(#[from] io::Error),
 }
 
 fn after(why: &PortError, moving: bool) -> &'static str {
-    match why {
-        PortError::Link(_) => "",
-        _ if moving => {
-            ".\nThe rig was moving: the probe goes on and lifts the finger at the end. To stop it now, press its emergency stop"
-        }
-        _ => "",
+    if moving && !matches!(why, PortError::Link(_)) {
+        ".\nThe rig was moving: the probe goes on and lifts the finger at the end. To stop it now, press its emergency stop"
+    } else {
+        ""
     }
 }
 
@@ -117,44 +108,69 @@ impl Interrupt {
 pub(crate) struct Bench {
     port: Port<Box<dyn Line>>,
     pub(crate) name: String,
-    log: Option<Log>,
     interrupt: Interrupt,
-    /// what the rig did last, and when it told where it is
-    phase: Option<Phase>,
-    lived: Instant,
+    heard: Heard,
     /// ends last
     _emulator: Option<Emulator>,
 }
 
+/// What the reports have said of the rig, and the log that keeps them.
+struct Heard {
+    log: Option<Log>,
+    /// what the rig does
+    phase: Option<Phase>,
+    /// when it told last where it is
+    located: Instant,
+}
+
+impl Heard {
+    fn hear(&mut self, report: &Report) {
+        if let Some(log) = &mut self.log {
+            log.told(report);
+        }
+        match &report.tell {
+            Tell::Phase(now) => self.phase = Some(*now),
+            Tell::Status(status) => self.phase = Some(status.phase),
+            Tell::Live(_) => self.located = Instant::now(),
+            _ => {}
+        }
+    }
+
+    fn asked(&mut self, ask: &Ask) {
+        if let Some(log) = &mut self.log {
+            log.asked(ask);
+        }
+    }
+
+    /// That all of it is in the log.
+    fn logged(&mut self) -> Result<(), BenchError> {
+        let Some(Err(why)) = self.log.as_mut().map(Log::flush) else {
+            return Ok(());
+        };
+        self.log = None;
+        Err(BenchError::Log(why))
+    }
+}
+
 impl Bench {
     /// Opens the line and waits until the probe has its table: it may have had its power just now.
-    ///
-    /// # Errors
-    /// See [`BenchError`].
     pub(crate) fn open(place: &Where) -> Result<(Self, Status), BenchError> {
         let interrupt = Interrupt::catch()?;
         let open = place.open()?;
-        let log = match &place.log {
-            Some(path) => Some(
-                Log::create(path, &open.name).map_err(|why| BenchError::Log {
-                    path: path.clone(),
-                    why,
-                })?,
-            ),
-            None => None,
-        };
-        let (greeting, patience) = if open.emulator.is_some() {
-            (EMULATED, EMULATED)
-        } else {
-            (GREETING, PATIENCE)
+        let log = place.log.as_ref().map(|path| Log::create(path, &open.name));
+        let (greeting, patience) = match open.emulator {
+            Some(_) => (EMULATED, EMULATED),
+            None => (GREETING, PATIENCE),
         };
         let mut bench = Self {
             port: Port::new(open.line, greeting),
             name: open.name,
-            log,
             interrupt,
-            phase: None,
-            lived: Instant::now(),
+            heard: Heard {
+                log: log.transpose()?,
+                phase: None,
+                located: Instant::now(),
+            },
             _emulator: open.emulator,
         };
         let status = bench.hello()?;
@@ -166,7 +182,7 @@ impl Bench {
     fn hello(&mut self) -> Result<Status, BenchError> {
         let began = Instant::now();
         loop {
-            let status = self.run(Question::status(), |_| Ok(()));
+            let status = self.get(Question::status());
             let is_up = match &status {
                 // a probe without a table has not opened its store yet
                 Ok(status) => status.textures > 0 && status.phase != Phase::Homing,
@@ -196,9 +212,6 @@ impl Bench {
     }
 
     /// Sees an errand through; `each` is shown all reports. Whatever ends it early leaves the rig stopped and lifted.
-    ///
-    /// # Errors
-    /// See [`BenchError`].
     pub(crate) fn run<E: Errand>(
         &mut self,
         errand: E,
@@ -224,7 +237,7 @@ impl Bench {
                     self.lift();
                     return Err(why.into());
                 }
-                (Err(why @ BenchError::Log { .. }), _) => {
+                (Err(why @ BenchError::Log(_)), _) => {
                     self.lift();
                     return Err(why);
                 }
@@ -233,15 +246,26 @@ impl Bench {
         }
     }
 
+    /// As [`run`](Self::run), for what comes of it alone.
+    pub(crate) fn get<E: Errand>(&mut self, errand: E) -> Result<E::Outcome, BenchError> {
+        self.run(errand, |_| Ok(()))
+    }
+
+    /// As [`run`](Self::run), for what moves: prints a fault, and what it asks for.
+    pub(crate) fn perform<E: Errand>(
+        &mut self,
+        errand: E,
+        out: &mut impl Write,
+    ) -> Result<E::Outcome, BenchError> {
+        self.run(errand, |report| show_fault(report, out))
+    }
+
     /// Begins an errand, for whoever looks at something else between its [steps](Bench::step).
-    ///
-    /// # Errors
-    /// See [`BenchError`].
     pub(crate) fn begin<E: Errand>(&mut self, errand: E) -> Result<Job<E>, BenchError> {
         let begun = self.port.begin(errand);
         let job = begun.map_err(|why| self.error(why, false))?;
-        if let (Some(log), Some(ask)) = (&mut self.log, job.asking()) {
-            log.asked(ask);
+        if let Some(ask) = job.asking() {
+            self.heard.asked(ask);
         }
         Ok(job)
     }
@@ -253,18 +277,14 @@ impl Bench {
     pub(crate) fn step<E: Errand>(
         &mut self,
         job: &mut Job<E>,
-        each: impl FnMut(&Report),
+        mut each: impl FnMut(&Report),
     ) -> Result<Poll<E::Outcome>, BenchError> {
         let moving = job.asking().is_some_and(moves);
-        let Self {
-            port,
-            log,
-            phase,
-            lived,
-            ..
-        } = self;
-        let polled = port.step(job, heard(log, phase, lived, each));
-        self.log_failure()?;
+        let polled = self.port.step(job, |report| {
+            self.heard.hear(report);
+            each(report);
+        });
+        self.heard.logged()?;
         polled.map_err(|why| {
             if moving && !matches!(why, PortError::Link(LinkError::Refused(_))) {
                 // there may be nobody to hear it
@@ -276,46 +296,28 @@ impl Bench {
     }
 
     /// Asks for something beside the errand under way.
-    ///
-    /// # Errors
-    /// See [`BenchError`].
     pub(crate) fn ask(&mut self, ask: Ask) -> Result<(), BenchError> {
-        if let Some(log) = &mut self.log {
-            log.asked(&ask);
-        }
+        self.heard.asked(&ask);
         let asked = self.port.ask(ask);
         asked.map_err(|why| self.error(why, false))
     }
 
     /// Reads once, without an errand.
-    ///
-    /// # Errors
-    /// See [`BenchError`].
-    pub(crate) fn listen(&mut self, each: impl FnMut(&Report)) -> Result<(), BenchError> {
-        let Self {
-            port,
-            log,
-            phase,
-            lived,
-            ..
-        } = self;
-        let listened = port.listen(heard(log, phase, lived, each));
-        self.log_failure()?;
+    pub(crate) fn listen(&mut self, mut each: impl FnMut(&Report)) -> Result<(), BenchError> {
+        let listened = self.port.listen(|report| {
+            self.heard.hear(report);
+            each(report);
+        });
+        self.heard.logged()?;
         listened.map_err(|why| self.error(why, false))
     }
 
     /// The table that the probe uses; all of it is in the log then.
-    ///
-    /// # Errors
-    /// See [`BenchError`].
     pub(crate) fn table(&mut self) -> Result<Vec<u8>, BenchError> {
-        self.run(ReadTable::default(), |_| Ok(()))
+        self.get(ReadTable::default())
     }
 
     /// The names of the textures that the probe knows.
-    ///
-    /// # Errors
-    /// See [`BenchError`].
     pub(crate) fn names(&mut self) -> Result<Vec<String>, BenchError> {
         let bytes = self.table()?;
         Ok(Table::read(&bytes)?.names().map(str::to_owned).collect())
@@ -325,9 +327,8 @@ impl Bench {
     /// the waiting.
     pub(crate) fn lift(&mut self) -> BenchError {
         match self.try_lift() {
-            Ok(None) => BenchError::Stopped,
             Ok(Some(Fault::LeverNotHome)) => BenchError::NotHome,
-            Ok(Some(_)) => BenchError::Stopped,
+            Ok(_) => BenchError::Stopped,
             Err(why) => why,
         }
     }
@@ -336,7 +337,7 @@ impl Bench {
         let began = Instant::now();
         let mut asked: Option<Instant> = None;
         let mut fault = None;
-        self.phase = None;
+        self.heard.phase = None;
         while began.elapsed() < LIFTING {
             if self.interrupt.take() {
                 return Err(BenchError::NotLifted);
@@ -353,25 +354,14 @@ impl Bench {
                     fault = status.fault;
                 }
             })?;
-            match self.phase {
+            let at_rest = self.heard.located.elapsed() > AT_REST;
+            match self.heard.phase {
                 Some(Phase::Ready | Phase::Parked) => return Ok(None),
-                Some(Phase::Faulted) if self.lived.elapsed() > AT_REST && fault.is_some() => {
-                    return Ok(fault);
-                }
+                Some(Phase::Faulted) if at_rest && fault.is_some() => return Ok(fault),
                 _ => {}
             }
         }
         Err(BenchError::NotLifted)
-    }
-
-    fn log_failure(&mut self) -> Result<(), BenchError> {
-        match self.log.as_mut().map(Log::flush) {
-            Some(Err(why)) => {
-                let path = self.log.take().map(Log::into_path).unwrap_or_default();
-                Err(BenchError::Log { path, why })
-            }
-            _ => Ok(()),
-        }
     }
 
     fn error(&self, why: PortError, moving: bool) -> BenchError {
@@ -380,27 +370,6 @@ impl Bench {
             why,
             moving,
         }
-    }
-}
-
-/// Takes notes of what is heard, and passes it on.
-fn heard(
-    log: &mut Option<Log>,
-    phase: &mut Option<Phase>,
-    lived: &mut Instant,
-    mut each: impl FnMut(&Report),
-) -> impl FnMut(&Report) {
-    move |report| {
-        if let Some(log) = log {
-            log.told(report);
-        }
-        match &report.tell {
-            Tell::Phase(now) => *phase = Some(*now),
-            Tell::Status(status) => *phase = Some(status.phase),
-            Tell::Live(_) => *lived = Instant::now(),
-            _ => {}
-        }
-        each(report);
     }
 }
 
@@ -414,10 +383,8 @@ fn moves(ask: &Ask) -> bool {
 
 /// Waits for Enter, or for Ctrl-C.
 pub(crate) fn wait_for_enter(interrupt: &Interrupt, prompt: &str) -> Result<(), BenchError> {
-    let mut err = io::stderr();
-    write!(err, "{prompt}")?;
-    err.flush()?;
-    let (entered, enter) = std::sync::mpsc::channel();
+    eprint!("{prompt}");
+    let (entered, enter) = mpsc::channel();
     // a blocking read does not see Ctrl-C; the thread ends with the program
     std::thread::spawn(move || {
         let mut line = String::new();
@@ -428,25 +395,25 @@ pub(crate) fn wait_for_enter(interrupt: &Interrupt, prompt: &str) -> Result<(), 
             return Err(BenchError::Stopped);
         }
         match enter.recv_timeout(Duration::from_millis(100)) {
-            Ok(read) => {
-                return if read? == 0 {
-                    Err(BenchError::Stopped)
-                } else {
-                    Ok(())
-                };
-            }
-            Err(std::sync::mpsc::RecvTimeoutError::Timeout) => {}
-            Err(_) => return Err(BenchError::Stopped),
+            Ok(Ok(1..)) => return Ok(()),
+            Ok(Err(why)) => return Err(why.into()),
+            Err(RecvTimeoutError::Timeout) => {}
+            Ok(Ok(0)) | Err(RecvTimeoutError::Disconnected) => return Err(BenchError::Stopped),
         }
     }
 }
 
-/// What a movement shows of a report: faults, and what they ask for.
-pub(crate) fn moved(report: &Report, out: &mut impl Write) -> io::Result<()> {
+/// Prints a fault, if it is one that is told, and what it asks for.
+pub(crate) fn show_fault(report: &Report, out: &mut impl Write) -> io::Result<()> {
     if let Tell::Fault(fault) = &report.tell {
-        let recovery = fault.row().map_or("reset", |row| row.recovery);
+        let recovery = recovery(fault);
         writeln!(out, "FAULT: {fault}. {recovery}: tactus device home")?;
         out.flush()?;
     }
     Ok(())
+}
+
+/// What a fault asks for.
+pub(crate) fn recovery(fault: &Fault) -> &'static str {
+    fault.row().map_or("reset", |row| row.recovery)
 }

@@ -1,14 +1,15 @@
 //! `tactus device calibrate`, `home` and `stop`: the rig itself.
 
-use std::io::{self, Write};
+use std::io::Write;
 
 use anyhow::ensure;
 use tactus::link::Question;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::Ask;
 
-use super::bench::{Bench, BenchError, moved};
+use super::bench::{Bench, BenchError};
 use super::line::Where;
+use crate::cmd::output::print_rows;
 
 /// Measure what differs from rig to rig, or show and set it
 #[derive(clap::Args)]
@@ -39,35 +40,21 @@ pub(crate) struct Args {
     force_mn_per_count: Option<f32>,
 }
 
-/// End a fault and find the limit switches
-#[derive(clap::Args)]
-pub(crate) struct Home {
-    #[command(flatten)]
-    at: Where,
-}
-
-/// Stop what is being done and lift the finger
-#[derive(clap::Args)]
-pub(crate) struct Stop {
-    #[command(flatten)]
-    at: Where,
-}
-
 /// Measures, shows or sets the rig's constants.
 pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (mut bench, _) = Bench::open(&how.at)?;
-    let mut calibration: RigCalibration = bench.run(Question::read_calibration(), |_| Ok(()))?;
+    let mut calibration = bench.get(Question::read_calibration())?;
     if how.show {
-        return Ok(show_calibration(&calibration, out)?);
+        return print_rows(&calibration_rows(&calibration), out);
     }
     if how.drifted {
         calibration.date = 0;
-        bench.run(Question::write_calibration(&calibration)?, |_| Ok(()))?;
-        bench.run(Question::command(Ask::Home), |report| moved(report, out))?;
+        bench.get(Question::write_calibration(&calibration)?)?;
+        bench.perform(Question::command(Ask::Home), out)?;
     }
     writeln!(out, "Measuring the motor's current without load ...")?;
     out.flush()?;
-    calibration = bench.run(Question::calibrate(), |report| moved(report, out))?;
+    calibration = bench.perform(Question::calibrate(), out)?;
     calibration.date = how.date.unwrap_or_else(today);
     if let Some(newton_per_ampere) = how.newton_per_ampere {
         calibration.newton_per_ampere = newton_per_ampere;
@@ -75,20 +62,61 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if let Some(force_mn_per_count) = how.force_mn_per_count {
         calibration.pressure.force_mn_per_count = force_mn_per_count;
     }
-    bench.run(Question::write_calibration(&calibration)?, |_| Ok(()))?;
-    let kept = bench.run(Question::read_calibration(), |_| Ok(()))?;
+    bench.get(Question::write_calibration(&calibration)?)?;
+    let kept = bench.get(Question::read_calibration())?;
     ensure!(
         kept == calibration,
         "the probe keeps other constants than it was given: calibrate again"
     );
-    show_calibration(&kept, out)?;
-    Ok(())
+    print_rows(&calibration_rows(&kept), out)
+}
+
+fn today() -> u32 {
+    let (year, month, day) = time::OffsetDateTime::now_utc().to_calendar_date();
+    u32::try_from(year).unwrap_or(0) * 10_000 + u32::from(u8::from(month)) * 100 + u32::from(day)
+}
+
+/// The constants in words.
+pub(crate) fn calibration_rows(c: &RigCalibration) -> [(&'static str, String); 6] {
+    let (year, month, day) = (c.date / 10_000, c.date / 100 % 100, c.date % 100);
+    let serial = String::from_utf8_lossy(&c.serial);
+    let (offset_ma, slope_ma) = (c.unloaded_a.0 * 1e3, c.unloaded_a.1 * 1e3);
+    let motor = format!("{offset_ma:.1} mA + {slope_ma:.3} mA per mm/s without load");
+    [
+        (
+            "calibrated",
+            match c.date {
+                0 => "never: constants that nobody measured".to_owned(),
+                _ => format!("{year}-{month:02}-{day:02}"),
+            },
+        ),
+        (
+            "sensor",
+            match serial.trim_matches('\0') {
+                "" => "not known".to_owned(),
+                serial => serial.to_owned(),
+            },
+        ),
+        (
+            "P_DC",
+            format!("{:.1} counts in the air", c.pressure.pdc_no_contact),
+        ),
+        (
+            "force",
+            format!("{:.2} mN per count", c.pressure.force_mn_per_count),
+        ),
+        ("motor current", motor),
+        (
+            "shear",
+            format!("{:.2} N/A above that", c.newton_per_ampere),
+        ),
+    ]
 }
 
 /// Ends a fault.
-pub(crate) fn home(args: &Home, out: &mut impl Write) -> anyhow::Result<()> {
-    let (mut bench, _) = Bench::open(&args.at)?;
-    bench.run(Question::command(Ask::Home), |report| moved(report, out))?;
+pub(crate) fn home(at: &Where, out: &mut impl Write) -> anyhow::Result<()> {
+    let (mut bench, _) = Bench::open(at)?;
+    bench.perform(Question::command(Ask::Home), out)?;
     writeln!(
         out,
         "Ready: lever and stage have found their limit switches."
@@ -97,8 +125,8 @@ pub(crate) fn home(args: &Home, out: &mut impl Write) -> anyhow::Result<()> {
 }
 
 /// Stops the rig.
-pub(crate) fn stop(args: &Stop, out: &mut impl Write) -> anyhow::Result<()> {
-    let (mut bench, _) = Bench::open(&args.at)?;
+pub(crate) fn stop(at: &Where, out: &mut impl Write) -> anyhow::Result<()> {
+    let (mut bench, _) = Bench::open(at)?;
     match bench.lift() {
         BenchError::Stopped => {
             writeln!(out, "Stopped: the finger is lifted and the stage stands.")?;
@@ -106,56 +134,4 @@ pub(crate) fn stop(args: &Stop, out: &mut impl Write) -> anyhow::Result<()> {
         }
         why => Err(why.into()),
     }
-}
-
-fn today() -> u32 {
-    let today = time::OffsetDateTime::now_utc().date();
-    let year = u32::try_from(today.year()).unwrap_or(0);
-    year * 10_000 + u32::from(u8::from(today.month())) * 100 + u32::from(today.day())
-}
-
-pub(crate) fn show_calibration(c: &RigCalibration, out: &mut impl Write) -> io::Result<()> {
-    let p = &c.pressure;
-    let date = match c.date {
-        0 => "never: constants that nobody measured".to_owned(),
-        date => format!(
-            "{}-{:02}-{:02}",
-            date / 10_000,
-            date / 100 % 100,
-            date % 100
-        ),
-    };
-    let serial = String::from_utf8_lossy(&c.serial);
-    let serial = serial.trim_matches('\0');
-    writeln!(out, "calibrated      {date}")?;
-    writeln!(
-        out,
-        "sensor          {}",
-        if serial.is_empty() {
-            "not known"
-        } else {
-            serial
-        }
-    )?;
-    writeln!(
-        out,
-        "P_DC            {:.1} counts in the air",
-        p.pdc_no_contact
-    )?;
-    writeln!(
-        out,
-        "force           {:.2} mN per count",
-        p.force_mn_per_count
-    )?;
-    writeln!(
-        out,
-        "motor current   {:.1} mA + {:.3} mA per mm/s without load",
-        c.unloaded_a.0 * 1e3,
-        c.unloaded_a.1 * 1e3
-    )?;
-    writeln!(
-        out,
-        "shear           {:.2} N/A above that",
-        c.newton_per_ampere
-    )
 }

@@ -31,21 +31,35 @@ pub(crate) struct Args {
 /// The chip's name in probe-rs.
 const CHIP: &str = "STM32F429ZITx";
 
-pub(crate) fn run(options: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+/// Flashes an image with probe-rs, or prints how.
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     ensure!(
-        options.dry_run || options.elf.is_file(),
+        args.dry_run || args.elf.is_file(),
         "{}: no such file; `cargo xtask build` builds the firmware and names it",
-        options.elf.display()
+        args.elf.display()
     );
-    if !options.dry_run {
+    if !args.dry_run {
         look_for_probe("probe-rs")?;
     }
-    for mut command in flash_commands(options) {
+    // an image to attach to is watched, others are left alone
+    let verbs: &[(&str, &[&str])] = match args.attach {
+        true => &[("run", &[])],
+        false => &[("download", &["--verify"]), ("reset", &[])],
+    };
+    for (verb, switches) in verbs {
+        let mut command = Command::new("probe-rs");
+        command
+            .args([verb, "--chip", CHIP])
+            .args(&args.options)
+            .args(*switches);
+        if *verb != "reset" {
+            command.arg(&args.elf);
+        }
         let words = std::iter::once(command.get_program()).chain(command.get_args());
         let words: Vec<_> = words.map(|word| word.to_string_lossy()).collect();
         writeln!(out, "{}", words.join(" "))?;
         out.flush()?;
-        if !options.dry_run {
+        if !args.dry_run {
             let status = command.status().context("probe-rs does not start")?;
             ensure!(
                 status.success(),
@@ -54,24 +68,6 @@ pub(crate) fn run(options: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         }
     }
     Ok(())
-}
-
-/// What is run: an image to attach to is watched, others are left alone.
-fn flash_commands(options: &Args) -> Vec<Command> {
-    let probe_rs = |verb: &str| {
-        let mut command = Command::new("probe-rs");
-        command.args([verb, "--chip", CHIP]).args(&options.options);
-        command
-    };
-    if options.attach {
-        let mut run = probe_rs("run");
-        run.arg(&options.elf);
-        vec![run]
-    } else {
-        let mut download = probe_rs("download");
-        download.arg("--verify").arg(&options.elf);
-        vec![download, probe_rs("reset")]
-    }
 }
 
 /// That the program is here, and a debug probe.

@@ -2,9 +2,9 @@
 
 use std::io::Write;
 
-use anyhow::bail;
+use anyhow::Context as _;
 use tactus::evaluate::Method;
-use tactus::link::{Found, Question};
+use tactus::link::Question;
 use tactus::show::Show;
 use tactus_core::table::Table;
 use tactus_core::wire::{Ask, Identify};
@@ -18,14 +18,7 @@ use crate::cmd::args::Stop;
 #[derive(clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
-    at: Where,
-    #[command(flatten)]
-    how: Exploration,
-}
-
-/// How to explore.
-#[derive(clap::Args, Clone)]
-pub(crate) struct Exploration {
+    pub(crate) at: Where,
     #[command(flatten)]
     stop: Stop,
     /// How to decide and to choose the next movement; the best for the probe's table unless given
@@ -45,23 +38,20 @@ pub(crate) struct Exploration {
     seed: Option<u32>,
 }
 
-impl Exploration {
+impl Args {
     /// The request, for a probe that knows these textures.
     pub(crate) fn wanted(&self, names: &[String]) -> anyhow::Result<Identify> {
-        let mut among = Vec::new();
-        for wanted in &self.among {
+        let index = |wanted: &String| {
             let wanted = wanted.trim();
             let index = names.iter().position(|n| n.eq_ignore_ascii_case(wanted));
-            let Some(index) = index else {
-                bail!(
-                    "--among {wanted}: the probe does not know it. It knows: {}",
-                    names.join(", ")
-                );
-            };
-            among.push(u16::try_from(index)?);
-        }
+            let index = index.and_then(|index| u16::try_from(index).ok());
+            index.with_context(|| {
+                let names = names.join(", ");
+                format!("--among {wanted}: the probe does not know it. It knows: {names}")
+            })
+        };
         Ok(Identify {
-            among: among.into_iter().collect(),
+            among: self.among.iter().map(index).collect::<Result<_, _>>()?,
             threshold: self.stop.threshold,
             max_slides: self.stop.max_slides,
             method: self.method.map(Method::method),
@@ -74,28 +64,22 @@ impl Exploration {
 }
 
 /// Has the probe explore.
-pub(crate) fn run(Args { at, how }: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let (mut bench, _) = Bench::open(at)?;
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    let (mut bench, _) = Bench::open(&args.at)?;
     // it is in the log then, too
     let bytes = bench.table()?;
     let table = Table::read(&bytes)?;
     let names: Vec<String> = table.names().map(str::to_owned).collect();
-    let wanted = how.wanted(&names)?;
-    let among = match wanted.among.len() {
-        0 => names.len(),
-        among => among,
-    };
-    writeln!(
-        out,
-        "An unknown texture, one of {among} (seed {}).",
-        wanted.seed
-    )?;
+    let wanted = args.wanted(&names)?;
+    let (among, seed) = (wanted.among.len(), wanted.seed);
+    let among = if among == 0 { names.len() } else { among };
+    writeln!(out, "An unknown texture, one of {among} (seed {seed}).")?;
     out.flush()?;
     // for the log: with its samples every slide can be felt again
-    bench.run(Question::command(Ask::Stream(true)), |_| Ok(()))?;
+    bench.get(Question::command(Ask::Stream(true)))?;
     let mut show = Show::new(table, &mut *out);
-    let found: Found = bench.run(Question::identify(wanted), |report| show.tell(&report.tell))?;
-    bench.run(Question::command(Ask::Stream(false)), |_| Ok(()))?;
+    let found = bench.run(Question::identify(wanted), |report| show.tell(&report.tell))?;
+    bench.get(Question::command(Ask::Stream(false)))?;
     if found.learned > 0 {
         writeln!(
             out,

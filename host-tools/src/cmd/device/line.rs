@@ -58,55 +58,35 @@ pub(crate) enum OpenError {
     Several(Vec<Found>),
     /// No such port.
     #[error("{port}: there is no such port. {}", others(.found))]
-    NotThere {
-        /// The port.
-        port: String,
-        /// Those that are there.
-        found: Vec<Found>,
-    },
+    NotThere { port: String, found: Vec<Found> },
     /// Another program has it.
     #[error(
-        "{port} is busy: another program has it open (another tactus, a terminal such as minicom, ModemManager). Close that; \
-         `fuser -v {port}` names it"
+        "{0} is busy: another program has it open (another tactus, a terminal such as minicom, ModemManager). Close that; \
+         `fuser -v {0}` names it"
     )]
-    Busy {
-        /// The port.
-        port: String,
-    },
+    Busy(String),
     /// The user may not.
     #[error(
-        "{port}: you may not open this port. On Linux: sudo usermod -aG dialout $USER, then log in again"
+        "{0}: you may not open this port. On Linux: sudo usermod -aG dialout $USER, then log in again"
     )]
-    Denied {
-        /// The port.
-        port: String,
-    },
+    Denied(String),
     /// Something else.
     #[error("{port} cannot be opened: {why}; is it a serial port?")]
     Serial {
-        /// The port.
         port: String,
-        /// What the system says.
         why: serialport::Error,
     },
     /// No such address, or nobody there.
     #[error(
         "{address}: {why}. Is the emulated board running there (`cargo xtask emulate --port N`)?"
     )]
-    Tcp {
-        /// HOST:PORT.
-        address: String,
-        /// What the system says.
-        why: io::Error,
-    },
-    /// The emulator or the firmware is not built.
+    Tcp { address: String, why: io::Error },
+    /// The emulator or the firmware is not built; a variable can name it.
     #[error(
         "{what} is not built: run `cargo xtask emulate` once, which builds it (or name it with {variable})"
     )]
     NotBuilt {
-        /// What is missing.
         what: &'static str,
-        /// The variable that can name it.
         variable: &'static str,
     },
     /// The emulator ended, or did not start.
@@ -129,12 +109,13 @@ impl Found {
 
 impl From<SerialPortInfo> for Found {
     fn from(port: SerialPortInfo) -> Self {
+        let usb = match port.port_type {
+            SerialPortType::UsbPort(usb) => Some(usb),
+            _ => None,
+        };
         Self {
             name: port.port_name,
-            usb: match port.port_type {
-                SerialPortType::UsbPort(usb) => Some(usb),
-                _ => None,
-            },
+            usb,
         }
     }
 }
@@ -146,10 +127,8 @@ impl fmt::Display for Found {
             return f.write_str("  no USB device");
         };
         write!(f, "  {:04x}:{:04x}", usb.vid, usb.pid)?;
-        for text in [&usb.manufacturer, &usb.product, &usb.serial_number]
-            .into_iter()
-            .flatten()
-        {
+        let texts = [&usb.manufacturer, &usb.product, &usb.serial_number];
+        for text in texts.into_iter().flatten() {
             write!(f, "  {text}")?;
         }
         if self.is_nucleo() {
@@ -182,27 +161,21 @@ pub(crate) fn found() -> Vec<Found> {
         // every Linux has 32 of these, there or not
         .filter(|port| port.usb.is_some() || !port.name.starts_with("/dev/ttyS"))
         .collect();
-    ports.sort_by(|a, b| {
-        b.is_nucleo()
-            .cmp(&a.is_nucleo())
-            .then_with(|| a.name.cmp(&b.name))
-    });
+    ports.sort_by_key(|port| (!port.is_nucleo(), port.name.clone()));
     ports
 }
 
 /// Prints the ports, and what to do with them.
 pub(crate) fn list(out: &mut impl Write) -> io::Result<()> {
-    let found = found();
-    match found.as_slice() {
+    match found().as_slice() {
         [] => writeln!(
             out,
             "No serial port here. Plug in the board's USB socket CN1 (LD4 must be lit), or try the emulated board:\n  \
              tactus device monitor --emulated"
         ),
-        ports => {
-            writeln!(out, "{}", lines(ports))?;
-            let name = ports.first().map_or("", |port| port.name.as_str());
-            writeln!(out, "\nTry: tactus device status --port {name}")
+        ports @ [first, ..] => {
+            let (ports, name) = (lines(ports), &first.name);
+            writeln!(out, "{ports}\n\nTry: tactus device status --port {name}")
         }
     }
 }
@@ -221,9 +194,6 @@ pub(crate) struct Open {
 
 impl Where {
     /// Opens the line.
-    ///
-    /// # Errors
-    /// See [`OpenError`].
     pub(crate) fn open(&self) -> Result<Open, OpenError> {
         if self.emulated {
             let emulator = Emulator::start(self)?;
@@ -261,27 +231,21 @@ fn only_nucleo(found: Vec<Found>) -> Result<String, OpenError> {
 fn serial(port: &str) -> Result<Box<dyn Line>, OpenError> {
     use io::ErrorKind as Io;
     use serialport::ErrorKind as Serial;
-    let opened = serialport::new(port, BAUD).timeout(READ).open();
     let port = port.to_owned();
-    match opened {
-        Ok(line) => Ok(Box::new(line)),
-        Err(why) => Err(match why.kind() {
-            Serial::Io(Io::PermissionDenied) => OpenError::Denied { port },
-            Serial::Io(Io::NotFound) => OpenError::NotThere {
-                found: found(),
-                port,
-            },
-            // serialport's word for a port that somebody else has, or one that Windows does not know
-            Serial::NoDevice if Path::new(&port).exists() || cfg!(windows) => {
-                OpenError::Busy { port }
-            }
-            Serial::NoDevice => OpenError::NotThere {
-                found: found(),
-                port,
-            },
-            _ => OpenError::Serial { port, why },
-        }),
-    }
+    let why = match serialport::new(&port, BAUD).timeout(READ).open() {
+        Ok(line) => return Ok(Box::new(line)),
+        Err(why) => why,
+    };
+    Err(match why.kind() {
+        Serial::Io(Io::PermissionDenied) => OpenError::Denied(port),
+        // serialport's word for a port that somebody else has, or one that Windows does not know
+        Serial::NoDevice if Path::new(&port).exists() || cfg!(windows) => OpenError::Busy(port),
+        Serial::NoDevice | Serial::Io(Io::NotFound) => {
+            let found = found();
+            OpenError::NotThere { port, found }
+        }
+        _ => OpenError::Serial { port, why },
+    })
 }
 
 fn tcp(address: &str) -> Result<Box<dyn Line>, OpenError> {
@@ -315,11 +279,8 @@ impl Drop for Emulator {
 
 impl Emulator {
     fn start(options: &Where) -> Result<Self, OpenError> {
-        let program = built(
-            "the emulator",
-            "TACTUS_EMULATOR",
-            &["emulator/release/tactus-emulator"],
-        )?;
+        let program = "emulator/release/tactus-emulator";
+        let program = built("the emulator", "TACTUS_EMULATOR", &[program])?;
         let elf = built(
             "the firmware",
             "TACTUS_ELF",

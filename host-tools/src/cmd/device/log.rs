@@ -41,10 +41,10 @@ impl Log {
                 io::Error::new(why.kind(), "is there already: give the log another name")
             }
             _ => why,
-        })?;
+        });
         let mut log = Self {
             path: path.to_owned(),
-            file: BufWriter::new(file),
+            file: BufWriter::new(file.map_err(|why| named(path, &why))?),
             failed: Ok(()),
         };
         log.line(&Line::Session {
@@ -73,11 +73,12 @@ impl Log {
 
     /// Everything so far is in the file.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
-        std::mem::replace(&mut self.failed, Ok(()))?;
-        self.file.flush()
+        let written = std::mem::replace(&mut self.failed, Ok(()));
+        let flushed = written.and_then(|()| self.file.flush());
+        flushed.map_err(|why| named(&self.path, &why))
     }
+}
 
-    pub(crate) fn into_path(self) -> PathBuf {
-        self.path
-    }
+fn named(path: &Path, why: &io::Error) -> io::Error {
+    io::Error::new(why.kind(), format!("{}: {why}", path.display()))
 }

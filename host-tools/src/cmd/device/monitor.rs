@@ -12,30 +12,20 @@ use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use ratatui::DefaultTerminal;
-use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
+use ratatui::crossterm::event::{self, KeyCode, KeyModifiers};
 use tactus::link::{Job, LinkError, PortError, Question, ReadTable};
 use tactus_core::table::Table;
 use tactus_core::wire::{Ask, Identify, Report};
 
 use self::state::{Monitor, Weight};
 use super::bench::{Bench, BenchError};
-use super::identify::Exploration;
-use super::line::Where;
+use super::identify::Args;
 
 /// How often the screen is drawn, and the probe asked how it is.
 const DRAWN: Duration = Duration::from_millis(100);
 const ASKED: Duration = Duration::from_secs(1);
 /// A probe that is asked every second and says nothing for so long is told to be silent.
 const SILENT: Duration = Duration::from_secs(3);
-
-/// Watch the probe live, and have it identify, home or stop by a key
-#[derive(clap::Args)]
-pub(crate) struct Args {
-    #[command(flatten)]
-    at: Where,
-    #[command(flatten)]
-    how: Exploration,
-}
 
 /// What the probe is asked for, one after the other.
 enum Doing {
@@ -50,10 +40,10 @@ enum End {
 }
 
 /// Watches until the user has enough of it; the rig is stopped and lifted then.
-pub(crate) fn run(Args { at, how }: &Args) -> anyhow::Result<()> {
-    let (mut bench, status) = Bench::open(at)?;
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    let (mut bench, status) = Bench::open(&args.at)?;
     let names = bench.names()?;
-    let wanted = how.wanted(&names)?;
+    let wanted = args.wanted(&names)?;
     if !io::stdout().is_terminal() {
         return Err(io::Error::other(
             "the monitor needs a terminal; `tactus device identify` writes lines, `--log FILE` a record",
@@ -109,15 +99,12 @@ fn watch(
             Some(Doing::Asked(job)) => bench.step(job, &mut hear),
             Some(Doing::Table(job)) => {
                 let polled = bench.step(job, &mut hear)?;
-                Ok(match polled {
-                    Poll::Ready(bytes) => {
-                        let table = Table::read(&bytes)?;
-                        monitor.names = table.names().map(str::to_owned).collect();
-                        monitor.table_crc = table.crc();
-                        Poll::Ready(())
-                    }
-                    Poll::Pending => Poll::Pending,
-                })
+                if let Poll::Ready(bytes) = &polled {
+                    let table = Table::read(bytes)?;
+                    monitor.names = table.names().map(str::to_owned).collect();
+                    monitor.table_crc = table.crc();
+                }
+                Ok(polled.map(|_| ()))
             }
             None => bench.listen(&mut hear).map(|()| Poll::Pending),
         };
@@ -148,11 +135,10 @@ fn watch(
         if doing.is_none()
             && let Some(ask) = to_do.pop_front()
         {
-            let job = match ask {
+            doing = Some(match ask {
                 Ask::ReadTable(_) => Doing::Table(Box::new(bench.begin(ReadTable::default())?)),
                 ask => Doing::Asked(Box::new(bench.begin(Question::command(ask))?)),
-            };
-            doing = Some(job);
+            });
         }
         if asked.is_none_or(|at| at.elapsed() >= ASKED) {
             asked = Some(Instant::now());
@@ -168,12 +154,9 @@ fn watch(
             return Ok(End::Interrupt);
         }
         while event::poll(Duration::ZERO)? {
-            let Event::Key(key) = event::read()? else {
+            let Some(key) = event::read()?.as_key_press_event() else {
                 continue;
             };
-            if key.kind != KeyEventKind::Press {
-                continue;
-            }
             let control = key.modifiers.contains(KeyModifiers::CONTROL);
             let busy = doing.is_some() || !to_do.is_empty();
             match key.code {
@@ -212,10 +195,7 @@ fn is_gone(terminal: &impl std::os::fd::AsFd) -> bool {
     use rustix::event::{PollFd, PollFlags, Timespec, poll};
     let mut polled = [PollFd::new(terminal, PollFlags::IN)];
     let now = Timespec::default();
-    poll(&mut polled, Some(&now)).is_ok()
-        && polled
-            .iter()
-            .any(|p| p.revents().intersects(PollFlags::HUP))
+    poll(&mut polled, Some(&now)).is_ok() && polled[0].revents().intersects(PollFlags::HUP)
 }
 
 #[cfg(not(unix))]

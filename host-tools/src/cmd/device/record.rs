@@ -9,7 +9,7 @@ use tactus::recordings::{RecordingWriter, Texture};
 use tactus_core::explorer::Strategy;
 use tactus_core::wire::{Ask, Identify};
 
-use super::bench::{Bench, moved, wait_for_enter};
+use super::bench::{Bench, show_fault, wait_for_enter};
 use super::line::Where;
 use super::recorder::Recorder;
 use super::train::seed_of_now;
@@ -45,8 +45,8 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     // before anything moves
     let mut writer = RecordingWriter::create(&args.out, named.collect())?;
     let (mut bench, _) = Bench::open(&args.at)?;
-    let calibration = bench.run(Question::read_calibration(), |_| Ok(()))?;
-    bench.run(Question::command(Ask::Stream(true)), |_| Ok(()))?;
+    let calibration = bench.get(Question::read_calibration())?;
+    bench.get(Question::command(Ask::Stream(true)))?;
     let mut written = 0;
     for (index, name) in textures.iter().enumerate() {
         if textures.len() > 1 {
@@ -65,27 +65,23 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             seed: args.seed.unwrap_or_else(seed_of_now),
         };
         let mut recorder = Recorder::new(calibration.pressure);
-        let mut lost = Vec::new();
-        let mut kept = Vec::new();
+        let (mut lost, mut kept) = (Vec::new(), Vec::new());
         bench.run(Question::identify(wanted), |report| {
             match recorder.hear(index, report) {
                 Some(Ok(slide)) => {
-                    writeln!(
-                        out,
-                        "{name}, slide {} of {slides}: {}",
-                        slide.number, slide.movement
-                    )?;
+                    let (number, movement) = (slide.number, slide.movement);
+                    writeln!(out, "{name}, slide {number} of {slides}: {movement}")?;
                     kept.push(slide);
                 }
                 Some(Err(why)) => lost.push(why),
-                None => moved(report, out)?,
+                None => show_fault(report, out)?,
             }
             out.flush()
         })?;
         for slide in &kept {
             writer.write(slide)?;
-            written += 1;
         }
+        written += kept.len();
         for why in &lost {
             writeln!(out, "{name}: a slide is not recorded: {why}")?;
         }
@@ -94,7 +90,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             "{name}: no slide arrived whole; check the cable, then record again"
         );
     }
-    bench.run(Question::command(Ask::Stream(false)), |_| Ok(()))?;
+    bench.get(Question::command(Ask::Stream(false)))?;
     writer.finish()?;
     writeln!(
         out,

@@ -30,13 +30,19 @@ pub(crate) enum RecordError {
 pub(crate) struct Recorder {
     calibration: Calibration,
     movement: Option<Movement>,
-    slide: Vec<Block>,
+    numbers: u32,
+    slide: Begun,
+}
+
+/// What has come of a slide.
+#[derive(Debug, Default)]
+struct Begun {
+    blocks: Vec<Block>,
     missing: Option<u16>,
-    /// when the slide began by the probe's clock, ms, and the force since then
+    /// when it began by the probe's clock, ms, and the force since then
     began_ms: Option<u32>,
     sliding: bool,
     forces: Vec<(u32, i16)>,
-    numbers: u32,
 }
 
 impl Recorder {
@@ -45,12 +51,8 @@ impl Recorder {
         Self {
             calibration,
             movement: None,
-            slide: Vec::new(),
-            missing: None,
-            began_ms: None,
-            sliding: false,
-            forces: Vec::new(),
             numbers: 0,
+            slide: Begun::default(),
         }
     }
 
@@ -60,54 +62,47 @@ impl Recorder {
         texture: usize,
         report: &Report,
     ) -> Option<Result<Slide, RecordError>> {
+        let slide = &mut self.slide;
         match &report.tell {
             Tell::Chosen { movement, .. } => {
                 self.movement = Some(*movement);
-                self.restart();
+                self.slide = Begun::default();
             }
-            Tell::Rejected { .. } => self.restart(),
+            Tell::Rejected { .. } => self.slide = Begun::default(),
             Tell::Phase(Phase::Sliding) => {
-                self.began_ms = Some(report.at_ms);
-                self.sliding = true;
+                slide.began_ms = Some(report.at_ms);
+                slide.sliding = true;
             }
-            Tell::Live(Live { force_mn, .. }) if self.sliding => {
-                self.forces.push((report.at_ms, *force_mn));
+            Tell::Live(Live { force_mn, .. }) if slide.sliding => {
+                slide.forces.push((report.at_ms, *force_mn));
             }
             // what is told while it is lifted is no force of the slide
-            Tell::Phase(_) if self.began_ms.is_some() => self.sliding = false,
+            Tell::Phase(_) if slide.began_ms.is_some() => slide.sliding = false,
             Tell::Block(block) => {
-                let expected = self.slide.len() as u16;
+                let expected = slide.blocks.len() as u16;
                 if block.number != expected {
-                    self.missing.get_or_insert(expected);
+                    slide.missing.get_or_insert(expected);
                 }
-                self.slide.push(block.clone());
+                slide.blocks.push(block.clone());
             }
             Tell::Felt { .. } => {
-                let slide = self.finish(texture);
-                self.restart();
-                return Some(slide);
+                let slide = std::mem::take(slide);
+                return Some(self.finish(texture, &slide));
             }
             _ => {}
         }
         None
     }
 
-    fn restart(&mut self) {
-        self.slide.clear();
-        self.missing = None;
-        self.began_ms = None;
-        self.sliding = false;
-        self.forces.clear();
-    }
-
-    fn finish(&mut self, texture: usize) -> Result<Slide, RecordError> {
-        if let Some(block) = self.missing {
+    fn finish(&mut self, texture: usize, slide: &Begun) -> Result<Slide, RecordError> {
+        if let Some(block) = slide.missing {
             return Err(RecordError::MissingBlock(block));
         }
-        let (still, moving): (Vec<&Block>, Vec<&Block>) = self.slide.iter().partition(|b| b.still);
+        let (still, moving): (Vec<&Block>, Vec<&Block>) =
+            slide.blocks.iter().partition(|b| b.still);
         let steady = moving.iter().find_map(|block| block.steady);
         let (Some((from, to)), Some(movement), Some(began_ms)) =
-            (steady, self.movement, self.began_ms)
+            (steady, self.movement, slide.began_ms)
         else {
             return Err(RecordError::NoSamples);
         };
@@ -125,10 +120,8 @@ impl Recorder {
         let pdc = (0..=samples(LIVE_HZ))
             .map(|n| {
                 let at_ms = began_ms + n as u32 * 1000 / LIVE_HZ;
-                let nearest = self
-                    .forces
-                    .iter()
-                    .min_by_key(|(told, _)| told.abs_diff(at_ms));
+                let forces = slide.forces.iter();
+                let nearest = forces.min_by_key(|(told, _)| told.abs_diff(at_ms));
                 let (_, force_mn) = nearest.ok_or(RecordError::NoSamples)?;
                 Ok((f32::from(*force_mn) / self.calibration.force_mn_per_count).round() as i16)
             })

@@ -5,10 +5,10 @@ use std::fs::File;
 use std::io::{self, BufRead as _, BufReader, Write};
 use std::path::{Path, PathBuf};
 
+use anyhow::{Context as _, anyhow, ensure};
 use clap::Subcommand;
 use tactus::follow::{ALLOWED, Agreement, Follower};
 use tactus::show::Show;
-use tactus_core::explorer::ExplorerError;
 use tactus_core::features::{Plan, PropertySet};
 use tactus_core::table::Table;
 use tactus_core::wire::{Ask, Forget, Identify, PROTOCOL, Tell};
@@ -31,57 +31,37 @@ pub(crate) enum Command {
 }
 
 /// Shows or replays a log.
-pub(crate) fn run(command: &Command, out: &mut impl Write) -> Result<(), ReplayError> {
-    match command {
-        Command::Replay { file } => replay(file, out),
-        Command::Show { file } => show(file, out),
-    }
+pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()> {
+    let (file, done) = match command {
+        Command::Replay { file } => (file, replay(file, out)),
+        Command::Show { file } => (file, show(file, out)),
+    };
+    done.with_context(|| file.display().to_string())
 }
 
 /// Why a log cannot be replayed.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum ReplayError {
-    /// The file.
-    #[error("{}: {why}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        why: io::Error,
-    },
+enum ReplayError {
     /// A line is none of a log.
     #[error(
-        "{}: line {line} is no line of a session's log ({why}); `tactus device identify --log FILE` writes one",
-        path.display()
+        "line {line} is no line of a session's log ({why}); `tactus device identify --log FILE` writes one"
     )]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// Its number, from 1.
-        line: usize,
-        /// What is wrong with it.
-        why: serde_json::Error,
-    },
+    Line { line: usize, why: serde_json::Error },
     /// Messages of another version.
     #[error(
-        "{}: written with version {protocol} of the messages, this program has version {PROTOCOL}: replay it with the \
-         tactus that wrote it", path.display()
+        "written with version {0} of the messages, this program has version {PROTOCOL}: replay it with the tactus that \
+         wrote it"
     )]
-    Protocol {
-        /// The file.
-        path: PathBuf,
-        /// Its version.
-        protocol: u8,
-    },
+    Protocol(u8),
     /// Nothing to replay.
-    #[error("{}: no exploration in this log: nothing was decided", .0.display())]
-    Nothing(PathBuf),
+    #[error("no exploration in this log: nothing was decided")]
+    Nothing,
     /// The decisions are others here.
-    #[error("{}: not every decision is the same here", .0.display())]
-    Differs(PathBuf),
-    /// What is shown cannot be written.
+    #[error("not every decision is the same here")]
+    Differs,
+    /// The log cannot be read, or what is shown cannot be written.
     #[error(transparent)]
-    Out(#[from] io::Error),
+    Io(#[from] io::Error),
 }
 
 /// An exploration as the log has it.
@@ -92,36 +72,29 @@ struct Logged {
     tells: Vec<Tell>,
 }
 
+impl Logged {
+    fn table(&self) -> Option<Table<'_>> {
+        Table::read(self.table.as_ref().ok()?).ok()
+    }
+}
+
 const NOT_READ: &str = "the log does not have the table that the probe used";
 const CHANGED: &str = "the probe's table was changed after the log read it";
 
 /// The explorations of a log.
 fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
-    let io = |why| ReplayError::Io {
-        path: path.to_owned(),
-        why,
-    };
-    let file = File::open(path).map_err(io)?;
+    let file = File::open(path)?;
     let mut explorations: Vec<Logged> = Vec::new();
     let mut running = false;
     let mut parts = Vec::new();
     let mut table = Err(NOT_READ);
     for (line, number) in BufReader::new(file).lines().zip(1..) {
-        let line = line.map_err(io)?;
-        let line = serde_json::from_str(&line).map_err(|why| ReplayError::Line {
-            path: path.to_owned(),
-            line: number,
-            why,
-        })?;
-        match line {
-            Line::Session { protocol, .. } => {
-                if protocol != PROTOCOL {
-                    return Err(ReplayError::Protocol {
-                        path: path.to_owned(),
-                        protocol,
-                    });
-                }
+        let read = serde_json::from_str(&line?);
+        match read.map_err(|why| ReplayError::Line { line: number, why })? {
+            Line::Session { protocol, .. } if protocol != PROTOCOL => {
+                return Err(ReplayError::Protocol(protocol));
             }
+            Line::Session { .. } => {}
             Line::Ask(ask) => match ask.into_owned() {
                 Ask::Identify(asked) => {
                     running = true;
@@ -170,7 +143,7 @@ fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
         }
     }
     if explorations.is_empty() {
-        return Err(ReplayError::Nothing(path.to_owned()));
+        return Err(ReplayError::Nothing);
     }
     Ok(explorations)
 }
@@ -179,7 +152,7 @@ fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
 fn show(path: &Path, out: &mut impl Write) -> Result<(), ReplayError> {
     for (logged, number) in explorations(path)?.iter().zip(1..) {
         headline(number, logged, out)?;
-        let Some(table) = logged.table.as_ref().ok().and_then(|t| Table::read(t).ok()) else {
+        let Some(table) = logged.table() else {
             writeln!(out, "  {NOT_READ}")?;
             continue;
         };
@@ -194,11 +167,12 @@ fn show(path: &Path, out: &mut impl Write) -> Result<(), ReplayError> {
 
 /// Computes every decision of a log again and says what came of it.
 fn replay(path: &Path, out: &mut impl Write) -> Result<(), ReplayError> {
-    let mut total = Agreement::default();
+    let (mut slides, mut choices, mut posteriors, mut answers) = (0, 0, 0, 0);
+    let mut largest = 0.0f32;
     let mut same = true;
     for (logged, number) in explorations(path)?.iter().zip(1..) {
         headline(number, logged, out)?;
-        let agreement = match follow(logged, out)? {
+        let agreement = match follow(logged, out) {
             Ok(agreement) => agreement,
             Err(why) => {
                 writeln!(out, "  cannot be replayed: {why}")?;
@@ -206,71 +180,53 @@ fn replay(path: &Path, out: &mut impl Write) -> Result<(), ReplayError> {
                 continue;
             }
         };
-        total.slides += agreement.slides;
-        total.choices += agreement.choices;
-        total.posteriors += agreement.posteriors;
-        total.verdicts += agreement.verdicts;
-        for (total, here) in [
-            (&mut total.properties, agreement.properties),
-            (&mut total.signal, agreement.signal),
-            (&mut total.posterior, agreement.posterior),
-            (&mut total.outlook, agreement.outlook),
-        ] {
-            *total = total.max(here);
-        }
+        slides += agreement.slides;
+        choices += agreement.choices;
+        posteriors += agreement.posteriors;
+        answers += agreement.verdicts;
+        let here = agreement.properties.max(agreement.signal);
+        largest = largest
+            .max(here)
+            .max(agreement.posterior)
+            .max(agreement.outlook);
         // one that was stopped before its first slide was over has decided nothing else
         let felt = logged.tells.iter().any(|t| matches!(t, Tell::Felt { .. }));
         same &= agreement.agrees()
             || !felt && agreement.other_choices.is_empty() && agreement.outlook <= ALLOWED;
     }
     if !same {
-        return Err(ReplayError::Differs(path.to_owned()));
+        return Err(ReplayError::Differs);
     }
-    let largest = total.properties.max(total.signal);
-    let largest = largest.max(total.posterior).max(total.outlook);
     writeln!(
         out,
-        "\nEvery decision is the same here: {} choices, {} slides felt again from their samples, {} posteriors, {} answers; \
-         largest difference {largest:e}.",
-        total.choices, total.slides, total.posteriors, total.verdicts
+        "\nEvery decision is the same here: {choices} choices, {slides} slides felt again from their samples, \
+         {posteriors} posteriors, {answers} answers; largest difference {largest:e}."
     )?;
     Ok(())
 }
 
 fn headline(number: usize, logged: &Logged, out: &mut impl Write) -> io::Result<()> {
-    let textures = logged.table.as_ref().ok().and_then(|t| Table::read(t).ok());
-    let textures = textures.map_or_else(String::new, |t| format!(" among {}", t.textures()));
+    let textures = logged.table().map(|t| format!(" among {}", t.textures()));
     writeln!(
         out,
-        "Exploration {number}{textures}, threshold {}, at most {} slides",
-        logged.asked.threshold, logged.asked.max_slides
+        "Exploration {number}{}, threshold {}, at most {} slides",
+        textures.unwrap_or_default(),
+        logged.asked.threshold,
+        logged.asked.max_slides
     )
 }
 
-/// Follows one exploration step by step; the inner error is why it cannot be.
-fn follow(logged: &Logged, out: &mut impl Write) -> Result<Result<Agreement, String>, ReplayError> {
-    let table = match &logged.table {
-        Ok(bytes) => Table::read(bytes).map_err(|why| why.to_string()),
-        Err(why) => Err((*why).to_owned()),
-    };
+/// Follows one exploration step by step.
+fn follow(logged: &Logged, out: &mut impl Write) -> anyhow::Result<Agreement> {
+    let table = Table::read(logged.table.as_ref().map_err(|why| anyhow!(*why))?)?;
     let plan = Plan::new();
     // a handheld probe feels no traction, from its first slide on
     let measured = logged.tells.iter().find_map(|tell| match tell {
         Tell::Felt { felt, .. } => Some(felt.properties().measured()),
         _ => None,
     });
-    let follower = table.and_then(|table| {
-        let measured = measured.unwrap_or(PropertySet::ALL);
-        let follower = Follower::new(table, measured, &logged.asked, &plan);
-        Ok((
-            table,
-            follower.map_err(|why: ExplorerError| why.to_string())?,
-        ))
-    });
-    let (table, mut follower) = match follower {
-        Ok(both) => both,
-        Err(why) => return Ok(Err(why)),
-    };
+    let measured = measured.unwrap_or(PropertySet::ALL);
+    let mut follower = Follower::new(table, measured, &logged.asked, &plan)?;
     let words = Show::new(table, io::sink());
     let mut whole = true;
     for tell in &logged.tells {
@@ -293,18 +249,18 @@ fn follow(logged: &Logged, out: &mut impl Write) -> Result<Result<Agreement, Str
                     true => format!("{what} up to {now:e} apart"),
                     false => format!("{what} the same"),
                 };
-                let felt = if now.slides == before.slides {
-                    "samples not compared".to_owned()
-                } else {
-                    let now = now.properties.max(now.signal);
-                    apart(now, before.properties.max(before.signal), "features")
+                let [features, earlier] = [now, &before].map(|a| a.properties.max(a.signal));
+                let felt = match now.slides == before.slides {
+                    true => "samples not compared".to_owned(),
+                    false => apart(features, earlier, "features"),
                 };
                 let posterior = apart(now.posterior, before.posterior, "posterior");
                 writeln!(out, "           {felt}, {posterior}")?;
             }
             Tell::Rejected { slide, why } => writeln!(out, "  slide {slide}: rejected: {why}")?,
             Tell::Verdict { name, slides, .. } => {
-                let here = if now.other_verdicts == before.other_verdicts {
+                let same = now.other_verdicts == before.other_verdicts;
+                let here = if same {
                     "the same here"
                 } else {
                     "ANOTHER ONE HERE"
@@ -315,9 +271,6 @@ fn follow(logged: &Logged, out: &mut impl Write) -> Result<Result<Agreement, Str
             _ => {}
         }
     }
-    let agreement = follower.agreement().clone();
-    Ok(match whole {
-        true => Ok(agreement),
-        false => Err("a part of it is missing".to_owned()),
-    })
+    ensure!(whole, "a part of it is missing");
+    Ok(follower.agreement().clone())
 }

@@ -1,15 +1,14 @@
 //! `tactus device status`: how the probe is.
 
-use std::io::{self, Write};
+use std::io::Write;
 
 use tactus::link::Question;
-use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::wire::{Phase, Status};
+use tactus_core::wire::Phase;
 
-use super::bench::Bench;
-use super::calibrate::show_calibration;
+use super::bench::{Bench, recovery};
+use super::calibrate::calibration_rows;
 use super::line::Where;
-use crate::cmd::output::{Format, print_json};
+use crate::cmd::output::{Format, print_json, print_rows};
 
 /// Say how the probe is: rig, faults, table, counters
 #[derive(clap::Args)]
@@ -24,65 +23,46 @@ pub(crate) struct Args {
 /// Prints the probe's status.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (mut bench, status) = Bench::open(&args.at)?;
-    match args.format {
-        Format::Json => print_json(&status, out),
-        Format::Text => {
-            let calibration = bench.run(Question::read_calibration(), |_| Ok(()))?;
-            Ok(show_status(&bench, &status, &calibration, out)?)
-        }
+    if args.format == Format::Json {
+        return print_json(&status, out);
     }
-}
-
-fn show_status(
-    bench: &Bench,
-    status: &Status,
-    calibration: &RigCalibration,
-    out: &mut impl Write,
-) -> io::Result<()> {
-    writeln!(out, "probe           at {}", bench.name)?;
-    writeln!(out, "rig             {}", phase_name(status.phase))?;
-    if let Some(fault) = status.fault {
-        let recovery = fault.row().map_or("reset", |row| row.recovery);
-        writeln!(
-            out,
-            "FAULT           {fault}: {recovery} (tactus device home)"
-        )?;
+    let calibration = bench.get(Question::read_calibration())?;
+    let mut rows = vec![
+        ("probe", format!("at {}", bench.name)),
+        ("rig", phase_name(status.phase).to_owned()),
+    ];
+    if let Some(fault) = &status.fault {
+        let fault = format!("{fault}: {} (tactus device home)", recovery(fault));
+        rows.push(("FAULT", fault));
     }
-    writeln!(
-        out,
-        "table           {} textures, {} bytes, checksum {:08x}{}",
-        status.textures,
-        status.table_bytes,
-        status.table_crc,
-        if status.factory {
-            ", the firmware's own"
-        } else {
-            ""
-        }
-    )?;
+    let whose = if status.factory {
+        ", the firmware's own"
+    } else {
+        ""
+    };
     let counts = &status.counts;
-    writeln!(
-        out,
-        "acquisition     {} slots; {} late, {} parity errors, {} error frames, {} samples lost",
-        counts.slots,
-        counts.late_slots,
-        counts.parity_errors,
-        counts.error_frames,
-        counts.lost_samples
-    )?;
     let (damaged, missing) = bench.losses();
-    writeln!(
-        out,
-        "link            {} reports found no room, {} requests damaged; here {damaged} frames damaged, {missing} reports lost",
-        counts.lost_reports, counts.damaged_frames
-    )?;
-    writeln!(
-        out,
-        "skin            {:.1} J of sliding, {:.1} J of it wear",
+    let (joule, wear) = (
         f64::from(status.skin_mj.0) * 1e-3,
-        f64::from(status.skin_mj.1) * 1e-3
-    )?;
-    show_calibration(calibration, out)
+        f64::from(status.skin_mj.1) * 1e-3,
+    );
+    rows.extend([
+        ("table", format!(
+            "{} textures, {} bytes, checksum {:08x}{whose}",
+            status.textures, status.table_bytes, status.table_crc
+        )),
+        ("acquisition", format!(
+            "{} slots; {} late, {} parity errors, {} error frames, {} samples lost",
+            counts.slots, counts.late_slots, counts.parity_errors, counts.error_frames, counts.lost_samples
+        )),
+        ("link", format!(
+            "{} reports found no room, {} requests damaged; here {damaged} frames damaged, {missing} reports lost",
+            counts.lost_reports, counts.damaged_frames
+        )),
+        ("skin", format!("{joule:.1} J of sliding, {wear:.1} J of it wear")),
+    ]);
+    rows.extend(calibration_rows(&calibration));
+    print_rows(&rows, out)
 }
 
 /// What the rig does, in a word.

@@ -18,10 +18,7 @@ use crate::cmd::table_file::{read_table, write_table};
 #[derive(Subcommand)]
 pub(crate) enum Command {
     /// Print what the probe's table holds
-    Show {
-        #[command(flatten)]
-        at: Where,
-    },
+    Show(Where),
     /// Write the probe's table to a file
     Pull {
         #[command(flatten)]
@@ -37,16 +34,13 @@ pub(crate) enum Command {
         file: PathBuf,
     },
     /// Go back to the table that came with the firmware
-    Factory {
-        #[command(flatten)]
-        at: Where,
-    },
+    Factory(Where),
 }
 
 /// Shows, fetches or changes the probe's table.
 pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()> {
     match command {
-        Command::Show { at } => {
+        Command::Show(at) => {
             let (mut bench, status) = Bench::open(at)?;
             let bytes = bench.table()?;
             let whose = if status.factory {
@@ -58,50 +52,43 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
             show_table(Table::read(&bytes)?, out)?;
         }
         Command::Pull { at, file } => {
-            let (mut bench, _) = Bench::open(at)?;
-            let bytes = bench.table()?;
+            let bytes = Bench::open(at)?.0.table()?;
             write_table(file, &bytes)?;
             let table = Table::read(&bytes)?;
+            let (file, textures, crc) = (file.display(), table.textures(), table.crc());
+            let length = bytes.len();
             writeln!(
                 out,
-                "{}: {} textures, {} bytes, checksum {:08x}",
-                file.display(),
-                table.textures(),
-                bytes.len(),
-                table.crc()
+                "{file}: {textures} textures, {length} bytes, checksum {crc:08x}"
             )?;
         }
         Command::Push { at, file } => {
             let mut bytes = Vec::new();
             let table = read_table(file, &mut bytes)?;
-            let push =
-                PushTable::new(table.as_bytes()).with_context(|| file.display().to_string())?;
+            let file = file.display();
+            let push = PushTable::new(table.as_bytes()).with_context(|| file.to_string())?;
             let (mut bench, _) = Bench::open(at)?;
-            bench.run(push, |_| Ok(()))?;
+            bench.get(push)?;
             // not what was sent counts, but what the probe uses from now on
-            let status = bench.run(Question::status(), |_| Ok(()))?;
+            let status = bench.get(Question::status())?;
+            let (textures, now, pushed) = (status.textures, status.table_crc, table.crc());
             ensure!(
-                status.table_crc == table.crc(),
-                "the probe uses the table {:08x} and not {:08x}, the one pushed: push it again",
-                status.table_crc,
-                table.crc()
+                now == pushed,
+                "the probe uses the table {now:08x} and not {pushed:08x}, the one pushed: push it again"
             );
             writeln!(
                 out,
-                "{}: the probe uses it now: {} textures, checksum {:08x}",
-                file.display(),
-                status.textures,
-                status.table_crc
+                "{file}: the probe uses it now: {textures} textures, checksum {now:08x}"
             )?;
         }
-        Command::Factory { at } => {
+        Command::Factory(at) => {
             let (mut bench, _) = Bench::open(at)?;
-            bench.run(Question::command(Ask::FactoryTable), |_| Ok(()))?;
-            let status = bench.run(Question::status(), |_| Ok(()))?;
+            bench.get(Question::command(Ask::FactoryTable))?;
+            let status = bench.get(Question::status())?;
+            let (textures, crc) = (status.textures, status.table_crc);
             writeln!(
                 out,
-                "The probe uses the firmware's own table: {} textures, checksum {:08x}",
-                status.textures, status.table_crc
+                "The probe uses the firmware's own table: {textures} textures, checksum {crc:08x}"
             )?;
         }
     }

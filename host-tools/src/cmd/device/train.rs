@@ -4,9 +4,10 @@ use std::io::{self, Write};
 
 use anyhow::ensure;
 use tactus::link::Question;
+use tactus_core::features::Property;
 use tactus_core::wire::{self, Name, Report, Tell};
 
-use super::bench::{Bench, moved};
+use super::bench::{Bench, show_fault};
 use super::line::Where;
 
 /// Have the probe learn the texture under its finger from new slides; an unfinished training goes on where it stood
@@ -79,53 +80,42 @@ pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
         seed: args.seed.unwrap_or_else(seed_of_now),
     };
     let (mut bench, _) = Bench::open(&args.at)?;
-    let slides = bench.run(Question::train(wanted), |report| trained(report, out))?;
+    let slides = bench.run(Question::train(wanted), |report| show_slide(report, out))?;
     writeln!(out, "{}: {slides} slides made.", args.name)?;
     Ok(())
 }
 
 /// Says what the probe felt.
-pub(crate) fn teach(args: &Teach, out: &mut impl Write) -> anyhow::Result<()> {
-    let question = Question::answer(name_of(&args.name)?);
-    let (mut bench, _) = Bench::open(&args.at)?;
-    let taught = bench.run(question, |_| Ok(()))?;
-    writeln!(
-        out,
-        "The probe has learned {} from {} slides.",
-        taught.name, taught.slides
-    )?;
+pub(crate) fn teach(Teach { at, name }: &Teach, out: &mut impl Write) -> anyhow::Result<()> {
+    let question = Question::answer(name_of(name)?);
+    let taught = Bench::open(at)?.0.get(question)?;
+    let (name, slides) = (taught.name, taught.slides);
+    writeln!(out, "The probe has learned {name} from {slides} slides.")?;
     Ok(())
 }
 
 /// Gives a texture another name.
 pub(crate) fn rename(Rename { at, from, to }: &Rename, out: &mut impl Write) -> anyhow::Result<()> {
     let question = Question::rename(name_of(from)?, name_of(to)?);
-    let (mut bench, _) = Bench::open(at)?;
-    bench.run(question, |_| Ok(()))?;
+    Bench::open(at)?.0.get(question)?;
     writeln!(out, "{from} is {to} now.")?;
     Ok(())
 }
 
 /// Has the probe forget something.
 pub(crate) fn forget(Forget { at, what }: &Forget, out: &mut impl Write) -> anyhow::Result<()> {
-    let (what, said) = match what {
-        What {
-            name: Some(name), ..
-        } => (wire::Forget::Texture(name_of(name)?), name.clone()),
-        What {
-            training: Some(name),
-            ..
-        } => (
-            wire::Forget::Training(name_of(name)?),
-            format!("the training of {name}"),
-        ),
-        What { .. } => (
-            wire::Forget::SelfTaught,
-            "what it learned by itself".to_owned(),
-        ),
+    let (what, said) = match (&what.name, &what.training) {
+        (Some(name), _) => (wire::Forget::Texture(name_of(name)?), name.clone()),
+        (None, Some(name)) => {
+            let said = format!("the training of {name}");
+            (wire::Forget::Training(name_of(name)?), said)
+        }
+        (None, None) => {
+            let said = "what it learned by itself".to_owned();
+            (wire::Forget::SelfTaught, said)
+        }
     };
-    let (mut bench, _) = Bench::open(at)?;
-    bench.run(Question::forget(what), |_| Ok(()))?;
+    Bench::open(at)?.0.get(Question::forget(what))?;
     writeln!(out, "The probe has forgotten {said}.")?;
     Ok(())
 }
@@ -145,7 +135,7 @@ pub(crate) fn seed_of_now() -> u32 {
 }
 
 /// What a training shows of a report.
-fn trained(report: &Report, out: &mut impl Write) -> io::Result<()> {
+fn show_slide(report: &Report, out: &mut impl Write) -> io::Result<()> {
     match &report.tell {
         Tell::Learned {
             movement,
@@ -153,18 +143,16 @@ fn trained(report: &Report, out: &mut impl Write) -> io::Result<()> {
             left,
             felt,
         } => {
-            let properties: Vec<String> = tactus_core::features::Property::ALL
-                .into_iter()
-                .filter_map(|p| Some(format!("{p} {:.3}", felt.properties().get(p)?)))
-                .collect();
+            let value = |p: Property| Some(format!("{p} {:.3}", felt.properties().get(p)?));
+            let properties: Vec<String> = Property::ALL.into_iter().filter_map(value).collect();
+            let properties = properties.join(", ");
             writeln!(
                 out,
-                "trial {trial} of {movement}: {}; {left} to go",
-                properties.join(", ")
+                "trial {trial} of {movement}: {properties}; {left} to go"
             )?;
         }
         Tell::Rejected { why, .. } => writeln!(out, "rejected, and made again: {why}")?,
-        _ => moved(report, out)?,
+        _ => show_fault(report, out)?,
     }
     out.flush()
 }

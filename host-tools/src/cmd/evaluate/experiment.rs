@@ -96,38 +96,34 @@ pub(crate) enum Novelty {
 
 /// What is to be evaluated, and its name.
 pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
-    if let Some(folder) = &args.fabrics {
+    let (experiment, name) = if let Some(folder) = &args.fabrics {
         let set = FabricSet::open(folder)?;
         let experiment = Experiment::fabrics(&set, args.repetition - 1, args.seed)?;
-        return Ok((experiment, "fabrics"));
-    }
-    if let Some(file) = &args.properties {
+        (experiment, "fabrics")
+    } else if let Some(file) = &args.properties {
         let set = PropertyTable::read(file)?;
         let experiment = Experiment::given(&set, args.train_slides, args.seed)
             .with_context(|| file.display().to_string())?;
-        return Ok((experiment, "properties"));
-    }
-    let Some(folder) = &args.recordings else {
+        (experiment, "properties")
+    } else if let Some(folder) = &args.recordings {
+        let (set, felt) = feel_folder(folder)?;
+        let test = args.test.as_deref().map(feel_folder).transpose()?;
+        let test = test.map(|(set, felt)| (names(&set), felt));
+        let test = test
+            .as_ref()
+            .map(|(names, felt)| (names.as_slice(), felt.as_slice()));
+        let (names, slides) = (names(&set), args.train_slides.unwrap_or(5));
+        let experiment =
+            Experiment::recorded(names, &felt, test, args.protocol, slides, args.seed)?;
+        let protocol = match args.protocol {
+            Protocol::Interleaved => "interleaved",
+            Protocol::Blocked => "blocked",
+            Protocol::Drift => "drift",
+        };
+        (experiment, protocol)
+    } else {
         bail!("give --recordings, --properties or --fabrics");
     };
-    let (set, felt) = feel_folder(folder)?;
-    let test = args.test.as_deref().map(feel_folder).transpose()?;
-    let test = test.map(|(set, felt)| (names(&set), felt));
-    let test = test
-        .as_ref()
-        .map(|(names, felt)| (names.as_slice(), felt.as_slice()));
-    let experiment = Experiment::recorded(
-        names(&set),
-        &felt,
-        test,
-        args.protocol,
-        args.train_slides.unwrap_or(5),
-        args.seed,
-    )?;
-    let protocol = match args.protocol {
-        Protocol::Interleaved => "interleaved",
-        Protocol::Blocked => "blocked",
-        Protocol::Drift => "drift",
-    };
-    Ok((experiment, protocol))
+    let features = args.features.map(Features::set);
+    Ok((experiment.with_features(features), name))
 }

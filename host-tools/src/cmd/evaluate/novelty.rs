@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use anyhow::bail;
+use anyhow::ensure;
 use serde::Serialize;
 use tactus::evaluate::Method;
 use tactus::experiment::Experiment;
@@ -12,7 +12,7 @@ use tactus_core::explorer::Config;
 
 use super::experiment::Args;
 use crate::cmd::output::{Format, print_json};
-use crate::cmd::progress::progress;
+use crate::cmd::progress::with_progress;
 
 /// What `evaluate --novelty` prints.
 #[derive(Serialize)]
@@ -38,6 +38,7 @@ struct LifelongFigures {
 /// Most sessions of `--lifelong`; they differ in the order of the textures only.
 const SESSIONS: u64 = 50;
 
+/// Leaves every texture out of the table in turn.
 pub(crate) fn leave_one_out(
     args: &Args,
     experiment: &Experiment,
@@ -45,41 +46,45 @@ pub(crate) fn leave_one_out(
     config: Config,
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
-    if experiment.names().len() < 4 {
-        bail!("leaving one out takes four textures or more");
-    }
-    let bar = progress(args.runs, "presenting new textures");
-    let novelty = novelty::leave_one_out(experiment, config, args.runs, || bar.inc(1))?;
-    bar.finish_and_clear();
-    let figures = NoveltyFigures {
-        method: args.method,
-        protocol,
-        train_slides: experiment.train_slides(),
-        runs: args.runs,
-        seed: args.seed,
-        novelty,
-    };
+    ensure!(
+        experiment.names().len() >= 4,
+        "leaving one out takes four textures or more"
+    );
+    let novelty = with_progress(args.runs, "presenting new textures", |done| {
+        novelty::leave_one_out(experiment, config, args.runs, done)
+    })?;
+    let (train_slides, runs, seed) = (experiment.train_slides(), args.runs, args.seed);
     if args.format == Format::Json {
+        let figures = NoveltyFigures {
+            method: args.method,
+            protocol,
+            train_slides,
+            runs,
+            seed,
+            novelty,
+        };
         return print_json(&figures, out);
     }
     writeln!(
         out,
-        "Every texture left out in turn, {protocol}, {} training slides, {} runs, seed {}",
-        figures.train_slides, figures.runs, figures.seed
+        "Every texture left out in turn, {protocol}, {train_slides} training slides, {runs} runs, seed {seed}"
     )?;
-    for after in &figures.novelty {
+    for after in novelty {
+        let slides = format!(
+            "{} slide{}",
+            after.slides,
+            if after.slides == 1 { " " } else { "s" }
+        );
+        let (noticed, alarms) = (after.detections * 100.0, after.false_alarms * 100.0);
         writeln!(
             out,
-            "  after {} slide{}  noticed {:5.1} %, known ones taken for new {:4.1} %",
-            after.slides,
-            if after.slides == 1 { " " } else { "s" },
-            after.detections * 100.0,
-            after.false_alarms * 100.0
+            "  after {slides}  noticed {noticed:5.1} %, known ones taken for new {alarms:4.1} %"
         )?;
     }
     Ok(())
 }
 
+/// Plays sessions in which the probe goes on learning.
 pub(crate) fn lifelong(
     args: &Args,
     experiment: &Experiment,
@@ -87,37 +92,41 @@ pub(crate) fn lifelong(
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
     let sessions = args.runs.min(SESSIONS);
-    let bar = progress(3 * sessions, "living through sessions");
-    let figures = LifelongFigures {
-        method: args.method,
-        train_slides: experiment.train_slides(),
-        sessions,
-        seed: args.seed,
-        lifelong: lifelong::lifelong(experiment, config, sessions, args.seed, || bar.inc(1))?,
-    };
-    bar.finish_and_clear();
+    let (train_slides, seed) = (experiment.train_slides(), args.seed);
+    let lifelong = with_progress(3 * sessions, "living through sessions", |done| {
+        lifelong::lifelong(experiment, config, sessions, seed, done)
+    })?;
     if args.format == Format::Json {
+        let figures = LifelongFigures {
+            method: args.method,
+            train_slides,
+            sessions,
+            seed,
+            lifelong,
+        };
         return print_json(&figures, out);
     }
     writeln!(
         out,
-        "A session in time order: {} slides to learn from, then visits of one slide; {sessions} orders of the textures, seed {}",
-        figures.train_slides, figures.seed
+        "A session in time order: {train_slides} slides to learn from, then visits of one slide; {sessions} orders of the textures, seed {seed}"
     )?;
-    for life in &figures.lifelong {
+    for life in lifelong {
         let (who, uncertain) = match life.learning {
-            Learning::None => ("learning nothing      ", "uncertain"),
-            Learning::Itself => ("learning by itself    ", "uncertain"),
+            Learning::None => ("learning nothing", "uncertain"),
+            Learning::Itself => ("learning by itself", "uncertain"),
             Learning::Asking => ("asking where uncertain", "asked"),
         };
+        let shares = [
+            life.accuracy,
+            life.worst.0,
+            life.uncertain,
+            life.wrong_lessons,
+        ];
+        let [right, worst, unsure, wrong] = shares.map(|share| share * 100.0);
         writeln!(
             out,
-            "  {who}  right at first {:5.1} %, worst {:5.1} % ({}), {uncertain} {:4.1} %, wrong lessons {:.2} %",
-            life.accuracy * 100.0,
-            life.worst.0 * 100.0,
-            life.worst.1,
-            life.uncertain * 100.0,
-            life.wrong_lessons * 100.0
+            "  {who:<22}  right at first {right:5.1} %, worst {worst:5.1} % ({}), {uncertain} {unsure:4.1} %, wrong lessons {wrong:.2} %",
+            life.worst.1
         )?;
     }
     Ok(())

@@ -4,9 +4,10 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use tactus_core::movement::Movement;
-use tactus_core::rig::guard::Fault;
 use tactus_core::table::Action;
 use tactus_core::wire::{Felt, Live, PROTOCOL, Phase, Report, Status, Tell};
+
+use crate::cmd::device::bench::recovery;
 
 /// P_AC samples that are shown: a second.
 pub(crate) const SHOWN: usize = 2200;
@@ -46,8 +47,6 @@ pub(crate) struct Monitor {
     pub(crate) table_crc: u32,
     pub(crate) status: Status,
     pub(crate) at_ms: u32,
-    pub(crate) phase: Phase,
-    pub(crate) fault: Option<Fault>,
     pub(crate) live: Option<Live>,
     pub(crate) pac: VecDeque<i16>,
     pub(crate) chosen: Option<Chosen>,
@@ -72,8 +71,6 @@ impl Monitor {
             names,
             table_crc: status.table_crc,
             at_ms: 0,
-            phase: status.phase,
-            fault: status.fault,
             live: None,
             pac: VecDeque::new(),
             chosen: None,
@@ -89,12 +86,12 @@ impl Monitor {
         }
     }
 
+    /// Keeps a line for people.
     pub(crate) fn note(&mut self, weight: Weight, text: impl Into<String>) {
-        let text = text.into();
         self.notes.push_back(Note {
             at_ms: self.at_ms,
             weight,
-            text,
+            text: text.into(),
         });
         if self.notes.len() > NOTES {
             self.notes.pop_front();
@@ -109,11 +106,7 @@ impl Monitor {
     pub(crate) fn hear(&mut self, report: &Report) {
         self.at_ms = report.at_ms;
         match &report.tell {
-            Tell::Status(status) => {
-                self.phase = status.phase;
-                self.fault = status.fault;
-                self.status = status.clone();
-            }
+            Tell::Status(status) => self.status = status.clone(),
             Tell::Booted {
                 protocol,
                 version,
@@ -124,21 +117,17 @@ impl Monitor {
                     self.protocol = Some(*protocol);
                 }
                 self.rebooted = true;
-                let words = last_words
-                    .as_ref()
-                    .map(|words| format!("; its last words: {words}"));
-                self.note(
-                    Weight::Fault,
-                    format!(
-                        "the probe has started, firmware {version}, after {reset:?}{}",
-                        words.unwrap_or_default()
-                    ),
-                );
+                let mut note =
+                    format!("the probe has started, firmware {version}, after {reset:?}");
+                if let Some(words) = last_words {
+                    note += &format!("; its last words: {words}");
+                }
+                self.note(Weight::Fault, note);
             }
             Tell::Phase(phase) => {
-                self.phase = *phase;
+                self.status.phase = *phase;
                 if *phase != Phase::Faulted {
-                    self.fault = None;
+                    self.status.fault = None;
                 }
                 if matches!(phase, Phase::Ready | Phase::Parked) {
                     self.live = None;
@@ -146,26 +135,26 @@ impl Monitor {
             }
             Tell::Live(live) => self.live = Some(*live),
             Tell::Fault(fault) => {
-                self.fault = Some(*fault);
-                let recovery = fault.row().map_or("reset", |row| row.recovery);
+                self.status.fault = Some(*fault);
+                let recovery = recovery(fault);
                 self.note(Weight::Fault, format!("{fault}: {recovery} (key h)"));
             }
-            Tell::Chosen {
+            &Tell::Chosen {
                 slide,
                 movement,
                 action,
-                outlook,
+                ref outlook,
             } => {
-                if *slide == 1 {
+                if slide == 1 {
                     self.posterior.clear();
                     self.answer = None;
                     self.felt = None;
                 }
-                let promise = outlook.iter().find(|promise| promise.action == *action);
+                let promise = outlook.iter().find(|promise| promise.action == action);
                 self.chosen = Some(Chosen {
-                    slide: *slide,
-                    movement: *movement,
-                    action: *action,
+                    slide,
+                    movement,
+                    action,
                     leaves: promise.map(|promise| promise.uncertainty),
                 });
             }
@@ -178,11 +167,9 @@ impl Monitor {
                 self.felt = Some(felt.clone());
                 self.posterior = posterior.to_vec();
                 if let Some((p, texture)) = self.ranked().first().copied() {
-                    let name = self.name(texture).to_owned();
-                    self.note(
-                        Weight::Said,
-                        format!("slide {slide}: most likely {name}, {:.1} %", p * 100.0),
-                    );
+                    let (name, p) = (self.name(texture), p * 100.0);
+                    let note = format!("slide {slide}: most likely {name}, {p:.1} %");
+                    self.note(Weight::Said, note);
                 }
             }
             Tell::Rejected { slide, why } => {
@@ -198,24 +185,18 @@ impl Monitor {
             } => {
                 let p = probability * 100.0;
                 let after = format!("{slides} slide{}", if *slides == 1 { "" } else { "s" });
-                let (answer, said) = if *unknown {
-                    (
-                        "It is none that I know".to_owned(),
-                        format!("none that I know, most like {name}, after {after}"),
-                    )
+                let (answer, note) = if *unknown {
+                    let note = format!("none that I know, most like {name}, after {after}");
+                    ("It is none that I know".to_owned(), note)
                 } else if *sure {
-                    (
-                        format!("It is {name}"),
-                        format!("it is {name}: {p:.1} % after {after}"),
-                    )
+                    let note = format!("it is {name}: {p:.1} % after {after}");
+                    (format!("It is {name}"), note)
                 } else {
-                    (
-                        "Not sure; most likely".to_owned(),
-                        format!("not sure after {after}; most likely {name}, {p:.1} %"),
-                    )
+                    let note = format!("not sure after {after}; most likely {name}, {p:.1} %");
+                    ("Not sure; most likely".to_owned(), note)
                 };
-                self.note(Weight::Said, said);
                 self.answer = Some(answer);
+                self.note(Weight::Said, note);
             }
             Tell::Taught {
                 name,
@@ -223,10 +204,8 @@ impl Monitor {
                 itself,
             } => {
                 let whom = if *itself { "by itself" } else { "from you" };
-                self.note(
-                    Weight::Said,
-                    format!("it has learned {name} {whom}: {slides} slides"),
-                );
+                let note = format!("it has learned {name} {whom}: {slides} slides");
+                self.note(Weight::Said, note);
             }
             Tell::Block(block) => {
                 if block.number == 0 {

@@ -158,7 +158,7 @@ fn an_answer_a_fault_and_silence_are_said_in_words() {
         at_ms: 9000,
         tell: Tell::Phase(Phase::Homing),
     });
-    assert_eq!(monitor.fault, None);
+    assert_eq!(monitor.status.fault, None);
     // what is lost on the line stands where everybody looks
     monitor.silent = None;
     monitor.losses = (2, 3);

@@ -3,7 +3,7 @@
 
 use ratatui::Frame;
 use ratatui::layout::{Alignment, Constraint, Layout, Rect};
-use ratatui::style::{Color, Modifier, Style, Stylize as _};
+use ratatui::style::{Color, Style, Stylize as _};
 use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, BorderType, Chart, Dataset, GraphType, Paragraph, Sparkline};
@@ -69,24 +69,21 @@ fn panel(title: impl Into<Line<'static>>) -> Block<'static> {
 }
 
 fn dim(text: impl Into<String>) -> Span<'static> {
-    Span::styled(text.into(), Style::new().fg(DIM))
+    Span::from(text.into()).fg(DIM)
 }
 
 fn draw_header(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let status = &monitor.status;
+    let whose = if status.factory { " (factory)" } else { "" };
     let left = Line::from(vec![
         Span::from(" Tactus ").bold().reversed(),
         Span::from(format!(" {}  ", monitor.place)),
-        dim(format!(
-            "{} textures{}",
-            status.textures,
-            if status.factory { " (factory)" } else { "" }
-        )),
+        dim(format!("{} textures{whose}", status.textures)),
     ]);
     let (damaged, missing) = monitor.losses;
     let late = status.counts.late_slots;
     let lost = status.counts.lost_samples;
-    let right = match (monitor.silent, monitor.fault) {
+    let right = match (monitor.silent, status.fault) {
         (Some(silent), _) => warning(format!(" SILENT for {} s ", silent.as_secs())),
         (None, Some(fault)) => warning(format!(" FAULT: {fault} ")),
         (None, None) if damaged + missing > 0 || late + lost > 0 => Span::styled(
@@ -100,8 +97,7 @@ fn draw_header(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
 }
 
 fn warning(text: String) -> Span<'static> {
-    let style = Style::new().fg(Color::Black).bg(VERMILLION);
-    Span::styled(text, style.add_modifier(Modifier::BOLD))
+    Span::from(text).fg(Color::Black).bg(VERMILLION).bold()
 }
 
 fn clock(at_ms: u32) -> String {
@@ -129,26 +125,16 @@ fn draw_trace(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
         .collect();
     let line = Dataset::default()
         .marker(Marker::Braille)
-        .graph_type(GraphType::Line)
-        .style(Style::new().fg(BLUE))
-        .data(&points);
-    let label = |text: String| Span::styled(text, Style::new().fg(DIM));
+        .graph_type(GraphType::Line);
+    let line = line.fg(BLUE).data(&points);
     let chart = Chart::new(vec![line])
         .block(panel(" P_AC, counts, 1 s "))
-        .x_axis(
-            Axis::default()
-                .bounds([0.0, SHOWN as f64])
-                .style(Style::new().fg(DIM)),
-        )
+        .x_axis(Axis::default().bounds([0.0, SHOWN as f64]).fg(DIM))
         .y_axis(
             Axis::default()
                 .bounds([-top, top])
-                .style(Style::new().fg(DIM))
-                .labels([
-                    label(format!("{:>5}", -top)),
-                    label(format!("{:>5}", 0)),
-                    label(format!("{top:>5}")),
-                ]),
+                .fg(DIM)
+                .labels([-top, 0.0, top].map(|label| dim(format!("{label:>5}")))),
         );
     frame.render_widget(chart, area);
     if pac.is_empty() && area.height > 4 {
@@ -186,28 +172,21 @@ fn draw_spectrum(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
         let height: Vec<u64> = (0..inner.width)
             .map(|column| (power(column).max(1.0).log10() * 10.0) as u64)
             .collect();
-        let line = Sparkline::default()
-            .data(height)
-            .max(SPECTRUM_DB as u64)
-            .style(Style::new().fg(ORANGE));
-        frame.render_widget(line, bars);
+        let line = Sparkline::default().data(height).max(SPECTRUM_DB as u64);
+        frame.render_widget(line.fg(ORANGE), bars);
     }
     let mut labels = vec![' '; inner.width.into()];
+    let mut write = |at: usize, text: &str| {
+        for (place, character) in labels.iter_mut().skip(at).zip(text.chars()) {
+            *place = character;
+        }
+    };
     for mark in [17.0f32, 50.0, 100.0, 200.0, 500.0] {
         let at = (mark / low).ln() / (high / low).ln() * f32::from(inner.width);
-        for (place, digit) in labels
-            .iter_mut()
-            .skip(at as usize)
-            .zip(format!("{mark}").chars())
-        {
-            *place = digit;
-        }
+        write(at as usize, &mark.to_string());
     }
     let end = "1000 Hz";
-    let from = labels.len().saturating_sub(end.len());
-    for (place, character) in labels.iter_mut().skip(from).zip(end.chars()) {
-        *place = character;
-    }
+    write(usize::from(inner.width).saturating_sub(end.len()), end);
     frame.render_widget(Line::from(dim(String::from_iter(labels))), axis);
 }
 
@@ -219,62 +198,50 @@ fn row(name: &str, value: String) -> Line<'static> {
 fn draw_rig(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let block = panel(" Rig ");
     let inner = block.inner(area);
-    let phase = match monitor.phase {
+    let phase = match monitor.status.phase {
         Phase::Parked => "parked",
         phase => phase_name(phase),
     };
-    let moving = !matches!(phase, "ready" | "parked");
-    let mut lines = vec![Line::from(vec![
-        dim("phase   "),
-        Span::from(phase.to_owned()).style(if moving {
-            Style::new().fg(ORANGE).add_modifier(Modifier::BOLD)
-        } else {
-            Style::new().add_modifier(Modifier::BOLD)
-        }),
-    ])];
+    let phase = match phase {
+        "ready" | "parked" => Span::from(phase),
+        moving => Span::from(moving).fg(ORANGE),
+    };
+    let mut lines = vec![Line::from(vec![dim("phase   "), phase.bold()])];
     match &monitor.live {
         Some(live) => {
             let force_n = f32::from(live.force_mn) * 1e-3;
-            lines.push(row("force", format!("{force_n:5.3} N")));
-            lines.push(gauge(
-                force_n,
-                monitor.chosen.map(|c| c.movement.force_n()),
-                inner.width,
-            ));
-            lines.push(row(
-                "speed",
-                format!("{:5.1} mm/s", live.speed_um_s as f32 * 1e-3),
-            ));
-            lines.push(row(
-                "stage",
-                format!("{:5.1} mm", live.stage_um as f32 * 1e-3),
-            ));
-            lines.push(row(
-                "lever",
-                format!("{:5.2} mm", live.steps as f32 * STEP_MM),
-            ));
-            lines.push(row("motor", format!("{:5} mA", live.current_ma)));
+            let wanted_n = monitor.chosen.map(|c| c.movement.force_n());
+            let mm = live.stage_um as f32 * 1e-3;
+            let mm_s = live.speed_um_s as f32 * 1e-3;
+            let lever_mm = live.steps as f32 * STEP_MM;
+            lines.extend([
+                row("force", format!("{force_n:5.3} N")),
+                gauge(force_n, wanted_n, inner.width),
+                row("speed", format!("{mm_s:5.1} mm/s")),
+                row("stage", format!("{mm:5.1} mm")),
+                row("lever", format!("{lever_mm:5.2} mm")),
+                row("motor", format!("{:5} mA", live.current_ma)),
+            ]);
         }
         None => {
-            lines.push(row("force", "at rest".into()));
-            lines.push(Line::default());
             let (joule, wear) = monitor.status.skin_mj;
-            lines.push(row("skin", format!("{:.1} J", f64::from(joule) * 1e-3)));
-            lines.push(row("wear", format!("{:.1} J", f64::from(wear) * 1e-3)));
+            lines.extend([
+                row("force", "at rest".into()),
+                Line::default(),
+                row("skin", format!("{:.1} J", f64::from(joule) * 1e-3)),
+                row("wear", format!("{:.1} J", f64::from(wear) * 1e-3)),
+            ]);
         }
     }
     // where there is room, what was counted since the probe has power
     if inner.height > 8 {
         let counts = &monitor.status.counts;
-        lines.resize(7, Line::default());
-        lines.push(Line::default());
-        for (name, count) in [
-            ("late", counts.late_slots),
-            ("parity", counts.parity_errors),
-            ("lost", counts.lost_samples),
-        ] {
-            lines.push(row(name, format!("{count:5}")));
-        }
+        lines.resize(8, Line::default());
+        lines.extend([
+            row("late", format!("{:5}", counts.late_slots)),
+            row("parity", format!("{:5}", counts.parity_errors)),
+            row("lost", format!("{:5}", counts.lost_samples)),
+        ]);
     }
     frame.render_widget(Paragraph::new(lines).block(block), area);
 }
@@ -302,38 +269,34 @@ fn gauge(force_n: f32, wanted_n: Option<f32>, width: u16) -> Line<'static> {
 }
 
 fn draw_slide(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
-    let title = monitor
-        .chosen
-        .map_or_else(|| " Slide ".to_owned(), |c| format!(" Slide {} ", c.slide));
+    let mut title = " Slide ".to_owned();
     let mut lines = Vec::new();
     if let Some(chosen) = monitor.chosen {
-        lines.push(Line::from(chosen.movement.to_string()));
-        let looked_at = chosen
-            .action
-            .property
-            .map_or("all it feels", Property::name);
-        lines.push(Line::from(dim(format!("for {looked_at}"))));
-        lines.push(match chosen.leaves {
-            Some(leaves) => Line::from(dim(format!("to leave {:.1} %", leaves * 100.0))),
-            None => Line::default(),
-        });
+        title += &format!("{} ", chosen.slide);
+        let property = chosen.action.property;
+        let looked_at = property.map_or("all it feels", Property::name);
+        let leaves = chosen
+            .leaves
+            .map(|leaves| format!("to leave {:.1} %", leaves * 100.0));
+        lines.extend([
+            Line::from(chosen.movement.to_string()),
+            Line::from(dim(format!("for {looked_at}"))),
+            leaves.map_or_else(Line::default, |leaves| Line::from(dim(leaves))),
+        ]);
     }
     if let Some(felt) = &monitor.felt {
         lines.push(Line::from(dim("last felt")));
-        for property in Property::ALL {
-            let unit = match property {
-                Property::Traction => " N",
-                _ => "",
+        lines.extend(Property::ALL.map(|property| {
+            let unit = if property == Property::Traction {
+                " N"
+            } else {
+                ""
             };
-            let value = match felt.properties().get(property) {
-                Some(value) => format!("{value:6.3}{unit}"),
-                None => "     -".to_owned(),
-            };
-            lines.push(Line::from(vec![
-                dim(format!("{:<10} ", property.name())),
-                Span::from(value),
-            ]));
-        }
+            let value = felt.properties().get(property);
+            let value = value.map_or("     -".to_owned(), |value| format!("{value:6.3}{unit}"));
+            let name = dim(format!("{:<10} ", property.name()));
+            Line::from(vec![name, Span::from(value)])
+        }));
     }
     frame.render_widget(Paragraph::new(lines).block(panel(title)), area);
 }
@@ -360,11 +323,7 @@ fn draw_textures(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
         lines.push(Line::from(dim(hint)));
     }
     // the rest takes a line
-    let most = if ranked.len() > room {
-        room.saturating_sub(1)
-    } else {
-        room
-    };
+    let most = room.saturating_sub(usize::from(ranked.len() > room));
     let worth = ranked.iter().filter(|(p, _)| *p >= WORTH_LISTING).count();
     let listed = worth.max(1).min(most).min(ranked.len());
     let (listed, others) = ranked.split_at(listed);
@@ -381,12 +340,9 @@ fn draw_textures(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     }
     if !others.is_empty() {
         let rest: f32 = others.iter().map(|(p, _)| p).sum();
-        let text = format!("{} others", others.len());
+        let (text, percent) = (format!("{} others", others.len()), rest * 100.0);
         let space = name_width + 1 + bar_width;
-        lines.push(Line::from(dim(format!(
-            "{text:<space$} {:5.1} %",
-            rest * 100.0
-        ))));
+        lines.push(Line::from(dim(format!("{text:<space$} {percent:5.1} %"))));
     }
     frame.render_widget(Paragraph::new(lines).block(block), area);
 }
@@ -400,8 +356,7 @@ fn draw_notes(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
         .iter()
         .skip(from)
         .map(|note| {
-            let time = dim(format!("{} ", clock(note.at_ms)));
-            let mut line = vec![time];
+            let mut line = vec![dim(format!("{} ", clock(note.at_ms)))];
             if note.weight == Weight::Fault {
                 line.push(warning(" ! ".into()));
                 line.push(Span::from(" "));
@@ -414,17 +369,15 @@ fn draw_notes(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
 }
 
 fn key_line() -> Line<'static> {
-    let key = |key: &'static str, what: &'static str| {
-        [
-            Span::from(format!(" {key} ")).bold().reversed(),
-            Span::from(format!(" {what}   ")),
-        ]
-    };
     let keys = [
-        key("i", "identify"),
-        key("h", "home"),
-        key("s", "stop and lift"),
-        key("q", "quit"),
+        ("i", "identify"),
+        ("h", "home"),
+        ("s", "stop and lift"),
+        ("q", "quit"),
     ];
-    Line::from(keys.into_iter().flatten().collect::<Vec<_>>())
+    let spans = keys.map(|(key, what)| {
+        let key = Span::from(format!(" {key} ")).bold().reversed();
+        [key, Span::from(format!(" {what}   "))]
+    });
+    Line::from(spans.concat())
 }
