@@ -8,9 +8,10 @@ use cortex_m::peripheral::DWT;
 use static_cell::StaticCell;
 use tactus_core::features::Plan;
 
+use crate::board;
+use crate::chip::rescue;
 use crate::kernels::Chip;
 use crate::workload::{Counter, Workload, run};
-use crate::{board, rescue};
 
 const WORDS: usize = 8192;
 const RESULTS: usize = 9000;

@@ -4,21 +4,14 @@
 #![cfg_attr(target_os = "none", no_std)]
 #![cfg(target_os = "none")]
 
-mod acquire;
 mod bench;
 mod board;
-mod display;
+mod chip;
 mod handheld;
 mod kernels;
-mod lever;
-mod link;
-mod memory;
-mod probe;
-mod rescue;
 mod rig;
 mod selftest;
-mod servo;
-mod session;
+mod tasks;
 pub mod workload;
 
 pub use bench::bench;

@@ -3,10 +3,10 @@
 //! | executor | task | does | tells |
 //! |---|---|---|---|
 //! | UART4's interrupt, woken by TIM2's | `acquire` | a sensor word every 227 us | words to `servo` |
-//! | UART5's interrupt, woken by the clock's | `servo` | control, guard and watchdog, 1 kHz | samples to `session`, a snapshot to all |
-//! | thread mode | `session` | explorations, training, tables; owns the store | commands to `servo`, reports to `send` |
+//! | UART5's interrupt, woken by the clock's | `servo` | control, guard and watchdog, 1 kHz | samples to `probe`, a snapshot to all |
+//! | thread mode | `probe` | explorations, training, tables; owns the store | commands to `servo`, reports to `send` |
 //! | thread mode | `watch` | phases, faults and places as they change | reports to `send` |
-//! | thread mode | `receive`, `send` | frames of USART3 | requests to `session` |
+//! | thread mode | `receive`, `send` | frames of USART3 | requests to `probe` |
 //!
 //! Their priorities, and between the two executors those of the link's bytes and of the lever's steps (TIM1), are in
 //! `board`.
@@ -15,25 +15,20 @@ use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::interrupt;
 use heapless::spsc::Queue;
 use static_cell::ConstStaticCell;
-use tactus_core::session::text;
-use tactus_core::wire::{PROTOCOL, Tell};
+use tactus_core::probe::servo_rig::Samples;
+use tactus_core::wire::{PROTOCOL, Tell, text};
 
-use crate::acquire::{self, WORDS, Word};
-use crate::servo::{self, SAMPLES, Samples};
-use crate::{board, link, rescue, session};
+use crate::board;
+use crate::chip::rescue;
+use crate::tasks::acquire::{self, ACQUIRE, WORDS, Word};
+use crate::tasks::servo::{self, SAMPLES};
+use crate::tasks::{link, outbox, probe, watch};
 
-pub(crate) static ACQUIRE: InterruptExecutor = InterruptExecutor::new();
 static SERVO: InterruptExecutor = InterruptExecutor::new();
 
 #[interrupt]
-fn UART4() {
-    // SAFETY: called from here only, and started before the interrupt is on.
-    unsafe { ACQUIRE.on_interrupt() }
-}
-
-#[interrupt]
 fn UART5() {
-    // SAFETY: as above.
+    // SAFETY: called from here only, and started before the interrupt is on.
     unsafe { SERVO.on_interrupt() }
 }
 
@@ -56,7 +51,7 @@ pub async fn rig(thread: Spawner) {
         spawn(&thread, link::send(tx));
         spawn(&thread, link::receive(rx));
     }
-    link::tell(Tell::Booted {
+    outbox::tell(Tell::Booted {
         protocol: PROTOCOL,
         version: env!("CARGO_PKG_VERSION").try_into().unwrap_or_default(),
         reset,
@@ -72,8 +67,8 @@ pub async fn rig(thread: Spawner) {
         Ok(task) => acquire.spawn(task),
         Err(_) => defmt::error!("no acquisition"),
     }
-    spawn(&thread, link::watch());
-    spawn(&thread, session::session(r.store, samples_out));
+    spawn(&thread, watch::watch());
+    spawn(&thread, probe::probe(r.store, samples_out));
 }
 
 /// Spawns a task, of which there is only one.

@@ -30,8 +30,9 @@ use tactus_core::sensor::{Exchange, PressureSensor as _};
 use tactus_core::store::Store;
 use tactus_core::wire::Reset;
 
-use crate::lever::Lever;
-use crate::{board, rescue};
+use crate::board;
+use crate::chip::lever::Lever;
+use crate::chip::rescue;
 
 const CORE_HZ: u32 = 168_000_000;
 const SLOTS_PER_S: u64 = 4400;

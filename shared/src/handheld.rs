@@ -8,6 +8,7 @@
 mod button;
 pub mod draw;
 pub mod guidance;
+pub mod jobs;
 pub mod judge;
 pub mod picture;
 pub mod screen;

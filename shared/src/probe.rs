@@ -1,12 +1,24 @@
-//! What a probe does when it is asked: explorations, trainings, what it learns and forgets.
+//! What a probe does when it is asked, the same on the chip, on the emulated board and in a PC's simulated probe: requests
+//! come to [`receive`], those that wait for their turn go to [`Probe::serve`]. What a probe runs on is behind [`seams`].
 
+mod calibrate;
+mod dispatch;
 pub mod explore;
-pub mod identify;
+mod identify;
+mod memory;
+pub mod seams;
+pub mod servo_rig;
+mod status;
 pub mod teach;
-pub mod train;
+mod train;
 pub mod training;
+mod transfer;
 
+pub use calibrate::restore;
+pub use dispatch::{Probe, Turn, receive, turn};
 pub use identify::identify;
+pub use memory::Memory;
+pub use status::{RigState, TableInUse, Watch};
 pub use train::train;
 
 #[cfg(test)]

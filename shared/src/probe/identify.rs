@@ -10,10 +10,10 @@ use crate::explorer::{Config, Explorer, Method, Outlook};
 use crate::features::Plan;
 use crate::kernels::Kernels;
 use crate::rig::Rig;
-use crate::session::{Visited, text};
+use crate::session::Visited;
 use crate::table::{Contents, Table};
 use crate::up_to;
-use crate::wire::{Identify, MAX_OUTLOOK, MAX_TEXTURES, Name, Promise, Tell, Text};
+use crate::wire::{Identify, MAX_OUTLOOK, MAX_TEXTURES, Name, Promise, Tell, Text, text};
 
 /// Explores what lies under the finger until there is an answer, which is told; the error is why there is none.
 ///

@@ -1,3 +1,7 @@
+//! Explorations and trainings on a scripted rig.
+
+mod dispatch;
+
 use super::explore::Random;
 use super::identify::best;
 use super::*;
@@ -11,7 +15,7 @@ use crate::store::tests::ram::Ram;
 use crate::store::{SelfTaught, Store};
 use crate::table::tests::{around, fused_of, known, straight, table_of};
 use crate::table::{Action, Table};
-use crate::wire::{Identify, MAX_OUTLOOK, Name, Tell, Text, Train};
+use crate::wire::{Identify, MAX_OUTLOOK, Name, Tell, Text, Train, text};
 use embassy_futures::block_on;
 use heapless::Vec;
 use std::format;

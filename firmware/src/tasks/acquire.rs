@@ -4,6 +4,7 @@ use core::future::poll_fn;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering::Relaxed};
 use core::task::Poll;
 
+use embassy_executor::InterruptExecutor;
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::pac::{SPI1, TIM2};
@@ -106,6 +107,14 @@ pub(crate) fn listen(on: bool) {
     if SET_UP.load(Relaxed) {
         TIM2.cr1().modify(|w| w.set_cen(on));
     }
+}
+
+pub(crate) static ACQUIRE: InterruptExecutor = InterruptExecutor::new();
+
+#[interrupt]
+fn UART4() {
+    // SAFETY: called from here only, and started before the interrupt is on.
+    unsafe { ACQUIRE.on_interrupt() }
 }
 
 #[embassy_executor::task]

@@ -12,7 +12,7 @@ use heapless::String;
 use tactus_core::rig::lever::MAX_STEPS;
 use tactus_core::wire::{Reset, Text};
 
-use crate::lever;
+use super::lever;
 
 const MAGIC: u32 = 0x7ac7_1a57;
 const LEVER_TOP: usize = 12;

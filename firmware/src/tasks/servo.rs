@@ -15,69 +15,24 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Ticker};
-use heapless::Vec;
 use heapless::spsc::{Consumer, Producer};
-use tactus_core::movement::Movement;
 use tactus_core::pressure::Calibration;
+use tactus_core::probe::RigState;
+use tactus_core::probe::servo_rig::{RigCommand, Samples};
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::rig::control::{Control, Ended, Phase, Refused};
+use tactus_core::rig::control::{Control, Refused};
 use tactus_core::rig::guard::Unguarded;
-use tactus_core::rig::pins::{Felt, Inputs, MAX_WORDS, Outputs};
-use tactus_core::rig::skin::SkinCare;
+use tactus_core::rig::pins::{Inputs, MAX_WORDS};
 use tactus_core::rig::stage::StageConstants;
 
-use crate::acquire::Word;
-use crate::{board, lever, rescue};
-
-/// A tick's samples; longer ones come in several.
-#[derive(Clone, Default)]
-pub(crate) struct Samples {
-    pub(crate) felt: Felt,
-    pub(crate) pac: Vec<i16, 8>,
-    pub(crate) shear_mn: Option<i16>,
-}
+use super::acquire::Word;
+use crate::board;
+use crate::chip::{lever, rescue};
 
 /// Samples on their way to the features: a quarter of a second.
 pub(crate) const SAMPLES: usize = 256;
 
-/// What the rig shall do.
-#[derive(Clone, Copy)]
-pub(crate) enum Command {
-    /// Lifts the finger to its limit switch, and leaves the stage alone.
-    Lift,
-    /// Ends a fault if there is one, then finds the limit switches.
-    Home,
-    /// A movement, and where on the sample it begins, 0 to 1.
-    Start(Movement, f32),
-    /// A run without load at this speed, um/s.
-    StartUnloaded(u32),
-    Calibrate(RigCalibration),
-    /// Another sample may lie under the finger.
-    SampleChanged,
-    /// What the skin has been through, from the store.
-    Skin(SkinCare),
-}
-
-/// What the rig is at, a thousand times a second.
-#[derive(Clone, Copy)]
-pub(crate) struct Snapshot {
-    pub(crate) phase: Phase,
-    pub(crate) at_rest: bool,
-    /// How the last movement ended, until the next begins.
-    pub(crate) ended: Option<Ended>,
-    pub(crate) force_mn: f32,
-    pub(crate) steps: i32,
-    pub(crate) stage_mm: f32,
-    pub(crate) velocity_mm_s: f32,
-    pub(crate) current_a: f32,
-    pub(crate) mean_current_a: Option<f32>,
-    /// P_DC in the air, by the last run without load.
-    pub(crate) air_counts: Option<f32>,
-    pub(crate) calibration: RigCalibration,
-    pub(crate) skin: SkinCare,
-}
-
-static COMMAND: Signal<CriticalSectionRawMutex, Command> = Signal::new();
+static COMMAND: Signal<CriticalSectionRawMutex, RigCommand> = Signal::new();
 static ANSWER: Signal<CriticalSectionRawMutex, Result<(), Refused>> = Signal::new();
 /// A slide has ended; its finger is being lifted.
 static ENDED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
@@ -85,20 +40,8 @@ static ENDED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 static STOP: AtomicBool = AtomicBool::new(false);
 /// The session was told to stop: between two movements the rig has nothing to stop.
 static STOPPED: AtomicBool = AtomicBool::new(false);
-static SNAPSHOT: Mutex<CriticalSectionRawMutex, Cell<Snapshot>> = Mutex::new(Cell::new(Snapshot {
-    phase: Phase::Parked,
-    at_rest: true,
-    ended: None,
-    force_mn: 0.0,
-    steps: 0,
-    stage_mm: 0.0,
-    velocity_mm_s: 0.0,
-    current_a: 0.0,
-    mean_current_a: None,
-    air_counts: None,
-    calibration: UNMEASURED,
-    skin: SkinCare::NEW,
-}));
+static STATE: Mutex<CriticalSectionRawMutex, Cell<RigState>> =
+    Mutex::new(Cell::new(RigState::parked(UNMEASURED)));
 /// Samples that found no room.
 pub(crate) static LOST: AtomicU32 = AtomicU32::new(0);
 /// Milliseconds since the tasks in thread mode have checked in.
@@ -127,7 +70,7 @@ const STUCK_LIMIT_MS: u32 = 30_000;
 const WATCHDOG_US: u32 = 100_000;
 
 /// Gives a command and waits for the answer. For one task at a time.
-pub(crate) async fn command(command: Command) -> Result<(), Refused> {
+pub(crate) async fn command(command: RigCommand) -> Result<(), Refused> {
     progress();
     ANSWER.reset();
     COMMAND.signal(command);
@@ -155,9 +98,9 @@ pub(crate) fn forget_stop() {
     STOPPED.store(false, Relaxed);
 }
 
-/// What the rig is at.
-pub(crate) fn snapshot() -> Snapshot {
-    SNAPSHOT.lock(Cell::get)
+/// What the rig is doing.
+pub(crate) fn state() -> RigState {
+    STATE.lock(Cell::get)
 }
 
 /// Waits for the end of a slide.
@@ -250,7 +193,7 @@ pub(crate) async fn servo(
         }
         if let Some(command) = COMMAND.try_take() {
             ended = None;
-            ANSWER.signal(obey(&mut control, command));
+            ANSWER.signal(command.apply(&mut control));
         }
         let silent_ms = SILENT_MS.fetch_add(1, Relaxed);
         // thread mode does not come between: the servo interrupts it
@@ -296,89 +239,21 @@ pub(crate) async fn servo(
         pwm.set_duty_cycle((libm::fabsf(outputs.stage_duty).min(1.0) * full as f32) as u32);
         bridge.set_level(outputs.stage_enabled.into());
 
-        pass_on(&outputs, &mut samples);
+        Samples::of(&outputs, |part| {
+            let many = part.pac.len() as u32;
+            if samples.enqueue(part).is_err() {
+                LOST.fetch_add(many, Relaxed);
+            }
+        });
         if let now @ Some(_) = control.take_ended() {
             ended = now;
             ENDED.signal(());
         }
-        SNAPSHOT.lock(|cell| {
-            cell.set(Snapshot {
-                phase: control.phase(),
-                at_rest: control.is_at_rest(),
-                ended,
-                force_mn: control.force_mn(),
-                steps: inputs.steps,
-                stage_mm: control.stage_mm(),
-                velocity_mm_s: control.stage_velocity_mm_s(),
-                current_a: inputs.current_a,
-                mean_current_a: control.mean_current_a(),
-                air_counts: control.air_counts(),
-                calibration: *control.calibration(),
-                skin: *control.skin(),
-            });
-        });
+        let state = RigState::of(&mut control, inputs.steps, inputs.current_a, ended);
+        STATE.lock(|cell| cell.set(state));
         match hung {
             Some(why) if control.is_at_rest() => rescue::remember(why),
             _ => watchdog.pet(),
         }
     }
-}
-
-fn obey(control: &mut Control, command: Command) -> Result<(), Refused> {
-    match command {
-        Command::Home => {
-            control.reset()?;
-            control.home()
-        }
-        Command::Lift => {
-            control.home()?;
-            control.stop();
-            Ok(())
-        }
-        Command::Start(movement, start) => control.start(movement, start),
-        Command::StartUnloaded(speed_um_s) => control.start_unloaded(speed_um_s),
-        Command::Calibrate(calibration) => control.calibrate(calibration),
-        Command::SampleChanged => {
-            control.sample_changed();
-            Ok(())
-        }
-        Command::Skin(skin) => {
-            *control.skin() = skin;
-            Ok(())
-        }
-    }
-}
-
-fn pass_on(outputs: &Outputs, samples: &mut Producer<'static, Samples>) {
-    if outputs.felt == Felt::Nothing {
-        return;
-    }
-    let mut part = Samples {
-        felt: outputs.felt.clone(),
-        pac: Vec::new(),
-        shear_mn: outputs.shear_mn,
-    };
-    let mut put = |part: Samples| {
-        let many = part.pac.len() as u32;
-        if samples.enqueue(part).is_err() {
-            LOST.fetch_add(many, Relaxed);
-        }
-    };
-    for &sample in &outputs.pac {
-        if part.pac.push(sample).is_err() {
-            let felt = match part.felt {
-                Felt::Still => Felt::Still,
-                _ => Felt::Slide,
-            };
-            put(core::mem::replace(
-                &mut part,
-                Samples {
-                    felt,
-                    ..Samples::default()
-                },
-            ));
-            let _ = part.pac.push(sample);
-        }
-    }
-    put(part);
 }

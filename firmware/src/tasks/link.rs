@@ -1,0 +1,140 @@
+//! USART3 at 921600: frames of `tactus_core::wire` in both directions.
+use core::cell::Cell;
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
+
+use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, BufferedUartTx};
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::ThreadModeRawMutex;
+use embassy_sync::channel::Channel;
+use embedded_io_async::{Read as _, Write as _};
+use static_cell::ConstStaticCell;
+use tactus_core::probe::seams::Panel;
+use tactus_core::probe::{RigState, TableInUse, Turn, receive as receive_request};
+use tactus_core::wire::{Counts, Receiver, Request, Tell};
+
+use super::outbox::{self, OUTBOX, STREAM, tell};
+use super::{acquire, servo};
+use crate::board::{self, Irqs};
+
+/// embassy's buffer for the line, and the longest write: a longer one would fail, and the flush after it never end.
+const CHUNK: usize = 256;
+
+static DAMAGED_FRAMES: AtomicU32 = AtomicU32::new(0);
+/// Requests for the session.
+pub(crate) static JOBS: Channel<ThreadModeRawMutex, Request, 1> = Channel::new();
+/// The session works on a request.
+pub(crate) static BUSY: AtomicBool = AtomicBool::new(false);
+
+/// The table in force.
+pub(crate) static TABLE: Mutex<ThreadModeRawMutex, Cell<TableInUse>> =
+    Mutex::new(Cell::new(TableInUse::NONE));
+
+/// Opens the line.
+pub(crate) fn open(
+    pins: board::Link,
+) -> Option<(BufferedUartTx<'static>, BufferedUartRx<'static>)> {
+    static TX: ConstStaticCell<[u8; CHUNK]> = ConstStaticCell::new([0; CHUNK]);
+    static RX: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
+    let mut config = usart::Config::default();
+    config.baudrate = 921_600;
+    let uart = BufferedUart::new(
+        pins.uart,
+        pins.rx,
+        pins.tx,
+        TX.take(),
+        RX.take(),
+        Irqs,
+        config,
+    );
+    uart.ok().map(BufferedUart::split)
+}
+
+#[embassy_executor::task]
+pub(crate) async fn send(mut uart: BufferedUartTx<'static>) {
+    let mut chunk = [0; CHUNK];
+    loop {
+        let length = OUTBOX.read(&mut chunk).await;
+        let mut rest = chunk.get(..length).unwrap_or_default();
+        // the line itself reports no error while sending; not `write_all`, which panics at a write of nothing
+        while !rest.is_empty() {
+            let Ok(written @ 1..) = uart.write(rest).await else {
+                break;
+            };
+            rest = rest.get(written..).unwrap_or_default();
+        }
+        let _ = uart.flush().await;
+    }
+}
+
+#[embassy_executor::task]
+pub(crate) async fn receive(mut uart: BufferedUartRx<'static>) {
+    static RECEIVER: ConstStaticCell<Receiver> = ConstStaticCell::new(Receiver::new());
+    let receiver = RECEIVER.take();
+    let mut bytes = [0; 64];
+    loop {
+        // a framing or overrun error costs bytes, which the CRC notices
+        let Ok(length) = uart.read(&mut bytes).await else {
+            continue;
+        };
+        for &byte in bytes.get(..length).unwrap_or_default() {
+            match receiver.push::<Request>(byte) {
+                None => {}
+                Some(Ok(request)) => received(request),
+                Some(Err(_)) => {
+                    let frames = DAMAGED_FRAMES.fetch_add(1, Relaxed) + 1;
+                    tell(Tell::Damaged(frames));
+                }
+            }
+        }
+    }
+}
+
+/// A request that has just come.
+fn received(request: Request) {
+    let busy = BUSY.load(Relaxed) || !JOBS.is_empty();
+    if receive_request(&request, busy, &mut AtAnyTime) == Turn::Queue {
+        // there is room: nobody else queues
+        let _ = JOBS.try_send(request);
+    }
+}
+
+/// What is answered while the probe works on something else.
+struct AtAnyTime;
+
+impl Panel for AtAnyTime {
+    fn rig(&self) -> RigState {
+        servo::state()
+    }
+
+    fn table(&self) -> TableInUse {
+        TABLE.lock(Cell::get)
+    }
+
+    fn counts(&self) -> Counts {
+        Counts {
+            slots: acquire::SLOTS.load(Relaxed),
+            late_slots: acquire::LATE.load(Relaxed),
+            parity_errors: acquire::PARITY.load(Relaxed),
+            error_frames: acquire::ERROR_FRAMES.load(Relaxed),
+            lost_samples: acquire::LOST.load(Relaxed) + servo::LOST.load(Relaxed),
+            lost_reports: outbox::LOST_REPORTS.load(Relaxed),
+            damaged_frames: DAMAGED_FRAMES.load(Relaxed),
+        }
+    }
+
+    fn stop(&mut self, all: bool) {
+        if all {
+            servo::stop_for_good();
+        } else {
+            servo::stop();
+        }
+    }
+
+    fn stream(&mut self, on: bool) {
+        STREAM.store(on, Relaxed);
+    }
+
+    fn tell(&mut self, event: Tell) {
+        tell(event);
+    }
+}

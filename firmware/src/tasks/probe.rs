@@ -1,0 +1,87 @@
+//! What the host asks for, one thing after the other. Owns the store.
+use core::sync::atomic::Ordering::Relaxed;
+
+use embassy_time::{Duration, Timer, with_timeout};
+use heapless::spsc::Consumer;
+use static_cell::{ConstStaticCell, StaticCell};
+use tactus_core::features::Plan;
+use tactus_core::probe::seams::{Events, RigHandle as _};
+use tactus_core::probe::servo_rig::{Samples, ServoRig};
+use tactus_core::probe::{self, Memory, Probe, TableInUse};
+use tactus_core::wire::{Tell, Text, text};
+
+use super::link::{BUSY, JOBS, TABLE};
+use super::outbox::tell;
+use super::rig_handle::ServoHandle;
+use super::servo;
+use crate::board;
+use crate::chip::Chip;
+use crate::chip::flash::{self, MappedTable, Storage};
+
+/// The table that comes with the firmware: textures of a simulated world, good for the emulated board. A real rig is
+/// taught, or given a table.
+static FACTORY: &[u8] = include_bytes!("../../factory.tact");
+/// The store is open by now, or will never be: two of its sectors erased take less than 2 s.
+const OPENING: Duration = Duration::from_secs(10);
+/// The sensor's first words are there by now.
+const HEARD_MS: u64 = 150;
+
+#[embassy_executor::task]
+pub(crate) async fn probe(flash: board::Storage, samples: Consumer<'static, Samples>) {
+    static PLAN: StaticCell<Plan> = StaticCell::new();
+    static BUFFER: ConstStaticCell<[u8; 16 * 1024]> = ConstStaticCell::new([0; 16 * 1024]);
+    let mut rig = ServoRig::new(ServoHandle(samples));
+    // Whatever was before the reset, the finger is lifted first, and waits for nothing but the sensor. The stage does not
+    // move before the calibration is there, which says whether the finger is in the air.
+    Timer::after_millis(HEARD_MS).await;
+    let _ = rig.lift().await;
+    let store = with_timeout(OPENING, open(flash, &mut rig))
+        .await
+        .unwrap_or_else(|_| {
+            defmt::error!("the store does not answer");
+            None
+        });
+    let mut probe = Probe {
+        rig,
+        memory: Memory::new(store, MappedTable, FACTORY, BUFFER.take()),
+        events: Told,
+        plan: PLAN.init_with(Plan::new),
+    };
+    probe.memory.reload(&mut probe.events).await;
+    let _ = probe.rig.home().await;
+    loop {
+        servo::forget_stop();
+        BUSY.store(false, Relaxed);
+        servo::waits();
+        let request = JOBS.receive().await;
+        servo::progress();
+        BUSY.store(true, Relaxed);
+        probe.serve::<Chip>(&request).await;
+    }
+}
+
+/// The store, its settings in use.
+async fn open(flash: board::Storage, rig: &mut ServoRig<ServoHandle>) -> Option<Storage> {
+    let mut store = flash::open(flash).await?;
+    if let Err(why) = probe::restore(&mut store, rig).await {
+        defmt::error!("settings are not read: {=str}", text(&why).as_str());
+    }
+    Some(store)
+}
+
+/// Tells the host, and the tasks that answer it meanwhile.
+struct Told;
+
+impl Events for Told {
+    fn tell(&mut self, event: Tell) {
+        tell(event);
+    }
+
+    fn table(&mut self, table: TableInUse) {
+        TABLE.lock(|cell| cell.set(table));
+    }
+
+    fn trouble(&mut self, what: Text) {
+        defmt::error!("{=str}", what.as_str());
+    }
+}

@@ -1,0 +1,55 @@
+//! The servo as a probe drives it: commands and samples across the executors.
+use core::sync::atomic::Ordering::Relaxed;
+
+use embassy_time::{Duration, with_timeout};
+use heapless::spsc::Consumer;
+use tactus_core::probe::RigState;
+use tactus_core::probe::servo_rig::{LOOK_MS, RigCommand, Samples, Servo};
+use tactus_core::rig::Refused;
+use tactus_core::wire::Tell;
+
+use super::outbox::{STREAM, tell};
+use super::{acquire, servo};
+
+/// The probe's end of the servo.
+pub(crate) struct ServoHandle(pub(crate) Consumer<'static, Samples>);
+
+impl Servo for ServoHandle {
+    async fn command(&mut self, command: RigCommand) -> Result<(), Refused> {
+        servo::command(command).await
+    }
+
+    async fn wait(&mut self) {
+        let _ = with_timeout(Duration::from_millis(LOOK_MS.into()), servo::ended()).await;
+        servo::progress();
+    }
+
+    fn state(&self) -> RigState {
+        servo::state()
+    }
+
+    fn samples(&mut self) -> Option<Samples> {
+        self.0.dequeue()
+    }
+
+    fn lost(&self) -> u32 {
+        let acquired = acquire::LOST.load(Relaxed);
+        acquired.wrapping_add(servo::LOST.load(Relaxed))
+    }
+
+    fn stop(&mut self) {
+        servo::stop();
+    }
+
+    fn is_stopped(&self) -> bool {
+        servo::is_stopped()
+    }
+
+    fn streams(&self) -> bool {
+        STREAM.load(Relaxed)
+    }
+
+    fn tell(&mut self, event: Tell) {
+        tell(event);
+    }
+}

@@ -1,0 +1,93 @@
+//! What the handheld wants to be done with the table, for the task that owns it.
+
+use embedded_storage_async::nor_flash::NorFlash;
+
+use super::judge::{Judgement, free_name, judge};
+use super::states::{Choice, Handheld, Job};
+use crate::kernels::Kernels;
+use crate::probe::Memory;
+use crate::probe::seams::{Events, StoredBytes};
+use crate::wire::{Name, Text, text};
+
+/// What came of a job, for the log.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Outcome<'j> {
+    /// So many slides were judged.
+    Judged {
+        /// How many.
+        slides: usize,
+        /// Name of the leading texture, and its probability.
+        leading: (&'j str, f32),
+        /// The judgement.
+        judgement: &'j Judgement,
+    },
+    /// This texture was learned.
+    Learned(&'j Name),
+    /// Nothing was learned.
+    NotLearned(&'j Text),
+}
+
+/// Does a job, and tells the handheld what came of it; `log` hears it first.
+pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
+    job: Job,
+    handheld: &mut Handheld<'_, K>,
+    memory: &mut Memory<'_, F, B>,
+    events: &mut impl Events,
+    mut log: impl FnMut(Outcome<'_>),
+) {
+    match job {
+        Job::Judge(slides) => {
+            let table = match memory.table() {
+                Ok(table) => table,
+                Err(why) => return handheld.memory_failed(text(why)),
+            };
+            let judged = judge::<K>(table, &slides).map(|(judgement, episode)| {
+                if let Some((texture, p)) = judgement.leading.first() {
+                    log(Outcome::Judged {
+                        slides: slides.len(),
+                        leading: (table.name(*texture).unwrap_or_default(), *p),
+                        judgement: &judgement,
+                    });
+                }
+                (judgement, episode)
+            });
+            match judged {
+                Ok((judgement, episode)) => {
+                    memory.episode = Some(episode);
+                    handheld.judged(Ok(judgement));
+                }
+                Err(why) => handheld.judged(Err(why)),
+            }
+        }
+        Job::Teach(choice) => {
+            let learned = teach(choice, memory, events).await;
+            log(match &learned {
+                Ok(name) => Outcome::Learned(name),
+                Err(why) => Outcome::NotLearned(why),
+            });
+            let textures = memory.table().map_or(0, |table| table.textures());
+            handheld.taught(learned, textures);
+        }
+    }
+}
+
+/// Learns the visit that was judged last.
+async fn teach<F: NorFlash, B: StoredBytes<F>>(
+    choice: Choice,
+    memory: &mut Memory<'_, F, B>,
+    events: &mut impl Events,
+) -> Result<Name, Text> {
+    let table = memory.table().map_err(text)?;
+    let name = match choice {
+        Choice::Known(texture) => {
+            Name::try_from(table.name(texture).unwrap_or_default()).unwrap_or_default()
+        }
+        Choice::Numbered => free_name(&table),
+        Choice::Spelled(name) => name,
+    };
+    if memory.episode.is_none() {
+        return Err(text("nothing was felt: slide first"));
+    }
+    memory.label(&name, events).await?;
+    Ok(name)
+}

@@ -1,0 +1,68 @@
+//! The constants of this rig: measured, kept, and restored at boot.
+
+use core::fmt;
+
+use embedded_storage_async::nor_flash::NorFlash;
+
+use super::seams::{RigHandle, UnloadedRun};
+use crate::rig::calibration::RigCalibration;
+use crate::rig::control::Phase;
+use crate::rig::unloaded::UnloadedRuns;
+use crate::store::{Store, StoreError};
+use crate::wire::{Text, text};
+
+/// Measures the motor's current without load and P_DC in the air, and uses them from now on.
+pub(super) async fn calibrate<R: RigHandle<Error: fmt::Display>>(
+    rig: &mut R,
+) -> Result<RigCalibration, Text> {
+    if rig.state().phase == Phase::Parked {
+        rig.home().await.map_err(text)?;
+    }
+    let mut runs = UnloadedRuns::default();
+    while let Some(speed_um_s) = runs.next_speed() {
+        let UnloadedRun {
+            from_mm,
+            to_mm,
+            mean_current_a,
+        } = rig.run_unloaded(speed_um_s).await.map_err(text)?;
+        runs.took(from_mm, to_mm, mean_current_a);
+    }
+    let state = rig.state();
+    let mut calibration = runs.finish(&state.calibration).map_err(text)?;
+    if let Some(air_counts) = state.air_counts {
+        calibration.pressure.pdc_no_contact = air_counts;
+    }
+    calibration.check().map_err(text)?;
+    rig.set_calibration(calibration).await.map_err(text)?;
+    Ok(calibration)
+}
+
+/// Keeps a calibration. Settings that cannot be read have lost theirs: they are begun anew.
+pub(super) async fn keep<F: NorFlash>(
+    store: &mut Store<F>,
+    calibration: &RigCalibration,
+) -> Result<(), Text> {
+    if store.settings().is_err() {
+        store.erase_settings().await.map_err(text)?;
+    }
+    store.set_calibration(calibration).await.map_err(text)
+}
+
+/// Gives the rig its skin and its calibration as they are stored; each whatever becomes of the other.
+///
+/// # Errors
+/// One of them cannot be read.
+pub async fn restore<F: NorFlash, R: RigHandle>(
+    store: &mut Store<F>,
+    rig: &mut R,
+) -> Result<(), StoreError<F::Error>> {
+    let skin = store.skin().await;
+    if let Ok(skin) = &skin {
+        rig.set_skin(*skin).await;
+    }
+    if let Some(calibration) = store.calibration().await? {
+        // one that was stored is not refused
+        let _ = rig.set_calibration(calibration).await;
+    }
+    skin.map(|_| ())
+}

@@ -1,0 +1,191 @@
+//! Every request, once: what is answered at any time, what waits for its turn, what is refused because the probe is busy;
+//! and what is done when its turn has come.
+
+use core::fmt;
+use core::pin::pin;
+
+use embedded_storage_async::nor_flash::NorFlash;
+
+use super::memory::Memory;
+use super::seams::{Events, Panel, RigHandle, StoredBytes};
+use super::{calibrate, identify, status, teach, train, transfer};
+use crate::features::Plan;
+use crate::kernels::Kernels;
+use crate::rig::calibration::RigCalibration;
+use crate::wire::{Ask, Request, Tell, Text, text};
+
+/// When a request is dealt with.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Turn {
+    /// At once, whatever the probe is busy with.
+    Now,
+    /// It is queued: the probe has nothing else to do.
+    Queue,
+    /// Never: the probe has something else to do.
+    Busy,
+}
+
+/// When this is dealt with by a probe that is busy with something else, or is not.
+pub const fn turn(ask: &Ask, busy: bool) -> Turn {
+    match ask {
+        Ask::Status | Ask::Stop | Ask::Stream(_) | Ask::ReadCalibration => Turn::Now,
+        _ if busy => Turn::Busy,
+        _ => Turn::Queue,
+    }
+}
+
+/// Deals with a request that has just come: answers it, refuses it, or gives back that it is to be queued for
+/// [`Probe::perform`]. `busy`: a request is queued or being worked on.
+pub fn receive(request: &Request, busy: bool, panel: &mut impl Panel) -> Turn {
+    let id = request.id;
+    let turn = turn(&request.ask, busy);
+    match turn {
+        Turn::Queue => return turn,
+        Turn::Busy => panel.tell(Tell::Refused {
+            id,
+            why: text("busy: wait, or stop what is being done"),
+        }),
+        Turn::Now => {
+            match request.ask {
+                Ask::Status => panel.tell(Tell::Status(status::status(panel))),
+                Ask::Stop => panel.stop(busy),
+                Ask::Stream(on) => panel.stream(on),
+                _ => panel.tell(status::calibration(&panel.rig().calibration)),
+            }
+            panel.tell(Tell::Done(id));
+        }
+    }
+    turn
+}
+
+/// A probe: a rig and a memory, and who hears of them.
+pub struct Probe<'m, R, F, B, E> {
+    /// The rig.
+    pub rig: R,
+    /// What it knows.
+    pub memory: Memory<'m, F, B>,
+    /// Who hears what it does.
+    pub events: E,
+    /// What every slide needs.
+    pub plan: &'m Plan,
+}
+
+impl<R, F, B, E> Probe<'_, R, F, B, E>
+where
+    R: RigHandle<Error: fmt::Display>,
+    F: NorFlash,
+    B: StoredBytes<F>,
+    E: Events,
+{
+    /// Does what was asked for, as [`turn`] had it queued, and says that it is done or why it is not.
+    pub async fn serve<K: Kernels>(&mut self, request: &Request) {
+        let done = self.perform::<K>(&request.ask).await;
+        let id = request.id;
+        self.events.tell(match done {
+            Ok(()) => Tell::Done(id),
+            Err(why) => Tell::Refused { id, why },
+        });
+    }
+
+    /// Does what was asked for.
+    ///
+    /// # Errors
+    /// The answer: why it was not done.
+    pub async fn perform<K: Kernels>(&mut self, ask: &Ask) -> Result<(), Text> {
+        let Self {
+            rig,
+            memory,
+            events,
+            plan,
+        } = self;
+        match ask {
+            Ask::Home => {
+                memory.episode = None;
+                rig.home().await.map_err(text)
+            }
+            Ask::Identify(wanted) => {
+                memory.episode = None;
+                rig.begin(wanted.seed).await;
+                let table = memory.table().map_err(text)?;
+                // awaited where it lies: moving it would take its size of the stack, twice
+                let done = {
+                    let tell = |event| events.tell(event);
+                    let exploration = pin!(identify::<_, K>(wanted, rig, table, plan, tell));
+                    exploration.await
+                };
+                memory.keep_skin(&rig.state().skin).await;
+                let episode = done?;
+                if wanted.learn {
+                    memory.learn_by_itself(&episode, events).await;
+                }
+                memory.episode = Some(episode);
+                Ok(())
+            }
+            Ask::Answer(name) => {
+                let learned = memory.label(name, events).await?;
+                events.tell(learned);
+                Ok(())
+            }
+            Ask::Train(wanted) => {
+                memory.episode = None;
+                rig.begin(wanted.seed).await;
+                let (store, base, buffer) = memory.lend().await?;
+                let tell = |event| events.tell(event);
+                let done = train::<_, _, K>(wanted, rig, store, base, plan, buffer, tell).await;
+                memory.reload(events).await;
+                memory.keep_skin(&rig.state().skin).await;
+                done
+            }
+            Ask::Rename { from, to } => {
+                let (store, base, buffer) = memory.lend().await?;
+                let done = teach::rename(from, to, &base, store, buffer).await;
+                memory.reload(events).await;
+                done
+            }
+            Ask::Forget(what) => {
+                let (store, base, buffer) = memory.lend().await?;
+                let done = teach::forget(what, &base, store, buffer).await;
+                memory.reload(events).await;
+                done
+            }
+            Ask::Calibrate => {
+                memory.episode = None;
+                let calibration = calibrate::calibrate(rig).await?;
+                events.tell(status::calibration(&calibration));
+                calibrate::keep(memory.store()?, &calibration).await
+            }
+            Ask::WriteCalibration(bytes) => {
+                let bytes = bytes
+                    .as_slice()
+                    .try_into()
+                    .map_err(|_| text("a calibration has 60 bytes"))?;
+                let calibration = RigCalibration::from_bytes(bytes).map_err(text)?;
+                rig.set_calibration(calibration).await.map_err(text)?;
+                calibrate::keep(memory.store()?, &calibration).await
+            }
+            Ask::ReadTable(offset) => {
+                events.tell(transfer::read(memory.in_force(), *offset)?);
+                Ok(())
+            }
+            Ask::BeginTable(length) => {
+                let store = memory.store()?;
+                store.begin_table(*length as usize).await.map_err(text)
+            }
+            Ask::WriteTable { offset, bytes } => {
+                transfer::write(memory.store()?, *offset, bytes).await
+            }
+            Ask::CommitTable => {
+                let done = memory.commit().await;
+                memory.reload(events).await;
+                done
+            }
+            Ask::FactoryTable => {
+                let done = memory.store()?.factory_table().await.map_err(text);
+                memory.reload(events).await;
+                done
+            }
+            // answered when they came, see `receive`
+            Ask::Status | Ask::Stop | Ask::Stream(_) | Ask::ReadCalibration => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! What a probe knows: the store, and the table in force.
+
+use embedded_storage_async::nor_flash::NorFlash;
+
+use super::seams::{Events, StoredBytes};
+use super::status::TableInUse;
+use super::teach::{self, put_in_force};
+use crate::rig::skin::SkinCare;
+use crate::session::Visited;
+use crate::store::Store;
+use crate::table::{Table, TableError};
+use crate::wire::{Tell, Text, text};
+
+/// What a probe knows.
+pub struct Memory<'m, F, B> {
+    store: Option<Store<F>>,
+    stored: B,
+    /// The table that comes with the firmware.
+    factory: &'m [u8],
+    /// Begins with the table in force: the stored one or the factory's, with what the probe has learned by itself. A new
+    /// table is made here too; afterwards [`Memory::reload`] is due.
+    buffer: &'m mut [u8],
+    /// Bytes of the table in force.
+    length: usize,
+    /// Nothing was taught or pushed.
+    is_factory: bool,
+    /// What the last exploration felt, until the rig moves again.
+    pub episode: Option<Visited>,
+}
+
+fn broken() -> Text {
+    text("the store is broken: see the log")
+}
+
+/// The table that all learning begins with: the stored one, or the factory's.
+async fn base<'b, F: NorFlash, B: StoredBytes<F>>(
+    store: Option<&mut Store<F>>,
+    stored: &'b mut B,
+    factory: &'b [u8],
+) -> &'b [u8] {
+    let bytes = match store {
+        Some(store) => stored.bytes(store).await,
+        None => None,
+    };
+    // one that another version of this firmware wrote is not understood
+    bytes
+        .filter(|bytes| Table::read(bytes).is_ok())
+        .unwrap_or(factory)
+}
+
+impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
+    /// A memory without a table in force: [`Memory::reload`] is due. `buffer` takes the longest table.
+    pub fn new(
+        store: Option<Store<F>>,
+        stored: B,
+        factory: &'m [u8],
+        buffer: &'m mut [u8],
+    ) -> Self {
+        Self {
+            store,
+            stored,
+            factory,
+            buffer,
+            length: 0,
+            is_factory: true,
+            episode: None,
+        }
+    }
+
+    /// Gives store, factory's table and buffer back.
+    pub fn close(self) -> (Option<Store<F>>, &'m [u8], &'m mut [u8]) {
+        (self.store, self.factory, self.buffer)
+    }
+
+    /// Puts the table in force, which `events` hears of.
+    pub async fn reload(&mut self, events: &mut impl Events) {
+        let base = base(self.store.as_mut(), &mut self.stored, self.factory).await;
+        self.is_factory = core::ptr::eq(base, self.factory);
+        let in_force = match Table::read(base) {
+            Ok(base) => put_in_force(&base, self.store.as_mut(), self.buffer)
+                .await
+                .map_err(|why| text(format_args!("no table in force: {why}"))),
+            Err(why) => Err(text(format_args!("no table: {why}"))),
+        };
+        self.length = in_force.unwrap_or_else(|why| {
+            events.trouble(why);
+            0
+        });
+        self.publish(events);
+    }
+
+    fn publish(&self, events: &mut impl Events) {
+        if let Ok(table) = self.table() {
+            events.table(TableInUse {
+                textures: table.textures(),
+                bytes: self.length as u32,
+                crc: table.crc(),
+                factory: self.is_factory,
+            });
+        }
+    }
+
+    /// The bytes of the table in force.
+    pub fn in_force(&self) -> &[u8] {
+        self.buffer.get(..self.length).unwrap_or_default()
+    }
+
+    /// The table in force.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn table(&self) -> Result<Table<'_>, TableError> {
+        Table::read(self.in_force())
+    }
+
+    /// The store.
+    ///
+    /// # Errors
+    /// It could not be opened.
+    pub fn store(&mut self) -> Result<&mut Store<F>, Text> {
+        self.store.as_mut().ok_or_else(broken)
+    }
+
+    /// The store, the table that learning begins with, and the buffer for a new one; [`Memory::reload`] is due after it.
+    pub(super) async fn lend(&mut self) -> Result<(&mut Store<F>, Table<'_>, &mut [u8]), Text> {
+        let store = self.store.as_mut();
+        let bytes = base(store, &mut self.stored, self.factory).await;
+        let base = Table::read(bytes).map_err(text)?;
+        let store = self.store.as_mut().ok_or_else(broken)?;
+        Ok((store, base, self.buffer))
+    }
+
+    /// Commits the table that was written to the store.
+    pub(super) async fn commit(&mut self) -> Result<(), Text> {
+        let store = self.store.as_mut().ok_or_else(broken)?;
+        let committed = store.commit_table(self.buffer).await;
+        committed.map(|_| ()).map_err(text)
+    }
+
+    /// Keeps what the skin has been through: worth keeping, but no reason to fail.
+    pub(super) async fn keep_skin(&mut self, skin: &SkinCare) {
+        if let Some(store) = &mut self.store {
+            let _ = store.set_skin(skin).await;
+        }
+    }
+
+    /// Learns from an exploration that the probe is certain of, and tells so. The exploration has its answer whatever
+    /// becomes of that.
+    pub(super) async fn learn_by_itself(&mut self, episode: &Visited, events: &mut impl Events) {
+        let Some(store) = &mut self.store else {
+            return;
+        };
+        match teach::learn_by_itself(episode, store, self.buffer).await {
+            Ok(Some(learned)) => {
+                self.publish(events);
+                events.tell(learned);
+            }
+            Ok(None) => {}
+            Err(why) => {
+                events.trouble(text(format_args!("not learned: {why}")));
+                self.reload(events).await;
+            }
+        }
+    }
+
+    /// Learns from the user's word what lay under the finger in the last exploration, and puts the new table in force.
+    /// After an error the exploration can be labelled anew: another name may do.
+    ///
+    /// # Errors
+    /// Nothing was felt since the rig moved last, or see [`teach::answer`].
+    pub async fn label(&mut self, name: &str, events: &mut impl Events) -> Result<Tell, Text> {
+        let episode = self
+            .episode
+            .take()
+            .ok_or_else(|| text("nothing was felt since the rig moved last: explore first"))?;
+        let (store, base, buffer) = self.lend().await?;
+        let learned = teach::answer(&episode, name, &base, store, buffer).await;
+        self.reload(events).await;
+        if learned.is_err() {
+            self.episode = Some(episode);
+        }
+        learned
+    }
+}

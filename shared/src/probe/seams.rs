@@ -1,0 +1,93 @@
+//! What a probe needs from the board, the emulated board or the PC that it runs on.
+
+use embedded_storage_async::nor_flash::NorFlash;
+
+use super::status::{RigState, TableInUse};
+use crate::rig::Rig;
+use crate::rig::calibration::RigCalibration;
+use crate::rig::skin::SkinCare;
+use crate::store::Store;
+use crate::wire::{Counts, Tell, Text};
+
+/// A run of the stage without load.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct UnloadedRun {
+    /// Where the stage stood before it, mm.
+    pub from_mm: f32,
+    /// Where it stood after it, mm.
+    pub to_mm: f32,
+    /// Mean motor current at constant speed, A; `None` if there was no time at constant speed.
+    pub mean_current_a: Option<f32>,
+}
+
+/// A [`Rig`] that a probe owns: besides its movements it homes, is calibrated, and shows its state.
+#[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
+pub trait RigHandle: Rig {
+    /// What the rig is doing now.
+    fn state(&self) -> RigState;
+
+    /// Something new begins: another sample may lie under the finger, and `seed` says where on it slides begin.
+    async fn begin(&mut self, seed: u32);
+
+    /// Ends a fault if there is one, then finds the limit switches, the lever's first.
+    ///
+    /// # Errors
+    /// The rig is not homed.
+    async fn home(&mut self) -> Result<(), Self::Error>;
+
+    /// Moves the stage without load from one end to the other, at this speed in um/s.
+    ///
+    /// # Errors
+    /// The run was refused, failed, or was stopped.
+    async fn run_unloaded(&mut self, speed_um_s: u32) -> Result<UnloadedRun, Self::Error>;
+
+    /// Uses this calibration from now on.
+    ///
+    /// # Errors
+    /// The rig refuses it.
+    async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), Self::Error>;
+
+    /// Goes on from this wear of the skin.
+    async fn set_skin(&mut self, skin: SkinCare);
+}
+
+/// Where the bytes of the stored table are read: mapped flash on the chip, a copy on a PC. They must stay readable beside
+/// the store that they came from, for a new table is written while the old one is read.
+#[allow(async_fn_in_trait)] // as above
+pub trait StoredBytes<F: NorFlash> {
+    /// The bytes of [`Store::table`]; `None` if no table is stored, or if it cannot be read.
+    async fn bytes(&mut self, store: &mut Store<F>) -> Option<&[u8]>;
+}
+
+/// Who hears what a probe does.
+pub trait Events {
+    /// The host is told.
+    fn tell(&mut self, event: Tell);
+
+    /// This table is in force now.
+    fn table(&mut self, table: TableInUse);
+
+    /// Something went wrong that is no answer to a request: a line for the log.
+    fn trouble(&mut self, what: Text);
+}
+
+/// What is answered at any time, whatever the probe is busy with.
+pub trait Panel {
+    /// What the rig is doing now.
+    fn rig(&self) -> RigState;
+
+    /// The table in force, see [`Events::table`].
+    fn table(&self) -> TableInUse;
+
+    /// What acquisition and link have counted since boot.
+    fn counts(&self) -> Counts;
+
+    /// Stops what is being done now. `all`: also what would come after it, until the request is over.
+    fn stop(&mut self, all: bool);
+
+    /// Whether raw samples are wanted from the next movement on.
+    fn stream(&mut self, on: bool);
+
+    /// The host is told.
+    fn tell(&mut self, event: Tell);
+}

@@ -1,0 +1,350 @@
+//! The rig that a servo moves, a thousand times a second, as a probe sees it: one movement after the other, its samples
+//! into the features.
+
+use heapless::Vec;
+
+use super::explore::Random;
+use super::seams::{RigHandle, UnloadedRun};
+use super::status::RigState;
+use crate::features::{PropertySet, Slide};
+use crate::kernels::Kernels;
+use crate::movement::Movement;
+use crate::rig::calibration::RigCalibration;
+use crate::rig::control::{Control, Ended, Phase, Refused};
+use crate::rig::patience::{Patience, Wait};
+use crate::rig::pins::{Felt, Outputs};
+use crate::rig::skin::SkinCare;
+use crate::rig::{Rig, RigError};
+use crate::session::Blocks;
+use crate::wire::Tell;
+
+/// How often the samples are looked after, ms.
+pub const LOOK_MS: u32 = 10;
+/// Samples of a slide that are given to the features at once: those between two looks, and some more after a late one.
+const GATHERED: usize = 32;
+
+/// What the servo shall do.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum RigCommand {
+    /// Lifts the finger to its limit switch, and leaves the stage alone.
+    Lift,
+    /// Ends a fault if there is one, then finds the limit switches.
+    Home,
+    /// A movement, and where on the sample it begins, 0 to 1.
+    Start(Movement, f32),
+    /// A run without load at this speed, um/s.
+    StartUnloaded(u32),
+    /// Uses this calibration.
+    Calibrate(RigCalibration),
+    /// Another sample may lie under the finger.
+    SampleChanged,
+    /// Goes on from this wear of the skin.
+    Skin(SkinCare),
+}
+
+impl RigCommand {
+    /// Has the control do it.
+    ///
+    /// # Errors
+    /// The control refuses it.
+    pub fn apply(self, control: &mut Control) -> Result<(), Refused> {
+        match self {
+            Self::Home => {
+                control.reset()?;
+                control.home()
+            }
+            Self::Lift => {
+                control.home()?;
+                control.stop();
+                Ok(())
+            }
+            Self::Start(movement, start) => control.start(movement, start),
+            Self::StartUnloaded(speed_um_s) => control.start_unloaded(speed_um_s),
+            Self::Calibrate(calibration) => control.calibrate(calibration),
+            Self::SampleChanged => {
+                control.sample_changed();
+                Ok(())
+            }
+            Self::Skin(skin) => {
+                *control.skin() = skin;
+                Ok(())
+            }
+        }
+    }
+}
+
+/// A tick's samples, or some of them.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Samples {
+    /// What they belong to.
+    pub felt: Felt,
+    /// P_AC, counts about the still finger's.
+    pub pac: Vec<i16, 8>,
+    /// Shear, mN.
+    pub shear_mn: Option<i16>,
+}
+
+impl Samples {
+    /// Gives a tick's samples to `put`, in as many parts as they take; none where nothing is felt.
+    pub fn of(outputs: &Outputs, mut put: impl FnMut(Self)) {
+        if outputs.felt == Felt::Nothing {
+            return;
+        }
+        let mut part = Self {
+            felt: outputs.felt.clone(),
+            pac: Vec::new(),
+            shear_mn: outputs.shear_mn,
+        };
+        for &sample in &outputs.pac {
+            if part.pac.push(sample).is_err() {
+                let felt = match part.felt {
+                    Felt::Still => Felt::Still,
+                    _ => Felt::Slide,
+                };
+                let next = Self {
+                    felt,
+                    ..Self::default()
+                };
+                put(core::mem::replace(&mut part, next));
+                let _ = part.pac.push(sample);
+            }
+        }
+        put(part);
+    }
+}
+
+/// What runs [`Control`], and hands on its samples.
+#[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
+pub trait Servo {
+    /// Gives a command and waits for the answer. Whatever was felt before the command is over.
+    async fn command(&mut self, command: RigCommand) -> Result<(), Refused>;
+
+    /// Waits for the end of a slide, [`LOOK_MS`] at most.
+    async fn wait(&mut self);
+
+    /// The state after the last tick.
+    fn state(&self) -> RigState;
+
+    /// The oldest samples that nobody has taken.
+    fn samples(&mut self) -> Option<Samples>;
+
+    /// Samples since boot that found no room on their way here.
+    fn lost(&self) -> u32;
+
+    /// Stops what is being done now: the stage stands, the finger is lifted.
+    fn stop(&mut self);
+
+    /// Whether the whole request is stopped: nothing further is to begin.
+    fn is_stopped(&self) -> bool;
+
+    /// Whether raw samples are wanted.
+    fn streams(&self) -> bool;
+
+    /// The host is told of raw samples.
+    fn tell(&mut self, event: Tell);
+}
+
+/// A rig moved by a servo.
+#[derive(Clone, Debug)]
+pub struct ServoRig<S> {
+    /// The servo.
+    pub servo: S,
+    random: Random,
+}
+
+impl<S: Servo> ServoRig<S> {
+    /// A rig that this servo moves.
+    pub const fn new(servo: S) -> Self {
+        Self {
+            servo,
+            random: Random::new(1),
+        }
+    }
+
+    /// Waits until the rig is at rest.
+    async fn rest(&mut self) -> Result<RigState, RigError> {
+        self.until(|rig| rig.at_rest, |_| ()).await
+    }
+
+    /// Waits until the rig is as it is to be; `each` is called at least every [`LOOK_MS`], and once more at the end.
+    async fn until(
+        &mut self,
+        over: impl Fn(&RigState) -> bool,
+        mut each: impl FnMut(&mut S),
+    ) -> Result<RigState, RigError> {
+        let mut patience = Patience::default();
+        loop {
+            self.servo.wait().await;
+            // before the samples, so that none of a movement that is over is left behind
+            let rig = self.servo.state();
+            each(&mut self.servo);
+            match (patience.wait(LOOK_MS, over(&rig)), rig.phase) {
+                (Wait::On, _) => {}
+                (Wait::Stop, _) => self.servo.stop(),
+                (Wait::Over | Wait::Hangs, Phase::Faulted(fault)) if rig.at_rest => {
+                    return Err(RigError::Fault(fault));
+                }
+                (Wait::Over, _) => return Ok(rig),
+                (Wait::Hangs, _) => return Err(RigError::Hangs),
+            }
+        }
+    }
+
+    /// Lifts the finger to its limit switch; the stage stays where it is.
+    ///
+    /// # Errors
+    /// See [`RigError`].
+    pub async fn lift(&mut self) -> Result<(), RigError> {
+        self.command(RigCommand::Lift).await?;
+        self.rest().await.map(|_| ())
+    }
+
+    /// Has something begun, unless all was stopped.
+    async fn command(&mut self, command: RigCommand) -> Result<(), RigError> {
+        if self.servo.is_stopped() {
+            return Err(RigError::Stopped);
+        }
+        self.servo
+            .command(command)
+            .await
+            .map_err(RigError::Refused)?;
+        // it was stopped in the same millisecond, before it began
+        if self.servo.is_stopped() {
+            self.servo.stop();
+        }
+        Ok(())
+    }
+}
+
+impl<S: Servo> RigHandle for ServoRig<S> {
+    fn state(&self) -> RigState {
+        self.servo.state()
+    }
+
+    async fn begin(&mut self, seed: u32) {
+        self.random = Random::new(seed);
+        // never refused
+        let _ = self.servo.command(RigCommand::SampleChanged).await;
+    }
+
+    async fn home(&mut self) -> Result<(), RigError> {
+        // the fault is what the user homes after
+        let _ = self.rest().await;
+        self.command(RigCommand::Home).await?;
+        match self.rest().await?.phase {
+            Phase::Ready => Ok(()),
+            _ => Err(RigError::Stopped),
+        }
+    }
+
+    async fn run_unloaded(&mut self, speed_um_s: u32) -> Result<UnloadedRun, RigError> {
+        let from_mm = self.servo.state().stage_mm;
+        self.command(RigCommand::StartUnloaded(speed_um_s)).await?;
+        let rig = self.rest().await?;
+        match rig.ended {
+            Some(Ended::Whole) => Ok(UnloadedRun {
+                from_mm,
+                to_mm: rig.stage_mm,
+                mean_current_a: rig.mean_current_a,
+            }),
+            _ => Err(RigError::Stopped),
+        }
+    }
+
+    async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), RigError> {
+        let command = RigCommand::Calibrate(calibration);
+        self.servo.command(command).await.map_err(RigError::Refused)
+    }
+
+    async fn set_skin(&mut self, skin: SkinCare) {
+        // never refused
+        let _ = self.servo.command(RigCommand::Skin(skin)).await;
+    }
+}
+
+impl<S: Servo> Rig for ServoRig<S> {
+    type Error = RigError;
+
+    fn measures(&self) -> PropertySet {
+        PropertySet::ALL
+    }
+
+    async fn perform<K: Kernels>(
+        &mut self,
+        movement: Movement,
+        slide: &mut Slide<'_, K>,
+    ) -> Result<(), RigError> {
+        if self.servo.state().phase == Phase::Parked {
+            self.home().await?;
+        }
+        while self.servo.samples().is_some() {}
+        let lost_before = self.servo.lost();
+        let start = self.random.next_f32();
+        self.command(RigCommand::Start(movement, start)).await?;
+        let mut blocks = self.servo.streams().then(Blocks::default);
+        let ended = self
+            .until(
+                |rig| rig.at_rest || rig.ended.is_some(),
+                |servo| {
+                    let mut gathered = Vec::new();
+                    while let Some(samples) = servo.samples() {
+                        feel(&samples, &mut gathered, slide);
+                        let block = blocks
+                            .as_mut()
+                            .and_then(|b| b.put(&samples.felt, &samples.pac, samples.shear_mn));
+                        if let Some(block) = block {
+                            servo.tell(Tell::Block(block));
+                        }
+                    }
+                    slide.push(&gathered);
+                },
+            )
+            .await
+            .map(|rig| rig.ended);
+        let gap = match ended {
+            Ok(Some(Ended::Gap(samples))) => samples,
+            _ => 0,
+        };
+        let gap = gap + self.servo.lost().wrapping_sub(lost_before);
+        if gap > 0 {
+            slide.lose(gap);
+        }
+        if let Some(blocks) = blocks {
+            self.servo.tell(Tell::Block(blocks.end(gap)));
+        }
+        match ended? {
+            Some(Ended::Whole | Ended::Gap(_)) => Ok(()),
+            Some(Ended::Stopped) | None => {
+                self.rest().await?;
+                Err(RigError::Stopped)
+            }
+        }
+    }
+
+    async fn lifted(&mut self) -> Result<(), RigError> {
+        self.rest().await.map(|_| ())
+    }
+}
+
+/// Gives samples to the features. Those of a slide are gathered first: the features take many at once for little more than
+/// a few. The caller flushes the remainder.
+fn feel<K: Kernels>(
+    samples: &Samples,
+    gathered: &mut Vec<i16, GATHERED>,
+    slide: &mut Slide<'_, K>,
+) {
+    let is_slide = samples.felt == Felt::Slide;
+    if !is_slide || gathered.len() + samples.pac.len() > GATHERED {
+        slide.push(gathered);
+        gathered.clear();
+    }
+    match &samples.felt {
+        Felt::Nothing => return,
+        Felt::Still => return slide.push_still(&samples.pac),
+        Felt::Begin(steady) => slide.start(steady.clone()),
+        Felt::Slide => {}
+    }
+    // there is room
+    let _ = gathered.extend_from_slice(&samples.pac);
+    slide.push_shear(samples.shear_mn.as_slice());
+}

@@ -1,0 +1,161 @@
+//! What a probe shows of itself: the state of its rig, the table in force, and what changes while it moves.
+
+use heapless::Vec;
+
+use super::seams::Panel;
+use crate::rig::calibration::RigCalibration;
+use crate::rig::control::{Control, Ended, Phase};
+use crate::rig::skin::SkinCare;
+use crate::wire::{Live, Status, Tell};
+
+/// What the rig is doing, as of its last tick.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct RigState {
+    /// Its phase.
+    pub phase: Phase,
+    /// The finger is lifted and the stage stands.
+    pub at_rest: bool,
+    /// How the last movement ended, until the next command.
+    pub ended: Option<Ended>,
+    /// Contact force, mN.
+    pub force_mn: f32,
+    /// Steps that the lever has made, downwards positive.
+    pub steps: i32,
+    /// Where the stage stands, mm.
+    pub stage_mm: f32,
+    /// How fast the stage moves, mm/s.
+    pub velocity_mm_s: f32,
+    /// Motor current, A.
+    pub current_a: f32,
+    /// Mean motor current of the last run at constant speed, A.
+    pub mean_current_a: Option<f32>,
+    /// P_DC in the air, counts, by the last run without load.
+    pub air_counts: Option<f32>,
+    /// The constants in use.
+    pub calibration: RigCalibration,
+    /// What the skin has been through.
+    pub skin: SkinCare,
+}
+
+impl RigState {
+    /// The state before the first tick.
+    pub const fn parked(calibration: RigCalibration) -> Self {
+        Self {
+            phase: Phase::Parked,
+            at_rest: true,
+            ended: None,
+            force_mn: 0.0,
+            steps: 0,
+            stage_mm: 0.0,
+            velocity_mm_s: 0.0,
+            current_a: 0.0,
+            mean_current_a: None,
+            air_counts: None,
+            calibration,
+            skin: SkinCare::NEW,
+        }
+    }
+
+    /// The state after a tick with these steps and this motor current.
+    pub fn of(control: &mut Control, steps: i32, current_a: f32, ended: Option<Ended>) -> Self {
+        Self {
+            phase: control.phase(),
+            at_rest: control.is_at_rest(),
+            ended,
+            force_mn: control.force_mn(),
+            steps,
+            stage_mm: control.stage_mm(),
+            velocity_mm_s: control.stage_velocity_mm_s(),
+            current_a,
+            mean_current_a: control.mean_current_a(),
+            air_counts: control.air_counts(),
+            calibration: *control.calibration(),
+            skin: *control.skin(),
+        }
+    }
+}
+
+/// The table in force.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct TableInUse {
+    /// Its textures.
+    pub textures: u16,
+    /// Its bytes.
+    pub bytes: u32,
+    /// Its checksum.
+    pub crc: u32,
+    /// It came with the firmware: nothing was taught or pushed.
+    pub factory: bool,
+}
+
+impl TableInUse {
+    /// There is no table yet.
+    pub const NONE: Self = Self {
+        textures: 0,
+        bytes: 0,
+        crc: 0,
+        factory: true,
+    };
+}
+
+/// How the probe is.
+pub(super) fn status(panel: &impl Panel) -> Status {
+    let (rig, table) = (panel.rig(), panel.table());
+    Status {
+        phase: rig.phase.into(),
+        fault: match rig.phase {
+            Phase::Faulted(fault) => Some(fault),
+            _ => None,
+        },
+        textures: table.textures,
+        table_bytes: table.bytes,
+        table_crc: table.crc,
+        factory: table.factory,
+        calibrated: rig.calibration.date,
+        counts: panel.counts(),
+        skin_mj: (
+            (rig.skin.energy_j() * 1e3) as u32,
+            (rig.skin.wear_j() * 1e3) as u32,
+        ),
+    }
+}
+
+/// Tells of these constants.
+pub(super) fn calibration(calibration: &RigCalibration) -> Tell {
+    Tell::Calibration(Vec::from_slice(&calibration.to_bytes()).unwrap_or_default())
+}
+
+/// Tells of every phase and fault, and where the rig is while it moves.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Watch {
+    phase: Option<Phase>,
+    looks: u32,
+}
+
+impl Watch {
+    /// The rig is to be looked at this often, ms.
+    pub const EVERY_MS: u64 = 5;
+    /// Looks from one report of a moving rig to the next.
+    const LIVE: u32 = 10;
+
+    /// Looks at the rig.
+    pub fn look(&mut self, rig: &RigState, mut tell: impl FnMut(Tell)) {
+        if self.phase != Some(rig.phase) {
+            self.phase = Some(rig.phase);
+            if let Phase::Faulted(fault) = rig.phase {
+                tell(Tell::Fault(fault));
+            }
+            tell(Tell::Phase(rig.phase.into()));
+        }
+        self.looks = self.looks.wrapping_add(1);
+        if self.looks.is_multiple_of(Self::LIVE) && !rig.at_rest {
+            tell(Tell::Live(Live {
+                force_mn: rig.force_mn as i16,
+                steps: rig.steps,
+                stage_um: (rig.stage_mm * 1e3) as i32,
+                speed_um_s: (rig.velocity_mm_s * 1e3) as i32,
+                current_ma: (rig.current_a * 1e3) as i16,
+            }));
+        }
+    }
+}
