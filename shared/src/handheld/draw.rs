@@ -76,6 +76,11 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.write(text, Point::new(x, y), &FONT_6X10, Alignment::Left, false)
     }
 
+    fn right(&mut self, text: &str, y: i32) -> Done<D> {
+        let at = Point::new(WIDTH, y);
+        self.write(text, at, &FONT_6X10, Alignment::Right, false)
+    }
+
     fn centre(&mut self, text: &str, y: i32, font: &MonoFont<'_>) -> Done<D> {
         self.write(text, Point::new(MIDDLE, y), font, Alignment::Center, false)
     }
@@ -172,8 +177,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
             let p = row.probability.clamp(0.0, 1.0);
             self.fill(69, y + 8, 32, 1, false)?;
             self.fill(69, y + 2, (32.0 * p) as i32, 7, false)?;
-            let at = Point::new(WIDTH, y);
-            self.write(&percent(p), at, &FONT_6X10, Alignment::Right, false)?;
+            self.right(&percent(p), y)?;
         }
         Ok(())
     }
@@ -214,7 +218,7 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             brush.centre("Hold it", 18, &FONT_10X20)?;
             brush.centre("in the air", 38, &FONT_10X20)
         }
-        Screen::Ready { textures } => ready(brush, *textures),
+        Screen::Ready { textures } => brush.ready(*textures),
         Screen::Press {
             slide,
             of,
@@ -238,7 +242,7 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             progress,
         } => {
             brush.title("Slide", &say(format_args!("slide {slide} of {of}")))?;
-            pace(brush, *progress)?;
+            brush.pace(*progress)?;
             brush.force(*force_mn, 48)
         }
         Screen::Again { why, lift } => {
@@ -281,8 +285,8 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             brush.left(&cut(name, 20), 7, 41)?;
             brush.button("next", "teach")
         }
-        Screen::Choose { at, count, entries } => choose(brush, *at, *count, entries),
-        Screen::Spell { text, wheel } => spell(brush, text, wheel),
+        Screen::Choose { at, count, entries } => brush.choose(*at, *count, entries),
+        Screen::Spell { text, wheel } => brush.spell(text, wheel),
         Screen::Saving => {
             brush.title("Teach", "")?;
             brush.headline("Learning", 18)?;
@@ -302,194 +306,172 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
         }
         Screen::Taught(Err(why)) => {
             brush.title("Not learned", "")?;
-            paragraph(brush, why, 14, 4)?;
+            brush.paragraph(why, 14, 4)?;
             brush.button("go on", "")
         }
-        Screen::Fault(trouble) => fault(brush, trouble),
-        Screen::About(about) => about_probe(brush, about),
+        Screen::Fault(trouble) => brush.fault(trouble),
+        Screen::About(about) => brush.about_probe(about),
     }
 }
 
-fn ready<D: DrawTarget<Color = BinaryColor>>(brush: &mut Brush<'_, D>, textures: u16) -> Done<D> {
-    brush.title("Tactus", &say(format_args!("{textures} textures")))?;
-    // a finger on a surface
-    brush.fill(8, 16, 21, 17, false)?;
-    brush.disc(18, 32, 10, false)?;
-    brush.fill(10, 16, 17, 17, true)?;
-    brush.disc(18, 32, 8, true)?;
-    brush.fill(0, 44, 40, 1, false)?;
-    for (x, step) in (0..40)
-        .step_by(8)
-        .flat_map(|x| (0..4).map(move |step| (x, step)))
-    {
-        brush.fill(x + step, 49 - step, 1, 1, false)?;
-    }
-    let at = |y| Point::new(44, y);
-    brush.write("Press", at(13), &FONT_10X20, Alignment::Left, false)?;
-    brush.write("and hold", at(31), &FONT_10X20, Alignment::Left, false)?;
-    brush.button("about", "teach")
-}
-
-/// How far the slide is, and how far it ought to be: 5 cm while the bar fills.
-fn pace<D: DrawTarget<Color = BinaryColor>>(
-    brush: &mut Brush<'_, D>,
-    progress: Option<f32>,
-) -> Done<D> {
-    let Some(progress) = progress else {
-        brush.centre("Slide", 12, &FONT_10X20)?;
-        return brush.centre("5 cm in 2 s", 31, &FONT_6X10);
-    };
-    let end = 10 + (107.0 * progress.clamp(0.0, 1.0)) as i32;
-    brush.fill(0, 26, WIDTH, 3, false)?;
-    // centimetres
-    for x in (4..=124).step_by(24) {
-        brush.fill(x, 29, 1, 5, false)?;
-    }
-    // the finger's place
-    brush.triangle(end, 14, 11, false)?;
-    brush.left("on, on", if end > 60 { 4 } else { 84 }, 14)
-}
-
-fn choose<D: DrawTarget<Color = BinaryColor>>(
-    brush: &mut Brush<'_, D>,
-    at: u16,
-    count: u16,
-    entries: &[Entry<'_>],
-) -> Done<D> {
-    let place = say(format_args!("{} of {count}", at.saturating_add(1)));
-    brush.title("What is it?", &place)?;
-    let first = first_line(at, count);
-    for ((entry, number), y) in entries.iter().zip(first..).zip((13..).step_by(10)) {
-        let chosen = number == at;
-        if chosen {
-            brush.fill(0, y - 1, WIDTH, 10, false)?;
+/// The screens that take more than a few lines.
+impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
+    fn ready(&mut self, textures: u16) -> Done<D> {
+        self.title("Tactus", &say(format_args!("{textures} textures")))?;
+        // a finger on a surface
+        self.fill(8, 16, 21, 17, false)?;
+        self.disc(18, 32, 10, false)?;
+        self.fill(10, 16, 17, 17, true)?;
+        self.disc(18, 32, 8, true)?;
+        self.fill(0, 44, 40, 1, false)?;
+        for (x, step) in (0..40)
+            .step_by(8)
+            .flat_map(|x| (0..4).map(move |step| (x, step)))
+        {
+            self.fill(x + step, 49 - step, 1, 1, false)?;
         }
-        let text = match entry {
-            Entry::Known(name) => cut(name, 21),
-            Entry::Numbered(name) => say(format_args!("new: {name}")),
-            Entry::Spell => say(format_args!("new: spell it")),
-            Entry::Nothing => say(format_args!("nothing, go back")),
+        let at = |y| Point::new(44, y);
+        self.write("Press", at(13), &FONT_10X20, Alignment::Left, false)?;
+        self.write("and hold", at(31), &FONT_10X20, Alignment::Left, false)?;
+        self.button("about", "teach")
+    }
+
+    /// How far the slide is, and how far it ought to be: 5 cm while the bar fills.
+    fn pace(&mut self, progress: Option<f32>) -> Done<D> {
+        let Some(progress) = progress else {
+            self.centre("Slide", 12, &FONT_10X20)?;
+            return self.centre("5 cm in 2 s", 31, &FONT_6X10);
         };
-        let place = Point::new(1, y - 1);
-        brush.write(&text, place, &FONT_6X10, Alignment::Left, chosen)?;
-    }
-    brush.button("next", "take")
-}
-
-fn spell<D: DrawTarget<Color = BinaryColor>>(
-    brush: &mut Brush<'_, D>,
-    text: &str,
-    wheel: &[Place; WHEEL],
-) -> Done<D> {
-    brush.title("Spell it", "")?;
-    brush.write(
-        text,
-        Point::new(1, 15),
-        &FONT_7X13_BOLD,
-        Alignment::Left,
-        false,
-    )?;
-    let cursor = 1 + 7 * text.chars().count() as i32;
-    brush.fill(cursor, 29, 6.min(WIDTH - cursor), 2, false)?;
-    for (place, n) in wheel.iter().zip(0..) {
-        let chosen = n == WHEEL as i32 / 2;
-        let x = MIDDLE + (n - WHEEL as i32 / 2) * 19;
-        if chosen {
-            brush.fill(x - 10, 33, 20, 20, false)?;
+        let end = 10 + (107.0 * progress.clamp(0.0, 1.0)) as i32;
+        self.fill(0, 26, WIDTH, 3, false)?;
+        // centimetres
+        for x in (4..=124).step_by(24) {
+            self.fill(x, 29, 1, 5, false)?;
         }
-        let mut letter: String<4> = String::new();
-        let (text, font, y) = match place {
-            Place::Done => ("OK", &FONT_7X13_BOLD, 36),
-            Place::Rub => ("<-", &FONT_7X13_BOLD, 36),
-            Place::Letter(' ') => ("_", &FONT_10X20, 32),
-            Place::Letter(c) => {
-                // a letter fits
-                let _ = letter.push(*c);
-                (letter.as_str(), &FONT_10X20, 33)
+        // the finger's place
+        self.triangle(end, 14, 11, false)?;
+        self.left("on, on", if end > 60 { 4 } else { 84 }, 14)
+    }
+
+    fn choose(&mut self, at: u16, count: u16, entries: &[Entry<'_>]) -> Done<D> {
+        let place = say(format_args!("{} of {count}", at.saturating_add(1)));
+        self.title("What is it?", &place)?;
+        let first = first_line(at, count);
+        for ((entry, number), y) in entries.iter().zip(first..).zip((13..).step_by(10)) {
+            let chosen = number == at;
+            if chosen {
+                self.fill(0, y - 1, WIDTH, 10, false)?;
+            }
+            let text = match entry {
+                Entry::Known(name) => cut(name, 21),
+                Entry::Numbered(name) => say(format_args!("new: {name}")),
+                Entry::Spell => say(format_args!("new: spell it")),
+                Entry::Nothing => say(format_args!("nothing, go back")),
+            };
+            let place = Point::new(1, y - 1);
+            self.write(&text, place, &FONT_6X10, Alignment::Left, chosen)?;
+        }
+        self.button("next", "take")
+    }
+
+    fn spell(&mut self, text: &str, wheel: &[Place; WHEEL]) -> Done<D> {
+        self.title("Spell it", "")?;
+        self.write(
+            text,
+            Point::new(1, 15),
+            &FONT_7X13_BOLD,
+            Alignment::Left,
+            false,
+        )?;
+        let cursor = 1 + 7 * text.chars().count() as i32;
+        self.fill(cursor, 29, 6.min(WIDTH - cursor), 2, false)?;
+        for (place, n) in wheel.iter().zip(0..) {
+            let chosen = n == WHEEL as i32 / 2;
+            let x = MIDDLE + (n - WHEEL as i32 / 2) * 19;
+            if chosen {
+                self.fill(x - 10, 33, 20, 20, false)?;
+            }
+            let mut letter: String<4> = String::new();
+            let (text, font, y) = match place {
+                Place::Done => ("OK", &FONT_7X13_BOLD, 36),
+                Place::Rub => ("<-", &FONT_7X13_BOLD, 36),
+                Place::Letter(' ') => ("_", &FONT_10X20, 32),
+                Place::Letter(c) => {
+                    // a letter fits
+                    let _ = letter.push(*c);
+                    (letter.as_str(), &FONT_10X20, 33)
+                }
+            };
+            self.write(text, Point::new(x, y), font, Alignment::Center, chosen)?;
+        }
+        self.button("next", "take")
+    }
+
+    fn fault(&mut self, trouble: &Trouble) -> Done<D> {
+        self.title("Fault", "")?;
+        let (what, first, second) = match trouble {
+            Trouble::Silent => ("No sensor", "Check its cable", "and its power"),
+            Trouble::Frozen => ("Sensor hangs", "Switch it off", "and on again"),
+            Trouble::Memory(why) => {
+                self.paragraph(why, 14, 4)?;
+                return self.button("go on", "");
             }
         };
-        brush.write(text, Point::new(x, y), font, Alignment::Center, chosen)?;
+        self.triangle(12, 16, 13, true)?;
+        self.fill(11, 19, 3, 5, true)?;
+        self.fill(11, 26, 3, 2, true)?;
+        let at = Point::new(28, 19);
+        self.write(what, at, &FONT_7X13_BOLD, Alignment::Left, false)?;
+        self.centre(first, 41, &FONT_6X10)?;
+        self.centre(second, 52, &FONT_6X10)
     }
-    brush.button("next", "take")
-}
 
-fn fault<D: DrawTarget<Color = BinaryColor>>(
-    brush: &mut Brush<'_, D>,
-    trouble: &Trouble,
-) -> Done<D> {
-    brush.title("Fault", "")?;
-    let (what, first, second) = match trouble {
-        Trouble::Silent => ("No sensor", "Check its cable", "and its power"),
-        Trouble::Frozen => ("Sensor hangs", "Switch it off", "and on again"),
-        Trouble::Memory(why) => {
-            paragraph(brush, why, 14, 4)?;
-            return brush.button("go on", "");
-        }
-    };
-    brush.triangle(12, 16, 13, true)?;
-    brush.fill(11, 19, 3, 5, true)?;
-    brush.fill(11, 26, 3, 2, true)?;
-    let at = Point::new(28, 19);
-    brush.write(what, at, &FONT_7X13_BOLD, Alignment::Left, false)?;
-    brush.centre(first, 41, &FONT_6X10)?;
-    brush.centre(second, 52, &FONT_6X10)
-}
-
-fn about_probe<D: DrawTarget<Color = BinaryColor>>(
-    brush: &mut Brush<'_, D>,
-    about: &About,
-) -> Done<D> {
-    brush.title("About", &say(format_args!("Tactus {}", about.version)))?;
-    brush.left("Core awake", 1, 14)?;
-    let share = |p: Option<f32>| match p {
-        // whole numbers: code to write others takes 9 kB
-        Some(p) => {
-            let tenths = libm::roundf(1000.0 * p) as u32;
-            say(format_args!("{}.{} %", tenths / 10, tenths % 10))
-        }
-        None => say(format_args!("-")),
-    };
-    brush.left("listening", 7, 24)?;
-    let right = |y| Point::new(WIDTH, y);
-    let (font, side) = (&FONT_6X10, Alignment::Right);
-    brush.write(&share(about.awake), right(24), font, side, false)?;
-    brush.left("at rest", 7, 34)?;
-    brush.write(&share(about.awake_at_rest), right(34), font, side, false)?;
-    let slots = say(format_args!("late {}, lost {}", about.late, about.lost));
-    brush.left("Slots", 1, 44)?;
-    brush.write(&cut(&slots, 15), right(44), font, side, false)?;
-    brush.button("go on", "")
-}
-
-/// A sentence over so many lines, broken at blanks.
-fn paragraph<D: DrawTarget<Color = BinaryColor>>(
-    brush: &mut Brush<'_, D>,
-    text: &str,
-    y: i32,
-    lines: usize,
-) -> Done<D> {
-    const LETTERS: usize = 21;
-    let mut line: String<LETTERS> = String::new();
-    let mut at = (y..).step_by(10).take(lines);
-    for word in text.split(' ') {
-        let blank = usize::from(!line.is_empty());
-        if line.len() + blank + word.len() > LETTERS && !line.is_empty() {
-            let Some(y) = at.next() else {
-                return Ok(());
-            };
-            brush.left(&line, 1, y)?;
-            line.clear();
-        }
-        if !line.is_empty() {
-            // there is room, as was looked at
-            let _ = line.push(' ');
-        }
-        let word = cut(word, LETTERS);
-        word.chars().all(|c| line.push(c).is_ok());
+    fn about_probe(&mut self, about: &About) -> Done<D> {
+        self.title("About", &say(format_args!("Tactus {}", about.version)))?;
+        self.left("Core awake", 1, 14)?;
+        let share = |p: Option<f32>| match p {
+            // whole numbers: code to write others takes 9 kB
+            Some(p) => {
+                let tenths = libm::roundf(1000.0 * p) as u32;
+                say(format_args!("{}.{} %", tenths / 10, tenths % 10))
+            }
+            None => say(format_args!("-")),
+        };
+        self.left("listening", 7, 24)?;
+        self.right(&share(about.awake), 24)?;
+        self.left("at rest", 7, 34)?;
+        self.right(&share(about.awake_at_rest), 34)?;
+        let slots = say(format_args!("late {}, lost {}", about.late, about.lost));
+        self.left("Slots", 1, 44)?;
+        self.right(&cut(&slots, 15), 44)?;
+        self.button("go on", "")
     }
-    match at.next() {
-        Some(y) => brush.left(&line, 1, y),
-        None => Ok(()),
+
+    /// A sentence over so many lines, broken at blanks.
+    fn paragraph(&mut self, text: &str, y: i32, lines: usize) -> Done<D> {
+        const LETTERS: usize = 21;
+        let mut line: String<LETTERS> = String::new();
+        let mut at = (y..).step_by(10).take(lines);
+        for word in text.split(' ') {
+            let blank = usize::from(!line.is_empty());
+            if line.len() + blank + word.len() > LETTERS && !line.is_empty() {
+                let Some(y) = at.next() else {
+                    return Ok(());
+                };
+                self.left(&line, 1, y)?;
+                line.clear();
+            }
+            if !line.is_empty() {
+                // there is room, as was looked at
+                let _ = line.push(' ');
+            }
+            let word = cut(word, LETTERS);
+            word.chars().all(|c| line.push(c).is_ok());
+        }
+        match at.next() {
+            Some(y) => self.left(&line, 1, y),
+            None => Ok(()),
+        }
     }
 }
 

@@ -426,8 +426,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         match event {
             Event::Zeroed | Event::Silent | Event::Frozen => {}
             Event::Down => match self.page {
-                Page::Ready | Page::Touching => self.show(Page::Touching),
-                Page::Again(_) => self.show(Page::Touching),
+                Page::Ready | Page::Touching | Page::Again(_) => self.show(Page::Touching),
                 Page::Verdict(_) => {
                     self.forget_visit();
                     self.show(Page::Touching);

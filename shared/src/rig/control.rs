@@ -7,7 +7,7 @@
 use super::calibration::RigCalibration;
 use super::fault::Fault;
 use super::force::ForceMeter;
-use super::guard::{FORCE_LIMIT_MN, Guard, Seen, Unguarded};
+use super::guard::{FORCE_LIMIT_MN, Guard, Seen, Switch, Unguarded};
 use super::lever::{Lever, LeverState};
 use super::phase::HIGH_FORCE_MN;
 use super::pins::{Inputs, Outputs};
@@ -28,8 +28,6 @@ const RETURN_MM_S: f32 = 50.0;
 const RELEASE_MS: u32 = 20;
 /// Force that has risen by so many counts since the lever's driver was off rises because of the lifting.
 const WORSE_COUNTS: f32 = 8.0;
-/// A limit switch that is looked for is believed after so many ms: less is its bouncing.
-const SWITCH_MS: u32 = 3;
 /// Slower than this the stage stands, mm/s.
 const STANDS_MM_S: f32 = 0.5;
 /// P_DC of a finger in the air is no further than this from what its calibration says, counts: between the drift with the
@@ -63,8 +61,8 @@ pub struct Control {
     compared: bool,
     /// P_DC in the air, mean of the last run without load.
     air: Option<f32>,
-    /// For how many ms the lever's and the left limit switch have been closed.
-    closed_ms: [u32; 2],
+    lever_top: Switch,
+    stage_left: Switch,
     /// Duty of the last tick.
     duty: f32,
 }
@@ -77,7 +75,7 @@ impl Control {
         unguarded: Unguarded,
     ) -> Self {
         Self {
-            lever: Lever::new(),
+            lever: Lever::default(),
             stage: Stage::new(constants),
             guard: Guard::new(unguarded),
             meter: ForceMeter::new(calibration.pressure.pdc_no_contact),
@@ -93,7 +91,8 @@ impl Control {
             zeroed: false,
             compared: false,
             air: None,
-            closed_ms: [0; 2],
+            lever_top: Switch::default(),
+            stage_left: Switch::default(),
             duty: 0.0,
         }
     }
@@ -301,7 +300,7 @@ impl Control {
             self.stage.stop();
             if fault == Fault::LeverNotHome {
                 // it is somewhere else than its steps say, and may be moved by hand now
-                self.lever = Lever::new();
+                self.lever = Lever::default();
             } else {
                 self.lever.reset();
             }
@@ -344,14 +343,8 @@ impl Control {
         if self.phase != Phase::Parked && self.knows_only_default() {
             self.meter.sink();
         }
-        for (ms, closed) in self
-            .closed_ms
-            .iter_mut()
-            .zip([inputs.lever_top, inputs.stage_limits.0])
-        {
-            *ms = if closed { ms.saturating_add(1) } else { 0 };
-        }
-        let [at_top, at_left] = self.closed_ms.map(|ms| ms >= SWITCH_MS);
+        let at_top = self.lever_top.tick(inputs.lever_top);
+        let at_left = self.stage_left.tick(inputs.stage_limits.0);
         match self.watch(inputs) {
             Some(Fault::ForceHigh) if self.phase == Phase::Faulted(Fault::ForceHigh) => {
                 let counts = self.meter.counts();
@@ -371,11 +364,11 @@ impl Control {
         };
         match self.stage.tick(inputs.encoder, at_left) {
             Ok(duty) => outputs.stage_duty = duty,
-            Err(fault) => self.check(fault.into()),
+            Err(fault) => self.check(fault),
         }
         match self.lever.tick(&mut self.meter, inputs.steps, at_top) {
             Ok(rate) => outputs.lever_steps_s = rate,
-            Err(fault) => self.check(fault.into()),
+            Err(fault) => self.check(fault),
         }
         self.advance(inputs, &mut outputs);
         match self.phase {

@@ -4,9 +4,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::lever::LeverFault;
-use super::stage::StageFault;
-
 /// A row of the fault table.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Row {
@@ -136,23 +133,3 @@ impl core::fmt::Display for Fault {
 }
 
 impl core::error::Error for Fault {}
-
-impl From<LeverFault> for Fault {
-    fn from(fault: LeverFault) -> Self {
-        match fault {
-            LeverFault::NotHome => Self::LeverNotHome,
-            LeverFault::NoContact => Self::NoContact,
-            LeverFault::Slips => Self::LeverSlips,
-            LeverFault::Unsteady => Self::Unsteady,
-        }
-    }
-}
-
-impl From<StageFault> for Fault {
-    fn from(fault: StageFault) -> Self {
-        match fault {
-            StageFault::Following => Self::StageOff,
-            StageFault::NotHome => Self::StageNotHome,
-        }
-    }
-}

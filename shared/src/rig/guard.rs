@@ -13,7 +13,6 @@ pub use super::fault::{FAULTS, Fault, Row};
 pub const FORCE_LIMIT_MN: f32 = 2050.0;
 const SILENT_MS: u32 = 10;
 const FROZEN_MS: u32 = 100;
-const SWITCH_MS: u32 = 3;
 const MOTION_MS: usize = 30;
 /// Damaged words in a second that are one too many.
 const MAX_DAMAGED: u32 = 22;
@@ -58,6 +57,24 @@ pub struct Seen<'a> {
     pub emf_mm_s: f32,
 }
 
+/// A limit switch. It is believed when it has been closed for 3 ms: less is its bouncing.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Switch {
+    closed_ms: u32,
+}
+
+impl Switch {
+    /// Another millisecond; whether the switch is believed to be closed.
+    pub(super) fn tick(&mut self, closed: bool) -> bool {
+        self.closed_ms = if closed {
+            self.closed_ms.saturating_add(1)
+        } else {
+            0
+        };
+        self.closed_ms >= 3
+    }
+}
+
 /// Watches over sensor, switches, stage and force.
 #[derive(Clone, Debug, Default)]
 pub struct Guard {
@@ -69,8 +86,8 @@ pub struct Guard {
     frozen_ms: [u32; 2],
     damaged: [u32; SLICES],
     slice_ms: u32,
-    lever_top_ms: u32,
-    stage_limit_ms: u32,
+    lever_top: Switch,
+    stage_limit: Switch,
     /// How far the stage should have come, has come by its encoder and has come by its motor's back-EMF, in mm since it
     /// began to move: the last [`MOTION_MS`] and where the next goes.
     motion: [[f32; 3]; MOTION_MS],
@@ -107,16 +124,8 @@ impl Guard {
     ) -> Option<Fault> {
         let sensor = self.sensor(seen.words);
         let stage = self.stage(seen);
-        self.lever_top_ms = if seen.lever_top {
-            self.lever_top_ms.saturating_add(1)
-        } else {
-            0
-        };
-        self.stage_limit_ms = if seen.stage_limit {
-            self.stage_limit_ms.saturating_add(1)
-        } else {
-            0
-        };
+        let lever_top = self.lever_top.tick(seen.lever_top);
+        let stage_limit = self.stage_limit.tick(seen.stage_limit);
         // a calibration that says less than the paper's does not allow more
         let mn_per_count = mn_per_count.max(Calibration::PAPER.force_mn_per_count);
         let force =
@@ -125,8 +134,8 @@ impl Guard {
             force.then_some(Fault::ForceHigh),
             seen.e_stop.then_some(Fault::EStop),
             seen.hung.then_some(Fault::TasksHung),
-            (self.lever_top_ms >= SWITCH_MS).then_some(Fault::LeverLimit),
-            (self.stage_limit_ms >= SWITCH_MS).then_some(Fault::StageLimit),
+            lever_top.then_some(Fault::LeverLimit),
+            stage_limit.then_some(Fault::StageLimit),
             stage,
         ]
         .into_iter()

@@ -3,6 +3,7 @@
 //! A plain state machine, asked a thousand times a second. It answers with a step rate; whoever makes the steps counts
 //! them and gives the count back.
 
+use super::fault::Fault;
 use super::force::ForceMeter;
 use crate::pressure::Counts;
 
@@ -63,9 +64,10 @@ const ZERO_MS: u32 = 200;
 const QUIET_MS: u32 = 100;
 
 /// What the lever is doing.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub enum LeverState {
     /// Its position is not known, the motor stands.
+    #[default]
     Unknown,
     /// Up, to the limit switch.
     Homing,
@@ -85,21 +87,8 @@ pub enum LeverState {
     Retracting(i32),
 }
 
-/// Why pressing failed.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum LeverFault {
-    /// The limit switch was not reached.
-    NotHome,
-    /// The lever came to its lower end without touching anything.
-    NoContact,
-    /// Steps are made, and the force does not follow.
-    Slips,
-    /// The force does not stay where it was put.
-    Unsteady,
-}
-
-/// The state machine of the lever.
-#[derive(Clone, Debug)]
+/// The state machine of the lever; by default of one that does not know where it is.
+#[derive(Clone, Debug, Default)]
 pub struct Lever {
     state: LeverState,
     /// Force asked for, in counts above no contact.
@@ -121,30 +110,7 @@ pub struct Lever {
     ms: u32,
 }
 
-impl Default for Lever {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Lever {
-    /// A lever that does not know where it is.
-    pub fn new() -> Self {
-        Self {
-            state: LeverState::Unknown,
-            target: 0.0,
-            trims: 0,
-            crept: 0.0,
-            counts_per_step: 0.0,
-            before: None,
-            zero: None,
-            top: 0,
-            known: false,
-            contact: None,
-            ms: 0,
-        }
-    }
-
     /// What it is doing.
     pub fn state(&self) -> LeverState {
         self.state
@@ -214,12 +180,7 @@ impl Lever {
     ///
     /// # Errors
     /// The motor is to stand; the guard then lifts the finger.
-    pub fn tick(
-        &mut self,
-        meter: &mut ForceMeter,
-        steps: i32,
-        at_top: bool,
-    ) -> Result<i32, LeverFault> {
+    pub fn tick(&mut self, meter: &mut ForceMeter, steps: i32, at_top: bool) -> Result<i32, Fault> {
         self.ms = self.ms.saturating_add(1);
         match self.state {
             LeverState::Unknown | LeverState::Lifted | LeverState::Holding => Ok(0),
@@ -241,7 +202,7 @@ impl Lever {
                 // the whole travel and a quarter, at the speed of lifting
                 let longest_ms = MAX_STEPS as u32 * 1250 / RETRACT_STEPS_S.unsigned_abs();
                 if self.ms > longest_ms {
-                    Err(LeverFault::NotHome)
+                    Err(Fault::LeverNotHome)
                 } else {
                     Ok(RETRACT_STEPS_S)
                 }
@@ -257,7 +218,7 @@ impl Lever {
                         .zero
                         .is_some_and(|last| libm::fabsf(zero - last) > ZERO_COUNTS);
                     if moved || zero + LIMIT_COUNTS > f32::from(Counts::MAX.get()) {
-                        return Err(LeverFault::Unsteady);
+                        return Err(Fault::Unsteady);
                     }
                     self.zero = Some(zero);
                     self.counts_per_step = SOFTEST;
@@ -280,7 +241,7 @@ impl Lever {
             }
             LeverState::Trimming(to) => {
                 if self.ms > TRIM_MS {
-                    return Err(LeverFault::Slips);
+                    return Err(Fault::LeverSlips);
                 }
                 if steps == to {
                     self.enter(LeverState::Settling);
@@ -291,7 +252,7 @@ impl Lever {
             }
             LeverState::Retracting(to) => {
                 if self.ms > LIFT_MS {
-                    return Err(LeverFault::NotHome);
+                    return Err(Fault::LeverNotHome);
                 }
                 if steps <= to || (at_top && steps - self.top <= NEAR_TOP_STEPS) {
                     self.enter(LeverState::Lifted);
@@ -308,18 +269,18 @@ impl Lever {
         meter: &ForceMeter,
         steps: i32,
         contact: Option<i32>,
-    ) -> Result<i32, LeverFault> {
+    ) -> Result<i32, Fault> {
         let counts = meter.counts_now();
         let contact = contact.or_else(|| (meter.counts() > CONTACT_COUNTS).then_some(steps));
         self.state = LeverState::Approaching(contact);
         match contact {
             // less than no contact: the zero has drifted, and with it the force that would be pressed
-            None if meter.counts() < -CONTACT_COUNTS => return Err(LeverFault::Unsteady),
+            None if meter.counts() < -CONTACT_COUNTS => return Err(Fault::Unsteady),
             None if self.ms > APPROACH_MS || steps - self.top >= MAX_STEPS => {
-                return Err(LeverFault::NoContact);
+                return Err(Fault::NoContact);
             }
             None => return Ok(APPROACH_STEPS_S),
-            Some(at) if steps - at > PRESS_STEPS => return Err(LeverFault::Slips),
+            Some(at) if steps - at > PRESS_STEPS => return Err(Fault::LeverSlips),
             Some(at) => self.contact = Some(at),
         }
         // stiffness over the last part of the way, for the trims
@@ -344,9 +305,9 @@ impl Lever {
     }
 
     /// The skin has settled: is the force right, or how many steps is it off?
-    fn weigh(&mut self, meter: &ForceMeter, steps: i32) -> Result<i32, LeverFault> {
+    fn weigh(&mut self, meter: &ForceMeter, steps: i32) -> Result<i32, Fault> {
         let Some(counts) = meter.long_counts() else {
-            return Err(LeverFault::Unsteady);
+            return Err(Fault::Unsteady);
         };
         let off = self.target - counts;
         let near = |counts: f32, share: f32| libm::fabsf(off) <= counts.max(share * self.target);
@@ -357,14 +318,14 @@ impl Lever {
             return Ok(0);
         }
         if self.trims >= MAX_TRIMS {
-            return Err(LeverFault::Unsteady);
+            return Err(Fault::Unsteady);
         }
         self.trims += 1;
         self.crept += off;
         let most =
             (MAX_CREEP_COUNTS + MAX_CREEP_SHARE * self.target).min(LIMIT_COUNTS - self.target);
         if self.crept > most.max(0.0) {
-            return Err(LeverFault::Unsteady);
+            return Err(Fault::Unsteady);
         }
         let most = PRESS_STEPS as f32 / 4.0;
         let correction = libm::roundf(off / self.counts_per_step).clamp(-most, most) as i32;

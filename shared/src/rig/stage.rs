@@ -1,5 +1,7 @@
 //! The stage: a trapezoidal profile, and the velocity PI that follows it a thousand times a second.
 
+use super::fault::Fault;
+
 /// Constants of one stage.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct StageConstants {
@@ -150,15 +152,6 @@ impl Profile {
     }
 }
 
-/// Why a move failed.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum StageFault {
-    /// The motor pushes and the stage does not follow.
-    Following,
-    /// The limit switch was not found: something is in the way, or the switch does not close.
-    NotHome,
-}
-
 /// The state machine of the stage.
 #[derive(Clone, Debug)]
 pub struct Stage {
@@ -254,7 +247,7 @@ impl Stage {
     ///
     /// # Errors
     /// The motor is to be off.
-    pub fn tick(&mut self, count: i32, at_left: bool) -> Result<f32, StageFault> {
+    pub fn tick(&mut self, count: i32, at_left: bool) -> Result<f32, Fault> {
         self.counts.rotate_left(1);
         let [.., newest] = &mut self.counts;
         *newest = count;
@@ -273,7 +266,7 @@ impl Stage {
                 let way = (from - count) as f32 * c.mm_per_count;
                 let off = HOMING_MM_S * t - way;
                 if off > HOMING_FOLLOWING_MM || t * HOMING_MM_S > c.travel_mm * 1.25 {
-                    return Err(StageFault::NotHome);
+                    return Err(Fault::StageNotHome);
                 }
                 let duty = c.duty_per_mm_s * HOMING_MM_S
                     + c.duty_friction
@@ -291,7 +284,7 @@ impl Stage {
                     .saturating_sub(libm::ceilf(profile.duration_s() * 1e3) as u32);
                 let following = FOLLOWING_MM + FOLLOWING_S * profile.speed_mm_s;
                 if libm::fabsf(off) > following || over > ARRIVE_MS {
-                    return Err(StageFault::Following);
+                    return Err(Fault::StageOff);
                 }
                 if over > 0
                     && libm::fabsf(off) < ARRIVED_MM

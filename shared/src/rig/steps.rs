@@ -18,19 +18,13 @@ pub struct Period {
 }
 
 /// Which periods have a pulse, and how many steps that makes.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Steps {
     steps: i32,
     phase: u32,
     down: bool,
     /// The period that comes has a pulse.
     pulse: bool,
-}
-
-impl Default for Steps {
-    fn default() -> Self {
-        Self::new()
-    }
 }
 
 impl Steps {

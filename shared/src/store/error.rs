@@ -89,9 +89,15 @@ impl<E> From<Error<E>> for StoreError<E> {
     fn from(why: Error<E>) -> Self {
         match why {
             Error::Storage { value, .. } => Self::Flash(value),
-            Error::FullStorage => Self::Settings(SettingsError::Full),
-            _ => Self::Settings(SettingsError::Corrupt),
+            Error::FullStorage => SettingsError::Full.into(),
+            _ => SettingsError::Corrupt.into(),
         }
+    }
+}
+
+impl<E> From<SettingsError> for StoreError<E> {
+    fn from(why: SettingsError) -> Self {
+        Self::Settings(why)
     }
 }
 

@@ -1,5 +1,8 @@
 //! The records of the settings: their keys, their sizes, and how they are read.
 
+use core::marker::PhantomData;
+use core::ops::Range;
+
 use embedded_storage_async::nor_flash::NorFlash;
 use sequential_storage::cache::key_pointers::ArrayKeyPointers;
 use sequential_storage::cache::{Cache, Uncached};
@@ -42,9 +45,49 @@ pub struct Trained {
     pub lesson: Lesson,
 }
 
+/// A record of which the settings hold several, each at a place of its own.
+pub(super) trait Record: Serialize + for<'b> Deserialize<'b> {
+    /// Key of the first place.
+    const FIRST: u8;
+    /// How many places there are.
+    const PLACES: u8;
+
+    /// Whether this record takes the place of `old`.
+    fn replaces(&self, old: &Self) -> bool;
+
+    /// Whether `old` is given up for this record when room runs out.
+    fn outlives(&self, old: &Self) -> bool;
+}
+
+impl Record for Trained {
+    const FIRST: u8 = KEY_TRAINED;
+    const PLACES: u8 = MAX_RECORDS;
+
+    fn replaces(&self, old: &Self) -> bool {
+        old.is(&self.name, self.movement, self.table)
+    }
+
+    fn outlives(&self, old: &Self) -> bool {
+        self.table.is_some() && old.table.is_some() && self.table != old.table
+    }
+}
+
 impl Trained {
     pub(super) fn is(&self, name: &str, movement: Movement, table: Option<u32>) -> bool {
         self.name == name && self.movement == movement && self.table == table
+    }
+}
+
+impl Record for SelfTaught {
+    const FIRST: u8 = KEY_SELF;
+    const PLACES: u8 = MAX_TEXTURES as u8;
+
+    fn replaces(&self, old: &Self) -> bool {
+        self.lineage == old.lineage && self.number == old.number
+    }
+
+    fn outlives(&self, old: &Self) -> bool {
+        self.lineage != old.lineage
     }
 }
 
@@ -64,64 +107,51 @@ pub struct SelfTaught {
 pub(super) type Places = Cache<Uncached, Uncached, ArrayKeyPointers<u8, KEYS>, u8>;
 
 pub(super) type Map<'f, F> = MapStorage<u8, Pages<'f, F>, Places>;
+type Items<'m, 'f, F> = map::MapItemIter<'m, u8, Pages<'f, F>, Places>;
 
-/// One pass over all records with keys from `first` on, oldest first: what a key held last counts.
-pub(super) struct Records<'m, 'f, F: NorFlash> {
-    items: map::MapItemIter<'m, u8, Pages<'f, F>, Places>,
-    first: u8,
-    places: u8,
+/// One pass over all records of a kind, oldest first: what a place held last counts.
+pub(super) struct Records<'m, 'f, F: NorFlash, T> {
+    items: Items<'m, 'f, F>,
+    kind: PhantomData<T>,
 }
 
-impl<'m, 'f, F: NorFlash> Records<'m, 'f, F> {
-    pub(super) fn trained(items: map::MapItemIter<'m, u8, Pages<'f, F>, Places>) -> Self {
-        Self {
-            items,
-            first: KEY_TRAINED,
-            places: MAX_RECORDS,
-        }
-    }
-
-    pub(super) fn self_taught(items: map::MapItemIter<'m, u8, Pages<'f, F>, Places>) -> Self {
-        Self {
-            items,
-            first: KEY_SELF,
-            places: MAX_TEXTURES as u8,
-        }
+impl<'m, 'f, F: NorFlash, T: Record> Records<'m, 'f, F, T> {
+    pub(super) fn new(items: Items<'m, 'f, F>) -> Self {
+        let kind = PhantomData;
+        Self { items, kind }
     }
 
     /// Place and record, `None` for a place that was cleared.
-    pub(super) async fn next<T: for<'b> Deserialize<'b>>(
-        &mut self,
-    ) -> Result<Option<(u8, Option<T>)>, StoreError<F::Error>> {
+    pub(super) async fn next(&mut self) -> Result<Option<(u8, Option<T>)>, StoreError<F::Error>> {
         let mut record = None;
-        let place = self
-            .look(&mut |bytes| {
-                record = postcard::from_bytes(bytes).ok();
-                record.is_some()
-            })
-            .await?;
-        Ok(place.zip(record))
-    }
-
-    /// As [`Records::next`], whatever its type is: `decode` says whether the bytes are a record.
-    async fn look(
-        &mut self,
-        decode: &mut dyn FnMut(&[u8]) -> bool,
-    ) -> Result<Option<u8>, StoreError<F::Error>> {
-        let mut buffer = [0; RECORD];
-        while let Some((key, bytes)) = self.items.next::<&[u8]>(&mut buffer).await? {
-            let place = key.checked_sub(self.first);
-            if let Some(place) = place.filter(|&place| place < self.places) {
-                return match decode(bytes) {
-                    true => Ok(Some(place)),
-                    false => Err(StoreError::Settings(SettingsError::Corrupt)),
-                };
-            }
-        }
-        Ok(None)
+        let mut decode = |bytes: &[u8]| {
+            record = postcard::from_bytes(bytes).ok();
+            record.is_some()
+        };
+        let keys = T::FIRST..T::FIRST + T::PLACES;
+        let key = next(&mut self.items, keys, &mut decode).await?;
+        Ok(key.map(|key| key - T::FIRST).zip(record))
     }
 }
 
+/// The next record with one of these keys, whatever its type is: `decode` says whether the bytes are a record.
+async fn next<F: NorFlash>(
+    items: &mut Items<'_, '_, F>,
+    keys: Range<u8>,
+    decode: &mut dyn FnMut(&[u8]) -> bool,
+) -> Result<Option<u8>, StoreError<F::Error>> {
+    let mut buffer = [0; RECORD];
+    while let Some((key, bytes)) = items.next::<&[u8]>(&mut buffer).await? {
+        if keys.contains(&key) {
+            return match decode(bytes) {
+                true => Ok(Some(key)),
+                false => Err(SettingsError::Corrupt.into()),
+            };
+        }
+    }
+    Ok(None)
+}
+
 pub(super) fn decode<'b, T: Deserialize<'b>, E>(bytes: &'b [u8]) -> Result<T, StoreError<E>> {
-    postcard::from_bytes(bytes).map_err(|_| StoreError::Settings(SettingsError::Corrupt))
+    postcard::from_bytes(bytes).map_err(|_| SettingsError::Corrupt.into())
 }

@@ -10,8 +10,8 @@ use super::error::{SettingsError, StoreError};
 use super::layout::SCHEMA;
 use super::pages::{Pages, page_size};
 use super::records::{
-    KEY_CALIBRATION, KEY_SCHEMA, KEY_SELF, KEY_SKIN, KEY_TRAINED, MAX_RECORDS, Map, RECORD,
-    Records, SelfTaught, Trained, decode,
+    KEY_CALIBRATION, KEY_SCHEMA, KEY_SKIN, Map, RECORD, Record, Records, SelfTaught, Trained,
+    decode,
 };
 use super::sectors::Store;
 use crate::movement::Movement;
@@ -19,7 +19,17 @@ use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::table::MAX_TEXTURES;
 use crate::training::Lesson;
-use crate::up_to;
+
+/// How a place for a record is used, as a new record sees it.
+#[derive(Clone, Copy, PartialEq)]
+enum Use {
+    Free,
+    Taken,
+    /// The record may be given up.
+    Stale,
+    /// The record is the one that is meant.
+    Same,
+}
 
 impl<F: NorFlash> Store<F> {
     /// Whether the settings can be used. If not, [`Store::erase_settings`] makes them so; the tables are not concerned.
@@ -52,9 +62,7 @@ impl<F: NorFlash> Store<F> {
         let Some(bytes) = self.fetch(KEY_CALIBRATION, &mut buffer).await? else {
             return Ok(None);
         };
-        let bytes = bytes
-            .try_into()
-            .map_err(|_| StoreError::Settings(SettingsError::Corrupt))?;
+        let bytes = bytes.try_into().map_err(|_| SettingsError::Corrupt)?;
         RigCalibration::from_bytes(bytes)
             .map(Some)
             .map_err(StoreError::Calibration)
@@ -106,12 +114,12 @@ impl<F: NorFlash> Store<F> {
         movement: Movement,
         table: Option<u32>,
     ) -> Result<Option<Lesson>, StoreError<F::Error>> {
-        self.settings.map_err(StoreError::Settings)?;
+        self.settings?;
         let mut found = None;
         let mut buffer = [0; RECORD];
         let mut map = self.map();
-        let mut records = Records::trained(map.fetch_all_items(&mut buffer).await?);
-        while let Some((place, record)) = records.next::<Trained>().await? {
+        let mut records = Records::<F, Trained>::new(map.fetch_all_items(&mut buffer).await?);
+        while let Some((place, record)) = records.next().await? {
             match record {
                 Some(record) if record.is(name, movement, table) => {
                     found = Some((place, record.lesson));
@@ -130,40 +138,7 @@ impl<F: NorFlash> Store<F> {
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
     pub async fn set_trained(&mut self, new: &Trained) -> Result<(), StoreError<F::Error>> {
-        #[derive(Clone, Copy, PartialEq)]
-        enum Use {
-            Free,
-            /// On top of a table that is no longer used.
-            Stale,
-            Taken,
-            /// Of this texture, movement and table.
-            Same,
-        }
-        self.settings.map_err(StoreError::Settings)?;
-        let mut places = [Use::Free; MAX_RECORDS as usize];
-        let mut buffer = [0; RECORD];
-        let mut map = self.map();
-        let mut records = Records::trained(map.fetch_all_items(&mut buffer).await?);
-        while let Some((place, record)) = records.next::<Trained>().await? {
-            if let Some(now) = places.get_mut(usize::from(place)) {
-                *now = match record {
-                    None => Use::Free,
-                    Some(old) if old.is(&new.name, new.movement, new.table) => Use::Same,
-                    Some(old)
-                        if new.table.is_some() && old.table.is_some() && old.table != new.table =>
-                    {
-                        Use::Stale
-                    }
-                    Some(_) => Use::Taken,
-                };
-            }
-        }
-        let place = [Use::Same, Use::Free, Use::Stale]
-            .into_iter()
-            .find_map(|wanted| places.iter().position(|now| *now == wanted))
-            .and_then(|place| u8::try_from(place).ok())
-            .ok_or(StoreError::Settings(SettingsError::Full))?;
-        self.encode(KEY_TRAINED + place, &Some(new)).await
+        self.put(new).await
     }
 
     /// Forgets the unfinished training of a texture, movement by movement: after a cut some may be left.
@@ -171,22 +146,7 @@ impl<F: NorFlash> Store<F> {
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
     pub async fn forget_trained(&mut self, name: &str) -> Result<(), StoreError<F::Error>> {
-        self.settings.map_err(StoreError::Settings)?;
-        let mut of_texture = [false; MAX_RECORDS as usize];
-        let mut buffer = [0; RECORD];
-        let mut map = self.map();
-        let mut records = Records::trained(map.fetch_all_items(&mut buffer).await?);
-        while let Some((place, record)) = records.next::<Trained>().await? {
-            if let Some(now) = of_texture.get_mut(usize::from(place)) {
-                *now = record.is_some_and(|record| record.name == name);
-            }
-        }
-        for (place, is_its) in (KEY_TRAINED..).zip(of_texture) {
-            if is_its {
-                self.encode(place, &None::<Trained>).await?;
-            }
-        }
-        Ok(())
+        self.clear(&|record: &Trained| record.name == name).await
     }
 
     /// What the probe has learned by itself of the textures of the table with this lineage, one after the other: `each` hears
@@ -199,23 +159,23 @@ impl<F: NorFlash> Store<F> {
         lineage: u32,
         each: &mut dyn FnMut(SelfTaught),
     ) -> Result<(), StoreError<F::Error>> {
-        self.settings.map_err(StoreError::Settings)?;
+        self.settings?;
         // which record of every place is the last: only that one counts
         let mut last = [0u16; MAX_TEXTURES];
         let mut buffer = [0; RECORD];
         let mut map = self.map();
-        let mut records = Records::self_taught(map.fetch_all_items(&mut buffer).await?);
+        let mut records = Records::<F, SelfTaught>::new(map.fetch_all_items(&mut buffer).await?);
         let mut number = 0;
-        while let Some((place, _)) = records.next::<SelfTaught>().await? {
+        while let Some((place, _)) = records.next().await? {
             number += 1;
             if let Some(last) = last.get_mut(usize::from(place)) {
                 *last = number;
             }
         }
         let mut map = self.map();
-        let mut records = Records::self_taught(map.fetch_all_items(&mut buffer).await?);
+        let mut records = Records::<F, SelfTaught>::new(map.fetch_all_items(&mut buffer).await?);
         let mut number = 0;
-        while let Some((place, record)) = records.next::<SelfTaught>().await? {
+        while let Some((place, record)) = records.next().await? {
             number += 1;
             let is_last = last.get(usize::from(place)) == Some(&number);
             if let Some(record) = record.filter(|record| is_last && record.lineage == lineage) {
@@ -231,23 +191,7 @@ impl<F: NorFlash> Store<F> {
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
     pub async fn set_self_taught(&mut self, new: &SelfTaught) -> Result<(), StoreError<F::Error>> {
-        let same = |old: &SelfTaught| old.lineage == new.lineage && old.number == new.number;
-        let used = self.self_keys(&|_| true).await?;
-        let place = match self.self_keys(&same).await?.first() {
-            Some(key) => Some(*key),
-            None => (KEY_SELF..)
-                .take(MAX_TEXTURES)
-                .find(|key| !used.contains(key)),
-        };
-        let place = match place {
-            Some(key) => Some(key),
-            None => {
-                let stale = self.self_keys(&|old| old.lineage != new.lineage).await?;
-                stale.first().copied()
-            }
-        };
-        let place = place.ok_or(StoreError::Settings(SettingsError::Full))?;
-        self.encode(place, &Some(new)).await
+        self.put(new).await
     }
 
     /// Forgets what the probe has learned by itself: of the texture with this number of that lineage, or all of it.
@@ -258,34 +202,70 @@ impl<F: NorFlash> Store<F> {
         &mut self,
         of: Option<(u32, u16)>,
     ) -> Result<(), StoreError<F::Error>> {
-        let is_its = |record: &SelfTaught| {
-            of.is_none_or(|(lineage, number)| record.lineage == lineage && record.number == number)
+        let is_its =
+            |record: &SelfTaught| of.is_none_or(|of| (record.lineage, record.number) == of);
+        self.clear(&is_its).await
+    }
+
+    /// Stores a record in the place of the one that it replaces; otherwise in a free place, or in that of one that it
+    /// outlives.
+    async fn put<T: Record>(&mut self, new: &T) -> Result<(), StoreError<F::Error>> {
+        let seen = |old: &T| {
+            if new.replaces(old) {
+                Use::Same
+            } else if new.outlives(old) {
+                Use::Stale
+            } else {
+                Use::Taken
+            }
         };
-        for &key in &self.self_keys(&is_its).await? {
-            self.encode(key, &None::<SelfTaught>).await?;
+        let uses = self.uses(&seen).await?;
+        let uses = uses.iter().take(T::PLACES.into());
+        let place = [Use::Same, Use::Free, Use::Stale]
+            .into_iter()
+            .find_map(|wanted| uses.clone().position(|now| *now == wanted))
+            .and_then(|place| u8::try_from(place).ok())
+            .ok_or(SettingsError::Full)?;
+        self.encode(T::FIRST + place, &Some(new)).await
+    }
+
+    /// Clears the places of such records.
+    async fn clear<T: Record>(
+        &mut self,
+        is_such: &dyn Fn(&T) -> bool,
+    ) -> Result<(), StoreError<F::Error>> {
+        let such = |record: &T| {
+            if is_such(record) {
+                Use::Same
+            } else {
+                Use::Taken
+            }
+        };
+        let uses = self.uses(&such).await?;
+        for (key, now) in (T::FIRST..).zip(uses) {
+            if now == Use::Same {
+                self.encode(key, &None::<T>).await?;
+            }
         }
         Ok(())
     }
 
-    /// The keys whose newest record is such a one.
-    async fn self_keys(
+    /// How every place of a kind of record is used.
+    async fn uses<T: Record>(
         &mut self,
-        is_wanted: &dyn Fn(&SelfTaught) -> bool,
-    ) -> Result<heapless::Vec<u8, MAX_TEXTURES>, StoreError<F::Error>> {
-        self.settings.map_err(StoreError::Settings)?;
-        let mut wanted = [false; MAX_TEXTURES];
+        of: &dyn Fn(&T) -> Use,
+    ) -> Result<[Use; MAX_TEXTURES], StoreError<F::Error>> {
+        self.settings?;
+        let mut uses = [Use::Free; MAX_TEXTURES];
         let mut buffer = [0; RECORD];
         let mut map = self.map();
-        let mut records = Records::self_taught(map.fetch_all_items(&mut buffer).await?);
-        while let Some((place, record)) = records.next::<SelfTaught>().await? {
-            if let Some(now) = wanted.get_mut(usize::from(place)) {
-                *now = record.is_some_and(|record| is_wanted(&record));
+        let mut records = Records::<F, T>::new(map.fetch_all_items(&mut buffer).await?);
+        while let Some((place, record)) = records.next().await? {
+            if let Some(now) = uses.get_mut(usize::from(place)) {
+                *now = record.as_ref().map_or(Use::Free, of);
             }
         }
-        let keys = (KEY_SELF..).zip(wanted);
-        Ok(up_to(
-            keys.filter(|(_, wanted)| *wanted).map(|(key, _)| key),
-        ))
+        Ok(uses)
     }
 
     /// Brings the pages into order, and looks whether they can be read.
@@ -309,22 +289,22 @@ impl<F: NorFlash> Store<F> {
         let schema = map.fetch_item::<&[u8]>(&mut buffer, &KEY_SCHEMA).await?;
         match schema.map(decode::<u16, F::Error>).transpose()? {
             Some(SCHEMA) => {}
-            Some(other) => return Err(StoreError::Settings(SettingsError::Schema(other))),
+            Some(other) => return Err(SettingsError::Schema(other).into()),
             None => {
                 // the schema is the first record of all
                 let mut items = map.fetch_all_items(&mut buffer).await?;
                 let mut buffer = [0; RECORD];
                 return match items.next::<&[u8]>(&mut buffer).await? {
                     None => Ok(false),
-                    Some(_) => Err(StoreError::Settings(SettingsError::Corrupt)),
+                    Some(_) => Err(SettingsError::Corrupt.into()),
                 };
             }
         }
-        let mut records = Records::trained(map.fetch_all_items(&mut buffer).await?);
-        while records.next::<Trained>().await?.is_some() {}
+        let mut records = Records::<F, Trained>::new(map.fetch_all_items(&mut buffer).await?);
+        while records.next().await?.is_some() {}
         let mut map = self.map();
-        let mut records = Records::self_taught(map.fetch_all_items(&mut buffer).await?);
-        while records.next::<SelfTaught>().await?.is_some() {}
+        let mut records = Records::<F, SelfTaught>::new(map.fetch_all_items(&mut buffer).await?);
+        while records.next().await?.is_some() {}
         Ok(true)
     }
 
@@ -342,7 +322,7 @@ impl<F: NorFlash> Store<F> {
         key: u8,
         buffer: &'b mut [u8; RECORD],
     ) -> Result<Option<&'b [u8]>, StoreError<F::Error>> {
-        self.settings.map_err(StoreError::Settings)?;
+        self.settings?;
         Ok(self.map().fetch_item(buffer, &key).await?)
     }
 
@@ -352,20 +332,19 @@ impl<F: NorFlash> Store<F> {
         value: &impl Serialize,
     ) -> Result<(), StoreError<F::Error>> {
         let mut room = [0; RECORD];
-        let bytes = postcard::to_slice(value, &mut room)
-            .map_err(|_| StoreError::Settings(SettingsError::Corrupt))?;
+        let bytes = postcard::to_slice(value, &mut room).map_err(|_| SettingsError::Corrupt)?;
         self.store(key, bytes).await
     }
 
     /// Stores a record and reads it back.
     async fn store(&mut self, key: u8, bytes: &[u8]) -> Result<(), StoreError<F::Error>> {
-        let schema_written = self.settings.map_err(StoreError::Settings)?;
+        let schema_written = self.settings?;
         let mut buffer = [0; RECORD];
         let mut map = self.map();
         if !schema_written {
             let mut room = [0; RECORD];
-            let schema: &[u8] = postcard::to_slice(&SCHEMA, &mut room)
-                .map_err(|_| StoreError::Settings(SettingsError::Corrupt))?;
+            let schema: &[u8] =
+                postcard::to_slice(&SCHEMA, &mut room).map_err(|_| SettingsError::Corrupt)?;
             map.store_item(&mut buffer, &KEY_SCHEMA, &schema).await?;
         }
         map.store_item(&mut buffer, &key, &bytes).await?;
