@@ -8,7 +8,7 @@
 //! | 2, 3 | settings: calibration, skin care, progress of the training, what the probe has learned by itself |
 //!
 //! A cut at any moment, in the middle of a word or of an erase as well, leaves the state before an operation or the one
-//! after it. The same goes for a future that is dropped before its end; open the store anew then.
+//! after it. So does a future that is dropped before its end; the store must then be opened anew.
 //!
 //! # A table slot, little-endian
 //!

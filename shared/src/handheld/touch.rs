@@ -58,36 +58,22 @@ const SILENT: u16 = 440;
 /// Equal samples of P_AC in a row that mean that it hangs: 100 ms.
 const FROZEN: u16 = 220;
 
-#[derive(Clone, Copy, PartialEq, Debug)]
-enum State {
-    Air,
-    /// Still blocks so far, and the sum of their liveliness.
-    Press {
-        still: u16,
-        lively: f32,
-    },
-    /// The same, and lively blocks since.
-    Slide {
-        still: u16,
-        lively: f32,
-        begins: u8,
-    },
-    Sliding {
-        /// Mean liveliness while still.
-        still: f32,
-        samples: u32,
-        stopped: u8,
-        /// Sum of the liveliness of a tenth.
-        tenth: f32,
-    },
-    Lift,
-}
-
 /// Follows touches.
 pub struct Touch<'p, K> {
     plan: &'p Plan,
     slide: Slide<'p, K>,
-    state: State,
+    phase: Phase,
+    /// Still blocks since the press, and the sum of their liveliness.
+    still: u16,
+    still_sum: f32,
+    /// Blocks in a row that are livelier than the still ones; then the slide has begun.
+    begins: u8,
+    /// Of the slide: liveliness of a still block before it, samples so far, blocks in a row as quiet as still ones, and the
+    /// sum of the liveliness of this tenth of a second.
+    still_mean: f32,
+    samples: u32,
+    stopped: u8,
+    tenth: f32,
     /// The block so far: samples in counts, words that have passed, and those that are missing.
     pac: Vec<i16, BLOCK>,
     pdc: Vec<i16, BLOCK>,
@@ -119,7 +105,14 @@ impl<'p, K: Kernels> Touch<'p, K> {
         Self {
             plan,
             slide: Slide::new(plan),
-            state: State::Air,
+            phase: Phase::Air,
+            still: 0,
+            still_sum: 0.0,
+            begins: 0,
+            still_mean: 0.0,
+            samples: 0,
+            stopped: 0,
+            tenth: 0.0,
             pac: Vec::new(),
             pdc: Vec::new(),
             words: 0,
@@ -150,23 +143,18 @@ impl<'p, K: Kernels> Touch<'p, K> {
 
     /// Whether the finger is down.
     pub fn is_down(&self) -> bool {
-        self.state != State::Air
+        self.phase != Phase::Air
     }
 
     /// As it is shown.
     pub fn view(&self) -> View {
-        let (phase, progress) = match self.state {
-            State::Air => (Phase::Air, 0.0),
-            State::Press { .. } => (Phase::Press, 0.0),
-            State::Slide { .. } => (Phase::Slide, 0.0),
-            State::Sliding { samples, .. } => {
-                let whole = (COMING_UP + STEADY) as f32;
-                (Phase::Sliding, samples as f32 / whole)
-            }
-            State::Lift => (Phase::Lift, 1.0),
+        let progress = match self.phase {
+            Phase::Sliding => self.samples as f32 / (COMING_UP + STEADY) as f32,
+            Phase::Lift => 1.0,
+            Phase::Air | Phase::Press | Phase::Slide => 0.0,
         };
         View {
-            phase,
+            phase: self.phase,
             force_mn: self.force_mn().max(0.0),
             progress,
         }
@@ -275,12 +263,11 @@ impl<'p, K: Kernels> Touch<'p, K> {
             // it was down when the zero was taken
             self.zero = pdc;
         }
-        let up = self.state != State::Air && self.is_up(now_mn);
-        match self.state {
-            State::Air => self.in_air(pdc, now_mn, lively),
+        let up = self.phase != Phase::Air && self.is_up(now_mn);
+        match self.phase {
+            Phase::Air => self.in_air(pdc, now_mn, lively),
             _ if up => {
-                let slid = matches!(self.state, State::Sliding { .. });
-                self.state = State::Air;
+                let slid = core::mem::replace(&mut self.phase, Phase::Air) == Phase::Sliding;
                 self.changes = 0;
                 // a slide that ends in the air was too short; that it is up is known by now
                 Some(if slid {
@@ -289,36 +276,27 @@ impl<'p, K: Kernels> Touch<'p, K> {
                     Event::Up
                 })
             }
-            State::Press { still, lively: sum } => self.pressing(still, sum, lively),
-            State::Slide {
-                still,
-                lively: sum,
-                begins,
-            } => self.waiting(still, sum, begins, lively),
-            State::Sliding {
-                still,
-                samples,
-                stopped,
-                tenth,
-            } => self.sliding(still, samples, stopped, tenth, lively),
-            State::Lift => None,
+            Phase::Press => self.pressing(lively),
+            Phase::Slide => self.waiting(lively),
+            Phase::Sliding => self.sliding(lively),
+            Phase::Lift => None,
         }
     }
 
     /// A block with a gap.
     fn broken(&mut self, first: bool) -> Option<Event> {
-        match self.state {
-            State::Press { .. } => {
+        match self.phase {
+            Phase::Press => {
                 self.press();
                 None
             }
-            State::Slide { .. } => {
+            Phase::Slide => {
                 // the person was told to slide and may have begun: what was still before the gap is background enough, and
                 // nothing of a slide has been taken yet
                 self.latest.clear();
                 None
             }
-            State::Sliding { .. } if !first => Some(self.again(Again::Disturbed)),
+            Phase::Sliding if !first => Some(self.again(Again::Disturbed)),
             _ => None,
         }
     }
@@ -362,16 +340,14 @@ impl<'p, K: Kernels> Touch<'p, K> {
 
     /// The finger is to be kept still from now on.
     fn press(&mut self) {
-        self.state = State::Press {
-            still: 0,
-            lively: 0.0,
-        };
+        self.phase = Phase::Press;
+        (self.still, self.still_sum) = (0, 0.0);
         self.slide = Slide::new(self.plan);
         self.latest.clear();
     }
 
     fn again(&mut self, why: Again) -> Event {
-        self.state = State::Lift;
+        self.phase = Phase::Lift;
         Event::Again(why)
     }
 
@@ -396,7 +372,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
         let _ = self.latest.push_back(self.about_rest());
     }
 
-    fn pressing(&mut self, still: u16, sum: f32, lively: f32) -> Option<Event> {
+    fn pressing(&mut self, lively: f32) -> Option<Event> {
         let force_mn = self.force_mn();
         if force_mn > MOST_MN {
             return Some(self.again(Again::TooHard));
@@ -406,35 +382,28 @@ impl<'p, K: Kernels> Touch<'p, K> {
             return None;
         }
         self.put_still();
-        let (still, sum) = (still + 1, sum + lively);
-        if still < STILL_BLOCKS {
-            self.state = State::Press { still, lively: sum };
+        self.still += 1;
+        self.still_sum += lively;
+        if self.still < STILL_BLOCKS {
             return None;
         }
-        self.state = State::Slide {
-            still,
-            lively: sum,
-            begins: 0,
-        };
+        self.phase = Phase::Slide;
+        self.begins = 0;
         Some(Event::Still)
     }
 
-    fn waiting(&mut self, still: u16, sum: f32, begins: u8, lively: f32) -> Option<Event> {
-        let mean = sum / f32::from(still.max(1));
-        let begins = if lively > LIVELY * mean {
-            begins + 1
+    fn waiting(&mut self, lively: f32) -> Option<Event> {
+        let mean = self.still_sum / f32::from(self.still.max(1));
+        self.begins = if lively > LIVELY * mean {
+            self.begins + 1
         } else {
             0
         };
-        if begins >= BEGINS {
+        if self.begins >= BEGINS {
             self.slide.start(COMING_UP..COMING_UP + STEADY);
             self.tenths.clear();
-            self.state = State::Sliding {
-                still: mean,
-                samples: 0,
-                stopped: 0,
-                tenth: 0.0,
-            };
+            self.phase = Phase::Sliding;
+            (self.still_mean, self.samples, self.stopped, self.tenth) = (mean, 0, 0, 0.0);
             return None;
         }
         if !ZONE_MN.contains(&self.force_mn()) {
@@ -442,25 +411,16 @@ impl<'p, K: Kernels> Touch<'p, K> {
             return None;
         }
         self.put_still();
-        let counts = begins == 0 && still < u16::MAX;
-        self.state = State::Slide {
-            still: still + u16::from(counts),
-            lively: if counts { sum + lively } else { sum },
-            begins,
-        };
+        if self.begins == 0 && self.still < u16::MAX {
+            self.still += 1;
+            self.still_sum += lively;
+        }
         None
     }
 
-    fn sliding(
-        &mut self,
-        still: f32,
-        samples: u32,
-        stopped: u8,
-        tenth: f32,
-        lively: f32,
-    ) -> Option<Event> {
+    fn sliding(&mut self, lively: f32) -> Option<Event> {
         self.slide.push(&self.about_rest());
-        let steady = samples >= COMING_UP;
+        let steady = self.samples >= COMING_UP;
         let force_mn = self.force_mn();
         if steady && force_mn > *ZONE_MN.end() {
             return Some(self.again(Again::TooHard));
@@ -468,31 +428,26 @@ impl<'p, K: Kernels> Touch<'p, K> {
         if steady && force_mn < *ZONE_MN.start() {
             return Some(self.again(Again::TooLight));
         }
-        let quiet = lively < still * (1.0 + (LIVELY - 1.0) / 2.0);
-        let stopped = if quiet { stopped + 1 } else { 0 };
-        if stopped >= STOPPED {
+        let quiet = lively < self.still_mean * (1.0 + (LIVELY - 1.0) / 2.0);
+        self.stopped = if quiet { self.stopped + 1 } else { 0 };
+        if self.stopped >= STOPPED {
             return Some(self.again(Again::TooShort));
         }
-        let samples = samples + BLOCK as u32;
-        let mut tenth = tenth;
+        self.samples += BLOCK as u32;
         if steady {
             let zero = libm::roundf(self.zero) as i16;
             let above: Vec<i16, BLOCK> = self.pdc.iter().map(|counts| counts - zero).collect();
             self.slide.push_pdc(&above);
-            tenth += lively;
-            if (samples - COMING_UP).is_multiple_of(10 * BLOCK as u32) {
+            self.tenth += lively;
+            if (self.samples - COMING_UP).is_multiple_of(10 * BLOCK as u32) {
                 // there is room: as many as the steady part has
-                let _ = self.tenths.push(libm::logf(tenth.max(f32::MIN_POSITIVE)));
-                tenth = 0.0;
+                let _ = self
+                    .tenths
+                    .push(libm::logf(self.tenth.max(f32::MIN_POSITIVE)));
+                self.tenth = 0.0;
             }
         }
-        if samples < COMING_UP + STEADY {
-            self.state = State::Sliding {
-                still,
-                samples,
-                stopped,
-                tenth,
-            };
+        if self.samples < COMING_UP + STEADY {
             return None;
         }
         Some(self.finish())
@@ -500,7 +455,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
 
     /// The slide is over.
     fn finish(&mut self) -> Event {
-        self.state = State::Lift;
+        self.phase = Phase::Lift;
         if deviation(&self.tenths) > UNEVEN {
             return Event::Again(Again::TooUneven);
         }

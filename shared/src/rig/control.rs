@@ -1,8 +1,8 @@
-//! One movement from beginning to end: position the stage, press, measure the still finger, slide, lift. Lever, stage and
-//! guard under one roof, asked a thousand times a second.
+//! One movement from beginning to end: position the stage, press, measure the still finger, slide, lift. [`Control`] joins
+//! lever, stage and guard, and is called once a millisecond.
 //!
-//! No input or output of its own: [`Control::tick`] takes what the pins say and returns what they shall do, so that board
-//! and simulator run the same code.
+//! It has no input or output of its own: [`Control::tick`] takes the state of the inputs and returns that of the outputs,
+//! so that board and simulator run the same code.
 
 use super::calibration::RigCalibration;
 use super::fault::Fault;
@@ -20,7 +20,7 @@ use crate::pressure::{Calibration, Channel};
 // until all users have the new path
 pub use super::phase::{Ended, Phase, Refused};
 
-/// The still finger is measured for so long.
+/// How long the still finger is measured.
 pub const BACKGROUND_MS: u32 = 1000;
 /// Speed of the stage while the finger is lifted.
 const RETURN_MM_S: f32 = 50.0;
@@ -153,7 +153,7 @@ impl Control {
         self.allow_high_force = allow;
     }
 
-    /// Another sample lies under the finger: how thick it is has to be found out anew.
+    /// Another sample lies under the finger and may be thicker: the place of the last contact is forgotten.
     pub fn sample_changed(&mut self) {
         self.lever.forget_contact();
     }
@@ -178,7 +178,7 @@ impl Control {
         }
     }
 
-    /// A default says nothing of where this finger's P_DC is without contact.
+    /// Whether nobody has measured this finger's P_DC without contact: the default says nothing of it.
     fn knows_only_default(&self) -> bool {
         !self.zeroed && self.calibration.date == 0
     }

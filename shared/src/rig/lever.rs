@@ -1,7 +1,7 @@
 //! The lever's motor: it lowers the finger until the force is right, holds, and lifts it again.
 //!
-//! A plain state machine, asked a thousand times a second. It answers with a step rate; whoever makes the steps counts
-//! them and gives the count back.
+//! A state machine that is called once a millisecond. It returns a step rate; the caller makes the steps, counts them and
+//! passes the count to the next call.
 
 use super::fault::Fault;
 use super::force::ForceMeter;

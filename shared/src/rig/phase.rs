@@ -12,7 +12,7 @@ pub(super) const HIGH_FORCE_MN: u16 = Movement::FOR_TRACTION.force_mn();
 /// What the rig is doing.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Phase {
-    /// Nothing; it does not know where lever and stage are.
+    /// Nothing; the positions of lever and stage are unknown until it homes.
     Parked,
     /// The lever, then the stage look for their limit switches.
     Homing,
@@ -50,7 +50,7 @@ pub enum Ended {
 pub enum Refused {
     /// Something else is being done.
     Busy,
-    /// Lever and stage do not know where they are: home first.
+    /// The positions of lever and stage are unknown: home first.
     NotHomed,
     /// A fault has to be reset first.
     Fault(Fault),
@@ -60,7 +60,7 @@ pub enum Refused {
     Speed(u32),
     /// The slide does not fit on the sample.
     Length,
-    /// The calibration cannot be.
+    /// The constants cannot be used.
     Calibration(RigCalibrationError),
 }
 

@@ -1,5 +1,5 @@
-//! What goes in and out of the rig's control every millisecond: the one seam between the control logic and board or
-//! simulator.
+//! What goes in and out of the rig's control every millisecond: the only interface between the control and the board or
+//! the simulator.
 
 use heapless::Vec;
 
@@ -9,7 +9,7 @@ pub use crate::features::Felt;
 
 /// Most words in one tick: 14 ms of slots, should a tick be late.
 pub const MAX_WORDS: usize = 64;
-/// What the pins say.
+/// The state of the inputs.
 #[derive(Clone, Debug, Default)]
 pub struct Inputs {
     /// Sensor words since the last tick, oldest first; `None` is a damaged or missing one.
@@ -30,7 +30,7 @@ pub struct Inputs {
     pub hung: bool,
 }
 
-/// What the pins shall do.
+/// The state that the outputs are to have.
 #[derive(Clone, Debug, Default)]
 pub struct Outputs {
     /// Steps per second of the lever, downwards positive; 0 holds.

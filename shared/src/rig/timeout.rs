@@ -1,4 +1,4 @@
-//! How long a movement may take, and that its finger is lifted before anybody hears that it took longer.
+//! How long a movement may take. One that takes longer is stopped, and its finger is lifted before the error is reported.
 
 /// A movement that takes longer than this does not end.
 const LONGEST_MS: u32 = 120_000;

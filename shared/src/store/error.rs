@@ -19,7 +19,7 @@ pub enum StoreError<E> {
     TooLong {
         /// Bytes of the table.
         length: usize,
-        /// Bytes there are.
+        /// Bytes there are for it.
         room: usize,
     },
     /// No table is being written.
@@ -104,7 +104,7 @@ impl<E> From<SettingsError> for StoreError<E> {
 /// Why settings cannot be used.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum SettingsError {
-    /// They do not read: erase them.
+    /// They cannot be read: erase them.
     Corrupt,
     /// They were written by another version: erase them.
     Schema(u16),

@@ -83,8 +83,8 @@ pub(super) fn header(table: &StoredTable) -> [u8; HEADER] {
         table.length as u32,
         table.crc,
     ];
-    for (room, field) in body.chunks_exact_mut(WORD).zip(fields) {
-        room.copy_from_slice(&field.to_le_bytes());
+    for (word, field) in body.chunks_exact_mut(WORD).zip(fields) {
+        word.copy_from_slice(&field.to_le_bytes());
     }
     end.copy_from_slice(&CRC32.checksum(body).to_le_bytes());
     bytes

@@ -102,8 +102,8 @@ pub struct SelfTaught {
     pub movements: heapless::Vec<(u8, u8, Whitened), SELF_MOVEMENTS>,
 }
 
-/// Remembers where the newest record of every key is while one call lasts. Without it, turning a page looks through the
-/// whole page for every record in it.
+/// Remembers where the newest record of every key is, for one call. Without it, `sequential-storage` reads the whole page
+/// for every record that it copies to the next page.
 pub(super) type Places = Cache<Uncached, Uncached, ArrayKeyPointers<u8, KEYS>, u8>;
 
 pub(super) type Map<'f, F> = MapStorage<u8, Pages<'f, F>, Places>;

@@ -26,10 +26,10 @@ impl<F: NorFlash> Store<F> {
     pub(super) async fn read(
         &mut self,
         offset: u32,
-        room: &mut [u8],
+        buffer: &mut [u8],
     ) -> Result<(), StoreError<F::Error>> {
         self.flash
-            .read(offset, room)
+            .read(offset, buffer)
             .await
             .map_err(StoreError::Flash)
     }

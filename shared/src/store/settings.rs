@@ -331,8 +331,8 @@ impl<F: NorFlash> Store<F> {
         key: u8,
         value: &impl Serialize,
     ) -> Result<(), StoreError<F::Error>> {
-        let mut room = [0; RECORD];
-        let bytes = postcard::to_slice(value, &mut room).map_err(|_| SettingsError::Corrupt)?;
+        let mut buffer = [0; RECORD];
+        let bytes = postcard::to_slice(value, &mut buffer).map_err(|_| SettingsError::Corrupt)?;
         self.store(key, bytes).await
     }
 

@@ -18,27 +18,27 @@ impl<F: NorFlash> Store<F> {
 
     /// The table to be used: the newest one that was committed and is whole; `None`: the factory's.
     ///
-    /// Checked are the store's own header and the table's checksum; [`Table::read`] finds the rest, as when the table was
-    /// written for another version of the program.
+    /// The store has checked its own header and the table's checksum. [`Table::read`] checks the rest: the table may have
+    /// been written for another version of the program.
     ///
-    /// On the chip the bytes are read where they lie. They stay there until the table after the next one is begun: once
-    /// [`Store::commit_table`] or [`Store::factory_table`] has returned, whoever borrows the former table must let go of
-    /// it before [`Store::begin_table`] is called again.
+    /// The chip reads the bytes where they lie in the flash. They stay there until the table after the next one is begun:
+    /// after [`Store::commit_table`] or [`Store::factory_table`], no one may use the former table any more when
+    /// [`Store::begin_table`] is called again.
     pub fn table(&self) -> Option<StoredTable> {
         self.slots.active.map(|(_, table)| table)
     }
 
-    /// Reads the table to be used into the beginning of `room`; `None`: the factory's is.
+    /// Reads the table to be used into the beginning of `buffer`; `None`: the factory's is.
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Buffer`]; [`StoreError::Table`] when [`Table::read`] refuses it.
     pub async fn read_table<'r>(
         &mut self,
-        room: &'r mut [u8],
+        buffer: &'r mut [u8],
     ) -> Result<Option<Table<'r>>, StoreError<F::Error>> {
         match self.table() {
             Some(table) => self
-                .read_back(table.offset, table.length, room)
+                .read_back(table.offset, table.length, buffer)
                 .await
                 .map(Some),
             None => Ok(None),
@@ -122,7 +122,7 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Reads the new table back into the beginning of `room`, checks it, and commits it: from here on it is the one to be
+    /// Reads the new table back into the beginning of `buffer`, checks it, and commits it: from here on it is the one to be
     /// used.
     ///
     /// # Errors
@@ -130,7 +130,7 @@ impl<F: NorFlash> Store<F> {
     /// [`StoreError::Unfinished`] and [`StoreError::Buffer`].
     pub async fn commit_table<'r>(
         &mut self,
-        room: &'r mut [u8],
+        buffer: &'r mut [u8],
     ) -> Result<(StoredTable, Table<'r>), StoreError<F::Error>> {
         let push = self.slots.push.as_ref().ok_or(StoreError::NoTable)?;
         let (slot, length, got) = (push.slot, push.length, push.at);
@@ -140,12 +140,12 @@ impl<F: NorFlash> Store<F> {
                 wanted: length,
             });
         }
-        if room.len() < length {
+        if buffer.len() < length {
             return Err(StoreError::Buffer(length));
         }
         self.slots.push = None;
         let start = slot.start::<F>();
-        let table = self.read_back(start + TABLE_AT, length, room).await?;
+        let table = self.read_back(start + TABLE_AT, length, buffer).await?;
         if table.as_bytes().len() != length {
             return Err(StoreError::Unfinished {
                 got: length,
@@ -284,10 +284,10 @@ impl<F: NorFlash> Store<F> {
         &mut self,
         offset: u32,
         length: usize,
-        room: &'r mut [u8],
+        buffer: &'r mut [u8],
     ) -> Result<Table<'r>, StoreError<F::Error>> {
-        let room = room.get_mut(..length).ok_or(StoreError::Buffer(length))?;
-        let (words, tail) = room.split_at_mut(length - length % WORD);
+        let buffer = buffer.get_mut(..length).ok_or(StoreError::Buffer(length))?;
+        let (words, tail) = buffer.split_at_mut(length - length % WORD);
         self.read(offset, words).await?;
         if !tail.is_empty() {
             let mut word = [0; WORD];
@@ -296,6 +296,6 @@ impl<F: NorFlash> Store<F> {
                 *to = from;
             }
         }
-        Table::read(room).map_err(StoreError::Table)
+        Table::read(buffer).map_err(StoreError::Table)
     }
 }

@@ -22,7 +22,7 @@ pub struct Request {
 /// does in between, and what it was asked for, is told before that.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub enum Ask {
-    /// How are you? [`super::Tell::Status`].
+    /// Asks how the probe is: [`super::Tell::Status`].
     Status,
     /// Ends a fault, then finds the limit switches.
     Home,
@@ -46,13 +46,13 @@ pub enum Ask {
     Forget(Forget),
     /// Measures the motor's current without load, takes and keeps it. [`super::Tell::Calibration`].
     Calibrate,
-    /// [`super::Tell::Calibration`].
+    /// Asks for the constants in use: [`super::Tell::Calibration`].
     ReadCalibration,
     /// Takes and keeps these constants: [`crate::rig::calibration::RigCalibration::to_bytes`].
     WriteCalibration(Vec<u8, 64>),
-    /// Whether raw samples are told: [`super::Tell::Block`].
+    /// Whether the probe sends raw samples: [`super::Tell::Block`].
     Stream(bool),
-    /// The table in use from this byte on. [`super::Tell::TablePart`].
+    /// Asks for the table in use from this byte on: [`super::Tell::TablePart`].
     ReadTable(u32),
     /// A table of so many bytes follows.
     BeginTable(u32),

@@ -12,7 +12,7 @@ use crate::movement::Movement;
 use crate::rig::guard::Fault;
 use crate::table::{Action, MAX_TEXTURES, Name};
 
-/// Most actions of an outlook that are told, the best ones.
+/// Most actions that are sent of an outlook: the best ones.
 pub const MAX_OUTLOOK: usize = 16;
 
 /// From the probe.
@@ -22,11 +22,11 @@ pub struct Report {
     pub number: u16,
     /// Since the probe booted, ms.
     pub at_ms: u32,
-    /// What there is to say.
+    /// What happened.
     pub tell: Tell,
 }
 
-/// What the probe may say.
+/// What can happen.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant)] // no allocation here, and only one at a time
 pub enum Tell {
@@ -38,7 +38,7 @@ pub enum Tell {
         version: String<16>,
         /// Why.
         reset: Reset,
-        /// What the firmware had to say before it gave up, if it did.
+        /// Why the firmware gave up before the reset, if it did.
         last_words: Option<Text>,
     },
     /// Answer to [`super::Ask::Status`].
@@ -49,7 +49,7 @@ pub enum Tell {
     Refused {
         /// Its number.
         id: u16,
-        /// Why, and what to do.
+        /// Why, and what to do next.
         why: Text,
     },
     /// A frame was damaged; so many were since the probe booted.

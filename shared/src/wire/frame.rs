@@ -29,13 +29,13 @@ impl fmt::Display for TooLong {
 
 impl core::error::Error for TooLong {}
 
-/// A frame of `message`, its closing 0 included, at the beginning of `room`.
+/// A frame of `message`, its closing 0 included, at the beginning of `buffer`.
 ///
 /// # Errors
 /// [`TooLong`].
 pub fn encode<'r, M: Serialize>(
     message: &M,
-    room: &'r mut [u8; MAX_FRAME + 1],
+    buffer: &'r mut [u8; MAX_FRAME + 1],
 ) -> Result<&'r [u8], TooLong> {
     let mut bytes = [0; MAX_MESSAGE + CRC_BYTES];
     let (body, _) = bytes.split_at_mut(MAX_MESSAGE);
@@ -47,9 +47,9 @@ pub fn encode<'r, M: Serialize>(
     let whole = bytes.get_mut(..length + CRC_BYTES).ok_or(TooLong)?;
     let end = whole.last_chunk_mut::<CRC_BYTES>().ok_or(TooLong)?;
     *end = crc;
-    let length = cobs::try_encode(whole, room).map_err(|_| TooLong)?;
-    // the room was chosen for it
-    let frame = room.get_mut(..=length).ok_or(TooLong)?;
+    let length = cobs::try_encode(whole, buffer).map_err(|_| TooLong)?;
+    // the buffer was chosen for it
+    let frame = buffer.get_mut(..=length).ok_or(TooLong)?;
     if let Some(closing) = frame.last_mut() {
         *closing = 0;
     }

@@ -12,7 +12,7 @@ pub fn text(sentence: impl fmt::Display) -> Text {
     cut(&sentence)
 }
 
-/// Once, whatever is said.
+/// Not generic, so that the firmware has this code once.
 #[inline(never)]
 fn cut(sentence: &dyn fmt::Display) -> Text {
     /// Takes what fits.
