@@ -18,9 +18,8 @@ pub mod steps;
 pub mod timeout;
 pub mod unloaded;
 
-use crate::features::{PropertySet, Slide};
+use crate::features::{Movement, PropertySet, Slide};
 use crate::kernels::Kernels;
-use crate::movement::Movement;
 
 pub use fault::{FAULTS, Fault};
 pub use phase::{Ended, Phase, Refused, RigError};

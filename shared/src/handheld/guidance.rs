@@ -3,7 +3,7 @@
 use core::fmt;
 use core::ops::RangeInclusive;
 
-use crate::fused::Observation;
+use crate::features::Observation;
 
 /// The force that is asked for, mN: about [`super::judge::MOVEMENT`]'s, as wide as people hold it without looking.
 pub const ZONE_MN: RangeInclusive<f32> = 300.0..=750.0;

@@ -5,10 +5,8 @@ use core::fmt;
 use heapless::Vec;
 
 use crate::explorer::{Config, Explorer, ExplorerError, Method, ObserveError};
-use crate::features::PropertySet;
-use crate::fused::{FeatureSet, Observation};
+use crate::features::{FeatureSet, Movement, Observation, PropertySet};
 use crate::kernels::Kernels;
-use crate::movement::Movement;
 use crate::session::Visited;
 use crate::table::{Action, Table};
 use crate::wire::{MAX_TEXTURES, Name};

@@ -8,10 +8,10 @@ use super::judge::{JudgeError, Judgement, MAX_SLIDES, free_name};
 use super::screen::{self, About, Row, Screen, Trouble};
 use super::spelling::{Spelling, Taken};
 use super::touch::Touch;
-use crate::features::Plan;
-use crate::fused::Observation;
+use crate::dsp::Plan;
+use crate::features::Observation;
 use crate::kernels::Kernels;
-use crate::pressure::Pressure;
+use crate::sensor::pressure::Pressure;
 use crate::table::Table;
 use crate::wire::{Name, Text, text};
 

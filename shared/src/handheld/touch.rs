@@ -7,10 +7,10 @@ use heapless::{Deque, Vec};
 
 // until all users have the new path
 pub use super::guidance::{Again, Event, Phase, View, ZONE_MN};
-use crate::features::{Plan, Slide, SlideError};
-use crate::fused::Observation;
+use crate::dsp::Plan;
+use crate::features::{Observation, Slide, SlideError};
 use crate::kernels::Kernels;
-use crate::pressure::{Calibration, Channel, Pressure, RATE_HZ};
+use crate::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ};
 
 /// Samples of a channel in a block: 10 ms.
 const BLOCK: usize = 22;

@@ -2,7 +2,7 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 
-use crate::pressure::{Calibration, CalibrationError};
+use crate::sensor::pressure::{Calibration, CalibrationError};
 
 const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 

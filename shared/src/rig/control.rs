@@ -14,8 +14,8 @@ use super::pins::{Inputs, Outputs};
 use super::skin::SkinCare;
 use super::slide::Run;
 use super::stage::{MARGIN_MM, Stage, StageConstants, StageState};
-use crate::movement::Movement;
-use crate::pressure::{Calibration, Channel};
+use crate::features::Movement;
+use crate::sensor::pressure::{Calibration, Channel};
 
 // until all users have the new path
 pub use super::phase::{Ended, Phase, Refused};
@@ -135,7 +135,7 @@ impl Control {
     /// Takes other constants, while nothing moves.
     ///
     /// # Errors
-    /// [`Refused::Busy`], or [`Refused::Calibration`] for constants that cannot be.
+    /// [`Refused::Busy`], or [`Refused::Calibration`] for constants that cannot be used.
     pub fn calibrate(&mut self, calibration: RigCalibration) -> Result<(), Refused> {
         if !self.is_at_rest() {
             return Err(Refused::Busy);

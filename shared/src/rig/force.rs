@@ -1,6 +1,6 @@
 //! Contact force from P_DC: a mean over 10 ms, and where that mean is going.
 
-use crate::pressure::{Calibration, Counts, RATE_HZ};
+use crate::sensor::pressure::{Calibration, Counts, RATE_HZ};
 
 /// Samples of P_DC in a mean: 10 ms.
 pub const MEAN_SAMPLES: usize = 22;

@@ -1,7 +1,7 @@
 //! Notices every fault that can be seen from outside the lever and the stage: sensor, switches, stage and force.
 
 use super::force::ForceMeter;
-use crate::pressure::{Calibration, Pressure};
+use crate::sensor::pressure::{Calibration, Pressure};
 
 // until all users have the new path
 pub use super::fault::{FAULTS, Fault, Row};

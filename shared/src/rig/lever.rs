@@ -5,7 +5,7 @@
 
 use super::fault::Fault;
 use super::force::ForceMeter;
-use crate::pressure::Counts;
+use crate::sensor::pressure::Counts;
 
 /// Travel of the reference lever per step, um: lead 2 mm, 200 steps, 1/16.
 pub const STEP_UM: f32 = 0.625;

@@ -4,7 +4,7 @@ use core::fmt;
 
 use super::calibration::RigCalibrationError;
 use super::fault::Fault;
-use crate::movement::{Movement, MovementError};
+use crate::features::{Movement, MovementError};
 
 /// Forces over this are pressed only by a rig that was allowed to.
 pub(super) const HIGH_FORCE_MN: u16 = Movement::FOR_TRACTION.force_mn();

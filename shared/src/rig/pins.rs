@@ -3,7 +3,7 @@
 
 use heapless::Vec;
 
-use crate::pressure::Pressure;
+use crate::sensor::pressure::Pressure;
 
 pub use crate::features::Felt;
 

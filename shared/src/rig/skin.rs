@@ -1,6 +1,6 @@
 //! Wear of the skin: sliding rubs the fingerprints off, and roughness changes when they go.
 
-use crate::movement::Movement;
+use crate::features::Movement;
 
 /// Wear after which the skin should be looked at, J of sliding weighted by [`wearing`].
 ///

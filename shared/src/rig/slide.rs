@@ -7,8 +7,8 @@ use super::phase::Ended;
 use super::pins::{Felt, Inputs, Outputs};
 use super::slide_path::SlidePath;
 use super::stage::{MARGIN_MM, StageConstants};
-use crate::movement::Movement;
-use crate::pressure::{Channel, RATE_HZ};
+use crate::features::Movement;
+use crate::sensor::pressure::{Channel, RATE_HZ};
 use crate::up_to;
 
 /// Longest slide at constant speed, s.

@@ -1,6 +1,6 @@
 //! What a slide asks of the stage.
 
-use crate::movement::Movement;
+use crate::features::Movement;
 
 /// Constant speed over `length_mm`, with a ramp before and one after.
 #[derive(Clone, Copy, PartialEq, Debug)]

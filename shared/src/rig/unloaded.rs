@@ -60,7 +60,7 @@ impl UnloadedRuns {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pressure::Calibration;
+    use crate::sensor::pressure::Calibration;
     use std::vec::Vec;
 
     const RIG: RigCalibration = RigCalibration {

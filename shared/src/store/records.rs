@@ -11,10 +11,8 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{SettingsError, StoreError};
 use super::pages::Pages;
-use crate::fused::Whitened;
-use crate::movement::Movement;
-use crate::table::{MAX_TEXTURES, Name};
-use crate::training::Lesson;
+use crate::features::Movement;
+use crate::table::{Lesson, MAX_TEXTURES, Name, Whitened};
 
 /// Most records of training: a pilot of 30 movements and three textures of three. With all of them in use, 108 bytes each,
 /// and everything self-taught besides, 84 bytes a texture, a page of 16 KB is not full.

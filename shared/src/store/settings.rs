@@ -14,11 +14,10 @@ use super::records::{
     decode,
 };
 use super::sectors::Store;
-use crate::movement::Movement;
+use crate::features::Movement;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
-use crate::table::MAX_TEXTURES;
-use crate::training::Lesson;
+use crate::table::{Lesson, MAX_TEXTURES};
 
 /// How a place for a record is used, as a new record sees it.
 #[derive(Clone, Copy, PartialEq)]

@@ -6,13 +6,12 @@ mod self_taught;
 mod wear;
 
 use super::*;
-use crate::movement::Movement;
-use crate::pressure::Calibration;
+use crate::features::Movement;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
+use crate::sensor::pressure::Calibration;
 use crate::table::tests::{around, table_of};
-use crate::table::{Experience, Table, TableError};
-use crate::training::Lesson;
+use crate::table::{Experience, Lesson, Table, TableError};
 use crate::wire::Name;
 use embassy_futures::block_on;
 use ram::{Ram, RamError, SECTOR};

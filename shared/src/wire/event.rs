@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use super::command::PART;
 use super::sparse;
 use super::text::Text;
-use crate::features::{Block, FUSED_BANDS, Measurement, Properties, Property};
-use crate::fused::Observation;
-use crate::movement::Movement;
+use crate::features::{
+    Block, FUSED_BANDS, Measurement, Movement, Observation, Properties, Property,
+};
 use crate::rig::guard::Fault;
 use crate::table::{Action, MAX_TEXTURES, Name};
 

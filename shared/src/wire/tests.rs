@@ -1,7 +1,6 @@
 use super::*;
 use crate::explorer::Method;
-use crate::features::{FUSED_BANDS, Properties, Property, PropertySet};
-use crate::movement::Movement;
+use crate::features::{FUSED_BANDS, Movement, Properties, Property, PropertySet};
 use crate::rig::guard::Fault;
 use crate::table::Action;
 use heapless::{String, Vec};

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::kernels::Plain;
-use crate::pressure::Counts;
+use crate::sensor::pressure::Counts;
 use crate::session::Random;
 use proptest::prelude::*;
 use std::vec::Vec as List;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::pressure::{Channel, Counts};
+use crate::sensor::pressure::{Channel, Counts};
 
 fn word(channel: Channel, counts: u16) -> Option<Pressure> {
     Some(Pressure {

@@ -2,7 +2,7 @@
 
 use super::ram::Torn;
 use super::*;
-use crate::fused::Whitened;
+use crate::table::Whitened;
 use crate::table::tests::fixed;
 use proptest::prelude::*;
 

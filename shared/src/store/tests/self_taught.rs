@@ -1,7 +1,8 @@
 //! What the probe has learned by itself, on the chip's own sectors: all of it, with all training.
 
 use super::*;
-use crate::fused::{MAX_FEATURES, Whitened};
+use crate::features::MAX_FEATURES;
+use crate::table::Whitened;
 use crate::wire::MAX_TEXTURES;
 
 const CHIP: usize = 16 * 1024;
