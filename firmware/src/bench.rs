@@ -9,8 +9,8 @@ use static_cell::StaticCell;
 use tactus_core::features::Plan;
 
 use crate::board;
+use crate::chip::Chip;
 use crate::chip::rescue;
-use crate::kernels::Chip;
 use crate::workload::{Counter, Workload, run};
 
 const WORDS: usize = 8192;

@@ -8,7 +8,6 @@ mod bench;
 mod board;
 mod chip;
 mod handheld;
-mod kernels;
 mod rig;
 mod selftest;
 mod tasks;

@@ -1,13 +1,15 @@
 //! From samples to power and spectrum: the band-pass, frames and transforms, and arithmetic in fixed point.
 //!
-//! The inner loops stand behind [`crate::kernels::Kernels`]. Of the sensor this room knows the sample rate only.
+//! The inner loops stand behind [`Kernels`]. Of the sensor this room knows the sample rate only.
 
 mod fir;
 pub mod fixed;
+mod kernels;
 mod plan;
 mod spectrum;
 
 pub use fir::BandPower;
+pub use kernels::{Kernels, Plain};
 pub use microfft::Complex32;
 pub use plan::{Angles, FRAME, Folded, PAIRS, PASS_BAND_HZ, Plan, TAPS, Taps, angles};
 pub use spectrum::{BIN_HZ, BINS, FrameSum, HOP, Spectrum, SpectrumSum};

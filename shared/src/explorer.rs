@@ -10,18 +10,21 @@ use core::marker::PhantomData;
 use heapless::{Vec, VecView};
 use serde::{Deserialize, Serialize};
 
+use crate::dsp::Plain;
 use crate::features::{Property, PropertySet};
 use crate::fused::{FeatureSet, Observation, Vector};
-use crate::kernels::{Kernels, Live, Plain, confused};
 use crate::table::{Action, Contents, Gaussian, MAX_ACTIONS, MAX_MOVEMENTS, Table, mean_step};
 use crate::up_to;
 
 mod confusions;
 mod fused;
+pub mod kernels;
 mod student;
 
 pub use confusions::{Confusions, Degrees};
 use fused::{Background, Visits};
+pub use kernels::Kernels;
+use kernels::{Live, confused};
 use student::{Shrunk, Student};
 
 /// Textures less probable than this are left out of the expected uncertainty: each changes it by at most about twice its

@@ -17,7 +17,6 @@ pub mod dsp;
 pub mod explorer;
 pub mod features;
 pub mod handheld;
-pub mod kernels;
 pub mod probe;
 pub mod rig;
 pub mod sensor;
@@ -50,6 +49,17 @@ pub mod spectrum {
         Angles, BIN_HZ, BINS, Complex32, FRAME, Folded, FrameSum, HOP, Spectrum, SpectrumSum,
         angles,
     };
+}
+
+/// See [`dsp`] and [`explorer::kernels`].
+pub mod kernels {
+    pub use crate::dsp::Plain;
+    pub use crate::explorer::kernels::{Candidate, EXP2, FAR, Live, ROUND, Spread, exp_neg};
+
+    /// What costs the time of a slide and of a decision.
+    pub trait Kernels: crate::dsp::Kernels + crate::explorer::Kernels {}
+
+    impl<K: crate::dsp::Kernels + crate::explorer::Kernels> Kernels for K {}
 }
 
 /// See [`features`] and [`rig::slide_path`].

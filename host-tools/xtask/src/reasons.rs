@@ -95,11 +95,11 @@ const REASONS: &[Reason] = &[
         "a number of 32 bits takes at most the five bytes that it has",
     ),
     never(
-        &["tactus_firmware::kernels::fold"],
+        &["tactus_firmware::chip::dsp_kernels::fold"],
         "divides by half the length of a plan's table, which is not empty",
     ),
     never(
-        &["features::Slide<", "fir::BandPower>"],
+        &["slide::Slide<", "fir::BandPower>"],
         "moves the end of its block to its beginning: the block is never longer than its room",
     ),
     never(
@@ -125,7 +125,11 @@ const REASONS: &[Reason] = &[
     ),
     Reason {
         panics: &["expect_failed", "option::unwrap_failed"],
-        callers: &["explorer::Explorer<", "session::identify<"],
+        callers: &[
+            "explorer::posterior::Explorer<",
+            "explorer::Explorer<",
+            "session::identify<",
+        ],
         why: "gathers what a table has of movements, actions and textures, which is checked to fit when the table is read",
     },
 ];

@@ -3,8 +3,8 @@
 //! Samples and coefficients are 16-bit integers and the sums are exact, so the power does not depend on how the samples
 //! were cut into blocks, nor on the machine.
 
+use super::kernels::Kernels;
 use super::plan::{HISTORY, Taps};
-use crate::kernels::Kernels;
 
 /// Samples filtered at once, whole sixes for kernels that take so many. No result depends on it.
 const BLOCK: usize = 264;
@@ -94,9 +94,9 @@ impl BandPower {
 
 #[cfg(test)]
 mod tests {
+    use super::super::kernels::Plain;
     use super::super::plan::tests::gain;
     use super::*;
-    use crate::kernels::Plain;
     use crate::sensor::pressure::RATE_HZ;
     use core::f64::consts::PI;
     use proptest::prelude::*;

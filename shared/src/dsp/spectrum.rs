@@ -16,8 +16,8 @@ use microfft::Complex32;
 use microfft::complex::{cfft_32, cfft_64, cfft_128};
 use microfft::real::rfft_64;
 
+use super::kernels::Kernels;
 use super::plan::{Angles, FRAME, Folded};
-use crate::kernels::Kernels;
 use crate::sensor::pressure::RATE_HZ;
 
 /// Samples from one frame to the next.
@@ -265,9 +265,9 @@ impl Spectrum {
 
 #[cfg(test)]
 mod tests {
+    use super::super::kernels::Plain;
     use super::super::plan::angles;
     use super::*;
-    use crate::kernels::Plain;
     use proptest::prelude::*;
     use std::vec::Vec;
 

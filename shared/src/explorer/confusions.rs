@@ -3,8 +3,8 @@
 
 use heapless::Vec;
 
+use super::kernels::{Candidate, Kernels, Live};
 use super::{Explorer, Method, Outlook, confuse_with, fused};
-use crate::kernels::{Candidate, Kernels, Live};
 use crate::table::{Action, MAX_ACTIONS};
 
 /// Actions side by side in [`Degrees`].

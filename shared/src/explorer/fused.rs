@@ -6,9 +6,9 @@
 
 use heapless::{Vec, VecView};
 
+use super::kernels::{Candidate, FREEDOM, Kernels, Spread, distance, mask};
 use crate::features::{MAX_FEATURES, Vector};
 use crate::fixed::exp_neg_q30;
-use crate::kernels::{Candidate, FREEDOM, Kernels, Spread, distance, mask};
 use crate::table::{Contents, MAX_MOVEMENTS, Table};
 use crate::table::{oas, white};
 use crate::up_to;

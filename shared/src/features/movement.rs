@@ -4,8 +4,6 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
-// until all users have the new path
-
 /// One exploratory movement: the contact force that is set before the slide and the speed of the slide.
 ///
 /// Whole millinewtons and micrometres per second, so that a movement in a table, on the link and in a recording's manifest

@@ -7,8 +7,7 @@ use core::marker::PhantomData;
 use core::ops::Range;
 
 use super::property::Properties;
-use crate::dsp::{BandPower, FRAME, Plan, Spectrum, SpectrumSum, TAPS};
-use crate::kernels::{Kernels, Plain};
+use crate::dsp::{BandPower, FRAME, Kernels, Plain, Plan, Spectrum, SpectrumSum, TAPS};
 
 /// Edges of eight bands from 20 to 1000 Hz in equal ratios, as half-open ranges of bins.
 pub const BAND_EDGES: [usize; 9] = [5, 8, 13, 21, 33, 54, 88, 143, 233];

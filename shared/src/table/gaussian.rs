@@ -16,7 +16,8 @@ pub const fn mean_step(property: Property) -> f32 {
     }
 }
 
-/// What one property of a texture is expected to be (eq. 4). The order of the fields is fixed: [`crate::kernels`].
+/// What one property of a texture is expected to be (eq. 4). The order of the fields is fixed, for kernels that are
+/// not written in Rust.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[repr(C)]
 pub struct Gaussian {

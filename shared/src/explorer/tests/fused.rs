@@ -862,8 +862,8 @@ fn a_slide_without_the_features_teaches_nothing() {
 /// The last texture of a table has fewer bytes behind its mean than a kernel reads at once.
 #[test]
 fn what_lies_behind_a_mean_does_not_count() {
+    use crate::explorer::kernels::{Candidate, mask};
     use crate::fused::MAX_FEATURES;
-    use crate::kernels::{Candidate, mask};
     let mean = [3i16, -400, 5000, -32768];
     let mut bytes: Vec<u8> = mean.iter().flat_map(|m| m.to_le_bytes()).collect();
     let last = Candidate::new(&bytes, &mask(mean.len()), 0.5, 7);

@@ -1,9 +1,8 @@
 //! Features against their definitions.
 
 use super::*;
-use crate::dsp::Plan;
+use crate::dsp::{Plain, Plan};
 use crate::features::Slide;
-use crate::kernels::Plain;
 use crate::table::tests::whitening::Noise;
 use std::vec;
 use std::vec::Vec as List;

@@ -1,16 +1,10 @@
-//! The inner loops, behind one type parameter: a chip may bring faster ones without touching the core.
+//! The inner loops of a decision, behind one type parameter: a chip may bring faster ones without touching the core.
 //!
 //! [`Plain`] is the reference. Another implementation must give the same integers, and the same floats to the bit.
 
-use core::mem::MaybeUninit;
-
-use microfft::Complex32;
-
-use crate::features::Property;
-use crate::fir::{TAPS, Taps};
-use crate::fixed::{exp_neg_q30, ln_q16};
-use crate::fused::MAX_FEATURES;
-use crate::spectrum::{Angles, FRAME, Folded};
+use crate::dsp::Plain;
+use crate::dsp::fixed::{exp_neg_q30, ln_q16};
+use crate::features::{MAX_FEATURES, Property};
 use crate::table::{Gaussian, Gaussians};
 
 /// A texture that is still likely, while a movement is weighed. The order of the fields is fixed, for kernels that are not
@@ -18,7 +12,7 @@ use crate::table::{Gaussian, Gaussians};
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct Candidate {
-    /// Its whitened mean, filled up with zeros: [`crate::fused`].
+    /// Its whitened mean, filled up with zeros.
     pub mean: [i16; MAX_FEATURES],
     /// Its probability.
     pub probability: f32,
@@ -189,32 +183,9 @@ pub(crate) fn distance(from: &[i16], mean: &[u8]) -> u64 {
 
 /// A property this many standard deviations off, squared and halved, counts as no farther: 1024 in Q16.
 const MOST_OFF: i32 = (1 << 26) - 1;
-/// What costs the time of a slide and of a decision.
+
+/// What costs the time of a decision.
 pub trait Kernels {
-    /// Filters `samples` and returns the sum of the squared outputs, in Q14 counts^2: each output is the sum of products
-    /// (Q15) rounded to Q7.
-    ///
-    /// The first output is due at sample `TAPS - 1` (those before it are history), so there are
-    /// `samples.len() - (TAPS - 1)` outputs, and none of fewer samples. No sample is outside -4096..=4095, which keeps
-    /// the sum of products inside i32.
-    fn band_energy(taps: &Taps, samples: &[i16]) -> u64;
-
-    /// Multiplies a frame by twice the Hann window, 1 - cos(2 pi n / N), and folds it as [`Kernels::fold`] does. No sample is
-    /// outside -16384..=16383, so that sums of two are 16 bits.
-    fn fold_frame<'r>(
-        angles: &Angles,
-        frame: &[i16; FRAME],
-        room: &'r mut MaybeUninit<Folded>,
-    ) -> &'r mut Folded;
-
-    /// Halves the transform of reals, of which each of `reals` has one and that half of them later: the first half of `folded`,
-    /// transformed, is bins 1, 5, 9 and so on, and the other one has the reals, in such pairs again, whose bins are 0, 2, 4 and
-    /// so on (decimation in frequency). Both are as long as each other, a power of 2 from 8 to 128.
-    fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]);
-
-    /// Adds |X|^2 of each bin to its sum.
-    fn add_power(bins: &[Complex32], sums: &mut [f32]);
-
     /// Makes logarithms 0.
     fn forget(logs: &mut [i32]);
 
@@ -248,67 +219,7 @@ pub trait Kernels {
     fn sqrt(x: f32) -> f32;
 }
 
-/// Plain Rust, the same on chip and PC.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Plain;
-
 impl Kernels for Plain {
-    fn band_energy(taps: &Taps, samples: &[i16]) -> u64 {
-        samples
-            .windows(TAPS)
-            .map(|x| {
-                let y = x
-                    .iter()
-                    .zip(taps.reversed())
-                    .fold(0i32, |sum, (&x, &h)| sum + i32::from(x) * i32::from(h));
-                let y = i64::from((y + (1 << 7)) >> 8);
-                (y * y) as u64
-            })
-            .sum()
-    }
-
-    fn fold_frame<'r>(
-        angles: &Angles,
-        frame: &[i16; FRAME],
-        room: &'r mut MaybeUninit<Folded>,
-    ) -> &'r mut Folded {
-        let folded = room.write([Complex32::new(0.0, 0.0); FRAME / 2]);
-        let ([odd, even], _) = folded.as_chunks_mut::<{ FRAME / 4 }>() else {
-            return folded;
-        };
-        let ([a, b, c, d], _) = frame.as_chunks::<{ FRAME / 4 }>() else {
-            return folded;
-        };
-        let x = a.iter().zip(b).zip(c.iter().zip(d)).zip(angles);
-        for ((((a, b), (c, d)), &[cos, sin]), (odd, even)) in x.zip(odd.iter_mut().zip(even)) {
-            let [a, b, c, d] = [a, b, c, d].map(|x| i32::from(*x));
-            let [sum, apart, sum_1, apart_1] = [a + c, a - c, b + d, b - d].map(|x| x as f32);
-            // the windows of a, b, c and d are 1 - cos, 1 + sin, 1 + cos and 1 - sin
-            even.re = sum - cos * apart;
-            even.im = sum_1 + sin * apart_1;
-            *odd = turned(apart - cos * sum, apart_1 + sin * sum_1, [cos, sin]);
-        }
-        folded
-    }
-
-    fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]) {
-        let half = reals.len() / 2;
-        let (a, b) = reals.split_at_checked(half).unwrap_or_default();
-        let (odd, even) = folded.split_at_mut_checked(half).unwrap_or_default();
-        let angles = angles.iter().step_by((angles.len() / half.max(1)).max(1));
-        let x = a.iter().zip(b).zip(angles);
-        for (((a, b), angle), (odd, even)) in x.zip(odd.iter_mut().zip(even)) {
-            *even = Complex32::new(a.re + a.im, b.re + b.im);
-            *odd = turned(a.re - a.im, b.re - b.im, *angle);
-        }
-    }
-
-    fn add_power(bins: &[Complex32], sums: &mut [f32]) {
-        for (sum, bin) in sums.iter_mut().zip(bins) {
-            *sum = *sum + bin.re * bin.re + bin.im * bin.im;
-        }
-    }
-
     fn forget(logs: &mut [i32]) {
         logs.fill(0);
     }
@@ -381,12 +292,6 @@ impl Kernels for Plain {
     fn sqrt(x: f32) -> f32 {
         libm::sqrtf(x)
     }
-}
-
-/// (p - iq) (cos - i sin), each product and sum rounded.
-#[inline]
-fn turned(p: f32, q: f32, [cos, sin]: [f32; 2]) -> Complex32 {
-    Complex32::new(p * cos - q * sin, -(p * sin) - q * cos)
 }
 
 /// 1.5 * 2^23: adding it leaves a number's whole part in the lowest bits.

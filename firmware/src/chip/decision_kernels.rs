@@ -1,100 +1,21 @@
-//! The core's inner loops for this chip. Their plain twins are `tactus_core::kernels::Plain`: `cargo xtask bench` compares
+//! The inner loops of a decision for this chip. Their plain twins are `tactus_core::dsp::Plain`: `cargo xtask bench` compares
 //! them, to the bit.
 
-use core::arch::{asm, global_asm};
-use core::mem::{MaybeUninit, offset_of};
+use core::arch::global_asm;
+use core::mem::offset_of;
 
-use tactus_core::fir::{TAPS, Taps};
-use tactus_core::fixed::{EXP2 as EXP2_PARTS, LN, LN_2, LOG2_E, PARTS};
-use tactus_core::fused::MAX_FEATURES;
-use tactus_core::kernels::{Candidate, EXP2, FAR, Kernels, Live, Plain, ROUND, Spread};
-use tactus_core::spectrum::{Angles, Complex32, FRAME, Folded};
-use tactus_core::table::{Gaussian, Gaussians};
+use tactus_core::dsp::Plain;
+use tactus_core::dsp::fixed::{EXP2, LN, LN_2, LOG2_E, PARTS};
+use tactus_core::explorer::kernels::{Candidate, Kernels, Live, Spread};
+use tactus_core::features::MAX_FEATURES;
+use tactus_core::table::Gaussians;
 
-/// Outputs of the band-pass that are computed at once.
-const AT_ONCE: usize = 6;
+use super::confusion_kernel::confuse;
+use super::dsp_kernels::Chip;
 
-// Six outputs at once, two products an instruction: r2, r4 and r6 are those that begin with the first sample of a pair, r3, r5
-// and r7 those between them; r8 to r10 are pairs of samples, r11 and r12 pairs of coefficients. Six of the 34 steps make the
-// loop: it has to fit into the flash accelerator's 1 KB, and an inline assembly block leaves too few registers.
 global_asm!(
     // the assembler is not told of the FPU otherwise
     ".fpu fpv4-sp-d16",
-    ".macro tactus_fir_step a, b, c",
-    "ldrd r11, r12, [r0], #8",
-    "smlad r2, \\a, r11, r2",
-    "smlad r3, \\a, r12, r3",
-    "ldr \\a, [r1], #4",
-    "smlad r4, \\b, r11, r4",
-    "smlad r5, \\b, r12, r5",
-    "smlad r6, \\c, r11, r6",
-    "smlad r7, \\c, r12, r7",
-    ".endm",
-    ".macro tactus_fir_square y",
-    "asr \\y, \\y, #8",
-    "smlal r8, r9, \\y, \\y",
-    ".endm",
-    ".section .text.tactus_band_energy,\"ax\",%progbits",
-    ".global tactus_band_energy",
-    ".type tactus_band_energy,%function",
-    ".thumb_func",
-    // r0: pairs of coefficients; r1: samples; r2: how many sixes, not 0. Sum of squares in r0 and r1.
-    "tactus_band_energy:",
-    "push {{r4-r11, lr}}",
-    "mov r8, #0",
-    "mov r9, #0",
-    // 0: sum of squares; 8: sixes to go
-    "push {{r2, r3}}",
-    "push {{r8, r9}}",
-    "1:",
-    "ldr r8, [r1], #4",
-    "ldr r9, [r1], #4",
-    "ldr r10, [r1], #4",
-    // half of what is shifted out: rounded
-    "mov r2, #128",
-    "mov r3, #128",
-    "mov r4, #128",
-    "mov r5, #128",
-    "mov r6, #128",
-    "mov r7, #128",
-    "mov lr, #5",
-    "2:",
-    "tactus_fir_step r8, r9, r10",
-    "tactus_fir_step r9, r10, r8",
-    "tactus_fir_step r10, r8, r9",
-    "tactus_fir_step r8, r9, r10",
-    "tactus_fir_step r9, r10, r8",
-    "tactus_fir_step r10, r8, r9",
-    "subs lr, lr, #1",
-    "bne 2b",
-    "tactus_fir_step r8, r9, r10",
-    "tactus_fir_step r9, r10, r8",
-    "tactus_fir_step r10, r8, r9",
-    // the last step, without the pair behind the samples
-    "ldrd r11, r12, [r0], #-264",
-    "smlad r2, r8, r11, r2",
-    "smlad r3, r8, r12, r3",
-    "smlad r4, r9, r11, r4",
-    "smlad r5, r9, r12, r5",
-    "smlad r6, r10, r11, r6",
-    "smlad r7, r10, r12, r7",
-    "ldrd r8, r9, [sp]",
-    "tactus_fir_square r2",
-    "tactus_fir_square r3",
-    "tactus_fir_square r4",
-    "tactus_fir_square r5",
-    "tactus_fir_square r6",
-    "tactus_fir_square r7",
-    "ldr r2, [sp, #8]",
-    "strd r8, r9, [sp]",
-    // 36 pairs were read, the next six outputs begin with the fourth of them
-    "sub r1, r1, #132",
-    "subs r2, r2, #1",
-    "str r2, [sp, #8]",
-    "bne 1b",
-    "pop {{r0, r1, r2, r3}}",
-    "pop {{r4-r11, pc}}",
-    ".size tactus_band_energy, . - tactus_band_energy",
     // One texture: r4 to r10 are the mean that the others are compared with, two numbers each, r1 where the next texture's begins,
     // r2 the next logarithm, r3 where they end.
     ".macro tactus_likelihood last",
@@ -389,8 +310,6 @@ global_asm!(
 );
 
 unsafe extern "C" {
-    /// `samples` has [`TAPS`] - 1 and 6 `sixes` samples, of which none is outside -4096..=4095.
-    fn tactus_band_energy(pairs: *const [u32; 2], samples: *const i16, sixes: usize) -> u64;
     /// `from` has 13 numbers, 14 if `even`, and so has each of the `means`, `stride` bytes after each other, of which there are
     /// as many as logarithms up to `end`, one at least; `ln` is 256 bytes before [`LN`].
     fn tactus_likelihoods(
@@ -445,278 +364,6 @@ unsafe extern "C" {
     safe fn tactus_sqrt(x: f32) -> f32;
 }
 
-/// [`Kernels::fold_frame`], two angles at a time: sums of two samples by one instruction, and then what `Plain` does, in its
-/// order (VMLA rounds the product).
-#[inline(never)]
-fn fold_frame<'r>(
-    angles: &Angles,
-    frame: &[i16; FRAME],
-    room: &'r mut MaybeUninit<Folded>,
-) -> &'r mut Folded {
-    let begin: *mut Complex32 = room.as_mut_ptr().cast();
-    // SAFETY: it reads all angles, an even number, and the whole frame, whose words need not be aligned; all of `room` is
-    // written.
-    unsafe {
-        asm!(
-            "2:",
-            "ldr {c}, [{f}, #{half}]",
-            "ldr {b}, [{f}, #{quarter}]",
-            "ldr {d}, [{f}, #{three_quarters}]",
-            "ldr {a}, [{f}], #4",
-            "vldmia {angles}!, {{s16-s19}}",
-            "sadd16 {x}, {a}, {c}",
-            "ssub16 {a}, {a}, {c}",
-            "sadd16 {c}, {b}, {d}",
-            "ssub16 {b}, {b}, {d}",
-            "vmov s8, s9, {x}, {c}",
-            "asr {x}, {x}, #16",
-            "asr {c}, {c}, #16",
-            "vmov s10, s11, {x}, {c}",
-            "vmov s0, s1, {a}, {b}",
-            "asr {a}, {a}, #16",
-            "asr {b}, {b}, #16",
-            "vmov s2, s3, {a}, {b}",
-            "vcvt.f32.s16 s8, s8, #0",
-            "vcvt.f32.s16 s9, s9, #0",
-            "vcvt.f32.s16 s0, s0, #0",
-            "vcvt.f32.s16 s1, s1, #0",
-            "vcvt.f32.s32 s10, s10",
-            "vcvt.f32.s32 s11, s11",
-            "vcvt.f32.s32 s2, s2",
-            "vcvt.f32.s32 s3, s3",
-            // even bins from s8 on, p and q of the odd ones from s0 on
-            "vmul.f32 s4, s16, s8",
-            "vmls.f32 s8, s16, s0",
-            "vsub.f32 s0, s0, s4",
-            "vmul.f32 s5, s17, s9",
-            "vmla.f32 s9, s17, s1",
-            "vadd.f32 s1, s1, s5",
-            "vmul.f32 s4, s18, s10",
-            "vmls.f32 s10, s18, s2",
-            "vsub.f32 s2, s2, s4",
-            "vmul.f32 s5, s19, s11",
-            "vmla.f32 s11, s19, s3",
-            "vadd.f32 s3, s3, s5",
-            "vmul.f32 s12, s0, s16",
-            "vmls.f32 s12, s1, s17",
-            "vnmul.f32 s13, s0, s17",
-            "vmls.f32 s13, s1, s16",
-            "vmul.f32 s14, s2, s18",
-            "vmls.f32 s14, s3, s19",
-            "vnmul.f32 s15, s2, s19",
-            "vmls.f32 s15, s3, s18",
-            "vstmia {odd}!, {{s12-s15}}",
-            "vstmia {even}!, {{s8-s11}}",
-            "cmp {odd}, {end}",
-            "bne 2b",
-            quarter = const 2 * FRAME / 4,
-            half = const 2 * FRAME / 2,
-            three_quarters = const 2 * FRAME / 4 * 3,
-            angles = inout(reg) angles.as_ptr() => _,
-            f = inout(reg) frame.as_ptr() => _,
-            odd = inout(reg) begin => _,
-            even = inout(reg) begin.add(FRAME / 4) => _,
-            end = in(reg) begin.add(FRAME / 4),
-            a = out(reg) _,
-            b = out(reg) _,
-            c = out(reg) _,
-            d = out(reg) _,
-            x = out(reg) _,
-            out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
-            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
-            out("s16") _, out("s17") _, out("s18") _, out("s19") _,
-            options(nostack),
-        );
-        room.assume_init_mut()
-    }
-}
-
-/// [`Kernels::fold`] of so many in both, a multiple of 4.
-///
-/// # Safety
-/// They are there.
-#[inline(never)]
-unsafe fn fold(angles: &Angles, reals: *const Complex32, folded: *mut Complex32, many: usize) {
-    let half = many / 2;
-    // SAFETY: it reads all of `reals`, writes all of `folded`, and takes as many angles as half of that, two at a time.
-    unsafe {
-        asm!(
-            "2:",
-            "vldmia {a}!, {{s0-s3}}",
-            "vldmia {b}!, {{s4-s7}}",
-            "vldr d8, [{angle}]",
-            "add {angle}, {angle}, {step}",
-            "vldr d9, [{angle}]",
-            "add {angle}, {angle}, {step}",
-            "vadd.f32 s8, s0, s1",
-            "vadd.f32 s9, s4, s5",
-            "vadd.f32 s10, s2, s3",
-            "vadd.f32 s11, s6, s7",
-            "vsub.f32 s0, s0, s1",
-            "vsub.f32 s4, s4, s5",
-            "vsub.f32 s2, s2, s3",
-            "vsub.f32 s6, s6, s7",
-            "vmul.f32 s12, s0, s16",
-            "vmls.f32 s12, s4, s17",
-            "vnmul.f32 s13, s0, s17",
-            "vmls.f32 s13, s4, s16",
-            "vmul.f32 s14, s2, s18",
-            "vmls.f32 s14, s6, s19",
-            "vnmul.f32 s15, s2, s19",
-            "vmls.f32 s15, s6, s18",
-            "vstmia {odd}!, {{s12-s15}}",
-            "vstmia {even}!, {{s8-s11}}",
-            "cmp {odd}, {end}",
-            "bne 2b",
-            angle = inout(reg) angles.as_ptr() => _,
-            step = in(reg) size_of_val(angles) / half,
-            a = inout(reg) reals => _,
-            b = inout(reg) reals.add(half) => _,
-            odd = inout(reg) folded => _,
-            even = inout(reg) folded.add(half) => _,
-            end = in(reg) folded.add(half),
-            out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
-            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
-            out("s16") _, out("s17") _, out("s18") _, out("s19") _,
-            options(nostack),
-        );
-    }
-}
-
-/// [`Kernels::add_power`] of so many, a multiple of 8 and not 0.
-///
-/// # Safety
-/// They are there.
-#[inline(never)]
-unsafe fn add_power(bins: *const Complex32, sums: *mut f32, many: usize) {
-    // SAFETY: it reads and writes as many.
-    unsafe {
-        asm!(
-            "2:",
-            "vldmia {bins}!, {{s0-s15}}",
-            "vldmia {sums}, {{s16-s23}}",
-            "vmla.f32 s16, s0, s0",
-            "vmla.f32 s17, s2, s2",
-            "vmla.f32 s18, s4, s4",
-            "vmla.f32 s19, s6, s6",
-            "vmla.f32 s20, s8, s8",
-            "vmla.f32 s21, s10, s10",
-            "vmla.f32 s22, s12, s12",
-            "vmla.f32 s23, s14, s14",
-            "vmla.f32 s16, s1, s1",
-            "vmla.f32 s17, s3, s3",
-            "vmla.f32 s18, s5, s5",
-            "vmla.f32 s19, s7, s7",
-            "vmla.f32 s20, s9, s9",
-            "vmla.f32 s21, s11, s11",
-            "vmla.f32 s22, s13, s13",
-            "vmla.f32 s23, s15, s15",
-            "vstmia {sums}!, {{s16-s23}}",
-            "cmp {sums}, {end}",
-            "bne 2b",
-            bins = inout(reg) bins => _,
-            sums = inout(reg) sums => _,
-            end = in(reg) sums.add(many),
-            out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
-            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
-            out("s16") _, out("s17") _, out("s18") _, out("s19") _, out("s20") _, out("s21") _, out("s22") _, out("s23") _,
-            options(nostack),
-        );
-    }
-}
-
-/// What [`confuse`] keeps in registers, from s16 on.
-static CONFUSE: [f32; 11] = {
-    let [c0, c1, c2, c3, c4, c5] = EXP2;
-    let octave = -core::f32::consts::LOG2_E;
-    [FAR, octave, ROUND, c0, c1, c2, c3, c4, c5, 1.0, 0.25]
-};
-
-// one load for all of a texture
-const _: () = assert!(
-    offset_of!(Live, probability) == 0
-        && offset_of!(Live, confused) == 4
-        && offset_of!(Live, expected) == 8
-        && offset_of!(Gaussian, mean) == 0
-        && offset_of!(Gaussian, sd) == 4
-);
-
-/// [`Kernels::confuse`] of one texture at least, up to `behind`. The same operations in the same order as
-/// `tactus_core::kernels::confused` and `exp_neg` have them (VMLA rounds the product), but for the comparison of the confusion
-/// with 0: adding that changes nothing.
-///
-/// # Safety
-/// `others` begin and end there.
-#[inline(never)]
-unsafe fn confuse(a: &mut Live, others: *mut Live, behind: *const Live) {
-    // SAFETY: it reads and writes `a`, the others and nothing else.
-    unsafe {
-        asm!(
-            "vldmia {constants}, {{s16-s26}}",
-            // its probability, what it is confused with, mean and standard deviation
-            "vldmia {a}, {{s0-s3}}",
-            "vmul.f32 s4, s3, s3",
-            "vadd.f32 s5, s3, s3",
-            "2:",
-            "vldmia {b}, {{s8-s11}}",
-            "vmul.f32 s12, s11, s11",
-            "vadd.f32 s12, s4, s12",
-            "vdiv.f32 s12, s25, s12",
-            "vsub.f32 s13, s2, s10",
-            "vmul.f32 s13, s13, s13",
-            "vmul.f32 s14, s26, s12",
-            "vmul.f32 s13, s13, s14",
-            "vcmp.f32 s13, s16",
-            "vmrs APSR_nzcv, fpscr",
-            "bgt 3f",
-            "vmul.f32 s14, s5, s11",
-            "vmul.f32 s14, s14, s12",
-            "vsqrt.f32 s14, s14",
-            "vmul.f32 s13, s13, s17",
-            "vadd.f32 s12, s13, s18",
-            "vsub.f32 s15, s12, s18",
-            "vsub.f32 s13, s13, s15",
-            "vmul.f32 s15, s19, s13",
-            "vadd.f32 s15, s15, s20",
-            "vmul.f32 s15, s15, s13",
-            "vadd.f32 s15, s15, s21",
-            "vmul.f32 s15, s15, s13",
-            "vadd.f32 s15, s15, s22",
-            "vmul.f32 s15, s15, s13",
-            "vadd.f32 s15, s15, s23",
-            "vmul.f32 s15, s15, s13",
-            "vadd.f32 s15, s15, s24",
-            "vmul.f32 s15, s15, s13",
-            "vadd.f32 s15, s15, s25",
-            "vmov {x}, s12",
-            "vmov {y}, s15",
-            "add {y}, {y}, {x}, lsl #23",
-            "vmov s15, {y}",
-            "vmul.f32 s14, s14, s15",
-            "vmla.f32 s1, s14, s8",
-            "vmla.f32 s9, s14, s0",
-            "vstr s9, [{b}, #4]",
-            "3:",
-            "add {b}, {b}, #{size}",
-            "cmp {b}, {behind}",
-            "bne 2b",
-            "vstr s1, [{a}, #4]",
-            constants = in(reg) &raw const CONFUSE,
-            a = in(reg) a,
-            b = inout(reg) others => _,
-            behind = in(reg) behind,
-            x = out(reg) _,
-            y = out(reg) _,
-            size = const size_of::<Live>(),
-            out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s8") _, out("s9") _,
-            out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _, out("s16") _, out("s17") _,
-            out("s18") _, out("s19") _, out("s20") _, out("s21") _, out("s22") _, out("s23") _, out("s24") _, out("s25") _,
-            out("s26") _,
-            options(nostack),
-        );
-    }
-}
-
 /// How many parts of a column there are, each so many bytes and so far from the next.
 fn there(column: &[u8], stride: usize, bytes: usize) -> usize {
     match column.len().checked_sub(bytes) {
@@ -730,48 +377,7 @@ fn before_ln() -> *const u32 {
     LN.as_ptr().cast::<u32>().wrapping_sub(2 * PARTS)
 }
 
-/// Cortex-M4F.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Chip;
-
 impl Kernels for Chip {
-    fn band_energy(taps: &Taps, samples: &[i16]) -> u64 {
-        let sixes = samples.len().saturating_sub(TAPS - 1) / AT_ONCE;
-        let rest = samples.get(sixes * AT_ONCE..).unwrap_or_default();
-        let rest = Plain::band_energy(taps, rest);
-        if sixes == 0 {
-            return rest;
-        }
-        // SAFETY: it reads all pairs and, as `sixes` was computed, no sample that is not there; words need not be aligned.
-        rest + unsafe { tactus_band_energy(taps.pairs().as_ptr(), samples.as_ptr(), sixes) }
-    }
-
-    fn fold_frame<'r>(
-        angles: &Angles,
-        frame: &[i16; FRAME],
-        room: &'r mut MaybeUninit<Folded>,
-    ) -> &'r mut Folded {
-        fold_frame(angles, frame, room)
-    }
-
-    fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]) {
-        let many = reals.len();
-        if many != folded.len() || many % 4 != 0 || many == 0 || many > FRAME / 4 {
-            return Plain::fold(angles, reals, folded);
-        }
-        // SAFETY: there are so many.
-        unsafe { fold(angles, reals.as_ptr(), folded.as_mut_ptr(), many) };
-    }
-
-    fn add_power(bins: &[Complex32], sums: &mut [f32]) {
-        let many = bins.len();
-        if many != sums.len() || many % 8 != 0 || many == 0 {
-            return Plain::add_power(bins, sums);
-        }
-        // SAFETY: there are so many.
-        unsafe { add_power(bins.as_ptr(), sums.as_mut_ptr(), many) };
-    }
-
     fn forget(logs: &mut [i32]) {
         let (eights, rest) = logs.as_chunks_mut::<8>();
         let eights = eights.as_flattened_mut().as_mut_ptr_range();
@@ -855,14 +461,7 @@ impl Kernels for Chip {
         // SAFETY: there are `many` of both.
         let sum = unsafe {
             let end = begin.add(many);
-            tactus_weigh(
-                logs.as_ptr(),
-                begin,
-                end,
-                top,
-                EXP2_PARTS.as_ptr(),
-                2 * LOG2_E,
-            )
+            tactus_weigh(logs.as_ptr(), begin, end, top, EXP2.as_ptr(), 2 * LOG2_E)
         };
         let total = sum as f32;
         let (eights, rest) = posterior.as_chunks_mut::<8>();
