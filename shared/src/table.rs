@@ -31,8 +31,6 @@ mod encode;
 mod format;
 mod gaussian;
 mod scatter;
-#[cfg(test)]
-pub(crate) mod tests;
 mod training_stats;
 mod view;
 mod whitening;
@@ -49,3 +47,6 @@ pub use scatter::{Scatter, WhitenError, whiten};
 pub use training_stats::{Experience, Lesson, Whitened};
 pub use view::Table;
 pub use whitening::{Whitening, white};
+
+#[cfg(test)]
+pub(crate) mod tests;

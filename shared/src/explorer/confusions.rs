@@ -3,8 +3,11 @@
 
 use heapless::Vec;
 
+use super::choice::{Outlook, benefit, confuse_with};
+use super::config::{Method, NEGLIGIBLE};
 use super::kernels::{Candidate, Kernels, Live};
-use super::{Explorer, Method, Outlook, confuse_with, fused};
+use super::posterior::{Explorer, LEAST};
+use super::whitened;
 use crate::table::{Action, MAX_ACTIONS};
 
 /// Actions side by side in [`Degrees`].
@@ -75,7 +78,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         // filled where it lies, and not moved: it is large
         let mut live: Vec<(u16, f32), N> = Vec::new();
         for (&probability, texture) in self.posterior.iter().zip(0..) {
-            if probability >= super::NEGLIGIBLE {
+            if probability >= NEGLIGIBLE {
                 // there is room: as much as for the posterior
                 let _ = live.push((texture, probability));
             }
@@ -89,7 +92,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             .map(|((&action, &made), uncertainty)| Outlook {
                 action,
                 uncertainty,
-                benefit: super::benefit(uncertainty, made),
+                benefit: benefit(uncertainty, made),
             })
             .collect()
     }
@@ -97,7 +100,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     /// Tells the degree of confusion of every two candidates by an action, as the kernels have it: these add it to both, times
     /// a probability that is 1 here.
     fn confuse_all(&self, action: Action, tell: impl FnMut(usize, usize, f32)) {
-        let is_candidate = |log: &i32| *log >= super::LEAST;
+        let is_candidate = |log: &i32| *log >= LEAST;
         let certain: Vec<f32, N> = self
             .log
             .iter()
@@ -108,10 +111,10 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         let method = self.config.method;
         if method == Method::Fused {
             let mut live: Vec<Candidate, N> = Vec::new();
-            fused::gather(&self.table, action.movement, &certain, &mut live);
+            whitened::gather(&self.table, action.movement, &certain, &mut live);
             let confuse = |a: &mut Candidate, others: &mut [Candidate]| {
                 K::candidate_distances(a, others);
-                fused::confuse_with(a, others);
+                whitened::confuse_with(a, others);
             };
             confuse_each(&mut live, &candidates, confuse, |c| &mut c.confused, tell);
         } else {

@@ -6,8 +6,10 @@ mod rules;
 mod student;
 
 use super::*;
-use crate::features::Properties;
+use crate::dsp::Plain;
+use crate::features::{FeatureSet, Observation, Properties, Property, PropertySet, Vector};
 use crate::table::tests::{around, fixed, table_of};
+use crate::table::{Action, Gaussian, Table};
 use proptest::prelude::{any, prop, prop_assert, prop_assert_eq, prop_assert_ne, proptest};
 use proptest::strategy::Strategy as _;
 use std::collections::BTreeMap;

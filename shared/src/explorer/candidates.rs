@@ -1,0 +1,124 @@
+//! Which textures an exploration tells apart, and by which actions.
+
+use super::config::{Config, ExplorerError, Method};
+use super::kernels::Kernels;
+use super::novelty::Background;
+use super::posterior::{Explorer, OUT};
+use super::student::Shrunk;
+use crate::features::{Property, PropertySet};
+use crate::table::{Action, Contents, Table};
+use crate::up_to;
+
+impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
+    /// An explorer for all textures of the table, for a rig that measures `measured`.
+    ///
+    /// # Errors
+    /// See [`ExplorerError`].
+    pub fn new(
+        table: Table<'t>,
+        measured: PropertySet,
+        config: Config,
+    ) -> Result<Self, ExplorerError> {
+        Self::among(table, measured, config, 0..table.textures())
+    }
+
+    /// An explorer that only considers `candidates` (Methods, "Texture Discrimination": a pair, all others at
+    /// probability 0).
+    ///
+    /// # Errors
+    /// See [`ExplorerError`].
+    pub fn among(
+        table: Table<'t>,
+        measured: PropertySet,
+        config: Config,
+        candidates: impl IntoIterator<Item = u16>,
+    ) -> Result<Self, ExplorerError> {
+        let mut explorer = Self::empty(table);
+        explorer.consider(measured, config, candidates)?;
+        Ok(explorer)
+    }
+
+    /// Makes an empty one what [`Explorer::among`] gives, where it lies: it is too large for a chip's stack to hold twice.
+    ///
+    /// # Errors
+    /// See [`ExplorerError`]; it is of no use then.
+    // with a method that is known while compiling, what the others take is left out
+    #[inline(always)]
+    pub(crate) fn consider(
+        &mut self,
+        measured: PropertySet,
+        config: Config,
+        candidates: impl IntoIterator<Item = u16>,
+    ) -> Result<(), ExplorerError> {
+        self.config = config;
+        let table = self.table;
+        let textures = table.textures();
+        let log = &mut self.log;
+        log.resize(textures.into(), OUT)
+            .map_err(|_| ExplorerError::Room { textures, room: N })?;
+        for texture in candidates {
+            *log.get_mut(usize::from(texture))
+                .ok_or(ExplorerError::Candidates)? = 0;
+        }
+        self.candidates = log.iter().filter(|&&l| l == 0).count() as u16;
+        if self.candidates == 0 {
+            return Err(ExplorerError::Candidates);
+        }
+        let method = config.method;
+        if !method.suits(table.contents()) {
+            return Err(ExplorerError::Method(method));
+        }
+        if let Contents::Fused(set, _) = table.contents()
+            && !set.measured_by(measured)
+        {
+            return Err(ExplorerError::Features(set));
+        }
+        let measured = measured.and(table.measured());
+        self.measured = measured;
+        let learned_by = |movement, most: fn(u8) -> bool| {
+            let mut candidates = log.iter().zip(0..).filter(|(l, _)| **l == 0);
+            candidates.all(|(_, texture)| most(table.trials(texture, movement)))
+        };
+        let movements = 0..table.movements().len() as u8;
+        let all_of = |movement| Action {
+            movement,
+            property: None,
+        };
+        self.actions = match method {
+            Method::Paper | Method::Student => table
+                .actions()
+                .filter(|a| a.property.is_some_and(|p| measured.contains(p)))
+                .filter(|a| learned_by(a.movement, |trials| trials >= 2))
+                .collect(),
+            Method::StudentAll => movements
+                .filter(|&m| !measured.is_empty() && learned_by(m, |trials| trials >= 2))
+                .map(all_of)
+                .collect(),
+            // one slide is enough, and a texture without any is not much in the way
+            Method::Fused => movements
+                .filter(|&m| !learned_by(m, |trials| trials == 0))
+                .map(all_of)
+                .collect(),
+        };
+        if self.actions.is_empty() {
+            return Err(ExplorerError::NothingToMeasure);
+        }
+        if let Method::Student | Method::StudentAll = method {
+            for movement in 0..table.movements().len() as u8 {
+                let of = Property::ALL.map(|property| Shrunk::new(&table, movement, property));
+                self.shrunk.extend(of);
+            }
+        }
+        if method == Method::Fused {
+            let backgrounds = self.actions.iter();
+            let backgrounds = backgrounds.map(|a| Background::new(&table, a.movement));
+            self.backgrounds.extend(backgrounds);
+        }
+        // as many
+        self.posterior = up_to(log.iter().map(|_| 0.0));
+        self.restart();
+        let actions = self.actions.iter();
+        self.at_first = actions.map(|a| self.uncertainty(method, *a)).collect();
+        Ok(())
+    }
+}

@@ -1,0 +1,216 @@
+//! The next movement: the one that should leave the least confusion among the textures that are still likely (eq. 7, 11-13).
+
+use heapless::{Vec, VecView};
+
+use super::config::{Method, NEGLIGIBLE, Strategy};
+use super::kernels::{Kernels, Live, confused};
+use super::posterior::Explorer;
+use super::whitened;
+use crate::features::{Property, PropertySet};
+use crate::table::{Action, Gaussian, MAX_ACTIONS, Table};
+
+/// What an action promises.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Outlook {
+    /// The action.
+    pub action: Action,
+    /// Uncertainty that is expected to remain after it (eq. 11), 0 to 1.
+    pub uncertainty: f32,
+    /// Its benefit (eq. 12), lower the more often it was made.
+    pub benefit: f32,
+}
+
+/// Degree of confusion of two textures by one property (eq. 7): 1 for equal, 0 for disjoint distributions.
+pub fn confusion<K: Kernels>(a: Gaussian, b: Gaussian) -> f32 {
+    confused(a, b, K::sqrt)
+}
+
+impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
+    /// The next action, where [`Explorer::outlook`] promises `outlook`. `random` decides for [`Strategy::Random`] and is
+    /// ignored otherwise.
+    pub fn choose(&self, outlook: &[Outlook], random: u32) -> Action {
+        let chosen = match self.config.strategy {
+            Strategy::Bayesian => {
+                // the first of equals
+                let best = outlook.iter().reduce(|best, next| {
+                    if next.benefit > best.benefit {
+                        next
+                    } else {
+                        best
+                    }
+                });
+                best.map(|o| o.action)
+            }
+            Strategy::Cycling => {
+                let turns = self.turns().count().max(1);
+                self.turns().nth(usize::from(self.slides) % turns)
+            }
+            Strategy::Random => {
+                let at = (u64::from(random) * self.actions.len() as u64) >> 32;
+                self.actions.get(at as usize).copied()
+            }
+        };
+        // there is always an action: `among` refuses to begin without
+        chosen.unwrap_or(Action {
+            movement: 0,
+            property: None,
+        })
+    }
+
+    /// What every action promises now, in their order.
+    pub fn outlook(&self) -> Vec<Outlook, MAX_ACTIONS> {
+        let mut promises = Vec::new();
+        self.look_out(&mut promises);
+        promises
+    }
+
+    /// As [`Explorer::outlook`], for those who have room for it: it is large, and not moved then.
+    pub fn look_out(&self, promises: &mut Vec<Outlook, MAX_ACTIONS>) {
+        promises.clear();
+        let actions = self.actions.iter().zip(&self.made).zip(&self.at_first);
+        for ((&action, &made), &at_first) in actions {
+            let uncertainty = match self.slides {
+                0 => at_first,
+                _ => self.uncertainty(self.config.method, action),
+            };
+            // there is room: as many as there are actions
+            let _ = promises.push(Outlook {
+                action,
+                uncertainty,
+                benefit: benefit(uncertainty, made),
+            });
+        }
+    }
+
+    /// What cycling goes through: the best action of each property when nothing is known, properties in their order; where all
+    /// is looked at, every movement.
+    pub fn turns(&self) -> impl Iterator<Item = Action> {
+        let all = self
+            .actions
+            .iter()
+            .copied()
+            .filter(|a| a.property.is_none());
+        let each = Property::ALL.into_iter().filter_map(|property| {
+            let of_property = self
+                .actions
+                .iter()
+                .zip(&self.at_first)
+                .filter(|(a, _)| a.property == Some(property));
+            of_property
+                .reduce(|best, next| if next.1 < best.1 { next } else { best })
+                .map(|(&action, _)| action)
+        });
+        all.chain(each)
+    }
+
+    /// Expected uncertainty after `action` (eq. 11).
+    ///
+    /// Computed as eq. 10: 1 minus a sum that is close to 1 would lose the digits that decide late in an exploration.
+    pub(super) fn uncertainty(&self, method: Method, action: Action) -> f32 {
+        let movement = action.movement;
+        if method == Method::Fused {
+            return whitened::uncertainty::<K, N>(&self.table, movement, &self.posterior);
+        }
+        let mut live: Vec<Live, N> = Vec::new();
+        let properties = self.gather(method, action, &self.posterior, &mut live);
+        uncertainty_of(&mut live, properties, K::confuse, K::sqrt)
+    }
+
+    /// The textures that are still likely, with what is expected of the properties that `action` looks at; how many these are.
+    // where a method is known while compiling, what the others take is left out here as well
+    #[inline(always)]
+    pub(super) fn gather(
+        &self,
+        method: Method,
+        action: Action,
+        posterior: &[f32],
+        live: &mut Vec<Live, N>,
+    ) -> usize {
+        let looked_at: PropertySet = match action.property {
+            Some(property) => [property].into_iter().collect(),
+            None => self.measured,
+        };
+        if method == Method::Paper {
+            gather(&self.table, action, posterior, live);
+        } else {
+            let expect = |texture, property| self.expected(texture, action.movement, property);
+            for (&probability, texture) in posterior.iter().zip(0..) {
+                if probability >= NEGLIGIBLE {
+                    let mut candidate = Live::new(probability);
+                    for (slot, property) in candidate.expected.iter_mut().zip(looked_at.iter()) {
+                        *slot = expect(texture, property).unwrap_or(*slot);
+                    }
+                    // there is room: `posterior` is no longer than N
+                    let _ = live.push(candidate);
+                }
+            }
+        }
+        looked_at.iter().count()
+    }
+}
+
+// The loops over all textures are not generic: so they are compiled with this crate, for speed.
+
+/// The textures that are still likely, with what is expected of the property that is looked at.
+#[inline(never)]
+fn gather(table: &Table<'_>, action: Action, posterior: &[f32], live: &mut VecView<Live>) {
+    let known = table.gaussians(action);
+    for (&probability, texture) in posterior.iter().zip(0..) {
+        if probability >= NEGLIGIBLE {
+            let mut candidate = Live::new(probability);
+            if let ([slot, ..], Some(known)) = (&mut candidate.expected, known.get(texture)) {
+                *slot = known;
+            }
+            // there is room: as much as for the posterior
+            let _ = live.push(candidate);
+        }
+    }
+}
+
+/// Expected uncertainty (eq. 11) of these textures, of which so many properties are looked at.
+#[inline(never)]
+fn uncertainty_of(
+    live: &mut [Live],
+    properties: usize,
+    confuse: fn(&mut Live, &mut [Live]),
+    sqrt: fn(f32) -> f32,
+) -> f32 {
+    let mut rest = &mut *live;
+    while let Some((a, others)) = rest.split_first_mut() {
+        confuse_with(a, others, properties, confuse, sqrt);
+        rest = others;
+    }
+    let left = |c: &Live| c.probability * c.confused / (c.probability + c.confused);
+    live.iter().map(left).sum()
+}
+
+/// Confusion of one texture with all others (eq. 7), by so many properties.
+#[inline(always)]
+pub(super) fn confuse_with(
+    a: &mut Live,
+    others: &mut [Live],
+    properties: usize,
+    confuse: fn(&mut Live, &mut [Live]),
+    sqrt: fn(f32) -> f32,
+) {
+    if properties == 1 {
+        return confuse(a, others);
+    }
+    for b in others {
+        let pairs = a.expected.iter().zip(&b.expected).take(properties);
+        let confusion: f32 = pairs.map(|(a, b)| confused(*a, *b, sqrt)).product();
+        a.confused += confusion * b.probability;
+        b.confused += confusion * a.probability;
+    }
+}
+
+/// Benefit of an action that leaves `uncertainty` and was made `made` times before (eq. 12).
+///
+/// Eq. 13 reads alpha = 1/n, which has no value for an action that was never made; taken as infinity, all untried actions
+/// would tie. Here alpha = 1/(n+1).
+pub fn benefit(uncertainty: f32, made: u8) -> f32 {
+    if made == 0 {
+        return 1.0 - uncertainty.clamp(0.0, 1.0);
+    }
+    1.0 - libm::powf(uncertainty.clamp(0.0, 1.0), 1.0 / (f32::from(made) + 1.0))
+}

@@ -1,0 +1,180 @@
+//! How to explore, and why an exploration or a slide is refused.
+
+use core::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::features::{FeatureSet, Property};
+use crate::table::{Action, Contents};
+
+/// Textures less probable than this are left out of the expected uncertainty: each changes it by at most about twice its
+/// probability, all of 117 by about 2e-4.
+pub(super) const NEGLIGIBLE: f32 = 1e-6;
+
+/// How what was felt is compared with what is known.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+pub enum Method {
+    /// The paper's: one property per slide, Gaussians (eq. 4).
+    #[default]
+    Paper,
+    /// One property per slide, Student's t with variances drawn towards each other.
+    Student,
+    /// As `Student`, with all properties of every slide.
+    StudentAll,
+    /// All features of every slide at once, whitened.
+    Fused,
+}
+
+impl Method {
+    /// The best one for a table.
+    pub const fn of(contents: Contents) -> Self {
+        match contents {
+            Contents::Gaussians(_) => Self::StudentAll,
+            Contents::Fused(..) => Self::Fused,
+        }
+    }
+
+    /// Whether it can use such a table.
+    pub const fn suits(self, contents: Contents) -> bool {
+        matches!(
+            (self, contents),
+            (Self::Fused, Contents::Fused(..))
+                | (
+                    Self::Paper | Self::Student | Self::StudentAll,
+                    Contents::Gaussians(_)
+                )
+        )
+    }
+
+    /// Its name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Student => "student",
+            Self::StudentAll => "student-all",
+            Self::Fused => "fused",
+        }
+    }
+}
+
+/// How the next movement is chosen.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+pub enum Strategy {
+    /// The action of the greatest benefit (eq. 12).
+    #[default]
+    Bayesian,
+    /// The best movement of each property in turn: the paper's uninformed cycling.
+    Cycling,
+    /// Any action, all equally likely.
+    Random,
+}
+
+/// How to choose, and when to stop.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Config {
+    /// How what was felt is compared with what is known.
+    pub method: Method,
+    /// How the next movement is chosen.
+    pub strategy: Strategy,
+    /// A texture more probable than this is the answer.
+    pub threshold: f32,
+    /// After this many slides the most probable texture is the answer, sure or not.
+    pub max_slides: u8,
+    /// Whether the answer may be that it is none of the candidates.
+    pub open: bool,
+}
+
+impl Default for Config {
+    /// Absolute identification in the paper: Bayesian exploration, 99 %, at most 10 movements.
+    fn default() -> Self {
+        Self {
+            method: Method::Paper,
+            strategy: Strategy::Bayesian,
+            threshold: 0.99,
+            max_slides: 10,
+            open: false,
+        }
+    }
+}
+
+impl Config {
+    /// Discrimination of a pair in the paper: 99.9 %.
+    pub const PAIR_THRESHOLD: f32 = 0.999;
+}
+
+/// Why an exploration cannot begin.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum ExplorerError {
+    /// The table has more textures than the explorer has room for.
+    Room {
+        /// Textures of the table.
+        textures: u16,
+        /// Room.
+        room: usize,
+    },
+    /// A candidate that the table does not have, or none at all.
+    Candidates,
+    /// No property that the rig measures was learned of every candidate, at least twice, at any one movement.
+    NothingToMeasure,
+    /// The rig does not measure the features that the table was learned from.
+    Features(FeatureSet),
+    /// The method cannot use this kind of table.
+    Method(Method),
+}
+
+impl fmt::Display for ExplorerError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Room { textures, room } => write!(f, "the table has {textures} textures, and there is room for {room}"),
+            Self::Candidates => f.write_str("the candidates are not textures of the table"),
+            Self::NothingToMeasure => f.write_str(
+                "no property that this rig measures was learned of every candidate at one movement, from two trials or more",
+            ),
+            Self::Features(set) => write!(
+                f,
+                "the table was learned from {}, and this rig does not measure them",
+                set.name()
+            ),
+            Self::Method(Method::Fused) => f.write_str(
+                "the method fused needs a table with whitened features; learn one, or take student-all",
+            ),
+            Self::Method(method) => write!(
+                f,
+                "the method {} needs a table of the three properties; this one is for the method fused",
+                method.name()
+            ),
+        }
+    }
+}
+
+impl core::error::Error for ExplorerError {}
+
+/// Why a slide taught nothing. The exploration stands as it was.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum ObserveError {
+    /// The slide has no such property, or it is not a finite number.
+    Missing(Property),
+    /// The slide lacks one of the features of the table.
+    Features(FeatureSet),
+    /// The explorer does not know the action.
+    Action(Action),
+}
+
+impl fmt::Display for ObserveError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Missing(property) => write!(f, "the slide did not give a value of {property}"),
+            Self::Features(set) => write!(f, "the slide did not give {}", set.name()),
+            Self::Action(action) => {
+                write!(
+                    f,
+                    "{} of movement {} is none of the actions",
+                    action.what(),
+                    action.movement + 1
+                )
+            }
+        }
+    }
+}
+
+impl core::error::Error for ObserveError {}

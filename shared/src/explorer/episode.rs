@@ -1,0 +1,68 @@
+//! The slides of one exploration, movement by movement, and what it can teach when it is over.
+
+use heapless::Vec;
+
+use crate::features::{MAX_FEATURES, Vector};
+use crate::table::MAX_MOVEMENTS;
+use crate::up_to;
+
+/// The slides made of one movement in a visit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Visit {
+    pub(super) movement: u8,
+    pub(super) slides: u8,
+    /// Sum of the whitened slides, 1/256.
+    pub(super) white: [i32; MAX_FEATURES],
+    /// Sum of the properties.
+    pub(super) properties: [f32; 3],
+}
+
+/// All movements made in a visit.
+pub(super) type Visits = Vec<Visit, MAX_MOVEMENTS>;
+
+/// The slides of `movement`, which now has one more.
+pub(super) fn visit(visits: &mut Visits, movement: u8) -> Option<&mut Visit> {
+    let at = match visits.iter().position(|v| v.movement == movement) {
+        Some(at) => at,
+        None => {
+            let new = Visit {
+                movement,
+                slides: 0,
+                white: [0; MAX_FEATURES],
+                properties: [0.0; 3],
+            };
+            visits.push(new).ok()?;
+            visits.len() - 1
+        }
+    };
+    visits.get_mut(at)
+}
+
+impl Visit {
+    /// Mean of so many whitened features, to the nearest step.
+    pub(super) fn mean(&self, features: usize) -> Vector {
+        if self.slides == 1 {
+            // without divisions
+            let slide = self.white.iter().take(features);
+            return up_to(slide.map(|&z| z as i16));
+        }
+        let n = i32::from(self.slides.max(1));
+        let rounded = |sum: i32| sum.saturating_mul(2).saturating_add(n).div_euclid(2 * n);
+        // a mean of i16
+        let means = self.white.iter().take(features);
+        up_to(means.map(|&sum| rounded(sum) as i16))
+    }
+}
+
+/// What an exploration can teach, until the next one begins.
+#[derive(Clone, Debug)]
+pub struct Visited {
+    /// Checksum of the table that was explored with.
+    pub table: u32,
+    /// The most probable texture.
+    pub texture: u16,
+    /// Whether the probe may learn from it by itself.
+    pub certain: bool,
+    /// The movements made, with the number of slides and their whitened mean; none with a table of Gaussians.
+    pub felt: Vec<(u8, u8, Vector), MAX_MOVEMENTS>,
+}

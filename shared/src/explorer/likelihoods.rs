@@ -1,0 +1,213 @@
+//! What a slide says about every candidate: likelihoods (eq. 4) of one property, of all properties, or of all features.
+
+use super::config::{Method, ObserveError};
+use super::episode::visit;
+use super::kernels::Kernels;
+use super::posterior::{Explorer, draw_near};
+use super::student::{Shrunk, Student};
+use super::whitened;
+use crate::features::{Observation, Property};
+use crate::table::{Action, Contents, Gaussian, mean_step};
+
+/// Most that the likelihood of a slide takes from a logarithm.
+const MOST: i32 = 1 << 26;
+/// Slides after which the greatest logarithm is made 0 again. Four times [`MOST`] below [`FLOOR`] is not [`LEAST`] yet.
+const SLIDES: u8 = 4;
+
+impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
+    /// Takes in a slide: what `action` looks at is compared with what every candidate would feel like (eq. 3, 4). The rest of
+    /// the slide is not used.
+    ///
+    /// # Errors
+    /// See [`ObserveError`]; nothing has changed then.
+    pub fn observe(&mut self, action: Action, slide: &Observation) -> Result<(), ObserveError> {
+        let made = self
+            .actions
+            .iter()
+            .position(|&a| a == action)
+            .filter(|&at| at < self.made.len());
+        let made = made.ok_or(ObserveError::Action(action))?;
+        match action.property {
+            Some(property) => self.observe_property(action, property, slide)?,
+            None if self.config.method == Method::Fused => self.observe_features(action, slide)?,
+            None => self.observe_properties(action, slide)?,
+        }
+        if let Some(made) = self.made.get_mut(made) {
+            *made = made.saturating_add(1);
+        }
+        self.slides = self.slides.saturating_add(1);
+        Ok(())
+    }
+
+    /// The value of a property of a slide, at most twice as far out as any mean that a table can hold: squares stay finite.
+    fn value(slide: &Observation, property: Property) -> Result<f32, ObserveError> {
+        let reach = mean_step(property) * 65536.0;
+        let x = slide.properties.get(property).filter(|x| x.is_finite());
+        x.map(|x| x.clamp(-reach, reach))
+            .ok_or(ObserveError::Missing(property))
+    }
+
+    /// One property: its likelihood is added to what was there.
+    fn observe_property(
+        &mut self,
+        action: Action,
+        property: Property,
+        slide: &Observation,
+    ) -> Result<(), ObserveError> {
+        let x = Self::value(slide, property)?;
+        if self.slides > 0 && (self.slides.is_multiple_of(SLIDES) || self.slides == u8::MAX) {
+            draw_near(&mut self.log);
+        }
+        if self.config.method == Method::Paper {
+            let known = self.table.gaussians(action);
+            K::add_gaussians(x / mean_step(property), &known, &mut self.log);
+        } else {
+            self.add_students(x, action.movement, property, 1);
+        }
+        self.settle();
+        Ok(())
+    }
+
+    /// Adds the likelihood of the mean `x` of so many slides to every logarithm.
+    fn add_students(&mut self, x: f32, movement: u8, property: Property, slides: u8) {
+        let mut student: Option<Student> = None;
+        for texture in 0..self.table.textures() {
+            let Some((shrunk, known, trials)) = self.shrunk_of(texture, movement, property) else {
+                continue;
+            };
+            let expected = shrunk.expect(known, trials, slides);
+            let student = self.student(&mut student, texture, movement, property);
+            let likelihood = (student.log(x, expected) * 65536.0) as i32;
+            if let Some(log) = self.log.get_mut(usize::from(texture)) {
+                *log += likelihood.clamp(-MOST, MOST);
+            }
+        }
+    }
+
+    /// All properties: the means of the slides of every movement are compared anew.
+    fn observe_properties(
+        &mut self,
+        action: Action,
+        slide: &Observation,
+    ) -> Result<(), ObserveError> {
+        for property in self.measured.iter() {
+            Self::value(slide, property)?;
+        }
+        let visit = visit(&mut self.visits, action.movement);
+        // beyond 255 slides nothing new is learned
+        if let Some(visit) = visit.filter(|visit| visit.slides < u8::MAX) {
+            visit.slides += 1;
+            for (property, sum) in Property::ALL.into_iter().zip(&mut visit.properties) {
+                *sum += Self::value(slide, property).unwrap_or(0.0);
+            }
+        }
+        self.forget();
+        for at in 0..self.visits.len() {
+            let Some(visit) = self.visits.get(at).copied() else {
+                continue;
+            };
+            for property in self.measured.iter() {
+                let Some(sum) = visit.properties.get(property.index()) else {
+                    continue;
+                };
+                self.add_students(
+                    sum / f32::from(visit.slides),
+                    visit.movement,
+                    property,
+                    visit.slides,
+                );
+            }
+            draw_near(&mut self.log);
+        }
+        self.settle();
+        Ok(())
+    }
+
+    /// All features, whitened.
+    fn observe_features(
+        &mut self,
+        action: Action,
+        slide: &Observation,
+    ) -> Result<(), ObserveError> {
+        let Contents::Fused(set, features) = self.table.contents() else {
+            return Err(ObserveError::Action(action));
+        };
+        let features = usize::from(features);
+        let Some(vector) = slide.vector(set, features) else {
+            return Err(ObserveError::Features(set));
+        };
+        let Some(white) = self.table.whiten(action.movement, &vector) else {
+            return Err(ObserveError::Features(set));
+        };
+        let visit = visit(&mut self.visits, action.movement);
+        // beyond 255 slides nothing new is learned
+        if let Some(visit) = visit.filter(|visit| visit.slides < u8::MAX) {
+            visit.slides += 1;
+            for (sum, z) in visit.white.iter_mut().zip(&white) {
+                *sum += i32::from(*z);
+            }
+        }
+        self.forget();
+        let elsewhere = whitened::add_likelihoods(
+            &self.table,
+            &self.visits,
+            &self.backgrounds,
+            &mut self.log,
+            K::add_likelihoods,
+        );
+        let average = self.settle();
+        self.log_odds =
+            elsewhere.and_then(|(elsewhere, can_tell)| can_tell.then_some(elsewhere - average));
+        Ok(())
+    }
+
+    /// What a property of a texture is expected to be in one slide.
+    pub(super) fn expected(
+        &self,
+        texture: u16,
+        movement: u8,
+        property: Property,
+    ) -> Option<Gaussian> {
+        if self.config.method == Method::Paper {
+            let property = Some(property);
+            return self.table.gaussian(texture, Action { movement, property });
+        }
+        let (shrunk, known, trials) = self.shrunk_of(texture, movement, property)?;
+        Some(shrunk.expect(known, trials, 1))
+    }
+
+    fn shrunk_of(
+        &self,
+        texture: u16,
+        movement: u8,
+        property: Property,
+    ) -> Option<(Shrunk, Gaussian, u8)> {
+        let at = usize::from(movement) * Property::ALL.len() + property.index();
+        let shrunk = self.shrunk.get(at)?;
+        let known = self.table.gaussian(
+            texture,
+            Action {
+                movement,
+                property: Some(property),
+            },
+        )?;
+        Some((*shrunk, known, self.table.trials(texture, movement)))
+    }
+
+    /// Student's t of a texture; `last` is that of the texture before it, which mostly has as many trials.
+    fn student(
+        &self,
+        last: &mut Option<Student>,
+        texture: u16,
+        movement: u8,
+        property: Property,
+    ) -> Student {
+        let at = usize::from(movement) * Property::ALL.len() + property.index();
+        let others = self.shrunk.get(at).map_or(0.0, |shrunk| shrunk.freedom);
+        let own = f32::from(self.table.trials(texture, movement)) - 1.0;
+        match last {
+            Some(student) if student.freedom() == others + own => *student,
+            _ => *last.insert(Student::new(others + own)),
+        }
+    }
+}
