@@ -7,7 +7,7 @@ use crate::table::MAX_MOVEMENTS;
 use crate::up_to;
 
 /// The slides made of one movement in a visit.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Visit {
     pub(super) movement: u8,
     pub(super) slides: u8,
@@ -20,22 +20,22 @@ pub(super) struct Visit {
 /// All movements made in a visit.
 pub(super) type Visits = Vec<Visit, MAX_MOVEMENTS>;
 
-/// The slides of `movement`, which now has one more.
-pub(super) fn visit(visits: &mut Visits, movement: u8) -> Option<&mut Visit> {
+/// The slides of `movement`, one more than before; `None` beyond 255, where nothing new is learned.
+pub(super) fn one_more(visits: &mut Visits, movement: u8) -> Option<&mut Visit> {
     let at = match visits.iter().position(|v| v.movement == movement) {
         Some(at) => at,
         None => {
             let new = Visit {
                 movement,
-                slides: 0,
-                white: [0; MAX_FEATURES],
-                properties: [0.0; 3],
+                ..Visit::default()
             };
             visits.push(new).ok()?;
             visits.len() - 1
         }
     };
-    visits.get_mut(at)
+    let visit = visits.get_mut(at)?;
+    visit.slides = visit.slides.checked_add(1)?;
+    Some(visit)
 }
 
 impl Visit {

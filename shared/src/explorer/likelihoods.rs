@@ -1,7 +1,7 @@
 //! What a slide says about every candidate: likelihoods (eq. 4) of one property, of all properties, or of all features.
 
 use super::config::{Method, ObserveError};
-use super::episode::visit;
+use super::episode::one_more;
 use super::kernels::Kernels;
 use super::posterior::{Explorer, draw_near};
 use super::student::{Shrunk, Student};
@@ -76,7 +76,12 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
                 continue;
             };
             let expected = shrunk.expect(known, trials, slides);
-            let student = self.student(&mut student, texture, movement, property);
+            let freedom = shrunk.freedom + (f32::from(trials) - 1.0);
+            // mostly that of the texture before, which has as many trials
+            let student = match student {
+                Some(ref last) if last.freedom() == freedom => last,
+                _ => student.insert(Student::new(freedom)),
+            };
             let likelihood = (student.log(x, expected) * 65536.0) as i32;
             if let Some(log) = self.log.get_mut(usize::from(texture)) {
                 *log += likelihood.clamp(-MOST, MOST);
@@ -93,10 +98,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         for property in self.measured.iter() {
             Self::value(slide, property)?;
         }
-        let visit = visit(&mut self.visits, action.movement);
-        // beyond 255 slides nothing new is learned
-        if let Some(visit) = visit.filter(|visit| visit.slides < u8::MAX) {
-            visit.slides += 1;
+        if let Some(visit) = one_more(&mut self.visits, action.movement) {
             for (property, sum) in Property::ALL.into_iter().zip(&mut visit.properties) {
                 *sum += Self::value(slide, property).unwrap_or(0.0);
             }
@@ -139,10 +141,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         let Some(white) = self.table.whiten(action.movement, &vector) else {
             return Err(ObserveError::Features(set));
         };
-        let visit = visit(&mut self.visits, action.movement);
-        // beyond 255 slides nothing new is learned
-        if let Some(visit) = visit.filter(|visit| visit.slides < u8::MAX) {
-            visit.slides += 1;
+        if let Some(visit) = one_more(&mut self.visits, action.movement) {
             for (sum, z) in visit.white.iter_mut().zip(&white) {
                 *sum += i32::from(*z);
             }
@@ -169,8 +168,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         property: Property,
     ) -> Option<Gaussian> {
         if self.config.method == Method::Paper {
-            let property = Some(property);
-            return self.table.gaussian(texture, Action { movement, property });
+            return self.table.gaussian(texture, Action::of(movement, property));
         }
         let (shrunk, known, trials) = self.shrunk_of(texture, movement, property)?;
         Some(shrunk.expect(known, trials, 1))
@@ -184,30 +182,9 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     ) -> Option<(Shrunk, Gaussian, u8)> {
         let at = usize::from(movement) * Property::ALL.len() + property.index();
         let shrunk = self.shrunk.get(at)?;
-        let known = self.table.gaussian(
-            texture,
-            Action {
-                movement,
-                property: Some(property),
-            },
-        )?;
+        let known = self
+            .table
+            .gaussian(texture, Action::of(movement, property))?;
         Some((*shrunk, known, self.table.trials(texture, movement)))
-    }
-
-    /// Student's t of a texture; `last` is that of the texture before it, which mostly has as many trials.
-    fn student(
-        &self,
-        last: &mut Option<Student>,
-        texture: u16,
-        movement: u8,
-        property: Property,
-    ) -> Student {
-        let at = usize::from(movement) * Property::ALL.len() + property.index();
-        let others = self.shrunk.get(at).map_or(0.0, |shrunk| shrunk.freedom);
-        let own = f32::from(self.table.trials(texture, movement)) - 1.0;
-        match last {
-            Some(student) if student.freedom() == others + own => *student,
-            _ => *last.insert(Student::new(others + own)),
-        }
     }
 }

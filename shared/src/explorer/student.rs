@@ -2,7 +2,7 @@
 //! uncertain, and what all textures have in common helps (Smyth 2004).
 
 use crate::features::Property;
-use crate::table::{Gaussian, Table};
+use crate::table::{Action, Gaussian, Table};
 
 /// Degrees of freedom of what is taken as known.
 const KNOWN: f64 = 1000.0;
@@ -21,10 +21,7 @@ pub(super) struct Shrunk {
 impl Shrunk {
     /// From the moments of the logarithms of the variances of the textures that were learned from two trials or more.
     pub(super) fn new(table: &Table<'_>, movement: u8, property: Property) -> Self {
-        let action = crate::table::Action {
-            movement,
-            property: Some(property),
-        };
+        let action = Action::of(movement, property);
         let logs = || {
             (0..table.textures()).filter_map(|texture| {
                 let gaussian = table.gaussian(texture, action)?;

@@ -6,6 +6,7 @@ use core::fmt;
 use core::marker::PhantomData;
 use core::ops::Range;
 
+use super::block::Block;
 use super::property::Properties;
 use crate::dsp::{BandPower, FRAME, Kernels, Plain, Plan, Spectrum, SpectrumSum, TAPS};
 
@@ -89,10 +90,10 @@ impl fmt::Display for SlideError {
 
 impl core::error::Error for SlideError {}
 
-/// One slide while its samples arrive.
+/// One slide while its samples arrive, as [`Block`]s: [`Slide::take`].
 ///
-/// In this order: the still finger ([`Slide::push_still`], or [`Slide::set_background`] where its power is known), then
-/// [`Slide::start`], then the samples of the slide.
+/// Whoever has samples in another form gives them in this order: the still finger ([`Slide::push_still`], or
+/// [`Slide::set_background`] where its power is known), then [`Slide::start`], then the samples of the slide.
 #[derive(Clone, Debug)]
 pub struct Slide<'p, K = Plain> {
     plan: &'p Plan,
@@ -129,6 +130,21 @@ impl<'p, K: Kernels> Slide<'p, K> {
             lost: 0,
             kernels: PhantomData,
         }
+    }
+
+    /// Takes the next block of the movement: of the still finger, then of the slide, the first of which says which samples are
+    /// at constant speed.
+    pub fn take(&mut self, block: &Block) {
+        if let Some((from, to)) = block.steady {
+            self.start(from..to);
+        }
+        if block.still {
+            self.push_still(&block.pac);
+        } else {
+            self.push(&block.pac);
+            self.push_shear(&block.shear_mn);
+        }
+        self.lose(block.lost);
     }
 
     /// P_AC of the pressed, still finger, in counts about its baseline: the background of eq. 16.
@@ -393,6 +409,39 @@ mod tests {
         );
         assert_eq!(background(&[&still[..66]]), Err(SlideError::NoBackground));
         assert_eq!(background(&[]), Err(SlideError::NoBackground));
+    }
+
+    /// What a rig felt in ticks, gathered into blocks, says the same as its samples.
+    #[test]
+    fn a_slide_of_blocks_is_that_of_its_samples() {
+        use super::super::block::{Blocks, Felt};
+        let (still, moving) = (texture(500), texture(2000));
+        let plan = Plan::new();
+        let mut by_hand = Slide::<Plain>::new(&plan);
+        by_hand.push_still(&still);
+        by_hand.start(100..1900);
+        by_hand.push(&moving);
+        by_hand.push_shear(&(0..900).map(|n| n - 300).collect::<Vec<i16>>());
+        let (mut blocks, mut slide) = (Blocks::default(), Slide::<Plain>::new(&plan));
+        let ticks = still.chunks(2).map(|pac| (Felt::Still, pac, None));
+        let slid = moving.chunks(2).zip(0..).map(|(pac, ms)| match ms {
+            0 => (Felt::Begin(100..1900), pac, None),
+            _ => (
+                Felt::Slide,
+                pac,
+                (50..950).contains(&ms).then_some(ms - 350),
+            ),
+        });
+        for (felt, pac, shear_mn) in ticks.chain(slid) {
+            if let Some(block) = blocks.put(&felt, pac, shear_mn) {
+                slide.take(&block);
+            }
+        }
+        let mut lossy = slide.clone();
+        lossy.take(&blocks.clone().end(3));
+        slide.take(&blocks.end(0));
+        assert_eq!(slide.finish(), by_hand.finish());
+        assert_eq!(lossy.finish(), Err(SlideError::Gap(3)));
     }
 
     #[test]

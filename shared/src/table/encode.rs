@@ -398,8 +398,7 @@ fn put_gaussians(
             }
             let step = libm::roundf(mean / mean_step(property));
             if !(f32::from(i16::MIN)..=f32::from(i16::MAX)).contains(&step) {
-                let property = Some(property);
-                let action = Action { movement, property };
+                let action = Action::of(movement, property);
                 return Err(EncodeError::Range {
                     texture,
                     action,

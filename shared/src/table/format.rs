@@ -42,6 +42,14 @@ pub struct Action {
 }
 
 impl Action {
+    /// Looks at one property of a movement.
+    pub const fn of(movement: u8, property: Property) -> Self {
+        Self {
+            movement,
+            property: Some(property),
+        }
+    }
+
     /// The property looked at, in words.
     pub const fn what(self) -> &'static str {
         match self.property {

@@ -136,8 +136,7 @@ impl<'a> Table<'a> {
                 for property in measured.iter() {
                     let cell = self.cell(texture, movement, property);
                     if cell.is_none_or(|(_, sd)| sd == 0) {
-                        let property = Some(property);
-                        let action = Action { movement, property };
+                        let action = Action::of(movement, property);
                         return Err(TableError::Deviation { texture, action });
                     }
                 }
@@ -234,10 +233,9 @@ impl<'a> Table<'a> {
     pub fn actions(&self) -> impl Iterator<Item = Action> + use<> {
         let measured = self.measured();
         (0..self.movements).flat_map(move |movement| {
-            measured.iter().map(move |property| Action {
-                movement,
-                property: Some(property),
-            })
+            measured
+                .iter()
+                .map(move |property| Action::of(movement, property))
         })
     }
 
