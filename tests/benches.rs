@@ -1,17 +1,18 @@
 //! How long the core's main steps take on this machine: `cargo bench`. Nothing here is gated; gates are on instructions.
 
 use divan::Bencher;
-use tactus::evaluate::{Method, evaluate};
-use tactus::experiment::{Experiment, Protocol};
-use tactus::learn::encode;
-use tactus::replay::Felt;
+use tactus::data::replay::Felt;
+use tactus::eval::evaluate::{Method, evaluate};
+use tactus::eval::experiment::{Experiment, Protocol};
+use tactus::eval::learn::encode;
+use tactus::sim::rig::SimRig;
 use tactus::sim::world::Setup;
-use tactus::simulated::SimRig;
+use tactus_core::dsp::Plain;
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer};
-use tactus_core::features::{Measurement, Plan, Properties, Property, PropertySet, Slide};
-use tactus_core::fused::Observation;
-use tactus_core::kernels::Plain;
-use tactus_core::movement::Movement;
+use tactus_core::features::Movement;
+use tactus_core::features::Observation;
+use tactus_core::features::{Measurement, Properties, Property, PropertySet, Slide};
 use tactus_core::table::{Action, Experience, Table};
 
 fn main() {

@@ -1,10 +1,10 @@
 //! Degrees of confusion that are kept, on the worlds and on recordings: they promise what computing them does, to the bit.
 
-use tactus::evaluate::{Method, Shared, explorer};
-use tactus::experiment::{Experiment, Protocol};
-use tactus::properties::PropertyTable;
-use tactus::recordings::RecordingSet;
-use tactus::replay::feel;
+use tactus::data::properties::PropertyTable;
+use tactus::data::recordings::RecordingSet;
+use tactus::data::replay::feel;
+use tactus::eval::evaluate::{Method, Shared, explorer};
+use tactus::eval::experiment::{Experiment, Protocol};
 use tactus_core::explorer::{Config, Outlook};
 use tactus_tests::data;
 

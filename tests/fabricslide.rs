@@ -1,5 +1,5 @@
 //! The reader of fabrics against the real recordings of `data/fabricslide`.
-use tactus::fabricslide::FabricSet;
+use tactus::data::fabricslide::FabricSet;
 use tactus_tests::data;
 
 #[test]
@@ -89,7 +89,7 @@ fn slides_measure_as_another_program_does() {
             "{found:?} {expected:?}"
         );
     };
-    let figures = |slide: &tactus::fabricslide::FabricSlide| -> Vec<f64> {
+    let figures = |slide: &tactus::data::fabricslide::FabricSlide| -> Vec<f64> {
         let all = slide.ln_bands.iter().chain(&slide.properties);
         all.map(|x| f64::from(*x)).collect()
     };

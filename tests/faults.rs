@@ -5,15 +5,18 @@
 use rayon::prelude::*;
 use tactus::sim::encoder::Cut;
 use tactus::sim::faults::Fault as Cause;
+use tactus::sim::rig::{SimError, SimRig};
 use tactus::sim::world::Setup;
-use tactus::simulated::{SimError, SimRig};
-use tactus_core::movement::Movement;
-use tactus_core::pressure::{Calibration, Channel, Counts, Pressure};
+use tactus_core::features::Movement;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::rig::control::{Control, Ended, Phase, Refused};
-use tactus_core::rig::guard::{FAULTS, Fault, Row, Unguarded};
+use tactus_core::rig::control::Control;
+use tactus_core::rig::fault::Row;
+use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::pins::Inputs;
 use tactus_core::rig::stage::StageConstants;
+use tactus_core::rig::{Ended, Phase, Refused};
+use tactus_core::rig::{FAULTS, Fault};
+use tactus_core::sensor::pressure::{Calibration, Channel, Counts, Pressure};
 
 /// When the cause comes.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -3,14 +3,14 @@
 use std::path::Path;
 use std::process::Command;
 
-use tactus::evaluate::{Method, Summary, evaluate};
-use tactus::experiment::{Experiment, Protocol};
-use tactus::fabricslide::FabricSet;
-use tactus::lifelong::lifelong;
-use tactus::novelty::leave_one_out;
-use tactus::properties::PropertyTable;
-use tactus::recordings::RecordingSet;
-use tactus::replay::feel;
+use tactus::data::fabricslide::FabricSet;
+use tactus::data::properties::PropertyTable;
+use tactus::data::recordings::RecordingSet;
+use tactus::data::replay::feel;
+use tactus::eval::evaluate::{Method, Summary, evaluate};
+use tactus::eval::experiment::{Experiment, Protocol};
+use tactus::eval::lifelong::lifelong;
+use tactus::eval::novelty::leave_one_out;
 use tactus_core::explorer::Config;
 use tactus_tests::{data, skipped};
 

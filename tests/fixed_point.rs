@@ -3,15 +3,15 @@
 
 use rand::Rng as _;
 use rayon::prelude::*;
-use tactus::evaluate::{Outcome, evaluate};
-use tactus::experiment::{Experiment, Protocol, Run};
-use tactus::fabricslide::FabricSet;
-use tactus::properties::PropertyTable;
-use tactus::recordings::RecordingSet;
-use tactus::replay::feel;
+use tactus::data::fabricslide::FabricSet;
+use tactus::data::properties::PropertyTable;
+use tactus::data::recordings::RecordingSet;
+use tactus::data::replay::feel;
+use tactus::eval::evaluate::{Outcome, evaluate};
+use tactus::eval::experiment::{Experiment, Protocol, Run};
 use tactus_core::explorer::{Config, Method};
 use tactus_core::features::Property;
-use tactus_core::fused::{FeatureSet, Observation};
+use tactus_core::features::{FeatureSet, Observation};
 use tactus_tests::data;
 
 #[path = "oracle/mod.rs"]

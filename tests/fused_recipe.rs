@@ -6,7 +6,8 @@
 use std::path::Path;
 
 use rayon::prelude::*;
-use tactus::recordings::{RecordingSet, Slide};
+use tactus::data::recording::Slide;
+use tactus::data::recordings::RecordingSet;
 use tactus_tests::data;
 
 #[path = "oracle/mod.rs"]

@@ -3,11 +3,12 @@
 use std::f64::consts::PI;
 
 use rustfft::{FftPlanner, num_complex::Complex};
-use tactus::recordings::RecordingSet;
-use tactus::replay::{feel, measure};
-use tactus_core::features::{BAND_EDGES, Plan, Property};
-use tactus_core::fir::Taps;
-use tactus_core::spectrum::{BIN_HZ, FRAME, HOP};
+use tactus::data::recordings::RecordingSet;
+use tactus::data::replay::{feel, measure};
+use tactus_core::dsp::Plan;
+use tactus_core::dsp::Taps;
+use tactus_core::dsp::{BIN_HZ, FRAME, HOP};
+use tactus_core::features::{BAND_EDGES, Property};
 use tactus_tests::data;
 
 #[test]
@@ -93,7 +94,7 @@ fn oracle(samples: &[i16]) -> Vec<f64> {
     psd.iter().map(|p| p / count / power).collect()
 }
 
-fn assert_near_oracle(samples: &[i16], spectrum: &tactus_core::spectrum::Spectrum, what: &str) {
+fn assert_near_oracle(samples: &[i16], spectrum: &tactus_core::dsp::Spectrum, what: &str) {
     let oracle = oracle(samples);
     let total: f64 = oracle.iter().sum();
     let mean = samples.iter().map(|&x| f64::from(x)).sum::<f64>() / samples.len() as f64;
@@ -157,8 +158,8 @@ fn spectra_of_made_up_signals_are_those_of_f64() {
                     - 64
             })
             .collect();
-        let mut sum = tactus_core::spectrum::SpectrumSum::default();
-        sum.push::<tactus_core::kernels::Plain>(&tactus_core::spectrum::angles(), &samples);
+        let mut sum = tactus_core::dsp::SpectrumSum::default();
+        sum.push::<tactus_core::dsp::Plain>(&tactus_core::dsp::angles(), &samples);
         assert_near_oracle(
             &samples,
             &sum.finish().unwrap(),

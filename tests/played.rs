@@ -2,18 +2,20 @@
 //! method tells real materials by them.
 
 use rayon::prelude::*;
-use tactus::collection::calibrated;
-use tactus::evaluate::{Summary, evaluate};
-use tactus::experiment::{Experiment, Protocol};
-use tactus::played::Lesson;
-use tactus::recordings::{RecordingSet, Slide};
-use tactus::replay::{Felt, measure};
+use tactus::data::recording::Slide;
+use tactus::data::recordings::RecordingSet;
+use tactus::data::replay::{Felt, measure};
+use tactus::eval::evaluate::{Summary, evaluate};
+use tactus::eval::experiment::{Experiment, Protocol};
+use tactus::sim::collection::calibrated;
 use tactus::sim::played::Played;
-use tactus::simulated::{Performed, SimRig};
+use tactus::sim::recorded::Lesson;
+use tactus::sim::rig::{Performed, SimRig};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer, Method};
-use tactus_core::features::{Plan, Property, PropertySet};
-use tactus_core::movement::Movement;
-use tactus_core::rig::{Event, explore};
+use tactus_core::features::Movement;
+use tactus_core::features::{Property, PropertySet};
+use tactus_core::probe::explore::{Event, explore};
 use tactus_core::table::Table;
 use tactus_tests::data;
 

@@ -2,9 +2,10 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use tactus::import::import;
-use tactus::properties::PropertyTable;
-use tactus::recordings::{Background, RecordingSet, Slide};
+use tactus::data::import::import;
+use tactus::data::properties::PropertyTable;
+use tactus::data::recording::{Background, Slide};
+use tactus::data::recordings::RecordingSet;
 use tactus_tests::data;
 
 #[test]

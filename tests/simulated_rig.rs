@@ -3,18 +3,20 @@
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use rayon::prelude::*;
-use tactus::collection::{Collection, calibrated, record_texture, texture_name};
-use tactus::replay::measure;
+use tactus::data::replay::measure;
+use tactus::sim::collection::{Collection, calibrated, record_texture, texture_name};
+use tactus::sim::rig::{Performed, SimRig};
 use tactus::sim::stage::{FORCE_N_PER_A, SAMPLE_AT_MM, SAMPLE_MM};
 use tactus::sim::world::Setup;
-use tactus::simulated::{Performed, SimRig};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer, Method};
-use tactus_core::features::{Measurement, Plan, Property, PropertySet};
-use tactus_core::movement::Movement;
-use tactus_core::pressure::Calibration;
+use tactus_core::features::Movement;
+use tactus_core::features::{Measurement, Property, PropertySet};
+use tactus_core::probe::explore::{Event, explore};
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::rig::control::{Control, Phase, Refused};
-use tactus_core::rig::{Event, explore};
+use tactus_core::rig::control::Control;
+use tactus_core::rig::{Phase, Refused};
+use tactus_core::sensor::pressure::Calibration;
 use tactus_core::table::Table;
 
 /// Whether an exploration was right, what it did, and what to tell of it.
@@ -143,7 +145,7 @@ fn a_recorded_slide_has_the_properties_that_were_felt_live() {
     let plan = Plan::new();
     let mut rig = SimRig::new(setup);
     rig.control().calibrate(calibration).unwrap();
-    let mut slide = tactus_core::features::Slide::<tactus_core::kernels::Plain>::new(&plan);
+    let mut slide = tactus_core::features::Slide::<tactus_core::dsp::Plain>::new(&plan);
     embassy_futures::block_on(tactus_core::rig::Rig::perform(
         &mut rig,
         Movement::FOR_FINENESS,
@@ -195,10 +197,10 @@ fn traction_is_the_shear_that_really_acts() {
         let slide = {
             rig.control().start(Movement::FOR_TRACTION, 0.5).unwrap();
             let plan = Plan::new();
-            let mut slide = tactus_core::features::Slide::<tactus_core::kernels::Plain>::new(&plan);
+            let mut slide = tactus_core::features::Slide::<tactus_core::dsp::Plain>::new(&plan);
             while rig.control().phase() != Phase::Ready {
                 let outputs = rig.tick().clone();
-                tactus::simulated::feel(&outputs, &mut slide);
+                tactus::sim::rig::feel(&outputs, &mut slide);
                 if outputs.shear_mn.is_some() {
                     shear.push(rig.world().truth().shear_n.abs());
                 }

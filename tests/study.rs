@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use rand::{Rng, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::evaluate::Method;
+use tactus::eval::evaluate::Method;
 use tactus::sim::TRIAL_VARIATION;
 use tactus::study::identify::{Identification, WorldRow, experiment, pairs};
 use tactus::study::pilot::Pilot;
@@ -18,9 +18,9 @@ use tactus::study::signals::Signals;
 use tactus::study::slides::{Recorded, Session, StudyWorld, TextureTrials, VISIBLE_WEAR};
 use tactus::study::training::{Training, Worn};
 use tactus::study::{Study, VARIATION};
+use tactus_core::features::Movement;
+use tactus_core::features::Observation;
 use tactus_core::features::{Properties, Property};
-use tactus_core::fused::Observation;
-use tactus_core::movement::Movement;
 use tactus_core::table::Table;
 use tactus_tests::skipped;
 

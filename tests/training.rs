@@ -1,18 +1,20 @@
 //! Training on the simulated rig: with the power cut after any trial, what is learned is the same.
 
 use embassy_futures::block_on;
-use tactus::collection::{Collection, calibrated, texture_name};
-use tactus::simulated::SimRig;
+use tactus::sim::collection::{Collection, calibrated, texture_name};
+use tactus::sim::rig::SimRig;
+use tactus_core::dsp::Plain;
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer, Method};
-use tactus_core::features::{Plan, PropertySet, Slide};
-use tactus_core::fused::Observation;
-use tactus_core::kernels::Plain;
-use tactus_core::movement::Movement;
+use tactus_core::features::Movement;
+use tactus_core::features::Observation;
+use tactus_core::features::{PropertySet, Slide};
+use tactus_core::probe::explore::explore;
+use tactus_core::probe::training::{Training, Wanted};
+use tactus_core::rig::Rig as _;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::rig::{Rig as _, explore};
 use tactus_core::store::Trained;
 use tactus_core::table::Table;
-use tactus_core::training::{Training, Wanted};
 
 const ROOM: usize = 16 * 1024 - 32;
 const NEW: u8 = 43;

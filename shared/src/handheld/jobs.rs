@@ -7,7 +7,8 @@ use super::states::{Choice, Handheld, Job};
 use crate::kernels::Kernels;
 use crate::probe::Memory;
 use crate::probe::seams::{Events, StoredBytes};
-use crate::wire::{Name, Text, text};
+use crate::table::Name;
+use crate::wire::{Text, text};
 
 /// What came of a job, for the log.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -4,12 +4,12 @@ use core::fmt;
 
 use heapless::Vec;
 
+use crate::explorer::Visited;
 use crate::explorer::{Config, Explorer, ExplorerError, Method, ObserveError};
 use crate::features::{FeatureSet, Movement, Observation, PropertySet};
 use crate::kernels::Kernels;
-use crate::session::Visited;
 use crate::table::{Action, Table};
-use crate::wire::{MAX_TEXTURES, Name};
+use crate::table::{MAX_TEXTURES, Name};
 
 /// What a person is asked to do: half a newton, 25 mm/s.
 pub const MOVEMENT: Movement = Movement::FOR_FINENESS;

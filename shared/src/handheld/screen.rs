@@ -5,7 +5,8 @@ use heapless::Vec;
 use super::guidance::{Again, Phase, View};
 use super::judge::LEADING;
 use super::spelling::{Place, WHEEL};
-use crate::wire::{Name, Text};
+use crate::table::Name;
+use crate::wire::Text;
 
 /// Entries of a list that are shown at once.
 pub const LINES: usize = 4;

@@ -1,6 +1,6 @@
 //! A name, letter by letter, with one button.
 
-use crate::wire::Name;
+use crate::table::Name;
 
 /// What can be taken: letters, then ends.
 const LETTERS: &str = "abcdefghijklmnopqrstuvwxyz 0123456789";

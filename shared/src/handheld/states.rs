@@ -12,8 +12,9 @@ use crate::dsp::Plan;
 use crate::features::Observation;
 use crate::kernels::Kernels;
 use crate::sensor::pressure::Pressure;
+use crate::table::Name;
 use crate::table::Table;
-use crate::wire::{Name, Text, text};
+use crate::wire::{Text, text};
 
 /// Ticks in a second.
 pub const TICKS_HZ: u32 = 100;

@@ -5,8 +5,8 @@ use core::fmt;
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::seams::{RigHandle, UnloadedRun};
+use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
-use crate::rig::control::Phase;
 use crate::rig::unloaded::UnloadedRuns;
 use crate::store::{Store, StoreError};
 use crate::wire::{Text, text};

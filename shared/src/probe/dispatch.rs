@@ -9,7 +9,7 @@ use embedded_storage_async::nor_flash::NorFlash;
 use super::memory::Memory;
 use super::seams::{Events, Panel, RigHandle, StoredBytes};
 use super::{calibrate, identify, status, teach, train, transfer};
-use crate::features::Plan;
+use crate::dsp::Plan;
 use crate::kernels::Kernels;
 use crate::rig::calibration::RigCalibration;
 use crate::wire::{Ask, Request, Tell, Text, text};

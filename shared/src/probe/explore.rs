@@ -2,9 +2,10 @@
 
 use core::fmt;
 
+use crate::dsp::Plan;
 use crate::explorer::{Explorer, ObserveError, Outlook, Verdict};
-use crate::features::{Measurement, Plan, Slide, SlideError};
-use crate::fused::Observation;
+use crate::features::Observation;
+use crate::features::{Measurement, Slide, SlideError};
 use crate::kernels::Kernels;
 use crate::rig::{MAX_REJECTED, Rig};
 use crate::table::Action;

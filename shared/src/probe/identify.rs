@@ -6,19 +6,20 @@ use core::fmt;
 use heapless::Vec;
 
 use super::explore::{Event, Random, explore};
+use crate::dsp::Plan;
+use crate::explorer::Visited;
 use crate::explorer::{Config, Explorer, Method, Outlook};
-use crate::features::Plan;
 use crate::kernels::Kernels;
 use crate::rig::Rig;
-use crate::session::Visited;
 use crate::table::{Contents, Table};
+use crate::table::{MAX_TEXTURES, Name};
 use crate::up_to;
-use crate::wire::{Identify, MAX_OUTLOOK, MAX_TEXTURES, Name, Promise, Tell, Text, text};
+use crate::wire::{Identify, MAX_OUTLOOK, Promise, Tell, Text, text};
 
 /// Explores what lies under the finger until there is an answer, which is told; the error is why there is none.
 ///
 /// # Errors
-/// The request makes no sense with this table, or the exploration failed: see [`crate::rig::ExploreError`].
+/// The request makes no sense with this table, or the exploration failed: see [`crate::probe::explore::ExploreError`].
 pub async fn identify<R, K>(
     wanted: &Identify,
     rig: &mut R,

@@ -6,16 +6,18 @@ use heapless::Vec;
 use super::explore::Random;
 use super::seams::{RigHandle, UnloadedRun};
 use super::status::RigState;
+use crate::features::Blocks;
+use crate::features::Felt;
+use crate::features::Movement;
 use crate::features::{PropertySet, Slide};
 use crate::kernels::Kernels;
-use crate::movement::Movement;
 use crate::rig::calibration::RigCalibration;
-use crate::rig::control::{Control, Ended, Phase, Refused};
-use crate::rig::patience::{Patience, Wait};
-use crate::rig::pins::{Felt, Outputs};
+use crate::rig::control::Control;
+use crate::rig::pins::Outputs;
 use crate::rig::skin::SkinCare;
+use crate::rig::timeout::{Patience, Wait};
+use crate::rig::{Ended, Phase, Refused};
 use crate::rig::{Rig, RigError};
-use crate::session::Blocks;
 use crate::wire::Tell;
 
 /// How often the samples are looked after, ms.

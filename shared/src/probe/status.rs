@@ -4,8 +4,9 @@ use heapless::Vec;
 
 use super::seams::Panel;
 use crate::rig::calibration::RigCalibration;
-use crate::rig::control::{Control, Ended, Phase};
+use crate::rig::control::Control;
 use crate::rig::skin::SkinCare;
+use crate::rig::{Ended, Phase};
 use crate::wire::{Live, Status, Tell};
 
 /// What the rig is doing, as of its last tick.

@@ -8,12 +8,14 @@
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
-use crate::fused::{Vector, Whitened};
-use crate::session::Visited;
+use crate::explorer::Visited;
+use crate::features::Vector;
 use crate::store::{SelfTaught, Store};
+use crate::table::Whitened;
 use crate::table::{Change, EncodeError, Known, MAX_MOVEMENTS, Table, Tally, amend, retell};
+use crate::table::{MAX_TEXTURES, Name};
 use crate::up_to;
-use crate::wire::{Forget, MAX_TEXTURES, Name, Tell, Text, text};
+use crate::wire::{Forget, Tell, Text, text};
 
 /// Copies the stored table into `room`, with what the probe has learned by itself in its place: the table in force. Gives its
 /// length.

@@ -5,17 +5,19 @@ mod dispatch;
 use super::explore::Random;
 use super::identify::best;
 use super::*;
+use crate::dsp::Plan;
 use crate::explorer::{Method, Outlook};
-use crate::features::{Plan, Property, PropertySet, Slide};
-use crate::fused::{FeatureSet, Observation};
+use crate::features::Movement;
+use crate::features::{FeatureSet, Observation};
+use crate::features::{Property, PropertySet, Slide};
 use crate::kernels::Kernels;
-use crate::movement::Movement;
 use crate::rig::Rig;
 use crate::store::tests::ram::Ram;
 use crate::store::{SelfTaught, Store};
+use crate::table::Name;
 use crate::table::tests::{around, fused_of, known, straight, table_of};
 use crate::table::{Action, Table};
-use crate::wire::{Identify, MAX_OUTLOOK, Name, Tell, Text, Train, text};
+use crate::wire::{Identify, MAX_OUTLOOK, Tell, Text, Train, text};
 use embassy_futures::block_on;
 use heapless::Vec;
 use std::format;
@@ -71,7 +73,7 @@ fn wanted(among: &[u16]) -> Identify {
 fn identified(slides: &[Option<i16>], wanted: &Identify) -> (Result<(), Text>, vec::Vec<String>) {
     let bytes = table();
     let mut told = vec::Vec::new();
-    let result = block_on(identify::<_, crate::kernels::Plain>(
+    let result = block_on(identify::<_, crate::dsp::Plain>(
         wanted,
         &mut Script(slides.iter().copied().collect()),
         Table::read(&bytes).unwrap(),
@@ -150,7 +152,7 @@ fn random_numbers_are_spread() {
 fn fused_table() -> vec::Vec<u8> {
     let bands = {
         let plan = Plan::new();
-        let mut slide = Slide::<crate::kernels::Plain>::new(&plan);
+        let mut slide = Slide::<crate::dsp::Plain>::new(&plan);
         block_on(Script([Some(0)].into()).perform(Movement::FOR_TRACTION, &mut slide)).unwrap();
         Observation::from(&slide.finish().unwrap()).bands
     };
@@ -178,7 +180,7 @@ fn a_fused_exploration_says_whether_it_is_certain() {
             open,
             ..wanted(&[])
         };
-        let visited = block_on(identify::<_, crate::kernels::Plain>(
+        let visited = block_on(identify::<_, crate::dsp::Plain>(
             &wanted,
             &mut Script(slides.iter().copied().collect()),
             Table::read(&bytes).unwrap(),
@@ -270,7 +272,7 @@ fn training_a_fused_texture_ends_in_the_store() {
         let mut rig = Script([None, Some(tractions[0]), Some(tractions[1])].into());
         let mut room = vec![0; 8192];
         let mut told = vec::Vec::new();
-        block_on(train::<_, _, crate::kernels::Plain>(
+        block_on(train::<_, _, crate::dsp::Plain>(
             &wanted,
             &mut rig,
             &mut store,

@@ -7,11 +7,12 @@ use heapless::Vec;
 
 use super::teach::forget_stale;
 use super::training::{Training, Wanted};
-use crate::features::{Plan, Slide};
-use crate::fused::Observation;
+use crate::dsp::Plan;
+use crate::features::Movement;
+use crate::features::Observation;
+use crate::features::Slide;
 use crate::kernels::Kernels;
-use crate::movement::Movement;
-use crate::rig::guard::Fault;
+use crate::rig::Fault;
 use crate::rig::{MAX_REJECTED, Rig};
 use crate::store::Store;
 use crate::table::{MAX_MOVEMENTS, Table};
@@ -22,7 +23,7 @@ use crate::wire::{Tell, Text, Train, text};
 /// is stored at once. In the end the store has a new table, which is to be used from then on. `room` holds a whole table.
 ///
 /// # Errors
-/// The texture cannot be learned, see [`crate::training::TrainingError`]; the rig or the store failed; [`MAX_REJECTED`]
+/// The texture cannot be learned, see [`crate::probe::training::TrainingError`]; the rig or the store failed; [`MAX_REJECTED`]
 /// slides in a row were no good.
 pub async fn train<R, F, K>(
     wanted: &Train,

@@ -15,16 +15,17 @@ use core::fmt;
 
 use heapless::Vec;
 
+use crate::features::Movement;
+use crate::features::{FeatureSet, Observation};
 use crate::features::{Property, PropertySet};
 use crate::fill;
-use crate::fused::{FeatureSet, Observation, Whitened};
-use crate::movement::Movement;
 use crate::store::Trained;
+use crate::table::Whitened;
 use crate::table::{
     Change, Contents, EncodeError, Experience, Known, MAX_MOVEMENTS, Table, Tally, Texture, amend,
     encode, encoded_len,
 };
-use crate::wire::{MAX_TEXTURES, Name};
+use crate::table::{MAX_TEXTURES, Name};
 
 pub use crate::table::Lesson;
 

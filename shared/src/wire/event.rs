@@ -9,7 +9,7 @@ use super::text::Text;
 use crate::features::{
     Block, FUSED_BANDS, Measurement, Movement, Observation, Properties, Property,
 };
-use crate::rig::guard::Fault;
+use crate::rig::Fault;
 use crate::table::{Action, MAX_TEXTURES, Name};
 
 /// Most actions that are sent of an outlook: the best ones.
@@ -159,7 +159,7 @@ pub enum Reset {
     Other,
 }
 
-/// What the rig does: [`crate::rig::control::Phase`] without its fault.
+/// What the rig does: [`crate::rig::Phase`] without its fault.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum Phase {
     /// It does not know where it is.
@@ -184,9 +184,9 @@ pub enum Phase {
     Faulted,
 }
 
-impl From<crate::rig::control::Phase> for Phase {
-    fn from(phase: crate::rig::control::Phase) -> Self {
-        use crate::rig::control::Phase as Rig;
+impl From<crate::rig::Phase> for Phase {
+    fn from(phase: crate::rig::Phase) -> Self {
+        use crate::rig::Phase as Rig;
         match phase {
             Rig::Parked => Self::Parked,
             Rig::Homing => Self::Homing,

@@ -1,7 +1,7 @@
 use super::*;
 use crate::explorer::Method;
 use crate::features::{FUSED_BANDS, Movement, Properties, Property, PropertySet};
-use crate::rig::guard::Fault;
+use crate::rig::Fault;
 use crate::table::Action;
 use heapless::{String, Vec};
 use proptest::prelude::*;

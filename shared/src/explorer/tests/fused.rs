@@ -1,9 +1,9 @@
 //! The fused way of deciding against its recipe, written out in f64.
 
 use super::*;
-use crate::fused::{Whitened, Whitening};
 use crate::table::tests::whitening::{Noise, World, learned};
 use crate::table::tests::{fused_of, known, straight};
+use crate::table::{Whitened, Whitening};
 use std::string::ToString;
 
 /// Steps 4, 6 and 7 of the recipe on the means that the table holds.
@@ -863,7 +863,7 @@ fn a_slide_without_the_features_teaches_nothing() {
 #[test]
 fn what_lies_behind_a_mean_does_not_count() {
     use crate::explorer::kernels::{Candidate, mask};
-    use crate::fused::MAX_FEATURES;
+    use crate::features::MAX_FEATURES;
     let mean = [3i16, -400, 5000, -32768];
     let mut bytes: Vec<u8> = mean.iter().flat_map(|m| m.to_le_bytes()).collect();
     let last = Candidate::new(&bytes, &mask(mean.len()), 0.5, 7);

@@ -10,7 +10,7 @@ use super::*;
 use crate::handheld::picture::{HEIGHT, Picture, WIDTH};
 use crate::handheld::screen::LINES;
 use crate::handheld::spelling::Spelling;
-use crate::wire::Name;
+use crate::table::Name;
 use heapless::Vec;
 
 const LONG: &str = "Corduroy, fine wale, well worn at the knee";

@@ -1,13 +1,13 @@
 //! The probe's states, whatever happens to them; with made-up slides, since touches have tests of their own.
 
 use super::*;
+use crate::dsp::Plain;
+use crate::explorer::Visited;
 use crate::handheld::draw;
 use crate::handheld::judge::{FEATURES, judge};
 use crate::handheld::picture::Picture;
-use crate::kernels::Plain;
 use crate::probe::explore::Random;
 use crate::sensor::pressure::{Channel, Counts};
-use crate::session::Visited;
 use crate::table::tests::{fused_of, known, straight};
 use proptest::prelude::*;
 use proptest::strategy::Strategy;

@@ -1,9 +1,9 @@
 //! Touches of made-up signals: a finger on a spring, vibrations of noise.
 
 use super::*;
-use crate::kernels::Plain;
+use crate::dsp::Plain;
+use crate::probe::explore::Random;
 use crate::sensor::pressure::Counts;
-use crate::session::Random;
 use proptest::prelude::*;
 use std::vec::Vec as List;
 

@@ -1,10 +1,10 @@
 //! Learning by itself and from answers, against running means in f64; the power is cut at every word.
 
 use super::*;
-use crate::fused::{FeatureSet, MAX_FEATURES};
-use crate::probe::training::Lesson;
+use crate::features::{FeatureSet, MAX_FEATURES};
 use crate::store::tests::ram::{Ram, RamError, Torn};
 use crate::store::{StoreError, Trained};
+use crate::table::Lesson;
 use crate::table::tests::{fused_of, known, straight};
 use embassy_futures::block_on;
 use std::vec;

@@ -1,7 +1,7 @@
 //! A probe with a scripted rig and a store in RAM is asked everything.
 
 use super::*;
-use crate::kernels::Plain;
+use crate::dsp::Plain;
 use crate::probe::seams::{Events, Panel, RigHandle, StoredBytes, UnloadedRun};
 use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
@@ -13,7 +13,7 @@ const SECTOR: usize = 16_384;
 type Flash = Ram<SECTOR>;
 
 const CALIBRATION: RigCalibration = RigCalibration {
-    pressure: crate::pressure::Calibration::PAPER,
+    pressure: crate::sensor::pressure::Calibration::PAPER,
     unloaded_a: (0.037, 0.0),
     newton_per_ampere: 16.4,
     date: 20_261_121,

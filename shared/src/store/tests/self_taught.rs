@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::features::MAX_FEATURES;
+use crate::table::MAX_TEXTURES;
 use crate::table::Whitened;
-use crate::wire::MAX_TEXTURES;
 
 const CHIP: usize = 16 * 1024;
 

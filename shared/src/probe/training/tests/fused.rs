@@ -1,7 +1,8 @@
 //! Training for a fused table: one slide is enough, and what comes is whitened as the table has it.
 
 use super::*;
-use crate::fused::{Vector, Whitening};
+use crate::features::Vector;
+use crate::table::Whitening;
 use crate::table::tests::whitening::{Noise, World, learned};
 use crate::table::tests::{fused_of, known, straight};
 
