@@ -9,8 +9,7 @@ use tactus::sim::faults::Fault;
 use tactus::sim::hand::Hand;
 use tactus::sim::world::NotLifted;
 
-use crate::board::{Emulator, Error, Options};
-use crate::rig::Output;
+use crate::board::{Display, Emulator, Error, Options, Output};
 
 /// How often the person looks, ns.
 const LOOK_NS: u64 = 20_000_000;
@@ -32,23 +31,49 @@ pub enum PlayError {
     #[error(transparent)]
     NotLifted(#[from] NotLifted),
     /// A step did not come out.
-    #[error("step {number}, at {at_s:.2} s: {what}. The display:\n{display}")]
+    #[error("step {number}, at {at_s:.2} s: {unmet}. The display:\n{display}")]
     Step {
         /// Which, from 1.
         number: usize,
         /// When, s of virtual time.
         at_s: f64,
         /// What was wrong.
-        what: String,
+        unmet: Unmet,
         /// What was seen.
         display: String,
     },
 }
 
+/// What did not come out.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Unmet {
+    /// A text that the display should show.
+    #[error("{text:?} is not seen within {within_s} s")]
+    NotSeen {
+        /// Its parts.
+        text: Vec<String>,
+        /// How long it was looked for.
+        within_s: f64,
+    },
+    /// A text that it should not show.
+    #[error("{0:?} is seen")]
+    Seen(String),
+    /// The display should be off.
+    #[error("the display is not off")]
+    NotDark,
+    /// A tone, and those that were heard.
+    #[error("{0} Hz are not heard, but {1:?}")]
+    NotHeard(u32, Vec<u32>),
+    /// The display should ask for a slide.
+    #[error("the display does not want a slide")]
+    NoSlideWanted,
+    /// There should be a verdict.
+    #[error("{0} slides were not enough")]
+    NotEnough(u32),
+}
+
 /// Plays a scenario on a board with this ELF, which may hold a store from before. Gives the board as it is in the end.
-///
-/// # Errors
-/// See [`PlayError`].
 pub fn play(
     scenario: &Scenario,
     elf: &Path,
@@ -64,11 +89,11 @@ pub fn play(
     played.power_up(store)?;
     for (step, number) in scenario.step.iter().zip(1..) {
         let done = played.act(step)?;
-        if let Err(what) = done {
+        if let Err(unmet) = done {
             return Err(PlayError::Step {
                 number,
                 at_s: played.board().now_ns() as f64 * 1e-9,
-                what,
+                unmet,
                 display: played.seen(),
             });
         }
@@ -87,7 +112,7 @@ struct Played<'s> {
 }
 
 /// What a step comes to: what was wrong.
-type Done = Result<Result<(), String>, PlayError>;
+type Done = Result<Result<(), Unmet>, PlayError>;
 
 impl Played<'_> {
     fn board(&mut self) -> &mut Emulator {
@@ -118,11 +143,7 @@ impl Played<'_> {
     }
 
     /// Looks until it is so.
-    fn until(
-        &mut self,
-        within_s: f64,
-        seen: impl Fn(&crate::Display) -> bool,
-    ) -> Result<bool, Error> {
+    fn until(&mut self, within_s: f64, seen: impl Fn(&Display) -> bool) -> Result<bool, Error> {
         let limit_ns = self.board().now_ns() + (within_s * 1e9) as u64;
         self.board()
             .run_to(limit_ns, LOOK_NS, |rig| seen(rig.display()))
@@ -135,7 +156,7 @@ impl Played<'_> {
     fn slide(&mut self, force_n: f64, pace_mm_s: f64, seconds: f64) -> Done {
         self.intend(force_n, 0.0);
         if !self.until(PATIENCE_S, |display| display.shows(SLIDE))? {
-            return Ok(Err("the display does not want a slide".into()));
+            return Ok(Err(Unmet::NoSlideWanted));
         }
         self.board().run_ms(Step::REACTION_MS)?;
         self.intend(force_n, pace_mm_s);
@@ -149,23 +170,24 @@ impl Played<'_> {
 
     fn act(&mut self, step: &Step) -> Done {
         let shows =
-            |display: &crate::Display, text: &[String]| text.iter().all(|text| display.shows(text));
+            |display: &Display, text: &[String]| text.iter().all(|text| display.shows(text));
         match step {
             Step::Note { .. } => {}
             Step::See { text, within_s } => {
                 if !self.until(*within_s, |display| shows(display, text))? {
-                    return Ok(Err(format!("{text:?} is not seen within {within_s} s")));
+                    let (text, within_s) = (text.clone(), *within_s);
+                    return Ok(Err(Unmet::NotSeen { text, within_s }));
                 }
             }
             Step::Miss { text } => {
                 let rig = self.board().rig();
                 if let Some(text) = text.iter().find(|text| rig.display().shows(text)) {
-                    return Ok(Err(format!("{text:?} is seen")));
+                    return Ok(Err(Unmet::Seen(text.clone())));
                 }
             }
             Step::Dark { within_s } => {
                 if !self.until(*within_s, |display| display.picture().is_none())? {
-                    return Ok(Err("the display is not off".into()));
+                    return Ok(Err(Unmet::NotDark));
                 }
             }
             Step::Hear { hz } => {
@@ -180,7 +202,7 @@ impl Played<'_> {
                     })
                     .collect();
                 if !heard.iter().any(|tone| tone.abs_diff(*hz) * 50 <= *hz) {
-                    return Ok(Err(format!("{hz} Hz are not heard, but {heard:?}")));
+                    return Ok(Err(Unmet::NotHeard(*hz, heard)));
                 }
             }
             Step::Hand { force_n, pace_mm_s } => self.intend(*force_n, *pace_mm_s),
@@ -195,14 +217,14 @@ impl Played<'_> {
                 slides,
             } => {
                 for _ in 0..*slides {
-                    if let Err(what) = self.slide(*force_n, *pace_mm_s, Step::EXPLORED_S)? {
-                        return Ok(Err(what));
+                    if let Err(unmet) = self.slide(*force_n, *pace_mm_s, Step::EXPLORED_S)? {
+                        return Ok(Err(unmet));
                     }
                     if self.until(Step::VERDICT_S, |display| display.shows(OVER))? {
                         return Ok(Ok(()));
                     }
                 }
-                return Ok(Err(format!("{slides} slides were not enough")));
+                return Ok(Err(Unmet::NotEnough(*slides)));
             }
             Step::Press { ms, times } => {
                 for _ in 0..*times {

@@ -17,7 +17,7 @@ pub const MAX_TEXTURES: usize = 2048;
 
 /// How a run decides and moves on.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
-#[cfg_attr(feature = "command", derive(clap::ValueEnum))]
+#[cfg_attr(feature = "arguments", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// All features of every slide at once, whitened; the movement chosen by Bayesian exploration.

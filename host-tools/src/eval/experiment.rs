@@ -22,7 +22,7 @@ use crate::eval::learn::{TableError, learn};
 
 /// How slides are divided into training and test.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
-#[cfg_attr(feature = "command", derive(clap::ValueEnum))]
+#[cfg_attr(feature = "arguments", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Protocol {
     /// Training slides at random from all of a session, tested on the rest: optimistic.

@@ -1,8 +1,9 @@
 //! The real ELF on the board.
 
+use tactus::sim::world::Setup;
 use tactus_core::wire::{Ask, Phase, Tell};
-use tactus_emulator::talk::Talk;
-use tactus_emulator::{Emulator, Options, Output, Setup};
+use tactus_emulator::board::{Emulator, Options, Output};
+use tactus_emulator::host::talk::Talk;
 
 use crate::common::elf;
 

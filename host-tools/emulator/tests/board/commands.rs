@@ -7,10 +7,11 @@ use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus::sim::stage::TRAVEL_MM;
+use tactus::sim::world::Setup;
 use tactus_core::explorer::{Method, Strategy};
 use tactus_core::wire::{Ask, Forget, Identify, MAX_FRAME, Name, Request, Train, encode};
-use tactus_emulator::talk::{Talk, TalkError};
-use tactus_emulator::{Emulator, Options, Setup};
+use tactus_emulator::board::{Emulator, Options};
+use tactus_emulator::host::talk::{Talk, TalkError};
 
 use crate::common::{elf, ready};
 

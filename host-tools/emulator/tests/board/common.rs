@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use tactus_emulator::Options;
-use tactus_emulator::lessons::Unknown;
-use tactus_emulator::talk::Talk;
+use tactus_emulator::board::Options;
+use tactus_emulator::host::talk::Talk;
+use tactus_emulator::host::under_finger::Unknown;
 
 /// The ELF that an environment variable names, as `cargo xtask test` sets them: `TACTUS_ELF` is the rig's. Without it these
 /// tests have nothing to run, which `TACTUS_REQUIRE_ELF=1` makes a failure.

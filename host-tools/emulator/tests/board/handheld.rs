@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use tactus::scenario::Scenario;
-use tactus_emulator::Emulator;
+use tactus_emulator::board::Emulator;
 
 use crate::common::elf_of;
 
@@ -116,7 +116,7 @@ fn the_share_of_time_awake_is_true() {
     let ready = br#"{"about": "", "texture": "burlap", "step": [{"see": {"text": ["Press", "and hold"]}}]}"#;
     let ready = Scenario::parse(ready).unwrap();
     let mut board = tactus_emulator::scenario::play(&ready, &elf, None).unwrap();
-    let clock_hz = tactus_emulator::Options::default().instructions_per_second;
+    let clock_hz = tactus_emulator::board::Options::default().instructions_per_second;
     let awake = |board: &mut Emulator, what: &str| {
         board.run_ms(1000).unwrap();
         let (from, from_ns) = (board.instructions().unwrap(), board.now_ns());

@@ -3,7 +3,9 @@
 //! TACTUS_SELFTEST_ELF names the ELF, which `cargo xtask build` makes; without it there is nothing to run.
 
 use tactus::sim::encoder::Cut;
-use tactus_emulator::{Emulator, Fault, Options, Output, ResetCause, Setup};
+use tactus::sim::faults::Fault;
+use tactus::sim::world::Setup;
+use tactus_emulator::board::{Emulator, Options, Output, ResetCause};
 
 use crate::common::elf_of;
 

@@ -25,7 +25,7 @@ impl Drop for Running {
 fn the_probe_answers_on_the_tcp_port() {
     let Some(elf) = elf() else { return };
     let child = Command::new(env!("CARGO_BIN_EXE_tactus-emulator"))
-        .arg("--elf")
+        .args(["serve", "--elf"])
         .arg(elf)
         .args(["--texture", "5", "--port", "0"])
         .stdout(Stdio::piped())

@@ -1,10 +1,11 @@
 //! The store of the real firmware, over many writes: its pages turn in time, and it loses nothing.
 
+use tactus::sim::world::Setup;
 use tactus_core::pressure::Calibration;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::{Ask, Tell, Train};
-use tactus_emulator::talk::{Talk, TalkError};
-use tactus_emulator::{Emulator, Options, Setup};
+use tactus_emulator::board::{Emulator, Options};
+use tactus_emulator::host::talk::{Talk, TalkError};
 
 use crate::common::{elf, ready};
 

@@ -9,9 +9,9 @@ use tactus::link::{Found, Question, ReadTable};
 use tactus_core::explorer::Method;
 use tactus_core::table::{Table, Tally};
 use tactus_core::wire::{Forget, Identify, Name, Status, Tell, Train};
-use tactus_emulator::exploration::{Exploration, explore};
-use tactus_emulator::lessons::{self, Known, Unknown};
-use tactus_emulator::talk::{PATIENCE_S, Talk, TalkError};
+use tactus_emulator::host::exploration::{Exploration, explore};
+use tactus_emulator::host::talk::{PATIENCE_S, Talk, TalkError};
+use tactus_emulator::host::under_finger::{self, Known, Unknown};
 
 use crate::common::{boot, elf};
 
@@ -33,14 +33,14 @@ fn world() -> &'static (Collection, Known) {
             textures,
             trials: 5,
         };
-        let known = lessons::simulated(&collection, Method::Fused, || ()).unwrap();
+        let known = under_finger::simulated(&collection, Method::Fused, || ()).unwrap();
         (collection, known)
     })
 }
 
 /// A trial of a texture that nothing was learned from.
 fn under(texture: u8, trial: u64) -> Unknown {
-    lessons::mounted(&world().0, texture, trial)
+    under_finger::mounted(&world().0, texture, trial)
 }
 
 /// A board that was given the world's table.

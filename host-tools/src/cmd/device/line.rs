@@ -290,7 +290,7 @@ impl Emulator {
             ],
         )?;
         let mut command = Command::new(&program);
-        command.arg("--elf").arg(&elf).args(["--port", "0"]);
+        command.args(["serve", "--port", "0", "--elf"]).arg(&elf);
         for (option, value) in [
             ("--texture", &options.texture),
             ("--recording", &options.recording),

@@ -1,0 +1,304 @@
+//! The handheld's display: an SSD1306 of 128 x 64 points on I2C1, from the bytes on the wire (Solomon Systech, SSD1306
+//! rev 1.1, chapters 8 to 10).
+
+use embedded_graphics::Drawable as _;
+use embedded_graphics::geometry::Point;
+use embedded_graphics::mono_font::ascii::{FONT_6X10, FONT_7X13_BOLD, FONT_10X20};
+use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
+use embedded_graphics::pixelcolor::BinaryColor;
+use embedded_graphics::text::{Baseline, Text};
+use tactus_core::handheld::picture::{HEIGHT, Picture, WIDTH};
+
+/// SA0 to ground.
+const ADDRESS: u8 = 0x3C;
+/// The fonts of the screens.
+const FONTS: [&MonoFont<'_>; 3] = [&FONT_6X10, &FONT_7X13_BOLD, &FONT_10X20];
+
+/// What the next byte of a transfer is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Next {
+    Control,
+    /// The rest of the transfer, or one byte and then another control byte.
+    Command {
+        rest: bool,
+    },
+    Data {
+        rest: bool,
+    },
+}
+
+/// The display.
+#[derive(Clone, Debug)]
+pub struct Display {
+    wired: bool,
+    plugged: bool,
+    next: Next,
+    /// a command with what has come of its parameters
+    command: Vec<u8>,
+    ram: [u8; WIDTH * HEIGHT / 8],
+    on: bool,
+    pump: bool,
+    inverted: bool,
+    /// turned by half a turn in each direction
+    remapped: (bool, bool),
+    mode: u8,
+    columns: (u8, u8),
+    pages: (u8, u8),
+    at: (u8, u8),
+    unknown: Vec<u8>,
+    bytes: u64,
+}
+
+impl Default for Display {
+    /// As after its reset.
+    fn default() -> Self {
+        Self {
+            wired: false,
+            plugged: true,
+            next: Next::Control,
+            command: Vec::new(),
+            ram: [0; WIDTH * HEIGHT / 8],
+            on: false,
+            pump: false,
+            inverted: false,
+            remapped: (false, false),
+            mode: 2,
+            columns: (0, 127),
+            pages: (0, 7),
+            at: (0, 0),
+            unknown: Vec::new(),
+            bytes: 0,
+        }
+    }
+}
+
+impl Display {
+    /// What is seen, as the module is held with its pins on top; `None` when it is off.
+    pub fn picture(&self) -> Option<Picture> {
+        if !(self.on && self.pump) {
+            return None;
+        }
+        let mut seen = [0; WIDTH * HEIGHT / 8];
+        for y in 0..HEIGHT {
+            for x in 0..WIDTH {
+                let column = if self.remapped.0 { x } else { WIDTH - 1 - x };
+                let row = if self.remapped.1 { y } else { HEIGHT - 1 - y };
+                let lit = self.ram[row / 8 * WIDTH + column] >> (row % 8) & 1 == 1;
+                seen[y / 8 * WIDTH + x] |= u8::from(lit != self.inverted) << (y % 8);
+            }
+        }
+        Some(Picture::from_bytes(seen))
+    }
+
+    /// Whether a text is seen, in any of the fonts, dark on light as well.
+    pub fn shows(&self, text: &str) -> bool {
+        self.picture().is_some_and(|picture| {
+            FONTS.iter().any(|font| {
+                let width = font.character_size.width as usize * text.chars().count();
+                let height = font.character_size.height as usize;
+                width <= WIDTH && is_in(&picture, &write(text, font), width, height)
+            })
+        })
+    }
+
+    /// Commands that it was sent and does not have.
+    pub fn unknown(&self) -> &[u8] {
+        &self.unknown
+    }
+
+    /// Bytes that came to it.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Pulls its plug, or puts it in again: then it is as after its reset.
+    pub fn plug(&mut self, plugged: bool) {
+        *self = Self {
+            wired: self.wired,
+            plugged,
+            ..Self::default()
+        };
+    }
+
+    /// Whether the pins carry I2C1.
+    pub(crate) fn wire(&mut self, wired: bool) {
+        self.wired = wired;
+    }
+
+    pub(super) fn start(&mut self, address: u8, read: bool) -> bool {
+        self.next = Next::Control;
+        self.command.clear();
+        self.wired && self.plugged && address == ADDRESS && !read
+    }
+
+    pub(super) fn byte(&mut self, byte: u8) {
+        self.bytes += 1;
+        match self.next {
+            Next::Control => {
+                let rest = byte & 0x80 == 0;
+                self.next = if byte & 0x40 == 0 {
+                    Next::Command { rest }
+                } else {
+                    Next::Data { rest }
+                };
+            }
+            Next::Command { rest } => {
+                self.command.push(byte);
+                self.obey();
+                if !rest {
+                    self.next = Next::Control;
+                }
+            }
+            Next::Data { rest } => {
+                self.put(byte);
+                if !rest {
+                    self.next = Next::Control;
+                }
+            }
+        }
+    }
+
+    /// Obeys the command once its parameters are there.
+    fn obey(&mut self) {
+        match self.command[..] {
+            // with parameters that are yet to come
+            [0x20 | 0x81 | 0xA8 | 0xD3 | 0xD5 | 0xD9 | 0xDA | 0xDB | 0x8D]
+            | [0x21 | 0x22]
+            | [0x21 | 0x22, _] => return,
+            [0x20, mode] => self.mode = mode & 3,
+            [0x21, from, to] => {
+                self.columns = (from & 0x7F, to & 0x7F);
+                self.at.0 = self.columns.0;
+            }
+            [0x22, from, to] => {
+                self.pages = (from & 7, to & 7);
+                self.at.1 = self.pages.0;
+            }
+            [0x8D, pump] => self.pump = pump & 4 != 0,
+            [low @ 0x00..=0x0F] => self.at.0 = self.at.0 & 0x70 | low,
+            [high @ 0x10..=0x17] => self.at.0 = self.at.0 & 0x0F | (high & 7) << 4,
+            [page @ 0xB0..=0xB7] => self.at.1 = page & 7,
+            [remap @ 0xA0..=0xA1] => self.remapped.0 = remap & 1 == 1,
+            [0xC0] => self.remapped.1 = false,
+            [0xC8] => self.remapped.1 = true,
+            [inverted @ 0xA6..=0xA7] => self.inverted = inverted & 1 == 1,
+            [on @ 0xAE..=0xAF] => self.on = on & 1 == 1,
+            // contrast, multiplex, offset, clock, precharge, COM pins, VCOMH, start line 0, RAM shown, no scrolling, nothing
+            [0x81 | 0xD5 | 0xD9 | 0xDB, _]
+            | [0xA8, 63]
+            | [0xD3, 0]
+            | [0xDA, 0x12]
+            | [0x40 | 0xA4 | 0x2E | 0xE3] => {}
+            [command, ..] => self.unknown.push(command),
+            [] => {}
+        }
+        self.command.clear();
+    }
+
+    /// A byte of the picture: eight points of a column.
+    fn put(&mut self, byte: u8) {
+        let (column, page) = self.at;
+        self.ram[usize::from(page) * WIDTH + usize::from(column)] = byte;
+        let step = |at: u8, (from, to): (u8, u8), most: u8| {
+            if at == to {
+                (from, true)
+            } else {
+                ((at + 1) & most, false)
+            }
+        };
+        match self.mode {
+            // along the row, then the next page
+            0 => {
+                let (column, over) = step(column, self.columns, 127);
+                self.at.0 = column;
+                if over {
+                    self.at.1 = step(page, self.pages, 7).0;
+                }
+            }
+            // down, then the next column
+            1 => {
+                let (page, over) = step(page, self.pages, 7);
+                self.at.1 = page;
+                if over {
+                    self.at.0 = step(column, self.columns, 127).0;
+                }
+            }
+            _ => self.at.0 = (column + 1) & 127,
+        }
+    }
+}
+
+/// A text in the corner of a picture.
+fn write(text: &str, font: &MonoFont<'_>) -> Picture {
+    let mut picture = Picture::new();
+    let style = MonoTextStyle::new(font, BinaryColor::On);
+    let Ok(_) = Text::with_baseline(text, Point::zero(), style, Baseline::Top).draw(&mut picture);
+    picture
+}
+
+/// Whether that corner of `part` is somewhere in `whole`, inverted or not.
+fn is_in(whole: &Picture, part: &Picture, width: usize, height: usize) -> bool {
+    // headlines begin a row above the glass, with a row of the font that is empty, and what ends at its right edge leaves
+    // the gap to the next letter, a column, beyond it
+    let is_at = |left: usize, rows_above: usize, top: usize, inverted: bool| {
+        (0..height).all(|y| {
+            (0..width).all(|x| match (top + y).checked_sub(rows_above) {
+                Some(row) if left + x < WIDTH => {
+                    (whole.is_lit(left + x, row) != inverted) == part.is_lit(x, y)
+                }
+                _ => !part.is_lit(x, y),
+            })
+        })
+    };
+    (0..=WIDTH - width + 1)
+        .any(|x| (0..=HEIGHT - height + 1).any(|y| is_at(x, 1, y, false) || is_at(x, 1, y, true)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn send(display: &mut Display, bytes: &[u8]) {
+        assert!(display.start(ADDRESS, false));
+        bytes.iter().for_each(|byte| display.byte(*byte));
+    }
+
+    #[test]
+    fn bytes_on_the_wire_make_a_picture_that_can_be_read() {
+        let mut display = Display::default();
+        assert!(!display.start(ADDRESS, false), "not wired");
+        display.wire(true);
+        assert!(!display.start(0x3D, false) && !display.start(ADDRESS, true));
+        assert!(display.picture().is_none());
+        send(
+            &mut display,
+            &[0x00, 0x8D, 0x14, 0xA1, 0xC8, 0x20, 0x00, 0xAF],
+        );
+        send(&mut display, &[0x00, 0x21, 0, 127, 0x22, 0, 7]);
+        let text = write("Tactus", &FONT_7X13_BOLD);
+        send(&mut display, &[&[0x40], &text.bytes()[..500]].concat());
+        send(&mut display, &[&[0x40], &text.bytes()[500..]].concat());
+        assert!(display.picture() == Some(text));
+        assert!(display.shows("Tactus") && display.shows("act") && !display.shows("cat"));
+        // at the edges
+        let mut edges = Picture::new();
+        let style = MonoTextStyle::new(&FONT_6X10, BinaryColor::On);
+        let end = Point::new(WIDTH as i32 + 1 - 6 * 6, 20);
+        let Ok(_) = Text::with_baseline("lost 0", end, style, Baseline::Top).draw(&mut edges);
+        let other = Display {
+            ram: *edges.bytes(),
+            ..display.clone()
+        };
+        assert!(other.shows("lost 0") && !other.shows("lost 8") && !other.shows("lost 0 "));
+        // turned round, nobody reads it; inverted, everybody
+        send(&mut display, &[0x80, 0xA0, 0x80, 0xA7]);
+        assert!(!display.shows("Tactus"));
+        send(&mut display, &[0x00, 0xA1]);
+        assert!(display.shows("Tactus"));
+        assert_eq!(display.unknown(), [0u8; 0]);
+        send(&mut display, &[0x00, 0xFF]);
+        assert_eq!(display.unknown(), [0xFF_u8]);
+        display.plug(false);
+        assert!(!display.start(ADDRESS, false) && !display.shows("Tactus"));
+    }
+}

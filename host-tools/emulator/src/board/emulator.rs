@@ -1,0 +1,439 @@
+//! The emulator for those who use it.
+
+use std::path::Path;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::thread::JoinHandle;
+
+use rigless::device::ResetCause;
+use rigless::emulator::{Start, run};
+use rigless::image::Image;
+use rigless::session::Session;
+use rigless::soc::Width;
+use rigless::time::VirtualNanos;
+use tactus::sim::faults::Fault;
+use tactus::sim::world::Setup;
+
+use super::chip::Board;
+use super::driver::{Command, Driver, Standing};
+use super::error::Error;
+use super::flash::{self, FlashWrite};
+use super::handler_profile::{Spending, Spent};
+use super::log::Log;
+use super::options::Options;
+use super::pins;
+use super::registers::register;
+use super::rig::{Rig, SharedRig, lock};
+use super::stack::{Stack, StackLayout, StackUse};
+use super::symbols::symbols;
+
+/// A reset of the chip.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Reset {
+    /// When, ns.
+    pub at_ns: u64,
+    /// By what: the core itself, or an instance such as IWDG.
+    pub cause: ResetCause,
+}
+
+/// A board that runs an ELF, with the rig on its pins. It stands except in [`Emulator::run_until`] and its like. What looks
+/// into the chip is an error once the run is over ([`Error::Ended`]).
+pub struct Emulator {
+    rig: SharedRig,
+    commands: Option<Sender<Command>>,
+    reached: Receiver<u64>,
+    thread: Option<JoinHandle<Result<(), Error>>>,
+    now_ns: u64,
+    /// name, address without the Thumb bit, size in bytes
+    symbols: Vec<(String, u64, u64)>,
+}
+
+impl Emulator {
+    /// Powers up a board with the ELF at `path` in its flash, and the rig of `setup` on its pins; stands at time 0.
+    pub fn start(path: &Path, setup: Setup, options: Options) -> Result<Self, Error> {
+        let elf = std::fs::read(path).map_err(|source| Error::Read {
+            path: path.into(),
+            source,
+        })?;
+        let symbols = symbols(&elf).map_err(|source| Error::Elf {
+            path: path.into(),
+            source,
+        })?;
+        let block = symbols.iter().find(|(name, ..)| name == "_SEGGER_RTT");
+        let log = block.and_then(|(_, address, _)| Log::new(&elf, *address));
+        let mut images = vec![Image::new(path, elf, None)?];
+        if let Some(store) = &options.store {
+            let at = Some(flash::STORE.start);
+            images.push(Image::new(Path::new("store"), store.clone(), at)?);
+        }
+        let rig = Arc::new(Mutex::new(Rig::new(setup, options.trace_s * 1_000_000_000)));
+        let (commands, commanded) = channel();
+        let (reaches, reached) = channel();
+        let mut driver = Driver {
+            rig: rig.clone(),
+            commands: commanded,
+            reached: reaches,
+            log,
+            stack: None,
+            spending: None,
+            instructions: 0,
+            tick_ns: options.tick_ns.max(1),
+            next_tick_ns: 0,
+            until_ns: 0,
+            resets: 0,
+            switches: [None; 4],
+            clock: options.clock,
+            stored: Vec::new(),
+        };
+        let shared = rig.clone();
+        let thread = std::thread::spawn(move || {
+            let board = Board::new(&shared, options.instructions_per_second)?;
+            let mut session = Session::new(Box::new(board), 0, VirtualNanos(0))?;
+            driver.power_up(&mut session);
+            let mut start = Start::new(&images);
+            // without it a `bkpt` of the firmware would be a fault
+            start.semihosting = true;
+            run(session, &start, driver)?;
+            Ok(())
+        });
+        let mut emulator = Self {
+            rig,
+            commands: Some(commands),
+            reached,
+            thread: Some(thread),
+            now_ns: 0,
+            symbols,
+        };
+        emulator.wait()?;
+        Ok(emulator)
+    }
+
+    fn wait(&mut self) -> Result<(), Error> {
+        match self.reached.recv() {
+            Ok(now_ns) => {
+                self.now_ns = now_ns;
+                Ok(())
+            }
+            Err(_) => Err(self.end()),
+        }
+    }
+
+    /// Why the run is over.
+    fn end(&mut self) -> Error {
+        self.commands = None;
+        match self.thread.take().map(JoinHandle::join) {
+            Some(Ok(Err(why))) => why,
+            Some(Err(panic)) => std::panic::resume_unwind(panic),
+            Some(Ok(Ok(()))) | None => Error::Ended,
+        }
+    }
+
+    /// Virtual time since power-up, ns.
+    pub fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    /// Goes on to a virtual time, ns; one that is past is now.
+    ///
+    /// # Errors
+    /// [`Error::Ended`] if the firmware ended the run by semihosting, else the emulator's.
+    pub fn run_until(&mut self, until_ns: u64) -> Result<(), Error> {
+        if until_ns <= self.now_ns {
+            return Ok(());
+        }
+        let sent = self
+            .commands
+            .as_ref()
+            .map(|commands| commands.send(Command::RunUntil(until_ns)));
+        match sent {
+            Some(Ok(())) => self.wait(),
+            _ => Err(self.end()),
+        }
+    }
+
+    /// Goes on for so many ms.
+    pub fn run_ms(&mut self, ms: u64) -> Result<(), Error> {
+        self.run_until(self.now_ns + ms * 1_000_000)
+    }
+
+    /// Goes on in steps of `step_ns` until `done` says so, at most until `limit_ns`; whether it did.
+    pub fn run_to(
+        &mut self,
+        limit_ns: u64,
+        step_ns: u64,
+        mut done: impl FnMut(&mut Rig) -> bool,
+    ) -> Result<bool, Error> {
+        while !done(&mut lock(&self.rig)) {
+            if self.now_ns >= limit_ns {
+                return Ok(false);
+            }
+            self.run_until((self.now_ns + step_ns.max(1)).min(limit_ns))?;
+        }
+        Ok(true)
+    }
+
+    /// The rig on the board's pins. Let go of it before the emulator runs on.
+    pub fn rig(&self) -> MutexGuard<'_, Rig> {
+        lock(&self.rig)
+    }
+
+    /// Breaks something on the rig now.
+    pub fn inject(&mut self, fault: Fault) {
+        self.rig().world().inject(fault);
+    }
+
+    /// Lets something break on the rig at a virtual time, ns, to its tick of 76 us.
+    pub fn schedule(&mut self, at_ns: u64, fault: Fault) {
+        self.rig().world().schedule(at_ns, fault);
+    }
+
+    /// Bytes to the firmware by USART3, as fast as the line takes them.
+    pub fn send(&mut self, bytes: &[u8]) {
+        self.rig().to_say.extend(bytes);
+    }
+
+    /// Bytes that the firmware sent by USART3 since the last call, with the time at which each was over, ns.
+    pub fn received(&mut self) -> Vec<(u64, u8)> {
+        std::mem::take(&mut self.rig().heard)
+    }
+
+    fn with<T: Send + 'static>(
+        &mut self,
+        act: impl FnOnce(&mut Standing<'_>) -> T + Send + 'static,
+    ) -> Result<T, Error> {
+        let (answer, answered) = channel();
+        let command = Command::With(Box::new(move |standing| {
+            // the owner waits for it below
+            let _ = answer.send(act(standing));
+        }));
+        let sent = self.commands.as_ref().map(|to| to.send(command));
+        if let Some(Ok(())) = sent
+            && let Ok(answer) = answered.recv()
+        {
+            return Ok(answer);
+        }
+        Err(self.end())
+    }
+
+    /// Lines of the firmware's log since the last call, with the time at which they were read, ns.
+    pub fn log(&mut self) -> Result<Vec<(u64, String)>, Error> {
+        self.with(|standing| {
+            let log = standing.driver.log.as_mut();
+            log.map(Log::take).unwrap_or_default()
+        })
+    }
+
+    /// Resets of the chip since power-up, in the order of time.
+    pub fn resets(&mut self) -> Result<Vec<Reset>, Error> {
+        self.with(|standing| {
+            let resets = standing.session.resets().iter();
+            resets
+                .map(|reset| Reset {
+                    at_ns: reset.at.0,
+                    cause: reset.cause,
+                })
+                .collect()
+        })
+    }
+
+    /// Registers that the firmware used and no model implements, "SYSCFG.EXTICR4" and so on. Only SYSCFG's should be here.
+    pub fn unimplemented(&mut self) -> Result<Vec<String>, Error> {
+        self.with(|standing| {
+            let registers = standing.session.unimplemented().values();
+            registers
+                .map(|used| format!("{}.{}", used.instance, used.register))
+                .collect()
+        })
+    }
+
+    /// Addresses that the firmware used and nothing is at.
+    pub fn unmapped(&mut self) -> Result<Vec<u64>, Error> {
+        self.with(|standing| {
+            let unmapped = standing.session.unmapped().into_iter();
+            // stores to the array are listed, since the driver does what they do
+            unmapped
+                .map(|access| access.address)
+                .filter(|address| !flash::ARRAY.contains(address))
+                .collect()
+        })
+    }
+
+    /// Presses the board's button or lets it go.
+    pub fn press(&mut self, pressed: bool) -> Result<(), Error> {
+        let at = VirtualNanos(self.now_ns);
+        self.with(move |standing| {
+            let board = standing.session.board_mut();
+            board.drive(at, pins::BUTTON, Some(pressed));
+        })
+    }
+
+    /// Whether the green, the blue and the red LED are on.
+    pub fn leds(&mut self) -> Result<[bool; 3], Error> {
+        self.with(|standing| pins::LEDS.map(|led| standing.session.board_mut().level(led)))
+    }
+
+    /// The debug probe's 8 MHz stop, for good. The chip's clock security system, where the firmware has turned it on, does
+    /// all that it does but the NMI, which rigless cannot raise: write ICSR by code of your own.
+    pub fn stop_clock(&mut self) -> Result<(), Error> {
+        let at = VirtualNanos(self.now_ns);
+        self.with(move |standing| {
+            standing.driver.clock = false;
+            let f427 = &mut standing.session.board_mut().part.f427;
+            f427.drive_clocks(at, |rcc, registers, context| {
+                rcc.fail_hse(registers, context);
+            });
+        })
+    }
+
+    /// From now on the flash's interrupt clears its flags, and wakes nobody; by new code for its handler. What to write back,
+    /// and where.
+    ///
+    /// # Errors
+    /// [`Error::Symbol`] and [`Error::Room`].
+    pub fn lose_flash_interrupts(&mut self) -> Result<(u64, Vec<u8>), Error> {
+        const HANDLER: &str = "FLASH";
+        let (address, size) = self.symbol(HANDLER)?;
+        let address = address & !1;
+        // ldr r0, [pc, #4]; ldr r1, [r0]; str r1, [r0]; bx lr; FLASH_SR
+        let mut code = vec![0x4801_u16, 0x6801, 0x6001, 0x4770, 0x3C0C, 0x4002];
+        if !address.is_multiple_of(4) {
+            // nop: the word at the end is read from a multiple of 4
+            code.insert(0, 0xBF00);
+        }
+        let bytes: Vec<u8> = code.iter().flat_map(|c| c.to_le_bytes()).collect();
+        let (name, needed) = (HANDLER, bytes.len() as u64);
+        if needed > size {
+            return Err(Error::Room { name, size, needed });
+        }
+        let whole = self.read(address, needed)?;
+        self.write(address, &bytes)?;
+        Ok((address, whole))
+    }
+
+    /// Resets the chip by its pin.
+    pub fn reset(&mut self) -> Result<(), Error> {
+        let at = VirtualNanos(self.now_ns);
+        self.with(move |standing| standing.session.reset_by_pin(at, 0, standing.host))
+    }
+
+    /// The firmware's store as it is now: what survives a power cut.
+    pub fn store(&mut self) -> Result<Vec<u8>, Error> {
+        self.read(flash::STORE.start, flash::STORE.end - flash::STORE.start)
+    }
+
+    /// What the firmware did to its store since the last call, in the order of time.
+    pub fn store_writes(&mut self) -> Result<Vec<FlashWrite>, Error> {
+        self.with(|standing| std::mem::take(&mut standing.driver.stored))
+    }
+
+    /// Where the core stands: the address of its next instruction.
+    pub fn program_counter(&mut self) -> Result<Option<u32>, Error> {
+        self.with(|standing| register(standing.host, 15))
+    }
+
+    /// Instructions since power-up; a core that sleeps makes none.
+    pub fn instructions(&mut self) -> Result<u64, Error> {
+        self.with(|standing| standing.driver.instructions)
+    }
+
+    /// Counts from now on the instructions of the handlers at these addresses.
+    pub fn count_handlers(&mut self, addresses: Vec<u64>) -> Result<(), Error> {
+        self.with(move |standing| {
+            standing.driver.spending = Some(Spending::new(addresses, standing.host));
+        })
+    }
+
+    /// What was counted since [`Emulator::count_handlers`], in the order of the addresses.
+    pub fn handlers(&mut self) -> Result<Vec<Spent>, Error> {
+        self.with(|standing| {
+            let spending = standing.driver.spending.as_ref();
+            spending.map_or_else(Vec::new, |spending| spending.handlers.clone())
+        })
+    }
+
+    /// Measures from now on how deep the stack gets. To be called at time 0: it paints the whole stack. Costs most of the
+    /// speed.
+    pub fn measure_stack(&mut self, layout: StackLayout) -> Result<(), Error> {
+        self.with(|standing| standing.driver.stack = Some(Stack::new(layout, standing.host)))
+    }
+
+    /// What was found of the stack since [`Emulator::measure_stack`]; `None` without it.
+    pub fn stack_use(&mut self) -> Result<Option<StackUse>, Error> {
+        self.with(|standing| {
+            let stack = standing.driver.stack.as_mut();
+            stack.map(|stack| stack.found(standing.host))
+        })
+    }
+
+    /// Address and size, bytes, of the one symbol that has `name` as its name or in it; names in the ELF are mangled.
+    ///
+    /// # Errors
+    /// [`Error::Symbol`].
+    pub fn symbol(&self, name: &str) -> Result<(u64, u64), Error> {
+        let exact: Vec<_> = self.symbols.iter().filter(|(n, ..)| n == name).collect();
+        let found = if exact.is_empty() {
+            let within = self.symbols.iter().filter(|(n, ..)| n.contains(name));
+            within.collect()
+        } else {
+            exact
+        };
+        match found[..] {
+            [(_, address, size)] => Ok((*address, *size)),
+            _ => Err(Error::Symbol {
+                name: name.into(),
+                count: found.len(),
+                examples: found
+                    .iter()
+                    .take(5)
+                    .map(|(n, ..)| n.as_str())
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            }),
+        }
+    }
+
+    /// Reads memory.
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn read(&mut self, address: u64, length: u64) -> Result<Vec<u8>, Error> {
+        self.with(move |standing| {
+            let bytes = (address..address + length).map(|address| {
+                let byte = standing.host.read(address, Width::W8);
+                byte.map(|byte| byte as u8)
+                    .map_err(|_| Error::Memory { address })
+            });
+            bytes.collect()
+        })?
+    }
+
+    /// Writes memory, flash too, whatever is in it: to break code on purpose, put `[0xFE, 0xE7]`, a branch to itself, or
+    /// `[0x00, 0xDE]`, an undefined instruction, at the address of a function.
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn write(&mut self, address: u64, bytes: &[u8]) -> Result<(), Error> {
+        let bytes = bytes.to_vec();
+        self.with(move |standing| {
+            for (address, byte) in (address..).zip(bytes) {
+                let done = if flash::ARRAY.contains(&address) {
+                    standing.host.program(address, Width::W8, byte.into())
+                } else {
+                    standing.host.write(address, Width::W8, byte.into())
+                };
+                done.map_err(|_| Error::Memory { address })?;
+            }
+            Ok(())
+        })?
+    }
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        // the run ends when nobody commands it
+        self.commands = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}

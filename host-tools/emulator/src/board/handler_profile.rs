@@ -1,0 +1,63 @@
+//! How many instructions exception handlers take, without those of others that interrupt them.
+
+use rigless::emulator::{Hit, Host};
+
+use super::handlers::Handlers;
+use super::registers::register;
+
+/// What a handler took.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Spent {
+    /// Its address.
+    pub address: u64,
+    /// How often it ran to its end.
+    pub runs: u64,
+    /// Instructions of all runs.
+    pub instructions: u64,
+}
+
+/// Instructions until a handler began, and those of handlers that interrupted it.
+struct Begun {
+    at: u64,
+    nested: u64,
+}
+
+/// Watches handlers.
+pub(crate) struct Spending {
+    pub(crate) handlers: Vec<Spent>,
+    watched: Handlers<Begun>,
+}
+
+impl Spending {
+    pub(crate) fn new(addresses: Vec<u64>, host: &mut dyn Host) -> Self {
+        let handlers = addresses.iter().map(|&address| Spent {
+            address,
+            runs: 0,
+            instructions: 0,
+        });
+        Self {
+            handlers: handlers.collect(),
+            watched: Handlers::watch(addresses, host),
+        }
+    }
+
+    pub(crate) fn hit(&mut self, hit: &Hit, host: &mut dyn Host) {
+        let Some(sp) = register(host, 13) else {
+            return;
+        };
+        let now = hit.instruction_count;
+        while let Some(ended) = self.watched.ended(hit, sp, host) {
+            let all = now - ended.kept.at;
+            let handler = &mut self.handlers[ended.handler];
+            handler.runs += 1;
+            handler.instructions += all - ended.kept.nested;
+            if let Some(below) = self.watched.latest() {
+                below.kept.nested += all;
+            }
+        }
+        if let Some(handler) = self.watched.begun(hit) {
+            let begun = Begun { at: now, nested: 0 };
+            self.watched.begin(handler, sp, begun, host);
+        }
+    }
+}

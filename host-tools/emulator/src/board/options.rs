@@ -1,0 +1,30 @@
+//! What else a run is made from.
+
+use std::num::NonZeroU64;
+
+/// What else a run is made from.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Instructions in a second of virtual time; the board's core makes about this many.
+    pub instructions_per_second: NonZeroU64,
+    /// Length of a step of switches, log and truth, ns. Sensor, encoder, STEP, PWM and current are exact in any case.
+    pub tick_ns: u64,
+    /// How long changes at the outputs are kept, s: [`Rig::trace`](super::Rig::trace).
+    pub trace_s: u64,
+    /// Whether the debug probe gives its 8 MHz at power-up.
+    pub clock: bool,
+    /// What the firmware's store holds at power-up, from [`Emulator::store`](super::Emulator::store); blank otherwise.
+    pub store: Option<Vec<u8>>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            instructions_per_second: NonZeroU64::new(168_000_000).expect("it is not 0"),
+            tick_ns: 100_000,
+            trace_s: 2,
+            clock: true,
+            store: None,
+        }
+    }
+}

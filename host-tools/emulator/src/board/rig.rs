@@ -1,0 +1,329 @@
+//! The simulated rig behind the board's pins, and what it notes of them.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tactus::sim::world::{Setup, World};
+
+use super::display::Display;
+use super::record::{Recorder, Slide};
+
+/// Shortest byte of a 10 MHz clock, the sensor's fastest, ns.
+const FASTEST_BYTE_NS: u64 = 800;
+/// CR1 of an SPI (RM0090 28.5.1): clock phase, clock polarity.
+const CR1_MODE: u64 = 0b11;
+const CR1_LSB_FIRST: u64 = 1 << 7;
+
+/// The rig, which the emulator's thread and its owner look at in turn.
+pub(crate) type SharedRig = Arc<Mutex<Rig>>;
+
+/// The lock is never contended: the emulator stands while its owner acts.
+pub(crate) fn lock(rig: &SharedRig) -> MutexGuard<'_, Rig> {
+    rig.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A change at an output of the firmware.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Output {
+    /// Level of the lever's STEP.
+    LeverStep(bool),
+    /// Level of the lever's DIR: high is down.
+    LeverDown(bool),
+    /// Level of the lever's EN.
+    LeverEnable(bool),
+    /// Duty of the stage, -1 to 1, positive towards higher positions.
+    StageDuty(f64),
+    /// Level of the stage's EN.
+    StageEnable(bool),
+    /// What the handheld's buzzer sounds, Hz.
+    Buzzer(Option<u32>),
+}
+
+/// The rig and the wires between it and the chip.
+pub struct Rig {
+    world: World,
+    /// STEP by the timer, and by the port if that has the pin
+    step_timer: bool,
+    step_port: Option<bool>,
+    step: bool,
+    duty_timer: f64,
+    duty_port: Option<bool>,
+    stage_up: bool,
+    lever_down: bool,
+    lever_enabled: bool,
+    stage_enabled: bool,
+    duty: f64,
+    selected: bool,
+    pub(super) selected_ns: u64,
+    /// bytes of this select so far, and the time of the last one
+    bytes: u32,
+    pub(super) byte_ns: u64,
+    /// last bit of MISO, for a wrong clock phase
+    bit: u8,
+    sensor_wired: bool,
+    encoder_wired: bool,
+    spi_control: u64,
+    encoder_lines: (bool, bool),
+    trace_ns: u64,
+    trace: VecDeque<(u64, Output)>,
+    recorder: Recorder,
+    commands: u64,
+    display: Display,
+    tone: Option<u32>,
+    /// From the firmware, with the time at which each byte was over.
+    pub(crate) heard: Vec<(u64, u8)>,
+    /// To the firmware.
+    pub(crate) to_say: VecDeque<u8>,
+}
+
+impl std::fmt::Debug for Rig {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Rig")
+            .field("truth", &self.world.truth())
+            .finish_non_exhaustive()
+    }
+}
+
+impl Rig {
+    pub(crate) fn new(setup: Setup, trace_ns: u64) -> Self {
+        Self {
+            world: World::new(Setup {
+                keep_edges: true,
+                // virtual time is the PC's
+                shimmed: true,
+                ..setup
+            }),
+            step_timer: false,
+            step_port: Some(false),
+            step: false,
+            duty_timer: 0.0,
+            duty_port: Some(false),
+            stage_up: false,
+            lever_down: false,
+            lever_enabled: false,
+            stage_enabled: false,
+            duty: 0.0,
+            selected: false,
+            selected_ns: 0,
+            bytes: 0,
+            byte_ns: 0,
+            bit: 1,
+            sensor_wired: false,
+            encoder_wired: false,
+            spi_control: 0,
+            encoder_lines: (false, false),
+            trace_ns,
+            trace: VecDeque::new(),
+            recorder: Recorder::default(),
+            commands: 0,
+            display: Display::default(),
+            tone: None,
+            heard: Vec::new(),
+            to_say: VecDeque::new(),
+        }
+    }
+
+    /// The world: its truth, its faults. Leave its pins to the firmware.
+    pub fn world(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    /// Changes at the firmware's outputs with their times, ns, oldest first: those of the last seconds
+    /// ([`Options::trace_s`](super::Options::trace_s)).
+    pub fn trace(&self) -> impl Iterator<Item = &(u64, Output)> {
+        self.trace.iter()
+    }
+
+    /// The handheld's display.
+    pub fn display(&self) -> &Display {
+        &self.display
+    }
+
+    pub(crate) fn display_mut(&mut self) -> &mut Display {
+        &mut self.display
+    }
+
+    /// What the buzzer sounds now, Hz.
+    pub(crate) fn buzzer(&mut self, now_ns: u64, tone: Option<u32>) {
+        if tone != self.tone {
+            self.tone = tone;
+            self.note(now_ns, Output::Buzzer(tone));
+        }
+    }
+
+    /// How every slide so far was really made.
+    pub fn slides(&self) -> &[Slide] {
+        self.recorder.slides()
+    }
+
+    /// Sample commands that the sensor got since power-up, one in each slot.
+    pub fn sensor_commands(&self) -> u64 {
+        self.commands
+    }
+
+    /// Tells the truth recorder the speed that the next slides are to have, mm/s. Without it, their median speed counts.
+    pub fn expect_speed(&mut self, mm_s: f64) {
+        self.recorder.expect_speed(mm_s);
+    }
+
+    pub(crate) fn advance_to(&mut self, now_ns: u64) {
+        self.world.advance_to(now_ns);
+    }
+
+    /// Lets time pass and takes note of what is so.
+    pub(crate) fn tick(&mut self, now_ns: u64) {
+        self.world.advance_to(now_ns);
+        self.recorder.tick(now_ns, &self.world.truth());
+        let oldest = now_ns.saturating_sub(self.trace_ns);
+        while self.trace.pop_front_if(|(at, _)| *at < oldest).is_some() {}
+    }
+
+    fn note(&mut self, now_ns: u64, output: Output) {
+        self.trace.push_back((now_ns, output));
+    }
+
+    pub(crate) fn step_timer(&mut self, now_ns: u64, high: bool) {
+        self.step_timer = high;
+        self.update_step(now_ns);
+    }
+
+    /// STEP as an output of its port; `None` leaves it to the timer.
+    pub(crate) fn step_port(&mut self, now_ns: u64, level: Option<bool>) {
+        self.step_port = level;
+        self.update_step(now_ns);
+    }
+
+    fn update_step(&mut self, now_ns: u64) {
+        let high = self.step_port.unwrap_or(self.step_timer);
+        if high != self.step {
+            self.step = high;
+            self.world.lever_step(now_ns, high);
+            self.note(now_ns, Output::LeverStep(high));
+        }
+    }
+
+    pub(crate) fn lever_dir(&mut self, now_ns: u64, high: bool) {
+        if high != self.lever_down {
+            self.lever_down = high;
+            self.world.lever_dir(now_ns, high);
+            self.note(now_ns, Output::LeverDown(high));
+        }
+    }
+
+    pub(crate) fn lever_enable(&mut self, now_ns: u64, high: bool) {
+        if high != self.lever_enabled {
+            self.lever_enabled = high;
+            self.world.lever_enable(now_ns, high);
+            self.note(now_ns, Output::LeverEnable(high));
+        }
+    }
+
+    /// Duty of the timer, 0 to 1.
+    pub(crate) fn stage_duty(&mut self, now_ns: u64, duty: f64) {
+        self.duty_timer = duty;
+        self.update_duty(now_ns);
+    }
+
+    /// PWM as an output of its port; `None` leaves it to the timer.
+    pub(crate) fn stage_port(&mut self, now_ns: u64, level: Option<bool>) {
+        self.duty_port = level;
+        self.update_duty(now_ns);
+    }
+
+    pub(crate) fn stage_dir(&mut self, now_ns: u64, high: bool) {
+        self.stage_up = high;
+        self.update_duty(now_ns);
+    }
+
+    fn update_duty(&mut self, now_ns: u64) {
+        let magnitude = self
+            .duty_port
+            .map_or(self.duty_timer, |level| f64::from(u8::from(level)));
+        let duty = if self.stage_up { magnitude } else { -magnitude };
+        if duty != self.duty {
+            self.duty = duty;
+            self.world.stage_pwm(now_ns, duty);
+            self.note(now_ns, Output::StageDuty(duty));
+        }
+    }
+
+    pub(crate) fn stage_enable(&mut self, now_ns: u64, high: bool) {
+        if high != self.stage_enabled {
+            self.stage_enabled = high;
+            self.world.stage_enable(now_ns, high);
+            self.note(now_ns, Output::StageEnable(high));
+        }
+    }
+
+    pub(crate) fn select_sensor(&mut self, now_ns: u64, selected: bool) {
+        if selected == self.selected {
+            return;
+        }
+        self.selected = selected;
+        if selected {
+            self.selected_ns = now_ns;
+            self.bytes = 0;
+            self.world.spi_select(now_ns);
+        } else {
+            self.world.spi_deselect(now_ns);
+        }
+    }
+
+    /// Whether the pins carry SPI1, and TIM4.
+    pub(crate) fn wire(&mut self, sensor: bool, encoder: bool) {
+        self.sensor_wired = sensor;
+        self.encoder_wired = encoder;
+    }
+
+    /// CR1 of SPI1.
+    pub(crate) fn spi_control(&mut self, cr1: u64) {
+        self.spi_control = cr1;
+    }
+
+    /// A byte over the sensor's bus, at its end.
+    pub(super) fn spi_byte(&mut self, now_ns: u64, mosi: u8) -> u8 {
+        if !self.sensor_wired || !self.selected {
+            return 0xFF;
+        }
+        let first = self.bytes == 0;
+        let too_fast = now_ns.saturating_sub(if first {
+            self.selected_ns
+        } else {
+            self.byte_ns
+        }) < FASTEST_BYTE_NS;
+        self.bytes += 1;
+        self.byte_ns = now_ns;
+        if first && mosi & 0x80 != 0 {
+            self.commands += 1;
+            self.recorder.command(self.selected_ns);
+        }
+        if too_fast || self.spi_control & CR1_LSB_FIRST != 0 {
+            self.world.spi_byte(mosi.reverse_bits());
+            return 0xFF;
+        }
+        let miso = self.world.spi_byte(mosi);
+        if self.spi_control & CR1_MODE == 0 {
+            return miso;
+        }
+        // read a bit late; the sensor itself is taken to understand (chosen), as facts/biotac.md counts
+        let late = self.bit << 7 | miso >> 1;
+        self.bit = miso & 1;
+        late
+    }
+
+    /// The encoder's lines after its next edge up to the time reached.
+    pub(crate) fn next_encoder_lines(&mut self) -> Option<(bool, bool)> {
+        let edge = self.world.next_encoder_edge()?;
+        self.encoder_lines = (edge.a, edge.b);
+        Some(self.encoder_lines())
+    }
+
+    /// The encoder's lines as the timer sees them.
+    pub(crate) fn encoder_lines(&self) -> (bool, bool) {
+        if self.encoder_wired {
+            self.encoder_lines
+        } else {
+            (false, false)
+        }
+    }
+}

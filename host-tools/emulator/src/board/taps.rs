@@ -1,0 +1,273 @@
+//! What the rig does round models whose pins it needs to the nanosecond: TIM1, TIM3, TIM4 and ADC1.
+
+use rigless::device::{DeviceContext, ErasedDevice, Level, RegisterFile, RequestChange};
+use rigless::soc::RegisterSpec;
+use rigless::soc::stm32f427::generated::tim3::Register as TimRegister;
+use rigless::soc::stm32f427::peripherals::adc::{self, Adc};
+use rigless::soc::stm32f427::peripherals::tim::{Advanced, Channel, General, Tim};
+use rigless::time::{EventId, VirtualNanos};
+
+use super::rig::{SharedRig, lock};
+
+/// What the rig does round a model.
+pub(super) trait Tap<M> {
+    /// Before the model is read, written or woken: what comes in by its pins up to now.
+    fn before(&mut self, _: &mut M, _: &mut RegisterFile, _: &mut DeviceContext<'_>) {}
+    /// Something was written, or its clock has changed: before [`Tap::after`].
+    fn touched(&mut self, _: VirtualNanos) {}
+    /// Whether it has to act on its own event now: a timer that does not catches up when it is looked at next.
+    fn heeds(&mut self, _: &RegisterFile, _: VirtualNanos) -> bool {
+        true
+    }
+    /// After it: what its pins say now.
+    fn after(&mut self, _: &mut M, _: &RegisterFile, _: VirtualNanos) {}
+}
+
+/// A model with the rig on its pins.
+#[derive(Debug)]
+pub(super) struct Tapped<M, T> {
+    pub(super) model: M,
+    pub(super) tap: T,
+}
+
+impl<M, T: Tap<M>> Tapped<M, T> {
+    fn touched(&mut self, registers: &RegisterFile, now: VirtualNanos) {
+        self.tap.touched(now);
+        self.tap.after(&mut self.model, registers, now);
+    }
+}
+
+impl<M: ErasedDevice, T: Tap<M>> ErasedDevice for Tapped<M, T> {
+    fn layout(&self) -> &'static [RegisterSpec] {
+        self.model.layout()
+    }
+
+    fn read(
+        &mut self,
+        row: usize,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) -> Option<u64> {
+        self.tap.before(&mut self.model, registers, context);
+        self.model.read(row, registers, context)
+    }
+
+    fn peek(&self, row: usize, registers: &RegisterFile, now: VirtualNanos) -> Option<u64> {
+        self.model.peek(row, registers, now)
+    }
+
+    fn write(
+        &mut self,
+        row: usize,
+        value: u64,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.tap.before(&mut self.model, registers, context);
+        self.model.write(row, value, registers, context);
+        self.touched(registers, context.now());
+    }
+
+    fn on_event(
+        &mut self,
+        event: EventId,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        if !self.tap.heeds(registers, context.now()) {
+            return;
+        }
+        self.tap.before(&mut self.model, registers, context);
+        self.model.on_event(event, registers, context);
+        self.tap.after(&mut self.model, registers, context.now());
+    }
+
+    fn on_request(
+        &mut self,
+        request: RequestChange,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.model.on_request(request, registers, context);
+        self.touched(registers, context.now());
+    }
+
+    fn on_clock(&mut self, hz: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        self.model.on_clock(hz, registers, context);
+        self.touched(registers, context.now());
+    }
+
+    fn on_clock_input(
+        &mut self,
+        input: usize,
+        hz: u64,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.model.on_clock_input(input, hz, registers, context);
+        self.touched(registers, context.now());
+    }
+
+    fn poll(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        self.model.poll(registers, context);
+    }
+
+    fn reset(&mut self) {
+        self.model.reset();
+    }
+
+    fn reset_line(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        self.model.reset_line(registers, context);
+        self.touched(registers, context.now());
+    }
+
+    fn on_access(
+        &mut self,
+        token: u64,
+        value: u64,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.model.on_access(token, value, registers, context);
+    }
+
+    fn on_refused(
+        &mut self,
+        token: u64,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.model.on_refused(token, registers, context);
+    }
+}
+
+pub(super) fn channel(number: u8) -> Channel {
+    Channel::new(number).expect("timers have channels 1 to 4")
+}
+
+/// TIM1's channel 1: the lever's STEP.
+#[derive(Debug)]
+pub(super) struct Step(pub(super) SharedRig);
+
+impl Tap<Tim<Advanced>> for Step {
+    fn after(&mut self, tim: &mut Tim<Advanced>, registers: &RegisterFile, now: VirtualNanos) {
+        let high = tim.output(channel(1), registers) == Some(Level::High);
+        lock(&self.0).step_timer(now.0, high);
+    }
+}
+
+/// TIM3's channel 1: the stage's PWM. Its duty is that of the shadow registers, which hold for a whole period.
+#[derive(Debug)]
+pub(super) struct Pwm {
+    rig: SharedRig,
+    touched: Option<VirtualNanos>,
+    period: u64,
+    /// What was written has come into force by then, ns.
+    settled: u64,
+}
+
+impl Pwm {
+    pub(super) fn new(rig: SharedRig) -> Self {
+        Self {
+            rig,
+            touched: None,
+            period: 0,
+            settled: u64::MAX,
+        }
+    }
+
+    /// A timer as after a reset.
+    pub(super) fn restart(&mut self) {
+        *self = Self::new(self.rig.clone());
+    }
+}
+
+impl Tap<Tim<General>> for Pwm {
+    fn touched(&mut self, now: VirtualNanos) {
+        self.touched = Some(now);
+    }
+
+    /// Its edges would stop the core 40 000 times a second. Nobody waits for them but by DIER, and the duty changes only where
+    /// a period begins after something was written.
+    fn heeds(&mut self, registers: &RegisterFile, now: VirtualNanos) -> bool {
+        now.0 <= self.settled || registers.get(TimRegister::Dier) != 0
+    }
+
+    fn after(&mut self, tim: &mut Tim<General>, registers: &RegisterFile, now: VirtualNanos) {
+        let pulse = tim.pulse(channel(1), registers);
+        let duty = match &pulse {
+            Some(pulse) if pulse.period.0 > 0 => pulse.width.0 as f64 / pulse.period.0 as f64,
+            _ => f64::from(u8::from(
+                tim.output(channel(1), registers) == Some(Level::High),
+            )),
+        };
+        if let Some(at) = self.touched.take() {
+            // the period under way and the next, by the longer of the old and the new; without a pulse every event counts
+            let period = pulse.map_or(u64::MAX, |pulse| pulse.period.0);
+            let longest = period.max(self.period);
+            self.settled = at.0.saturating_add(longest.saturating_mul(2));
+            self.period = period;
+        }
+        lock(&self.rig).stage_duty(now.0, duty);
+    }
+}
+
+/// TIM4's channels 1 and 2: the stage's encoder. Its edges up to now are counted before anybody looks.
+#[derive(Debug)]
+pub(super) struct Encoder {
+    pub(super) rig: SharedRig,
+    pub(super) lines: (bool, bool),
+}
+
+impl Encoder {
+    fn show(
+        shown: &mut (bool, bool),
+        (a, b): (bool, bool),
+        tim: &mut Tim<General>,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        if a != shown.0 {
+            tim.drive_input(channel(1), a.into(), registers, context);
+        }
+        if b != shown.1 {
+            tim.drive_input(channel(2), b.into(), registers, context);
+        }
+        *shown = (a, b);
+    }
+}
+
+impl Tap<Tim<General>> for Encoder {
+    fn before(
+        &mut self,
+        tim: &mut Tim<General>,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        let mut rig = lock(&self.rig);
+        rig.advance_to(context.now().0);
+        while let Some(lines) = rig.next_encoder_lines() {
+            Self::show(&mut self.lines, lines, tim, registers, context);
+        }
+        let lines = rig.encoder_lines();
+        Self::show(&mut self.lines, lines, tim, registers, context);
+    }
+}
+
+/// ADC1's channel 3: the motor's current, at the end of each conversion.
+#[derive(Debug)]
+pub(super) struct Current(pub(super) SharedRig);
+
+impl Current {
+    /// rigless makes code = input x 4095 / reference, both in whole mV: with this reference the input is the code.
+    pub(super) const REFERENCE: u32 = 4095;
+}
+
+impl Tap<Adc> for Current {
+    fn before(&mut self, adc: &mut Adc, _: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let mut rig = lock(&self.0);
+        rig.advance_to(context.now().0);
+        let pa3 = adc::Channel::new(3).expect("the converter has channels 0 to 15");
+        adc.set_input(pa3, rig.world().motor_adc().into());
+    }
+}

@@ -1,0 +1,125 @@
+//! Arguments that several runs take, and what they stand for.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde_json::Value;
+use sha2::{Digest as _, Sha256};
+use tactus::evaluate::Method;
+
+use crate::board::Error;
+
+/// The firmware that runs.
+#[derive(Args)]
+pub struct Firmware {
+    /// The firmware: what `cargo xtask build` names
+    #[arg(long, value_name = "PATH")]
+    pub elf: PathBuf,
+}
+
+impl Firmware {
+    /// Its SHA-256, shown before anything is drawn or learned: nobody can say that the firmware was made for the texture.
+    /// What goes to stdout is for people; programs want nothing there but the result.
+    ///
+    /// # Errors
+    /// [`Error::Read`].
+    pub fn show(&self, on_stdout: bool) -> Result<String, Error> {
+        let elf = std::fs::read(&self.elf).map_err(|source| Error::Read {
+            path: self.elf.clone(),
+            source,
+        })?;
+        let sha256 = hex_sha256(&elf);
+        let named = format!("ELF {}\nSHA-256 {sha256}", self.elf.display());
+        if on_stdout {
+            println!("{named}");
+        } else {
+            eprintln!("{named}");
+        }
+        Ok(sha256)
+    }
+}
+
+/// SHA-256 in hexadecimal.
+pub fn hex_sha256(bytes: &[u8]) -> String {
+    let digest = Sha256::digest(bytes);
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Whom a result is for.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// For people.
+    Text,
+    /// For programs.
+    Json,
+}
+
+/// Why a result is not where it should be.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {}: {source}", path.display())]
+pub struct WriteError {
+    /// The file.
+    pub path: PathBuf,
+    /// Why.
+    pub source: std::io::Error,
+}
+
+/// Where a result goes.
+#[derive(Args)]
+pub struct Output {
+    /// A table for people, or one JSON object for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+    /// Where the result goes instead of the terminal
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+impl Output {
+    /// Writes the result as it is wanted.
+    pub fn write(
+        &self,
+        text: impl FnOnce() -> String,
+        json: impl FnOnce() -> Value,
+    ) -> Result<(), WriteError> {
+        let result = match self.format {
+            Format::Text => text(),
+            Format::Json => format!("{}\n", json()),
+        };
+        let Some(path) = &self.out else {
+            print!("{result}");
+            return Ok(());
+        };
+        std::fs::write(path, result).map_err(|source| WriteError {
+            path: path.clone(),
+            source,
+        })
+    }
+}
+
+/// The board, and what lies under its finger.
+#[derive(Args)]
+pub struct World {
+    /// What runs.
+    #[command(flatten)]
+    pub firmware: Firmware,
+    /// The texture under the finger: its name in Table 1 or its number; drawn by the seed unless given
+    #[arg(long, value_name = "NAME")]
+    pub texture: Option<String>,
+    /// Let the finger feel recordings of this material of data/biotac instead: its name or its number. The firmware knows
+    /// all 20, from other slides
+    #[arg(long, value_name = "MATERIAL", conflicts_with_all = ["texture", "among"])]
+    pub recording: Option<String>,
+    /// How many textures the firmware is to know; the unknown one is among them
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u8).range(2..=117))]
+    pub among: u8,
+    /// Another seed is another world, another trial, and another texture unless one is given
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// How the firmware decides, and what its table is learned for
+    #[arg(long, value_enum, default_value_t = Method::Fused)]
+    pub method: Method,
+    /// Print the firmware's log to stderr
+    #[arg(long)]
+    pub log: bool,
+}

@@ -1,0 +1,488 @@
+//! Explorations by the firmware, judged by the rig's truth and by the PC that follows them.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+use tactus::follow::{ALLOWED, Agreement, Follower};
+use tactus::link::{Found, Question};
+use tactus::sim::played::PlayCounts;
+use tactus_core::features::{Plan, Property, PropertySet};
+use tactus_core::fused::white;
+use tactus_core::movement::Movement;
+use tactus_core::table::{Action, Contents, Table, TableError};
+use tactus_core::wire::{Ask, Counts, Felt, Identify, Report, Tell};
+
+use super::talk::{PATIENCE_S, Talk, TalkError};
+use crate::board::{self, Emulator, Slide};
+
+/// A whole exploration, virtual seconds.
+const EXPLORATION_S: f64 = 600.0;
+
+/// Largest relative error of a slide's force ...
+pub const FORCE_SHARE: f64 = 0.05;
+/// ... unless it is less than a count of P_DC, N.
+pub const FORCE_N: f64 = 0.0115;
+/// Largest relative error of a slide's speed.
+pub const SPEED_SHARE: f64 = 0.01;
+/// Largest deviation of a slot from its grid, us.
+pub const JITTER_US: f64 = 2.0;
+
+/// Why there is no exploration to judge.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExploreError {
+    /// The firmware did not do what it was asked for.
+    #[error(transparent)]
+    Talk(#[from] TalkError),
+    /// The table cannot be read.
+    #[error("the table is damaged: {0}")]
+    Table(#[from] TableError),
+    /// The exploration cannot be followed.
+    #[error("the exploration cannot be followed: {0}")]
+    Follow(#[from] tactus_core::explorer::ExplorerError),
+}
+
+impl From<board::Error> for ExploreError {
+    fn from(why: board::Error) -> Self {
+        Self::Talk(why.into())
+    }
+}
+
+/// What a slide said, beside what is learned of the true texture.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Step {
+    /// The movement.
+    pub movement: Option<Movement>,
+    /// What was looked at.
+    pub action: Action,
+    /// The properties that were looked at, with their values; all where the action looks at everything.
+    pub felt: Vec<(Property, f32)>,
+    /// How far what was felt is from what was learned of the true texture, in standard deviations: the root of the mean
+    /// square over all that was looked at, about 1 if it is that texture. `None` where nothing was learned.
+    pub distance_sd: Option<f32>,
+    /// Posterior probability of the true texture.
+    pub probability: f32,
+    /// The most probable other texture.
+    pub other: Option<Other>,
+}
+
+/// Another texture than the true one.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Other {
+    /// Its name.
+    pub name: String,
+    /// Its posterior probability.
+    pub probability: f32,
+    /// See [`Step::distance_sd`].
+    pub distance_sd: Option<f32>,
+}
+
+/// An exploration, as the firmware told it and as it really was.
+#[derive(Clone, Debug)]
+pub struct Exploration {
+    /// Name of the texture under the finger.
+    pub truth: String,
+    /// Whether the table has it.
+    pub known: bool,
+    /// The verdict.
+    pub found: Found,
+    /// From power-up to the end, virtual seconds.
+    pub virtual_s: f64,
+    /// How every slide was really made, and what it should have been.
+    pub slides: Vec<(Movement, Slide)>,
+    /// What every slide that counted said.
+    pub steps: Vec<Step>,
+    /// What the firmware counted.
+    pub counts: Counts,
+    /// Sample commands that the sensor got, before and after the firmware was asked what it counted.
+    pub commands: (u64, u64),
+    /// Resets since power-up.
+    pub resets: usize,
+    /// How well the PC agrees.
+    pub agreement: Agreement,
+    /// What the PC could not compare.
+    pub not_followed: Vec<String>,
+    /// Reports that came damaged or not at all.
+    pub lost_reports: u64,
+    /// What was played of recordings, all 0 without any.
+    pub played: PlayCounts,
+}
+
+/// Has the firmware find out what lies under its finger, and follows it. It must know `table` and be ready; `each` sees all
+/// reports meanwhile, and after every millisecond none.
+pub fn explore(
+    talk: &mut Talk,
+    table: &[u8],
+    identify: Identify,
+    truth: &str,
+    mut each: impl FnMut(&mut Emulator, Option<&Report>),
+) -> Result<Exploration, ExploreError> {
+    let plan = Plan::new();
+    let table = Table::read(table)?;
+    let mut follower = Follower::new(table, PropertySet::ALL, &identify, &plan)?;
+    let mut not_followed = Vec::new();
+    let mut steps = Vec::new();
+    let mut slides = Vec::new();
+    let mut movement = None;
+    let before = talk.board().rig().slides().len();
+    talk.ask(Ask::Stream(true), PATIENCE_S, &mut each)?;
+    let asked = Question::identify(identify);
+    let found = talk.run(asked, EXPLORATION_S, |board, report| {
+        if let Some(report) = report {
+            if let Err(why) = follower.hear(&report.tell) {
+                not_followed.push(why.to_string());
+            }
+            match &report.tell {
+                Tell::Chosen {
+                    movement: chosen, ..
+                } => {
+                    movement = Some(*chosen);
+                    board.rig().expect_speed(chosen.speed_mm_s().into());
+                }
+                Tell::Felt {
+                    action,
+                    felt,
+                    posterior,
+                    ..
+                } => steps.push(step(table, truth, *action, felt, posterior)),
+                _ => {}
+            }
+        } else if let Some(movement) = movement {
+            let rig = board.rig();
+            let new = rig.slides().iter().skip(before + slides.len());
+            slides.extend(new.map(|slide| (movement, *slide)));
+        }
+        each(board, report);
+    })?;
+    let commands = talk.board().rig().sensor_commands();
+    let status = talk.run(Question::status(), PATIENCE_S, &mut each)?;
+    let lost_reports = talk.session().damaged() + talk.session().missing();
+    let board = talk.board();
+    let commands = (commands, board.rig().sensor_commands());
+    let played = board.rig().world().played();
+    Ok(Exploration {
+        truth: truth.to_owned(),
+        known: table.find(truth).is_some(),
+        found,
+        virtual_s: board.now_ns() as f64 * 1e-9,
+        slides,
+        steps,
+        counts: status.counts,
+        commands,
+        resets: board.resets()?.len(),
+        agreement: follower.agreement().clone(),
+        not_followed,
+        lost_reports,
+        played,
+    })
+}
+
+fn step(table: Table<'_>, truth: &str, action: Action, felt: &Felt, posterior: &[f32]) -> Step {
+    let number = table.find(truth);
+    let others = posterior.iter().zip(0..);
+    let other = others
+        .filter(|(_, texture)| Some(*texture) != number)
+        .max_by(|a, b| a.0.total_cmp(b.0));
+    let distance_sd = |texture| distance_sd(table, texture, action, felt);
+    let looked_at = |property: &Property| action.property.is_none_or(|only| only == *property);
+    let properties = felt.properties();
+    Step {
+        movement: table.movement(action.movement),
+        action,
+        felt: Property::ALL
+            .into_iter()
+            .filter(looked_at)
+            .filter_map(|property| Some((property, properties.get(property)?)))
+            .collect(),
+        distance_sd: number.and_then(distance_sd),
+        probability: number
+            .and_then(|number| posterior.get(usize::from(number)).copied())
+            .unwrap_or(0.0),
+        other: other.map(|(probability, texture)| Other {
+            name: table.name(texture).unwrap_or("?").to_owned(),
+            probability: *probability,
+            distance_sd: distance_sd(texture),
+        }),
+    }
+}
+
+fn distance_sd(table: Table<'_>, texture: u16, action: Action, felt: &Felt) -> Option<f32> {
+    let squares: Vec<f32> = match table.contents() {
+        Contents::Fused(set, features) => {
+            if table.trials(texture, action.movement) == 0 {
+                return None;
+            }
+            let vector = felt.observation().vector(set, features.into())?;
+            let felt = table.whiten(action.movement, &vector)?;
+            let learned = table.white_mean(texture, action.movement);
+            let apart = felt
+                .into_iter()
+                .zip(learned)
+                .map(|(z, m)| white(z) - white(m));
+            apart.map(|sd| sd * sd).collect()
+        }
+        Contents::Gaussians(measured) => measured
+            .iter()
+            .filter(|property| action.property.is_none_or(|only| only == *property))
+            .map(|property| {
+                let property_of = Action {
+                    property: Some(property),
+                    ..action
+                };
+                let learned = table.gaussian(texture, property_of)?;
+                let sd = (felt.properties().get(property)? - learned.mean) / learned.sd;
+                Some(sd * sd)
+            })
+            .collect::<Option<_>>()?,
+    };
+    let mean = squares.iter().sum::<f32>() / squares.len() as f32;
+    mean.is_finite().then(|| mean.sqrt())
+}
+
+/// Where a slide's force is off most: N, relative, and whether that is too much.
+fn force_error(slides: &[(Movement, Slide)]) -> (f64, f64, bool) {
+    let errors = slides.iter().map(|(movement, slide)| {
+        let wanted = f64::from(movement.force_n());
+        let error = (slide.force_n - wanted).abs();
+        (error, error / wanted)
+    });
+    errors.fold((0.0, 0.0, false), |worst, (newtons, share)| {
+        let over = newtons > FORCE_N && share > FORCE_SHARE;
+        (
+            f64::max(worst.0, newtons),
+            f64::max(worst.1, share),
+            worst.2 || over,
+        )
+    })
+}
+
+impl Exploration {
+    /// Whether the verdict is the texture under the finger, or that the table does not have it, and so it is.
+    pub fn right(&self) -> bool {
+        if self.found.unknown {
+            !self.known
+        } else {
+            self.found.name.as_str() == self.truth
+        }
+    }
+
+    /// Whether the PC came to the same, from the raw samples.
+    pub fn follows(&self) -> bool {
+        self.agreement.agrees() && self.not_followed.is_empty()
+    }
+
+    /// Largest error of a slide's force: N, and relative.
+    pub fn force_error(&self) -> (f64, f64) {
+        let (newtons, share, _) = force_error(&self.slides);
+        (newtons, share)
+    }
+
+    /// Largest relative error of a slide's speed.
+    pub fn speed_error(&self) -> f64 {
+        let errors = self.slides.iter().map(|(_, slide)| slide.speed_error);
+        errors.fold(0.0, f64::max)
+    }
+
+    /// Largest deviation of a slot from its grid, us.
+    pub fn jitter_us(&self) -> f64 {
+        let jitters = self.slides.iter().map(|(_, slide)| slide.slot_jitter_us);
+        jitters.fold(0.0, f64::max)
+    }
+
+    /// Slots in which the sensor was not asked, as the sensor saw it, during the slides.
+    pub fn missed_slots(&self) -> usize {
+        self.slides
+            .iter()
+            .map(|(_, slide)| slide.missed_slots)
+            .sum()
+    }
+
+    /// Largest difference of a property or of the signal it comes from.
+    pub fn features_difference(&self) -> f32 {
+        self.agreement.properties.max(self.agreement.signal)
+    }
+
+    /// The bars that were missed, whatever the verdict; none if all is well. The rig has no fault: every sample that is
+    /// lost, late or damaged is the firmware's.
+    pub fn missed(&self) -> Vec<String> {
+        let mut missed = Vec::new();
+        let mut check = |good: bool, what: String| {
+            if !good {
+                missed.push(what);
+            }
+        };
+        let (newtons, share, too_far) = force_error(&self.slides);
+        let (mn, percent) = (newtons * 1e3, share * 100.0);
+        check(!too_far, format!("force off by {mn:.1} mN, {percent:.1} %"));
+        let speed = self.speed_error();
+        check(
+            speed <= SPEED_SHARE,
+            format!("speed off by {:.2} %", speed * 100.0),
+        );
+        let jitter = self.jitter_us();
+        check(jitter <= JITTER_US, format!("slots off by {jitter:.2} us"));
+        check(self.resets == 0, format!("{} resets", self.resets));
+        let counts = self.counts;
+        check(
+            counts.lost_samples == 0,
+            format!("{} samples lost", counts.lost_samples),
+        );
+        check(
+            counts.late_slots == 0,
+            format!("{} slots late", counts.late_slots),
+        );
+        check(
+            self.missed_slots() as u64 <= u64::from(counts.late_slots),
+            format!(
+                "the sensor missed {} slots, the firmware tells of {}",
+                self.missed_slots(),
+                counts.late_slots
+            ),
+        );
+        let slots = u64::from(counts.slots);
+        // a slot is counted before its command goes out
+        let possible = self.commands.0..=self.commands.1 + u64::from(counts.late_slots) + 1;
+        check(
+            possible.contains(&slots),
+            format!("{slots} slots are told, the sensor saw {possible:?}"),
+        );
+        check(
+            counts.parity_errors == 0 && counts.error_frames == 0,
+            format!(
+                "{} parity errors and {} error frames, and the sensor sent none",
+                counts.parity_errors, counts.error_frames
+            ),
+        );
+        check(
+            counts.lost_reports == 0 && self.lost_reports == 0,
+            format!(
+                "{} reports lost by the firmware's account, {} by the PC's",
+                counts.lost_reports, self.lost_reports
+            ),
+        );
+        check(
+            !self.slides.is_empty() && self.steps.len() == usize::from(self.found.slides),
+            format!(
+                "{} slides made, {} felt, {} counted",
+                self.slides.len(),
+                self.steps.len(),
+                self.found.slides
+            ),
+        );
+        check(
+            self.agreement.agrees(),
+            format!("the PC does not agree: {:?}", self.agreement),
+        );
+        for why in &self.not_followed {
+            check(false, format!("not followed: {why}"));
+        }
+        missed
+    }
+
+    /// For programs: everything in the units of its name.
+    pub fn json(&self) -> Value {
+        let (force_n, force_share) = self.force_error();
+        let steps = self.steps.iter().map(|step| {
+            json!({
+                "movement": step.movement.map(|movement| movement.to_string()),
+                "looked_at": step.action.what(),
+                "felt": step.felt.iter().map(|(p, x)| (p.name(), *x)).collect::<BTreeMap<_, _>>(),
+                "distance_sd": step.distance_sd,
+                "probability_true": step.probability,
+                "other": step.other.as_ref().map(|other| &other.name),
+                "distance_sd_other": step.other.as_ref().map(|other| other.distance_sd),
+                "probability_other": step.other.as_ref().map(|other| other.probability),
+            })
+        });
+        let mut json = json!({
+            "texture_true": self.truth,
+            "texture_identified": self.found.name.as_str(),
+            "right": self.right(),
+            "probability": self.found.probability,
+            "sure": self.found.sure,
+            "unknown": self.found.unknown,
+            "unknown_log_odds": self.found.log_odds,
+            "slides_learned_by_itself": self.found.learned,
+            "slides": self.found.slides,
+            "virtual_seconds": self.virtual_s,
+            "lost_samples": self.counts.lost_samples,
+            "late_slots": self.counts.late_slots,
+            "parity_errors": self.counts.parity_errors,
+            "missed_slots_true": self.missed_slots(),
+            "resets": self.resets,
+            "force_error_max": force_share,
+            "force_error_max_n": force_n,
+            "speed_error_max": self.speed_error(),
+            "slot_jitter_us": self.jitter_us(),
+            "features_difference": number(self.features_difference()),
+            "posterior_difference": number(self.agreement.posterior),
+            "other_choices": self.agreement.other_choices.len(),
+            "follows": self.follows(),
+            "bars_missed": self.missed(),
+            "log": steps.collect::<Vec<_>>(),
+        });
+        if self.played != PlayCounts::default() {
+            json["played"] = json!({
+                "recordings": self.played.slides,
+                "samples_clipped": self.played.clipped,
+                "samples_beyond_the_end": self.played.over,
+                "movements": 1,
+                "seconds_used": "3 of 5",
+            });
+        }
+        json
+    }
+
+    /// When and by which property the exploration went where it went, a line for each slide.
+    pub fn log(&self) -> Vec<String> {
+        let lines = self.steps.iter().zip(1..).map(|(step, number)| {
+            let movement = step.movement.map_or("?".into(), |m| m.to_string());
+            let felt: Vec<String> = step
+                .felt
+                .iter()
+                .map(|(p, x)| format!("{p} {x:.3}"))
+                .collect();
+            let away =
+                |sd: Option<f32>| sd.map_or("never felt".into(), |sd| format!("{sd:.1} sd away"));
+            let other = step.other.as_ref().map_or("no other".into(), |other| {
+                let p = other.probability * 100.0;
+                format!("{} {p:.1} % ({})", other.name, away(other.distance_sd))
+            });
+            format!(
+                "slide {number}: {} at {movement}, felt {}; {} {:.1} % ({}), {other}",
+                step.action.what(),
+                felt.join(", "),
+                self.truth,
+                step.probability * 100.0,
+                away(step.distance_sd),
+            )
+        });
+        lines.collect()
+    }
+
+    /// How well the PC agrees, for people.
+    pub fn followed(&self) -> String {
+        let agreement = &self.agreement;
+        format!(
+            "{}: features within {:.1e}, posterior within {:.1e} (allowed {ALLOWED:.0e}), {} other choices of {}",
+            if self.follows() {
+                "the PC agrees"
+            } else {
+                "THE PC DOES NOT AGREE"
+            },
+            self.features_difference(),
+            agreement.posterior,
+            agreement.other_choices.len(),
+            agreement.choices
+        )
+    }
+}
+
+/// JSON has no infinity; a difference that has no value must not read as none.
+fn number(difference: f32) -> Value {
+    if difference.is_finite() {
+        json!(difference)
+    } else {
+        json!("infinite")
+    }
+}

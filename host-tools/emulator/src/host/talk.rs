@@ -1,0 +1,194 @@
+//! A host in the same process: [`tactus::link`] over the emulated board's USART3, by virtual time.
+
+use std::task::Poll;
+
+use tactus::link::{Errand, Job, LinkError, PushTable, Question, Session};
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::guard::Fault;
+use tactus_core::wire::{Ask, Phase, Report, Reset, Tell};
+
+use crate::board::{Emulator, Error};
+
+/// How far the board runs between two looks at the line, ns, unless told otherwise.
+const STEP_NS: u64 = 1_000_000;
+/// Longest that anything but explorations and training takes, virtual seconds.
+pub const PATIENCE_S: f64 = 60.0;
+
+/// Why the firmware does not do what it is asked for.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TalkError {
+    /// The emulator.
+    #[error(transparent)]
+    Emulator(#[from] Error),
+    /// It says why.
+    #[error("the firmware refuses: {0}")]
+    Refused(String),
+    /// It has started anew meanwhile.
+    #[error("the firmware restarted instead of answering ({0:?})")]
+    Rebooted(Reset),
+    /// The link, otherwise.
+    #[error(transparent)]
+    Link(LinkError),
+    /// It says nothing more.
+    #[error(
+        "no answer from the firmware in {0} virtual seconds: does this ELF speak the protocol? See its log with --log"
+    )]
+    Silent(f64),
+}
+
+impl From<LinkError> for TalkError {
+    fn from(why: LinkError) -> Self {
+        match why {
+            LinkError::Refused(why) => Self::Refused(why),
+            LinkError::Rebooted { reset, .. } => Self::Rebooted(reset),
+            why => Self::Link(why),
+        }
+    }
+}
+
+/// The host's end of the line.
+pub struct Talk {
+    emulator: Emulator,
+    session: Session,
+    step_ns: u64,
+}
+
+impl Talk {
+    /// Talks to the firmware on a board.
+    pub fn new(emulator: Emulator) -> Self {
+        Self {
+            emulator,
+            session: Session::default(),
+            step_ns: STEP_NS,
+        }
+    }
+
+    /// Looks at the line every so many ms instead of every one: two threads take turns at every look.
+    pub fn look_every(mut self, ms: u64) -> Self {
+        self.step_ns = ms.max(1) * STEP_NS;
+        self
+    }
+
+    /// The board.
+    pub fn board(&mut self) -> &mut Emulator {
+        &mut self.emulator
+    }
+
+    /// The time it has reached, ns.
+    pub fn now_ns(&self) -> u64 {
+        self.emulator.now_ns()
+    }
+
+    /// What was damaged and lost on the way from the firmware.
+    pub fn session(&self) -> &Session {
+        &self.session
+    }
+
+    fn bytes(&mut self) -> Result<Vec<u8>, Error> {
+        let until_ns = self.emulator.now_ns() + self.step_ns;
+        self.emulator.run_until(until_ns)?;
+        let received = self.emulator.received();
+        Ok(received.into_iter().map(|(_, byte)| byte).collect())
+    }
+
+    /// Runs the board to the next look and gives what the firmware said in it.
+    pub fn step(&mut self) -> Result<Vec<Report>, Error> {
+        let bytes = self.bytes()?;
+        Ok(self.session.receive(&bytes))
+    }
+
+    /// Runs the board until `pick` makes something of a report; `each` sees all of them, and after every look none.
+    ///
+    /// # Errors
+    /// [`TalkError::Silent`] if that takes longer than `patience_s` of virtual time; see also [`TalkError`].
+    pub fn wait<T>(
+        &mut self,
+        patience_s: f64,
+        mut each: impl FnMut(&mut Emulator, Option<&Report>),
+        mut pick: impl FnMut(&Tell) -> Option<Result<T, TalkError>>,
+    ) -> Result<T, TalkError> {
+        let until_ns = self.emulator.now_ns() + (patience_s * 1e9) as u64;
+        while self.emulator.now_ns() < until_ns {
+            let mut picked = None;
+            for report in self.step()? {
+                each(&mut self.emulator, Some(&report));
+                if picked.is_none() {
+                    picked = pick(&report.tell);
+                }
+            }
+            each(&mut self.emulator, None);
+            if let Some(picked) = picked {
+                return picked;
+            }
+        }
+        Err(TalkError::Silent(patience_s))
+    }
+
+    /// Sees an errand through; `each` sees all reports meanwhile, and after every look none.
+    ///
+    /// # Errors
+    /// [`TalkError::Silent`] if that takes longer than `patience_s` of virtual time; see also [`TalkError`].
+    pub fn run<E: Errand>(
+        &mut self,
+        errand: E,
+        patience_s: f64,
+        mut each: impl FnMut(&mut Emulator, Option<&Report>),
+    ) -> Result<E::Outcome, TalkError> {
+        let mut send = Vec::new();
+        let mut job = Job::begin(errand, &mut self.session, &mut send)?;
+        let until_ns = self.emulator.now_ns() + (patience_s * 1e9) as u64;
+        while self.emulator.now_ns() < until_ns {
+            self.emulator.send(&send);
+            send.clear();
+            let bytes = self.bytes()?;
+            let polled = job.poll(&mut self.session, &bytes, &mut send, |report| {
+                each(&mut self.emulator, Some(report));
+            });
+            each(&mut self.emulator, None);
+            if let Poll::Ready(outcome) = polled {
+                return Ok(outcome?);
+            }
+        }
+        Err(TalkError::Silent(patience_s))
+    }
+
+    /// Asks for something and waits until it is over; `each` sees all reports meanwhile.
+    pub fn ask(
+        &mut self,
+        ask: Ask,
+        patience_s: f64,
+        each: impl FnMut(&mut Emulator, Option<&Report>),
+    ) -> Result<(), TalkError> {
+        self.run(Question::command(ask), patience_s, each)
+    }
+
+    /// Waits until the firmware has booted and found the limit switches. A fault of that is given back, after it has been
+    /// asked to home again.
+    pub fn ready(
+        &mut self,
+        mut each: impl FnMut(&mut Emulator, Option<&Report>),
+    ) -> Result<Option<Fault>, TalkError> {
+        let fault = self.wait(PATIENCE_S, &mut each, |tell| match tell {
+            Tell::Phase(Phase::Ready) => Some(Ok(None)),
+            Tell::Fault(fault) => Some(Ok(Some(*fault))),
+            _ => None,
+        })?;
+        if fault.is_some() {
+            self.ask(Ask::Home, PATIENCE_S, each)?;
+        }
+        Ok(fault)
+    }
+
+    /// Gives the firmware calibration and table, which it keeps.
+    pub fn teach(
+        &mut self,
+        calibration: &RigCalibration,
+        table: &[u8],
+        mut each: impl FnMut(&mut Emulator, Option<&Report>),
+    ) -> Result<(), TalkError> {
+        let write = Question::write_calibration(calibration)?;
+        self.run(write, PATIENCE_S, &mut each)?;
+        self.run(PushTable::new(table)?, PATIENCE_S, each)
+    }
+}

@@ -1,0 +1,167 @@
+//! What lies under the finger, and what the firmware is told beforehand.
+
+use std::path::PathBuf;
+
+use tactus::collection::{Collection, LearnError, calibrated, texture_name};
+use tactus::played::{Lesson, PlayError};
+use tactus::recordings::RecordingSet;
+use tactus::sim::played::Played;
+use tactus::sim::world::Setup;
+use tactus_core::explorer::Method;
+use tactus_core::rig::calibration::RigCalibration;
+
+use crate::board::{Emulator, Error, Options};
+
+/// Trials of each texture and movement (PAPER: five).
+pub const TRIALS: u32 = 5;
+/// What recordings cannot show.
+pub const RECORDED_LIMITS: &str = "Recordings: one movement, 3 of their 5 s are felt, and what 12 bits do not hold is clipped; learned and felt \
+     slides are of one session (interleaved).";
+
+/// Why there is nothing to learn, or to feel.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LessonError {
+    /// There are no recordings.
+    #[error(
+        "no recordings in {}: make them from github.com/dexrob/BioTac_slide_20_50 in the layout of data/biotac, and set \
+         TACTUS_DATA to the folder that holds biotac/",
+        .0.display()
+    )]
+    NoData(PathBuf),
+    /// They cannot be played.
+    #[error(transparent)]
+    Play(#[from] PlayError),
+    /// The simulated rig failed.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+    /// There is no such texture in the simulated world.
+    #[error(
+        "no texture {0} in Table 1: `tactus textures` lists them, or give a number from 1 to 117"
+    )]
+    NoTexture(String),
+    /// The table that should be given to the firmware cannot be read.
+    #[error("cannot read the table {}: {source}", path.display())]
+    Table {
+        /// Its path.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// There is no such texture in the recordings.
+    #[error("no material {name}; there are {known}, or give a number from 1")]
+    NoMaterial {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+}
+
+/// What the firmware is told.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Known {
+    /// Constants of the rig.
+    pub calibration: RigCalibration,
+    /// The texture table.
+    pub table: Vec<u8>,
+}
+
+/// What lies under the finger.
+#[derive(Clone, Debug)]
+pub struct Unknown {
+    /// Its name in the table.
+    pub name: String,
+    /// The rig.
+    pub setup: Setup,
+    /// Recorded slides that the finger feels instead of the simulated sample, in an order that the seed gives.
+    pub recorded: Option<(Vec<Played>, u64)>,
+}
+
+impl Unknown {
+    /// Powers up a board with it under the finger.
+    pub fn start(&self, elf: &std::path::Path, options: Options) -> Result<Emulator, Error> {
+        let emulator = Emulator::start(elf, self.setup, options)?;
+        if let Some((slides, seed)) = &self.recorded {
+            emulator.rig().world().play(slides.clone(), *seed);
+        }
+        Ok(emulator)
+    }
+}
+
+/// Learns the textures of a simulated world for a method; `done` hears of each.
+pub fn simulated(
+    collection: &Collection,
+    method: Method,
+    done: impl Fn() + Sync,
+) -> Result<Known, LessonError> {
+    let first = collection.textures.first().copied().unwrap_or(1);
+    let calibration = calibrated(collection.setup(first, 0)).map_err(LearnError::from)?;
+    let table = collection.learn(method, calibration, done)?;
+    Ok(Known { calibration, table })
+}
+
+/// A texture of a simulated world in a trial that nothing was learned from: those from 1 on.
+pub fn mounted(collection: &Collection, texture: u8, trial: u64) -> Unknown {
+    Unknown {
+        name: texture_name(texture).to_owned(),
+        setup: collection.setup(texture, trial),
+        recorded: None,
+    }
+}
+
+/// Recorded slides of each material that are learned from; the unknown one is felt by the others. The paper's method takes
+/// the standard deviation of a few trials for the truth: with five it is wrong too often.
+fn recorded_trials(method: Method) -> usize {
+    match method {
+        Method::Paper => 15,
+        Method::Student | Method::StudentAll | Method::Fused => TRIALS as usize,
+    }
+}
+
+/// The recordings of a real finger, to be learned from and felt: in `biotac` below `TACTUS_DATA`, else beside the repository in `shared/data`.
+pub fn recordings(method: Method, seed: u64) -> Result<Lesson, LessonError> {
+    let root = std::env::var_os("TACTUS_DATA").map_or_else(
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
+        PathBuf::from,
+    );
+    let folder = root.join("biotac");
+    if !folder.is_dir() {
+        return Err(LessonError::NoData(folder));
+    }
+    let set = RecordingSet::open(&folder).map_err(PlayError::from)?;
+    Ok(Lesson::interleaved(&set, recorded_trials(method), seed)?)
+}
+
+/// Learns the recorded textures for a method.
+pub fn recorded(lesson: &Lesson, method: Method) -> Result<Known, LessonError> {
+    let calibration = calibrated(Lesson::setup(0)).map_err(LearnError::from)?;
+    let table = lesson.learn(method, calibration)?;
+    Ok(Known { calibration, table })
+}
+
+/// Number of a material by its name, whatever the case, or by its number from 1.
+///
+/// # Errors
+/// [`LessonError::NoMaterial`].
+pub fn material(lesson: &Lesson, name: &str) -> Result<usize, LessonError> {
+    let number = name.parse().ok().map(|n: usize| n.wrapping_sub(1));
+    let mut names = lesson.names.iter();
+    names
+        .position(|known| known.eq_ignore_ascii_case(name))
+        .or(number.filter(|n| *n < lesson.names.len()))
+        .ok_or_else(|| LessonError::NoMaterial {
+            name: name.to_owned(),
+            known: lesson.names.join(", "),
+        })
+}
+
+/// A recorded texture: its slides that nothing was learned from.
+pub fn played(lesson: &Lesson, texture: usize, seed: u64) -> Unknown {
+    Unknown {
+        name: lesson.names.get(texture).cloned().unwrap_or_default(),
+        // other trials of the rig than those that were learned, whose seeds are the textures'
+        setup: Lesson::setup(1000 * (seed + 1) + texture as u64),
+        recorded: Some((lesson.test.get(texture).cloned().unwrap_or_default(), seed)),
+    }
+}

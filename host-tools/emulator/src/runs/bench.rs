@@ -1,0 +1,267 @@
+//! `cargo xtask bench` asks what the kernels cost: the bench image is given its work on the emulated chip, the instructions
+//! that it counted are read, and the plain kernels do the same on this PC.
+
+mod counter;
+pub mod error;
+mod gates;
+mod inputs;
+mod on_the_rig;
+mod plot;
+mod row;
+#[path = "../../../../firmware/src/workload.rs"]
+pub mod workload;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args as Arguments;
+use serde_json::Value;
+use tactus_core::explorer::Method;
+
+use self::counter::Bench;
+use self::error::BenchError;
+use self::gates::{GATES, gate};
+use self::inputs::{SLIDE, Wanted, corners, felt, slide, synthetic};
+use self::on_the_rig::on_the_rig;
+use self::plot::{Curve, draw};
+use self::row::{Row, print};
+use self::workload::Workload;
+use super::error::RunError;
+use crate::host::args::{Firmware, Format};
+
+/// What is counted.
+#[derive(Arguments)]
+pub struct Args {
+    /// The bench image.
+    #[command(flatten)]
+    firmware: Firmware,
+    /// The rig's image, whose acquisition, load and latency are measured during a slide
+    #[arg(long)]
+    rig: Option<PathBuf>,
+    /// For people, or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+    /// Tell how table and decision grow with the number of textures instead
+    #[arg(long)]
+    growth: bool,
+    /// With --growth, draw that as SVG, too
+    #[arg(long, value_name = "FILE", requires = "growth")]
+    plot: Option<PathBuf>,
+}
+
+/// Textures of the paper, and of the table that comes with the firmware.
+const TEXTURES: usize = 117;
+/// Exit code when gates are missed and every result is right. `cargo xtask test` knows it.
+const MISSED: u8 = 2;
+
+/// Counts, and says by its exit code whether every gate is met.
+pub fn run(args: &Args) -> Result<ExitCode, RunError> {
+    let met = count(args)?;
+    Ok(if met {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(MISSED)
+    })
+}
+
+fn count(args: &Args) -> Result<bool, BenchError> {
+    let mut bench = Bench::start(&args.firmware.elf)?;
+    if args.growth {
+        return growth(&mut bench, args.plot.as_deref());
+    }
+    corners(&mut bench)?;
+    let text = args.format == Format::Text;
+    bench.model = text;
+    let (samples, source) = slide()?;
+    let mut rows = kernels(&mut bench, &samples)?;
+    if let Some(rig) = &args.rig {
+        rows.extend(on_the_rig(rig)?);
+        let is_counted = |name: &str| rows.iter().any(|row| row.kernel == name);
+        if let Some((name, ..)) = GATES.iter().find(|(name, ..)| !is_counted(name)) {
+            let (kernel, what) = ((*name).to_owned(), "it has a gate and was not counted");
+            return Err(BenchError::Unsuitable { kernel, what });
+        }
+    }
+    if text {
+        print(&rows, source);
+    } else {
+        println!("{}", Value::from_iter(rows.iter().map(Row::json)));
+    }
+    let different = rows.iter().filter(|row| !row.equal);
+    let different: Vec<String> = different.map(|row| row.kernel.clone()).collect();
+    if !different.is_empty() {
+        return Err(BenchError::Different(different));
+    }
+    Ok(rows.iter().all(Row::ok))
+}
+
+/// A kernel that is to be counted: its work, and what it is held against.
+struct Kernel<'a> {
+    name: String,
+    unit: &'static str,
+    /// How many of them the work has.
+    units: usize,
+    cmsis: Option<f64>,
+    floor: Option<f64>,
+    workload: Workload,
+    table: &'a [u8],
+    words: &'a [i16],
+}
+
+impl<'a> Kernel<'a> {
+    fn new(
+        name: impl Into<String>,
+        unit: &'static str,
+        workload: Workload,
+        table: &'a [u8],
+        words: &'a [i16],
+    ) -> Self {
+        Self {
+            name: name.into(),
+            unit,
+            units: 1,
+            cmsis: None,
+            floor: None,
+            workload,
+            table,
+            words,
+        }
+    }
+
+    /// What CMSIS-DSP takes in an expert's hands.
+    fn cmsis(self, cmsis: f64) -> Self {
+        Self {
+            cmsis: Some(cmsis),
+            ..self
+        }
+    }
+
+    fn count(self, bench: &mut Bench) -> Result<Row, BenchError> {
+        let counted = bench.count(self.workload, self.table, self.words)?;
+        let units = self.units as f64;
+        Ok(Row {
+            gate: gate(&self.name),
+            kernel: self.name,
+            unit: self.unit,
+            instructions: counted.instructions as f64 / units,
+            cycles: counted.cycles.map(|cycles| cycles / units),
+            cmsis: self.cmsis,
+            floor: self.floor,
+            equal: counted.equal,
+        })
+    }
+}
+
+/// The core's kernels as a rig with 117 textures uses them, on a slide.
+fn kernels(bench: &mut Bench, samples: &[i16]) -> Result<Vec<Row>, BenchError> {
+    let name = "band-pass FIR with mean power";
+    let band_power = Kernel {
+        units: SLIDE,
+        floor: Some(45.0),
+        ..Kernel::new(name, "sample", Workload::BandPower, &[], samples)
+    };
+    let name = "window, FFT, power accumulated";
+    let frame = Kernel::new(name, "512 points", Workload::Frame, &[], samples);
+    let name = "all features of a slide";
+    let all = Kernel::new(name, "slide of 3 s", Workload::Slide, &[], samples);
+    let mut rows = vec![
+        band_power.cmsis(96.5 + 1.8).count(bench)?,
+        frame.cmsis(2.0 * 14_162.0).count(bench)?,
+        all.cmsis(1_650_000.0).count(bench)?,
+    ];
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware/factory.tact");
+    let factory = std::fs::read(&path).map_err(|source| BenchError::Factory { path, source })?;
+    let paper = synthetic(Method::Paper, TEXTURES)?;
+    rows.extend(decisions(bench, samples, &paper, Method::Paper)?);
+    rows.extend(decisions(bench, samples, &factory, Method::Fused)?);
+    Ok(rows)
+}
+
+/// What decisions take with a table.
+fn decisions(
+    bench: &mut Bench,
+    samples: &[i16],
+    table: &[u8],
+    method: Method,
+) -> Result<Vec<Row>, BenchError> {
+    let is_paper = method == Method::Paper;
+    let name = if is_paper { "paper" } else { "fused" };
+    let [many, few] = [50, 20].map(|live| felt(table, method, live));
+    let (many, few) = (many?, few?);
+    let words = &many.words[..];
+    let last = [words, &samples[..SLIDE]].concat();
+    let kernel = |what: &str, unit, workload, words| {
+        Kernel::new(format!("{what}, {name}"), unit, workload, table, words)
+    };
+    let choice = |felt: &Wanted| format!("choice among {} live textures", felt.live);
+    let mut posterior = kernel("posterior", "117 textures", Workload::Observe, words);
+    let first = kernel("first choice", "choice", Workload::FirstChoice, words);
+    let mut of_many = kernel(&choice(&many), "choice", Workload::Choice, words);
+    let of_few = kernel(&choice(&few), "choice", Workload::Choice, &few.words);
+    let decision = "last sample to decision";
+    let decision = kernel(decision, "decision", Workload::Decision, &last);
+    let begin = kernel("an explorer begins", "exploration", Workload::Begin, words);
+    if is_paper {
+        posterior = posterior.cmsis(23_412.0);
+        of_many = Kernel {
+            floor: Some(154_000.0),
+            ..of_many.cmsis(251_000.0)
+        };
+    }
+    let kernels = [posterior, first, of_many, of_few, decision, begin].into_iter();
+    let is_counted = |kernel: &Kernel<'_>| !(is_paper && kernel.words == few.words);
+    kernels
+        .filter(is_counted)
+        .map(|kernel| kernel.count(bench))
+        .collect()
+}
+
+/// Table bytes, and instructions of a fused decision of three movements after a typical slide.
+fn growth(bench: &mut Bench, plot: Option<&Path>) -> Result<bool, BenchError> {
+    println!(
+        "{:>8} {:>12} {:>12} {:>6} {:>12}",
+        "textures", "table bytes", "posterior", "live", "choice"
+    );
+    let mut equal = true;
+    let mut curves = [
+        "table, KB",
+        "posterior, thousands of instructions",
+        "choice among up to 50 live, thousands",
+    ]
+    .map(|name| -> Curve { (name, Vec::new()) });
+    for textures in [20, 117, 500, workload::MOST_ROOM, 2000] {
+        let table = synthetic(Method::Fused, textures)?;
+        curves[0]
+            .1
+            .push((textures as f64, table.len() as f64 / 1024.0));
+        if textures > workload::MOST_ROOM {
+            println!(
+                "{textures:>8} {:>12}   more than the chip's RAM has room for",
+                table.len()
+            );
+            continue;
+        }
+        let felt = felt(&table, Method::Fused, textures.min(50))?;
+        let posterior = bench.count(Workload::Observe, &table, &felt.words)?;
+        let choice = bench.count(Workload::Choice, &table, &felt.words)?;
+        equal &= posterior.equal && choice.equal;
+        println!(
+            "{textures:>8} {:>12} {:>12} {:>6} {:>12}",
+            table.len(),
+            posterior.instructions,
+            felt.live,
+            choice.instructions
+        );
+        let counts = [posterior, choice].map(|counted| counted.instructions as f64 * 1e-3);
+        for ((_, points), y) in curves.iter_mut().skip(1).zip(counts) {
+            points.push((textures as f64, y));
+        }
+    }
+    if let Some(file) = plot {
+        draw(file, &curves)?;
+    }
+    if !equal {
+        return Err(BenchError::Different(vec!["a decision".into()]));
+    }
+    Ok(true)
+}

@@ -1,0 +1,26 @@
+//! What the kernels may cost.
+
+/// Kernel, unit, and the most that it may take of it: instructions, where the unit is no other one.
+pub(crate) const GATES: &[(&str, &str, f64)] = &[
+    ("band-pass FIR with mean power", "sample", 60.0),
+    ("window, FFT, power accumulated", "512 points", 24_000.0),
+    ("all features of a slide", "slide of 3 s", 1_100_000.0),
+    ("posterior, paper", "117 textures", 2500.0),
+    ("first choice, paper", "choice", 2000.0),
+    ("choice among 50 live textures, paper", "choice", 450_000.0),
+    ("last sample to decision, paper", "decision", 500_000.0),
+    ("posterior, fused", "117 textures", 12_000.0),
+    ("first choice, fused", "choice", 2000.0),
+    ("choice among 50 live textures, fused", "choice", 250_000.0),
+    ("choice among 20 live textures, fused", "choice", 45_000.0),
+    ("last sample to decision, fused", "decision", 300_000.0),
+    ("acquisition, bus waiting included", "slot", 2500.0),
+    ("core busy during a slide", "% at 168 MHz", 10.0),
+    ("last sample to the verdict on the link", "ms", 5.0),
+];
+
+/// The gate of a kernel.
+pub(super) fn gate(kernel: &str) -> Option<f64> {
+    let of = |(name, _, gate): &(&str, _, f64)| (*name == kernel).then_some(*gate);
+    GATES.iter().find_map(of)
+}

@@ -1,0 +1,303 @@
+//! What the kernels are given: a slide, tables, and what was felt.
+
+use std::path::{Path, PathBuf};
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use tactus::learn;
+use tactus::recordings::{PAC_RATE_HZ, RecordingSet};
+use tactus_core::explorer::{Config, Explorer, Method};
+use tactus_core::features::{Properties, Property, PropertySet};
+use tactus_core::fused::{FeatureSet, MAX_FEATURES, Observation};
+use tactus_core::movement::Movement;
+use tactus_core::table::{Action, Contents, Table};
+
+use super::counter::Bench;
+use super::error::BenchError;
+use super::workload::{Felt, Workload};
+
+/// Samples of a slide of 3 s.
+pub(super) const SLIDE: usize = 6600;
+/// Less probable textures are left out of a choice: the core's own limit.
+const NEGLIGIBLE: f32 = 1e-6;
+
+fn unsuitable(kernel: &str, what: &'static str) -> BenchError {
+    let kernel = kernel.to_owned();
+    BenchError::Unsuitable { kernel, what }
+}
+
+/// 3 s of a slide of a real finger, or of a synthetic one where there are no recordings; and which.
+pub(super) fn slide() -> Result<(Vec<i16>, &'static str), BenchError> {
+    let root = std::env::var_os("TACTUS_DATA").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
+        PathBuf::from,
+    );
+    let folder = root.join("biotac");
+    if folder.is_dir() {
+        let slides = RecordingSet::open(&folder)?.load_texture(0)?;
+        let steady = slides
+            .first()
+            .and_then(|slide| slide.pac.get(slide.steady(PAC_RATE_HZ)));
+        let samples = steady.and_then(|steady| steady.get(..SLIDE));
+        let too_short = || unsuitable("a slide", "the first recorded material has none of 3 s");
+        return Ok((samples.ok_or_else(too_short)?.to_vec(), "a real finger's"));
+    }
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let samples = (0..SLIDE).map(|n| {
+        let noise: f64 = random.random_range(-40.0..40.0);
+        (300.0 * (n as f64 * 0.3).sin() + noise) as i16
+    });
+    Ok((samples.collect(), "synthetic: there are no recordings"))
+}
+
+const MOVEMENTS: [Movement; 3] = [
+    Movement::FOR_TRACTION,
+    Movement::FOR_FINENESS,
+    Movement::FOR_ROUGHNESS,
+];
+
+/// A table of so many textures, neighbours hard to tell apart, each learned from 5 slides of 3 movements.
+pub(super) fn synthetic(method: Method, textures: usize) -> Result<Vec<u8>, BenchError> {
+    let mut random = ChaCha8Rng::seed_from_u64(2);
+    let names: Vec<String> = (1..=textures).map(|t| format!("texture {t}")).collect();
+    let slides: Vec<Vec<Vec<Observation>>> = names
+        .iter()
+        .map(|_| {
+            let mut slides_of = |_: &Movement| {
+                let mut around =
+                    |centre: f32, reach: f32| random.random_range(centre - reach..centre + reach);
+                let centre = [around(1.0, 0.8), around(8.0, 3.0), around(4.0, 1.0)];
+                let bands: Vec<f32> = (0..12).map(|_| around(3.0, 3.0)).collect();
+                let mut slide = |_| {
+                    let properties = Properties::new(centre.map(|c| Some(around(c, 0.2))));
+                    let bands = bands
+                        .iter()
+                        .filter_map(|b| tactus_core::fused::fixed(around(*b, 0.5)));
+                    Observation {
+                        bands: bands.collect(),
+                        ..Observation::from(properties)
+                    }
+                };
+                (0..5).map(&mut slide).collect()
+            };
+            MOVEMENTS.iter().map(&mut slides_of).collect()
+        })
+        .collect();
+    Ok(learn::learn(method, None, &names, &MOVEMENTS, &slides)?)
+}
+
+/// Posteriors that the figures below do not go through: few textures and odd numbers of them, all numbers of features, textures
+/// too far away for the chip's short way, learned from different numbers of slides, or not at all, and values far from all.
+pub(super) fn corners(bench: &mut Bench) -> Result<(), BenchError> {
+    let mut random = ChaCha8Rng::seed_from_u64(4);
+    for textures in [3, 8, 21] {
+        for (set, far) in FeatureSet::ALL
+            .into_iter()
+            .zip([false, true].iter().cycle())
+        {
+            for uneven in [false, true] {
+                let slides = corner(&mut random, textures, set, *far || uneven, uneven);
+                let what = format!("{textures} textures by {}, uneven: {uneven}", set.name());
+                for method in [Method::Fused, Method::Paper] {
+                    let names: Vec<String> = (0..textures).map(|t| format!("t{t}")).collect();
+                    let set = (method == Method::Fused).then_some(set);
+                    if set.is_none()
+                        && slides
+                            .iter()
+                            .flatten()
+                            .flatten()
+                            .any(|s| s.properties == Properties::default())
+                    {
+                        continue;
+                    }
+                    let table = learn::learn(method, set, &names, &MOVEMENTS, &slides)?;
+                    for _ in 0..3 {
+                        // where one was never felt, the paper's method does not look
+                        let movement = match (uneven, method) {
+                            (true, Method::Fused) => 1,
+                            (true, _) => 0,
+                            (false, _) => random.random_range(0..3),
+                        };
+                        let texture = random.random_range(0..textures);
+                        let felt = slides[texture][movement].first();
+                        let felt = felt.or(slides[0][0].first());
+                        let no_slide = || unsuitable(&what, "a texture without a slide");
+                        let mut slide = felt.ok_or_else(no_slide)?.clone();
+                        if set.is_none() && random.random() {
+                            slide.properties = Properties::new([Some(1e6), Some(-1e6), Some(0.0)]);
+                        }
+                        let action = Action {
+                            movement: movement as u8,
+                            property: set
+                                .is_none()
+                                .then_some(Property::ALL[random.random_range(0..3)]),
+                        };
+                        let mut words = Vec::new();
+                        Felt {
+                            method,
+                            action,
+                            slide,
+                        }
+                        .write(|word| words.push(word));
+                        let counted = bench.count(Workload::Observe, &table, &words)?;
+                        if !counted.equal {
+                            return Err(BenchError::Different(vec![format!("{what}, {method:?}")]));
+                        }
+                    }
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Slides of textures, movement by movement; some from fewer where they are `uneven`, one from none.
+fn corner(
+    random: &mut ChaCha8Rng,
+    textures: usize,
+    set: FeatureSet,
+    far: bool,
+    uneven: bool,
+) -> Vec<Vec<Vec<Observation>>> {
+    let (reach, scatter) = if far { (15.0, 0.02) } else { (3.0, 0.5) };
+    let mut texture = |texture: usize| {
+        let mut slides_at = |movement: usize| {
+            let centres: Vec<f32> = (0..17)
+                .map(|_| random.random_range(-reach..reach))
+                .collect();
+            let slides = match (uneven, movement, texture) {
+                (true, 1, 1) => 0,
+                (true, _, _) => 2 + texture % 3,
+                _ => 5,
+            };
+            let mut slide = |_| {
+                let felt: Vec<f32> = centres
+                    .iter()
+                    .map(|c| c + random.random_range(-scatter..scatter))
+                    .collect();
+                let fixed = |x: &f32| tactus_core::fused::fixed(*x).unwrap_or(0);
+                let properties = match set {
+                    FeatureSet::Pressure | FeatureSet::Bands => [None; 3],
+                    _ => [
+                        Some(felt[0] / 4.0),
+                        Some(felt[1] / 2.0),
+                        Some(felt[2] / 4.0),
+                    ],
+                };
+                Observation {
+                    properties: Properties::new(properties),
+                    pressure: (set == FeatureSet::Pressure)
+                        .then(|| [fixed(&felt[3]), fixed(&felt[4])]),
+                    bands: felt[5..].iter().map(fixed).collect(),
+                }
+            };
+            (0..slides).map(&mut slide).collect()
+        };
+        (0..MOVEMENTS.len()).map(&mut slides_at).collect()
+    };
+    (0..textures).map(&mut texture).collect()
+}
+
+/// What was felt, as words, and how many textures it leaves.
+pub(super) struct Wanted {
+    pub(super) words: Vec<i16>,
+    pub(super) live: usize,
+}
+
+/// A slide after which so many textures are still likely, or as nearly as can be found.
+pub(super) fn felt(table: &[u8], method: Method, live: usize) -> Result<Wanted, BenchError> {
+    let table = Table::read(table).map_err(|_| unsuitable("a decision", "the table is broken"))?;
+    let mut random = ChaCha8Rng::seed_from_u64(live as u64);
+    let config = Config {
+        method,
+        ..Config::default()
+    };
+    let mut explorer = Explorer::<2000>::new(table, PropertySet::ALL, config)
+        .map_err(|_| unsuitable("a decision", "the table cannot be explored"))?;
+    let mut best: Option<(usize, Felt)> = None;
+    for _ in 0..20_000 {
+        let felt = match table.contents() {
+            Contents::Gaussians(_) => by_property(&table, method, &mut random),
+            Contents::Fused(set, features) => by_bands(&table, set, features, &mut random),
+        };
+        let Some(felt) = felt else { continue };
+        explorer.restart();
+        if explorer.observe(felt.action, &felt.slide).is_err() {
+            continue;
+        }
+        let left = explorer.posterior().iter().filter(|p| **p >= NEGLIGIBLE);
+        let left = left.count();
+        if best
+            .as_ref()
+            .is_none_or(|(best, _)| left.abs_diff(live) < best.abs_diff(live))
+        {
+            best = Some((left, felt));
+        }
+        if left == live {
+            break;
+        }
+    }
+    let (live, felt) = best.ok_or_else(|| unsuitable("a decision", "no slide suits"))?;
+    let mut words = Vec::new();
+    felt.write(|word| words.push(word));
+    Ok(Wanted { words, live })
+}
+
+/// A slide of one of the textures, looked at by one property.
+fn by_property(table: &Table<'_>, method: Method, random: &mut ChaCha8Rng) -> Option<Felt> {
+    let texture = random.random_range(0..table.textures());
+    let movement = random.random_range(0..table.movements().len() as u8);
+    let looked_at = Property::ALL[random.random_range(0..3)];
+    let values = Property::ALL.map(|property| {
+        let property = Some(property);
+        let known = table.gaussian(texture, Action { movement, property })?;
+        Some(known.mean + known.sd * random.random_range(-2.0..2.0))
+    });
+    Some(Felt {
+        method,
+        action: Action {
+            movement,
+            property: Some(looked_at),
+        },
+        slide: Properties::new(values).into(),
+    })
+}
+
+/// A slide somewhere between all textures, the farther out the more of them it leaves.
+fn by_bands(
+    table: &Table<'_>,
+    set: FeatureSet,
+    features: u8,
+    random: &mut ChaCha8Rng,
+) -> Option<Felt> {
+    if set != FeatureSet::Force {
+        return None;
+    }
+    let movement = random.random_range(0..table.movements().len() as u8);
+    let whitening = table.whitening(movement)?;
+    let mean: Vec<i16> = whitening
+        .as_bytes()
+        .chunks_exact(2)
+        .take(features.into())
+        .map(|pair| i16::from_le_bytes([pair[0], pair[1]]))
+        .collect();
+    let reach = random.random_range(0.0..3000.0f32);
+    let values: heapless::Vec<i16, MAX_FEATURES> = mean
+        .iter()
+        .map(|mean| mean.saturating_add((reach * random.random_range(-1.0..1.0)) as i16))
+        .collect();
+    let (traction, bands) = values.split_first()?;
+    let properties = [Some(f32::from(*traction) / 1024.0), Some(8.0), Some(4.0)];
+    Some(Felt {
+        method: Method::Fused,
+        action: Action {
+            movement,
+            property: None,
+        },
+        slide: Observation {
+            properties: Properties::new(properties),
+            bands: bands.iter().copied().collect(),
+            pressure: None,
+        },
+    })
+}

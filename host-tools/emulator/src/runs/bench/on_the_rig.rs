@@ -1,0 +1,111 @@
+//! Load and latency of the rig's own image, while it makes a slide.
+
+use std::path::Path;
+
+use tactus::sim::world::Setup;
+use tactus_core::explorer::Strategy;
+use tactus_core::rig::lever::RETRACT_STEPS_S;
+use tactus_core::wire::{Ask, Identify, Phase, Tell};
+
+use super::error::BenchError;
+use super::gates::gate;
+use super::row::Row;
+use crate::board::{Emulator, Options, Output};
+use crate::host::talk::Talk;
+
+/// Longest that the rig takes for anything, virtual seconds.
+const PATIENCE_S: f64 = 120.0;
+const CORE_HZ: f64 = 168e6;
+
+/// The last sample is up to a tick of 1 ms old when the servo has the lever step up, and the first step comes a period of its rate
+/// later.
+const BEFORE_STEP_NS: u64 = 1_000_000 + 1_000_000_000 / RETRACT_STEPS_S.unsigned_abs() as u64;
+
+/// When the lever's driver got its first step since the slide began: the end of the slide, as the pins show it.
+fn first_step_up(board: &mut Emulator, since_ns: u64) -> Option<u64> {
+    let rig = board.rig();
+    rig.trace().find_map(|&(at_ns, output)| {
+        (output == Output::LeverStep(true) && at_ns > since_ns).then_some(at_ns)
+    })
+}
+
+/// Load and latency of the rig's image while it makes a slide.
+pub(super) fn on_the_rig(elf: &Path) -> Result<Vec<Row>, BenchError> {
+    let options = Options {
+        trace_s: 2,
+        ..Options::default()
+    };
+    let emulator = Emulator::start(elf, Setup::default(), options)?;
+    let handlers = ["TIM2", "UART4"].map(|name| emulator.symbol(name).map(|(address, _)| address));
+    let handlers = handlers.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let mut talk = Talk::new(emulator);
+    talk.ready(|_, _| ())?;
+    let identify = Identify {
+        among: Default::default(),
+        threshold: 1.0,
+        max_slides: 1,
+        method: None,
+        strategy: Strategy::Bayesian,
+        open: false,
+        learn: false,
+        seed: 1,
+    };
+    // times in ns and instructions so far
+    let (mut begun, mut over, mut told) = (None, None, None);
+    let mut lifts_ns = None;
+    let mut failed = None;
+    talk.ask(Ask::Identify(identify), PATIENCE_S, |board, report| {
+        let mut now = |board: &mut Emulator| {
+            let instructions = board.instructions();
+            let instructions = instructions.map_err(|why| failed = Some(why)).unwrap_or(0);
+            Some((board.now_ns(), instructions))
+        };
+        match report.map(|report| &report.tell) {
+            Some(Tell::Phase(Phase::Sliding)) if begun.is_none() => {
+                begun = now(board);
+                let counted = board.count_handlers(handlers.clone());
+                failed = counted.err();
+            }
+            Some(Tell::Phase(Phase::Lifting)) if over.is_none() => over = now(board),
+            Some(Tell::Verdict { .. }) => {
+                told = now(board);
+                lifts_ns = begun.and_then(|(from_ns, _)| first_step_up(board, from_ns));
+            }
+            _ => {}
+        }
+    })?;
+    if let Some(why) = failed {
+        return Err(why.into());
+    }
+    let spent = talk.board().handlers()?;
+    let [timer, executor] = spent[..] else {
+        return Err(BenchError::Rig("its handlers were not counted"));
+    };
+    let begun = begun.ok_or(BenchError::Rig("it says nothing of a slide"))?;
+    let over = over.ok_or(BenchError::Rig("the slide does not end"))?;
+    let (told_ns, _) = told.ok_or(BenchError::Rig("there is no verdict"))?;
+    let lifts_ns = lifts_ns.ok_or(BenchError::Rig(
+        "the finger is not lifted before the verdict",
+    ))?;
+    // the timer's update and its compare
+    let slots = timer.runs as f64 / 2.0;
+    let seconds = (over.0 - begun.0) as f64 * 1e-9;
+    let busy = (over.1 - begun.1) as f64 / (seconds * CORE_HZ);
+    let row = |kernel: &str, unit, measured| Row {
+        kernel: kernel.into(),
+        unit,
+        instructions: measured,
+        cycles: None,
+        gate: gate(kernel),
+        cmsis: None,
+        floor: None,
+        equal: true,
+    };
+    let slot = (timer.instructions + executor.instructions) as f64 / slots;
+    let late_ms = (told_ns + BEFORE_STEP_NS - lifts_ns) as f64 * 1e-6;
+    Ok(vec![
+        row("acquisition, bus waiting included", "slot", slot),
+        row("core busy during a slide", "% at 168 MHz", 100.0 * busy),
+        row("last sample to the verdict on the link", "ms", late_ms),
+    ])
+}

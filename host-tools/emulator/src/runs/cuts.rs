@@ -1,0 +1,469 @@
+//! The power is cut while the real firmware stores something: what it makes of the flash that is left.
+//!
+//! The firmware stores once without a cut, and every word that it programs and every sector that it erases is noted. For a cut,
+//! the flash is made as it is after a part of them, with the last one torn, and the firmware boots on it: it must hold the state from before
+//! or the one from after, and say so before it has found its switches.
+
+mod outcome;
+pub mod tear;
+
+use std::path::Path;
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use tactus::collection::Collection;
+use tactus::link::{Found, Question, ReadTable};
+use tactus::sim::world::{Setup, World};
+use tactus_core::explorer::{Method, Strategy};
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::wire::{Identify, Name, Reset, Tell};
+
+pub use self::outcome::{Cuts, Outcome};
+use self::tear::{Cut, CutError, Held, Left, Operation, Torn, judge, left_by};
+use crate::board::{FlashWrite, Options};
+use crate::host::exploration::explore;
+use crate::host::talk::{PATIENCE_S, Talk, TalkError};
+use crate::host::under_finger::{self, Known, Unknown};
+
+/// The texture under the finger, which the table has.
+const TEXTURE: u8 = 47;
+/// Textures of the table: few, so that every word of it can be cut.
+const AMONG: u8 = 4;
+/// The probe learns from visits that it is certain of: one of so many.
+const VISITS: u64 = 8;
+/// More calibrations than a page of settings holds.
+const CALIBRATIONS: u32 = 400;
+/// The firmware has its store open by then: two erases and the lever's way up, virtual s.
+const OPEN_S: f64 = 20.0;
+/// Nothing here is as quick as the line.
+const LOOK_MS: u64 = 10;
+/// Places at power-up among which the highest is looked for.
+const TRIALS: u64 = 100;
+/// After so many cuts of an operation the probe homes and identifies as well.
+const PROBED: usize = 2;
+
+/// What is cut, and in what world.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// A teaching and an update on the go, to be cut at every word, and an update that turns a page.
+    pub operations: Vec<Operation>,
+    unknown: Unknown,
+}
+
+/// Has the firmware store all that is to be cut, each once and whole; `each` hears what it does.
+pub fn prepare(
+    elf: &Path,
+    seed: u64,
+    mut each: impl FnMut(&'static str),
+) -> Result<Prepared, CutError> {
+    each("learning a table");
+    let collection = Collection {
+        seed,
+        textures: Collection::spread(TEXTURE, AMONG),
+        trials: under_finger::TRIALS,
+    };
+    let known = under_finger::simulated(&collection, Method::Fused, || ())?;
+    let unknown = under_finger::mounted(&collection, TEXTURE, 1 + seed);
+    each("a board finds its switches");
+    let mut talk = boot(elf, &unknown, None)?;
+    talk.ready(|_, _| ())?;
+    let Known { calibration, table } = &known;
+    talk.teach(calibration, table, |_, _| ())?;
+    each("it learns by itself");
+    let update = noted_update("update", &mut talk, &unknown, |_| true)?;
+    each("it is taught");
+    visit(&mut talk, &unknown, 1, false)?;
+    let name = Name::try_from("taught").unwrap_or_default();
+    let (before, held) = begin(&mut talk)?;
+    talk.run(Question::answer(name), PATIENCE_S, |_, _| ())?;
+    let teach = noted("teach", &mut talk, before, held, |before, after| {
+        vec![before, after]
+    })?;
+    each("a page of settings fills up");
+    let full = fill(&mut talk, calibration)?;
+    drop(talk);
+    each("another board finds its switches");
+    let mut talk = boot(elf, &unknown, Some(full))?;
+    talk.ready(|_, _| ())?;
+    each("it learns by itself, and the page turns");
+    let turned = noted_update("sector change", &mut talk, &unknown, |writes| {
+        erases(writes).next().is_some()
+    })?;
+    Ok(Prepared {
+        operations: vec![teach, update, turned],
+        unknown: lifted(unknown),
+    })
+}
+
+/// The same with the finger as high as it may be when the power comes: it was lifted when it was cut, and every boot lifts it first.
+fn lifted(unknown: Unknown) -> Unknown {
+    let setups = (0..TRIALS).map(|trial_seed| Setup {
+        trial_seed,
+        ..unknown.setup
+    });
+    let height = |setup: &Setup| World::new(*setup).truth().tip_mm;
+    let highest = setups.max_by(|a, b| height(a).total_cmp(&height(b)));
+    Unknown {
+        setup: highest.unwrap_or(unknown.setup),
+        ..unknown
+    }
+}
+
+fn erases(writes: &[FlashWrite]) -> impl Iterator<Item = usize> {
+    let erase =
+        |(at, write): (usize, &FlashWrite)| matches!(write, FlashWrite::Erase { .. }).then_some(at);
+    writes.iter().enumerate().filter_map(erase)
+}
+
+fn boot(elf: &Path, unknown: &Unknown, store: Option<Vec<u8>>) -> Result<Talk, CutError> {
+    let options = Options {
+        store,
+        ..Options::default()
+    };
+    Ok(Talk::new(unknown.start(elf, options)?).look_every(LOOK_MS))
+}
+
+fn visit(talk: &mut Talk, unknown: &Unknown, seed: u32, learn: bool) -> Result<Found, CutError> {
+    let table = talk.run(ReadTable::default(), PATIENCE_S, |_, _| ())?;
+    let identify = Identify {
+        among: Default::default(),
+        threshold: 0.99,
+        max_slides: 10,
+        method: None,
+        strategy: Strategy::default(),
+        open: true,
+        learn,
+        seed,
+    };
+    let explored = explore(talk, &table, identify, &unknown.name, |_, _| ())?;
+    Ok(explored.found)
+}
+
+/// The store and what is held, before something is stored.
+fn begin(talk: &mut Talk) -> Result<(Vec<u8>, Held), CutError> {
+    talk.board().store_writes()?;
+    Ok((talk.board().store()?, held(talk)?))
+}
+
+/// What was stored since.
+fn noted(
+    name: &'static str,
+    talk: &mut Talk,
+    before: Vec<u8>,
+    held_before: Held,
+    states: impl FnOnce(Held, Held) -> Vec<Held>,
+) -> Result<Operation, CutError> {
+    let writes = talk.board().store_writes()?;
+    let whole = Cut {
+        at: writes.len(),
+        torn: Torn::Nothing,
+        seed: 0,
+    };
+    if left_by(&before, &writes, whole) != talk.board().store()? {
+        return Err(CutError::Noted(name));
+    }
+    Ok(Operation {
+        name,
+        before,
+        writes,
+        states: states(held_before, held(talk)?),
+    })
+}
+
+/// Visits until the probe learns by itself, and stores what `wanted` is.
+fn noted_update(
+    name: &'static str,
+    talk: &mut Talk,
+    unknown: &Unknown,
+    wanted: impl Fn(&[FlashWrite]) -> bool,
+) -> Result<Operation, CutError> {
+    for seed in 1..=VISITS {
+        let (before, held_before) = begin(talk)?;
+        let found = visit(talk, unknown, seed as u32, true)?;
+        // first the skin is kept, then what was learned
+        let update = noted(name, talk, before, held_before, |before, after| {
+            let between = Held {
+                skin_mj: after.skin_mj,
+                ..before.clone()
+            };
+            vec![before, between, after]
+        })?;
+        if found.learned > 0 && wanted(&update.writes) {
+            return Ok(update);
+        }
+    }
+    Err(CutError::Nothing("learn by itself as it should"))
+}
+
+/// Stores calibrations until a page turns; the store from before the one that turned it.
+fn fill(talk: &mut Talk, calibration: &RigCalibration) -> Result<Vec<u8>, CutError> {
+    for number in 1..=CALIBRATIONS {
+        let before = talk.board().store()?;
+        talk.board().store_writes()?;
+        // nothing that the rig goes by
+        let mut next = *calibration;
+        for (byte, digit) in next.serial.iter_mut().zip(format!("{number:016}").bytes()) {
+            *byte = digit;
+        }
+        let write = Question::write_calibration(&next).map_err(TalkError::from)?;
+        talk.run(write, PATIENCE_S, |_, _| ())?;
+        if erases(&talk.board().store_writes()?).next().is_some() {
+            return Ok(before);
+        }
+    }
+    Err(CutError::Nothing("turn a page"))
+}
+
+/// What the firmware holds now.
+fn held(talk: &mut Talk) -> Result<Held, CutError> {
+    let status = talk.run(Question::status(), PATIENCE_S, |_, _| ())?;
+    let calibration = talk.run(Question::read_calibration(), PATIENCE_S, |_, _| ())?;
+    Ok(Held {
+        table: (status.table_crc, status.table_bytes),
+        textures: status.textures,
+        factory: status.factory,
+        calibration: calibration.to_bytes(),
+        skin_mj: status.skin_mj,
+    })
+}
+
+/// Boots the firmware on a flash until it holds something.
+fn reboot(elf: &Path, unknown: &Unknown, store: Vec<u8>) -> Result<(Talk, Held), CutError> {
+    let mut talk = boot(elf, unknown, Some(store))?;
+    let booted = |tell: &Tell| match tell {
+        Tell::Booted { reset, .. } => Some(Ok(*reset)),
+        _ => None,
+    };
+    match talk.wait(1.0, |_, _| (), booted)? {
+        Reset::Power => {}
+        reset => return Err(CutError::Started(reset)),
+    }
+    while talk.now_ns() < (OPEN_S * 1e9) as u64 {
+        let found = held(&mut talk)?;
+        // no table is in force before the store is open
+        if found.textures > 0 {
+            return Ok((talk, found));
+        }
+        talk.board().run_ms(10)?;
+    }
+    Err(CutError::NoTable(OPEN_S))
+}
+
+/// A cut that is to be made.
+struct Task {
+    operation: usize,
+    cut: Cut,
+    probed: bool,
+}
+
+/// The cuts of all operations: every word of those that turn no page, and as many seeded ones of those that do.
+fn tasks(operations: &[Operation], turned: usize, seed: u64) -> Vec<Task> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut tasks = Vec::new();
+    for (number, operation) in operations.iter().enumerate() {
+        let length = operation.writes.len();
+        let all = operation.name != "sector change";
+        let count = if all { length } else { turned };
+        let erases: Vec<usize> = erases(&operation.writes).collect();
+        for index in 0..count {
+            let near = erases.get(index / 2 % erases.len().max(1));
+            let at = match near {
+                _ if all => index,
+                // every other one in the erase and in what marks it
+                Some(erase) if index % 2 == 0 => {
+                    (erase + random.random_range(0..5)).saturating_sub(2)
+                }
+                _ => random.random_range(0..length),
+            };
+            let way = random.random_range(0..Torn::ALL.len());
+            tasks.push(Task {
+                operation: number,
+                cut: Cut {
+                    at,
+                    torn: Torn::ALL[way],
+                    seed: random.random(),
+                },
+                probed: index * PROBED / count != (index + 1) * PROBED / count,
+            });
+        }
+    }
+    tasks
+}
+
+/// How many cuts [`run`] makes.
+pub fn count(prepared: &Prepared, turned: usize) -> usize {
+    tasks(&prepared.operations, turned, 0).len()
+}
+
+/// Makes the cuts, as many at once as there are cores; `done` hears of each. `turned` of them are seeded ones of the sector
+/// change.
+///
+/// # Errors
+/// [`CutError::Kept`]: an operation is not kept without a cut.
+pub fn run(
+    elf: &Path,
+    prepared: &Prepared,
+    turned: usize,
+    seed: u64,
+    done: impl Fn() + Sync,
+) -> Result<Cuts, CutError> {
+    let Prepared {
+        operations,
+        unknown,
+    } = prepared;
+    for operation in operations {
+        kept(elf, unknown, operation)?;
+    }
+    let outcome = |operation: &Operation| Outcome {
+        name: operation.name,
+        writes: operation.writes.len(),
+        erases: erases(&operation.writes).count(),
+        ..Outcome::default()
+    };
+    let mut outcomes: Vec<Outcome> = operations.iter().map(outcome).collect();
+    let made = tasks(operations, turned, seed).into_par_iter().map(|task| {
+        let results = one(elf, unknown, &operations[task.operation], &task);
+        done();
+        (task, results)
+    });
+    for (task, results) in made.collect::<Vec<_>>() {
+        let outcome = &mut outcomes[task.operation];
+        outcome.in_recovery += results.len() - 1;
+        outcome.probed += usize::from(task.probed && results[0].is_ok());
+        for result in results {
+            match result {
+                Ok(Left::Old) => outcome.old += 1,
+                Ok(Left::Between) => outcome.between += 1,
+                Ok(Left::New) => outcome.new += 1,
+                Err(why) => outcome.wrong.push(format!("{:?}: {why}", task.cut)),
+            }
+        }
+    }
+    Ok(Cuts {
+        outcomes,
+        planted_seen: planted_is_seen(elf, prepared),
+    })
+}
+
+/// Without a cut, what was held before and afterwards is held after a restart.
+fn kept(elf: &Path, unknown: &Unknown, operation: &Operation) -> Result<(), CutError> {
+    let ends = [
+        (0, operation.states.first()),
+        (usize::MAX, operation.states.last()),
+    ];
+    for (at, state) in ends {
+        let cut = Cut {
+            at,
+            torn: Torn::Nothing,
+            seed: 0,
+        };
+        let store = left_by(&operation.before, &operation.writes, cut);
+        let (_, found) = reboot(elf, unknown, store)?;
+        if let Some(state) = state
+            && *state != found
+        {
+            let (state, found) = (Box::new(state.clone()), Box::new(found));
+            return Err(CutError::Kept(operation.name, state, found));
+        }
+    }
+    Ok(())
+}
+
+/// One cut, and one in the recovery from it if there is any; what was left by each.
+fn one(
+    elf: &Path,
+    unknown: &Unknown,
+    operation: &Operation,
+    task: &Task,
+) -> Vec<Result<Left, CutError>> {
+    let store = left_by(&operation.before, &operation.writes, task.cut);
+    let judged = |found: Held| {
+        judge(&operation.states, &found).ok_or_else(|| CutError::Neither(Box::new(found)))
+    };
+    let (mut talk, found) = match reboot(elf, unknown, store.clone()) {
+        Ok(booted) => booted,
+        Err(why) => return vec![Err(why)],
+    };
+    let repaired = talk.board().store_writes().unwrap_or_default();
+    let mut first = judged(found);
+    if task.probed && first.is_ok() {
+        first = first.and_then(|left| identifies(&mut talk, unknown).map(|()| left));
+    }
+    drop(talk);
+    let mut results = vec![first];
+    if !repaired.is_empty() {
+        let mut random = ChaCha8Rng::seed_from_u64(task.cut.seed ^ 1);
+        let cut = Cut {
+            at: random.random_range(0..repaired.len()),
+            ..task.cut
+        };
+        let again = reboot(elf, unknown, left_by(&store, &repaired, cut));
+        results.push(again.and_then(|(_, found)| judged(found)));
+    }
+    results
+}
+
+/// It homes, and finds out what lies under its finger.
+fn identifies(talk: &mut Talk, unknown: &Unknown) -> Result<(), CutError> {
+    talk.ready(|_, _| ())?;
+    let found = visit(talk, unknown, 1, false)?;
+    // what was taught last is the same texture
+    let names = [unknown.name.as_str(), "taught"];
+    if found.unknown || !names.contains(&found.name.as_str()) {
+        return Err(CutError::Identifies(Box::new(found)));
+    }
+    Ok(())
+}
+
+/// Whether the judge objects to a firmware that erases first and copies afterwards: what it must be able to see.
+fn planted_is_seen(elf: &Path, prepared: &Prepared) -> bool {
+    let unknown = &prepared.unknown;
+    prepared.operations.iter().all(|operation| {
+        let sector = operation.writes.iter().find_map(|write| match write {
+            // the slots of tables are erased first: nothing valid is in them
+            FlashWrite::Erase { sector } if *sector >= 2 => Some(*sector),
+            _ => None,
+        });
+        let Some(sector) = sector else {
+            return true;
+        };
+        let cut = Cut {
+            at: 1,
+            torn: Torn::Nothing,
+            seed: 0,
+        };
+        let store = left_by(&operation.before, &[FlashWrite::Erase { sector }], cut);
+        let booted = reboot(elf, unknown, store);
+        booted.is_ok_and(|(_, found)| judge(&operation.states, &found).is_none())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::SECTOR;
+
+    #[test]
+    fn every_word_is_cut_and_the_erase_of_a_sector_change_often() {
+        let program = |at| FlashWrite::Program { at, word: 0 };
+        let mut writes: Vec<FlashWrite> = (0..50).map(|n| program(4 * n)).collect();
+        let operation = |name, writes: &[FlashWrite]| Operation {
+            name,
+            before: vec![0xFF; 4 * SECTOR],
+            writes: writes.to_vec(),
+            states: Vec::new(),
+        };
+        let teach = operation("teach", &writes);
+        writes.insert(30, FlashWrite::Erase { sector: 2 });
+        let turned = operation("sector change", &writes);
+        let tasks = tasks(&[teach, turned], 100, 1);
+        let of = |number| tasks.iter().filter(move |task| task.operation == number);
+        let words: Vec<usize> = of(0).map(|task| task.cut.at).collect();
+        assert_eq!(words, (0..50).collect::<Vec<_>>());
+        assert_eq!(of(1).count(), 100);
+        assert!(of(1).all(|task| task.cut.at < 51));
+        assert!(of(1).filter(|task| task.cut.at == 30).count() >= 5);
+        assert_eq!(of(1).filter(|task| task.probed).count(), PROBED);
+    }
+}

@@ -1,0 +1,233 @@
+//! What the day and the hour share: visits, drawn by the seed, and what becomes of them.
+//!
+//! Both visit texture after texture; they are taught, they forget, and in every fourth visit something breaks. What lies under the
+//! finger, when what breaks, and what is learned is the seed's.
+
+use std::collections::BTreeMap;
+
+use rand::RngExt as _;
+use rand::seq::IndexedRandom as _;
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+use tactus::collection::Collection;
+use tactus::sim::faults::Fault;
+use tactus_core::explorer::Strategy;
+use tactus_core::wire::Identify;
+
+/// More force than this is never on the finger, N: see the guard of the core's `rig`.
+pub const MOST_N: f64 = 2.2;
+/// A visit with a fault among so many.
+const FAULTS_IN: u32 = 4;
+/// A visit takes some 15 s: when what breaks does so, ns after it began.
+const LATEST_NS: u64 = 15_000_000_000;
+/// A rig is asked to home so often once its fault is gone.
+pub(super) const HOMINGS: usize = 3;
+
+/// The world that the firmware's own table is learned from.
+pub(super) fn world() -> Collection {
+    Collection {
+        seed: 1,
+        textures: (1..=117).collect(),
+        trials: 5,
+    }
+}
+
+/// The table that comes with the firmware.
+pub(super) const FACTORY: &[u8] = include_bytes!("../../../../../firmware/factory.tact");
+
+/// What the seed draws for a visit.
+pub(super) struct Plan {
+    pub(super) texture: u8,
+    pub(super) identify: Identify,
+    /// What breaks, and when, ns after the visit began.
+    pub(super) fault: Option<(u64, Fault)>,
+    /// The probe is told what lay there.
+    pub(super) answer: bool,
+}
+
+impl Plan {
+    pub(super) fn draw(random: &mut ChaCha8Rng) -> Self {
+        let breaks = random.random_range(0..FAULTS_IN) == 0;
+        let at_ns = random.random_range(0..LATEST_NS);
+        let fault = Fault::EXAMPLES.choose(random).copied();
+        Self {
+            texture: random.random_range(1..=117),
+            identify: Identify {
+                among: Default::default(),
+                threshold: 0.99,
+                max_slides: 10,
+                method: None,
+                strategy: Strategy::default(),
+                open: true,
+                learn: random.random(),
+                seed: random.random(),
+            },
+            fault: fault.filter(|_| breaks).map(|fault| (at_ns, fault)),
+            answer: random.random_range(0..4) == 0,
+        }
+    }
+}
+
+/// What became of visits.
+#[derive(Clone, Debug, Default)]
+pub struct Visits {
+    /// Explorations that were begun.
+    pub made: u32,
+    /// Those in which nothing broke.
+    pub sound: u32,
+    /// Of these the ones of textures that the probe knew, and the right verdicts on them.
+    pub known: (u32, u32),
+    /// Those of textures that it had forgotten, and how often it said that it does not know them.
+    pub unknown: (u32, u32),
+    /// What was taken for what, and when, virtual s.
+    pub wrong: Vec<String>,
+    /// Wrong verdicts of which the probe was sure, on textures that it knew and on others.
+    pub sure_and_wrong: (u32, u32),
+    /// Slides that were made again, and why, in visits in which nothing broke.
+    pub rejected: Vec<String>,
+    /// Textures that were taught, by the user and by the probe itself.
+    pub taught: (u32, u32),
+    /// What was forgotten.
+    pub forgotten: u32,
+    /// What broke, by its name.
+    pub faults: BTreeMap<String, Broken>,
+}
+
+/// What became of a kind of fault.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Broken {
+    /// How often it came.
+    pub came: u32,
+    /// It ended the visit.
+    pub noticed: u32,
+}
+
+impl Visits {
+    /// Takes a verdict in: the texture that was named, unless it is said to be unknown, and whether the probe is sure.
+    pub(super) fn judge(
+        &mut self,
+        at_s: f64,
+        truth: &str,
+        known: bool,
+        found: Option<&str>,
+        sure: bool,
+    ) {
+        self.sound += 1;
+        let right = found.map_or(!known, |name| name == truth);
+        let (all, good) = if known {
+            &mut self.known
+        } else {
+            &mut self.unknown
+        };
+        *all += 1;
+        *good += u32::from(right);
+        if !right {
+            let surely = if sure { "surely " } else { "" };
+            let forgotten = if known {
+                ""
+            } else {
+                ", which it had forgotten,"
+            };
+            let found = found.unwrap_or("an unknown one");
+            let wrong = format!("{at_s:.0} s: {truth}{forgotten} was {surely}taken for {found}");
+            self.wrong.push(wrong);
+            let (of_known, of_others) = &mut self.sure_and_wrong;
+            *if known { of_known } else { of_others } += u32::from(sure);
+        }
+    }
+
+    pub(super) fn broke(&mut self, fault: Fault, noticed: bool) {
+        let kind = self.faults.entry(format!("{fault:?}")).or_default();
+        kind.came += 1;
+        kind.noticed += u32::from(noticed);
+    }
+
+    /// All faults together.
+    pub fn broken(&self) -> Broken {
+        let sum = |of: fn(&Broken) -> u32| self.faults.values().map(of).sum();
+        Broken {
+            came: sum(|kind| kind.came),
+            noticed: sum(|kind| kind.noticed),
+        }
+    }
+
+    /// For programs.
+    pub fn json(&self) -> Value {
+        let kind = |(name, kind): (&String, &Broken)| {
+            (
+                name.clone(),
+                json!({ "came": kind.came, "noticed": kind.noticed }),
+            )
+        };
+        json!({
+            "visits": self.made,
+            "without_fault": self.sound,
+            "known": { "visits": self.known.0, "right": self.known.1, "sure_and_wrong": self.sure_and_wrong.0 },
+            "forgotten": { "visits": self.unknown.0, "noticed": self.unknown.1, "sure_and_wrong": self.sure_and_wrong.1 },
+            "wrong": self.wrong,
+            "slides_rejected": self.rejected,
+            "taught": self.taught.0,
+            "taught_itself": self.taught.1,
+            "forgot": self.forgotten,
+            "faults": self.faults.iter().map(kind).collect::<serde_json::Map<_, _>>(),
+        })
+    }
+
+    /// For people.
+    pub fn text(&self) -> String {
+        let broken = self.broken();
+        format!(
+            "{} visits, {} without a fault; of textures that it knew {} of {} right, {} wrong though sure; of those it had forgotten {} \
+             of {} noticed, {} wrong though sure; {} slides made again\n  {} faults, {} ended the visit; taught {} times, itself {} \
+             times, forgot {} times",
+            self.made,
+            self.sound,
+            self.known.1,
+            self.known.0,
+            self.sure_and_wrong.0,
+            self.unknown.1,
+            self.unknown.0,
+            self.sure_and_wrong.1,
+            self.rejected.len(),
+            broken.came,
+            broken.noticed,
+            self.taught.0,
+            self.taught.1,
+            self.forgotten
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng as _;
+
+    use super::*;
+
+    #[test]
+    fn an_unknown_texture_is_right_only_where_the_table_lacks_it() {
+        let mut visits = Visits::default();
+        visits.judge(1.0, "elm", true, Some("elm"), true);
+        visits.judge(2.0, "elm", false, None, false);
+        assert_eq!(visits.wrong, [""; 0]);
+        visits.judge(3.0, "elm", true, None, false);
+        visits.judge(4.0, "elm", true, Some("oak"), true);
+        visits.judge(5.0, "elm", false, Some("oak"), true);
+        assert_eq!((visits.known, visits.unknown), ((3, 1), (2, 1)));
+        assert_eq!(visits.sure_and_wrong, (1, 1));
+        assert!(visits.wrong[1].contains("elm was surely taken for oak"));
+        assert!(visits.wrong[2].contains("forgotten"));
+    }
+
+    #[test]
+    fn a_quarter_of_the_visits_breaks_and_every_fault_comes() {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let plans: Vec<Plan> = (0..2000).map(|_| Plan::draw(&mut random)).collect();
+        let mut visits = Visits::default();
+        for (_, fault) in plans.iter().filter_map(|plan| plan.fault) {
+            visits.broke(fault, true);
+        }
+        assert!((400..600).contains(&visits.broken().came));
+        assert_eq!(visits.faults.len(), Fault::EXAMPLES.len());
+    }
+}
