@@ -7,7 +7,8 @@ use anyhow::{Context as _, Result, ensure};
 use clap::{Args, ValueEnum};
 use serde_json::Value;
 
-use crate::{cargo, emulate, firmware, run};
+use crate::shell::{cargo, run};
+use crate::{emulate, firmware};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -52,7 +53,7 @@ pub(crate) fn bench(options: &Options) -> Result<()> {
         cargo.args(["bench", "--package", "tactus-tests", "--bench", "*", "--"]);
         return run(cargo.args(&options.options));
     }
-    let mut program = program()?;
+    let mut program = program(options.plot.is_some())?;
     if options.format == Format::Json {
         program.args(["--format", "json"]);
     }
@@ -75,7 +76,7 @@ const MISSED: i32 = 2;
 
 /// An error if a gate is missed that was met, or one that is not met yet has become worse.
 pub(crate) fn gates() -> Result<()> {
-    let output = program()?.args(["--format", "json"]).output()?;
+    let output = program(false)?.args(["--format", "json"]).output()?;
     eprint!("{}", String::from_utf8_lossy(&output.stderr));
     // a row that is not ok does not say whether its gate is missed or its result is wrong: that must not pass for the former
     ensure!(
@@ -127,12 +128,16 @@ fn judge(is: f64, ok: bool, was: Option<f64>) -> Result<String, String> {
     }
 }
 
-/// Builds the bench image, the rig's, and what counts their instructions.
-fn program() -> Result<Command> {
+/// Builds the bench image, the rig's, and what counts their instructions, and draws if need be.
+fn program(draws: bool) -> Result<Command> {
     let elves = firmware::compile(&[IMAGE, RIG])?;
-    run(emulate::build().args(["--bin", IMAGE]))?;
-    let mut program = Command::new(emulate::folder().join("release").join(IMAGE));
-    program.arg(firmware::image(&elves, IMAGE)?);
+    let mut build = emulate::build();
+    if draws {
+        build.args(["--features", "plot"]);
+    }
+    run(&mut build)?;
+    let mut program = emulate::program("bench");
+    program.arg("--elf").arg(firmware::image(&elves, IMAGE)?);
     program.arg("--rig").arg(firmware::image(&elves, RIG)?);
     Ok(program)
 }

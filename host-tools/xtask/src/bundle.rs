@@ -10,7 +10,7 @@ use object::{Endianness, elf};
 
 use crate::factory::TABLES;
 use crate::firmware::{self, hash, shown};
-use crate::root;
+use crate::shell::root;
 
 /// Where the chip's flash begins, and how much of it an image has (memory.x).
 const FLASH: u32 = 0x0800_0000;

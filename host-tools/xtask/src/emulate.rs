@@ -5,34 +5,66 @@ use std::process::Command;
 
 use anyhow::Result;
 
-use crate::{cargo, firmware, root, target};
+use crate::firmware;
+use crate::shell::{self, cargo, root, target};
 
-/// Builds firmware and emulator and starts a program of the emulator's with them.
-pub(crate) fn start(program: &str, options: &[OsString]) -> Result<()> {
+/// The image that every run is of.
+const RIG: &str = "tactus-rig";
+
+/// Has the firmware identify a texture, or serves its serial port where a TCP port for it is given.
+pub(crate) fn emulate(options: &[OsString]) -> Result<()> {
+    let served = |option: &OsString| {
+        let option = option.to_string_lossy();
+        option == "--port" || option.starts_with("--port=")
+    };
+    let run = if options.iter().any(served) {
+        "serve"
+    } else {
+        "identify"
+    };
+    start(run, options)
+}
+
+/// Builds firmware and emulator and starts a run of it.
+pub(crate) fn start(run: &str, options: &[OsString]) -> Result<()> {
     let help = options.iter().any(|o| o == "--help" || o == "-h");
     // an ELF that is named is the one to run
     let named = options
         .iter()
         .any(|o| o == "--elf" || o.to_string_lossy().starts_with("--elf="));
-    let elf = if help || named {
-        None
-    } else {
-        Some(firmware::image(&firmware::build()?, "tactus-rig")?.to_owned())
-    };
-    crate::run(&mut build())?;
-    let mut emulator = Command::new(folder().join("release").join(program));
+    // each of the builds has a long tail of a single thread
+    let elf = std::thread::scope(|scope| {
+        let emulator = scope.spawn(|| shell::run(&mut build()));
+        let elf = if help || named {
+            None
+        } else {
+            let elf = firmware::compile(&[RIG])?.remove(0);
+            Some(elf)
+        };
+        emulator.join().expect("a build does not panic")?;
+        anyhow::Ok(elf)
+    })?;
+    let mut emulator = program(run);
     if let Some(elf) = elf {
+        firmware::describe(&elf)?;
         emulator.arg("--elf").arg(elf);
     }
-    crate::run(emulator.args(options))
+    shell::run(emulator.args(options))
+}
+
+/// A run of the emulator, which is built.
+pub(crate) fn program(run: &str) -> Command {
+    let mut emulator = Command::new(folder().join("release/tactus-emulator"));
+    emulator.arg(run);
+    emulator
 }
 
 /// Where cargo puts the emulator.
-pub(crate) fn folder() -> PathBuf {
+fn folder() -> PathBuf {
     target().join("emulator")
 }
 
-/// Builds the emulator's programs.
+/// Builds the emulator.
 pub(crate) fn build() -> Command {
     let mut build = cargo_there("build");
     build.arg("--release");
@@ -54,7 +86,7 @@ pub(crate) fn lints() -> [Command; 2] {
 pub(crate) fn tests(elves: &[PathBuf]) -> Result<Command> {
     let mut tests = cargo_there("test");
     tests.args(["--release", "--no-fail-fast"]);
-    tests.env("TACTUS_ELF", firmware::image(elves, "tactus-rig")?);
+    tests.env("TACTUS_ELF", firmware::image(elves, RIG)?);
     let selftest = firmware::image(elves, "tactus-selftest")?;
     tests.env("TACTUS_SELFTEST_ELF", selftest);
     let handheld = firmware::image(elves, "tactus-handheld")?;

@@ -4,7 +4,7 @@ use std::path::Path;
 use anyhow::{Context as _, Result, ensure};
 
 use crate::firmware::hash;
-use crate::{cargo, root, run, target};
+use crate::shell::{cargo, root, run, target};
 
 /// The world, and the trials of each texture and movement, that the firmware's table is learned from.
 const SEED: &str = "1";

@@ -6,7 +6,8 @@ use anyhow::{Context as _, Result, bail, ensure};
 use object::{Object as _, ObjectSegment as _};
 use sha2::{Digest as _, Sha256};
 
-use crate::{root, toolchain};
+use crate::shell::root;
+use crate::toolchain;
 
 /// The images by the profile that each is built with: the rig for speed, the handheld for a small chip.
 const PROFILES: [(&str, &[&str]); 2] = [
@@ -19,7 +20,7 @@ const PROFILES: [(&str, &[&str]); 2] = [
 /// The images that are flashed. The bench image is for the emulated board only.
 const FLASHED: [&str; 3] = ["tactus-rig", "tactus-selftest", "tactus-handheld"];
 
-/// Builds every image of the firmware and says what came out; the ELFs.
+/// Builds every image of the firmware that is flashed and says what came out; the ELFs.
 pub(crate) fn build() -> Result<Vec<PathBuf>> {
     let elves = elves()?;
     for elf in &elves {
@@ -28,7 +29,13 @@ pub(crate) fn build() -> Result<Vec<PathBuf>> {
     Ok(elves)
 }
 
-/// Builds every image of the firmware: the ELFs, by name. Leaves stdout to who asks.
+/// As [`build`], with the bench image: all that the other steps of `cargo xtask test` want.
+pub(crate) fn build_all() -> Result<()> {
+    compile(&[&FLASHED[..], &["tactus-bench"]].concat())?;
+    build().map(|_| ())
+}
+
+/// Builds every image that is flashed: the ELFs, by name. Leaves stdout to who asks.
 pub(crate) fn elves() -> Result<Vec<PathBuf>> {
     compile(&FLASHED)
 }
@@ -105,7 +112,8 @@ fn executables(messages: &str) -> Vec<PathBuf> {
         .collect()
 }
 
-fn describe(elf: &Path) -> Result<()> {
+/// Says what came out.
+pub(crate) fn describe(elf: &Path) -> Result<()> {
     let image = std::fs::read(elf).with_context(|| elf.display().to_string())?;
     let size = Size::of(&image).with_context(|| elf.display().to_string())?;
     println!("ELF      {}", shown(elf));

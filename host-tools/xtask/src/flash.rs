@@ -6,7 +6,8 @@ use std::process::Command;
 use anyhow::Result;
 use clap::Args;
 
-use crate::{cargo, firmware, run};
+use crate::firmware;
+use crate::shell::{cargo, run};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -93,7 +94,7 @@ mod tests {
 
     #[test]
     fn the_chip_is_the_one_of_cargo_run() {
-        let config = crate::root().join(".cargo/config.toml");
+        let config = crate::shell::root().join(".cargo/config.toml");
         let config = std::fs::read_to_string(config).unwrap();
         assert!(config.contains(&format!("probe-rs run --chip {CHIP}")));
     }

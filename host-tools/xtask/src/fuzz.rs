@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
 
-use crate::{cargo, root, run, target};
+use crate::shell::{cargo, root, run, target};
 
 /// What is attacked: the binaries of tests/fuzz.
 const TARGETS: [&str; 5] = ["wire", "table", "store", "recordings", "scenario"];

@@ -7,16 +7,19 @@ mod firmware;
 mod flash;
 mod fuzz;
 mod reasons;
+mod shell;
 mod size;
 mod test;
 mod toolchain;
 
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::path::PathBuf;
+use std::process::ExitCode;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 use clap::Parser;
+
+use shell::{cargo, has_subcommand, run};
 
 /// Builds, tests and measures Tactus.
 ///
@@ -30,20 +33,28 @@ enum Cli {
     /// has the target thumbv7em-none-eabihf (`rustup target add thumbv7em-none-eabihf`). If it has not, Debian's Rust
     /// packages build it, and where those are missing too, root gets them installed by apt-get.
     Build,
+    /// Run the quick checks: formatting, lints, and the unit tests of core and host tools
+    ///
+    /// Some minutes at most, for every day; `cargo xtask test` is the whole check.
+    Check,
     /// Run every check: formatting, lints, licences, tests, documentation, firmware
     ///
-    /// All of them run even when one fails. The last lines say what ran and how long it took, and what was skipped and why;
+    /// All of them run even when one fails, two at a time; what each prints comes when it is over. The last lines say what ran and how long it took, and what was skipped and why;
     /// tests that want recordings are skipped where there are none (TACTUS_REQUIRE_DATA=1 makes them fail instead).
     Test {
         /// Leave out the firmware build
         #[arg(long)]
         quick: bool,
+        /// Run this step only, in this process
+        #[arg(long, value_name = "NAME", conflicts_with = "quick")]
+        step: Option<String>,
     },
     /// Run the firmware on the emulated board, where it identifies a texture of the simulated rig
     ///
     /// Builds the firmware and the emulator first; that takes some minutes the first time.
     #[command(after_help = "Examples:
   cargo xtask emulate --texture 10 --log     with the firmware's own log
+  cargo xtask emulate --port 7429            serves its serial port at tcp:127.0.0.1:7429 instead
   cargo xtask emulate --help                 all options")]
     #[command(disable_help_flag = true)]
     Emulate {
@@ -142,10 +153,14 @@ enum Cli {
 fn main() -> ExitCode {
     let done = match Cli::parse() {
         Cli::Build => firmware::build().map(|_| ()),
-        Cli::Emulate { options } => emulate::start("tactus-emulator", &options),
-        Cli::Campaign { options } => emulate::start("tactus-campaign", &options),
-        Cli::Soak { options } => emulate::start("tactus-soak", &options),
-        Cli::Test { quick } => return test::run(quick),
+        Cli::Emulate { options } => emulate::emulate(&options),
+        Cli::Campaign { options } => emulate::start("campaign", &options),
+        Cli::Soak { options } => emulate::start("soak", &options),
+        Cli::Check => return ended(test::check()),
+        Cli::Test { step: None, quick } => return ended(test::test(quick)),
+        Cli::Test {
+            step: Some(name), ..
+        } => test::one(&name),
         Cli::Flash(options) => flash::flash(&options),
         Cli::Size(options) => size::size(&options),
         Cli::Bundle { out } => bundle::bundle(&out),
@@ -154,13 +169,14 @@ fn main() -> ExitCode {
         Cli::Fuzz(options) => fuzz::fuzz(&options),
         Cli::Bench(options) => bench::bench(&options),
     };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(e) => {
-            eprintln!("error: {e:#}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(done.map(|()| ExitCode::SUCCESS))
+}
+
+fn ended(done: Result<ExitCode>) -> ExitCode {
+    done.unwrap_or_else(|e| {
+        eprintln!("error: {e:#}");
+        ExitCode::FAILURE
+    })
 }
 
 fn mutants(options: Vec<OsString>) -> Result<()> {
@@ -175,44 +191,6 @@ fn mutants(options: Vec<OsString>) -> Result<()> {
         cargo.args(["--file", &format!("shared/src/{module}*/**")]);
     }
     run(cargo.args(options))
-}
-
-/// The top of the repository.
-fn root() -> PathBuf {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    here.ancestors().nth(2).unwrap_or(here).to_owned()
-}
-
-/// Where cargo puts what it builds.
-fn target() -> PathBuf {
-    root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
-}
-
-/// The cargo that runs this program, at the top of the repository.
-fn cargo() -> Command {
-    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    cargo.current_dir(root());
-    cargo
-}
-
-fn has_subcommand(name: &str) -> bool {
-    cargo()
-        .args([name, "--version"])
-        .output()
-        .is_ok_and(|o| o.status.success())
-}
-
-/// Runs a command with its output where ours goes; an error unless it succeeds.
-fn run(command: &mut Command) -> Result<()> {
-    let program = command.get_program().to_owned();
-    let status = command
-        .status()
-        .with_context(|| format!("cannot start {}", program.display()))?;
-    if !status.success() {
-        let name = Path::new(&program).file_name().unwrap_or(&program);
-        bail!("{} ended with {status}", name.display());
-    }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -231,12 +209,5 @@ mod tests {
             panic!("not mutants");
         };
         assert_eq!(options, ["--jobs", "2"]);
-    }
-
-    #[test]
-    fn a_command_that_fails_is_an_error_with_its_name() {
-        assert!(run(&mut Command::new("true")).is_ok());
-        let error = run(&mut Command::new("false")).unwrap_err().to_string();
-        assert!(error.starts_with("false ended with"), "{error}");
     }
 }

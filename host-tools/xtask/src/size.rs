@@ -1,13 +1,17 @@
 //! What the images take of the chip's memories, and how deep the stack gets.
+mod panics;
+
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
 use clap::{Args, ValueEnum};
-use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SymbolKind};
 use serde_json::{Value, json};
 
+use panics::{Panics, Symbol, panics, symbols};
+
 use crate::firmware::{self, Size};
-use crate::{emulate, reasons, root, run};
+use crate::shell::{root, run};
+use crate::{emulate, reasons};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -29,7 +33,6 @@ const LEEWAY: u64 = 100;
 const MARGIN: u64 = 2;
 /// RAM in memory.x; stack and variables are both in it.
 const RAM: u64 = 192 * KB;
-const SYMBOLS: usize = 10;
 /// The image whose stack is measured.
 const RIG: &str = "tactus-rig";
 
@@ -49,13 +52,6 @@ enum Format {
     Json,
 }
 
-/// A function, constant or variable, and its bytes.
-#[derive(PartialEq, Eq, PartialOrd, Ord, Debug)]
-struct Symbol {
-    bytes: u64,
-    name: String,
-}
-
 /// An image and what was measured of it.
 struct Measured {
     name: String,
@@ -64,7 +60,7 @@ struct Measured {
     table: u64,
     symbols: Vec<Symbol>,
     panics: Vec<Panics>,
-    /// what the emulator's stack-depth says
+    /// what the emulator says
     stack: Option<Value>,
 }
 
@@ -117,14 +113,14 @@ fn measure(no_stack: bool) -> Result<Vec<Measured>> {
 /// Measures the stack on the emulated board.
 fn stack(elf: &Path) -> Result<Value> {
     run(&mut emulate::build())?;
-    let program = emulate::folder().join("release/stack-depth");
-    let output = std::process::Command::new(program)
+    let output = emulate::program("stack")
+        .arg("--elf")
         .arg(elf)
         .stderr(std::process::Stdio::inherit())
         .output()
-        .context("cannot start stack-depth")?;
+        .context("cannot start the emulator")?;
     ensure!(output.status.success(), "the stack was not measured");
-    serde_json::from_slice(&output.stdout).context("stack-depth does not answer in JSON")
+    serde_json::from_slice(&output.stdout).context("the emulator does not answer in JSON")
 }
 
 /// Bytes of the table that comes with an image.
@@ -137,155 +133,6 @@ fn table(image: &str) -> Result<u64> {
     let file = root().join("firmware").join(name);
     let table = std::fs::metadata(&file).with_context(|| file.display().to_string())?;
     Ok(table.len())
-}
-
-/// A function that panics, and those that call it.
-struct Panics {
-    name: String,
-    callers: Vec<String>,
-}
-
-/// Parts of the names of functions that do nothing but panic.
-const PANICKING: [&str; 13] = [
-    "panicking::panic",
-    "panicking::assert_failed",
-    "panic_already",
-    "panic_const",
-    "panic_bounds_check",
-    "panic_display",
-    "slice_index_fail",
-    "len_mismatch_fail",
-    "panic_on_ord_violation",
-    "do_panic",
-    "unwrap_failed",
-    "expect_failed",
-    "_defmt_panic",
-];
-
-/// Functions that panic, and who calls them, by the calls and jumps in the code.
-fn panics(elf: &[u8]) -> Result<Vec<Panics>> {
-    let file = object::File::parse(elf)?;
-    let mut functions = Vec::new();
-    for symbol in file.symbols() {
-        if symbol.kind() == SymbolKind::Text && symbol.is_definition() && symbol.size() > 0 {
-            let name = format!("{:#}", rustc_demangle::demangle(symbol.name()?));
-            functions.push((symbol.address() & !1, symbol.size(), name));
-        }
-    }
-    functions.sort();
-    let calls: Vec<Vec<u64>> = functions
-        .iter()
-        .map(|(address, size, _)| {
-            let code = file
-                .sections()
-                .find_map(|section| section.data_range(*address, *size).ok().flatten());
-            targets(*address, code.unwrap_or_default()).collect()
-        })
-        .collect();
-    Ok(callers(&functions, &calls))
-}
-
-/// Parts of the names of functions that panic for whoever calls them: what the compiler puts into a function of its own because
-/// many end with it, and indexing.
-const WAYS: [&str; 4] = [
-    "OUTLINED_FUNCTION",
-    "core::slice::copy_from_slice_impl",
-    "as core::ops::index::Index",
-    "core::slice::index::",
-];
-
-/// The functions that panic, and who calls them: functions by address, size and name, and where the calls of each go.
-fn callers(functions: &[(u64, u64, String)], calls: &[Vec<u64>]) -> Vec<Panics> {
-    let does = |name: &str| PANICKING.iter().any(|part| name.contains(part));
-    let is_way = |name: &str| WAYS.iter().any(|part| name.contains(part));
-    let mut panics: std::collections::BTreeMap<u64, Panics> = functions
-        .iter()
-        .filter(|(_, _, name)| does(name))
-        .map(|(address, _, name)| {
-            let panics = Panics {
-                name: name.clone(),
-                callers: Vec::new(),
-            };
-            (*address, panics)
-        })
-        .collect();
-    // what ends in a panic is its way, not its reason: one that panics for another, and what was outlined
-    let mut ways: std::collections::BTreeMap<u64, u64> =
-        panics.keys().map(|address| (*address, *address)).collect();
-    let mut known = 0;
-    while known < ways.len() {
-        known = ways.len();
-        for ((address, _, name), targets) in functions.iter().zip(calls) {
-            if is_way(name)
-                && let Some(end) = targets.iter().find_map(|target| ways.get(target))
-            {
-                ways.insert(*address, *end);
-            }
-        }
-    }
-    for ((_, _, name), targets) in functions.iter().zip(calls) {
-        for target in targets {
-            if !does(name)
-                && !is_way(name)
-                && let Some(panics) = ways.get(target).and_then(|end| panics.get_mut(end))
-                && !panics.callers.contains(name)
-            {
-                panics.callers.push(name.clone());
-            }
-        }
-    }
-    panics.into_values().collect()
-}
-
-/// Where the long calls and jumps (BL and B.W) of code at an address go.
-fn targets(address: u64, code: &[u8]) -> impl Iterator<Item = u64> + '_ {
-    let (halves, _) = code.as_chunks();
-    let halves: Vec<u32> = halves
-        .iter()
-        .map(|half| u32::from(u16::from_le_bytes(*half)))
-        .collect();
-    let mut at = 0;
-    std::iter::from_fn(move || {
-        while let Some(&first) = halves.get(at) {
-            let here = address + 2 * at as u64;
-            if first >> 11 < 0b11101 {
-                at += 1;
-                continue;
-            }
-            let second = halves.get(at + 1).copied().unwrap_or_default();
-            at += 2;
-            // BL, or B without a condition
-            if first >> 11 == 0b11110 && second & 0x9000 == 0x9000 {
-                let sign = first >> 10 & 1;
-                let (j1, j2) = (second >> 13 & 1, second >> 11 & 1);
-                let high = (sign ^ j1 ^ 1) << 23 | (sign ^ j2 ^ 1) << 22;
-                let offset = high | (first & 0x3ff) << 12 | (second & 0x7ff) << 1;
-                let offset = offset | if sign == 1 { 0xff00_0000 } else { 0 };
-                return Some((here + 4).wrapping_add_signed(i64::from(offset as i32)));
-            }
-        }
-        None
-    })
-}
-
-/// The biggest symbols.
-fn symbols(elf: &[u8]) -> Result<Vec<Symbol>> {
-    let file = object::File::parse(elf)?;
-    let sized = file.symbols().filter(|symbol| {
-        matches!(symbol.kind(), SymbolKind::Text | SymbolKind::Data) && symbol.is_definition()
-    });
-    let mut symbols = sized
-        .map(|symbol| {
-            Ok(Symbol {
-                bytes: symbol.size(),
-                name: format!("{:#}", rustc_demangle::demangle(symbol.name()?)),
-            })
-        })
-        .collect::<Result<Vec<_>>>()?;
-    symbols.sort_by(|a, b| b.cmp(a));
-    symbols.dedup();
-    symbols.truncate(SYMBOLS);
-    Ok(symbols)
 }
 
 /// The stack at its worst, if it was measured: every handler at its deepest upon every other.
@@ -565,17 +412,6 @@ mod tests {
     }
 
     #[test]
-    fn calls_are_found_where_they_go() {
-        // nop; bl +8; bl -4 from its end; b.w +4; a short branch
-        let code = [
-            0xbf00u16, 0xf000, 0xf804, 0xf7ff, 0xfffe, 0xf000, 0xb802, 0xe7fe,
-        ];
-        let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
-        let found: Vec<u64> = targets(0x0800_0000, &bytes).collect();
-        assert_eq!(found, [0x0800_000e, 0x0800_0006, 0x0800_0012]);
-    }
-
-    #[test]
     fn a_panic_that_nobody_explains_is_wrong() {
         let with = |name: &str, caller: &str| {
             let mut image = image(0, 0, None);
@@ -594,36 +430,6 @@ mod tests {
             with("tactus-selftest", "tactus_core::rig::stage::Stage::tick"),
             ""
         );
-    }
-
-    #[test]
-    fn a_panic_is_its_callers_whatever_lies_between() {
-        let names = [
-            "core::panicking::panic",
-            "OUTLINED_FUNCTION_3",
-            "OUTLINED_FUNCTION_4",
-            "<[u8] as core::ops::index::Index<usize>>::index",
-            "rig::work",
-            "rig::tick",
-            "rig::rest",
-        ];
-        let functions: Vec<(u64, u64, String)> = (1..)
-            .zip(names)
-            .map(|(n, name)| (16 * n, 8, name.into()))
-            .collect();
-        let calls = [
-            vec![],
-            vec![48],
-            vec![16],
-            vec![8, 16],
-            vec![32],
-            vec![64, 16],
-            vec![112],
-        ];
-        let found = callers(&functions, &calls);
-        assert_eq!(found.len(), 1);
-        assert_eq!(found[0].name, "core::panicking::panic");
-        assert_eq!(found[0].callers, ["rig::work", "rig::tick"]);
     }
 
     #[test]

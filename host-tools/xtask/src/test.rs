@@ -1,290 +1,247 @@
-//! `cargo xtask test`: every check, and an account of what ran.
-use std::fmt::Write as _;
-use std::io::{BufRead as _, BufReader};
+//! `cargo xtask test`: every check, two at a time, and an account of what ran. `cargo xtask check`: the quick ones.
+mod failures;
+mod steps;
+mod summary;
+
+use std::fs::File;
+use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
-use std::time::{Duration, Instant};
+use std::sync::{Condvar, Mutex, PoisonError};
+use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{
-    bench, cargo, emulate, firmware, fuzz, has_subcommand, run as run_command, size, target,
-};
+use crate::shell::{has_subcommand, target};
+use steps::{CHECK, QUICK, SLOW, STEPS, Step};
+use summary::{Outcome, Ran, summary};
 
-/// How long each parser is attacked ...
-const FUZZ_S: u64 = 10;
-/// ... and how long the bugs that are there on purpose may stay hidden.
-const PLANTED_S: u64 = 150;
+/// Names the file to which tests that are skipped add a line each.
+const SKIP_LOG: &str = "TACTUS_SKIP_LOG";
+/// A build has one long tail of a single thread, and a step waits for the one before: two at a time keep two cores busy.
+const AT_ONCE: usize = 2;
 
-/// How a step ended.
-enum Outcome {
-    Passed,
-    Failed(String),
-    /// With the reason.
-    Skipped(String),
+/// Runs one step here.
+pub(crate) fn one(name: &str) -> Result<()> {
+    let step = STEPS.iter().find(|step| step.name == name);
+    let step = step.with_context(|| format!("there is no step {name:?}"))?;
+    (step.check)()
 }
 
-struct Step {
-    name: &'static str,
-    outcome: Outcome,
-    took: Duration,
+/// Formatting, lints and unit tests.
+pub(crate) fn check() -> Result<ExitCode> {
+    run(&CHECK, &[])
 }
 
-pub(crate) fn run(quick: bool) -> ExitCode {
-    // a file of this run's own: tests add a line each to what is there
-    let skip_log = target().join(format!("skipped-tests-{}", std::process::id()));
-    let _ = std::fs::remove_file(&skip_log);
-
-    let mut steps = vec![
-        step("formatting", || cargo_step(&["fmt", "--all", "--check"])),
-        step("lints", || {
-            cargo_step(&["clippy", "--workspace", "--all-targets", "--", "-Dwarnings"])
-        }),
-    ];
-    // advisories would need the network
-    steps.push(if has_subcommand("deny") {
-        step("licences and sources", || {
-            cargo_step(&["deny", "check", "bans", "licenses", "sources"])
-        })
-    } else {
-        skipped(
-            "licences and sources",
-            "cargo-deny is not installed (cargo install cargo-deny --locked)",
-        )
-    });
-    steps.push(step("tests", || {
-        let mut tests = cargo();
-        tests.args(["test", "--workspace", "--no-fail-fast"]);
-        tests.env("TACTUS_SKIP_LOG", &skip_log);
-        announce(&tests);
-        run_tests(&mut tests)
-    }));
-    steps.push(step("documentation", || {
-        let mut doc = cargo();
-        doc.args(["doc", "--workspace", "--no-deps"]);
-        announce_and_run(doc.env("RUSTDOCFLAGS", "-Dwarnings"))
-    }));
+/// Every check, or those without the firmware.
+pub(crate) fn test(quick: bool) -> Result<ExitCode> {
     if quick {
-        steps.extend(
-            ["fuzz", "firmware", "emulator", "bench", "size"].map(|name| skipped(name, "--quick")),
-        );
+        run(&QUICK, &SLOW)
     } else {
-        steps.push(step("fuzz", || {
-            fuzz::fuzz(&fuzz::Options::all(FUZZ_S, false))?;
-            fuzz::fuzz(&fuzz::Options::all(PLANTED_S, true))
-        }));
-        let mut elves = None;
-        steps.push(step("firmware", || {
-            println!("\n== cargo xtask build");
-            elves = Some(firmware::build()?);
-            Ok(())
-        }));
-        steps.push(step("lints of the emulator", || {
-            emulate::lints().iter_mut().try_for_each(announce_and_run)
-        }));
-        steps.push(match elves {
-            Some(elves) => step("emulator", || {
-                let mut tests = emulate::tests(&elves)?;
-                tests.env("TACTUS_SKIP_LOG", &skip_log);
-                announce(&tests);
-                run_tests(&mut tests)
-            }),
-            None => skipped("emulator", "there is no firmware to run on it"),
-        });
-        steps.push(step("bench", || {
-            println!("\n== cargo xtask bench");
-            bench::gates()
-        }));
-        steps.push(step("size", || {
-            println!("\n== cargo xtask size");
-            size::gates()
-        }));
+        run(&[&QUICK[..], &SLOW].concat(), &[])
     }
+}
 
+fn run(wanted: &[&str], left_out: &[&'static str]) -> Result<ExitCode> {
+    // cargo may put another program there meanwhile
+    let program = std::env::current_exe().context("cannot find this program")?;
+    let folder = target().join(format!("test-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    let skip_log = folder.join("skipped");
+    let todo: Vec<&Step> = STEPS.iter().filter(|s| wanted.contains(&s.name)).collect();
+    let mut ran = all(todo, |step| {
+        in_its_own_process(&program, step, &folder, &skip_log)
+    });
+    ran.extend(left_out.iter().map(|name| Ran::skipped(name, "--quick")));
     let log = std::fs::read_to_string(&skip_log).unwrap_or_default();
-    let _ = std::fs::remove_file(&skip_log);
+    let _ = std::fs::remove_dir_all(&folder);
     let mut skipped_tests: Vec<&str> = log.lines().collect();
     skipped_tests.sort_unstable();
-    print!("{}", summary(&steps, &skipped_tests));
-    let failed = steps
-        .iter()
-        .any(|step| matches!(step.outcome, Outcome::Failed(_)));
-    ExitCode::from(u8::from(failed))
+    print!("{}", summary(&ran, &skipped_tests));
+    let failed = |ran: &Ran| matches!(ran.outcome, Outcome::Failed(_));
+    Ok(ExitCode::from(u8::from(ran.iter().any(failed))))
 }
 
-fn step(name: &'static str, check: impl FnOnce() -> Result<()>) -> Step {
-    let start = Instant::now();
-    let outcome = match check() {
-        Ok(()) => Outcome::Passed,
-        Err(e) => {
-            eprintln!("error: {e:#}");
-            Outcome::Failed(format!("{e:#}"))
+/// What is still to be done, what is being done, and what is over.
+struct Progress<'s> {
+    todo: Vec<&'s Step>,
+    running: Vec<&'s Step>,
+    ran: Vec<Ran>,
+}
+
+impl<'s> Progress<'s> {
+    /// The next step that nothing keeps: what it waits for is not to come any more, and its folder is free.
+    fn next(&mut self) -> Option<&'s Step> {
+        let (todo, running) = (&self.todo, &self.running);
+        let is_free = |step: &&Step| {
+            let mut ahead = todo.iter().chain(running);
+            let mut folders = running.iter().map(|other| other.folder);
+            !ahead.any(|other| step.after.contains(&other.name))
+                && !folders.any(|folder| !folder.is_empty() && folder == step.folder)
+        };
+        let step = self.todo.remove(todo.iter().position(is_free)?);
+        self.running.push(step);
+        Some(step)
+    }
+
+    /// A step that this one needs, and that has not passed.
+    fn lacks(&self, step: &Step) -> Option<&'static str> {
+        let passed = |name: &str| {
+            let passed = |ran: &Ran| matches!(ran.outcome, Outcome::Passed);
+            self.ran.iter().any(|ran| ran.name == name && passed(ran))
+        };
+        step.after.iter().find(|name| !passed(name)).copied()
+    }
+}
+
+/// Runs the steps, some at a time, in an order that each allows.
+fn all(todo: Vec<&Step>, check: impl Fn(&Step) -> Result<()> + Sync) -> Vec<Ran> {
+    let progress = Mutex::new(Progress {
+        todo,
+        running: Vec::new(),
+        ran: Vec::new(),
+    });
+    let changed = Condvar::new();
+    let locked = || progress.lock().unwrap_or_else(PoisonError::into_inner);
+    let work = || {
+        let mut now = locked();
+        while !now.todo.is_empty() {
+            let Some(step) = now.next() else {
+                now = changed.wait(now).unwrap_or_else(PoisonError::into_inner);
+                continue;
+            };
+            let lacks = now.lacks(step);
+            drop(now);
+            let ran = match lacks {
+                Some(other) => Ran::skipped(step.name, format!("{other} has not passed")),
+                None => timed(step, &check),
+            };
+            now = locked();
+            now.running.retain(|other| other.name != step.name);
+            now.ran.push(ran);
+            changed.notify_all();
         }
     };
-    Step {
-        name,
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 1..cores.min(AT_ONCE) {
+            scope.spawn(work);
+        }
+        work();
+    });
+    progress
+        .into_inner()
+        .unwrap_or_else(PoisonError::into_inner)
+        .ran
+}
+
+fn timed(step: &Step, check: impl Fn(&Step) -> Result<()>) -> Ran {
+    if let Some(command) = step.wants.filter(|command| !has_subcommand(command)) {
+        let why =
+            format!("cargo-{command} is not installed (cargo install cargo-{command} --locked)");
+        return Ran::skipped(step.name, why);
+    }
+    let start = Instant::now();
+    let outcome = match check(step) {
+        Ok(()) => Outcome::Passed,
+        Err(e) => Outcome::Failed(format!("{e:#}")),
+    };
+    Ran {
+        name: step.name,
         outcome,
         took: start.elapsed(),
     }
 }
 
-fn skipped(name: &'static str, reason: &str) -> Step {
-    Step {
-        name,
-        outcome: Outcome::Skipped(reason.into()),
-        took: Duration::ZERO,
+/// Runs a step, and prints what it had to say when it is over.
+fn in_its_own_process(program: &Path, step: &Step, folder: &Path, skip_log: &Path) -> Result<()> {
+    let name = step.name;
+    println!("-- {name} ...");
+    let log = folder.join(name);
+    let file = File::create(&log).with_context(|| log.display().to_string())?;
+    let mut run = Command::new(program);
+    run.args(["test", "--step", name]).env(SKIP_LOG, skip_log);
+    run.stdin(Stdio::null())
+        .stdout(file.try_clone()?)
+        .stderr(file);
+    let status = run.status().context("cannot start this program again")?;
+    let said = std::fs::read(&log).with_context(|| log.display().to_string())?;
+    let said = String::from_utf8_lossy(&said);
+    println!("\n==== {name}\n{said}");
+    if status.success() {
+        return Ok(());
     }
-}
-
-fn cargo_step(arguments: &[&str]) -> Result<()> {
-    announce_and_run(cargo().args(arguments))
-}
-
-fn announce_and_run(command: &mut Command) -> Result<()> {
-    announce(command);
-    run_command(command)
-}
-
-fn announce(command: &Command) {
-    let arguments: Vec<_> = command.get_args().map(|a| a.to_string_lossy()).collect();
-    println!("\n== cargo {}", arguments.join(" "));
-}
-
-/// Runs tests, shows what they print, and says again at the end what the failed ones had to say: whoever sees only the end
-/// of a log must see why.
-fn run_tests(command: &mut Command) -> Result<()> {
-    let mut tests = command
-        .stdout(Stdio::piped())
-        .spawn()
-        .context("cannot start cargo")?;
-    let mut failures = Failures::default();
-    if let Some(output) = tests.stdout.take() {
-        // not by lines(): a test may print bytes that are not UTF-8
-        for line in BufReader::new(output).split(b'\n') {
-            let line = line.context("cannot read what the tests print")?;
-            let line = String::from_utf8_lossy(&line);
-            println!("{line}");
-            failures.hear(&line);
-        }
+    match said.rsplit_once("\nerror: ") {
+        Some((_, why)) => bail!("{}", why.trim_end()),
+        None => bail!("it ended with {status}"),
     }
-    let status = tests.wait().context("cargo vanished")?;
-    if !status.success() {
-        bail!("cargo ended with {status}{}", failures.told);
-    }
-    Ok(())
-}
-
-/// What the failed tests of a run printed, from the sections that libtest prints of them.
-#[derive(Default)]
-struct Failures {
-    told: String,
-    inside: bool,
-}
-
-impl Failures {
-    /// Lines of one section that are kept: what was wrong comes first.
-    const LINES: usize = 12;
-
-    fn hear(&mut self, line: &str) {
-        if line.starts_with("---- ") && line.ends_with(" stdout ----") {
-            self.inside = true;
-        } else if line == "failures:" || line == "stack backtrace:" {
-            self.inside = false;
-        }
-        let in_section = self.told.rsplit("\n---- ").next().unwrap_or_default();
-        if self.inside && !line.is_empty() && in_section.lines().count() < Self::LINES {
-            self.told.push('\n');
-            self.told.push_str(line);
-        }
-    }
-}
-
-/// The closing lines: a line for each step and each test that was skipped, and the count of these lines.
-fn summary(steps: &[Step], skipped_tests: &[&str]) -> String {
-    let (mut passed, mut failed, mut skipped) = (0, 0, skipped_tests.len());
-    let mut text = String::from("\n");
-    for Step {
-        name,
-        outcome,
-        took,
-    } in steps
-    {
-        let seconds = took.as_secs_f64();
-        // writing to a String cannot fail
-        let _ = match outcome {
-            Outcome::Passed => {
-                passed += 1;
-                writeln!(text, "passed   {name} ({seconds:.1} s)")
-            }
-            Outcome::Failed(why) => {
-                failed += 1;
-                writeln!(text, "FAILED   {name} ({seconds:.1} s): {why}")
-            }
-            Outcome::Skipped(why) => {
-                skipped += 1;
-                writeln!(text, "skipped  {name}: {why}")
-            }
-        };
-    }
-    for test in skipped_tests {
-        let _ = writeln!(text, "skipped  test {test}");
-    }
-    let _ = writeln!(text, "{passed} passed, {failed} failed, {skipped} skipped");
-    text
 }
 
 #[cfg(test)]
 mod tests {
+    use anyhow::ensure;
+
     use super::*;
 
-    #[test]
-    fn the_summary_counts_its_lines() {
-        let steps = [
-            Step {
-                name: "lints",
-                outcome: Outcome::Passed,
-                took: Duration::from_millis(1250),
-            },
-            Step {
-                name: "tests",
-                outcome: Outcome::Failed("cargo ended with 101\n---- a::b".into()),
-                took: Duration::from_secs(60),
-            },
-            skipped("firmware", "--quick"),
-        ];
-        let text = summary(&steps, &["golden: no folder x"]);
-        let lines: Vec<&str> = text.trim_start().lines().collect();
-        assert_eq!(
-            lines,
-            [
-                "passed   lints (1.2 s)",
-                "FAILED   tests (60.0 s): cargo ended with 101",
-                "---- a::b",
-                "skipped  firmware: --quick",
-                "skipped  test golden: no folder x",
-                "1 passed, 1 failed, 2 skipped",
-            ]
-        );
+    fn names(ran: &[Ran]) -> Vec<&str> {
+        ran.iter().map(|ran| ran.name).collect()
     }
 
     #[test]
-    fn what_failed_tests_printed_is_kept_up_to_a_few_lines() {
-        let long = "noise\n".repeat(30);
-        let printed = format!(
-            "test a ... FAILED\n\nfailures:\n\n---- a stdout ----\n\nthread 'a' panicked at x.rs:1:\nleft\nstack backtrace:\n  0: y\n\n\n---- b stdout ----\n{long}\n\nfailures:\n    a\n    b\n"
-        );
-        let mut failures = Failures::default();
-        printed.lines().for_each(|line| failures.hear(line));
-        let expected = format!(
-            "\n---- a stdout ----\nthread 'a' panicked at x.rs:1:\nleft\n---- b stdout ----{}",
-            "\nnoise".repeat(Failures::LINES - 1)
-        );
-        assert_eq!(failures.told, expected);
+    fn every_step_is_in_a_suite_and_every_suite_has_its_steps() {
+        for step in &STEPS {
+            let suites = [&CHECK[..], &QUICK, &SLOW].concat();
+            assert!(suites.contains(&step.name), "{}", step.name);
+            for after in step.after {
+                assert!(STEPS.iter().any(|other| other.name == *after));
+            }
+        }
+        for name in [&CHECK[..], &QUICK, &SLOW].concat() {
+            assert!(STEPS.iter().any(|step| step.name == name), "{name}");
+        }
     }
 
     #[test]
-    fn a_failing_check_is_a_failed_step() {
-        assert!(matches!(step("x", || Ok(())).outcome, Outcome::Passed));
-        let failed = step("x", || Err(anyhow::anyhow!("why")));
-        assert!(matches!(failed.outcome, Outcome::Failed(why) if why == "why"));
+    fn all_steps_run_and_each_after_what_it_needs() {
+        let wanted = [&QUICK[..], &SLOW].concat();
+        let todo: Vec<&Step> = STEPS.iter().filter(|s| wanted.contains(&s.name)).collect();
+        let count = todo.len();
+        let busy = Mutex::new(Vec::new());
+        let ran = all(todo, |step| {
+            let folder = step.folder;
+            if !folder.is_empty() {
+                let mut busy = busy.lock().unwrap();
+                assert!(!busy.contains(&folder), "{folder} twice at once");
+                busy.push(folder);
+            }
+            std::thread::sleep(std::time::Duration::from_millis(2));
+            busy.lock().unwrap().retain(|other| *other != folder);
+            Ok(())
+        });
+        assert_eq!(ran.len(), count);
+        let ran = names(&ran);
+        let at = |name: &str| ran.iter().position(|ran| *ran == name).unwrap();
+        for after in ["emulator", "bench", "size"] {
+            assert!(at("firmware") < at(after), "{ran:?}");
+        }
+    }
+
+    #[test]
+    fn what_needs_a_step_that_failed_is_skipped() {
+        let todo = STEPS.iter().collect();
+        let ran = all(todo, |step| {
+            ensure!(step.name != "firmware", "why");
+            Ok(())
+        });
+        let outcome = |name: &str| {
+            ran.iter()
+                .find(|ran| ran.name == name)
+                .unwrap()
+                .outcome
+                .clone()
+        };
+        assert!(matches!(outcome("firmware"), Outcome::Failed(why) if why == "why"));
+        let skipped = outcome("emulator");
+        assert!(matches!(skipped, Outcome::Skipped(why) if why == "firmware has not passed"));
+        assert!(matches!(outcome("lints"), Outcome::Passed));
     }
 }

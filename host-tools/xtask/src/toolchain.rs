@@ -5,7 +5,7 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo, root, run, target};
+use crate::shell::{cargo, root, run, target};
 
 /// The chip's target: Cortex-M4 with its FPU.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
