@@ -81,4 +81,17 @@ mod tests {
     fn the_command_line_is_consistent() {
         super::Tactus::command().debug_assert();
     }
+
+    #[test]
+    fn every_command_or_its_group_has_examples() {
+        fn check(command: &clap::Command, group: bool) {
+            let help = command.get_after_help().map(ToString::to_string);
+            let has = help.is_some_and(|help| help.contains("\n  tactus ")) || group;
+            let mut commands = command.get_subcommands().peekable();
+            assert!(has || commands.peek().is_some(), "{}", command.get_name());
+            commands.for_each(|command| check(command, has));
+        }
+        let command = super::Tactus::command();
+        command.get_subcommands().for_each(|c| check(c, false));
+    }
 }

@@ -24,18 +24,26 @@ pub(crate) use bench::BenchError;
 #[derive(Subcommand)]
 #[command(after_help = "\
 Try first:
-  tactus device list                         the serial ports, and which of them is a board
-  tactus device monitor --emulated           the emulated board, live (cargo xtask emulate builds it)
-  tactus device status                       how the probe is that is plugged in
-  tactus device identify --log visit.jsonl   what lies under its finger
-  tactus device log replay visit.jsonl       the same decisions, computed again on this PC
+  tactus device list                           the serial ports, and which of them is a board
+  tactus device monitor --emulated             the emulated board, live (cargo xtask emulate builds it)
+  tactus device status                         the state of the probe that is plugged in
+  tactus device identify --log session.jsonl   what lies under its finger
+  tactus device log replay session.jsonl       the same decisions, computed again on this PC
 
 Ctrl-C stops the rig and waits until the finger is lifted; the exit code is 130 then.")]
 pub(crate) enum Command {
     /// List the serial ports, boards first
+    #[command(after_help = "\
+Examples:
+  tactus device list
+  tactus device status --port PORT    one of those listed")]
     List,
     Status(status::Args),
     /// Watch the probe live, and have it identify, home or stop by a key
+    #[command(after_help = "\
+Examples:
+  tactus device monitor
+  tactus device monitor --emulated --texture burlap    the emulated board, over simulated burlap")]
     Monitor(identify::Args),
     Identify(identify::Args),
     Train(train::Train),
@@ -47,8 +55,14 @@ pub(crate) enum Command {
     Table(table::Command),
     Calibrate(calibrate::Args),
     /// End a fault and find the limit switches
+    #[command(after_help = "\
+Examples:
+  tactus device home    once the cause of the fault is removed")]
     Home(line::Where),
-    /// Stop what is being done and lift the finger
+    /// Stop the rig and lift the finger
+    #[command(after_help = "\
+Examples:
+  tactus device stop")]
     Stop(line::Where),
     Flash(flash::Args),
     #[command(subcommand)]

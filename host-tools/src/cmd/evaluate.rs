@@ -44,7 +44,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let is_fused = args.method.method() == explorer::Method::Fused;
     ensure!(
         is_fused || !args.lifelong && args.novelty.is_none(),
-        "--novelty and --lifelong need --method fused: the others cannot tell what they do not know"
+        "--novelty and --lifelong need --method fused: the other methods do not recognise new textures"
     );
     let (experiment, protocol) = experiment::open(args)?;
     let config = args.stop.config(args.method);

@@ -10,6 +10,10 @@ use super::textures::feel_folder;
 
 /// Print the properties and band powers of every recorded slide
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus features --recordings DIR
+  tactus features --recordings DIR --format csv > features.csv")]
 pub(crate) struct Args {
     #[command(flatten)]
     from: Recordings,

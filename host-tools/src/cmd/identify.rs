@@ -34,17 +34,23 @@ Try first:
   tactus identify --simulated --texture burlap     another one
 With a folder of recordings, such as ../shared/data/biotac:
   tactus identify --recordings DIR --material 3    a real texture is recognised from its slides
-  tactus features --recordings DIR                 what was felt of every slide
+  tactus features --recordings DIR                 what every slide measures
   tactus evaluate --recordings DIR                 how often the answers are right, and how sure
 With a probe, or with the emulated board that `cargo xtask emulate` builds:
   tactus device list                               which port it is at
-  tactus device monitor [--emulated]               what it feels, live
+  tactus device monitor [--emulated]               what it measures, live
 
 No recordings are shipped. The publisher of the BioTac's has them at
 https://github.com/dexrob/BioTac_slide_20_50; `tactus import` reads them. `tactus simulate` makes some.";
 
 /// Recognise an unknown texture from its slides, and show every step
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus identify --simulated --texture burlap
+  tactus identify --simulated --among 117 --method paper      as published: one property a slide, 117 textures
+  tactus identify --recordings DIR --material 'bath towel'
+  tactus identify --recordings DIR --material 3 --table FILE  with a table that `tactus learn` wrote")]
 pub(crate) struct Args {
     /// Folder of recordings
     #[arg(
@@ -151,7 +157,7 @@ fn identify_recorded(
     if table.find(name).is_none() {
         writeln!(
             out,
-            "The table does not know {name}: whatever the answer, it will be wrong."
+            "The table does not hold {name}, so the right answer is that it is none of the known textures."
         )?;
     }
     let shown_count = shown.len();
@@ -209,7 +215,7 @@ pub(crate) fn demonstrate(out: &mut impl Write) -> anyhow::Result<()> {
         out,
         "Tactus tells what a surface is by touching it. Here is a simulated probe: a BioTac fingertip on a lever, over a\n\
          stage that slides the sample. It learns twenty textures, five trials each at three movements, and is then given\n\
-         one of them without being told which. It is felt, decided and controlled by the firmware's own core.\n"
+         one of them without being told which. The firmware's own core measures, decides and controls the rig.\n"
     )?;
     out.flush()?;
     let Demonstration { args } = Demonstration::parse_from(["identify", "--simulated"]);

@@ -7,6 +7,10 @@ use super::progress::progress;
 
 /// Convert recordings into the project's format (.npy files and a CSV manifest)
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  git clone https://github.com/dexrob/BioTac_slide_20_50
+  tactus import BioTac_slide_20_50 recordings")]
 pub(crate) struct Args {
     /// A folder in the layout of data/biotac, or the publisher's folders of CSV files
     from: PathBuf,

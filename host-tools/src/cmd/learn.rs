@@ -17,6 +17,11 @@ use super::textures::{collection, feel_folder, names};
 
 /// Learn a texture table from the first slides of every texture
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus learn --recordings DIR --out table
+  tactus learn --recordings DIR --method paper --out table     the table of the paper's method
+  tactus device table push table                               gives it to the probe")]
 pub(crate) struct Args {
     #[command(flatten)]
     from: Recordings,
@@ -36,6 +41,10 @@ pub(crate) struct Args {
 
 /// Learn a handheld probe's table from slides of a simulated hand
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus learn-by-hand --out table
+  tactus learn-by-hand --textures burlap,47,'silk satin' --out table")]
 pub(crate) struct ByHand {
     /// The file to write
     #[arg(long, value_name = "FILE")]
@@ -82,7 +91,11 @@ pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()>
         bytes.len()
     )?;
     for number in left_out {
-        writeln!(out, "not felt: {}", texture_name(number))?;
+        writeln!(
+            out,
+            "left out, no good slide of it: {}",
+            texture_name(number)
+        )?;
     }
     Ok(())
 }

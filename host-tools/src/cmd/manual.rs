@@ -21,6 +21,9 @@ pub(crate) struct Completions {
 
 /// Write the manual pages
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus man --out man && man man/tactus.1")]
 pub(crate) struct Man {
     /// The folder to write; without it the first page is printed
     #[arg(long, value_name = "DIR")]

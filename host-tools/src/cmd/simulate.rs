@@ -11,6 +11,10 @@ use super::textures::collection;
 
 /// Record slides on the simulated rig, in the project's format
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus simulate --out DIR --textures burlap,47 --trials 10
+  tactus simulate --out DIR --seed 2                       all 117 textures of another world")]
 pub(crate) struct Args {
     /// The folder to write; it must not hold recordings yet
     #[arg(long, value_name = "DIR")]

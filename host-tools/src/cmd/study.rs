@@ -31,7 +31,7 @@ all       all of it
 The folder gets report.html, which needs nothing else, every figure as .svg, every table as .csv, the tables in the chip's
 format, and study.json. The same command gives the same files on any number of cores.
 
-Try:
+Examples:
   tactus study all --out study
   tactus study identify --seeds 11-20 --out worlds     the same in ten worlds")]
 pub(crate) struct Args {

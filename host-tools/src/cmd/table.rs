@@ -10,6 +10,10 @@ use super::table_file::read_table;
 
 /// Look into a texture table
 #[derive(Subcommand)]
+#[command(after_help = "\
+Examples:
+  tactus table show table      textures, trials, and how far they are apart
+  tactus table check table     whether every check of it passes")]
 pub(crate) enum Command {
     /// Print what the table holds
     Show {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, ensure};
 use tactus_core::table::Table;
 
 /// An old table is replaced whole or not at all.
@@ -15,14 +15,14 @@ pub(crate) fn write_table(file: &Path, bytes: &[u8]) -> anyhow::Result<()> {
 }
 
 pub(crate) fn read_table<'b>(file: &Path, bytes: &'b mut Vec<u8>) -> anyhow::Result<Table<'b>> {
-    *bytes = std::fs::read(file).with_context(|| file.display().to_string())?;
-    let table = Table::read(bytes).with_context(|| file.display().to_string())?;
+    let name = file.display();
+    *bytes = std::fs::read(file)
+        .with_context(|| format!("{name}: no table here, `tactus learn --out FILE` writes one"))?;
+    let table = Table::read(bytes).with_context(|| name.to_string())?;
     let behind = bytes.len() - table.as_bytes().len();
-    if behind > 0 {
-        bail!(
-            "{}: {behind} bytes follow the table; the file is not what `tactus learn` wrote",
-            file.display()
-        );
-    }
+    ensure!(
+        behind == 0,
+        "{name}: {behind} bytes follow the table; the file is not what `tactus learn` wrote"
+    );
     Ok(table)
 }

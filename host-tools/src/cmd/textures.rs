@@ -10,11 +10,11 @@ use tactus::sim::textures::TEXTURES;
 
 use super::progress::with_progress;
 
-/// Opens a folder and feels all of its slides.
+/// Opens a folder and measures all of its slides.
 pub(crate) fn feel_folder(folder: &Path) -> anyhow::Result<(RecordingSet, Vec<Vec<Felt>>)> {
     let set = RecordingSet::open(folder)?;
     let textures = set.textures().len() as u64;
-    let felt = with_progress(textures, "feeling slides", |done| feel(&set, |_| done()))
+    let felt = with_progress(textures, "measuring slides", |done| feel(&set, |_| done()))
         .with_context(|| format!("recordings in {}", folder.display()))?;
     Ok((set, felt))
 }

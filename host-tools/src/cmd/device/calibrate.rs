@@ -17,7 +17,7 @@ use crate::cmd::output::print_rows;
 Examples:
   tactus device calibrate                   measures the motor's current without load; the date is today's
   tactus device calibrate --show            what is in use
-  tactus device calibrate --drifted         for a finger that says in the air that it is not: forgets the old date first
+  tactus device calibrate --drifted         if a finger in the air seems to touch something: takes its P_DC anew
   tactus device calibrate --newton-per-ampere 16.2 --force-mn-per-count 11.4
                                             also takes what was measured on an incline and on a scale")]
 pub(crate) struct Args {
@@ -26,7 +26,7 @@ pub(crate) struct Args {
     /// Print what is in use, and change nothing
     #[arg(long, conflicts_with_all = ["drifted", "date", "newton_per_ampere", "force_mn_per_count"])]
     show: bool,
-    /// The finger has drifted further than the probe believes: forget what P_DC was in the air, and measure it anew
+    /// The finger has drifted further than the probe allows: discard the P_DC that it had in the air, and measure it anew
     #[arg(long)]
     drifted: bool,
     /// The day of the calibration, as 20261121; today unless given
@@ -86,7 +86,7 @@ pub(crate) fn calibration_rows(c: &RigCalibration) -> [(&'static str, String); 6
         (
             "calibrated",
             match c.date {
-                0 => "never: constants that nobody measured".to_owned(),
+                0 => "never: factory defaults".to_owned(),
                 _ => format!("{year}-{month:02}-{day:02}"),
             },
         ),

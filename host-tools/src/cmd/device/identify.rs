@@ -14,8 +14,13 @@ use super::line::Where;
 use super::train::seed_of_now;
 use crate::cmd::args::Stop;
 
-/// Have the probe find out what lies under its finger, and show every step
+/// Have the probe identify what lies under its finger, and show every step
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus device identify --log session.jsonl          every report is kept, and can be computed again
+  tactus device identify --among burlap,silk --closed it is one of these two
+  tactus device identify --emulated --texture burlap  on the emulated board")]
 pub(crate) struct Args {
     #[command(flatten)]
     pub(crate) at: Where,

@@ -32,7 +32,7 @@ pub(crate) struct Where {
     /// What lies under the emulated finger: a texture of Table 1, its name or number
     #[arg(long, value_name = "NAME", requires = "emulated")]
     pub(crate) texture: Option<String>,
-    /// Let the emulated finger feel slides of a real BioTac: a material of data/biotac
+    /// Give the emulated finger the recorded slides of a real BioTac: a material of data/biotac
     #[arg(
         long,
         value_name = "MATERIAL",
@@ -40,7 +40,7 @@ pub(crate) struct Where {
         conflicts_with = "texture"
     )]
     pub(crate) recording: Option<String>,
-    /// Write all that is asked and told to this file, for `tactus device log`
+    /// Write all requests and reports to this file, for `tactus device log`
     #[arg(long, value_name = "FILE")]
     pub(crate) log: Option<PathBuf>,
 }

@@ -118,7 +118,7 @@ fn watch(
                 // the probe said why, and goes on
                 doing = None;
                 to_do.clear();
-                monitor.note(Weight::Said, why.to_string());
+                monitor.note(Weight::Message, why.to_string());
             }
             Err(why) => return Err(why),
         }
@@ -165,10 +165,10 @@ fn watch(
                 KeyCode::Char('s') | KeyCode::Esc => {
                     to_do.clear();
                     bench.ask(Ask::Stop)?;
-                    monitor.note(Weight::Said, "stopping");
+                    monitor.note(Weight::Message, "stopping");
                 }
                 KeyCode::Char('i' | 'h') if busy => {
-                    monitor.note(Weight::Said, "it is busy: wait, or stop it with s");
+                    monitor.note(Weight::Message, "it is busy: wait, or stop it with s");
                 }
                 KeyCode::Char('i') => {
                     if monitor.table_crc != monitor.status.table_crc {
@@ -177,11 +177,11 @@ fn watch(
                     to_do.push_back(Ask::Identify(wanted.clone()));
                     // the next one begins elsewhere on the sample
                     wanted.seed = wanted.seed.wrapping_add(1);
-                    monitor.note(Weight::Said, "identify");
+                    monitor.note(Weight::Message, "identify");
                 }
                 KeyCode::Char('h') => {
                     to_do.push_back(Ask::Home);
-                    monitor.note(Weight::Said, "home");
+                    monitor.note(Weight::Message, "home");
                 }
                 _ => {}
             }

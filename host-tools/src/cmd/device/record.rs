@@ -16,6 +16,10 @@ use super::train::seed_of_now;
 
 /// Record slides in the project's format, for `tactus learn` and `tactus evaluate`
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus device record burlap silk --out recordings     asks for the next texture when it is due
+  tactus evaluate --recordings recordings")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,

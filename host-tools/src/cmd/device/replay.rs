@@ -11,12 +11,16 @@ use tactus::follow::{ALLOWED, Agreement, Follower};
 use tactus::show::Show;
 use tactus_core::features::{Plan, PropertySet};
 use tactus_core::table::Table;
-use tactus_core::wire::{Ask, Forget, Identify, PROTOCOL, Tell};
+use tactus_core::wire::{self, Forget, Identify, PROTOCOL, Tell};
 
 use super::log::Line;
 
-/// Look into the log of a session (--log)
+/// Show the log of a session (--log), or compute its decisions again
 #[derive(Subcommand)]
+#[command(after_help = "\
+Examples:
+  tactus device log show session.jsonl
+  tactus device log replay session.jsonl    computes every decision again; exit code 1 if one differs")]
 pub(crate) enum Command {
     /// Compute every decision of the session again, and compare
     Replay {
@@ -54,7 +58,7 @@ enum ReplayError {
     )]
     Protocol(u8),
     /// Nothing to replay.
-    #[error("no exploration in this log: nothing was decided")]
+    #[error("no exploration in this log; `tactus device identify --log FILE` writes one")]
     Nothing,
     /// The decisions are others here.
     #[error("not every decision is the same here")]
@@ -96,7 +100,7 @@ fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
             }
             Line::Session { .. } => {}
             Line::Ask(ask) => match ask.into_owned() {
-                Ask::Identify(asked) => {
+                wire::Ask::Identify(asked) => {
                     running = true;
                     explorations.push(Logged {
                         asked,
@@ -104,13 +108,13 @@ fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
                         tells: Vec::new(),
                     });
                 }
-                Ask::Answer(_)
-                | Ask::Train(_)
-                | Ask::Rename { .. }
-                | Ask::Forget(Forget::Texture(_) | Forget::SelfTaught)
-                | Ask::BeginTable(_)
-                | Ask::CommitTable
-                | Ask::FactoryTable => table = Err(CHANGED),
+                wire::Ask::Answer(_)
+                | wire::Ask::Train(_)
+                | wire::Ask::Rename { .. }
+                | wire::Ask::Forget(Forget::Texture(_) | Forget::SelfTaught)
+                | wire::Ask::BeginTable(_)
+                | wire::Ask::CommitTable
+                | wire::Ask::FactoryTable => table = Err(CHANGED),
                 _ => {}
             },
             Line::Report(report) => match report.into_owned().tell {
@@ -199,7 +203,7 @@ fn replay(path: &Path, out: &mut impl Write) -> Result<(), ReplayError> {
     }
     writeln!(
         out,
-        "\nEvery decision is the same here: {choices} choices, {slides} slides felt again from their samples, \
+        "\nEvery decision is the same here: {choices} choices, {slides} slides measured again from their samples, \
          {posteriors} posteriors, {answers} answers; largest difference {largest:e}."
     )?;
     Ok(())

@@ -10,8 +10,12 @@ use super::calibrate::calibration_rows;
 use super::line::Where;
 use crate::cmd::output::{Format, print_json, print_rows};
 
-/// Say how the probe is: rig, faults, table, counters
+/// Show the state of the probe: rig, faults, table, counters
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus device status
+  tactus device status --port /dev/ttyACM1 --format json")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,
@@ -56,7 +60,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             counts.slots, counts.late_slots, counts.parity_errors, counts.error_frames, counts.lost_samples
         )),
         ("link", format!(
-            "{} reports found no room, {} requests damaged; here {damaged} frames damaged, {missing} reports lost",
+            "probe: {} reports dropped, {} requests damaged; PC: {damaged} frames damaged, {missing} reports lost",
             counts.lost_reports, counts.damaged_frames
         )),
         ("skin", format!("{joule:.1} J of sliding, {wear:.1} J of it wear")),
@@ -68,7 +72,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
 /// What the rig does, in a word.
 pub(crate) fn phase_name(phase: Phase) -> &'static str {
     match phase {
-        Phase::Parked => "parked: does not know where it is",
+        Phase::Parked => "parked: position not known, home it first",
         Phase::Homing => "homing",
         Phase::Ready => "ready",
         Phase::Positioning => "positioning",

@@ -8,14 +8,20 @@ use clap::Subcommand;
 use tactus::link::{PushTable, Question};
 use tactus::show::show_table;
 use tactus_core::table::Table;
-use tactus_core::wire::Ask;
+use tactus_core::wire;
 
 use super::bench::Bench;
 use super::line::Where;
 use crate::cmd::table_file::{read_table, write_table};
 
-/// Look at the probe's texture table, fetch it, give it another
+/// Show, fetch or replace the probe's texture table
 #[derive(Subcommand)]
+#[command(after_help = "\
+Examples:
+  tactus device table show
+  tactus device table pull table      a copy of it
+  tactus device table push table      the probe uses it from now on
+  tactus device table factory         back to the firmware's own")]
 pub(crate) enum Command {
     /// Print what the probe's table holds
     Show(Where),
@@ -26,7 +32,7 @@ pub(crate) enum Command {
         /// The file to write
         file: PathBuf,
     },
-    /// Check a table, give it to the probe, and compare what it holds then
+    /// Check a table, send it to the probe, and compare what the probe uses then
     Push {
         #[command(flatten)]
         at: Where,
@@ -46,7 +52,7 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
             let whose = if status.factory {
                 "came with the firmware"
             } else {
-                "was given to the probe or taught to it"
+                "was pushed to the probe, or has learned since"
             };
             writeln!(out, "The table {whose}.")?;
             show_table(Table::read(&bytes)?, out)?;
@@ -83,7 +89,7 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
         }
         Command::Factory(at) => {
             let (mut bench, _) = Bench::open(at)?;
-            bench.get(Question::command(Ask::FactoryTable))?;
+            bench.get(Question::command(wire::Ask::FactoryTable))?;
             let status = bench.get(Question::status())?;
             let (textures, crc) = (status.textures, status.table_crc);
             writeln!(

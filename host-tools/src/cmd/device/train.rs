@@ -12,15 +12,19 @@ use super::line::Where;
 
 /// Have the probe learn the texture under its finger from new slides; an unfinished training goes on where it stood
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus device train burlap                five trials of each movement of the probe's table
+  tactus device train burlap --pilot        every movement, to find out which ones tell textures apart")]
 pub(crate) struct Train {
     #[command(flatten)]
     at: Where,
     /// What lies under the finger
     name: String,
-    /// How often each movement is to have been made in the end
+    /// Trials of each movement, those of an unfinished training included
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u8).range(1..))]
     trials: u8,
-    /// All movements of the grid up to 1.26 N instead of the table's: to find out which tell textures apart
+    /// Make all movements of the grid up to 1.26 N instead of the table's, to find out which tell textures apart
     #[arg(long)]
     pilot: bool,
     /// Where on the sample slides begin; drawn anew unless given
@@ -28,8 +32,11 @@ pub(crate) struct Train {
     seed: Option<u32>,
 }
 
-/// Tell the probe what it felt in its last exploration; it learns that
+/// Tell the probe which texture it explored last; it learns from those slides
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus device teach burlap    after `tactus device identify`")]
 pub(crate) struct Teach {
     #[command(flatten)]
     at: Where,
@@ -39,6 +46,9 @@ pub(crate) struct Teach {
 
 /// Give a texture of the probe another name
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus device rename burlap 'coarse burlap'")]
 pub(crate) struct Rename {
     #[command(flatten)]
     at: Where,
@@ -50,6 +60,11 @@ pub(crate) struct Rename {
 
 /// Have the probe forget a texture, an unfinished training, or all that it learned by itself
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus device forget --name burlap
+  tactus device forget --training burlap    the slides of an unfinished training
+  tactus device forget --self-taught        only what nobody confirmed")]
 pub(crate) struct Forget {
     #[command(flatten)]
     at: Where,
@@ -60,13 +75,13 @@ pub(crate) struct Forget {
 #[derive(clap::Args)]
 #[group(required = true, multiple = false)]
 struct What {
-    /// A texture, whoever taught it
+    /// A texture, whether the factory, you or the probe itself added it
     #[arg(long, value_name = "NAME", id = "forgotten")]
     name: Option<String>,
     /// An unfinished training
     #[arg(long, value_name = "NAME")]
     training: Option<String>,
-    /// All that the probe has learned by itself: its table is again as it was taught
+    /// All that the probe has learned by itself; what it learned from you stays
     #[arg(long)]
     self_taught: bool,
 }
@@ -85,7 +100,7 @@ pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Says what the probe felt.
+/// Names the texture of the last exploration.
 pub(crate) fn teach(Teach { at, name }: &Teach, out: &mut impl Write) -> anyhow::Result<()> {
     let question = Question::answer(name_of(name)?);
     let taught = Bench::open(at)?.0.get(question)?;
@@ -122,7 +137,10 @@ pub(crate) fn forget(Forget { at, what }: &Forget, out: &mut impl Write) -> anyh
 
 fn name_of(name: &str) -> anyhow::Result<Name> {
     let name = name.trim();
-    ensure!(!name.is_empty(), "a texture needs a name");
+    ensure!(
+        !name.is_empty(),
+        "the name of the texture is empty: give one"
+    );
     Name::try_from(name).map_err(|_| {
         anyhow::anyhow!("{name:?} is longer than the 40 bytes that the probe keeps: shorten it")
     })
@@ -151,7 +169,7 @@ fn show_slide(report: &Report, out: &mut impl Write) -> io::Result<()> {
                 "trial {trial} of {movement}: {properties}; {left} to go"
             )?;
         }
-        Tell::Rejected { why, .. } => writeln!(out, "rejected, and made again: {why}")?,
+        Tell::Rejected { why, .. } => writeln!(out, "rejected, and repeated: {why}")?,
         _ => show_fault(report, out)?,
     }
     out.flush()

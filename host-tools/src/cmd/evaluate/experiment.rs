@@ -27,10 +27,11 @@ With --fabrics DIR, the folder is one of FabricSlide: fabrics at many movements,
 the other.
 
 --novelty leaves one texture after the other out of the table and counts how often it is noticed, and how often a known one
-is taken for new. --lifelong plays a session in time order: the first slides are learned, and every later one is a visit.
+is taken for new. --lifelong plays a session in time order: the first slides are learned, and every later one is an
+episode of its own.
 Both need the method fused.
 
-Try:
+Examples:
   tactus evaluate --recordings DIR --protocol drift
   tactus evaluate --recordings DIR --method paper
   tactus evaluate --recordings DIR --novelty leave-one-out

@@ -48,7 +48,7 @@ pub(crate) fn leave_one_out(
 ) -> anyhow::Result<()> {
     ensure!(
         experiment.names().len() >= 4,
-        "leaving one out takes four textures or more"
+        "--novelty needs four textures or more: record more of them"
     );
     let novelty = with_progress(args.runs, "presenting new textures", |done| {
         novelty::leave_one_out(experiment, config, args.runs, done)
@@ -108,7 +108,7 @@ pub(crate) fn lifelong(
     }
     writeln!(
         out,
-        "A session in time order: {train_slides} slides to learn from, then visits of one slide; {sessions} orders of the textures, seed {seed}"
+        "A session in time order: {train_slides} slides to learn from, then episodes of one slide; {sessions} orders of the textures, seed {seed}"
     )?;
     for life in lifelong {
         let (who, uncertain) = match life.learning {
@@ -125,7 +125,7 @@ pub(crate) fn lifelong(
         let [right, worst, unsure, wrong] = shares.map(|share| share * 100.0);
         writeln!(
             out,
-            "  {who:<22}  right at first {right:5.1} %, worst {worst:5.1} % ({}), {uncertain} {unsure:4.1} %, wrong lessons {wrong:.2} %",
+            "  {who:<22}  right at first {right:5.1} %, worst {worst:5.1} % ({}), {uncertain} {unsure:4.1} %, wrong updates {wrong:.2} %",
             life.worst.1
         )?;
     }

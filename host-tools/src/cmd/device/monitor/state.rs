@@ -17,7 +17,7 @@ pub(crate) const NOTES: usize = 50;
 /// How much a note matters.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Weight {
-    Said,
+    Message,
     Fault,
 }
 
@@ -169,11 +169,11 @@ impl Monitor {
                 if let Some((p, texture)) = self.ranked().first().copied() {
                     let (name, p) = (self.name(texture), p * 100.0);
                     let note = format!("slide {slide}: most likely {name}, {p:.1} %");
-                    self.note(Weight::Said, note);
+                    self.note(Weight::Message, note);
                 }
             }
             Tell::Rejected { slide, why } => {
-                self.note(Weight::Said, format!("slide {slide} is repeated: {why}"));
+                self.note(Weight::Message, format!("slide {slide} is repeated: {why}"));
             }
             Tell::Verdict {
                 name,
@@ -196,7 +196,7 @@ impl Monitor {
                     ("Not sure; most likely".to_owned(), note)
                 };
                 self.answer = Some(answer);
-                self.note(Weight::Said, note);
+                self.note(Weight::Message, note);
             }
             Tell::Taught {
                 name,
@@ -205,7 +205,7 @@ impl Monitor {
             } => {
                 let whom = if *itself { "by itself" } else { "from you" };
                 let note = format!("it has learned {name} {whom}: {slides} slides");
-                self.note(Weight::Said, note);
+                self.note(Weight::Message, note);
             }
             Tell::Block(block) => {
                 if block.number == 0 {

@@ -104,12 +104,12 @@ fn a_slide_looks_like_this() {
 │phase   sliding       ││1.26 N, 10.0 mm/s   ││Oak wood       ██████░░  75.0 % │
 │force   1.050 N       ││for roughness       ││Velcro         █░░░░░░░  15.0 % │
 │████████░░┃░░░░░ 2.1 N││to leave 12.5 %     ││Burlap         ░░░░░░░░   5.0 % │
-│speed    10.0 mm/s    ││last felt           ││Felt           ░░░░░░░░   5.0 % │
+│speed    10.0 mm/s    ││last slide          ││Felt           ░░░░░░░░   5.0 % │
 │stage    31.3 mm      ││traction    0.512 N ││                                │
 │lever    1.00 mm      ││roughness   5.250   ││                                │
 │motor     132 mA      ││fineness        -   ││                                │
 ╰──────────────────────╯╰────────────────────╯╰────────────────────────────────╯
-╭ Said ────────────────────────────────────────────────────────────────────────╮
+╭ Messages ────────────────────────────────────────────────────────────────────╮
 │0:00:03 slide 1: most likely Oak wood, 75.0 %                                 │";
     assert_eq!(screen[10..21].join("\n"), golden);
     assert_eq!(

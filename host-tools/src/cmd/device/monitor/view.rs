@@ -144,7 +144,7 @@ fn draw_trace(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
             width: area.width.saturating_sub(9),
             height: 1,
         };
-        let text = Line::from(dim("comes while the finger measures"));
+        let text = Line::from(dim("drawn while the finger slides"));
         frame.render_widget(text, hint);
     }
 }
@@ -274,7 +274,7 @@ fn draw_slide(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     if let Some(chosen) = monitor.chosen {
         title += &format!("{} ", chosen.slide);
         let property = chosen.action.property;
-        let looked_at = property.map_or("all it feels", Property::name);
+        let looked_at = property.map_or("all features", Property::name);
         let leaves = chosen
             .leaves
             .map(|leaves| format!("to leave {:.1} %", leaves * 100.0));
@@ -285,7 +285,7 @@ fn draw_slide(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
         ]);
     }
     if let Some(felt) = &monitor.felt {
-        lines.push(Line::from(dim("last felt")));
+        lines.push(Line::from(dim("last slide")));
         lines.extend(Property::ALL.map(|property| {
             let unit = if property == Property::Traction {
                 " N"
@@ -316,7 +316,7 @@ fn draw_textures(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let ranked = monitor.ranked();
     if ranked.is_empty() {
         let hint = if monitor.chosen.is_some() {
-            "the first slide is made ..."
+            "the rig makes the first slide ..."
         } else {
             "i: find out what lies under the finger"
         };
@@ -348,7 +348,7 @@ fn draw_textures(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
 }
 
 fn draw_notes(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
-    let block = panel(" Said ");
+    let block = panel(" Messages ");
     let room = usize::from(block.inner(area).height);
     let from = monitor.notes.len().saturating_sub(room);
     let lines: Vec<Line<'_>> = monitor
