@@ -53,23 +53,13 @@ Examples:
   tactus identify --recordings DIR --material 3 --table FILE  with a table that `tactus learn` wrote")]
 pub(crate) struct Args {
     /// Folder of recordings
-    #[arg(
-        long,
-        value_name = "DIR",
-        required_unless_present = "simulated",
-        conflicts_with = "simulated"
-    )]
+    #[arg(long, value_name = "DIR", required_unless_present = "simulated")]
     recordings: Option<PathBuf>,
     /// The recorded texture to present as unknown: its number or its name
-    #[arg(
-        long,
-        value_name = "M",
-        required_unless_present = "simulated",
-        conflicts_with = "simulated"
-    )]
+    #[arg(long, value_name = "M", required_unless_present = "simulated")]
     material: Option<String>,
     /// Explore live on the simulated rig, in place of recordings
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["recordings", "material", "table"])]
     simulated: bool,
     /// The texture to put under the simulated finger: its name in Table 1 or its number; drawn by the seed unless given
     #[arg(long, value_name = "NAME", requires = "simulated")]
@@ -78,7 +68,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", default_value_t = 20, requires = "simulated", value_parser = clap::value_parser!(u8).range(2..=117))]
     among: u8,
     /// Texture table to use; without it one is learned from slides drawn at random, and the rest are presented
-    #[arg(long, value_name = "FILE", conflicts_with = "simulated")]
+    #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,
     /// Slides per texture to learn from, where no table is given
     #[arg(long, value_name = "N", default_value_t = 5)]

@@ -30,15 +30,15 @@ pub(crate) struct Where {
     #[arg(long)]
     pub(crate) emulated: bool,
     /// What lies under the emulated finger: a texture of Table 1, its name or number
-    #[arg(long, value_name = "NAME", requires = "emulated")]
-    pub(crate) texture: Option<String>,
-    /// Give the emulated finger the recorded slides of a real BioTac: a material of data/biotac
     #[arg(
         long,
-        value_name = "MATERIAL",
+        value_name = "NAME",
         requires = "emulated",
-        conflicts_with = "texture"
+        conflicts_with = "recording"
     )]
+    pub(crate) texture: Option<String>,
+    /// Give the emulated finger the recorded slides of a real BioTac: a material of data/biotac
+    #[arg(long, value_name = "MATERIAL", requires = "emulated")]
     pub(crate) recording: Option<String>,
     /// Write all requests and reports to this file, for `tactus device log`
     #[arg(long, value_name = "FILE")]

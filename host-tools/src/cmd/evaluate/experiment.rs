@@ -38,18 +38,13 @@ Examples:
   tactus evaluate --recordings DIR --lifelong")]
 pub(crate) struct Args {
     /// Folder of recordings
-    #[arg(
-        long,
-        value_name = "DIR",
-        required_unless_present_any = ["properties", "fabrics"],
-        conflicts_with_all = ["properties", "fabrics"]
-    )]
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["properties", "fabrics"])]
     pub(crate) recordings: Option<PathBuf>,
     /// CSV file of properties in place of recordings
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["recordings", "fabrics"])]
     pub(crate) properties: Option<PathBuf>,
     /// Folder of FabricSlide in place of recordings
-    #[arg(long, value_name = "DIR", conflicts_with = "properties")]
+    #[arg(long, value_name = "DIR", conflicts_with = "recordings")]
     pub(crate) fabrics: Option<PathBuf>,
     /// The repetition of the fabrics to learn from, 1 or 2; the other one is tested
     #[arg(long, value_name = "N", default_value_t = 1, requires = "fabrics", value_parser = clap::value_parser!(u8).range(1..=2))]
