@@ -1,5 +1,6 @@
 //! Recordings of slides, tables of properties, and what is read from other formats.
 
+pub mod content;
 #[cfg(feature = "fabrics")]
 pub mod fabricslide;
 pub mod import;

@@ -40,6 +40,7 @@ use std::path::Path;
 use rayon::prelude::*;
 use tactus_core::movement::Movement;
 
+use crate::data::content::ContentError;
 use crate::data::recordings::files;
 pub use error::{FabricError, MANIFEST};
 pub use features::{BAND_EDGES, TAXELS};
@@ -149,14 +150,12 @@ impl Entry {
         meter: &Meter,
         raw: &[u8],
         key: manifest::Key,
-    ) -> Result<std::array::IntoIter<features::Felt, CUTS>, String> {
-        let rows = self
-            .rows(key)
-            .ok_or("the manifest lists no such recording")?;
+    ) -> Result<std::array::IntoIter<features::Felt, CUTS>, ContentError> {
+        let rows = self.rows(key).ok_or(ContentError::NoRecording)?;
         let mut felt = [features::Felt::default(); CUTS];
         for (felt, slide) in felt.iter_mut().zip(cut(&rows)) {
             let bytes = raw.get(slide.start * ROW_BYTES..slide.end * ROW_BYTES);
-            *felt = meter.measure(bytes.ok_or("ends before this recording; fetch it again")?)?;
+            *felt = meter.measure(bytes.ok_or(ContentError::Ends)?)?;
         }
         Ok(felt.into_iter())
     }

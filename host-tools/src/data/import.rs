@@ -26,6 +26,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use tactus_core::movement::Movement;
 
+use crate::data::content::ContentError;
 use crate::data::recording::{Background, Slide, Texture};
 use crate::data::recordings::biotac::{BACKGROUND_POWER, NOMINAL_FORCE_MN};
 use crate::data::recordings::{RecordingError, RecordingSet, RecordingWriter, Result};
@@ -152,9 +153,9 @@ fn number(text: &str) -> Option<u32> {
 }
 
 fn names(folder: &Path) -> Result<Vec<String>> {
-    let io_error = |source| RecordingError::Io {
+    let io_error = |cause| RecordingError::Io {
         path: folder.to_owned(),
-        source,
+        cause,
     };
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).map_err(io_error)? {
@@ -176,7 +177,7 @@ fn read_slide(folder: &Path, material: u32, texture: usize, number: u32) -> Resu
     };
     let shear = interpolate(&force, &bio.times).map_err(|cause| fault(&cw_path, cause))?;
     let movement =
-        Movement::new(NOMINAL_FORCE_MN, SPEED_UM_S).map_err(|e| fault(&bio_path, e.to_string()))?;
+        Movement::new(NOMINAL_FORCE_MN, SPEED_UM_S).map_err(|e| fault(&bio_path, e.into()))?;
     let slide = Slide {
         texture,
         number,
@@ -189,13 +190,9 @@ fn read_slide(folder: &Path, material: u32, texture: usize, number: u32) -> Resu
         window: WINDOW,
         background: Background::Power(BACKGROUND_POWER),
     };
-    match slide.fault() {
-        None => Ok((slide, bio.lost_rows)),
-        Some(cause) => Err(fault(
-            &bio_path,
-            format!("{cause}; fetch the file again, or move it and its _cw away"),
-        )),
-    }
+    let imported = |cause| fault(&bio_path, ContentError::Imported(Box::new(cause)));
+    slide.check().map_err(imported)?;
+    Ok((slide, bio.lost_rows))
 }
 
 #[derive(Default)]
@@ -223,25 +220,22 @@ fn read_bio(path: &Path) -> Result<Bio> {
         let count = |column| -> Result<u16> {
             let count = row.parse(column, COUNT)?;
             if count > 4095 {
-                return Err(row
-                    .error(Some(column), format!("{count} is not {COUNT}"))
-                    .into());
+                let cause = ContentError::NotA(row.text(column).to_owned(), COUNT);
+                return Err(row.error(Some(column), cause).into());
             }
             Ok(count)
         };
         let time: f64 = row.number("timestamp")?;
         if let Some(before) = bio.times.last() {
             if time <= *before {
-                let cause = "not after the row before; fetch the file again".to_owned();
-                return Err(row.error(Some("timestamp"), cause).into());
+                return Err(row.error(Some("timestamp"), ContentError::NotAfter).into());
             }
             // rows jitter by 2 ms
             let steps = ((time - before) * f64::from(ROW_RATE_HZ)).round() as usize;
             bio.lost_rows = bio.lost_rows.saturating_add(steps.saturating_sub(1));
         }
         if bio.times.len() == MAX_ROWS {
-            let cause = format!("more than {MAX_ROWS} rows are no slide");
-            return Err(row.error(None, cause).into());
+            return Err(row.error(None, ContentError::Rows(MAX_ROWS)).into());
         }
         bio.times.push(time);
         bio.pdc.push(count("pdc")?.cast_signed());
@@ -259,13 +253,11 @@ fn read_force(path: &Path) -> Result<Vec<(f64, f64)>> {
     while let Some(row) = rows.next_row()? {
         let time = row.number("timestamp")?;
         if force.last().is_some_and(|(before, _)| time < *before) {
-            let cause = "before that of the row before; fetch the file again".to_owned();
-            return Err(row.error(Some("timestamp"), cause).into());
+            return Err(row.error(Some("timestamp"), ContentError::Before).into());
         }
         let newton: f64 = row.number("fz")?;
         if newton.abs() > 32.0 {
-            let cause = format!("{newton} N would tear the finger off; fetch the file again");
-            return Err(row.error(Some("fz"), cause).into());
+            return Err(row.error(Some("fz"), ContentError::Force(newton)).into());
         }
         force.push((time, newton));
     }
@@ -273,17 +265,13 @@ fn read_force(path: &Path) -> Result<Vec<(f64, f64)>> {
 }
 
 /// The force at `times`, in mN: on a straight line between its neighbours, before the first and after the last as these.
-fn interpolate(force: &[(f64, f64)], times: &[f64]) -> std::result::Result<Vec<i16>, String> {
+fn interpolate(force: &[(f64, f64)], times: &[f64]) -> std::result::Result<Vec<i16>, ContentError> {
     let span = |of: Option<f64>, to: Option<f64>| of.zip(to);
     let measured = span(force.first().map(|f| f.0), force.last().map(|f| f.0));
     let wanted = span(times.first().copied(), times.last().copied());
     match (measured, wanted) {
         (Some(m), Some(w)) if m.0 <= w.1 && w.0 <= m.1 => {}
-        _ => {
-            return Err(
-                "no force at the time of the slide; fetch it and its _bio again".to_owned(),
-            );
-        }
+        _ => return Err(ContentError::NoForce),
     }
     let at = |&time: &f64| {
         let after = force.partition_point(|(t, _)| *t <= time);

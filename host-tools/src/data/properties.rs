@@ -7,6 +7,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use crate::data::content::ContentError;
 use crate::data::rows::{RowError, Rows};
 
 const COLUMNS: [&str; 7] = [
@@ -43,12 +44,24 @@ pub enum PropertyError {
     #[error(transparent)]
     Row(#[from] RowError),
     /// A texture lacks trials of a movement.
-    #[error("{}: {cause}; every movement of a texture needs as many trials", path.display())]
+    #[error(
+        "{}: texture {}, movement {}: {found} {set} trials, where texture {}, movement {} has {expected}; every movement of a \
+         texture needs as many trials",
+        path.display(), at.0, at.1, like.0, like.1
+    )]
     Unbalanced {
         /// The table.
         path: PathBuf,
-        /// Which texture and movement, and how many trials there are and should be.
-        cause: String,
+        /// `train` or `validate`.
+        set: &'static str,
+        /// Texture and movement.
+        at: (String, String),
+        /// Trials that they have.
+        found: usize,
+        /// A texture and movement that have the right number.
+        like: (String, String),
+        /// How many that is.
+        expected: usize,
     },
     /// A set has no trials at all.
     #[error("{}: no {set} rows; the table needs both train and validate", path.display())]
@@ -75,26 +88,27 @@ impl PropertyTable {
         let mut seen = HashSet::new();
         while let Some(row) = rows.next_row()? {
             let index = |column, names: &mut Vec<String>| match row.text(column) {
-                "" => Err(row.error(Some(column), "is empty; give a name or number".to_owned())),
+                "" => Err(row.error(Some(column), ContentError::NoName)),
                 name => Ok(position_or_push(names, name)),
             };
             let texture = index("texture", &mut textures)?;
             let movement = index("movement", &mut movements)?;
             let trial: u32 = row.parse("trial", "the number of a trial")?;
-            let set = row.text("set");
-            let trials = match set {
-                "train" => &mut train,
-                "validate" => &mut validate,
+            let (set, trials) = match row.text("set") {
+                "train" => ("train", &mut train),
+                "validate" => ("validate", &mut validate),
                 other => {
-                    let cause = format!("{other:?} is neither train nor validate");
+                    let cause = ContentError::NoSet(other.to_owned());
                     return Err(row.error(Some("set"), cause).into());
                 }
             };
             if !seen.insert((texture, movement, trial, set == "train")) {
-                let cause = format!(
-                    "{set} trial {trial} of texture {}, movement {} comes twice; number the trials",
-                    textures[texture], movements[movement]
-                );
+                let cause = ContentError::TrialTwice {
+                    set,
+                    trial,
+                    texture: textures[texture].clone(),
+                    movement: movements[movement].clone(),
+                };
                 return Err(row.error(Some("trial"), cause).into());
             }
             let properties = [
@@ -132,16 +146,18 @@ impl PropertyTable {
         let count = |trials: &Trials, key| trials.get(&key).map_or(0, Vec::len);
         let unbalanced = |set, key: (usize, usize), found, like: (usize, usize), expected| {
             let name = |(texture, movement): (usize, usize)| {
-                let (texture, movement) = (&self.textures[texture], &self.movements[movement]);
-                format!("texture {texture}, movement {movement}")
+                (
+                    self.textures[texture].clone(),
+                    self.movements[movement].clone(),
+                )
             };
             PropertyError::Unbalanced {
                 path: path.to_owned(),
-                cause: format!(
-                    "{}: {found} {set} trials, where {} has {expected}",
-                    name(key),
-                    name(like)
-                ),
+                set,
+                at: name(key),
+                found,
+                like: name(like),
+                expected,
             }
         };
         // as many as the first pair has that was trained at all

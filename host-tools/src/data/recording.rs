@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use tactus_core::movement::Movement;
 
+use crate::data::content::ContentError;
+
 /// Rate of P_AC in every recording: the BioTac's 2200 Hz.
 pub const PAC_RATE_HZ: u32 = 2200;
 /// Longest stream that is read, in samples: half an hour of P_AC. A slide lasts 15 s at most.
@@ -68,45 +70,45 @@ impl Slide {
         sample(self.window.0)..sample(self.window.1)
     }
 
-    /// Says what makes this slide unusable, if anything: every reader and writer asks.
-    pub(crate) fn fault(&self) -> Option<String> {
+    /// Refuses a slide that cannot be used: every reader and writer asks.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub(crate) fn check(&self) -> Result<(), ContentError> {
         let (start, end) = self.window;
         if !(start.is_finite() && end.is_finite() && 0.0 <= start && start < end) {
-            return Some(format!(
-                "the steady window {start} s to {end} s is not a stretch of time"
-            ));
+            return Err(ContentError::Window(start, end));
         }
         let streams = [
             ("P_AC", PAC_RATE_HZ, Some(&self.pac)),
             ("P_DC", self.pdc_rate_hz, Some(&self.pdc)),
             ("shear", self.shear_rate_hz, self.shear_mn.as_ref()),
         ];
-        for (name, rate, samples) in streams {
-            let Some(samples) = samples else { continue };
-            if rate == 0 || rate > 100_000 {
-                return Some(format!("a rate of {rate} Hz for {name} is impossible"));
+        for (stream, rate_hz, samples) in streams {
+            let Some(samples) = samples.map(Vec::len) else {
+                continue;
+            };
+            if rate_hz == 0 || rate_hz > 100_000 {
+                return Err(ContentError::Rate(rate_hz, stream));
             }
-            if samples.len() > MAX_SAMPLES {
-                return Some(format!(
-                    "{} samples of {name} are more than a slide can have ({MAX_SAMPLES})",
-                    samples.len()
-                ));
+            if samples > MAX_SAMPLES {
+                return Err(ContentError::Samples(samples, stream));
             }
-            if samples.len() < self.steady(rate).end {
-                return Some(format!(
-                    "{name} has {} samples at {rate} Hz and ends before the steady window does ({end} s)",
-                    samples.len()
-                ));
+            if samples < self.steady(rate_hz).end {
+                return Err(ContentError::EndsEarly {
+                    stream,
+                    samples,
+                    rate_hz,
+                    end_s: end,
+                });
             }
         }
         match &self.background {
             Background::Power(power) if !power.is_finite() || *power < 0.0 => {
-                Some(format!("a background power of {power} is impossible"))
+                Err(ContentError::BackgroundPower(*power))
             }
-            Background::Still(still) if still.is_empty() => {
-                Some("the record of the still finger is empty".to_owned())
-            }
-            _ => None,
+            Background::Still(still) if still.is_empty() => Err(ContentError::NoStill),
+            _ => Ok(()),
         }
     }
 }

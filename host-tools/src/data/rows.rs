@@ -4,6 +4,8 @@ use std::io::{self, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use crate::data::content::ContentError;
+
 /// Largest table that is read, in bytes: a damaged file must not fill the memory with one endless line.
 pub const MAX_BYTES: u64 = 64 << 20;
 
@@ -18,7 +20,7 @@ pub struct RowError {
     /// Column, by its name in the header, if the error is about one.
     pub column: Option<&'static str>,
     /// What is wrong, and what to do.
-    pub cause: String,
+    pub cause: ContentError,
 }
 
 /// A table that is being read.
@@ -45,13 +47,13 @@ impl Rows {
     /// # Errors
     /// If the file cannot be read or a column is missing.
     pub fn open(path: &Path, columns: &[&'static str]) -> Result<Self, RowError> {
-        let header_error = |cause: String| RowError {
+        let header_error = |cause| RowError {
             path: path.to_owned(),
             line: 1,
             column: None,
             cause,
         };
-        let file = File::open(path).map_err(|e| header_error(e.to_string()))?;
+        let file = File::open(path).map_err(|e| header_error(ContentError::Io(e)))?;
         let mut reader = csv::ReaderBuilder::new()
             // of "\r\n" the first half is trimmed away: csv's own way of ending a line there counts lines one short
             .terminator(csv::Terminator::Any(b'\n'))
@@ -60,7 +62,7 @@ impl Rows {
             .from_reader(BufReader::new(file.take(MAX_BYTES)));
         let header = reader
             .headers()
-            .map_err(|e| header_error(cause_of(&e)))?
+            .map_err(|e| header_error(cause_of(e)))?
             .clone();
         let columns = columns
             .iter()
@@ -70,14 +72,9 @@ impl Rows {
                     (Some((i, _)), None) => Ok((name, i)),
                     (None, _) => {
                         let found: Vec<&str> = header.iter().take(50).collect();
-                        Err(header_error(format!(
-                            "no column {name} in the header ({})",
-                            found.join(",")
-                        )))
+                        Err(header_error(ContentError::NoColumn(name, found.join(","))))
                     }
-                    (Some(_), Some(_)) => {
-                        Err(header_error(format!("two columns {name} in the header")))
-                    }
+                    (Some(_), Some(_)) => Err(header_error(ContentError::TwoColumns(name))),
                 }
             })
             .collect::<Result<_, _>>()?;
@@ -106,11 +103,10 @@ impl Rows {
             let line = self.reader.position().line();
             let more = self.reader.read_record(&mut self.record).map_err(|e| {
                 let line = e.position().map_or(line, csv::Position::line);
-                error(line, cause_of(&e))
+                error(line, cause_of(e))
             })?;
             if self.reader.get_ref().get_ref().limit() == 0 {
-                let cause = format!("the table is longer than {MAX_BYTES} bytes; split it");
-                return Err(error(line, cause));
+                return Err(error(line, ContentError::LongTable(MAX_BYTES)));
             }
             if !more {
                 return Ok(None);
@@ -123,10 +119,7 @@ impl Rows {
         let line = self.record.position().map_or(0, csv::Position::line);
         let (fields, wanted) = (self.record.len(), self.header_fields);
         if fields < wanted || self.record.iter().skip(wanted).any(|f| !f.is_empty()) {
-            let cause = format!(
-                "{fields} fields where the header has {wanted}: cut off or damaged; fetch or write the file again"
-            );
-            return Err(error(line, cause));
+            return Err(error(line, ContentError::Fields(fields, wanted)));
         }
         Ok(Some(Row {
             path: &self.path,
@@ -152,11 +145,15 @@ impl<'a> Row<'a> {
     ///
     /// # Errors
     /// If it is not.
-    pub fn parse<T: FromStr>(&self, column: &'static str, what: &str) -> Result<T, RowError> {
+    pub fn parse<T: FromStr>(
+        &self,
+        column: &'static str,
+        what: &'static str,
+    ) -> Result<T, RowError> {
         let text = self.text(column);
         let wrong = |_| {
             let text: String = text.chars().take(40).collect();
-            self.error(Some(column), format!("{text:?} is not {what}"))
+            self.error(Some(column), ContentError::NotA(text, what))
         };
         text.parse().map_err(wrong)
     }
@@ -171,19 +168,14 @@ impl<'a> Row<'a> {
     {
         let number: T = self.parse(column, "a number")?;
         if !number.into().is_finite() {
-            return Err(self.error(
-                Some(column),
-                format!(
-                    "{} is not a finite number; measure it again or leave the row out",
-                    self.text(column)
-                ),
-            ));
+            let text = self.text(column).to_owned();
+            return Err(self.error(Some(column), ContentError::NotFinite(text)));
         }
         Ok(number)
     }
 
     /// An error in this row.
-    pub fn error(&self, column: Option<&'static str>, cause: String) -> RowError {
+    pub fn error(&self, column: Option<&'static str>, cause: ContentError) -> RowError {
         RowError {
             path: self.path.to_owned(),
             line: self.line(),
@@ -194,11 +186,11 @@ impl<'a> Row<'a> {
 }
 
 /// What csv says, without the place, which is ours to say.
-fn cause_of(error: &csv::Error) -> String {
+fn cause_of(error: csv::Error) -> ContentError {
     match error.kind() {
-        csv::ErrorKind::Io(e) => e.to_string(),
-        csv::ErrorKind::Utf8 { .. } => "not UTF-8 text; this is no such table".to_owned(),
-        _ => error.to_string(),
+        csv::ErrorKind::Io(_) => ContentError::Io(error.into()),
+        csv::ErrorKind::Utf8 { .. } => ContentError::NotUtf8,
+        _ => ContentError::Csv(error),
     }
 }
 

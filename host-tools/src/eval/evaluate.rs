@@ -91,7 +91,7 @@ pub enum EvaluateError {
     #[error(transparent)]
     Learn(#[from] learn::TableError),
     /// The table cannot be read back.
-    #[error("the table does not read back")]
+    #[error("the table that was learned does not read back; please report this")]
     Table(#[from] TableError),
     /// The table cannot be explored.
     #[error("the table cannot be explored")]

@@ -306,48 +306,28 @@ impl Experiment {
         if set.movements.len() > table::MAX_MOVEMENTS {
             return Err(ExperimentError::Movements(set.movements.len()));
         }
-        let of = |fabric: usize, movement: usize, learned: bool| -> Vec<Observation> {
-            let same = set.slides.iter().filter(|s| {
-                s.fabric == fabric
-                    && s.movement == movement
-                    && (s.repetition == learned_from) == learned
-            });
-            let observation = |s: &FabricSlide| Observation {
-                properties: Properties::new(s.properties.map(Some)),
-                bands: s
-                    .ln_bands
-                    .into_iter()
-                    .filter_map(tactus_core::fused::fixed)
-                    .collect(),
-                pressure: None,
-            };
-            same.map(observation).collect()
+        let observation = |s: &FabricSlide| Observation {
+            properties: Properties::new(s.properties.map(Some)),
+            bands: s
+                .ln_bands
+                .into_iter()
+                .filter_map(tactus_core::fused::fixed)
+                .collect(),
+            pressure: None,
         };
-        let pool = |fabric, movement| Pool {
-            train: of(fabric, movement, true),
-            test: Some(of(fabric, movement, false)),
+        let of = |learned: bool| -> Vec<Vec<Vec<Observation>>> {
+            let mut slides = vec![vec![Vec::new(); set.movements.len()]; set.fabrics.len()];
+            for s in &set.slides {
+                if (s.repetition == learned_from) == learned {
+                    slides[s.fabric][s.movement].push(observation(s));
+                }
+            }
+            slides
         };
-        let movements = 0..set.movements.len();
-        let pools: Vec<Vec<Pool>> = (0..set.fabrics.len())
-            .map(|fabric| movements.clone().map(|m| pool(fabric, m)).collect())
-            .collect();
-        let there = pools.iter().flatten().map(|pool| pool.train.len());
-        let train_slides = there.min().unwrap_or(0);
-        if train_slides < 2 {
-            return Err(ExperimentError::One(train_slides));
-        }
-        Ok(Self {
-            unknowns: (0..set.fabrics.len()).collect(),
-            names: set.fabrics.clone(),
-            movements: set.movements.clone(),
-            pools,
-            candidates: None,
-            train_slides,
-            drawn: false,
-            measured: PropertySet::ALL,
-            features: None,
-            seed,
-        })
+        let train = of(true);
+        let there = train.iter().flatten().map(Vec::len).min().unwrap_or(0);
+        let (names, movements) = (set.fabrics.clone(), set.movements.clone());
+        Self::collected(names, movements, train, of(false), there, seed)
     }
 
     /// The same with other features for the fused method.
@@ -472,13 +452,14 @@ impl<'e> Run<'e> {
     /// # Errors
     /// See [`TableError`].
     pub fn learn(&self, method: Method) -> Result<Vec<u8>, TableError> {
-        let Experiment {
-            names,
-            movements,
-            features,
-            ..
-        } = self.experiment;
-        learn(method, *features, names, movements, &self.training())
+        let of = self.experiment;
+        learn(
+            method,
+            of.features,
+            &of.names,
+            &of.movements,
+            &self.training(),
+        )
     }
 
     /// As [`Run::learn`], without one of the textures.
@@ -486,16 +467,11 @@ impl<'e> Run<'e> {
     /// # Errors
     /// See [`TableError`].
     pub fn learn_without(&self, method: Method, texture: usize) -> Result<Vec<u8>, TableError> {
-        let Experiment {
-            names,
-            movements,
-            features,
-            ..
-        } = self.experiment;
-        let (mut names, mut training) = (names.clone(), self.training());
+        let of = self.experiment;
+        let (mut names, mut training) = (of.names.clone(), self.training());
         names.remove(texture);
         training.remove(texture);
-        learn(method, *features, &names, movements, &training)
+        learn(method, of.features, &names, &of.movements, &training)
     }
 
     /// One more slide of the unknown texture.

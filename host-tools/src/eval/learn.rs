@@ -10,10 +10,12 @@ use tactus_core::table::{self, Contents, EncodeError, Experience};
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     /// The table cannot be written.
-    #[error("the table cannot be written: {0}")]
+    #[error("the table cannot be written")]
     Encode(#[from] EncodeError),
     /// How slides of one texture differ cannot be told.
-    #[error("the features cannot be whitened: {0}")]
+    #[error(
+        "the features cannot be whitened; learn from more slides, or with --features of a smaller set"
+    )]
     Whiten(#[from] WhitenError),
     /// A slide lacks features.
     #[error("a slide of {texture} does not have {}; learn from other features", set.name())]

@@ -13,7 +13,7 @@ use super::transaction::{Errand, Job};
 #[derive(Debug, thiserror::Error)]
 pub enum PortError {
     /// The port cannot be read or written.
-    #[error("the port failed: {0}; check the cable, then open it again")]
+    #[error("the port failed; check the cable, then open it again")]
     Io(#[from] io::Error),
     /// The other end has closed the port.
     #[error("the other end closed the port; open it again")]

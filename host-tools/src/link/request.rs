@@ -62,14 +62,24 @@ pub struct Taught {
     pub slides: u8,
 }
 
+impl<T> Question<T> {
+    fn new(
+        ask: Ask,
+        answer: Option<T>,
+        pick: fn(&Tell, &mut Option<T>) -> Result<(), LinkError>,
+    ) -> Self {
+        Self {
+            ask: Some(ask),
+            answer,
+            pick,
+        }
+    }
+}
+
 impl Question<()> {
     /// A request whose end is all there is to know: [`Ask::Home`], [`Ask::Stream`], ...
     pub fn command(ask: Ask) -> Self {
-        Self {
-            ask: Some(ask),
-            answer: Some(()),
-            pick: |_, _| Ok(()),
-        }
+        Self::new(ask, Some(()), |_, _| Ok(()))
     }
 
     /// Gives a texture another name.
@@ -99,45 +109,31 @@ impl Question<()> {
 impl Question<Status> {
     /// How the probe is.
     pub fn status() -> Self {
-        Self {
-            ask: Some(Ask::Status),
-            answer: None,
-            pick: |tell, answer| {
-                if let Tell::Status(status) = tell {
-                    *answer = Some(status.clone());
-                }
-                Ok(())
-            },
-        }
+        Self::new(Ask::Status, None, |tell, answer| {
+            if let Tell::Status(status) = tell {
+                *answer = Some(status.clone());
+            }
+            Ok(())
+        })
     }
 }
 
 impl Question<RigCalibration> {
     /// The constants that the probe uses.
     pub fn read_calibration() -> Self {
-        Self {
-            ask: Some(Ask::ReadCalibration),
-            answer: None,
-            pick: take_calibration,
-        }
+        Self::new(Ask::ReadCalibration, None, take_calibration)
     }
 
     /// Has the probe measure its motor's current without load; the constants that it then uses.
     pub fn calibrate() -> Self {
-        Self {
-            ask: Some(Ask::Calibrate),
-            answer: None,
-            pick: take_calibration,
-        }
+        Self::new(Ask::Calibrate, None, take_calibration)
     }
 }
 
 fn take_calibration(tell: &Tell, answer: &mut Option<RigCalibration>) -> Result<(), LinkError> {
     if let Tell::Calibration(bytes) = tell {
-        let bytes = bytes
-            .as_slice()
-            .try_into()
-            .map_err(|_| RigCalibrationError::Damaged)?;
+        let bytes = bytes.as_slice().try_into();
+        let bytes = bytes.map_err(|_| RigCalibrationError::Damaged)?;
         *answer = Some(RigCalibration::from_bytes(bytes)?);
     }
     Ok(())
@@ -146,86 +142,84 @@ fn take_calibration(tell: &Tell, answer: &mut Option<RigCalibration>) -> Result<
 impl Question<Found> {
     /// Has the probe find out what lies under its finger.
     pub fn identify(how: Identify) -> Self {
-        Self {
-            ask: Some(Ask::Identify(how)),
-            answer: None,
-            pick: |tell, answer: &mut Option<Found>| {
-                match tell {
-                    Tell::Verdict {
-                        texture,
-                        name,
-                        probability,
-                        sure,
-                        unknown,
-                        log_odds,
-                        slides,
-                        asks,
-                    } => {
-                        *answer = Some(Found {
-                            texture: *texture,
-                            name: name.clone(),
-                            probability: *probability,
-                            sure: *sure,
-                            unknown: *unknown,
-                            log_odds: *log_odds,
-                            slides: *slides,
-                            asks: *asks,
-                            learned: 0,
-                        });
-                    }
-                    Tell::Taught {
-                        slides,
-                        itself: true,
-                        ..
-                    } => {
-                        if let Some(found) = answer {
-                            found.learned = *slides;
-                        }
-                    }
-                    _ => {}
-                }
-                Ok(())
-            },
-        }
+        Self::new(Ask::Identify(how), None, |tell, answer| {
+            if let Some(found) = Found::of(tell) {
+                *answer = Some(found);
+            }
+            if let (
+                Tell::Taught {
+                    slides,
+                    itself: true,
+                    ..
+                },
+                Some(found),
+            ) = (tell, answer)
+            {
+                found.learned = *slides;
+            }
+            Ok(())
+        })
+    }
+}
+
+impl Found {
+    /// What a verdict says.
+    fn of(tell: &Tell) -> Option<Self> {
+        let Tell::Verdict {
+            texture,
+            ref name,
+            probability,
+            sure,
+            unknown,
+            log_odds,
+            slides,
+            asks,
+        } = *tell
+        else {
+            return None;
+        };
+        Some(Self {
+            texture,
+            name: name.clone(),
+            probability,
+            sure,
+            unknown,
+            log_odds,
+            slides,
+            asks,
+            learned: 0,
+        })
     }
 }
 
 impl Question<Taught> {
     /// Tells the probe what lay under its finger in the last exploration; what it has learned from that.
     pub fn answer(name: Name) -> Self {
-        Self {
-            ask: Some(Ask::Answer(name)),
-            answer: None,
-            pick: |tell, answer| {
-                if let Tell::Taught {
-                    name,
-                    slides,
-                    itself: false,
-                } = tell
-                {
-                    *answer = Some(Taught {
-                        name: name.clone(),
-                        slides: *slides,
-                    });
-                }
-                Ok(())
-            },
-        }
+        Self::new(Ask::Answer(name), None, |tell, answer| {
+            if let Tell::Taught {
+                name,
+                slides,
+                itself: false,
+            } = tell
+            {
+                *answer = Some(Taught {
+                    name: name.clone(),
+                    slides: *slides,
+                });
+            }
+            Ok(())
+        })
     }
 }
 
 impl Question<u32> {
     /// Has the probe learn what lies under its finger; how many slides it made for that.
     pub fn train(what: Train) -> Self {
-        Self {
-            ask: Some(Ask::Train(what)),
-            answer: Some(0),
-            pick: |tell, answer| {
-                if let Tell::Learned { .. } = tell {
-                    *answer.get_or_insert(0) += 1;
-                }
-                Ok(())
-            },
-        }
+        Self::new(Ask::Train(what), Some(0), |tell, answer| {
+            if let Tell::Learned { .. } = tell {
+                *answer.get_or_insert(0) += 1;
+            }
+            Ok(())
+        })
     }
 }

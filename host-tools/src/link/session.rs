@@ -48,7 +48,7 @@ pub enum LinkError {
     )]
     NoAnswer,
     /// No table, or one that the probe does not hold.
-    #[error("this is no table for the probe: {0}")]
+    #[error("this is no table for the probe")]
     Table(#[from] TableError),
     /// More textures than the probe holds.
     #[error("the table has {0} textures, the probe holds {MAX_TEXTURES}: learn fewer")]
@@ -57,7 +57,7 @@ pub enum LinkError {
     #[error("the table was changed while it was read: read it again")]
     Changed,
     /// Constants that no rig has.
-    #[error("the calibration cannot be used: {0}")]
+    #[error("the calibration cannot be used")]
     Calibration(#[from] RigCalibrationError),
     /// A request too long for a frame; none that can be made is.
     #[error(transparent)]

@@ -1,5 +1,7 @@
 //! The textures of a simulated world: recorded trial by trial, and learned.
 
+use std::fmt;
+
 use rayon::prelude::*;
 use tactus_core::explorer::Method;
 use tactus_core::features::{Plan, SlideError};
@@ -78,7 +80,7 @@ impl Collection {
         &self,
         calibration: RigCalibration,
         done: impl Fn() + Sync,
-    ) -> Result<Vec<Vec<recording::Slide>>, SimError> {
+    ) -> Result<Vec<Vec<recording::Slide>>, TrialError> {
         self.textures
             .par_iter()
             .enumerate()
@@ -117,16 +119,76 @@ impl Collection {
                     .iter()
                     .map(|movement| {
                         let trials = slides.iter().filter(|s| s.movement == *movement);
-                        trials
-                            .map(|s| Ok(Observation::from(&measure(&plan, s)?)))
-                            .collect()
+                        let observed = (1..).zip(trials).map(|(trial, slide)| {
+                            let at = Trial {
+                                world: self.seed,
+                                texture: self.textures[slide.texture],
+                                slide: Some((*movement, trial)),
+                            };
+                            at.measure(&plan, slide)
+                        });
+                        observed.collect()
                     })
-                    .collect::<Result<Vec<Vec<_>>, SlideError>>()
+                    .collect::<Result<Vec<Vec<_>>, TrialError>>()
             })
-            .collect::<Result<Vec<_>, SlideError>>()?;
+            .collect::<Result<Vec<_>, TrialError>>()?;
         let names = self.names();
         Ok(learn::learn(method, None, &names, &Self::MOVEMENTS, &felt)?)
     }
+}
+
+/// Where in a simulated world something failed.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Trial {
+    /// The world's seed.
+    pub world: u64,
+    /// Number of the texture in Table 1.
+    pub texture: u8,
+    /// The movement and the number of the trial, from 1; before the first, the rig powers up.
+    pub slide: Option<(Movement, u32)>,
+}
+
+impl Trial {
+    /// What was felt in a slide that was made here.
+    ///
+    /// # Errors
+    /// [`TrialError::Slide`].
+    pub fn measure(self, plan: &Plan, slide: &recording::Slide) -> Result<Observation, TrialError> {
+        let felt = measure(plan, slide).map_err(|source| TrialError::Slide { at: self, source })?;
+        Ok(Observation::from(&felt))
+    }
+}
+
+impl fmt::Display for Trial {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (texture, name) = (self.texture, texture_name(self.texture));
+        write!(f, "world {}, T{texture} {name}, ", self.world)?;
+        match self.slide {
+            Some((movement, trial)) => write!(f, "{movement}, trial {trial}"),
+            None => write!(f, "at power-up"),
+        }
+    }
+}
+
+/// Why a trial in a simulated world gave nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum TrialError {
+    /// The rig failed.
+    #[error("{at}: the simulated rig failed; another seed makes another world")]
+    Rig {
+        /// Where.
+        at: Trial,
+        /// How.
+        source: SimError,
+    },
+    /// The slide has no properties.
+    #[error("{at}: the slide has no properties; another seed makes another world")]
+    Slide {
+        /// Where.
+        at: Trial,
+        /// Why.
+        source: SlideError,
+    },
 }
 
 /// Why a simulated world taught nothing.
@@ -135,9 +197,21 @@ pub enum LearnError {
     /// A rig failed.
     #[error(transparent)]
     Rig(#[from] SimError),
-    /// A slide has no properties.
+    /// A trial gave nothing.
     #[error(transparent)]
-    Slide(#[from] SlideError),
+    Trial(#[from] TrialError),
+    /// A recorded slide has no properties on the simulated rig.
+    #[error(
+        "slide {slide} of {texture} has no properties on the simulated rig; play other recordings"
+    )]
+    Slide {
+        /// Name of the texture.
+        texture: String,
+        /// Which of the slides to learn from, from 1.
+        slide: usize,
+        /// Why.
+        source: SlideError,
+    },
     /// The table cannot be learned.
     #[error(transparent)]
     Table(#[from] TableError),
@@ -173,44 +247,65 @@ pub fn calibrated(setup: Setup) -> Result<RigCalibration, SimError> {
 /// Trials of one texture at every movement, movement by movement, numbered in the order of time.
 ///
 /// # Errors
-/// See [`SimError`].
+/// See [`TrialError`].
 pub fn record_texture(
     setup: Setup,
     calibration: RigCalibration,
     movements: &[Movement],
     trials: u32,
-) -> Result<Vec<recording::Slide>, SimError> {
+) -> Result<Vec<recording::Slide>, TrialError> {
     let mut slides = Vec::new();
     let mut rig = SimRig::new(setup);
-    record_trials(&mut rig, calibration, movements, trials, |_, slide| {
-        slides.push(recording::Slide {
-            number: slides.len() as u32 + 1,
-            ..slide
-        });
-        Ok::<_, SimError>(())
-    })?;
+    let at = Trial {
+        world: setup.world_seed,
+        texture: setup.texture,
+        slide: None,
+    };
+    record_trials(
+        &mut rig,
+        at,
+        calibration,
+        movements,
+        trials,
+        |_, _, slide| {
+            slides.push(recording::Slide {
+                number: slides.len() as u32 + 1,
+                ..slide
+            });
+            Ok(())
+        },
+    )?;
     Ok(slides)
 }
 
 /// Powers up a rig and makes trials of what lies under it, movement by movement; `each` gets every slide.
 ///
 /// # Errors
-/// See [`SimError`], and what `each` returns.
-pub fn record_trials<E: From<SimError>>(
+/// See [`TrialError`], and what `each` returns.
+pub fn record_trials(
     rig: &mut SimRig,
+    at: Trial,
     calibration: RigCalibration,
     movements: &[Movement],
     trials: u32,
-    mut each: impl FnMut(&mut SimRig, recording::Slide) -> Result<(), E>,
-) -> Result<(), E> {
-    rig.control()
-        .calibrate(calibration)
-        .map_err(SimError::from)?;
-    rig.home()?;
+    mut each: impl FnMut(&mut SimRig, Trial, recording::Slide) -> Result<(), TrialError>,
+) -> Result<(), TrialError> {
+    let calibrated = rig.control().calibrate(calibration).map_err(SimError::from);
+    calibrated
+        .and_then(|()| rig.home())
+        .map_err(|source| TrialError::Rig { at, source })?;
     for &movement in movements {
-        for _ in 0..trials {
-            let slide = rig.record(movement)?;
-            each(rig, slide)?;
+        for trial in 1..=trials {
+            let at = Trial {
+                slide: Some((movement, trial)),
+                ..at
+            };
+            let slide = rig.record(movement);
+            each(
+                rig,
+                at,
+                slide.map_err(|source| TrialError::Rig { at, source })?,
+            )?;
         }
     }
     Ok(())

@@ -14,7 +14,7 @@ use tactus_core::pressure::{Channel, Pressure, SLOTS_HZ};
 use tactus_core::sensor::PressureSensor as _;
 
 use crate::eval::learn::{self, TableError};
-use crate::sim::collection::Collection;
+use crate::sim::collection::{Collection, texture_name};
 use crate::sim::person::{Hand, Manner};
 use crate::sim::world::{Setup, Truth, World};
 
@@ -35,7 +35,10 @@ const ATTEMPTS: u32 = 10;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum HandError {
     /// One attempt after the other was no good.
-    #[error("{} was felt in no slide of {ATTEMPTS}: {why:?}", crate::sim::collection::texture_name(*texture))]
+    #[error(
+        "{} was felt in no slide of {ATTEMPTS}, the last one was {}; take another texture or another seed",
+        texture_name(*texture), why.map_or("not noticed", Again::why)
+    )]
     NotFelt {
         /// Number of the texture in Table 1.
         texture: u8,

@@ -149,10 +149,17 @@ impl Lesson {
                     .calibrate(calibration)
                     .map_err(|why| LearnError::Rig(why.into()))?;
                 rig.home()?;
-                let felt = slides
-                    .iter()
-                    .map(|_| Ok((&measure(&plan, &rig.record(self.movement)?)?).into()))
-                    .collect::<Result<Vec<Observation>, LearnError>>()?;
+                let felt = (1..=slides.len())
+                    .map(|slide| {
+                        let felt = measure(&plan, &rig.record(self.movement)?);
+                        let felt = felt.map_err(|source| LearnError::Slide {
+                            texture: self.names[texture].clone(),
+                            slide,
+                            source,
+                        })?;
+                        Ok(Observation::from(&felt))
+                    })
+                    .collect::<Result<Vec<_>, LearnError>>()?;
                 Ok(vec![felt])
             })
             .collect::<Result<Vec<_>, LearnError>>()?;

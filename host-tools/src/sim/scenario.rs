@@ -183,7 +183,7 @@ fn once() -> u32 {
 #[non_exhaustive]
 pub enum ScenarioError {
     /// It cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("{} cannot be read", path.display())]
     Read {
         /// Its path.
         path: PathBuf,

@@ -1,21 +1,27 @@
 //! Why a study comes to nothing.
 
-use tactus_core::features::SlideError;
-
 use crate::eval::evaluate::EvaluateError;
 use crate::eval::experiment::ExperimentError;
 use crate::eval::learn::TableError;
+use crate::sim::collection::TrialError;
 use crate::sim::rig::SimError;
 
 /// Why a study comes to nothing.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// A rig failed.
-    #[error("the simulated rig failed: {0}")]
-    Rig(#[from] SimError),
-    /// A slide has no properties.
-    #[error("a slide of the simulated rig has no properties: {0}")]
-    Slide(#[from] SlideError),
+    /// The rig of a world fails before the first texture.
+    #[error(
+        "world {world}: the simulated rig cannot be calibrated; another --seed makes another world"
+    )]
+    Calibration {
+        /// The world's seed.
+        world: u64,
+        /// How.
+        source: SimError,
+    },
+    /// A trial gave nothing.
+    #[error(transparent)]
+    Trial(#[from] TrialError),
     /// The table cannot be learned.
     #[error(transparent)]
     Table(#[from] TableError),

@@ -15,7 +15,9 @@ use super::error::StudyError;
 use super::slides::{Named, StudyWorld, properties};
 use super::training::correlation;
 use crate::data::replay::measure;
+use crate::sim::collection::{Trial, TrialError};
 use crate::sim::finger::PAC_PA_PER_COUNT;
+use crate::sim::rig::SimError;
 
 /// Numbers of the sessions: see [`super::slides::Session::number`].
 const PRESS: u64 = 5;
@@ -191,12 +193,17 @@ fn example(
     movement: Movement,
 ) -> Result<Example, StudyError> {
     let mut rig = world.rig(texture, EXAMPLES, 0.0);
-    rig.control()
-        .calibrate(calibration)
-        .map_err(crate::sim::rig::SimError::from)?;
-    rig.home()?;
-    let slide = rig.record(movement)?;
-    let felt = measure(&Plan::new(), &slide)?;
+    let at = Trial {
+        world: world.seed,
+        texture,
+        slide: Some((movement, 1)),
+    };
+    let calibrated = rig.control().calibrate(calibration).map_err(SimError::from);
+    let slide = calibrated
+        .and_then(|()| rig.home())
+        .and_then(|()| rig.record(movement));
+    let slide = slide.map_err(|source| TrialError::Rig { at, source })?;
+    let felt = measure(&Plan::new(), &slide).map_err(|source| TrialError::Slide { at, source })?;
     let steady = slide.steady(RATE_HZ);
     let length = (SHOWN_S * RATE_HZ as f32) as usize;
     let shown = steady.start..(steady.start + length).min(steady.end);

@@ -3,6 +3,8 @@
 //! Every slide is made by the whole simulated rig: the core's control presses and slides, the world answers in sensor words,
 //! and the core decodes them and computes the features, as the chip does.
 
+use std::fmt;
+
 use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::features::{Plan, Property};
@@ -13,9 +15,8 @@ use tactus_core::rig::guard::{Fault, Unguarded};
 
 use super::error::StudyError;
 use super::published::{IDENTIFIED, TRIALS};
-use crate::data::replay::measure;
 use crate::sim::Conditions;
-use crate::sim::collection::{Collection, calibrated, record_trials, texture_name};
+use crate::sim::collection::{Collection, Trial, calibrated, record_trials, texture_name};
 use crate::sim::finger::wear_per_mm;
 use crate::sim::rig::SimRig;
 use crate::sim::textures;
@@ -96,7 +97,9 @@ impl StudyWorld {
     /// # Errors
     /// See [`StudyError`].
     pub fn calibration(self) -> Result<RigCalibration, StudyError> {
-        Ok(calibrated(self.collection().setup(1, 0))?)
+        let world = self.seed;
+        calibrated(self.collection().setup(1, 0))
+            .map_err(|source| StudyError::Calibration { world, source })
     }
 
     /// Makes all slides of a session, textures side by side; `done` hears of each texture.
@@ -163,19 +166,31 @@ impl StudyWorld {
             new_skin: false,
         };
         let mut trial = 0;
-        record_trials(&mut rig, calibration, movements, trials, |rig, slide| {
-            if trial % trials == 0 {
-                felt.slides.push(Vec::with_capacity(trials as usize));
-                felt.wear.push(0.0);
-            }
-            trial += 1;
-            let observation = Observation::from(&measure(plan, &slide)?);
-            if let (Some(slides), Some(wear)) = (felt.slides.last_mut(), felt.wear.last_mut()) {
-                slides.push(observation);
-                *wear = rig.world().truth().wear;
-            }
-            Ok::<_, StudyError>(())
-        })?;
+        let at = Trial {
+            world: self.seed,
+            texture,
+            slide: None,
+        };
+        record_trials(
+            &mut rig,
+            at,
+            calibration,
+            movements,
+            trials,
+            |rig, at, slide| {
+                if trial % trials == 0 {
+                    felt.slides.push(Vec::with_capacity(trials as usize));
+                    felt.wear.push(0.0);
+                }
+                trial += 1;
+                let observation = at.measure(plan, &slide)?;
+                if let (Some(slides), Some(wear)) = (felt.slides.last_mut(), felt.wear.last_mut()) {
+                    slides.push(observation);
+                    *wear = rig.world().truth().wear;
+                }
+                Ok(())
+            },
+        )?;
         Ok(felt)
     }
 
@@ -262,6 +277,12 @@ impl Named {
             number,
             name: texture_name(number),
         }
+    }
+}
+
+impl fmt::Display for Named {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "T{} {}", self.number, self.name)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::data::content::ContentError;
 use crate::data::recordings::files::RecordingError;
 
 /// Name of the manifest.
@@ -42,7 +43,7 @@ pub enum FabricError {
         /// As in the manifest.
         repetition: u8,
         /// What is wrong with it, and what to do.
-        cause: String,
+        cause: ContentError,
     },
     /// A file cannot be read or is not what its manifest says.
     #[error(transparent)]

@@ -5,6 +5,8 @@ use std::sync::Arc;
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
+use crate::data::content::ContentError;
+
 /// Taxels of the finger: values in a row.
 pub const TAXELS: usize = 16;
 /// Bins of the eight bands, half-open, in the spectrum of 256 samples.
@@ -56,24 +58,17 @@ impl Meter {
     ///
     /// # Errors
     /// If the slide is too short or no taxel felt anything, as what to say of it.
-    pub(super) fn measure(&self, rows: &[u8]) -> Result<Felt, String> {
+    pub(super) fn measure(&self, rows: &[u8]) -> Result<Felt, ContentError> {
         let samples = rows.len() / ROW_BYTES;
         if samples < SHORTEST {
-            return Err(format!(
-                "a slide of {samples} samples is too short, {SHORTEST} are the least; record it again or take this movement \
-                 out of the manifest"
-            ));
+            return Err(ContentError::Short(samples, SHORTEST));
         }
         let taxels: [Vec<f64>; TAXELS] = std::array::from_fn(|t| detrended(rows, t));
         let variances = taxels
             .each_ref()
             .map(|taxel| taxel.iter().map(|x| x * x).sum::<f64>() / samples as f64);
         if variances.iter().all(|v| *v < FLAT) {
-            return Err(
-                "no taxel moves: the finger did not touch, or the sensor is dead; record it again or take this movement out of \
-                 the manifest"
-                    .to_owned(),
-            );
+            return Err(ContentError::Silent);
         }
         let spectrum = self.spectrum(&taxels);
         let ln_bands = std::array::from_fn(|b| {

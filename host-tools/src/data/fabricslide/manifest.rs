@@ -12,6 +12,7 @@ use tactus_core::movement::Movement;
 
 use super::error::FabricError;
 use super::features::TAXELS;
+use crate::data::content::ContentError;
 use crate::data::recordings::files::{self, RecordingError};
 
 /// Most bytes of samples of one fabric: it is read into memory as a whole, and all fabrics at once.
@@ -92,36 +93,25 @@ impl Manifest {
     /// # Errors
     /// If it cannot be read, is no such manifest, or contradicts itself.
     pub(super) fn read(path: &Path) -> Result<Self, RecordingError> {
-        let fault = |place: String, cause: String| RecordingError::Entry {
+        let fault = |place: String, cause| RecordingError::Entry {
             path: path.to_owned(),
             place,
             cause,
         };
         let bytes = files::read_bounded(path, files::MAX_MANIFEST)?;
         let json: Json = serde_json::from_slice(&bytes).map_err(|e| {
-            fault(
-                format!("line {}, column {}", e.line(), e.column()),
-                format!("{e}; the layout is that of data/fabricslide"),
-            )
+            let place = format!("line {}, column {}", e.line(), e.column());
+            fault(place, ContentError::Json(e, "data/fabricslide"))
         })?;
         if json.files.is_empty() {
-            return Err(fault(
-                "files".to_owned(),
-                "no fabric is listed; list some".to_owned(),
-            ));
+            return Err(fault("files".to_owned(), ContentError::NoFabric));
         }
         let mut names = HashSet::new();
         let mut fabrics = Vec::new();
         for file in json.files {
             let place = format!("files, {}", file.file);
             if !names.insert(file.fabric.clone()) {
-                return Err(fault(
-                    place,
-                    format!(
-                        "a second file of the fabric {:?}; give each fabric one file and one name",
-                        file.fabric
-                    ),
-                ));
+                return Err(fault(place, ContentError::SecondFile(file.fabric)));
             }
             fabrics.push(Entry::of(file).map_err(|(slide, cause)| match slide {
                 None => fault(place, cause),
@@ -165,9 +155,7 @@ impl Manifest {
                 RecordingError::Entry {
                     path: self.path.clone(),
                     place: action.to_string(),
-                    cause: format!(
-                        "{e} (the set-point stands in place of the force); take this movement out of the manifest"
-                    ),
+                    cause: ContentError::Setpoint(e),
                 }
             })
         });
@@ -254,15 +242,10 @@ impl fmt::Display for Action {
 
 impl Entry {
     /// Checks the recordings of a file; an error is the number of the recording, if it is one's, and the cause.
-    fn of(file: File) -> Result<Self, (Option<usize>, String)> {
+    fn of(file: File) -> Result<Self, (Option<usize>, ContentError)> {
         if file.slides.is_empty() || file.slides.len() > MAX_RECORDINGS {
-            return Err((
-                None,
-                format!(
-                    "{} slides are listed; 1 to {MAX_RECORDINGS} can be: add some, or split the file",
-                    file.slides.len()
-                ),
-            ));
+            let cause = ContentError::SlideCount(file.slides.len(), MAX_RECORDINGS);
+            return Err((None, cause));
         }
         let mut recordings = HashMap::new();
         let mut spans: Vec<(u64, u64, usize)> = Vec::new();
@@ -276,10 +259,7 @@ impl Entry {
             }
             .of(slide.direction, slide.rep);
             if slide.rep > 1 {
-                return Err(fault(format!(
-                    "rep is {}; the two repetitions are 0 and 1: correct the manifest",
-                    slide.rep
-                )));
+                return Err(fault(ContentError::Repetition(slide.rep)));
             }
             let end = slide
                 .n
@@ -287,37 +267,26 @@ impl Entry {
                 .and_then(|values| values.checked_add(slide.offset_values))
                 .filter(|end| *end <= MAX_RAW / 2);
             let Some(end) = end.filter(|_| slide.n > 0) else {
-                return Err(fault(format!(
-                    "{} rows of {TAXELS} values from value {} on: a recording has 1 row at least, and a file no more than {} \
-                     values; correct the manifest",
-                    slide.n,
-                    slide.offset_values,
-                    MAX_RAW / 2
-                )));
+                let cause = ContentError::Span(slide.n, slide.offset_values, MAX_RAW / 2);
+                return Err(fault(cause));
             };
             // below MAX_RAW, so usize holds them
             let row = |value: u64| (value / TAXELS as u64) as usize;
             spans.push((slide.offset_values, end, index));
             let rows = row(slide.offset_values)..row(end);
             if recordings.insert(key, rows).is_some() {
-                return Err(fault(format!(
-                    "{}, direction {}, rep {} is listed twice; correct the manifest",
-                    key.action, key.direction, key.repetition
-                )));
+                return Err(fault(ContentError::RecordingTwice {
+                    movement: key.action.to_string(),
+                    direction: key.direction,
+                    repetition: key.repetition,
+                }));
             }
         }
         spans.sort_unstable();
         let mut bytes_raw = 0;
         for (start, end, index) in spans {
             if start != bytes_raw / 2 {
-                return Err((
-                    Some(index),
-                    format!(
-                        "offset_values is {start}, but the recording before it ends at {}; recordings follow each other without \
-                         gap or overlap: correct the manifest",
-                        bytes_raw / 2
-                    ),
-                ));
+                return Err((Some(index), ContentError::Gap(start, bytes_raw / 2)));
             }
             bytes_raw = end * 2;
         }
@@ -341,10 +310,7 @@ impl Entry {
         if !path.is_file() {
             return Err(RecordingError::Samples {
                 path: path.to_owned(),
-                cause: format!(
-                    "no such file, but the manifest names it; fetch it, or take {} out of the manifest",
-                    self.name
-                ),
+                cause: ContentError::NoSamples(self.name.clone()),
             });
         }
         // twice the raw size is more than gzip ever needs

@@ -15,6 +15,7 @@ use super::files::{
     in_order_of_time, inside, read_bounded, unpack,
 };
 use super::npy;
+use crate::data::content::ContentError;
 use crate::data::recording::{Background, MAX_SAMPLES, PAC_RATE_HZ, Slide, SlideKey, Texture};
 
 /// The pressing force is not in the manifest: the arm pressed with about 0.8 N, which fell to 0.3 N over the slide.
@@ -93,26 +94,25 @@ impl Manifest {
     /// # Errors
     /// If it cannot be read, is no such manifest, or contradicts itself.
     pub fn read(path: &Path) -> Result<Self> {
-        let fault = |place: &str, cause: String| RecordingError::Entry {
+        let fault = |place: &str, cause| RecordingError::Entry {
             path: path.to_owned(),
             place: place.to_owned(),
             cause,
         };
         let bytes = read_bounded(path, MAX_MANIFEST)?;
-        let json: Json = serde_json::from_slice(&bytes).map_err(|e| RecordingError::Entry {
-            path: path.to_owned(),
-            place: format!("line {}, column {}", e.line(), e.column()),
-            cause: format!("{e}; the layout is that of data/biotac"),
+        let json: Json = serde_json::from_slice(&bytes).map_err(|e| {
+            let place = format!("line {}, column {}", e.line(), e.column());
+            fault(&place, ContentError::Json(e, "data/biotac"))
         })?;
         let movement =
             Movement::from_si(f32::from(NOMINAL_FORCE_MN) * 1e-3, json.motion.speed_mm_s)
-                .map_err(|e| fault("motion.speed_mm_s", e.to_string()))?;
+                .map_err(|e| fault("motion.speed_mm_s", e.into()))?;
         let record = Record::of(&json.record).map_err(|cause| fault("record", cause))?;
 
         let textures: Vec<Texture> = json.files.iter().map(Entry::texture).collect();
         distinct_textures(path, &textures)?;
         if textures.is_empty() {
-            return Err(fault("files", "no material is listed".to_owned()));
+            return Err(fault("files", ContentError::NoMaterial));
         }
         for entry in &json.files {
             if entry.n_slides == 0 || json.slides.is_empty() {
@@ -123,44 +123,25 @@ impl Manifest {
                 });
             }
             let place = format!("files, {}", entry.file);
-            if entry.n_slides != json.slides.len() {
-                return Err(fault(
-                    &place,
-                    format!(
-                        "n_slides is {}, but {} slides are listed under \"slides\"; they must agree",
-                        entry.n_slides,
-                        json.slides.len()
-                    ),
-                ));
+            let listed = json.slides.len();
+            if entry.n_slides != listed {
+                let cause = ContentError::SlidesDisagree(entry.n_slides, listed);
+                return Err(fault(&place, cause));
             }
             let bytes = (entry.n_slides * 2).checked_mul(record.values);
             if bytes.is_none_or(|n| n as u64 != entry.bytes_raw) {
-                return Err(fault(
-                    &place,
-                    format!(
-                        "bytes_raw is {}, but {} slides of {} 16-bit values are not that many bytes; they must agree",
-                        entry.bytes_raw, entry.n_slides, record.values
-                    ),
-                ));
+                let (slides, values) = (entry.n_slides, record.values);
+                let cause = ContentError::LengthDisagrees(entry.bytes_raw, slides, values);
+                return Err(fault(&place, cause));
             }
             if entry.bytes_raw > MAX_RAW {
-                return Err(fault(
-                    &place,
-                    format!(
-                        "bytes_raw is {}, more than the {MAX_RAW} bytes one material can have; split it",
-                        entry.bytes_raw
-                    ),
-                ));
+                let cause = ContentError::LongMaterial(entry.bytes_raw, MAX_RAW);
+                return Err(fault(&place, cause));
             }
             // twice the raw size is more than gzip ever needs
             if entry.bytes_gz > entry.bytes_raw.saturating_mul(2) + 4096 {
-                return Err(fault(
-                    &place,
-                    format!(
-                        "bytes_gz is {}, far more than the {} bytes that are in it; correct the manifest",
-                        entry.bytes_gz, entry.bytes_raw
-                    ),
-                ));
+                let cause = ContentError::LongPacked(entry.bytes_gz, entry.bytes_raw);
+                return Err(fault(&place, cause));
             }
         }
         let mut slides: Vec<(u32, usize)> = json.slides.into_iter().zip(0..).collect();
@@ -218,21 +199,19 @@ impl Manifest {
                     window: self.window,
                     background: Background::Power(BACKGROUND_POWER),
                 };
-                match slide.fault() {
-                    None => Ok(slide),
-                    Some(cause) => Err(RecordingError::Entry {
-                        path: self.path.clone(),
-                        place: format!("slide {number} of {}", entry.file),
-                        cause,
-                    }),
-                }
+                slide.check().map_err(|cause| RecordingError::Entry {
+                    path: self.path.clone(),
+                    place: format!("slide {number} of {}", entry.file),
+                    cause,
+                })?;
+                Ok(slide)
             })
             .collect()
     }
 }
 
 impl Record {
-    fn of(fields: &[Field]) -> std::result::Result<Self, String> {
+    fn of(fields: &[Field]) -> std::result::Result<Self, ContentError> {
         let mut start = 0;
         let (mut pac, mut pdc, mut shear) = (None, None, None);
         for field in fields {
@@ -242,9 +221,7 @@ impl Record {
                 rate_hz,
             } = *field;
             if count == 0 || count > MAX_SAMPLES {
-                return Err(format!(
-                    "{name} with {count} values; a slide has 1 to {MAX_SAMPLES}"
-                ));
+                return Err(ContentError::FieldLength(name.clone(), count));
             }
             let span = Some(Span {
                 start,
@@ -258,22 +235,19 @@ impl Record {
                 _ => &mut None,
             };
             if slot.is_some() {
-                return Err(format!("{name} is listed twice"));
+                return Err(ContentError::Twice(name.clone()));
             }
             *slot = span;
             start += count;
         }
-        let pac = pac.ok_or("there is no pac in it")?;
+        let pac = pac.ok_or(ContentError::NoField("pac"))?;
         if pac.rate_hz != PAC_RATE_HZ {
-            return Err(format!(
-                "pac at {} Hz; all of Tactus counts on {PAC_RATE_HZ} Hz",
-                pac.rate_hz
-            ));
+            return Err(ContentError::PacRate(pac.rate_hz));
         }
         Ok(Self {
             values: start,
             pac,
-            pdc: pdc.ok_or("there is no pdc in it")?,
+            pdc: pdc.ok_or(ContentError::NoField("pdc"))?,
             shear,
         })
     }
@@ -289,17 +263,12 @@ impl Entry {
 
     /// All values of the file, hashes checked before and after decompression.
     fn values(&self, path: &Path) -> Result<Vec<i16>> {
-        let fault = |cause| RecordingError::Samples {
-            path: path.to_owned(),
-            cause,
-        };
         let packed = read_bounded(path, self.bytes_gz)?;
         if (packed.len() as u64) < self.bytes_gz {
-            return Err(fault(format!(
-                "truncated: {} bytes, the manifest says {}; fetch it again",
-                packed.len(),
-                self.bytes_gz
-            )));
+            return Err(RecordingError::Samples {
+                path: path.to_owned(),
+                cause: ContentError::Truncated(packed.len(), self.bytes_gz),
+            });
         }
         let raw = unpack(
             path,

@@ -9,6 +9,7 @@ use std::path::{Component, Path, PathBuf};
 use flate2::read::GzDecoder;
 use sha2::{Digest as _, Sha256};
 
+use crate::data::content::ContentError;
 use crate::data::recording::Texture;
 use crate::data::rows::RowError;
 
@@ -42,12 +43,12 @@ pub enum RecordingError {
     )]
     NothingToImport(PathBuf),
     /// The system could not read or write.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {cause}", path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,
         /// What the system says.
-        source: io::Error,
+        cause: io::Error,
     },
     /// A row of a table makes no sense.
     #[error(transparent)]
@@ -60,7 +61,7 @@ pub enum RecordingError {
         /// Line, or the name of the field.
         place: String,
         /// What is wrong with it, and what to do.
-        cause: String,
+        cause: ContentError,
     },
     /// A file of samples is not what its manifest says.
     #[error("{}: {cause}", path.display())]
@@ -68,7 +69,7 @@ pub enum RecordingError {
         /// The file of samples.
         path: PathBuf,
         /// What is wrong with it, and what to do.
-        cause: String,
+        cause: ContentError,
     },
     /// A manifest names a file outside its folder.
     #[error("{}: names the file {name:?}, which is not inside this folder; it is not opened. Correct the manifest", manifest.display())]
@@ -151,10 +152,7 @@ pub(super) fn distinct_textures(manifest: &Path, textures: &[Texture]) -> Result
             return Err(RecordingError::Entry {
                 path: manifest.to_owned(),
                 place: format!("texture {}", texture.id),
-                cause: format!(
-                    "is both {other:?} and {:?}; give each texture one number and one name",
-                    texture.name
-                ),
+                cause: ContentError::TwoNames(other.clone(), texture.name.clone()),
             });
         }
     }
@@ -178,7 +176,7 @@ pub(crate) fn inside(folder: &Path, manifest: &str, name: &str) -> Result<PathBu
 pub(crate) fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
     let io_error = |source| RecordingError::Io {
         path: path.to_owned(),
-        source,
+        cause: source,
     };
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(io_error)?;
@@ -188,7 +186,7 @@ pub(crate) fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
     if bytes.len() as u64 > limit {
         return Err(RecordingError::Samples {
             path: path.to_owned(),
-            cause: format!("longer than the {limit} bytes it can have; fetch or record it again"),
+            cause: ContentError::TooLong(limit),
         });
     }
     Ok(bytes)
@@ -204,17 +202,23 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
 }
 
 /// Refuses bytes that the manifest's SHA-256 was not made of.
-pub(super) fn check_hash(path: &Path, what: &str, bytes: &[u8], expected: &str) -> Result<()> {
+pub(super) fn check_hash(
+    path: &Path,
+    what: &'static str,
+    bytes: &[u8],
+    expected: &str,
+) -> Result<()> {
     let found = sha256(bytes);
     if found.eq_ignore_ascii_case(expected.trim()) {
         return Ok(());
     }
     Err(RecordingError::Samples {
         path: path.to_owned(),
-        cause: format!(
-            "SHA-256 of {what} is {found}, the manifest says {expected}: the file was damaged or changed; fetch or record it \
-             again"
-        ),
+        cause: ContentError::Hash {
+            what,
+            found,
+            expected: expected.to_owned(),
+        },
     })
 }
 
@@ -235,22 +239,9 @@ pub(crate) fn unpack(
     GzDecoder::new(packed)
         .take(bytes.saturating_add(1))
         .read_to_end(&mut raw)
-        .map_err(|e| fault(format!("no whole gzip stream ({e}); fetch it again")))?;
+        .map_err(|e| fault(ContentError::Gzip(e)))?;
     if raw.len() as u64 != bytes {
-        let more = if raw.len() as u64 > bytes {
-            "or more "
-        } else {
-            ""
-        };
-        let odd = if raw.len().is_multiple_of(2) {
-            ""
-        } else {
-            ", an odd number for 16-bit values"
-        };
-        return Err(fault(format!(
-            "unpacks to {} {more}bytes{odd}; the manifest says {bytes}",
-            raw.len()
-        )));
+        return Err(fault(ContentError::Unpacked(raw.len() as u64, bytes)));
     }
     check_hash(path, "the unpacked samples", &raw, sha256_raw)?;
     Ok(raw)

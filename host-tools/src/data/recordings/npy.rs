@@ -1,23 +1,47 @@
 //! One stream of 16-bit samples as a `.npy` file, which numpy opens in one line (`numpy.load`).
-use npyz::WriterBuilder as _;
-
 use crate::data::recording::MAX_SAMPLES;
 
 /// Longest file that [`read`] can be given: samples and a generous header.
 pub const MAX_BYTES: u64 = 2 * MAX_SAMPLES as u64 + 4096;
 
+/// Why a file is no stream of samples, and what to do.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum NpyError {
+    /// Another format.
+    #[error("not a .npy file{FIX}")]
+    Other,
+    /// It is too short.
+    #[error("the .npy file ends within its header; fetch or record it again")]
+    Header,
+    /// Another version of the format.
+    #[error("version {0}.{1} of the .npy format is unknown{FIX}")]
+    Version(u8, u8),
+    /// Another type or shape; the header.
+    #[error("{0} in the .npy header {1}{FIX}")]
+    Array(&'static str, String),
+    /// Half a sample is left over: the bytes of all samples.
+    #[error(
+        "{0} bytes of samples are an odd number, and a sample has two; fetch or record the file again"
+    )]
+    Odd(usize),
+    /// Samples by the header, and in the file.
+    #[error("the .npy header promises {0} samples, the file has {1}; fetch or record it again")]
+    Length(u64, usize),
+}
+
+const FIX: &str = "; save a one-dimensional array of numpy.int16 with numpy.save";
+
 /// The file of `samples`: format version 1, `<i2`, one dimension.
 pub fn write(samples: &[i16]) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    let dtype = npyz::DType::Plain("<i2".parse().expect("a type of numpy"));
-    let mut writer = npyz::WriteOptions::new()
-        .dtype(dtype)
-        .shape(&[samples.len() as u64])
-        .writer(&mut bytes)
-        .begin_nd()
-        .expect("a vector takes any header");
-    let written = writer.extend(samples).and_then(|()| writer.finish());
-    written.expect("a vector takes any samples, and all of the shape's were given");
+    let shape = format!(
+        "{{'descr': '<i2', 'fortran_order': False, 'shape': ({}, ), }}",
+        samples.len()
+    );
+    // samples begin at byte 128
+    let header = format!("{shape:<117}\n");
+    let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    bytes.extend_from_slice(header.as_bytes());
+    bytes.extend(samples.iter().flat_map(|sample| sample.to_le_bytes()));
     bytes
 }
 
@@ -27,38 +51,26 @@ pub fn write(samples: &[i16]) -> Vec<u8> {
 /// which a damaged file can turn against us.
 ///
 /// # Errors
-/// What is wrong with the file.
-pub fn read(bytes: &[u8]) -> Result<Vec<i16>, String> {
-    const FIX: &str = "; save a one-dimensional array of numpy.int16 with numpy.save";
-    let short = || "the .npy file ends within its header; fetch or record it again".to_owned();
-    let Some(rest) = bytes.strip_prefix(b"\x93NUMPY") else {
-        return Err(format!("not a .npy file{FIX}"));
-    };
-    let (version, rest) = rest.split_at_checked(2).ok_or_else(short)?;
+/// See [`NpyError`].
+pub fn read(bytes: &[u8]) -> Result<Vec<i16>, NpyError> {
+    let rest = bytes.strip_prefix(b"\x93NUMPY").ok_or(NpyError::Other)?;
+    let (version, rest) = rest.split_at_checked(2).ok_or(NpyError::Header)?;
     let size_bytes = match version {
         [1, 0] => 2,
         [2 | 3, 0] => 4,
-        _ => {
-            let [major, minor] = [version[0], version[1]];
-            return Err(format!(
-                "version {major}.{minor} of the .npy format is unknown{FIX}"
-            ));
-        }
+        _ => return Err(NpyError::Version(version[0], version[1])),
     };
-    let (size, rest) = rest.split_at_checked(size_bytes).ok_or_else(short)?;
+    let (size, rest) = rest.split_at_checked(size_bytes).ok_or(NpyError::Header)?;
     // little-endian
     let size = size.iter().rev().fold(0, |n, b| n << 8 | usize::from(*b));
-    let (header, data) = rest.split_at_checked(size).ok_or_else(short)?;
+    let (header, data) = rest.split_at_checked(size).ok_or(NpyError::Header)?;
     let header: String = header
         .iter()
         .filter(|b| !b.is_ascii_whitespace())
         .map(|b| char::from(*b))
         .collect();
 
-    let wrong = |what: &str| {
-        let header: String = header.chars().take(120).collect();
-        format!("{what} in the .npy header {header}{FIX}")
-    };
+    let wrong = |what| NpyError::Array(what, header.chars().take(120).collect());
     let rest = header
         .strip_prefix("{'descr':'<i2',")
         .ok_or_else(|| wrong("the type is not '<i2'"))?;
@@ -71,16 +83,10 @@ pub fn read(bytes: &[u8]) -> Result<Vec<i16>, String> {
         .and_then(|number| number.parse::<u64>().ok())
         .ok_or_else(|| wrong("the shape is not one number"))?;
     if !data.len().is_multiple_of(2) {
-        return Err(format!(
-            "{} bytes of samples are an odd number, and a sample has two; fetch or record the file again",
-            data.len()
-        ));
+        return Err(NpyError::Odd(data.len()));
     }
     if shape != data.len() as u64 / 2 {
-        return Err(format!(
-            "the .npy header promises {shape} samples, the file has {}; fetch or record it again",
-            data.len() / 2
-        ));
+        return Err(NpyError::Length(shape, data.len() / 2));
     }
     Ok(from_le_bytes(data))
 }

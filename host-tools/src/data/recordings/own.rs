@@ -29,6 +29,7 @@ use super::files::{
     distinct_textures, in_order_of_time, inside, read_bounded, sha256,
 };
 use super::npy;
+use crate::data::content::ContentError;
 use crate::data::recording::{Background, PAC_RATE_HZ, Slide, SlideKey, Texture};
 use crate::data::rows::{Row, RowError, Rows};
 
@@ -112,7 +113,7 @@ impl Manifest {
             return Err(RecordingError::Entry {
                 path: path.to_owned(),
                 place: "line 1".to_owned(),
-                cause: "no slide is listed below the header; record some".to_owned(),
+                cause: ContentError::NoSlides,
             });
         }
         let names: Vec<Texture> = textures.iter().map(|(t, _)| t.clone()).collect();
@@ -155,28 +156,23 @@ impl Entry {
     fn of(row: &Row<'_>) -> std::result::Result<Self, RowError> {
         let rate = |column| row.parse(column, "a rate in whole Hz");
         let movement = Movement::from_si(row.number("force_n")?, row.number("speed_mm_s")?)
-            .map_err(|e| row.error(None, e.to_string()))?;
+            .map_err(|e| row.error(None, e.into()))?;
         let pac_rate_hz: u32 = rate("pac_rate_hz")?;
         if pac_rate_hz != PAC_RATE_HZ {
-            return Err(row.error(
-                Some("pac_rate_hz"),
-                format!("{pac_rate_hz} Hz; all of Tactus counts on {PAC_RATE_HZ} Hz"),
-            ));
+            let cause = ContentError::PacRate(pac_rate_hz);
+            return Err(row.error(Some("pac_rate_hz"), cause));
         }
         let still = Stream::of(row, "background_file", "background_sha256")?;
         let background = match (row.text("background_power"), still) {
             ("", Some(still)) => BackgroundEntry::Still(still),
             (_, None) => BackgroundEntry::Power(row.number("background_power")?),
             (_, Some(_)) => {
-                return Err(row.error(
-                    Some("background_power"),
-                    "there is a background_file too; leave one of them empty".to_owned(),
-                ));
+                return Err(row.error(Some("background_power"), ContentError::TwoBackgrounds));
             }
         };
         let needed = |file, sha256| {
             Stream::of(row, file, sha256)?
-                .ok_or_else(|| row.error(Some(file), "no file is named".to_owned()))
+                .ok_or_else(|| row.error(Some(file), ContentError::NoFile))
         };
         Ok(Self {
             line: row.line(),
@@ -208,14 +204,12 @@ impl Entry {
                 BackgroundEntry::Still(still) => Background::Still(still.load(folder)?),
             },
         };
-        match slide.fault() {
-            None => Ok(slide),
-            Some(cause) => Err(RecordingError::Entry {
-                path: folder.join(MANIFEST),
-                place: format!("line {}, {}", self.line, self.pac.file),
-                cause,
-            }),
-        }
+        slide.check().map_err(|cause| RecordingError::Entry {
+            path: folder.join(MANIFEST),
+            place: format!("line {}, {}", self.line, self.pac.file),
+            cause,
+        })?;
+        Ok(slide)
     }
 }
 
@@ -228,8 +222,8 @@ impl Stream {
     ) -> std::result::Result<Option<Self>, RowError> {
         match (row.text(file), row.text(sha256)) {
             ("", "") => Ok(None),
-            ("", _) => Err(row.error(Some(file), "a hash, but no file is named".to_owned())),
-            (_, "") => Err(row.error(Some(sha256), "a file without its hash".to_owned())),
+            ("", _) => Err(row.error(Some(file), ContentError::HashAlone)),
+            (_, "") => Err(row.error(Some(sha256), ContentError::FileAlone)),
             (name, hash) => Ok(Some(Self {
                 file: name.to_owned(),
                 sha256: hash.to_owned(),
@@ -241,7 +235,10 @@ impl Stream {
         let path = inside(folder, MANIFEST, &self.file)?;
         let bytes = read_bounded(&path, npy::MAX_BYTES)?;
         check_hash(&path, "the file", &bytes, &self.sha256)?;
-        npy::read(&bytes).map_err(|cause| RecordingError::Samples { path, cause })
+        npy::read(&bytes).map_err(|why| RecordingError::Samples {
+            path,
+            cause: why.into(),
+        })
     }
 }
 
@@ -296,13 +293,11 @@ impl RecordingWriter {
             index: slide.texture,
             count: self.textures.len(),
         })?;
-        if let Some(cause) = slide.fault() {
-            return Err(RecordingError::Entry {
-                path: manifest,
-                place: format!("texture {}, {place}", texture.id),
-                cause,
-            });
-        }
+        slide.check().map_err(|cause| RecordingError::Entry {
+            path: manifest.clone(),
+            place: format!("texture {}, {place}", texture.id),
+            cause,
+        })?;
         if self.keys.contains(&(slide.texture, slide.number)) {
             return Err(RecordingError::DuplicateSlide {
                 manifest,
@@ -390,9 +385,9 @@ fn thousandths(value: u32) -> String {
     format!("{}.{:03}", value / 1000, value % 1000)
 }
 
-fn io_error(path: &Path, source: std::io::Error) -> RecordingError {
+fn io_error(path: &Path, cause: std::io::Error) -> RecordingError {
     RecordingError::Io {
         path: path.to_owned(),
-        source,
+        cause,
     }
 }

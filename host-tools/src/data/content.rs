@@ -1,0 +1,267 @@
+//! What can be wrong with the contents of a file, and what to do about it. Who reads the file says where it is.
+
+use std::io;
+
+use tactus_core::movement::MovementError;
+
+use crate::data::recording::{MAX_SAMPLES, PAC_RATE_HZ};
+
+/// What is wrong with the contents of a file, and what to do. The errors that hold it say which file, and where in it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ContentError {
+    /// The system could not read.
+    #[error("{0}")]
+    Io(io::Error),
+    /// The file is longer than this, in bytes.
+    #[error("longer than the {0} bytes it can have; fetch or record it again")]
+    TooLong(u64),
+    /// A number is too large for any movement.
+    #[error(transparent)]
+    Movement(#[from] MovementError),
+
+    // tables
+    /// No text.
+    #[error("not UTF-8 text; this is no such table")]
+    NotUtf8,
+    /// The CSV reader complains.
+    #[error("{0}")]
+    Csv(csv::Error),
+    /// A column is missing; the header.
+    #[error("no column {0} in the header ({1})")]
+    NoColumn(&'static str, String),
+    /// A column comes twice.
+    #[error("two columns {0} in the header")]
+    TwoColumns(&'static str),
+    /// The table is longer than this, in bytes.
+    #[error("the table is longer than {0} bytes; split it")]
+    LongTable(u64),
+    /// A row has another number of fields than the header.
+    #[error(
+        "{0} fields where the header has {1}: cut off or damaged; fetch or write the file again"
+    )]
+    Fields(usize, usize),
+    /// A field is not what it should be.
+    #[error("{0:?} is not {1}")]
+    NotA(String, &'static str),
+    /// A number is not finite.
+    #[error("{0} is not a finite number; measure it again or leave the row out")]
+    NotFinite(String),
+    /// A name is missing.
+    #[error("is empty; give a name or number")]
+    NoName,
+    /// A trial belongs to no set.
+    #[error("{0:?} is neither train nor validate")]
+    NoSet(String),
+    /// A trial comes twice.
+    #[error(
+        "{set} trial {trial} of texture {texture}, movement {movement} comes twice; number the trials"
+    )]
+    TrialTwice {
+        /// `train` or `validate`.
+        set: &'static str,
+        /// Its number.
+        trial: u32,
+        /// Name of the texture.
+        texture: String,
+        /// Name of the movement.
+        movement: String,
+    },
+
+    // recorded slides
+    /// Start and end of the steady part, s.
+    #[error("the steady window {0} s to {1} s is not a stretch of time")]
+    Window(f32, f32),
+    /// The rate of a stream, Hz, and the stream.
+    #[error("a rate of {0} Hz for {1} is impossible")]
+    Rate(u32, &'static str),
+    /// P_AC has another rate than [`PAC_RATE_HZ`].
+    #[error("{0} Hz; all of Tactus counts on {PAC_RATE_HZ} Hz")]
+    PacRate(u32),
+    /// A stream is too long.
+    #[error("{0} samples of {1} are more than a slide can have ({MAX_SAMPLES})")]
+    Samples(usize, &'static str),
+    /// A stream is shorter than the steady part.
+    #[error(
+        "{stream} has {samples} samples at {rate_hz} Hz and ends before the steady window does ({end_s} s)"
+    )]
+    EndsEarly {
+        /// The stream.
+        stream: &'static str,
+        /// Its length.
+        samples: usize,
+        /// Its rate, Hz.
+        rate_hz: u32,
+        /// End of the steady part, s.
+        end_s: f32,
+    },
+    /// A background power, counts^2.
+    #[error("a background power of {0} is impossible")]
+    BackgroundPower(f32),
+    /// There is nothing of the still finger.
+    #[error("the record of the still finger is empty")]
+    NoStill,
+    /// A row names a power and a file.
+    #[error("there is a background_file too; leave one of them empty")]
+    TwoBackgrounds,
+    /// A stream has no file.
+    #[error("no file is named")]
+    NoFile,
+    /// A hash of nothing.
+    #[error("a hash, but no file is named")]
+    HashAlone,
+    /// A file that cannot be checked.
+    #[error("a file without its hash")]
+    FileAlone,
+    /// A manifest without a slide.
+    #[error("no slide is listed below the header; record some")]
+    NoSlides,
+    /// Two names of a texture of one number.
+    #[error("is both {0:?} and {1:?}; give each texture one number and one name")]
+    TwoNames(String, String),
+
+    // files of samples
+    /// The file was changed.
+    #[error(
+        "SHA-256 of {what} is {found}, the manifest says {expected}: the file was damaged or changed; fetch or record it \
+         again"
+    )]
+    Hash {
+        /// What was hashed.
+        what: &'static str,
+        /// Its hash.
+        found: String,
+        /// The manifest's.
+        expected: String,
+    },
+    /// The file does not unpack.
+    #[error("no whole gzip stream ({0}); fetch it again")]
+    Gzip(io::Error),
+    /// The file unpacks to other than the manifest says: bytes found (of too many, one more than wanted) and wanted.
+    #[error(
+        "unpacks to {0} {more}bytes{odd}; the manifest says {1}",
+        more = if .0 > .1 { "or more " } else { "" },
+        odd = if .0.is_multiple_of(2) { "" } else { ", an odd number for 16-bit values" }
+    )]
+    Unpacked(u64, u64),
+    /// The file is shorter than the manifest says.
+    #[error("truncated: {0} bytes, the manifest says {1}; fetch it again")]
+    Truncated(usize, u64),
+    /// The file does not hold an array of samples.
+    #[error(transparent)]
+    Npy(#[from] crate::data::recordings::npy::NpyError),
+
+    // manifests in JSON
+    /// The JSON reader complains; a folder with that layout.
+    #[error("{0}; the layout is that of {1}")]
+    Json(serde_json::Error, &'static str),
+    /// A field of a record is too long.
+    #[error("{0} with {1} values; a slide has 1 to {MAX_SAMPLES}")]
+    FieldLength(String, usize),
+    /// A field of a record comes twice.
+    #[error("{0} is listed twice")]
+    Twice(String),
+    /// A field of a record is missing.
+    #[error("there is no {0} in it")]
+    NoField(&'static str),
+    /// No material.
+    #[error("no material is listed")]
+    NoMaterial,
+    /// A material has another number of slides than the manifest.
+    #[error("n_slides is {0}, but {1} slides are listed under \"slides\"; they must agree")]
+    SlidesDisagree(usize, usize),
+    /// The length of a file, its slides, and the values of a slide.
+    #[error(
+        "bytes_raw is {0}, but {1} slides of {2} 16-bit values are not that many bytes; they must agree"
+    )]
+    LengthDisagrees(u64, usize, usize),
+    /// A file is too long for the memory.
+    #[error("bytes_raw is {0}, more than the {1} bytes one material can have; split it")]
+    LongMaterial(u64, u64),
+    /// A packed file is longer than its contents.
+    #[error("bytes_gz is {0}, far more than the {1} bytes that are in it; correct the manifest")]
+    LongPacked(u64, u64),
+
+    // the publisher's files
+    /// Time does not go on.
+    #[error("not after the row before; fetch the file again")]
+    NotAfter,
+    /// Time goes back.
+    #[error("before that of the row before; fetch the file again")]
+    Before,
+    /// More rows than a slide has.
+    #[error("more than {0} rows are no slide")]
+    Rows(usize),
+    /// A force, N.
+    #[error("{0} N would tear the finger off; fetch the file again")]
+    Force(f64),
+    /// The two files of a slide are of different times.
+    #[error("no force at the time of the slide; fetch it and its _bio again")]
+    NoForce,
+    /// A slide that came of a publisher's file is not usable.
+    #[error("{0}; fetch the file again, or move it and its _cw away")]
+    Imported(Box<Self>),
+
+    // fabrics
+    /// No fabric.
+    #[error("no fabric is listed; list some")]
+    NoFabric,
+    /// Two files of a fabric.
+    #[error("a second file of the fabric {0:?}; give each fabric one file and one name")]
+    SecondFile(String),
+    /// How many slides are listed, and may be at most.
+    #[error("{0} slides are listed; 1 to {1} can be: add some, or split the file")]
+    SlideCount(usize, usize),
+    /// A third repetition.
+    #[error("rep is {0}; the two repetitions are 0 and 1: correct the manifest")]
+    Repetition(u8),
+    /// Rows of a recording, its first value, and the most values of a file.
+    #[error(
+        "{0} rows of 16 values from value {1} on: a recording has 1 row at least, and a file no more than {2} values; correct \
+         the manifest"
+    )]
+    Span(u64, u64, u64),
+    /// A recording comes twice.
+    #[error(
+        "{movement}, direction {direction}, rep {repetition} is listed twice; correct the manifest"
+    )]
+    RecordingTwice {
+        /// Set-point and speed.
+        movement: String,
+        /// As in the manifest.
+        direction: i8,
+        /// As in the manifest.
+        repetition: u8,
+    },
+    /// Where a recording begins, and where the one before ends.
+    #[error(
+        "offset_values is {0}, but the recording before it ends at {1}; recordings follow each other without gap or overlap: \
+         correct the manifest"
+    )]
+    Gap(u64, u64),
+    /// A set-point and speed that are no movement.
+    #[error(
+        "{0} (the set-point stands in place of the force); take this movement out of the manifest"
+    )]
+    Setpoint(MovementError),
+    /// The file of a fabric is missing.
+    #[error("no such file, but the manifest names it; fetch it, or take {0} out of the manifest")]
+    NoSamples(String),
+    /// A recording that the manifest does not have.
+    #[error("the manifest lists no such recording")]
+    NoRecording,
+    /// The file ends too early.
+    #[error("ends before this recording; fetch it again")]
+    Ends,
+    /// Samples of a slide, and the least there must be.
+    #[error(
+        "a slide of {0} samples is too short, {1} are the least; record it again or take this movement out of the manifest"
+    )]
+    Short(usize, usize),
+    /// Nothing was felt.
+    #[error(
+        "no taxel moves: the finger did not touch, or the sensor is dead; record it again or take this movement out of the \
+         manifest"
+    )]
+    Silent,
+}
