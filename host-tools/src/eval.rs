@@ -1,5 +1,7 @@
 //! Texture tables learned from recorded slides, and how well they tell textures apart.
 
+#[cfg(feature = "plots")]
+pub mod chart;
 pub mod evaluate;
 pub mod experiment;
 pub mod learn;

@@ -12,10 +12,6 @@ use super::training::Training;
 /// (95.4 %).
 pub const VARIATION: f64 = 1.2;
 
-/// How the knob was set, for the report.
-pub(super) const CALIBRATED: &str = "It was set on worlds 1 to 10 so that Bayesian exploration comes within 2 points of its published \
-95.4 % there, and then left alone.";
-
 /// Everything that a study found: study.json.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Study {

@@ -1,80 +1,149 @@
-//! What a report is made of: sections of words, tables and figures.
+//! What a report is made of: tables, figures, and the numbers that its page puts between its words.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use serde_json::Value;
+use tactus_core::features::Property;
+
+use crate::eval::chart::Figure;
+
+/// All that a study shows: the page's template says where each piece stands and what is said about it.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct Report {
+    /// Tables that the page shows, by the names of their files.
+    pub(super) tables: BTreeMap<&'static str, Table>,
+    /// Tables that are too large to read: the page only names their files.
+    #[serde(skip)]
+    pub(super) files: BTreeMap<String, Table>,
+    /// The panels of the page's figures, by figure.
+    pub(super) figures: BTreeMap<&'static str, Vec<Figure>>,
+    /// What stands between the words, by section.
+    #[serde(flatten)]
+    pub(super) words: BTreeMap<&'static str, Value>,
+}
+
+impl Report {
+    /// Adds a table that the page shows.
+    pub(super) fn table(&mut self, id: &'static str, header: &[&str], rows: Rows) {
+        self.tables.insert(
+            id,
+            Table {
+                header: owned(header),
+                rows,
+            },
+        );
+    }
+
+    /// Adds a table that is too large to read.
+    pub(super) fn file(&mut self, id: &str, header: Vec<String>, rows: Rows) {
+        self.files.insert(id.to_owned(), Table { header, rows });
+    }
+}
+
+/// Names of columns.
+pub(super) fn owned(names: &[&str]) -> Vec<String> {
+    names.iter().map(|&name| name.to_owned()).collect()
+}
+
+/// A movement by its force in N and its speed in mm/s.
+pub(super) fn movement_name((force_n, speed_mm_s): (f32, f32)) -> String {
+    format!("{force_n:.2} N, {speed_mm_s:.1} mm/s")
+}
+
+/// A property with its unit, for an axis.
+pub(super) fn axis(property: Property) -> &'static str {
+    match property {
+        Property::Traction => "traction (N)",
+        Property::Roughness => "roughness (ln of counts\u{b2})",
+        Property::Fineness => "fineness (ln of Hz)",
+    }
+}
+
+/// The rows of a table, each as long as its header.
+pub(super) type Rows = Vec<Vec<Cell>>;
 
 /// A table of the report.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Debug, Serialize)]
 pub(super) struct Table {
-    /// Name of its file, without the ending.
-    pub(super) id: &'static str,
-    /// What it shows.
-    pub(super) title: String,
     /// Names of the columns, with units.
     pub(super) header: Vec<String>,
-    /// The rows.
-    pub(super) rows: Vec<Vec<Cell>>,
+    pub(super) rows: Rows,
+}
+
+impl Table {
+    /// The table as a file: every number with all its digits.
+    pub(super) fn csv(&self) -> Result<Vec<u8>, csv::Error> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(&self.header)?;
+        for row in &self.rows {
+            writer.write_record(row.iter().map(|cell| &cell.exact))?;
+        }
+        writer
+            .into_inner()
+            .map_err(|failed| failed.into_error().into())
+    }
 }
 
 /// A cell of a table.
-#[derive(Clone, PartialEq, Debug)]
-pub(super) enum Cell {
-    /// Words.
-    Text(String),
-    /// A number, and how many decimals of it people see; files have all.
-    Number(f64, usize),
-    /// Nothing.
-    Empty,
+#[derive(Debug, Default, Serialize)]
+pub(super) struct Cell {
+    /// What people see.
+    shown: String,
+    /// What files have: all digits.
+    #[serde(skip)]
+    exact: String,
+    number: bool,
 }
 
-impl Cell {
-    pub(super) fn text(text: impl ToString) -> Self {
-        Self::Text(text.to_string())
-    }
+/// The cells of a row: words, and numbers with how many decimals of them people see.
+macro_rules! cells {
+    ($($cell:expr),* $(,)?) => { vec![$($crate::study::report::model::Cell::from($cell)),*] };
+}
+pub(super) use cells;
 
-    /// A number of single precision, with the digits that it has.
-    pub(super) fn single(value: f32, decimals: usize) -> Self {
-        Self::Number(value.to_string().parse().unwrap_or(f64::NAN), decimals)
-    }
-
-    /// In a file.
-    pub(super) fn exact(&self) -> String {
-        match self {
-            Self::Text(text) => text.clone(),
-            Self::Number(value, _) => value.to_string(),
-            Self::Empty => String::new(),
+impl From<String> for Cell {
+    fn from(words: String) -> Self {
+        Self {
+            shown: words.clone(),
+            exact: words,
+            number: false,
         }
     }
 }
 
-/// A figure, or a panel of one.
-#[derive(Clone, PartialEq, Debug)]
-pub(super) struct Figure {
-    /// Name of its file, without the ending.
-    pub(super) id: String,
-    /// What it shows, for those who cannot see it.
-    pub(super) title: String,
-    /// The drawing.
-    pub(super) svg: String,
+impl From<&str> for Cell {
+    fn from(words: &str) -> Self {
+        words.to_owned().into()
+    }
 }
 
-/// A part of a section.
-#[derive(Clone, PartialEq, Debug)]
-pub(super) enum Block {
-    /// A paragraph.
-    Text(String),
-    /// A table.
-    Table(Table),
-    /// The panels of a figure, and what they show.
-    Figure(Vec<Figure>, String),
-    /// A table that is too large to read: only its file is named.
-    File(Table),
+impl From<bool> for Cell {
+    fn from(is: bool) -> Self {
+        (if is { "yes" } else { "no" }).into()
+    }
 }
 
-/// A section of the report.
-#[derive(Clone, PartialEq, Debug)]
-pub(super) struct Section {
-    /// Its place in the page.
-    pub(super) id: &'static str,
-    /// Its heading.
-    pub(super) title: String,
-    /// What is in it.
-    pub(super) blocks: Vec<Block>,
+impl From<(f64, usize)> for Cell {
+    fn from((value, decimals): (f64, usize)) -> Self {
+        Self {
+            shown: format!("{value:.decimals$}"),
+            exact: value.to_string(),
+            number: true,
+        }
+    }
+}
+
+/// A number of single precision has the digits that it has.
+impl From<(f32, usize)> for Cell {
+    fn from((value, decimals): (f32, usize)) -> Self {
+        let digits: f64 = value.to_string().parse().unwrap_or(f64::NAN);
+        (digits, decimals).into()
+    }
+}
+
+impl From<u8> for Cell {
+    fn from(number: u8) -> Self {
+        (f64::from(number), 0).into()
+    }
 }
