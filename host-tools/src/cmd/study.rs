@@ -172,7 +172,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     report::write(&study, &args.out)?;
     match args.format {
-        Format::Json => out.write_all(report::json(&study).as_bytes())?,
+        Format::Json => out.write_all(report::json(&study)?.as_bytes())?,
         Format::Text => print(args, &study, &times, out)?,
     }
     Ok(())
