@@ -82,17 +82,27 @@ pub(crate) fn lints() -> [Command; 2] {
     [format, clippy]
 }
 
-/// The emulator's tests, with the images that would be flashed.
-pub(crate) fn tests(elves: &[PathBuf]) -> Result<Command> {
+/// The emulator's tests.
+pub(crate) fn tests() -> Command {
     let mut tests = cargo_there("test");
     tests.args(["--release", "--no-fail-fast"]);
-    tests.env("TACTUS_ELF", firmware::image(elves, RIG)?);
-    let selftest = firmware::image(elves, "tactus-selftest")?;
-    tests.env("TACTUS_SELFTEST_ELF", selftest);
-    let handheld = firmware::image(elves, "tactus-handheld")?;
-    tests.env("TACTUS_HANDHELD_ELF", handheld);
-    tests.env("TACTUS_REQUIRE_ELF", "1");
-    Ok(tests)
+    tests
+}
+
+/// Tests with the images that would be flashed.
+pub(crate) fn with_images<'t>(
+    tests: &'t mut Command,
+    elves: &[PathBuf],
+) -> Result<&'t mut Command> {
+    let images = [
+        ("TACTUS_ELF", RIG),
+        ("TACTUS_SELFTEST_ELF", "tactus-selftest"),
+        ("TACTUS_HANDHELD_ELF", "tactus-handheld"),
+    ];
+    for (variable, name) in images {
+        tests.env(variable, firmware::image(elves, name)?);
+    }
+    Ok(tests.env("TACTUS_REQUIRE_ELF", "1"))
 }
 
 /// A cargo command in the emulator's workspace.

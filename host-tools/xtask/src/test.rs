@@ -222,6 +222,7 @@ mod tests {
         let at = |name: &str| ran.iter().position(|ran| *ran == name).unwrap();
         for after in ["emulator", "bench", "size"] {
             assert!(at("firmware") < at(after), "{ran:?}");
+            assert!(at("build of the emulator") < at(after), "{ran:?}");
         }
     }
 

@@ -108,6 +108,21 @@ pub struct Exploration {
     pub played: PlayCounts,
 }
 
+/// An exploration among all textures, by the table's own method: until one is more probable than 0.99, with at most 10
+/// slides (PAPER).
+pub fn among_all(seed: u32) -> Identify {
+    Identify {
+        among: Default::default(),
+        threshold: 0.99,
+        max_slides: 10,
+        method: None,
+        strategy: Default::default(),
+        open: true,
+        learn: false,
+        seed,
+    }
+}
+
 /// Has the firmware find out what lies under its finger, and follows it. It must know `table` and be ready; `each` sees all
 /// reports meanwhile, and after every millisecond none.
 pub fn explore(

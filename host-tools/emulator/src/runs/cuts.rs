@@ -15,14 +15,14 @@ use rayon::prelude::*;
 use tactus::collection::Collection;
 use tactus::link::{Found, Question, ReadTable};
 use tactus::sim::world::{Setup, World};
-use tactus_core::explorer::{Method, Strategy};
+use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::{Identify, Name, Reset, Tell};
 
 pub use self::outcome::{Cuts, Outcome};
 use self::tear::{Cut, CutError, Held, Left, Operation, Torn, judge, left_by};
 use crate::board::{FlashWrite, Options};
-use crate::host::exploration::explore;
+use crate::host::exploration::{among_all, explore};
 use crate::host::talk::{PATIENCE_S, Talk, TalkError};
 use crate::host::under_finger::{self, Known, Unknown};
 
@@ -127,14 +127,8 @@ fn boot(elf: &Path, unknown: &Unknown, store: Option<Vec<u8>>) -> Result<Talk, C
 fn visit(talk: &mut Talk, unknown: &Unknown, seed: u32, learn: bool) -> Result<Found, CutError> {
     let table = talk.run(ReadTable::default(), PATIENCE_S, |_, _| ())?;
     let identify = Identify {
-        among: Default::default(),
-        threshold: 0.99,
-        max_slides: 10,
-        method: None,
-        strategy: Strategy::default(),
-        open: true,
         learn,
-        seed,
+        ..among_all(seed)
     };
     let explored = explore(talk, &table, identify, &unknown.name, |_, _| ())?;
     Ok(explored.found)

@@ -13,7 +13,7 @@ use tactus_core::wire::{Identify, Phase, Report, Tell};
 use super::error::RunError;
 use crate::board::{self, Emulator, Options};
 use crate::host::args::{Format, World};
-use crate::host::exploration::{self, ExploreError};
+use crate::host::exploration::{self, ExploreError, among_all};
 use crate::host::learned::Chosen;
 use crate::host::progress;
 use crate::host::talk::Talk;
@@ -90,15 +90,12 @@ pub fn run(args: &Args) -> Result<(), RunError> {
     talk.teach(&known.calibration, &known.table, |board, _| logged(board))?;
 
     let identify = Identify {
-        among: Default::default(),
         threshold: args.threshold,
         max_slides: args.max_slides,
         // a table from a file may be for any method
         method: args.table.is_none().then(|| world.method.method()),
         strategy: world.method.strategy(),
-        open: true,
-        learn: false,
-        seed: chosen.seed,
+        ..among_all(chosen.seed)
     };
     let mut out: Box<dyn std::io::Write> = if text {
         Box::new(std::io::stdout())

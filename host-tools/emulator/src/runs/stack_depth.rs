@@ -5,12 +5,12 @@ use std::path::Path;
 use clap::Args as Arguments;
 use serde_json::{Value, json};
 use tactus::sim::world::Setup;
-use tactus_core::explorer::Strategy;
 use tactus_core::wire::{Ask, Identify, Phase, Tell};
 
 use super::error::RunError;
 use crate::board::{Emulator, Options, StackLayout, StackLevel, StackUse};
 use crate::host::args::Firmware;
+use crate::host::exploration::among_all;
 use crate::host::talk::Talk;
 
 /// What is measured.
@@ -63,14 +63,10 @@ fn explore(elf: &Path, layout: StackLayout, slides: u8) -> Result<StackUse, RunE
     homed?;
     let mut felt = 0;
     let identify = Identify {
-        among: Default::default(),
         threshold: 1.0,
         max_slides: slides,
-        method: None,
-        strategy: Strategy::Bayesian,
-        open: true,
         learn: true,
-        seed: 1,
+        ..among_all(1)
     };
     talk.ask(Ask::Identify(identify), PATIENCE_S, |board, report| {
         if let Some(report) = report

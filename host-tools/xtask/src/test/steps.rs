@@ -35,17 +35,18 @@ pub(super) const QUICK: [&str; 5] = [
     "documentation",
 ];
 /// ... and what it leaves out.
-pub(super) const SLOW: [&str; 6] = [
+pub(super) const SLOW: [&str; 7] = [
     "fuzz",
     "firmware",
     "lints of the emulator",
+    "build of the emulator",
     "emulator",
     "bench",
     "size",
 ];
 
 /// All steps, in the order in which they begin if nothing else keeps them: what others wait for, and what takes long, first.
-pub(super) const STEPS: [Step; 12] = [
+pub(super) const STEPS: [Step; 13] = [
     step("formatting", "", &[], || {
         cargo_step(&["fmt", "--all", "--check"])
     }),
@@ -77,8 +78,14 @@ pub(super) const STEPS: [Step; 12] = [
     step("lints of the emulator", "emulator", &[], || {
         emulate::lints().iter_mut().try_for_each(announce_and_run)
     }),
-    step("emulator", "emulator", &["firmware"], || {
-        announce_and_test(&mut emulate::tests(&firmware::elves()?)?)
+    step("build of the emulator", "emulator", &[], || {
+        let mut tests = emulate::tests();
+        announce_and_run(tests.arg("--no-run"))?;
+        announce_and_run(&mut emulate::build())
+    }),
+    step("emulator", "", BUILT, || {
+        let mut tests = emulate::tests();
+        announce_and_test(emulate::with_images(&mut tests, &firmware::elves()?)?)
     }),
     step("fuzz", "fuzz", &[], || {
         fuzz::fuzz(&fuzz::Options::all(FUZZ_S, false))?;
@@ -89,15 +96,18 @@ pub(super) const STEPS: [Step; 12] = [
         doc.args(["doc", "--workspace", "--no-deps"]);
         announce_and_run(doc.env("RUSTDOCFLAGS", "-Dwarnings"))
     }),
-    step("bench", "emulator", &["firmware"], || {
+    step("bench", "", BUILT, || {
         println!("== cargo xtask bench");
         bench::gates()
     }),
-    step("size", "emulator", &["firmware"], || {
+    step("size", "", BUILT, || {
         println!("== cargo xtask size");
         size::gates()
     }),
 ];
+
+/// What runs firmware on the emulated board needs both.
+const BUILT: &[&str] = &["firmware", "build of the emulator"];
 
 const fn step(
     name: &'static str,

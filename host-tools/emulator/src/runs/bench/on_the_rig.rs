@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use tactus::sim::world::Setup;
-use tactus_core::explorer::Strategy;
 use tactus_core::rig::lever::RETRACT_STEPS_S;
 use tactus_core::wire::{Ask, Identify, Phase, Tell};
 
@@ -11,6 +10,7 @@ use super::error::BenchError;
 use super::gates::gate;
 use super::row::Row;
 use crate::board::{Emulator, Options, Output};
+use crate::host::exploration::among_all;
 use crate::host::talk::Talk;
 
 /// Longest that the rig takes for anything, virtual seconds.
@@ -41,14 +41,10 @@ pub(super) fn on_the_rig(elf: &Path) -> Result<Vec<Row>, BenchError> {
     let mut talk = Talk::new(emulator);
     talk.ready(|_, _| ())?;
     let identify = Identify {
-        among: Default::default(),
         threshold: 1.0,
         max_slides: 1,
-        method: None,
-        strategy: Strategy::Bayesian,
         open: false,
-        learn: false,
-        seed: 1,
+        ..among_all(1)
     };
     // times in ns and instructions so far
     let (mut begun, mut over, mut told) = (None, None, None);

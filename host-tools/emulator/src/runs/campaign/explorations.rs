@@ -9,14 +9,10 @@ use tactus::played::Lesson;
 use tactus_core::wire::Identify;
 
 use crate::board::Options;
-use crate::host::exploration::{Exploration, ExploreError, explore};
+use crate::host::exploration::{Exploration, ExploreError, among_all, explore};
 use crate::host::talk::Talk;
 use crate::host::under_finger::{self, Known, LessonError, TRIALS, Unknown};
 
-/// A texture more probable than this is the answer (PAPER).
-const THRESHOLD: f32 = 0.99;
-/// Slides at most (PAPER).
-const MAX_SLIDES: u8 = 10;
 /// Textures of the simulated world's table.
 const AMONG: u8 = 20;
 
@@ -123,14 +119,9 @@ fn one(elf: &Path, group: &Group, index: usize) -> Result<Exploration, ExploreEr
     let Known { calibration, table } = &group.known;
     talk.teach(calibration, table, |_, _| ())?;
     let identify = Identify {
-        among: Default::default(),
-        threshold: THRESHOLD,
-        max_slides: MAX_SLIDES,
         method: Some(group.method.method()),
         strategy: group.method.strategy(),
-        open: true,
-        learn: false,
-        seed: (group.seed as u32).wrapping_mul(1009) + index as u32 + 1,
+        ..among_all((group.seed as u32).wrapping_mul(1009) + index as u32 + 1)
     };
     explore(&mut talk, table, identify, &unknown.name, |_, _| ())
 }

@@ -11,8 +11,9 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 use tactus::collection::Collection;
 use tactus::sim::faults::Fault;
-use tactus_core::explorer::Strategy;
 use tactus_core::wire::Identify;
+
+use crate::host::exploration::among_all;
 
 /// More force than this is never on the finger, N: see the guard of the core's `rig`.
 pub const MOST_N: f64 = 2.2;
@@ -53,14 +54,9 @@ impl Plan {
         Self {
             texture: random.random_range(1..=117),
             identify: Identify {
-                among: Default::default(),
-                threshold: 0.99,
-                max_slides: 10,
-                method: None,
-                strategy: Strategy::default(),
-                open: true,
+                // the draws in this order
                 learn: random.random(),
-                seed: random.random(),
+                ..among_all(random.random())
             },
             fault: fault.filter(|_| breaks).map(|fault| (at_ns, fault)),
             answer: random.random_range(0..4) == 0,
