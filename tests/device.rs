@@ -1,4 +1,4 @@
-//! `tactus device` as a user meets it, at a probe in software: the simulated rig and the core's own session behind the
+//! `tactus device` as a user meets it, at a probe in software: the simulated rig under the core's own probe behind the
 //! frames of the link, on a TCP port or a pseudo terminal; and at lines that are no probe's.
 
 use std::cell::RefCell;
@@ -14,18 +14,20 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use tactus::collection::{Collection, calibrated};
-use tactus::simulated::{SimError, SimRig, feel};
+use tactus::sim::flash::{RamFlash, SECTOR};
+use tactus::sim::probe::{self, Host};
+use tactus::sim::rig::SimRig;
 use tactus_core::explorer::Method;
-use tactus_core::features::{Plan, PropertySet, Slide};
-use tactus_core::kernels::{Kernels, Plain};
+use tactus_core::features::Plan;
+use tactus_core::kernels::Plain;
 use tactus_core::movement::Movement;
-use tactus_core::rig::control::Phase as RigPhase;
-use tactus_core::rig::{Rig, calibration::RigCalibration};
-use tactus_core::session::{self, Blocks, text};
-use tactus_core::table::Table;
+use tactus_core::probe::seams::{Panel, RigHandle as _};
+use tactus_core::probe::{RigState, TableInUse, Turn, Watch, receive};
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::skin::SkinCare;
 use tactus_core::wire::{
-    self, Ask, Counts, Forget, Live, MAX_FRAME, Name, PART, PROTOCOL, Phase, Receiver, Report,
-    Request, Reset, Status, Tell,
+    self, Ask, Counts, Forget, MAX_FRAME, Name, PROTOCOL, Phase, Receiver, Report, Request, Reset,
+    Status, Tell,
 };
 
 const UNKNOWN: u8 = 47;
@@ -56,11 +58,15 @@ struct Wire {
     line: Box<dyn Line>,
     receiver: Receiver,
     number: u16,
-    at_ms: u32,
-    phase: RigPhase,
-    table: Vec<u8>,
-    calibration: RigCalibration,
+    at_ms: u64,
+    /// ms of the rig's time between two looks at the line, each of which takes a real one
+    hurry: u64,
+    watch: Watch,
+    rig: RigState,
+    table: TableInUse,
     streams: bool,
+    /// stop in this millisecond; and until the request is over
+    stop: bool,
     stopped: bool,
     busy: bool,
     requests: VecDeque<Request>,
@@ -70,28 +76,6 @@ struct Wire {
 }
 
 impl Wire {
-    fn tell(&mut self, tell: Tell) {
-        let report = Report {
-            number: self.number,
-            at_ms: self.at_ms,
-            tell,
-        };
-        self.number = self.number.wrapping_add(1);
-        let mut room = [0; MAX_FRAME + 1];
-        let frame = wire::encode(&report, &mut room).unwrap();
-        self.gone |= self.line.write_all(frame).is_err();
-    }
-
-    fn enter(&mut self, phase: RigPhase) {
-        if phase != self.phase {
-            self.phase = phase;
-            if let RigPhase::Faulted(fault) = phase {
-                self.tell(Tell::Fault(fault));
-            }
-            self.tell(Tell::Phase(phase.into()));
-        }
-    }
-
     /// Takes in what has come, and answers what can be answered at any time.
     fn look(&mut self) {
         let mut bytes = [0; 1024];
@@ -107,203 +91,134 @@ impl Wire {
             let Some(request) = self.receiver.push::<Request>(byte) else {
                 continue;
             };
-            let Request { id, ask } = request.unwrap();
-            let _ = self.asked.send(ask.clone());
-            match ask {
-                Ask::Status => {
-                    let table = Table::read(&self.table).unwrap();
-                    let status = Status {
-                        phase: self.phase.into(),
-                        fault: None,
-                        textures: table.textures(),
-                        table_bytes: self.table.len() as u32,
-                        table_crc: table.crc(),
-                        factory: self.table == known().1,
-                        calibrated: self.calibration.date,
-                        counts: Counts::default(),
-                        skin_mj: (1500, 250),
-                    };
-                    self.tell(Tell::Status(status));
-                }
-                Ask::Stop => self.stopped = self.busy,
-                Ask::Stream(on) => self.streams = on,
-                Ask::ReadCalibration => {
-                    let bytes = self.calibration.to_bytes();
-                    self.tell(Tell::Calibration(bytes.into_iter().collect()));
-                }
-                _ if self.busy => {
-                    let why = text("busy: wait, or stop what is being done");
-                    self.tell(Tell::Refused { id, why });
-                    continue;
-                }
-                ask => {
-                    self.requests.push_back(Request { id, ask });
-                    continue;
-                }
+            let request = request.unwrap();
+            let _ = self.asked.send(request.ask.clone());
+            let busy = self.busy || !self.requests.is_empty();
+            if receive(&request, busy, self) == Turn::Queue {
+                self.requests.push_back(request);
             }
-            self.tell(Tell::Done(id));
         }
     }
 }
 
-/// The simulated rig, with everything told that happens.
-struct Streamed<'w> {
-    rig: SimRig,
-    wire: &'w RefCell<Wire>,
-    /// ms of the rig's time between two looks at the line, each of which takes a real one
-    hurry: u64,
-}
-
-impl Rig for Streamed<'_> {
-    type Error = SimError;
-
-    fn measures(&self) -> PropertySet {
-        PropertySet::ALL
+impl Panel for Wire {
+    fn rig(&self) -> RigState {
+        self.rig
     }
 
-    async fn perform<K: Kernels>(
-        &mut self,
-        movement: Movement,
-        slide: &mut Slide<'_, K>,
-    ) -> Result<(), SimError> {
-        if self.rig.control().phase() == RigPhase::Parked {
-            self.rig.home()?;
-        }
-        self.rig.control().start(movement, 0.5)?;
-        let mut blocks = Blocks::default();
-        for ms in 0u64.. {
-            let outputs = self.rig.tick().clone();
-            feel(&outputs, slide);
-            let mut wire = self.wire.borrow_mut();
-            wire.at_ms = self.rig.now().as_millis() as u32;
-            if let Some(block) = blocks.put(&outputs.felt, &outputs.pac, outputs.shear_mn)
-                && wire.streams
-            {
-                wire.tell(Tell::Block(block));
-            }
-            let control = self.rig.control();
-            wire.enter(control.phase());
-            if ms % 50 == 0 {
-                wire.tell(Tell::Live(Live {
-                    force_mn: control.force_mn() as i16,
-                    steps: 0,
-                    stage_um: (control.stage_mm() * 1e3) as i32,
-                    speed_um_s: 0,
-                    current_ma: 0,
-                }));
-            }
-            if ms % self.hurry == 0 {
-                wire.look();
-                thread::sleep(Duration::from_millis(1));
-            }
-            if wire.stopped {
-                control.stop();
-            }
-            if control.is_at_rest() {
-                break;
-            }
-        }
-        let mut wire = self.wire.borrow_mut();
-        if wire.streams {
-            wire.tell(Tell::Block(blocks.end(0)));
-        }
-        // its finger really is in the air
-        assert!(self.rig.world().truth().force_n == 0.0);
-        if std::mem::take(&mut wire.stopped) {
-            return Err(SimError::Stopped);
-        }
-        Ok(())
+    fn table(&self) -> TableInUse {
+        self.table
+    }
+
+    fn counts(&self) -> Counts {
+        Counts::default()
+    }
+
+    fn stop(&mut self, all: bool) {
+        self.stop = true;
+        self.stopped |= all;
+    }
+
+    fn stream(&mut self, on: bool) {
+        self.streams = on;
+    }
+
+    fn tell(&mut self, tell: Tell) {
+        let report = Report {
+            number: self.number,
+            at_ms: self.at_ms as u32,
+            tell,
+        };
+        self.number = self.number.wrapping_add(1);
+        let mut room = [0; MAX_FRAME + 1];
+        let frame = wire::encode(&report, &mut room).unwrap();
+        self.gone |= self.line.write_all(frame).is_err();
     }
 }
 
-/// Serves one line until the host is gone.
-fn serve(line: Box<dyn Line>, hurry: u64, asked: Sender<Ask>) {
-    let (calibration, table) = known();
+impl Host for Wire {
+    fn tell(&mut self, event: Tell) {
+        Panel::tell(self, event);
+    }
+
+    fn table(&mut self, table: TableInUse) {
+        self.table = table;
+    }
+
+    fn tick(&mut self, now: Duration, rig: &RigState) {
+        self.at_ms = now.as_millis() as u64;
+        self.rig = *rig;
+        if self.at_ms.is_multiple_of(Watch::EVERY_MS) {
+            let mut watch = self.watch;
+            watch.look(rig, |event| Panel::tell(self, event));
+            self.watch = watch;
+        }
+        if self.at_ms.is_multiple_of(self.hurry) {
+            self.look();
+            thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn stops(&mut self) -> bool {
+        std::mem::take(&mut self.stop)
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.stopped
+    }
+
+    fn streams(&self) -> bool {
+        self.streams
+    }
+}
+
+/// Serves one host after the other.
+fn serve(lines: impl IntoIterator<Item = Box<dyn Line>>, hurry: u64, asked: Sender<Ask>) {
+    let (calibration, factory) = known();
+    let mut rig = SimRig::new(world().setup(UNKNOWN, 100));
+    rig.control().calibrate(*calibration).unwrap();
+    rig.home().unwrap();
     let wire = RefCell::new(Wire {
-        line,
+        line: Box::new(std::io::empty()),
         receiver: Receiver::default(),
         number: 0,
         at_ms: 0,
-        phase: RigPhase::Ready,
-        table: table.clone(),
-        calibration: *calibration,
+        hurry,
+        watch: Watch::default(),
+        rig: rig.state(None),
+        table: TableInUse::NONE,
         streams: false,
+        stop: false,
         stopped: false,
         busy: false,
         requests: VecDeque::new(),
         asked,
         gone: false,
     });
-    let mut rig = Streamed {
-        rig: SimRig::new(world().setup(UNKNOWN, 100)),
-        wire: &wire,
-        hurry,
-    };
-    rig.rig.control().calibrate(*calibration).unwrap();
-    rig.rig.home().unwrap();
-    let mut pushed = Vec::new();
-    while !wire.borrow().gone {
-        wire.borrow_mut().look();
-        thread::sleep(Duration::from_millis(1));
-        let Some(Request { id, ask }) = wire.borrow_mut().requests.pop_front() else {
-            continue;
-        };
-        wire.borrow_mut().busy = true;
-        let done = obey(ask, &mut rig, &mut pushed);
-        let mut wire = wire.borrow_mut();
-        wire.busy = false;
-        wire.tell(match done {
-            Ok(()) => Tell::Done(id),
-            Err(why) => Tell::Refused { id, why: *why },
-        });
+    let (mut buffer, plan) = (vec![0; SECTOR], Plan::new());
+    let flash = RamFlash::blank();
+    let probe = probe::switch_on(rig, flash, factory, &mut buffer, &plan, &wire);
+    let mut probe = probe.unwrap();
+    embassy_futures::block_on(probe.rig.set_skin(SkinCare::after(1.5, 0.25)));
+    for line in lines {
+        wire.borrow_mut().line = line;
+        wire.borrow_mut().gone = false;
+        while !wire.borrow().gone {
+            wire.borrow_mut().look();
+            thread::sleep(Duration::from_millis(1));
+            let request = wire.borrow_mut().requests.pop_front();
+            let Some(request) = request else {
+                probe.rig.servo.tick();
+                continue;
+            };
+            wire.borrow_mut().busy = true;
+            embassy_futures::block_on(probe.serve::<Plain>(&request));
+            let mut wire = wire.borrow_mut();
+            (wire.busy, wire.stopped) = (false, false);
+            // its finger really is in the air
+            assert!(probe.rig.servo.rig().world().truth().force_n == 0.0);
+        }
     }
-}
-
-fn obey(ask: Ask, rig: &mut Streamed<'_>, pushed: &mut Vec<u8>) -> Result<(), Box<wire::Text>> {
-    let wire = rig.wire;
-    let tell = |tell| wire.borrow_mut().tell(tell);
-    match ask {
-        Ask::Identify(wanted) => {
-            let bytes = wire.borrow().table.clone();
-            let table = Table::read(&bytes).map_err(text)?;
-            let plan = Plan::new();
-            let exploring = session::identify::<_, Plain>(&wanted, rig, table, &plan, tell);
-            embassy_futures::block_on(exploring)?;
-        }
-        Ask::ReadTable(from) => {
-            let table = wire.borrow().table.clone();
-            tell(Tell::TablePart {
-                offset: from,
-                length: table.len() as u32,
-                bytes: table[from as usize..].iter().copied().take(PART).collect(),
-            });
-        }
-        Ask::BeginTable(_) => pushed.clear(),
-        Ask::WriteTable { bytes, .. } => pushed.extend_from_slice(&bytes),
-        Ask::CommitTable => wire.borrow_mut().table = pushed.clone(),
-        Ask::FactoryTable => wire.borrow_mut().table = known().1.clone(),
-        Ask::WriteCalibration(bytes) => {
-            let bytes = bytes.as_slice().try_into().unwrap();
-            wire.borrow_mut().calibration = RigCalibration::from_bytes(bytes).map_err(text)?;
-        }
-        Ask::Calibrate => {
-            let mut calibration = wire.borrow().calibration;
-            calibration.unloaded_a.0 += 0.001;
-            wire.borrow_mut().calibration = calibration;
-            let bytes = calibration.to_bytes();
-            tell(Tell::Calibration(bytes.into_iter().collect()));
-        }
-        Ask::Answer(name) => tell(Tell::Taught {
-            name,
-            slides: 2,
-            itself: false,
-        }),
-        Ask::Rename { from, .. } if from == "cheese" => {
-            return Err(Box::new(text("there is no cheese")));
-        }
-        _ => {}
-    }
-    Ok(())
 }
 
 /// A probe on a TCP port of its own: where, and what it is asked.
@@ -311,18 +226,33 @@ fn probe(hurry: u64) -> (String, Told<Ask>) {
     // before anybody waits for it
     known();
     let (asked, told) = mpsc::channel();
-    let at = line(move |stream| {
-        let wait = Some(Duration::from_millis(1));
-        stream.set_read_timeout(wait).unwrap();
-        serve(Box::new(stream), hurry, asked.clone());
+    let (listener, at) = listen();
+    thread::spawn(move || {
+        let streams = listener.incoming().map(|stream| {
+            let stream = stream.unwrap();
+            let wait = Some(Duration::from_millis(1));
+            stream.set_read_timeout(wait).unwrap();
+            Box::new(stream) as Box<dyn Line>
+        });
+        serve(streams, hurry, asked);
     });
     (at, told)
 }
 
-/// Somebody on a TCP port of its own, one host after the other.
-fn line(answer: impl Fn(TcpStream) + Send + 'static) -> String {
+fn listen() -> (TcpListener, String) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let at = format!("tcp:{}", listener.local_addr().unwrap());
+    (listener, at)
+}
+
+/// One host, on this line.
+fn once(line: impl Line + 'static) -> [Box<dyn Line>; 1] {
+    [Box::new(line)]
+}
+
+/// Somebody on a TCP port of its own, one host after the other.
+fn line(answer: impl Fn(TcpStream) + Send + 'static) -> String {
+    let (listener, at) = listen();
     thread::spawn(move || {
         for stream in listener.incoming() {
             answer(stream.unwrap());
@@ -589,7 +519,7 @@ fn a_table_is_checked_pushed_and_pulled() {
 }
 
 #[test]
-fn teaching_and_calibrating_ask_for_what_was_meant() {
+fn teaching_and_calibrating_do_what_was_meant() {
     let (at, asked) = probe(1000);
     let name = |name: &str| Name::try_from(name).unwrap();
     let last = |arguments: &[&str], ask: Ask| {
@@ -597,19 +527,45 @@ fn teaching_and_calibrating_ask_for_what_was_meant() {
         assert!(asked.try_iter().any(|asked| asked == ask), "{ask:?}");
         said
     };
+    let refused = |arguments: &[&str]| complaint(&[arguments, &["--port", &at]].concat());
+    // of an exploration only
     assert_says(
-        &last(&["teach", "felt"], Ask::Answer(name("felt"))),
-        &["learned felt from 2 slides"],
+        &refused(&["teach", "velvet"]),
+        &["the probe refused", "explore first"],
     );
-    let rename = Ask::Rename {
-        from: name("a"),
-        to: name("b"),
+    let identify = [
+        "identify",
+        "--threshold",
+        "1",
+        "--max-slides",
+        "2",
+        "--seed",
+        "7",
+    ];
+    printed(&[&identify[..], &["--port", &at]].concat());
+    assert_says(
+        &last(&["teach", "velvet"], Ask::Answer(name("velvet"))),
+        &["learned velvet from 2 slides"],
+    );
+    let textures = |count: &str| {
+        let status = printed(&["status", "--port", &at]);
+        assert_says(&status, &[count]);
     };
-    last(&["rename", "a", "b"], rename);
-    last(
-        &["forget", "--name", "a"],
-        Ask::Forget(Forget::Texture(name("a"))),
+    textures("4 textures");
+    let rename = Ask::Rename {
+        from: name("velvet"),
+        to: name("felt"),
+    };
+    last(&["rename", "velvet", "felt"], rename);
+    assert_says(
+        &refused(&["forget", "--name", "velvet"]),
+        &["the probe refused: there is no texture velvet in the table"],
     );
+    last(
+        &["forget", "--name", "felt"],
+        Ask::Forget(Forget::Texture(name("felt"))),
+    );
+    textures("3 textures");
     last(
         &["forget", "--training", "a"],
         Ask::Forget(Forget::Training(name("a"))),
@@ -621,8 +577,8 @@ fn teaching_and_calibrating_ask_for_what_was_meant() {
     last(&["home"], Ask::Home);
     last(&["stop"], Ask::Stop);
     assert_says(
-        &complaint(&["rename", "cheese", "felt", "--port", &at]),
-        &["the probe refused: there is no cheese"],
+        &refused(&["rename", "cheese", "felt"]),
+        &["the probe refused: there is no texture cheese in the table"],
     );
     let long = "x".repeat(41);
     assert_says(&complaint(&["teach", &long, "--port", &at]), &["40 bytes"]);
@@ -768,7 +724,7 @@ fn a_slow_line_is_waited_for_and_one_that_vanishes_is_told() {
     let slow = line(|stream| {
         let wait = Some(Duration::from_millis(1));
         stream.set_read_timeout(wait).unwrap();
-        serve(Box::new(Slow(stream)), 1000, mpsc::channel().0);
+        serve(once(Slow(stream)), 1000, mpsc::channel().0);
     });
     assert_says(&printed(&["status", "--port", &slow]), &["3 textures"]);
 
@@ -783,7 +739,7 @@ fn a_slow_line_is_waited_for_and_one_that_vanishes_is_told() {
             thread::sleep(Duration::from_millis(100));
             let _ = cable.shutdown(std::net::Shutdown::Both);
         });
-        serve(Box::new(stream), 10, asked);
+        serve(once(stream), 10, asked);
     });
     let said = complaint(&["identify", "--port", &vanishing]);
     assert_says(&said, &["port", "The rig was moving", "emergency stop"]);
@@ -887,7 +843,7 @@ mod unix {
         holder.set_exclusive(false).unwrap();
         drop(holder);
         master.set_timeout(Duration::from_millis(1)).unwrap();
-        thread::spawn(move || serve(Box::new(master), 1000, mpsc::channel().0));
+        thread::spawn(move || serve(once(master), 1000, mpsc::channel().0));
         let status = printed(&["status", "--port", &name]);
         assert_says(&status, &[&name, "3 textures", "0 frames damaged"]);
     }

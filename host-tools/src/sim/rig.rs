@@ -10,6 +10,7 @@ use tactus_core::features::{PropertySet, Slide};
 use tactus_core::kernels::Kernels;
 use tactus_core::movement::Movement;
 use tactus_core::pressure::{Calibration, Channel, Pressure, RATE_HZ, SLOTS_HZ};
+use tactus_core::probe::RigState;
 use tactus_core::rig::calibration::{LineFit, RigCalibration, RigCalibrationError};
 use tactus_core::rig::control::{Control, Ended, Phase, Refused};
 use tactus_core::rig::guard::{Fault, Unguarded};
@@ -75,6 +76,8 @@ pub struct SimRig {
     down: bool,
     next_step_ns: u64,
     outputs: Outputs,
+    /// Motor current of the last tick, A.
+    current_a: f32,
     /// P_DC words of the last tick.
     pdc: Vec<u16>,
     performed: Vec<Performed>,
@@ -129,6 +132,7 @@ impl SimRig {
             down: true,
             next_step_ns: 0,
             outputs: Outputs::default(),
+            current_a: 0.0,
             pdc: Vec::new(),
             performed: Vec::new(),
         }
@@ -157,6 +161,11 @@ impl SimRig {
     /// The control at the other end.
     pub fn control(&mut self) -> &mut Control {
         &mut self.control
+    }
+
+    /// What the rig is doing, as a probe shows it; how the last movement ended is for the caller to remember.
+    pub fn state(&mut self, ended: Option<Ended>) -> RigState {
+        RigState::of(&mut self.control, self.steps, self.current_a, ended)
     }
 
     /// Virtual time since power-up.
@@ -220,6 +229,7 @@ impl SimRig {
             e_stop: self.world.e_stop(),
             hung: false,
         };
+        self.current_a = inputs.current_a;
         self.outputs = self.control.tick(&inputs);
         self.world.lever_enable(end, self.outputs.lever_enabled);
         self.world.stage_enable(end, self.outputs.stage_enabled);

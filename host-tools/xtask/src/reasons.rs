@@ -116,9 +116,10 @@ const REASONS: &[Reason] = &[
             "send_task",
             "receive_task",
             "watch_task",
-            "session_task",
-            "link::tell",
-            "session::tell_link",
+            "probe_task",
+            "outbox::tell",
+            "tasks::probe::Told",
+            "tasks::link::AtAnyTime",
         ],
         "what only thread mode may use is used by tasks of thread mode; bytes are copied between slices cut to one length, and \
          COBS compares a block's length with the frame's",
@@ -128,7 +129,7 @@ const REASONS: &[Reason] = &[
         callers: &[
             "explorer::posterior::Explorer<",
             "explorer::Explorer<",
-            "session::identify<",
+            "probe::identify::identify<",
         ],
         why: "gathers what a table has of movements, actions and textures, which is checked to fit when the table is read",
     },
@@ -150,8 +151,8 @@ mod tests {
 
     #[test]
     fn a_reason_is_for_its_callers_and_panics_only() {
-        let task = "<TaskStorage<tactus_firmware::link::__watch_task::{closure#0}>>::poll";
-        let work = "tactus_firmware::session::work::{closure#0}";
+        let task = "<TaskStorage<tactus_firmware::tasks::watch::__watch_task::{closure#0}>>::poll";
+        let work = "<tactus_core::probe::dispatch::Probe<R, F, B, E>>::perform::{closure#0}";
         let resumed = "core::panicking::panic_const::panic_const_async_fn_resumed";
         assert!(why(resumed, task).is_some_and(|why| why.contains("polled after its end")));
         assert!(why(resumed, work).is_some());

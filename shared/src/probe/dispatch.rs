@@ -5,14 +5,16 @@ use core::fmt;
 use core::pin::pin;
 
 use embedded_storage_async::nor_flash::NorFlash;
+use heapless::Vec;
 
 use super::memory::Memory;
 use super::seams::{Events, Panel, RigHandle, StoredBytes};
-use super::{calibrate, identify, status, teach, train, transfer};
+use super::{calibrate, identify, teach, train, transfer};
 use crate::dsp::Plan;
 use crate::kernels::Kernels;
+use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
-use crate::wire::{Ask, Request, Tell, Text, text};
+use crate::wire::{Ask, Request, Status, Tell, Text, text};
 
 /// When a request is dealt with.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -47,15 +49,42 @@ pub fn receive(request: &Request, busy: bool, panel: &mut impl Panel) -> Turn {
         }),
         Turn::Now => {
             match request.ask {
-                Ask::Status => panel.tell(Tell::Status(status::status(panel))),
+                Ask::Status => panel.tell(Tell::Status(status(panel))),
                 Ask::Stop => panel.stop(busy),
                 Ask::Stream(on) => panel.stream(on),
-                _ => panel.tell(status::calibration(&panel.rig().calibration)),
+                _ => panel.tell(told(&panel.rig().calibration)),
             }
             panel.tell(Tell::Done(id));
         }
     }
     turn
+}
+
+/// How the probe is.
+fn status(panel: &impl Panel) -> Status {
+    let (rig, table) = (panel.rig(), panel.table());
+    Status {
+        phase: rig.phase.into(),
+        fault: match rig.phase {
+            Phase::Faulted(fault) => Some(fault),
+            _ => None,
+        },
+        textures: table.textures,
+        table_bytes: table.bytes,
+        table_crc: table.crc,
+        factory: table.factory,
+        calibrated: rig.calibration.date,
+        counts: panel.counts(),
+        skin_mj: (
+            (rig.skin.energy_j() * 1e3) as u32,
+            (rig.skin.wear_j() * 1e3) as u32,
+        ),
+    }
+}
+
+/// These constants, as the host is told of them.
+fn told(calibration: &RigCalibration) -> Tell {
+    Tell::Calibration(Vec::from_slice(&calibration.to_bytes()).unwrap_or_default())
 }
 
 /// A probe: a rig and a memory, and who hears of them.
@@ -151,7 +180,7 @@ where
             Ask::Calibrate => {
                 memory.episode = None;
                 let calibration = calibrate::calibrate(rig).await?;
-                events.tell(status::calibration(&calibration));
+                events.tell(told(&calibration));
                 calibrate::keep(memory.store()?, &calibration).await
             }
             Ask::WriteCalibration(bytes) => {

@@ -1,13 +1,10 @@
 //! What a probe shows of itself: the state of its rig, the table in force, and what changes while it moves.
 
-use heapless::Vec;
-
-use super::seams::Panel;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::control::Control;
 use crate::rig::skin::SkinCare;
 use crate::rig::{Ended, Phase};
-use crate::wire::{Live, Status, Tell};
+use crate::wire::{Live, Tell};
 
 /// What the rig is doing, as of its last tick.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -97,33 +94,6 @@ impl TableInUse {
         crc: 0,
         factory: true,
     };
-}
-
-/// How the probe is.
-pub(super) fn status(panel: &impl Panel) -> Status {
-    let (rig, table) = (panel.rig(), panel.table());
-    Status {
-        phase: rig.phase.into(),
-        fault: match rig.phase {
-            Phase::Faulted(fault) => Some(fault),
-            _ => None,
-        },
-        textures: table.textures,
-        table_bytes: table.bytes,
-        table_crc: table.crc,
-        factory: table.factory,
-        calibrated: rig.calibration.date,
-        counts: panel.counts(),
-        skin_mj: (
-            (rig.skin.energy_j() * 1e3) as u32,
-            (rig.skin.wear_j() * 1e3) as u32,
-        ),
-    }
-}
-
-/// Tells of these constants.
-pub(super) fn calibration(calibration: &RigCalibration) -> Tell {
-    Tell::Calibration(Vec::from_slice(&calibration.to_bytes()).unwrap_or_default())
 }
 
 /// Tells of every phase and fault, and where the rig is while it moves.

@@ -1,11 +1,10 @@
 //! A flash in RAM, and what stores leave in one.
 
-use std::convert::Infallible;
 use std::sync::OnceLock;
 
 use embassy_futures::block_on;
-use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use tactus::learn::learn;
+use tactus::sim::flash::RamFlash;
 use tactus_core::explorer::Method;
 use tactus_core::features::Properties;
 use tactus_core::fused::{FeatureSet, Observation};
@@ -17,60 +16,8 @@ use tactus_core::store::Store;
 /// Bytes of a sector: a sixteenth of the chip's, so that they fill up.
 pub(crate) const SECTOR: usize = 1024;
 
-/// Four sectors.
-#[derive(Clone, Debug)]
-pub struct Flash {
-    /// What they hold.
-    pub bytes: Vec<u8>,
-}
-
-impl Flash {
-    /// Erased.
-    pub fn blank() -> Self {
-        let bytes = vec![0xFF; tactus_core::store::SECTORS * SECTOR];
-        Self { bytes }
-    }
-}
-
-impl ErrorType for Flash {
-    type Error = Infallible;
-}
-
-impl ReadNorFlash for Flash {
-    const READ_SIZE: usize = 4;
-
-    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Infallible> {
-        let at = offset as usize;
-        assert!(at.is_multiple_of(4) && bytes.len().is_multiple_of(4));
-        bytes.copy_from_slice(&self.bytes[at..at + bytes.len()]);
-        Ok(())
-    }
-
-    fn capacity(&self) -> usize {
-        self.bytes.len()
-    }
-}
-
-impl NorFlash for Flash {
-    const WRITE_SIZE: usize = 4;
-    const ERASE_SIZE: usize = SECTOR;
-
-    async fn erase(&mut self, from: u32, to: u32) -> Result<(), Infallible> {
-        let (from, to) = (from as usize, to as usize);
-        assert!(from.is_multiple_of(SECTOR) && to.is_multiple_of(SECTOR));
-        self.bytes[from..to].fill(0xFF);
-        Ok(())
-    }
-
-    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Infallible> {
-        let at = offset as usize;
-        assert!(at.is_multiple_of(4) && bytes.len().is_multiple_of(4));
-        // bits are only cleared
-        let there = &mut self.bytes[at..at + bytes.len()];
-        there.iter_mut().zip(bytes).for_each(|(cell, b)| *cell &= b);
-        Ok(())
-    }
-}
+/// Four such sectors.
+pub type Flash = RamFlash<SECTOR>;
 
 pub(crate) fn calibration() -> RigCalibration {
     RigCalibration {

@@ -1,0 +1,79 @@
+//! A flash in RAM, for probes and stores on a PC.
+
+use std::convert::Infallible;
+
+use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use tactus_core::store::SECTORS;
+
+/// Bytes of a sector of the chip's store.
+pub const SECTOR: usize = 16 * 1024;
+
+/// The sectors of a store, of `S` bytes each. They obey the rules: words are read and written whole, sectors are erased
+/// whole, and writing only clears bits.
+#[derive(Clone, Debug)]
+pub struct RamFlash<const S: usize = SECTOR> {
+    /// What they hold.
+    pub bytes: Vec<u8>,
+    /// Sectors that were erased so far.
+    pub erases: u32,
+}
+
+impl<const S: usize> RamFlash<S> {
+    /// Erased.
+    pub fn blank() -> Self {
+        Self::of(vec![0xFF; SECTORS * S])
+    }
+
+    /// Flash that holds these bytes.
+    pub fn of(bytes: Vec<u8>) -> Self {
+        Self { bytes, erases: 0 }
+    }
+
+    fn words(&mut self, offset: u32, length: usize) -> &mut [u8] {
+        let at = offset as usize;
+        assert!(
+            at.is_multiple_of(4) && length.is_multiple_of(4),
+            "flash is read and written in words: {length} bytes at {at}"
+        );
+        &mut self.bytes[at..at + length]
+    }
+}
+
+impl<const S: usize> ErrorType for RamFlash<S> {
+    type Error = Infallible;
+}
+
+impl<const S: usize> ReadNorFlash for RamFlash<S> {
+    const READ_SIZE: usize = 4;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Infallible> {
+        bytes.copy_from_slice(self.words(offset, bytes.len()));
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.bytes.len()
+    }
+}
+
+impl<const S: usize> NorFlash for RamFlash<S> {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = S;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), Infallible> {
+        let (from, to) = (from as usize, to as usize);
+        assert!(
+            from.is_multiple_of(S) && to.is_multiple_of(S),
+            "flash is erased in sectors of {S} bytes: {from} to {to}"
+        );
+        self.bytes[from..to].fill(0xFF);
+        self.erases += ((to - from) / S) as u32;
+        Ok(())
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Infallible> {
+        let there = self.words(offset, bytes.len());
+        there.iter_mut().zip(bytes).for_each(|(cell, b)| *cell &= b);
+        Ok(())
+    }
+}

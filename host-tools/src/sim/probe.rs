@@ -1,0 +1,206 @@
+//! A whole probe in software: the simulated rig and a store in RAM under the core's own [`Probe`], in virtual time.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::convert::Infallible;
+use std::time::Duration;
+
+use embassy_futures::block_on;
+use tactus_core::features::Plan;
+use tactus_core::probe::seams::{Events, StoredBytes};
+use tactus_core::probe::servo_rig::{LOOK_MS, RigCommand, Samples, Servo, ServoRig};
+use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
+use tactus_core::rig::{Ended, Refused};
+use tactus_core::store::{Store, StoreError};
+use tactus_core::wire::{Tell, Text};
+
+use super::flash::RamFlash;
+use super::rig::SimRig;
+
+/// Who is at the other end of a simulated probe.
+pub trait Host {
+    /// The probe says this.
+    fn tell(&mut self, event: Tell);
+
+    /// This table is in force now.
+    fn table(&mut self, _table: TableInUse) {}
+
+    /// It is `now` by the rig's clock, and this is its state: heard a thousand times a second.
+    fn tick(&mut self, _now: Duration, _rig: &RigState) {}
+
+    /// Whether the rig is to be stopped in this millisecond.
+    fn stops(&mut self) -> bool {
+        false
+    }
+
+    /// Whether nothing further of the request is to begin.
+    fn is_stopped(&self) -> bool {
+        false
+    }
+
+    /// Whether raw samples are wanted.
+    fn streams(&self) -> bool {
+        false
+    }
+}
+
+/// The servo of a simulated rig: virtual time passes while somebody waits for it.
+pub struct SimServo<'p, H> {
+    rig: SimRig,
+    host: &'p RefCell<H>,
+    ended: Option<Ended>,
+    state: RigState,
+    samples: VecDeque<Samples>,
+}
+
+impl<'p, H: Host> SimServo<'p, H> {
+    fn new(mut rig: SimRig, host: &'p RefCell<H>) -> Self {
+        Self {
+            state: rig.state(None),
+            rig,
+            host,
+            ended: None,
+            samples: VecDeque::new(),
+        }
+    }
+
+    /// The rig: its world, its clock.
+    pub fn rig(&mut self) -> &mut SimRig {
+        &mut self.rig
+    }
+
+    /// A millisecond passes.
+    pub fn tick(&mut self) {
+        if self.host.borrow_mut().stops() {
+            self.rig.control().stop();
+        }
+        let samples = &mut self.samples;
+        Samples::of(self.rig.tick(), |part| samples.push_back(part));
+        if let Some(ended) = self.rig.control().take_ended() {
+            self.ended = Some(ended);
+        }
+        self.state = self.rig.state(self.ended);
+        self.host.borrow_mut().tick(self.rig.now(), &self.state);
+    }
+}
+
+impl<H: Host> Servo for SimServo<'_, H> {
+    async fn command(&mut self, command: RigCommand) -> Result<(), Refused> {
+        self.ended = None;
+        let answer = command.apply(self.rig.control());
+        self.tick();
+        answer
+    }
+
+    async fn wait(&mut self) {
+        let before = self.ended;
+        for _ in 0..LOOK_MS {
+            self.tick();
+            if self.ended != before {
+                return;
+            }
+        }
+    }
+
+    fn state(&self) -> RigState {
+        self.state
+    }
+
+    fn samples(&mut self) -> Option<Samples> {
+        self.samples.pop_front()
+    }
+
+    fn lost(&self) -> u32 {
+        0
+    }
+
+    fn stop(&mut self) {
+        self.rig.control().stop();
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.host.borrow().is_stopped()
+    }
+
+    fn streams(&self) -> bool {
+        self.host.borrow().streams()
+    }
+
+    fn tell(&mut self, event: Tell) {
+        self.host.borrow_mut().tell(event);
+    }
+}
+
+/// The stored table, copied out of the flash.
+#[derive(Debug, Default)]
+pub struct TableCopy(Vec<u8>);
+
+impl<const S: usize> StoredBytes<RamFlash<S>> for TableCopy {
+    async fn bytes(&mut self, store: &mut Store<RamFlash<S>>) -> Option<&[u8]> {
+        self.0.resize(Store::<RamFlash<S>>::MAX_TABLE, 0);
+        let table = store.read_table(&mut self.0).await.ok()??;
+        Some(table.as_bytes())
+    }
+}
+
+/// Tells the host.
+pub struct Told<'p, H>(&'p RefCell<H>);
+
+impl<H: Host> Events for Told<'_, H> {
+    fn tell(&mut self, event: Tell) {
+        self.0.borrow_mut().tell(event);
+    }
+
+    fn table(&mut self, table: TableInUse) {
+        self.0.borrow_mut().table(table);
+    }
+
+    fn trouble(&mut self, what: Text) {
+        eprintln!("the simulated probe: {what}");
+    }
+}
+
+/// A simulated probe.
+pub type SimProbe<'p, H> = Probe<'p, ServoRig<SimServo<'p, H>>, RamFlash, TableCopy, Told<'p, H>>;
+
+/// Switches a probe on: `rig` has found its switches, `flash` is as an earlier life left it, `factory` is the table that
+/// comes with the firmware. `buffer` takes the longest table.
+///
+/// # Errors
+/// The flash has no room for a store, or its settings cannot be read.
+pub fn switch_on<'p, H: Host>(
+    rig: SimRig,
+    flash: RamFlash,
+    factory: &'p [u8],
+    buffer: &'p mut [u8],
+    plan: &'p Plan,
+    host: &'p RefCell<H>,
+) -> Result<SimProbe<'p, H>, StoreError<Infallible>> {
+    let mut rig = ServoRig::new(SimServo::new(rig, host));
+    let mut store = block_on(Store::open(flash))?;
+    block_on(probe::restore(&mut store, &mut rig))?;
+    let mut probe = Probe {
+        rig,
+        memory: Memory::new(Some(store), TableCopy::default(), factory, buffer),
+        events: Told(host),
+        plan,
+    };
+    block_on(probe.memory.reload(&mut probe.events));
+    Ok(probe)
+}
+
+/// Takes the power from a probe for a moment: only what its flash holds is left. Its rig stays as it is.
+///
+/// # Errors
+/// See [`switch_on`].
+pub fn switch_off_and_on<H: Host>(
+    probe: SimProbe<'_, H>,
+) -> Result<SimProbe<'_, H>, StoreError<Infallible>> {
+    let Probe {
+        rig, memory, plan, ..
+    } = probe;
+    let (store, factory, buffer) = memory.close();
+    let flash = store.map_or_else(RamFlash::blank, Store::close);
+    let SimServo { rig, host, .. } = rig.servo;
+    switch_on(rig, flash, factory, buffer, plan, host)
+}
