@@ -127,7 +127,7 @@ impl Played<'_> {
             ..Options::default()
         };
         let board = Emulator::start(self.elf, setup, options)?;
-        let manner = self.scenario.hand.into();
+        let manner = self.scenario.hand;
         board
             .rig()
             .world()

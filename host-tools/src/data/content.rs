@@ -63,9 +63,9 @@ pub enum ContentError {
         /// Its number.
         trial: u32,
         /// Name of the texture.
-        texture: String,
+        texture: Box<str>,
         /// Name of the movement.
-        movement: String,
+        movement: Box<str>,
     },
 
     // recorded slides
@@ -130,9 +130,9 @@ pub enum ContentError {
         /// What was hashed.
         what: &'static str,
         /// Its hash.
-        found: String,
+        found: Box<str>,
         /// The manifest's.
-        expected: String,
+        expected: Box<str>,
     },
     /// The file does not unpack.
     #[error("no whole gzip stream ({0}); fetch it again")]

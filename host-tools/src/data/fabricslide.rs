@@ -117,7 +117,7 @@ impl FabricSet {
                             let felt = entry.measure(&meter, &raw, key.of(direction, repetition));
                             let felt = felt.map_err(|cause| FabricError::Slide {
                                 path: path.clone(),
-                                movement: key.to_string(),
+                                movement: key.to_string().into(),
                                 direction,
                                 repetition,
                                 cause,

@@ -47,7 +47,7 @@ pub enum PropertyError {
     #[error(
         "{}: texture {}, movement {}: {found} {set} trials, where texture {}, movement {} has {expected}; every movement of a \
          texture needs as many trials",
-        path.display(), at.0, at.1, like.0, like.1
+        path.display(), at[0], at[1], like[0], like[1]
     )]
     Unbalanced {
         /// The table.
@@ -55,11 +55,11 @@ pub enum PropertyError {
         /// `train` or `validate`.
         set: &'static str,
         /// Texture and movement.
-        at: (String, String),
+        at: Box<[String; 2]>,
         /// Trials that they have.
         found: usize,
         /// A texture and movement that have the right number.
-        like: (String, String),
+        like: Box<[String; 2]>,
         /// How many that is.
         expected: usize,
     },
@@ -106,8 +106,8 @@ impl PropertyTable {
                 let cause = ContentError::TrialTwice {
                     set,
                     trial,
-                    texture: textures[texture].clone(),
-                    movement: movements[movement].clone(),
+                    texture: textures[texture].as_str().into(),
+                    movement: movements[movement].as_str().into(),
                 };
                 return Err(row.error(Some("trial"), cause).into());
             }
@@ -146,10 +146,8 @@ impl PropertyTable {
         let count = |trials: &Trials, key| trials.get(&key).map_or(0, Vec::len);
         let unbalanced = |set, key: (usize, usize), found, like: (usize, usize), expected| {
             let name = |(texture, movement): (usize, usize)| {
-                (
-                    self.textures[texture].clone(),
-                    self.movements[movement].clone(),
-                )
+                let names = [&self.textures[texture], &self.movements[movement]];
+                Box::new(names.map(String::clone))
             };
             PropertyError::Unbalanced {
                 path: path.to_owned(),
@@ -160,25 +158,18 @@ impl PropertyTable {
                 expected,
             }
         };
-        // as many as the first pair has that was trained at all
-        let textures = 0..self.textures.len();
-        let like = train.keys().min().copied().unwrap_or_default();
-        let expected = count(train, like);
-        for key in textures.clone().flat_map(keys) {
-            let found = count(train, key);
-            if found != expected {
-                return Err(unbalanced("train", key, found, like, expected));
-            }
-        }
-        for texture in textures {
-            let Some(like) = keys(texture).find(|key| count(validate, *key) > 0) else {
-                continue;
-            };
-            let expected = count(validate, like);
-            for key in keys(texture) {
-                let found = count(validate, key);
-                if found != expected {
-                    return Err(unbalanced("validate", key, found, like, expected));
+        // as many as the first pair has that was trained at all; tested, as the texture's first that was
+        let trained = train.keys().min().copied();
+        for texture in 0..self.textures.len() {
+            let tested = keys(texture).find(|key| count(validate, *key) > 0);
+            for (set, trials, like) in [("train", train, trained), ("validate", validate, tested)] {
+                let Some(like) = like else { continue };
+                let expected = count(trials, like);
+                for key in keys(texture) {
+                    let found = count(trials, key);
+                    if found != expected {
+                        return Err(unbalanced(set, key, found, like, expected));
+                    }
                 }
             }
         }

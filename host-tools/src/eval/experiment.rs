@@ -114,6 +114,28 @@ pub struct Experiment {
 }
 
 impl Experiment {
+    /// Any of all textures is unknown, every slide has all properties, and the first slides are learned from.
+    fn of(
+        names: Vec<String>,
+        movements: Vec<Movement>,
+        pools: Vec<Vec<Pool>>,
+        train_slides: usize,
+        seed: u64,
+    ) -> Self {
+        Self {
+            unknowns: (0..names.len()).collect(),
+            names,
+            movements,
+            pools,
+            candidates: None,
+            train_slides,
+            drawn: false,
+            measured: PropertySet::ALL,
+            features: None,
+            seed,
+        }
+    }
+
     /// Recorded slides. Without a second folder the test slides come from the first.
     ///
     /// # Errors
@@ -200,16 +222,9 @@ impl Experiment {
             set.and(s.measurement.properties.measured())
         });
         Ok(Self {
-            unknowns: (0..names.len()).collect(),
-            names,
-            movements,
-            pools,
-            candidates: None,
-            train_slides,
             drawn: protocol != Protocol::Drift,
             measured,
-            features: None,
-            seed,
+            ..Self::of(names, movements, pools, train_slides, seed)
         })
     }
 
@@ -283,17 +298,10 @@ impl Experiment {
         };
         let pools = train.into_iter().zip(test);
         let pools = pools.map(|(train, test)| train.into_iter().zip(test).map(pool).collect());
+        let pools = pools.collect();
         Ok(Self {
-            names,
-            movements,
-            pools: pools.collect(),
             unknowns,
-            candidates: None,
-            train_slides,
-            drawn: false,
-            measured: PropertySet::ALL,
-            features: None,
-            seed,
+            ..Self::of(names, movements, pools, train_slides, seed)
         })
     }
 

@@ -269,18 +269,7 @@ impl<'t> Follower<'t> {
             });
         }
         *next = next.wrapping_add(1);
-        if block.lost > 0 {
-            slide.lose(block.lost);
-        }
-        if block.still {
-            slide.push_still(&block.pac);
-            return Ok(());
-        }
-        if let Some((from, to)) = block.steady {
-            slide.start(from..to);
-        }
-        slide.push(&block.pac);
-        slide.push_shear(&block.shear_mn);
+        slide.take(block);
         Ok(())
     }
 

@@ -5,6 +5,8 @@
 
 use std::f64::consts::TAU;
 
+use serde::{Deserialize, Serialize};
+
 use super::conditions::TICK_S;
 use super::noise::Noise;
 use super::surface::LENGTH_MM;
@@ -33,7 +35,8 @@ const TREMOR_WIDTH: f64 = 0.4;
 const BEGINS_MM: (f64, f64) = (4.0, 16.0);
 
 /// How well a hand is kept.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Manner {
     /// Tremor, relative to the force: rms.
     pub tremor: f64,

@@ -44,40 +44,13 @@ pub struct Scenario {
     pub seed: u64,
     /// How the hand is kept; as a careful adult's unless said.
     #[serde(default)]
-    pub hand: Kept,
+    pub hand: Manner,
     /// What is done and seen, one after the other.
     pub step: Vec<Step>,
 }
 
 fn one() -> u64 {
     1
-}
-
-/// See [`Manner`].
-#[derive(Clone, Copy, PartialEq, Debug, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Kept {
-    /// Relative to the force, rms.
-    pub tremor: f64,
-    /// Relative to the force, rms.
-    pub wander: f64,
-    /// Relative to the pace, rms.
-    pub uneven: f64,
-}
-
-impl Default for Kept {
-    fn default() -> Self {
-        let Manner {
-            tremor,
-            wander,
-            uneven,
-        } = Manner::default();
-        Self {
-            tremor,
-            wander,
-            uneven,
-        }
-    }
 }
 
 /// One thing that is done or must be seen.
@@ -291,7 +264,7 @@ impl Scenario {
         if self.step.len() > MAX_STEPS {
             return Err(InvalidScenario::Steps(self.step.len()));
         }
-        let Kept {
+        let Manner {
             tremor,
             wander,
             uneven,
@@ -323,21 +296,6 @@ impl Scenario {
             trials: 1,
         };
         collection.setup(texture, 100 * self.seed + starts)
-    }
-}
-
-impl From<Kept> for Manner {
-    fn from(kept: Kept) -> Self {
-        let Kept {
-            tremor,
-            wander,
-            uneven,
-        } = kept;
-        Self {
-            tremor,
-            wander,
-            uneven,
-        }
     }
 }
 

@@ -30,7 +30,7 @@ pub fn scenario(data: &[u8]) {
     let number = texture(&scenario.texture).expect("a texture that was checked");
     let starts = scenario.step.iter().filter(|s| **s == Step::PowerCycle);
     let last = scenario.setup(number, starts.count() as u64);
-    let mut person = Person::new(last, scenario.hand.into());
+    let mut person = Person::new(last, scenario.hand);
     let intentions = scenario.step.iter().filter_map(|step| match *step {
         Step::Hand { force_n, pace_mm_s }
         | Step::Slide {

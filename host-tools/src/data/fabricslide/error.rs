@@ -37,7 +37,7 @@ pub enum FabricError {
         /// The file of samples.
         path: PathBuf,
         /// Set-point and speed.
-        movement: String,
+        movement: Box<str>,
         /// As in the manifest.
         direction: i8,
         /// As in the manifest.

@@ -193,7 +193,7 @@ pub(crate) fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
 }
 
 /// SHA-256 in lower-case hexadecimal.
-pub(crate) fn sha256(bytes: &[u8]) -> String {
+pub fn sha256(bytes: &[u8]) -> String {
     let mut hex = String::new();
     for byte in Sha256::digest(bytes) {
         let _ = write!(hex, "{byte:02x}");
@@ -216,8 +216,8 @@ pub(super) fn check_hash(
         path: path.to_owned(),
         cause: ContentError::Hash {
             what,
-            found,
-            expected: expected.to_owned(),
+            found: found.into(),
+            expected: expected.into(),
         },
     })
 }

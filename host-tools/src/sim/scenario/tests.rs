@@ -14,7 +14,7 @@ fn what_is_read_is_what_is_written() {
     )
     .unwrap();
     assert_eq!((scenario.world, scenario.seed), (1, 1));
-    assert_eq!(Manner::from(scenario.hand), Manner::default());
+    assert_eq!(scenario.hand, Manner::default());
     // 8 s until it is seen, 8 s until a slide is wanted, and the slide
     assert!((scenario.longest_s() - (8.0 + 8.0 + 0.3 + 1.8 + 0.15 + 0.5)).abs() < 1e-9);
     let again = Scenario::parse(&serde_json::to_vec(&scenario).unwrap()).unwrap();
