@@ -3,30 +3,29 @@
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
-use std::fs;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
 use std::sync::mpsc::{self, Receiver as Told, Sender};
-use std::thread;
 use std::time::{Duration, Instant};
+use std::{fs, thread};
 
-use tactus::collection::{Collection, calibrated};
+use tactus::sim::collection::{Collection, calibrated};
 use tactus::sim::flash::{RamFlash, SECTOR};
 use tactus::sim::probe::{self, Host};
 use tactus::sim::rig::SimRig;
+use tactus_core::dsp::{Plain, Plan};
 use tactus_core::explorer::Method;
-use tactus_core::features::Plan;
-use tactus_core::kernels::Plain;
-use tactus_core::movement::Movement;
+use tactus_core::features::Movement;
 use tactus_core::probe::seams::{Panel, RigHandle as _};
 use tactus_core::probe::{RigState, TableInUse, Turn, Watch, receive};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::skin::SkinCare;
+use tactus_core::table::Name;
 use tactus_core::wire::{
-    self, Ask, Counts, Forget, MAX_FRAME, Name, PROTOCOL, Phase, Receiver, Report, Request, Reset,
+    self, Ask, Counts, Forget, MAX_FRAME, PROTOCOL, Phase, Receiver, Report, Request, Reset,
     Status, Tell,
 };
 
@@ -483,9 +482,9 @@ fn a_table_is_checked_pushed_and_pulled() {
     let felt = [0.4f32, 0.6].map(|x| {
         let properties =
             tactus_core::features::Properties::new([Some(x), Some(3.0 + x), Some(5.0 + x)]);
-        tactus_core::fused::Observation::from(properties)
+        tactus_core::features::Observation::from(properties)
     });
-    let table = tactus::learn::learn(
+    let table = tactus::eval::learn::learn(
         Method::Paper,
         None,
         &["a".to_owned(), "b".to_owned()],

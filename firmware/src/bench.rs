@@ -2,15 +2,15 @@
 //! board counts one for each. No task, no interrupt: what is counted is the core's code as the rig's image has it.
 use core::cell::UnsafeCell;
 use core::ptr::{addr_of, addr_of_mut, read_volatile, write_volatile};
-use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::AtomicU32;
+use core::sync::atomic::Ordering::Relaxed;
 
 use cortex_m::peripheral::DWT;
 use static_cell::StaticCell;
-use tactus_core::features::Plan;
+use tactus_core::dsp::Plan;
 
 use crate::board;
-use crate::chip::Chip;
-use crate::chip::rescue;
+use crate::chip::{Chip, rescue};
 use crate::workload::{Counter, Workload, run};
 
 const WORDS: usize = 8192;

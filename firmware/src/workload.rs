@@ -4,20 +4,17 @@
 use core::hint::black_box;
 
 use heapless::Vec;
-use tactus_core::explorer::{Config, Explorer, Method};
-use tactus_core::features::{Plan, Properties, PropertySet, Slide};
-use tactus_core::fused::Observation;
-use tactus_core::kernels::Kernels;
-use tactus_core::spectrum::{FRAME, HOP, SpectrumSum};
+use tactus_core::dsp::{BandPower, FRAME, HOP, Plan, SpectrumSum};
+use tactus_core::explorer::{Config, Explorer, Kernels, Method};
+use tactus_core::features::{Observation, Properties, Property, PropertySet, Slide};
 use tactus_core::table::{Action, Table};
-use tactus_core::{features::Property, fir::BandPower};
 
 /// Samples of P_AC in the 10 ms after which the rig's probe looks after them.
 const LOOK: usize = 22;
 /// Forces in them: one each tick of the servo's.
 const SHEARS: usize = 10;
 /// Room for textures: the firmware's own.
-const ROOM: usize = tactus_core::wire::MAX_TEXTURES;
+const ROOM: usize = tactus_core::table::MAX_TEXTURES;
 /// About as many as fit at all: a choice takes 64 bytes of stack for each, and posterior and distances 20.
 pub const MOST_ROOM: usize = 1500;
 

@@ -6,7 +6,6 @@ mod observation;
 mod property;
 mod slide;
 
-pub use crate::dsp::Plan;
 pub use block::{BLOCK, Block, Blocks, Felt};
 pub use movement::{Movement, MovementError};
 pub use observation::{

@@ -20,61 +20,9 @@ pub mod handheld;
 pub mod probe;
 pub mod rig;
 pub mod sensor;
-pub mod session;
 pub mod store;
 pub mod table;
 pub mod wire;
-
-/// Former path.
-pub mod teaching {
-    pub use crate::probe::teach::*;
-}
-
-/// Former path.
-pub mod training {
-    pub use crate::probe::training::*;
-}
-
-pub use dsp::fixed;
-pub use sensor::{biotac, mcp3202, pressure};
-
-/// See [`dsp`].
-pub mod fir {
-    pub use crate::dsp::{BandPower, PAIRS, PASS_BAND_HZ, TAPS, Taps};
-}
-
-/// See [`dsp`].
-pub mod spectrum {
-    pub use crate::dsp::{
-        Angles, BIN_HZ, BINS, Complex32, FRAME, Folded, FrameSum, HOP, Spectrum, SpectrumSum,
-        angles,
-    };
-}
-
-/// See [`dsp`] and [`explorer::kernels`].
-pub mod kernels {
-    pub use crate::dsp::Plain;
-    pub use crate::explorer::kernels::{Candidate, EXP2, FAR, Live, ROUND, Spread, exp_neg};
-
-    /// What costs the time of a slide and of a decision.
-    pub trait Kernels: crate::dsp::Kernels + crate::explorer::Kernels {}
-
-    impl<K: crate::dsp::Kernels + crate::explorer::Kernels> Kernels for K {}
-}
-
-/// See [`features`] and [`rig::slide_path`].
-pub mod movement {
-    pub use crate::features::{Movement, MovementError};
-    pub use crate::rig::slide_path::SlidePath;
-}
-
-/// See [`features`] and [`table`].
-pub mod fused {
-    pub use crate::features::{
-        FEATURE_STEPS, FeatureSet, MAX_FEATURES, Observation, Vector, WHITE_STEPS, fixed,
-    };
-    pub use crate::table::{Scatter, WhitenError, Whitened, Whitening, white, whiten};
-}
 
 /// Adds as many of them as there is room for: `extend` would panic at more.
 fn fill<T, const N: usize>(room: &mut heapless::Vec<T, N>, items: impl Iterator<Item = T>) {

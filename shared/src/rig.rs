@@ -18,15 +18,11 @@ pub mod steps;
 pub mod timeout;
 pub mod unloaded;
 
+use crate::dsp::Kernels;
 use crate::features::{Movement, PropertySet, Slide};
-use crate::kernels::Kernels;
 
 pub use fault::{FAULTS, Fault};
 pub use phase::{Ended, Phase, Refused, RigError};
-
-// until all users have the new path
-pub use crate::probe::explore::{Event, ExploreError, Rejection, explore};
-pub use timeout as patience;
 
 /// Slides in a row without properties, after which an exploration ends.
 pub const MAX_REJECTED: u8 = 3;

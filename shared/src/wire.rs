@@ -10,8 +10,6 @@ mod frame;
 mod sparse;
 mod text;
 
-pub use crate::features::{BLOCK, Block};
-pub use crate::table::{MAX_TEXTURES, Name};
 pub use command::{Ask, Forget, Identify, PART, Request, Train};
 pub use event::{Counts, Felt, Live, MAX_OUTLOOK, Phase, Promise, Report, Reset, Status, Tell};
 pub use frame::{FrameError, MAX_FRAME, MAX_MESSAGE, PROTOCOL, Receiver, TooLong, decode, encode};

@@ -1,7 +1,8 @@
 //! Sensor words, alone in the highest executor: a slot every 227 us from TIM2, P_AC and P_DC in turn. The command goes out
 //! at the timer's update and the answer is read at its compare, so that the sensor's 50 us are not waited for.
 use core::future::poll_fn;
-use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::Ordering::Relaxed;
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32};
 use core::task::Poll;
 
 use embassy_executor::InterruptExecutor;
@@ -14,9 +15,9 @@ use embassy_stm32::timer::low_level::Timer as SlotTimer;
 use embassy_sync::waitqueue::AtomicWaker;
 use embassy_time::Timer;
 use heapless::spsc::Producer;
-use tactus_core::biotac::{BioTac, WordStats};
-use tactus_core::pressure::{Channel, Pressure};
 use tactus_core::sensor::PressureSensor as _;
+use tactus_core::sensor::biotac::{BioTac, WordStats};
+use tactus_core::sensor::pressure::{Channel, Pressure};
 
 use crate::board;
 

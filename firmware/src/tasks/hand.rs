@@ -1,5 +1,6 @@
 //! The handheld in a hand: states, button, buzzer and table; and how long the core sleeps between them.
-use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::AtomicU32;
+use core::sync::atomic::Ordering::Relaxed;
 
 use embassy_stm32::gpio::{Input, OutputType, Pull};
 use embassy_stm32::peripherals;
@@ -9,10 +10,9 @@ use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
 use embassy_time::{Duration, Instant, Ticker, Timer, with_timeout};
 use heapless::spsc::Consumer;
 use static_cell::{ConstStaticCell, StaticCell};
-use tactus_core::features::Plan;
+use tactus_core::dsp::{Plain, Plan};
 use tactus_core::handheld::jobs::{Outcome, work};
 use tactus_core::handheld::{About, Handheld, Picture, Screen, TICKS_HZ, draw};
-use tactus_core::kernels::Plain;
 use tactus_core::probe::seams::Events;
 use tactus_core::probe::{Memory, TableInUse};
 use tactus_core::wire::{Tell, Text, text};

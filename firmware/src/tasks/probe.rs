@@ -4,7 +4,7 @@ use core::sync::atomic::Ordering::Relaxed;
 use embassy_time::{Duration, Timer, with_timeout};
 use heapless::spsc::Consumer;
 use static_cell::{ConstStaticCell, StaticCell};
-use tactus_core::features::Plan;
+use tactus_core::dsp::Plan;
 use tactus_core::probe::seams::{Events, RigHandle as _};
 use tactus_core::probe::servo_rig::{Samples, ServoRig};
 use tactus_core::probe::{self, Memory, Probe, TableInUse};

@@ -1,7 +1,8 @@
 //! A thousand times a second: the pins into [`Control`], what it says to the pins, and the samples of the slide on their
 //! way to the features. Lever, stage and guard live in the core; here is only where their pins are.
 use core::cell::Cell;
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::Ordering::Relaxed;
+use core::sync::atomic::{AtomicBool, AtomicU32};
 
 use embassy_stm32::Peri;
 use embassy_stm32::adc::{Adc, SampleTime};
@@ -16,14 +17,15 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Ticker};
 use heapless::spsc::{Consumer, Producer};
-use tactus_core::pressure::Calibration;
 use tactus_core::probe::RigState;
 use tactus_core::probe::servo_rig::{RigCommand, Samples};
+use tactus_core::rig::Refused;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::rig::control::{Control, Refused};
+use tactus_core::rig::control::Control;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::pins::{Inputs, MAX_WORDS};
 use tactus_core::rig::stage::StageConstants;
+use tactus_core::sensor::pressure::Calibration;
 
 use super::acquire::Word;
 use crate::board;

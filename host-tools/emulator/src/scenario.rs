@@ -1,12 +1,12 @@
-//! Plays scenarios for the handheld probe, those in `scenarios/` and others: see [`tactus::scenario`].
+//! Plays scenarios for the handheld probe, those in `scenarios/` and others: see [`tactus::sim::scenario`].
 //!
 //! The person sees the display and nothing else, as it is decoded from the bytes on the wire.
 
 use std::path::Path;
 
-use tactus::scenario::{InvalidScenario, PATIENCE_S, Scenario, Step, texture};
 use tactus::sim::faults::Fault;
-use tactus::sim::hand::Hand;
+use tactus::sim::person::Hand;
+use tactus::sim::scenario::{InvalidScenario, PATIENCE_S, Scenario, Step, texture};
 use tactus::sim::world::NotLifted;
 
 use crate::board::{Display, Emulator, Error, Options, Output};

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use tactus::evaluate::Method;
+use tactus::eval::evaluate::Method;
 use tactus_core::explorer::Config;
-use tactus_core::fused::FeatureSet;
+use tactus_core::features::FeatureSet;
 
 #[derive(Args)]
 pub(crate) struct Recordings {

@@ -5,8 +5,8 @@ use std::io::{self, Write};
 use anyhow::ensure;
 use clap::ValueEnum as _;
 use serde::Serialize;
-use tactus::evaluate::{Method, Summary, evaluate};
-use tactus::experiment::Protocol;
+use tactus::eval::evaluate::{Method, Summary, evaluate};
+use tactus::eval::experiment::Protocol;
 use tactus_core::explorer;
 
 use super::output::{Format, print_json};

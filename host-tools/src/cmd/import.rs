@@ -21,7 +21,7 @@ pub(crate) struct Args {
 /// Imports a folder into another.
 pub(crate) fn run(Args { from, to }: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let bar = progress(0, "importing slides");
-    let imported = tactus::import::import(from, to, &mut |done, all| {
+    let imported = tactus::data::import::import(from, to, &mut |done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
     })?;

@@ -4,12 +4,11 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::ensure;
-use tactus::collection::texture_name;
-use tactus::evaluate::Method;
-use tactus::recordings::RecordingSet;
-use tactus::replay::Felt;
-use tactus_core::fused::{FeatureSet, Observation};
-use tactus_core::movement::Movement;
+use tactus::data::recordings::RecordingSet;
+use tactus::data::replay::Felt;
+use tactus::eval::evaluate::Method;
+use tactus::sim::collection::texture_name;
+use tactus_core::features::{FeatureSet, Movement, Observation};
 
 use super::args::{Features, Recordings};
 use super::table_file::write_table;
@@ -80,7 +79,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
 /// Learns a handheld probe's table.
 pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()> {
     let collection = collection(&args.textures, args.trials, args.seed)?;
-    let (bytes, left_out) = tactus::handheld::learn(&collection)?;
+    let (bytes, left_out) = tactus::sim::handheld::learn(&collection)?;
     write_table(&args.out, &bytes)?;
     writeln!(
         out,
@@ -140,7 +139,7 @@ pub(crate) fn learn_first(
     });
     let first: Vec<Vec<Vec<Observation>>> = first.collect::<anyhow::Result<_>>()?;
     let method = method.method();
-    Ok(tactus::learn::learn(
+    Ok(tactus::eval::learn::learn(
         method,
         features,
         &names(set),

@@ -3,8 +3,9 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use tactus::collection::{Collection, calibrated, texture_name};
-use tactus::recordings::{RecordingWriter, Slide, Texture};
+use tactus::data::recording::{Slide, Texture};
+use tactus::data::recordings::RecordingWriter;
+use tactus::sim::collection::{Collection, calibrated, texture_name};
 
 use super::progress::with_progress;
 use super::textures::collection;

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Subcommand;
-use tactus::show::show_table;
+use tactus::eval::show::show_table;
 
 use super::table_file::read_table;
 

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use anyhow::Context as _;
-use tactus::collection::{Collection, texture_number};
-use tactus::recordings::RecordingSet;
-use tactus::replay::{Felt, feel};
+use tactus::data::recordings::RecordingSet;
+use tactus::data::replay::{Felt, feel};
+use tactus::sim::collection::{Collection, texture_number};
 use tactus::sim::textures::TEXTURES;
 
 use super::progress::with_progress;

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use tactus_core::movement::MovementError;
+use tactus_core::features::MovementError;
 
 use crate::data::recording::{MAX_SAMPLES, PAC_RATE_HZ};
 

@@ -38,7 +38,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use rayon::prelude::*;
-use tactus_core::movement::Movement;
+use tactus_core::features::Movement;
 
 use crate::data::content::ContentError;
 use crate::data::recordings::files;

@@ -24,7 +24,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use tactus_core::movement::Movement;
+use tactus_core::features::Movement;
 
 use crate::data::content::ContentError;
 use crate::data::recording::{Background, Slide, Texture};

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use tactus_core::movement::Movement;
+use tactus_core::features::Movement;
 
 use crate::data::content::ContentError;
 

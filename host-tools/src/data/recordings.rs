@@ -13,7 +13,7 @@ pub mod own;
 
 use std::path::{Path, PathBuf};
 
-use tactus_core::movement::Movement;
+use tactus_core::features::Movement;
 
 use crate::data::recording::{Slide, SlideKey, Texture};
 pub use files::{RecordingError, Result};

@@ -3,9 +3,8 @@
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tactus_core::features::{self, Measurement, Plan, Property, PropertySet, SlideError};
-use tactus_core::kernels::{Kernels, Plain};
-use tactus_core::movement::Movement;
+use tactus_core::dsp::{Kernels, Plain, Plan};
+use tactus_core::features::{self, Measurement, Movement, Property, PropertySet, SlideError};
 use tactus_core::rig::Rig;
 
 use crate::data::recording::{Background, PAC_RATE_HZ, Slide, Texture};

@@ -9,9 +9,7 @@ use rand::seq::SliceRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus_core::explorer::Method;
-use tactus_core::features::{Properties, PropertySet};
-use tactus_core::fused::{FeatureSet, Observation};
-use tactus_core::movement::Movement;
+use tactus_core::features::{FeatureSet, Movement, Observation, Properties, PropertySet};
 use tactus_core::table;
 
 #[cfg(feature = "fabrics")]
@@ -319,7 +317,7 @@ impl Experiment {
             bands: s
                 .ln_bands
                 .into_iter()
-                .filter_map(tactus_core::fused::fixed)
+                .filter_map(tactus_core::features::fixed)
                 .collect(),
             pressure: None,
         };

@@ -1,10 +1,10 @@
 //! Texture tables learned from slides, for every way of deciding.
 
 use tactus_core::explorer::Method;
-use tactus_core::features::PropertySet;
-use tactus_core::fused::{FeatureSet, Observation, Scatter, Vector, WhitenError, Whitened, whiten};
-use tactus_core::movement::Movement;
-use tactus_core::table::{self, Contents, EncodeError, Experience};
+use tactus_core::features::{FeatureSet, Movement, Observation, PropertySet, Vector};
+use tactus_core::table::{
+    self, Contents, EncodeError, Experience, Scatter, WhitenError, Whitened, whiten,
+};
 
 /// Why slides do not make a table.
 #[derive(Debug, thiserror::Error)]

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::Config;
-use tactus_core::fused::Observation;
+use tactus_core::features::Observation;
 use tactus_core::table::{Action, Contents, EncodeError, Table, retell};
 
 use crate::eval::evaluate::{EvaluateError, explorer};

@@ -4,9 +4,8 @@ use std::io::{self, Write};
 
 use tactus_core::explorer::{Outlook, Verdict};
 use tactus_core::features::{Properties, Property};
-use tactus_core::fused::white;
-use tactus_core::rig::Event;
-use tactus_core::table::{Action, Contents, Table};
+use tactus_core::probe::explore::Event;
+use tactus_core::table::{Action, Contents, Table, white};
 use tactus_core::wire::Tell;
 
 const BAR: usize = 24;

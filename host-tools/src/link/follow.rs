@@ -1,12 +1,12 @@
 //! The PC follows the probe: from the reports of one exploration with streaming on, it computes everything anew with the
 //! same core, and compares.
 
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer, ExplorerError, Method};
-use tactus_core::features::{Plan, PropertySet, Slide, SlideError};
-use tactus_core::fused::FEATURE_STEPS;
-use tactus_core::session::Random;
-use tactus_core::table::{Action, Contents, Table};
-use tactus_core::wire::{Block, Felt, Identify, MAX_OUTLOOK, MAX_TEXTURES, Promise, Tell};
+use tactus_core::features::{Block, FEATURE_STEPS, PropertySet, Slide, SlideError};
+use tactus_core::probe::explore::Random;
+use tactus_core::table::{Action, Contents, MAX_TEXTURES, Table};
+use tactus_core::wire::{Felt, Identify, MAX_OUTLOOK, Promise, Tell};
 
 /// Chip and PC do the same operations in the same order and agree to the bit; more than this apart they do not agree.
 pub const ALLOWED: f32 = 1e-4;

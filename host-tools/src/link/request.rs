@@ -1,7 +1,8 @@
 //! Single requests, and which reports answer them.
 
 use tactus_core::rig::calibration::{RigCalibration, RigCalibrationError};
-use tactus_core::wire::{Ask, Forget, Identify, Name, Status, Tell, Train};
+use tactus_core::table::Name;
+use tactus_core::wire::{Ask, Forget, Identify, Status, Tell, Train};
 
 use super::session::LinkError;
 use super::transaction::Errand;

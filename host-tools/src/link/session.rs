@@ -1,10 +1,9 @@
 //! Requests become frames here, and received bytes reports; and why nothing came of a request.
 
 use tactus_core::rig::calibration::RigCalibrationError;
-use tactus_core::table::TableError;
+use tactus_core::table::{MAX_TEXTURES, TableError};
 use tactus_core::wire::{
-    self, Ask, FrameError, MAX_FRAME, MAX_TEXTURES, PROTOCOL, Receiver, Report, Request, Reset,
-    Tell, TooLong,
+    self, Ask, FrameError, MAX_FRAME, PROTOCOL, Receiver, Report, Request, Reset, Tell, TooLong,
 };
 
 /// A request that may be made twice is made so often before the line is given up.

@@ -1,7 +1,7 @@
 //! Texture tables on their way to the probe, and from it.
 
-use tactus_core::table::{Table, TableError};
-use tactus_core::wire::{Ask, MAX_TEXTURES, PART, Tell};
+use tactus_core::table::{MAX_TEXTURES, Table, TableError};
+use tactus_core::wire::{Ask, PART, Tell};
 
 use super::session::{LinkError, MAX_TRIES};
 use super::transaction::Errand;

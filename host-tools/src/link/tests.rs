@@ -4,19 +4,16 @@ use std::task::Poll;
 use std::time::Duration;
 
 use proptest::prelude::*;
-use tactus_core::explorer::Method;
-use tactus_core::explorer::Strategy as Choice;
-use tactus_core::features::Properties;
-use tactus_core::fused::Observation;
-use tactus_core::movement::Movement;
-use tactus_core::pressure::Calibration;
-use tactus_core::wire::{BLOCK, Block, Phase, Text};
+use tactus_core::explorer::{Method, Strategy as Choice};
+use tactus_core::features::{BLOCK, Block, Movement, Observation, Properties};
+use tactus_core::sensor::pressure::Calibration;
+use tactus_core::wire::{Phase, Text};
 
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::table::{Table, TableError};
+use tactus_core::table::{MAX_TEXTURES, Name, Table, TableError};
 use tactus_core::wire::{
-    self, Ask, Forget, Identify, MAX_FRAME, MAX_TEXTURES, Name, PART, PROTOCOL, Receiver, Report,
-    Request, Reset, Tell, Train,
+    self, Ask, Forget, Identify, MAX_FRAME, PART, PROTOCOL, Receiver, Report, Request, Reset, Tell,
+    Train,
 };
 
 use super::*;

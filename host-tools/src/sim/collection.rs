@@ -3,10 +3,9 @@
 use std::fmt;
 
 use rayon::prelude::*;
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
-use tactus_core::features::{Plan, SlideError};
-use tactus_core::fused::Observation;
-use tactus_core::movement::Movement;
+use tactus_core::features::{Movement, Observation, SlideError};
 use tactus_core::rig::calibration::RigCalibration;
 
 use crate::data::recording;

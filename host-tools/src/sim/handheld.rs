@@ -3,15 +3,15 @@
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tactus_core::biotac::BioTac;
+use tactus_core::dsp::{Plain, Plan};
 use tactus_core::explorer::Method;
-use tactus_core::features::Plan;
-use tactus_core::fused::Observation;
-use tactus_core::handheld::touch::{Again, Event, Touch};
+use tactus_core::features::Observation;
+use tactus_core::handheld::guidance::{Again, Event};
+use tactus_core::handheld::touch::Touch;
 use tactus_core::handheld::{FEATURES, MOVEMENT};
-use tactus_core::kernels::Plain;
-use tactus_core::pressure::{Channel, Pressure, SLOTS_HZ};
 use tactus_core::sensor::PressureSensor as _;
+use tactus_core::sensor::biotac::BioTac;
+use tactus_core::sensor::pressure::{Channel, Pressure, SLOTS_HZ};
 
 use crate::eval::learn::{self, TableError};
 use crate::sim::collection::{Collection, texture_name};

@@ -6,7 +6,7 @@ use std::convert::Infallible;
 use std::time::Duration;
 
 use embassy_futures::block_on;
-use tactus_core::features::Plan;
+use tactus_core::dsp::Plan;
 use tactus_core::probe::seams::{Events, StoredBytes};
 use tactus_core::probe::servo_rig::{LOOK_MS, RigCommand, Samples, Servo, ServoRig};
 use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};

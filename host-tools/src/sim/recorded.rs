@@ -4,10 +4,9 @@ use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
-use tactus_core::features::Plan;
-use tactus_core::fused::Observation;
-use tactus_core::movement::Movement;
+use tactus_core::features::{Movement, Observation};
 use tactus_core::rig::calibration::RigCalibration;
 
 use crate::data::recording::{PAC_RATE_HZ, Slide};

@@ -2,8 +2,7 @@
 
 use serde::Serialize;
 use tactus_core::explorer::{Config, Explorer, Method};
-use tactus_core::features::{Property, PropertySet};
-use tactus_core::movement::Movement;
+use tactus_core::features::{Movement, Property, PropertySet};
 use tactus_core::table::Table;
 
 use super::error::StudyError;

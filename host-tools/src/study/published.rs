@@ -1,7 +1,6 @@
 //! What Fishel & Loeb published (Front. Neurorobot. 6:4, 2012): every number that the study puts beside its own.
 
-use tactus_core::features::Property;
-use tactus_core::movement::Movement;
+use tactus_core::features::{Movement, Property};
 
 /// The ten textures of the pilot study (Table 2), by their numbers.
 pub const PILOT_TEXTURES: [u8; 10] = [2, 10, 30, 43, 45, 46, 47, 84, 87, 100];

@@ -2,14 +2,12 @@
 
 use rayon::prelude::*;
 use serde::Serialize;
-use tactus_core::biotac::BioTac;
-use tactus_core::features::Plan;
-use tactus_core::fir::{TAPS, Taps};
-use tactus_core::movement::Movement;
-use tactus_core::pressure::{Calibration, Channel, RATE_HZ};
+use tactus_core::dsp::{BIN_HZ, Plan, TAPS, Taps};
+use tactus_core::features::Movement;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::PressureSensor as _;
-use tactus_core::spectrum::BIN_HZ;
+use tactus_core::sensor::biotac::BioTac;
+use tactus_core::sensor::pressure::{Calibration, Channel, RATE_HZ};
 
 use super::error::StudyError;
 use super::slides::{Named, StudyWorld, properties};

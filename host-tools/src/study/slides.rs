@@ -7,19 +7,19 @@ use std::fmt;
 
 use rayon::prelude::*;
 use serde::Serialize;
-use tactus_core::features::{Plan, Property};
-use tactus_core::fused::Observation;
-use tactus_core::movement::{Movement, SlidePath};
+use tactus_core::dsp::Plan;
+use tactus_core::features::{Movement, Observation, Property};
+use tactus_core::rig::Fault;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::rig::guard::{Fault, Unguarded};
+use tactus_core::rig::guard::Unguarded;
+use tactus_core::rig::slide_path::SlidePath;
 
 use super::error::StudyError;
 use super::published::{IDENTIFIED, TRIALS};
-use crate::sim::Conditions;
 use crate::sim::collection::{Collection, Trial, calibrated, record_trials, texture_name};
 use crate::sim::finger::wear_per_mm;
 use crate::sim::rig::SimRig;
-use crate::sim::textures;
+use crate::sim::{Conditions, textures};
 
 /// Wear at which the ridges look worn: the skin is changed before the next texture (paper: at any visible sign). Chosen, so
 /// that the 1755 slides of the training take about the two changes that they took in the paper.

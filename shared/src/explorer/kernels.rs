@@ -185,7 +185,7 @@ pub(crate) fn distance(from: &[i16], mean: &[u8]) -> u64 {
 const MOST_OFF: i32 = (1 << 26) - 1;
 
 /// What costs the time of a decision.
-pub trait Kernels {
+pub trait Kernels: crate::dsp::Kernels {
     /// Makes logarithms 0.
     fn forget(logs: &mut [i32]);
 

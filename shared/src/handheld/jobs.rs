@@ -4,7 +4,7 @@ use embedded_storage_async::nor_flash::NorFlash;
 
 use super::judge::{Judgement, free_name, judge};
 use super::states::{Choice, Handheld, Job};
-use crate::kernels::Kernels;
+use crate::explorer::Kernels;
 use crate::probe::Memory;
 use crate::probe::seams::{Events, StoredBytes};
 use crate::table::Name;

@@ -4,12 +4,9 @@ use core::fmt;
 
 use heapless::Vec;
 
-use crate::explorer::Visited;
-use crate::explorer::{Config, Explorer, ExplorerError, Method, ObserveError};
+use crate::explorer::{Config, Explorer, ExplorerError, Kernels, Method, ObserveError, Visited};
 use crate::features::{FeatureSet, Movement, Observation, PropertySet};
-use crate::kernels::Kernels;
-use crate::table::{Action, Table};
-use crate::table::{MAX_TEXTURES, Name};
+use crate::table::{Action, MAX_TEXTURES, Name, Table};
 
 /// What a person is asked to do: half a newton, 25 mm/s.
 pub const MOVEMENT: Movement = Movement::FOR_FINENESS;

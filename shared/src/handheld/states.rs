@@ -9,11 +9,10 @@ use super::screen::{self, About, Row, Screen, Trouble};
 use super::spelling::{Spelling, Taken};
 use super::touch::Touch;
 use crate::dsp::Plan;
+use crate::explorer::Kernels;
 use crate::features::Observation;
-use crate::kernels::Kernels;
 use crate::sensor::pressure::Pressure;
-use crate::table::Name;
-use crate::table::Table;
+use crate::table::{Name, Table};
 use crate::wire::{Text, text};
 
 /// Ticks in a second.

@@ -8,8 +8,8 @@ use heapless::{Deque, Vec};
 // until all users have the new path
 pub use super::guidance::{Again, Event, Phase, View, ZONE_MN};
 use crate::dsp::Plan;
+use crate::explorer::Kernels;
 use crate::features::{Observation, Slide, SlideError};
-use crate::kernels::Kernels;
 use crate::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ};
 
 /// Samples of a channel in a block: 10 ms.

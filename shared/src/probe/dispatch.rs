@@ -11,7 +11,7 @@ use super::memory::Memory;
 use super::seams::{Events, Panel, RigHandle, StoredBytes};
 use super::{calibrate, identify, teach, train, transfer};
 use crate::dsp::Plan;
-use crate::kernels::Kernels;
+use crate::explorer::Kernels;
 use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
 use crate::wire::{Ask, Request, Status, Tell, Text, text};

@@ -3,10 +3,8 @@
 use core::fmt;
 
 use crate::dsp::Plan;
-use crate::explorer::{Explorer, ObserveError, Outlook, Verdict};
-use crate::features::Observation;
-use crate::features::{Measurement, Slide, SlideError};
-use crate::kernels::Kernels;
+use crate::explorer::{Explorer, Kernels, ObserveError, Outlook, Verdict};
+use crate::features::{Measurement, Observation, Slide, SlideError};
 use crate::rig::{MAX_REJECTED, Rig};
 use crate::table::Action;
 

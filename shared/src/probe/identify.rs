@@ -7,12 +7,9 @@ use heapless::Vec;
 
 use super::explore::{Event, Random, explore};
 use crate::dsp::Plan;
-use crate::explorer::Visited;
-use crate::explorer::{Config, Explorer, Method, Outlook};
-use crate::kernels::Kernels;
+use crate::explorer::{Config, Explorer, Kernels, Method, Outlook, Visited};
 use crate::rig::Rig;
-use crate::table::{Contents, Table};
-use crate::table::{MAX_TEXTURES, Name};
+use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
 use crate::wire::{Identify, MAX_OUTLOOK, Promise, Tell, Text, text};
 

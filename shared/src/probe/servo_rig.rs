@@ -6,18 +6,14 @@ use heapless::Vec;
 use super::explore::Random;
 use super::seams::{RigHandle, UnloadedRun};
 use super::status::RigState;
-use crate::features::Blocks;
-use crate::features::Felt;
-use crate::features::Movement;
-use crate::features::{PropertySet, Slide};
-use crate::kernels::Kernels;
+use crate::dsp::Kernels;
+use crate::features::{Blocks, Felt, Movement, PropertySet, Slide};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::control::Control;
 use crate::rig::pins::Outputs;
 use crate::rig::skin::SkinCare;
 use crate::rig::timeout::{Patience, Wait};
-use crate::rig::{Ended, Phase, Refused};
-use crate::rig::{Rig, RigError};
+use crate::rig::{Ended, Phase, Refused, Rig, RigError};
 use crate::wire::Tell;
 
 /// How often the samples are looked after, ms.

@@ -5,24 +5,19 @@ mod dispatch;
 use super::explore::Random;
 use super::identify::best;
 use super::*;
-use crate::dsp::Plan;
+use crate::dsp::{Kernels, Plan};
 use crate::explorer::{Method, Outlook};
-use crate::features::Movement;
-use crate::features::{FeatureSet, Observation};
-use crate::features::{Property, PropertySet, Slide};
-use crate::kernels::Kernels;
+use crate::features::{FeatureSet, Movement, Observation, Property, PropertySet, Slide};
 use crate::rig::Rig;
 use crate::store::tests::ram::Ram;
 use crate::store::{SelfTaught, Store};
-use crate::table::Name;
 use crate::table::tests::{around, fused_of, known, straight, table_of};
-use crate::table::{Action, Table};
+use crate::table::{Action, Name, Table};
 use crate::wire::{Identify, MAX_OUTLOOK, Tell, Text, Train, text};
 use embassy_futures::block_on;
 use heapless::Vec;
-use std::format;
 use std::string::String;
-use std::vec;
+use std::{format, vec};
 
 /// A rig on which every texture has the traction that comes next, in mN; none is a slide without samples.
 struct Script(std::collections::VecDeque<Option<i16>>);

@@ -11,23 +11,18 @@
 //! what it learns does not go into that table: its result is stored and told. It makes a table only where there is none,
 //! with the pilot's movements, or where the table has these already.
 
+use crate::table::Lesson;
 use core::fmt;
 
 use heapless::Vec;
 
-use crate::features::Movement;
-use crate::features::{FeatureSet, Observation};
-use crate::features::{Property, PropertySet};
+use crate::features::{FeatureSet, Movement, Observation, Property, PropertySet};
 use crate::fill;
 use crate::store::Trained;
-use crate::table::Whitened;
 use crate::table::{
-    Change, Contents, EncodeError, Experience, Known, MAX_MOVEMENTS, Table, Tally, Texture, amend,
-    encode, encoded_len,
+    Change, Contents, EncodeError, Experience, Known, MAX_MOVEMENTS, MAX_TEXTURES, Name, Table,
+    Tally, Texture, Whitened, amend, encode, encoded_len,
 };
-use crate::table::{MAX_TEXTURES, Name};
-
-pub use crate::table::Lesson;
 
 /// The movements of a table that is begun: the three that the paper chose.
 pub const FIRST_MOVEMENTS: [Movement; 3] = [

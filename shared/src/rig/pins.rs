@@ -1,11 +1,10 @@
 //! What goes in and out of the rig's control every millisecond: the only interface between the control and the board or
 //! the simulator.
 
+use crate::features::Felt;
 use heapless::Vec;
 
 use crate::sensor::pressure::Pressure;
-
-pub use crate::features::Felt;
 
 /// Most words in one tick: 14 ms of slots, should a tick be late.
 pub const MAX_WORDS: usize = 64;

@@ -4,10 +4,10 @@
 use core::ops::Range;
 
 use super::phase::Ended;
-use super::pins::{Felt, Inputs, Outputs};
+use super::pins::{Inputs, Outputs};
 use super::slide_path::SlidePath;
 use super::stage::{MARGIN_MM, StageConstants};
-use crate::features::Movement;
+use crate::features::{Felt, Movement};
 use crate::sensor::pressure::{Channel, RATE_HZ};
 use crate::up_to;
 

@@ -1,8 +1,8 @@
 use super::*;
 use crate::explorer::Method;
-use crate::features::{FUSED_BANDS, Movement, Properties, Property, PropertySet};
+use crate::features::{BLOCK, Block, FUSED_BANDS, Movement, Properties, Property, PropertySet};
 use crate::rig::Fault;
-use crate::table::Action;
+use crate::table::{Action, MAX_TEXTURES, Name};
 use heapless::{String, Vec};
 use proptest::prelude::*;
 use serde::de::DeserializeOwned;

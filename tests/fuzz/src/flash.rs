@@ -3,13 +3,11 @@
 use std::sync::OnceLock;
 
 use embassy_futures::block_on;
-use tactus::learn::learn;
+use tactus::eval::learn::learn;
 use tactus::sim::flash::RamFlash;
 use tactus_core::explorer::Method;
-use tactus_core::features::Properties;
-use tactus_core::fused::{FeatureSet, Observation};
-use tactus_core::movement::Movement;
-use tactus_core::pressure::Calibration;
+use tactus_core::features::{Properties, FeatureSet, Observation, Movement};
+use tactus_core::sensor::pressure::Calibration;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::store::Store;
 

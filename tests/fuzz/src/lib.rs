@@ -16,12 +16,11 @@ use embassy_futures::block_on;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use tactus_core::explorer::{Config, Explorer, Method, Strategy};
-use tactus_core::features::{FUSED_BANDS, Properties};
-use tactus_core::fused::Observation;
+use tactus_core::features::{FUSED_BANDS, Properties, Observation};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::store::{SelfTaught, Store};
 use tactus_core::table::{Change, Table, amend};
-use tactus_core::teaching::put_in_force;
+use tactus_core::probe::teach::put_in_force;
 use tactus_core::wire::{Ask, MAX_FRAME, Receiver, Request, Tell};
 
 pub use flash::{Flash, images};

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde_json::Value;
 use sha2::{Digest as _, Sha256};
-use tactus::evaluate::Method;
+use tactus::eval::evaluate::Method;
 
 use crate::board::Error;
 

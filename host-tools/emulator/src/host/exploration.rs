@@ -3,13 +3,12 @@
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
-use tactus::follow::{ALLOWED, Agreement, Follower};
+use tactus::link::follow::{ALLOWED, Agreement, Follower};
 use tactus::link::{Found, Question};
 use tactus::sim::played::PlayCounts;
-use tactus_core::features::{Plan, Property, PropertySet};
-use tactus_core::fused::white;
-use tactus_core::movement::Movement;
-use tactus_core::table::{Action, Contents, Table, TableError};
+use tactus_core::dsp::Plan;
+use tactus_core::features::{Movement, Property, PropertySet};
+use tactus_core::table::{Action, Contents, Table, TableError, white};
 use tactus_core::wire::{Ask, Counts, Felt, Identify, Report, Tell};
 
 use super::talk::{PATIENCE_S, Talk, TalkError};

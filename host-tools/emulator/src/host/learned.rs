@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::collection::{Collection, texture_number};
-use tactus::played::Lesson;
+use tactus::sim::collection::{Collection, texture_number};
+use tactus::sim::recorded::Lesson;
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::Table;

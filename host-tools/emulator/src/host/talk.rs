@@ -3,8 +3,8 @@
 use std::task::Poll;
 
 use tactus::link::{Errand, Job, LinkError, PushTable, Question, Session};
+use tactus_core::rig::Fault;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::rig::guard::Fault;
 use tactus_core::wire::{Ask, Phase, Report, Reset, Tell};
 
 use crate::board::{Emulator, Error};

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use tactus::collection::{Collection, LearnError, calibrated, texture_name};
-use tactus::played::{Lesson, PlayError};
-use tactus::recordings::RecordingSet;
+use tactus::data::recordings::RecordingSet;
+use tactus::sim::collection::{Collection, LearnError, calibrated, texture_name};
 use tactus::sim::played::Played;
+use tactus::sim::recorded::{Lesson, PlayError};
 use tactus::sim::world::Setup;
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;

@@ -6,7 +6,7 @@ mod report;
 use std::time::Instant;
 
 use clap::Args as Arguments;
-use tactus::evaluate::Method;
+use tactus::eval::evaluate::Method;
 
 pub use self::explorations::{Bars, Group, Results, recorded, run as explore, simulated};
 use self::report::Report;

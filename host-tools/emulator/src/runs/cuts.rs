@@ -12,12 +12,13 @@ use std::path::Path;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tactus::collection::Collection;
 use tactus::link::{Found, Question, ReadTable};
+use tactus::sim::collection::Collection;
 use tactus::sim::world::{Setup, World};
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::wire::{Identify, Name, Reset, Tell};
+use tactus_core::table::Name;
+use tactus_core::wire::{Identify, Reset, Tell};
 
 pub use self::outcome::{Cuts, Outcome};
 use self::tear::{Cut, CutError, Held, Left, Operation, Torn, judge, left_by};

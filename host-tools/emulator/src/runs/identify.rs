@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args as Arguments;
-use tactus::show::Show;
+use tactus::eval::show::Show;
 use tactus_core::explorer::Verdict;
 use tactus_core::table::Table;
 use tactus_core::wire::{Identify, Phase, Report, Tell};

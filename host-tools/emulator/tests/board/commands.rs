@@ -9,7 +9,8 @@ use rand_chacha::ChaCha8Rng;
 use tactus::sim::stage::TRAVEL_MM;
 use tactus::sim::world::Setup;
 use tactus_core::explorer::{Method, Strategy};
-use tactus_core::wire::{Ask, Forget, Identify, MAX_FRAME, Name, Request, Train, encode};
+use tactus_core::table::Name;
+use tactus_core::wire::{Ask, Forget, Identify, MAX_FRAME, Request, Train, encode};
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::talk::{Talk, TalkError};
 

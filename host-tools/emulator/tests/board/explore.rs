@@ -4,9 +4,9 @@ use std::sync::OnceLock;
 
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::collection::Collection;
-use tactus::evaluate::Method;
+use tactus::eval::evaluate::Method;
 use tactus::link::{Question, ReadTable};
+use tactus::sim::collection::Collection;
 use tactus::sim::world::Setup;
 use tactus_core::table::Table;
 use tactus_core::wire::{Identify, Report, Tell, Train};

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use tactus::sim::encoder::Cut;
 use tactus::sim::faults::Fault;
 use tactus::sim::world::Setup;
-use tactus_core::rig::guard::Fault as Seen;
+use tactus_core::rig::Fault as Seen;
 use tactus_core::wire::{Ask, Identify, MAX_FRAME, Phase, Request, Reset, Tell, encode};
 use tactus_emulator::board::{Emulator, Options, Output};
 use tactus_emulator::host::talk::{Talk, TalkError};

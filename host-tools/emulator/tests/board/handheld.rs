@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use tactus::scenario::Scenario;
+use tactus::sim::scenario::Scenario;
 use tactus_emulator::board::Emulator;
 
 use crate::common::elf_of;

@@ -1,8 +1,8 @@
 //! The store of the real firmware, over many writes: its pages turn in time, and it loses nothing.
 
 use tactus::sim::world::Setup;
-use tactus_core::pressure::Calibration;
 use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::sensor::pressure::Calibration;
 use tactus_core::wire::{Ask, Tell, Train};
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::talk::{Talk, TalkError};

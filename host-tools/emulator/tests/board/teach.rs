@@ -4,11 +4,11 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use tactus::collection::Collection;
 use tactus::link::{Found, Question, ReadTable};
+use tactus::sim::collection::Collection;
 use tactus_core::explorer::Method;
-use tactus_core::table::{Table, Tally};
-use tactus_core::wire::{Forget, Identify, Name, Status, Tell, Train};
+use tactus_core::table::{Name, Table, Tally};
+use tactus_core::wire::{Forget, Identify, Status, Tell, Train};
 use tactus_emulator::host::exploration::{Exploration, explore};
 use tactus_emulator::host::talk::{PATIENCE_S, Talk, TalkError};
 use tactus_emulator::host::under_finger::{self, Known, Unknown};

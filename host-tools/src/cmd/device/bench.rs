@@ -2,13 +2,14 @@
 
 use std::io::{self, Write};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use tactus::link::{Errand, Job, LinkError, Port, PortError, Question, ReadTable};
-use tactus_core::rig::guard::Fault;
+use tactus_core::rig::Fault;
 use tactus_core::table::{Table, TableError};
 use tactus_core::wire::{Ask, Phase, Report, Status, Tell};
 

@@ -3,9 +3,9 @@
 use std::io::Write;
 
 use anyhow::Context as _;
-use tactus::evaluate::Method;
+use tactus::eval::evaluate::Method;
+use tactus::eval::show::Show;
 use tactus::link::Question;
-use tactus::show::Show;
 use tactus_core::table::Table;
 use tactus_core::wire::{Ask, Identify};
 

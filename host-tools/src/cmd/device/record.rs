@@ -4,8 +4,9 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::ensure;
+use tactus::data::recording::Texture;
+use tactus::data::recordings::RecordingWriter;
 use tactus::link::Question;
-use tactus::recordings::{RecordingWriter, Texture};
 use tactus_core::explorer::Strategy;
 use tactus_core::wire::{Ask, Identify};
 

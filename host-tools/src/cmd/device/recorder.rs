@@ -4,10 +4,10 @@
 //! very samples that went into its features. P_DC is not streamed: it is computed back from the contact force, which is told
 //! 20 times a second.
 
-use tactus::recordings::{Background, PAC_RATE_HZ, Slide};
-use tactus_core::movement::Movement;
-use tactus_core::pressure::Calibration;
-use tactus_core::wire::{Block, Live, Phase, Report, Tell};
+use tactus::data::recording::{Background, PAC_RATE_HZ, Slide};
+use tactus_core::features::{Block, Movement};
+use tactus_core::sensor::pressure::Calibration;
+use tactus_core::wire::{Live, Phase, Report, Tell};
 
 /// How often the force is told while the rig moves.
 const LIVE_HZ: u32 = 20;

@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, ensure};
 use clap::Subcommand;
-use tactus::follow::{ALLOWED, Agreement, Follower};
-use tactus::show::Show;
-use tactus_core::features::{Plan, PropertySet};
+use tactus::eval::show::Show;
+use tactus::link::follow::{ALLOWED, Agreement, Follower};
+use tactus_core::dsp::Plan;
+use tactus_core::features::PropertySet;
 use tactus_core::table::Table;
 use tactus_core::wire::{self, Forget, Identify, PROTOCOL, Tell};
 

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, ensure};
 use clap::Subcommand;
+use tactus::eval::show::show_table;
 use tactus::link::{PushTable, Question};
-use tactus::show::show_table;
 use tactus_core::table::Table;
 use tactus_core::wire;
 

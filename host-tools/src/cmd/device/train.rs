@@ -5,7 +5,8 @@ use std::io::{self, Write};
 use anyhow::ensure;
 use tactus::link::Question;
 use tactus_core::features::Property;
-use tactus_core::wire::{self, Name, Report, Tell};
+use tactus_core::table::Name;
+use tactus_core::wire::{self, Report, Tell};
 
 use super::bench::{Bench, show_fault};
 use super::line::Where;

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
 use clap::ValueEnum;
-use tactus::evaluate::Method;
-use tactus::experiment::{Experiment, Protocol};
-use tactus::fabricslide::FabricSet;
-use tactus::properties::PropertyTable;
+use tactus::data::fabricslide::FabricSet;
+use tactus::data::properties::PropertyTable;
+use tactus::eval::evaluate::Method;
+use tactus::eval::experiment::{Experiment, Protocol};
 
 use crate::cmd::args::{Features, Stop};
 use crate::cmd::output::Format;

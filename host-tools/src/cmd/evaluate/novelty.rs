@@ -4,10 +4,10 @@ use std::io::Write;
 
 use anyhow::ensure;
 use serde::Serialize;
-use tactus::evaluate::Method;
-use tactus::experiment::Experiment;
-use tactus::lifelong::{self, Learning, Lifelong};
-use tactus::novelty::{self, After};
+use tactus::eval::evaluate::Method;
+use tactus::eval::experiment::Experiment;
+use tactus::eval::lifelong::{self, Learning, Lifelong};
+use tactus::eval::novelty::{self, After};
 use tactus_core::explorer::Config;
 
 use super::experiment::Args;

@@ -8,7 +8,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use tactus_core::movement::Movement;
+use tactus_core::features::Movement;
 
 use super::error::FabricError;
 use super::features::TAXELS;

@@ -7,7 +7,7 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use serde_json::{Value, json};
-use tactus_core::movement::Movement;
+use tactus_core::features::Movement;
 use tempfile::TempDir;
 
 use super::features::{Meter, SHORTEST};

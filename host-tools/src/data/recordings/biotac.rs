@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use tactus_core::movement::Movement;
+use tactus_core::features::Movement;
 
 use super::files::{
     BIOTAC_MANIFEST as MANIFEST, MAX_MANIFEST, RecordingError, Result, distinct_textures,

@@ -22,7 +22,7 @@ use std::fs::{self, File};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use tactus_core::movement::Movement;
+use tactus_core::features::Movement;
 
 use super::files::{
     BIOTAC_MANIFEST, OWN_MANIFEST as MANIFEST, RecordingError, Result, check_hash,

@@ -2,7 +2,7 @@
 use std::fs;
 use std::path::Path;
 
-use tactus_core::movement::Movement;
+use tactus_core::features::Movement;
 use tempfile::TempDir;
 
 use super::files::*;

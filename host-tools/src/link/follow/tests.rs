@@ -1,12 +1,13 @@
 use std::cell::RefCell;
 use std::sync::OnceLock;
 
+use tactus_core::dsp::Kernels;
 use tactus_core::explorer::Strategy;
-use tactus_core::features;
-use tactus_core::kernels::Kernels;
-use tactus_core::movement::Movement;
-use tactus_core::rig::{Event, Rig, explore, pins};
-use tactus_core::wire::{self, BLOCK, MAX_FRAME, Name, Receiver, Report};
+use tactus_core::features::{self, BLOCK, Movement};
+use tactus_core::probe::explore::{Event, explore};
+use tactus_core::rig::Rig;
+use tactus_core::table::Name;
+use tactus_core::wire::{self, MAX_FRAME, Receiver, Report};
 
 use super::*;
 use crate::sim::collection::{Collection, calibrated};
@@ -77,7 +78,7 @@ impl Rig for Streamed<'_> {
         movement: Movement,
         slide: &mut features::Slide<'_, K>,
     ) -> Result<(), SimError> {
-        if self.rig.control().phase() == tactus_core::rig::control::Phase::Parked {
+        if self.rig.control().phase() == tactus_core::rig::Phase::Parked {
             self.rig.home()?;
         }
         let mut ticks = Vec::new();
@@ -96,8 +97,8 @@ impl Rig for Streamed<'_> {
         };
         for tick in ticks {
             let still = match &tick.felt {
-                pins::Felt::Nothing => continue,
-                pins::Felt::Still => true,
+                features::Felt::Nothing => continue,
+                features::Felt::Still => true,
                 _ => false,
             };
             let full = block.pac.len() + tick.pac.len() > BLOCK;
@@ -105,7 +106,7 @@ impl Rig for Streamed<'_> {
                 self.tell(&mut number, &mut block);
             }
             block.still = still;
-            if let pins::Felt::Begin(steady) = tick.felt {
+            if let features::Felt::Begin(steady) = tick.felt {
                 block.steady = Some((steady.start, steady.end));
             }
             block.pac.extend_from_slice(&tick.pac).unwrap();

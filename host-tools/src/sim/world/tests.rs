@@ -1,6 +1,6 @@
 use std::hash::{DefaultHasher, Hasher as _};
 
-use tactus_core::biotac::decode;
+use tactus_core::sensor::biotac::decode;
 
 use super::*;
 

@@ -1,7 +1,7 @@
 //! The pilot study in the report: the 36 movements, and figs. 5 to 7.
 
 use serde_json::json;
-use tactus_core::movement::Movement;
+use tactus_core::features::Movement;
 
 use super::model::{Report, axis, cells, movement_name, owned};
 use crate::eval::chart::{Chart, DrawError, Figure, Mark, Series, Tile, grid};

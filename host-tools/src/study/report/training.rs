@@ -1,8 +1,7 @@
 //! The training in the report: Table 3, figs. 8 and 9, the wear of the skin, and all matrices as files.
 
 use serde_json::json;
-use tactus_core::features::Property;
-use tactus_core::movement::Movement;
+use tactus_core::features::{Movement, Property};
 
 use super::model::{Report, Rows, axis, cells, movement_name, owned};
 use crate::eval::chart::{Chart, DrawError, Figure, Mark, SHADES, Series, matrix, room};

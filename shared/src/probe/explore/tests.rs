@@ -1,7 +1,7 @@
 use super::*;
+use crate::dsp::Kernels;
 use crate::explorer::{Config, Explorer, Strategy};
-use crate::features::Movement;
-use crate::features::{Property, PropertySet};
+use crate::features::{Movement, Property, PropertySet};
 use crate::table::Table;
 use crate::table::tests::{around, table_of};
 use embassy_futures::block_on;

@@ -5,8 +5,7 @@ use std::path::Path;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus::sim::world::Setup;
-use tactus_core::features::Plan;
-use tactus_core::kernels::Plain;
+use tactus_core::dsp::{Plain, Plan};
 
 use super::error::BenchError;
 use super::workload::{self, Counter, Workload};

@@ -1,7 +1,7 @@
 //! Why nothing is counted.
 
-use tactus::learn::TableError as LearnError;
-use tactus::recordings::RecordingError;
+use tactus::data::recordings::RecordingError;
+use tactus::eval::learn::TableError as LearnError;
 
 use crate::board;
 use crate::host::talk::TalkError;
@@ -47,7 +47,7 @@ pub enum BenchError {
     /// The curves.
     #[cfg(feature = "plot")]
     #[error(transparent)]
-    Draw(#[from] tactus::study::report::DrawError),
+    Draw(#[from] tactus::eval::chart::DrawError),
     /// Their file.
     #[error(transparent)]
     Write(#[from] crate::host::args::WriteError),

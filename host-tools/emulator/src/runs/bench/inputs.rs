@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::learn;
-use tactus::recordings::{PAC_RATE_HZ, RecordingSet};
+use tactus::data::recording::PAC_RATE_HZ;
+use tactus::data::recordings::RecordingSet;
+use tactus::eval::learn;
 use tactus_core::explorer::{Config, Explorer, Method};
-use tactus_core::features::{Properties, Property, PropertySet};
-use tactus_core::fused::{FeatureSet, MAX_FEATURES, Observation};
-use tactus_core::movement::Movement;
+use tactus_core::features::{
+    FeatureSet, MAX_FEATURES, Movement, Observation, Properties, Property, PropertySet,
+};
 use tactus_core::table::{Action, Contents, Table};
 
 use super::counter::Bench;
@@ -72,7 +73,7 @@ pub(super) fn synthetic(method: Method, textures: usize) -> Result<Vec<u8>, Benc
                     let properties = Properties::new(centre.map(|c| Some(around(c, 0.2))));
                     let bands = bands
                         .iter()
-                        .filter_map(|b| tactus_core::fused::fixed(around(*b, 0.5)));
+                        .filter_map(|b| tactus_core::features::fixed(around(*b, 0.5)));
                     Observation {
                         bands: bands.collect(),
                         ..Observation::from(properties)
@@ -175,7 +176,7 @@ fn corner(
                     .iter()
                     .map(|c| c + random.random_range(-scatter..scatter))
                     .collect();
-                let fixed = |x: &f32| tactus_core::fused::fixed(*x).unwrap_or(0);
+                let fixed = |x: &f32| tactus_core::features::fixed(*x).unwrap_or(0);
                 let properties = match set {
                     FeatureSet::Pressure | FeatureSet::Bands => [None; 3],
                     _ => [

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use rayon::prelude::*;
-use tactus::collection::Collection;
-use tactus::evaluate::Method;
-use tactus::played::Lesson;
+use tactus::eval::evaluate::Method;
+use tactus::sim::collection::Collection;
+use tactus::sim::recorded::Lesson;
 use tactus_core::wire::Identify;
 
 use crate::board::Options;

@@ -1,7 +1,7 @@
 //! The campaign's result in words and in JSON.
 
 use serde_json::{Value, json};
-use tactus::evaluate::Method;
+use tactus::eval::evaluate::Method;
 
 use super::explorations::{Bars, Results};
 use crate::host::exploration::{Exploration, FORCE_N, FORCE_SHARE, JITTER_US, SPEED_SHARE};

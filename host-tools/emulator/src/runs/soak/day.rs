@@ -11,9 +11,8 @@ use tactus::sim::collection::{calibrated, texture_name};
 use tactus::sim::flash::{RamFlash, SECTOR};
 use tactus::sim::probe::{Host, SimProbe, switch_off_and_on, switch_on};
 use tactus::sim::rig::{SimError, SimRig};
-use tactus_core::features;
-use tactus_core::kernels::Plain;
-use tactus_core::pressure::SLOTS_HZ;
+use tactus_core::dsp::{self, Plain};
+use tactus_core::sensor::pressure::SLOTS_HZ;
 use tactus_core::store::{Store, StoreError};
 use tactus_core::table::TableError;
 use tactus_core::wire::{Ask, Forget, Identify, Tell, Text};
@@ -160,7 +159,7 @@ pub fn day(virtual_s: f64, seed: u64, mut each: impl FnMut(f64)) -> Result<Day, 
         .calibrate(calibration)
         .map_err(SimError::from)?;
     rig.home()?;
-    let (host, plan) = (RefCell::default(), features::Plan::new());
+    let (host, plan) = (RefCell::default(), dsp::Plan::new());
     let mut buffer = vec![0; SECTOR];
     let flash = RamFlash::blank();
     let mut probe = switch_on(rig, flash, FACTORY, &mut buffer, &plan, &host)?;
@@ -353,7 +352,7 @@ mod tests {
     fn a_restart_notices_what_the_flash_lost() {
         let mut rig = SimRig::new(world().setup(1, 1));
         rig.home().unwrap();
-        let (host, plan) = (RefCell::default(), features::Plan::new());
+        let (host, plan) = (RefCell::default(), dsp::Plan::new());
         let mut buffer = vec![0; SECTOR];
         let flash = RamFlash::blank();
         let probe = switch_on(rig, flash, FACTORY, &mut buffer, &plan, &host);
@@ -367,7 +366,10 @@ mod tests {
         let mut renamed = vec![0; SECTOR];
         let table = Table::read(FACTORY).unwrap();
         let change = Change::Forget(0);
-        let length = amend(&mut renamed, &table, change).unwrap().as_bytes().len();
+        let length = amend(&mut renamed, &table, change)
+            .unwrap()
+            .as_bytes()
+            .len();
         block_on(store.replace_table(&mut renamed, length)).unwrap();
         restarted(probe, &mut day).unwrap();
         assert_eq!(day.missed, ["restart 2: another table"]);

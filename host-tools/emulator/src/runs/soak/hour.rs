@@ -5,10 +5,10 @@ use std::path::Path;
 use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::collection::{calibrated, texture_name};
 use tactus::link::{Question, ReadTable};
-use tactus_core::table::Table;
-use tactus_core::wire::{Ask, Counts, Forget, Name, Report, Reset, Status, Tell};
+use tactus::sim::collection::{calibrated, texture_name};
+use tactus_core::table::{Name, Table};
+use tactus_core::wire::{Ask, Counts, Forget, Report, Reset, Status, Tell};
 
 use super::hour_report::{Hour, HourError, Restart, missed};
 use super::visits::{HOMINGS, Plan, world};

@@ -1,7 +1,7 @@
 //! What became of an hour on the emulated board, and what it must be.
 
 use serde_json::{Value, json};
-use tactus::simulated::SimError;
+use tactus::sim::rig::SimError;
 use tactus_core::table::TableError;
 use tactus_core::wire::Reset;
 

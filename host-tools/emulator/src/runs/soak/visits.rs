@@ -9,7 +9,7 @@ use rand::RngExt as _;
 use rand::seq::IndexedRandom as _;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
-use tactus::collection::Collection;
+use tactus::sim::collection::Collection;
 use tactus::sim::faults::Fault;
 use tactus_core::wire::Identify;
 

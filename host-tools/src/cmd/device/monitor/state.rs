@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use tactus_core::movement::Movement;
+use tactus_core::features::Movement;
 use tactus_core::table::Action;
 use tactus_core::wire::{Felt, Live, PROTOCOL, Phase, Report, Status, Tell};
 

@@ -2,11 +2,10 @@ use std::time::Duration;
 
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
-use tactus_core::features::Property;
-use tactus_core::movement::Movement;
-use tactus_core::rig::guard::Fault;
+use tactus_core::features::{Block, Movement, Property};
+use tactus_core::rig::Fault;
 use tactus_core::table::Action;
-use tactus_core::wire::{Block, Counts, Felt, Live, Phase, Promise, Report, Status, Tell, Text};
+use tactus_core::wire::{Counts, Felt, Live, Phase, Promise, Report, Status, Tell, Text};
 
 use super::state::{Monitor, NOTES, SHOWN};
 use super::{is_gone, view};

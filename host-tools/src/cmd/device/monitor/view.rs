@@ -7,9 +7,8 @@ use ratatui::style::{Color, Style, Stylize as _};
 use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, BorderType, Chart, Dataset, GraphType, Paragraph, Sparkline};
+use tactus_core::dsp::{BIN_HZ, Plain, SpectrumSum, angles};
 use tactus_core::features::Property;
-use tactus_core::kernels::Plain;
-use tactus_core::spectrum::{BIN_HZ, SpectrumSum, angles};
 use tactus_core::wire::Phase;
 
 use super::state::{Monitor, SHOWN, Weight};

@@ -1,6 +1,6 @@
 //! Each fault at the pins.
 
-use tactus_core::biotac::{WordError, decode};
+use tactus_core::sensor::biotac::{WordError, decode};
 
 use super::*;
 use crate::sim::encoder::Cut;
