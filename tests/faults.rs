@@ -10,7 +10,6 @@ use tactus::sim::world::Setup;
 use tactus_core::features::Movement;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::control::Control;
-use tactus_core::rig::fault::Row;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::pins::Inputs;
 use tactus_core::rig::stage::StageConstants;
@@ -467,31 +466,6 @@ fn every_fault_of_the_table_is_tested() {
             CASES.iter().any(|case| case.fault == row.fault) || elsewhere.contains(&row.fault);
         assert!(tested, "{}", row.name);
     }
-}
-
-#[test]
-fn the_readme_has_the_table() {
-    let table: String = FAULTS
-        .iter()
-        .map(|row| {
-            let Row {
-                name,
-                detected,
-                deadline_ms,
-                stops,
-                refused,
-                recovery,
-                ..
-            } = row;
-            format!("| {name} | {detected} | {deadline_ms} | {stops} | {refused} | {recovery} |\n")
-        })
-        .collect();
-    let readme =
-        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md")).unwrap();
-    assert!(
-        readme.contains(&table),
-        "the README's table of faults should be\n{table}"
-    );
 }
 
 /// A rig that presses, its finger on the sample.

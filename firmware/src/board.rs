@@ -1,5 +1,5 @@
 //! The NUCLEO-F429ZI: its clocks, and who gets which pin and timer (UM1974). Pins are named by their Arduino and Zio
-//! connectors in the README.
+//! connectors in docs/src/rig.md.
 use assign_resources::assign_resources;
 use embassy_stm32::gpio::{Level, OutputOpenDrain, Pull, Speed};
 use embassy_stm32::interrupt::{self, InterruptExt as _, Priority};

@@ -32,16 +32,16 @@ pub(crate) const FIRST_STEPS: &str = "\
 Try first:
   tactus                                           a simulated probe recognises an unknown texture
   tactus identify --simulated --texture burlap     another one
-With a folder of recordings, such as ../shared/data/biotac:
-  tactus identify --recordings DIR --material 3    a real texture is recognised from its slides
+With a folder of recordings, such as tests/recordings/simulated (there with --train-slides 2):
+  tactus identify --recordings DIR --material 91   a recorded texture is recognised from its slides
   tactus features --recordings DIR                 what every slide measures
   tactus evaluate --recordings DIR                 how often the answers are right, and how sure
 With a probe, or with the emulated board that `cargo xtask emulate` builds:
   tactus device list                               which port it is at
   tactus device monitor [--emulated]               what it measures, live
 
-No recordings are shipped. The publisher of the BioTac's has them at
-https://github.com/dexrob/BioTac_slide_20_50; `tactus import` reads them. `tactus simulate` makes some.";
+Recordings of a real BioTac are at https://github.com/dexrob/BioTac_slide_20_50; `tactus import` reads
+them. `tactus simulate` makes others.";
 
 /// Recognise an unknown texture from its slides, and show every step
 #[derive(clap::Args)]

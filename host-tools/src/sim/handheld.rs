@@ -294,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "the README's figures; a minute"]
+    #[ignore = "the book's figures; a minute"]
     fn all_textures_of_the_world() {
         let collection = Collection {
             textures: (1..=117).collect(),

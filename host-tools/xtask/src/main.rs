@@ -1,6 +1,7 @@
 //! The project's own commands: `cargo xtask --help` lists them.
 mod bench;
 mod bundle;
+mod docs;
 mod emulate;
 mod factory;
 mod firmware;
@@ -148,6 +149,9 @@ enum Cli {
     /// where there is one; every result is compared with the plain kernels' on this PC. An error if a kernel misses its gate.
     #[command(after_help = bench::EXAMPLES)]
     Bench(bench::Options),
+    /// Build the book, or check and write what is generated in README and book
+    #[command(after_help = docs::EXAMPLES)]
+    Docs(docs::Options),
 }
 
 fn main() -> ExitCode {
@@ -168,6 +172,7 @@ fn main() -> ExitCode {
         Cli::Mutants { options } => mutants(options),
         Cli::Fuzz(options) => fuzz::fuzz(&options),
         Cli::Bench(options) => bench::bench(&options),
+        Cli::Docs(options) => docs::docs(&options),
     };
     ended(done.map(|()| ExitCode::SUCCESS))
 }

@@ -20,10 +20,15 @@ pub const MAX_RECORDS: u8 = 40;
 /// Movements of a texture that a probe learns by itself: an exploration rarely makes more.
 pub const SELF_MOVEMENTS: usize = 2;
 
+/// The version of the records.
 pub(super) const KEY_SCHEMA: u8 = 0;
+/// The calibration of rig and finger.
 pub(super) const KEY_CALIBRATION: u8 = 1;
+/// How far the finger has slid, and the work that the skin has seen.
 pub(super) const KEY_SKIN: u8 = 2;
+/// The first of the unfinished trainings: a texture at one movement each.
 pub(super) const KEY_TRAINED: u8 = 16;
+/// The first of the textures that the probe learned by itself, one each.
 pub(super) const KEY_SELF: u8 = 64;
 /// One past the last key.
 pub(super) const KEYS: usize = KEY_SELF as usize + MAX_TEXTURES;

@@ -26,7 +26,7 @@ pub(crate) const MAX_MANIFEST: u64 = 64 << 20;
 pub enum RecordingError {
     /// The folder does not exist.
     #[error(
-        "{}: no such folder. No recordings are shipped with Tactus; the BioTac's publisher has them at \
+        "{}: no such folder. Simulated recordings are in tests/recordings/simulated; those of a real BioTac are at \
          https://github.com/dexrob/BioTac_slide_20_50, and `tactus import` reads them", .0.display()
     )]
     NoFolder(PathBuf),

@@ -1,4 +1,4 @@
-//! What an identification and a teaching wear off the chip's own sectors: counted, and stated in the README ("Wear").
+//! What an identification and a teaching wear off the chip's own sectors: counted, and stated in the book (docs/src/learning.md).
 //!
 //! The firmware stores the skin's care after every identification, and one self-taught record where it may learn and was
 //! certain (`firmware/src/session.rs`); whatever the user teaches writes the table anew.

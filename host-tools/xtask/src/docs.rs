@@ -1,0 +1,46 @@
+//! `cargo xtask docs`: the book, its generated parts, and their test.
+use anyhow::{Result, ensure};
+use clap::Args;
+
+use crate::shell::{cargo, root, run, target};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask docs            the book as pages, in target/book (needs mdBook)
+  cargo xtask docs --check    links, commands, outputs, recordings and generated tables, without mdBook
+  cargo xtask docs --write    writes outputs, recordings, tables and the moving picture again";
+
+#[derive(Args)]
+pub(crate) struct Options {
+    /// Check README and book instead of building pages
+    #[arg(long, conflicts_with = "write")]
+    check: bool,
+    /// Write what is generated from the code instead of building pages
+    #[arg(long)]
+    write: bool,
+}
+
+pub(crate) fn docs(options: &Options) -> Result<()> {
+    if options.check || options.write {
+        let mut test = cargo();
+        test.args(["test", "--package", "tactus", "--test", "book"]);
+        if options.write {
+            // one after the other: two of them may write one page
+            test.env("TACTUS_BOOK", "write")
+                .args(["--", "--test-threads", "1"]);
+        }
+        return run(&mut test);
+    }
+    let mdbook = || std::process::Command::new("mdbook");
+    ensure!(
+        mdbook().arg("--version").output().is_ok(),
+        "mdBook is not installed: cargo install mdbook --locked"
+    );
+    run(mdbook()
+        .arg("build")
+        .arg(root().join("docs"))
+        .arg("--dest-dir")
+        .arg(target().join("book")))?;
+    println!("{}", target().join("book/index.html").display());
+    Ok(())
+}
