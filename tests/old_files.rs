@@ -1,0 +1,274 @@
+//! What was written before names and places changed still opens: tables, stores, frames of the link, and logs of sessions.
+//!
+//! The files are those of commit c026dfc (`tests/golden/README.md` has the commands that made them) and are never made anew: a
+//! format that changes gets files of its own, beside these.
+
+use std::convert::Infallible;
+use std::fmt::Debug;
+use std::fs;
+use std::io::Read as _;
+use std::path::PathBuf;
+use std::process::Command;
+
+use embassy_futures::block_on;
+use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use flate2::read::GzDecoder;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
+use tactus_core::features::{FeatureSet, Movement, Property};
+use tactus_core::probe::teach::put_in_force;
+use tactus_core::store::Store;
+use tactus_core::table::{Action, Contents, Table};
+use tactus_core::wire::{MAX_FRAME, Report, Request, decode, encode};
+
+fn golden(name: &str) -> PathBuf {
+    let here = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    here.join("../tests/golden").join(name)
+}
+
+fn text(name: &str) -> String {
+    fs::read_to_string(golden(name)).unwrap()
+}
+
+fn json_of(name: &str) -> Value {
+    serde_json::from_str(&text(name)).unwrap()
+}
+
+fn unpacked(name: &str) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let file = fs::File::open(golden(name)).unwrap();
+    GzDecoder::new(file).read_to_end(&mut bytes).unwrap();
+    bytes
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+fn bytes(hex: &Value) -> Vec<u8> {
+    let (pairs, _) = hex.as_str().unwrap().as_bytes().as_chunks::<2>();
+    let byte = |pair: &[u8; 2]| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16).unwrap();
+    pairs.iter().map(byte).collect()
+}
+
+/// Any value in postcard's form, in a frame.
+fn frame(message: &impl Serialize) -> String {
+    hex(encode(message, &mut [0; MAX_FRAME + 1]).unwrap())
+}
+
+/// Every line has a message as JSON, with the names of its day, and its frame.
+fn assert_frames<M: Serialize + DeserializeOwned + PartialEq + Debug>(file: &str, wanted: usize) {
+    let lines = text(file);
+    for line in lines.lines() {
+        let line: Value = serde_json::from_str(line).unwrap();
+        let message: M = serde_json::from_value(line["message"].clone())
+            .unwrap_or_else(|why| panic!("{}: {why}", line["message"]));
+        assert_eq!(line["frame"], frame(&message), "{message:?}");
+        let mut frame = bytes(&line["frame"]);
+        assert_eq!(frame.pop(), Some(0));
+        assert_eq!(decode::<M>(&mut frame), Ok(message));
+    }
+    assert_eq!(lines.lines().count(), wanted);
+}
+
+#[test]
+fn frames_of_every_request_are_what_they_were() {
+    assert_frames::<Request>("requests.jsonl", 34);
+}
+
+#[test]
+fn frames_of_every_report_are_what_they_were() {
+    assert_frames::<Report>("reports.jsonl", 65);
+}
+
+/// What a table holds; of a large one, every thirteenth texture.
+fn values(bytes: &[u8]) -> Value {
+    let table = Table::read(bytes).unwrap();
+    assert_eq!(table.as_bytes(), bytes);
+    let every = if table.textures() > 13 { 13 } else { 1 };
+    let (set, features) = match table.contents() {
+        Contents::Gaussians(_) => (None, 0),
+        Contents::Fused(set, features) => (Some(set), features),
+    };
+    let movements = 0..table.movements().len() as u8;
+    let textures = (0..table.textures()).step_by(every).map(|texture| {
+        let tally = table.tally(texture);
+        let learned = movements.clone().map(|movement| {
+            let gaussian = |property| {
+                let property = Some(property);
+                let gaussian = table.gaussian(texture, Action { movement, property });
+                gaussian.map(|gaussian| [gaussian.mean, gaussian.sd])
+            };
+            let trials = table.trials(texture, movement);
+            match set {
+                None => json!([
+                    trials,
+                    Property::ALL.map(gaussian),
+                    frame(&table.experience(texture, movement))
+                ]),
+                Some(_) => {
+                    let whitened = table.whitened(texture, movement);
+                    let mean = &whitened.mean[..usize::from(features)];
+                    json!([trials, whitened.slides, mean])
+                }
+            }
+        });
+        json!({
+            "factory": tally.factory,
+            "user": tally.user,
+            "itself": tally.itself,
+            "texture": texture,
+            "name": table.name(texture),
+            "number": table.number(texture),
+            "learned": learned.collect::<Vec<_>>(),
+        })
+    });
+    // what the whitening makes of some slide
+    let slide: Vec<i16> = (1..=i16::from(features)).map(|n| 700 * n - 3000).collect();
+    let whitened = movements.clone().map(|movement| {
+        let white = table.whiten(movement, &slide);
+        white.map(|white| white.to_vec())
+    });
+    json!({
+        "textures": table.textures(),
+        "names": table.names().collect::<Vec<_>>(),
+        "movements": table.movements().collect::<Vec<_>>(),
+        "features": set.and_then(|set| FeatureSet::ALL.iter().position(|s| *s == set)),
+        "dimensions": features,
+        "measured": table.measured().bits(),
+        "next_number": table.next_number(),
+        "lineage": table.lineage(),
+        "crc": table.crc(),
+        "whitened": whitened.collect::<Vec<_>>(),
+        "learned": textures.collect::<Vec<_>>(),
+    })
+}
+
+#[test]
+fn tables_read_to_the_same_values() {
+    let tables = [
+        "factory",
+        "handheld",
+        "paper",
+        "fused-force",
+        "fused-pressure",
+        "fused-bands",
+        "fused-properties",
+    ];
+    for name in tables {
+        let table = fs::read(golden(&format!("{name}.tact"))).unwrap();
+        let values = serde_json::to_string(&values(&table)).unwrap();
+        let values: Value = serde_json::from_str(&values).unwrap();
+        assert_eq!(values, json_of(&format!("{name}.json")), "{name}");
+    }
+}
+
+/// The store's sectors, which opening and reading leaves as they are.
+struct Sectors(Vec<u8>);
+
+impl ErrorType for Sectors {
+    type Error = Infallible;
+}
+
+impl ReadNorFlash for Sectors {
+    const READ_SIZE: usize = 4;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Infallible> {
+        bytes.copy_from_slice(&self.0[offset as usize..][..bytes.len()]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.len()
+    }
+}
+
+impl NorFlash for Sectors {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = 16 * 1024;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), Infallible> {
+        panic!("erases {from} to {to}")
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Infallible> {
+        panic!("writes {} bytes to {offset}", bytes.len())
+    }
+}
+
+#[test]
+fn stores_open_and_hold_the_same() {
+    for kind in ["fused", "gaussians"] {
+        let holds = json_of(&format!("store-{kind}.json"));
+        let image = unpacked(&format!("store-{kind}.bin.gz"));
+        let mut store = block_on(Store::open(Sectors(image))).unwrap();
+        assert_eq!(store.settings(), Ok(()));
+        let calibration = block_on(store.calibration()).unwrap().unwrap();
+        assert_eq!(holds["calibration"], hex(&calibration.to_bytes()));
+        let skin = block_on(store.skin()).unwrap();
+        assert_eq!(holds["skin"], json!([skin.energy_j(), skin.wear_j()]));
+        let stored = store.table().unwrap();
+        assert_eq!(holds["offset"], stored.offset);
+        assert_eq!(holds["generation"], stored.generation);
+        let mut buffer = [0; Sectors::ERASE_SIZE];
+        let table = block_on(store.read_table(&mut buffer)).unwrap().unwrap();
+        assert_eq!(holds["table"], hex(table.as_bytes()));
+
+        let mut in_force = [0; Sectors::ERASE_SIZE];
+        let length = block_on(put_in_force(&table, Some(&mut store), &mut in_force)).unwrap();
+        assert_eq!(holds["in_force"], hex(&in_force[..length]));
+        let mut learned = Vec::new();
+        let mut each = |record| learned.push(frame(&record));
+        block_on(store.self_taught(table.lineage(), &mut each)).unwrap();
+        assert_eq!(holds["self_taught"], json!(learned));
+        let trained = holds["trained"].as_array().unwrap();
+        assert!(trained.len() >= 3);
+        for record in trained {
+            let movement: Movement = serde_json::from_value(record[1].clone()).unwrap();
+            let table = record[2].as_u64().map(|crc| crc as u32);
+            let found = block_on(store.trained(record[0].as_str().unwrap(), movement, table));
+            assert_eq!(record[3], frame(&found.unwrap().unwrap()), "{record}");
+        }
+    }
+}
+
+/// Whether `tactus device log` is content with a log, and what it says.
+fn log(command: &str, name: &str) -> (bool, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join(name);
+    fs::write(&log, unpacked(&format!("{name}.gz"))).unwrap();
+    let mut tactus = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    let output = tactus.args(["device", "log", command]).arg(&log).output();
+    let output = output.unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    (output.status.success(), String::from_utf8(said).unwrap())
+}
+
+#[test]
+fn logs_of_explorations_replay_to_the_same_bits() {
+    for (name, texture) in [
+        ("identify.jsonl", "Polyurethane rubber"),
+        ("paper.jsonl", "Burlap"),
+    ] {
+        let (same, said) = log("replay", name);
+        assert!(same, "{name}: {said}");
+        // the last line counts choices, slides, posteriors and answers
+        let last = said.lines().last().unwrap_or_default();
+        assert_eq!(
+            last.matches(": 1 ").count() + last.matches(", 1 ").count(),
+            4,
+            "{said}"
+        );
+        assert!(last.ends_with("largest difference 0e0."), "{name}: {said}");
+        let (shown, said) = log("show", name);
+        assert!(shown && said.contains(texture), "{name}: {said}");
+    }
+}
+
+#[test]
+fn logs_of_teaching_are_read() {
+    // every line was understood: there is only nothing to replay
+    let (_, said) = log("replay", "learning.jsonl");
+    assert!(said.contains("no exploration in this log"), "{said}");
+}
