@@ -9,9 +9,12 @@ use cortex_m::peripheral::DWT;
 use static_cell::StaticCell;
 use tactus_core::dsp::Plan;
 
+use self::workload::{Counter, Workload, run};
 use crate::board;
-use crate::chip::{Chip, rescue};
-use crate::workload::{Counter, Workload, run};
+use crate::chip::Chip;
+use crate::chip::rescue;
+
+pub mod workload;
 
 const WORDS: usize = 8192;
 const RESULTS: usize = 9000;

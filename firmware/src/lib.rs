@@ -11,9 +11,8 @@ mod handheld;
 mod rig;
 mod selftest;
 mod tasks;
-pub mod workload;
 
-pub use bench::bench;
+pub use bench::{bench, workload};
 pub use handheld::handheld;
 pub use rig::rig;
 pub use selftest::selftest;

@@ -1,5 +1,5 @@
 //! Why the functions of the rig's image that panic are not called while it runs. The last words of a panic that comes all the
-//! same are in `firmware/src/rescue.rs`: the finger is lifted, and the probe starts again.
+//! same are in `firmware/src/chip/rescue.rs`: the finger is lifted, and the probe starts again.
 
 /// Callers, by parts of their names, that do not panic, and why.
 struct Reason {

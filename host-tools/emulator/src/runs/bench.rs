@@ -8,7 +8,7 @@ mod inputs;
 mod on_the_rig;
 mod plot;
 mod row;
-#[path = "../../../../firmware/src/workload.rs"]
+#[path = "../../../../firmware/src/bench/workload.rs"]
 pub mod workload;
 
 use std::path::{Path, PathBuf};

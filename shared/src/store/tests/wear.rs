@@ -1,7 +1,7 @@
 //! What an identification and a teaching wear off the chip's own sectors: counted, and stated in the book (docs/src/learning.md).
 //!
 //! The firmware stores the skin's care after every identification, and one self-taught record where it may learn and was
-//! certain (`firmware/src/session.rs`); whatever the user teaches writes the table anew.
+//! certain (`probe/memory.rs`); whatever the user teaches writes the table anew.
 
 use super::self_taught::{Chip, chip, taught};
 use super::*;

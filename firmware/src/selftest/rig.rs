@@ -1,0 +1,304 @@
+//! Current amplifier, switches, lever and stage. Motors move only after all switches were seen closed, and no further than a
+//! bound.
+use core::sync::atomic::Ordering::Relaxed;
+
+use embassy_stm32::Peri;
+use embassy_stm32::adc::{Adc, SampleTime};
+use embassy_stm32::gpio::{AnyPin, Input, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::timer::qei::Qei;
+use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
+use embassy_time::Timer;
+use tactus_core::rig::lever::{APPROACH_STEPS_S, MAX_STEPS, RETRACT_STEPS_S};
+use tactus_core::rig::stage::StageConstants;
+
+use super::account::{Account, wait_us};
+use super::sensor::Spread;
+use crate::board;
+use crate::chip::lever::Lever;
+use crate::chip::rescue;
+
+/// The current amplifier's zero is half of the reference, 2048; this is far beyond what its resistors can do.
+const ZERO_COUNTS: f32 = 60.0;
+/// 13 mA; the slowest slide draws 40.
+const CURRENT_NOISE_COUNTS: f32 = 16.0;
+/// 2 mm of the lever.
+const LEVER_STEPS: i32 = 3200;
+/// 0.1 mm: how far from where it opened the lever's switch may close.
+const LEVER_PLAY: i32 = 160;
+/// About 36 mm/s: enough to overcome friction, slow enough to stop by hand.
+const STAGE_DUTY: f32 = 0.08;
+const STAGE_MM: f32 = 1.0;
+/// At that duty no more than 10 mm, should the encoder be silent.
+const STAGE_MS: u32 = 250;
+
+struct Switches {
+    lever_top: Input<'static>,
+    stage_left: Input<'static>,
+    stage_right: Input<'static>,
+    e_stop: Input<'static>,
+}
+
+/// Current amplifier, switches, lever and stage; motors only if all is `well` so far.
+pub(super) async fn rig(
+    lever: board::Lever,
+    stage: board::Stage,
+    switches: board::Switches,
+    well: bool,
+    blue: &mut Output<'static>,
+    account: &mut Account,
+) {
+    let switch = |pin: Peri<'static, AnyPin>| Input::new(pin, Pull::Up);
+    let switches = Switches {
+        lever_top: switch(switches.lever_top.into()),
+        stage_left: switch(switches.stage_left.into()),
+        stage_right: switch(switches.stage_right.into()),
+        e_stop: switch(switches.e_stop.into()),
+    };
+    let mut lever = Lever::new(lever);
+    let mut pwm = SimplePwm::new(
+        stage.timer,
+        Some(PwmPin::new(stage.pwm, OutputType::PushPull)),
+        None,
+        None,
+        None,
+        Hertz::khz(20),
+        Default::default(),
+    );
+    let mut pwm = pwm.ch1();
+    pwm.set_duty_cycle_fully_off();
+    pwm.enable();
+    let full = pwm.max_duty_cycle();
+    let mut bridge = Output::new(stage.enable, Level::Low, Speed::Low);
+    let mut right = Output::new(stage.direction, Level::Low, Speed::Low);
+    let encoder = Qei::new(
+        stage.encoder,
+        stage.encoder_a,
+        stage.encoder_b,
+        Default::default(),
+    );
+    let mut adc = Adc::new(stage.adc);
+    let mut current_pin = stage.current;
+
+    let mut current = Spread::default();
+    for _ in 0..1000 {
+        current.add(adc.blocking_read(&mut current_pin, SampleTime::CYCLES56));
+        wait_us(20);
+    }
+    account.check(
+        (current.mean() - 2048.0).abs() <= ZERO_COUNTS && current.rms() <= CURRENT_NOISE_COUNTS,
+        "motor current at rest",
+        format_args!("{:.0} counts, noise {:.1} rms", current.mean(), current.rms()),
+        "2048 +- 60 and below 16 rms are right. The amplifier's output belongs to PA3, its reference to half of 3.3 V",
+    );
+
+    let mut closed = true;
+    for (name, input) in [
+        ("left switch PF14", &switches.stage_left),
+        ("right switch PF15", &switches.stage_right),
+        ("emergency stop PF13", &switches.e_stop),
+    ] {
+        closed &= account.check(
+            input.is_low(),
+            name,
+            level(input),
+            "Push the stage to its middle, release the emergency stop; if it stays so its wire is broken",
+        );
+    }
+    // pressed is no fault here: the lever's own check tells it from a broken wire
+    let top = level(&switches.lever_top);
+    account.check(true, "lever switch PF12", top, "");
+
+    if !(closed && well) {
+        let why = if well {
+            "since a switch is open"
+        } else {
+            "after this reset"
+        };
+        account.leave_out("lever", why);
+        account.leave_out("stage", why);
+        return;
+    }
+    defmt::warn!("THE MOTORS MOVE IN 3 s: the finger must be off, hands away");
+    for _ in 0..15 {
+        blue.set_high();
+        Timer::after_millis(100).await;
+        blue.set_low();
+        Timer::after_millis(100).await;
+    }
+    blue.set_high();
+    // should the firmware give up now, the rescue can drive both
+    rescue::ARMED.store(true, Relaxed);
+
+    let lifted = match test_lever(&mut lever, &switches).await {
+        Ok((up, play)) => account.check(
+            true,
+            "lever",
+            format_args!("{up} steps up to its switch, 2 mm down and up again within {play} steps"),
+            "",
+        ),
+        Err(why) => account.check(
+            false,
+            "lever",
+            why,
+            "STEP PE9, DIR PE11 (high is down), EN PE13, switch PF12, 16 microsteps, the driver's supply",
+        ),
+    };
+    lever.drive(false, 0);
+    if !lifted {
+        rescue::ARMED.store(false, Relaxed);
+        blue.set_low();
+        account.leave_out("stage", "since the lever may be down");
+        return;
+    }
+
+    let mut drive = |duty: f32| {
+        right.set_level((duty > 0.0).into());
+        pwm.set_duty_cycle((libm::fabsf(duty) * full as f32) as u32);
+    };
+    bridge.set_high();
+    let mut count: i32 = 0;
+    let mut position_mm = || {
+        count += i32::from(encoder.count().wrapping_sub(count as u16) as i16);
+        count as f32 * StageConstants::REFERENCE.mm_per_count
+    };
+    position_mm();
+    let there = move_stage(STAGE_DUTY, &mut drive, &mut position_mm, &switches).await;
+    let moved = match there {
+        Ok(right_mm) => move_stage(-STAGE_DUTY, &mut drive, &mut position_mm, &switches)
+            .await
+            .map(|left_mm| (right_mm, left_mm)),
+        Err(why) => Err(why),
+    };
+    bridge.set_low();
+    match moved {
+        Ok((right_mm, left_mm)) => account.check(
+            true,
+            "stage",
+            format_args!("{right_mm:.2} mm to the right, {:.2} mm back", -left_mm),
+            "",
+        ),
+        Err(why) => account.check(
+            false,
+            "stage",
+            why,
+            "PWM PC6, DIR PC7 (high is right), EN PC8, encoder PD12 and PD13, the bridge's supply",
+        ),
+    };
+    rescue::ARMED.store(false, Relaxed);
+    blue.set_low();
+}
+
+fn level(input: &Input<'_>) -> &'static str {
+    if input.is_low() { "closed" } else { "open" }
+}
+
+/// Drives the lever until its switch is as wanted, three times in a row; the steps made.
+async fn drive_lever(
+    lever: &mut Lever,
+    switches: &Switches,
+    rate: i32,
+    most: i32,
+    until_open: Option<bool>,
+) -> Result<i32, &'static str> {
+    let from = lever.steps();
+    let mut seen = 0;
+    lever.drive(true, rate);
+    let done = loop {
+        Timer::after_millis(1).await;
+        let made = (lever.steps() - from).abs();
+        seen = match until_open {
+            Some(open) if switches.lever_top.is_high() == open => seen + 1,
+            _ => 0,
+        };
+        if switches.e_stop.is_high() {
+            break Err("emergency stop");
+        }
+        if seen >= 3 {
+            break Ok(made);
+        }
+        if made >= most {
+            break if until_open.is_some() {
+                Err(
+                    "the switch at its top stays closed on the way up: it does not move, or moves down",
+                )
+            } else {
+                Ok(made)
+            };
+        }
+    };
+    lever.drive(true, 0);
+    // the step that is under way
+    Timer::after_millis(2).await;
+    done
+}
+
+/// Up to the switch, 2 mm down and up again: steps to the switch, and the difference between the ways.
+async fn test_lever(lever: &mut Lever, switches: &Switches) -> Result<(i32, i32), &'static str> {
+    // the drivers want a while with current before they step
+    lever.drive(true, 0);
+    Timer::after_millis(10).await;
+    let most = MAX_STEPS * 5 / 4;
+    let up = drive_lever(lever, switches, RETRACT_STEPS_S, most, Some(true)).await?;
+    let down = 2 * APPROACH_STEPS_S;
+    drive_lever(lever, switches, down, LEVER_STEPS, None).await?;
+    if switches.lever_top.is_high() {
+        return Err(
+            "the switch at its top stays open 2 mm below: its wire is broken, or the lever does not move",
+        );
+    }
+    let most = LEVER_STEPS + LEVER_PLAY;
+    let back = drive_lever(lever, switches, -down, most, Some(true)).await?;
+    let play = (back - LEVER_STEPS).abs();
+    if play > LEVER_PLAY {
+        return Err("it came back to its switch too early: it loses steps on the way down");
+    }
+    Ok((up, play))
+}
+
+/// Moves the stage by at least [`STAGE_MM`] and brakes it; how far it went, mm, to the right positive.
+async fn move_stage(
+    duty: f32,
+    drive: &mut impl FnMut(f32),
+    position_mm: &mut impl FnMut() -> f32,
+    switches: &Switches,
+) -> Result<f32, &'static str> {
+    let from_mm = position_mm();
+    let direction = duty.signum();
+    drive(duty);
+    let mut ms = 0;
+    let done = loop {
+        Timer::after_millis(1).await;
+        ms += 1;
+        let moved_mm = (position_mm() - from_mm) * direction;
+        let limit = if duty > 0.0 {
+            &switches.stage_right
+        } else {
+            &switches.stage_left
+        };
+        if switches.e_stop.is_high() {
+            break Err("emergency stop");
+        }
+        if limit.is_high() {
+            break Err("it ran into a limit switch: push it to its middle and run the test again");
+        }
+        if moved_mm > STAGE_MM {
+            break Ok(());
+        }
+        if moved_mm < -STAGE_MM / 2.0 {
+            break Err(
+                "the encoder counts backwards: swap its lines A and B, or the motor's wires",
+            );
+        }
+        if ms >= STAGE_MS {
+            break Err(
+                "the encoder does not count: a line of it is cut, or the stage does not move",
+            );
+        }
+    };
+    // without duty the bridge shorts the motor
+    drive(0.0);
+    Timer::after_millis(200).await;
+    let moved_mm = position_mm() - from_mm;
+    done.map(|()| moved_mm)
+}

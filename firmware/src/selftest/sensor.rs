@@ -1,0 +1,155 @@
+//! The sensor on its bus: who it is, whether its words come whole and in time, and what it measures when nobody touches it.
+use embassy_stm32::gpio::{Level, Output, Pull, Speed};
+use embassy_stm32::mode::Blocking;
+use embassy_stm32::spi::mode::Master;
+use embassy_stm32::spi::{self, Spi};
+use embassy_stm32::time::Hertz;
+use embassy_time::{Duration, Instant, Timer};
+use tactus_core::sensor::biotac::{BioTac, Diagnosis, IdentityBytes, WordStats};
+use tactus_core::sensor::pressure::Channel;
+use tactus_core::sensor::{Exchange, PressureSensor as _};
+
+use super::account::{Account, wait_us};
+use crate::board;
+
+const SLOTS_PER_S: u64 = 4400;
+/// A slot that begins later than this leaves the sensor less than its 50 us before the next one.
+const LATE_US: u64 = 100;
+/// P_AC of a BioTac that nobody touches. Less is a dead converter, more is a bad ground.
+const PAC_NOISE_COUNTS: core::ops::RangeInclusive<f32> = 1.0..=8.0;
+/// P_DC of a finger filled as it should be, in air.
+const PDC_COUNTS: core::ops::RangeInclusive<f32> = 2000.0..=3200.0;
+
+/// The bus of the sensor, used directly.
+struct Sensor {
+    spi: Spi<'static, Blocking, Master>,
+    select: Output<'static>,
+}
+
+impl Sensor {
+    fn exchange<R: AsMut<[u8]>>(&mut self, mut exchange: Exchange<R>) -> R {
+        // the bus itself cannot fail: no mode fault with software select, no overrun with blocking transfers
+        if let Some(command) = &exchange.command {
+            self.select.set_low();
+            let _ = self.spi.blocking_write(command);
+            self.select.set_high();
+            wait_us(exchange.gap_us);
+        }
+        self.select.set_low();
+        let _ = self.spi.blocking_transfer_in_place(exchange.read.as_mut());
+        self.select.set_high();
+        wait_us(exchange.rest_us);
+        exchange.read
+    }
+}
+
+/// Mean and standard deviation of counts.
+#[derive(Default)]
+pub(super) struct Spread {
+    number: f32,
+    sum: f32,
+    squares: f32,
+    /// sums are about the first value, so that they stay small
+    first: f32,
+}
+
+impl Spread {
+    pub(super) fn add(&mut self, counts: u16) {
+        let counts = f32::from(counts);
+        if self.number == 0.0 {
+            self.first = counts;
+        }
+        let off = counts - self.first;
+        self.number += 1.0;
+        self.sum += off;
+        self.squares += off * off;
+    }
+
+    pub(super) fn mean(&self) -> f32 {
+        self.first + self.sum / self.number.max(1.0)
+    }
+
+    pub(super) fn rms(&self) -> f32 {
+        let mean = self.sum / self.number.max(1.0);
+        libm::sqrtf((self.squares / self.number.max(1.0) - mean * mean).max(0.0))
+    }
+}
+
+pub(super) async fn sensor(pins: board::Acquire, account: &mut Account) {
+    let mut config = spi::Config::default();
+    config.frequency = Hertz(5_250_000);
+    config.miso_pull = Pull::Up;
+    let mut sensor = Sensor {
+        spi: Spi::new_blocking(pins.spi, pins.sck, pins.mosi, pins.miso, config),
+        select: Output::new(pins.select, Level::High, Speed::VeryHigh),
+    };
+    Timer::after_millis(BioTac::POWER_UP_MS.into()).await;
+    let mut bytes = IdentityBytes::default();
+    for exchange in bytes.exchanges() {
+        sensor.exchange(exchange);
+    }
+    match bytes.decode() {
+        Ok(id) => account.check(
+            true,
+            "sensor identity",
+            format_args!("{}, firmware {}, flex {}", id.serial, id.firmware, id.flex),
+            "",
+        ),
+        Err(why) => account.check(
+            false,
+            "sensor identity",
+            why,
+            "SCK PA5, MISO PA6, MOSI PB5, CS PD14, 3.3 V and ground",
+        ),
+    };
+
+    let mut stats = WordStats::default();
+    let (mut pac, mut pdc) = (Spread::default(), Spread::default());
+    let mut late: u32 = 0;
+    let began = Instant::now();
+    for slot in 0..SLOTS_PER_S {
+        let due = began + Duration::from_micros(slot * 1_000_000 / SLOTS_PER_S);
+        Timer::at(due).await;
+        if Instant::now().saturating_duration_since(due).as_micros() > LATE_US {
+            late += 1;
+        }
+        let channel = if slot % 2 == 0 {
+            Channel::Pac
+        } else {
+            Channel::Pdc
+        };
+        let word = BioTac::decode(channel, sensor.exchange(BioTac::exchange(channel)));
+        stats.count(&word);
+        if let Ok(pressure) = word {
+            match channel {
+                Channel::Pac => pac.add(pressure.counts.get()),
+                Channel::Pdc => pdc.add(pressure.counts.get()),
+            }
+        }
+    }
+    let diagnosis = stats.diagnosis();
+    account.check(
+        diagnosis == Diagnosis::Good && late == 0,
+        "sensor words",
+        format_args!(
+            "{} words, {} garbled, {} error frames, {} silent, {late} late: {diagnosis}",
+            stats.words,
+            stats.parity + stats.padding,
+            stats.error_frames,
+            stats.no_sensor
+        ),
+        "Shorten the cable and check the pins named above",
+    );
+    account.check(
+        PAC_NOISE_COUNTS.contains(&pac.rms()),
+        "P_AC noise",
+        format_args!("{:.2} counts rms", pac.rms()),
+        "1 to 8 are right. Less: the sensor does not convert. More: is the finger touched? Check its ground",
+    );
+    account.check(
+        PDC_COUNTS.contains(&pdc.mean()),
+        "P_DC",
+        format_args!("{:.0} counts", pdc.mean()),
+        "2000 to 3200 are right without contact. Refill the finger as its manual says; keep off anything that presses it",
+    );
+}
