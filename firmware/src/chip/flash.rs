@@ -31,7 +31,7 @@ pub(crate) async fn open(flash: board::Storage) -> Option<Storage> {
 pub(crate) struct MappedTable;
 
 impl StoredBytes<Bank2> for MappedTable {
-    async fn bytes(&mut self, store: &mut Storage) -> Option<&[u8]> {
+    fn bytes(&mut self, store: &mut Storage) -> Option<&[u8]> {
         let table = store.table()?;
         let at = table.offset as usize;
         // SAFETY: the store's sectors are mapped at this address and are nothing else; the slot in use is erased only when

@@ -251,8 +251,10 @@ pub(crate) async fn servo(
             ended = now;
             ENDED.signal(());
         }
-        let state = RigState::of(&mut control, inputs.steps, inputs.current_a, ended);
-        STATE.lock(|cell| cell.set(state));
+        STATE.lock(|cell| {
+            let (steps, current_a) = (inputs.steps, inputs.current_a);
+            cell.set(RigState::of(&mut control, steps, current_a, ended));
+        });
         match hung {
             Some(why) if control.is_at_rest() => rescue::remember(why),
             _ => watchdog.pet(),

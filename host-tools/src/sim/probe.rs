@@ -136,9 +136,9 @@ impl<H: Host> Servo for SimServo<'_, H> {
 pub struct TableCopy(Vec<u8>);
 
 impl<const S: usize> StoredBytes<RamFlash<S>> for TableCopy {
-    async fn bytes(&mut self, store: &mut Store<RamFlash<S>>) -> Option<&[u8]> {
+    fn bytes(&mut self, store: &mut Store<RamFlash<S>>) -> Option<&[u8]> {
         self.0.resize(Store::<RamFlash<S>>::MAX_TABLE, 0);
-        let table = store.read_table(&mut self.0).await.ok()??;
+        let table = block_on(store.read_table(&mut self.0)).ok()??;
         Some(table.as_bytes())
     }
 }

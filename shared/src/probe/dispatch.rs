@@ -150,15 +150,11 @@ where
                 memory.episode = Some(episode);
                 Ok(())
             }
-            Ask::Answer(name) => {
-                let learned = memory.label(name, events).await?;
-                events.tell(learned);
-                Ok(())
-            }
+            Ask::Answer(name) => memory.label(name, events).await,
             Ask::Train(wanted) => {
                 memory.episode = None;
                 rig.begin(wanted.seed).await;
-                let (store, base, buffer) = memory.lend().await?;
+                let (store, base, buffer) = memory.lend().map_err(text)?;
                 let tell = |event| events.tell(event);
                 let done = train::<_, _, K>(wanted, rig, store, base, plan, buffer, tell).await;
                 memory.reload(events).await;
@@ -166,13 +162,13 @@ where
                 done
             }
             Ask::Rename { from, to } => {
-                let (store, base, buffer) = memory.lend().await?;
+                let (store, base, buffer) = memory.lend().map_err(text)?;
                 let done = teach::rename(from, to, &base, store, buffer).await;
                 memory.reload(events).await;
                 done
             }
             Ask::Forget(what) => {
-                let (store, base, buffer) = memory.lend().await?;
+                let (store, base, buffer) = memory.lend().map_err(text)?;
                 let done = teach::forget(what, &base, store, buffer).await;
                 memory.reload(events).await;
                 done
@@ -181,7 +177,7 @@ where
                 memory.episode = None;
                 let calibration = calibrate::calibrate(rig).await?;
                 events.tell(told(&calibration));
-                calibrate::keep(memory.store()?, &calibration).await
+                calibrate::keep(memory.store().map_err(text)?, &calibration).await
             }
             Ask::WriteCalibration(bytes) => {
                 let bytes = bytes
@@ -190,18 +186,19 @@ where
                     .map_err(|_| text("a calibration has 60 bytes"))?;
                 let calibration = RigCalibration::from_bytes(bytes).map_err(text)?;
                 rig.set_calibration(calibration).await.map_err(text)?;
-                calibrate::keep(memory.store()?, &calibration).await
+                calibrate::keep(memory.store().map_err(text)?, &calibration).await
             }
             Ask::ReadTable(offset) => {
-                events.tell(transfer::read(memory.in_force(), *offset)?);
+                let part = transfer::read(memory.in_force(), *offset);
+                events.tell(part.ok_or_else(|| text("the table has no such byte"))?);
                 Ok(())
             }
             Ask::BeginTable(length) => {
-                let store = memory.store()?;
+                let store = memory.store().map_err(text)?;
                 store.begin_table(*length as usize).await.map_err(text)
             }
             Ask::WriteTable { offset, bytes } => {
-                transfer::write(memory.store()?, *offset, bytes).await
+                transfer::write(memory.store().map_err(text)?, *offset, bytes).await
             }
             Ask::CommitTable => {
                 let done = memory.commit().await;
@@ -209,7 +206,12 @@ where
                 done
             }
             Ask::FactoryTable => {
-                let done = memory.store()?.factory_table().await.map_err(text);
+                let done = memory
+                    .store()
+                    .map_err(text)?
+                    .factory_table()
+                    .await
+                    .map_err(text);
                 memory.reload(events).await;
                 done
             }

@@ -1,5 +1,7 @@
 //! What a probe knows: the store, and the table in force.
 
+use core::fmt;
+
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::seams::{Events, StoredBytes};
@@ -9,7 +11,7 @@ use crate::explorer::Visited;
 use crate::rig::skin::SkinCare;
 use crate::store::Store;
 use crate::table::{Table, TableError};
-use crate::wire::{Tell, Text, text};
+use crate::wire::{Text, text};
 
 /// What a probe knows.
 pub struct Memory<'m, F, B> {
@@ -28,22 +30,36 @@ pub struct Memory<'m, F, B> {
     pub episode: Option<Visited>,
 }
 
-fn broken() -> Text {
-    text("the store is broken: see the log")
+/// Why nothing can be learned.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum MemoryError {
+    /// The store could not be opened.
+    Broken,
+    /// There is no table to begin with: the firmware's own cannot be read.
+    NoTable,
 }
 
+impl fmt::Display for MemoryError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Broken => "the store is broken: see the log",
+            Self::NoTable => "there is no table: see the log",
+        })
+    }
+}
+
+impl core::error::Error for MemoryError {}
+
 /// The table that all learning begins with: the stored one, or the factory's.
-async fn base<'b, F: NorFlash, B: StoredBytes<F>>(
+#[inline(never)]
+fn base<'b, F: NorFlash, B: StoredBytes<F>>(
     store: Option<&mut Store<F>>,
     stored: &'b mut B,
     factory: &'b [u8],
 ) -> &'b [u8] {
-    let bytes = match store {
-        Some(store) => stored.bytes(store).await,
-        None => None,
-    };
-    // one that another version of this firmware wrote is not understood
-    bytes
+    store
+        .and_then(|store| stored.bytes(store))
+        // one that another version of this firmware wrote is not understood
         .filter(|bytes| Table::read(bytes).is_ok())
         .unwrap_or(factory)
 }
@@ -74,7 +90,7 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
 
     /// Puts the table in force, which `events` hears of.
     pub async fn reload(&mut self, events: &mut impl Events) {
-        let base = base(self.store.as_mut(), &mut self.stored, self.factory).await;
+        let base = base(self.store.as_mut(), &mut self.stored, self.factory);
         self.is_factory = core::ptr::eq(base, self.factory);
         let in_force = match Table::read(base) {
             Ok(base) => put_in_force(&base, self.store.as_mut(), self.buffer)
@@ -117,22 +133,23 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
     ///
     /// # Errors
     /// It could not be opened.
-    pub fn store(&mut self) -> Result<&mut Store<F>, Text> {
-        self.store.as_mut().ok_or_else(broken)
+    pub fn store(&mut self) -> Result<&mut Store<F>, MemoryError> {
+        self.store.as_mut().ok_or(MemoryError::Broken)
     }
 
     /// The store, the table that learning begins with, and the buffer for a new one; [`Memory::reload`] is due after it.
-    pub(super) async fn lend(&mut self) -> Result<(&mut Store<F>, Table<'_>, &mut [u8]), Text> {
-        let store = self.store.as_mut();
-        let bytes = base(store, &mut self.stored, self.factory).await;
-        let base = Table::read(bytes).map_err(text)?;
-        let store = self.store.as_mut().ok_or_else(broken)?;
+    #[inline(never)]
+    pub(super) fn lend(&mut self) -> Result<(&mut Store<F>, Table<'_>, &mut [u8]), MemoryError> {
+        let bytes = base(self.store.as_mut(), &mut self.stored, self.factory);
+        let base = Table::read(bytes).map_err(|_| MemoryError::NoTable)?;
+        let store = self.store.as_mut().ok_or(MemoryError::Broken)?;
         Ok((store, base, self.buffer))
     }
 
     /// Commits the table that was written to the store.
     pub(super) async fn commit(&mut self) -> Result<(), Text> {
-        let store = self.store.as_mut().ok_or_else(broken)?;
+        let store = self.store.as_mut();
+        let store = store.ok_or_else(|| text(MemoryError::Broken))?;
         let committed = store.commit_table(self.buffer).await;
         committed.map(|_| ()).map_err(text)
     }
@@ -163,22 +180,29 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         }
     }
 
-    /// Learns from the user's word what lay under the finger in the last exploration, and puts the new table in force.
+    /// Learns from the user's word what lay under the finger in the last exploration, puts the new table in force and tells
+    /// so.
     /// After an error the exploration can be labelled anew: another name may do.
     ///
     /// # Errors
     /// Nothing was felt since the rig moved last, or see [`teach::answer`].
-    pub async fn label(&mut self, name: &str, events: &mut impl Events) -> Result<Tell, Text> {
+    pub async fn label(&mut self, name: &str, events: &mut impl Events) -> Result<(), Text> {
         let episode = self
             .episode
             .take()
             .ok_or_else(|| text("nothing was felt since the rig moved last: explore first"))?;
-        let (store, base, buffer) = self.lend().await?;
+        let (store, base, buffer) = self.lend().map_err(text)?;
         let learned = teach::answer(&episode, name, &base, store, buffer).await;
         self.reload(events).await;
-        if learned.is_err() {
-            self.episode = Some(episode);
+        match learned {
+            Ok(learned) => {
+                events.tell(learned);
+                Ok(())
+            }
+            Err(why) => {
+                self.episode = Some(episode);
+                Err(why)
+            }
         }
-        learned
     }
 }

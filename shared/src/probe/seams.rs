@@ -53,10 +53,9 @@ pub trait RigHandle: Rig {
 
 /// Where the bytes of the stored table are read: mapped flash on the chip, a copy on a PC. They must stay readable beside
 /// the store that they came from, for a new table is written while the old one is read.
-#[allow(async_fn_in_trait)] // as above
 pub trait StoredBytes<F: NorFlash> {
     /// The bytes of [`Store::table`]; `None` if no table is stored, or if it cannot be read.
-    async fn bytes(&mut self, store: &mut Store<F>) -> Option<&[u8]>;
+    fn bytes(&mut self, store: &mut Store<F>) -> Option<&[u8]>;
 }
 
 /// Who hears what a probe does.

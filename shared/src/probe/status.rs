@@ -55,6 +55,7 @@ impl RigState {
     }
 
     /// The state after a tick with these steps and this motor current.
+    #[inline]
     pub fn of(control: &mut Control, steps: i32, current_a: f32, ended: Option<Ended>) -> Self {
         Self {
             phase: control.phase(),

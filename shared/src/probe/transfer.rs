@@ -6,13 +6,11 @@ use heapless::Vec;
 use crate::store::{Store, StoreError};
 use crate::wire::{PART, Tell, Text, text};
 
-/// Tells of the part of `table` that begins at `offset`.
-pub(super) fn read(table: &[u8], offset: u32) -> Result<Tell, Text> {
-    let rest = table
-        .get(offset as usize..)
-        .ok_or_else(|| text("the table has no such byte"))?;
+/// The part of `table` that begins at `offset`, as the host is told of it; `None` if the table ends before.
+pub(super) fn read(table: &[u8], offset: u32) -> Option<Tell> {
+    let rest = table.get(offset as usize..)?;
     let part = rest.get(..rest.len().min(PART)).unwrap_or_default();
-    Ok(Tell::TablePart {
+    Some(Tell::TablePart {
         offset,
         length: table.len() as u32,
         bytes: Vec::from_slice(part).unwrap_or_default(),

@@ -90,9 +90,9 @@ impl RigHandle for Bench {
 struct Copied(vec::Vec<u8>);
 
 impl StoredBytes<Flash> for Copied {
-    async fn bytes(&mut self, store: &mut Store<Flash>) -> Option<&[u8]> {
+    fn bytes(&mut self, store: &mut Store<Flash>) -> Option<&[u8]> {
         self.0.resize(SECTOR, 0);
-        let table = store.read_table(&mut self.0).await.ok()??;
+        let table = block_on(store.read_table(&mut self.0)).ok()??;
         Some(table.as_bytes())
     }
 }
