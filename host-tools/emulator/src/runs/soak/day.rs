@@ -211,9 +211,9 @@ pub fn day(virtual_s: f64, seed: u64, mut each: impl FnMut(f64)) -> Result<Day, 
     Ok(day)
 }
 
-/// Has the probe do something, as a host would.
-fn ask(probe: &mut Probe<'_>, ask: Ask) -> Result<(), Text> {
-    block_on(probe.perform::<Plain>(&ask))
+/// Has the probe do something, as a host would; why it does not.
+fn ask(probe: &mut Probe<'_>, ask: Ask) -> Result<(), Box<Text>> {
+    block_on(probe.perform::<Plain>(&ask)).map_err(Box::new)
 }
 
 fn now_s(probe: &mut Probe<'_>) -> f64 {
