@@ -68,6 +68,10 @@ pub enum ContentError {
         movement: Box<str>,
     },
 
+    /// A count is larger than the converter gives.
+    #[error("{0} is not a count of 0 to 4095")]
+    Count(u16),
+
     // recorded slides
     /// Start and end of the steady part, s.
     #[error("the steady window {0} s to {1} s is not a stretch of time")]
@@ -164,6 +168,9 @@ pub enum ContentError {
     /// A field of a record is missing.
     #[error("there is no {0} in it")]
     NoField(&'static str),
+    /// The record has P_AC at another rate than [`PAC_RATE_HZ`].
+    #[error("pac at {0} Hz; all of Tactus counts on {PAC_RATE_HZ} Hz")]
+    PacFieldRate(u32),
     /// No material.
     #[error("no material is listed")]
     NoMaterial,

@@ -220,8 +220,7 @@ fn read_bio(path: &Path) -> Result<Bio> {
         let count = |column| -> Result<u16> {
             let count = row.parse(column, COUNT)?;
             if count > 4095 {
-                let cause = ContentError::NotA(row.text(column).to_owned(), COUNT);
-                return Err(row.error(Some(column), cause).into());
+                return Err(row.error(Some(column), ContentError::Count(count)).into());
             }
             Ok(count)
         };

@@ -16,7 +16,14 @@ use super::finger::{Contact, Finger};
 use super::sensor::{POWER_UP_NS, SensorPeer};
 
 /// What drives the world with the core's control, and learns from it: these files know both, and the world none of them.
-const DRIVERS: [&str; 5] = ["collection", "handheld", "recorded", "rig", "scenario"];
+const DRIVERS: [&str; 6] = [
+    "collection",
+    "handheld",
+    "probe",
+    "recorded",
+    "rig",
+    "scenario",
+];
 
 /// Whether a file or folder is one of [`DRIVERS`].
 fn drives(path: &Path) -> bool {

@@ -242,7 +242,7 @@ impl Record {
         }
         let pac = pac.ok_or(ContentError::NoField("pac"))?;
         if pac.rate_hz != PAC_RATE_HZ {
-            return Err(ContentError::PacRate(pac.rate_hz));
+            return Err(ContentError::PacFieldRate(pac.rate_hz));
         }
         Ok(Self {
             values: start,
