@@ -3,8 +3,9 @@
 use std::io;
 
 use tactus_core::features::MovementError;
+use tactus_core::sensor::pressure::RATE_HZ;
 
-use crate::data::recording::{MAX_SAMPLES, PAC_RATE_HZ};
+use crate::data::recordings::npy::{MAX_SAMPLES, NpyError};
 
 /// What is wrong with the contents of a file, and what to do. The errors that hold it say which file, and where in it.
 #[derive(Debug, thiserror::Error)]
@@ -79,8 +80,8 @@ pub enum ContentError {
     /// The rate of a stream, Hz, and the stream.
     #[error("a rate of {0} Hz for {1} is impossible")]
     Rate(u32, &'static str),
-    /// P_AC has another rate than [`PAC_RATE_HZ`].
-    #[error("{0} Hz; all of Tactus counts on {PAC_RATE_HZ} Hz")]
+    /// P_AC has another rate than [`RATE_HZ`].
+    #[error("{0} Hz; all of Tactus counts on {RATE_HZ} Hz")]
     PacRate(u32),
     /// A stream is too long.
     #[error("{0} samples of {1} are more than a slide can have ({MAX_SAMPLES})")]
@@ -153,7 +154,7 @@ pub enum ContentError {
     Truncated(usize, u64),
     /// The file does not hold an array of samples.
     #[error(transparent)]
-    Npy(#[from] crate::data::recordings::npy::NpyError),
+    Npy(#[from] NpyError),
 
     // manifests in JSON
     /// The JSON reader complains; a folder with that layout.
@@ -168,8 +169,8 @@ pub enum ContentError {
     /// A field of a record is missing.
     #[error("there is no {0} in it")]
     NoField(&'static str),
-    /// The record has P_AC at another rate than [`PAC_RATE_HZ`].
-    #[error("pac at {0} Hz; all of Tactus counts on {PAC_RATE_HZ} Hz")]
+    /// The record has P_AC at another rate than [`RATE_HZ`].
+    #[error("pac at {0} Hz; all of Tactus counts on {RATE_HZ} Hz")]
     PacFieldRate(u32),
     /// No material.
     #[error("no material is listed")]

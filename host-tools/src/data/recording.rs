@@ -3,13 +3,14 @@
 use std::ops::Range;
 
 use tactus_core::features::Movement;
+use tactus_core::sensor::pressure::RATE_HZ;
 
 use crate::data::content::ContentError;
+use crate::data::recordings::npy::MAX_SAMPLES;
 
 /// Rate of P_AC in every recording: the BioTac's 2200 Hz.
-pub const PAC_RATE_HZ: u32 = 2200;
-/// Longest stream that is read, in samples: half an hour of P_AC. A slide lasts 15 s at most.
-pub const MAX_SAMPLES: usize = 1 << 22;
+pub const PAC_RATE_HZ: u32 = RATE_HZ;
+
 /// One slide over one texture.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Slide {

@@ -14,9 +14,9 @@ use super::files::{
     BIOTAC_MANIFEST as MANIFEST, MAX_MANIFEST, RecordingError, Result, distinct_textures,
     in_order_of_time, inside, read_bounded, unpack,
 };
-use super::npy;
+use super::npy::{self, MAX_SAMPLES};
 use crate::data::content::ContentError;
-use crate::data::recording::{Background, MAX_SAMPLES, PAC_RATE_HZ, Slide, SlideKey, Texture};
+use crate::data::recording::{Background, PAC_RATE_HZ, Slide, SlideKey, Texture};
 
 /// The pressing force is not in the manifest: the arm pressed with about 0.8 N, which fell to 0.3 N over the slide.
 pub const NOMINAL_FORCE_MN: u16 = 800;
