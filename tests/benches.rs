@@ -1,7 +1,7 @@
 //! How long the core's main steps take on this machine: `cargo bench`. Nothing here is gated; gates are on instructions.
 
 use divan::Bencher;
-use tactus::data::replay::Felt;
+use tactus::data::replay::MeasuredSlide;
 use tactus::eval::evaluate::{Method, evaluate};
 use tactus::eval::experiment::{Experiment, Protocol};
 use tactus::eval::learn::encode;
@@ -110,8 +110,8 @@ fn choice_of_the_next_movement(bencher: Bencher<'_, '_>) {
     let mut explorer = explorer(&bytes);
     explorer.observe(ACTION, &slide()).unwrap();
     bencher.bench_local(|| {
-        let outlook = explorer.outlook();
-        explorer.choose(&outlook, 0)
+        let expected = explorer.expected_outcomes();
+        explorer.choose(&expected, 0)
     });
 }
 
@@ -139,12 +139,12 @@ fn evaluate_8000_runs(bencher: Bencher<'_, '_>) {
         slide.finish().unwrap()
     };
     let names: Vec<String> = (0..20).map(|t| format!("texture {t}")).collect();
-    let felt: Vec<Vec<Felt>> = names
+    let observed: Vec<Vec<MeasuredSlide>> = names
         .iter()
         .map(|_| {
             let centre = [2.5 + noise(), 9.0 + 1.5 * noise(), 2.5 + 0.5 * noise()];
             (1..=34)
-                .map(|number| Felt {
+                .map(|number| MeasuredSlide {
                     number,
                     movement: Movement::FOR_FINENESS,
                     measurement: Measurement {
@@ -155,7 +155,8 @@ fn evaluate_8000_runs(bencher: Bencher<'_, '_>) {
                 .collect()
         })
         .collect();
-    let experiment = Experiment::recorded(names, &felt, None, Protocol::Interleaved, 5, 1).unwrap();
+    let experiment =
+        Experiment::recorded(names, &observed, None, Protocol::Interleaved, 5, 1).unwrap();
     let config = Config {
         strategy: Method::Paper.strategy(),
         ..Config::default()

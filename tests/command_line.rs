@@ -426,7 +426,7 @@ fn identify_recognises_a_texture_and_explains_each_step() {
         "Slide 1:",
         "because",
         "should leave",
-        "felt",
+        "measured",
         "█",
         "It is bath towel",
         "Right.",

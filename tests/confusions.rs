@@ -1,11 +1,11 @@
-//! Degrees of confusion that are kept, on the worlds and on recordings: they promise what computing them does, to the bit.
+//! Degrees of confusion that are kept, on the worlds and on recordings: the expected outcomes are those computed without them, to the bit.
 
 use tactus::data::properties::PropertyTable;
 use tactus::data::recordings::RecordingSet;
-use tactus::data::replay::feel;
+use tactus::data::replay::measure_all;
 use tactus::eval::evaluate::{Method, Shared, explorer};
 use tactus::eval::experiment::{Experiment, Protocol};
-use tactus_core::explorer::{Config, Outlook};
+use tactus_core::explorer::{Config, ExpectedOutcome};
 use tactus_tests::data;
 
 /// Explores, and compares what every action promises at every step; the number of promises.
@@ -22,25 +22,25 @@ fn compared(experiment: &Experiment, method: Method, candidates: Option<&[u16]>)
     let shared = Shared::new(explorer, config.strategy);
     let confusions = shared.confusions.expect("there is memory for so few");
     let mut explorer = shared.explorer;
-    let bits = |o: &Outlook| (o.action, o.uncertainty.to_bits(), o.benefit.to_bits());
-    let mut promises = 0;
+    let bits = |o: &ExpectedOutcome| (o.action, o.uncertainty.to_bits(), o.benefit.to_bits());
+    let mut outcomes = 0;
     for number in 0..150 {
         let mut run = experiment.run(number);
         explorer.restart();
         while explorer.verdict().is_none() {
-            let computed = explorer.outlook();
-            let kept = explorer.outlook_by(&confusions);
+            let computed = explorer.expected_outcomes();
+            let kept = explorer.expected_outcomes_by(&confusions);
             assert!(
                 kept.iter().map(bits).eq(computed.iter().map(bits)),
                 "{method:?}, run {number}: {kept:?} for {computed:?}"
             );
-            promises += kept.len();
+            outcomes += kept.len();
             let action = explorer.choose(&kept, 0);
             let slide = run.slide(action.movement.into());
             explorer.observe(action, slide).unwrap();
         }
     }
-    promises
+    outcomes
 }
 
 const METHODS: [(Method, usize); 4] = [
@@ -59,8 +59,8 @@ fn kept_degrees_promise_the_same_in_the_worlds() {
         let few: Vec<u16> = (0..117).step_by(3).collect();
         for (method, actions) in METHODS {
             for candidates in [None, Some(few.as_slice())] {
-                let promises = compared(&experiment, method, candidates);
-                assert_eq!(promises, 150 * 10 * actions, "world {world}, {method:?}");
+                let outcomes = compared(&experiment, method, candidates);
+                assert_eq!(outcomes, 150 * 10 * actions, "world {world}, {method:?}");
             }
         }
     }
@@ -71,10 +71,10 @@ fn kept_degrees_promise_the_same_on_recordings() {
     let Some(folder) = data("biotac") else { return };
     let set = RecordingSet::open(&folder).unwrap();
     let names = set.textures().iter().map(|t| t.name.clone()).collect();
-    let felt = feel(&set, |_| ()).unwrap();
-    let experiment = Experiment::recorded(names, &felt, None, Protocol::Drift, 5, 1).unwrap();
+    let observed = measure_all(&set, |_| ()).unwrap();
+    let experiment = Experiment::recorded(names, &observed, None, Protocol::Drift, 5, 1).unwrap();
     for (method, actions) in METHODS {
-        let promises = compared(&experiment, method, None);
-        assert_eq!(promises, 150 * 10 * actions / 3, "{method:?}");
+        let outcomes = compared(&experiment, method, None);
+        assert_eq!(outcomes, 150 * 10 * actions / 3, "{method:?}");
     }
 }

@@ -25,8 +25,8 @@ use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::skin::SkinCare;
 use tactus_core::table::Name;
 use tactus_core::wire::{
-    self, Ask, Counts, Forget, MAX_FRAME, PROTOCOL, Phase, Receiver, Report, Request, Reset,
-    Status, Tell,
+    self, Counts, Event, Forget, MAX_FRAME, PROTOCOL, Phase, Receiver, Report, Request, Reset,
+    Status,
 };
 
 const UNKNOWN: u8 = 47;
@@ -70,7 +70,7 @@ struct Wire {
     busy: bool,
     requests: VecDeque<Request>,
     /// all that was asked, for the test
-    asked: Sender<Ask>,
+    asked: Sender<wire::Command>,
     gone: bool,
 }
 
@@ -91,7 +91,7 @@ impl Wire {
                 continue;
             };
             let request = request.unwrap();
-            let _ = self.asked.send(request.ask.clone());
+            let _ = self.asked.send(request.command.clone());
             let busy = self.busy || !self.requests.is_empty();
             if receive(&request, busy, self) == Turn::Queue {
                 self.requests.push_back(request);
@@ -122,21 +122,21 @@ impl Panel for Wire {
         self.streams = on;
     }
 
-    fn tell(&mut self, tell: Tell) {
+    fn tell(&mut self, tell: Event) {
         let report = Report {
             number: self.number,
             at_ms: self.at_ms as u32,
-            tell,
+            event: tell,
         };
         self.number = self.number.wrapping_add(1);
-        let mut room = [0; MAX_FRAME + 1];
-        let frame = wire::encode(&report, &mut room).unwrap();
+        let mut buffer = [0; MAX_FRAME + 1];
+        let frame = wire::encode(&report, &mut buffer).unwrap();
         self.gone |= self.line.write_all(frame).is_err();
     }
 }
 
 impl Host for Wire {
-    fn tell(&mut self, event: Tell) {
+    fn tell(&mut self, event: Event) {
         Panel::tell(self, event);
     }
 
@@ -172,7 +172,7 @@ impl Host for Wire {
 }
 
 /// Serves one host after the other.
-fn serve(lines: impl IntoIterator<Item = Box<dyn Line>>, hurry: u64, asked: Sender<Ask>) {
+fn serve(lines: impl IntoIterator<Item = Box<dyn Line>>, hurry: u64, asked: Sender<wire::Command>) {
     let (calibration, factory) = known();
     let mut rig = SimRig::new(world().setup(UNKNOWN, 100));
     rig.control().calibrate(*calibration).unwrap();
@@ -221,7 +221,7 @@ fn serve(lines: impl IntoIterator<Item = Box<dyn Line>>, hurry: u64, asked: Send
 }
 
 /// A probe on a TCP port of its own: where, and what it is asked.
-fn probe(hurry: u64) -> (String, Told<Ask>) {
+fn probe(hurry: u64) -> (String, Told<wire::Command>) {
     // before anybody waits for it
     known();
     let (asked, told) = mpsc::channel();
@@ -322,7 +322,7 @@ fn a_probe_says_how_it_is() {
 fn every_decision_of_a_session_is_computed_again_from_its_log() {
     let (at, asked) = probe(1000);
     let temp = tempfile::tempdir().unwrap();
-    let log = temp.path().join("visit.jsonl");
+    let log = temp.path().join("session.jsonl");
     let identify = [
         "identify",
         "--port",
@@ -341,12 +341,15 @@ fn every_decision_of_a_session_is_computed_again_from_its_log() {
     let live = printed(&identify);
     assert_says(
         &live,
-        &["one of 3 (seed 7)", "Slide 1:", "felt", "█", "after"],
+        &["one of 3 (seed 7)", "Slide 1:", "measured", "█", "after"],
     );
-    let asked: Vec<Ask> = asked.try_iter().collect();
-    assert!(asked.contains(&Ask::Stream(true)) && asked.last() == Some(&Ask::Stream(false)));
+    let asked: Vec<wire::Command> = asked.try_iter().collect();
+    assert!(
+        asked.contains(&wire::Command::Stream(true))
+            && asked.last() == Some(&wire::Command::Stream(false))
+    );
     // a log is never written over
-    assert_says(&complaint(&identify), &["visit.jsonl", "another name"]);
+    assert_says(&complaint(&identify), &["session.jsonl", "another name"]);
 
     let replayed = printed(&["log", "replay", path(&log)]);
     assert_says(
@@ -383,14 +386,14 @@ fn every_decision_of_a_session_is_computed_again_from_its_log() {
         assert_eq!(out.status.code(), Some(1), "{from}");
         String::from_utf8([out.stdout, out.stderr].concat()).unwrap()
     };
-    let gone = |_: &str| String::from("{\"ask\":\"Status\"}");
+    let gone = |_: &str| String::from("{\"command\":\"Status\"}");
     // another seed makes other random choices
     let seed = |line: &str| line.replace("\"seed\":7", "\"seed\":11");
-    let other = changed("{\"ask\":{\"Identify\"", 0, &seed);
+    let other = changed("{\"command\":{\"Identify\"", 0, &seed);
     assert_says(&other, &["IS CHOSEN", "not every decision is the same"]);
     let sample = |line: &str| {
         let mut line: serde_json::Value = serde_json::from_str(line).unwrap();
-        line["report"]["tell"]["Block"]["pac"][7] = 900.into();
+        line["report"]["event"]["Block"]["pac"][7] = 900.into();
         line.to_string()
     };
     let other = changed("\"still\":false", 30, &sample);
@@ -398,7 +401,7 @@ fn every_decision_of_a_session_is_computed_again_from_its_log() {
     let other = changed("\"TablePart\"", 0, &gone);
     assert_says(&other, &["does not have the table"]);
     assert_says(&changed("\"still\":false", 30, &gone), &["is missing"]);
-    let other = changed("\"Felt\"", 0, &|_| "nonsense".into());
+    let other = changed("\"SlideReport\"", 0, &|_| "nonsense".into());
     assert_says(&other, &["no line of a session's log"]);
     let version = format!("\"protocol\":{PROTOCOL}");
     let other = changed("session", 0, &|line| {
@@ -412,7 +415,7 @@ fn every_decision_of_a_session_is_computed_again_from_its_log() {
 }
 
 #[test]
-fn recorded_slides_are_felt_again_as_the_probe_felt_them() {
+fn recorded_slides_measure_again_what_the_probe_reported() {
     let (at, _) = probe(1000);
     let temp = tempfile::tempdir().unwrap();
     let (folder, log) = (temp.path().join("slides"), temp.path().join("log"));
@@ -434,10 +437,10 @@ fn recorded_slides_are_felt_again_as_the_probe_felt_them() {
         .lines()
         .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap())
         .filter_map(|line| {
-            let felt = line["report"]["tell"]["Felt"]["felt"]["properties"]
+            let observed = line["report"]["event"]["SlideReport"]["observed"]["properties"]
                 .as_array()?
                 .clone();
-            Some([0, 1, 2].map(|n| felt[n].as_f64().unwrap()))
+            Some([0, 1, 2].map(|n| observed[n].as_f64().unwrap()))
         })
         .collect();
     let out = Command::new(env!("CARGO_BIN_EXE_tactus"))
@@ -479,7 +482,7 @@ fn a_table_is_checked_pushed_and_pulled() {
         &printed(&["table", "show", "--port", &at]),
         &["came with the firmware", "movement 3: "],
     );
-    let felt = [0.4f32, 0.6].map(|x| {
+    let observed = [0.4f32, 0.6].map(|x| {
         let properties =
             tactus_core::features::Properties::new([Some(x), Some(3.0 + x), Some(5.0 + x)]);
         tactus_core::features::Observation::from(properties)
@@ -489,7 +492,7 @@ fn a_table_is_checked_pushed_and_pulled() {
         None,
         &["a".to_owned(), "b".to_owned()],
         &[Movement::FOR_TRACTION],
-        &vec![vec![felt.to_vec()]; 2],
+        &vec![vec![observed.to_vec()]; 2],
     );
     fs::write(&other, table.unwrap()).unwrap();
     while asked.try_recv().is_ok() {}
@@ -497,7 +500,11 @@ fn a_table_is_checked_pushed_and_pulled() {
         &printed(&["table", "push", "--port", &at, path(&other)]),
         &["the probe uses it now: 2 textures"],
     );
-    assert!(asked.try_iter().any(|ask| ask == Ask::CommitTable));
+    assert!(
+        asked
+            .try_iter()
+            .any(|command| command == wire::Command::CommitTable)
+    );
     // what is damaged is never begun
     let mut bytes = fs::read(&other).unwrap();
     bytes[40] ^= 1;
@@ -509,7 +516,7 @@ fn a_table_is_checked_pushed_and_pulled() {
     assert!(
         asked
             .try_iter()
-            .all(|ask| !matches!(ask, Ask::BeginTable(_)))
+            .all(|command| !matches!(command, wire::Command::BeginTable(_)))
     );
     assert_says(
         &printed(&["table", "factory", "--port", &at]),
@@ -521,9 +528,12 @@ fn a_table_is_checked_pushed_and_pulled() {
 fn teaching_and_calibrating_do_what_was_meant() {
     let (at, asked) = probe(1000);
     let name = |name: &str| Name::try_from(name).unwrap();
-    let last = |arguments: &[&str], ask: Ask| {
+    let last = |arguments: &[&str], command: wire::Command| {
         let said = printed(&[arguments, &["--port", &at]].concat());
-        assert!(asked.try_iter().any(|asked| asked == ask), "{ask:?}");
+        assert!(
+            asked.try_iter().any(|asked| asked == command),
+            "{command:?}"
+        );
         said
     };
     let refused = |arguments: &[&str]| complaint(&[arguments, &["--port", &at]].concat());
@@ -543,7 +553,7 @@ fn teaching_and_calibrating_do_what_was_meant() {
     ];
     printed(&[&identify[..], &["--port", &at]].concat());
     assert_says(
-        &last(&["teach", "velvet"], Ask::Answer(name("velvet"))),
+        &last(&["teach", "velvet"], wire::Command::Label(name("velvet"))),
         &["learned velvet from 2 slides"],
     );
     let textures = |count: &str| {
@@ -551,7 +561,7 @@ fn teaching_and_calibrating_do_what_was_meant() {
         assert_says(&status, &[count]);
     };
     textures("4 textures");
-    let rename = Ask::Rename {
+    let rename = wire::Command::Rename {
         from: name("velvet"),
         to: name("felt"),
     };
@@ -562,19 +572,19 @@ fn teaching_and_calibrating_do_what_was_meant() {
     );
     last(
         &["forget", "--name", "felt"],
-        Ask::Forget(Forget::Texture(name("felt"))),
+        wire::Command::Forget(Forget::Texture(name("felt"))),
     );
     textures("3 textures");
     last(
         &["forget", "--training", "a"],
-        Ask::Forget(Forget::Training(name("a"))),
+        wire::Command::Forget(Forget::Training(name("a"))),
     );
     last(
         &["forget", "--self-taught"],
-        Ask::Forget(Forget::SelfTaught),
+        wire::Command::Forget(Forget::SelfLearned),
     );
-    last(&["home"], Ask::Home);
-    last(&["stop"], Ask::Stop);
+    last(&["home"], wire::Command::Home);
+    last(&["stop"], wire::Command::Stop);
     assert_says(
         &refused(&["rename", "cheese", "felt"]),
         &["the probe refused: there is no texture cheese in the table"],
@@ -590,31 +600,35 @@ fn teaching_and_calibrating_do_what_was_meant() {
             "--newton-per-ampere",
             "16.25",
         ],
-        Ask::Calibrate,
+        wire::Command::Calibrate,
     );
     assert_says(&measured, &["2026-11-21", "16.25 N/A"]);
     let shown = printed(&["calibrate", "--show", "--port", &at]);
-    assert!(!asked.try_iter().any(|ask| ask == Ask::Calibrate));
+    assert!(
+        !asked
+            .try_iter()
+            .any(|command| command == wire::Command::Calibrate)
+    );
     assert_says(&shown, &["counts in the air"]);
     let nonsense = ["calibrate", "--newton-per-ampere", "NaN", "--port", &at];
     assert_says(&complaint(&nonsense), &["above 0"]);
 }
 
 /// Frames of these reports, and a reader of what the host says, which is thrown away.
-fn says(tells: &'static [fn() -> Tell]) -> String {
+fn says(events: &'static [fn() -> Event]) -> String {
     line(move |mut stream| {
         let mut bytes = [0; 256];
         let mut number = 0;
         while stream.read(&mut bytes).is_ok_and(|length| length > 0) {
-            for tell in tells {
+            for tell in events {
                 let report = Report {
                     number,
                     at_ms: 0,
-                    tell: tell(),
+                    event: tell(),
                 };
                 number += 1;
-                let mut room = [0; MAX_FRAME + 1];
-                let frame = wire::encode(&report, &mut room).unwrap();
+                let mut buffer = [0; MAX_FRAME + 1];
+                let frame = wire::encode(&report, &mut buffer).unwrap();
                 let _ = stream.write_all(frame);
             }
         }
@@ -622,7 +636,7 @@ fn says(tells: &'static [fn() -> Tell]) -> String {
 }
 
 #[test]
-fn what_is_no_probe_is_told_and_what_to_do() {
+fn errors_name_what_is_no_probe_and_what_to_do() {
     let garbage = line(|mut stream| {
         let noise: Vec<u8> = (0..4000u32)
             .map(|n| (n.wrapping_mul(2_654_435_761) >> 13) as u8)
@@ -654,7 +668,7 @@ fn what_is_no_probe_is_told_and_what_to_do() {
         &complaint(&["status", "--port", &closed]),
         &["port", "open it again"],
     );
-    let booted = says(&[|| Tell::Booted {
+    let booted = says(&[|| Event::Booted {
         protocol: 1,
         version: Default::default(),
         reset: Reset::Power,
@@ -668,8 +682,8 @@ fn what_is_no_probe_is_told_and_what_to_do() {
     let foreign = line(|mut stream| {
         let mut bytes = [0; 256];
         while stream.read(&mut bytes).is_ok_and(|length| length > 0) {
-            let mut room = [0; MAX_FRAME + 1];
-            let _ = stream.write_all(wire::encode(&[250u8; 30], &mut room).unwrap());
+            let mut buffer = [0; MAX_FRAME + 1];
+            let _ = stream.write_all(wire::encode(&[250u8; 30], &mut buffer).unwrap());
         }
     });
     assert_says(
@@ -702,7 +716,7 @@ fn what_is_no_probe_is_told_and_what_to_do() {
 }
 
 #[test]
-fn a_slow_line_is_waited_for_and_one_that_vanishes_is_told() {
+fn a_slow_line_works_and_a_vanished_one_is_an_error() {
     known();
     /// Gives its bytes one at a time.
     struct Slow(TcpStream);
@@ -734,7 +748,7 @@ fn a_slow_line_is_waited_for_and_one_that_vanishes_is_told() {
         stream.set_read_timeout(wait).unwrap();
         let cable = stream.try_clone().unwrap();
         thread::spawn(move || {
-            while !matches!(told.recv(), Ok(Ask::Identify(_)) | Err(_)) {}
+            while !matches!(told.recv(), Ok(wire::Command::Identify(_)) | Err(_)) {}
             thread::sleep(Duration::from_millis(100));
             let _ = cable.shutdown(std::net::Shutdown::Both);
         });
@@ -757,10 +771,11 @@ mod unix {
     }
 
     /// Waits for a request.
-    fn wait_for(asked: &Told<Ask>, is: impl Fn(&Ask) -> bool) {
+    fn wait_for(asked: &Told<wire::Command>, is: impl Fn(&wire::Command) -> bool) {
         let until = Instant::now() + Duration::from_secs(60);
-        while let Ok(ask) = asked.recv_timeout(until.saturating_duration_since(Instant::now())) {
-            if is(&ask) {
+        while let Ok(command) = asked.recv_timeout(until.saturating_duration_since(Instant::now()))
+        {
+            if is(&command) {
                 return;
             }
         }
@@ -777,7 +792,9 @@ mod unix {
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
-        wait_for(&asked, |ask| matches!(ask, Ask::Identify(_)));
+        wait_for(&asked, |command| {
+            matches!(command, wire::Command::Identify(_))
+        });
         thread::sleep(Duration::from_millis(300));
         interrupt(&child);
         let out = child.wait_with_output().unwrap();
@@ -790,7 +807,7 @@ mod unix {
                 "the finger is lifted and the stage stands",
             ],
         );
-        wait_for(&asked, |ask| *ask == Ask::Stop);
+        wait_for(&asked, |command| *command == wire::Command::Stop);
         // the next host finds it so
         assert_says(
             &printed(&["status", "--port", &at]),
@@ -802,7 +819,7 @@ mod unix {
     fn a_second_ctrl_c_says_that_the_finger_may_be_down() {
         let sliding = says(&[
             || {
-                Tell::Status(Status {
+                Event::Status(Status {
                     phase: Phase::Sliding,
                     fault: None,
                     textures: 3,
@@ -814,7 +831,7 @@ mod unix {
                     skin_mj: (0, 0),
                 })
             },
-            || Tell::Done(0),
+            || Event::Done(0),
         ]);
         let mut stop = device(&["stop", "--port", &sliding]);
         let child = stop.stderr(Stdio::piped()).spawn().unwrap();
@@ -829,7 +846,7 @@ mod unix {
     }
 
     #[test]
-    fn a_serial_port_is_opened_and_a_busy_one_is_told() {
+    fn a_serial_port_opens_and_a_busy_one_is_an_error() {
         known();
         // the other end of the terminal stays open, so that it lives on while nobody else has it
         let (mut master, slave) = TTYPort::pair().unwrap();
@@ -960,7 +977,12 @@ mod unix {
             "the finger is lifted and the stage stands",
             "ended with 130",
         ]);
-        let stops = |asked: &Told<Ask>| asked.try_iter().filter(|ask| *ask == Ask::Stop).count();
+        let stops = |asked: &Told<wire::Command>| {
+            asked
+                .try_iter()
+                .filter(|command| *command == wire::Command::Stop)
+                .count()
+        };
         assert!(stops(&asked) >= 2);
         // and so does quitting, which is no failure
         tmux.run(&["respawn-pane", "-k", "-t", "probe", &command]);

@@ -6,7 +6,7 @@ use std::process::Command;
 use tactus::data::fabricslide::FabricSet;
 use tactus::data::properties::PropertyTable;
 use tactus::data::recordings::RecordingSet;
-use tactus::data::replay::feel;
+use tactus::data::replay::measure_all;
 use tactus::eval::evaluate::{Method, Summary, evaluate};
 use tactus::eval::experiment::{Experiment, Protocol};
 use tactus::eval::lifelong::lifelong;
@@ -31,7 +31,7 @@ fn recorded(folder: &Path, protocol: Protocol, train_slides: usize) -> Experimen
     let names = set.textures().iter().map(|t| t.name.clone()).collect();
     Experiment::recorded(
         names,
-        &feel(&set, |_| ()).unwrap(),
+        &measure_all(&set, |_| ()).unwrap(),
         None,
         protocol,
         train_slides,

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use tactus::data::fabricslide::FabricSet;
 use tactus::data::properties::PropertyTable;
 use tactus::data::recordings::RecordingSet;
-use tactus::data::replay::feel;
+use tactus::data::replay::measure_all;
 use tactus::eval::evaluate::{Outcome, evaluate};
 use tactus::eval::experiment::{Experiment, Protocol, Run};
 use tactus_core::explorer::{Config, Method};
@@ -17,7 +17,7 @@ use tactus_tests::data;
 #[path = "oracle/mod.rs"]
 mod oracle;
 
-use oracle::{Trained, Visit};
+use oracle::{Episode, Trained};
 
 /// Mean and standard deviation per texture and action, actions in the core's order.
 struct Oracle {
@@ -141,9 +141,9 @@ fn explore_fused(
     config: Config,
     x: impl Fn(&Observation) -> Vec<f64>,
 ) -> Outcome {
-    let mut visit = Visit::new(trained.movements.len());
+    let mut episode = Episode::new(trained.movements.len());
     loop {
-        let benefits = visit.benefits(trained);
+        let benefits = episode.benefits(trained);
         let first = |best: usize, m: usize| {
             if benefits[m] > benefits[best] {
                 m
@@ -155,16 +155,16 @@ fn explore_fused(
         // the core draws for the random strategy at every step
         let _ = run.random.next_u32();
         let slide = run.slide(movement);
-        visit.slide(trained, movement, &x(slide));
-        let (best, p) = visit.best(trained);
+        episode.slide(trained, movement, &x(slide));
+        let (best, p) = episode.best(trained);
         let sure = p > f64::from(config.threshold);
-        if sure || visit.slides() == u32::from(config.max_slides) {
+        if sure || episode.slides() == u32::from(config.max_slides) {
             return Outcome {
                 unknown: run.unknown,
                 identified: best,
                 sure,
-                slides: visit.slides() as u8,
-                unknown_like: visit.novel(trained),
+                slides: episode.slides() as u8,
+                unknown_like: episode.novel(trained),
             };
         }
     }
@@ -247,9 +247,10 @@ fn recorded_slides_are_decided_as_in_f64() {
     let Some(folder) = data("biotac") else { return };
     let set = RecordingSet::open(&folder).unwrap();
     let names: Vec<String> = set.textures().iter().map(|t| t.name.clone()).collect();
-    let felt = feel(&set, |_| ()).unwrap();
+    let observed = measure_all(&set, |_| ()).unwrap();
     for protocol in [Protocol::Interleaved, Protocol::Blocked, Protocol::Drift] {
-        let experiment = Experiment::recorded(names.clone(), &felt, None, protocol, 5, 1).unwrap();
+        let experiment =
+            Experiment::recorded(names.clone(), &observed, None, protocol, 5, 1).unwrap();
         let name = format!("{protocol:?}");
         decided_alike(&name, experiment.clone(), None, 8000);
         decided_alike(&name, experiment, Some(FeatureSet::Force), 8000);

@@ -13,7 +13,7 @@ use tactus_tests::data;
 #[path = "oracle/mod.rs"]
 mod oracle;
 
-use oracle::{LIMIT, Learning, SURE, Trained, Visit, features};
+use oracle::{Episode, LIMIT, Learning, SURE, Trained, features};
 
 /// Virtual explorations of a protocol, unless a test says otherwise.
 const RUNS: u64 = 2000;
@@ -130,17 +130,17 @@ struct Outcome {
 
 /// One exploration: slides from `draw` until sure, or the limit.
 fn explore(table: &Trained, truth: usize, mut draw: impl FnMut() -> Vec<f64>) -> Outcome {
-    let mut visit = Visit::new(1);
+    let mut episode = Episode::new(1);
     loop {
-        visit.slide_z(0, &draw());
-        let (best, p) = visit.best(table);
+        episode.slide_z(0, &draw());
+        let (best, p) = episode.best(table);
         let sure = p > SURE;
-        if sure || visit.slides() == LIMIT {
+        if sure || episode.slides() == LIMIT {
             return Outcome {
                 best,
                 right: best == truth,
                 sure,
-                slides: visit.slides(),
+                slides: episode.slides(),
             };
         }
     }
@@ -259,7 +259,7 @@ fn leave_one_out(
     textures: &[usize],
     protocol: Protocol,
     n: usize,
-    flags: impl Fn(&Trained, &Visit) -> bool + Sync,
+    flags: impl Fn(&Trained, &Episode) -> bool + Sync,
 ) -> (Flagged, Vec<f64>) {
     let draws = RUNS as usize / textures.len();
     let each: Vec<Flagged> = textures
@@ -276,10 +276,10 @@ fn leave_one_out(
                 let (picks, test) = split(protocol, n, session[left_out].len(), &mut random);
                 let table = train(session, &known, &picks);
                 let mut show = |texture: usize, flagged: &mut [f64; 3], weight: f64| {
-                    let mut visit = Visit::new(1);
+                    let mut episode = Episode::new(1);
                     for share in flagged {
-                        visit.slide(&table, 0, &session[texture][test[random.below(test.len())]]);
-                        *share += f64::from(u8::from(flags(&table, &visit))) * weight;
+                        episode.slide(&table, 0, &session[texture][test[random.below(test.len())]]);
+                        *share += f64::from(u8::from(flags(&table, &episode))) * weight;
                     }
                 };
                 show(left_out, &mut sum.unknown, 1.0 / draws as f64);
@@ -310,8 +310,8 @@ fn unknown_materials_are_flagged() {
         let session = session(&folder, features);
         let all: Vec<usize> = (0..session.len()).collect();
         for (protocol, n) in PROTOCOLS {
-            let (flagged, each) = leave_one_out(&session, &all, protocol, n, |table, visit| {
-                visit.novel(table)
+            let (flagged, each) = leave_one_out(&session, &all, protocol, n, |table, episode| {
+                episode.novel(table)
             });
             println!("unknown, {what} and 12 bands, {protocol:?} {n}:{flagged}");
             let each: Vec<String> = each.iter().map(|e| format!("{e:.2}")).collect();
@@ -323,13 +323,13 @@ fn unknown_materials_are_flagged() {
     }
 }
 
-/// What came of a session of single visits.
+/// What came of a session of single episodes.
 #[derive(Clone, Debug)]
 struct Lived {
-    visits: f64,
+    episodes: f64,
     /// The gate was not passed.
     asked: f64,
-    /// Right where it did not ask; a visit where it asked ends with the right name.
+    /// Right where it did not ask; an episode where it asked ends with the right name.
     right_or_asked: f64,
     learned_wrong: f64,
     /// Right by material.
@@ -339,7 +339,7 @@ struct Lived {
 impl Lived {
     fn new(textures: usize) -> Self {
         Self {
-            visits: 0.0,
+            episodes: 0.0,
             asked: 0.0,
             right_or_asked: 0.0,
             learned_wrong: 0.0,
@@ -348,7 +348,7 @@ impl Lived {
     }
 
     fn add(&mut self, other: &Self) {
-        self.visits += other.visits;
+        self.episodes += other.episodes;
         self.asked += other.asked;
         self.right_or_asked += other.right_or_asked;
         self.learned_wrong += other.learned_wrong;
@@ -358,16 +358,16 @@ impl Lived {
     }
 
     fn accuracy(&self) -> f64 {
-        self.by_texture.iter().sum::<f64>() / self.visits
+        self.by_texture.iter().sum::<f64>() / self.episodes
     }
 
     fn worst(&self) -> f64 {
-        let visits = self.visits / self.by_texture.len() as f64;
+        let episodes = self.episodes / self.by_texture.len() as f64;
         self.by_texture
             .iter()
             .copied()
             .fold(f64::INFINITY, f64::min)
-            / visits
+            / episodes
     }
 }
 
@@ -378,9 +378,9 @@ impl std::fmt::Display for Lived {
             "{:.4} right, worst material {:.3}, gate not passed {:.4}, right with the user's answers {:.4}, wrong updates {:.5}",
             self.accuracy(),
             self.worst(),
-            self.asked / self.visits,
-            self.right_or_asked / self.visits,
-            self.learned_wrong / self.visits
+            self.asked / self.episodes,
+            self.right_or_asked / self.episodes,
+            self.learned_wrong / self.episodes
         )
     }
 }
@@ -395,7 +395,7 @@ enum Life {
     WithUser,
 }
 
-/// The first `n` slides train; then each later slide of each of `textures` is a visit of its own, in the order of time. The
+/// The first `n` slides train; then each later slide of each of `textures` is an episode of its own, in the order of time. The
 /// order of the textures at each slide number is drawn anew in each of the `lives`.
 fn live(
     session: &Session,
@@ -413,15 +413,15 @@ fn live(
             let mut random = Random::new(3, seed);
             let mut table = trained.clone();
             let mut lived = Lived::new(textures.len());
-            let visits = n..session[textures[0]].len();
-            for slide in visits {
+            let episodes = n..session[textures[0]].len();
+            for slide in episodes {
                 for texture in random.order(textures.len()) {
-                    let mut visit = Visit::new(1);
-                    visit.slide(&table, 0, &session[textures[texture]][slide]);
-                    let (best, _) = visit.best(&table);
-                    let certain = visit.certain(learning, &table);
+                    let mut episode = Episode::new(1);
+                    episode.slide(&table, 0, &session[textures[texture]][slide]);
+                    let (best, _) = episode.best(&table);
+                    let certain = episode.certain(learning, &table);
                     let right = f64::from(u8::from(best == texture));
-                    lived.visits += 1.0;
+                    lived.episodes += 1.0;
                     lived.by_texture[texture] += right;
                     lived.right_or_asked += if certain { right } else { 1.0 };
                     lived.asked += f64::from(u8::from(!certain));
@@ -432,7 +432,7 @@ fn live(
                     };
                     if let Some(name) = name {
                         lived.learned_wrong += f64::from(u8::from(name != texture));
-                        table.learn_visit(learning, name, &visit);
+                        table.learn_episode(learning, name, &episode);
                     }
                 }
             }
@@ -458,7 +458,7 @@ fn cut(session: &Session) -> Vec<Session> {
 
 /// Share of the first slides of a texture that was left out that pass the gate: they would spoil another one's mean.
 fn unknown_learned(session: &Session, textures: &[usize], learning: &Learning) -> f64 {
-    let passed = |table: &Trained, visit: &Visit| visit.certain(learning, table);
+    let passed = |table: &Trained, episode: &Episode| episode.certain(learning, table);
     leave_one_out(session, textures, Protocol::Interleaved, 5, passed)
         .0
         .unknown[0]
@@ -496,7 +496,7 @@ fn a_session_is_learned_on_the_go() {
                         Life::WithUser => {
                             assert!(lived.accuracy() >= 0.98 && lived.worst() >= 0.80);
                             // with the recipe's own memory: 0.104
-                            assert!(name == "recipe" || lived.asked / lived.visits <= 0.10);
+                            assert!(name == "recipe" || lived.asked / lived.episodes <= 0.10);
                             assert!(lived.learned_wrong == 0.0);
                         }
                         _ => (),
@@ -517,8 +517,8 @@ fn a_session_is_learned_on_the_go() {
     }
 }
 
-/// Share of `right` answers from one slide of a texture that was taught from `n`, the others having been learned from five.
-fn taught(session: &Session, n: usize) -> f64 {
+/// Share of `right` answers from one slide of a texture that was learned from `n`, the others having been learned from five.
+fn learned_from(session: &Session, n: usize) -> f64 {
     let right: usize = (0..RUNS)
         .into_par_iter()
         .map(|run| {
@@ -529,21 +529,21 @@ fn taught(session: &Session, n: usize) -> f64 {
             let mut table = train(session, &known, &picks);
             let slides = picks[..n].iter().map(|&p| session[new][p].clone());
             let index = table.teach(&[slides.collect()]);
-            let mut visit = Visit::new(1);
-            visit.slide(&table, 0, &session[new][test[random.below(test.len())]]);
-            usize::from(visit.best(&table).0 == index)
+            let mut episode = Episode::new(1);
+            episode.slide(&table, 0, &session[new][test[random.below(test.len())]]);
+            usize::from(episode.best(&table).0 == index)
         })
         .sum();
     right as f64 / RUNS as f64
 }
 
 #[test]
-fn a_texture_is_taught_from_few_slides() {
+fn a_texture_is_learned_from_few_slides() {
     let Some(folder) = data("biotac") else { return };
     let session = session(&folder, with_traction);
     for (n, floor) in [(1, 0.84), (2, 0.90), (3, 0.93), (5, 0.94)] {
-        let right = taught(&session, n);
-        println!("taught from {n}: recognised from one slide {right:.4}");
+        let right = learned_from(&session, n);
+        println!("learned from {n}: recognised from one slide {right:.4}");
         assert!(!public(&folder) || right >= floor, "{n}: {right}");
     }
 }
@@ -628,38 +628,38 @@ fn one_feature_by_hand() {
     assert_eq!(table.counts, [[2.0], [2.0]]);
 
     // one slide right on the first: v = 1 + 1/2, q = 0 and 50
-    let mut visit = Visit::new(1);
+    let mut episode = Episode::new(1);
     let confusion = (-50f64 / 12.0).exp();
-    near(visit.benefits(&table)[0], 1.0 / (1.0 + confusion));
-    visit.slide(&table, 0, &[1.0]);
-    let l = visit.log_likelihoods(&table);
+    near(episode.benefits(&table)[0], 1.0 / (1.0 + confusion));
+    episode.slide(&table, 0, &[1.0]);
+    let l = episode.log_likelihoods(&table);
     near(l[0], -0.5 * 1.5f64.ln());
     near(l[1], -0.5 * 1.5f64.ln() - 4.5 * (1.0 + 50.0 / 12.0f64).ln());
     let ratio = (1.0 + 50.0 / 12.0f64).powf(-4.5);
-    near(visit.best(&table).1, 1.0 / (1.0 + ratio));
+    near(episode.best(&table).1, 1.0 / (1.0 + ratio));
     near(
-        visit.posterior_from(&table, &[1.0, 9.0])[0],
+        episode.posterior_from(&table, &[1.0, 9.0])[0],
         1.0 / (1.0 + 9.0 * ratio),
     );
     // the background: about 0, variance 12.5 + 1
     near(
-        visit.novelty(&table),
+        episode.novelty(&table),
         -0.5 * 13.5f64.ln() - 4.5 * (1.0 + 12.5 / 13.5 / 8.0f64).ln() + 0.5 * 1.5f64.ln()
             - (0.5 * (1.0 + ratio)).ln(),
     );
     // the benefit of a second slide: the square root of what is left
-    let p = visit.posterior(&table);
+    let p = episode.posterior(&table);
     let left =
         1.0 - p[0] * p[0] / (p[0] + confusion * p[1]) - p[1] * p[1] / (p[1] + confusion * p[0]);
-    near(visit.benefits(&table)[0], 1.0 - left.sqrt());
+    near(episode.benefits(&table)[0], 1.0 - left.sqrt());
 
     // a second slide replaces what the first said: k = 2, mean at 2
-    visit.slide(&table, 0, &[3.0]);
-    let l = visit.log_likelihoods(&table);
+    episode.slide(&table, 0, &[3.0]);
+    let l = episode.log_likelihoods(&table);
     near(l[0], -4.5 * (1.0 + 0.5 / 8.0f64).ln());
 
-    // learned once for the visit: 1 moves a third of the way to 2
-    table.learn_visit(&Learning::RECIPE, 0, &visit);
+    // learned once for the episode: 1 moves a third of the way to 2
+    table.learn_episode(&Learning::RECIPE, 0, &episode);
     near(table.means[0][0][0], (1.0 + 1.0 / 3.0 - 6.0) / root);
     near(table.counts[0][0], 3.0);
     // and a count stops at the memory, or stays where training brought it
@@ -697,7 +697,7 @@ fn movements_add_and_lend_each_other_their_covariance() {
         table.movements[1].w[0][0],
         (8.0 - 15.0 / 17.0 * 3.0f64).powf(-0.5),
     );
-    let mut of = [Visit::new(2), Visit::new(2), Visit::new(2)];
+    let mut of = [Episode::new(2), Episode::new(2), Episode::new(2)];
     of[0].slide(&table, 0, &[1.0]);
     of[1].slide(&table, 1, &[4.0]);
     of[2].slide(&table, 0, &[1.0]);

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use rustfft::{FftPlanner, num_complex::Complex};
 use tactus::data::recordings::RecordingSet;
-use tactus::data::replay::{feel, measure};
+use tactus::data::replay::{measure, measure_all};
 use tactus_core::dsp::Plan;
 use tactus_core::dsp::Taps;
 use tactus_core::dsp::{BIN_HZ, FRAME, HOP};
@@ -15,7 +15,7 @@ use tactus_tests::data;
 fn all_public_slides_have_the_golden_values() {
     let Some(folder) = data("biotac") else { return };
     let set = RecordingSet::open(&folder).unwrap();
-    let felt = feel(&set, |_| ()).unwrap();
+    let observed = measure_all(&set, |_| ()).unwrap();
     let mut golden = csv::Reader::from_path(folder.join("features.csv")).unwrap();
     let columns = golden.headers().unwrap().clone();
     let column = |name: &str| columns.iter().position(|c| c == name).unwrap();
@@ -29,7 +29,7 @@ fn all_public_slides_have_the_golden_values() {
             .iter()
             .position(|t| f64::from(t.id) == value("material"))
             .unwrap();
-        let slide = felt[material]
+        let slide = observed[material]
             .iter()
             .find(|s| f64::from(s.number) == value("slide"))
             .unwrap();
@@ -47,7 +47,7 @@ fn all_public_slides_have_the_golden_values() {
         "{rows} slides; furthest off: traction {:.1e} N, roughness {:.1e}, fineness {:.1e}, bands {:.1e}",
         worst[0], worst[1], worst[2], worst[3]
     );
-    assert_eq!(rows, felt.iter().map(Vec::len).sum::<usize>());
+    assert_eq!(rows, observed.iter().map(Vec::len).sum::<usize>());
     assert!(rows >= 20);
     assert!(
         worst[0] < 1e-3 && worst[1..].iter().all(|&w| w < 2e-3),

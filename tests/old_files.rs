@@ -220,14 +220,15 @@ fn stores_open_and_hold_the_same() {
         assert_eq!(holds["in_force"], hex(&in_force[..length]));
         let mut learned = Vec::new();
         let mut each = |record| learned.push(frame(&record));
-        block_on(store.self_taught(table.lineage(), &mut each)).unwrap();
+        block_on(store.self_learned(table.lineage(), &mut each)).unwrap();
         assert_eq!(holds["self_taught"], json!(learned));
         let trained = holds["trained"].as_array().unwrap();
         assert!(trained.len() >= 3);
         for record in trained {
             let movement: Movement = serde_json::from_value(record[1].clone()).unwrap();
             let table = record[2].as_u64().map(|crc| crc as u32);
-            let found = block_on(store.trained(record[0].as_str().unwrap(), movement, table));
+            let found =
+                block_on(store.training_record(record[0].as_str().unwrap(), movement, table));
             assert_eq!(record[3], frame(&found.unwrap().unwrap()), "{record}");
         }
     }

@@ -4,18 +4,18 @@
 use rayon::prelude::*;
 use tactus::data::recording::Slide;
 use tactus::data::recordings::RecordingSet;
-use tactus::data::replay::{Felt, measure};
+use tactus::data::replay::{MeasuredSlide, measure};
 use tactus::eval::evaluate::{Summary, evaluate};
 use tactus::eval::experiment::{Experiment, Protocol};
 use tactus::sim::collection::calibrated;
 use tactus::sim::played::Played;
-use tactus::sim::recorded::Lesson;
+use tactus::sim::recorded::RecordedTexture;
 use tactus::sim::rig::{Performed, SimRig};
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::Movement;
 use tactus_core::features::{Property, PropertySet};
-use tactus_core::probe::explore::{Event, explore};
+use tactus_core::probe::explore::{ExplorationStep, explore};
 use tactus_core::table::Table;
 use tactus_tests::data;
 
@@ -33,31 +33,31 @@ fn ramp(from: i16) -> Played {
 }
 
 #[test]
-fn every_sample_of_a_recording_is_felt_once() {
-    let setup = Lesson::setup(1);
+fn every_sample_of_a_recording_is_played_once() {
+    let setup = RecordedTexture::setup(1);
     let mut rig = SimRig::new(setup);
     rig.control().calibrate(calibrated(setup).unwrap()).unwrap();
     rig.home().unwrap();
     rig.world().play(vec![ramp(0), ramp(600)], 1);
     let mut begun = Vec::new();
     for _ in 0..3 {
-        let felt = rig.record(movement()).unwrap();
+        let observed = rig.record(movement()).unwrap();
         // the stage gets going within milliseconds; until then the finger is still
-        let start = felt.pac.iter().position(|&x| x > 20).unwrap();
+        let start = observed.pac.iter().position(|&x| x > 20).unwrap();
         assert!(start < 100, "{start}");
-        let steady = felt.steady(2200);
-        let steps: Vec<i16> = felt.pac[steady.clone()]
+        let steady = observed.steady(2200);
+        let steps: Vec<i16> = observed.pac[steady.clone()]
             .windows(2)
             .map(|w| w[1] - w[0])
             .collect();
         assert!(steps.iter().all(|&step| step == 1 || step == -499));
-        begun.push(felt.pac[steady.start] > 550);
+        begun.push(observed.pac[steady.start] > 550);
         // 300 mN and 1 mN for every 10 ms since the movement began
-        let shear = felt.shear_mn.as_ref().unwrap();
-        let window = felt.steady(1000);
+        let shear = observed.shear_mn.as_ref().unwrap();
+        let window = observed.steady(1000);
         let middle = (window.start + window.end) / 2;
         let mean = shear[window].iter().map(|&mn| f64::from(mn)).sum::<f64>()
-            / felt.steady(1000).len() as f64;
+            / observed.steady(1000).len() as f64;
         let expected = 300.0 + middle as f64 / 10.0;
         assert!((mean - expected).abs() < 20.0, "{mean} mN, {expected}");
     }
@@ -69,7 +69,7 @@ fn every_sample_of_a_recording_is_felt_once() {
 
 #[test]
 fn what_is_cut_is_counted() {
-    let mut rig = SimRig::new(Lesson::setup(1));
+    let mut rig = SimRig::new(RecordedTexture::setup(1));
     rig.home().unwrap();
     let loud = Played {
         pac: [0, 3000].repeat(500),
@@ -80,7 +80,7 @@ fn what_is_cut_is_counted() {
     let counts = rig.world().played();
     assert_eq!(counts.clipped, 500);
     assert!(counts.over > 4000, "{counts:?}");
-    // without recordings the sample is felt again
+    // without recordings the sample is played again
     rig.world().play(Vec::new(), 1);
     rig.record(movement()).unwrap();
     assert_eq!(rig.world().played().slides, 0);
@@ -109,14 +109,14 @@ fn config(method: Method) -> Config {
 
 /// An exploration of each of the 20 materials with slides that were not learned.
 fn explore_all(set: &RecordingSet, method: Method, train: usize, seed: u64) -> Tally {
-    let calibration = calibrated(Lesson::setup(0)).unwrap();
+    let calibration = calibrated(RecordedTexture::setup(0)).unwrap();
     let plan = Plan::new();
-    let lesson = Lesson::interleaved(set, train, seed).unwrap();
-    assert_eq!(lesson.movement, movement());
-    let bytes = lesson.learn(method, calibration).unwrap();
+    let recorded_texture = RecordedTexture::interleaved(set, train, seed).unwrap();
+    assert_eq!(recorded_texture.movement, movement());
+    let bytes = recorded_texture.learn(method, calibration).unwrap();
     let table = Table::read(&bytes).unwrap();
     let explore_one = |texture: usize| {
-        let mut rig = lesson.unknown(texture, seed);
+        let mut rig = recorded_texture.unknown(texture, seed);
         rig.control().calibrate(calibration).unwrap();
         let mut explorer = Explorer::<32>::new(table, PropertySet::ALL, config(method)).unwrap();
         let mut slides = 0;
@@ -126,9 +126,11 @@ fn explore_all(set: &RecordingSet, method: Method, train: usize, seed: u64) -> T
             &plan,
             || 0,
             |event| match event {
-                Event::Felt(..) => slides += 1,
-                Event::Rejected(_, why) => panic!("{}: {why}", lesson.names[texture]),
-                Event::Chosen(..) | Event::Decided { .. } => {}
+                ExplorationStep::Measured(..) => slides += 1,
+                ExplorationStep::Rejected(_, why) => {
+                    panic!("{}: {why}", recorded_texture.names[texture])
+                }
+                ExplorationStep::Chosen(..) | ExplorationStep::Decided { .. } => {}
             },
         );
         let verdict = embassy_futures::block_on(exploration).unwrap();
@@ -144,7 +146,7 @@ fn explore_all(set: &RecordingSet, method: Method, train: usize, seed: u64) -> T
             cut: counts.clipped,
         }
     };
-    let tallies: Vec<Tally> = (0..lesson.names.len())
+    let tallies: Vec<Tally> = (0..recorded_texture.names.len())
         .into_par_iter()
         .map(explore_one)
         .collect();
@@ -166,24 +168,24 @@ impl Tally {
 /// Accuracy of 8000 virtual explorations with the same stretches of the recordings, no rig in between.
 fn without_a_rig(set: &RecordingSet, method: Method, train: usize) -> f64 {
     let plan = Plan::new();
-    let felt: Vec<Vec<Felt>> = (0..set.textures().len())
+    let observed: Vec<Vec<MeasuredSlide>> = (0..set.textures().len())
         .into_par_iter()
         .map(|texture| {
             let slides = set.load_texture(texture).unwrap();
-            let felt = |mut slide: Slide| {
+            let observed = |mut slide: Slide| {
                 slide.window = STRETCH_S;
-                Felt {
+                MeasuredSlide {
                     number: slide.number,
                     movement: slide.movement,
                     measurement: measure(&plan, &slide).unwrap(),
                 }
             };
-            slides.into_iter().map(felt).collect()
+            slides.into_iter().map(observed).collect()
         })
         .collect();
     let names: Vec<String> = set.textures().iter().map(|t| t.name.clone()).collect();
     let experiment =
-        Experiment::recorded(names, &felt, None, Protocol::Interleaved, train, 1).unwrap();
+        Experiment::recorded(names, &observed, None, Protocol::Interleaved, train, 1).unwrap();
     let config = config(method);
     let outcomes = evaluate(&experiment, config, 8000, || ()).unwrap();
     Summary::new(&outcomes, experiment.names(), config.max_slides).accuracy
@@ -222,24 +224,25 @@ fn twenty_real_materials_are_told_apart_on_the_simulated_rig() {
 fn the_stage_keeps_its_speed_under_recorded_forces() {
     let Some(folder) = data("biotac") else { return };
     let set = RecordingSet::open(&folder).unwrap();
-    let calibration = calibrated(Lesson::setup(0)).unwrap();
-    let lesson = Lesson::interleaved(&set, 5, 1).unwrap();
-    let worst: Vec<(f64, f64, &str)> = (0..lesson.names.len())
+    let calibration = calibrated(RecordedTexture::setup(0)).unwrap();
+    let recorded_texture = RecordedTexture::interleaved(&set, 5, 1).unwrap();
+    let worst: Vec<(f64, f64, &str)> = (0..recorded_texture.names.len())
         .into_par_iter()
         .map(|texture| {
-            let mut rig = SimRig::new(Lesson::setup(texture as u64));
+            let mut rig = SimRig::new(RecordedTexture::setup(texture as u64));
             rig.control().calibrate(calibration).unwrap();
             rig.home().unwrap();
-            rig.world().play(lesson.test[texture].clone(), 1);
-            for _ in 0..lesson.test[texture].len() {
-                rig.record(lesson.movement).unwrap();
+            rig.world().play(recorded_texture.test[texture].clone(), 1);
+            for _ in 0..recorded_texture.test[texture].len() {
+                rig.record(recorded_texture.movement).unwrap();
             }
             let performed = rig.performed();
             let speed = performed.iter().map(|p| p.speed_error).fold(0.0, f64::max);
-            let force =
-                |p: &Performed| (p.force_n / f64::from(lesson.movement.force_n()) - 1.0).abs();
+            let force = |p: &Performed| {
+                (p.force_n / f64::from(recorded_texture.movement.force_n()) - 1.0).abs()
+            };
             let force = performed.iter().map(force).fold(0.0, f64::max);
-            (speed, force, lesson.names[texture].as_str())
+            (speed, force, recorded_texture.names[texture].as_str())
         })
         .collect();
     for (speed, force, name) in &worst {
@@ -258,13 +261,13 @@ fn the_stage_keeps_its_speed_under_recorded_forces() {
 fn played_recordings_have_the_properties_of_the_recordings() {
     let Some(folder) = data("biotac") else { return };
     let set = RecordingSet::open(&folder).unwrap();
-    let calibration = calibrated(Lesson::setup(0)).unwrap();
+    let calibration = calibrated(RecordedTexture::setup(0)).unwrap();
     let plan = Plan::new();
-    let lesson = Lesson::interleaved(&set, 5, 1).unwrap();
-    let off: Vec<[f64; 3]> = (0..lesson.names.len())
+    let recorded_texture = RecordedTexture::interleaved(&set, 5, 1).unwrap();
+    let off: Vec<[f64; 3]> = (0..recorded_texture.names.len())
         .into_par_iter()
         .map(|texture| {
-            let mut rig = SimRig::new(Lesson::setup(texture as u64));
+            let mut rig = SimRig::new(RecordedTexture::setup(texture as u64));
             rig.control().calibrate(calibration).unwrap();
             rig.home().unwrap();
             let recorded = set.load_texture(texture).unwrap();
@@ -277,11 +280,12 @@ fn played_recordings_have_the_properties_of_the_recordings() {
                 }],
                 1,
             );
-            let felt = rig.record(movement()).unwrap();
+            let observed = rig.record(movement()).unwrap();
             let mut stretch = whole.clone();
-            let moved = felt.window.1 + 0.5;
-            stretch.window = (felt.window.0 + 0.5, moved);
-            let [here, there] = [&felt, &stretch].map(|s| measure(&plan, s).unwrap().properties);
+            let moved = observed.window.1 + 0.5;
+            stretch.window = (observed.window.0 + 0.5, moved);
+            let [here, there] =
+                [&observed, &stretch].map(|s| measure(&plan, s).unwrap().properties);
             Property::ALL.map(|p| f64::from(here.get(p).unwrap() - there.get(p).unwrap()))
         })
         .collect();

@@ -12,7 +12,7 @@ use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::Movement;
 use tactus_core::features::{Measurement, Property, PropertySet};
-use tactus_core::probe::explore::{Event, explore};
+use tactus_core::probe::explore::{ExplorationStep, explore};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::control::Control;
 use tactus_core::rig::{Phase, Refused};
@@ -56,11 +56,11 @@ fn two_hundred_explorations() {
                 &plan,
                 || 0,
                 |event| match event {
-                    Event::Felt(action, ..) => {
+                    ExplorationStep::Measured(action, ..) => {
                         movements.push(table.movement(action.movement).unwrap())
                     }
-                    Event::Rejected(_, why) => panic!("{}: {why}", texture_name(unknown)),
-                    Event::Chosen(..) | Event::Decided { .. } => {}
+                    ExplorationStep::Rejected(_, why) => panic!("{}: {why}", texture_name(unknown)),
+                    ExplorationStep::Chosen(..) | ExplorationStep::Decided { .. } => {}
                 },
             ));
             let verdict = verdict.unwrap_or_else(|why| panic!("{}: {why}", texture_name(unknown)));
@@ -127,7 +127,7 @@ fn the_same_seed_gives_the_same_slides_on_any_number_of_threads() {
 }
 
 #[test]
-fn a_recorded_slide_has_the_properties_that_were_felt_live() {
+fn a_recorded_slide_has_the_properties_measured_live() {
     // the same rig twice: once it explores, once it records
     let setup = Setup {
         texture: 100,
@@ -200,7 +200,7 @@ fn traction_is_the_shear_that_really_acts() {
             let mut slide = tactus_core::features::Slide::<tactus_core::dsp::Plain>::new(&plan);
             while rig.control().phase() != Phase::Ready {
                 let outputs = rig.tick().clone();
-                tactus::sim::rig::feel(&outputs, &mut slide);
+                tactus::sim::rig::take_samples(&outputs, &mut slide);
                 if outputs.shear_mn.is_some() {
                     shear.push(rig.world().truth().shear_n.abs());
                 }
@@ -235,9 +235,9 @@ fn the_skin_is_reported_worn_before_its_roughness_goes() {
     let rough = Movement::from_si(1.8, 100.0).unwrap();
     let mut roughness = || {
         let recorded = rig.record(rough).unwrap();
-        let felt = measure(&plan, &recorded).unwrap();
+        let observed = measure(&plan, &recorded).unwrap();
         let worn = rig.control().skin().is_worn();
-        (felt.properties.get(Property::Roughness).unwrap(), worn)
+        (observed.properties.get(Property::Roughness).unwrap(), worn)
     };
     let new: Vec<f32> = (0..15).map(|_| roughness().0).collect();
     // the slides from the warning on: they have somewhat more wear, and are as many as the new ones

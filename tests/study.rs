@@ -43,8 +43,8 @@ fn invented(textures: &[u8], movements: usize, trials: usize, seed: u64) -> Vec<
         let slides = (0..movements).map(|_| {
             let mean: [f64; 15] = std::array::from_fn(|_| 2.0 + 0.6 * normal(&mut like));
             let slide = |_| {
-                let felt = mean.map(|mean| mean + 0.1 * normal(&mut random));
-                let [traction, roughness, fineness, bands @ ..] = felt;
+                let observed = mean.map(|mean| mean + 0.1 * normal(&mut random));
+                let [traction, roughness, fineness, bands @ ..] = observed;
                 Observation {
                     properties: Properties::new(
                         [traction, roughness, fineness].map(|p| Some(p as f32)),

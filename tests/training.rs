@@ -13,7 +13,7 @@ use tactus_core::probe::explore::explore;
 use tactus_core::probe::training::{Training, Wanted};
 use tactus_core::rig::Rig as _;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::store::Trained;
+use tactus_core::store::TrainingRecord;
 use tactus_core::table::Table;
 
 const ROOM: usize = 16 * 1024 - 32;
@@ -45,15 +45,15 @@ fn slides(
     let plan = Plan::new();
     let mut rig = SimRig::new(world().setup(NEW, 7));
     rig.control().calibrate(calibration).unwrap();
-    let mut felt = Vec::new();
+    let mut observed = Vec::new();
     while let Some(movement) = training.next() {
         let mut slide = Slide::<Plain>::new(&plan);
         block_on(rig.perform(movement, &mut slide)).unwrap();
         let observation = Observation::from(&slide.finish().unwrap());
         training.took(Some(table), movement, &observation).unwrap();
-        felt.push((movement, observation));
+        observed.push((movement, observation));
     }
-    (training, felt)
+    (training, observed)
 }
 
 #[test]
@@ -63,21 +63,21 @@ fn a_texture_is_trained_through_power_cuts_and_identified() {
     let bytes = world().learn(Method::Fused, calibration, || ()).unwrap();
     let old = Table::read(&bytes).unwrap();
     let begin = || Training::new(wanted(name), Some(&old), ROOM).unwrap();
-    let (training, felt) = slides(calibration, &old, begin());
-    assert_eq!(felt.len(), 15);
-    let mut room = vec![0; ROOM];
-    let new = training.encode(Some(&old), &mut room).unwrap();
+    let (training, observed) = slides(calibration, &old, begin());
+    assert_eq!(observed.len(), 15);
+    let mut buffer = vec![0; ROOM];
+    let new = training.encode(Some(&old), &mut buffer).unwrap();
 
     // cut after every trial: only what was stored is left
-    for cut in 0..=felt.len() {
-        let mut stored: Vec<Trained> = Vec::new();
+    for cut in 0..=observed.len() {
+        let mut stored: Vec<TrainingRecord> = Vec::new();
         let mut training = begin();
-        for (n, (movement, observation)) in felt.iter().enumerate() {
+        for (n, (movement, observation)) in observed.iter().enumerate() {
             if n == cut {
                 training = begin();
                 for record in &stored {
                     assert_eq!(record.table, training.table());
-                    training.resume(record.movement, record.lesson).unwrap();
+                    training.resume(record.movement, record.stats).unwrap();
                 }
             }
             assert_eq!(
@@ -89,8 +89,8 @@ fn a_texture_is_trained_through_power_cuts_and_identified() {
             stored.retain(|other| other.movement != *movement);
             stored.push(record);
         }
-        let mut room = vec![0; ROOM];
-        let again = training.encode(Some(&old), &mut room).unwrap();
+        let mut buffer = vec![0; ROOM];
+        let again = training.encode(Some(&old), &mut buffer).unwrap();
         assert_eq!(again.as_bytes(), new.as_bytes(), "cut after {cut}");
     }
 

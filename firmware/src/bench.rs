@@ -108,9 +108,9 @@ fn serve(desk: &mut Desk, plan: &Plan) -> Option<()> {
     let mut cycles = Cycles(0);
     let (output, mut at) = (&mut desk.output, 0);
     let mut put = |bytes: &[u8]| {
-        let room = output.get_mut(at..at + bytes.len());
-        if let Some(room) = room {
-            room.copy_from_slice(bytes);
+        let buffer = output.get_mut(at..at + bytes.len());
+        if let Some(buffer) = buffer {
+            buffer.copy_from_slice(bytes);
         }
         at += bytes.len();
     };

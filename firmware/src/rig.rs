@@ -16,7 +16,7 @@ use embassy_stm32::interrupt;
 use heapless::spsc::Queue;
 use static_cell::ConstStaticCell;
 use tactus_core::probe::servo_rig::Samples;
-use tactus_core::wire::{PROTOCOL, Tell, text};
+use tactus_core::wire::{Event, PROTOCOL, text};
 
 use crate::board;
 use crate::chip::rescue;
@@ -51,7 +51,7 @@ pub async fn rig(thread: Spawner) {
         spawn(&thread, link::send(tx));
         spawn(&thread, link::receive(rx));
     }
-    outbox::tell(Tell::Booted {
+    outbox::tell(Event::Booted {
         protocol: PROTOCOL,
         version: env!("CARGO_PKG_VERSION").try_into().unwrap_or_default(),
         reset,

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use tactus::data::recordings::RecordingSet;
-use tactus::data::replay::feel;
+use tactus::data::replay::measure_all;
 use tactus::eval::learn::learn;
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{Observation, PropertySet};
@@ -19,7 +19,7 @@ const LEARNED: usize = 2;
 pub(crate) fn main() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/recordings/simulated");
     let set = RecordingSet::open(&folder).expect("a folder of recordings");
-    let slides = feel(&set, |_| ()).expect("slides with features");
+    let slides = measure_all(&set, |_| ()).expect("slides with features");
     let names: Vec<String> = set.textures().iter().map(|t| t.name.clone()).collect();
     let movements = set.movements();
 
@@ -47,7 +47,7 @@ pub(crate) fn main() {
         Explorer::<'_, 8>::new(table, PropertySet::ALL, Config::default()).expect("it can begin");
     let mut rows = vec![explorer.posterior().to_vec()];
     while explorer.verdict().is_none() {
-        let action = explorer.choose(&explorer.outlook(), 0);
+        let action = explorer.choose(&explorer.expected_outcomes(), 0);
         let slide = &trials(UNKNOWN, movements[usize::from(action.movement)])[LEARNED];
         explorer
             .observe(action, slide)

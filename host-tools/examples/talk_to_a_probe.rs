@@ -7,8 +7,8 @@ use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 
-use tactus::link::{Port, Question};
-use tactus_core::wire::{self, Counts, Phase, Receiver, Report, Request, Status, Tell};
+use tactus::link::{Port, Request};
+use tactus_core::wire::{self, Counts, Event, Phase, Receiver, Report, Status};
 
 pub(crate) fn main() {
     let address = match std::env::var("TACTUS_PROBE") {
@@ -21,7 +21,7 @@ pub(crate) fn main() {
     let mut port = Port::new(line, Duration::from_secs(5));
     // each report that comes on the way is shown to the closure
     let status = port
-        .run(Question::status(), |report| println!("{report:?}"))
+        .run(Request::status(), |report| println!("{report:?}"))
         .expect("an answer");
     println!(
         "{:?}, {} textures, table {:08x}",
@@ -37,11 +37,11 @@ fn pretend() -> SocketAddr {
         let (mut line, _) = listener.accept().expect("somebody asks");
         let mut receiver = Receiver::new();
         let mut number = 0;
-        let mut say = |line: &mut TcpStream, tell| {
+        let mut say = |line: &mut TcpStream, event| {
             let report = Report {
                 number,
                 at_ms: 1000,
-                tell,
+                event,
             };
             number += 1;
             let mut frame = [0; wire::MAX_FRAME + 1];
@@ -50,7 +50,7 @@ fn pretend() -> SocketAddr {
         };
         let mut byte = [0];
         while line.read_exact(&mut byte).is_ok() {
-            if let Some(Ok(request)) = receiver.push::<Request>(byte[0]) {
+            if let Some(Ok(request)) = receiver.push::<wire::Request>(byte[0]) {
                 let status = Status {
                     phase: Phase::Ready,
                     fault: None,
@@ -62,8 +62,8 @@ fn pretend() -> SocketAddr {
                     counts: Counts::default(),
                     skin_mj: (0, 0),
                 };
-                say(&mut line, Tell::Status(status));
-                say(&mut line, Tell::Done(request.id));
+                say(&mut line, Event::Status(status));
+                say(&mut line, Event::Done(request.id));
             }
         }
     });

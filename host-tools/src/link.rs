@@ -1,7 +1,7 @@
 //! The host's end of the link to the probe, without IO and without a clock: bytes come in, bytes go out.
 //!
-//! [`Session`] makes requests and understands reports. [`Job`] sees an [`Errand`] through, which is one request
-//! ([`Question`]) or a sequence of them ([`PushTable`], [`ReadTable`]), whatever is damaged or lost on the way.
+//! [`Session`] makes requests and understands reports. [`Job`] sees an [`Transaction`] through, which is one request
+//! ([`Request`]) or a sequence of them ([`PushTable`], [`ReadTable`]), whatever is damaged or lost on the way.
 //! [`Port`] runs jobs over anything that reads and writes: a serial line, a TCP connection.
 
 pub mod follow;
@@ -12,10 +12,10 @@ mod table;
 mod transaction;
 
 pub use port::{Port, PortError};
-pub use request::{Found, Question, Taught};
+pub use request::{Found, Learned, Request};
 pub use session::{LinkError, MAX_TRIES, Session};
 pub use table::{PushTable, ReadTable};
-pub use transaction::{Errand, Job};
+pub use transaction::{Job, Transaction};
 
 #[cfg(test)]
 mod tests;

@@ -38,8 +38,8 @@ pub(crate) fn main() {
         Explorer::<'_, 2>::new(table, PropertySet::ALL, Config::default()).expect("it can begin");
     let unknown = [[0.49, 7.6, 5.2], [0.51, 7.7, 5.0]];
     for slide in unknown {
-        let outlook = explorer.outlook();
-        let action = explorer.choose(&outlook, 0);
+        let outcomes = explorer.expected_outcomes();
+        let action = explorer.choose(&outcomes, 0);
         let slide = Observation {
             properties: Properties::new(slide.map(Some)),
             ..Observation::default()

@@ -19,8 +19,8 @@ pub(crate) fn main() {
     let explorer = Explorer::<'_, 128>::new(table, PropertySet::ALL, config).expect("it fits");
     println!("{} textures", table.textures());
 
-    let outlook = explorer.outlook();
-    for action in &outlook {
+    let outcomes = explorer.expected_outcomes();
+    for action in &outcomes {
         let movement = table
             .movement(action.action.movement)
             .expect("of the table");
@@ -32,6 +32,6 @@ pub(crate) fn main() {
             action.benefit
         );
     }
-    let next = explorer.choose(&outlook, 0);
+    let next = explorer.choose(&outcomes, 0);
     println!("next: movement {} of the table", next.movement + 1);
 }

@@ -53,7 +53,7 @@ pub(crate) fn main() {
         let mut explorer =
             Explorer::<'_, 8>::new(table, PropertySet::ALL, config).expect("it can begin");
         let verdict = loop {
-            let action = explorer.choose(&explorer.outlook(), 0);
+            let action = explorer.choose(&explorer.expected_outcomes(), 0);
             let bands = slide(number, &mut random).into_iter().collect();
             let slide = Observation {
                 bands,

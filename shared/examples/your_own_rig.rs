@@ -8,7 +8,7 @@ use embassy_futures::block_on;
 use tactus_core::dsp::{Kernels, Plain, Plan};
 use tactus_core::explorer::{Config, Explorer};
 use tactus_core::features::{Movement, Properties, Property, PropertySet, Slide};
-use tactus_core::probe::explore::{Event, explore};
+use tactus_core::probe::explore::{ExplorationStep, explore};
 use tactus_core::rig::Rig;
 use tactus_core::table::{Experience, Texture, encode};
 
@@ -67,8 +67,8 @@ pub(crate) fn main() {
     let mut rig = Hum(80.0);
     let explorer = Explorer::<'_, 2>::new(table, rig.measures(), Config::default());
     let mut explorer = explorer.expect("it can begin");
-    let tell = |event: Event<'_>| {
-        if let Event::Felt(action, _, posterior) = event {
+    let tell = |event: ExplorationStep<'_>| {
+        if let ExplorationStep::Measured(action, _, posterior) = event {
             println!("looked at {}: {posterior:.3?}", action.what());
         }
     };

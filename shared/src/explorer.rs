@@ -13,10 +13,10 @@ mod posterior;
 mod student;
 mod whitened;
 
-pub use choice::{Outlook, benefit, confusion};
+pub use choice::{ExpectedOutcome, benefit, confusion};
 pub use config::{Config, ExplorerError, Method, ObserveError, Strategy};
 pub use confusions::{Confusions, Degrees};
-pub use episode::Visited;
+pub use episode::EpisodeSummary;
 pub use kernels::Kernels;
 pub use posterior::{Explorer, Verdict};
 

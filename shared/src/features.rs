@@ -6,7 +6,7 @@ mod observation;
 mod property;
 mod slide;
 
-pub use block::{BLOCK, Block, Blocks, Felt};
+pub use block::{BLOCK, Block, Blocks, SamplePhase};
 pub use movement::{Movement, MovementError};
 pub use observation::{
     FEATURE_STEPS, FeatureSet, MAX_FEATURES, Observation, Vector, WHITE_STEPS, fixed,

@@ -24,18 +24,18 @@ pub mod store;
 pub mod table;
 pub mod wire;
 
-/// Adds as many of them as there is room for: `extend` would panic at more.
-fn fill<T, const N: usize>(room: &mut heapless::Vec<T, N>, items: impl Iterator<Item = T>) {
+/// Adds as many of them as it fits for: `extend` would panic at more.
+fn fill<T, const N: usize>(buffer: &mut heapless::Vec<T, N>, items: impl Iterator<Item = T>) {
     for item in items {
-        if room.push(item).is_err() {
+        if buffer.push(item).is_err() {
             break;
         }
     }
 }
 
-/// As many of them as there is room for: `collect` would panic at more.
+/// As many of them as it fits for: `collect` would panic at more.
 fn up_to<T, const N: usize>(items: impl Iterator<Item = T>) -> heapless::Vec<T, N> {
-    let mut room = heapless::Vec::new();
-    fill(&mut room, items);
-    room
+    let mut buffer = heapless::Vec::new();
+    fill(&mut buffer, items);
+    buffer
 }

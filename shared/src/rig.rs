@@ -27,7 +27,7 @@ pub use phase::{Ended, Phase, Refused, RigError};
 /// Slides in a row without properties, after which an exploration ends.
 pub const MAX_REJECTED: u8 = 3;
 
-/// A board, a simulator or a recording: it makes one movement and delivers what was felt.
+/// A board, a simulator or a recording: it makes one movement and delivers the samples.
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait Rig {
     /// Why a movement failed.
@@ -47,7 +47,7 @@ pub trait Rig {
         slide: &mut Slide<'_, K>,
     ) -> Result<(), Self::Error>;
 
-    /// Waits until the finger is lifted, which takes longer than it takes to judge what was felt. For a rig whose movements
+    /// Waits until the finger is lifted, which takes longer than it takes to judge the slide. For a rig whose movements
     /// end with that, or that has no finger, there is nothing to wait for.
     ///
     /// # Errors

@@ -40,7 +40,7 @@ mod tables;
 
 pub use error::{SettingsError, StoreError};
 pub use layout::{SCHEMA, SECTORS, StoredTable};
-pub use records::{MAX_RECORDS, SELF_MOVEMENTS, SelfTaught, Trained};
+pub use records::{MAX_RECORDS, SELF_MOVEMENTS, SelfLearnedRecord, TrainingRecord};
 pub use sectors::Store;
 
 #[cfg(test)]

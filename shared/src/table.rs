@@ -3,7 +3,7 @@
 //! A [`Table`] borrows the binary form, from flash or a file, and copies nothing. There are two kinds of contents, for the
 //! two ways of deciding: one Gaussian per (texture, movement, property), learned as [`Experience`] and written by
 //! [`encode`]; or the mean of all features of a slide in whitened space, learned as [`Whitened`] and written by
-//! [`encode_fused`]. [`amend`] teaches, renames and forgets textures of either kind.
+//! [`encode_fused`]. [`amend`] learns, renames and deletes textures of either kind.
 //!
 //! # Binary form, version 3, little-endian
 //!
@@ -44,7 +44,7 @@ pub use format::{
 pub use gaussian::{Gaussian, Gaussians, SD_LEAST, SD_STEP, mean_step};
 pub(crate) use scatter::oas;
 pub use scatter::{Scatter, WhitenError, whiten};
-pub use training_stats::{Experience, Lesson, Whitened};
+pub use training_stats::{Experience, TrainingStats, Whitened};
 pub use view::Table;
 pub use whitening::{Whitening, white};
 

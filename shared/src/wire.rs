@@ -10,8 +10,11 @@ mod frame;
 mod sparse;
 mod text;
 
-pub use command::{Ask, Forget, Identify, PART, Request, Train};
-pub use event::{Counts, Felt, Live, MAX_OUTLOOK, Phase, Promise, Report, Reset, Status, Tell};
+pub use crate::explorer::ExpectedOutcome;
+pub use command::{Command, Forget, Identify, PART, Request, Train};
+pub use event::{
+    Counts, Event, Live, MAX_EXPECTED_OUTCOMES, Phase, Report, Reset, SlideReport, Status,
+};
 pub use frame::{FrameError, MAX_FRAME, MAX_MESSAGE, PROTOCOL, Receiver, TooLong, decode, encode};
 pub use text::{Text, text};
 

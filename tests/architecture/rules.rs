@@ -137,7 +137,7 @@ impl House<'_> {
     }
 
     /// The package, the room of a file, and its step.
-    fn room(&self, file: FileId) -> Option<(usize, &str, usize)> {
+    fn buffer(&self, file: FileId) -> Option<(usize, &str, usize)> {
         let (package, first) = self.place(file)?;
         let steps = self.packages[package].steps.iter();
         let step = steps
@@ -153,7 +153,7 @@ impl House<'_> {
                 continue;
             };
             let Package { steps, outside, .. } = self.packages[package];
-            let known = steps.is_empty() || outside.contains(&first) || self.room(id).is_some();
+            let known = steps.is_empty() || outside.contains(&first) || self.buffer(id).is_some();
             if file.is_product && !known {
                 let rooms: Vec<&str> = steps.iter().copied().flatten().copied().collect();
                 let rooms = rooms.join(", ");
@@ -167,40 +167,42 @@ impl House<'_> {
     fn doors(&self) -> Vec<String> {
         let mut wrong: BTreeMap<(&str, &str, String), BTreeMap<&str, &Use>> = BTreeMap::new();
         for found in &self.uses {
-            let Some((package, user, step)) = self.room(found.from) else {
+            let Some((package, user, step)) = self.buffer(found.from) else {
                 continue;
             };
             for &used in found.through.iter().chain([&found.to]) {
-                let Some((_, room, later)) = self.room(used).filter(|used| used.0 == package)
+                let Some((_, buffer, later)) = self.buffer(used).filter(|used| used.0 == package)
                 else {
                     continue;
                 };
                 let strangers = self.packages[package].strangers.iter();
                 let mut strangers = strangers.map(|(a, b)| [[*a, *b], [*b, *a]]);
-                let why = if room == user {
+                let why = if buffer == user {
                     continue;
                 } else if later > step {
                     format!("comes after {user}")
-                } else if later == step || strangers.any(|pair| pair.contains(&[user, room])) {
+                } else if later == step || strangers.any(|pair| pair.contains(&[user, buffer])) {
                     format!("and {user} do not know each other")
                 } else {
                     continue;
                 };
                 let last = found.what.rsplit("::").next().unwrap_or(&found.what);
-                let names = wrong.entry((self.name(found.from), room, why)).or_default();
+                let names = wrong
+                    .entry((self.name(found.from), buffer, why))
+                    .or_default();
                 let first = names.entry(last).or_insert(found);
                 if found.line < first.line {
                     *first = found;
                 }
             }
         }
-        let wrong = wrong.into_iter().map(|((file, room, why), names)| {
+        let wrong = wrong.into_iter().map(|((file, buffer, why), names)| {
             let names = names.into_values();
             let names: Vec<String> = names
                 .map(|found| format!("`{}` (line {})", found.what, found.line))
                 .collect();
             let names = names.join(", ");
-            format!("{file} uses {names} of the room {room}, but {room} {why}")
+            format!("{file} uses {names} of the room {buffer}, but {buffer} {why}")
         });
         wrong.collect()
     }

@@ -104,7 +104,7 @@ pub(super) fn moving(printed: &str, command: &str) -> String {
     let (mut finger, mut sample) = (vec![(0.0, up())], vec![(0.0, at(0.0))]);
     for (number, slide) in slides.iter().enumerate() {
         let begin = each * number as f64;
-        let [choice, slid, felt, _] = PARTS;
+        let [choice, slid, observed, _] = PARTS;
         let (down, over) = (begin + choice, begin + choice + slid);
         // the last one stays below the verdict
         let end = if number + 1 == slides.len() {
@@ -125,7 +125,7 @@ pub(super) fn moving(printed: &str, command: &str) -> String {
         ]);
         shown(&mut css, &format!("c{number}"), total, begin, end);
         shown(&mut css, &format!("f{number}"), total, over, end);
-        shown(&mut css, &format!("p{number}"), total, over + felt, end);
+        shown(&mut css, &format!("p{number}"), total, over + observed, end);
         writeln!(
             body,
             r#"<g class="c{number}"><text x="24" y="262" class="h">Slide {}: {}</text><text x="24" y="282" class="s">{}</text></g>"#,

@@ -12,19 +12,19 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
 /// Degrees of freedom of the Student-t that a slide is judged by, and of the background class.
-pub const FREEDOM: f64 = 8.0;
-/// A posterior above this ends a visit.
+pub const DEGREES_OF_FREEDOM: f64 = 8.0;
+/// A posterior above this ends an episode.
 pub const SURE: f64 = 0.99;
 /// The stricter threshold.
 pub const STRICT: f64 = 0.999;
-/// Slides after which a visit ends anyway.
+/// Slides after which an episode ends anyway.
 pub const LIMIT: u32 = 10;
 /// Slides of trust that the average over movements has against one movement's own covariance.
 pub const BLEND: f64 = 15.0;
 /// Novelty log-odds that flag an unknown texture after one slide, and after more.
 pub const NOVEL_AT_ONCE: f64 = 2.0;
 pub const NOVEL_LATER: f64 = 1.5;
-/// When a visit's best guess is learned without asking, and how much of it.
+/// When an episode's best guess is learned without asking, and how much of it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Learning {
     /// The posterior must be above this ...
@@ -311,7 +311,7 @@ impl Trained {
         self.means.len() - 1
     }
 
-    /// Step 8: moves the mean of a texture towards one slide (or the mean of a visit's) of a movement.
+    /// Step 8: moves the mean of a texture towards one slide (or the mean of an episode's) of a movement.
     pub fn learn(&mut self, learning: &Learning, texture: usize, movement: usize, z: &[f64]) {
         let count = &mut self.counts[texture][movement];
         let rate = 1.0 / (count.min(learning.memory) + 1.0);
@@ -323,8 +323,8 @@ impl Trained {
 
     /// Step 8 for a whole visit. reading: once for each movement made, towards the visit's running mean, since slides of one
     /// visit share its deviation.
-    pub fn learn_visit(&mut self, learning: &Learning, texture: usize, visit: &Visit) {
-        for (movement, made) in visit.made.iter().enumerate() {
+    pub fn learn_episode(&mut self, learning: &Learning, texture: usize, episode: &Episode) {
+        for (movement, made) in episode.made.iter().enumerate() {
             if made.slides > 0 {
                 self.learn(learning, texture, movement, &made.mean);
             }
@@ -383,13 +383,13 @@ pub struct Made {
 
 /// One visit to one texture: slides of any movements.
 #[derive(Clone, Debug)]
-pub struct Visit {
+pub struct Episode {
     /// By movement.
     pub made: Vec<Made>,
 }
 
-impl Visit {
-    /// A visit before its first slide.
+impl Episode {
+    /// An episode before its first slide.
     pub fn new(movements: usize) -> Self {
         Self {
             made: vec![Made::default(); movements],
@@ -428,7 +428,8 @@ impl Visit {
                 let d = mean.len() as f64;
                 let v = 1.0 / k + 1.0 / table.counts[j][movement];
                 let q = squared_distance(mean, &table.means[j][movement]);
-                -d / 2.0 * v.ln() - (FREEDOM + d) / 2.0 * (q / (FREEDOM * v)).ln_1p()
+                -d / 2.0 * v.ln()
+                    - (DEGREES_OF_FREEDOM + d) / 2.0 * (q / (DEGREES_OF_FREEDOM * v)).ln_1p()
             });
             by_movement.sum()
         };
@@ -513,7 +514,7 @@ impl Visit {
             let row = |row: &Vec<f64>| row.iter().zip(&z).map(|(w, z)| w * z).sum::<f64>();
             let q: f64 = w.iter().map(row).map(|x| x * x).sum();
             let ln: f64 = (0..d).map(|i| -2.0 * w[i][i].ln()).sum();
-            -ln / 2.0 - (FREEDOM + df) / 2.0 * (q / FREEDOM).ln_1p()
+            -ln / 2.0 - (DEGREES_OF_FREEDOM + df) / 2.0 * (q / DEGREES_OF_FREEDOM).ln_1p()
         });
         background.sum::<f64>() - (ln_sum_exp(&self.log_likelihoods(table)) - textures.ln())
     }

@@ -13,10 +13,10 @@ use tactus_core::table::{Action, Table};
 const LOOK: usize = 22;
 /// Forces in them: one each tick of the servo's.
 const SHEARS: usize = 10;
-/// Room for textures: the firmware's own.
-const ROOM: usize = tactus_core::table::MAX_TEXTURES;
+/// Textures at most: the firmware's own.
+const CAPACITY: usize = tactus_core::table::MAX_TEXTURES;
 /// About as many as fit at all: a choice takes 64 bytes of stack for each, and posterior and distances 20.
-pub const MOST_ROOM: usize = 1500;
+pub const MOST_TEXTURES: usize = 1500;
 
 /// What is counted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -62,17 +62,17 @@ pub trait Counter {
     fn count<T>(&mut self, work: impl FnOnce() -> T) -> T;
 }
 
-/// A slide that was felt, and the action that looks at it, in words.
-pub struct Felt {
+/// An observed slide, and the action that looks at it, in words.
+pub struct ObservedSlide {
     /// The method that decides.
     pub method: Method,
     /// What is looked at.
     pub action: Action,
-    /// What was felt.
+    /// What was measured.
     pub slide: Observation,
 }
 
-impl Felt {
+impl ObservedSlide {
     const METHODS: [Method; 4] = [
         Method::Paper,
         Method::Student,
@@ -112,7 +112,7 @@ impl Felt {
             *property = Some(value).filter(|value| !value.is_nan());
         }
         let property = usize::try_from(property).ok();
-        let felt = Self {
+        let observed = Self {
             method: *Self::METHODS.get(usize::try_from(method).ok()?)?,
             action: Action {
                 movement: u8::try_from(movement).ok()?,
@@ -124,11 +124,11 @@ impl Felt {
                 pressure: (has_pressure != 0).then_some([mean, sd]),
             },
         };
-        Some((felt, rest))
+        Some((observed, rest))
     }
 }
 
-/// Does a workload with the samples or the felt slide in `words`, the background before them, and puts its results; `None` if
+/// Does a workload with the samples or the observed slide in `words`, the background before them, and puts its results; `None` if
 /// they do not make sense.
 pub fn run<K: Kernels>(
     workload: Workload,
@@ -163,27 +163,27 @@ pub fn run<K: Kernels>(
             let mut slide = Slide::<K>::new(plan);
             slide.set_background(2.0);
             slide.start(0..words.len() as u32);
-            let felt = counter.count(|| {
+            let observed = counter.count(|| {
                 for samples in black_box(words).chunks(LOOK) {
                     look(&mut slide, samples);
                 }
                 slide.finish().map(|slide| Observation::from(&slide))
             });
-            put_observation(&felt.ok()?, put);
+            put_observation(&observed.ok()?, put);
         }
         _ => {
             let table = Table::read(table).ok()?;
-            if usize::from(table.textures()) <= ROOM {
-                explore::<K, ROOM>(workload, plan, table, words, counter, put)?;
+            if usize::from(table.textures()) <= CAPACITY {
+                explore::<K, CAPACITY>(workload, plan, table, words, counter, put)?;
             } else {
-                explore::<K, MOST_ROOM>(workload, plan, table, words, counter, put)?;
+                explore::<K, MOST_TEXTURES>(workload, plan, table, words, counter, put)?;
             }
         }
     }
     Some(())
 }
 
-// a frame of its own: that of the larger room would not fit beside anything else
+// a frame of its own: that of the larger buffer would not fit beside anything else
 #[inline(never)]
 fn explore<K: Kernels, const N: usize>(
     workload: Workload,
@@ -193,9 +193,9 @@ fn explore<K: Kernels, const N: usize>(
     counter: &mut impl Counter,
     put: &mut impl FnMut(&[u8]),
 ) -> Option<()> {
-    let (felt, samples) = Felt::read(words)?;
+    let (observed, samples) = ObservedSlide::read(words)?;
     let config = Config {
-        method: felt.method,
+        method: observed.method,
         ..Config::default()
     };
     let begin = || Explorer::<N, K>::new(table, PropertySet::ALL, config);
@@ -205,20 +205,20 @@ fn explore<K: Kernels, const N: usize>(
         begin().ok()?
     };
     let choose = |explorer: &Explorer<'_, N, K>| {
-        let mut outlook = Vec::new();
-        explorer.look_out(&mut outlook);
-        black_box(explorer.choose(black_box(&outlook), 0))
+        let mut outcomes = Vec::new();
+        explorer.evaluate_actions(&mut outcomes);
+        black_box(explorer.choose(black_box(&outcomes), 0))
     };
     let chosen = match workload {
         Workload::FirstChoice => Some(counter.count(|| choose(black_box(&explorer)))),
         Workload::Observe => {
-            let slide = black_box(&felt.slide);
-            let done = counter.count(|| explorer.observe(felt.action, slide));
+            let slide = black_box(&observed.slide);
+            let done = counter.count(|| explorer.observe(observed.action, slide));
             done.ok()?;
             None
         }
         Workload::Choice => {
-            explorer.observe(felt.action, &felt.slide).ok()?;
+            explorer.observe(observed.action, &observed.slide).ok()?;
             Some(counter.count(|| choose(black_box(&explorer))))
         }
         Workload::Decision => {
@@ -231,7 +231,7 @@ fn explore<K: Kernels, const N: usize>(
                 slide.push(&[*last]);
                 let measured = slide.finish().map(|slide| Observation::from(&slide));
                 // the posterior is of the other slide, which leaves as many textures as are wanted
-                let seen = explorer.observe(felt.action, black_box(&felt.slide));
+                let seen = explorer.observe(observed.action, black_box(&observed.slide));
                 (measured, seen, explorer.verdict(), choose(&explorer))
             });
             let (measured, seen, _, chosen) = decided;
@@ -248,9 +248,9 @@ fn explore<K: Kernels, const N: usize>(
     put(&log_odds.to_bits().to_le_bytes());
     let action = chosen.unwrap_or_else(|| choose(&explorer));
     put(&[action.movement]);
-    for promise in &explorer.outlook() {
-        put(&promise.uncertainty.to_le_bytes());
-        put(&promise.benefit.to_le_bytes());
+    for outcome in &explorer.expected_outcomes() {
+        put(&outcome.uncertainty.to_le_bytes());
+        put(&outcome.benefit.to_le_bytes());
     }
     Some(())
 }
@@ -263,10 +263,13 @@ fn look<K: Kernels>(slide: &mut Slide<'_, K>, samples: &[i16]) {
     slide.push(samples);
 }
 
-fn put_observation(felt: &Observation, put: &mut impl FnMut(&[u8])) {
+fn put_observation(observed: &Observation, put: &mut impl FnMut(&[u8])) {
     for property in Property::ALL {
-        let value = felt.properties.get(property).unwrap_or(f32::NAN);
+        let value = observed.properties.get(property).unwrap_or(f32::NAN);
         put(&value.to_le_bytes());
     }
-    felt.bands.iter().for_each(|band| put(&band.to_le_bytes()));
+    observed
+        .bands
+        .iter()
+        .for_each(|band| put(&band.to_le_bytes()));
 }

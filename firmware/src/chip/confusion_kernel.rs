@@ -3,7 +3,7 @@
 use core::arch::asm;
 use core::mem::offset_of;
 
-use tactus_core::explorer::kernels::{EXP2, FAR, Live, ROUND};
+use tactus_core::explorer::kernels::{EXP2, FAR, LiveTexture, ROUND};
 use tactus_core::table::Gaussian;
 
 /// What [`confuse`] keeps in registers, from s16 on.
@@ -15,9 +15,9 @@ static CONFUSE: [f32; 11] = {
 
 // one load for all of a texture
 const _: () = assert!(
-    offset_of!(Live, probability) == 0
-        && offset_of!(Live, confused) == 4
-        && offset_of!(Live, expected) == 8
+    offset_of!(LiveTexture, probability) == 0
+        && offset_of!(LiveTexture, confused) == 4
+        && offset_of!(LiveTexture, expected) == 8
         && offset_of!(Gaussian, mean) == 0
         && offset_of!(Gaussian, sd) == 4
 );
@@ -29,7 +29,11 @@ const _: () = assert!(
 /// # Safety
 /// `others` begin and end there.
 #[inline(never)]
-pub(super) unsafe fn confuse(a: &mut Live, others: *mut Live, behind: *const Live) {
+pub(super) unsafe fn confuse(
+    a: &mut LiveTexture,
+    others: *mut LiveTexture,
+    behind: *const LiveTexture,
+) {
     // SAFETY: it reads and writes `a`, the others and nothing else.
     unsafe {
         asm!(
@@ -88,7 +92,7 @@ pub(super) unsafe fn confuse(a: &mut Live, others: *mut Live, behind: *const Liv
             behind = in(reg) behind,
             x = out(reg) _,
             y = out(reg) _,
-            size = const size_of::<Live>(),
+            size = const size_of::<LiveTexture>(),
             out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s8") _, out("s9") _,
             out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _, out("s16") _, out("s17") _,
             out("s18") _, out("s19") _, out("s20") _, out("s21") _, out("s22") _, out("s23") _, out("s24") _, out("s25") _,

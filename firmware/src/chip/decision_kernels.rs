@@ -6,7 +6,7 @@ use core::mem::offset_of;
 
 use tactus_core::dsp::Plain;
 use tactus_core::dsp::fixed::{EXP2, LN, LN_2, LOG2_E, PARTS};
-use tactus_core::explorer::kernels::{Candidate, Kernels, Live, Spread};
+use tactus_core::explorer::kernels::{Candidate, Kernels, LiveTexture, Spread};
 use tactus_core::features::MAX_FEATURES;
 use tactus_core::table::Gaussians;
 
@@ -236,12 +236,12 @@ global_asm!(
     "bne 2b",
     "bx lr",
     ".size tactus_divide, . - tactus_divide",
-    ".section .text.tactus_forget,\"ax\",%progbits",
-    ".global tactus_forget",
-    ".type tactus_forget,%function",
+    ".section .text.tactus_reset_to_prior,\"ax\",%progbits",
+    ".global tactus_reset_to_prior",
+    ".type tactus_reset_to_prior,%function",
     ".thumb_func",
     // r0: numbers, a multiple of 8; r1: where they end, behind the first
-    "tactus_forget:",
+    "tactus_reset_to_prior:",
     "push {{r4-r9}}",
     ".irp next, r2, r3, r4, r5, r6, r7, r8, r9",
     "mov \\next, #0",
@@ -252,7 +252,7 @@ global_asm!(
     "bne 2b",
     "pop {{r4-r9}}",
     "bx lr",
-    ".size tactus_forget, . - tactus_forget",
+    ".size tactus_reset_to_prior, . - tactus_reset_to_prior",
     ".section .text.tactus_candidates,\"ax\",%progbits",
     ".global tactus_candidates",
     ".type tactus_candidates,%function",
@@ -352,7 +352,7 @@ unsafe extern "C" {
     /// There are 8, 16, 24... numbers up to `end`, the bits of whole ones.
     fn tactus_divide(numbers: *mut f32, end: *const f32, by: f32);
     /// There are 8, 16, 24... numbers up to `end`.
-    fn tactus_forget(numbers: *mut i32, end: *const i32);
+    fn tactus_reset_to_prior(numbers: *mut i32, end: *const i32);
     /// `from` has 14 numbers and begins at a whole word, `square` is the sum of their squares; there is at least one of
     /// `others`, and `behind` is where the last of them ends.
     fn tactus_candidates(
@@ -378,12 +378,12 @@ fn before_ln() -> *const u32 {
 }
 
 impl Kernels for Chip {
-    fn forget(logs: &mut [i32]) {
+    fn reset_to_prior(logs: &mut [i32]) {
         let (eights, rest) = logs.as_chunks_mut::<8>();
         let eights = eights.as_flattened_mut().as_mut_ptr_range();
         if !eights.is_empty() {
             // SAFETY: they are whole eights.
-            unsafe { tactus_forget(eights.start, eights.end) };
+            unsafe { tactus_reset_to_prior(eights.start, eights.end) };
         }
         for log in rest {
             *log = 0;
@@ -486,7 +486,7 @@ impl Kernels for Chip {
         }
     }
 
-    fn confuse(a: &mut Live, others: &mut [Live]) {
+    fn confuse(a: &mut LiveTexture, others: &mut [LiveTexture]) {
         let others = others.as_mut_ptr_range();
         if !others.is_empty() {
             // SAFETY: there is one at least, and the others end where it is said.

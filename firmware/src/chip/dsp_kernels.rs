@@ -104,10 +104,10 @@ unsafe extern "C" {
 fn fold_frame<'r>(
     angles: &Angles,
     frame: &[i16; FRAME],
-    room: &'r mut MaybeUninit<Folded>,
+    buffer: &'r mut MaybeUninit<Folded>,
 ) -> &'r mut Folded {
-    let begin: *mut Complex32 = room.as_mut_ptr().cast();
-    // SAFETY: it reads all angles, an even number, and the whole frame, whose words need not be aligned; all of `room` is
+    let begin: *mut Complex32 = buffer.as_mut_ptr().cast();
+    // SAFETY: it reads all angles, an even number, and the whole frame, whose words need not be aligned; all of `buffer` is
     // written.
     unsafe {
         asm!(
@@ -180,7 +180,7 @@ fn fold_frame<'r>(
             out("s16") _, out("s17") _, out("s18") _, out("s19") _,
             options(nostack),
         );
-        room.assume_init_mut()
+        buffer.assume_init_mut()
     }
 }
 
@@ -297,9 +297,9 @@ impl Kernels for Chip {
     fn fold_frame<'r>(
         angles: &Angles,
         frame: &[i16; FRAME],
-        room: &'r mut MaybeUninit<Folded>,
+        buffer: &'r mut MaybeUninit<Folded>,
     ) -> &'r mut Folded {
-        fold_frame(angles, frame, room)
+        fold_frame(angles, frame, buffer)
     }
 
     fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]) {

@@ -15,7 +15,7 @@ use tactus_core::handheld::jobs::{Outcome, work};
 use tactus_core::handheld::{About, Handheld, Picture, Screen, TICKS_HZ, draw};
 use tactus_core::probe::seams::Events;
 use tactus_core::probe::{Memory, TableInUse};
-use tactus_core::wire::{Tell, Text, text};
+use tactus_core::wire::{Event, Text, text};
 
 use super::acquire::{self, Word};
 use super::display;
@@ -24,7 +24,7 @@ use crate::chip::flash::{self, Bank2, MappedTable};
 use crate::chip::rescue;
 
 /// The table that comes with the handheld: textures of a simulated world under a simulated hand. It tells how the slides
-/// of a hand differ; a real probe is taught.
+/// of a hand differ; a real probe is trained.
 static FACTORY: &[u8] = include_bytes!("../../handheld.tact");
 /// The store is open by now, or will never be.
 const OPENING: Duration = Duration::from_secs(10);
@@ -247,7 +247,7 @@ type Knowledge = Memory<'static, Bank2, MappedTable>;
 struct Logged;
 
 impl Events for Logged {
-    fn tell(&mut self, _: Tell) {}
+    fn tell(&mut self, _: Event) {}
 
     fn table(&mut self, _: TableInUse) {}
 

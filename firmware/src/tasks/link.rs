@@ -10,7 +10,7 @@ use embedded_io_async::{Read as _, Write as _};
 use static_cell::ConstStaticCell;
 use tactus_core::probe::seams::Panel;
 use tactus_core::probe::{RigState, TableInUse, Turn, receive as receive_request};
-use tactus_core::wire::{Counts, Receiver, Request, Tell};
+use tactus_core::wire::{Counts, Event, Receiver, Request};
 
 use super::outbox::{self, OUTBOX, STREAM, tell};
 use super::{acquire, servo};
@@ -82,7 +82,7 @@ pub(crate) async fn receive(mut uart: BufferedUartRx<'static>) {
                 Some(Ok(request)) => received(request),
                 Some(Err(_)) => {
                     let frames = DAMAGED_FRAMES.fetch_add(1, Relaxed) + 1;
-                    tell(Tell::Damaged(frames));
+                    tell(Event::Damaged(frames));
                 }
             }
         }
@@ -93,7 +93,7 @@ pub(crate) async fn receive(mut uart: BufferedUartRx<'static>) {
 fn received(request: Request) {
     let busy = BUSY.load(Relaxed) || !JOBS.is_empty();
     if receive_request(&request, busy, &mut AtAnyTime) == Turn::Queue {
-        // there is room: nobody else queues
+        // it fits: nobody else queues
         let _ = JOBS.try_send(request);
     }
 }
@@ -134,7 +134,7 @@ impl Panel for AtAnyTime {
         STREAM.store(on, Relaxed);
     }
 
-    fn tell(&mut self, event: Tell) {
+    fn tell(&mut self, event: Event) {
         tell(event);
     }
 }

@@ -4,7 +4,7 @@ use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering::Relaxed};
 use embassy_sync::blocking_mutex::raw::ThreadModeRawMutex;
 use embassy_sync::pipe::Pipe;
 use embassy_time::Instant;
-use tactus_core::wire::{self, MAX_FRAME, Report, Tell};
+use tactus_core::wire::{self, Event, MAX_FRAME, Report};
 
 /// What is on its way to the host: 90 ms of the line.
 const OUT: usize = 8192;
@@ -15,15 +15,15 @@ pub(crate) static LOST_REPORTS: AtomicU32 = AtomicU32::new(0);
 /// Raw samples are wanted.
 pub(crate) static STREAM: AtomicBool = AtomicBool::new(false);
 
-/// Tells the host. What finds no room is lost, and counted; it leaves a gap in the numbers.
-pub(crate) fn tell(tell: Tell) {
+/// Tells the host. What does not fit is lost, and counted; it leaves a gap in the numbers.
+pub(crate) fn tell(tell: Event) {
     let report = Report {
         number: NUMBER.fetch_add(1, Relaxed),
         at_ms: Instant::now().as_millis() as u32,
         tell,
     };
-    let mut room = [0; MAX_FRAME + 1];
-    let sent = wire::encode(&report, &mut room).is_ok_and(|mut frame| {
+    let mut buffer = [0; MAX_FRAME + 1];
+    let sent = wire::encode(&report, &mut buffer).is_ok_and(|mut frame| {
         // all writers are in thread mode and none is interrupted by another: what is free stays free
         if OUTBOX.free_capacity() < frame.len() {
             return false;

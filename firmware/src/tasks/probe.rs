@@ -8,7 +8,7 @@ use tactus_core::dsp::Plan;
 use tactus_core::probe::seams::{Events, RigHandle as _};
 use tactus_core::probe::servo_rig::{Samples, ServoRig};
 use tactus_core::probe::{self, Memory, Probe, TableInUse};
-use tactus_core::wire::{Tell, Text, text};
+use tactus_core::wire::{Event, Text, text};
 
 use super::link::{BUSY, JOBS, TABLE};
 use super::outbox::tell;
@@ -19,7 +19,7 @@ use crate::chip::Chip;
 use crate::chip::flash::{self, MappedTable, Storage};
 
 /// The table that comes with the firmware: textures of a simulated world, good for the emulated board. A real rig is
-/// taught, or given a table.
+/// trained, or given a table.
 static FACTORY: &[u8] = include_bytes!("../../factory.tact");
 /// The store is open by now, or will never be: two of its sectors erased take less than 2 s.
 const OPENING: Duration = Duration::from_secs(10);
@@ -73,7 +73,7 @@ async fn open(flash: board::Storage, rig: &mut ServoRig<ServoHandle>) -> Option<
 struct Told;
 
 impl Events for Told {
-    fn tell(&mut self, event: Tell) {
+    fn tell(&mut self, event: Event) {
         tell(event);
     }
 

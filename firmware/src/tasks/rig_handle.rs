@@ -6,7 +6,7 @@ use heapless::spsc::Consumer;
 use tactus_core::probe::RigState;
 use tactus_core::probe::servo_rig::{LOOK_MS, RigCommand, Samples, Servo};
 use tactus_core::rig::Refused;
-use tactus_core::wire::Tell;
+use tactus_core::wire::Event;
 
 use super::outbox::{STREAM, tell};
 use super::{acquire, servo};
@@ -49,7 +49,7 @@ impl Servo for ServoHandle {
         STREAM.load(Relaxed)
     }
 
-    fn tell(&mut self, event: Tell) {
+    fn tell(&mut self, event: Event) {
         tell(event);
     }
 }

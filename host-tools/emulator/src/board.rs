@@ -25,7 +25,7 @@ pub use display::Display;
 pub use emulator::{Emulator, Reset};
 pub use error::Error;
 pub use flash::{FLASH, FlashWrite, SECTOR, STORE};
-pub use handler_profile::Spent;
+pub use handler_profile::HandlerProfile;
 pub use options::Options;
 pub use record::Slide;
 pub use rig::{Output, Rig};

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use tactus::sim::faults::Fault;
 use tactus::sim::person::Hand;
-use tactus::sim::scenario::{InvalidScenario, PATIENCE_S, Scenario, Step, texture};
+use tactus::sim::scenario::{InvalidScenario, Scenario, Step, TIMEOUT_S, texture};
 use tactus::sim::world::NotLifted;
 
 use crate::board::{Display, Emulator, Error, Options, Output};
@@ -155,7 +155,7 @@ impl Played<'_> {
 
     fn slide(&mut self, force_n: f64, pace_mm_s: f64, seconds: f64) -> Done {
         self.intend(force_n, 0.0);
-        if !self.until(PATIENCE_S, |display| display.shows(SLIDE))? {
+        if !self.until(TIMEOUT_S, |display| display.shows(SLIDE))? {
             return Ok(Err(Unmet::NoSlideWanted));
         }
         self.board().run_ms(Step::REACTION_MS)?;

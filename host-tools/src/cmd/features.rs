@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use tactus_core::features::{BAND_EDGES, Property};
 
 use super::args::Recordings;
-use super::textures::feel_folder;
+use super::textures::measure_folder;
 
 /// Print the properties and band powers of every recorded slide
 #[derive(clap::Args)]
@@ -32,11 +32,11 @@ enum Rows {
 
 /// Prints a row for every slide.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let (set, felt) = feel_folder(&args.from.recordings)?;
+    let (set, measured) = measure_folder(&args.from.recordings)?;
     let rows = set
         .textures()
         .iter()
-        .zip(&felt)
+        .zip(&measured)
         .flat_map(|(texture, slides)| slides.iter().map(move |s| (texture, s)));
     match args.format {
         Rows::Csv => {

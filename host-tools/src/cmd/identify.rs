@@ -26,7 +26,7 @@ use super::args::Stop;
 use super::learn::{at_least_two, learn_first};
 use super::progress::with_progress;
 use super::table_file::read_table;
-use super::textures::{feel_folder, find_material, find_textures, names};
+use super::textures::{find_material, find_textures, measure_folder, names};
 
 pub(crate) const FIRST_STEPS: &str = "\
 Try first:
@@ -107,13 +107,13 @@ fn identify_recorded(
         Some(file) => Some((file, read_table(file, &mut given)?)),
         None => None,
     };
-    let (_, felt) = feel_folder(folder)?;
+    let (_, measured) = measure_folder(folder)?;
     let mut shown = set.load_texture(index)?;
     let table = if let Some((file, table)) = given {
         // a table learned from this very folder has seen the first slides of every movement
         let trials = table.trials(0, 0).into();
         let learned_as = Method::of(explorer::Method::of(table.contents()));
-        let own = learn_first(&set, &felt, trials, learned_as, None);
+        let own = learn_first(&set, &measured, trials, learned_as, None);
         if own.is_ok_and(|own| own == table.as_bytes()) {
             let mut seen: HashMap<Movement, usize> = HashMap::new();
             shown.retain(|slide| {
@@ -131,15 +131,16 @@ fn identify_recorded(
     } else {
         let (slides, interleaved) = (args.train_slides, Protocol::Interleaved);
         let experiment =
-            Experiment::recorded(names(&set), &felt, None, interleaved, slides, args.seed)?;
+            Experiment::recorded(names(&set), &measured, None, interleaved, slides, args.seed)?;
         let run = experiment.run(index as u64);
         learned = run.learn(args.method.unwrap_or(Method::Fused).method())?;
         let seen = &run.training()[index];
-        let mut felt = felt[index].iter();
+        let mut measured = measured[index].iter();
         shown.retain(|slide| {
-            felt.next().is_some_and(|felt| {
-                let felt_now = Observation::from(&felt.measurement);
-                slide.number == felt.number && !seen.iter().flatten().any(|l| *l == felt_now)
+            measured.next().is_some_and(|measured| {
+                let observed_now = Observation::from(&measured.measurement);
+                slide.number == measured.number
+                    && !seen.iter().flatten().any(|l| *l == observed_now)
             })
         });
         Table::read(&learned)?
@@ -186,7 +187,7 @@ where
         &mut explorer,
         &Plan::new(),
         || random.next_u32(),
-        |event| show.event(event),
+        |event| show.step(event),
     ));
     show.finish(verdict?, explorer.slides(), truth)?;
     Ok(())

@@ -5,14 +5,14 @@ use std::path::PathBuf;
 
 use anyhow::ensure;
 use tactus::data::recordings::RecordingSet;
-use tactus::data::replay::Felt;
+use tactus::data::replay::MeasuredSlide;
 use tactus::eval::evaluate::Method;
 use tactus::sim::collection::texture_name;
 use tactus_core::features::{FeatureSet, Movement, Observation};
 
 use super::args::{Features, Recordings};
 use super::table_file::write_table;
-use super::textures::{collection, feel_folder, names};
+use super::textures::{collection, measure_folder, names};
 
 /// Learn a texture table from the first slides of every texture
 #[derive(clap::Args)]
@@ -61,9 +61,9 @@ pub(crate) struct ByHand {
 
 /// Learns a table from recordings.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let (set, felt) = feel_folder(&args.from.recordings)?;
+    let (set, measured) = measure_folder(&args.from.recordings)?;
     let features = args.features.map(Features::set);
-    let bytes = learn_first(&set, &felt, args.train_slides, args.method, features)?;
+    let bytes = learn_first(&set, &measured, args.train_slides, args.method, features)?;
     write_table(&args.out, &bytes)?;
     writeln!(
         out,
@@ -111,15 +111,15 @@ pub(crate) fn at_least_two(slides: usize) -> anyhow::Result<()> {
 /// The first slides of every texture and movement, and the table that they teach.
 pub(crate) fn learn_first(
     set: &RecordingSet,
-    felt: &[Vec<Felt>],
+    measured: &[Vec<MeasuredSlide>],
     slides: usize,
     method: Method,
     features: Option<FeatureSet>,
 ) -> anyhow::Result<Vec<u8>> {
     at_least_two(slides)?;
     let movements = set.movements();
-    let first = |name: &str, felt: &[Felt], movement: Movement| {
-        let same = felt.iter().filter(|s| s.movement == movement);
+    let first = |name: &str, measured: &[MeasuredSlide], movement: Movement| {
+        let same = measured.iter().filter(|s| s.movement == movement);
         let trials: Vec<_> = same
             .map(|s| Observation::from(&s.measurement))
             .take(slides)
@@ -131,12 +131,16 @@ pub(crate) fn learn_first(
         );
         Ok(trials)
     };
-    let first = set.textures().iter().zip(felt).map(|(texture, felt)| {
-        let trials = movements
-            .iter()
-            .map(|&movement| first(&texture.name, felt, movement));
-        trials.collect()
-    });
+    let first = set
+        .textures()
+        .iter()
+        .zip(measured)
+        .map(|(texture, measured)| {
+            let trials = movements
+                .iter()
+                .map(|&movement| first(&texture.name, measured, movement));
+            trials.collect()
+        });
     let first: Vec<Vec<Vec<Observation>>> = first.collect::<anyhow::Result<_>>()?;
     let method = method.method();
     Ok(tactus::eval::learn::learn(

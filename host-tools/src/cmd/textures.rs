@@ -4,19 +4,23 @@ use std::path::Path;
 
 use anyhow::Context as _;
 use tactus::data::recordings::RecordingSet;
-use tactus::data::replay::{Felt, feel};
+use tactus::data::replay::{MeasuredSlide, measure_all};
 use tactus::sim::collection::{Collection, texture_number};
 use tactus::sim::textures::TEXTURES;
 
 use super::progress::with_progress;
 
 /// Opens a folder and measures all of its slides.
-pub(crate) fn feel_folder(folder: &Path) -> anyhow::Result<(RecordingSet, Vec<Vec<Felt>>)> {
+pub(crate) fn measure_folder(
+    folder: &Path,
+) -> anyhow::Result<(RecordingSet, Vec<Vec<MeasuredSlide>>)> {
     let set = RecordingSet::open(folder)?;
     let textures = set.textures().len() as u64;
-    let felt = with_progress(textures, "measuring slides", |done| feel(&set, |_| done()))
-        .with_context(|| format!("recordings in {}", folder.display()))?;
-    Ok((set, felt))
+    let measured = with_progress(textures, "measuring slides", |done| {
+        measure_all(&set, |_| done())
+    })
+    .with_context(|| format!("recordings in {}", folder.display()))?;
+    Ok((set, measured))
 }
 
 pub(crate) fn names(set: &RecordingSet) -> Vec<String> {

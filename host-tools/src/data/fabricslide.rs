@@ -51,7 +51,7 @@ use manifest::{Entry, Manifest};
 const DROPPED_PERCENT: usize = 6;
 /// Slides that a recording is cut into.
 const CUTS: usize = 2;
-/// What was felt of the fabrics of one folder.
+/// What was measured of the fabrics of one folder.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FabricSet {
     /// Names, in the order of the manifest.
@@ -66,7 +66,7 @@ pub struct FabricSet {
     pub slides: Vec<FabricSlide>,
 }
 
-/// What was felt in one slide.
+/// What was measured in one slide.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FabricSlide {
     /// Index in [`FabricSet::fabrics`].
@@ -114,20 +114,21 @@ impl FabricSet {
                 for (movement, key) in shared.keys().enumerate() {
                     for repetition in [0, 1] {
                         for &direction in &shared.directions {
-                            let felt = entry.measure(&meter, &raw, key.of(direction, repetition));
-                            let felt = felt.map_err(|cause| FabricError::Slide {
+                            let observed =
+                                entry.measure(&meter, &raw, key.of(direction, repetition));
+                            let observed = observed.map_err(|cause| FabricError::Slide {
                                 path: path.clone(),
                                 movement: key.to_string().into(),
                                 direction,
                                 repetition,
                                 cause,
                             })?;
-                            slides.extend(felt.map(|felt| FabricSlide {
+                            slides.extend(observed.map(|observed| FabricSlide {
                                 fabric,
                                 movement,
                                 repetition,
-                                ln_bands: felt.ln_bands,
-                                properties: felt.properties,
+                                ln_bands: observed.ln_bands,
+                                properties: observed.properties,
                             }));
                         }
                     }
@@ -150,14 +151,14 @@ impl Entry {
         meter: &Meter,
         raw: &[u8],
         key: manifest::Key,
-    ) -> Result<std::array::IntoIter<features::Felt, CUTS>, ContentError> {
+    ) -> Result<std::array::IntoIter<features::SlideSpectrum, CUTS>, ContentError> {
         let rows = self.rows(key).ok_or(ContentError::NoRecording)?;
-        let mut felt = [features::Felt::default(); CUTS];
-        for (felt, slide) in felt.iter_mut().zip(cut(&rows)) {
+        let mut observed = [features::SlideSpectrum::default(); CUTS];
+        for (observed, slide) in observed.iter_mut().zip(cut(&rows)) {
             let bytes = raw.get(slide.start * ROW_BYTES..slide.end * ROW_BYTES);
-            *felt = meter.measure(bytes.ok_or(ContentError::Ends)?)?;
+            *observed = meter.measure(bytes.ok_or(ContentError::Ends)?)?;
         }
-        Ok(felt.into_iter())
+        Ok(observed.into_iter())
     }
 }
 

@@ -1,4 +1,4 @@
-//! Recorded slides, felt with the core: as a [`Rig`] that replays them, and a whole folder at once.
+//! Recorded slides, measured with the core: as a [`Rig`] that replays them, and a whole folder at once.
 
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
@@ -44,9 +44,9 @@ pub fn measure(plan: &Plan, recorded: &Slide) -> Result<Measurement, SlideError>
     slide.finish()
 }
 
-/// One slide of a folder, felt.
+/// The features of one recorded slide.
 #[derive(Clone, Debug)]
-pub struct Felt {
+pub struct MeasuredSlide {
     /// Number of the slide, in the order of time.
     pub number: u32,
     /// The movement that made it.
@@ -55,9 +55,9 @@ pub struct Felt {
     pub measurement: Measurement,
 }
 
-/// Why a folder cannot be felt.
+/// Why a folder cannot be measured.
 #[derive(Debug, thiserror::Error)]
-pub enum FeelError {
+pub enum MeasureError {
     /// It cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
@@ -73,38 +73,38 @@ pub enum FeelError {
     },
 }
 
-/// Feels every slide of a folder, textures side by side; `done` hears of each finished texture. Per texture, its slides in
+/// Measures every slide of a folder, textures side by side; `done` hears of each finished texture. Per texture, its slides in
 /// the order of time.
 ///
 /// # Errors
 /// The first file that cannot be read, or slide that has no properties.
-pub fn feel(
+pub fn measure_all(
     set: &RecordingSet,
     done: impl Fn(&Texture) + Sync,
-) -> Result<Vec<Vec<Felt>>, FeelError> {
+) -> Result<Vec<Vec<MeasuredSlide>>, MeasureError> {
     let plan = Plan::new();
     (0..set.textures().len())
         .into_par_iter()
         .map(|index| {
             let texture = &set.textures()[index];
-            let felt = set
+            let measured = set
                 .load_texture(index)?
                 .iter()
                 .map(|slide| {
-                    let measurement = measure(&plan, slide).map_err(|why| FeelError::Slide {
+                    let measurement = measure(&plan, slide).map_err(|why| MeasureError::Slide {
                         texture: texture.name.clone(),
                         number: slide.number,
                         why,
                     })?;
-                    Ok(Felt {
+                    Ok(MeasuredSlide {
                         number: slide.number,
                         movement: slide.movement,
                         measurement,
                     })
                 })
-                .collect::<Result<Vec<_>, FeelError>>()?;
+                .collect::<Result<Vec<_>, MeasureError>>()?;
             done(texture);
-            Ok(felt)
+            Ok(measured)
         })
         .collect()
 }

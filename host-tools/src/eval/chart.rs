@@ -137,7 +137,7 @@ pub struct DrawError {
 }
 
 /// Range that holds all values, with a little room.
-pub(crate) fn room(values: impl Iterator<Item = f64>) -> (f64, f64) {
+pub(crate) fn buffer(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = values
         .filter(|v| v.is_finite())
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
@@ -146,8 +146,8 @@ pub(crate) fn room(values: impl Iterator<Item = f64>) -> (f64, f64) {
     if low > high {
         return (0.0, 1.0);
     }
-    let room = (0.06 * (high - low)).max(1e-6);
-    (low - room, high + room)
+    let buffer = (0.06 * (high - low)).max(1e-6);
+    (low - buffer, high + buffer)
 }
 
 /// A number for an axis.
@@ -176,7 +176,7 @@ pub fn curves(
             points.clone(),
         )
     });
-    let x_range = room(
+    let x_range = buffer(
         curves
             .iter()
             .flat_map(|(_, points)| points)
@@ -203,7 +203,7 @@ impl<'a> Chart<'a> {
             x,
             y,
             x_range,
-            y_range: room(series.iter().flat_map(|s| &s.points).map(|p| p.1)),
+            y_range: buffer(series.iter().flat_map(|s| &s.points).map(|p| p.1)),
             x_marks: 6,
             x_text: &plain,
             named_at_end: false,

@@ -113,9 +113,9 @@ pub struct Shared<'b> {
 impl<'b> Shared<'b> {
     /// Of an explorer that moves on so.
     pub fn new(explorer: Box<Explorer<'b, MAX_TEXTURES>>, strategy: Strategy) -> Self {
-        let room = Confusions::<Vec<_>>::room(&explorer);
-        let keep = strategy == Strategy::Bayesian && room <= MAX_KEPT / size_of::<Degrees>();
-        let kept = || Confusions::new(&explorer, vec![Degrees::default(); room]);
+        let buffer = Confusions::<Vec<_>>::len_for(&explorer);
+        let keep = strategy == Strategy::Bayesian && buffer <= MAX_KEPT / size_of::<Degrees>();
+        let kept = || Confusions::new(&explorer, vec![Degrees::default(); buffer]);
         Self {
             confusions: keep.then(kept).flatten(),
             explorer,
@@ -130,16 +130,16 @@ pub fn play<const N: usize>(
     strategy: Strategy,
     run: Run<'_>,
 ) -> Outcome {
-    play_and_tell(explorer, confusions, strategy, run, |_, _| ())
+    play_with(explorer, confusions, strategy, run, |_, _| ())
 }
 
 /// As [`play`]; `tell` hears of every action and the posterior after it.
-pub fn play_and_tell<const N: usize>(
+pub fn play_with<const N: usize>(
     explorer: &mut Explorer<'_, N>,
     confusions: Option<&Confusions<Vec<Degrees>>>,
     strategy: Strategy,
     mut run: Run<'_>,
-    mut tell: impl FnMut(Action, &[f32]),
+    mut each: impl FnMut(Action, &[f32]),
 ) -> Outcome {
     explorer.restart();
     let verdict = loop {
@@ -147,21 +147,21 @@ pub fn play_and_tell<const N: usize>(
             break verdict;
         }
         // only Bayesian exploration looks ahead
-        let outlook = match (strategy, confusions) {
+        let expected = match (strategy, confusions) {
             (Strategy::Bayesian, Some(confusions)) => {
                 #[cfg(test)]
                 tests::KEPT.set(tests::KEPT.get() + 1);
-                explorer.outlook_by(confusions)
+                explorer.expected_outcomes_by(confusions)
             }
-            (Strategy::Bayesian, None) => explorer.outlook(),
+            (Strategy::Bayesian, None) => explorer.expected_outcomes(),
             _ => Default::default(),
         };
-        let action = explorer.choose(&outlook, run.random.next_u32());
+        let action = explorer.choose(&expected, run.random.next_u32());
         let slide = run.slide(action.movement.into());
         explorer
             .observe(action, slide)
             .expect("every slide has the properties that the explorer was told of");
-        tell(action, explorer.posterior());
+        each(action, explorer.posterior());
     };
     Outcome {
         unknown: run.unknown,

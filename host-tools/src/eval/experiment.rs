@@ -15,7 +15,7 @@ use tactus_core::table;
 #[cfg(feature = "fabrics")]
 use crate::data::fabricslide::{FabricSet, FabricSlide};
 use crate::data::properties::PropertyTable;
-use crate::data::replay::Felt;
+use crate::data::replay::MeasuredSlide;
 use crate::eval::learn::{TableError, learn};
 
 /// How slides are divided into training and test.
@@ -140,8 +140,8 @@ impl Experiment {
     /// See [`ExperimentError`].
     pub fn recorded(
         names: Vec<String>,
-        felt: &[Vec<Felt>],
-        test: Option<(&[String], &[Vec<Felt>])>,
+        observed: &[Vec<MeasuredSlide>],
+        test: Option<(&[String], &[Vec<MeasuredSlide>])>,
         protocol: Protocol,
         train_slides: usize,
         seed: u64,
@@ -150,12 +150,12 @@ impl Experiment {
             return Err(ExperimentError::One(train_slides));
         }
         let mut movements: Vec<Movement> = Vec::new();
-        for slide in felt.iter().flatten() {
+        for slide in observed.iter().flatten() {
             if !movements.contains(&slide.movement) {
                 movements.push(slide.movement);
             }
         }
-        let of = |slides: &[Felt], movement| -> Vec<(u32, Observation)> {
+        let of = |slides: &[MeasuredSlide], movement| -> Vec<(u32, Observation)> {
             let same = slides.iter().filter(|s| s.movement == movement);
             same.map(|s| (s.number, Observation::from(&s.measurement)))
                 .collect()
@@ -163,7 +163,7 @@ impl Experiment {
         let properties =
             |slides: &[(u32, Observation)]| slides.iter().map(|s| s.1.clone()).collect::<Vec<_>>();
         let pool = |texture: usize, movement: Movement| {
-            let mut train = of(&felt[texture], movement);
+            let mut train = of(&observed[texture], movement);
             let mut tested = match test {
                 None => None,
                 Some((others, slides)) => {
@@ -209,10 +209,10 @@ impl Experiment {
             }
             Ok(pool)
         };
-        let pools = (0..felt.len())
+        let pools = (0..observed.len())
             .map(|texture| movements.iter().map(|&m| pool(texture, m)).collect())
             .collect::<Result<_, _>>()?;
-        let slides = felt
+        let slides = observed
             .iter()
             .flatten()
             .chain(test.iter().flat_map(|(_, slides)| slides.iter().flatten()));

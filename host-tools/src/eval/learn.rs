@@ -117,12 +117,12 @@ pub fn encode(
         .iter()
         .zip(experience)
         .map(|(name, experience)| table::Texture { name, experience });
-    let mut bytes = room(Contents::Gaussians(measured), names, movements.len());
+    let mut bytes = buffer(Contents::Gaussians(measured), names, movements.len());
     table::encode(&mut bytes, measured, movements, textures)?;
     Ok(bytes)
 }
 
-fn room(contents: Contents, names: &[String], movements: usize) -> Vec<u8> {
+fn buffer(contents: Contents, names: &[String], movements: usize) -> Vec<u8> {
     let of_names = names.iter().map(|n| n.len() + 1).sum();
     vec![0; table::encoded_len(contents, names.len(), movements, of_names)]
 }
@@ -174,7 +174,7 @@ fn learn_fused(
         .collect();
     let movements: Vec<_> = movements.iter().copied().zip(whitenings).collect();
     let contents = Contents::Fused(set, features as u8);
-    let mut bytes = room(contents, names, movements.len());
+    let mut bytes = buffer(contents, names, movements.len());
     let textures = names.iter().map(String::as_str);
     let textures = textures.zip(whitened.iter().map(Vec::as_slice));
     table::encode_fused(&mut bytes, set, &movements, textures)?;

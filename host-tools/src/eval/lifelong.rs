@@ -1,4 +1,4 @@
-//! A session in time order: a few slides to learn from, then every later slide is a visit of its own, and the probe goes on
+//! A session in time order: a few slides to learn from, then every later slide is an episode of its own, and the probe goes on
 //! learning.
 
 use rand::SeedableRng as _;
@@ -30,20 +30,20 @@ pub enum Learning {
 pub struct Lifelong {
     /// From whom the probe learned.
     pub learning: Learning,
-    /// Visits of one slide.
-    pub visits: usize,
+    /// Episodes of one slide.
+    pub episodes: usize,
     /// Right first guesses, before anybody was asked.
     pub accuracy: f64,
     /// Those of the texture that fared worst, and its name.
     pub worst: (f64, String),
-    /// Share of the visits that the probe was not certain of: with a user, it asks.
+    /// Share of the episodes that the probe was not certain of: it asks a user for the label.
     pub uncertain: f64,
-    /// Wrong ones among what the probe taught itself.
-    pub wrong_lessons: f64,
+    /// Share of wrong labels among those that the probe gave itself.
+    pub wrong_updates: f64,
 }
 
-/// One visit: what was presented, and what became of it.
-struct Visit {
+/// One episode: what was presented, and what became of it.
+struct Episode {
     texture: usize,
     right: bool,
     certain: bool,
@@ -63,20 +63,20 @@ pub fn lifelong(
     [Learning::None, Learning::Itself, Learning::Asking]
         .into_iter()
         .map(|learning| {
-            let visits: Vec<Visit> = (0..sessions)
+            let episodes: Vec<Episode> = (0..sessions)
                 .into_par_iter()
                 .map(|session| {
                     let mut random = ChaCha8Rng::seed_from_u64(seed);
                     random.set_stream(session);
-                    let visits = play(experiment, config, learning, random);
+                    let episodes = play(experiment, config, learning, random);
                     done();
-                    visits
+                    episodes
                 })
                 .collect::<Result<Vec<_>, EvaluateError>>()?
                 .into_iter()
                 .flatten()
                 .collect();
-            Ok(sum_up(learning, &visits, experiment.names()))
+            Ok(sum_up(learning, &episodes, experiment.names()))
         })
         .collect()
 }
@@ -86,12 +86,12 @@ fn play(
     config: Config,
     learning: Learning,
     mut random: ChaCha8Rng,
-) -> Result<Vec<Visit>, EvaluateError> {
+) -> Result<Vec<Episode>, EvaluateError> {
     let mut bytes = experiment.run(0).learn(config.method)?;
     let mut order: Vec<usize> = (0..experiment.names().len()).collect();
     let later: Vec<_> = order.iter().map(|&t| experiment.session(t)).collect();
     let longest = later.iter().flatten().map(|(_, later)| later.len()).max();
-    let mut visits = Vec::new();
+    let mut episodes = Vec::new();
     for time in 0..longest.unwrap_or(0) {
         order.shuffle(&mut random);
         for &texture in &order {
@@ -109,7 +109,7 @@ fn play(
                 if let Some(lesson) = lesson {
                     learn(&mut bytes, lesson, movement, slide)?;
                 }
-                visits.push(Visit {
+                episodes.push(Episode {
                     texture,
                     right,
                     certain: best.1,
@@ -117,7 +117,7 @@ fn play(
             }
         }
     }
-    Ok(visits)
+    Ok(episodes)
 }
 
 /// The first guess from one slide, and whether it is certain.
@@ -161,24 +161,24 @@ fn learn(
     Ok(())
 }
 
-fn sum_up(learning: Learning, visits: &[Visit], names: &[String]) -> Lifelong {
+fn sum_up(learning: Learning, episodes: &[Episode], names: &[String]) -> Lifelong {
     let share = |part: usize, of: usize| part as f64 / of.max(1) as f64;
-    let right = |of: &dyn Fn(&Visit) -> bool| {
-        let all = visits.iter().filter(|v| of(v));
+    let right = |of: &dyn Fn(&Episode) -> bool| {
+        let all = episodes.iter().filter(|v| of(v));
         share(all.clone().filter(|v| v.right).count(), all.count())
     };
     let of_each = (0..names.len()).map(|texture| (right(&|v| v.texture == texture), texture));
     let worst = of_each.min_by(|a, b| a.0.total_cmp(&b.0));
-    let certain = visits.iter().filter(|v| v.certain);
+    let certain = episodes.iter().filter(|v| v.certain);
     let wrong = certain.clone().filter(|v| !v.right).count();
     Lifelong {
         learning,
-        visits: visits.len(),
+        episodes: episodes.len(),
         accuracy: right(&|_| true),
         worst: worst.map_or((0.0, String::new()), |(share, at)| {
             (share, names[at].clone())
         }),
-        uncertain: share(visits.len() - certain.clone().count(), visits.len()),
-        wrong_lessons: share(wrong, certain.count()),
+        uncertain: share(episodes.len() - certain.clone().count(), episodes.len()),
+        wrong_updates: share(wrong, certain.count()),
     }
 }

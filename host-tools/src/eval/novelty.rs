@@ -14,7 +14,7 @@ pub const SLIDES: usize = 3;
 /// What is counted after so many slides.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct After {
-    /// Slides of the visit.
+    /// Slides of the episode.
     pub slides: usize,
     /// Share of the textures that were left out of the table and are noticed.
     pub detections: f64,
@@ -39,8 +39,8 @@ pub fn leave_one_out(
             let presented = run.unknown;
             let textures = experiment.names().len();
             let other = (presented + 1 + run.random.random_range(0..textures - 1)) % textures;
-            let new = visit(experiment, config, &mut run, presented)?;
-            let known = visit(experiment, config, &mut run, other)?;
+            let new = episode(experiment, config, &mut run, presented)?;
+            let known = episode(experiment, config, &mut run, other)?;
             done();
             Ok([new, known])
         })
@@ -59,7 +59,7 @@ pub fn leave_one_out(
 }
 
 /// Slides over the run's texture with a table that lacks `left_out`; after which of them it is taken for unknown.
-fn visit(
+fn episode(
     experiment: &Experiment,
     config: Config,
     run: &mut Run<'_>,
@@ -69,8 +69,8 @@ fn visit(
     let mut explorer = explorer(&bytes, experiment.measured(), config, None)?;
     let mut flagged = [false; SLIDES];
     for flag in &mut flagged {
-        let outlook = explorer.outlook();
-        let action = explorer.choose(&outlook, 0);
+        let expected = explorer.expected_outcomes();
+        let action = explorer.choose(&expected, 0);
         let slide = run.slide(action.movement.into());
         explorer
             .observe(action, slide)

@@ -2,11 +2,11 @@
 
 use std::io::{self, Write};
 
-use tactus_core::explorer::{Outlook, Verdict};
+use tactus_core::explorer::{ExpectedOutcome, Verdict};
 use tactus_core::features::{Properties, Property};
-use tactus_core::probe::explore::Event;
+use tactus_core::probe::explore::ExplorationStep;
 use tactus_core::table::{Action, Contents, Table, white};
-use tactus_core::wire::Tell;
+use tactus_core::wire::Event;
 
 const BAR: usize = 24;
 /// Most candidates listed after a slide.
@@ -36,24 +36,24 @@ impl<'t, W: Write> Show<'t, W> {
     }
 
     /// Shows one event.
-    pub fn event(&mut self, event: Event<'_>) {
+    pub fn step(&mut self, event: ExplorationStep<'_>) {
         if self.failed.is_ok() {
-            self.failed = self.try_event(event);
+            self.failed = self.try_step(event);
         }
     }
 
-    fn try_event(&mut self, event: Event<'_>) -> io::Result<()> {
+    fn try_step(&mut self, event: ExplorationStep<'_>) -> io::Result<()> {
         match event {
-            Event::Chosen(action, outlook) => self.chosen(action, outlook),
-            Event::Felt(action, measurement, posterior) => self.felt(
+            ExplorationStep::Chosen(action, expected) => self.chosen(action, expected),
+            ExplorationStep::Measured(action, measurement, posterior) => self.slide_report(
                 action,
                 &measurement.properties,
                 measurement.roughness_is_bound,
                 posterior,
             ),
-            Event::Rejected(_, why) => self.line(&format!("  rejected: {why}")),
+            ExplorationStep::Rejected(_, why) => self.line(&format!("  rejected: {why}")),
             // shown with the truth: see `finish`
-            Event::Decided { .. } => Ok(()),
+            ExplorationStep::Decided { .. } => Ok(()),
         }
     }
 
@@ -61,15 +61,15 @@ impl<'t, W: Write> Show<'t, W> {
     ///
     /// # Errors
     /// A failure to write.
-    pub fn chosen(&mut self, action: Action, outlook: &[Outlook]) -> io::Result<()> {
+    pub fn chosen(&mut self, action: Action, expected: &[ExpectedOutcome]) -> io::Result<()> {
         writeln!(
             self.out,
             "\nSlide {}: {}",
             self.slides + 1,
             self.name(action)
         )?;
-        if let Some(chosen) = outlook.iter().find(|o| o.action == action) {
-            writeln!(self.out, "  because {}", self.reason(chosen, outlook))?;
+        if let Some(chosen) = expected.iter().find(|o| o.action == action) {
+            writeln!(self.out, "  because {}", self.reason(chosen, expected))?;
         }
         self.out.flush()
     }
@@ -78,7 +78,7 @@ impl<'t, W: Write> Show<'t, W> {
     ///
     /// # Errors
     /// A failure to write.
-    pub fn felt(
+    pub fn slide_report(
         &mut self,
         action: Action,
         properties: &Properties,
@@ -86,7 +86,7 @@ impl<'t, W: Write> Show<'t, W> {
         posterior: &[f32],
     ) -> io::Result<()> {
         self.slides += 1;
-        let felt: Vec<String> = Property::ALL
+        let observed: Vec<String> = Property::ALL
             .into_iter()
             .filter(|&property| {
                 action
@@ -105,8 +105,8 @@ impl<'t, W: Write> Show<'t, W> {
                 Some(format!("{property} {at_most}{value:.3}{unit}"))
             })
             .collect();
-        if !felt.is_empty() {
-            writeln!(self.out, "  felt    {}", felt.join(", "))?;
+        if !observed.is_empty() {
+            writeln!(self.out, "  measured {}", observed.join(", "))?;
         }
         self.candidates(posterior)?;
         self.out.flush()
@@ -125,35 +125,35 @@ impl<'t, W: Write> Show<'t, W> {
     ///
     /// # Errors
     /// A failure to write.
-    pub fn tell(&mut self, tell: &Tell) -> io::Result<()> {
-        match tell {
-            Tell::Chosen {
-                action, outlook, ..
+    pub fn event(&mut self, event: &Event) -> io::Result<()> {
+        match event {
+            Event::Chosen {
+                action, expected, ..
             } => {
-                let outlook: Vec<Outlook> = outlook
+                let expected: Vec<ExpectedOutcome> = expected
                     .iter()
-                    .map(|promise| Outlook {
-                        action: promise.action,
-                        uncertainty: promise.uncertainty,
-                        benefit: promise.benefit,
+                    .map(|outcome| ExpectedOutcome {
+                        action: outcome.action,
+                        uncertainty: outcome.uncertainty,
+                        benefit: outcome.benefit,
                     })
                     .collect();
-                self.chosen(*action, &outlook)
+                self.chosen(*action, &expected)
             }
-            Tell::Felt {
+            Event::SlideReport {
                 action,
-                felt,
+                observed,
                 posterior,
                 ..
-            } => self.felt(
+            } => self.slide_report(
                 *action,
-                &felt.properties(),
-                felt.roughness_is_bound,
+                &observed.properties(),
+                observed.roughness_is_bound,
                 posterior,
             ),
-            Tell::Rejected { why, .. } => self.line(&format!("  rejected: {why}")),
-            Tell::Fault(fault) => self.line(&format!("  fault: {fault}")),
-            Tell::Verdict {
+            Event::Rejected { why, .. } => self.line(&format!("  rejected: {why}")),
+            Event::Fault(fault) => self.line(&format!("  fault: {fault}")),
+            Event::Verdict {
                 texture,
                 probability,
                 sure,
@@ -193,19 +193,21 @@ impl<'t, W: Write> Show<'t, W> {
         }
     }
 
-    fn reason(&self, chosen: &Outlook, outlook: &[Outlook]) -> String {
-        let left = |o: &Outlook| format!("{:.1} %", o.uncertainty * 100.0);
-        let mut others: Vec<&Outlook> = outlook
+    fn reason(&self, chosen: &ExpectedOutcome, expected: &[ExpectedOutcome]) -> String {
+        let left = |o: &ExpectedOutcome| format!("{:.1} %", o.uncertainty * 100.0);
+        let mut others: Vec<&ExpectedOutcome> = expected
             .iter()
             .filter(|o| o.action != chosen.action)
             .collect();
         others.sort_by(|a, b| b.benefit.total_cmp(&a.benefit));
         let single = self.table.movements().len() == 1;
-        let name = |o: &Outlook| match (o.action.property, self.table.movement(o.action.movement)) {
-            (Some(property), _) if single => property.to_string(),
-            (None, Some(movement)) => movement.to_string(),
-            _ => self.name(o.action),
-        };
+        let name =
+            |o: &ExpectedOutcome| match (o.action.property, self.table.movement(o.action.movement))
+            {
+                (Some(property), _) if single => property.to_string(),
+                (None, Some(movement)) => movement.to_string(),
+                _ => self.name(o.action),
+            };
         let rest: Vec<String> = others
             .iter()
             .take(2)

@@ -6,7 +6,7 @@ use tactus_core::explorer::{Config, Explorer, ExplorerError, Method};
 use tactus_core::features::{Block, FEATURE_STEPS, PropertySet, Slide, SlideError};
 use tactus_core::probe::explore::Random;
 use tactus_core::table::{Action, Contents, MAX_TEXTURES, Table};
-use tactus_core::wire::{Felt, Identify, MAX_OUTLOOK, Promise, Tell};
+use tactus_core::wire::{Event, ExpectedOutcome, Identify, MAX_EXPECTED_OUTCOMES, SlideReport};
 
 /// Chip and PC do the same operations in the same order and agree to the bit; more than this apart they do not agree.
 pub const ALLOWED: f32 = 1e-4;
@@ -30,7 +30,9 @@ pub enum FollowError {
     #[error("slide {0}: no samples came; ask for them with `Stream` before the exploration")]
     NoBlocks(u8),
     /// A slide or its choice was told out of order: a report was lost.
-    #[error("slide {got} was told where slide {expected} was due; a report was lost")]
+    #[error(
+        "slide {got} came where slide {expected} was due; a report was lost, record the session again"
+    )]
     Order {
         /// Number of the slide that was due.
         expected: u8,
@@ -48,7 +50,9 @@ pub enum FollowError {
         why: SlideError,
     },
     /// The explorer here could not take in what was told.
-    #[error("slide {slide}: what was felt says nothing here; do both ends have the same table?")]
+    #[error(
+        "slide {slide}: the explorer here cannot use the slide; read the table of the probe again (`tactus device identify --log` does)"
+    )]
     Observe {
         /// Number of the slide.
         slide: u8,
@@ -69,7 +73,7 @@ pub struct OtherChoice {
 /// How well probe and PC agree: largest absolute differences, infinite where one has a value and the other has none.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Agreement {
-    /// Slides whose samples were compared with what was felt.
+    /// Slides whose features were computed again and compared.
     pub slides: u32,
     /// Of the properties, in their units.
     pub properties: f32,
@@ -81,8 +85,8 @@ pub struct Agreement {
     pub posterior: f32,
     /// Choices compared.
     pub choices: u32,
-    /// Of the promised uncertainties and benefits.
-    pub outlook: f32,
+    /// Of the expected uncertainties and benefits.
+    pub expected: f32,
     /// Choices that are others here.
     pub other_choices: Vec<OtherChoice>,
     /// Slides that were rejected there.
@@ -99,7 +103,7 @@ pub struct Agreement {
 impl Agreement {
     /// Whether nothing differs by more than [`ALLOWED`], and there was something to compare.
     pub fn agrees(&self) -> bool {
-        let largest = [self.properties, self.signal, self.posterior, self.outlook];
+        let largest = [self.properties, self.signal, self.posterior, self.expected];
         self.slides > 0
             && self.posteriors > 0
             && largest.into_iter().all(|d| d <= ALLOWED)
@@ -162,30 +166,30 @@ impl<'t> Follower<'t> {
     ///
     /// # Errors
     /// See [`FollowError`]: something could not be compared.
-    pub fn hear(&mut self, tell: &Tell) -> Result<(), FollowError> {
-        match tell {
-            Tell::Chosen {
+    pub fn hear(&mut self, event: &Event) -> Result<(), FollowError> {
+        match event {
+            Event::Chosen {
                 slide,
                 action,
-                outlook,
+                expected,
                 ..
-            } => self.chosen(*slide, *action, outlook),
-            Tell::Block(block) => self.block(block),
-            Tell::Felt {
+            } => self.chosen(*slide, *action, expected),
+            Event::Block(block) => self.block(block),
+            Event::SlideReport {
                 slide,
                 action,
-                felt,
+                observed,
                 posterior,
-            } => self.felt(*slide, *action, felt, posterior),
-            Tell::Rejected { slide, .. } => self.rejected(*slide),
-            Tell::Verdict {
+            } => self.observed(*slide, *action, observed, posterior),
+            Event::Rejected { slide, .. } => self.rejected(*slide),
+            Event::Verdict {
                 texture,
                 probability,
                 sure,
                 unknown,
                 log_odds,
                 slides,
-                asks,
+                wants_label,
                 ..
             } => {
                 self.agreement.verdicts += 1;
@@ -196,7 +200,7 @@ impl<'t> Follower<'t> {
                         && here.sure == *sure
                         && here.unknown == *unknown
                         && self.explorer.slides() == *slides
-                        && (is_fused && !self.explorer.is_certain()) == *asks
+                        && (is_fused && !self.explorer.is_certain()) == *wants_label
                 });
                 self.agreement.other_verdicts += u32::from(!same);
                 let agreement = &mut self.agreement;
@@ -226,26 +230,31 @@ impl<'t> Follower<'t> {
         Ok(())
     }
 
-    fn chosen(&mut self, slide: u8, there: Action, told: &[Promise]) -> Result<(), FollowError> {
+    fn chosen(
+        &mut self,
+        slide: u8,
+        there: Action,
+        told: &[ExpectedOutcome],
+    ) -> Result<(), FollowError> {
         self.samples = Some((Slide::new(self.plan), 0));
         let random = self.random.next_u32();
         self.in_order(slide)?;
-        let outlook = self.explorer.outlook();
+        let expected = self.explorer.expected_outcomes();
         let agreement = &mut self.agreement;
-        if told.len() != outlook.len().min(MAX_OUTLOOK) {
-            agreement.outlook = f32::INFINITY;
+        if told.len() != expected.len().min(MAX_EXPECTED_OUTCOMES) {
+            agreement.expected = f32::INFINITY;
         }
-        for promise in told {
-            let here = outlook.iter().find(|here| here.action == promise.action);
+        for outcome in told {
+            let here = expected.iter().find(|here| here.action == outcome.action);
             for (here, there) in [
-                (here.map(|o| o.uncertainty), promise.uncertainty),
-                (here.map(|o| o.benefit), promise.benefit),
+                (here.map(|o| o.uncertainty), outcome.uncertainty),
+                (here.map(|o| o.benefit), outcome.benefit),
             ] {
-                widen(&mut agreement.outlook, apart(here, Some(there)));
+                widen(&mut agreement.expected, apart(here, Some(there)));
             }
         }
         agreement.choices += 1;
-        let here = self.explorer.choose(&outlook, random);
+        let here = self.explorer.choose(&expected, random);
         if here != there {
             agreement
                 .other_choices
@@ -273,18 +282,18 @@ impl<'t> Follower<'t> {
         Ok(())
     }
 
-    fn felt(
+    fn observed(
         &mut self,
         slide: u8,
         action: Action,
-        felt: &Felt,
+        observed: &SlideReport,
         posterior: &[f32],
     ) -> Result<(), FollowError> {
         self.in_order(slide)?;
-        let compared = self.compare(slide, felt);
+        let compared = self.compare(slide, observed);
         // with what was told, so that a difference of the slide is not counted again
         self.explorer
-            .observe(action, &felt.observation())
+            .observe(action, &observed.observation())
             .map_err(|_| FollowError::Observe { slide })?;
         let here = self.explorer.posterior();
         let agreement = &mut self.agreement;
@@ -298,8 +307,8 @@ impl<'t> Follower<'t> {
         compared
     }
 
-    /// What is felt here from the samples, against what was felt there.
-    fn compare(&mut self, slide: u8, there: &Felt) -> Result<(), FollowError> {
+    /// Features computed here from the samples, against those that the probe reported.
+    fn compare(&mut self, slide: u8, there: &SlideReport) -> Result<(), FollowError> {
         let here = match self.samples.take() {
             // it was said before
             None => return Ok(()),
@@ -308,7 +317,7 @@ impl<'t> Follower<'t> {
                 .finish()
                 .map_err(|why| FollowError::Slide { slide, why })?,
         };
-        let here = Felt::from(&here);
+        let here = SlideReport::from(&here);
         let agreement = &mut self.agreement;
         agreement.slides += 1;
         for (here, there) in here.properties.into_iter().zip(there.properties) {

@@ -4,12 +4,12 @@ use std::io::{self, Read, Write};
 use std::task::Poll;
 use std::time::{Duration, Instant};
 
-use tactus_core::wire::{Ask, Report};
+use tactus_core::wire::{Command, Report};
 
 use super::session::{LinkError, MAX_TRIES, Session};
-use super::transaction::{Errand, Job};
+use super::transaction::{Job, Transaction};
 
-/// Why nothing came of an errand over a port.
+/// Why a transaction over a port failed.
 #[derive(Debug, thiserror::Error)]
 pub enum PortError {
     /// The port cannot be read or written.
@@ -31,13 +31,13 @@ pub enum PortError {
     Link(#[from] LinkError),
 }
 
-/// A session over something that reads and writes. Its reads must come back within a fraction of the patience, with
+/// A session over something that reads and writes. Its reads must return within a fraction of the timeout, with
 /// [`io::ErrorKind::WouldBlock`] or [`io::ErrorKind::TimedOut`] when nothing came.
 #[derive(Debug)]
 pub struct Port<S> {
     pub(super) stream: S,
     session: Session,
-    patience: Duration,
+    timeout: Duration,
     /// to be sent with the next step
     send: Vec<u8>,
     /// when something came last, or was waited for from then on
@@ -48,12 +48,12 @@ pub struct Port<S> {
 }
 
 impl<S: Read + Write> Port<S> {
-    /// A port whose silence is taken for a loss after `patience`.
-    pub fn new(stream: S, patience: Duration) -> Self {
+    /// A port that takes silence for a loss after `timeout`.
+    pub fn new(stream: S, timeout: Duration) -> Self {
         Self {
             stream,
             session: Session::default(),
-            patience,
+            timeout,
             send: Vec::new(),
             heard: Instant::now(),
             bytes: 0,
@@ -61,9 +61,9 @@ impl<S: Read + Write> Port<S> {
         }
     }
 
-    /// Silence is taken for a loss after `patience` from now on.
-    pub fn set_patience(&mut self, patience: Duration) {
-        self.patience = patience;
+    /// From now on the port takes silence for a loss after `timeout` from now on.
+    pub fn set_timeout(&mut self, timeout: Duration) {
+        self.timeout = timeout;
     }
 
     /// What was damaged and lost so far.
@@ -71,16 +71,16 @@ impl<S: Read + Write> Port<S> {
         &self.session
     }
 
-    /// Sees an errand through; `each` is shown all reports.
+    /// Runs a transaction to its end; `each` gets every report.
     ///
     /// # Errors
     /// See [`PortError`].
-    pub fn run<E: Errand>(
+    pub fn run<E: Transaction>(
         &mut self,
-        errand: E,
+        transaction: E,
         mut each: impl FnMut(&Report),
     ) -> Result<E::Outcome, PortError> {
-        let mut job = self.begin(errand)?;
+        let mut job = self.begin(transaction)?;
         loop {
             if let Poll::Ready(outcome) = self.step(&mut job, &mut each)? {
                 return Ok(outcome);
@@ -88,20 +88,20 @@ impl<S: Read + Write> Port<S> {
         }
     }
 
-    /// Begins an errand, for whoever has something else to do between its [steps](Port::step).
+    /// Begins a transaction; the caller may do something else between its [steps](Port::step).
     ///
     /// # Errors
     /// See [`PortError`].
-    pub fn begin<E: Errand>(&mut self, errand: E) -> Result<Job<E>, PortError> {
+    pub fn begin<E: Transaction>(&mut self, transaction: E) -> Result<Job<E>, PortError> {
         self.heard = Instant::now();
-        Ok(Job::begin(errand, &mut self.session, &mut self.send)?)
+        Ok(Job::begin(transaction, &mut self.session, &mut self.send)?)
     }
 
-    /// Goes on with an errand: sends what is due, and reads once. Not to be called again once it is ready.
+    /// Continues a transaction: sends what is due, and reads once. Not to be called again once it is ready.
     ///
     /// # Errors
     /// See [`PortError`].
-    pub fn step<E: Errand>(
+    pub fn step<E: Transaction>(
         &mut self,
         job: &mut Job<E>,
         mut each: impl FnMut(&Report),
@@ -122,15 +122,15 @@ impl<S: Read + Write> Port<S> {
                 Poll::Pending => Ok(Poll::Pending),
             };
         }
-        if self.heard.elapsed() >= self.patience {
+        if self.heard.elapsed() >= self.timeout {
             match job.repeat(&mut self.session, &mut self.send) {
                 Ok(true) => self.heard = Instant::now(),
                 Ok(false) | Err(LinkError::Disturbed) if self.bytes > 0 && self.reports == 0 => {
                     return Err(PortError::Garbage(self.bytes));
                 }
-                Ok(false) => return Err(PortError::Silent(self.patience)),
+                Ok(false) => return Err(PortError::Silent(self.timeout)),
                 Err(LinkError::Disturbed) => {
-                    return Err(PortError::Silent(self.patience * MAX_TRIES.into()));
+                    return Err(PortError::Silent(self.timeout * MAX_TRIES.into()));
                 }
                 Err(why) => return Err(why.into()),
             }
@@ -138,18 +138,18 @@ impl<S: Read + Write> Port<S> {
         Ok(Poll::Pending)
     }
 
-    /// Makes a request beside the errand under way, or without one; its answer is among the reports.
+    /// Sends a command beside the transaction under way, or without one; its answer is among the reports.
     ///
     /// # Errors
     /// See [`PortError`].
-    pub fn ask(&mut self, ask: Ask) -> Result<(), PortError> {
+    pub fn send(&mut self, command: Command) -> Result<(), PortError> {
         self.session
-            .request(ask, &mut self.send)
+            .request(command, &mut self.send)
             .map_err(LinkError::from)?;
         Ok(())
     }
 
-    /// Sends what is due, and reads once, while there is no errand.
+    /// Sends what is due, and reads once, while no transaction is under way.
     ///
     /// # Errors
     /// See [`PortError`].

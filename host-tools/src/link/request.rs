@@ -2,28 +2,28 @@
 
 use tactus_core::rig::calibration::{RigCalibration, RigCalibrationError};
 use tactus_core::table::Name;
-use tactus_core::wire::{Ask, Forget, Identify, Status, Tell, Train};
+use tactus_core::wire::{Command, Event, Forget, Identify, Status, Train};
 
 use super::session::LinkError;
-use super::transaction::Errand;
+use super::transaction::Transaction;
 
 /// One request, and what of the reports is its answer.
 #[derive(Clone, Debug)]
-pub struct Question<T> {
-    ask: Option<Ask>,
+pub struct Request<T> {
+    command: Option<Command>,
     answer: Option<T>,
-    pick: fn(&Tell, &mut Option<T>) -> Result<(), LinkError>,
+    pick: fn(&Event, &mut Option<T>) -> Result<(), LinkError>,
 }
 
-impl<T> Errand for Question<T> {
+impl<T> Transaction for Request<T> {
     type Outcome = T;
 
-    fn next(&mut self) -> Result<Option<Ask>, LinkError> {
-        Ok(self.ask.take())
+    fn next(&mut self) -> Result<Option<Command>, LinkError> {
+        Ok(self.command.take())
     }
 
-    fn hear(&mut self, tell: &Tell) -> Result<(), LinkError> {
-        (self.pick)(tell, &mut self.answer)
+    fn hear(&mut self, event: &Event) -> Result<(), LinkError> {
+        (self.pick)(event, &mut self.answer)
     }
 
     fn outcome(&mut self) -> Result<T, LinkError> {
@@ -48,49 +48,49 @@ pub struct Found {
     pub log_odds: Option<f32>,
     /// Slides that counted.
     pub slides: u8,
-    /// Whether the probe would learn from [`Question::answer`].
-    pub asks: bool,
+    /// Whether the probe would learn from [`Request::label`].
+    pub wants_label: bool,
     /// Slides that the probe has learned from by itself.
     pub learned: u8,
 }
 
 /// What the probe has learned from an answer.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Taught {
+pub struct Learned {
     /// Name of the texture.
     pub name: Name,
     /// How many slides.
     pub slides: u8,
 }
 
-impl<T> Question<T> {
+impl<T> Request<T> {
     fn new(
-        ask: Ask,
+        command: Command,
         answer: Option<T>,
-        pick: fn(&Tell, &mut Option<T>) -> Result<(), LinkError>,
+        pick: fn(&Event, &mut Option<T>) -> Result<(), LinkError>,
     ) -> Self {
         Self {
-            ask: Some(ask),
+            command: Some(command),
             answer,
             pick,
         }
     }
 }
 
-impl Question<()> {
-    /// A request whose end is all there is to know: [`Ask::Home`], [`Ask::Stream`], ...
-    pub fn command(ask: Ask) -> Self {
-        Self::new(ask, Some(()), |_, _| Ok(()))
+impl Request<()> {
+    /// A request whose end is all there is to know: [`Command::Home`], [`Command::Stream`], ...
+    pub fn command(command: Command) -> Self {
+        Self::new(command, Some(()), |_, _| Ok(()))
     }
 
     /// Gives a texture another name.
     pub fn rename(from: Name, to: Name) -> Self {
-        Self::command(Ask::Rename { from, to })
+        Self::command(Command::Rename { from, to })
     }
 
-    /// Has the probe forget a texture, what it taught itself, or a training.
+    /// Has the probe forget a texture, what it learned by itself, or a training.
     pub fn forget(what: Forget) -> Self {
-        Self::command(Ask::Forget(what))
+        Self::command(Command::Forget(what))
     }
 
     /// Has the probe take and keep these constants.
@@ -101,17 +101,17 @@ impl Question<()> {
         calibration.check()?;
         let bytes = calibration.to_bytes();
         // 60 bytes into 64
-        Ok(Self::command(Ask::WriteCalibration(
+        Ok(Self::command(Command::WriteCalibration(
             bytes.into_iter().collect(),
         )))
     }
 }
 
-impl Question<Status> {
+impl Request<Status> {
     /// How the probe is.
     pub fn status() -> Self {
-        Self::new(Ask::Status, None, |tell, answer| {
-            if let Tell::Status(status) = tell {
+        Self::new(Command::Status, None, |event, answer| {
+            if let Event::Status(status) = event {
                 *answer = Some(status.clone());
             }
             Ok(())
@@ -119,20 +119,20 @@ impl Question<Status> {
     }
 }
 
-impl Question<RigCalibration> {
+impl Request<RigCalibration> {
     /// The constants that the probe uses.
     pub fn read_calibration() -> Self {
-        Self::new(Ask::ReadCalibration, None, take_calibration)
+        Self::new(Command::ReadCalibration, None, take_calibration)
     }
 
     /// Has the probe measure its motor's current without load; the constants that it then uses.
     pub fn calibrate() -> Self {
-        Self::new(Ask::Calibrate, None, take_calibration)
+        Self::new(Command::Calibrate, None, take_calibration)
     }
 }
 
-fn take_calibration(tell: &Tell, answer: &mut Option<RigCalibration>) -> Result<(), LinkError> {
-    if let Tell::Calibration(bytes) = tell {
+fn take_calibration(event: &Event, answer: &mut Option<RigCalibration>) -> Result<(), LinkError> {
+    if let Event::Calibration(bytes) = event {
         let bytes = bytes.as_slice().try_into();
         let bytes = bytes.map_err(|_| RigCalibrationError::Damaged)?;
         *answer = Some(RigCalibration::from_bytes(bytes)?);
@@ -140,21 +140,21 @@ fn take_calibration(tell: &Tell, answer: &mut Option<RigCalibration>) -> Result<
     Ok(())
 }
 
-impl Question<Found> {
+impl Request<Found> {
     /// Has the probe find out what lies under its finger.
     pub fn identify(how: Identify) -> Self {
-        Self::new(Ask::Identify(how), None, |tell, answer| {
-            if let Some(found) = Found::of(tell) {
+        Self::new(Command::Identify(how), None, |event, answer| {
+            if let Some(found) = Found::of(event) {
                 *answer = Some(found);
             }
             if let (
-                Tell::Taught {
+                Event::TextureLearned {
                     slides,
                     itself: true,
                     ..
                 },
                 Some(found),
-            ) = (tell, answer)
+            ) = (event, answer)
             {
                 found.learned = *slides;
             }
@@ -165,8 +165,8 @@ impl Question<Found> {
 
 impl Found {
     /// What a verdict says.
-    fn of(tell: &Tell) -> Option<Self> {
-        let Tell::Verdict {
+    fn of(event: &Event) -> Option<Self> {
+        let Event::Verdict {
             texture,
             ref name,
             probability,
@@ -174,8 +174,8 @@ impl Found {
             unknown,
             log_odds,
             slides,
-            asks,
-        } = *tell
+            wants_label,
+        } = *event
         else {
             return None;
         };
@@ -187,23 +187,23 @@ impl Found {
             unknown,
             log_odds,
             slides,
-            asks,
+            wants_label,
             learned: 0,
         })
     }
 }
 
-impl Question<Taught> {
+impl Request<Learned> {
     /// Tells the probe what lay under its finger in the last exploration; what it has learned from that.
-    pub fn answer(name: Name) -> Self {
-        Self::new(Ask::Answer(name), None, |tell, answer| {
-            if let Tell::Taught {
+    pub fn label(name: Name) -> Self {
+        Self::new(Command::Label(name), None, |event, answer| {
+            if let Event::TextureLearned {
                 name,
                 slides,
                 itself: false,
-            } = tell
+            } = event
             {
-                *answer = Some(Taught {
+                *answer = Some(Learned {
                     name: name.clone(),
                     slides: *slides,
                 });
@@ -213,11 +213,11 @@ impl Question<Taught> {
     }
 }
 
-impl Question<u32> {
+impl Request<u32> {
     /// Has the probe learn what lies under its finger; how many slides it made for that.
     pub fn train(what: Train) -> Self {
-        Self::new(Ask::Train(what), Some(0), |tell, answer| {
-            if let Tell::Learned { .. } = tell {
+        Self::new(Command::Train(what), Some(0), |event, answer| {
+            if let Event::TrainingSlide { .. } = event {
                 *answer.get_or_insert(0) += 1;
             }
             Ok(())

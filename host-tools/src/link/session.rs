@@ -3,13 +3,13 @@
 use tactus_core::rig::calibration::RigCalibrationError;
 use tactus_core::table::{MAX_TEXTURES, TableError};
 use tactus_core::wire::{
-    self, Ask, FrameError, MAX_FRAME, PROTOCOL, Receiver, Report, Request, Reset, Tell, TooLong,
+    self, Command, Event, FrameError, MAX_FRAME, PROTOCOL, Receiver, Report, Reset, TooLong,
 };
 
 /// A request that may be made twice is made so often before the line is given up.
 pub const MAX_TRIES: u8 = 5;
 
-/// Why an errand came to nothing, and what to do.
+/// Why a transaction failed, and what to do.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum LinkError {
     /// The probe says why and what to do.
@@ -87,10 +87,10 @@ impl Session {
     ///
     /// # Errors
     /// [`TooLong`].
-    pub fn request(&mut self, ask: Ask, send: &mut Vec<u8>) -> Result<u16, TooLong> {
+    pub fn request(&mut self, command: Command, send: &mut Vec<u8>) -> Result<u16, TooLong> {
         let id = self.next_id;
-        let mut room = [0; MAX_FRAME + 1];
-        let frame = wire::encode(&Request { id, ask }, &mut room)?;
+        let mut buffer = [0; MAX_FRAME + 1];
+        let frame = wire::encode(&wire::Request { id, command }, &mut buffer)?;
         self.next_id = id.wrapping_add(1);
         send.push(0);
         send.extend_from_slice(frame);
@@ -110,7 +110,7 @@ impl Session {
                 Some(Ok(report)) => {
                     // a probe that boots counts anew
                     if let (Some(expected), false) =
-                        (self.expected, matches!(report.tell, Tell::Booted { .. }))
+                        (self.expected, matches!(report.event, Event::Booted { .. }))
                     {
                         self.missing += u64::from(report.number.wrapping_sub(expected));
                     }

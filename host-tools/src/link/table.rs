@@ -1,10 +1,10 @@
 //! Texture tables on their way to the probe, and from it.
 
 use tactus_core::table::{MAX_TEXTURES, Table, TableError};
-use tactus_core::wire::{Ask, PART, Tell};
+use tactus_core::wire::{Command, Event, PART};
 
 use super::session::{LinkError, MAX_TRIES};
-use super::transaction::Errand;
+use super::transaction::Transaction;
 
 /// Gives the probe another table: begins, writes it in parts of [`PART`] bytes, each when the one before is done, and has
 /// it taken into use.
@@ -37,29 +37,29 @@ impl PushTable {
     }
 }
 
-impl Errand for PushTable {
+impl Transaction for PushTable {
     type Outcome = ();
 
-    fn next(&mut self) -> Result<Option<Ask>, LinkError> {
+    fn next(&mut self) -> Result<Option<Command>, LinkError> {
         let parts = self.bytes.len().div_ceil(PART);
         let next = self.next;
         self.next += 1;
         Ok(match next {
-            0 => Some(Ask::BeginTable(self.bytes.len() as u32)),
+            0 => Some(Command::BeginTable(self.bytes.len() as u32)),
             n if n <= parts => {
                 let offset = (n - 1) * PART;
                 let rest = self.bytes.get(offset..).unwrap_or_default();
-                Some(Ask::WriteTable {
+                Some(Command::WriteTable {
                     offset: offset as u32,
                     bytes: rest.iter().copied().take(PART).collect(),
                 })
             }
-            n if n == parts + 1 => Some(Ask::CommitTable),
+            n if n == parts + 1 => Some(Command::CommitTable),
             _ => None,
         })
     }
 
-    fn hear(&mut self, _: &Tell) -> Result<(), LinkError> {
+    fn hear(&mut self, _: &Event) -> Result<(), LinkError> {
         Ok(())
     }
 
@@ -79,10 +79,10 @@ pub struct ReadTable {
     asked: (usize, u8),
 }
 
-impl Errand for ReadTable {
+impl Transaction for ReadTable {
     type Outcome = Vec<u8>;
 
-    fn next(&mut self) -> Result<Option<Ask>, LinkError> {
+    fn next(&mut self) -> Result<Option<Command>, LinkError> {
         let got = self.bytes.len();
         if self.length.is_some_and(|length| got as u32 >= length) {
             return Ok(None);
@@ -93,15 +93,15 @@ impl Errand for ReadTable {
             return Err(LinkError::Disturbed);
         }
         self.asked = (got, tries + 1);
-        Ok(Some(Ask::ReadTable(got as u32)))
+        Ok(Some(Command::ReadTable(got as u32)))
     }
 
-    fn hear(&mut self, tell: &Tell) -> Result<(), LinkError> {
-        if let Tell::TablePart {
+    fn hear(&mut self, event: &Event) -> Result<(), LinkError> {
+        if let Event::TablePart {
             offset,
             length,
             bytes,
-        } = tell
+        } = event
         {
             if *self.length.get_or_insert(*length) != *length {
                 return Err(LinkError::Changed);

@@ -12,7 +12,7 @@ use tactus_core::wire::{Phase, Text};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::{MAX_TEXTURES, Name, Table, TableError};
 use tactus_core::wire::{
-    self, Ask, Forget, Identify, MAX_FRAME, PART, PROTOCOL, Receiver, Report, Request, Reset, Tell,
+    self, Command, Event, Forget, Identify, MAX_FRAME, PART, PROTOCOL, Receiver, Report, Reset,
     Train,
 };
 
@@ -22,11 +22,11 @@ use crate::eval::learn::learn;
 /// A table of so many textures.
 fn table(textures: u16) -> Vec<u8> {
     let names: Vec<String> = (0..textures).map(|n| format!("texture {n}")).collect();
-    let felt = [0.4, 0.6]
+    let observed = [0.4, 0.6]
         .map(|x| Observation::from(Properties::new([Some(x), Some(3.0 + x), Some(5.0 + x)])));
-    let felt = vec![vec![felt.to_vec()]; textures.into()];
+    let observed = vec![vec![observed.to_vec()]; textures.into()];
     let movements = [Movement::FOR_TRACTION];
-    learn(Method::Paper, None, &names, &movements, &felt).unwrap()
+    learn(Method::Paper, None, &names, &movements, &observed).unwrap()
 }
 
 fn calibration() -> RigCalibration {
@@ -63,21 +63,21 @@ struct Probe {
     calibration: Vec<u8>,
     /// parts that an answer to `ReadTable` has
     parts: usize,
-    asked: Vec<Ask>,
+    asked: Vec<Command>,
 }
 
 impl Probe {
-    fn tell(&mut self, tell: Tell) -> Vec<u8> {
-        let mut room = [0; MAX_FRAME + 1];
+    fn event(&mut self, event: Event) -> Vec<u8> {
+        let mut buffer = [0; MAX_FRAME + 1];
         let number = self.number;
         self.number = number.wrapping_add(1);
         wire::encode(
             &Report {
                 number,
                 at_ms: 0,
-                tell,
+                event,
             },
-            &mut room,
+            &mut buffer,
         )
         .unwrap()
         .to_vec()
@@ -86,15 +86,15 @@ impl Probe {
     fn receive(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut send = Vec::new();
         for &byte in bytes {
-            match self.receiver.push::<Request>(byte) {
+            match self.receiver.push::<wire::Request>(byte) {
                 None => {}
                 Some(Err(_)) => {
                     self.damaged += 1;
-                    send.extend(self.tell(Tell::Damaged(self.damaged)));
+                    send.extend(self.event(Event::Damaged(self.damaged)));
                 }
                 Some(Ok(request)) => {
-                    for tell in self.obey(request) {
-                        send.extend(self.tell(tell));
+                    for event in self.obey(request) {
+                        send.extend(self.event(event));
                     }
                 }
             }
@@ -102,52 +102,52 @@ impl Probe {
         send
     }
 
-    fn obey(&mut self, Request { id, ask }: Request) -> Vec<Tell> {
-        self.asked.push(ask.clone());
-        let refused = |why: &str| Tell::Refused {
+    fn obey(&mut self, wire::Request { id, command }: wire::Request) -> Vec<Event> {
+        self.asked.push(command.clone());
+        let refused = |why: &str| Event::Refused {
             id,
             why: Text::try_from(why).unwrap(),
         };
-        let calibration = |bytes: &[u8]| Tell::Calibration(bytes.iter().copied().collect());
-        let mut tells = match ask {
-            Ask::ReadTable(from) => {
+        let calibration = |bytes: &[u8]| Event::Calibration(bytes.iter().copied().collect());
+        let mut events = match command {
+            Command::ReadTable(from) => {
                 let length = self.table.len() as u32;
                 let parts = self.table[from as usize..].chunks(PART).zip(0..);
                 parts
                     .take(self.parts)
-                    .map(|(bytes, n)| Tell::TablePart {
+                    .map(|(bytes, n)| Event::TablePart {
                         offset: from + n * PART as u32,
                         length,
                         bytes: bytes.iter().copied().collect(),
                     })
                     .collect()
             }
-            Ask::BeginTable(length) => {
+            Command::BeginTable(length) => {
                 self.pushed = Some(vec![0xFF; length as usize]);
                 vec![]
             }
-            Ask::WriteTable { offset, bytes } => {
+            Command::WriteTable { offset, bytes } => {
                 let Some(pushed) = &mut self.pushed else {
                     return vec![refused("begin a table first")];
                 };
                 pushed[offset as usize..][..bytes.len()].copy_from_slice(&bytes);
                 vec![]
             }
-            Ask::CommitTable => match self.pushed.take() {
+            Command::CommitTable => match self.pushed.take() {
                 Some(pushed) if Table::read(&pushed).is_ok() => {
                     self.table = pushed;
                     vec![]
                 }
                 _ => return vec![refused("the table is not whole: push it again")],
             },
-            Ask::ReadCalibration => vec![calibration(&self.calibration)],
-            Ask::WriteCalibration(bytes) => {
+            Command::ReadCalibration => vec![calibration(&self.calibration)],
+            Command::WriteCalibration(bytes) => {
                 self.calibration = bytes.to_vec();
                 vec![calibration(&bytes)]
             }
-            Ask::Identify(how) => vec![
-                Tell::Phase(Phase::Sliding),
-                Tell::Block(Block {
+            Command::Identify(how) => vec![
+                Event::Phase(Phase::Sliding),
+                Event::Block(Block {
                     number: 0,
                     still: true,
                     steady: None,
@@ -155,7 +155,7 @@ impl Probe {
                     shear_mn: Default::default(),
                     lost: 0,
                 }),
-                Tell::Verdict {
+                Event::Verdict {
                     texture: how.among[0],
                     name: Name::try_from("velcro").unwrap(),
                     probability: 0.995,
@@ -163,38 +163,38 @@ impl Probe {
                     unknown: false,
                     log_odds: Some(-7.5),
                     slides: 3,
-                    asks: false,
+                    wants_label: false,
                 },
-                Tell::Taught {
+                Event::TextureLearned {
                     name: Name::try_from("velcro").unwrap(),
                     slides: 3,
                     itself: true,
                 },
             ],
-            Ask::Answer(name) if name.is_empty() => return vec![refused("a name, please")],
-            Ask::Answer(name) => vec![Tell::Taught {
+            Command::Label(name) if name.is_empty() => return vec![refused("a name, please")],
+            Command::Label(name) => vec![Event::TextureLearned {
                 name,
                 slides: 2,
                 itself: false,
             }],
-            Ask::Home => vec![Tell::Phase(Phase::Homing), Tell::Phase(Phase::Ready)],
+            Command::Home => vec![Event::Phase(Phase::Homing), Event::Phase(Phase::Ready)],
             _ => vec![],
         };
-        tells.push(Tell::Done(id));
-        tells
+        events.push(Event::Done(id));
+        events
     }
 }
 
 /// Sees an errand through, the line doing to every chunk what `disturb` does; `None` if both ends wait for each other and
 /// the request may not be repeated.
-fn see_through<E: Errand>(
+fn see_through<E: Transaction>(
     session: &mut Session,
     probe: &mut Probe,
-    errand: E,
+    transaction: E,
     mut disturb: impl FnMut(Vec<u8>) -> Vec<Vec<u8>>,
 ) -> Option<Result<E::Outcome, LinkError>> {
     let mut send = Vec::new();
-    let mut job = match Job::begin(errand, session, &mut send) {
+    let mut job = match Job::begin(transaction, session, &mut send) {
         Ok(job) => job,
         Err(why) => return Some(Err(why)),
     };
@@ -226,25 +226,25 @@ fn undisturbed(bytes: Vec<u8>) -> Vec<Vec<u8>> {
 #[test]
 fn the_longest_requests_fit() {
     let mut session = Session::default();
-    for ask in [
-        Ask::Identify(identify()),
-        Ask::WriteTable {
+    for command in [
+        Command::Identify(identify()),
+        Command::WriteTable {
             offset: u32::MAX,
             bytes: (0..PART).map(|_| 0xFF).collect(),
         },
-        Ask::Train(Train {
+        Command::Train(Train {
             name: Name::try_from("n".repeat(40).as_str()).unwrap(),
             trials: 255,
             pilot: true,
             seed: u32::MAX,
         }),
-        Ask::WriteCalibration((0..64).collect()),
-        Ask::Rename {
+        Command::WriteCalibration((0..64).collect()),
+        Command::Rename {
             from: Name::try_from("n".repeat(40).as_str()).unwrap(),
             to: Name::try_from("m".repeat(40).as_str()).unwrap(),
         },
     ] {
-        assert!(session.request(ask, &mut Vec::new()).is_ok());
+        assert!(session.request(command, &mut Vec::new()).is_ok());
     }
 }
 
@@ -263,8 +263,8 @@ fn a_table_is_pushed_part_by_part_and_read_back() {
         assert_eq!(pushed, Some(Ok(())));
         assert_eq!(probe.table, bytes);
         assert_eq!(probe.asked.len(), steps);
-        assert_eq!(probe.asked[0], Ask::BeginTable(bytes.len() as u32));
-        assert_eq!(probe.asked.last(), Some(&Ask::CommitTable));
+        assert_eq!(probe.asked[0], Command::BeginTable(bytes.len() as u32));
+        assert_eq!(probe.asked.last(), Some(&Command::CommitTable));
         let read = see_through(&mut session, &mut probe, ReadTable::default(), undisturbed);
         assert_eq!(read, Some(Ok(bytes)));
         assert_eq!((session.damaged(), session.missing()), (0, 0));
@@ -288,49 +288,49 @@ fn what_no_probe_holds_is_not_pushed() {
         ..calibration()
     };
     assert!(matches!(
-        Question::write_calibration(&wrong),
+        Request::write_calibration(&wrong),
         Err(LinkError::Calibration(_))
     ));
 }
 
 #[test]
-fn questions_are_answered() {
+fn requests_get_their_answers() {
     let mut session = Session::default();
     let mut probe = Probe::default();
-    let mut ask = |question| see_through(&mut session, &mut probe, question, undisturbed);
-    let command = Question::write_calibration(&calibration()).unwrap();
-    assert_eq!(ask(command), Some(Ok(())));
-    let home = Question::command(Ask::Home);
-    assert_eq!(ask(home), Some(Ok(())));
+    let mut send = |transaction| see_through(&mut session, &mut probe, transaction, undisturbed);
+    let command = Request::write_calibration(&calibration()).unwrap();
+    assert_eq!(send(command), Some(Ok(())));
+    let home = Request::command(Command::Home);
+    assert_eq!(send(home), Some(Ok(())));
     let read = see_through(
         &mut session,
         &mut probe,
-        Question::read_calibration(),
+        Request::read_calibration(),
         undisturbed,
     );
     assert_eq!(read, Some(Ok(calibration())));
     let found = see_through(
         &mut session,
         &mut probe,
-        Question::identify(identify()),
+        Request::identify(identify()),
         undisturbed,
     );
     let found = found.unwrap().unwrap();
     assert_eq!((found.name.as_str(), found.slides), ("velcro", 3));
     assert_eq!((found.learned, found.log_odds), (3, Some(-7.5)));
-    let named = |name| Question::answer(Name::try_from(name).unwrap());
+    let named = |name| Request::label(Name::try_from(name).unwrap());
     let answered = see_through(&mut session, &mut probe, named("felt"), undisturbed);
-    let taught = Taught {
+    let learned = Learned {
         name: Name::try_from("felt").unwrap(),
         slides: 2,
     };
-    assert_eq!(answered, Some(Ok(taught)));
+    assert_eq!(answered, Some(Ok(learned)));
     let nameless = see_through(&mut session, &mut probe, named(""), undisturbed);
     assert!(matches!(nameless, Some(Err(LinkError::Refused(_)))));
     // the mock tells no status: done without an answer
-    let status = see_through(&mut session, &mut probe, Question::status(), undisturbed);
+    let status = see_through(&mut session, &mut probe, Request::status(), undisturbed);
     assert_eq!(status, Some(Err(LinkError::NoAnswer)));
-    let trained = Question::train(Train {
+    let trained = Request::train(Train {
         name: Name::new(),
         trials: 5,
         pilot: false,
@@ -344,7 +344,7 @@ fn questions_are_answered() {
 fn a_refusal_says_why() {
     let mut session = Session::default();
     let mut probe = Probe::default();
-    let commit = Question::command(Ask::CommitTable);
+    let commit = Request::command(Command::CommitTable);
     let refused = see_through(&mut session, &mut probe, commit, undisturbed);
     let Some(Err(why)) = refused else {
         panic!("{refused:?}")
@@ -375,25 +375,25 @@ fn a_damaged_request_is_repeated_only_if_it_may_be() {
     let read = see_through(
         &mut session,
         &mut probe,
-        Question::read_calibration(),
+        Request::read_calibration(),
         once(),
     );
     assert_eq!(read, Some(Ok(calibration())));
     let found = see_through(
         &mut session,
         &mut probe,
-        Question::identify(identify()),
+        Request::identify(identify()),
         once(),
     );
     assert_eq!(found, Some(Err(LinkError::Unheard)));
     let cut = |_: Vec<u8>| vec![vec![]];
-    let read = see_through(&mut session, &mut probe, Question::read_calibration(), cut);
+    let read = see_through(&mut session, &mut probe, Request::read_calibration(), cut);
     assert_eq!(read, Some(Err(LinkError::Disturbed)));
 }
 
 #[test]
 fn a_restart_is_noticed() {
-    let booted = |protocol| Tell::Booted {
+    let booted = |protocol| Event::Booted {
         protocol,
         version: Default::default(),
         reset: Reset::Watchdog,
@@ -414,10 +414,10 @@ fn a_restart_is_noticed() {
             number: 700,
             ..Probe::default()
         };
-        let ready = before.tell(Tell::Phase(Phase::Ready));
+        let ready = before.event(Event::Phase(Phase::Ready));
         session.receive(&ready);
-        let mut job = Job::begin(Question::identify(identify()), &mut session, &mut send).unwrap();
-        let bytes = Probe::default().tell(booted(protocol));
+        let mut job = Job::begin(Request::identify(identify()), &mut session, &mut send).unwrap();
+        let bytes = Probe::default().event(booted(protocol));
         let outcome = job.poll(&mut session, &bytes, &mut send, |_| ());
         assert_eq!(outcome, Poll::Ready(Err(expected)));
         assert_eq!(session.missing(), 0, "numbers begin anew");
@@ -430,7 +430,7 @@ fn gaps_in_the_numbers_are_counted() {
         number: u16::MAX - 1,
         ..Probe::default()
     };
-    let frames: Vec<Vec<u8>> = (0..6).map(|n| probe.tell(Tell::Done(n))).collect();
+    let frames: Vec<Vec<u8>> = (0..6).map(|n| probe.event(Event::Done(n))).collect();
     let mut session = Session::default();
     for n in [0, 1, 4, 5] {
         assert_eq!(session.receive(&frames[n]).len(), 1);
@@ -441,15 +441,15 @@ fn gaps_in_the_numbers_are_counted() {
 #[test]
 fn an_outsider_may_ask_in_between() {
     let (mut session, mut send, mut probe) = (Session::default(), Vec::new(), Probe::default());
-    let mut job = Job::begin(Question::identify(identify()), &mut session, &mut send).unwrap();
-    let stop = session.request(Ask::Stop, &mut send).unwrap();
+    let mut job = Job::begin(Request::identify(identify()), &mut session, &mut send).unwrap();
+    let stop = session.request(Command::Stop, &mut send).unwrap();
     let bytes = probe.receive(&send);
     let mut told = Vec::new();
     let outcome = job.poll(&mut session, &bytes, &mut send, |report| {
-        told.push(report.tell.clone())
+        told.push(report.event.clone())
     });
     assert!(matches!(outcome, Poll::Ready(Ok(_))), "{outcome:?}");
-    assert_eq!(told.last(), Some(&Tell::Done(stop)), "all is shown");
+    assert_eq!(told.last(), Some(&Event::Done(stop)), "all is shown");
 }
 
 /// A line that gives what the probe answers, piece by piece, and times out in between.
@@ -460,12 +460,12 @@ struct Line {
 }
 
 impl Read for Line {
-    fn read(&mut self, room: &mut [u8]) -> io::Result<usize> {
-        let n = self.answer.len().min(room.len()).min(7);
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let n = self.answer.len().min(buffer.len()).min(7);
         if n == 0 {
             return Err(io::ErrorKind::WouldBlock.into());
         }
-        for (to, from) in room.iter_mut().zip(self.answer.drain(..n)) {
+        for (to, from) in buffer.iter_mut().zip(self.answer.drain(..n)) {
             *to = from;
         }
         Ok(n)
@@ -486,7 +486,7 @@ impl Write for Line {
 }
 
 #[test]
-fn a_port_runs_errands() {
+fn a_port_runs_transactions() {
     let bytes = table(20);
     let line = Line {
         probe: Probe {
@@ -515,15 +515,15 @@ proptest! {
     fn reports_do_not_depend_on_where_reads_end(cuts in proptest::collection::vec(1usize..300, 1..50)) {
         let mut probe = Probe { parts: usize::MAX, table: table(40), ..Probe::default() };
         let mut bytes = Vec::new();
-        for ask in [
-            Ask::ReadTable(0),
-            Ask::Home,
-            Ask::Identify(identify()),
-            Ask::Answer(Name::try_from("felt").unwrap()),
-            Ask::Forget(Forget::SelfTaught),
+        for command in [
+            Command::ReadTable(0),
+            Command::Home,
+            Command::Identify(identify()),
+            Command::Label(Name::try_from("felt").unwrap()),
+            Command::Forget(Forget::SelfLearned),
         ] {
-            for tell in probe.obey(Request { id: 9, ask }) {
-                bytes.extend(probe.tell(tell));
+            for event in probe.obey(wire::Request { id: 9, command }) {
+                bytes.extend(probe.event(event));
             }
         }
         let whole = Session::default().receive(&bytes);
@@ -544,7 +544,7 @@ proptest! {
     #[test]
     fn damaged_reports_are_never_believed_and_later_ones_understood(damage in damage(), garbage in proptest::collection::vec(any::<u8>(), 0..300)) {
         let mut probe = Probe::default();
-        let frames: Vec<Vec<u8>> = (0..60).map(|n| probe.tell(Tell::TablePart { offset: n * 256, length: 15_360, bytes: (0..PART).map(|b| b as u8).collect() })).collect();
+        let frames: Vec<Vec<u8>> = (0..60).map(|n| probe.event(Event::TablePart { offset: n * 256, length: 15_360, bytes: (0..PART).map(|b| b as u8).collect() })).collect();
         let sent = Session::default().receive(&frames.concat());
         let mut bytes = frames.concat();
         let length = bytes.len();
@@ -561,7 +561,7 @@ proptest! {
         session.receive(&[0]);
         let counted = got.len() as u64 + session.missing();
         prop_assert!(counted <= 60);
-        let next = probe.tell(Tell::Done(7));
+        let next = probe.event(Event::Done(7));
         let next = session.receive(&next);
         prop_assert_eq!(next.len(), 1);
         prop_assert!(got.is_empty() || got.len() as u64 + session.missing() + got[0].number as u64 == 60);

@@ -2,26 +2,26 @@
 
 use std::task::Poll;
 
-use tactus_core::wire::{Ask, Forget, PROTOCOL, Report, Tell};
+use tactus_core::wire::{Command, Event, Forget, PROTOCOL, Report};
 
 use super::session::{LinkError, MAX_TRIES, Session};
 
 /// Requests that follow each other, and what is to be known in the end.
-pub trait Errand {
+pub trait Transaction {
     /// What is known in the end.
     type Outcome;
 
     /// The next request; `None` when all is done. Asked for once the last one is done.
     ///
     /// # Errors
-    /// The errand cannot go on.
-    fn next(&mut self) -> Result<Option<Ask>, LinkError>;
+    /// The transaction cannot continue.
+    fn next(&mut self) -> Result<Option<Command>, LinkError>;
 
     /// Something that the probe said meanwhile.
     ///
     /// # Errors
-    /// The errand cannot go on.
-    fn hear(&mut self, tell: &Tell) -> Result<(), LinkError>;
+    /// The transaction cannot continue.
+    fn hear(&mut self, event: &Event) -> Result<(), LinkError>;
 
     /// What came of it, once all is done.
     ///
@@ -32,34 +32,38 @@ pub trait Errand {
 
 /// A request that is not over.
 #[derive(Debug)]
-struct Asked {
-    ask: Ask,
+struct Sent {
+    command: Command,
     /// of all tries, the last one last
     ids: Vec<u16>,
     /// something was told since
     heard: bool,
 }
 
-/// An errand on its way. It has one request under way at a time; whoever has the [`Session`] may make others in between,
+/// A transaction under way. It has one command under way at a time; the owner of the [`Session`] may send others in between,
 /// to stop for example.
 ///
 /// Where the line damages a request or a report, a request that may be made twice is. Others are left to whoever waits: a
 /// damaged report need not have been their answer.
 #[derive(Debug)]
 pub struct Job<E> {
-    errand: E,
-    asked: Option<Asked>,
+    transaction: E,
+    sent: Option<Sent>,
 }
 
-impl<E: Errand> Job<E> {
+impl<E: Transaction> Job<E> {
     /// Begins: appends the first request to `send`.
     ///
     /// # Errors
     /// See [`LinkError`].
-    pub fn begin(errand: E, session: &mut Session, send: &mut Vec<u8>) -> Result<Self, LinkError> {
+    pub fn begin(
+        transaction: E,
+        session: &mut Session,
+        send: &mut Vec<u8>,
+    ) -> Result<Self, LinkError> {
         let mut job = Self {
-            errand,
-            asked: None,
+            transaction,
+            sent: None,
         };
         job.go_on(session, send)?;
         Ok(job)
@@ -75,17 +79,17 @@ impl<E: Errand> Job<E> {
         mut each: impl FnMut(&Report),
     ) -> Poll<Result<E::Outcome, LinkError>> {
         let lost = session.damaged() + session.missing();
-        let asked = self.last_id();
+        let sent = self.last_id();
         // all that has come is shown, also what comes behind the end
         let mut over = None;
         for report in session.receive(received) {
             each(&report);
             if over.is_none() {
-                over = self.take(session, &report.tell, send).transpose();
+                over = self.take(session, &report.event, send).transpose();
             }
         }
         let disturbed = session.damaged() + session.missing() > lost;
-        if over.is_none() && disturbed && self.last_id() == asked {
+        if over.is_none() && disturbed && self.last_id() == sent {
             over = self.repeat(session, send).err().map(Err);
         }
         over.map_or(Poll::Pending, Poll::Ready)
@@ -96,61 +100,61 @@ impl<E: Errand> Job<E> {
     /// # Errors
     /// [`LinkError::Disturbed`] or [`LinkError::Foreign`] after [`MAX_TRIES`].
     pub fn repeat(&mut self, session: &mut Session, send: &mut Vec<u8>) -> Result<bool, LinkError> {
-        let Some(asked) = self.asked.as_mut().filter(|a| may_repeat(&a.ask)) else {
+        let Some(sent) = self.sent.as_mut().filter(|a| may_repeat(&a.command)) else {
             return Ok(false);
         };
-        if asked.ids.len() >= MAX_TRIES.into() {
+        if sent.ids.len() >= MAX_TRIES.into() {
             return Err(if session.foreign() > 0 {
                 LinkError::Foreign
             } else {
                 LinkError::Disturbed
             });
         }
-        asked.ids.push(session.request(asked.ask.clone(), send)?);
+        sent.ids.push(session.request(sent.command.clone(), send)?);
         Ok(true)
     }
 
     /// The request that is under way.
-    pub fn asking(&self) -> Option<&Ask> {
-        self.asked.as_ref().map(|asked| &asked.ask)
+    pub fn command(&self) -> Option<&Command> {
+        self.sent.as_ref().map(|sent| &sent.command)
     }
 
     fn last_id(&self) -> Option<u16> {
-        self.asked.as_ref()?.ids.last().copied()
+        self.sent.as_ref()?.ids.last().copied()
     }
 
     /// Takes in what the probe says; the outcome, when there is one.
     fn take(
         &mut self,
         session: &mut Session,
-        tell: &Tell,
+        event: &Event,
         send: &mut Vec<u8>,
     ) -> Result<Option<E::Outcome>, LinkError> {
-        let Some(asked) = &mut self.asked else {
+        let Some(sent) = &mut self.sent else {
             return Ok(None);
         };
-        let (first, repeatable) = (!asked.heard, may_repeat(&asked.ask));
-        asked.heard = true;
-        match tell {
-            Tell::Done(id) if asked.ids.contains(id) => {
+        let (first, repeatable) = (!sent.heard, may_repeat(&sent.command));
+        sent.heard = true;
+        match event {
+            Event::Done(id) if sent.ids.contains(id) => {
                 self.go_on(session, send)?;
-                if self.asked.is_none() {
-                    return self.errand.outcome().map(Some);
+                if self.sent.is_none() {
+                    return self.transaction.outcome().map(Some);
                 }
             }
             // a try before the last one may be refused because of the one before it
-            Tell::Refused { id, why } if asked.ids.last() == Some(id) => {
+            Event::Refused { id, why } if sent.ids.last() == Some(id) => {
                 return Err(LinkError::Refused(why.as_str().to_owned()));
             }
-            Tell::Damaged(_) if repeatable => {
+            Event::Damaged(_) if repeatable => {
                 self.repeat(session, send)?;
             }
             // nothing was said in between, so it was this request that was damaged
-            Tell::Damaged(_) if first => return Err(LinkError::Unheard),
-            Tell::Booted { protocol, .. } if *protocol != PROTOCOL => {
+            Event::Damaged(_) if first => return Err(LinkError::Unheard),
+            Event::Booted { protocol, .. } if *protocol != PROTOCOL => {
                 return Err(LinkError::Protocol(*protocol));
             }
-            Tell::Booted {
+            Event::Booted {
                 reset, last_words, ..
             } => {
                 return Err(LinkError::Rebooted {
@@ -158,16 +162,16 @@ impl<E: Errand> Job<E> {
                     last_words: last_words.as_ref().map(|words| words.as_str().to_owned()),
                 });
             }
-            tell => self.errand.hear(tell)?,
+            event => self.transaction.hear(event)?,
         }
         Ok(None)
     }
 
     fn go_on(&mut self, session: &mut Session, send: &mut Vec<u8>) -> Result<(), LinkError> {
-        self.asked = match self.errand.next()? {
-            Some(ask) => Some(Asked {
-                ids: vec![session.request(ask.clone(), send)?],
-                ask,
+        self.sent = match self.transaction.next()? {
+            Some(command) => Some(Sent {
+                ids: vec![session.request(command.clone(), send)?],
+                command,
                 heard: false,
             }),
             None => None,
@@ -177,25 +181,25 @@ impl<E: Errand> Job<E> {
 }
 
 /// Whether a request made twice does what it does once.
-fn may_repeat(ask: &Ask) -> bool {
-    match ask {
-        Ask::Status
-        | Ask::Stop
-        | Ask::ReadCalibration
-        | Ask::WriteCalibration(_)
-        | Ask::Stream(_)
-        | Ask::ReadTable(_)
-        | Ask::BeginTable(_)
-        | Ask::WriteTable { .. }
-        | Ask::Forget(Forget::SelfTaught | Forget::Training(_))
-        | Ask::FactoryTable => true,
-        Ask::Home
-        | Ask::Identify(_)
-        | Ask::Answer(_)
-        | Ask::Train(_)
-        | Ask::Rename { .. }
-        | Ask::Forget(Forget::Texture(_))
-        | Ask::Calibrate
-        | Ask::CommitTable => false,
+fn may_repeat(command: &Command) -> bool {
+    match command {
+        Command::Status
+        | Command::Stop
+        | Command::ReadCalibration
+        | Command::WriteCalibration(_)
+        | Command::Stream(_)
+        | Command::ReadTable(_)
+        | Command::BeginTable(_)
+        | Command::WriteTable { .. }
+        | Command::Forget(Forget::SelfLearned | Forget::Training(_))
+        | Command::FactoryTable => true,
+        Command::Home
+        | Command::Identify(_)
+        | Command::Label(_)
+        | Command::Train(_)
+        | Command::Rename { .. }
+        | Command::Forget(Forget::Texture(_))
+        | Command::Calibrate
+        | Command::CommitTable => false,
     }
 }

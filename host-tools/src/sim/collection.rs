@@ -110,7 +110,7 @@ impl Collection {
         done: impl Fn() + Sync,
     ) -> Result<Vec<u8>, LearnError> {
         let plan = Plan::new();
-        let felt = self
+        let measured = self
             .record(calibration, done)?
             .iter()
             .map(|slides| {
@@ -132,7 +132,13 @@ impl Collection {
             })
             .collect::<Result<Vec<_>, TrialError>>()?;
         let names = self.names();
-        Ok(learn::learn(method, None, &names, &Self::MOVEMENTS, &felt)?)
+        Ok(learn::learn(
+            method,
+            None,
+            &names,
+            &Self::MOVEMENTS,
+            &measured,
+        )?)
     }
 }
 
@@ -148,13 +154,14 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// What was felt in a slide that was made here.
+    /// What was measured in a slide that was made here.
     ///
     /// # Errors
     /// [`TrialError::Slide`].
     pub fn measure(self, plan: &Plan, slide: &recording::Slide) -> Result<Observation, TrialError> {
-        let felt = measure(plan, slide).map_err(|source| TrialError::Slide { at: self, source })?;
-        Ok(Observation::from(&felt))
+        let measured =
+            measure(plan, slide).map_err(|source| TrialError::Slide { at: self, source })?;
+        Ok(Observation::from(&measured))
     }
 }
 
@@ -190,7 +197,7 @@ pub enum TrialError {
     },
 }
 
-/// Why a simulated world taught nothing.
+/// Why no table was learned in a simulated world.
 #[derive(Debug, thiserror::Error)]
 pub enum LearnError {
     /// A rig failed.

@@ -31,15 +31,15 @@ const SLIDE_S: f64 = 1.8;
 /// Attempts that a person makes before giving up on a texture.
 const ATTEMPTS: u32 = 10;
 
-/// Why a texture was not felt.
+/// Why no slide over a texture was good.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum HandError {
     /// One attempt after the other was no good.
     #[error(
-        "{} was felt in no slide of {ATTEMPTS}, the last one was {}; take another texture or another seed",
+        "{}: none of {ATTEMPTS} slides was good, the last one was {}; take another texture or another seed",
         texture_name(*texture), why.map_or("not noticed", Again::why)
     )]
-    NotFelt {
+    NoGoodSlide {
         /// Number of the texture in Table 1.
         texture: u8,
         /// What the last slide was; `None` if none was noticed.
@@ -103,7 +103,7 @@ impl Person {
     }
 
     /// Lets so much time pass; the first event for which `until` holds ends it.
-    fn feel(
+    fn run_until(
         &mut self,
         touch: &mut Touch<'_, Plain>,
         seconds: f64,
@@ -127,18 +127,18 @@ impl Person {
         let force_n = target_n * (FORCE_SPREAD * self.normal()).exp();
         let pace_mm_s = pace_mm_s * (PACE_SPREAD * self.normal()).exp();
         self.intend(force_n, 0.0);
-        self.feel(touch, 5.0, |event| *event == Event::Still);
+        self.run_until(touch, 5.0, |event| *event == Event::Still);
         let reaction_s = self.random.random_range(REACTION_S.0..REACTION_S.1);
-        self.feel(touch, reaction_s, |_| false);
+        self.run_until(touch, reaction_s, |_| false);
         self.intend(force_n, pace_mm_s);
         let over = |event: &Event| matches!(event, Event::Slid(_) | Event::Again(_));
-        let felt = self.feel(touch, SLIDE_S, over);
+        let measured = self.run_until(touch, SLIDE_S, over);
         self.intend(force_n, 0.0);
-        self.feel(touch, 0.1, |_| false);
+        self.run_until(touch, 0.1, |_| false);
         self.intend(0.0, 0.0);
         let pause_s = self.random.random_range(0.3..0.5);
-        self.feel(touch, pause_s, |_| false);
-        match felt? {
+        self.run_until(touch, pause_s, |_| false);
+        match measured? {
             Event::Slid(observation) => Some(Ok(observation)),
             Event::Again(why) => Some(Err(why)),
             _ => None,
@@ -158,7 +158,7 @@ pub fn slides(
     let plan = Plan::new();
     let mut touch = Touch::<Plain>::new(&plan);
     let mut person = Person::new(setup, manner);
-    person.feel(&mut touch, 0.5, |event| *event == Event::Zeroed);
+    person.run_until(&mut touch, 0.5, |event| *event == Event::Zeroed);
     let (mut good, mut bad, mut row) = (Vec::new(), 0, 0);
     let mut last;
     while (good.len() as u32) < wanted {
@@ -174,7 +174,7 @@ pub fn slides(
         bad += 1;
         row += 1;
         if row == ATTEMPTS {
-            return Err(HandError::NotFelt {
+            return Err(HandError::NoGoodSlide {
                 texture: setup.texture,
                 why: last,
             });
@@ -189,7 +189,7 @@ pub fn slides(
 /// # Errors
 /// See [`TableError`].
 pub fn learn(collection: &Collection) -> Result<(Vec<u8>, Vec<u8>), TableError> {
-    let felt: Vec<_> = collection
+    let measured: Vec<_> = collection
         .textures
         .par_iter()
         .map(|&texture| {
@@ -198,18 +198,18 @@ pub fn learn(collection: &Collection) -> Result<(Vec<u8>, Vec<u8>), TableError> 
         })
         .collect();
     let (mut names, mut known, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
-    for ((name, &texture), felt) in collection
+    for ((name, &texture), measured) in collection
         .names()
         .into_iter()
         .zip(&collection.textures)
-        .zip(felt)
+        .zip(measured)
     {
-        match felt {
+        match measured {
             Ok((good, _)) => {
                 names.push(name);
                 known.push(vec![good]);
             }
-            Err(HandError::NotFelt { .. }) => left_out.push(texture),
+            Err(HandError::NoGoodSlide { .. }) => left_out.push(texture),
         }
     }
     let table = learn::learn(Method::Fused, Some(FEATURES), &names, &[MOVEMENT], &known)?;
@@ -235,18 +235,18 @@ mod tests {
     fn explore(collection: &Collection, table: &[u8]) -> [usize; 5] {
         let table = Table::read(table).unwrap();
         let [mut all, mut right, mut unknown, mut wrong, mut made] = [0; 5];
-        let felt: Vec<_> = collection
+        let measured: Vec<_> = collection
             .textures
             .par_iter()
             .map(|&texture| slides(collection.setup(texture, 7), Manner::default(), 5))
             .collect();
-        for (texture, felt) in collection.names().iter().zip(felt) {
-            let (Some(index), Ok((felt, _))) = (table.find(texture), felt) else {
+        for (texture, measured) in collection.names().iter().zip(measured) {
+            let (Some(index), Ok((measured, _))) = (table.find(texture), measured) else {
                 continue;
             };
             all += 1;
             let mut judged =
-                (1..=MAX_SLIDES).map(|n| (n, judge::<Plain>(table, &felt[..n]).unwrap().0));
+                (1..=MAX_SLIDES).map(|n| (n, judge::<Plain>(table, &measured[..n]).unwrap().0));
             let (n, judged) = judged.find(|(_, judged)| !judged.open).unwrap();
             made += n;
             let is = judged.leading[0].0 == index;
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_hand_taught_a_hand_recognises() {
+    fn a_hand_recognises_what_a_hand_trained() {
         let collection = world(12);
         let (table, left_out) = learn(&collection).unwrap();
         assert_eq!(left_out, [0u8; 0]);
@@ -282,13 +282,13 @@ mod tests {
             let mut touch = Touch::<Plain>::new(&plan);
             let mut person = Person::new(world(1).setup(burlap, trial), Manner::default());
             person.intend(0.5, 0.0);
-            let still = person.feel(&mut touch, 5.0, |event| *event == Event::Still);
+            let still = person.run_until(&mut touch, 5.0, |event| *event == Event::Still);
             assert!(still.is_some(), "{trial}");
-            person.feel(&mut touch, 0.3, |_| false);
+            person.run_until(&mut touch, 0.3, |_| false);
             person.intend(0.5, 70.0);
-            person.feel(&mut touch, 0.6, |_| false);
+            person.run_until(&mut touch, 0.6, |_| false);
             person.intend(0.5, 8.0);
-            let over = person.feel(&mut touch, 2.0, |_| true);
+            let over = person.run_until(&mut touch, 2.0, |_| true);
             assert_eq!(over, Some(Event::Again(Again::TooUneven)), "{trial}");
         }
     }
@@ -302,19 +302,19 @@ mod tests {
             trials: 15,
             ..world(1)
         };
-        let felt: Vec<_> = collection
+        let measured: Vec<_> = collection
             .textures
             .par_iter()
             .map(|&t| (t, slides(collection.setup(t, 0), Manner::default(), 5)))
             .collect();
-        let bad: u32 = felt
+        let bad: u32 = measured
             .iter()
             .filter_map(|(_, r)| r.as_ref().ok())
             .map(|r| r.1)
             .sum();
         eprintln!("{bad} slides rejected");
         let (table, left_out) = learn(&collection).unwrap();
-        eprintln!("not felt: {left_out:?}; {} bytes", table.len());
+        eprintln!("no good slide: {left_out:?}; {} bytes", table.len());
         explore(&collection, &table);
         // none of another world's textures is known
         let other = Collection {
@@ -324,10 +324,11 @@ mod tests {
         let read = Table::read(&table).unwrap();
         let [mut all, mut new, mut taken] = [0; 3];
         for &texture in &other.textures {
-            let Ok((felt, _)) = slides(other.setup(texture, 1), Manner::default(), 5) else {
+            let Ok((measured, _)) = slides(other.setup(texture, 1), Manner::default(), 5) else {
                 continue;
             };
-            let mut judged = (1..=MAX_SLIDES).map(|n| judge::<Plain>(read, &felt[..n]).unwrap().0);
+            let mut judged =
+                (1..=MAX_SLIDES).map(|n| judge::<Plain>(read, &measured[..n]).unwrap().0);
             let judged = judged.find(|judged| !judged.open).unwrap();
             all += 1;
             new += usize::from(judged.unknown);

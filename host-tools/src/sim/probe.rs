@@ -12,7 +12,7 @@ use tactus_core::probe::servo_rig::{LOOK_MS, RigCommand, Samples, Servo, ServoRi
 use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
 use tactus_core::rig::{Ended, Refused};
 use tactus_core::store::{Store, StoreError};
-use tactus_core::wire::{Tell, Text};
+use tactus_core::wire::{Event, Text};
 
 use super::flash::RamFlash;
 use super::rig::SimRig;
@@ -20,7 +20,7 @@ use super::rig::SimRig;
 /// Who is at the other end of a simulated probe.
 pub trait Host {
     /// The probe says this.
-    fn tell(&mut self, event: Tell);
+    fn tell(&mut self, event: Event);
 
     /// This table is in force now.
     fn table(&mut self, _table: TableInUse) {}
@@ -126,7 +126,7 @@ impl<H: Host> Servo for SimServo<'_, H> {
         self.host.borrow().streams()
     }
 
-    fn tell(&mut self, event: Tell) {
+    fn tell(&mut self, event: Event) {
         self.host.borrow_mut().tell(event);
     }
 }
@@ -147,7 +147,7 @@ impl<const S: usize> StoredBytes<RamFlash<S>> for TableCopy {
 pub struct Told<'p, H>(&'p RefCell<H>);
 
 impl<H: Host> Events for Told<'_, H> {
-    fn tell(&mut self, event: Tell) {
+    fn tell(&mut self, event: Event) {
         self.0.borrow_mut().tell(event);
     }
 

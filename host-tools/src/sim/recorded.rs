@@ -1,4 +1,4 @@
-//! Recorded slides of real textures, felt by the simulated rig: see [`World::play`](crate::sim::world::World::play).
+//! Recorded slides of real textures, played to the simulated rig: see [`World::play`](crate::sim::world::World::play).
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -53,7 +53,7 @@ pub enum PlayError {
 
 /// Recorded slides of one movement, divided into those that are learned and those that the unknown texture shows.
 #[derive(Clone, Debug)]
-pub struct Lesson {
+pub struct RecordedTexture {
     /// Names of the textures.
     pub names: Vec<String>,
     /// The movement that made the recordings.
@@ -64,7 +64,7 @@ pub struct Lesson {
     pub test: Vec<Vec<Played>>,
 }
 
-impl Lesson {
+impl RecordedTexture {
     /// All textures of a folder; `train` slides of each, drawn by `seed` from its whole session, are to be learned from
     /// (interleaved).
     ///
@@ -126,7 +126,7 @@ impl Lesson {
         rig
     }
 
-    /// Learns a table for a method on the rig: every slide to learn from is felt once.
+    /// Learns a table for a method on the rig: the rig plays every slide to learn from once.
     ///
     /// # Errors
     /// The first fault of a rig, or slide without properties.
@@ -136,7 +136,7 @@ impl Lesson {
         calibration: RigCalibration,
     ) -> Result<Vec<u8>, LearnError> {
         let plan = Plan::new();
-        let felt = self
+        let measured = self
             .train
             .par_iter()
             .enumerate()
@@ -148,22 +148,28 @@ impl Lesson {
                     .calibrate(calibration)
                     .map_err(|why| LearnError::Rig(why.into()))?;
                 rig.home()?;
-                let felt = (1..=slides.len())
+                let measured = (1..=slides.len())
                     .map(|slide| {
-                        let felt = measure(&plan, &rig.record(self.movement)?);
-                        let felt = felt.map_err(|source| LearnError::Slide {
+                        let measured = measure(&plan, &rig.record(self.movement)?);
+                        let measured = measured.map_err(|source| LearnError::Slide {
                             texture: self.names[texture].clone(),
                             slide,
                             source,
                         })?;
-                        Ok(Observation::from(&felt))
+                        Ok(Observation::from(&measured))
                     })
                     .collect::<Result<Vec<_>, LearnError>>()?;
-                Ok(vec![felt])
+                Ok(vec![measured])
             })
             .collect::<Result<Vec<_>, LearnError>>()?;
         let movements = [self.movement];
-        Ok(learn::learn(method, None, &self.names, &movements, &felt)?)
+        Ok(learn::learn(
+            method,
+            None,
+            &self.names,
+            &movements,
+            &measured,
+        )?)
     }
 }
 

@@ -6,14 +6,14 @@ use std::time::Duration;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus_core::dsp::Kernels;
-use tactus_core::features::{Felt, Movement, PropertySet, Slide};
+use tactus_core::features::{Movement, PropertySet, SamplePhase, Slide};
 use tactus_core::probe::RigState;
 use tactus_core::rig::calibration::{LineFit, RigCalibration, RigCalibrationError};
 use tactus_core::rig::control::Control;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::pins::{Inputs, Outputs};
 use tactus_core::rig::stage::StageConstants;
-use tactus_core::rig::timeout::{Patience, Wait};
+use tactus_core::rig::timeout::{MovementTimeout, Wait};
 use tactus_core::rig::unloaded::UnloadedRuns;
 use tactus_core::rig::{Ended, Fault, MAX_REJECTED, Phase, Refused, Rig};
 use tactus_core::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ, SLOTS_HZ};
@@ -282,12 +282,12 @@ impl SimRig {
     /// # Errors
     /// The fault that it came to, or that it never came to rest.
     pub fn rest(&mut self, mut each: impl FnMut(&Outputs)) -> Result<(), SimError> {
-        let mut patience = Patience::default();
+        let mut timeout = MovementTimeout::default();
         let mut hung = Phase::Parked;
         loop {
             each(self.tick());
             let phase = self.control.phase();
-            match (patience.wait(1, self.control.is_at_rest()), phase) {
+            match (timeout.wait(1, self.control.is_at_rest()), phase) {
                 (Wait::On, _) => {}
                 (Wait::Stop, _) => {
                     hung = phase;
@@ -439,7 +439,7 @@ impl SimRig {
     ) -> Result<Ended, SimError> {
         self.control.start(movement, start)?;
         self.world.reset_extremes();
-        let mut patience = Patience::default();
+        let mut timeout = MovementTimeout::default();
         let mut truth = Performed::default();
         let mut speeds = Vec::new();
         loop {
@@ -447,9 +447,9 @@ impl SimRig {
             each(&self.outputs, &self.pdc);
             let now = self.world.truth();
             truth.force_max_n = now.force_max_n;
-            match &self.outputs.felt {
-                Felt::Still => truth.force_n = now.force_n,
-                Felt::Begin(_) | Felt::Slide if self.outputs.shear_mn.is_some() => {
+            match &self.outputs.sample_phase {
+                SamplePhase::Still => truth.force_n = now.force_n,
+                SamplePhase::Begin(_) | SamplePhase::Slide if self.outputs.shear_mn.is_some() => {
                     speeds.push(now.speed_mm_s)
                 }
                 _ => {}
@@ -458,7 +458,7 @@ impl SimRig {
                 Phase::Ready => break,
                 Phase::Faulted(_) => self.rest(|_| ())?,
                 phase => {
-                    if patience.wait(1, false) == Wait::Stop {
+                    if timeout.wait(1, false) == Wait::Stop {
                         self.control.stop();
                         self.rest(|_| ())?;
                         return Err(SimError::Hangs(phase));
@@ -505,14 +505,14 @@ impl SimRig {
             let start = self.random.random();
             let no_contact = self.control.calibration().pressure.pdc_no_contact as i16;
             let ended = self.slide(movement, start, |outputs, pdc| {
-                match &outputs.felt {
-                    Felt::Nothing => return,
-                    Felt::Still => return still.extend_from_slice(&outputs.pac),
-                    Felt::Begin(steady) => {
+                match &outputs.sample_phase {
+                    SamplePhase::Nothing => return,
+                    SamplePhase::Still => return still.extend_from_slice(&outputs.pac),
+                    SamplePhase::Begin(steady) => {
                         let seconds = |sample: u32| sample as f32 / RATE_HZ as f32;
                         slide.window = (seconds(steady.start), seconds(steady.end));
                     }
-                    Felt::Slide => {}
+                    SamplePhase::Slide => {}
                 }
                 slide.pac.extend_from_slice(&outputs.pac);
                 slide
@@ -548,7 +548,7 @@ impl Rig for SimRig {
             self.home()?;
         }
         let start = self.random.random();
-        let ended = self.slide(movement, start, |outputs, _| feel(outputs, slide))?;
+        let ended = self.slide(movement, start, |outputs, _| take_samples(outputs, slide))?;
         if let Ended::Gap(samples) = ended {
             slide.lose(samples);
         }
@@ -556,13 +556,13 @@ impl Rig for SimRig {
     }
 }
 
-/// Gives what a tick felt to the core.
-pub fn feel<K: Kernels>(outputs: &Outputs, slide: &mut Slide<'_, K>) {
-    match &outputs.felt {
-        Felt::Nothing => return,
-        Felt::Still => return slide.push_still(&outputs.pac),
-        Felt::Begin(steady) => slide.start(steady.clone()),
-        Felt::Slide => {}
+/// Gives the samples of a tick to the core.
+pub fn take_samples<K: Kernels>(outputs: &Outputs, slide: &mut Slide<'_, K>) {
+    match &outputs.sample_phase {
+        SamplePhase::Nothing => return,
+        SamplePhase::Still => return slide.push_still(&outputs.pac),
+        SamplePhase::Begin(steady) => slide.start(steady.clone()),
+        SamplePhase::Slide => {}
     }
     slide.push(&outputs.pac);
     slide.push_shear(outputs.shear_mn.as_slice());

@@ -13,7 +13,7 @@ use crate::sim::person::Manner;
 use crate::sim::world::Setup;
 
 /// Longest that anything is waited for, s, unless a step says otherwise.
-pub const PATIENCE_S: f64 = 8.0;
+pub const TIMEOUT_S: f64 = 8.0;
 /// Limits of what is accepted: bytes of a file, steps, and virtual seconds that they may take.
 const MAX_BYTES: u64 = 256 << 10;
 const MAX_STEPS: usize = 1000;
@@ -67,7 +67,7 @@ pub enum Step {
         /// Parts of lines.
         text: Vec<String>,
         /// s.
-        #[serde(default = "patience")]
+        #[serde(default = "timeout")]
         within_s: f64,
     },
     /// None of this is on the display now.
@@ -143,8 +143,8 @@ pub enum Step {
     },
 }
 
-fn patience() -> f64 {
-    PATIENCE_S
+fn timeout() -> f64 {
+    TIMEOUT_S
 }
 
 fn once() -> u32 {
@@ -418,7 +418,7 @@ impl Step {
 
 /// A slide of so many seconds, with all that is waited for.
 fn slide_s(seconds: f64) -> f64 {
-    PATIENCE_S + Step::REACTION_MS as f64 * 1e-3 + seconds + Step::HELD_S + Step::LIFTED_S
+    TIMEOUT_S + Step::REACTION_MS as f64 * 1e-3 + seconds + Step::HELD_S + Step::LIFTED_S
 }
 
 #[cfg(test)]

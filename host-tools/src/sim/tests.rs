@@ -114,19 +114,19 @@ fn the_world_knows_nothing_of_features_tables_and_decisions() {
         assert!(forbidden(&bad.replace('X', core)).is_some(), "{bad}");
     }
     for bad in ["use Y::rig::SimRig;", "use Y::{noise, collection::names};"] {
-        for room in [concat!("crate", "::sim"), concat!("su", "per")] {
+        for buffer in [concat!("crate", "::sim"), concat!("su", "per")] {
             assert!(
-                forbidden(&bad.replace('Y', room)).is_some(),
-                "{room}: {bad}"
+                forbidden(&bad.replace('Y', buffer)).is_some(),
+                "{buffer}: {bad}"
             );
         }
     }
-    let room =
+    let buffer =
         fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("src/sim.rs")).unwrap();
     assert!(
         DRIVERS
             .iter()
-            .all(|driver| room.contains(&format!("mod {driver};")))
+            .all(|driver| buffer.contains(&format!("mod {driver};")))
     );
     let sources = sources();
     assert!(sources.len() > 20, "{}", sources.len());

@@ -323,7 +323,7 @@ impl World {
     }
 
     /// Has the finger feel recorded slides instead of the mounted sample: each press-and-slide is the next one of an order
-    /// that `seed` gives, over and over. Without any, the sample is felt again.
+    /// that `seed` gives, over and over. Without any, the sample is played again.
     ///
     /// From where the pressed finger begins to move, P_AC is the recorded one about the simulated finger's rest, and shear
     /// the recorded force once the skin has stretched that far. The sample still carries the press, and makes P_DC; a still

@@ -9,7 +9,7 @@ use super::error::StudyError;
 use super::published::{IDENTIFIED, PAIRS};
 use super::slides::{Named, Recorded, StudyWorld};
 use crate::eval::evaluate::{
-    MAX_TEXTURES, Method, Outcome, Summary, evaluate, explorer, play_and_tell,
+    MAX_TEXTURES, Method, Outcome, Summary, evaluate, explorer, play_with,
 };
 use crate::eval::experiment::Experiment;
 use crate::sim::collection::{Collection, texture_name};
@@ -282,7 +282,7 @@ fn evolution(
         1.0 / experiment.names().len() as f32;
         experiment.names().len()
     ]];
-    let outcome = play_and_tell(
+    let outcome = play_with(
         explorer,
         None,
         Method::Paper.strategy(),

@@ -136,10 +136,10 @@ fn uncertainty(
     let explorer = Explorer::<128>::new(table, PropertySet::ALL, Config::default())
         .map_err(EvaluateError::from)?;
     let mut left = vec![[1.0; 3]; movements.len()];
-    for promise in explorer.outlook() {
-        let of_movement = left.get_mut(usize::from(promise.action.movement));
-        if let (Some(left), Some(property)) = (of_movement, promise.action.property) {
-            left[property.index()] = promise.uncertainty;
+    for outcome in explorer.expected_outcomes() {
+        let of_movement = left.get_mut(usize::from(outcome.action.movement));
+        if let (Some(left), Some(property)) = (of_movement, outcome.action.property) {
+            left[property.index()] = outcome.uncertainty;
         }
     }
     Ok(left)

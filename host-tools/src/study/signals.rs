@@ -201,7 +201,8 @@ fn example(
         .and_then(|()| rig.home())
         .and_then(|()| rig.record(movement));
     let slide = slide.map_err(|source| TrialError::Rig { at, source })?;
-    let felt = measure(&Plan::new(), &slide).map_err(|source| TrialError::Slide { at, source })?;
+    let measured =
+        measure(&Plan::new(), &slide).map_err(|source| TrialError::Slide { at, source })?;
     let steady = slide.steady(RATE_HZ);
     let length = (SHOWN_S * RATE_HZ as f32) as usize;
     let shown = steady.start..(steady.start + length).min(steady.end);
@@ -231,15 +232,15 @@ fn example(
             .map(mean)
             .collect(),
         steady_from_s: of_ms.start as f64 / f64::from(slide.shear_rate_hz),
-        spectrum_pa2: felt
+        spectrum_pa2: measured
             .spectrum
             .psd()
             .iter()
             .map(|p| f64::from(*p) * PAC_PA_PER_COUNT * PAC_PA_PER_COUNT)
             .collect(),
         bin_hz: BIN_HZ,
-        centroid_hz: felt.spectrum.centroid_hz().unwrap_or(0.0),
-        properties: properties(&[vec![(&felt).into()]])[0][0],
+        centroid_hz: measured.spectrum.centroid_hz().unwrap_or(0.0),
+        properties: properties(&[vec![(&measured).into()]])[0][0],
     })
 }
 

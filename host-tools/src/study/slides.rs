@@ -159,7 +159,7 @@ impl StudyWorld {
         } = *session;
         let mut rig = self.guarded_rig(texture, session.number, wear, session.force_guard);
         rig.control().allow_high_force(!session.force_guard);
-        let mut felt = TextureTrials {
+        let mut measured = TextureTrials {
             texture,
             slides: Vec::with_capacity(movements.len()),
             wear: vec![wear],
@@ -179,19 +179,21 @@ impl StudyWorld {
             trials,
             |rig, at, slide| {
                 if trial % trials == 0 {
-                    felt.slides.push(Vec::with_capacity(trials as usize));
-                    felt.wear.push(0.0);
+                    measured.slides.push(Vec::with_capacity(trials as usize));
+                    measured.wear.push(0.0);
                 }
                 trial += 1;
                 let observation = at.measure(plan, &slide)?;
-                if let (Some(slides), Some(wear)) = (felt.slides.last_mut(), felt.wear.last_mut()) {
+                if let (Some(slides), Some(wear)) =
+                    (measured.slides.last_mut(), measured.wear.last_mut())
+                {
                     slides.push(observation);
                     *wear = rig.world().truth().wear;
                 }
                 Ok(())
             },
         )?;
-        Ok(felt)
+        Ok(measured)
     }
 
     /// The skin before each texture: its wear, and whether it is new.

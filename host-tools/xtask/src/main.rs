@@ -110,7 +110,7 @@ enum Cli {
     },
     /// Have the probe work for a day on the simulated rig and for an hour on the emulated board, with random faults
     ///
-    /// It is taught, forgets and explores, and in every fourth visit something breaks. Judged are its clock, its slots, its stack,
+    /// The probe learns, deletes and identifies textures, and in every fourth episode something breaks. Judged are its clock, its slots, its stack,
     /// its restarts, what it has stored, and the force on the finger. Exit code 1 if a bar is missed.
     #[command(after_help = "Examples:
   cargo xtask soak                                  some 25 minutes on an idle core, 3 of them for the PC's 24 hours

@@ -61,11 +61,11 @@ impl BandPower {
 
     /// Takes as many samples as the block has room for, and gives the others back.
     fn take<'s>(&mut self, samples: &'s [i16]) -> &'s [i16] {
-        let room = self.samples.0.get_mut(HISTORY + self.filled..);
-        let room = room.unwrap_or_default();
-        let many = samples.len().min(room.len());
+        let buffer = self.samples.0.get_mut(HISTORY + self.filled..);
+        let buffer = buffer.unwrap_or_default();
+        let many = samples.len().min(buffer.len());
         let (now, later) = samples.split_at_checked(many).unwrap_or_default();
-        for (slot, &sample) in room.iter_mut().zip(now) {
+        for (slot, &sample) in buffer.iter_mut().zip(now) {
             *slot = sample.clamp(-4096, 4095);
         }
         self.filled += many;

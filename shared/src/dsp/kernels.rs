@@ -23,7 +23,7 @@ pub trait Kernels {
     fn fold_frame<'r>(
         angles: &Angles,
         frame: &[i16; FRAME],
-        room: &'r mut MaybeUninit<Folded>,
+        buffer: &'r mut MaybeUninit<Folded>,
     ) -> &'r mut Folded;
 
     /// Halves the transform of reals, of which each of `reals` has one and that half of them later: the first half of `folded`,
@@ -57,9 +57,9 @@ impl Kernels for Plain {
     fn fold_frame<'r>(
         angles: &Angles,
         frame: &[i16; FRAME],
-        room: &'r mut MaybeUninit<Folded>,
+        buffer: &'r mut MaybeUninit<Folded>,
     ) -> &'r mut Folded {
-        let folded = room.write([Complex32::new(0.0, 0.0); FRAME / 2]);
+        let folded = buffer.write([Complex32::new(0.0, 0.0); FRAME / 2]);
         let ([odd, even], _) = folded.as_chunks_mut::<{ FRAME / 4 }>() else {
             return folded;
         };

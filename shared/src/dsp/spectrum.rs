@@ -170,8 +170,8 @@ impl SpectrumSum {
         while !samples.is_empty() {
             samples = self.fill(samples);
             if self.filled >= FRAME {
-                let mut room = MaybeUninit::uninit();
-                let folded = K::fold_frame(angles, &self.frame, &mut room);
+                let mut buffer = MaybeUninit::uninit();
+                let folded = K::fold_frame(angles, &self.frame, &mut buffer);
                 self.sum.add(angles, folded, K::fold, K::add_power);
                 self.frame.copy_within(HOP.., 0);
                 self.filled = FRAME - HOP;
@@ -183,12 +183,12 @@ impl SpectrumSum {
     // not generic: compiled with this crate, for speed
     #[inline(never)]
     fn fill<'s>(&mut self, samples: &'s [i16]) -> &'s [i16] {
-        let room = self.frame.get_mut(self.filled..).unwrap_or_default();
-        let many = samples.len().min(room.len());
+        let buffer = self.frame.get_mut(self.filled..).unwrap_or_default();
+        let many = samples.len().min(buffer.len());
         let (now, later) = samples.split_at_checked(many).unwrap_or_default();
         // a frame's sum is in 32 bits
         let mut total = 0;
-        for (slot, &sample) in room.iter_mut().zip(now) {
+        for (slot, &sample) in buffer.iter_mut().zip(now) {
             *slot = sample;
             total += i32::from(sample);
         }

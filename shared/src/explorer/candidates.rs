@@ -2,9 +2,9 @@
 
 use super::config::{Config, ExplorerError, Method};
 use super::kernels::Kernels;
-use super::novelty::Background;
+use super::novelty::NoveltyModel;
 use super::posterior::{Explorer, OUT};
-use super::student::Shrunk;
+use super::student::ShrinkagePrior;
 use crate::features::{Property, PropertySet};
 use crate::table::{Action, Contents, Table};
 use crate::up_to;
@@ -55,7 +55,10 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         let textures = table.textures();
         let log = &mut self.log;
         log.resize(textures.into(), OUT)
-            .map_err(|_| ExplorerError::Room { textures, room: N })?;
+            .map_err(|_| ExplorerError::NoSpace {
+                textures,
+                capacity: N,
+            })?;
         for texture in candidates {
             *log.get_mut(usize::from(texture))
                 .ok_or(ExplorerError::Candidates)? = 0;
@@ -105,14 +108,15 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         }
         if let Method::Student | Method::StudentAll = method {
             for movement in 0..table.movements().len() as u8 {
-                let of = Property::ALL.map(|property| Shrunk::new(&table, movement, property));
-                self.shrunk.extend(of);
+                let of =
+                    Property::ALL.map(|property| ShrinkagePrior::new(&table, movement, property));
+                self.shrinkage.extend(of);
             }
         }
         if method == Method::Fused {
-            let backgrounds = self.actions.iter();
-            let backgrounds = backgrounds.map(|a| Background::new(&table, a.movement));
-            self.backgrounds.extend(backgrounds);
+            let novelty_models = self.actions.iter();
+            let novelty_models = novelty_models.map(|a| NoveltyModel::new(&table, a.movement));
+            self.novelty_models.extend(novelty_models);
         }
         // as many
         self.posterior = up_to(log.iter().map(|_| 0.0));

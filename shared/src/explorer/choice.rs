@@ -1,17 +1,18 @@
 //! The next movement: the one that should leave the least confusion among the textures that are still likely (eq. 7, 11-13).
 
 use heapless::{Vec, VecView};
+use serde::{Deserialize, Serialize};
 
 use super::config::{Method, NEGLIGIBLE, Strategy};
-use super::kernels::{Kernels, Live, confused};
+use super::kernels::{Kernels, LiveTexture, confused};
 use super::posterior::Explorer;
 use super::whitened;
 use crate::features::{Property, PropertySet};
 use crate::table::{Action, Gaussian, MAX_ACTIONS, Table};
 
-/// What an action promises.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Outlook {
+/// What an action is expected to bring.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct ExpectedOutcome {
     /// The action.
     pub action: Action,
     /// Uncertainty that is expected to remain after it (eq. 11), 0 to 1.
@@ -26,13 +27,13 @@ pub fn confusion<K: Kernels>(a: Gaussian, b: Gaussian) -> f32 {
 }
 
 impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
-    /// The next action, where [`Explorer::outlook`] promises `outlook`. `random` decides for [`Strategy::Random`] and is
+    /// The next action, where [`Explorer::expected_outcomes`] expects `outcomes`. `random` decides for [`Strategy::Random`] and is
     /// ignored otherwise.
-    pub fn choose(&self, outlook: &[Outlook], random: u32) -> Action {
+    pub fn choose(&self, outcomes: &[ExpectedOutcome], random: u32) -> Action {
         let chosen = match self.config.strategy {
             Strategy::Bayesian => {
                 // the first of equals
-                let best = outlook.iter().reduce(|best, next| {
+                let best = outcomes.iter().reduce(|best, next| {
                     if next.benefit > best.benefit {
                         next
                     } else {
@@ -57,24 +58,24 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         })
     }
 
-    /// What every action promises now, in their order.
-    pub fn outlook(&self) -> Vec<Outlook, MAX_ACTIONS> {
-        let mut promises = Vec::new();
-        self.look_out(&mut promises);
-        promises
+    /// The expected outcome of every action now, in their order.
+    pub fn expected_outcomes(&self) -> Vec<ExpectedOutcome, MAX_ACTIONS> {
+        let mut outcomes = Vec::new();
+        self.evaluate_actions(&mut outcomes);
+        outcomes
     }
 
-    /// As [`Explorer::outlook`], for those who have room for it: it is large, and not moved then.
-    pub fn look_out(&self, promises: &mut Vec<Outlook, MAX_ACTIONS>) {
-        promises.clear();
+    /// As [`Explorer::expected_outcomes`], for callers with a buffer for it: it is large, and not moved then.
+    pub fn evaluate_actions(&self, outcomes: &mut Vec<ExpectedOutcome, MAX_ACTIONS>) {
+        outcomes.clear();
         let actions = self.actions.iter().zip(&self.made).zip(&self.at_first);
         for ((&action, &made), &at_first) in actions {
             let uncertainty = match self.slides {
                 0 => at_first,
                 _ => self.uncertainty(self.config.method, action),
             };
-            // there is room: as many as there are actions
-            let _ = promises.push(Outlook {
+            // it fits: as many as there are actions
+            let _ = outcomes.push(ExpectedOutcome {
                 action,
                 uncertainty,
                 benefit: benefit(uncertainty, made),
@@ -111,7 +112,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         if method == Method::Fused {
             return whitened::uncertainty::<K, N>(&self.table, movement, &self.posterior);
         }
-        let mut live: Vec<Live, N> = Vec::new();
+        let mut live: Vec<LiveTexture, N> = Vec::new();
         let properties = self.gather(method, action, &self.posterior, &mut live);
         uncertainty_of(&mut live, properties, K::confuse, K::sqrt)
     }
@@ -124,7 +125,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         method: Method,
         action: Action,
         posterior: &[f32],
-        live: &mut Vec<Live, N>,
+        live: &mut Vec<LiveTexture, N>,
     ) -> usize {
         let looked_at: PropertySet = match action.property {
             Some(property) => [property].into_iter().collect(),
@@ -136,11 +137,11 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             let expect = |texture, property| self.expected(texture, action.movement, property);
             for (&probability, texture) in posterior.iter().zip(0..) {
                 if probability >= NEGLIGIBLE {
-                    let mut candidate = Live::new(probability);
+                    let mut candidate = LiveTexture::new(probability);
                     for (slot, property) in candidate.expected.iter_mut().zip(looked_at.iter()) {
                         *slot = expect(texture, property).unwrap_or(*slot);
                     }
-                    // there is room: `posterior` is no longer than N
+                    // it fits: `posterior` is no longer than N
                     let _ = live.push(candidate);
                 }
             }
@@ -153,15 +154,15 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
 
 /// The textures that are still likely, with what is expected of the property that is looked at.
 #[inline(never)]
-fn gather(table: &Table<'_>, action: Action, posterior: &[f32], live: &mut VecView<Live>) {
+fn gather(table: &Table<'_>, action: Action, posterior: &[f32], live: &mut VecView<LiveTexture>) {
     let known = table.gaussians(action);
     for (&probability, texture) in posterior.iter().zip(0..) {
         if probability >= NEGLIGIBLE {
-            let mut candidate = Live::new(probability);
+            let mut candidate = LiveTexture::new(probability);
             if let ([slot, ..], Some(known)) = (&mut candidate.expected, known.get(texture)) {
                 *slot = known;
             }
-            // there is room: as much as for the posterior
+            // it fits: as much as for the posterior
             let _ = live.push(candidate);
         }
     }
@@ -170,9 +171,9 @@ fn gather(table: &Table<'_>, action: Action, posterior: &[f32], live: &mut VecVi
 /// Expected uncertainty (eq. 11) of these textures, of which so many properties are looked at.
 #[inline(never)]
 fn uncertainty_of(
-    live: &mut [Live],
+    live: &mut [LiveTexture],
     properties: usize,
-    confuse: fn(&mut Live, &mut [Live]),
+    confuse: fn(&mut LiveTexture, &mut [LiveTexture]),
     sqrt: fn(f32) -> f32,
 ) -> f32 {
     let mut rest = &mut *live;
@@ -180,17 +181,17 @@ fn uncertainty_of(
         confuse_with(a, others, properties, confuse, sqrt);
         rest = others;
     }
-    let left = |c: &Live| c.probability * c.confused / (c.probability + c.confused);
+    let left = |c: &LiveTexture| c.probability * c.confused / (c.probability + c.confused);
     live.iter().map(left).sum()
 }
 
 /// Confusion of one texture with all others (eq. 7), by so many properties.
 #[inline(always)]
 pub(super) fn confuse_with(
-    a: &mut Live,
-    others: &mut [Live],
+    a: &mut LiveTexture,
+    others: &mut [LiveTexture],
     properties: usize,
-    confuse: fn(&mut Live, &mut [Live]),
+    confuse: fn(&mut LiveTexture, &mut [LiveTexture]),
     sqrt: fn(f32) -> f32,
 ) {
     if properties == 1 {

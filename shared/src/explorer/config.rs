@@ -11,7 +11,7 @@ use crate::table::{Action, Contents};
 /// probability, all of 117 by about 2e-4.
 pub(super) const NEGLIGIBLE: f32 = 1e-6;
 
-/// How what was felt is compared with what is known.
+/// How slides are compared with the table.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub enum Method {
     /// The paper's: one property per slide, Gaussians (eq. 4).
@@ -72,7 +72,7 @@ pub enum Strategy {
 /// How to choose, and when to stop.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Config {
-    /// How what was felt is compared with what is known.
+    /// How slides are compared with the table.
     pub method: Method,
     /// How the next movement is chosen.
     pub strategy: Strategy,
@@ -106,11 +106,11 @@ impl Config {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ExplorerError {
     /// The table has more textures than the explorer has room for.
-    Room {
+    NoSpace {
         /// Textures of the table.
         textures: u16,
         /// Room.
-        room: usize,
+        capacity: usize,
     },
     /// A candidate that the table does not have, or none at all.
     Candidates,
@@ -125,7 +125,7 @@ pub enum ExplorerError {
 impl fmt::Display for ExplorerError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Room { textures, room } => write!(f, "the table has {textures} textures, and there is room for {room}"),
+            Self::NoSpace { textures, capacity } => write!(f, "the table has {textures} textures, and there is room for {capacity}"),
             Self::Candidates => f.write_str("the candidates are not textures of the table"),
             Self::NothingToMeasure => f.write_str(
                 "no property that this rig measures was learned of every candidate at one movement, from two trials or more",
@@ -149,7 +149,7 @@ impl fmt::Display for ExplorerError {
 
 impl core::error::Error for ExplorerError {}
 
-/// Why a slide taught nothing. The exploration stands as it was.
+/// Why a slide was not used. The exploration stands as it was.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum ObserveError {
     /// The slide has no such property, or it is not a finite number.

@@ -3,9 +3,9 @@
 
 use heapless::Vec;
 
-use super::choice::{Outlook, benefit, confuse_with};
+use super::choice::{ExpectedOutcome, benefit, confuse_with};
 use super::config::{Method, NEGLIGIBLE};
-use super::kernels::{Candidate, Kernels, Live};
+use super::kernels::{Candidate, Kernels, LiveTexture};
 use super::posterior::{Explorer, LEAST};
 use super::whitened;
 use crate::table::{Action, MAX_ACTIONS};
@@ -19,7 +19,7 @@ const ROWS: usize = 4;
 pub type Degrees = [f32; LANES];
 
 /// Degrees of confusion of every two candidates of an explorer by each of its actions, in memory that the caller brings. They
-/// serve every explorer of the same table, candidates and method: [`Explorer::outlook_by`].
+/// serve every explorer of the same table, candidates and method: [`Explorer::expected_outcomes_by`].
 #[derive(Clone, Copy, Debug)]
 pub struct Confusions<M> {
     /// Square matrices, one for every few actions. A texture with itself has 0: eq. 10 leaves it out.
@@ -29,18 +29,18 @@ pub struct Confusions<M> {
 
 impl<M: AsRef<[Degrees]> + AsMut<[Degrees]>> Confusions<M> {
     /// How much memory those of an explorer take.
-    pub fn room<const N: usize, K>(explorer: &Explorer<'_, N, K>) -> usize {
+    pub fn len_for<const N: usize, K>(explorer: &Explorer<'_, N, K>) -> usize {
         let textures = explorer.posterior.len();
         explorer.actions.len().div_ceil(LANES) * textures * textures
     }
 
-    /// Computes them; `None` where the memory is not as large as [`Confusions::room`] says.
+    /// Computes them; `None` where the memory is not as large as [`Confusions::len_for`] says.
     pub fn new<const N: usize, K: Kernels>(
         explorer: &Explorer<'_, N, K>,
         mut memory: M,
     ) -> Option<Self> {
         let all = memory.as_mut();
-        if all.len() != Self::room(explorer) {
+        if all.len() != Self::len_for(explorer) {
             return None;
         }
         all.fill([0.0; LANES]);
@@ -66,20 +66,20 @@ impl<M: AsRef<[Degrees]> + AsMut<[Degrees]>> Confusions<M> {
 }
 
 impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
-    /// As [`Explorer::outlook`], to the bit, by degrees of confusion that were computed before: of an explorer of the same
+    /// As [`Explorer::expected_outcomes`], to the bit, by degrees of confusion that were computed before: of an explorer of the same
     /// table, candidates and method.
-    pub fn outlook_by(
+    pub fn expected_outcomes_by(
         &self,
         confusions: &Confusions<impl AsRef<[Degrees]>>,
-    ) -> Vec<Outlook, MAX_ACTIONS> {
+    ) -> Vec<ExpectedOutcome, MAX_ACTIONS> {
         if self.slides == 0 {
-            return self.outlook();
+            return self.expected_outcomes();
         }
         // filled where it lies, and not moved: it is large
         let mut live: Vec<(u16, f32), N> = Vec::new();
         for (&probability, texture) in self.posterior.iter().zip(0..) {
             if probability >= NEGLIGIBLE {
-                // there is room: as much as for the posterior
+                // it fits: as much as for the posterior
                 let _ = live.push((texture, probability));
             }
         }
@@ -89,7 +89,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         let uncertainty = matrices.flat_map(|matrix| uncertainty(matrix, textures, &live));
         let actions = self.actions.iter().zip(&self.made).zip(uncertainty);
         actions
-            .map(|((&action, &made), uncertainty)| Outlook {
+            .map(|((&action, &made), uncertainty)| ExpectedOutcome {
                 action,
                 uncertainty,
                 benefit: benefit(uncertainty, made),
@@ -118,9 +118,9 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             };
             confuse_each(&mut live, &candidates, confuse, |c| &mut c.confused, tell);
         } else {
-            let mut live: Vec<Live, N> = Vec::new();
+            let mut live: Vec<LiveTexture, N> = Vec::new();
             let properties = self.gather(method, action, &certain, &mut live);
-            let confuse = |a: &mut Live, others: &mut [Live]| {
+            let confuse = |a: &mut LiveTexture, others: &mut [LiveTexture]| {
                 confuse_with(a, others, properties, K::confuse, K::sqrt);
             };
             confuse_each(&mut live, &candidates, confuse, |c| &mut c.confused, tell);

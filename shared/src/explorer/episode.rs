@@ -6,9 +6,9 @@ use crate::features::{MAX_FEATURES, Vector};
 use crate::table::MAX_MOVEMENTS;
 use crate::up_to;
 
-/// The slides made of one movement in a visit.
+/// The slides of one movement in an episode.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Visit {
+pub(super) struct MovementSums {
     pub(super) movement: u8,
     pub(super) slides: u8,
     /// Sum of the whitened slides, 1/256.
@@ -17,28 +17,28 @@ pub(super) struct Visit {
     pub(super) properties: [f32; 3],
 }
 
-/// All movements made in a visit.
-pub(super) type Visits = Vec<Visit, MAX_MOVEMENTS>;
+/// All movements of an episode.
+pub(super) type Episode = Vec<MovementSums, MAX_MOVEMENTS>;
 
 /// The slides of `movement`, one more than before; `None` beyond 255, where nothing new is learned.
-pub(super) fn one_more(visits: &mut Visits, movement: u8) -> Option<&mut Visit> {
-    let at = match visits.iter().position(|v| v.movement == movement) {
+pub(super) fn one_more(episode: &mut Episode, movement: u8) -> Option<&mut MovementSums> {
+    let at = match episode.iter().position(|v| v.movement == movement) {
         Some(at) => at,
         None => {
-            let new = Visit {
+            let new = MovementSums {
                 movement,
-                ..Visit::default()
+                ..MovementSums::default()
             };
-            visits.push(new).ok()?;
-            visits.len() - 1
+            episode.push(new).ok()?;
+            episode.len() - 1
         }
     };
-    let visit = visits.get_mut(at)?;
-    visit.slides = visit.slides.checked_add(1)?;
-    Some(visit)
+    let sums = episode.get_mut(at)?;
+    sums.slides = sums.slides.checked_add(1)?;
+    Some(sums)
 }
 
-impl Visit {
+impl MovementSums {
     /// Mean of so many whitened features, to the nearest step.
     pub(super) fn mean(&self, features: usize) -> Vector {
         if self.slides == 1 {
@@ -56,7 +56,7 @@ impl Visit {
 
 /// What an exploration can teach, until the next one begins.
 #[derive(Clone, Debug)]
-pub struct Visited {
+pub struct EpisodeSummary {
     /// Checksum of the table that was explored with.
     pub table: u32,
     /// The most probable texture.
@@ -64,5 +64,5 @@ pub struct Visited {
     /// Whether the probe may learn from it by itself.
     pub certain: bool,
     /// The movements made, with the number of slides and their whitened mean; none with a table of Gaussians.
-    pub felt: Vec<(u8, u8, Vector), MAX_MOVEMENTS>,
+    pub observed: Vec<(u8, u8, Vector), MAX_MOVEMENTS>,
 }

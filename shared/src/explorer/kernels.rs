@@ -90,7 +90,7 @@ pub(crate) fn mask(features: usize) -> Mask {
 /// as that of [`Candidate`].
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
-pub struct Live {
+pub struct LiveTexture {
     /// Its probability.
     pub probability: f32,
     /// Sum over all others of confusion times probability: the numerator of eq. 8.
@@ -99,7 +99,7 @@ pub struct Live {
     pub expected: [Gaussian; Property::ALL.len()],
 }
 
-impl Live {
+impl LiveTexture {
     /// One that is not compared yet, of which nothing is expected.
     pub const fn new(probability: f32) -> Self {
         Self {
@@ -127,7 +127,7 @@ pub(crate) fn confused(a: Gaussian, b: Gaussian, sqrt: fn(f32) -> f32) -> f32 {
 }
 
 /// Degrees of freedom of Student's t in the fused way of deciding.
-pub(crate) const FREEDOM: u8 = 8;
+pub(crate) const DEGREES_OF_FREEDOM: u8 = 8;
 
 /// What Student's t makes of `k` slides against a mean of `n`, whose difference has the variance v = 1/k + 1/n.
 #[derive(Clone, Copy, Debug)]
@@ -146,16 +146,18 @@ impl Spread {
     /// Of `k` slides against a mean of `n`, none of them 0.
     pub(crate) fn new(k: u8, n: u8, features: usize) -> Self {
         let (k32, n32) = (u32::from(k), u32::from(n));
-        let of_v = u64::from(u32::from(FREEDOM) * (k32 + n32));
+        let of_v = u64::from(u32::from(DEGREES_OF_FREEDOM) * (k32 + n32));
         // 20 bits at most, as k and n have 8 each
         let narrowness = ((u64::from(k32 * n32) << 16) / of_v.max(1)) as u32;
-        let ln_v = -i64::from(ln_q16(u64::from(FREEDOM) * u64::from(narrowness)));
+        let ln_v = -i64::from(ln_q16(
+            u64::from(DEGREES_OF_FREEDOM) * u64::from(narrowness),
+        ));
         Self {
             slides: n,
             narrowness,
             // ln v is 5 at most, times 14/2
             norm: (-(features as i64) * ln_v / 2) as i32,
-            weight: i32::from(FREEDOM) + features as i32,
+            weight: i32::from(DEGREES_OF_FREEDOM) + features as i32,
         }
     }
 
@@ -186,8 +188,8 @@ const MOST_OFF: i32 = (1 << 26) - 1;
 
 /// What costs the time of a decision.
 pub trait Kernels: crate::dsp::Kernels {
-    /// Makes logarithms 0.
-    fn forget(logs: &mut [i32]);
+    /// Sets logarithms to 0, the prior.
+    fn reset_to_prior(logs: &mut [i32]);
 
     /// Adds the likelihood (ln, Q16, up to a constant) of textures when the mean of some slides is `from`, to `logs`, one
     /// texture after another. `means` has their whitened means, one at the beginning of every `stride` bytes, learned from as
@@ -213,14 +215,14 @@ pub trait Kernels: crate::dsp::Kernels {
 
     /// Adds the confusion of `a` with each of `others` (eq. 7), by the first property that is looked at, to what they are
     /// confused with. Means and standard deviations are a table's: finite, and these above 0.
-    fn confuse(a: &mut Live, others: &mut [Live]);
+    fn confuse(a: &mut LiveTexture, others: &mut [LiveTexture]);
 
     /// Square root of a number that is not negative, correctly rounded (IEEE 754).
     fn sqrt(x: f32) -> f32;
 }
 
 impl Kernels for Plain {
-    fn forget(logs: &mut [i32]) {
+    fn reset_to_prior(logs: &mut [i32]) {
         logs.fill(0);
     }
 
@@ -275,7 +277,7 @@ impl Kernels for Plain {
         }
     }
 
-    fn confuse(a: &mut Live, others: &mut [Live]) {
+    fn confuse(a: &mut LiveTexture, others: &mut [LiveTexture]) {
         let [of_a, ..] = a.expected;
         let mut sum = a.confused;
         for b in others {

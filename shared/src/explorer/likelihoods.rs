@@ -3,8 +3,8 @@
 use super::config::{Method, ObserveError};
 use super::episode::one_more;
 use super::kernels::Kernels;
-use super::posterior::{Explorer, draw_near};
-use super::student::{Shrunk, Student};
+use super::posterior::{Explorer, rebase};
+use super::student::{ShrinkagePrior, Student};
 use super::whitened;
 use crate::features::{Observation, Property};
 use crate::table::{Action, Contents, Gaussian, mean_step};
@@ -56,7 +56,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     ) -> Result<(), ObserveError> {
         let x = Self::value(slide, property)?;
         if self.slides > 0 && (self.slides.is_multiple_of(SLIDES) || self.slides == u8::MAX) {
-            draw_near(&mut self.log);
+            rebase(&mut self.log);
         }
         if self.config.method == Method::Paper {
             let known = self.table.gaussians(action);
@@ -64,7 +64,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         } else {
             self.add_students(x, action.movement, property, 1);
         }
-        self.settle();
+        self.normalize();
         Ok(())
     }
 
@@ -72,11 +72,12 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     fn add_students(&mut self, x: f32, movement: u8, property: Property, slides: u8) {
         let mut student: Option<Student> = None;
         for texture in 0..self.table.textures() {
-            let Some((shrunk, known, trials)) = self.shrunk_of(texture, movement, property) else {
+            let Some((shrinkage, known, trials)) = self.shrinkage_of(texture, movement, property)
+            else {
                 continue;
             };
-            let expected = shrunk.expect(known, trials, slides);
-            let freedom = shrunk.freedom + (f32::from(trials) - 1.0);
+            let expected = shrinkage.expect(known, trials, slides);
+            let freedom = shrinkage.freedom + (f32::from(trials) - 1.0);
             // mostly that of the texture before, which has as many trials
             let student = match student {
                 Some(ref last) if last.freedom() == freedom => last,
@@ -98,30 +99,30 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         for property in self.measured.iter() {
             Self::value(slide, property)?;
         }
-        if let Some(visit) = one_more(&mut self.visits, action.movement) {
-            for (property, sum) in Property::ALL.into_iter().zip(&mut visit.properties) {
+        if let Some(sums) = one_more(&mut self.episode, action.movement) {
+            for (property, sum) in Property::ALL.into_iter().zip(&mut sums.properties) {
                 *sum += Self::value(slide, property).unwrap_or(0.0);
             }
         }
-        self.forget();
-        for at in 0..self.visits.len() {
-            let Some(visit) = self.visits.get(at).copied() else {
+        self.reset_to_prior();
+        for at in 0..self.episode.len() {
+            let Some(sums) = self.episode.get(at).copied() else {
                 continue;
             };
             for property in self.measured.iter() {
-                let Some(sum) = visit.properties.get(property.index()) else {
+                let Some(sum) = sums.properties.get(property.index()) else {
                     continue;
                 };
                 self.add_students(
-                    sum / f32::from(visit.slides),
-                    visit.movement,
+                    sum / f32::from(sums.slides),
+                    sums.movement,
                     property,
-                    visit.slides,
+                    sums.slides,
                 );
             }
-            draw_near(&mut self.log);
+            rebase(&mut self.log);
         }
-        self.settle();
+        self.normalize();
         Ok(())
     }
 
@@ -141,20 +142,20 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         let Some(white) = self.table.whiten(action.movement, &vector) else {
             return Err(ObserveError::Features(set));
         };
-        if let Some(visit) = one_more(&mut self.visits, action.movement) {
-            for (sum, z) in visit.white.iter_mut().zip(&white) {
+        if let Some(sums) = one_more(&mut self.episode, action.movement) {
+            for (sum, z) in sums.white.iter_mut().zip(&white) {
                 *sum += i32::from(*z);
             }
         }
-        self.forget();
+        self.reset_to_prior();
         let elsewhere = whitened::add_likelihoods(
             &self.table,
-            &self.visits,
-            &self.backgrounds,
+            &self.episode,
+            &self.novelty_models,
             &mut self.log,
             K::add_likelihoods,
         );
-        let average = self.settle();
+        let average = self.normalize();
         self.log_odds =
             elsewhere.and_then(|(elsewhere, can_tell)| can_tell.then_some(elsewhere - average));
         Ok(())
@@ -170,21 +171,21 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         if self.config.method == Method::Paper {
             return self.table.gaussian(texture, Action::of(movement, property));
         }
-        let (shrunk, known, trials) = self.shrunk_of(texture, movement, property)?;
-        Some(shrunk.expect(known, trials, 1))
+        let (shrinkage, known, trials) = self.shrinkage_of(texture, movement, property)?;
+        Some(shrinkage.expect(known, trials, 1))
     }
 
-    fn shrunk_of(
+    fn shrinkage_of(
         &self,
         texture: u16,
         movement: u8,
         property: Property,
-    ) -> Option<(Shrunk, Gaussian, u8)> {
+    ) -> Option<(ShrinkagePrior, Gaussian, u8)> {
         let at = usize::from(movement) * Property::ALL.len() + property.index();
-        let shrunk = self.shrunk.get(at)?;
+        let shrinkage = self.shrinkage.get(at)?;
         let known = self
             .table
             .gaussian(texture, Action::of(movement, property))?;
-        Some((*shrunk, known, self.table.trials(texture, movement)))
+        Some((*shrinkage, known, self.table.trials(texture, movement)))
     }
 }

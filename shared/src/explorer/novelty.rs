@@ -1,6 +1,6 @@
 //! What a texture that the table does not have is like.
 
-use super::kernels::FREEDOM;
+use super::kernels::DEGREES_OF_FREEDOM;
 use crate::features::{MAX_FEATURES, Vector};
 use crate::table::{Contents, Table, oas, white};
 
@@ -11,7 +11,7 @@ const WIDE: f32 = 400.0;
 
 /// The likelihood of a texture that the table does not have: means of textures scatter as those of the table do.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Background {
+pub(super) struct NoveltyModel {
     pub(super) movement: u8,
     mean: [f32; MAX_FEATURES],
     variance: [f32; MAX_FEATURES],
@@ -21,7 +21,7 @@ pub(super) struct Background {
     pub(super) slides: Option<u8>,
 }
 
-impl Background {
+impl NoveltyModel {
     pub(super) fn new(table: &Table<'_>, movement: u8) -> Self {
         let mut count = 0;
         let mut sum = [0i64; MAX_FEATURES];
@@ -39,7 +39,7 @@ impl Background {
         let slides = table.trials(0, movement);
         let same = (0..table.textures()).all(|texture| table.trials(texture, movement) == slides);
         let step = white(1);
-        let mut background = Self {
+        let mut model = Self {
             movement,
             mean: sum.map(|sum| sum as f32 / n * step),
             variance: [WIDE; MAX_FEATURES],
@@ -47,18 +47,18 @@ impl Background {
             slides: same.then_some(slides),
         };
         if known {
-            for ((variance, sum), squares) in background.variance.iter_mut().zip(sum).zip(squares) {
+            for ((variance, sum), squares) in model.variance.iter_mut().zip(sum).zip(squares) {
                 // exact in i64: 117 means of 16 bits
                 let above = squares * count as i64 - sum * sum;
                 *variance = above as f32 / (n * n) * step * step;
             }
             let Contents::Fused(_, features) = table.contents() else {
-                return background;
+                return model;
             };
-            let variances = background.variance.get_mut(..features.into());
+            let variances = model.variance.get_mut(..features.into());
             shrink(variances.unwrap_or_default(), n);
         }
-        background
+        model
     }
 
     /// As [`Spread::likelihood`], of the mean of `k` slides.
@@ -78,7 +78,7 @@ impl Background {
             }
             norm += libm::logf(product);
         }
-        let freedom = f32::from(FREEDOM);
+        let freedom = f32::from(DEGREES_OF_FREEDOM);
         let tail = (freedom + mean.len() as f32) / 2.0;
         -0.5 * norm - tail * libm::log1pf(distance / freedom)
     }

@@ -8,10 +8,10 @@ use core::marker::PhantomData;
 use heapless::Vec;
 
 use super::config::Config;
-use super::episode::Visits;
+use super::episode::Episode;
 use super::kernels::Kernels;
-use super::novelty::Background;
-use super::student::Shrunk;
+use super::novelty::NoveltyModel;
+use super::student::ShrinkagePrior;
 use crate::dsp::Plain;
 use crate::features::{PropertySet, Vector};
 use crate::table::{Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, Table};
@@ -64,12 +64,12 @@ pub struct Explorer<'t, const N: usize, K = Plain> {
     pub(super) at_first: Vec<f32, MAX_ACTIONS>,
     pub(super) slides: u8,
     /// The slides of this exploration, for the methods that take their mean.
-    pub(super) visits: Visits,
+    pub(super) episode: Episode,
     pub(super) log_odds: Option<f32>,
     /// For Student's t: movement by movement, properties in their order.
-    pub(super) shrunk: Vec<Shrunk, MAX_ACTIONS>,
+    pub(super) shrinkage: Vec<ShrinkagePrior, MAX_ACTIONS>,
     /// For the fused method: what a texture that is not in the table is like, at every movement.
-    pub(super) backgrounds: Vec<Background, MAX_MOVEMENTS>,
+    pub(super) novelty_models: Vec<NoveltyModel, MAX_MOVEMENTS>,
     pub(super) kernels: PhantomData<K>,
 }
 
@@ -87,24 +87,24 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             made: Vec::new(),
             at_first: Vec::new(),
             slides: 0,
-            visits: Vec::new(),
+            episode: Vec::new(),
             log_odds: None,
-            shrunk: Vec::new(),
-            backgrounds: Vec::new(),
+            shrinkage: Vec::new(),
+            novelty_models: Vec::new(),
             kernels: PhantomData,
         }
     }
 
-    /// Forgets all slides: the next exploration begins, with the same candidates equally probable.
+    /// Starts the next exploration, with the same candidates equally probable.
     pub fn restart(&mut self) {
         let prior = 1.0 / f32::from(self.candidates);
-        self.forget();
+        self.reset_to_prior();
         for (posterior, log) in self.posterior.iter_mut().zip(&self.log) {
             *posterior = if *log < LEAST { 0.0 } else { prior };
         }
         self.made = self.actions.iter().map(|_| 0).collect();
         self.slides = 0;
-        self.visits.clear();
+        self.episode.clear();
         self.log_odds = None;
     }
 
@@ -132,7 +132,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         (sure || unknown || self.slides >= self.config.max_slides).then_some(best)
     }
 
-    /// Log-odds that the texture is none of the candidates, after what was felt so far; `None` where the method or the table
+    /// Log-odds that the texture is none of the candidates, after the slides so far; `None` where the method or the table
     /// cannot tell.
     pub fn log_odds(&self) -> Option<f32> {
         self.log_odds
@@ -149,21 +149,21 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         self.log_odds.is_some_and(|log_odds| log_odds > limit)
     }
 
-    /// Whether what was felt is certain enough for the probe to learn from it by itself. Never by the paper's properties
-    /// alone: one in ten such lessons would be wrong.
+    /// Whether the posterior is certain enough for the probe to learn from it by itself. Never by the paper's properties
+    /// alone: one in ten such updates would be wrong.
     pub fn is_certain(&self) -> bool {
         let known = self.log_odds.is_some_and(|log_odds| log_odds <= CERTAIN);
         known && self.best().probability > self.config.threshold
     }
 
     /// The movements made, with the number of slides and their whitened mean: what this exploration can teach a fused table.
-    pub fn felt(&self) -> impl Iterator<Item = (u8, u8, Vector)> + '_ {
+    pub fn observed(&self) -> impl Iterator<Item = (u8, u8, Vector)> + '_ {
         let features = match self.table.contents() {
             Contents::Fused(_, features) => usize::from(features),
             Contents::Gaussians(_) => 0,
         };
-        let visits = self.visits.iter().filter(move |_| features > 0);
-        visits.map(move |v| (v.movement, v.slides, v.mean(features)))
+        let episode = self.episode.iter().filter(move |_| features > 0);
+        episode.map(move |v| (v.movement, v.slides, v.mean(features)))
     }
 
     /// The most probable texture as things stand, the first of equals.
@@ -190,9 +190,9 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     }
 
     /// Logarithms as before the first slide.
-    pub(super) fn forget(&mut self) {
+    pub(super) fn reset_to_prior(&mut self) {
         if usize::from(self.candidates) == self.log.len() {
-            K::forget(&mut self.log);
+            K::reset_to_prior(&mut self.log);
         } else {
             for log in &mut self.log {
                 *log = if *log < LEAST { OUT } else { 0 };
@@ -201,16 +201,16 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     }
 
     /// The posterior from its logarithms; the logarithm of the candidates' mean likelihood.
-    pub(super) fn settle(&mut self) -> f32 {
+    pub(super) fn normalize(&mut self) -> f32 {
         let (top, sum) = K::posterior(&self.log, &mut self.posterior);
         let mean = sum / (1 << 30) as f32 / f32::from(self.candidates);
         top as f32 / 65536.0 + libm::logf(mean)
     }
 }
 
-/// Makes the greatest logarithm 0, so that there is room for slides to come.
+/// Makes the greatest logarithm 0, so that the slides to come have a range left.
 #[inline(never)]
-pub(super) fn draw_near(log: &mut [i32]) {
+pub(super) fn rebase(log: &mut [i32]) {
     let top = log.iter().copied().max().unwrap_or(0);
     for log in log {
         *log = if *log < LEAST {

@@ -11,14 +11,14 @@ const HALVINGS: usize = 60;
 
 /// What the variances of all textures have in common at one movement, for one property.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Shrunk {
+pub(super) struct ShrinkagePrior {
     /// Degrees of freedom that the others are worth, d0.
     pub(super) freedom: f32,
     /// The variance that they say, s0^2.
     variance: f32,
 }
 
-impl Shrunk {
+impl ShrinkagePrior {
     /// From the moments of the logarithms of the variances of the textures that were learned from two trials or more.
     pub(super) fn new(table: &Table<'_>, movement: u8, property: Property) -> Self {
         let action = Action::of(movement, property);

@@ -170,11 +170,20 @@ fn any_cells() -> impl proptest::strategy::Strategy<Value = Vec<Vec<[(f32, f32);
 /// What an explorer says of itself.
 fn state<const N: usize>(
     explorer: &mut Explorer<'_, N>,
-) -> (Vec<f32>, Vec<Outlook>, u8, Option<Verdict>, Vec<Action>) {
-    let (outlook, each) = (explorer.outlook().to_vec(), explorer.turns().collect());
+) -> (
+    Vec<f32>,
+    Vec<ExpectedOutcome>,
+    u8,
+    Option<Verdict>,
+    Vec<Action>,
+) {
+    let (outcomes, each) = (
+        explorer.expected_outcomes().to_vec(),
+        explorer.turns().collect(),
+    );
     (
         explorer.posterior().to_vec(),
-        outlook,
+        outcomes,
         explorer.slides(),
         explorer.verdict(),
         each,
@@ -205,14 +214,14 @@ proptest! {
         let truth = truth.index(candidates.len());
         let mut done = 0;
         while explorer.verdict().is_none() {
-            let outlook = explorer.outlook();
-            prop_assert!(outlook.iter().map(|o| o.action).eq(table.actions()));
+            let outcomes = explorer.expected_outcomes();
+            prop_assert!(outcomes.iter().map(|o| o.action).eq(table.actions()));
             // the logarithm of each slide's likelihood is 1.7e-4 off at most
-            for o in &outlook {
+            for o in &outcomes {
                 prop_assert!((f64::from(o.uncertainty) - paper.uncertainty(o.action)).abs() < 1e-4, "{o:?}");
                 prop_assert!((f64::from(o.benefit) - paper.benefit(o.action)).abs() < 2e-4, "{o:?}");
             }
-            let chosen = explorer.choose(&outlook, 0);
+            let chosen = explorer.choose(&outcomes, 0);
             let most = table.actions().map(|a| paper.benefit(a)).fold(0.0, f64::max);
             let first = table.actions().find(|&a| paper.benefit(a) == most);
             prop_assert!(first == Some(chosen) || most - paper.benefit(chosen) < 2e-4);
@@ -298,9 +307,9 @@ proptest! {
         let mut alone = explorer(&alone, Strategy::Bayesian);
         let mut pair = Eight::among(Table::read(&bytes).unwrap(), PropertySet::ALL, Config::default(), [last as u16, 0, 0]).unwrap();
         for x in x {
-            let outlook = alone.outlook();
-            prop_assert_eq!(&pair.outlook(), &outlook);
-            let action = alone.choose(&outlook, 0);
+            let outcomes = alone.expected_outcomes();
+            prop_assert_eq!(&pair.expected_outcomes(), &outcomes);
+            let action = alone.choose(&outcomes, 0);
             alone.observe(action, &all(x)).unwrap();
             pair.observe(action, &all(x)).unwrap();
             let posterior = pair.posterior();

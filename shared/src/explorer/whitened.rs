@@ -1,29 +1,29 @@
-//! The fused way of deciding: how well the whitened slides of a visit fit each texture, in fixed point.
+//! The fused way of deciding: how well the whitened slides of an episode fit each texture, in fixed point.
 //!
-//! At each movement the running mean of the visit's slides is compared with the texture's mean, as Student's t with 8
+//! At each movement the running mean of the episode's slides is compared with the texture's mean, as Student's t with 8
 //! degrees of freedom. A further slide replaces what the movement said before: adding to it would count the error of the
 //! texture's own mean again with every slide.
 
 use heapless::{Vec, VecView};
 
 use super::config::NEGLIGIBLE;
-use super::episode::Visits;
+use super::episode::Episode;
 use super::kernels::{Candidate, Kernels, Spread, distance, mask};
-use super::novelty::Background;
+use super::novelty::NoveltyModel;
 use crate::dsp::fixed::exp_neg_q30;
 use crate::table::{Contents, Table};
 
 /// [`Kernels::add_likelihoods`].
 type AddLikelihoods = fn(&[i16], &[u8], usize, &Spread, &mut [i32]) -> usize;
 
-/// Adds the logarithms of the likelihoods (Q16, up to a constant) of all textures after the slides of a visit to `logs`; that of
+/// Adds the logarithms of the likelihoods (Q16, up to a constant) of all textures after the slides of an episode to `logs`; that of
 /// a texture that the table does not have, and whether the table has textures enough to tell it.
 // not generic: so it is compiled with this crate, for speed
 #[inline(never)]
 pub(super) fn add_likelihoods(
     table: &Table<'_>,
-    visits: &Visits,
-    backgrounds: &[Background],
+    episode: &Episode,
+    novelty_models: &[NoveltyModel],
     logs: &mut [i32],
     add: AddLikelihoods,
 ) -> Option<(f32, bool)> {
@@ -32,15 +32,17 @@ pub(super) fn add_likelihoods(
     };
     let features = usize::from(features);
     let (mut elsewhere, mut can_tell) = (0.0, true);
-    for visit in visits {
-        let mean = visit.mean(features);
-        let background = backgrounds.iter().find(|b| b.movement == visit.movement)?;
-        let unknown = background.likelihood(&mean, visit.slides);
+    for sums in episode {
+        let mean = sums.mean(features);
+        let background = novelty_models
+            .iter()
+            .find(|b| b.movement == sums.movement)?;
+        let unknown = background.likelihood(&mean, sums.slides);
         elsewhere += unknown;
         can_tell &= background.known;
-        // as little is known of a texture that was never felt here as of one that the table does not have
+        // as little is known of a texture that was never measured here as of one that the table does not have
         let untaught = (unknown * 65536.0) as i32;
-        let column = table.column(visit.movement);
+        let column = table.column(sums.movement);
         let mut rest = &mut *logs;
         let mut texture = 0;
         while !rest.is_empty() {
@@ -59,7 +61,7 @@ pub(super) fn add_likelihoods(
             if slides == 0 {
                 these.iter_mut().for_each(|log| *log += untaught);
             } else {
-                let spread = Spread::new(visit.slides, slides, features);
+                let spread = Spread::new(sums.slides, slides, features);
                 let mut done = 0;
                 loop {
                     let to_do = these.get_mut(done..).unwrap_or_default();
@@ -132,7 +134,7 @@ pub(super) fn gather(
     for (&probability, texture) in posterior.iter().zip(0..) {
         if probability >= NEGLIGIBLE {
             let (mean, slides) = (column.mean(texture), column.slides(texture));
-            // there is room: as much as for the posterior
+            // it fits: as much as for the posterior
             let _ = live.push(Candidate::new(mean, &mask, probability, slides));
         }
     }

@@ -10,7 +10,7 @@ pub const BLOCK: usize = 64;
 
 /// What the samples of a tick belong to.
 #[derive(Clone, PartialEq, Debug, Default)]
-pub enum Felt {
+pub enum SamplePhase {
     /// Nothing.
     #[default]
     Nothing,
@@ -75,25 +75,30 @@ impl Blocks {
         Some(core::mem::replace(&mut self.block, next))
     }
 
-    /// Takes in what a tick felt: at most [`BLOCK`] samples. Gives the block before it, if it is full
+    /// Takes in the samples of a tick: at most [`BLOCK`] samples. Gives the block before it, if it is full
     /// or of another kind.
-    pub fn put(&mut self, felt: &Felt, pac: &[i16], shear_mn: Option<i16>) -> Option<Block> {
-        let still = match felt {
-            Felt::Nothing => return None,
-            Felt::Still => true,
-            Felt::Begin(_) | Felt::Slide => false,
+    pub fn put(
+        &mut self,
+        phase: &SamplePhase,
+        pac: &[i16],
+        shear_mn: Option<i16>,
+    ) -> Option<Block> {
+        let still = match phase {
+            SamplePhase::Nothing => return None,
+            SamplePhase::Still => true,
+            SamplePhase::Begin(_) | SamplePhase::Slide => false,
         };
         let full = self.block.pac.len() + pac.len() > self.block.pac.capacity()
             || self.block.shear_mn.is_full();
-        let done = if full || still != self.block.still || matches!(felt, Felt::Begin(_)) {
+        let done = if full || still != self.block.still || matches!(phase, SamplePhase::Begin(_)) {
             self.take(still)
         } else {
             None
         };
-        if let Felt::Begin(steady) = felt {
+        if let SamplePhase::Begin(steady) = phase {
             self.block.steady = Some((steady.start, steady.end));
         }
-        // there is room for it: the block is empty, or not full
+        // it fits for it: the block is empty, or not full
         let _ = self.block.pac.extend_from_slice(pac);
         if let Some(shear_mn) = shear_mn {
             let _ = self.block.shear_mn.push(shear_mn);
@@ -124,14 +129,14 @@ mod tests {
             (from..next).collect()
         };
         for _ in 0..70 {
-            sent.extend(blocks.put(&Felt::Still, &samples(3), None));
+            sent.extend(blocks.put(&SamplePhase::Still, &samples(3), None));
         }
-        sent.extend(blocks.put(&Felt::Nothing, &[], None));
-        sent.extend(blocks.put(&Felt::Begin(440..900), &samples(2), None));
+        sent.extend(blocks.put(&SamplePhase::Nothing, &[], None));
+        sent.extend(blocks.put(&SamplePhase::Begin(440..900), &samples(2), None));
         for ms in 0..200 {
-            sent.extend(blocks.put(&Felt::Slide, &samples(2), Some(ms)));
+            sent.extend(blocks.put(&SamplePhase::Slide, &samples(2), Some(ms)));
         }
-        sent.extend(blocks.put(&Felt::Slide, &samples(BLOCK), Some(200)));
+        sent.extend(blocks.put(&SamplePhase::Slide, &samples(BLOCK), Some(200)));
         sent.push(blocks.end(5));
         assert!(
             sent.iter()

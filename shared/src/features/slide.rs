@@ -411,10 +411,10 @@ mod tests {
         assert_eq!(background(&[]), Err(SlideError::NoBackground));
     }
 
-    /// What a rig felt in ticks, gathered into blocks, says the same as its samples.
+    /// The samples of ticks, gathered into blocks, say the same as its samples.
     #[test]
     fn a_slide_of_blocks_is_that_of_its_samples() {
-        use super::super::block::{Blocks, Felt};
+        use super::super::block::{Blocks, SamplePhase};
         let (still, moving) = (texture(500), texture(2000));
         let plan = Plan::new();
         let mut by_hand = Slide::<Plain>::new(&plan);
@@ -423,17 +423,17 @@ mod tests {
         by_hand.push(&moving);
         by_hand.push_shear(&(0..900).map(|n| n - 300).collect::<Vec<i16>>());
         let (mut blocks, mut slide) = (Blocks::default(), Slide::<Plain>::new(&plan));
-        let ticks = still.chunks(2).map(|pac| (Felt::Still, pac, None));
+        let ticks = still.chunks(2).map(|pac| (SamplePhase::Still, pac, None));
         let slid = moving.chunks(2).zip(0..).map(|(pac, ms)| match ms {
-            0 => (Felt::Begin(100..1900), pac, None),
+            0 => (SamplePhase::Begin(100..1900), pac, None),
             _ => (
-                Felt::Slide,
+                SamplePhase::Slide,
                 pac,
                 (50..950).contains(&ms).then_some(ms - 350),
             ),
         });
-        for (felt, pac, shear_mn) in ticks.chain(slid) {
-            if let Some(block) = blocks.put(&felt, pac, shear_mn) {
+        for (phase, pac, shear_mn) in ticks.chain(slid) {
+            if let Some(block) = blocks.put(&phase, pac, shear_mn) {
                 slide.take(&block);
             }
         }

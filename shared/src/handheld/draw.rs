@@ -292,7 +292,7 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             brush.headline("Learning", 18)?;
             brush.centre("Leave it on", 42, &FONT_6X10)
         }
-        Screen::Taught(Ok(name)) => {
+        Screen::Learned(Ok(name)) => {
             brush.title("Learned", "")?;
             brush.headline(name, 16)?;
             // a tick
@@ -304,7 +304,7 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             }
             Ok(())
         }
-        Screen::Taught(Err(why)) => {
+        Screen::Learned(Err(why)) => {
             brush.title("Not learned", "")?;
             brush.paragraph(why, 14, 4)?;
             brush.button("go on", "")
@@ -462,7 +462,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
                 line.clear();
             }
             if !line.is_empty() {
-                // there is room, as was looked at
+                // it fits, as was looked at
                 let _ = line.push(' ');
             }
             let word = cut(word, LETTERS);

@@ -67,12 +67,12 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
                 Err(why) => Outcome::NotLearned(why),
             });
             let textures = memory.table().map_or(0, |table| table.textures());
-            handheld.taught(learned, textures);
+            handheld.learned(learned, textures);
         }
     }
 }
 
-/// Learns the visit that was judged last.
+/// Learns the episode that was judged last.
 async fn teach<F: NorFlash, B: StoredBytes<F>>(
     choice: Choice,
     memory: &mut Memory<'_, F, B>,
@@ -87,7 +87,7 @@ async fn teach<F: NorFlash, B: StoredBytes<F>>(
         Choice::Spelled(name) => name,
     };
     if memory.episode.is_none() {
-        return Err(text("nothing was felt: slide first"));
+        return Err(text("no slide was measured: slide first"));
     }
     memory.label(&name, events).await?;
     Ok(name)

@@ -1,10 +1,12 @@
-//! What the slides of a visit say: which textures of the table are the most probable.
+//! What the slides of an episode say: which textures of the table are the most probable.
 
 use core::fmt;
 
 use heapless::Vec;
 
-use crate::explorer::{Config, Explorer, ExplorerError, Kernels, Method, ObserveError, Visited};
+use crate::explorer::{
+    Config, EpisodeSummary, Explorer, ExplorerError, Kernels, Method, ObserveError,
+};
 use crate::features::{FeatureSet, Movement, Observation, PropertySet};
 use crate::table::{Action, MAX_TEXTURES, Name, Table};
 
@@ -17,7 +19,7 @@ pub const MAX_SLIDES: usize = 5;
 /// Textures that a verdict shows.
 pub const LEADING: usize = 3;
 
-/// What the probe makes of a visit.
+/// What the probe makes of an episode.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Judgement {
     /// The most probable textures and their probabilities, the first one leading.
@@ -30,7 +32,7 @@ pub struct Judgement {
     pub open: bool,
 }
 
-/// Why a visit cannot be judged.
+/// Why an episode cannot be judged.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum JudgeError {
     /// The table cannot be used by a handheld probe.
@@ -53,14 +55,14 @@ impl fmt::Display for JudgeError {
 
 impl core::error::Error for JudgeError {}
 
-/// Compares the slides of a visit with every texture of the table. Gives what is to be shown, and what the visit can teach.
+/// Compares the slides of an episode with every texture of the table. Gives what is to be shown, and what the probe can learn from them.
 ///
 /// # Errors
 /// The table is not one for a handheld probe, or a slide lacks a feature.
 pub fn judge<K: Kernels>(
     table: Table<'_>,
     slides: &[Observation],
-) -> Result<(Judgement, Visited), JudgeError> {
+) -> Result<(Judgement, EpisodeSummary), JudgeError> {
     let config = Config {
         method: Method::Fused,
         max_slides: MAX_SLIDES as u8,
@@ -87,7 +89,7 @@ pub fn judge<K: Kernels>(
             .unwrap_or(leading.len());
         if place < LEADING {
             leading.truncate(leading.len().min(LEADING - 1));
-            // there is room now, and the place is at most its end
+            // it fits now, and the place is at most its end
             let _ = leading.insert(place, (texture, probability));
         }
     }
@@ -98,13 +100,13 @@ pub fn judge<K: Kernels>(
         unknown: verdict.is_some_and(|verdict| verdict.unknown),
         open: verdict.is_none(),
     };
-    let visited = Visited {
+    let episode = EpisodeSummary {
         table: table.crc(),
         texture: best.texture,
         certain: explorer.is_certain(),
-        felt: explorer.felt().collect(),
+        observed: explorer.observed().collect(),
     };
-    Ok((judgement, visited))
+    Ok((judgement, episode))
 }
 
 /// The movement of the table that the person makes: the one nearest to [`MOVEMENT`] is the only one in a handheld's table.

@@ -64,7 +64,7 @@ pub struct About {
 pub enum Screen<'a> {
     /// The finger is to be held in the air: P_DC's zero is taken.
     Air,
-    /// A visit may begin.
+    /// An episode may begin.
     Ready {
         /// Textures that are known.
         textures: u16,
@@ -134,7 +134,7 @@ pub enum Screen<'a> {
     /// The table is written.
     Saving,
     /// What was learned, or why nothing was.
-    Taught(Result<&'a Name, &'a str>),
+    Learned(Result<&'a Name, &'a str>),
     /// What keeps the probe from working.
     Fault(&'a Trouble),
     /// The probe.

@@ -17,18 +17,18 @@ use crate::wire::{Text, text};
 
 /// Ticks in a second.
 pub const TICKS_HZ: u32 = 100;
-/// Slides that a texture is taught from when teaching is what the person began with.
-const LESSON: usize = 3;
+/// Slides that a texture is learned from when the person began with training.
+const TRAINING_SLIDES: usize = 3;
 /// Nothing happens for this long: the display goes dark and the sensor rests, ticks.
 const DARK_AFTER: u32 = 60 * TICKS_HZ;
 /// "Again" is shown at least this long, ticks.
 const AGAIN: u32 = 3 * TICKS_HZ / 2;
 /// That something was learned is shown this long, ticks.
-const TAUGHT: u32 = 3 * TICKS_HZ;
+const LEARNED: u32 = 3 * TICKS_HZ;
 /// No word for this long is a fault, ticks: the sensor needs 10 to start.
 const NO_WORDS: u32 = 50;
 
-/// What the visit felt like, by the person's word.
+/// What the texture was, by the person's word.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Choice {
     /// The texture with this index.
@@ -45,7 +45,7 @@ pub enum Choice {
 pub enum Job {
     /// Compare these slides with it: [`judge`], and tell [`Handheld::judged`].
     Judge(Vec<Observation, MAX_SLIDES>),
-    /// Learn that the visit that was judged last is this, and tell [`Handheld::taught`].
+    /// Learn that the episode that was judged last is this, and tell [`Handheld::learned`].
     Teach(Choice),
 }
 
@@ -54,7 +54,7 @@ pub enum Job {
 enum Page {
     /// Nothing begun.
     Ready,
-    /// A visit: the finger is to be pressed and slid.
+    /// An episode: the finger is to be pressed and slid.
     Touching,
     /// A slide was no good; the slides before it stand.
     Again(Again),
@@ -65,7 +65,7 @@ enum Page {
     Choose(u16),
     Spell(Spelling),
     Saving,
-    Taught(Result<Name, Text>),
+    Learned(Result<Name, Text>),
     Fault(Trouble),
     About,
     Dark,
@@ -83,12 +83,12 @@ pub struct Handheld<'p, K> {
     shown: u32,
     idle: u32,
     silent: u32,
-    /// The slides of this visit that were good.
-    visit: Vec<Observation, MAX_SLIDES>,
+    /// The slides of this episode that were good.
+    episode: Vec<Observation, MAX_SLIDES>,
     /// What was made of them last.
     judgement: Option<Judgement>,
-    /// The visit is to teach, not to ask.
-    lesson: bool,
+    /// The slides are for learning, not for identifying.
+    training: bool,
     /// Textures of the table.
     textures: u16,
     job: Option<Job>,
@@ -116,9 +116,9 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             shown: 0,
             idle: 0,
             silent: 0,
-            visit: Vec::new(),
+            episode: Vec::new(),
             judgement: None,
-            lesson: false,
+            training: false,
             textures,
             job: None,
             melody: &[],
@@ -134,7 +134,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         }
         self.silent = 0;
         if let Some(event) = self.touch.word(word) {
-            self.felt(event);
+            self.on_touch(event);
         }
     }
 
@@ -159,7 +159,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             self.pressed(press);
         }
         match &self.page {
-            Page::Taught(_) if self.shown >= TAUGHT => self.begin(),
+            Page::Learned(_) if self.shown >= LEARNED => self.begin(),
             Page::Thinking | Page::Saving | Page::Fault(_) | Page::Dark => {}
             _ if self.idle >= DARK_AFTER => self.show(Page::Dark),
             _ => {}
@@ -182,8 +182,8 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         };
         let (open, unknown, sure) = (judgement.open, judgement.unknown, judgement.sure);
         self.judgement = Some(judgement.clone());
-        if self.lesson {
-            if self.visit.len() < LESSON {
+        if self.training {
+            if self.episode.len() < TRAINING_SLIDES {
                 self.sound(GOOD);
                 self.show(Page::Touching);
             } else {
@@ -206,13 +206,13 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 
     /// What came of [`Job::Teach`]: the name that was learned, or why none was. The table has so many textures now.
-    pub fn taught(&mut self, taught: Result<Name, Text>, textures: u16) {
+    pub fn learned(&mut self, learned: Result<Name, Text>, textures: u16) {
         self.textures = textures;
         if !matches!(self.page, Page::Saving) {
             return;
         }
-        self.sound(if taught.is_ok() { SURE_IT_IS } else { ALARM });
-        self.show(Page::Taught(taught));
+        self.sound(if learned.is_ok() { SURE_IT_IS } else { ALARM });
+        self.show(Page::Learned(learned));
     }
 
     /// The store or the table cannot be used.
@@ -231,7 +231,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             Page::Choose(_)
             | Page::Spell(_)
             | Page::Saving
-            | Page::Taught(_)
+            | Page::Learned(_)
             | Page::About
             | Page::Dark => false,
         }
@@ -271,8 +271,12 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 })
                 .collect()
         };
-        let slide = self.visit.len() as u8 + 1;
-        let of = if self.lesson { LESSON } else { MAX_SLIDES } as u8;
+        let slide = self.episode.len() as u8 + 1;
+        let of = if self.training {
+            TRAINING_SLIDES
+        } else {
+            MAX_SLIDES
+        } as u8;
         match &self.page {
             Page::Ready if !self.touch.has_zero() => Screen::Air,
             Page::Ready => Screen::Ready {
@@ -301,7 +305,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 wheel: spelling.wheel(),
             },
             Page::Saving => Screen::Saving,
-            Page::Taught(taught) => Screen::Taught(taught.as_ref().map_err(Text::as_str)),
+            Page::Learned(learned) => Screen::Learned(learned.as_ref().map_err(Text::as_str)),
             Page::Fault(trouble) => Screen::Fault(trouble),
             Page::About => Screen::About(about.clone()),
             Page::Dark => Screen::Dark,
@@ -376,21 +380,21 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     fn fail(&mut self, trouble: Trouble) {
         if !matches!(&self.page, Page::Fault(shown) if *shown == trouble) {
             self.sound(ALARM);
-            self.forget_visit();
+            self.clear_episode();
             self.job = None;
             self.show(Page::Fault(trouble));
         }
     }
 
-    fn forget_visit(&mut self) {
-        self.visit.clear();
+    fn clear_episode(&mut self) {
+        self.episode.clear();
         self.judgement = None;
-        self.lesson = false;
+        self.training = false;
     }
 
-    /// A new visit may begin.
+    /// A new episode may begin.
     fn begin(&mut self) {
-        self.forget_visit();
+        self.clear_episode();
         self.show(Page::Ready);
     }
 
@@ -410,7 +414,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         }
     }
 
-    fn felt(&mut self, event: Event) {
+    fn on_touch(&mut self, event: Event) {
         if event != Event::Still {
             self.idle = 0;
         }
@@ -428,14 +432,14 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             Event::Down => match self.page {
                 Page::Ready | Page::Touching | Page::Again(_) => self.show(Page::Touching),
                 Page::Verdict(_) => {
-                    self.forget_visit();
+                    self.clear_episode();
                     self.show(Page::Touching);
                 }
                 _ => {}
             },
             Event::Still => self.sound(SLIDE),
             Event::Up => match self.page {
-                Page::Touching if self.visit.is_empty() && !self.lesson => self.begin(),
+                Page::Touching if self.episode.is_empty() && !self.training => self.begin(),
                 Page::Again(_) if self.shown >= AGAIN => self.show(Page::Touching),
                 _ => {}
             },
@@ -446,9 +450,9 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 }
             }
             Event::Slid(observation) => {
-                // there is room: a visit ends with its last slide
-                if matches!(self.page, Page::Touching) && self.visit.push(observation).is_ok() {
-                    self.job = Some(Job::Judge(self.visit.clone()));
+                // it fits: an episode ends with its last slide
+                if matches!(self.page, Page::Touching) && self.episode.push(observation).is_ok() {
+                    self.job = Some(Job::Judge(self.episode.clone()));
                     self.show(Page::Thinking);
                 }
             }
@@ -463,8 +467,8 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             (Page::Dark, _) => self.begin(),
             (Page::Ready, Press::Short) => self.show(Page::About),
             (Page::Ready, Press::Long) => {
-                self.forget_visit();
-                self.lesson = true;
+                self.clear_episode();
+                self.training = true;
                 self.show(Page::Touching);
             }
             (Page::Touching | Page::Again(_), Press::Short) => {}
@@ -491,15 +495,15 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 Taken::Done(name) => self.teach(Choice::Spelled(name)),
                 Taken::Back => self.show(Page::Choose(0)),
             },
-            (Page::Fault(Trouble::Memory(_)) | Page::About | Page::Taught(_), _) => self.begin(),
+            (Page::Fault(Trouble::Memory(_)) | Page::About | Page::Learned(_), _) => self.begin(),
             (Page::Fault(_), _) => {}
         }
         self.sound(CLICK);
     }
 
     fn teach(&mut self, choice: Choice) {
-        if self.visit.is_empty() || self.judgement.is_none() {
-            // nothing was felt
+        if self.episode.is_empty() || self.judgement.is_none() {
+            // no slide was measured
             return self.begin();
         }
         self.job = Some(Job::Teach(choice));
@@ -507,7 +511,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 }
 
-/// What can be chosen for a visit.
+/// What can be chosen for an episode.
 enum Entry {
     Known(u16),
     Numbered,

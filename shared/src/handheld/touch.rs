@@ -1,7 +1,7 @@
 //! One touch by hand, from its sensor words: when the finger is pressed well, when it slides, and whether the slide is good.
 //!
 //! Nothing tells the probe that it moves but what it feels. A slide has begun when P_AC is livelier than that of the still
-//! finger; its steady part has a fixed length, and must be felt to its end at about the same force and pace.
+//! finger; its steady part has a fixed length, and must last to its end at about the same force and pace.
 
 use heapless::{Deque, Vec};
 
@@ -44,7 +44,7 @@ const LIVELY: f32 = 2.0;
 /// ... for so many blocks, and has stopped when it is less than half of that above still for so many.
 const BEGINS: u8 = 3;
 const STOPPED: u8 = 8;
-/// From where a slide is felt to where it is steady, samples: 150 ms to come up to speed.
+/// From where a slide begins to where it is steady, samples: 150 ms to come up to speed.
 const COMING_UP: u32 = 15 * BLOCK as u32;
 /// The steady part, samples: 1.2 s.
 const STEADY: u32 = 120 * BLOCK as u32;
@@ -100,7 +100,7 @@ pub struct Touch<'p, K> {
 }
 
 impl<'p, K: Kernels> Touch<'p, K> {
-    /// Nothing was felt yet.
+    /// No slide yet.
     pub fn new(plan: &'p Plan) -> Self {
         Self {
             plan,
@@ -174,14 +174,14 @@ impl<'p, K: Kernels> Touch<'p, K> {
                 self.unreadable = 0;
                 let counts = counts.get() as i16;
                 // a channel that comes too often has taken the other's place
-                let room = match channel {
+                let pushed = match channel {
                     Channel::Pac => {
                         event = self.hangs(counts);
                         self.pac.push(counts)
                     }
                     Channel::Pdc => self.pdc.push(counts),
                 };
-                self.missing = self.missing.saturating_add(room.is_err().into());
+                self.missing = self.missing.saturating_add(pushed.is_err().into());
             }
             None => {
                 self.missing = self.missing.saturating_add(1);
@@ -253,7 +253,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
         if self.forces.is_full() {
             let _ = self.forces.pop_front();
         }
-        // there is room now
+        // it fits now
         let _ = self.forces.push_back(pdc);
         if !self.has_zero() {
             return self.find_zero(pdc, lively);
@@ -368,7 +368,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
         {
             self.slide.push_still(&old);
         }
-        // there is room now
+        // it fits now
         let _ = self.latest.push_back(self.about_rest());
     }
 
@@ -440,7 +440,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
             self.slide.push_pdc(&above);
             self.tenth += lively;
             if (self.samples - COMING_UP).is_multiple_of(10 * BLOCK as u32) {
-                // there is room: as many as the steady part has
+                // it fits: as many as the steady part has
                 let _ = self
                     .tenths
                     .push(libm::logf(self.tenth.max(f32::MIN_POSITIVE)));

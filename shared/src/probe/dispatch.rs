@@ -14,7 +14,7 @@ use crate::dsp::Plan;
 use crate::explorer::Kernels;
 use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
-use crate::wire::{Ask, Request, Status, Tell, Text, text};
+use crate::wire::{Command, Event, Request, Status, Text, text};
 
 /// When a request is dealt with.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -28,9 +28,11 @@ pub enum Turn {
 }
 
 /// When this is dealt with by a probe that is busy with something else, or is not.
-pub const fn turn(ask: &Ask, busy: bool) -> Turn {
-    match ask {
-        Ask::Status | Ask::Stop | Ask::Stream(_) | Ask::ReadCalibration => Turn::Now,
+pub const fn turn(command: &Command, busy: bool) -> Turn {
+    match command {
+        Command::Status | Command::Stop | Command::Stream(_) | Command::ReadCalibration => {
+            Turn::Now
+        }
         _ if busy => Turn::Busy,
         _ => Turn::Queue,
     }
@@ -40,21 +42,21 @@ pub const fn turn(ask: &Ask, busy: bool) -> Turn {
 /// [`Probe::perform`]. `busy`: a request is queued or being worked on.
 pub fn receive(request: &Request, busy: bool, panel: &mut impl Panel) -> Turn {
     let id = request.id;
-    let turn = turn(&request.ask, busy);
+    let turn = turn(&request.command, busy);
     match turn {
         Turn::Queue => return turn,
-        Turn::Busy => panel.tell(Tell::Refused {
+        Turn::Busy => panel.tell(Event::Refused {
             id,
             why: text("busy: wait, or stop what is being done"),
         }),
         Turn::Now => {
-            match request.ask {
-                Ask::Status => panel.tell(Tell::Status(status(panel))),
-                Ask::Stop => panel.stop(busy),
-                Ask::Stream(on) => panel.stream(on),
+            match request.command {
+                Command::Status => panel.tell(Event::Status(status(panel))),
+                Command::Stop => panel.stop(busy),
+                Command::Stream(on) => panel.stream(on),
                 _ => panel.tell(told(&panel.rig().calibration)),
             }
-            panel.tell(Tell::Done(id));
+            panel.tell(Event::Done(id));
         }
     }
     turn
@@ -83,8 +85,8 @@ fn status(panel: &impl Panel) -> Status {
 }
 
 /// These constants, as the host is told of them.
-fn told(calibration: &RigCalibration) -> Tell {
-    Tell::Calibration(Vec::from_slice(&calibration.to_bytes()).unwrap_or_default())
+fn told(calibration: &RigCalibration) -> Event {
+    Event::Calibration(Vec::from_slice(&calibration.to_bytes()).unwrap_or_default())
 }
 
 /// A probe: a rig and a memory, and who hears of them.
@@ -108,11 +110,11 @@ where
 {
     /// Does what was asked for, as [`turn`] had it queued, and says that it is done or why it is not.
     pub async fn serve<K: Kernels>(&mut self, request: &Request) {
-        let done = self.perform::<K>(&request.ask).await;
+        let done = self.perform::<K>(&request.command).await;
         let id = request.id;
         self.events.tell(match done {
-            Ok(()) => Tell::Done(id),
-            Err(why) => Tell::Refused { id, why },
+            Ok(()) => Event::Done(id),
+            Err(why) => Event::Refused { id, why },
         });
     }
 
@@ -120,19 +122,19 @@ where
     ///
     /// # Errors
     /// The answer: why it was not done.
-    pub async fn perform<K: Kernels>(&mut self, ask: &Ask) -> Result<(), Text> {
+    pub async fn perform<K: Kernels>(&mut self, command: &Command) -> Result<(), Text> {
         let Self {
             rig,
             memory,
             events,
             plan,
         } = self;
-        match ask {
-            Ask::Home => {
+        match command {
+            Command::Home => {
                 memory.episode = None;
                 rig.home().await.map_err(text)
             }
-            Ask::Identify(wanted) => {
+            Command::Identify(wanted) => {
                 memory.episode = None;
                 rig.begin(wanted.seed).await;
                 let table = memory.table().map_err(text)?;
@@ -150,8 +152,8 @@ where
                 memory.episode = Some(episode);
                 Ok(())
             }
-            Ask::Answer(name) => memory.label(name, events).await,
-            Ask::Train(wanted) => {
+            Command::Label(name) => memory.label(name, events).await,
+            Command::Train(wanted) => {
                 memory.episode = None;
                 rig.begin(wanted.seed).await;
                 let (store, base, buffer) = memory.lend().map_err(text)?;
@@ -161,25 +163,25 @@ where
                 memory.keep_skin(&rig.state().skin).await;
                 done
             }
-            Ask::Rename { from, to } => {
+            Command::Rename { from, to } => {
                 let (store, base, buffer) = memory.lend().map_err(text)?;
                 let done = teach::rename(from, to, &base, store, buffer).await;
                 memory.reload(events).await;
                 done
             }
-            Ask::Forget(what) => {
+            Command::Forget(what) => {
                 let (store, base, buffer) = memory.lend().map_err(text)?;
-                let done = teach::forget(what, &base, store, buffer).await;
+                let done = teach::delete(what, &base, store, buffer).await;
                 memory.reload(events).await;
                 done
             }
-            Ask::Calibrate => {
+            Command::Calibrate => {
                 memory.episode = None;
                 let calibration = calibrate::calibrate(rig).await?;
                 events.tell(told(&calibration));
                 calibrate::keep(memory.store().map_err(text)?, &calibration).await
             }
-            Ask::WriteCalibration(bytes) => {
+            Command::WriteCalibration(bytes) => {
                 let bytes = bytes
                     .as_slice()
                     .try_into()
@@ -188,24 +190,24 @@ where
                 rig.set_calibration(calibration).await.map_err(text)?;
                 calibrate::keep(memory.store().map_err(text)?, &calibration).await
             }
-            Ask::ReadTable(offset) => {
+            Command::ReadTable(offset) => {
                 let part = transfer::read(memory.in_force(), *offset);
                 events.tell(part.ok_or_else(|| text("the table has no such byte"))?);
                 Ok(())
             }
-            Ask::BeginTable(length) => {
+            Command::BeginTable(length) => {
                 let store = memory.store().map_err(text)?;
                 store.begin_table(*length as usize).await.map_err(text)
             }
-            Ask::WriteTable { offset, bytes } => {
+            Command::WriteTable { offset, bytes } => {
                 transfer::write(memory.store().map_err(text)?, *offset, bytes).await
             }
-            Ask::CommitTable => {
+            Command::CommitTable => {
                 let done = memory.commit().await;
                 memory.reload(events).await;
                 done
             }
-            Ask::FactoryTable => {
+            Command::FactoryTable => {
                 let done = memory
                     .store()
                     .map_err(text)?
@@ -216,7 +218,9 @@ where
                 done
             }
             // answered when they came, see `receive`
-            Ask::Status | Ask::Stop | Ask::Stream(_) | Ask::ReadCalibration => Ok(()),
+            Command::Status | Command::Stop | Command::Stream(_) | Command::ReadCalibration => {
+                Ok(())
+            }
         }
     }
 }

@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crate::dsp::Plan;
-use crate::explorer::{Explorer, Kernels, ObserveError, Outlook, Verdict};
+use crate::explorer::{ExpectedOutcome, Explorer, Kernels, ObserveError, Verdict};
 use crate::features::{Measurement, Observation, Slide, SlideError};
 use crate::rig::{MAX_REJECTED, Rig};
 use crate::table::Action;
@@ -35,11 +35,11 @@ impl Random {
 
 /// What an exploration does, as it does it.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub enum Event<'a> {
-    /// This action comes next; it and the others promised this.
-    Chosen(Action, &'a [Outlook]),
+pub enum ExplorationStep<'a> {
+    /// This action comes next; this was expected of it and of the others.
+    Chosen(Action, &'a [ExpectedOutcome]),
     /// The slide was made and taken in; the posterior of every texture.
-    Felt(Action, &'a Measurement, &'a [f32]),
+    Measured(Action, &'a Measurement, &'a [f32]),
     /// The slide was made, but has no value of the property. It does not count: the choice is made again, and is the same
     /// unless it is random.
     Rejected(Action, Rejection),
@@ -104,7 +104,7 @@ pub async fn explore<R: Rig, const N: usize, K: Kernels>(
     explorer: &mut Explorer<'_, N, K>,
     plan: &Plan,
     random: impl FnMut() -> u32,
-    tell: impl FnMut(Event<'_>),
+    tell: impl FnMut(ExplorationStep<'_>),
 ) -> Result<Verdict, ExploreError<R::Error>> {
     let answer = slides(rig, explorer, plan, random, tell).await;
     if !matches!(answer, Err(ExploreError::Rig(_))) {
@@ -119,23 +119,23 @@ async fn slides<R: Rig, const N: usize, K: Kernels>(
     explorer: &mut Explorer<'_, N, K>,
     plan: &Plan,
     mut random: impl FnMut() -> u32,
-    mut tell: impl FnMut(Event<'_>),
+    mut tell: impl FnMut(ExplorationStep<'_>),
 ) -> Result<Verdict, ExploreError<R::Error>> {
     explorer.restart();
     let mut rejected = 0;
     loop {
         if let Some(verdict) = explorer.verdict() {
-            tell(Event::Decided {
+            tell(ExplorationStep::Decided {
                 verdict: &verdict,
                 slides: explorer.slides(),
                 certain: explorer.is_certain(),
             });
             return Ok(verdict);
         }
-        let mut outlook = heapless::Vec::new();
-        explorer.look_out(&mut outlook);
-        let action = explorer.choose(&outlook, random());
-        tell(Event::Chosen(action, &outlook));
+        let mut expected = heapless::Vec::new();
+        explorer.evaluate_actions(&mut expected);
+        let action = explorer.choose(&expected, random());
+        tell(ExplorationStep::Chosen(action, &expected));
         let movement = explorer
             .table()
             .movement(action.movement)
@@ -145,7 +145,7 @@ async fn slides<R: Rig, const N: usize, K: Kernels>(
         rig.perform(movement, &mut slide)
             .await
             .map_err(ExploreError::Rig)?;
-        let felt = slide
+        let measured = slide
             .finish()
             .map_err(Rejection::Slide)
             .and_then(|measurement| {
@@ -154,14 +154,18 @@ async fn slides<R: Rig, const N: usize, K: Kernels>(
                     .map_err(Rejection::Observe)?;
                 Ok(measurement)
             });
-        match felt {
+        match measured {
             Ok(measurement) => {
                 rejected = 0;
-                tell(Event::Felt(action, &measurement, explorer.posterior()));
+                tell(ExplorationStep::Measured(
+                    action,
+                    &measurement,
+                    explorer.posterior(),
+                ));
             }
             Err(why) => {
                 rejected += 1;
-                tell(Event::Rejected(action, why));
+                tell(ExplorationStep::Rejected(action, why));
                 if rejected == MAX_REJECTED {
                     return Err(ExploreError::Rejected(why));
                 }

@@ -5,13 +5,13 @@ use core::fmt;
 
 use heapless::Vec;
 
-use super::explore::{Event, Random, explore};
+use super::explore::{ExplorationStep, Random, explore};
 use crate::dsp::Plan;
-use crate::explorer::{Config, Explorer, Kernels, Method, Outlook, Visited};
+use crate::explorer::{Config, EpisodeSummary, ExpectedOutcome, Explorer, Kernels, Method};
 use crate::rig::Rig;
 use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
-use crate::wire::{Identify, MAX_OUTLOOK, Promise, Tell, Text, text};
+use crate::wire::{Event, Identify, MAX_EXPECTED_OUTCOMES, Text, text};
 
 /// Explores what lies under the finger until there is an answer, which is told; the error is why there is none.
 ///
@@ -22,8 +22,8 @@ pub async fn identify<R, K>(
     rig: &mut R,
     table: Table<'_>,
     plan: &Plan,
-    mut tell: impl FnMut(Tell),
-) -> Result<Visited, Text>
+    mut tell: impl FnMut(Event),
+) -> Result<EpisodeSummary, Text>
 where
     R: Rig,
     R::Error: fmt::Display,
@@ -55,34 +55,34 @@ where
         plan,
         || random.next_u32(),
         |event| match event {
-            Event::Chosen(action, outlook) => {
+            ExplorationStep::Chosen(action, expected) => {
                 if let Some(movement) = table.movement(action.movement) {
-                    tell(Tell::Chosen {
+                    tell(Event::Chosen {
                         slide,
                         movement,
                         action,
-                        outlook: best(outlook),
+                        expected: best(expected),
                     });
                 }
             }
-            Event::Felt(action, measurement, posterior) => {
-                tell(Tell::Felt {
+            ExplorationStep::Measured(action, measurement, posterior) => {
+                tell(Event::SlideReport {
                     slide,
                     action,
-                    felt: measurement.into(),
+                    observed: measurement.into(),
                     posterior: Vec::from_slice(posterior).unwrap_or_default(),
                 });
                 slide = slide.saturating_add(1);
             }
-            Event::Rejected(_, why) => tell(Tell::Rejected {
+            ExplorationStep::Rejected(_, why) => tell(Event::Rejected {
                 slide,
                 why: text(why),
             }),
-            Event::Decided {
+            ExplorationStep::Decided {
                 verdict,
                 slides,
                 certain,
-            } => tell(Tell::Verdict {
+            } => tell(Event::Verdict {
                 texture: verdict.texture,
                 name: Name::try_from(table.name(verdict.texture).unwrap_or_default())
                     .unwrap_or_default(),
@@ -91,37 +91,33 @@ where
                 unknown: verdict.unknown,
                 log_odds: verdict.log_odds,
                 slides,
-                asks: matches!(contents, Contents::Fused(..)) && !certain,
+                wants_label: matches!(contents, Contents::Fused(..)) && !certain,
             }),
         },
     )
     .await
     .map_err(text)?;
-    Ok(Visited {
+    Ok(EpisodeSummary {
         table: table.crc(),
         texture: verdict.texture,
         certain: explorer.is_certain(),
-        felt: up_to(explorer.felt()),
+        observed: up_to(explorer.observed()),
     })
 }
 
 /// The most useful actions, best first. One after the other, for sorting them all takes the chip 2 KB.
-pub(super) fn best(outlook: &[Outlook]) -> Vec<Promise, MAX_OUTLOOK> {
-    let mut best: Vec<Promise, MAX_OUTLOOK> = Vec::new();
-    for o in outlook {
-        let better = |p: &Promise| p.benefit.total_cmp(&o.benefit).is_ge();
+pub(super) fn best(expected: &[ExpectedOutcome]) -> Vec<ExpectedOutcome, MAX_EXPECTED_OUTCOMES> {
+    let mut best: Vec<ExpectedOutcome, MAX_EXPECTED_OUTCOMES> = Vec::new();
+    for o in expected {
+        let better = |p: &ExpectedOutcome| p.benefit.total_cmp(&o.benefit).is_ge();
         if best.is_full() {
             if best.last().is_some_and(better) {
                 continue;
             }
             best.pop();
         }
-        // there is room
-        let _ = best.push(Promise {
-            action: o.action,
-            uncertainty: o.uncertainty,
-            benefit: o.benefit,
-        });
+        // it fits
+        let _ = best.push(*o);
         let mut rest = best.as_mut_slice();
         while let [.., before, last] = rest
             && !better(before)

@@ -7,7 +7,7 @@ use embedded_storage_async::nor_flash::NorFlash;
 use super::seams::{Events, StoredBytes};
 use super::status::TableInUse;
 use super::teach::{self, put_in_force};
-use crate::explorer::Visited;
+use crate::explorer::EpisodeSummary;
 use crate::rig::skin::SkinCare;
 use crate::store::Store;
 use crate::table::{Table, TableError};
@@ -24,10 +24,10 @@ pub struct Memory<'m, F, B> {
     buffer: &'m mut [u8],
     /// Bytes of the table in force.
     length: usize,
-    /// Nothing was taught or pushed.
+    /// No texture was learned and no table was written.
     is_factory: bool,
-    /// What the last exploration felt, until the rig moves again.
-    pub episode: Option<Visited>,
+    /// Summary of the last exploration, until the rig moves again.
+    pub episode: Option<EpisodeSummary>,
 }
 
 /// Why nothing can be learned.
@@ -163,7 +163,11 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
 
     /// Learns from an exploration that the probe is certain of, and tells so. The exploration has its answer whatever
     /// becomes of that.
-    pub(super) async fn learn_by_itself(&mut self, episode: &Visited, events: &mut impl Events) {
+    pub(super) async fn learn_by_itself(
+        &mut self,
+        episode: &EpisodeSummary,
+        events: &mut impl Events,
+    ) {
         let Some(store) = &mut self.store else {
             return;
         };
@@ -185,14 +189,14 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
     /// After an error the exploration can be labelled anew: another name may do.
     ///
     /// # Errors
-    /// Nothing was felt since the rig moved last, or see [`teach::answer`].
+    /// The rig has moved since the last slide, or see [`teach::label`].
     pub async fn label(&mut self, name: &str, events: &mut impl Events) -> Result<(), Text> {
         let episode = self
             .episode
             .take()
-            .ok_or_else(|| text("nothing was felt since the rig moved last: explore first"))?;
+            .ok_or_else(|| text("no slide was measured since the rig moved last: explore first"))?;
         let (store, base, buffer) = self.lend().map_err(text)?;
-        let learned = teach::answer(&episode, name, &base, store, buffer).await;
+        let learned = teach::label(&episode, name, &base, store, buffer).await;
         self.reload(events).await;
         match learned {
             Ok(learned) => {

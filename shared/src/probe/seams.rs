@@ -7,7 +7,7 @@ use crate::rig::Rig;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::store::Store;
-use crate::wire::{Counts, Tell, Text};
+use crate::wire::{Counts, Event, Text};
 
 /// A run of the stage without load.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -61,7 +61,7 @@ pub trait StoredBytes<F: NorFlash> {
 /// Who hears what a probe does.
 pub trait Events {
     /// The host is told.
-    fn tell(&mut self, event: Tell);
+    fn tell(&mut self, event: Event);
 
     /// This table is in force now.
     fn table(&mut self, table: TableInUse);
@@ -88,5 +88,5 @@ pub trait Panel {
     fn stream(&mut self, on: bool);
 
     /// The host is told.
-    fn tell(&mut self, event: Tell);
+    fn tell(&mut self, event: Event);
 }

@@ -7,14 +7,14 @@ use super::explore::Random;
 use super::seams::{RigHandle, UnloadedRun};
 use super::status::RigState;
 use crate::dsp::Kernels;
-use crate::features::{Blocks, Felt, Movement, PropertySet, Slide};
+use crate::features::{Blocks, Movement, PropertySet, SamplePhase, Slide};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::control::Control;
 use crate::rig::pins::Outputs;
 use crate::rig::skin::SkinCare;
-use crate::rig::timeout::{Patience, Wait};
+use crate::rig::timeout::{MovementTimeout, Wait};
 use crate::rig::{Ended, Phase, Refused, Rig, RigError};
-use crate::wire::Tell;
+use crate::wire::Event;
 
 /// How often the samples are looked after, ms.
 pub const LOOK_MS: u32 = 10;
@@ -75,7 +75,7 @@ impl RigCommand {
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Samples {
     /// What they belong to.
-    pub felt: Felt,
+    pub sample_phase: SamplePhase,
     /// P_AC, counts about the still finger's.
     pub pac: Vec<i16, 8>,
     /// Shear, mN.
@@ -83,24 +83,24 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// Gives a tick's samples to `put`, in as many parts as they take; none where nothing is felt.
+    /// Gives a tick's samples to `put`, in as many parts as they take; none outside a movement's sampling.
     pub fn of(outputs: &Outputs, mut put: impl FnMut(Self)) {
-        if outputs.felt == Felt::Nothing {
+        if outputs.sample_phase == SamplePhase::Nothing {
             return;
         }
         let mut part = Self {
-            felt: outputs.felt.clone(),
+            sample_phase: outputs.sample_phase.clone(),
             pac: Vec::new(),
             shear_mn: outputs.shear_mn,
         };
         for &sample in &outputs.pac {
             if part.pac.push(sample).is_err() {
-                let felt = match part.felt {
-                    Felt::Still => Felt::Still,
-                    _ => Felt::Slide,
+                let sample_phase = match part.sample_phase {
+                    SamplePhase::Still => SamplePhase::Still,
+                    _ => SamplePhase::Slide,
                 };
                 let next = Self {
-                    felt,
+                    sample_phase,
                     ..Self::default()
                 };
                 put(core::mem::replace(&mut part, next));
@@ -114,7 +114,7 @@ impl Samples {
 /// What runs [`Control`], and hands on its samples.
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait Servo {
-    /// Gives a command and waits for the answer. Whatever was felt before the command is over.
+    /// Gives a command and waits for the answer. Samples from before the command are dropped.
     async fn command(&mut self, command: RigCommand) -> Result<(), Refused>;
 
     /// Waits for the end of a slide, [`LOOK_MS`] at most.
@@ -126,7 +126,7 @@ pub trait Servo {
     /// The oldest samples that nobody has taken.
     fn samples(&mut self) -> Option<Samples>;
 
-    /// Samples since boot that found no room on their way here.
+    /// Samples since boot that did not fit on their way here.
     fn lost(&self) -> u32;
 
     /// Stops what is being done now: the stage stands, the finger is lifted.
@@ -139,7 +139,7 @@ pub trait Servo {
     fn streams(&self) -> bool;
 
     /// The host is told of raw samples.
-    fn tell(&mut self, event: Tell);
+    fn tell(&mut self, event: Event);
 }
 
 /// A rig moved by a servo.
@@ -170,13 +170,13 @@ impl<S: Servo> ServoRig<S> {
         over: impl Fn(&RigState) -> bool,
         mut each: impl FnMut(&mut S),
     ) -> Result<RigState, RigError> {
-        let mut patience = Patience::default();
+        let mut timeout = MovementTimeout::default();
         loop {
             self.servo.wait().await;
             // before the samples, so that none of a movement that is over is left behind
             let rig = self.servo.state();
             each(&mut self.servo);
-            match (patience.wait(LOOK_MS, over(&rig)), rig.phase) {
+            match (timeout.wait(LOOK_MS, over(&rig)), rig.phase) {
                 (Wait::On, _) => {}
                 (Wait::Stop, _) => self.servo.stop(),
                 (Wait::Over | Wait::Hangs, Phase::Faulted(fault)) if rig.at_rest => {
@@ -287,11 +287,11 @@ impl<S: Servo> Rig for ServoRig<S> {
                     let mut gathered = Vec::new();
                     while let Some(samples) = servo.samples() {
                         feel(&samples, &mut gathered, slide);
-                        let block = blocks
-                            .as_mut()
-                            .and_then(|b| b.put(&samples.felt, &samples.pac, samples.shear_mn));
+                        let block = blocks.as_mut().and_then(|b| {
+                            b.put(&samples.sample_phase, &samples.pac, samples.shear_mn)
+                        });
                         if let Some(block) = block {
-                            servo.tell(Tell::Block(block));
+                            servo.tell(Event::Block(block));
                         }
                     }
                     slide.push(&gathered);
@@ -308,7 +308,7 @@ impl<S: Servo> Rig for ServoRig<S> {
             slide.lose(gap);
         }
         if let Some(blocks) = blocks {
-            self.servo.tell(Tell::Block(blocks.end(gap)));
+            self.servo.tell(Event::Block(blocks.end(gap)));
         }
         match ended? {
             Some(Ended::Whole | Ended::Gap(_)) => Ok(()),
@@ -331,18 +331,18 @@ fn feel<K: Kernels>(
     gathered: &mut Vec<i16, GATHERED>,
     slide: &mut Slide<'_, K>,
 ) {
-    let is_slide = samples.felt == Felt::Slide;
+    let is_slide = samples.sample_phase == SamplePhase::Slide;
     if !is_slide || gathered.len() + samples.pac.len() > GATHERED {
         slide.push(gathered);
         gathered.clear();
     }
-    match &samples.felt {
-        Felt::Nothing => return,
-        Felt::Still => return slide.push_still(&samples.pac),
-        Felt::Begin(steady) => slide.start(steady.clone()),
-        Felt::Slide => {}
+    match &samples.sample_phase {
+        SamplePhase::Nothing => return,
+        SamplePhase::Still => return slide.push_still(&samples.pac),
+        SamplePhase::Begin(steady) => slide.start(steady.clone()),
+        SamplePhase::Slide => {}
     }
-    // there is room
+    // it fits
     let _ = gathered.extend_from_slice(&samples.pac);
     slide.push_shear(samples.shear_mn.as_slice());
 }

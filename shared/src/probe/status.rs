@@ -4,7 +4,7 @@ use crate::rig::calibration::RigCalibration;
 use crate::rig::control::Control;
 use crate::rig::skin::SkinCare;
 use crate::rig::{Ended, Phase};
-use crate::wire::{Live, Tell};
+use crate::wire::{Event, Live};
 
 /// What the rig is doing, as of its last tick.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -83,7 +83,7 @@ pub struct TableInUse {
     pub bytes: u32,
     /// Its checksum.
     pub crc: u32,
-    /// It came with the firmware: nothing was taught or pushed.
+    /// It came with the firmware: no texture was learned and no table was written.
     pub factory: bool,
 }
 
@@ -111,17 +111,17 @@ impl Watch {
     const LIVE: u32 = 10;
 
     /// Looks at the rig.
-    pub fn look(&mut self, rig: &RigState, mut tell: impl FnMut(Tell)) {
+    pub fn look(&mut self, rig: &RigState, mut tell: impl FnMut(Event)) {
         if self.phase != Some(rig.phase) {
             self.phase = Some(rig.phase);
             if let Phase::Faulted(fault) = rig.phase {
-                tell(Tell::Fault(fault));
+                tell(Event::Fault(fault));
             }
-            tell(Tell::Phase(rig.phase.into()));
+            tell(Event::Phase(rig.phase.into()));
         }
         self.looks = self.looks.wrapping_add(1);
         if self.looks.is_multiple_of(Self::LIVE) && !rig.at_rest {
-            tell(Tell::Live(Live {
+            tell(Event::Live(Live {
                 force_mn: rig.force_mn as i16,
                 steps: rig.steps,
                 stage_um: (rig.stage_mm * 1e3) as i32,

@@ -6,14 +6,14 @@ use super::explore::Random;
 use super::identify::best;
 use super::*;
 use crate::dsp::{Kernels, Plan};
-use crate::explorer::{Method, Outlook};
+use crate::explorer::{ExpectedOutcome, Method};
 use crate::features::{FeatureSet, Movement, Observation, Property, PropertySet, Slide};
 use crate::rig::Rig;
 use crate::store::tests::ram::Ram;
-use crate::store::{SelfTaught, Store};
+use crate::store::{SelfLearnedRecord, Store};
 use crate::table::tests::{around, fused_of, known, straight, table_of};
 use crate::table::{Action, Name, Table};
-use crate::wire::{Identify, MAX_OUTLOOK, Tell, Text, Train, text};
+use crate::wire::{Event, Identify, MAX_EXPECTED_OUTCOMES, Text, Train, text};
 use embassy_futures::block_on;
 use heapless::Vec;
 use std::string::String;
@@ -75,14 +75,16 @@ fn identified(slides: &[Option<i16>], wanted: &Identify) -> (Result<(), Text>, v
         &Plan::new(),
         |tell| {
             told.push(match tell {
-                Tell::Chosen { slide, outlook, .. } => {
-                    format!("chosen {slide} of {}", outlook.len())
+                Event::Chosen {
+                    slide, expected, ..
+                } => {
+                    format!("chosen {slide} of {}", expected.len())
                 }
-                Tell::Felt {
+                Event::SlideReport {
                     slide, posterior, ..
-                } => format!("felt {slide} {posterior:.2?}"),
-                Tell::Rejected { slide, why } => format!("rejected {slide}: {why}"),
-                Tell::Verdict {
+                } => format!("measured {slide} {posterior:.2?}"),
+                Event::Rejected { slide, why } => format!("rejected {slide}: {why}"),
+                Event::Verdict {
                     name, sure, slides, ..
                 } => format!("{name} {sure} {slides}"),
                 other => format!("{other:?}"),
@@ -102,9 +104,9 @@ fn an_exploration_is_told_from_beginning_to_end() {
             "chosen 1 of 1",
             "rejected 1: the slide never reached its steady part",
             "chosen 1 of 1",
-            "felt 1 [0.00, 0.99, 0.01]",
+            "measured 1 [0.00, 0.99, 0.01]",
             "chosen 2 of 1",
-            "felt 2 [0.00, 1.00, 0.00]",
+            "measured 2 [0.00, 1.00, 0.00]",
             "t1 true 2",
         ]
     );
@@ -175,7 +177,7 @@ fn a_fused_exploration_says_whether_it_is_certain() {
             open,
             ..wanted(&[])
         };
-        let visited = block_on(identify::<_, crate::dsp::Plain>(
+        let episode = block_on(identify::<_, crate::dsp::Plain>(
             &wanted,
             &mut Script(slides.iter().copied().collect()),
             Table::read(&bytes).unwrap(),
@@ -183,14 +185,14 @@ fn a_fused_exploration_says_whether_it_is_certain() {
             |tell| told.push(tell),
         ))
         .unwrap();
-        (visited, told.pop().unwrap())
+        (episode, told.pop().unwrap())
     };
-    let (visited, verdict) = explored(&[Some(10_000)], true);
-    let Tell::Verdict {
+    let (episode, verdict) = explored(&[Some(10_000)], true);
+    let Event::Verdict {
         texture: 2,
         sure: true,
         unknown: false,
-        asks: false,
+        wants_label: false,
         slides: 1,
         log_odds,
         ..
@@ -201,46 +203,46 @@ fn a_fused_exploration_says_whether_it_is_certain() {
     assert!(log_odds.unwrap() < -2.0);
     let table = Table::read(&bytes).unwrap();
     assert_eq!(
-        (visited.table, visited.texture, visited.certain),
+        (episode.table, episode.texture, episode.certain),
         (table.crc(), 2, true)
     );
-    let (movement, slides, mean) = &visited.felt[0];
-    assert_eq!((visited.felt.len(), *movement, *slides), (1, 0, 1));
+    let (movement, slides, mean) = &episode.observed[0];
+    assert_eq!((episode.observed.len(), *movement, *slides), (1, 0, 1));
     let mean = mean.iter().zip(table.white_mean(2, 0));
     assert!(mean.clone().count() == 13 && mean.clone().all(|(a, b)| a.abs_diff(b) <= 1));
     // far from all
-    let (visited, verdict) = explored(&[Some(-32_000), Some(-32_000)], true);
-    let Tell::Verdict {
+    let (episode, verdict) = explored(&[Some(-32_000), Some(-32_000)], true);
+    let Event::Verdict {
         texture: 0,
         sure: false,
         unknown: true,
-        asks: true,
+        wants_label: true,
         slides: 2,
         ..
     } = verdict
     else {
         panic!("{verdict:?}");
     };
-    assert!(!visited.certain);
-    assert_eq!(visited.felt[0].1, 2);
-    let (visited, verdict) = explored(&[Some(-32_000)], false);
-    let Tell::Verdict {
+    assert!(!episode.certain);
+    assert_eq!(episode.observed[0].1, 2);
+    let (episode, verdict) = explored(&[Some(-32_000)], false);
+    let Event::Verdict {
         texture: 0,
         sure: true,
         unknown: false,
-        asks: true,
+        wants_label: true,
         ..
     } = verdict
     else {
         panic!("{verdict:?}");
     };
     assert!(
-        !visited.certain,
+        !episode.certain,
         "closed, and not to be learned from all the same"
     );
 }
 
-/// The user trains a texture of which the probe had taught itself something: what the user taught stands in its place.
+/// The user trains a texture of which the probe had learned something by itself: the user's training replaces it.
 #[test]
 fn training_a_fused_texture_ends_in_the_store() {
     let bytes = fused_table();
@@ -250,12 +252,12 @@ fn training_a_fused_texture_ends_in_the_store() {
         let movements = Vec::from_slice(&[(0, 3, known(9, &[1.0; 13]))]).unwrap();
         // number 4 is the next one's
         for number in [1, 2, 4] {
-            let record = SelfTaught {
+            let record = SelfLearnedRecord {
                 lineage: table.lineage(),
                 number,
                 movements: movements.clone(),
             };
-            block_on(store.set_self_taught(&record)).unwrap();
+            block_on(store.set_self_learned(&record)).unwrap();
         }
         let known_before = table.find(name).map_or(0, |t| table.trials(t, 0));
         let wanted = Train {
@@ -265,7 +267,7 @@ fn training_a_fused_texture_ends_in_the_store() {
             seed: 1,
         };
         let mut rig = Script([None, Some(tractions[0]), Some(tractions[1])].into());
-        let mut room = vec![0; 8192];
+        let mut buffer = vec![0; 8192];
         let mut told = vec::Vec::new();
         block_on(train::<_, _, crate::dsp::Plain>(
             &wanted,
@@ -273,20 +275,20 @@ fn training_a_fused_texture_ends_in_the_store() {
             &mut store,
             table,
             &Plan::new(),
-            &mut room,
+            &mut buffer,
             |tell| told.push(tell),
         ))
         .unwrap();
         assert!(matches!(
             told[..],
             [
-                Tell::Rejected { slide: 1, .. },
-                Tell::Learned { left: 1, .. },
-                Tell::Learned { left: 0, .. }
+                Event::Rejected { slide: 1, .. },
+                Event::TrainingSlide { left: 1, .. },
+                Event::TrainingSlide { left: 0, .. }
             ]
         ));
-        let mut room = vec![0; 8192];
-        let new = block_on(store.read_table(&mut room)).unwrap().unwrap();
+        let mut buffer = vec![0; 8192];
+        let new = block_on(store.read_table(&mut buffer)).unwrap().unwrap();
         let texture = new.find(name).unwrap();
         assert_eq!(new.trials(texture, 0), known_before + 2);
         let mean = new.white_mean(texture, 0).next().unwrap();
@@ -300,19 +302,19 @@ fn training_a_fused_texture_ends_in_the_store() {
         assert_eq!((new.tally(texture).user, new.lineage()), (2, table.crc()));
         let number = new.number(texture);
         let mut left = vec::Vec::new();
-        block_on(store.self_taught(table.lineage(), &mut |r| left.push(r.number))).unwrap();
+        block_on(store.self_learned(table.lineage(), &mut |r| left.push(r.number))).unwrap();
         assert!(!left.contains(&number) && left.contains(&1), "{left:?}");
-        let unfinished = block_on(store.trained(name, table.movement(0).unwrap(), None));
+        let unfinished = block_on(store.training_record(name, table.movement(0).unwrap(), None));
         assert_eq!(unfinished, Ok(None));
     }
 }
 
 #[test]
-fn the_outlook_has_the_best_first_and_no_more_than_its_room() {
+fn expected_outcomes_are_the_best_first_and_fit() {
     let mut random = Random::new(5);
-    for length in [0, 1, 5, MAX_OUTLOOK, 50] {
-        let outlook: vec::Vec<Outlook> = (0..length)
-            .map(|n| Outlook {
+    for length in [0, 1, 5, MAX_EXPECTED_OUTCOMES, 50] {
+        let expected: vec::Vec<ExpectedOutcome> = (0..length)
+            .map(|n| ExpectedOutcome {
                 action: Action {
                     movement: n as u8,
                     property: None,
@@ -322,10 +324,10 @@ fn the_outlook_has_the_best_first_and_no_more_than_its_room() {
                 benefit: (random.next_u32() % 20) as f32,
             })
             .collect();
-        let mut sorted = outlook.clone();
+        let mut sorted = expected.clone();
         sorted.sort_by(|a, b| b.benefit.total_cmp(&a.benefit));
-        let told = best(&outlook);
-        assert_eq!(told.len(), length.min(MAX_OUTLOOK));
+        let told = best(&expected);
+        assert_eq!(told.len(), length.min(MAX_EXPECTED_OUTCOMES));
         for (told, sorted) in told.iter().zip(&sorted) {
             assert_eq!((told.action, told.benefit), (sorted.action, sorted.benefit));
             assert_eq!(told.uncertainty, sorted.uncertainty);

@@ -1,24 +1,24 @@
-//! Learning a texture by touching it: which movement comes next, what its slide has taught, and the table in the end.
+//! Learning a texture by touching it: which movement comes next, what its slide adds, and the table in the end.
 //!
-//! A [`Training`] touches nothing itself. Every [`Trained`] that it gives is to be stored before the next slide; a training
+//! A [`Training`] touches nothing itself. Every [`TrainingRecord`] that it gives is to be stored before the next slide; a training
 //! begun anew with the same name and table goes on where it stood when it is given them back:
 //!
 //! ```text
-//! new -> resume per stored movement -> [ next -> slide -> took -> store ]* -> encode -> commit the table -> forget
+//! new -> resume per stored movement -> [ next -> slide -> took -> store ]* -> encode -> commit the table -> delete
 //! ```
 //!
 //! A pilot (the paper's "Identifying the most useful exploratory movements") makes other movements than the table has, so
 //! what it learns does not go into that table: its result is stored and told. It makes a table only where there is none,
 //! with the pilot's movements, or where the table has these already.
 
-use crate::table::Lesson;
+use crate::table::TrainingStats;
 use core::fmt;
 
 use heapless::Vec;
 
 use crate::features::{FeatureSet, Movement, Observation, Property, PropertySet};
 use crate::fill;
-use crate::store::Trained;
+use crate::store::TrainingRecord;
 use crate::table::{
     Change, Contents, EncodeError, Experience, Known, MAX_MOVEMENTS, MAX_TEXTURES, Name, Table,
     Tally, Texture, Whitened, amend, encode, encoded_len,
@@ -49,7 +49,7 @@ pub enum TrainingError {
     /// The table has as many textures as it may have.
     Textures,
     /// The table would take this many bytes, and there is less room.
-    Room(usize),
+    NoSpace(usize),
     /// This rig does not measure a property that the table has, or none at all.
     Measures(Option<Property>),
     /// The slide has no value of this property; it does not count.
@@ -57,7 +57,7 @@ pub enum TrainingError {
     /// This rig, or the slide, does not have the features of the table.
     Features(FeatureSet),
     /// What was stored of this training is for another kind of table.
-    Lesson,
+    Stats,
     /// A movement that is none of this training's.
     Movement(Movement),
     /// Trials are missing.
@@ -84,7 +84,7 @@ impl fmt::Display for TrainingError {
                 "{trials} trials give no standard deviation: {LEAST_TRIALS} or more, 1 or more for a fused table"
             ),
             Self::Textures => write!(f, "the table has {MAX_TEXTURES} textures: it is full"),
-            Self::Room(bytes) => write!(
+            Self::NoSpace(bytes) => write!(
                 f,
                 "the table is full: it would take {bytes} bytes, and there is less room"
             ),
@@ -99,7 +99,7 @@ impl fmt::Display for TrainingError {
             Self::Features(set) => {
                 write!(f, "the table was learned from {}, which are not measured here", set.name())
             }
-            Self::Lesson => f.write_str(
+            Self::Stats => f.write_str(
                 "what is stored of this training is for another kind of table: forget it, and begin again",
             ),
             Self::Movement(movement) => write!(f, "{movement} is no part of this training"),
@@ -141,11 +141,11 @@ pub struct Training {
     goes_on: bool,
     /// Whether a table can be made of it.
     makes_table: bool,
-    learned: Vec<(Movement, Lesson), MAX_MOVEMENTS>,
+    learned: Vec<(Movement, TrainingStats), MAX_MOVEMENTS>,
 }
 
 impl Training {
-    /// Begins a training, or begins it again; `table` is the one in use, `room` the bytes that a table may have.
+    /// Begins a training, or begins it again; `table` is the one in use, `buffer` the bytes that a table may have.
     ///
     /// Without a table its movements are [`FIRST_MOVEMENTS`], or the pilot's.
     ///
@@ -155,7 +155,7 @@ impl Training {
     pub fn new(
         wanted: Wanted<'_>,
         table: Option<&Table<'_>>,
-        room: usize,
+        buffer: usize,
     ) -> Result<Self, TrainingError> {
         let length = wanted.name.len();
         let name = Name::try_from(wanted.name).map_err(|_| TrainingError::Name(length))?;
@@ -194,8 +194,8 @@ impl Training {
             }
         }
         let untouched = match contents {
-            Contents::Gaussians(_) => Lesson::Gaussians(Experience::default()),
-            Contents::Fused(..) => Lesson::Fused(Whitened::default()),
+            Contents::Gaussians(_) => TrainingStats::Gaussians(Experience::default()),
+            Contents::Fused(..) => TrainingStats::Fused(Whitened::default()),
         };
         let untouched = |movement| (movement, untouched);
         let known = table
@@ -208,9 +208,9 @@ impl Training {
                 table.movements().zip(0..).map(|(movement, index)| {
                     let known = known.map(|(table, texture)| match contents {
                         Contents::Gaussians(_) => {
-                            Lesson::Gaussians(table.experience(texture, index))
+                            TrainingStats::Gaussians(table.experience(texture, index))
                         }
-                        Contents::Fused(..) => Lesson::Fused(table.whitened(texture, index)),
+                        Contents::Fused(..) => TrainingStats::Fused(table.whitened(texture, index)),
                     });
                     (movement, known.unwrap_or(untouched(movement).1))
                 }),
@@ -229,8 +229,8 @@ impl Training {
                 .chain([wanted.name]);
             let names = names.map(|name| 1 + name.len()).sum();
             let length = encoded_len(contents, textures, learned.len(), names);
-            if length > room {
-                return Err(TrainingError::Room(length));
+            if length > buffer {
+                return Err(TrainingError::NoSpace(length));
             }
         }
         Ok(Self {
@@ -261,26 +261,30 @@ impl Training {
     }
 
     /// Movements and what has been learned at them.
-    pub fn learned(&self) -> &[(Movement, Lesson)] {
+    pub fn learned(&self) -> &[(Movement, TrainingStats)] {
         &self.learned
     }
 
     /// Takes up what was stored of this training at a movement.
     ///
     /// # Errors
-    /// [`TrainingError::Movement`], [`TrainingError::Lesson`].
+    /// [`TrainingError::Movement`], [`TrainingError::Stats`].
     #[inline]
-    pub fn resume(&mut self, movement: Movement, lesson: Lesson) -> Result<(), TrainingError> {
+    pub fn resume(
+        &mut self,
+        movement: Movement,
+        stats: TrainingStats,
+    ) -> Result<(), TrainingError> {
         let fits = matches!(
-            (lesson, self.contents),
-            (Lesson::Gaussians(_), Contents::Gaussians(_))
-                | (Lesson::Fused(_), Contents::Fused(..))
+            (stats, self.contents),
+            (TrainingStats::Gaussians(_), Contents::Gaussians(_))
+                | (TrainingStats::Fused(_), Contents::Fused(..))
         );
         let at = self.at(movement)?;
         if !fits {
-            return Err(TrainingError::Lesson);
+            return Err(TrainingError::Stats);
         }
-        *at = lesson;
+        *at = stats;
         Ok(())
     }
 
@@ -309,14 +313,14 @@ impl Training {
         table: Option<&Table<'_>>,
         movement: Movement,
         slide: &Observation,
-    ) -> Result<Trained, TrainingError> {
+    ) -> Result<TrainingRecord, TrainingError> {
         let contents = self.contents;
-        let lesson = self.at(movement)?;
-        match (&mut *lesson, contents) {
-            (Lesson::Gaussians(experience), Contents::Gaussians(measured)) => experience
+        let stats = self.at(movement)?;
+        match (&mut *stats, contents) {
+            (TrainingStats::Gaussians(experience), Contents::Gaussians(measured)) => experience
                 .learn(measured, &slide.properties)
                 .map_err(TrainingError::Missing)?,
-            (Lesson::Fused(whitened), Contents::Fused(set, features)) => {
+            (TrainingStats::Fused(whitened), Contents::Fused(set, features)) => {
                 let white = slide.vector(set, features.into()).and_then(|vector| {
                     let table = table?;
                     let index = table.movements().position(|m| m == movement)?;
@@ -324,18 +328,18 @@ impl Training {
                 });
                 whitened.teach(&white.ok_or(TrainingError::Features(set))?);
             }
-            _ => return Err(TrainingError::Lesson),
+            _ => return Err(TrainingError::Stats),
         }
-        let lesson = *lesson;
-        Ok(Trained {
-            lesson,
+        let stats = *stats;
+        Ok(TrainingRecord {
+            stats,
             name: self.name.clone(),
             movement,
             table: self.table(),
         })
     }
 
-    /// Writes the table with this texture into the beginning of `room`: `table`, the one in use, with all other textures as
+    /// Writes the table with this texture into the beginning of `buffer`: `table`, the one in use, with all other textures as
     /// they are to the bit, or one of this texture alone.
     ///
     /// # Errors
@@ -344,7 +348,7 @@ impl Training {
     pub fn encode<'r>(
         &self,
         table: Option<&Table<'_>>,
-        room: &'r mut [u8],
+        buffer: &'r mut [u8],
     ) -> Result<Table<'r>, TrainingError> {
         if let Some(movement) = self.next() {
             return Err(TrainingError::Unfinished(movement));
@@ -359,11 +363,11 @@ impl Training {
             Vec::<Experience, MAX_MOVEMENTS>::new(),
             Vec::<Whitened, MAX_MOVEMENTS>::new(),
         );
-        for (_, lesson) in &self.learned {
-            // there is room: all three are as long
-            let _ = match lesson {
-                Lesson::Gaussians(e) => experience.push(*e).is_ok(),
-                Lesson::Fused(w) => whitened.push(*w).is_ok(),
+        for (_, stats) in &self.learned {
+            // it fits: all three are as long
+            let _ = match stats {
+                TrainingStats::Gaussians(e) => experience.push(*e).is_ok(),
+                TrainingStats::Fused(w) => whitened.push(*w).is_ok(),
             };
         }
         let known = match self.contents {
@@ -374,39 +378,39 @@ impl Training {
         match (table, self.contents) {
             (Some(table), _) => {
                 let tally = self.tally(table);
-                amend(room, table, Change::Put { name, known, tally })
+                amend(buffer, table, Change::Put { name, known, tally })
             }
             (None, Contents::Gaussians(measured)) => {
                 let movements: Vec<Movement, MAX_MOVEMENTS> =
                     self.learned.iter().map(|(m, _)| *m).collect();
                 let experience = &experience;
                 let texture = Texture { name, experience };
-                encode(room, measured, &movements, [texture].into_iter())
+                encode(buffer, measured, &movements, [texture].into_iter())
             }
             (None, Contents::Fused(..)) => return Err(TrainingError::Table),
         }
         .map_err(TrainingError::Encode)
     }
 
-    /// What the table counted of the texture, and what the user has taught since.
+    /// What the table counted of the texture, and the trials from the user since.
     fn tally(&self, table: &Table<'_>) -> Tally {
         let known = table.find(&self.name);
         let before = known.map_or(Tally::default(), |texture| table.tally(texture));
-        let taught = self.learned.iter().zip(0..).map(|((_, lesson), movement)| {
+        let learned = self.learned.iter().zip(0..).map(|((_, stats), movement)| {
             let before = known.map_or(0, |texture| table.trials(texture, movement));
-            lesson.trials().saturating_sub(before)
+            stats.trials().saturating_sub(before)
         });
         Tally {
-            user: taught.fold(before.user, u8::saturating_add),
+            user: learned.fold(before.user, u8::saturating_add),
             ..before
         }
     }
 
-    fn at(&mut self, movement: Movement) -> Result<&mut Lesson, TrainingError> {
+    fn at(&mut self, movement: Movement) -> Result<&mut TrainingStats, TrainingError> {
         self.learned
             .iter_mut()
             .find(|(m, _)| *m == movement)
-            .map(|(_, lesson)| lesson)
+            .map(|(_, stats)| stats)
             .ok_or(TrainingError::Movement(movement))
     }
 }

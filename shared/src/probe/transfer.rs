@@ -4,13 +4,13 @@ use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
 use crate::store::{Store, StoreError};
-use crate::wire::{PART, Tell, Text, text};
+use crate::wire::{Event, PART, Text, text};
 
 /// The part of `table` that begins at `offset`, as the host is told of it; `None` if the table ends before.
-pub(super) fn read(table: &[u8], offset: u32) -> Option<Tell> {
+pub(super) fn read(table: &[u8], offset: u32) -> Option<Event> {
     let rest = table.get(offset as usize..)?;
     let part = rest.get(..rest.len().min(PART)).unwrap_or_default();
-    Some(Tell::TablePart {
+    Some(Event::TablePart {
         offset,
         length: table.len() as u32,
         bytes: Vec::from_slice(part).unwrap_or_default(),

@@ -37,8 +37,8 @@ impl RigCalibration {
         let (body, end) = bytes.split_at_mut(Self::BYTES - 4);
         let (numbers, serial) = body.split_at_mut(40);
         let (floats, date) = numbers.split_at_mut(36);
-        for (room, value) in floats.chunks_exact_mut(4).zip(self.numbers()) {
-            room.copy_from_slice(&value.to_le_bytes());
+        for (slot, value) in floats.chunks_exact_mut(4).zip(self.numbers()) {
+            slot.copy_from_slice(&value.to_le_bytes());
         }
         date.copy_from_slice(&self.date.to_le_bytes());
         serial.copy_from_slice(&self.serial);

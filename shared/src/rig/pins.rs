@@ -1,7 +1,7 @@
 //! What goes in and out of the rig's control every millisecond: the only interface between the control and the board or
 //! the simulator.
 
-use crate::features::Felt;
+use crate::features::SamplePhase;
 use heapless::Vec;
 
 use crate::sensor::pressure::Pressure;
@@ -41,8 +41,8 @@ pub struct Outputs {
     /// The stage's bridge is on.
     pub stage_enabled: bool,
     /// What the samples of this tick are.
-    pub felt: Felt,
-    /// P_AC of this tick in counts about the still finger's, where it is felt.
+    pub sample_phase: SamplePhase,
+    /// P_AC of this tick in counts about the still finger's, where it is sampled.
     pub pac: Vec<i16, MAX_WORDS>,
     /// Shear of this tick in mN, at constant speed.
     pub shear_mn: Option<i16>,

@@ -7,7 +7,7 @@ use super::phase::Ended;
 use super::pins::{Inputs, Outputs};
 use super::slide_path::SlidePath;
 use super::stage::{MARGIN_MM, StageConstants};
-use crate::features::{Felt, Movement};
+use crate::features::{Movement, SamplePhase};
 use crate::sensor::pressure::{Channel, RATE_HZ};
 use crate::up_to;
 
@@ -63,10 +63,10 @@ impl Run {
             acceleration_mm_s2: stage.acceleration_mm_s2,
             ..SlidePath::new(movement, length)
         };
-        let room = path.start_room_mm(sample)?;
+        let margin = path.start_room_mm(sample)?;
         // not-a-number clamps to itself, and is no start
         let start = if start >= 0.0 { start.min(1.0) } else { 0.0 };
-        let from = MARGIN_MM + start * room;
+        let from = MARGIN_MM + start * margin;
         let begin_s = path.ramp_s() + STEADY_MARGIN_S.min(0.2 * path.steady_s());
         let end_s = path.ramp_s() + path.steady_s();
         Some(Self {
@@ -117,7 +117,7 @@ impl Run {
     /// A tick of the background.
     pub(super) fn still(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
         self.feel(inputs, outputs);
-        outputs.felt = Felt::Still;
+        outputs.sample_phase = SamplePhase::Still;
         // those of the slide are counted from its first tick on
         self.words = 0;
     }
@@ -126,10 +126,10 @@ impl Run {
     pub(super) fn slid(&mut self, ms: u32, shear_n: f32, inputs: &Inputs, outputs: &mut Outputs) {
         self.feel(inputs, outputs);
         // the stage started with the tick before the first one of the slide
-        outputs.felt = if ms == 1 {
-            Felt::Begin(samples(self.steady_ms.start)..samples(self.steady_ms.end))
+        outputs.sample_phase = if ms == 1 {
+            SamplePhase::Begin(samples(self.steady_ms.start)..samples(self.steady_ms.end))
         } else {
-            Felt::Slide
+            SamplePhase::Slide
         };
         self.weigh_current(ms, inputs);
         if self.steady_ms.contains(&ms) {

@@ -53,8 +53,8 @@ impl SlidePath {
     /// Where the slide may start so that the finger stays on a sample of `sample_mm`, as the room in mm behind the first
     /// possible start; `None` if the slide does not fit at all.
     pub fn start_room_mm(&self, sample_mm: f32) -> Option<f32> {
-        let room = sample_mm - self.travel_mm();
-        (room >= 0.0).then_some(room)
+        let margin = sample_mm - self.travel_mm();
+        (margin >= 0.0).then_some(margin)
     }
 }
 
@@ -80,8 +80,8 @@ mod tests {
     #[test]
     fn start_room_is_what_the_sample_leaves() {
         let path = SlidePath::new(Movement::FOR_TRACTION, SlidePath::LONGEST_MM);
-        let room = path.start_room_mm(SlidePath::SAMPLE_MM).unwrap();
-        assert!((room - 14.9).abs() < 1e-4);
+        let margin = path.start_room_mm(SlidePath::SAMPLE_MM).unwrap();
+        assert!((margin - 14.9).abs() < 1e-4);
         assert!(path.start_room_mm(60.0).is_none());
     }
 }

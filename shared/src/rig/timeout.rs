@@ -20,12 +20,12 @@ pub enum Wait {
 
 /// Waits for a movement.
 #[derive(Clone, Copy, Debug)]
-pub struct Patience {
+pub struct MovementTimeout {
     left_ms: u32,
     stopped: bool,
 }
 
-impl Default for Patience {
+impl Default for MovementTimeout {
     fn default() -> Self {
         Self {
             left_ms: LONGEST_MS,
@@ -34,7 +34,7 @@ impl Default for Patience {
     }
 }
 
-impl Patience {
+impl MovementTimeout {
     /// Another `ms` have passed, and the rig is at rest or is not.
     pub fn wait(&mut self, ms: u32, at_rest: bool) -> Wait {
         if at_rest {
@@ -62,15 +62,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn patience_ends_twice() {
-        let mut patience = Patience::default();
-        let mut waited = |times: u32| (0..times).map(|_| patience.wait(10, false)).last();
+    fn a_timeout_ends_twice() {
+        let mut timeout = MovementTimeout::default();
+        let mut waited = |times: u32| (0..times).map(|_| timeout.wait(10, false)).last();
         assert_eq!(waited(LONGEST_MS / 10 - 1), Some(Wait::On));
         assert_eq!(waited(1), Some(Wait::Stop));
         assert_eq!(waited(LIFTING_MS / 10 - 1), Some(Wait::On));
-        let mut lifted = patience;
+        let mut lifted = timeout;
         assert_eq!(lifted.wait(10, true), Wait::Hangs);
-        assert_eq!(patience.wait(10, false), Wait::Hangs);
-        assert_eq!(Patience::default().wait(10, true), Wait::Over);
+        assert_eq!(timeout.wait(10, false), Wait::Hangs);
+        assert_eq!(MovementTimeout::default().wait(10, true), Wait::Over);
     }
 }

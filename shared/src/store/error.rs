@@ -14,13 +14,13 @@ pub enum StoreError<E> {
     /// The flash itself failed.
     Flash(E),
     /// The flash has fewer than four sectors.
-    Room(usize),
+    NoSpace(usize),
     /// The table does not fit into its sector.
     TooLong {
         /// Bytes of the table.
         length: usize,
         /// Bytes there are for it.
-        room: usize,
+        capacity: usize,
     },
     /// No table is being written.
     NoTable,
@@ -54,14 +54,14 @@ impl<E: fmt::Debug> fmt::Display for StoreError<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Flash(why) => write!(f, "the flash failed: {why:?}"),
-            Self::Room(bytes) => write!(
+            Self::NoSpace(bytes) => write!(
                 f,
                 "{bytes} bytes of flash, and the store takes {SECTORS} sectors"
             ),
-            Self::TooLong { length, room } => {
+            Self::TooLong { length, capacity } => {
                 write!(
                     f,
-                    "the table takes {length} bytes, and there is room for {room}"
+                    "the table takes {length} bytes, and there is room for {capacity}"
                 )
             }
             Self::NoTable => f.write_str("no table is being written: begin one"),

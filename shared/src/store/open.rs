@@ -12,7 +12,7 @@ impl<F: NorFlash> Store<F> {
     /// Settings that cannot be read are no error here, see [`Store::settings`]: tables can be used without them.
     ///
     /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Room`].
+    /// [`StoreError::Flash`], [`StoreError::NoSpace`].
     pub async fn open(flash: F) -> Result<Self, StoreError<F::Error>> {
         let () = Self::CHECK;
         let mut store = Self {
@@ -21,7 +21,7 @@ impl<F: NorFlash> Store<F> {
             settings: Err(SettingsError::Corrupt),
         };
         if store.flash.capacity() < SECTORS * F::ERASE_SIZE {
-            return Err(StoreError::Room(store.flash.capacity()));
+            return Err(StoreError::NoSpace(store.flash.capacity()));
         }
         store.find_tables().await?;
         store.open_settings().await?;

@@ -12,10 +12,10 @@ use serde::{Deserialize, Serialize};
 use super::error::{SettingsError, StoreError};
 use super::pages::Pages;
 use crate::features::Movement;
-use crate::table::{Lesson, MAX_TEXTURES, Name, Whitened};
+use crate::table::{MAX_TEXTURES, Name, TrainingStats, Whitened};
 
 /// Most records of training: a pilot of 30 movements and three textures of three. With all of them in use, 108 bytes each,
-/// and everything self-taught besides, 84 bytes a texture, a page of 16 KB is not full.
+/// and everything self-learned besides, 84 bytes a texture, a page of 16 KB is not full.
 pub const MAX_RECORDS: u8 = 40;
 /// Movements of a texture that a probe learns by itself: an exploration rarely makes more.
 pub const SELF_MOVEMENTS: usize = 2;
@@ -32,12 +32,12 @@ pub(super) const KEY_TRAINED: u8 = 16;
 pub(super) const KEY_SELF: u8 = 64;
 /// One past the last key.
 pub(super) const KEYS: usize = KEY_SELF as usize + MAX_TEXTURES;
-/// The longest record with its key, in whole words: one of training takes 99 bytes, a self-taught one 106.
+/// The longest record with its key, in whole words: one of training takes 99 bytes, a self-learned one 106.
 pub(super) const RECORD: usize = 112;
 
 /// How far the training of a texture at one movement has come.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct Trained {
+pub struct TrainingRecord {
     /// The texture.
     pub name: Name,
     /// The movement.
@@ -45,7 +45,7 @@ pub struct Trained {
     /// Checksum of the table whose trials of this texture are counted in; `None` for trials of its own only.
     pub table: Option<u32>,
     /// What was learned.
-    pub lesson: Lesson,
+    pub stats: TrainingStats,
 }
 
 /// A record of which the settings hold several, each at a place of its own.
@@ -62,7 +62,7 @@ pub(super) trait Record: Serialize + for<'b> Deserialize<'b> {
     fn outlives(&self, old: &Self) -> bool;
 }
 
-impl Record for Trained {
+impl Record for TrainingRecord {
     const FIRST: u8 = KEY_TRAINED;
     const PLACES: u8 = MAX_RECORDS;
 
@@ -75,13 +75,13 @@ impl Record for Trained {
     }
 }
 
-impl Trained {
+impl TrainingRecord {
     pub(super) fn is(&self, name: &str, movement: Movement, table: Option<u32>) -> bool {
         self.name == name && self.movement == movement && self.table == table
     }
 }
 
-impl Record for SelfTaught {
+impl Record for SelfLearnedRecord {
     const FIRST: u8 = KEY_SELF;
     const PLACES: u8 = MAX_TEXTURES as u8;
 
@@ -96,8 +96,8 @@ impl Record for SelfTaught {
 
 /// What the probe has learned by itself of a texture, in place of what the table says of it at these movements.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct SelfTaught {
-    /// [`crate::table::Table::lineage`] of the table: what was taught since does not change it.
+pub struct SelfLearnedRecord {
+    /// [`crate::table::Table::lineage`] of the table: what is learned later does not change it.
     pub lineage: u32,
     /// [`crate::table::Table::number`] of the texture.
     pub number: u16,

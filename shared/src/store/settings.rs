@@ -10,14 +10,14 @@ use super::error::{SettingsError, StoreError};
 use super::layout::SCHEMA;
 use super::pages::{Pages, page_size};
 use super::records::{
-    KEY_CALIBRATION, KEY_SCHEMA, KEY_SKIN, Map, RECORD, Record, Records, SelfTaught, Trained,
-    decode,
+    KEY_CALIBRATION, KEY_SCHEMA, KEY_SKIN, Map, RECORD, Record, Records, SelfLearnedRecord,
+    TrainingRecord, decode,
 };
 use super::sectors::Store;
 use crate::features::Movement;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
-use crate::table::{Lesson, MAX_TEXTURES};
+use crate::table::{MAX_TEXTURES, TrainingStats};
 
 /// How a place for a record is used, as a new record sees it.
 #[derive(Clone, Copy, PartialEq)]
@@ -107,28 +107,29 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`].
-    pub async fn trained(
+    pub async fn training_record(
         &mut self,
         name: &str,
         movement: Movement,
         table: Option<u32>,
-    ) -> Result<Option<Lesson>, StoreError<F::Error>> {
+    ) -> Result<Option<TrainingStats>, StoreError<F::Error>> {
         self.settings?;
         let mut found = None;
         let mut buffer = [0; RECORD];
         let mut map = self.map();
-        let mut records = Records::<F, Trained>::new(map.fetch_all_items(&mut buffer).await?);
+        let mut records =
+            Records::<F, TrainingRecord>::new(map.fetch_all_items(&mut buffer).await?);
         while let Some((place, record)) = records.next().await? {
             match record {
                 Some(record) if record.is(name, movement, table) => {
-                    found = Some((place, record.lesson));
+                    found = Some((place, record.stats));
                 }
                 // the place went to another
                 _ if found.is_some_and(|(at, _)| at == place) => found = None,
                 _ => {}
             }
         }
-        Ok(found.map(|(_, lesson)| lesson))
+        Ok(found.map(|(_, stats)| stats))
     }
 
     /// Stores how far a training has come, in place of what was stored for this texture, movement and table. When room runs
@@ -136,16 +137,23 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
-    pub async fn set_trained(&mut self, new: &Trained) -> Result<(), StoreError<F::Error>> {
+    pub async fn set_training_record(
+        &mut self,
+        new: &TrainingRecord,
+    ) -> Result<(), StoreError<F::Error>> {
         self.put(new).await
     }
 
-    /// Forgets the unfinished training of a texture, movement by movement: after a cut some may be left.
+    /// Deletes the unfinished training of a texture, movement by movement: after a cut some may be left.
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
-    pub async fn forget_trained(&mut self, name: &str) -> Result<(), StoreError<F::Error>> {
-        self.clear(&|record: &Trained| record.name == name).await
+    pub async fn delete_training_records(
+        &mut self,
+        name: &str,
+    ) -> Result<(), StoreError<F::Error>> {
+        self.clear(&|record: &TrainingRecord| record.name == name)
+            .await
     }
 
     /// What the probe has learned by itself of the textures of the table with this lineage, one after the other: `each` hears
@@ -153,17 +161,18 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`].
-    pub async fn self_taught(
+    pub async fn self_learned(
         &mut self,
         lineage: u32,
-        each: &mut dyn FnMut(SelfTaught),
+        each: &mut dyn FnMut(SelfLearnedRecord),
     ) -> Result<(), StoreError<F::Error>> {
         self.settings?;
         // which record of every place is the last: only that one counts
         let mut last = [0u16; MAX_TEXTURES];
         let mut buffer = [0; RECORD];
         let mut map = self.map();
-        let mut records = Records::<F, SelfTaught>::new(map.fetch_all_items(&mut buffer).await?);
+        let mut records =
+            Records::<F, SelfLearnedRecord>::new(map.fetch_all_items(&mut buffer).await?);
         let mut number = 0;
         while let Some((place, _)) = records.next().await? {
             number += 1;
@@ -172,7 +181,8 @@ impl<F: NorFlash> Store<F> {
             }
         }
         let mut map = self.map();
-        let mut records = Records::<F, SelfTaught>::new(map.fetch_all_items(&mut buffer).await?);
+        let mut records =
+            Records::<F, SelfLearnedRecord>::new(map.fetch_all_items(&mut buffer).await?);
         let mut number = 0;
         while let Some((place, record)) = records.next().await? {
             number += 1;
@@ -189,20 +199,23 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
-    pub async fn set_self_taught(&mut self, new: &SelfTaught) -> Result<(), StoreError<F::Error>> {
+    pub async fn set_self_learned(
+        &mut self,
+        new: &SelfLearnedRecord,
+    ) -> Result<(), StoreError<F::Error>> {
         self.put(new).await
     }
 
-    /// Forgets what the probe has learned by itself: of the texture with this number of that lineage, or all of it.
+    /// Deletes what the probe has learned by itself: of the texture with this number of that lineage, or all of it.
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
-    pub async fn forget_self_taught(
+    pub async fn delete_self_learned(
         &mut self,
         of: Option<(u32, u16)>,
     ) -> Result<(), StoreError<F::Error>> {
         let is_its =
-            |record: &SelfTaught| of.is_none_or(|of| (record.lineage, record.number) == of);
+            |record: &SelfLearnedRecord| of.is_none_or(|of| (record.lineage, record.number) == of);
         self.clear(&is_its).await
     }
 
@@ -299,10 +312,12 @@ impl<F: NorFlash> Store<F> {
                 };
             }
         }
-        let mut records = Records::<F, Trained>::new(map.fetch_all_items(&mut buffer).await?);
+        let mut records =
+            Records::<F, TrainingRecord>::new(map.fetch_all_items(&mut buffer).await?);
         while records.next().await?.is_some() {}
         let mut map = self.map();
-        let mut records = Records::<F, SelfTaught>::new(map.fetch_all_items(&mut buffer).await?);
+        let mut records =
+            Records::<F, SelfLearnedRecord>::new(map.fetch_all_items(&mut buffer).await?);
         while records.next().await?.is_some() {}
         Ok(true)
     }
@@ -341,9 +356,9 @@ impl<F: NorFlash> Store<F> {
         let mut buffer = [0; RECORD];
         let mut map = self.map();
         if !schema_written {
-            let mut room = [0; RECORD];
+            let mut record = [0; RECORD];
             let schema: &[u8] =
-                postcard::to_slice(&SCHEMA, &mut room).map_err(|_| SettingsError::Corrupt)?;
+                postcard::to_slice(&SCHEMA, &mut record).map_err(|_| SettingsError::Corrupt)?;
             map.store_item(&mut buffer, &KEY_SCHEMA, &schema).await?;
         }
         map.store_item(&mut buffer, &key, &bytes).await?;

@@ -55,7 +55,7 @@ impl<F: NorFlash> Store<F> {
         if length > Self::MAX_TABLE {
             return Err(StoreError::TooLong {
                 length,
-                room: Self::MAX_TABLE,
+                capacity: Self::MAX_TABLE,
             });
         }
         let slot = self

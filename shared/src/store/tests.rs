@@ -2,7 +2,7 @@
 
 mod cuts;
 pub(crate) mod ram;
-mod self_taught;
+mod self_learned;
 mod wear;
 
 use super::*;
@@ -12,7 +12,7 @@ use crate::rig::skin::SkinCare;
 use crate::sensor::pressure::Calibration;
 use crate::table::Name;
 use crate::table::tests::{around, table_of};
-use crate::table::{Experience, Lesson, Table, TableError};
+use crate::table::{Experience, Table, TableError, TrainingStats};
 use embassy_futures::block_on;
 use ram::{Ram, RamError, SECTOR};
 use std::vec;
@@ -51,16 +51,16 @@ async fn push(store: &mut Store<Ram>, bytes: &[u8], part: usize) -> Outcome<()> 
     for (index, some) in bytes.chunks(part).enumerate() {
         store.write_table(index * part, some).await?;
     }
-    let mut room = [0; SECTOR];
-    let (stored, table) = store.commit_table(&mut room).await?;
+    let mut buffer = [0; SECTOR];
+    let (stored, table) = store.commit_table(&mut buffer).await?;
     assert_eq!((table.as_bytes(), table.crc()), (bytes, stored.crc));
     Ok(())
 }
 
 /// The table in use.
 fn used(store: &mut Store<Ram>) -> Option<Vec<u8>> {
-    let mut room = [0; SECTOR];
-    let table = block_on(store.read_table(&mut room)).unwrap()?;
+    let mut buffer = [0; SECTOR];
+    let table = block_on(store.read_table(&mut buffer)).unwrap()?;
     let bytes = table.as_bytes().to_vec();
     let stored = store.table().unwrap();
     assert_eq!((stored.crc, stored.length), (table.crc(), bytes.len()));
@@ -89,16 +89,21 @@ fn experience(trials: u8) -> Experience {
     experience
 }
 
-fn lesson(trials: u8) -> Lesson {
-    Lesson::Gaussians(experience(trials))
+fn stats(trials: u8) -> TrainingStats {
+    TrainingStats::Gaussians(experience(trials))
 }
 
-fn trained(name: &str, movement: Movement, table: Option<u32>, trials: u8) -> super::Trained {
-    super::Trained {
+fn training_record(
+    name: &str,
+    movement: Movement,
+    table: Option<u32>,
+    trials: u8,
+) -> super::TrainingRecord {
+    super::TrainingRecord {
         name: Name::try_from(name).unwrap(),
         movement,
         table,
-        lesson: lesson(trials),
+        stats: stats(trials),
     }
 }
 
@@ -109,14 +114,14 @@ fn a_blank_flash_is_an_empty_store() {
     assert_eq!(store.settings(), Ok(()));
     assert_eq!(block_on(store.calibration()), Ok(None));
     assert_eq!(block_on(store.skin()), Ok(SkinCare::default()));
-    let none = block_on(store.trained("felt", Movement::FOR_TRACTION, None));
+    let none = block_on(store.training_record("felt", Movement::FOR_TRACTION, None));
     assert_eq!(none, Ok(None));
     assert_eq!(store.close().operations, 0, "looking writes nothing");
     let mut short = Ram::<SECTOR>::new();
     short.bytes.truncate(3 * SECTOR);
     assert_eq!(
         block_on(Store::open(short)).err(),
-        Some(StoreError::Room(3 * SECTOR))
+        Some(StoreError::NoSpace(3 * SECTOR))
     );
 }
 
@@ -144,17 +149,17 @@ fn a_table_that_is_not_whole_is_refused_and_the_former_one_stays() {
     let mut store = open(Ram::new());
     let (old, new) = (table(1), table(2));
     block_on(push(&mut store, &old, 16)).unwrap();
-    let mut room = [0; SECTOR];
+    let mut buffer = [0; SECTOR];
     let part = |offset, wanted| Err(StoreError::Part { offset, wanted });
     block_on(async {
         assert_eq!(store.write_table(0, &new).await, Err(StoreError::NoTable));
         assert_eq!(
-            store.commit_table(&mut room).await.err(),
+            store.commit_table(&mut buffer).await.err(),
             Some(StoreError::NoTable)
         );
         let too_long = StoreError::TooLong {
             length: SECTOR - 31,
-            room: SECTOR - 32,
+            capacity: SECTOR - 32,
         };
         assert_eq!(store.begin_table(SECTOR - 31).await, Err(too_long));
         store.begin_table(new.len()).await.unwrap();
@@ -166,18 +171,21 @@ fn a_table_that_is_not_whole_is_refused_and_the_former_one_stays() {
             got: 7,
             wanted: new.len(),
         };
-        assert_eq!(store.commit_table(&mut room).await.err(), Some(unfinished));
+        assert_eq!(
+            store.commit_table(&mut buffer).await.err(),
+            Some(unfinished)
+        );
         store.write_table(7, &new[7..]).await.unwrap();
-        let small = store.commit_table(&mut room[..new.len() - 1]).await.err();
+        let small = store.commit_table(&mut buffer[..new.len() - 1]).await.err();
         assert_eq!(small, Some(StoreError::Buffer(new.len())));
-        store.commit_table(&mut room).await.unwrap();
+        store.commit_table(&mut buffer).await.unwrap();
         // a damaged one
         let mut damaged = old.clone();
         damaged[30] ^= 1;
         store.begin_table(damaged.len()).await.unwrap();
         store.write_table(0, &damaged).await.unwrap();
         assert!(matches!(
-            store.commit_table(&mut room).await,
+            store.commit_table(&mut buffer).await,
             Err(StoreError::Table(TableError::Crc { .. }))
         ));
         // one with something behind it
@@ -186,7 +194,7 @@ fn a_table_that_is_not_whole_is_refused_and_the_former_one_stays() {
         store.begin_table(longer.len()).await.unwrap();
         store.write_table(0, &longer).await.unwrap();
         assert!(matches!(
-            store.commit_table(&mut room).await,
+            store.commit_table(&mut buffer).await,
             Err(StoreError::Unfinished { .. })
         ));
     });
@@ -220,14 +228,14 @@ fn settings_are_kept_over_many_rounds_of_the_pages() {
     let mut skin = SkinCare::default();
     block_on(async {
         store.set_calibration(&calibration(7)).await.unwrap();
-        let mut one = trained("felt", Movement::FOR_TRACTION, Some(5), 3);
-        store.set_trained(&one).await.unwrap();
+        let mut one = training_record("felt", Movement::FOR_TRACTION, Some(5), 3);
+        store.set_training_record(&one).await.unwrap();
         for n in 0..200u8 {
             skin = SkinCare::after(f32::from(n), f32::from(n) * 1.5);
             store.set_skin(&skin).await.unwrap();
-            one.lesson = lesson(n);
+            one.stats = stats(n);
             one.table = None;
-            store.set_trained(&one).await.unwrap();
+            store.set_training_record(&one).await.unwrap();
         }
     });
     let ram = store.close();
@@ -244,12 +252,15 @@ fn settings_are_kept_over_many_rounds_of_the_pages() {
             ("wool", at(None), None),
             ("felt", (Movement::FOR_ROUGHNESS, None), None),
         ] {
-            let found = store.trained(name, movement, table).await.unwrap();
-            assert_eq!(found, trials.map(lesson), "{name}");
+            let found = store.training_record(name, movement, table).await.unwrap();
+            assert_eq!(found, trials.map(stats), "{name}");
         }
-        store.forget_trained("felt").await.unwrap();
+        store.delete_training_records("felt").await.unwrap();
         let (movement, table) = at(None);
-        assert_eq!(store.trained("felt", movement, table).await, Ok(None));
+        assert_eq!(
+            store.training_record("felt", movement, table).await,
+            Ok(None)
+        );
         let unusable = RigCalibration {
             newton_per_ampere: 0.0,
             ..calibration(1)
@@ -268,7 +279,7 @@ fn progress_on_top_of_a_former_table_makes_room() {
         let full = loop {
             let name = std::format!("{stored:040}");
             match store
-                .set_trained(&trained(&name, Movement::FOR_TRACTION, Some(1), 2))
+                .set_training_record(&training_record(&name, Movement::FOR_TRACTION, Some(1), 2))
                 .await
             {
                 Ok(()) => stored += 1,
@@ -277,15 +288,17 @@ fn progress_on_top_of_a_former_table_makes_room() {
         };
         assert_eq!(full, StoreError::Settings(SettingsError::Full));
         assert!(stored >= 8, "{stored}");
-        // what there is can still be read, and forgotten
+        // what there is can still be read, and deleted
         for n in 0..stored {
             let name = std::format!("{n:040}");
-            let found = store.trained(&name, Movement::FOR_TRACTION, Some(1)).await;
-            assert_eq!(found, Ok(Some(lesson(2))), "{n}");
-            store.forget_trained(&name).await.unwrap();
+            let found = store
+                .training_record(&name, Movement::FOR_TRACTION, Some(1))
+                .await;
+            assert_eq!(found, Ok(Some(stats(2))), "{n}");
+            store.delete_training_records(&name).await.unwrap();
         }
-        let one = trained("felt", Movement::FOR_TRACTION, Some(1), 2);
-        store.set_trained(&one).await.unwrap();
+        let one = training_record("felt", Movement::FOR_TRACTION, Some(1), 2);
+        store.set_training_record(&one).await.unwrap();
     });
 }
 
@@ -328,7 +341,7 @@ fn damaged_settings_are_told_and_erased_without_the_tables() {
         assert_eq!(block_on(store.calibration()), Err(told));
         assert_eq!(block_on(store.set_skin(&SkinCare::default())), Err(told));
         assert_eq!(
-            block_on(store.trained("felt", Movement::FOR_TRACTION, None)),
+            block_on(store.training_record("felt", Movement::FOR_TRACTION, None)),
             Err(told)
         );
         assert_eq!(used(&mut store), Some(table(5)));

@@ -33,7 +33,7 @@ pub enum Known<'a> {
 /// What is to be different in a table.
 #[derive(Clone, Copy, Debug)]
 pub enum Change<'a> {
-    /// A texture that is taught: in place of the one of that name, or one more.
+    /// A texture to learn: in place of the one of that name, or one more.
     Put {
         /// Its name.
         name: &'a str,
@@ -63,7 +63,7 @@ pub enum EncodeError {
     /// There is no texture with this index.
     Texture(u16),
     /// The table takes this many bytes, and there is less room.
-    Room(usize),
+    NoSpace(usize),
     /// A texture has not as many experiences as there are movements.
     Movements(u16),
     /// A name is longer than 255 bytes.
@@ -91,7 +91,7 @@ impl fmt::Display for EncodeError {
             ),
             Self::Contents => f.write_str("what was learned does not fit this kind of table"),
             Self::Texture(texture) => write!(f, "the table has no texture {}", texture + 1),
-            Self::Room(needed) => {
+            Self::NoSpace(needed) => {
                 write!(f, "the table takes {needed} bytes, and there is less room")
             }
             Self::Movements(texture) => write!(
@@ -279,8 +279,8 @@ pub fn retell(
     let features = usize::from(features);
     let cell = usize::from(texture) * usize::from(table.movements) + usize::from(movement);
     let mut put = |at: usize, new: &[u8]| {
-        if let Some(room) = bytes.get_mut(at..at + new.len()) {
-            room.copy_from_slice(new);
+        if let Some(buffer) = bytes.get_mut(at..at + new.len()) {
+            buffer.copy_from_slice(new);
         }
     };
     for (mean, at) in whitened.mean.iter().take(features).zip((0..).step_by(2)) {
@@ -430,14 +430,14 @@ fn write<'o, 'a>(
     });
     let length = encoded_len(contents, count, movements.len(), names);
     let (Ok(count), Ok(length_field)) = (u16::try_from(count), u32::try_from(length)) else {
-        return Err(EncodeError::Room(length));
+        return Err(EncodeError::NoSpace(length));
     };
     if count == 0 || !(1..=MAX_MOVEMENTS).contains(&movements.len()) {
         return Err(EncodeError::Empty);
     }
     let per_texture = movements.len();
     let mut writer = Writer {
-        room: out.get_mut(..length).ok_or(EncodeError::Room(length))?,
+        buffer: out.get_mut(..length).ok_or(EncodeError::NoSpace(length))?,
         at: 0,
     };
     let [code, what, features] = contents.codes();
@@ -477,24 +477,24 @@ fn write<'o, 'a>(
     }
     let crc = CRC32.checksum(writer.written());
     writer.put(&crc.to_le_bytes());
-    Table::read(writer.room).map_err(EncodeError::Invalid)
+    Table::read(writer.buffer).map_err(EncodeError::Invalid)
 }
 
 /// Fills a slice from its beginning.
 struct Writer<'o> {
-    room: &'o mut [u8],
+    buffer: &'o mut [u8],
     at: usize,
 }
 
 impl Writer<'_> {
     fn put(&mut self, bytes: &[u8]) {
-        if let Some(room) = self.room.get_mut(self.at..self.at + bytes.len()) {
-            room.copy_from_slice(bytes);
+        if let Some(buffer) = self.buffer.get_mut(self.at..self.at + bytes.len()) {
+            buffer.copy_from_slice(bytes);
         }
         self.at += bytes.len();
     }
 
     fn written(&self) -> &[u8] {
-        self.room.get(..self.at).unwrap_or_default()
+        self.buffer.get(..self.at).unwrap_or_default()
     }
 }

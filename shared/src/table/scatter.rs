@@ -205,7 +205,7 @@ pub fn whiten(scatters: &[Scatter]) -> Result<Vec<Whitening, MAX_MOVEMENTS>, Whi
                 .find(|&p| largest * f64::from(1u32 << p) < f64::from(i16::MAX))
                 .unwrap_or(0);
             let scale = f64::from(1u32 << places);
-            // there is room: a square of so many features at most
+            // it fits: a square of so many features at most
             bytes.extend([places]);
             words.extend(weights.map(|w| libm::round(w * scale) as i16));
         }

@@ -484,10 +484,10 @@ fn what_cannot_be_written_is_refused() {
         write(&mut out[..length], PropertySet::ALL, &MOVEMENTS),
         Ok(length)
     );
-    let room = Err(EncodeError::Room(length));
+    let buffer = Err(EncodeError::NoSpace(length));
     assert_eq!(
         write(&mut out[..length - 1], PropertySet::ALL, &MOVEMENTS),
-        room
+        buffer
     );
 
     let names: Vec<String> = (0..65536).map(|n| n.to_string()).collect();
@@ -496,7 +496,7 @@ fn what_cannot_be_written_is_refused() {
         experience: &[],
     });
     let too_many = encode(out, PropertySet::ALL, &MOVEMENTS, textures).map(|_| ());
-    assert!(matches!(too_many, Err(EncodeError::Room(bytes)) if bytes > 65536 * 26));
+    assert!(matches!(too_many, Err(EncodeError::NoSpace(bytes)) if bytes > 65536 * 26));
 }
 
 #[test]

@@ -105,14 +105,14 @@ impl Whitened {
 
 /// What was learned of a texture at one movement, as the table that it is for keeps it.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
-pub enum Lesson {
+pub enum TrainingStats {
     /// For a table of Gaussians.
     Gaussians(Experience),
     /// For a fused table.
     Fused(Whitened),
 }
 
-impl Lesson {
+impl TrainingStats {
     /// Trials so far.
     pub const fn trials(&self) -> u8 {
         match self {

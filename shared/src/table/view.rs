@@ -423,7 +423,7 @@ impl<'a> Table<'a> {
         label.flatten().unwrap_or_default()
     }
 
-    /// A texture's number, which stays its own when others are forgotten or it is renamed.
+    /// A texture's number, which stays its own when others are deleted or it is renamed.
     pub fn number(&self, texture: u16) -> u16 {
         let [low, high, ..] = self.label(texture);
         u16::from_le_bytes([low, high])
@@ -450,7 +450,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The checksum of the table that was in the beginning, before anything was taught: its own, if nothing was.
+    /// The checksum of the table that was in the beginning, before anything was learned: its own, if nothing was.
     pub fn lineage(&self) -> u32 {
         let stored = array(self.bytes, self.layout().lineage).map_or(0, u32::from_le_bytes);
         if stored == 0 { self.crc() } else { stored }

@@ -114,7 +114,7 @@ impl<'b> View<'b> {
                     row.zip(apart).map(|(w, x)| dot(w, x)).sum()
                 }
             };
-            // there is room
+            // it fits
             let _ = white.push(rounded(sum, places));
             rest = rest.get(2 * self.features..).unwrap_or_default();
         }

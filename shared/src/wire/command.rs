@@ -15,14 +15,15 @@ pub struct Request {
     /// Comes back in the answer.
     pub id: u16,
     /// What is asked for.
-    pub ask: Ask,
+    #[serde(alias = "ask")]
+    pub command: Command,
 }
 
-/// What the host may ask for. Every request is answered with [`super::Tell::Done`] or [`super::Tell::Refused`] when it is over; what it
+/// What the host may ask for. Every request is answered with [`super::Event::Done`] or [`super::Event::Refused`] when it is over; what it
 /// does in between, and what it was asked for, is told before that.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub enum Ask {
-    /// Asks how the probe is: [`super::Tell::Status`].
+pub enum Command {
+    /// Asks how the probe is: [`super::Event::Status`].
     Status,
     /// Ends a fault, then finds the limit switches.
     Home,
@@ -32,7 +33,8 @@ pub enum Ask {
     Identify(Identify),
     /// What lay under the finger in the last exploration: one of the textures known, or a new one. The probe learns it from
     /// the slides of that exploration.
-    Answer(Name),
+    #[serde(alias = "Answer")]
+    Label(Name),
     /// Learns what lies under the finger.
     Train(Train),
     /// Gives a texture another name.
@@ -42,17 +44,17 @@ pub enum Ask {
         /// Its new name.
         to: Name,
     },
-    /// Forgets what was learned.
+    /// Deletes what was learned.
     Forget(Forget),
-    /// Measures the motor's current without load, takes and keeps it. [`super::Tell::Calibration`].
+    /// Measures the motor's current without load, takes and keeps it. [`super::Event::Calibration`].
     Calibrate,
-    /// Asks for the constants in use: [`super::Tell::Calibration`].
+    /// Asks for the constants in use: [`super::Event::Calibration`].
     ReadCalibration,
     /// Takes and keeps these constants: [`crate::rig::calibration::RigCalibration::to_bytes`].
     WriteCalibration(Vec<u8, 64>),
-    /// Whether the probe sends raw samples: [`super::Tell::Block`].
+    /// Whether the probe sends raw samples: [`super::Event::Block`].
     Stream(bool),
-    /// Asks for the table in use from this byte on: [`super::Tell::TablePart`].
+    /// Asks for the table in use from this byte on: [`super::Event::TablePart`].
     ReadTable(u32),
     /// A table of so many bytes follows.
     BeginTable(u32),
@@ -78,7 +80,7 @@ pub struct Identify {
     pub threshold: f32,
     /// After this many slides the most probable texture is the answer.
     pub max_slides: u8,
-    /// How what was felt is compared with what is known; the best one for the table, unless given.
+    /// How slides are compared with the table; the best one for the table, unless given.
     pub method: Option<Method>,
     /// How the next movement is chosen.
     pub strategy: Strategy,
@@ -90,13 +92,14 @@ pub struct Identify {
     pub seed: u32,
 }
 
-/// What is to be forgotten.
+/// What is to be deleted.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum Forget {
-    /// A texture, whoever taught it.
+    /// A texture, whether the user or the probe itself gave its label.
     Texture(Name),
-    /// All that the probe has learned by itself: the table is again as it was taught.
-    SelfTaught,
+    /// All that the probe has learned by itself: the table is again as the user trained it.
+    #[serde(alias = "SelfTaught")]
+    SelfLearned,
     /// The unfinished training of a texture, or a finished pilot.
     Training(Name),
 }

@@ -6,14 +6,15 @@ use serde::{Deserialize, Serialize};
 use super::command::PART;
 use super::sparse;
 use super::text::Text;
+use crate::explorer::ExpectedOutcome;
 use crate::features::{
     Block, FUSED_BANDS, Measurement, Movement, Observation, Properties, Property,
 };
 use crate::rig::Fault;
 use crate::table::{Action, MAX_TEXTURES, Name};
 
-/// Most actions that are sent of an outlook: the best ones.
-pub const MAX_OUTLOOK: usize = 16;
+/// Most expected outcomes that are sent: those of the best actions.
+pub const MAX_EXPECTED_OUTCOMES: usize = 16;
 
 /// From the probe.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -23,13 +24,14 @@ pub struct Report {
     /// Since the probe booted, ms.
     pub at_ms: u32,
     /// What happened.
-    pub tell: Tell,
+    #[serde(alias = "tell")]
+    pub event: Event,
 }
 
 /// What can happen.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant)] // no allocation here, and only one at a time
-pub enum Tell {
+pub enum Event {
     /// The probe has booted.
     Booted {
         /// [`PROTOCOL`](super::PROTOCOL) of the probe.
@@ -41,7 +43,7 @@ pub enum Tell {
         /// Why the firmware gave up before the reset, if it did.
         last_words: Option<Text>,
     },
-    /// Answer to [`super::Ask::Status`].
+    /// Answer to [`super::Command::Status`].
     Status(Status),
     /// The request of this number is over.
     Done(u16),
@@ -64,17 +66,20 @@ pub enum Tell {
         movement: Movement,
         /// What is looked at.
         action: Action,
-        /// What the best actions promise, best first.
-        outlook: Vec<Promise, MAX_OUTLOOK>,
+        /// Expected outcomes of the best actions, best first.
+        #[serde(alias = "outlook")]
+        expected: Vec<ExpectedOutcome, MAX_EXPECTED_OUTCOMES>,
     },
     /// The slide was made and taken in.
-    Felt {
+    #[serde(alias = "Felt")]
+    SlideReport {
         /// Number of the slide, from 1.
         slide: u8,
         /// What was looked at.
         action: Action,
-        /// What was felt.
-        felt: Felt,
+        /// What was measured.
+        #[serde(alias = "felt")]
+        observed: SlideReport,
         /// Probability of every texture of the table. On the line only those that are not 0: most are soon.
         #[serde(with = "sparse")]
         posterior: Vec<f32, MAX_TEXTURES>,
@@ -102,11 +107,13 @@ pub enum Tell {
         log_odds: Option<f32>,
         /// Slides that counted.
         slides: u8,
-        /// Whether the probe would learn from [`super::Ask::Answer`]: it is not certain.
-        asks: bool,
+        /// Whether the probe would learn from [`super::Command::Label`]: it is not certain.
+        #[serde(alias = "asks")]
+        wants_label: bool,
     },
-    /// The probe has learned from what it felt: so many slides.
-    Taught {
+    /// The probe has learned a texture from so many slides of an exploration.
+    #[serde(alias = "Taught")]
+    TextureLearned {
         /// Name of the texture.
         name: Name,
         /// How many slides.
@@ -115,15 +122,17 @@ pub enum Tell {
         itself: bool,
     },
     /// A movement of a texture that is learned was made.
-    Learned {
+    #[serde(alias = "Learned")]
+    TrainingSlide {
         /// The movement.
         movement: Movement,
         /// Its trial, from 1.
         trial: u8,
         /// Trials to come after it, of all movements.
         left: u16,
-        /// What was felt.
-        felt: Felt,
+        /// What was measured.
+        #[serde(alias = "felt")]
+        observed: SlideReport,
     },
     /// What the rig is at, 20 times a second while it moves.
     Live(Live),
@@ -236,28 +245,17 @@ pub struct Counts {
     pub parity_errors: u32,
     /// Error frames of the sensor, and words of no sensor.
     pub error_frames: u32,
-    /// Words that found no room on their way to the features.
+    /// Words that did not fit on their way to the features.
     pub lost_samples: u32,
-    /// Reports that found no room on their way to the host.
+    /// Reports that did not fit on their way to the host.
     pub lost_reports: u32,
     /// Frames from the host that were damaged.
     pub damaged_frames: u32,
 }
 
-/// What an action promises.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
-pub struct Promise {
-    /// The action.
-    pub action: Action,
-    /// Uncertainty that is expected to remain (eq. 11).
-    pub uncertainty: f32,
-    /// Its benefit (eq. 12).
-    pub benefit: f32,
-}
-
 /// What one slide says.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct Felt {
+pub struct SlideReport {
     /// Values in the order of [`Property::ALL`].
     pub properties: [Option<f32>; 3],
     /// The roughness is an upper bound.
@@ -270,7 +268,7 @@ pub struct Felt {
     pub pressure: Option<[i16; 2]>,
 }
 
-impl Felt {
+impl SlideReport {
     /// The properties.
     pub const fn properties(&self) -> Properties {
         Properties::new(self.properties)
@@ -286,7 +284,7 @@ impl Felt {
     }
 }
 
-impl From<&Measurement> for Felt {
+impl From<&Measurement> for SlideReport {
     fn from(slide: &Measurement) -> Self {
         let Observation {
             properties,

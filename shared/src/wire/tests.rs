@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use std::vec;
 
 fn frame(message: &impl Serialize) -> std::vec::Vec<u8> {
-    let mut room = [0; MAX_FRAME + 1];
-    encode(message, &mut room).unwrap().to_vec()
+    let mut buffer = [0; MAX_FRAME + 1];
+    encode(message, &mut buffer).unwrap().to_vec()
 }
 
 fn receive<M: DeserializeOwned>(bytes: &[u8]) -> std::vec::Vec<Result<M, FrameError>> {
@@ -22,11 +22,11 @@ fn receive<M: DeserializeOwned>(bytes: &[u8]) -> std::vec::Vec<Result<M, FrameEr
         .collect()
 }
 
-fn report(tell: Tell) -> Report {
+fn report(event: Event) -> Report {
     Report {
         number: 7,
         at_ms: 1234,
-        tell,
+        event,
     }
 }
 
@@ -36,33 +36,33 @@ fn longest() -> vec::Vec<Report> {
         movement: 35,
         property: Some(Property::Fineness),
     };
-    let felt = Felt {
+    let observed = SlideReport {
         properties: [Some(1.0), Some(f32::MAX), Some(-2.5)],
         roughness_is_bound: true,
         background: 2.2,
         bands: Vec::from_slice(&[i16::MIN; FUSED_BANDS]).unwrap(),
         pressure: Some([i16::MAX, i16::MIN]),
     };
-    let promise = Promise {
+    let outcome = ExpectedOutcome {
         action,
         uncertainty: 0.5,
         benefit: 0.7,
     };
     let text = || Text::try_from("ä".repeat(60).as_str()).unwrap();
     vec![
-        report(Tell::Felt {
+        report(Event::SlideReport {
             slide: 255,
             action,
-            felt: felt.clone(),
+            observed: observed.clone(),
             posterior: Vec::from_slice(&[0.25; MAX_TEXTURES]).unwrap(),
         }),
-        report(Tell::Chosen {
+        report(Event::Chosen {
             slide: 1,
             movement: Movement::FOR_TRACTION,
             action,
-            outlook: Vec::from_slice(&[promise; MAX_OUTLOOK]).unwrap(),
+            expected: Vec::from_slice(&[outcome; MAX_EXPECTED_OUTCOMES]).unwrap(),
         }),
-        report(Tell::Block(Block {
+        report(Event::Block(Block {
             number: u16::MAX,
             still: false,
             steady: Some((u32::MAX, u32::MAX)),
@@ -70,22 +70,22 @@ fn longest() -> vec::Vec<Report> {
             shear_mn: Vec::from_slice(&[i16::MAX; BLOCK]).unwrap(),
             lost: u32::MAX,
         })),
-        report(Tell::TablePart {
+        report(Event::TablePart {
             offset: u32::MAX,
             length: u32::MAX,
             bytes: Vec::from_slice(&[0; PART]).unwrap(),
         }),
-        report(Tell::Refused {
+        report(Event::Refused {
             id: u16::MAX,
             why: text(),
         }),
-        report(Tell::Booted {
+        report(Event::Booted {
             protocol: PROTOCOL,
             version: String::try_from("0.1.0").unwrap(),
             reset: Reset::Watchdog,
             last_words: Some(text()),
         }),
-        report(Tell::Verdict {
+        report(Event::Verdict {
             texture: u16::MAX,
             name: name('n'),
             probability: 0.999,
@@ -93,25 +93,25 @@ fn longest() -> vec::Vec<Report> {
             unknown: true,
             log_odds: Some(-1e9),
             slides: 255,
-            asks: true,
+            wants_label: true,
         }),
-        report(Tell::Taught {
+        report(Event::TextureLearned {
             name: name('t'),
             slides: 255,
             itself: true,
         }),
-        report(Tell::Learned {
+        report(Event::TrainingSlide {
             movement: Movement::FOR_ROUGHNESS,
             trial: 255,
             left: u16::MAX,
-            felt,
+            observed,
         }),
-        report(Tell::Rejected {
+        report(Event::Rejected {
             slide: 255,
             why: text(),
         }),
-        report(Tell::Calibration(Vec::from_slice(&[0; 64]).unwrap())),
-        report(Tell::Status(Status {
+        report(Event::Calibration(Vec::from_slice(&[0; 64]).unwrap())),
+        report(Event::Status(Status {
             phase: Phase::Unloaded,
             fault: Some(Fault::Rejected),
             textures: u16::MAX,
@@ -141,7 +141,7 @@ fn name(letter: char) -> Name {
 /// Every request that carries something, as long as it can be.
 fn requests() -> vec::Vec<Request> {
     let identify = |method, open| {
-        Ask::Identify(Identify {
+        Command::Identify(Identify {
             among: Vec::from_slice(&[u16::MAX; MAX_TEXTURES]).unwrap(),
             threshold: 0.999,
             max_slides: 255,
@@ -163,22 +163,22 @@ fn requests() -> vec::Vec<Request> {
         .into_iter()
         .flat_map(|method| [identify(method, false), identify(method, true)]);
     let others = [
-        Ask::Answer(name('a')),
-        Ask::Rename {
+        Command::Label(name('a')),
+        Command::Rename {
             from: name('f'),
             to: name('t'),
         },
-        Ask::Forget(Forget::Texture(name('g'))),
-        Ask::Forget(Forget::SelfTaught),
-        Ask::Forget(Forget::Training(name('h'))),
-        Ask::Train(Train {
+        Command::Forget(Forget::Texture(name('g'))),
+        Command::Forget(Forget::SelfLearned),
+        Command::Forget(Forget::Training(name('h'))),
+        Command::Train(Train {
             name: name('i'),
             trials: 255,
             pilot: true,
             seed: u32::MAX,
         }),
-        Ask::WriteCalibration(Vec::from_slice(&[0; 64]).unwrap()),
-        Ask::WriteTable {
+        Command::WriteCalibration(Vec::from_slice(&[0; 64]).unwrap()),
+        Command::WriteTable {
             offset: u32::MAX,
             bytes: Vec::from_slice(&[0; PART]).unwrap(),
         },
@@ -186,7 +186,7 @@ fn requests() -> vec::Vec<Request> {
     let id = u16::MAX;
     explorations
         .chain(others)
-        .map(|ask| Request { id, ask })
+        .map(|command| Request { id, command })
         .collect()
 }
 
@@ -206,11 +206,11 @@ fn the_longest_messages_fit() {
 #[test]
 fn a_verdict_and_an_answer_have_these_bytes() {
     let body = |message: &dyn Fn(&mut [u8]) -> usize| {
-        let mut room = [0; 64];
-        let length = message(&mut room);
-        room[..length].to_vec()
+        let mut buffer = [0; 64];
+        let length = message(&mut buffer);
+        buffer[..length].to_vec()
     };
-    let verdict = report(Tell::Verdict {
+    let verdict = report(Event::Verdict {
         texture: 300,
         name: Name::try_from("oak").unwrap(),
         probability: 0.5,
@@ -218,9 +218,9 @@ fn a_verdict_and_an_answer_have_these_bytes() {
         unknown: true,
         log_odds: Some(2.0),
         slides: 2,
-        asks: true,
+        wants_label: true,
     });
-    let bytes = body(&|room| postcard::to_slice(&verdict, room).unwrap().len());
+    let bytes = body(&|buffer| postcard::to_slice(&verdict, buffer).unwrap().len());
     // number 7, 1234 ms as a varint, variant 9, 300 as a varint, length and name, two f32, little-endian
     assert_eq!(
         bytes,
@@ -228,9 +228,9 @@ fn a_verdict_and_an_answer_have_these_bytes() {
     );
     let answer = Request {
         id: 5,
-        ask: Ask::Answer(Name::try_from("elm").unwrap()),
+        command: Command::Label(Name::try_from("elm").unwrap()),
     };
-    let bytes = body(&|room| postcard::to_slice(&answer, room).unwrap().len());
+    let bytes = body(&|buffer| postcard::to_slice(&answer, buffer).unwrap().len());
     assert_eq!(bytes, *b"\x05\x04\x03elm");
     // looking at everything has no property; fineness is the variant 2
     let look = |property| {
@@ -238,7 +238,7 @@ fn a_verdict_and_an_answer_have_these_bytes() {
             movement: 2,
             property,
         };
-        body(&|room| postcard::to_slice(&action, room).unwrap().len())
+        body(&|buffer| postcard::to_slice(&action, buffer).unwrap().len())
     };
     assert_eq!(look(None), [2, 0]);
     assert_eq!(look(Some(Property::Fineness)), [2, 1, 2]);
@@ -249,7 +249,7 @@ fn a_verdict_and_an_answer_have_these_bytes() {
 fn a_request_has_these_bytes() {
     let request = Request {
         id: 0x0102,
-        ask: Ask::Status,
+        command: Command::Status,
     };
     // crc32(82 02 00) by Python's zlib
     let crc = 0x2fc6_747e_u32.to_le_bytes();
@@ -263,7 +263,7 @@ fn a_request_has_these_bytes() {
 fn a_damaged_frame_is_dropped_and_the_next_one_understood() {
     let request = |id| Request {
         id,
-        ask: Ask::Stream(true),
+        command: Command::Stream(true),
     };
     let mut bytes = frame(&request(1));
     bytes[2] ^= 0x40;
@@ -285,7 +285,7 @@ fn an_endless_frame_is_one_error() {
     bytes.push(0);
     let request = Request {
         id: 9,
-        ask: Ask::Stop,
+        command: Command::Stop,
     };
     bytes.extend(frame(&request));
     assert_eq!(receive(&bytes), [Err(FrameError::TooLong), Ok(request)]);
@@ -293,11 +293,11 @@ fn an_endless_frame_is_one_error() {
 
 #[test]
 fn a_message_too_long_is_an_error() {
-    let mut room = [0; MAX_FRAME + 1];
+    let mut buffer = [0; MAX_FRAME + 1];
     let fits = ([1_u8; 32], [1_u8; 32], [1_u8; 32], [[1_u8; 32]; 21]);
-    assert!(encode(&fits, &mut room).is_ok(), "768 bytes");
-    assert_eq!(room.iter().position(|&b| b == 0), Some(MAX_FRAME));
-    assert_eq!(encode(&(fits, 1_u8), &mut room), Err(TooLong));
+    assert!(encode(&fits, &mut buffer).is_ok(), "768 bytes");
+    assert_eq!(buffer.iter().position(|&b| b == 0), Some(MAX_FRAME));
+    assert_eq!(encode(&(fits, 1_u8), &mut buffer), Err(TooLong));
 }
 
 #[test]
@@ -309,8 +309,8 @@ fn a_posterior_has_only_its_textures_that_are_possible() {
     #[derive(PartialEq, Debug, Serialize, Deserialize)]
     struct Posterior(#[serde(with = "sparse")] Vec<f32, MAX_TEXTURES>);
     let posterior = Posterior(posterior);
-    let mut room = [0; 16];
-    let bytes = postcard::to_slice(&posterior, &mut room).unwrap();
+    let mut buffer = [0; 16];
+    let bytes = postcard::to_slice(&posterior, &mut buffer).unwrap();
     // how many textures, how many possible ones, and each of these with its place
     assert_eq!(bytes, [117, 2, 3, 0, 0, 0x40, 0x3F, 116, 0, 0, 0x80, 0x3E]);
     assert_eq!(postcard::from_bytes(bytes), Ok(posterior));
@@ -348,19 +348,19 @@ fn values_that_cannot_be_are_no_message() {
 }
 
 #[test]
-fn what_was_felt_goes_both_ways() {
-    let felt = Felt {
+fn a_slide_report_goes_both_ways() {
+    let observed = SlideReport {
         properties: [None, Some(2.0), Some(3.0)],
         roughness_is_bound: false,
         background: 1.0,
         bands: Vec::from_slice(&[-3, 5]).unwrap(),
         pressure: Some([7, 8]),
     };
-    let observation = felt.observation();
-    assert_eq!(observation.properties, Properties::new(felt.properties));
+    let observation = observed.observation();
+    assert_eq!(observation.properties, Properties::new(observed.properties));
     assert_eq!(observation.bands, [-3, 5]);
     assert_eq!(observation.pressure, Some([7, 8]));
-    let measured = felt.properties().measured();
+    let measured = observed.properties().measured();
     let expected: PropertySet = [Property::Roughness, Property::Fineness]
         .into_iter()
         .collect();

@@ -63,13 +63,13 @@ pub fn images() -> &'static [Vec<u8>] {
     IMAGES.get_or_init(|| {
         (0..tables().len() as u8 + 1)
             .map(|fill| {
-                let mut room = vec![0; SECTOR];
+                let mut buffer = vec![0; SECTOR];
                 block_on(async {
                     let mut store = Store::open(Flash::blank()).await.expect("blank flash");
                     if let Some(table) = tables().get(usize::from(fill)) {
                         store.begin_table(table.len()).await.expect("room");
                         store.write_table(0, table).await.expect("in order");
-                        store.commit_table(&mut room).await.expect("whole");
+                        store.commit_table(&mut buffer).await.expect("whole");
                     }
                     for date in 0..10 * u32::from(fill) {
                         let calibration = RigCalibration {

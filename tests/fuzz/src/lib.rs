@@ -18,10 +18,10 @@ use serde::de::DeserializeOwned;
 use tactus_core::explorer::{Config, Explorer, Method, Strategy};
 use tactus_core::features::{FUSED_BANDS, Properties, Observation};
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::store::{SelfTaught, Store};
+use tactus_core::store::{SelfLearnedRecord, Store};
 use tactus_core::table::{Change, Table, amend};
 use tactus_core::probe::teach::put_in_force;
-use tactus_core::wire::{Ask, MAX_FRAME, Receiver, Request, Tell};
+use tactus_core::wire::{Command, MAX_FRAME, Receiver, Request, Event};
 
 pub use flash::{Flash, images};
 pub use folder::recordings;
@@ -58,22 +58,22 @@ pub fn wire(data: &[u8]) {
     requests.into_iter().flatten().for_each(heard);
     for report in tactus::link::Session::default().receive(&frame) {
         said_again(&report);
-        if let Tell::Felt { felt, .. } = &report.tell {
-            felt.observation();
+        if let Event::SlideReport { observed, .. } = &report.event {
+            observed.observation();
         }
     }
 }
 
 fn heard(request: Request) {
     said_again(&request);
-    if let Ask::WriteCalibration(bytes) = &request.ask
+    if let Command::WriteCalibration(bytes) = &request.command
         && let Ok(bytes) = <&[u8; RigCalibration::BYTES]>::try_from(bytes.as_slice())
         && let Ok(calibration) = RigCalibration::from_bytes(bytes)
     {
         calibration.check().expect("what is read has been checked");
     }
     #[cfg(feature = "planted")]
-    if let Ask::WriteTable { offset, bytes } = &request.ask {
+    if let Command::WriteTable { offset, bytes } = &request.command {
         // no check that the part lies in the table
         assert!(bytes.is_empty() || *offset < 1 << 20, "planted");
     }
@@ -84,9 +84,9 @@ fn said_again<M>(message: &M)
 where
     M: Serialize + DeserializeOwned,
 {
-    let mut room = [0; MAX_FRAME + 1];
+    let mut buffer = [0; MAX_FRAME + 1];
     // a message may be longer in its canonical form than it came, but not longer than any
-    let Ok(frame) = tactus_core::wire::encode(message, &mut room) else {
+    let Ok(frame) = tactus_core::wire::encode(message, &mut buffer) else {
         return;
     };
     let mut receiver = Receiver::new();
@@ -103,10 +103,10 @@ where
 }
 
 fn cobs_of(bytes: &[u8]) -> Vec<u8> {
-    let mut room = vec![0; cobs::max_encoding_length(bytes.len())];
-    let length = cobs::encode(bytes, &mut room);
-    room.truncate(length);
-    room
+    let mut buffer = vec![0; cobs::max_encoding_length(bytes.len())];
+    let length = cobs::encode(bytes, &mut buffer);
+    buffer.truncate(length);
+    buffer
 }
 
 /// A texture table: read, explored, and amended.
@@ -135,7 +135,7 @@ pub fn table(data: &[u8]) {
     ] {
         explore(&table, method, &bytes, mode);
     }
-    let mut room = vec![0; bytes.len() + 64];
+    let mut buffer = vec![0; bytes.len() + 64];
     let change = match mode >> 1 & 1 {
         0 => Change::Forget(u16::from(mode >> 2)),
         _ => Change::Rename {
@@ -143,7 +143,7 @@ pub fn table(data: &[u8]) {
             name: "another",
         },
     };
-    if let Ok(changed) = amend(&mut room, &table, change) {
+    if let Ok(changed) = amend(&mut buffer, &table, change) {
         look_at(&changed);
         let gone = u16::from(matches!(change, Change::Forget(_)));
         assert_eq!(changed.textures() + gone, table.textures());
@@ -182,11 +182,11 @@ fn explore(table: &Table<'_>, method: Method, bytes: &[u8], mode: u8) {
     let Ok(mut explorer) = Explorer::<TEXTURES>::new(*table, table.measured(), config) else {
         return;
     };
-    let mut felt = bytes.iter().rev().copied().cycle();
-    let mut number = || i16::from_le_bytes([felt.next().unwrap_or(0), felt.next().unwrap_or(0)]);
+    let mut observed = bytes.iter().rev().copied().cycle();
+    let mut number = || i16::from_le_bytes([observed.next().unwrap_or(0), observed.next().unwrap_or(0)]);
     while explorer.verdict().is_none() {
-        let outlook = explorer.outlook();
-        let action = explorer.choose(&outlook, number() as u16 as u32);
+        let expected = explorer.expected_outcomes();
+        let action = explorer.choose(&expected, number() as u16 as u32);
         let mut value = || Some(f32::from(number()) / 1024.0);
         let slide = Observation {
             properties: Properties::new([value(), value(), value()]),
@@ -223,21 +223,21 @@ pub fn store(data: &[u8]) {
     let Ok(mut store) = block_on(Store::open(flash)) else {
         return;
     };
-    let mut room = vec![0; flash::SECTOR];
+    let mut buffer = vec![0; flash::SECTOR];
     // a table that is damaged gives way to the factory's
     #[cfg(feature = "planted")]
     assert!(
-        image % 6 != 0 || !matches!(block_on(store.read_table(&mut room)), Ok(None)),
+        image % 6 != 0 || !matches!(block_on(store.read_table(&mut buffer)), Ok(None)),
         "planted"
     );
     for step in todo.as_chunks::<2>().0 {
-        used(&mut store, *step, &mut room);
+        used(&mut store, *step, &mut buffer);
     }
-    let before = said(&mut store, &mut room);
+    let before = said(&mut store, &mut buffer);
     let Ok(mut again) = block_on(Store::open(store.close())) else {
         panic!("a store that was opened opens again");
     };
-    let after = said(&mut again, &mut room);
+    let after = said(&mut again, &mut buffer);
     if changed.is_empty() {
         assert_eq!(before, after, "as it was");
         return;
@@ -255,16 +255,16 @@ pub fn store(data: &[u8]) {
 }
 
 /// What a store holds, in words.
-fn said(store: &mut Store<Flash>, room: &mut [u8]) -> String {
+fn said(store: &mut Store<Flash>, buffer: &mut [u8]) -> String {
     let settings = store.settings();
-    let table = block_on(store.read_table(room));
+    let table = block_on(store.read_table(buffer));
     let table = table.map(|table| table.map(|table| table.crc()));
     let calibration = block_on(store.calibration());
     let skin = block_on(store.skin());
     format!("{settings:?} {table:?} {calibration:?} {skin:?}")
 }
 
-fn used(store: &mut Store<Flash>, [what, how]: [u8; 2], room: &mut [u8]) {
+fn used(store: &mut Store<Flash>, [what, how]: [u8; 2], buffer: &mut [u8]) {
     let calibration = RigCalibration {
         date: how.into(),
         ..flash::calibration()
@@ -283,27 +283,27 @@ fn used(store: &mut Store<Flash>, [what, how]: [u8; 2], room: &mut [u8]) {
             let _ = block_on(async {
                 store.begin_table(bytes.len()).await?;
                 store.write_table(0, bytes).await?;
-                store.commit_table(room).await.map(|_| ())
+                store.commit_table(buffer).await.map(|_| ())
             });
         }
         3 => {
-            let record = SelfTaught {
+            let record = SelfLearnedRecord {
                 lineage: how.into(),
                 number: (how % 4).into(),
                 movements: Default::default(),
             };
-            let _ = block_on(store.set_self_taught(&record));
+            let _ = block_on(store.set_self_learned(&record));
         }
         4 => {
             let _ = block_on(store.erase_settings());
         }
         5 => {
-            let _ = block_on(store.forget_trained("felt"));
+            let _ = block_on(store.delete_training_records("felt"));
         }
         6 => {
             let base = flash::tables();
             let base = Table::read(&base[0]).expect("our own table");
-            let _ = block_on(put_in_force(&base, Some(store), room));
+            let _ = block_on(put_in_force(&base, Some(store), buffer));
         }
         _ => {
             let _ = block_on(store.begin_table(usize::from(how) * 64));
@@ -331,9 +331,9 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
     let behind = |mode: u8, bytes: &[u8]| [&[mode], bytes].concat();
     match target {
         "wire" => {
-            let asks = [
-                Ask::Status,
-                Ask::Identify(tactus_core::wire::Identify {
+            let wants_label = [
+                Command::Status,
+                Command::Identify(tactus_core::wire::Identify {
                     among: [1, 2].into_iter().collect(),
                     threshold: 0.99,
                     max_slides: 10,
@@ -343,16 +343,16 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
                     learn: true,
                     seed: 1,
                 }),
-                Ask::WriteCalibration(flash::calibration().to_bytes().into_iter().collect()),
-                Ask::WriteTable {
+                Command::WriteCalibration(flash::calibration().to_bytes().into_iter().collect()),
+                Command::WriteTable {
                     offset: 256,
                     bytes: (0..40).collect(),
                 },
             ];
             let mut seeds = Vec::new();
-            for (id, ask) in (0..).zip(asks) {
-                let mut room = [0; MAX_FRAME + 1];
-                let frame = tactus_core::wire::encode(&Request { id, ask }, &mut room);
+            for (id, ask) in (0..).zip(wants_label) {
+                let mut buffer = [0; MAX_FRAME + 1];
+                let frame = tactus_core::wire::encode(&Request { id, ask }, &mut buffer);
                 let frame = frame.expect("room for a frame");
                 seeds.push(behind(0, frame));
                 let mut whole = frame[..frame.len() - 1].to_vec();

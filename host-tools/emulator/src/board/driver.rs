@@ -12,7 +12,7 @@ use rigless::time::VirtualNanos;
 
 use super::chip::Board;
 use super::flash::{self, FlashWrite};
-use super::handler_profile::Spending;
+use super::handler_profile::HandlerProfiler;
 use super::log::Log;
 use super::pins::{self, PinId};
 use super::rig::{SharedRig, lock};
@@ -51,7 +51,7 @@ pub(crate) struct Driver {
     pub(crate) reached: Sender<u64>,
     pub(crate) log: Option<Log>,
     pub(crate) stack: Option<Stack>,
-    pub(crate) spending: Option<Spending>,
+    pub(crate) profiler: Option<HandlerProfiler>,
     /// instructions since power-up, without the time that the core slept
     pub(crate) instructions: u64,
     pub(crate) tick_ns: u64,
@@ -283,8 +283,8 @@ impl emulator::Driver<Board> for Driver {
                 if let Some(stack) = &mut self.stack {
                     stack.hit(&hit, host);
                 }
-                if let Some(spending) = &mut self.spending {
-                    spending.hit(&hit, host);
+                if let Some(profiler) = &mut self.profiler {
+                    profiler.hit(&hit, host);
                 }
             }
             _ => {}

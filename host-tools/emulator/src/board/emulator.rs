@@ -18,7 +18,7 @@ use super::chip::Board;
 use super::driver::{Command, Driver, Standing};
 use super::error::Error;
 use super::flash::{self, FlashWrite};
-use super::handler_profile::{Spending, Spent};
+use super::handler_profile::{HandlerProfile, HandlerProfiler};
 use super::log::Log;
 use super::options::Options;
 use super::pins;
@@ -75,7 +75,7 @@ impl Emulator {
             reached: reaches,
             log,
             stack: None,
-            spending: None,
+            profiler: None,
             instructions: 0,
             tick_ns: options.tick_ns.max(1),
             next_tick_ns: 0,
@@ -289,7 +289,7 @@ impl Emulator {
     /// and where.
     ///
     /// # Errors
-    /// [`Error::Symbol`] and [`Error::Room`].
+    /// [`Error::Symbol`] and [`Error::NoSpace`].
     pub fn lose_flash_interrupts(&mut self) -> Result<(u64, Vec<u8>), Error> {
         const HANDLER: &str = "FLASH";
         let (address, size) = self.symbol(HANDLER)?;
@@ -303,7 +303,7 @@ impl Emulator {
         let bytes: Vec<u8> = code.iter().flat_map(|c| c.to_le_bytes()).collect();
         let (name, needed) = (HANDLER, bytes.len() as u64);
         if needed > size {
-            return Err(Error::Room { name, size, needed });
+            return Err(Error::NoSpace { name, size, needed });
         }
         let whole = self.read(address, needed)?;
         self.write(address, &bytes)?;
@@ -339,15 +339,15 @@ impl Emulator {
     /// Counts from now on the instructions of the handlers at these addresses.
     pub fn count_handlers(&mut self, addresses: Vec<u64>) -> Result<(), Error> {
         self.with(move |standing| {
-            standing.driver.spending = Some(Spending::new(addresses, standing.host));
+            standing.driver.profiler = Some(HandlerProfiler::new(addresses, standing.host));
         })
     }
 
     /// What was counted since [`Emulator::count_handlers`], in the order of the addresses.
-    pub fn handlers(&mut self) -> Result<Vec<Spent>, Error> {
+    pub fn handlers(&mut self) -> Result<Vec<HandlerProfile>, Error> {
         self.with(|standing| {
-            let spending = standing.driver.spending.as_ref();
-            spending.map_or_else(Vec::new, |spending| spending.handlers.clone())
+            let profiler = standing.driver.profiler.as_ref();
+            profiler.map_or_else(Vec::new, |profiler| profiler.handlers.clone())
         })
     }
 

@@ -48,7 +48,7 @@ pub enum Error {
     },
     /// A function is too short for the code that is to take its place.
     #[error("{name} has {size} bytes, {needed} are needed")]
-    Room {
+    NoSpace {
         /// The function.
         name: &'static str,
         /// What it has, bytes.

@@ -7,7 +7,7 @@ use super::registers::register;
 
 /// What a handler took.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Spent {
+pub struct HandlerProfile {
     /// Its address.
     pub address: u64,
     /// How often it ran to its end.
@@ -23,14 +23,14 @@ struct Begun {
 }
 
 /// Watches handlers.
-pub(crate) struct Spending {
-    pub(crate) handlers: Vec<Spent>,
+pub(crate) struct HandlerProfiler {
+    pub(crate) handlers: Vec<HandlerProfile>,
     watched: Handlers<Begun>,
 }
 
-impl Spending {
+impl HandlerProfiler {
     pub(crate) fn new(addresses: Vec<u64>, host: &mut dyn Host) -> Self {
-        let handlers = addresses.iter().map(|&address| Spent {
+        let handlers = addresses.iter().map(|&address| HandlerProfile {
             address,
             runs: 0,
             instructions: 0,

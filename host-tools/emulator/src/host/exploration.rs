@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 use tactus::link::follow::{ALLOWED, Agreement, Follower};
-use tactus::link::{Found, Question};
+use tactus::link::{Found, Request};
 use tactus::sim::played::PlayCounts;
 use tactus_core::dsp::Plan;
 use tactus_core::features::{Movement, Property, PropertySet};
 use tactus_core::table::{Action, Contents, Table, TableError, white};
-use tactus_core::wire::{Ask, Counts, Felt, Identify, Report, Tell};
+use tactus_core::wire::{Command, Counts, Event, Identify, Report, SlideReport};
 
-use super::talk::{PATIENCE_S, Talk, TalkError};
+use super::talk::{TIMEOUT_S, Talk, TalkError};
 use crate::board::{self, Emulator, Slide};
 
 /// A whole exploration, virtual seconds.
@@ -55,8 +55,8 @@ pub struct Step {
     /// What was looked at.
     pub action: Action,
     /// The properties that were looked at, with their values; all where the action looks at everything.
-    pub felt: Vec<(Property, f32)>,
-    /// How far what was felt is from what was learned of the true texture, in standard deviations: the root of the mean
+    pub observed: Vec<(Property, f32)>,
+    /// How far the observation is from what was learned of the true texture, in standard deviations: the root of the mean
     /// square over all that was looked at, about 1 if it is that texture. `None` where nothing was learned.
     pub distance_sd: Option<f32>,
     /// Posterior probability of the true texture.
@@ -139,26 +139,26 @@ pub fn explore(
     let mut slides = Vec::new();
     let mut movement = None;
     let before = talk.board().rig().slides().len();
-    talk.ask(Ask::Stream(true), PATIENCE_S, &mut each)?;
-    let asked = Question::identify(identify);
+    talk.send(Command::Stream(true), TIMEOUT_S, &mut each)?;
+    let asked = Request::identify(identify);
     let found = talk.run(asked, EXPLORATION_S, |board, report| {
         if let Some(report) = report {
-            if let Err(why) = follower.hear(&report.tell) {
+            if let Err(why) = follower.hear(&report.event) {
                 not_followed.push(why.to_string());
             }
-            match &report.tell {
-                Tell::Chosen {
+            match &report.event {
+                Event::Chosen {
                     movement: chosen, ..
                 } => {
                     movement = Some(*chosen);
                     board.rig().expect_speed(chosen.speed_mm_s().into());
                 }
-                Tell::Felt {
+                Event::SlideReport {
                     action,
-                    felt,
+                    observed,
                     posterior,
                     ..
-                } => steps.push(step(table, truth, *action, felt, posterior)),
+                } => steps.push(step(table, truth, *action, observed, posterior)),
                 _ => {}
             }
         } else if let Some(movement) = movement {
@@ -169,7 +169,7 @@ pub fn explore(
         each(board, report);
     })?;
     let commands = talk.board().rig().sensor_commands();
-    let status = talk.run(Question::status(), PATIENCE_S, &mut each)?;
+    let status = talk.run(Request::status(), TIMEOUT_S, &mut each)?;
     let lost_reports = talk.session().damaged() + talk.session().missing();
     let board = talk.board();
     let commands = (commands, board.rig().sensor_commands());
@@ -191,19 +191,25 @@ pub fn explore(
     })
 }
 
-fn step(table: Table<'_>, truth: &str, action: Action, felt: &Felt, posterior: &[f32]) -> Step {
+fn step(
+    table: Table<'_>,
+    truth: &str,
+    action: Action,
+    observed: &SlideReport,
+    posterior: &[f32],
+) -> Step {
     let number = table.find(truth);
     let others = posterior.iter().zip(0..);
     let other = others
         .filter(|(_, texture)| Some(*texture) != number)
         .max_by(|a, b| a.0.total_cmp(b.0));
-    let distance_sd = |texture| distance_sd(table, texture, action, felt);
+    let distance_sd = |texture| distance_sd(table, texture, action, observed);
     let looked_at = |property: &Property| action.property.is_none_or(|only| only == *property);
-    let properties = felt.properties();
+    let properties = observed.properties();
     Step {
         movement: table.movement(action.movement),
         action,
-        felt: Property::ALL
+        observed: Property::ALL
             .into_iter()
             .filter(looked_at)
             .filter_map(|property| Some((property, properties.get(property)?)))
@@ -220,16 +226,21 @@ fn step(table: Table<'_>, truth: &str, action: Action, felt: &Felt, posterior: &
     }
 }
 
-fn distance_sd(table: Table<'_>, texture: u16, action: Action, felt: &Felt) -> Option<f32> {
+fn distance_sd(
+    table: Table<'_>,
+    texture: u16,
+    action: Action,
+    observed: &SlideReport,
+) -> Option<f32> {
     let squares: Vec<f32> = match table.contents() {
         Contents::Fused(set, features) => {
             if table.trials(texture, action.movement) == 0 {
                 return None;
             }
-            let vector = felt.observation().vector(set, features.into())?;
-            let felt = table.whiten(action.movement, &vector)?;
+            let vector = observed.observation().vector(set, features.into())?;
+            let observed = table.whiten(action.movement, &vector)?;
             let learned = table.white_mean(texture, action.movement);
-            let apart = felt
+            let apart = observed
                 .into_iter()
                 .zip(learned)
                 .map(|(z, m)| white(z) - white(m));
@@ -244,7 +255,7 @@ fn distance_sd(table: Table<'_>, texture: u16, action: Action, felt: &Felt) -> O
                     ..action
                 };
                 let learned = table.gaussian(texture, property_of)?;
-                let sd = (felt.properties().get(property)? - learned.mean) / learned.sd;
+                let sd = (observed.properties().get(property)? - learned.mean) / learned.sd;
                 Some(sd * sd)
             })
             .collect::<Option<_>>()?,
@@ -377,7 +388,7 @@ impl Exploration {
         check(
             !self.slides.is_empty() && self.steps.len() == usize::from(self.found.slides),
             format!(
-                "{} slides made, {} felt, {} counted",
+                "{} slides made, {} observed, {} counted",
                 self.slides.len(),
                 self.steps.len(),
                 self.found.slides
@@ -400,7 +411,7 @@ impl Exploration {
             json!({
                 "movement": step.movement.map(|movement| movement.to_string()),
                 "looked_at": step.action.what(),
-                "felt": step.felt.iter().map(|(p, x)| (p.name(), *x)).collect::<BTreeMap<_, _>>(),
+                "observed": step.observed.iter().map(|(p, x)| (p.name(), *x)).collect::<BTreeMap<_, _>>(),
                 "distance_sd": step.distance_sd,
                 "probability_true": step.probability,
                 "other": step.other.as_ref().map(|other| &other.name),
@@ -451,21 +462,22 @@ impl Exploration {
     pub fn log(&self) -> Vec<String> {
         let lines = self.steps.iter().zip(1..).map(|(step, number)| {
             let movement = step.movement.map_or("?".into(), |m| m.to_string());
-            let felt: Vec<String> = step
-                .felt
+            let observed: Vec<String> = step
+                .observed
                 .iter()
                 .map(|(p, x)| format!("{p} {x:.3}"))
                 .collect();
-            let away =
-                |sd: Option<f32>| sd.map_or("never felt".into(), |sd| format!("{sd:.1} sd away"));
+            let away = |sd: Option<f32>| {
+                sd.map_or("never measured".into(), |sd| format!("{sd:.1} sd away"))
+            };
             let other = step.other.as_ref().map_or("no other".into(), |other| {
                 let p = other.probability * 100.0;
                 format!("{} {p:.1} % ({})", other.name, away(other.distance_sd))
             });
             format!(
-                "slide {number}: {} at {movement}, felt {}; {} {:.1} % ({}), {other}",
+                "slide {number}: {} at {movement}, observed {}; {} {:.1} % ({}), {other}",
                 step.action.what(),
-                felt.join(", "),
+                observed.join(", "),
                 self.truth,
                 step.probability * 100.0,
                 away(step.distance_sd),

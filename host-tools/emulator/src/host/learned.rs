@@ -5,19 +5,19 @@ use std::path::{Path, PathBuf};
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus::sim::collection::{Collection, texture_number};
-use tactus::sim::recorded::Lesson;
+use tactus::sim::recorded::RecordedTexture;
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::Table;
 
 use super::args::{World, hex_sha256};
 use super::progress;
-use super::under_finger::{self, Known, LessonError, TRIALS, Unknown};
+use super::under_finger::{self, Known, KnownError, TRIALS, Unknown};
 
 /// Where the textures come from.
 enum Textures {
     Simulated(Collection),
-    Recorded(Lesson),
+    Recorded(RecordedTexture),
 }
 
 /// What the seed draws.
@@ -31,20 +31,20 @@ pub struct Chosen {
 
 impl Chosen {
     /// Draws what the arguments leave open.
-    pub fn new(cli: &World) -> Result<Self, LessonError> {
+    pub fn new(cli: &World) -> Result<Self, KnownError> {
         let mut random = ChaCha8Rng::seed_from_u64(cli.seed);
         if let Some(name) = &cli.recording {
-            let lesson = under_finger::recordings(cli.method.method(), cli.seed)?;
-            let texture = under_finger::material(&lesson, name)?;
+            let recorded_texture = under_finger::recordings(cli.method.method(), cli.seed)?;
+            let texture = under_finger::material(&recorded_texture, name)?;
             return Ok(Self {
-                unknown: under_finger::played(&lesson, texture, cli.seed),
+                unknown: under_finger::played(&recorded_texture, texture, cli.seed),
                 seed: random.next_u32(),
-                textures: Textures::Recorded(lesson),
+                textures: Textures::Recorded(recorded_texture),
             });
         }
         let texture = match &cli.texture {
             Some(name) => {
-                texture_number(name).ok_or_else(|| LessonError::NoTexture(name.clone()))?
+                texture_number(name).ok_or_else(|| KnownError::NoTexture(name.clone()))?
             }
             None => random.random_range(1..=117),
         };
@@ -63,7 +63,7 @@ impl Chosen {
     }
 
     /// Calibration of the rig and table of the textures for a method, or the table of a file.
-    pub fn learn(&self, method: Method, table: Option<&Path>) -> Result<Known, LessonError> {
+    pub fn learn(&self, method: Method, table: Option<&Path>) -> Result<Known, KnownError> {
         let kept = self.kept_in(method);
         let mut known = match kept.as_deref().and_then(read) {
             Some(known) => known,
@@ -77,7 +77,7 @@ impl Chosen {
             }
         };
         if let Some(path) = table {
-            known.table = std::fs::read(path).map_err(|source| LessonError::Table {
+            known.table = std::fs::read(path).map_err(|source| KnownError::Table {
                 path: path.into(),
                 source,
             })?;
@@ -85,7 +85,7 @@ impl Chosen {
         Ok(known)
     }
 
-    fn learn_anew(&self, method: Method) -> Result<Known, LessonError> {
+    fn learn_anew(&self, method: Method) -> Result<Known, KnownError> {
         let bar;
         let known = match &self.textures {
             Textures::Simulated(collection) => {
@@ -93,9 +93,9 @@ impl Chosen {
                 bar = progress::bar("learning textures", count, ", {eta} left");
                 under_finger::simulated(collection, method, || bar.inc(1))?
             }
-            Textures::Recorded(lesson) => {
+            Textures::Recorded(recorded_texture) => {
                 bar = progress::spinner("learning materials");
-                under_finger::recorded(lesson, method)?
+                under_finger::recorded(recorded_texture, method)?
             }
         };
         bar.finish_and_clear();

@@ -2,17 +2,17 @@
 
 use std::task::Poll;
 
-use tactus::link::{Errand, Job, LinkError, PushTable, Question, Session};
+use tactus::link::{Job, LinkError, PushTable, Request, Session, Transaction};
 use tactus_core::rig::Fault;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::wire::{Ask, Phase, Report, Reset, Tell};
+use tactus_core::wire::{Command, Event, Phase, Report, Reset};
 
 use crate::board::{Emulator, Error};
 
 /// How far the board runs between two looks at the line, ns, unless told otherwise.
 const STEP_NS: u64 = 1_000_000;
 /// Longest that anything but explorations and training takes, virtual seconds.
-pub const PATIENCE_S: f64 = 60.0;
+pub const TIMEOUT_S: f64 = 60.0;
 
 /// Why the firmware does not do what it is asked for.
 #[derive(Debug, thiserror::Error)]
@@ -101,20 +101,20 @@ impl Talk {
     /// Runs the board until `pick` makes something of a report; `each` sees all of them, and after every look none.
     ///
     /// # Errors
-    /// [`TalkError::Silent`] if that takes longer than `patience_s` of virtual time; see also [`TalkError`].
+    /// [`TalkError::Silent`] if that takes longer than `timeout_s` of virtual time; see also [`TalkError`].
     pub fn wait<T>(
         &mut self,
-        patience_s: f64,
+        timeout_s: f64,
         mut each: impl FnMut(&mut Emulator, Option<&Report>),
-        mut pick: impl FnMut(&Tell) -> Option<Result<T, TalkError>>,
+        mut pick: impl FnMut(&Event) -> Option<Result<T, TalkError>>,
     ) -> Result<T, TalkError> {
-        let until_ns = self.emulator.now_ns() + (patience_s * 1e9) as u64;
+        let until_ns = self.emulator.now_ns() + (timeout_s * 1e9) as u64;
         while self.emulator.now_ns() < until_ns {
             let mut picked = None;
             for report in self.step()? {
                 each(&mut self.emulator, Some(&report));
                 if picked.is_none() {
-                    picked = pick(&report.tell);
+                    picked = pick(&report.event);
                 }
             }
             each(&mut self.emulator, None);
@@ -122,22 +122,22 @@ impl Talk {
                 return picked;
             }
         }
-        Err(TalkError::Silent(patience_s))
+        Err(TalkError::Silent(timeout_s))
     }
 
-    /// Sees an errand through; `each` sees all reports meanwhile, and after every look none.
+    /// Runs a transaction to its end; `each` gets all reports meanwhile, and after every look none.
     ///
     /// # Errors
-    /// [`TalkError::Silent`] if that takes longer than `patience_s` of virtual time; see also [`TalkError`].
-    pub fn run<E: Errand>(
+    /// [`TalkError::Silent`] if that takes longer than `timeout_s` of virtual time; see also [`TalkError`].
+    pub fn run<E: Transaction>(
         &mut self,
-        errand: E,
-        patience_s: f64,
+        transaction: E,
+        timeout_s: f64,
         mut each: impl FnMut(&mut Emulator, Option<&Report>),
     ) -> Result<E::Outcome, TalkError> {
         let mut send = Vec::new();
-        let mut job = Job::begin(errand, &mut self.session, &mut send)?;
-        let until_ns = self.emulator.now_ns() + (patience_s * 1e9) as u64;
+        let mut job = Job::begin(transaction, &mut self.session, &mut send)?;
+        let until_ns = self.emulator.now_ns() + (timeout_s * 1e9) as u64;
         while self.emulator.now_ns() < until_ns {
             self.emulator.send(&send);
             send.clear();
@@ -150,17 +150,17 @@ impl Talk {
                 return Ok(outcome?);
             }
         }
-        Err(TalkError::Silent(patience_s))
+        Err(TalkError::Silent(timeout_s))
     }
 
     /// Asks for something and waits until it is over; `each` sees all reports meanwhile.
-    pub fn ask(
+    pub fn send(
         &mut self,
-        ask: Ask,
-        patience_s: f64,
+        command: Command,
+        timeout_s: f64,
         each: impl FnMut(&mut Emulator, Option<&Report>),
     ) -> Result<(), TalkError> {
-        self.run(Question::command(ask), patience_s, each)
+        self.run(Request::command(command), timeout_s, each)
     }
 
     /// Waits until the firmware has booted and found the limit switches. A fault of that is given back, after it has been
@@ -169,13 +169,13 @@ impl Talk {
         &mut self,
         mut each: impl FnMut(&mut Emulator, Option<&Report>),
     ) -> Result<Option<Fault>, TalkError> {
-        let fault = self.wait(PATIENCE_S, &mut each, |tell| match tell {
-            Tell::Phase(Phase::Ready) => Some(Ok(None)),
-            Tell::Fault(fault) => Some(Ok(Some(*fault))),
+        let fault = self.wait(TIMEOUT_S, &mut each, |event| match event {
+            Event::Phase(Phase::Ready) => Some(Ok(None)),
+            Event::Fault(fault) => Some(Ok(Some(*fault))),
             _ => None,
         })?;
         if fault.is_some() {
-            self.ask(Ask::Home, PATIENCE_S, each)?;
+            self.send(Command::Home, TIMEOUT_S, each)?;
         }
         Ok(fault)
     }
@@ -187,8 +187,8 @@ impl Talk {
         table: &[u8],
         mut each: impl FnMut(&mut Emulator, Option<&Report>),
     ) -> Result<(), TalkError> {
-        let write = Question::write_calibration(calibration)?;
-        self.run(write, PATIENCE_S, &mut each)?;
-        self.run(PushTable::new(table)?, PATIENCE_S, each)
+        let write = Request::write_calibration(calibration)?;
+        self.run(write, TIMEOUT_S, &mut each)?;
+        self.run(PushTable::new(table)?, TIMEOUT_S, each)
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use tactus::data::recordings::RecordingSet;
 use tactus::sim::collection::{Collection, LearnError, calibrated, texture_name};
 use tactus::sim::played::Played;
-use tactus::sim::recorded::{Lesson, PlayError};
+use tactus::sim::recorded::{PlayError, RecordedTexture};
 use tactus::sim::world::Setup;
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
@@ -15,13 +15,13 @@ use crate::board::{Emulator, Error, Options};
 /// Trials of each texture and movement (PAPER: five).
 pub const TRIALS: u32 = 5;
 /// What recordings cannot show.
-pub const RECORDED_LIMITS: &str = "Recordings: one movement, 3 of their 5 s are felt, and what 12 bits do not hold is clipped; learned and felt \
+pub const RECORDED_LIMITS: &str = "Recordings: one movement, 3 of their 5 s are played, and what 12 bits do not hold is clipped; learned and explored \
      slides are of one session (interleaved).";
 
 /// Why there is nothing to learn, or to feel.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum LessonError {
+pub enum KnownError {
     /// There are no recordings.
     #[error(
         "no recordings in {}: make them from github.com/dexrob/BioTac_slide_20_50 in the layout of data/biotac, and set \
@@ -94,7 +94,7 @@ pub fn simulated(
     collection: &Collection,
     method: Method,
     done: impl Fn() + Sync,
-) -> Result<Known, LessonError> {
+) -> Result<Known, KnownError> {
     let first = collection.textures.first().copied().unwrap_or(1);
     let calibration = calibrated(collection.setup(first, 0)).map_err(LearnError::from)?;
     let table = collection.learn(method, calibration, done)?;
@@ -110,7 +110,7 @@ pub fn mounted(collection: &Collection, texture: u8, trial: u64) -> Unknown {
     }
 }
 
-/// Recorded slides of each material that are learned from; the unknown one is felt by the others. The paper's method takes
+/// Recorded slides of each material that are learned from; the unknown one is played from the others. The paper's method takes
 /// the standard deviation of a few trials for the truth: with five it is wrong too often.
 fn recorded_trials(method: Method) -> usize {
     match method {
@@ -119,49 +119,64 @@ fn recorded_trials(method: Method) -> usize {
     }
 }
 
-/// The recordings of a real finger, to be learned from and felt: in `biotac` below `TACTUS_DATA`, else beside the repository in `shared/data`.
-pub fn recordings(method: Method, seed: u64) -> Result<Lesson, LessonError> {
+/// The recordings of a real finger, to be learned from and played: in `biotac` below `TACTUS_DATA`, else beside the repository in `shared/data`.
+pub fn recordings(method: Method, seed: u64) -> Result<RecordedTexture, KnownError> {
     let root = std::env::var_os("TACTUS_DATA").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
         PathBuf::from,
     );
     let folder = root.join("biotac");
     if !folder.is_dir() {
-        return Err(LessonError::NoData(folder));
+        return Err(KnownError::NoData(folder));
     }
     let set = RecordingSet::open(&folder).map_err(PlayError::from)?;
-    Ok(Lesson::interleaved(&set, recorded_trials(method), seed)?)
+    Ok(RecordedTexture::interleaved(
+        &set,
+        recorded_trials(method),
+        seed,
+    )?)
 }
 
 /// Learns the recorded textures for a method.
-pub fn recorded(lesson: &Lesson, method: Method) -> Result<Known, LessonError> {
-    let calibration = calibrated(Lesson::setup(0)).map_err(LearnError::from)?;
-    let table = lesson.learn(method, calibration)?;
+pub fn recorded(recorded_texture: &RecordedTexture, method: Method) -> Result<Known, KnownError> {
+    let calibration = calibrated(RecordedTexture::setup(0)).map_err(LearnError::from)?;
+    let table = recorded_texture.learn(method, calibration)?;
     Ok(Known { calibration, table })
 }
 
 /// Number of a material by its name, whatever the case, or by its number from 1.
 ///
 /// # Errors
-/// [`LessonError::NoMaterial`].
-pub fn material(lesson: &Lesson, name: &str) -> Result<usize, LessonError> {
+/// [`KnownError::NoMaterial`].
+pub fn material(recorded_texture: &RecordedTexture, name: &str) -> Result<usize, KnownError> {
     let number = name.parse().ok().map(|n: usize| n.wrapping_sub(1));
-    let mut names = lesson.names.iter();
+    let mut names = recorded_texture.names.iter();
     names
         .position(|known| known.eq_ignore_ascii_case(name))
-        .or(number.filter(|n| *n < lesson.names.len()))
-        .ok_or_else(|| LessonError::NoMaterial {
+        .or(number.filter(|n| *n < recorded_texture.names.len()))
+        .ok_or_else(|| KnownError::NoMaterial {
             name: name.to_owned(),
-            known: lesson.names.join(", "),
+            known: recorded_texture.names.join(", "),
         })
 }
 
 /// A recorded texture: its slides that nothing was learned from.
-pub fn played(lesson: &Lesson, texture: usize, seed: u64) -> Unknown {
+pub fn played(recorded_texture: &RecordedTexture, texture: usize, seed: u64) -> Unknown {
     Unknown {
-        name: lesson.names.get(texture).cloned().unwrap_or_default(),
+        name: recorded_texture
+            .names
+            .get(texture)
+            .cloned()
+            .unwrap_or_default(),
         // other trials of the rig than those that were learned, whose seeds are the textures'
-        setup: Lesson::setup(1000 * (seed + 1) + texture as u64),
-        recorded: Some((lesson.test.get(texture).cloned().unwrap_or_default(), seed)),
+        setup: RecordedTexture::setup(1000 * (seed + 1) + texture as u64),
+        recorded: Some((
+            recorded_texture
+                .test
+                .get(texture)
+                .cloned()
+                .unwrap_or_default(),
+            seed,
+        )),
     }
 }

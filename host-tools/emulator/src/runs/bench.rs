@@ -21,7 +21,7 @@ use tactus_core::explorer::Method;
 use self::counter::Bench;
 use self::error::BenchError;
 use self::gates::{GATES, gate};
-use self::inputs::{SLIDE, Wanted, corners, felt, slide, synthetic};
+use self::inputs::{SLIDE, Wanted, corners, observed, slide, synthetic};
 use self::on_the_rig::on_the_rig;
 use self::plot::{Curve, draw};
 use self::row::{Row, print};
@@ -186,14 +186,14 @@ fn decisions(
 ) -> Result<Vec<Row>, BenchError> {
     let is_paper = method == Method::Paper;
     let name = if is_paper { "paper" } else { "fused" };
-    let [many, few] = [50, 20].map(|live| felt(table, method, live));
+    let [many, few] = [50, 20].map(|live| observed(table, method, live));
     let (many, few) = (many?, few?);
     let words = &many.words[..];
     let last = [words, &samples[..SLIDE]].concat();
     let kernel = |what: &str, unit, workload, words| {
         Kernel::new(format!("{what}, {name}"), unit, workload, table, words)
     };
-    let choice = |felt: &Wanted| format!("choice among {} live textures", felt.live);
+    let choice = |observed: &Wanted| format!("choice among {} live textures", observed.live);
     let mut posterior = kernel("posterior", "117 textures", Workload::Observe, words);
     let first = kernel("first choice", "choice", Workload::FirstChoice, words);
     let mut of_many = kernel(&choice(&many), "choice", Workload::Choice, words);
@@ -229,27 +229,27 @@ fn growth(bench: &mut Bench, plot: Option<&Path>) -> Result<bool, BenchError> {
         "choice among up to 50 live, thousands",
     ]
     .map(|name| -> Curve { (name, Vec::new()) });
-    for textures in [20, 117, 500, workload::MOST_ROOM, 2000] {
+    for textures in [20, 117, 500, workload::MOST_TEXTURES, 2000] {
         let table = synthetic(Method::Fused, textures)?;
         curves[0]
             .1
             .push((textures as f64, table.len() as f64 / 1024.0));
-        if textures > workload::MOST_ROOM {
+        if textures > workload::MOST_TEXTURES {
             println!(
                 "{textures:>8} {:>12}   more than the chip's RAM has room for",
                 table.len()
             );
             continue;
         }
-        let felt = felt(&table, Method::Fused, textures.min(50))?;
-        let posterior = bench.count(Workload::Observe, &table, &felt.words)?;
-        let choice = bench.count(Workload::Choice, &table, &felt.words)?;
+        let observed = observed(&table, Method::Fused, textures.min(50))?;
+        let posterior = bench.count(Workload::Observe, &table, &observed.words)?;
+        let choice = bench.count(Workload::Choice, &table, &observed.words)?;
         equal &= posterior.equal && choice.equal;
         println!(
             "{textures:>8} {:>12} {:>12} {:>6} {:>12}",
             table.len(),
             posterior.instructions,
-            felt.live,
+            observed.live,
             choice.instructions
         );
         let counts = [posterior, choice].map(|counted| counted.instructions as f64 * 1e-3);

@@ -20,7 +20,7 @@ use crate::host::{progress, under_finger};
 /// One half feels the textures of a simulated world, the other recordings of a real BioTac; each knows 20 textures. Every
 /// exploration is followed by the PC from the raw samples.
 ///
-/// Then the power is cut: at every word that the firmware programs when it is taught and when it learns by itself, and at
+/// Then the power is cut: at every word that the firmware programs when a texture is trained and when the probe learns by itself, and at
 /// seeded moments of an update that turns a page of its settings. It boots on what is left of the flash, in which the last
 /// word or erase is torn, and must hold the old or the new; where it repairs the flash first, the power is cut in that too.
 /// The exit code is 1 if a bar is missed.
@@ -57,8 +57,8 @@ pub fn run(args: &Args) -> Result<bool, RunError> {
     // recordings first, since it may be that there are none
     if args.recordings > 0 {
         bar.set_message("learning the recorded materials");
-        let lesson = under_finger::recordings(args.method.method(), args.seed)?;
-        let group = recorded(&lesson, args.recordings, args.method, args.seed)?;
+        let recorded_texture = under_finger::recordings(args.method.method(), args.seed)?;
+        let group = recorded(&recorded_texture, args.recordings, args.method, args.seed)?;
         groups.push(group);
     }
     if args.simulated > 0 {

@@ -12,27 +12,27 @@ use std::path::Path;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tactus::link::{Found, Question, ReadTable};
+use tactus::link::{Found, ReadTable, Request};
 use tactus::sim::collection::Collection;
 use tactus::sim::world::{Setup, World};
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::Name;
-use tactus_core::wire::{Identify, Reset, Tell};
+use tactus_core::wire::{Event, Identify, Reset};
 
 pub use self::outcome::{Cuts, Outcome};
 use self::tear::{Cut, CutError, Held, Left, Operation, Torn, judge, left_by};
 use crate::board::{FlashWrite, Options};
 use crate::host::exploration::{among_all, explore};
-use crate::host::talk::{PATIENCE_S, Talk, TalkError};
+use crate::host::talk::{TIMEOUT_S, Talk, TalkError};
 use crate::host::under_finger::{self, Known, Unknown};
 
 /// The texture under the finger, which the table has.
 const TEXTURE: u8 = 47;
 /// Textures of the table: few, so that every word of it can be cut.
 const AMONG: u8 = 4;
-/// The probe learns from visits that it is certain of: one of so many.
-const VISITS: u64 = 8;
+/// The probe learns from episodes that it is certain of: one of so many.
+const EPISODES: u64 = 8;
 /// More calibrations than a page of settings holds.
 const CALIBRATIONS: u32 = 400;
 /// The firmware has its store open by then: two erases and the lever's way up, virtual s.
@@ -73,11 +73,11 @@ pub fn prepare(
     talk.teach(calibration, table, |_, _| ())?;
     each("it learns by itself");
     let update = noted_update("update", &mut talk, &unknown, |_| true)?;
-    each("it is taught");
-    visit(&mut talk, &unknown, 1, false)?;
-    let name = Name::try_from("taught").unwrap_or_default();
+    each("a texture is trained");
+    run_episode(&mut talk, &unknown, 1, false)?;
+    let name = Name::try_from("trained").unwrap_or_default();
     let (before, held) = begin(&mut talk)?;
-    talk.run(Question::answer(name), PATIENCE_S, |_, _| ())?;
+    talk.run(Request::label(name), TIMEOUT_S, |_, _| ())?;
     let teach = noted("teach", &mut talk, before, held, |before, after| {
         vec![before, after]
     })?;
@@ -125,8 +125,13 @@ fn boot(elf: &Path, unknown: &Unknown, store: Option<Vec<u8>>) -> Result<Talk, C
     Ok(Talk::new(unknown.start(elf, options)?).look_every(LOOK_MS))
 }
 
-fn visit(talk: &mut Talk, unknown: &Unknown, seed: u32, learn: bool) -> Result<Found, CutError> {
-    let table = talk.run(ReadTable::default(), PATIENCE_S, |_, _| ())?;
+fn run_episode(
+    talk: &mut Talk,
+    unknown: &Unknown,
+    seed: u32,
+    learn: bool,
+) -> Result<Found, CutError> {
+    let table = talk.run(ReadTable::default(), TIMEOUT_S, |_, _| ())?;
     let identify = Identify {
         learn,
         ..among_all(seed)
@@ -166,16 +171,16 @@ fn noted(
     })
 }
 
-/// Visits until the probe learns by itself, and stores what `wanted` is.
+/// Explores until the probe learns by itself, and stores what `wanted` is.
 fn noted_update(
     name: &'static str,
     talk: &mut Talk,
     unknown: &Unknown,
     wanted: impl Fn(&[FlashWrite]) -> bool,
 ) -> Result<Operation, CutError> {
-    for seed in 1..=VISITS {
+    for seed in 1..=EPISODES {
         let (before, held_before) = begin(talk)?;
-        let found = visit(talk, unknown, seed as u32, true)?;
+        let found = run_episode(talk, unknown, seed as u32, true)?;
         // first the skin is kept, then what was learned
         let update = noted(name, talk, before, held_before, |before, after| {
             let between = Held {
@@ -201,8 +206,8 @@ fn fill(talk: &mut Talk, calibration: &RigCalibration) -> Result<Vec<u8>, CutErr
         for (byte, digit) in next.serial.iter_mut().zip(format!("{number:016}").bytes()) {
             *byte = digit;
         }
-        let write = Question::write_calibration(&next).map_err(TalkError::from)?;
-        talk.run(write, PATIENCE_S, |_, _| ())?;
+        let write = Request::write_calibration(&next).map_err(TalkError::from)?;
+        talk.run(write, TIMEOUT_S, |_, _| ())?;
         if erases(&talk.board().store_writes()?).next().is_some() {
             return Ok(before);
         }
@@ -212,8 +217,8 @@ fn fill(talk: &mut Talk, calibration: &RigCalibration) -> Result<Vec<u8>, CutErr
 
 /// What the firmware holds now.
 fn held(talk: &mut Talk) -> Result<Held, CutError> {
-    let status = talk.run(Question::status(), PATIENCE_S, |_, _| ())?;
-    let calibration = talk.run(Question::read_calibration(), PATIENCE_S, |_, _| ())?;
+    let status = talk.run(Request::status(), TIMEOUT_S, |_, _| ())?;
+    let calibration = talk.run(Request::read_calibration(), TIMEOUT_S, |_, _| ())?;
     Ok(Held {
         table: (status.table_crc, status.table_bytes),
         textures: status.textures,
@@ -226,8 +231,8 @@ fn held(talk: &mut Talk) -> Result<Held, CutError> {
 /// Boots the firmware on a flash until it holds something.
 fn reboot(elf: &Path, unknown: &Unknown, store: Vec<u8>) -> Result<(Talk, Held), CutError> {
     let mut talk = boot(elf, unknown, Some(store))?;
-    let booted = |tell: &Tell| match tell {
-        Tell::Booted { reset, .. } => Some(Ok(*reset)),
+    let booted = |event: &Event| match event {
+        Event::Booted { reset, .. } => Some(Ok(*reset)),
         _ => None,
     };
     match talk.wait(1.0, |_, _| (), booted)? {
@@ -402,9 +407,9 @@ fn one(
 /// It homes, and finds out what lies under its finger.
 fn identifies(talk: &mut Talk, unknown: &Unknown) -> Result<(), CutError> {
     talk.ready(|_, _| ())?;
-    let found = visit(talk, unknown, 1, false)?;
-    // what was taught last is the same texture
-    let names = [unknown.name.as_str(), "taught"];
+    let found = run_episode(talk, unknown, 1, false)?;
+    // what was trained last is the same texture
+    let names = [unknown.name.as_str(), "trained"];
     if found.unknown || !names.contains(&found.name.as_str()) {
         return Err(CutError::Identifies(Box::new(found)));
     }

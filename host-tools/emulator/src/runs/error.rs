@@ -4,7 +4,7 @@ use crate::board;
 use crate::host::args::WriteError;
 use crate::host::exploration::ExploreError;
 use crate::host::talk::TalkError;
-use crate::host::under_finger::LessonError;
+use crate::host::under_finger::KnownError;
 
 use super::bench::error::BenchError;
 use super::cuts::tear::CutError;
@@ -20,7 +20,7 @@ pub enum RunError {
     Board(#[from] board::Error),
     /// What lies under the finger.
     #[error(transparent)]
-    Lesson(#[from] LessonError),
+    Known(#[from] KnownError),
     /// The firmware.
     #[error(transparent)]
     Talk(#[from] TalkError),

@@ -8,7 +8,7 @@ use clap::Args as Arguments;
 use tactus::eval::show::Show;
 use tactus_core::explorer::Verdict;
 use tactus_core::table::Table;
-use tactus_core::wire::{Identify, Phase, Report, Tell};
+use tactus_core::wire::{Event, Identify, Phase, Report};
 
 use super::error::RunError;
 use crate::board::{self, Emulator, Options};
@@ -108,11 +108,11 @@ pub fn run(args: &Args) -> Result<(), RunError> {
     let explored =
         exploration::explore(&mut talk, &known.table, identify, truth, |board, report| {
             logged(board);
-            let Some(Report { tell, .. }) = report else {
+            let Some(Report { event, .. }) = report else {
                 return;
             };
             // not within `suspend`, which holds the bar
-            if let Tell::Live(live) = tell {
+            if let Event::Live(live) = event {
                 forces.push(f32::from(live.force_mn) * 1e-3);
                 bar.set_message(format!(
                     "{:6.1} s  finger {:4.2} N  stage {:5.1} mm, {:5.1} mm/s  motor {:4} mA",
@@ -124,16 +124,18 @@ pub fn run(args: &Args) -> Result<(), RunError> {
                 ));
                 return;
             }
-            let shown = bar.suspend(|| match tell {
+            let shown = bar.suspend(|| match event {
                 // from here on the force is about the still finger's
-                Tell::Phase(Phase::Pressing) => {
+                Event::Phase(Phase::Pressing) => {
                     forces.clear();
                     Ok(())
                 }
                 // shown at the end, with whether it is right
-                Tell::Verdict { .. } => Ok(()),
-                Tell::Felt { .. } => show.line(&pressed(&forces)).and_then(|()| show.tell(tell)),
-                _ => show.tell(tell),
+                Event::Verdict { .. } => Ok(()),
+                Event::SlideReport { .. } => show
+                    .line(&pressed(&forces))
+                    .and_then(|()| show.event(event)),
+                _ => show.event(event),
             });
             if failed.is_ok() {
                 failed = shown;

@@ -65,10 +65,10 @@ pub fn run(args: &Args) -> Result<(), RunError> {
 }
 
 fn exchange(stream: &mut TcpStream, said: &[u8], board: &mut Emulator) -> std::io::Result<()> {
-    let mut room = [0; 4096];
-    match stream.read(&mut room) {
+    let mut buffer = [0; 4096];
+    match stream.read(&mut buffer) {
         Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
-        Ok(length) => board.send(&room[..length]),
+        Ok(length) => board.send(&buffer[..length]),
         Err(why) if why.kind() == ErrorKind::WouldBlock => {}
         Err(why) => return Err(why),
     }

@@ -1,9 +1,9 @@
 //! A day on the simulated rig and an hour on the emulated board, with random faults, against the bars.
 
 pub mod day;
+pub mod episodes;
 mod hour;
 pub mod hour_report;
-pub mod visits;
 
 use std::time::Instant;
 
@@ -16,14 +16,14 @@ use super::error::RunError;
 use crate::host::args::{Firmware, Output};
 use crate::host::progress;
 
-/// Has the probe work for long, taught and forgetting, while in every fourth visit something of its rig breaks.
+/// Has the probe work for long: it learns and deletes textures, and in every fourth episode something of its rig breaks.
 ///
 /// First the core's sessions on the simulated rig of the PC, then the real firmware on the emulated board over one boot,
 /// which is broken and reset four times in the end. A fault must end in a lifted finger and a rig that homes once it is
 /// repaired.
 ///
 /// Bars: no drift of time, no slot late, missed or lost, no report lost, no growth of the stack from the first quarter to
-/// the end, every reset on purpose and told with its reason, never more than 2.2 N on the finger, at least 30 visits an
+/// the end, every reset on purpose and told with its reason, never more than 2.2 N on the finger, at least 30 episodes an
 /// hour without a fault on the board, and all that was stored still there after the power was off. Wrong answers are
 /// listed, and are no bar. The exit code is 1 if a bar is missed.
 ///
@@ -42,7 +42,7 @@ pub struct Args {
     /// Virtual hours on the emulated board; 0 leaves it out
     #[arg(long, value_name = "H", default_value_t = 1.0, value_parser = hours)]
     board_hours: f64,
-    /// Another seed draws other textures, faults and lessons
+    /// Another seed draws other textures, faults and trainings
     #[arg(long, default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
@@ -124,10 +124,10 @@ impl Report {
             lines.extend(wrong.iter().map(|wrong| format!("  wrong: {wrong}")));
         };
         if let Some((day, wall_s)) = &self.day {
-            part(day.text(), *wall_s, &day.visits.wrong);
+            part(day.text(), *wall_s, &day.episodes.wrong);
         }
         if let Some((hour, wall_s)) = &self.hour {
-            part(hour.text(), *wall_s, &hour.visits.wrong);
+            part(hour.text(), *wall_s, &hour.episodes.wrong);
         }
         lines.extend(self.missed().map(|missed| format!("MISSED: {missed}")));
         lines.push(if self.met() {

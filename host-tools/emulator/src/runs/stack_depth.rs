@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::Args as Arguments;
 use serde_json::{Value, json};
 use tactus::sim::world::Setup;
-use tactus_core::wire::{Ask, Identify, Phase, Tell};
+use tactus_core::wire::{Command, Event, Identify, Phase};
 
 use super::error::RunError;
 use crate::board::{Emulator, Options, StackLayout, StackLevel, StackUse};
@@ -24,7 +24,7 @@ pub struct Args {
 }
 
 /// Longer than it takes, virtual seconds.
-const PATIENCE_S: f64 = 120.0;
+const TIMEOUT_S: f64 = 120.0;
 
 /// Measures the stack of the rig's firmware while it identifies a texture among those of its factory table.
 pub fn run(args: &Args) -> Result<(), RunError> {
@@ -56,29 +56,29 @@ fn explore(elf: &Path, layout: StackLayout, slides: u8) -> Result<StackUse, RunE
     let mut talk = Talk::new(emulator);
     // the firmware homes the rig when it starts
     let homed = talk.wait(
-        PATIENCE_S,
+        TIMEOUT_S,
         |_, _| {},
-        |tell| matches!(tell, Tell::Phase(Phase::Ready)).then_some(Ok(())),
+        |event| matches!(event, Event::Phase(Phase::Ready)).then_some(Ok(())),
     );
     homed?;
-    let mut felt = 0;
+    let mut observed = 0;
     let identify = Identify {
         threshold: 1.0,
         max_slides: slides,
         learn: true,
         ..among_all(1)
     };
-    talk.ask(Ask::Identify(identify), PATIENCE_S, |board, report| {
+    talk.send(Command::Identify(identify), TIMEOUT_S, |board, report| {
         if let Some(report) = report
-            && matches!(report.tell, Tell::Felt { .. })
+            && matches!(report.event, Event::SlideReport { .. })
         {
-            felt += 1;
+            observed += 1;
             eprintln!(
-                "slide {felt} of {slides} at {:.1} virtual s",
+                "slide {observed} of {slides} at {:.1} virtual s",
                 board.now_ns() as f64 * 1e-9
             );
         }
     })?;
     let measured = talk.board().stack_use()?;
-    measured.filter(|_| felt > 0).ok_or(RunError::NoSlide)
+    measured.filter(|_| observed > 0).ok_or(RunError::NoSlide)
 }

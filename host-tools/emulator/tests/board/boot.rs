@@ -1,7 +1,7 @@
 //! The real ELF on the board.
 
 use tactus::sim::world::Setup;
-use tactus_core::wire::{Ask, Phase, Tell};
+use tactus_core::wire::{Command, Event, Phase};
 use tactus_emulator::board::{Emulator, Options, Output};
 use tactus_emulator::host::talk::Talk;
 
@@ -53,12 +53,12 @@ fn a_board_without_the_probes_clock_runs_by_its_own() {
         };
         let mut talk = Talk::new(Emulator::start(&elf, Setup::default(), options).unwrap());
         let mut words = None;
-        let ready = |tell: &Tell| match tell {
-            Tell::Booted { last_words, .. } => {
+        let ready = |event: &Event| match event {
+            Event::Booted { last_words, .. } => {
                 words = Some(last_words.clone());
                 None
             }
-            Tell::Phase(Phase::Ready) => Some(Ok(())),
+            Event::Phase(Phase::Ready) => Some(Ok(())),
             _ => None,
         };
         talk.wait(30.0, |_, _| (), ready).unwrap();
@@ -68,7 +68,7 @@ fn a_board_without_the_probes_clock_runs_by_its_own() {
         assert_eq!(said, !clock);
         if !clock {
             // the line, the stage, the sensor's slots and the motor's current, at their rates
-            talk.ask(Ask::Calibrate, 80.0, |_, _| ()).unwrap();
+            talk.send(Command::Calibrate, 80.0, |_, _| ()).unwrap();
         }
         assert_eq!(talk.board().resets().unwrap(), []);
     }
@@ -106,7 +106,7 @@ fn a_store_that_does_not_open_does_not_keep_the_finger_down() {
     talk.wait(
         20.0,
         |_, _| (),
-        |tell| matches!(tell, Tell::Phase(Phase::Ready)).then_some(Ok(())),
+        |event| matches!(event, Event::Phase(Phase::Ready)).then_some(Ok(())),
     )
     .unwrap();
     let now_ms = talk.board().now_ns() / 1_000_000;
@@ -124,5 +124,5 @@ fn a_store_that_does_not_open_does_not_keep_the_finger_down() {
     eprintln!("lifts from {first_ms:?} ms on, ready after {now_ms} ms");
     assert!(first_ms.is_some_and(|ms| ms < 500), "{first_ms:?}");
     assert_eq!(talk.board().resets().unwrap(), []);
-    talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
+    talk.send(Command::Home, 40.0, |_, _| ()).unwrap();
 }

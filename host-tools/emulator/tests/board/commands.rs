@@ -10,7 +10,7 @@ use tactus::sim::stage::TRAVEL_MM;
 use tactus::sim::world::Setup;
 use tactus_core::explorer::{Method, Strategy};
 use tactus_core::table::Name;
-use tactus_core::wire::{Ask, Forget, Identify, MAX_FRAME, Request, Train, encode};
+use tactus_core::wire::{Command, Forget, Identify, MAX_FRAME, Request, Train, encode};
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::talk::{Talk, TalkError};
 
@@ -62,36 +62,36 @@ fn identify(random: &mut ChaCha8Rng) -> Identify {
 }
 
 /// What moves comes most often.
-fn ask(random: &mut ChaCha8Rng) -> Ask {
+fn command(random: &mut ChaCha8Rng) -> Command {
     match random.random_range(0..30) {
-        0..=6 => Ask::Identify(identify(random)),
-        7..=10 => Ask::Train(Train {
+        0..=6 => Command::Identify(identify(random)),
+        7..=10 => Command::Train(Train {
             name: name(random),
             trials: random.random(),
             pilot: random.random(),
             seed: random.random(),
         }),
-        11..=14 => Ask::Home,
-        15 => Ask::Stop,
-        16 => Ask::ReadCalibration,
-        17..=18 => Ask::Calibrate,
-        19 => Ask::Status,
-        20 => Ask::Stream(random.random()),
-        21 => Ask::Answer(name(random)),
-        22 => Ask::Rename {
+        11..=14 => Command::Home,
+        15 => Command::Stop,
+        16 => Command::ReadCalibration,
+        17..=18 => Command::Calibrate,
+        19 => Command::Status,
+        20 => Command::Stream(random.random()),
+        21 => Command::Label(name(random)),
+        22 => Command::Rename {
             from: name(random),
             to: name(random),
         },
-        23 => Ask::Forget(Forget::Texture(name(random))),
-        24 => Ask::ReadTable(random.random()),
-        25 => Ask::BeginTable(random.random_range(0..20_000)),
-        26 => Ask::WriteTable {
+        23 => Command::Forget(Forget::Texture(name(random))),
+        24 => Command::ReadTable(random.random()),
+        25 => Command::BeginTable(random.random_range(0..20_000)),
+        26 => Command::WriteTable {
             offset: random.random_range(0..20_000),
             bytes: bytes(random, 200).into_iter().collect(),
         },
-        27 => Ask::CommitTable,
-        28 => Ask::FactoryTable,
-        _ => Ask::WriteCalibration(bytes(random, 64).into_iter().collect()),
+        27 => Command::CommitTable,
+        28 => Command::FactoryTable,
+        _ => Command::WriteCalibration(bytes(random, 64).into_iter().collect()),
     }
 }
 
@@ -131,11 +131,11 @@ fn survives(elf: &Path, seed: u64) {
             board.send(&noise);
             after += "noise, ";
         } else {
-            let ask = ask(&mut random);
-            after.extend(format!("{ask:?}").chars().take(60));
+            let command = command(&mut random);
+            after.extend(format!("{command:?}").chars().take(60));
             after += ", ";
-            let mut room = [0; MAX_FRAME + 1];
-            board.send(encode(&Request { id, ask }, &mut room).unwrap());
+            let mut buffer = [0; MAX_FRAME + 1];
+            board.send(encode(&Request { id, command }, &mut buffer).unwrap());
         }
         // from the next one at once to the middle of a slide
         let longest = [10, 2000, 20_000].choose(&mut random).copied().unwrap();
@@ -149,7 +149,7 @@ fn survives(elf: &Path, seed: u64) {
     board.send(&[0]);
     // what was said so far, the boot's report first, is nobody's answer
     board.received();
-    match talk.ask(Ask::Stop, 10.0, |_, _| ()) {
+    match talk.send(Command::Stop, 10.0, |_, _| ()) {
         Ok(()) | Err(TalkError::Refused(_)) => {}
         Err(why) => panic!("stop: {why} after {after}"),
     }
@@ -160,7 +160,7 @@ fn survives(elf: &Path, seed: u64) {
         "{truth:?} after {after}"
     );
     // what was being stored may take its time
-    let home = (0..5).any(|_| match talk.ask(Ask::Home, 40.0, |_, _| ()) {
+    let home = (0..5).any(|_| match talk.send(Command::Home, 40.0, |_, _| ()) {
         Ok(()) => true,
         Err(TalkError::Refused(why)) => {
             println!("seed {seed}: home: {why}");

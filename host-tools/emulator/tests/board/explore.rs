@@ -1,17 +1,17 @@
-//! Explorations by the real ELF, judged by the rig's truth, and what it keeps of what it was told and taught.
+//! Explorations by the real ELF, judged by the rig's truth, and what it keeps of what it was told and what it learned.
 
 use std::sync::OnceLock;
 
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus::eval::evaluate::Method;
-use tactus::link::{Question, ReadTable};
+use tactus::link::{ReadTable, Request};
 use tactus::sim::collection::Collection;
 use tactus::sim::world::Setup;
 use tactus_core::table::Table;
-use tactus_core::wire::{Identify, Report, Tell, Train};
+use tactus_core::wire::{Event, Identify, Report, Train};
 use tactus_emulator::host::exploration::explore;
-use tactus_emulator::host::talk::{PATIENCE_S, Talk};
+use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
 use tactus_emulator::host::under_finger::{self, Known, Unknown};
 use tactus_emulator::runs::campaign;
 
@@ -82,7 +82,7 @@ fn explorations_meet_the_bars() {
     let Some(elf) = elf() else { return };
     let simulated = campaign::simulated(4, Method::Fused, 1, || ()).unwrap();
     let recorded = under_finger::recordings(Method::Fused.method(), 1)
-        .map(|lesson| campaign::recorded(&lesson, 3, Method::Fused, 1));
+        .map(|recorded_texture| campaign::recorded(&recorded_texture, 3, Method::Fused, 1));
     let recorded = match recorded {
         Ok(group) => Some(group.unwrap()),
         Err(why) => {
@@ -112,10 +112,10 @@ fn explorations_meet_the_bars() {
 }
 
 #[test]
-fn a_texture_taught_on_the_probe_is_kept() {
+fn a_texture_trained_on_the_probe_is_kept() {
     let Some(elf) = elf() else { return };
     let (collection, known) = world();
-    let name = "Taught here";
+    let name = "Trained here";
     let new = (1..=117).find(|number| !collection.textures.contains(number));
     let unknown = under_finger::mounted(collection, new.unwrap(), 1);
     let mut talk = boot(&elf, &unknown, None);
@@ -128,32 +128,32 @@ fn a_texture_taught_on_the_probe_is_kept() {
         pilot: false,
         seed: 1,
     };
-    let slides = talk.run(Question::train(train), 300.0, |_, _| ()).unwrap();
+    let slides = talk.run(Request::train(train), 300.0, |_, _| ()).unwrap();
     assert_eq!(slides, 2 * before.movements().len() as u32);
 
     let check = |talk: &mut Talk| {
         let bytes = talk
-            .run(ReadTable::default(), PATIENCE_S, |_, _| ())
+            .run(ReadTable::default(), TIMEOUT_S, |_, _| ())
             .unwrap();
         let table = Table::read(&bytes).unwrap();
         assert_eq!(table.textures(), before.textures() + 1);
-        let taught = table.find(name).expect("the table holds it");
+        let learned = table.find(name).expect("the table holds it");
         for movement in 0..table.movements().len() as u8 {
-            assert_eq!(table.trials(taught, movement), 2);
+            assert_eq!(table.trials(learned, movement), 2);
         }
-        let status = talk.run(Question::status(), PATIENCE_S, |_, _| ()).unwrap();
+        let status = talk.run(Request::status(), TIMEOUT_S, |_, _| ()).unwrap();
         assert!(!status.factory);
         assert_eq!(status.table_crc, table.crc());
         let calibration = talk
-            .run(Question::read_calibration(), PATIENCE_S, |_, _| ())
+            .run(Request::read_calibration(), TIMEOUT_S, |_, _| ())
             .unwrap();
         assert_eq!(calibration, known.calibration);
         bytes
     };
-    let taught = check(&mut talk);
+    let learned = check(&mut talk);
     let store = talk.board().store().unwrap();
     let mut again = boot(&elf, &unknown, Some(store));
-    assert_eq!(check(&mut again), taught);
+    assert_eq!(check(&mut again), learned);
 }
 
 #[test]
@@ -189,7 +189,7 @@ fn a_corrupt_table_gives_way_to_the_factorys_until_another_comes() {
 }
 
 fn status(talk: &mut Talk) -> tactus_core::wire::Status {
-    talk.run(Question::status(), PATIENCE_S, |_, _| ()).unwrap()
+    talk.run(Request::status(), TIMEOUT_S, |_, _| ()).unwrap()
 }
 
 #[test]
@@ -212,11 +212,11 @@ fn garbage_on_the_line_is_told_and_believed_by_nobody() {
         asked,
         &unknown.name,
         |board, report| {
-            match report.map(|Report { tell, .. }| tell) {
-                Some(Tell::Chosen { .. }) => exploring = true,
-                Some(Tell::Damaged(count)) => damaged = *count,
+            match report.map(|Report { event, .. }| event) {
+                Some(Event::Chosen { .. }) => exploring = true,
+                Some(Event::Damaged(count)) => damaged = *count,
                 // nothing but the requests that frame the exploration
-                Some(Tell::Done(_) | Tell::Refused { .. }) => answers += 1,
+                Some(Event::Done(_) | Event::Refused { .. }) => answers += 1,
                 // every 50 ms, so that its answers find room
                 None if exploring && board.now_ns() / 1_000_000 % 50 == 0 => {
                     board.send(pieces.next().unwrap_or_default());

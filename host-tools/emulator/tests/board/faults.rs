@@ -7,7 +7,7 @@ use tactus::sim::encoder::Cut;
 use tactus::sim::faults::Fault;
 use tactus::sim::world::Setup;
 use tactus_core::rig::Fault as Seen;
-use tactus_core::wire::{Ask, Identify, MAX_FRAME, Phase, Request, Reset, Tell, encode};
+use tactus_core::wire::{Command, Event, Identify, MAX_FRAME, Phase, Request, Reset, encode};
 use tactus_emulator::board::{Emulator, Options, Output};
 use tactus_emulator::host::talk::{Talk, TalkError};
 
@@ -261,8 +261,8 @@ fn board(elf: &std::path::Path, seed: u64, texture: u8) -> Talk {
 }
 
 /// Never sure: an exploration of so many slides.
-fn identify(slides: u8) -> Ask {
-    Ask::Identify(Identify {
+fn identify(slides: u8) -> Command {
+    Command::Identify(Identify {
         among: Default::default(),
         threshold: 1.0,
         max_slides: slides,
@@ -307,11 +307,11 @@ fn run(case: &Case, talk: &mut Talk, random: &mut ChaCha8Rng) -> Outcome {
     let mut booted = None;
     let mut seen = None;
     let after_ms = case.deadline_ms.unwrap_or(1500) + 400;
-    let ended = talk.ask(identify(10), 80.0, |board, report| {
+    let ended = talk.send(identify(10), 80.0, |board, report| {
         if let Some(report) = report {
-            match &report.tell {
-                Tell::Fault(fault) => seen = Some(*fault),
-                Tell::Booted {
+            match &report.event {
+                Event::Fault(fault) => seen = Some(*fault),
+                Event::Booted {
                     reset, last_words, ..
                 } => booted = Some((*reset, last_words.as_ref().map(|w| w.as_str().to_owned()))),
                 _ => {}
@@ -364,9 +364,9 @@ fn run(case: &Case, talk: &mut Talk, random: &mut ChaCha8Rng) -> Outcome {
     let until_ns = broken_ns.unwrap_or_default() + (after_ms + 8000) * 1_000_000;
     while talk.board().now_ns() < until_ns {
         for report in talk.step().unwrap() {
-            match report.tell {
-                Tell::Fault(fault) => seen = seen.or(Some(fault)),
-                Tell::Booted {
+            match report.event {
+                Event::Fault(fault) => seen = seen.or(Some(fault)),
+                Event::Booted {
                     reset, last_words, ..
                 } => booted = Some((reset, last_words.map(|w| w.as_str().to_owned()))),
                 _ => {}
@@ -476,10 +476,10 @@ fn check(names: &[&str]) {
         if let Cause::Rig(_) = case.cause {
             // the sensor starts up
             talk.board().run_ms(200).unwrap();
-            talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
+            talk.send(Command::Home, 40.0, |_, _| ()).unwrap();
         }
     }
-    talk.ask(identify(1), 80.0, |_, _| ()).unwrap();
+    talk.send(identify(1), 80.0, |_, _| ()).unwrap();
 }
 
 /// A flash that never says that it is done: the session waits for it, and everything else works.
@@ -496,8 +496,8 @@ fn a_session_that_is_stuck_is_noticed() {
     let (address, whole) = talk.board().lose_flash_interrupts().unwrap();
     let began_ns = talk.board().now_ns();
     let mut words = None;
-    let ended = talk.ask(Ask::BeginTable(1000), 60.0, |_, report| {
-        if let Some(Tell::Booted { last_words, .. }) = report.map(|report| &report.tell) {
+    let ended = talk.send(Command::BeginTable(1000), 60.0, |_, report| {
+        if let Some(Event::Booted { last_words, .. }) = report.map(|report| &report.event) {
             words = last_words.as_ref().map(|words| words.as_str().to_owned());
         }
     });
@@ -512,7 +512,8 @@ fn a_session_that_is_stuck_is_noticed() {
     // and it works again
     talk.board().write(address, &whole).unwrap();
     ready(&mut talk);
-    talk.ask(Ask::BeginTable(1000), 20.0, |_, _| ()).unwrap();
+    talk.send(Command::BeginTable(1000), 20.0, |_, _| ())
+        .unwrap();
 }
 
 /// A stop between two movements, where the rig itself has nothing to stop.
@@ -520,22 +521,22 @@ fn a_session_that_is_stuck_is_noticed() {
 fn a_stop_holds_whenever_it_comes() {
     let Some(elf) = elf() else { return };
     let mut talk = board(&elf, 77, 5);
-    let mut room = [0; MAX_FRAME + 1];
+    let mut buffer = [0; MAX_FRAME + 1];
     let stop = Request {
         id: 9999,
-        ask: Ask::Stop,
+        command: Command::Stop,
     };
-    let frame = encode(&stop, &mut room).unwrap().to_vec();
+    let frame = encode(&stop, &mut buffer).unwrap().to_vec();
     let mut sent = false;
     let mut chosen_after = 0;
-    let ended = talk.ask(identify(10), 100.0, |board, report| {
+    let ended = talk.send(identify(10), 100.0, |board, report| {
         let Some(report) = report else { return };
-        match report.tell {
-            Tell::Phase(Phase::Lifting) if !sent => {
+        match report.event {
+            Event::Phase(Phase::Lifting) if !sent => {
                 sent = true;
                 board.send(&frame);
             }
-            Tell::Phase(Phase::Pressing) if sent => chosen_after += 1,
+            Event::Phase(Phase::Pressing) if sent => chosen_after += 1,
             _ => {}
         }
     });
@@ -545,14 +546,14 @@ fn a_stop_holds_whenever_it_comes() {
     );
     assert_eq!(chosen_after, 0, "the finger came down again");
     // and what comes after it is not stopped
-    talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
-    talk.ask(identify(1), 80.0, |_, _| ()).unwrap();
+    talk.send(Command::Home, 40.0, |_, _| ()).unwrap();
+    talk.send(identify(1), 80.0, |_, _| ()).unwrap();
     // an emergency stop while nothing is done: homing waits for the finger, which hangs low
     talk.board().inject(Fault::EStop);
     talk.board().run_ms(10).unwrap();
     assert!(!talk.board().rig().world().lever_top());
     talk.board().rig().world().clear();
-    talk.ask(Ask::Home, 40.0, |_, _| ()).unwrap();
+    talk.send(Command::Home, 40.0, |_, _| ()).unwrap();
 }
 
 macro_rules! faults {

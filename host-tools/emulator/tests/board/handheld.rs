@@ -78,7 +78,7 @@ fn an_uneven_slide_is_made_again() {
 }
 
 #[test]
-fn an_unknown_texture_is_taught_and_known_after_a_power_cut() {
+fn an_unknown_texture_is_learned_and_known_after_a_power_cut() {
     play("teach");
 }
 

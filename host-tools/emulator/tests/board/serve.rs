@@ -5,7 +5,7 @@ use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use tactus::link::{LinkError, Port, PortError, Question, ReadTable};
+use tactus::link::{LinkError, Port, PortError, ReadTable, Request};
 use tactus_core::table::Table;
 use tactus_core::wire::Status;
 
@@ -46,7 +46,7 @@ fn the_probe_answers_on_the_tcp_port() {
         .unwrap();
     let mut port = Port::new(stream, Duration::from_secs(20));
     let status = loop {
-        match port.run(Question::status(), |_| ()) {
+        match port.run(Request::status(), |_| ()) {
             // it had its power just now
             Err(PortError::Link(LinkError::Rebooted { .. })) => {}
             // nor has it opened its store yet

@@ -3,7 +3,7 @@
 use tactus::sim::world::Setup;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::pressure::Calibration;
-use tactus_core::wire::{Ask, Tell, Train};
+use tactus_core::wire::{Command, Event, Train};
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::talk::{Talk, TalkError};
 
@@ -41,8 +41,8 @@ fn pages_turn_in_time_and_nothing_is_lost() {
     for n in 1..=430 {
         let bytes = calibration(20_260_000 + n).to_bytes();
         let began_ns = talk.board().now_ns();
-        let ask = Ask::WriteCalibration(bytes.into_iter().collect());
-        talk.ask(ask, 20.0, |_, _| ()).unwrap();
+        let command = Command::WriteCalibration(bytes.into_iter().collect());
+        talk.send(command, 20.0, |_, _| ()).unwrap();
         longest_ms = longest_ms.max(((talk.board().now_ns() - began_ns) / 1_000_000, n));
     }
     eprintln!(
@@ -56,22 +56,22 @@ fn pages_turn_in_time_and_nothing_is_lost() {
     let mut talk = boot(&elf, Some(store));
     let mut kept = None;
     let hear = |_: &mut Emulator, report: Option<&tactus_core::wire::Report>| {
-        if let Some(Tell::Calibration(bytes)) = report.map(|r| &r.tell) {
+        if let Some(Event::Calibration(bytes)) = report.map(|r| &r.event) {
             kept = bytes.as_slice().try_into().ok();
         }
     };
-    talk.ask(Ask::ReadCalibration, 5.0, hear).unwrap();
+    talk.send(Command::ReadCalibration, 5.0, hear).unwrap();
     assert_eq!(
         RigCalibration::from_bytes(&kept.unwrap()),
         Ok(calibration(20_260_430))
     );
     // and a training that cannot be is refused before anything moves
-    let nameless = Ask::Train(Train {
+    let nameless = Command::Train(Train {
         name: Default::default(),
         trials: 5,
         pilot: false,
         seed: 1,
     });
-    let refused = talk.ask(nameless, 5.0, |_, _| ());
+    let refused = talk.send(nameless, 5.0, |_, _| ());
     assert!(matches!(refused, Err(TalkError::Refused(_))), "{refused:?}");
 }

@@ -4,13 +4,13 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use tactus::link::{Found, Question, ReadTable};
+use tactus::link::{Found, ReadTable, Request};
 use tactus::sim::collection::Collection;
 use tactus_core::explorer::Method;
 use tactus_core::table::{Name, Table, Tally};
-use tactus_core::wire::{Forget, Identify, Status, Tell, Train};
+use tactus_core::wire::{Event, Forget, Identify, Status, Train};
 use tactus_emulator::host::exploration::{Exploration, explore};
-use tactus_emulator::host::talk::{PATIENCE_S, Talk, TalkError};
+use tactus_emulator::host::talk::{TIMEOUT_S, Talk, TalkError};
 use tactus_emulator::host::under_finger::{self, Known, Unknown};
 
 use crate::common::{boot, elf};
@@ -76,13 +76,13 @@ fn identify(seed: u32) -> Identify {
 }
 
 fn status(talk: &mut Talk) -> Status {
-    talk.run(Question::status(), PATIENCE_S, |_, _| ()).unwrap()
+    talk.run(Request::status(), TIMEOUT_S, |_, _| ()).unwrap()
 }
 
 /// The table in force, which the status tells of as well.
 fn table(talk: &mut Talk) -> Vec<u8> {
     let bytes = talk
-        .run(ReadTable::default(), PATIENCE_S, |_, _| ())
+        .run(ReadTable::default(), TIMEOUT_S, |_, _| ())
         .unwrap();
     let read = Table::read(&bytes).unwrap();
     let told = status(talk);
@@ -94,7 +94,7 @@ fn table(talk: &mut Talk) -> Vec<u8> {
 }
 
 /// Explores, and follows; the probe's work is as good as ever.
-fn visit(talk: &mut Talk, asked: Identify, truth: &str) -> Exploration {
+fn run_episode(talk: &mut Talk, asked: Identify, truth: &str) -> Exploration {
     let bytes = table(talk);
     let explored = explore(talk, &bytes, asked, truth, |_, _| ()).unwrap();
     eprintln!(
@@ -112,17 +112,17 @@ fn assert_is(found: &Found, name: &str) {
 }
 
 #[test]
-fn a_texture_taught_by_touching_is_recognised() {
+fn a_texture_trained_by_touching_is_recognised() {
     let Some(elf) = elf() else { return };
     let mut talk = told(&elf, &under(NEW, 1));
     let before = table(&mut talk);
     let train = Train {
-        name: name("taught"),
+        name: name("trained"),
         trials: 2,
         pilot: false,
         seed: 1,
     };
-    let slides = talk.run(Question::train(train), LONG_S, |_, _| ()).unwrap();
+    let slides = talk.run(Request::train(train), LONG_S, |_, _| ()).unwrap();
     assert_eq!(slides, 6);
     let after = table(&mut talk);
     let (old, new) = (Table::read(&before).unwrap(), Table::read(&after).unwrap());
@@ -135,9 +135,9 @@ fn a_texture_taught_by_touching_is_recognised() {
         );
     }
     assert_eq!(new.lineage(), old.crc());
-    let taught = new.find("taught").unwrap();
+    let learned = new.find("trained").unwrap();
     assert_eq!(
-        new.tally(taught),
+        new.tally(learned),
         Tally {
             user: 6,
             ..Tally::default()
@@ -146,11 +146,11 @@ fn a_texture_taught_by_touching_is_recognised() {
     assert!(!status(&mut talk).factory);
     // other trials of it, after the power was off, and of one that was there before
     let mut talk = again(&elf, talk, &under(NEW, 2));
-    let explored = visit(&mut talk, identify(2), "taught");
-    assert_is(&explored.found, "taught");
+    let explored = run_episode(&mut talk, identify(2), "trained");
+    assert_is(&explored.found, "trained");
     let before = under(OLD, 2);
     let mut talk = again(&elf, talk, &before);
-    let explored = visit(&mut talk, identify(3), &before.name);
+    let explored = run_episode(&mut talk, identify(3), &before.name);
     assert_is(&explored.found, &before.name);
 }
 
@@ -159,19 +159,22 @@ fn an_unknown_texture_is_said_to_be_and_its_name_learned() {
     let Some(elf) = elf() else { return };
     let unknown = under(NEW, 1);
     let mut talk = told(&elf, &unknown);
-    // nothing was felt yet
+    // no slide was measured yet
     let answer =
-        |talk: &mut Talk, text: &str| talk.run(Question::answer(name(text)), PATIENCE_S, |_, _| ());
-    let early = answer(&mut talk, "what I felt");
+        |talk: &mut Talk, text: &str| talk.run(Request::label(name(text)), TIMEOUT_S, |_, _| ());
+    let early = answer(&mut talk, "my texture");
     assert!(matches!(early, Err(TalkError::Refused(_))), "{early:?}");
     let asked = Identify {
         learn: true,
         ..identify(4)
     };
     let before = table(&mut talk);
-    let explored = visit(&mut talk, asked, &unknown.name);
+    let explored = run_episode(&mut talk, asked, &unknown.name);
     let found = explored.found.clone();
-    assert!(found.unknown && !found.sure && found.asks, "{found:?}");
+    assert!(
+        found.unknown && !found.sure && found.wants_label,
+        "{found:?}"
+    );
     assert!(explored.right() && found.log_odds > Some(0.0), "{found:?}");
     // an unknown one teaches nothing before it has a name
     assert_eq!(found.learned, 0);
@@ -181,27 +184,27 @@ fn an_unknown_texture_is_said_to_be_and_its_name_learned() {
         matches!(nameless, Err(TalkError::Refused(_))),
         "{nameless:?}"
     );
-    let taught = answer(&mut talk, "what I felt").unwrap();
+    let learned = answer(&mut talk, "my texture").unwrap();
     assert_eq!(
-        (taught.name.as_str(), taught.slides),
-        ("what I felt", found.slides)
+        (learned.name.as_str(), learned.slides),
+        ("my texture", found.slides)
     );
     // an answer is taken once
-    let twice = answer(&mut talk, "what I felt");
+    let twice = answer(&mut talk, "my texture");
     assert!(matches!(twice, Err(TalkError::Refused(_))), "{twice:?}");
     let after = table(&mut talk);
     let new = Table::read(&after).unwrap();
     assert_eq!(new.textures(), Table::read(&before).unwrap().textures() + 1);
-    // the next visit, of another trial
+    // the next episode, of another trial
     let mut talk = again(&elf, talk, &under(NEW, 2));
     assert_eq!(table(&mut talk), after);
-    let explored = visit(&mut talk, identify(5), "what I felt");
-    assert_eq!(explored.found.name.as_str(), "what I felt");
+    let explored = run_episode(&mut talk, identify(5), "my texture");
+    assert_eq!(explored.found.name.as_str(), "my texture");
     assert!(!explored.found.unknown, "{:?}", explored.found);
 }
 
 #[test]
-fn what_it_teaches_itself_is_kept_and_can_be_forgotten() {
+fn what_it_learns_by_itself_is_kept_and_can_be_deleted() {
     let Some(elf) = elf() else { return };
     let known = under(OLD, 3);
     let mut talk = told(&elf, &known);
@@ -212,11 +215,11 @@ fn what_it_teaches_itself_is_kept_and_can_be_forgotten() {
     };
     let mut told = None;
     let explored = explore(&mut talk, &base, asked, &known.name, |_, report| {
-        if let Some(Tell::Taught {
+        if let Some(Event::TextureLearned {
             name,
             slides,
             itself,
-        }) = report.map(|report| &report.tell)
+        }) = report.map(|report| &report.event)
         {
             told = Some((name.clone(), *slides, *itself));
         }
@@ -235,20 +238,20 @@ fn what_it_teaches_itself_is_kept_and_can_be_forgotten() {
     let mut talk = again(&elf, talk, &known);
     assert_eq!(table(&mut talk), learned);
     // forgetting it gives back what it was told, to the bit
-    let forget = || Question::forget(Forget::SelfTaught);
+    let forget = || Request::forget(Forget::SelfLearned);
     let store = talk.board().store().unwrap();
     let mut forgetful = boot(&elf, &known, Some(store));
-    forgetful.run(forget(), PATIENCE_S, |_, _| ()).unwrap();
+    forgetful.run(forget(), TIMEOUT_S, |_, _| ()).unwrap();
     assert_eq!(table(&mut forgetful), base);
     let mut forgetful = again(&elf, forgetful, &known);
     assert_eq!(table(&mut forgetful), base);
     drop(forgetful);
     // what it learned stays with a texture that gets another name
-    let rename = |from: &str, to: &str| Question::rename(name(from), name(to));
+    let rename = |from: &str, to: &str| Request::rename(name(from), name(to));
     let other = Table::read(&base).unwrap().names().next().unwrap();
-    let taken = talk.run(rename(other, &known.name), PATIENCE_S, |_, _| ());
+    let taken = talk.run(rename(other, &known.name), TIMEOUT_S, |_, _| ());
     assert!(matches!(taken, Err(TalkError::Refused(_))), "{taken:?}");
-    talk.run(rename(&known.name, "renamed"), PATIENCE_S, |_, _| ())
+    talk.run(rename(&known.name, "renamed"), TIMEOUT_S, |_, _| ())
         .unwrap();
     let mut talk = again(&elf, talk, &known);
     let renamed = table(&mut talk);
@@ -256,10 +259,10 @@ fn what_it_teaches_itself_is_kept_and_can_be_forgotten() {
     assert_eq!(table_of(&renamed).find(&known.name), None);
     assert_eq!(table_of(&renamed).find("renamed"), Some(found.texture));
     assert_eq!(table_of(&renamed).tally(found.texture), tally);
-    talk.run(rename("renamed", &known.name), PATIENCE_S, |_, _| ())
+    talk.run(rename("renamed", &known.name), TIMEOUT_S, |_, _| ())
         .unwrap();
-    // what it taught itself can be forgotten still
-    talk.run(forget(), PATIENCE_S, |_, _| ()).unwrap();
+    // what it learned by itself can still be deleted
+    talk.run(forget(), TIMEOUT_S, |_, _| ()).unwrap();
     let forgotten = table(&mut talk);
     for (texture, movement) in (0..8).flat_map(|t| (0..3).map(move |m| (t, m))) {
         let of = |bytes| table_of(bytes).whitened(texture, movement);
@@ -267,8 +270,8 @@ fn what_it_teaches_itself_is_kept_and_can_be_forgotten() {
     }
     assert_eq!(table_of(&forgotten).tally(found.texture).itself, 0);
     // a texture goes altogether
-    let gone = Question::forget(Forget::Texture(name(other)));
-    talk.run(gone, PATIENCE_S, |_, _| ()).unwrap();
+    let gone = Request::forget(Forget::Texture(name(other)));
+    talk.run(gone, TIMEOUT_S, |_, _| ()).unwrap();
     let less = table(&mut talk);
     assert_eq!(table_of(&less).textures(), 7);
     assert_eq!(table_of(&less).find(other), None);

@@ -8,16 +8,16 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::task::Poll;
 use std::time::{Duration, Instant};
 
-use tactus::link::{Errand, Job, LinkError, Port, PortError, Question, ReadTable};
+use tactus::link::{Job, LinkError, Port, PortError, ReadTable, Request, Transaction};
 use tactus_core::rig::Fault;
 use tactus_core::table::{Table, TableError};
-use tactus_core::wire::{Ask, Phase, Report, Status, Tell};
+use tactus_core::wire::{Command, Event, Phase, Report, Status};
 
 use super::line::{Emulator, Line, OpenError, Where};
 use super::log::Log;
 
 /// A probe that says nothing for so long is taken for gone: its longest silence is an erase of its flash, 2 s.
-const PATIENCE: Duration = Duration::from_secs(5);
+const TIMEOUT: Duration = Duration::from_secs(5);
 /// Whether anybody is there is known sooner: a status is told at once.
 const GREETING: Duration = Duration::from_secs(1);
 /// An emulated board may go slower than real time.
@@ -129,17 +129,17 @@ impl Heard {
         if let Some(log) = &mut self.log {
             log.told(report);
         }
-        match &report.tell {
-            Tell::Phase(now) => self.phase = Some(*now),
-            Tell::Status(status) => self.phase = Some(status.phase),
-            Tell::Live(_) => self.located = Instant::now(),
+        match &report.event {
+            Event::Phase(now) => self.phase = Some(*now),
+            Event::Status(status) => self.phase = Some(status.phase),
+            Event::Live(_) => self.located = Instant::now(),
             _ => {}
         }
     }
 
-    fn asked(&mut self, ask: &Ask) {
+    fn asked(&mut self, command: &Command) {
         if let Some(log) = &mut self.log {
-            log.asked(ask);
+            log.asked(command);
         }
     }
 
@@ -159,9 +159,9 @@ impl Bench {
         let interrupt = Interrupt::catch()?;
         let open = place.open()?;
         let log = place.log.as_ref().map(|path| Log::create(path, &open.name));
-        let (greeting, patience) = match open.emulator {
+        let (greeting, timeout) = match open.emulator {
             Some(_) => (EMULATED, EMULATED),
-            None => (GREETING, PATIENCE),
+            None => (GREETING, TIMEOUT),
         };
         let mut bench = Self {
             port: Port::new(open.line, greeting),
@@ -175,7 +175,7 @@ impl Bench {
             _emulator: open.emulator,
         };
         let status = bench.hello()?;
-        bench.port.set_patience(patience);
+        bench.port.set_timeout(timeout);
         Ok((bench, status))
     }
 
@@ -183,7 +183,7 @@ impl Bench {
     fn hello(&mut self) -> Result<Status, BenchError> {
         let began = Instant::now();
         loop {
-            let status = self.get(Question::status());
+            let status = self.get(Request::status());
             let is_up = match &status {
                 // a probe without a table has not opened its store yet
                 Ok(status) => status.textures > 0 && status.phase != Phase::Homing,
@@ -212,13 +212,13 @@ impl Bench {
         &self.interrupt
     }
 
-    /// Sees an errand through; `each` is shown all reports. Whatever ends it early leaves the rig stopped and lifted.
-    pub(crate) fn run<E: Errand>(
+    /// Runs a transaction to its end; `each` gets every report. Whatever ends it early leaves the rig stopped and lifted.
+    pub(crate) fn run<E: Transaction>(
         &mut self,
-        errand: E,
+        transaction: E,
         mut each: impl FnMut(&Report) -> io::Result<()>,
     ) -> Result<E::Outcome, BenchError> {
-        let mut job = self.begin(errand)?;
+        let mut job = self.begin(transaction)?;
         loop {
             let mut shown = Ok(());
             let polled = self.step(&mut job, |report| {
@@ -248,25 +248,25 @@ impl Bench {
     }
 
     /// As [`run`](Self::run), for what comes of it alone.
-    pub(crate) fn get<E: Errand>(&mut self, errand: E) -> Result<E::Outcome, BenchError> {
-        self.run(errand, |_| Ok(()))
+    pub(crate) fn get<E: Transaction>(&mut self, transaction: E) -> Result<E::Outcome, BenchError> {
+        self.run(transaction, |_| Ok(()))
     }
 
     /// As [`run`](Self::run), for what moves: prints a fault, and what it asks for.
-    pub(crate) fn perform<E: Errand>(
+    pub(crate) fn perform<E: Transaction>(
         &mut self,
-        errand: E,
+        transaction: E,
         out: &mut impl Write,
     ) -> Result<E::Outcome, BenchError> {
-        self.run(errand, |report| show_fault(report, out))
+        self.run(transaction, |report| show_fault(report, out))
     }
 
     /// Begins an errand, for whoever looks at something else between its [steps](Bench::step).
-    pub(crate) fn begin<E: Errand>(&mut self, errand: E) -> Result<Job<E>, BenchError> {
-        let begun = self.port.begin(errand);
+    pub(crate) fn begin<E: Transaction>(&mut self, transaction: E) -> Result<Job<E>, BenchError> {
+        let begun = self.port.begin(transaction);
         let job = begun.map_err(|why| self.error(why, false))?;
-        if let Some(ask) = job.asking() {
-            self.heard.asked(ask);
+        if let Some(command) = job.command() {
+            self.heard.asked(command);
         }
         Ok(job)
     }
@@ -275,12 +275,12 @@ impl Bench {
     ///
     /// # Errors
     /// See [`BenchError`]. What moves is told to stop, should the probe still hear it.
-    pub(crate) fn step<E: Errand>(
+    pub(crate) fn step<E: Transaction>(
         &mut self,
         job: &mut Job<E>,
         mut each: impl FnMut(&Report),
     ) -> Result<Poll<E::Outcome>, BenchError> {
-        let moving = job.asking().is_some_and(moves);
+        let moving = job.command().is_some_and(moves);
         let polled = self.port.step(job, |report| {
             self.heard.hear(report);
             each(report);
@@ -289,7 +289,7 @@ impl Bench {
         polled.map_err(|why| {
             if moving && !matches!(why, PortError::Link(LinkError::Refused(_))) {
                 // there may be nobody to hear it
-                let _ = self.port.ask(Ask::Stop);
+                let _ = self.port.send(Command::Stop);
                 let _ = self.port.listen(|_| ());
             }
             self.error(why, moving)
@@ -297,9 +297,9 @@ impl Bench {
     }
 
     /// Asks for something beside the errand under way.
-    pub(crate) fn ask(&mut self, ask: Ask) -> Result<(), BenchError> {
-        self.heard.asked(&ask);
-        let asked = self.port.ask(ask);
+    pub(crate) fn send(&mut self, command: Command) -> Result<(), BenchError> {
+        self.heard.asked(&command);
+        let asked = self.port.send(command);
         asked.map_err(|why| self.error(why, false))
     }
 
@@ -346,12 +346,12 @@ impl Bench {
             if asked.is_none_or(|at| at.elapsed() > Duration::from_millis(200)) {
                 asked = Some(Instant::now());
                 // again and again: a request may be damaged, and stopping twice does no harm
-                for ask in [Ask::Stop, Ask::Stream(false), Ask::Status] {
-                    self.ask(ask)?;
+                for command in [Command::Stop, Command::Stream(false), Command::Status] {
+                    self.send(command)?;
                 }
             }
             self.listen(|report| {
-                if let Tell::Status(status) = &report.tell {
+                if let Event::Status(status) = &report.event {
                     fault = status.fault;
                 }
             })?;
@@ -375,10 +375,10 @@ impl Bench {
 }
 
 /// Whether a request has the rig move.
-fn moves(ask: &Ask) -> bool {
+fn moves(command: &Command) -> bool {
     matches!(
-        ask,
-        Ask::Home | Ask::Identify(_) | Ask::Train(_) | Ask::Calibrate
+        command,
+        Command::Home | Command::Identify(_) | Command::Train(_) | Command::Calibrate
     )
 }
 
@@ -406,7 +406,7 @@ pub(crate) fn wait_for_enter(interrupt: &Interrupt, prompt: &str) -> Result<(), 
 
 /// Prints a fault, if it is one that is told, and what it asks for.
 pub(crate) fn show_fault(report: &Report, out: &mut impl Write) -> io::Result<()> {
-    if let Tell::Fault(fault) = &report.tell {
+    if let Event::Fault(fault) = &report.event {
         let recovery = recovery(fault);
         writeln!(out, "FAULT: {fault}. {recovery}: tactus device home")?;
         out.flush()?;

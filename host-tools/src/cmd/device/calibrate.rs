@@ -3,9 +3,9 @@
 use std::io::Write;
 
 use anyhow::ensure;
-use tactus::link::Question;
+use tactus::link::Request;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::wire::Ask;
+use tactus_core::wire::Command;
 
 use super::bench::{Bench, BenchError};
 use super::line::Where;
@@ -43,18 +43,18 @@ pub(crate) struct Args {
 /// Measures, shows or sets the rig's constants.
 pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (mut bench, _) = Bench::open(&how.at)?;
-    let mut calibration = bench.get(Question::read_calibration())?;
+    let mut calibration = bench.get(Request::read_calibration())?;
     if how.show {
         return print_rows(&calibration_rows(&calibration), out);
     }
     if how.drifted {
         calibration.date = 0;
-        bench.get(Question::write_calibration(&calibration)?)?;
-        bench.perform(Question::command(Ask::Home), out)?;
+        bench.get(Request::write_calibration(&calibration)?)?;
+        bench.perform(Request::command(Command::Home), out)?;
     }
     writeln!(out, "Measuring the motor's current without load ...")?;
     out.flush()?;
-    calibration = bench.perform(Question::calibrate(), out)?;
+    calibration = bench.perform(Request::calibrate(), out)?;
     calibration.date = how.date.unwrap_or_else(today);
     if let Some(newton_per_ampere) = how.newton_per_ampere {
         calibration.newton_per_ampere = newton_per_ampere;
@@ -62,8 +62,8 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if let Some(force_mn_per_count) = how.force_mn_per_count {
         calibration.pressure.force_mn_per_count = force_mn_per_count;
     }
-    bench.get(Question::write_calibration(&calibration)?)?;
-    let kept = bench.get(Question::read_calibration())?;
+    bench.get(Request::write_calibration(&calibration)?)?;
+    let kept = bench.get(Request::read_calibration())?;
     ensure!(
         kept == calibration,
         "the probe keeps other constants than it was given: calibrate again"
@@ -116,7 +116,7 @@ pub(crate) fn calibration_rows(c: &RigCalibration) -> [(&'static str, String); 6
 /// Ends a fault.
 pub(crate) fn home(at: &Where, out: &mut impl Write) -> anyhow::Result<()> {
     let (mut bench, _) = Bench::open(at)?;
-    bench.perform(Question::command(Ask::Home), out)?;
+    bench.perform(Request::command(Command::Home), out)?;
     writeln!(
         out,
         "Ready: lever and stage have found their limit switches."

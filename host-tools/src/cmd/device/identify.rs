@@ -5,9 +5,9 @@ use std::io::Write;
 use anyhow::Context as _;
 use tactus::eval::evaluate::Method;
 use tactus::eval::show::Show;
-use tactus::link::Question;
+use tactus::link::Request;
 use tactus_core::table::Table;
-use tactus_core::wire::{Ask, Identify};
+use tactus_core::wire::{Command, Identify};
 
 use super::bench::Bench;
 use super::line::Where;
@@ -81,10 +81,12 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     writeln!(out, "An unknown texture, one of {among} (seed {seed}).")?;
     out.flush()?;
     // for the log: with its samples every slide can be felt again
-    bench.get(Question::command(Ask::Stream(true)))?;
+    bench.get(Request::command(Command::Stream(true)))?;
     let mut show = Show::new(table, &mut *out);
-    let found = bench.run(Question::identify(wanted), |report| show.tell(&report.tell))?;
-    bench.get(Question::command(Ask::Stream(false)))?;
+    let found = bench.run(Request::identify(wanted), |report| {
+        show.event(&report.event)
+    })?;
+    bench.get(Request::command(Command::Stream(false)))?;
     if found.learned > 0 {
         writeln!(
             out,
@@ -92,7 +94,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             found.learned
         )?;
     }
-    if found.asks {
+    if found.wants_label {
         writeln!(
             out,
             "It is not certain. If you know what it is: tactus device teach NAME"

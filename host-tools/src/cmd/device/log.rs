@@ -1,8 +1,8 @@
 //! The log of a session: a line of JSON for everything that was asked and told.
 //!
 //! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":2,"port":"/dev/ttyACM0"}}`. Each other one is
-//! `{"ask":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log itself: the
-//! table in use (the parts that were read), the raw samples (blocks), what was felt, chosen and answered.
+//! `{"command":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log itself: the
+//! table in use (the parts that were read), the raw samples (blocks), what was measured, chosen and answered.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -10,7 +10,7 @@ use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use tactus_core::wire::{Ask, PROTOCOL, Report};
+use tactus_core::wire::{Command, PROTOCOL, Report};
 
 /// One line.
 #[derive(Serialize, Deserialize)]
@@ -21,7 +21,8 @@ pub(crate) enum Line<'a> {
         protocol: u8,
         port: Cow<'a, str>,
     },
-    Ask(Box<Cow<'a, Ask>>),
+    #[serde(alias = "ask")]
+    Command(Box<Cow<'a, Command>>),
     Report(Box<Cow<'a, Report>>),
 }
 
@@ -56,8 +57,8 @@ impl Log {
         Ok(log)
     }
 
-    pub(crate) fn asked(&mut self, ask: &Ask) {
-        self.line(&Line::Ask(Box::new(Cow::Borrowed(ask))));
+    pub(crate) fn asked(&mut self, command: &Command) {
+        self.line(&Line::Command(Box::new(Cow::Borrowed(command))));
     }
 
     pub(crate) fn told(&mut self, report: &Report) {

@@ -13,9 +13,9 @@ use std::time::{Duration, Instant};
 
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, KeyCode, KeyModifiers};
-use tactus::link::{Job, LinkError, PortError, Question, ReadTable};
+use tactus::link::{Job, LinkError, PortError, ReadTable, Request};
 use tactus_core::table::Table;
-use tactus_core::wire::{Ask, Identify, Report};
+use tactus_core::wire::{Command, Identify, Report};
 
 use self::state::{Monitor, Weight};
 use super::bench::{Bench, BenchError};
@@ -29,7 +29,7 @@ const SILENT: Duration = Duration::from_secs(3);
 
 /// What the probe is asked for, one after the other.
 enum Doing {
-    Asked(Box<Job<Question<()>>>),
+    Asked(Box<Job<Request<()>>>),
     Table(Box<Job<ReadTable>>),
 }
 
@@ -81,12 +81,12 @@ fn watch(
     wanted: &Identify,
 ) -> Result<End, BenchError> {
     let mut wanted = wanted.clone();
-    let mut to_do: VecDeque<Ask> = VecDeque::new();
+    let mut to_do: VecDeque<Command> = VecDeque::new();
     let mut doing: Option<Doing> = None;
     let mut drawn: Option<Instant> = None;
     let mut asked: Option<Instant> = None;
     let mut heard = Instant::now();
-    bench.ask(Ask::Stream(true))?;
+    bench.send(Command::Stream(true))?;
     loop {
         if bench.interrupt().take() {
             return Ok(End::Interrupt);
@@ -130,19 +130,19 @@ fn watch(
             });
         }
         if std::mem::take(&mut monitor.rebooted) {
-            bench.ask(Ask::Stream(true))?;
+            bench.send(Command::Stream(true))?;
         }
         if doing.is_none()
-            && let Some(ask) = to_do.pop_front()
+            && let Some(command) = to_do.pop_front()
         {
-            doing = Some(match ask {
-                Ask::ReadTable(_) => Doing::Table(Box::new(bench.begin(ReadTable::default())?)),
-                ask => Doing::Asked(Box::new(bench.begin(Question::command(ask))?)),
+            doing = Some(match command {
+                Command::ReadTable(_) => Doing::Table(Box::new(bench.begin(ReadTable::default())?)),
+                command => Doing::Asked(Box::new(bench.begin(Request::command(command))?)),
             });
         }
         if asked.is_none_or(|at| at.elapsed() >= ASKED) {
             asked = Some(Instant::now());
-            bench.ask(Ask::Status)?;
+            bench.send(Command::Status)?;
         }
         monitor.silent = Some(heard.elapsed()).filter(|silent| *silent >= SILENT);
         monitor.losses = bench.losses();
@@ -164,7 +164,7 @@ fn watch(
                 KeyCode::Char('q') => return Ok(End::Quit),
                 KeyCode::Char('s') | KeyCode::Esc => {
                     to_do.clear();
-                    bench.ask(Ask::Stop)?;
+                    bench.send(Command::Stop)?;
                     monitor.note(Weight::Message, "stopping");
                 }
                 KeyCode::Char('i' | 'h') if busy => {
@@ -172,15 +172,15 @@ fn watch(
                 }
                 KeyCode::Char('i') => {
                     if monitor.table_crc != monitor.status.table_crc {
-                        to_do.push_back(Ask::ReadTable(0));
+                        to_do.push_back(Command::ReadTable(0));
                     }
-                    to_do.push_back(Ask::Identify(wanted.clone()));
+                    to_do.push_back(Command::Identify(wanted.clone()));
                     // the next one begins elsewhere on the sample
                     wanted.seed = wanted.seed.wrapping_add(1);
                     monitor.note(Weight::Message, "identify");
                 }
                 KeyCode::Char('h') => {
-                    to_do.push_back(Ask::Home);
+                    to_do.push_back(Command::Home);
                     monitor.note(Weight::Message, "home");
                 }
                 _ => {}

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use anyhow::ensure;
 use tactus::data::recording::Texture;
 use tactus::data::recordings::RecordingWriter;
-use tactus::link::Question;
+use tactus::link::Request;
 use tactus_core::explorer::Strategy;
-use tactus_core::wire::{Ask, Identify};
+use tactus_core::wire::{Command, Identify};
 
 use super::bench::{Bench, show_fault, wait_for_enter};
 use super::line::Where;
@@ -50,8 +50,8 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     // before anything moves
     let mut writer = RecordingWriter::create(&args.out, named.collect())?;
     let (mut bench, _) = Bench::open(&args.at)?;
-    let calibration = bench.get(Question::read_calibration())?;
-    bench.get(Question::command(Ask::Stream(true)))?;
+    let calibration = bench.get(Request::read_calibration())?;
+    bench.get(Request::command(Command::Stream(true)))?;
     let mut written = 0;
     for (index, name) in textures.iter().enumerate() {
         if textures.len() > 1 {
@@ -71,7 +71,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         };
         let mut recorder = Recorder::new(calibration.pressure);
         let (mut lost, mut kept) = (Vec::new(), Vec::new());
-        bench.run(Question::identify(wanted), |report| {
+        bench.run(Request::identify(wanted), |report| {
             match recorder.hear(index, report) {
                 Some(Ok(slide)) => {
                     let (number, movement) = (slide.number, slide.movement);
@@ -95,7 +95,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             "{name}: no slide arrived whole; check the cable, then record again"
         );
     }
-    bench.get(Question::command(Ask::Stream(false)))?;
+    bench.get(Request::command(Command::Stream(false)))?;
     writer.finish()?;
     writeln!(
         out,

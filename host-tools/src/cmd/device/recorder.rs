@@ -7,7 +7,7 @@
 use tactus::data::recording::{Background, PAC_RATE_HZ, Slide};
 use tactus_core::features::{Block, Movement};
 use tactus_core::sensor::pressure::Calibration;
-use tactus_core::wire::{Live, Phase, Report, Tell};
+use tactus_core::wire::{Event, Live, Phase, Report};
 
 /// How often the force is told while the rig moves.
 const LIVE_HZ: u32 = 20;
@@ -63,29 +63,29 @@ impl Recorder {
         report: &Report,
     ) -> Option<Result<Slide, RecordError>> {
         let slide = &mut self.slide;
-        match &report.tell {
-            Tell::Chosen { movement, .. } => {
+        match &report.event {
+            Event::Chosen { movement, .. } => {
                 self.movement = Some(*movement);
                 self.slide = Begun::default();
             }
-            Tell::Rejected { .. } => self.slide = Begun::default(),
-            Tell::Phase(Phase::Sliding) => {
+            Event::Rejected { .. } => self.slide = Begun::default(),
+            Event::Phase(Phase::Sliding) => {
                 slide.began_ms = Some(report.at_ms);
                 slide.sliding = true;
             }
-            Tell::Live(Live { force_mn, .. }) if slide.sliding => {
+            Event::Live(Live { force_mn, .. }) if slide.sliding => {
                 slide.forces.push((report.at_ms, *force_mn));
             }
             // what is told while it is lifted is no force of the slide
-            Tell::Phase(_) if slide.began_ms.is_some() => slide.sliding = false,
-            Tell::Block(block) => {
+            Event::Phase(_) if slide.began_ms.is_some() => slide.sliding = false,
+            Event::Block(block) => {
                 let expected = slide.blocks.len() as u16;
                 if block.number != expected {
                     slide.missing.get_or_insert(expected);
                 }
                 slide.blocks.push(block.clone());
             }
-            Tell::Felt { .. } => {
+            Event::SlideReport { .. } => {
                 let slide = std::mem::take(slide);
                 return Some(self.finish(texture, &slide));
             }

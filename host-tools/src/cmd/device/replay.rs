@@ -12,7 +12,7 @@ use tactus::link::follow::{ALLOWED, Agreement, Follower};
 use tactus_core::dsp::Plan;
 use tactus_core::features::PropertySet;
 use tactus_core::table::Table;
-use tactus_core::wire::{self, Forget, Identify, PROTOCOL, Tell};
+use tactus_core::wire::{self, Event, Forget, Identify, PROTOCOL};
 
 use super::log::Line;
 
@@ -74,7 +74,7 @@ struct Logged {
     asked: Identify,
     /// The table in use, or why it is not known.
     table: Result<Vec<u8>, &'static str>,
-    tells: Vec<Tell>,
+    events: Vec<Event>,
 }
 
 impl Logged {
@@ -100,26 +100,26 @@ fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
                 return Err(ReplayError::Protocol(protocol));
             }
             Line::Session { .. } => {}
-            Line::Ask(ask) => match ask.into_owned() {
-                wire::Ask::Identify(asked) => {
+            Line::Command(command) => match command.into_owned() {
+                wire::Command::Identify(asked) => {
                     running = true;
                     explorations.push(Logged {
                         asked,
                         table: table.clone(),
-                        tells: Vec::new(),
+                        events: Vec::new(),
                     });
                 }
-                wire::Ask::Answer(_)
-                | wire::Ask::Train(_)
-                | wire::Ask::Rename { .. }
-                | wire::Ask::Forget(Forget::Texture(_) | Forget::SelfTaught)
-                | wire::Ask::BeginTable(_)
-                | wire::Ask::CommitTable
-                | wire::Ask::FactoryTable => table = Err(CHANGED),
+                wire::Command::Label(_)
+                | wire::Command::Train(_)
+                | wire::Command::Rename { .. }
+                | wire::Command::Forget(Forget::Texture(_) | Forget::SelfLearned)
+                | wire::Command::BeginTable(_)
+                | wire::Command::CommitTable
+                | wire::Command::FactoryTable => table = Err(CHANGED),
                 _ => {}
             },
-            Line::Report(report) => match report.into_owned().tell {
-                Tell::TablePart {
+            Line::Report(report) => match report.into_owned().event {
+                Event::TablePart {
                     offset,
                     length,
                     bytes,
@@ -134,13 +134,13 @@ fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
                         table = Ok(std::mem::take(&mut parts));
                     }
                 }
-                tell => {
-                    if matches!(tell, Tell::Taught { .. }) {
+                event => {
+                    if matches!(event, Event::TextureLearned { .. }) {
                         table = Err(CHANGED);
                     }
-                    let over = matches!(tell, Tell::Verdict { .. } | Tell::Refused { .. });
+                    let over = matches!(event, Event::Verdict { .. } | Event::Refused { .. });
                     if running && let Some(last) = explorations.last_mut() {
-                        last.tells.push(tell);
+                        last.events.push(event);
                         running = !over;
                     }
                 }
@@ -162,8 +162,8 @@ fn show(path: &Path, out: &mut impl Write) -> Result<(), ReplayError> {
             continue;
         };
         let mut show = Show::new(table, &mut *out);
-        for tell in &logged.tells {
-            show.tell(tell)?;
+        for event in &logged.events {
+            show.event(event)?;
         }
         writeln!(out)?;
     }
@@ -193,11 +193,14 @@ fn replay(path: &Path, out: &mut impl Write) -> Result<(), ReplayError> {
         largest = largest
             .max(here)
             .max(agreement.posterior)
-            .max(agreement.outlook);
+            .max(agreement.expected);
         // one that was stopped before its first slide was over has decided nothing else
-        let felt = logged.tells.iter().any(|t| matches!(t, Tell::Felt { .. }));
+        let observed = logged
+            .events
+            .iter()
+            .any(|t| matches!(t, Event::SlideReport { .. }));
         same &= agreement.agrees()
-            || !felt && agreement.other_choices.is_empty() && agreement.outlook <= ALLOWED;
+            || !observed && agreement.other_choices.is_empty() && agreement.expected <= ALLOWED;
     }
     if !same {
         return Err(ReplayError::Differs);
@@ -226,44 +229,44 @@ fn follow(logged: &Logged, out: &mut impl Write) -> anyhow::Result<Agreement> {
     let table = Table::read(logged.table.as_ref().map_err(|why| anyhow!(*why))?)?;
     let plan = Plan::new();
     // a handheld probe feels no traction, from its first slide on
-    let measured = logged.tells.iter().find_map(|tell| match tell {
-        Tell::Felt { felt, .. } => Some(felt.properties().measured()),
+    let measured = logged.events.iter().find_map(|event| match event {
+        Event::SlideReport { observed, .. } => Some(observed.properties().measured()),
         _ => None,
     });
     let measured = measured.unwrap_or(PropertySet::ALL);
     let mut follower = Follower::new(table, measured, &logged.asked, &plan)?;
     let words = Show::new(table, io::sink());
     let mut whole = true;
-    for tell in &logged.tells {
+    for event in &logged.events {
         let before = follower.agreement().clone();
-        if let Err(why) = follower.hear(tell) {
+        if let Err(why) = follower.hear(event) {
             writeln!(out, "  {why}")?;
             whole = false;
         }
         let now = follower.agreement();
-        match tell {
-            Tell::Chosen { slide, action, .. } => {
+        match event {
+            Event::Chosen { slide, action, .. } => {
                 let here = match now.other_choices.get(before.other_choices.len()) {
                     None => "chosen here too".to_owned(),
                     Some(other) => format!("HERE {} IS CHOSEN", words.name(other.here)),
                 };
                 writeln!(out, "  slide {slide}: {}: {here}", words.name(*action))?;
             }
-            Tell::Felt { .. } => {
+            Event::SlideReport { .. } => {
                 let apart = |now: f32, before: f32, what: &str| match now > before {
                     true => format!("{what} up to {now:e} apart"),
                     false => format!("{what} the same"),
                 };
                 let [features, earlier] = [now, &before].map(|a| a.properties.max(a.signal));
-                let felt = match now.slides == before.slides {
+                let observed = match now.slides == before.slides {
                     true => "samples not compared".to_owned(),
                     false => apart(features, earlier, "features"),
                 };
                 let posterior = apart(now.posterior, before.posterior, "posterior");
-                writeln!(out, "           {felt}, {posterior}")?;
+                writeln!(out, "           {observed}, {posterior}")?;
             }
-            Tell::Rejected { slide, why } => writeln!(out, "  slide {slide}: rejected: {why}")?,
-            Tell::Verdict { name, slides, .. } => {
+            Event::Rejected { slide, why } => writeln!(out, "  slide {slide}: rejected: {why}")?,
+            Event::Verdict { name, slides, .. } => {
                 let same = now.other_verdicts == before.other_verdicts;
                 let here = if same {
                     "the same here"
@@ -272,7 +275,7 @@ fn follow(logged: &Logged, out: &mut impl Write) -> anyhow::Result<Agreement> {
                 };
                 writeln!(out, "  answer after {slides}: {name}: {here}")?;
             }
-            Tell::Refused { why, .. } => writeln!(out, "  ended: {why}")?,
+            Event::Refused { why, .. } => writeln!(out, "  ended: {why}")?,
             _ => {}
         }
     }

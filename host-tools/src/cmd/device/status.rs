@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use tactus::link::Question;
+use tactus::link::Request;
 use tactus_core::wire::Phase;
 
 use super::bench::{Bench, recovery};
@@ -30,7 +30,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if args.format == Format::Json {
         return print_json(&status, out);
     }
-    let calibration = bench.get(Question::read_calibration())?;
+    let calibration = bench.get(Request::read_calibration())?;
     let mut rows = vec![
         ("probe", format!("at {}", bench.name)),
         ("rig", phase_name(status.phase).to_owned()),

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, ensure};
 use clap::Subcommand;
 use tactus::eval::show::show_table;
-use tactus::link::{PushTable, Question};
+use tactus::link::{PushTable, Request};
 use tactus_core::table::Table;
 use tactus_core::wire;
 
@@ -76,7 +76,7 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
             let (mut bench, _) = Bench::open(at)?;
             bench.get(push)?;
             // not what was sent counts, but what the probe uses from now on
-            let status = bench.get(Question::status())?;
+            let status = bench.get(Request::status())?;
             let (textures, now, pushed) = (status.textures, status.table_crc, table.crc());
             ensure!(
                 now == pushed,
@@ -89,8 +89,8 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
         }
         Command::Factory(at) => {
             let (mut bench, _) = Bench::open(at)?;
-            bench.get(Question::command(wire::Ask::FactoryTable))?;
-            let status = bench.get(Question::status())?;
+            bench.get(Request::command(wire::Command::FactoryTable))?;
+            let status = bench.get(Request::status())?;
             let (textures, crc) = (status.textures, status.table_crc);
             writeln!(
                 out,

@@ -3,10 +3,10 @@
 use std::io::{self, Write};
 
 use anyhow::ensure;
-use tactus::link::Question;
+use tactus::link::Request;
 use tactus_core::features::Property;
 use tactus_core::table::Name;
-use tactus_core::wire::{self, Report, Tell};
+use tactus_core::wire::{self, Event, Report};
 
 use super::bench::{Bench, show_fault};
 use super::line::Where;
@@ -96,24 +96,24 @@ pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
         seed: args.seed.unwrap_or_else(seed_of_now),
     };
     let (mut bench, _) = Bench::open(&args.at)?;
-    let slides = bench.run(Question::train(wanted), |report| show_slide(report, out))?;
+    let slides = bench.run(Request::train(wanted), |report| show_slide(report, out))?;
     writeln!(out, "{}: {slides} slides made.", args.name)?;
     Ok(())
 }
 
 /// Names the texture of the last exploration.
 pub(crate) fn teach(Teach { at, name }: &Teach, out: &mut impl Write) -> anyhow::Result<()> {
-    let question = Question::answer(name_of(name)?);
-    let taught = Bench::open(at)?.0.get(question)?;
-    let (name, slides) = (taught.name, taught.slides);
+    let request = Request::label(name_of(name)?);
+    let learned = Bench::open(at)?.0.get(request)?;
+    let (name, slides) = (learned.name, learned.slides);
     writeln!(out, "The probe has learned {name} from {slides} slides.")?;
     Ok(())
 }
 
 /// Gives a texture another name.
 pub(crate) fn rename(Rename { at, from, to }: &Rename, out: &mut impl Write) -> anyhow::Result<()> {
-    let question = Question::rename(name_of(from)?, name_of(to)?);
-    Bench::open(at)?.0.get(question)?;
+    let request = Request::rename(name_of(from)?, name_of(to)?);
+    Bench::open(at)?.0.get(request)?;
     writeln!(out, "{from} is {to} now.")?;
     Ok(())
 }
@@ -128,10 +128,10 @@ pub(crate) fn forget(Forget { at, what }: &Forget, out: &mut impl Write) -> anyh
         }
         (None, None) => {
             let said = "what it learned by itself".to_owned();
-            (wire::Forget::SelfTaught, said)
+            (wire::Forget::SelfLearned, said)
         }
     };
-    Bench::open(at)?.0.get(Question::forget(what))?;
+    Bench::open(at)?.0.get(Request::forget(what))?;
     writeln!(out, "The probe has forgotten {said}.")?;
     Ok(())
 }
@@ -155,14 +155,14 @@ pub(crate) fn seed_of_now() -> u32 {
 
 /// What a training shows of a report.
 fn show_slide(report: &Report, out: &mut impl Write) -> io::Result<()> {
-    match &report.tell {
-        Tell::Learned {
+    match &report.event {
+        Event::TrainingSlide {
             movement,
             trial,
             left,
-            felt,
+            observed,
         } => {
-            let value = |p: Property| Some(format!("{p} {:.3}", felt.properties().get(p)?));
+            let value = |p: Property| Some(format!("{p} {:.3}", observed.properties().get(p)?));
             let properties: Vec<String> = Property::ALL.into_iter().filter_map(value).collect();
             let properties = properties.join(", ");
             writeln!(
@@ -170,7 +170,7 @@ fn show_slide(report: &Report, out: &mut impl Write) -> io::Result<()> {
                 "trial {trial} of {movement}: {properties}; {left} to go"
             )?;
         }
-        Tell::Rejected { why, .. } => writeln!(out, "rejected, and repeated: {why}")?,
+        Event::Rejected { why, .. } => writeln!(out, "rejected, and repeated: {why}")?,
         _ => show_fault(report, out)?,
     }
     out.flush()

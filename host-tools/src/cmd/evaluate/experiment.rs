@@ -11,7 +11,7 @@ use tactus::eval::experiment::{Experiment, Protocol};
 
 use crate::cmd::args::{Features, Stop};
 use crate::cmd::output::Format;
-use crate::cmd::textures::{feel_folder, names};
+use crate::cmd::textures::{measure_folder, names};
 
 /// Play thousands of virtual explorations and count the right answers
 #[derive(clap::Args, Clone)]
@@ -102,15 +102,15 @@ pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
             .with_context(|| file.display().to_string())?;
         (experiment, "properties")
     } else if let Some(folder) = &args.recordings {
-        let (set, felt) = feel_folder(folder)?;
-        let test = args.test.as_deref().map(feel_folder).transpose()?;
-        let test = test.map(|(set, felt)| (names(&set), felt));
+        let (set, measured) = measure_folder(folder)?;
+        let test = args.test.as_deref().map(measure_folder).transpose()?;
+        let test = test.map(|(set, measured)| (names(&set), measured));
         let test = test
             .as_ref()
-            .map(|(names, felt)| (names.as_slice(), felt.as_slice()));
+            .map(|(names, measured)| (names.as_slice(), measured.as_slice()));
         let (names, slides) = (names(&set), args.train_slides.unwrap_or(5));
         let experiment =
-            Experiment::recorded(names, &felt, test, args.protocol, slides, args.seed)?;
+            Experiment::recorded(names, &measured, test, args.protocol, slides, args.seed)?;
         let protocol = match args.protocol {
             Protocol::Interleaved => "interleaved",
             Protocol::Blocked => "blocked",

@@ -120,7 +120,7 @@ pub(crate) fn lifelong(
             life.accuracy,
             life.worst.0,
             life.uncertain,
-            life.wrong_lessons,
+            life.wrong_updates,
         ];
         let [right, worst, unsure, wrong] = shares.map(|share| share * 100.0);
         writeln!(

@@ -32,7 +32,7 @@ const RIGID: f64 = 1e-6;
 
 /// Bands and properties of a slide, as [`super::FabricSlide`] describes them.
 #[derive(Clone, Copy, Default, Debug)]
-pub(super) struct Felt {
+pub(super) struct SlideSpectrum {
     pub(super) ln_bands: [f32; 8],
     pub(super) properties: [f32; 3],
 }
@@ -58,7 +58,7 @@ impl Meter {
     ///
     /// # Errors
     /// If the slide is too short or no taxel felt anything, as what to say of it.
-    pub(super) fn measure(&self, rows: &[u8]) -> Result<Felt, ContentError> {
+    pub(super) fn measure(&self, rows: &[u8]) -> Result<SlideSpectrum, ContentError> {
         let samples = rows.len() / ROW_BYTES;
         if samples < SHORTEST {
             return Err(ContentError::Short(samples, SHORTEST));
@@ -81,7 +81,7 @@ impl Meter {
             centroid(&spectrum),
             decorrelation(&taxels, &variances),
         ];
-        Ok(Felt {
+        Ok(SlideSpectrum {
             ln_bands,
             properties: properties.map(|x| x.ln() as f32),
         })

@@ -232,19 +232,22 @@ fn a_sine_is_in_its_band() {
         // a trend, too, that is to be removed
         (1000.0 + 500.0 * phase.cos() + t as f64).round() as u16
     };
-    let felt = Meter::default().measure(&rows(512, wave)).unwrap();
+    let observed = Meter::default().measure(&rows(512, wave)).unwrap();
     // A^2 N / 4 in three bins of the eight of this band
     let expected = (500.0_f32 * 500.0 * 256.0 / 4.0 / 8.0).ln();
-    assert!((felt.ln_bands[4] - expected).abs() < 1e-3, "{felt:?}");
+    assert!(
+        (observed.ln_bands[4] - expected).abs() < 1e-3,
+        "{observed:?}"
+    );
     for band in [0, 1, 2, 6, 7] {
-        assert!(felt.ln_bands[band] < 5.0, "band {band} of {felt:?}");
+        assert!(observed.ln_bands[band] < 5.0, "band {band} of {observed:?}");
     }
-    let [power, centroid, decorrelation] = felt.properties;
-    assert!((power - 125_000_f32.ln()).abs() < 1e-3, "{felt:?}");
-    assert!((centroid - 16_f32.ln()).abs() < 1e-2, "{felt:?}");
+    let [power, centroid, decorrelation] = observed.properties;
+    assert!((power - 125_000_f32.ln()).abs() < 1e-3, "{observed:?}");
+    assert!((centroid - 16_f32.ln()).abs() < 1e-2, "{observed:?}");
     // 56 pairs of 120 with correlation 1, 64 with -1
     let expected = (1.0 + 8.0 / 120.0_f32).ln();
-    assert!((decorrelation - expected).abs() < 1e-4, "{felt:?}");
+    assert!((decorrelation - expected).abs() < 1e-4, "{observed:?}");
 }
 
 #[test]
@@ -257,7 +260,7 @@ fn bands_are_those_of_a_plain_transform_also_in_short_slides() {
     for (samples, starts) in [(83, vec![0]), (256, vec![0]), (401, vec![0, 128])] {
         // as much up as down about the middle, so that there is no trend
         let value = |t: usize, taxel: usize| noise(taxel)(t.min(samples - 1 - t), taxel);
-        let felt = Meter::default().measure(&rows(samples, value)).unwrap();
+        let observed = Meter::default().measure(&rows(samples, value)).unwrap();
         let mut bins = [0.0; 129];
         for taxel in 0..TAXELS {
             let series: Vec<f64> = (0..samples).map(|t| f64::from(value(t, taxel))).collect();
@@ -278,7 +281,7 @@ fn bands_are_those_of_a_plain_transform_also_in_short_slides() {
         for (band, edges) in BAND_EDGES.windows(2).enumerate() {
             let mean = bins[edges[0]..edges[1]].iter().sum::<f64>() / (edges[1] - edges[0]) as f64;
             let expected = (mean + 0.1).ln();
-            let found = f64::from(felt.ln_bands[band]);
+            let found = f64::from(observed.ln_bands[band]);
             assert!(
                 (found - expected).abs() < 1e-5,
                 "{samples} samples, band {band}: {found}, {expected}"
@@ -291,17 +294,17 @@ fn bands_are_those_of_a_plain_transform_also_in_short_slides() {
             .map(|(p, k)| p * f64::from(k))
             .sum::<f64>()
             / power;
-        assert!((f64::from(felt.properties[1]) - centroid.ln()).abs() < 1e-5);
+        assert!((f64::from(observed.properties[1]) - centroid.ln()).abs() < 1e-5);
     }
 }
 
 #[test]
 fn flat_taxels_and_rigid_fingers_have_finite_properties() {
     let finite = |value: &dyn Fn(usize, usize) -> u16| {
-        let felt = Meter::default().measure(&rows(SHORTEST, value)).unwrap();
-        let all = felt.ln_bands.iter().chain(&felt.properties);
-        assert!(all.clone().all(|x| x.is_finite()), "{felt:?}");
-        felt
+        let observed = Meter::default().measure(&rows(SHORTEST, value)).unwrap();
+        let all = observed.ln_bands.iter().chain(&observed.properties);
+        assert!(all.clone().all(|x| x.is_finite()), "{observed:?}");
+        observed
     };
     let one = finite(&|t, taxel| if taxel == 3 { noise(0)(t, 0) } else { 7 });
     assert!(

@@ -290,7 +290,7 @@ fn damaged_npy_files_are_refused() {
         (with("False", "True "), "the order is not C"),
         (with("(3,", "(3,1,"), "the shape is not one number"),
         (with("(3,", "("), "the shape is not one number"),
-        (with("(3,", "(9,"), "promises 9 samples, the file has 3"),
+        (with("(3,", "(9,"), "says 9 samples, the file has 3"),
         (
             good[..good.len() - 1].to_vec(),
             "5 bytes of samples are an odd number",
@@ -302,7 +302,7 @@ fn damaged_npy_files_are_refused() {
         ),
         (
             header("{'descr': '<i2', 'fortran_order': False, 'shape': (18446744073709551615,), }"),
-            "promises 18446744073709551615 samples",
+            "says 18446744073709551615 samples",
         ),
         (header(&"{[(".repeat(60)), "the type is not '<i2'"),
     ] {

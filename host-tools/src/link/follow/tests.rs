@@ -4,33 +4,33 @@ use std::sync::OnceLock;
 use tactus_core::dsp::Kernels;
 use tactus_core::explorer::Strategy;
 use tactus_core::features::{self, BLOCK, Movement};
-use tactus_core::probe::explore::{Event, explore};
+use tactus_core::probe::explore::{ExplorationStep, explore};
 use tactus_core::rig::Rig;
 use tactus_core::table::Name;
 use tactus_core::wire::{self, MAX_FRAME, Receiver, Report};
 
 use super::*;
 use crate::sim::collection::{Collection, calibrated};
-use crate::sim::rig::{SimError, SimRig, feel};
+use crate::sim::rig::{SimError, SimRig, take_samples};
 
 const UNKNOWN: u8 = 47;
 
 /// Tells as the probe does, through frames.
 #[derive(Default)]
-struct Tells(RefCell<Vec<Tell>>);
+struct Events(RefCell<Vec<Event>>);
 
-impl Tells {
-    fn push(&self, tell: Tell) {
-        let mut room = [0; MAX_FRAME + 1];
+impl Events {
+    fn push(&self, event: Event) {
+        let mut buffer = [0; MAX_FRAME + 1];
         let report = Report {
             number: 0,
             at_ms: 0,
-            tell,
+            event,
         };
         let mut receiver = Receiver::default();
-        for &byte in wire::encode(&report, &mut room).unwrap() {
+        for &byte in wire::encode(&report, &mut buffer).unwrap() {
             if let Some(got) = receiver.push::<Report>(byte) {
-                self.0.borrow_mut().push(got.unwrap().tell);
+                self.0.borrow_mut().push(got.unwrap().event);
             }
         }
     }
@@ -39,11 +39,11 @@ impl Tells {
 /// The simulated rig, with its samples told in blocks.
 struct Streamed<'a> {
     rig: SimRig,
-    tells: &'a Tells,
+    events: &'a Events,
 }
 
 impl Streamed<'_> {
-    fn tell(&self, number: &mut u16, block: &mut Block) {
+    fn event(&self, number: &mut u16, block: &mut Block) {
         let steady = block.steady;
         let still = block.still;
         let told = std::mem::replace(
@@ -57,7 +57,7 @@ impl Streamed<'_> {
                 lost: 0,
             },
         );
-        self.tells.push(Tell::Block(Block {
+        self.events.push(Event::Block(Block {
             number: *number,
             steady,
             ..told
@@ -83,7 +83,7 @@ impl Rig for Streamed<'_> {
         }
         let mut ticks = Vec::new();
         self.rig.slide(movement, 0.5, |outputs, _| {
-            feel(outputs, slide);
+            take_samples(outputs, slide);
             ticks.push(outputs.clone());
         })?;
         let mut number = 0;
@@ -96,23 +96,23 @@ impl Rig for Streamed<'_> {
             lost: 0,
         };
         for tick in ticks {
-            let still = match &tick.felt {
-                features::Felt::Nothing => continue,
-                features::Felt::Still => true,
+            let still = match &tick.sample_phase {
+                features::SamplePhase::Nothing => continue,
+                features::SamplePhase::Still => true,
                 _ => false,
             };
             let full = block.pac.len() + tick.pac.len() > BLOCK;
             if (full || still != block.still) && !block.pac.is_empty() {
-                self.tell(&mut number, &mut block);
+                self.event(&mut number, &mut block);
             }
             block.still = still;
-            if let features::Felt::Begin(steady) = tick.felt {
+            if let features::SamplePhase::Begin(steady) = tick.sample_phase {
                 block.steady = Some((steady.start, steady.end));
             }
             block.pac.extend_from_slice(&tick.pac).unwrap();
             block.shear_mn.extend(tick.shear_mn);
         }
-        self.tell(&mut number, &mut block);
+        self.event(&mut number, &mut block);
         Ok(())
     }
 }
@@ -131,12 +131,12 @@ fn asked() -> Identify {
 }
 
 /// A fused table of three textures, and what a probe tells of an exploration with it.
-fn explored() -> &'static (Vec<u8>, Vec<Tell>) {
-    static EXPLORED: OnceLock<(Vec<u8>, Vec<Tell>)> = OnceLock::new();
+fn explored() -> &'static (Vec<u8>, Vec<Event>) {
+    static EXPLORED: OnceLock<(Vec<u8>, Vec<Event>)> = OnceLock::new();
     EXPLORED.get_or_init(|| exploration(Method::Fused))
 }
 
-fn exploration(method: Method) -> (Vec<u8>, Vec<Tell>) {
+fn exploration(method: Method) -> (Vec<u8>, Vec<Event>) {
     let world = Collection {
         seed: 5,
         textures: vec![10, UNKNOWN, 100],
@@ -145,10 +145,10 @@ fn exploration(method: Method) -> (Vec<u8>, Vec<Tell>) {
     let calibration = calibrated(world.setup(10, 0)).unwrap();
     let bytes = world.learn(method, calibration, || ()).unwrap();
     let table = Table::read(&bytes).unwrap();
-    let tells = Tells::default();
+    let events = Events::default();
     let mut rig = Streamed {
         rig: SimRig::new(world.setup(UNKNOWN, 100)),
-        tells: &tells,
+        events: &events,
     };
     rig.rig.control().calibrate(calibration).unwrap();
     let config = Config {
@@ -166,38 +166,38 @@ fn exploration(method: Method) -> (Vec<u8>, Vec<Tell>) {
         &plan,
         || 0,
         |event| {
-            tells.push(match event {
-                Event::Chosen(action, outlook) => {
-                    let mut outlook: Vec<Promise> = outlook
+            events.push(match event {
+                ExplorationStep::Chosen(action, expected) => {
+                    let mut expected: Vec<ExpectedOutcome> = expected
                         .iter()
-                        .map(|o| Promise {
+                        .map(|o| ExpectedOutcome {
                             action: o.action,
                             uncertainty: o.uncertainty,
                             benefit: o.benefit,
                         })
                         .collect();
-                    outlook.sort_by(|a, b| b.benefit.total_cmp(&a.benefit));
-                    Tell::Chosen {
+                    expected.sort_by(|a, b| b.benefit.total_cmp(&a.benefit));
+                    Event::Chosen {
                         slide,
                         movement: table.movement(action.movement).unwrap(),
                         action,
-                        outlook: outlook.into_iter().take(MAX_OUTLOOK).collect(),
+                        expected: expected.into_iter().take(MAX_EXPECTED_OUTCOMES).collect(),
                     }
                 }
-                Event::Felt(action, measurement, posterior) => {
+                ExplorationStep::Measured(action, measurement, posterior) => {
                     slide += 1;
-                    Tell::Felt {
+                    Event::SlideReport {
                         slide: slide - 1,
                         action,
-                        felt: measurement.into(),
+                        observed: measurement.into(),
                         posterior: posterior.iter().copied().collect(),
                     }
                 }
-                Event::Decided {
+                ExplorationStep::Decided {
                     verdict,
                     slides,
                     certain,
-                } => Tell::Verdict {
+                } => Event::Verdict {
                     texture: verdict.texture,
                     name: Name::try_from(table.name(verdict.texture).unwrap()).unwrap(),
                     probability: verdict.probability,
@@ -205,40 +205,40 @@ fn exploration(method: Method) -> (Vec<u8>, Vec<Tell>) {
                     unknown: verdict.unknown,
                     log_odds: verdict.log_odds,
                     slides,
-                    asks: method == Method::Fused && !certain,
+                    wants_label: method == Method::Fused && !certain,
                 },
-                Event::Rejected(..) => panic!("{event:?}"),
+                ExplorationStep::Rejected(..) => panic!("{event:?}"),
             });
         },
     );
     embassy_futures::block_on(exploration).unwrap();
-    let tells = tells.0.into_inner();
-    (bytes, tells)
+    let events = events.0.into_inner();
+    (bytes, events)
 }
 
 /// Follows these reports; how well they agree, and what could not be compared.
-fn follow(tells: &[Tell]) -> (Agreement, Vec<FollowError>) {
-    follow_with(&explored().0, &asked(), tells)
+fn follow(events: &[Event]) -> (Agreement, Vec<FollowError>) {
+    follow_with(&explored().0, &asked(), events)
 }
 
-fn follow_with(table: &[u8], asked: &Identify, tells: &[Tell]) -> (Agreement, Vec<FollowError>) {
+fn follow_with(table: &[u8], asked: &Identify, events: &[Event]) -> (Agreement, Vec<FollowError>) {
     let plan = Plan::new();
     let table = Table::read(table).unwrap();
     let mut follower = Follower::new(table, PropertySet::ALL, asked, &plan).unwrap();
-    let errors = tells.iter().filter_map(|tell| follower.hear(tell).err());
+    let errors = events.iter().filter_map(|event| follower.hear(event).err());
     let errors = errors.collect();
     (follower.agreement().clone(), errors)
 }
 
 /// Follows the exploration with the first report changed that `change` knows.
-fn changed(change: impl FnMut(&mut Tell) -> bool) -> (Agreement, Vec<FollowError>) {
-    let mut tells = explored().1.clone();
-    assert!(tells.iter_mut().any(change));
-    follow(&tells)
+fn changed(change: impl FnMut(&mut Event) -> bool) -> (Agreement, Vec<FollowError>) {
+    let mut events = explored().1.clone();
+    assert!(events.iter_mut().any(change));
+    follow(&events)
 }
 
 /// The `nth` report (from 0) that `is` knows.
-fn place(nth: usize, is: impl Fn(&Tell) -> bool) -> usize {
+fn place(nth: usize, is: impl Fn(&Event) -> bool) -> usize {
     let mut places = explored().1.iter().enumerate().filter(|(_, t)| is(t));
     places.nth(nth).unwrap().0
 }
@@ -257,33 +257,33 @@ fn an_exploration_is_followed_to_the_bit() {
     assert_eq!(agreement, exact);
     assert!(agreement.agrees());
     // so is one by the paper's method, if it was asked for
-    let (table, tells) = exploration(Method::Paper);
+    let (table, events) = exploration(Method::Paper);
     let asked = Identify {
         method: Some(Method::Paper),
         ..asked()
     };
-    assert_eq!(follow_with(&table, &asked, &tells), (exact, vec![]));
+    assert_eq!(follow_with(&table, &asked, &events), (exact, vec![]));
 }
 
 #[test]
 fn a_changed_sample_is_found() {
     // in the middle of the steady part of the first slide
-    let at = place(60, |t| matches!(t, Tell::Block(b) if !b.still));
-    let mut tells = explored().1.clone();
-    let Tell::Block(block) = &mut tells[at] else {
+    let at = place(60, |t| matches!(t, Event::Block(b) if !b.still));
+    let mut events = explored().1.clone();
+    let Event::Block(block) = &mut events[at] else {
         panic!()
     };
     block.pac[7] += 40;
-    let (agreement, errors) = follow(&tells);
+    let (agreement, errors) = follow(&events);
     assert_eq!((errors, agreement.slides), (vec![], 4));
     assert!(agreement.properties > 0.0 && agreement.signal > 0.0);
-    assert_eq!((agreement.posterior, agreement.outlook), (0.0, 0.0));
+    assert_eq!((agreement.posterior, agreement.expected), (0.0, 0.0));
 }
 
 #[test]
-fn a_changed_posterior_property_or_promise_is_found() {
-    let (agreement, _) = changed(|tell| match tell {
-        Tell::Felt {
+fn a_changed_posterior_property_or_outcome_is_found() {
+    let (agreement, _) = changed(|event| match event {
+        Event::SlideReport {
             slide: 2,
             posterior,
             ..
@@ -294,51 +294,55 @@ fn a_changed_posterior_property_or_promise_is_found() {
         _ => false,
     });
     assert!((agreement.posterior - 2e-4).abs() < 1e-6 && !agreement.agrees());
-    let (agreement, _) = changed(|tell| match tell {
-        Tell::Felt { slide: 1, felt, .. } => {
-            felt.properties[0] = None;
+    let (agreement, _) = changed(|event| match event {
+        Event::SlideReport {
+            slide: 1, observed, ..
+        } => {
+            observed.properties[0] = None;
             true
         }
         _ => false,
     });
     assert_eq!(agreement.properties, f32::INFINITY);
-    let (agreement, _) = changed(|tell| match tell {
-        Tell::Chosen {
-            slide: 3, outlook, ..
+    let (agreement, _) = changed(|event| match event {
+        Event::Chosen {
+            slide: 3, expected, ..
         } => {
-            outlook[0].benefit -= 1e-3;
+            expected[0].benefit -= 1e-3;
             true
         }
         _ => false,
     });
-    assert!((agreement.outlook - 1e-3).abs() < 1e-6 && !agreement.agrees());
-    let (agreement, _) = changed(|tell| match tell {
-        Tell::Verdict { sure, .. } => {
+    assert!((agreement.expected - 1e-3).abs() < 1e-6 && !agreement.agrees());
+    let (agreement, _) = changed(|event| match event {
+        Event::Verdict { sure, .. } => {
             *sure = !*sure;
             true
         }
         _ => false,
     });
     assert_eq!(agreement.other_verdicts, 1);
-    let (agreement, _) = changed(|tell| match tell {
-        Tell::Verdict { unknown, .. } => {
+    let (agreement, _) = changed(|event| match event {
+        Event::Verdict { unknown, .. } => {
             *unknown = !*unknown;
             true
         }
         _ => false,
     });
     assert_eq!(agreement.other_verdicts, 1);
-    let (agreement, _) = changed(|tell| match tell {
-        Tell::Verdict { log_odds, .. } => {
+    let (agreement, _) = changed(|event| match event {
+        Event::Verdict { log_odds, .. } => {
             *log_odds = log_odds.map(|odds| odds + 0.5);
             true
         }
         _ => false,
     });
     assert!((agreement.posterior - 0.5).abs() < 1e-3, "{agreement:?}");
-    let (agreement, _) = changed(|tell| match tell {
-        Tell::Felt { slide: 1, felt, .. } => {
-            felt.bands[3] += 1;
+    let (agreement, _) = changed(|event| match event {
+        Event::SlideReport {
+            slide: 1, observed, ..
+        } => {
+            observed.bands[3] += 1;
             true
         }
         _ => false,
@@ -348,14 +352,14 @@ fn a_changed_posterior_property_or_promise_is_found() {
 
 #[test]
 fn another_choice_is_found() {
-    let (agreement, errors) = changed(|tell| match tell {
-        Tell::Chosen {
+    let (agreement, errors) = changed(|event| match event {
+        Event::Chosen {
             slide: 1,
             action,
-            outlook,
+            expected,
             ..
         } => {
-            *action = outlook.last().unwrap().action;
+            *action = expected.last().unwrap().action;
             true
         }
         _ => false,
@@ -369,11 +373,11 @@ fn another_choice_is_found() {
 #[test]
 fn a_missing_report_is_said_and_the_rest_followed() {
     let without = |at: usize| {
-        let mut tells = explored().1.clone();
-        tells.remove(at);
-        follow(&tells)
+        let mut events = explored().1.clone();
+        events.remove(at);
+        follow(&events)
     };
-    let (agreement, errors) = without(place(40, |t| matches!(t, Tell::Block(_))));
+    let (agreement, errors) = without(place(40, |t| matches!(t, Event::Block(_))));
     let missing = FollowError::MissingBlock {
         slide: 1,
         expected: 40,
@@ -381,8 +385,8 @@ fn a_missing_report_is_said_and_the_rest_followed() {
     };
     assert_eq!(errors, [missing]);
     assert_eq!((agreement.slides, agreement.posteriors), (3, 4));
-    // what was felt is lost: nothing after it can be compared
-    let (agreement, errors) = without(place(1, |t| matches!(t, Tell::Felt { .. })));
+    // what was measured is lost: nothing after it can be compared
+    let (agreement, errors) = without(place(1, |t| matches!(t, Event::SlideReport { .. })));
     assert_eq!(
         errors[0],
         FollowError::Order {
@@ -392,10 +396,10 @@ fn a_missing_report_is_said_and_the_rest_followed() {
     );
     assert_eq!(agreement.posteriors, 1);
     // streaming was off
-    let silent: Vec<Tell> = explored().1.clone();
-    let silent: Vec<Tell> = silent
+    let silent: Vec<Event> = explored().1.clone();
+    let silent: Vec<Event> = silent
         .into_iter()
-        .filter(|t| !matches!(t, Tell::Block(_)))
+        .filter(|t| !matches!(t, Event::Block(_)))
         .collect();
     let (agreement, errors) = follow(&silent);
     assert_eq!(
@@ -407,19 +411,19 @@ fn a_missing_report_is_said_and_the_rest_followed() {
 
 #[test]
 fn lost_samples_are_no_slide_here_either() {
-    let at = place(0, |t| matches!(t, Tell::Felt { .. }));
-    let mut tells = explored().1[..at].to_vec();
-    let rejected = Tell::Rejected {
+    let at = place(0, |t| matches!(t, Event::SlideReport { .. }));
+    let mut events = explored().1[..at].to_vec();
+    let rejected = Event::Rejected {
         slide: 1,
         why: wire::Text::try_from("3 samples were lost").unwrap(),
     };
-    let (agreement, errors) = follow(&[&tells[..], std::slice::from_ref(&rejected)].concat());
+    let (agreement, errors) = follow(&[&events[..], std::slice::from_ref(&rejected)].concat());
     assert_eq!((agreement.rejected, agreement.rejected_only_there), (1, 1));
     assert_eq!(errors, []);
-    let Some(Tell::Block(last)) = tells.last_mut() else {
+    let Some(Event::Block(last)) = events.last_mut() else {
         panic!()
     };
     last.lost = 3;
-    let (agreement, _) = follow(&[&tells[..], &[rejected]].concat());
+    let (agreement, _) = follow(&[&events[..], &[rejected]].concat());
     assert_eq!((agreement.rejected, agreement.rejected_only_there), (1, 0));
 }

@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::model::{Report, cells};
-use crate::eval::chart::{COLOURS, Chart, DrawError, Figure, Mark, Series, room};
+use crate::eval::chart::{COLOURS, Chart, DrawError, Figure, Mark, Series, buffer};
 use crate::study::signals::{Example, PAPER_LINE, Press, Signals};
 
 /// Adds figs. 3 and 4.
@@ -42,7 +42,7 @@ fn fig3(press: &Press) -> Result<Figure, DrawError> {
     let title = "Force against P_DC";
     let (x, y) = ("change of P_DC (counts)", "normal force (N)");
     Chart {
-        y_range: room(both.map(|p| p.1).chain([0.0])),
+        y_range: buffer(both.map(|p| p.1).chain([0.0])),
         ..Chart::new(title, x, y, (-0.02 * end, 1.05 * end), series)
     }
     .figure("fig3")
@@ -95,7 +95,7 @@ fn spectrum(example: &Example) -> Result<Figure, DrawError> {
 fn traction(example: &Example) -> Result<Figure, DrawError> {
     let seconds = (0..).map(|n| example.steady_from_s + 0.02 * f64::from(n));
     let shear: Vec<_> = seconds.zip(example.shear_n.iter().copied()).collect();
-    let x_range = room(shear.iter().map(|p| p.0));
+    let x_range = buffer(shear.iter().map(|p| p.0));
     let y_range = (
         0.0,
         1.2 * example.shear_n.iter().copied().fold(0.0, f64::max),

@@ -4,7 +4,7 @@ use serde_json::json;
 use tactus_core::features::{Movement, Property};
 
 use super::model::{Report, Rows, axis, cells, movement_name, owned};
-use crate::eval::chart::{Chart, DrawError, Figure, Mark, SHADES, Series, matrix, room};
+use crate::eval::chart::{Chart, DrawError, Figure, Mark, SHADES, Series, buffer, matrix};
 use crate::study::published::{MOST_USEFUL, TRIALS};
 use crate::study::training::Training;
 
@@ -175,7 +175,7 @@ fn wear(training: &Training) -> Result<Figure, DrawError> {
         wear.extend([(x - 1.0, t.wear.0), (x, t.wear.1)]);
     }
     let limit = training.skin.changed_at;
-    let y_range = room(wear.iter().map(|w| w.1).chain([0.0, limit]));
+    let y_range = buffer(wear.iter().map(|w| w.1).chain([0.0, limit]));
     let line = Series::dashed("changed", vec![(0.0, limit), (117.0, limit)]);
     let series = vec![Series::curve(0, Mark::None, "wear", wear), line];
     let title = "Wear of the skin during the training";

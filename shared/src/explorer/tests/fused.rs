@@ -13,7 +13,7 @@ struct Recipe {
     known: Vec<Vec<(f64, Vec<f64>)>>,
     candidates: Vec<usize>,
     /// Of every movement: slides, and their whitened sum.
-    visits: BTreeMap<usize, (f64, Vec<f64>)>,
+    episodes: BTreeMap<usize, (f64, Vec<f64>)>,
     made: BTreeMap<usize, f64>,
 }
 
@@ -32,7 +32,7 @@ impl Recipe {
             d: known[0][0].1.len() as f64,
             known,
             candidates: candidates.iter().map(|&c| c.into()).collect(),
-            visits: BTreeMap::new(),
+            episodes: BTreeMap::new(),
             made: BTreeMap::new(),
         }
     }
@@ -40,7 +40,7 @@ impl Recipe {
     fn observe(&mut self, movement: u8, z: &[i16]) {
         let movement = usize::from(movement);
         let (k, sum) = self
-            .visits
+            .episodes
             .entry(movement)
             .or_insert((0.0, vec![0.0; z.len()]));
         *k += 1.0;
@@ -87,7 +87,7 @@ impl Recipe {
     fn decide(&self, whole_steps: bool) -> (Vec<f64>, Option<f64>) {
         let mut l = vec![0.0; self.known.len()];
         let (mut elsewhere, mut can_tell) = (0.0, true);
-        for (&movement, (k, sum)) in &self.visits {
+        for (&movement, (k, sum)) in &self.episodes {
             let mean = sum.iter().map(|s| s / k);
             let mean: Vec<f64> = if whole_steps {
                 mean.map(|m| (m * 256.0 + 0.5).floor() / 256.0).collect()
@@ -238,22 +238,22 @@ fn explored(
     };
     let mut recipe = Recipe::new(table, candidates);
     for slides in 1..=config.max_slides {
-        let outlook = explorer.outlook();
-        super::confusions::promise_the_same_as_kept(&explorer);
+        let outcomes = explorer.expected_outcomes();
+        super::confusions::expect_the_same_as_kept(&explorer);
         let p: Vec<f64> = candidates
             .iter()
             .map(|&c| explorer.posterior()[usize::from(c)].into())
             .collect();
-        let taught: Vec<u8> = (0..table.movements().len() as u8)
+        let movements: Vec<u8> = (0..table.movements().len() as u8)
             .filter(|&m| candidates.iter().any(|&c| table.trials(c, m) > 0))
             .collect();
         assert!(
-            outlook
+            outcomes
                 .iter()
                 .map(|o| o.action)
-                .eq(taught.iter().map(|&m| look(m)))
+                .eq(movements.iter().map(|&m| look(m)))
         );
-        for o in &outlook {
+        for o in &outcomes {
             let movement = o.action.movement.into();
             let difference = f64::from(o.uncertainty) - recipe.uncertainty(movement, &p);
             assert!(difference.abs() < 3e-4, "{o:?}: {difference}");
@@ -268,9 +268,9 @@ fn explored(
                 assert!(difference.abs() < 1e-3, "{o:?}: {difference}");
             }
         }
-        let action = explorer.choose(&outlook, 0);
-        let most = outlook.iter().map(|o| o.benefit).fold(0.0, f32::max);
-        let first = outlook.iter().find(|o| o.benefit == most);
+        let action = explorer.choose(&outcomes, 0);
+        let most = outcomes.iter().map(|o| o.benefit).fold(0.0, f32::max);
+        let first = outcomes.iter().find(|o| o.benefit == most);
         assert_eq!(first.unwrap().action, action);
         let x = slide(action.movement);
         explorer.observe(action, &with_features(set, &x)).unwrap();
@@ -282,12 +282,12 @@ fn explored(
 
         let (p, log_odds) = recipe.decide(true);
         // of every movement: what the line between two entries of a logarithm's table is off
-        let visited = recipe.visits.len() as f64;
+        let slides_made = recipe.episodes.len() as f64;
         let mut total = 0.0;
         for (&c, p) in candidates.iter().zip(&p) {
             let posterior = f64::from(explorer.posterior()[usize::from(c)]);
             assert!(
-                (posterior - p).abs() < 5e-4 + 5e-4 * visited,
+                (posterior - p).abs() < 5e-4 + 5e-4 * slides_made,
                 "{posterior} {p}"
             );
             total += posterior;
@@ -302,7 +302,7 @@ fn explored(
         assert_eq!(explorer.log_odds().is_some(), log_odds.is_some());
         if let (Some(found), Some(expected)) = (explorer.log_odds(), log_odds) {
             let error = (f64::from(found) - expected).abs();
-            assert!(error < 1e-3 + 3e-3 * visited, "{found} {expected}");
+            assert!(error < 1e-3 + 3e-3 * slides_made, "{found} {expected}");
         }
         // the verdict, and what the mean's rounding may change: little
         let (rounded, (p, log_odds)) = (p, recipe.decide(false));
@@ -338,10 +338,10 @@ fn explored(
         }
     }
     // what can be learned of it
-    let felt: Vec<_> = explorer.felt().collect();
-    assert_eq!(felt.len(), recipe.visits.len());
-    for (movement, slides, mean) in felt {
-        let (k, sum) = &recipe.visits[&movement.into()];
+    let observed: Vec<_> = explorer.observed().collect();
+    assert_eq!(observed.len(), recipe.episodes.len());
+    for (movement, slides, mean) in observed {
+        let (k, sum) = &recipe.episodes[&movement.into()];
         assert_eq!((f64::from(slides), mean.len()), (*k, sum.len()));
         for (mean, sum) in mean.iter().zip(sum) {
             assert!((f64::from(*mean) - sum / k * 256.0).abs() <= 0.5);
@@ -496,7 +496,7 @@ fn another_slide_of_a_movement_replaces_and_does_not_add() {
     assert!(!other.is_certain());
     assert!(
         other
-            .felt()
+            .observed()
             .eq([(0, 2, heapless::Vec::from_slice(&[256]).unwrap())])
     );
 }
@@ -581,7 +581,7 @@ fn a_texture_never_learned_at_a_movement_is_like_any_other() {
     assert!(pair.posterior()[0] > 0.9);
     // and confused with all: eq. 11 of two equal ones that nothing tells apart is 1/2
     pair.restart();
-    assert!((pair.outlook()[0].uncertainty - 0.5).abs() < 1e-6);
+    assert!((pair.expected_outcomes()[0].uncertainty - 0.5).abs() < 1e-6);
     // alone it has nothing to be looked at
     let alone = Twenty::among(table, PropertySet::ALL, OPEN, [3]).map(|_| ());
     assert_eq!(alone, Err(ExplorerError::NothingToMeasure));
@@ -697,12 +697,12 @@ fn it_learns_by_itself_only_where_it_is_certain() {
     for method in [Method::Paper, Method::Student, Method::StudentAll] {
         let mut explorer = fused(&bytes, Config { method, ..OPEN });
         for _ in 0..5 {
-            let outlook = explorer.outlook();
-            explorer.observe(outlook[0].action, &all(2.0)).unwrap();
+            let outcomes = explorer.expected_outcomes();
+            explorer.observe(outcomes[0].action, &all(2.0)).unwrap();
         }
         assert!(explorer.best().probability > 0.99, "{method:?}");
         assert!(!explorer.is_certain() && explorer.log_odds().is_none());
-        assert_eq!(explorer.felt().count(), 0);
+        assert_eq!(explorer.observed().count(), 0);
     }
 }
 
@@ -743,9 +743,9 @@ fn far_off_values_neither_overflow_nor_panic() {
                     assert!(posterior.iter().all(|p| (0.0..=1.0).contains(p)));
                     assert!(explorer.log_odds().is_some_and(f32::is_finite));
                     if n % 50 == 0 {
-                        let mut outlook = explorer.outlook().into_iter();
+                        let mut outcomes = explorer.expected_outcomes().into_iter();
                         let within = |x: f32| (0.0..=1.0).contains(&x);
-                        assert!(outlook.all(|o| within(o.uncertainty) && within(o.benefit)));
+                        assert!(outcomes.all(|o| within(o.uncertainty) && within(o.benefit)));
                     }
                 }
             }
@@ -764,8 +764,8 @@ fn cycling_goes_through_the_movements_in_turn() {
     let mut explorer = fused(&bytes, config);
     assert!(explorer.turns().eq([look(0), look(1), look(2)]));
     for slide in 0..7 {
-        let outlook = explorer.outlook();
-        let action = explorer.choose(&outlook, 99);
+        let outcomes = explorer.expected_outcomes();
+        let action = explorer.choose(&outcomes, 99);
         assert_eq!(action, look(slide % 3));
         explorer.observe(action, &at(&[0.5])).unwrap();
     }
@@ -774,8 +774,8 @@ fn cycling_goes_through_the_movements_in_turn() {
         ..OPEN
     };
     let explorer = fused(&bytes, random);
-    let outlook = explorer.outlook();
-    let drawn = [0, u32::MAX / 2, u32::MAX].map(|random| explorer.choose(&outlook, random));
+    let outcomes = explorer.expected_outcomes();
+    let drawn = [0, u32::MAX / 2, u32::MAX].map(|random| explorer.choose(&outcomes, random));
     assert_eq!(drawn, [look(0), look(1), look(2)]);
 }
 
@@ -830,7 +830,10 @@ fn a_slide_without_the_features_teaches_nothing() {
     let bytes = axes();
     let mut explorer = fused(&bytes, OPEN);
     explorer.observe(look(0), &at(&[5.0, 1.0, 0.0])).unwrap();
-    let before = (state(&mut explorer), explorer.felt().collect::<Vec<_>>());
+    let before = (
+        state(&mut explorer),
+        explorer.observed().collect::<Vec<_>>(),
+    );
     let missing = ObserveError::Features(FeatureSet::Bands);
     for slide in [
         Observation::default(),
@@ -849,14 +852,20 @@ fn a_slide_without_the_features_teaches_nothing() {
         );
     }
     assert_eq!(
-        (state(&mut explorer), explorer.felt().collect::<Vec<_>>()),
+        (
+            state(&mut explorer),
+            explorer.observed().collect::<Vec<_>>()
+        ),
         before
     );
     // and a new exploration knows nothing of the last one
     explorer.restart();
     let mut new = fused(&bytes, OPEN);
     assert_eq!(state(&mut explorer), state(&mut new));
-    assert_eq!((explorer.log_odds(), explorer.felt().count()), (None, 0));
+    assert_eq!(
+        (explorer.log_odds(), explorer.observed().count()),
+        (None, 0)
+    );
 }
 
 /// The last texture of a table has fewer bytes behind its mean than a kernel reads at once.

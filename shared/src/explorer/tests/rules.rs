@@ -28,8 +28,8 @@ fn of_equal_actions_the_first_is_chosen() {
     let mut explorer = explorer(&bytes, Strategy::Bayesian);
     let mut order = Vec::new();
     for _ in 0..11 {
-        let outlook = explorer.outlook();
-        let action = explorer.choose(&outlook, u32::MAX);
+        let outcomes = explorer.expected_outcomes();
+        let action = explorer.choose(&outcomes, u32::MAX);
         order.push(index(action));
         // half-way between all: nothing is learned of the first two, the third is left out at once
         explorer.observe(action, &all(0.125)).unwrap();
@@ -52,26 +52,26 @@ fn the_answer_exceeds_the_threshold_or_is_the_best_after_the_last_slide() {
         Eight::new(table, PropertySet::ALL, config).unwrap()
     };
     let action = act(0, Property::Fineness);
-    fn felt(mut explorer: Eight<'_>) -> Eight<'_> {
+    fn observed(mut explorer: Eight<'_>) -> Eight<'_> {
         explorer
             .observe(act(0, Property::Fineness), &all(0.27))
             .unwrap();
         explorer
     }
-    let first = felt(with(0.99, 10));
+    let first = observed(with(0.99, 10));
     assert_eq!(first.verdict(), None);
     let best = first.best();
     assert_eq!((best.texture, best.sure), (1, false));
     assert_eq!(best.probability, first.posterior()[1]);
     // at the threshold is not above it
-    assert_eq!(felt(with(best.probability, 10)).verdict(), None);
+    assert_eq!(observed(with(best.probability, 10)).verdict(), None);
     let below = best.probability.next_down();
     let sure = Verdict { sure: true, ..best };
     assert_eq!((best.unknown, best.log_odds), (false, None));
-    assert_eq!(felt(with(below, 10)).verdict(), Some(sure));
+    assert_eq!(observed(with(below, 10)).verdict(), Some(sure));
     // the last slide
-    assert_eq!(felt(with(0.99, 1)).verdict(), Some(best));
-    let mut second = felt(with(0.99, 2));
+    assert_eq!(observed(with(0.99, 1)).verdict(), Some(best));
+    let mut second = observed(with(0.99, 2));
     assert_eq!(second.verdict(), None);
     second.observe(action, &all(0.27)).unwrap();
     assert_eq!(second.verdict(), Some(second.best()));
@@ -107,12 +107,12 @@ fn cycling_takes_the_best_action_of_each_property_in_turn() {
     let mut explorer = explorer(&bytes, Strategy::Cycling);
     assert_eq!(explorer.turns().collect::<Vec<_>>(), each);
     for turn in 0..8 {
-        let outlook = explorer.outlook();
-        let action = explorer.choose(&outlook, turn);
+        let outcomes = explorer.expected_outcomes();
+        let action = explorer.choose(&outcomes, turn);
         assert_eq!(action, each[turn as usize % 3]);
         // a slide that teaches nothing is no turn
         assert!(explorer.observe(action, &Observation::default()).is_err());
-        assert_eq!(explorer.choose(&outlook, turn), action);
+        assert_eq!(explorer.choose(&outcomes, turn), action);
         explorer.observe(action, &all(0.1)).unwrap();
         assert_eq!(explorer.turns().collect::<Vec<_>>(), each);
     }
@@ -121,8 +121,8 @@ fn cycling_takes_the_best_action_of_each_property_in_turn() {
         .collect();
     let mut explorer = Eight::new(explorer.table(), two, config(Strategy::Cycling)).unwrap();
     for turn in 0..4 {
-        let outlook = explorer.outlook();
-        let action = explorer.choose(&outlook, 0);
+        let outcomes = explorer.expected_outcomes();
+        let action = explorer.choose(&outcomes, 0);
         assert_eq!(action, each[1 + turn % 2]);
         explorer.observe(action, &all(0.1)).unwrap();
     }
@@ -132,10 +132,10 @@ fn cycling_takes_the_best_action_of_each_property_in_turn() {
 fn random_takes_every_action_equally_often() {
     let bytes = plain(&[0.0, 0.2], 3);
     let explorer = explorer(&bytes, Strategy::Random);
-    let outlook = explorer.outlook();
+    let outcomes = explorer.expected_outcomes();
     let mut count = BTreeMap::new();
     for n in 0..1u32 << 16 {
-        let action = explorer.choose(&outlook, n << 16);
+        let action = explorer.choose(&outcomes, n << 16);
         *count.entry(index(action)).or_insert(0u32) += 1;
     }
     assert!(count.keys().copied().eq(0..9));
@@ -143,9 +143,9 @@ fn random_takes_every_action_equally_often() {
         count.values().all(|&n| n.abs_diff((1 << 16) / 9) <= 1),
         "{count:?}"
     );
-    assert_eq!(explorer.choose(&outlook, 0), act(0, Property::Traction));
+    assert_eq!(explorer.choose(&outcomes, 0), act(0, Property::Traction));
     assert_eq!(
-        explorer.choose(&outlook, u32::MAX),
+        explorer.choose(&outcomes, u32::MAX),
         act(2, Property::Fineness)
     );
 }
@@ -162,9 +162,9 @@ fn what_the_rig_cannot_measure_is_never_chosen() {
     for strategy in [Strategy::Bayesian, Strategy::Cycling, Strategy::Random] {
         let mut explorer = Eight::new(table, two, config(strategy)).unwrap();
         for n in 0..20 {
-            let outlook = explorer.outlook();
-            assert_eq!(outlook.len(), 4);
-            let action = explorer.choose(&outlook, n * 214_748_364);
+            let outcomes = explorer.expected_outcomes();
+            assert_eq!(outcomes.len(), 4);
+            let action = explorer.choose(&outcomes, n * 214_748_364);
             assert_ne!(action.property, Some(Property::Traction));
             explorer.observe(action, &all(0.0)).unwrap();
         }
@@ -181,7 +181,7 @@ fn what_the_rig_cannot_measure_is_never_chosen() {
     let explorer = explorer(&bytes, Strategy::Bayesian);
     assert!(
         explorer
-            .outlook()
+            .expected_outcomes()
             .iter()
             .map(|o| o.action)
             .eq([act(0, Property::Fineness)])
@@ -209,7 +209,7 @@ fn movements_that_not_every_candidate_was_trained_at_are_left_out() {
             candidates.to_vec(),
         )?;
         let mut movements: Vec<u8> = explorer
-            .outlook()
+            .expected_outcomes()
             .iter()
             .map(|o| o.action.movement)
             .collect();
@@ -232,10 +232,10 @@ fn movements_that_not_every_candidate_was_trained_at_are_left_out() {
 fn the_whole_grid_fits() {
     let bytes = plain(&[0.0, 1.0], 36);
     let explorer = explorer(&bytes, Strategy::Random);
-    let outlook = explorer.outlook();
-    assert_eq!(outlook.len(), 108);
+    let outcomes = explorer.expected_outcomes();
+    assert_eq!(outcomes.len(), 108);
     assert_eq!(
-        explorer.choose(&outlook, u32::MAX),
+        explorer.choose(&outcomes, u32::MAX),
         act(35, Property::Fineness)
     );
 }
@@ -265,7 +265,7 @@ fn far_off_values_neither_overflow_nor_stick() {
         }
         assert!(
             explorer
-                .outlook()
+                .expected_outcomes()
                 .iter()
                 .all(|o| (0.0..=1.0).contains(&o.benefit) && o.uncertainty >= 0.0)
         );
@@ -336,7 +336,7 @@ fn negligible_textures_change_little() {
         explorer.observe(action, &all(x)).unwrap();
         paper.observe(action, x.into());
         let out: f64 = paper.p.iter().filter(|&&p| p < 1e-6).sum();
-        for o in explorer.outlook() {
+        for o in explorer.expected_outcomes() {
             let difference = (f64::from(o.uncertainty) - paper.uncertainty(o.action)).abs();
             // that of the logarithms: 1.7e-4 a slide
             assert!(difference < 2.0 * out + 1e-4, "{n}: {difference} {out}");
@@ -351,9 +351,9 @@ fn without_room_candidates_or_properties_there_is_no_exploration() {
     let small = Explorer::<'_, 2>::new(table, PropertySet::ALL, Config::default()).map(|_| ());
     assert_eq!(
         small,
-        Err(ExplorerError::Room {
+        Err(ExplorerError::NoSpace {
             textures: 3,
-            room: 2
+            capacity: 2
         })
     );
     assert!(Explorer::<'_, 3>::new(table, PropertySet::ALL, Config::default()).is_ok());
@@ -393,9 +393,9 @@ fn without_room_candidates_or_properties_there_is_no_exploration() {
 fn the_errors_say_what_is_missing() {
     for (error, message) in [
         (
-            ExplorerError::Room {
+            ExplorerError::NoSpace {
                 textures: 117,
-                room: 20,
+                capacity: 20,
             },
             "the table has 117 textures, and there is room for 20",
         ),
@@ -455,9 +455,9 @@ fn single_precision_is_enough_for_117_textures() {
         // the sum of eq. 4's exponents: the densities themselves underflow even in f64
         let mut log = vec![0f64; 117];
         while explorer.verdict().is_none() {
-            let outlook = explorer.outlook();
-            let action = explorer.choose(&outlook, 0);
-            for o in &outlook {
+            let outcomes = explorer.expected_outcomes();
+            let action = explorer.choose(&outcomes, 0);
+            for o in &outcomes {
                 let difference = f64::from(o.uncertainty) - paper.uncertainty(o.action);
                 assert!(difference.abs() < 1e-4, "{o:?} {difference}");
                 assert!(paper.benefit(o.action) <= paper.benefit(action) + 1e-4);

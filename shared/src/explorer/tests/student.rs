@@ -151,17 +151,17 @@ fn explores_by_students_t() {
         let mut explorer = begin(table, PropertySet::ALL, Method::Student);
         let mut log = vec![0.0; table.textures().into()];
         for _ in 0..8 {
-            let outlook = explorer.outlook();
-            assert!(outlook.iter().map(|o| o.action).eq(table.actions()));
+            let outcomes = explorer.expected_outcomes();
+            assert!(outcomes.iter().map(|o| o.action).eq(table.actions()));
             let p: Vec<f64> = explorer.posterior().iter().map(|p| f64::from(*p)).collect();
-            for o in &outlook {
+            for o in &outcomes {
                 let u = uncertainty(&[expected(&table, o.action)], &p);
                 assert!(
                     (f64::from(o.uncertainty) - u).abs() < 1e-4,
                     "{seed} {o:?} {u}"
                 );
             }
-            let action = explorer.choose(&outlook, 0);
+            let action = explorer.choose(&outcomes, 0);
             let x = (1.5 * noise.normal()) as f32;
             explorer.observe(action, &slide(action, x)).unwrap();
             for (log, known) in log.iter_mut().zip(shrunk(&table, action)) {
@@ -189,19 +189,19 @@ fn explores_by_the_product_of_all_properties() {
         let movements = table.movements().len() as u8;
         let mut slides: BTreeMap<u8, Vec<[f32; 3]>> = BTreeMap::new();
         for _ in 0..8 {
-            let outlook = explorer.outlook();
+            let outcomes = explorer.expected_outcomes();
             let everything = |movement| Action {
                 movement,
                 property: None,
             };
             assert!(
-                outlook
+                outcomes
                     .iter()
                     .map(|o| o.action)
                     .eq((0..movements).map(everything))
             );
             let p: Vec<f64> = explorer.posterior().iter().map(|p| f64::from(*p)).collect();
-            for o in &outlook {
+            for o in &outcomes {
                 let of = measured
                     .iter()
                     .map(|p| expected(&table, act(o.action.movement, p)));
@@ -213,7 +213,7 @@ fn explores_by_the_product_of_all_properties() {
                 let made = slides.get(&o.action.movement).map_or(0, Vec::len) as u8;
                 assert_eq!(o.benefit, benefit(o.uncertainty, made));
             }
-            let action = explorer.choose(&outlook, 0);
+            let action = explorer.choose(&outcomes, 0);
             let x: [f32; 3] = core::array::from_fn(|_| (1.5 * noise.normal()) as f32);
             // what is not measured need not be there
             let values = Property::ALL.map(|p| measured.contains(p).then_some(x[p.index()]));
@@ -283,8 +283,8 @@ fn far_off_values_neither_overflow_nor_stick() {
         for x in [f32::MAX, f32::MIN, 1e4, -32.0] {
             let mut explorer = begin(table, PropertySet::ALL, method);
             for _ in 0..600 {
-                let outlook = explorer.outlook();
-                explorer.observe(outlook[0].action, &all(x)).unwrap();
+                let outcomes = explorer.expected_outcomes();
+                explorer.observe(outcomes[0].action, &all(x)).unwrap();
                 let posterior = explorer.posterior();
                 let sum: f32 = posterior.iter().sum();
                 assert!((sum - 1.0).abs() < 1e-5, "{method:?} {x}: {posterior:?}");
@@ -299,7 +299,7 @@ fn beyond_255_slides_nothing_changes() {
     let bytes = plain(&[0.0, 0.01, 0.02], 1);
     let table = Table::read(&bytes).unwrap();
     let mut explorer = begin(table, PropertySet::ALL, Method::StudentAll);
-    let action = explorer.outlook()[0].action;
+    let action = explorer.expected_outcomes()[0].action;
     for _ in 0..255 {
         explorer.observe(action, &all(0.004)).unwrap();
     }

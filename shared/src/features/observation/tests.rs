@@ -145,10 +145,10 @@ fn a_slide_says_its_bands_and_pressure() {
         let pdc: List<i16> = (0..300).map(|n| 90 + (n * 7 % 40) as i16).collect();
         slide.push_pdc(&pdc);
         let measured = slide.finish().unwrap();
-        let felt = Observation::from(&measured);
-        assert_eq!(felt.properties, measured.properties);
-        assert_eq!(felt.bands.len(), 12);
-        for (edges, band) in EDGES.windows(2).zip(&felt.bands) {
+        let observation = Observation::from(&measured);
+        assert_eq!(observation.properties, measured.properties);
+        assert_eq!(observation.bands.len(), 12);
+        for (edges, band) in EDGES.windows(2).zip(&observation.bands) {
             let bins = &measured.spectrum.psd()[edges[0]..edges[1]];
             let mean = bins.iter().map(|p| f64::from(*p)).sum::<f64>() / bins.len() as f64;
             let steps = (mean + 0.1).ln() * 1024.0;
@@ -157,11 +157,11 @@ fn a_slide_says_its_bands_and_pressure() {
         let n = pdc.len() as f64;
         let mean = pdc.iter().map(|x| f64::from(*x)).sum::<f64>() / n;
         let squares: f64 = pdc.iter().map(|x| (f64::from(*x) - mean).powi(2)).sum();
-        let [m, sd] = felt.pressure.unwrap();
+        let [m, sd] = observation.pressure.unwrap();
         assert!((f64::from(m) - mean * 10.24).abs() < 0.51, "{m} {mean}");
         let expected = (squares / (n - 1.0)).sqrt();
         assert!((f64::from(sd) - expected * 10.24).abs() < 0.51, "{sd}");
-        assert!(felt.vector(FeatureSet::Pressure, 14).is_some());
-        assert_eq!(felt.vector(FeatureSet::Force, 13).unwrap()[0], 512);
+        assert!(observation.vector(FeatureSet::Pressure, 14).is_some());
+        assert_eq!(observation.vector(FeatureSet::Force, 13).unwrap()[0], 512);
     }
 }

@@ -130,10 +130,10 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
     );
     each("saving", &Screen::Saving);
     let name = Name::try_from("velvet").unwrap();
-    each("taught", &Screen::Taught(Ok(&name)));
+    each("taught", &Screen::Learned(Ok(&name)));
     each(
         "taught-not",
-        &Screen::Taught(Err("the table is full: forget a texture first")),
+        &Screen::Learned(Err("the table is full: forget a texture first")),
     );
     each("fault-silent", &Screen::Fault(&Trouble::Silent));
     each("fault-frozen", &Screen::Fault(&Trouble::Frozen));

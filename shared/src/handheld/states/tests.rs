@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::dsp::Plain;
-use crate::explorer::Visited;
+use crate::explorer::EpisodeSummary;
 use crate::handheld::draw;
 use crate::handheld::judge::{FEATURES, judge};
 use crate::handheld::picture::Picture;
@@ -40,12 +40,12 @@ fn slide(texture: Option<usize>) -> Observation {
     }
 }
 
-/// A probe, its table, and what was taught.
+/// A probe, its table, and what was learned.
 struct Bench<'p> {
     probe: Handheld<'p, Plain>,
     table: List<u8>,
-    taught: List<(Choice, u8)>,
-    visited: Option<Visited>,
+    learned: List<(Choice, u8)>,
+    episode: Option<EpisodeSummary>,
 }
 
 impl<'p> Bench<'p> {
@@ -53,8 +53,8 @@ impl<'p> Bench<'p> {
         Self {
             probe: Handheld::new(plan, 4),
             table: table(),
-            taught: List::new(),
-            visited: None,
+            learned: List::new(),
+            episode: None,
         }
     }
 
@@ -63,16 +63,16 @@ impl<'p> Bench<'p> {
         match self.probe.job() {
             None => {}
             Some(Job::Judge(slides)) => match judge::<Plain>(table, &slides) {
-                Ok((judgement, visited)) => {
-                    self.visited = Some(visited);
+                Ok((judgement, episode)) => {
+                    self.episode = Some(episode);
                     self.probe.judged(Ok(judgement));
                 }
                 Err(why) => self.probe.judged(Err(why)),
             },
             Some(Job::Teach(choice)) => {
-                let slides = self.visited.take().unwrap().felt[0].1;
-                self.taught.push((choice, slides));
-                self.probe.taught(Ok(free_name(&table)), 4);
+                let slides = self.episode.take().unwrap().observed[0].1;
+                self.learned.push((choice, slides));
+                self.probe.learned(Ok(free_name(&table)), 4);
             }
         }
     }
@@ -90,7 +90,7 @@ impl<'p> Bench<'p> {
 
     fn touch(&mut self, slid: Event) {
         for event in [Event::Down, Event::Still, slid, Event::Up] {
-            self.probe.felt(event);
+            self.probe.on_touch(event);
             self.work();
         }
     }
@@ -111,7 +111,7 @@ impl<'p> Bench<'p> {
 }
 
 #[test]
-fn a_known_texture_is_recognised_and_the_next_visit_begins_anew() {
+fn a_known_texture_is_recognised_and_the_next_episode_begins_anew() {
     let plan = Plan::new();
     let mut bench = Bench::new(&plan);
     assert_eq!(bench.shown(), "Air");
@@ -123,11 +123,11 @@ fn a_known_texture_is_recognised_and_the_next_visit_begins_anew() {
         };
         assert!(judgement.sure && !judgement.unknown);
         assert_eq!(usize::from(judgement.leading[0].0), texture);
-        assert_eq!(bench.probe.visit.len(), 1);
+        assert_eq!(bench.probe.episode.len(), 1);
     }
     bench.press(10);
-    assert!(bench.probe.visit.is_empty());
-    assert_eq!(bench.taught, []);
+    assert!(bench.probe.episode.is_empty());
+    assert_eq!(bench.learned, []);
 }
 
 #[test]
@@ -142,9 +142,9 @@ fn an_unknown_one_is_said_to_be_and_can_be_named() {
     // the three leading ones, then a number
     (0..3).for_each(|_| bench.press(10));
     bench.press(70);
-    assert_eq!(bench.taught, [(Choice::Numbered, 2)]);
-    assert_eq!(bench.shown(), "Taught");
-    (0..TAUGHT).for_each(|_| bench.tick(false));
+    assert_eq!(bench.learned, [(Choice::Numbered, 2)]);
+    assert_eq!(bench.shown(), "Learned");
+    (0..LEARNED).for_each(|_| bench.tick(false));
     assert_eq!(bench.shown(), "Air");
 }
 
@@ -163,11 +163,11 @@ fn names_are_spelled() {
     (0..36).for_each(|_| bench.press(10));
     bench.press(70);
     let spelled = Choice::Spelled(Name::try_from("b").unwrap());
-    assert_eq!(bench.taught, [(spelled, 1)]);
+    assert_eq!(bench.learned, [(spelled, 1)]);
 }
 
 #[test]
-fn a_lesson_takes_three_good_slides() {
+fn a_training_takes_three_good_slides() {
     let plan = Plan::new();
     let mut bench = Bench::new(&plan);
     bench.press(70);
@@ -180,11 +180,11 @@ fn a_lesson_takes_three_good_slides() {
     bench.slide(Some(3));
     assert_eq!(bench.shown(), "Choose");
     bench.press(70);
-    assert_eq!(bench.taught, [(Choice::Known(3), 3)]);
+    assert_eq!(bench.learned, [(Choice::Known(3), 3)]);
 }
 
 #[test]
-fn a_rejected_slide_is_no_part_of_the_visit() {
+fn a_rejected_slide_is_no_part_of_the_episode() {
     let plan = Plan::new();
     let mut bench = Bench::new(&plan);
     for why in [
@@ -196,10 +196,10 @@ fn a_rejected_slide_is_no_part_of_the_visit() {
     ] {
         bench.touch(Event::Again(why));
         assert_eq!(bench.shown(), "Again");
-        assert!(bench.probe.visit.is_empty() && bench.probe.job.is_none());
+        assert!(bench.probe.episode.is_empty() && bench.probe.job.is_none());
     }
     bench.slide(Some(1));
-    assert_eq!(bench.visited.as_ref().unwrap().felt[0].1, 1);
+    assert_eq!(bench.episode.as_ref().unwrap().observed[0].1, 1);
 }
 
 #[test]
@@ -208,12 +208,12 @@ fn faults_show_and_go() {
     let mut bench = Bench::new(&plan);
     (0..NO_WORDS).for_each(|_| bench.probe.tick(false));
     assert_eq!(bench.shown(), "Fault");
-    bench.probe.felt(Event::Zeroed);
+    bench.probe.on_touch(Event::Zeroed);
     assert_eq!(bench.probe.page, Page::Ready);
     bench.slide(None);
-    bench.probe.felt(Event::Silent);
+    bench.probe.on_touch(Event::Silent);
     assert_eq!(bench.shown(), "Fault");
-    assert!(bench.probe.visit.is_empty() && bench.probe.listens());
+    assert!(bench.probe.episode.is_empty() && bench.probe.listens());
     bench.probe.memory_failed(crate::wire::text("worn"));
     assert!(!bench.probe.listens());
     bench.press(10);
@@ -248,32 +248,32 @@ fn melodies_end() {
 /// What may happen to a probe.
 #[derive(Clone, Debug)]
 enum Happens {
-    Felt(u8),
+    Touched(u8),
     Slid(u8),
     Words(u16, u16),
     Lost(u32),
     Ticks(bool, u8),
     Judged(u16, bool, bool, bool),
-    Taught(bool, u16),
+    Learned(bool, u16),
     Broken,
 }
 
 fn happens() -> impl Strategy<Value = Happens> {
     prop_oneof![
-        4 => (0u8..12).prop_map(Happens::Felt),
+        4 => (0u8..12).prop_map(Happens::Touched),
         4 => (0u8..6).prop_map(Happens::Slid),
         1 => (any::<u16>(), 0u16..2000).prop_map(|(seed, n)| Happens::Words(seed, n)),
         1 => any::<u32>().prop_map(Happens::Lost),
         6 => (any::<bool>(), 0u8..120).prop_map(|(pressed, n)| Happens::Ticks(pressed, n)),
         2 => (any::<u16>(), any::<bool>(), any::<bool>(), any::<bool>())
             .prop_map(|(t, a, b, c)| Happens::Judged(t, a, b, c)),
-        2 => (any::<bool>(), any::<u16>()).prop_map(|(ok, n)| Happens::Taught(ok, n)),
+        2 => (any::<bool>(), any::<u16>()).prop_map(|(ok, n)| Happens::Learned(ok, n)),
         1 => Just(Happens::Broken),
     ]
 }
 
 proptest! {
-    /// Nothing panics, everything can be drawn, and only good slides are judged and taught from.
+    /// Nothing panics, everything can be drawn, and only good slides are judged and learned from.
     #[test]
     fn whatever_happens_only_good_slides_count(steps in proptest::collection::vec(happens(), 1..80)) {
         let plan = Plan::new();
@@ -285,7 +285,7 @@ proptest! {
         let mut random = Random::new(1);
         for step in steps {
             match step {
-                Happens::Felt(which) => probe.felt(match which {
+                Happens::Touched(which) => probe.on_touch(match which {
                     0 => Event::Zeroed,
                     1..=3 => Event::Down,
                     4 => Event::Still,
@@ -300,7 +300,7 @@ proptest! {
                     let mut slide = slide(usize::from(which).checked_sub(2));
                     slide.bands[11] = good.len() as i16;
                     good.push(slide.clone());
-                    probe.felt(Event::Slid(slide));
+                    probe.on_touch(Event::Slid(slide));
                 }
                 Happens::Words(seed, n) => {
                     let mut random = Random::new(seed.into());
@@ -319,9 +319,9 @@ proptest! {
                     probe.judged(Ok(Judgement { leading, sure, unknown, open }));
                     judged = true;
                 }
-                Happens::Taught(ok, textures) => {
+                Happens::Learned(ok, textures) => {
                     let name = if ok { Ok(free_name(&table)) } else { Err(crate::wire::text("no")) };
-                    probe.taught(name, textures);
+                    probe.learned(name, textures);
                 }
                 Happens::Broken => probe.memory_failed(crate::wire::text("broken")),
             }
@@ -331,14 +331,14 @@ proptest! {
                     prop_assert!(slides.iter().all(|slide| good.contains(slide)));
                     judged = false;
                 }
-                Some(Job::Teach(_)) => prop_assert!(judged, "taught from what nobody judged"),
+                Some(Job::Teach(_)) => prop_assert!(judged, "learned from what nobody judged"),
                 None => {}
             }
             let screen = probe.screen(Some(&table), &About::default());
             let mut picture = Picture::new();
             let Ok(()) = draw(&screen, &mut picture);
             probe.screen(None, &About::default());
-            prop_assert!(probe.visit.len() <= good.len());
+            prop_assert!(probe.episode.len() <= good.len());
         }
     }
 }

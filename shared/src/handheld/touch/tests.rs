@@ -81,7 +81,7 @@ fn again(events: &[Event]) -> Option<Again> {
 }
 
 #[test]
-fn a_good_slide_is_a_slide_and_says_what_was_felt() {
+fn a_good_slide_is_a_slide_and_has_its_features() {
     let slide = with(
         pressed(500.0),
         std::vec![
@@ -95,21 +95,21 @@ fn a_good_slide_is_a_slide_and_says_what_was_felt() {
         Event::Zeroed,
         Event::Down,
         Event::Still,
-        Event::Slid(felt),
+        Event::Slid(observation),
         Event::Up,
     ] = &events[..]
     else {
         panic!("{events:?}");
     };
     // 45 counts of P_DC, in hundreds, in 1024ths
-    let [mean, sd] = felt.pressure.unwrap();
+    let [mean, sd] = observation.pressure.unwrap();
     assert!(
         (mean - (0.52e3 / 11.5 / 100.0 * 1024.0) as i16).abs() < 12,
         "{mean}"
     );
     assert!(sd < 10, "{sd}");
     // white noise: the same power in every bin
-    let power = f64::from(felt.bands[5]) / 1024.0;
+    let power = f64::from(observation.bands[5]) / 1024.0;
     assert!((power - f64::ln(40.0 * 40.0 + 2.25)).abs() < 0.4, "{power}");
 }
 

@@ -13,7 +13,7 @@ use std::vec::Vec;
 
 /// What the finger feels next.
 #[derive(Clone, Copy)]
-enum Felt {
+enum Stimulus {
     /// A slide with this tangential force in mN.
     Traction(i16),
     /// A slide without force sensing.
@@ -23,11 +23,11 @@ enum Felt {
     /// The movement fails.
     Fault(&'static str),
 }
-use Felt::{Fault, NoForce, Stuck, Traction};
+use Stimulus::{Fault, NoForce, Stuck, Traction};
 
 /// A rig that feels one thing after the other, and notes its movements.
 struct Script {
-    felt: Vec<Felt>,
+    stimuli: Vec<Stimulus>,
     made: Vec<Movement>,
 }
 
@@ -43,13 +43,13 @@ impl Rig for Script {
         movement: Movement,
         slide: &mut Slide<'_, K>,
     ) -> Result<(), Self::Error> {
-        let felt = self
-            .felt
+        let stimuli = self
+            .stimuli
             .get(self.made.len())
             .copied()
             .unwrap_or(Fault("script over"));
         self.made.push(movement);
-        match felt {
+        match stimuli {
             Fault(why) => return Err(why),
             Stuck => return Ok(()),
             Traction(mn) => slide.push_shear(&[mn; 10]),
@@ -72,10 +72,10 @@ fn bytes() -> Vec<u8> {
 type Outcome = Result<Verdict, ExploreError<&'static str>>;
 
 /// Explores by this script; the outcome, what was told, and the movements that were made.
-fn explored(felt: &[Felt], config: Config) -> (Outcome, Vec<String>, Vec<Movement>) {
+fn explored(stimuli: &[Stimulus], config: Config) -> (Outcome, Vec<String>, Vec<Movement>) {
     let bytes = bytes();
     let mut rig = Script {
-        felt: felt.to_vec(),
+        stimuli: stimuli.to_vec(),
         made: Vec::new(),
     };
     let table = Table::read(&bytes).unwrap();
@@ -89,16 +89,18 @@ fn explored(felt: &[Felt], config: Config) -> (Outcome, Vec<String>, Vec<Movemen
         || random.next().unwrap(),
         |event| {
             told.push(match event {
-                Event::Decided { .. } => return,
-                Event::Chosen(action, outlook) => {
-                    assert!(outlook.iter().any(|o| o.action == action));
+                ExplorationStep::Decided { .. } => return,
+                ExplorationStep::Chosen(action, expected) => {
+                    assert!(expected.iter().any(|o| o.action == action));
                     format!("{} {}", action.what(), action.movement)
                 }
-                Event::Felt(action, slide, posterior) => {
+                ExplorationStep::Measured(action, slide, posterior) => {
                     let x = slide.properties.get(action.property.unwrap()).unwrap();
-                    format!("felt {} {x:.1}: {:.2}", action.movement, posterior[1])
+                    format!("measured {} {x:.1}: {:.2}", action.movement, posterior[1])
                 }
-                Event::Rejected(action, why) => format!("rejected {}: {why}", action.movement),
+                ExplorationStep::Rejected(action, why) => {
+                    format!("rejected {}: {why}", action.movement)
+                }
             });
         },
     ));
@@ -117,8 +119,8 @@ const STUCK: Rejection = Rejection::Slide(SlideError::NotStarted);
 
 #[test]
 fn explores_until_it_is_sure() {
-    let felt = [1900, 2000, 2000, 2000].map(Traction);
-    let (outcome, told, made) = explored(&felt, config(0.99, 10));
+    let stimuli = [1900, 2000, 2000, 2000].map(Traction);
+    let (outcome, told, made) = explored(&stimuli, config(0.99, 10));
     let verdict = outcome.unwrap();
     assert_eq!((verdict.texture, verdict.sure), (1, true));
     // by hand: log odds +2.5, +0.78 and +3.125; uncertainty after the first 0.128 at the first movement and 0.098 at
@@ -127,11 +129,11 @@ fn explores_until_it_is_sure() {
         told,
         [
             "traction 1",
-            "felt 1 1.9: 0.92",
+            "measured 1 1.9: 0.92",
             "traction 0",
-            "felt 0 2.0: 0.96",
+            "measured 0 2.0: 0.96",
             "traction 1",
-            "felt 1 2.0: 1.00"
+            "measured 1 2.0: 1.00"
         ]
     );
     let grid: Vec<Movement> = Movement::grid().take(2).collect();
@@ -160,7 +162,7 @@ impl Rig for Slow<'_> {
     }
 
     async fn lifted(&mut self) -> Result<(), Self::Error> {
-        let jams = self.0.felt.len() == self.0.made.len();
+        let jams = self.0.stimuli.len() == self.0.made.len();
         self.1.borrow_mut().push("lifted");
         if jams { Err("it jams") } else { Ok(()) }
     }
@@ -168,10 +170,10 @@ impl Rig for Slow<'_> {
 
 #[test]
 fn a_slide_is_judged_while_the_finger_is_lifted() {
-    let outcome = |felt: &[Felt], config| {
+    let outcome = |stimuli: &[Stimulus], config| {
         let (bytes, noted) = (bytes(), RefCell::default());
         let script = Script {
-            felt: felt.to_vec(),
+            stimuli: stimuli.to_vec(),
             made: Vec::new(),
         };
         let mut rig = Slow(script, &noted);
@@ -185,10 +187,10 @@ fn a_slide_is_judged_while_the_finger_is_lifted() {
             || 0,
             |event| {
                 noted.borrow_mut().push(match event {
-                    Event::Chosen(..) => "chosen",
-                    Event::Felt(..) => "felt",
-                    Event::Rejected(..) => "rejected",
-                    Event::Decided { slides, .. } => {
+                    ExplorationStep::Chosen(..) => "chosen",
+                    ExplorationStep::Measured(..) => "measured",
+                    ExplorationStep::Rejected(..) => "rejected",
+                    ExplorationStep::Decided { slides, .. } => {
                         assert_eq!(slides, 2);
                         "decided"
                     }
@@ -202,18 +204,18 @@ fn a_slide_is_judged_while_the_finger_is_lifted() {
         "chosen",
         "lifted",
         "performed",
-        "felt",
+        "measured",
         "chosen",
         "lifted",
         "performed",
-        "felt",
+        "measured",
         "decided",
         "lifted",
     ];
-    let felt = [Traction(1900), Traction(2000), Traction(0)];
-    assert_eq!(outcome(&felt, config(1.0, 2)), (Ok(1), all.to_vec()));
+    let stimuli = [Traction(1900), Traction(2000), Traction(0)];
+    assert_eq!(outcome(&stimuli, config(1.0, 2)), (Ok(1), all.to_vec()));
     // the answer stands, and is told; that the finger is down is told as well
-    let (failed, noted) = outcome(&felt[..2], config(1.0, 2));
+    let (failed, noted) = outcome(&stimuli[..2], config(1.0, 2));
     assert_eq!(
         (failed, noted),
         (Err(ExploreError::Rig("it jams")), all.to_vec())
@@ -233,7 +235,7 @@ fn names_the_best_after_the_last_slide() {
     let verdict = outcome.unwrap();
     assert_eq!((verdict.texture, verdict.sure), (1, false));
     assert_eq!((told.len(), made.len()), (6, 3));
-    assert!(told[5].starts_with("felt"));
+    assert!(told[5].starts_with("measured"));
     let (outcome, told, made) = explored(&[], config(1.0, 0));
     assert_eq!(outcome.unwrap().probability, 0.5, "without a slide");
     assert!(told.is_empty() && made.is_empty());
@@ -254,11 +256,11 @@ fn a_rejected_slide_is_repeated_and_teaches_nothing() {
             "traction 1",
             "rejected 1: the slide never reached its steady part",
             "traction 1",
-            "felt 1 1.9: 0.92",
+            "measured 1 1.9: 0.92",
             "traction 0",
             "rejected 0: the slide did not give a value of traction",
             "traction 0",
-            "felt 0 2.0: 0.96",
+            "measured 0 2.0: 0.96",
         ]
     );
 }
@@ -282,7 +284,7 @@ fn three_rejected_in_a_row_end_it() {
 
 #[test]
 fn a_good_slide_in_between_resets_the_count() {
-    let felt = [
+    let stimuli = [
         Stuck,
         Stuck,
         Traction(1500),
@@ -294,7 +296,7 @@ fn a_good_slide_in_between_resets_the_count() {
         Stuck,
         Traction(1500),
     ];
-    let (outcome, told, made) = explored(&felt, config(0.99, 10));
+    let (outcome, told, made) = explored(&stimuli, config(0.99, 10));
     assert_eq!(outcome, Err(ExploreError::Rejected(STUCK)));
     assert_eq!((told.len(), made.len()), (18, 9));
 }

@@ -3,8 +3,8 @@
 use super::*;
 use crate::features::{FeatureSet, MAX_FEATURES};
 use crate::store::tests::ram::{Ram, RamError, Torn};
-use crate::store::{StoreError, Trained};
-use crate::table::Lesson;
+use crate::store::{StoreError, TrainingRecord};
+use crate::table::TrainingStats;
 use crate::table::tests::{fused_of, known, straight};
 use embassy_futures::block_on;
 use std::vec;
@@ -26,8 +26,8 @@ fn base() -> List<u8> {
 /// A store with this table.
 fn store(bytes: &[u8]) -> Store<Ram> {
     let mut store = block_on(Store::open(Ram::new())).unwrap();
-    let mut room = bytes.to_vec();
-    block_on(store.replace_table(&mut room, bytes.len())).unwrap();
+    let mut buffer = bytes.to_vec();
+    block_on(store.replace_table(&mut buffer, bytes.len())).unwrap();
     store
 }
 
@@ -37,33 +37,33 @@ fn again(store: Store<Ram>) -> Store<Ram> {
 
 /// The stored table.
 fn stored(store: &mut Store<Ram>) -> List<u8> {
-    let mut room = vec![0; 1024];
-    let table = block_on(store.read_table(&mut room)).unwrap().unwrap();
+    let mut buffer = vec![0; 1024];
+    let table = block_on(store.read_table(&mut buffer)).unwrap().unwrap();
     table.as_bytes().to_vec()
 }
 
 /// The table in force.
 fn in_force(store: &mut Store<Ram>) -> List<u8> {
     let bytes = stored(store);
-    let mut room = vec![0xa5; 1024];
+    let mut buffer = vec![0xa5; 1024];
     let base = Table::read(&bytes).unwrap();
-    let length = block_on(put_in_force(&base, Some(store), &mut room)).unwrap();
-    room.truncate(length);
-    room
+    let length = block_on(put_in_force(&base, Some(store), &mut buffer)).unwrap();
+    buffer.truncate(length);
+    buffer
 }
 
-fn selves(store: &mut Store<Ram>, lineage: u32) -> List<SelfTaught> {
+fn selves(store: &mut Store<Ram>, lineage: u32) -> List<SelfLearnedRecord> {
     let mut all = List::new();
-    block_on(store.self_taught(lineage, &mut |record| all.push(record))).unwrap();
+    block_on(store.self_learned(lineage, &mut |record| all.push(record))).unwrap();
     all
 }
 
-fn visited(table: &[u8], texture: u16, felt: &[(u8, u8, [i16; 3])]) -> Visited {
-    Visited {
+fn summary(table: &[u8], texture: u16, observed: &[(u8, u8, [i16; 3])]) -> EpisodeSummary {
+    EpisodeSummary {
         table: Table::read(table).unwrap().crc(),
         texture,
         certain: true,
-        felt: felt
+        observed: observed
             .iter()
             .map(|(movement, slides, mean)| (*movement, *slides, Vector::from_slice(mean).unwrap()))
             .collect(),
@@ -71,10 +71,10 @@ fn visited(table: &[u8], texture: u16, felt: &[(u8, u8, [i16; 3])]) -> Visited {
 }
 
 /// Room for a table, with this one at its beginning.
-fn room(table: &[u8]) -> List<u8> {
-    let mut room = table.to_vec();
-    room.resize(900, 0x5a);
-    room
+fn buffer(table: &[u8]) -> List<u8> {
+    let mut buffer = table.to_vec();
+    buffer.resize(900, 0x5a);
+    buffer
 }
 
 /// Step 8 of the recipe with a memory of three slides, so many slides of this mean, in steps.
@@ -86,9 +86,9 @@ fn recipe(mut mean: f64, mut n: f64, slides: u8, z: i16) -> (f64, f64) {
     (mean, n)
 }
 
-fn taught(name: &str, slides: u8, itself: bool) -> Tell {
+fn learned_event(name: &str, slides: u8, itself: bool) -> Event {
     let name = Name::try_from(name).unwrap();
-    Tell::Taught {
+    Event::TextureLearned {
         name,
         slides,
         itself,
@@ -111,26 +111,26 @@ fn same(new: &Table<'_>, old: &Table<'_>, textures: &[u16]) {
 fn without_anything_learned_the_table_in_force_is_the_stored_one() {
     let bytes = base();
     let table = Table::read(&bytes).unwrap();
-    let mut room = room(&[]);
-    let length = block_on(put_in_force::<Ram>(&table, None, &mut room)).unwrap();
-    assert_eq!((&room[..length], room[length]), (&bytes[..], 0x5a));
+    let mut buffer = buffer(&[]);
+    let length = block_on(put_in_force::<Ram>(&table, None, &mut buffer)).unwrap();
+    assert_eq!((&buffer[..length], buffer[length]), (&bytes[..], 0x5a));
     let mut store = store(&bytes);
     assert_eq!(in_force(&mut store), bytes);
     let small = block_on(put_in_force(
         &table,
         Some(&mut store),
-        &mut room[..length - 1],
+        &mut buffer[..length - 1],
     ));
-    assert_eq!(small, Err(EncodeError::Room(length)));
+    assert_eq!(small, Err(EncodeError::NoSpace(length)));
     // what was learned of another table, or of a texture that is gone, is nothing to this one
     for (lineage, number) in [(table.lineage() ^ 1, 0), (table.lineage(), 9)] {
         let movements = Vec::from_slice(&[(0, 3, Whitened::default())]).unwrap();
-        let record = SelfTaught {
+        let record = SelfLearnedRecord {
             lineage,
             number,
             movements,
         };
-        block_on(store.set_self_taught(&record)).unwrap();
+        block_on(store.set_self_learned(&record)).unwrap();
     }
     assert_eq!(in_force(&mut store), bytes);
 }
@@ -140,11 +140,11 @@ fn it_learns_by_itself_by_the_recipe() {
     let bytes = base();
     let old = Table::read(&bytes).unwrap();
     let mut store = store(&bytes);
-    let mut force = room(&bytes);
+    let mut force = buffer(&bytes);
     // mean and number of every movement as the recipe has them
     let mut means = [[0.0, 6.0 * 256.0, 0.0]; 3];
     let mut counts = [5.0; 3];
-    let visits: [&[(u8, u8, [i16; 3])]; 4] = [
+    let episodes: [&[(u8, u8, [i16; 3])]; 4] = [
         &[(1, 1, [100, 1400, -300])],
         &[(1, 2, [150, 1300, -200]), (2, 4, [-500, 2000, 90])],
         &[(2, 1, [0, 1000, 0])],
@@ -152,11 +152,11 @@ fn it_learns_by_itself_by_the_recipe() {
         &[(0, 3, [900, 900, 900]), (1, 9, [130, 1380, -280])],
     ];
     let mut total = 0;
-    for felt in visits {
-        let visit = visited(&force, 2, felt);
-        let told = block_on(learn_by_itself(&visit, &mut store, &mut force)).unwrap();
+    for observed in episodes {
+        let episode = summary(&force, 2, observed);
+        let told = block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap();
         let mut slides = 0;
-        for &(movement, count, z) in felt.iter().filter(|f| f.0 != 0) {
+        for &(movement, count, z) in observed.iter().filter(|f| f.0 != 0) {
             slides += count;
             let at = usize::from(movement);
             let before = counts[at];
@@ -164,7 +164,7 @@ fn it_learns_by_itself_by_the_recipe() {
                 (*mean, counts[at]) = recipe(*mean, before, count, z);
             }
         }
-        assert_eq!(told, Some(taught("t2", slides, true)));
+        assert_eq!(told, Some(learned_event("t2", slides, true)));
         total += slides;
         let table = Table::read(&force).unwrap();
         for movement in 0..3 {
@@ -188,7 +188,7 @@ fn it_learns_by_itself_by_the_recipe() {
         assert_eq!(stored(&mut store), bytes, "the stored table is as it was");
     }
     assert_eq!(means[0], [0.0, 6.0 * 256.0, 0.0]);
-    block_on(forget(&Forget::SelfTaught, &old, &mut store, &mut force)).unwrap();
+    block_on(delete(&Forget::SelfLearned, &old, &mut store, &mut force)).unwrap();
     assert_eq!(in_force(&mut again(store)), bytes, "to the bit");
 }
 
@@ -196,29 +196,29 @@ fn it_learns_by_itself_by_the_recipe() {
 fn nothing_is_learned_that_is_not_certain() {
     let bytes = base();
     let mut store = store(&bytes);
-    let mut force = room(&bytes);
-    let felt = [(1, 1, [100, 1400, -300])];
-    let sure = visited(&bytes, 2, &felt);
-    let uncertain = Visited {
+    let mut force = buffer(&bytes);
+    let observed = [(1, 1, [100, 1400, -300])];
+    let sure = summary(&bytes, 2, &observed);
+    let uncertain = EpisodeSummary {
         certain: false,
         ..sure.clone()
     };
-    let changed = Visited {
+    let changed = EpisodeSummary {
         table: sure.table ^ 1,
         ..sure.clone()
     };
-    let nothing = visited(&bytes, 2, &[]);
+    let nothing = summary(&bytes, 2, &[]);
     let flash = store.close();
     let before = flash.bytes.clone();
     store = block_on(Store::open(flash)).unwrap();
-    for visit in [uncertain, changed, nothing] {
-        let told = block_on(learn_by_itself(&visit, &mut store, &mut force));
+    for episode in [uncertain, changed, nothing] {
+        let told = block_on(learn_by_itself(&episode, &mut store, &mut force));
         assert_eq!(told, Ok(None));
     }
-    assert_eq!(force, room(&bytes));
+    assert_eq!(force, buffer(&bytes));
     let flash = store.close();
     assert!(flash.bytes == before, "nothing is written");
-    // twice from one visit: the table is another one after the first time
+    // twice from one episode: the table is another one after the first time
     let mut store = block_on(Store::open(flash.again())).unwrap();
     assert!(
         block_on(learn_by_itself(&sure, &mut store, &mut force))
@@ -238,27 +238,27 @@ fn an_answer_teaches_a_known_texture() {
     let bytes = base();
     let old = Table::read(&bytes).unwrap();
     let mut store = store(&bytes);
-    let mut force = room(&bytes);
+    let mut force = buffer(&bytes);
     // it has learned one movement of it by itself before
-    let visit = visited(&force, 1, &[(0, 2, [-1600, 40, 50])]);
-    block_on(learn_by_itself(&visit, &mut store, &mut force)).unwrap();
+    let episode = summary(&force, 1, &[(0, 2, [-1600, 40, 50])]);
+    block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap();
     let by_itself = Table::read(&force).unwrap().whitened(1, 0);
-    let felt = [
+    let observed = [
         (0, 3, [-1500, 10, 20]),
         (2, 1, [-1700, -10, -20]),
         (9, 1, [1, 2, 3]),
     ];
     // the most probable one was another
-    let visit = visited(&force, 3, &felt);
-    let told = block_on(answer(&visit, "t1", &old, &mut store, &mut force)).unwrap();
-    assert_eq!(told, taught("t1", 4, false));
+    let episode = summary(&force, 3, &observed);
+    let told = block_on(label(&episode, "t1", &old, &mut store, &mut force)).unwrap();
+    assert_eq!(told, learned_event("t1", 4, false));
     let mut store = again(store);
     let new = stored(&mut store);
     let new = Table::read(&new).unwrap();
     assert!(new.names().eq(old.names()));
     assert_eq!(new.lineage(), old.crc());
     let mut expected = [[-6.0 * 256.0, 0.0, 0.0]; 3];
-    for &(movement, count, z) in felt.iter().take(2) {
+    for &(movement, count, z) in observed.iter().take(2) {
         let mean = &mut expected[usize::from(movement)];
         for (mean, z) in mean.iter_mut().zip(z) {
             *mean = recipe(*mean, 5.0, count, z).0;
@@ -294,17 +294,17 @@ fn an_answer_teaches_a_new_texture() {
     let old = Table::read(&bytes).unwrap();
     let mut store = store(&bytes);
     // a cut has left what was learned of a texture that had its number
-    let stale = SelfTaught {
+    let stale = SelfLearnedRecord {
         lineage: old.lineage(),
         number: 4,
         movements: Vec::from_slice(&[(0, 3, known(9, &[30.0; 3]))]).unwrap(),
     };
-    block_on(store.set_self_taught(&stale)).unwrap();
-    let mut force = room(&bytes);
-    let felt = [(0, 3, [700, -701, 5]), (2, 1, [-3, 4, 9000])];
-    let visit = visited(&force, 3, &felt);
-    let told = block_on(answer(&visit, "elm", &old, &mut store, &mut force)).unwrap();
-    assert_eq!(told, taught("elm", 4, false));
+    block_on(store.set_self_learned(&stale)).unwrap();
+    let mut force = buffer(&bytes);
+    let observed = [(0, 3, [700, -701, 5]), (2, 1, [-3, 4, 9000])];
+    let episode = summary(&force, 3, &observed);
+    let told = block_on(label(&episode, "elm", &old, &mut store, &mut force)).unwrap();
+    assert_eq!(told, learned_event("elm", 4, false));
     let mut store = again(store);
     let new = stored(&mut store);
     assert_eq!(in_force(&mut store), new, "nothing is left of the other");
@@ -314,7 +314,7 @@ fn an_answer_teaches_a_new_texture() {
         (new.textures(), new.find("elm"), new.number(4)),
         (5, Some(4), 4)
     );
-    for &(movement, slides, mean) in &felt {
+    for &(movement, slides, mean) in &observed {
         let mut expected = Whitened {
             slides,
             mean: [0; MAX_FEATURES],
@@ -333,29 +333,30 @@ fn an_answer_to_nothing_is_refused() {
     let bytes = base();
     let old = Table::read(&bytes).unwrap();
     let mut store = store(&bytes);
-    let mut force = room(&bytes);
-    let good = visited(&bytes, 0, &[(0, 1, [1, 2, 3])]);
-    let mut refused = |visit: &Visited, name: &str, base: &Table<'_>, force: &mut List<u8>| {
-        let why = block_on(answer(visit, name, base, &mut store, force)).unwrap_err();
-        assert_eq!(stored(&mut store), bytes);
-        why
-    };
-    let changed = Visited {
+    let mut force = buffer(&bytes);
+    let good = summary(&bytes, 0, &[(0, 1, [1, 2, 3])]);
+    let mut refused =
+        |episode: &EpisodeSummary, name: &str, base: &Table<'_>, force: &mut List<u8>| {
+            let why = block_on(label(episode, name, base, &mut store, force)).unwrap_err();
+            assert_eq!(stored(&mut store), bytes);
+            why
+        };
+    let changed = EpisodeSummary {
         table: good.table ^ 1,
         ..good.clone()
     };
     let why = refused(&changed, "elm", &old, &mut force);
     assert!(why.contains("changed since the exploration"), "{why}");
-    let nothing = visited(&bytes, 0, &[]);
+    let nothing = summary(&bytes, 0, &[]);
     let why = refused(&nothing, "elm", &old, &mut force);
     assert!(why.contains("by `train` only"), "{why}");
     let why = refused(&good, "", &old, &mut force);
     assert!(why.contains("the name of texture 5 is empty"), "{why}");
     let full = vec![vec![known(1, &[0.0])]; MAX_TEXTURES];
     let full = fused_of(FeatureSet::Bands, &[straight(1)], &full);
-    let visit = visited(&full, 0, &[(0, 1, [1, 2, 3])]);
+    let episode = summary(&full, 0, &[(0, 1, [1, 2, 3])]);
     let mut force = full.clone();
-    let why = refused(&visit, "elm", &Table::read(&full).unwrap(), &mut force);
+    let why = refused(&episode, "elm", &Table::read(&full).unwrap(), &mut force);
     assert!(why.contains("forget a texture first"), "{why}");
     // no room for one more
     let mut force = bytes.clone();
@@ -364,14 +365,14 @@ fn an_answer_to_nothing_is_refused() {
 }
 
 #[test]
-fn textures_are_renamed_and_forgotten() {
+fn textures_are_renamed_and_deleted() {
     let bytes = base();
     let old = Table::read(&bytes).unwrap();
     let mut store = store(&bytes);
-    let mut force = room(&bytes);
+    let mut force = buffer(&bytes);
     for texture in [1, 3] {
-        let visit = visited(&force, texture, &[(0, 1, [1, 2, 3])]);
-        block_on(learn_by_itself(&visit, &mut store, &mut force)).unwrap();
+        let episode = summary(&force, texture, &[(0, 1, [1, 2, 3])]);
+        block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap();
     }
     let learned = Table::read(&force).unwrap().whitened(3, 0);
     let refused = block_on(rename("elm", "oak", &old, &mut store, &mut force)).unwrap_err();
@@ -395,9 +396,9 @@ fn textures_are_renamed_and_forgotten() {
     );
 
     let gone = |name| Forget::Texture(Name::try_from(name).unwrap());
-    let refused = block_on(forget(&gone("t3"), &renamed, &mut store, &mut force)).unwrap_err();
+    let refused = block_on(delete(&gone("t3"), &renamed, &mut store, &mut force)).unwrap_err();
     assert_eq!(refused, "there is no texture t3 in the table");
-    block_on(forget(&gone("t1"), &renamed, &mut store, &mut force)).unwrap();
+    block_on(delete(&gone("t1"), &renamed, &mut store, &mut force)).unwrap();
     let mut store = again(store);
     let bytes = stored(&mut store);
     let less = Table::read(&bytes).unwrap();
@@ -413,34 +414,37 @@ fn textures_are_renamed_and_forgotten() {
     // the last one stays
     let bytes = fused_of(FeatureSet::Bands, &[straight(1)], &[vec![known(1, &[0.0])]]);
     let one = Table::read(&bytes).unwrap();
-    let refused = block_on(forget(&gone("t0"), &one, &mut store, &mut force)).unwrap_err();
+    let refused = block_on(delete(&gone("t0"), &one, &mut store, &mut force)).unwrap_err();
     assert_eq!(refused, "a table cannot be without any texture");
 }
 
 #[test]
-fn unfinished_training_is_forgotten() {
+fn unfinished_training_is_deleted() {
     let bytes = base();
     let old = Table::read(&bytes).unwrap();
     let mut store = store(&bytes);
     let movement = old.movement(0).unwrap();
-    let lesson = Lesson::Fused(known(2, &[1.0; 3]));
+    let stats = TrainingStats::Fused(known(2, &[1.0; 3]));
     for name in ["elm", "oak"] {
         let name = Name::try_from(name).unwrap();
         let table = None;
-        let record = Trained {
+        let record = TrainingRecord {
             name,
             movement,
             table,
-            lesson,
+            stats,
         };
-        block_on(store.set_trained(&record)).unwrap();
+        block_on(store.set_training_record(&record)).unwrap();
     }
     let what = Forget::Training(Name::try_from("elm").unwrap());
-    block_on(forget(&what, &old, &mut store, &mut [])).unwrap();
-    assert_eq!(block_on(store.trained("elm", movement, None)), Ok(None));
+    block_on(delete(&what, &old, &mut store, &mut [])).unwrap();
     assert_eq!(
-        block_on(store.trained("oak", movement, None)),
-        Ok(Some(lesson))
+        block_on(store.training_record("elm", movement, None)),
+        Ok(None)
+    );
+    assert_eq!(
+        block_on(store.training_record("oak", movement, None)),
+        Ok(Some(stats))
     );
     assert_eq!(stored(&mut store), bytes);
 }
@@ -485,16 +489,16 @@ fn a_cut_in_an_answer_leaves_the_old_or_the_new_table() {
     let bytes = base();
     let old = Table::read(&bytes).unwrap();
     let mut store = store(&bytes);
-    let mut force = room(&bytes);
-    let visit = visited(&force, 1, &[(0, 2, [-1600, 40, 50])]);
-    block_on(learn_by_itself(&visit, &mut store, &mut force)).unwrap();
+    let mut force = buffer(&bytes);
+    let episode = summary(&force, 1, &[(0, 2, [-1600, 40, 50])]);
+    block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap();
     let ram = store.close().again();
     for name in ["t1", "elm"] {
-        let visit = visited(&force, 1, &[(0, 3, [-1500, 10, 20]), (1, 1, [9, 8, 7])]);
+        let episode = summary(&force, 1, &[(0, 3, [-1500, 10, 20]), (1, 1, [9, 8, 7])]);
         let operation = |store: &mut Store<Ram>| {
             // the table that was explored with
             let mut force = force.clone();
-            block_on(answer(&visit, name, &old, store, &mut force)).is_ok()
+            block_on(label(&episode, name, &old, store, &mut force)).is_ok()
         };
         let open = |ram: &Ram| {
             let mut store = block_on(Store::open(ram.clone().again())).unwrap();
@@ -531,20 +535,20 @@ fn a_cut_in_an_answer_leaves_the_old_or_the_new_table() {
 fn a_cut_while_it_learns_leaves_what_it_knew_or_what_it_learned() {
     let bytes = base();
     let mut store = store(&bytes);
-    let mut force = room(&bytes);
-    let mut visit = visited(&force, 2, &[(1, 1, [100, 1400, -300])]);
-    block_on(learn_by_itself(&visit, &mut store, &mut force)).unwrap();
-    visit = visited(&force, 2, &[(1, 1, [90, 1300, -200]), (2, 2, [4, 1500, 8])]);
+    let mut force = buffer(&bytes);
+    let mut episode = summary(&force, 2, &[(1, 1, [100, 1400, -300])]);
+    block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap();
+    episode = summary(&force, 2, &[(1, 1, [90, 1300, -200]), (2, 2, [4, 1500, 8])]);
     let before = in_force(&mut store);
     let ram = store.close().again();
     let mut after = force.clone();
     let mut whole = block_on(Store::open(ram.clone())).unwrap();
-    block_on(learn_by_itself(&visit, &mut whole, &mut after)).unwrap();
+    block_on(learn_by_itself(&episode, &mut whole, &mut after)).unwrap();
     after.truncate(before.len());
     let operation = |store: &mut Store<Ram>| {
-        let mut room = force.clone();
-        let told = block_on(learn_by_itself(&visit, store, &mut room));
-        assert_eq!(told.is_err(), room == force, "as it was, if it failed");
+        let mut buffer = force.clone();
+        let told = block_on(learn_by_itself(&episode, store, &mut buffer));
+        assert_eq!(told.is_err(), buffer == force, "as it was, if it failed");
         told.is_ok()
     };
     let (mut olds, mut news) = (0, 0);
@@ -566,9 +570,9 @@ fn a_flash_that_fails_is_told() {
     let mut flash = store(&bytes).close().again();
     flash.cut = Some((1, Torn::Nothing));
     let mut store = block_on(Store::open(flash)).unwrap();
-    let mut force = room(&bytes);
-    let visit = visited(&bytes, 2, &[(1, 1, [100, 1400, -300])]);
-    let why = block_on(learn_by_itself(&visit, &mut store, &mut force)).unwrap_err();
+    let mut force = buffer(&bytes);
+    let episode = summary(&bytes, 2, &[(1, 1, [100, 1400, -300])]);
+    let why = block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap_err();
     assert_eq!(why, text(StoreError::Flash(RamError::Cut)));
-    assert_eq!(force, room(&bytes));
+    assert_eq!(force, buffer(&bytes));
 }

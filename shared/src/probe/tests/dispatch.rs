@@ -6,7 +6,7 @@ use crate::probe::seams::{Events, Panel, RigHandle, StoredBytes, UnloadedRun};
 use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
-use crate::wire::{Ask, Counts, Forget, PART, Request, Status};
+use crate::wire::{Command, Counts, Forget, PART, Request, Status};
 use std::boxed::Box;
 
 const SECTOR: usize = 16_384;
@@ -99,13 +99,13 @@ impl StoredBytes<Flash> for Copied {
 
 #[derive(Default)]
 struct Heard {
-    told: vec::Vec<Tell>,
+    told: vec::Vec<Event>,
     tables: vec::Vec<TableInUse>,
     trouble: vec::Vec<String>,
 }
 
 impl Events for Heard {
-    fn tell(&mut self, event: Tell) {
+    fn tell(&mut self, event: Event) {
         self.told.push(event);
     }
 
@@ -151,8 +151,8 @@ fn probe() -> Tested {
     )
 }
 
-fn ask(probe: &mut Tested, ask: Ask) -> Result<(), String> {
-    let done = block_on(probe.perform::<Plain>(&ask));
+fn command(probe: &mut Tested, command: Command) -> Result<(), String> {
+    let done = block_on(probe.perform::<Plain>(&command));
     done.map_err(|why| why.as_str().into())
 }
 
@@ -164,8 +164,8 @@ fn feels(probe: &mut Tested, tractions: &[i16]) {
     probe.rig.script.0 = tractions.iter().copied().map(Some).collect();
 }
 
-fn exploration(learn: bool) -> Ask {
-    Ask::Identify(Identify {
+fn exploration(learn: bool) -> Command {
+    Command::Identify(Identify {
         method: None,
         open: true,
         learn,
@@ -174,7 +174,7 @@ fn exploration(learn: bool) -> Ask {
 }
 
 /// One of each.
-fn all() -> vec::Vec<Ask> {
+fn all() -> vec::Vec<Command> {
     let training = Train {
         name: name("elm"),
         trials: 1,
@@ -182,51 +182,51 @@ fn all() -> vec::Vec<Ask> {
         seed: 3,
     };
     vec![
-        Ask::Status,
-        Ask::Home,
-        Ask::Stop,
+        Command::Status,
+        Command::Home,
+        Command::Stop,
         exploration(false),
-        Ask::Answer(name("elm")),
-        Ask::Train(training),
-        Ask::Rename {
+        Command::Label(name("elm")),
+        Command::Train(training),
+        Command::Rename {
             from: name("t0"),
             to: name("elm"),
         },
-        Ask::Forget(Forget::SelfTaught),
-        Ask::Calibrate,
-        Ask::ReadCalibration,
-        Ask::WriteCalibration(Vec::from_slice(&CALIBRATION.to_bytes()).unwrap()),
-        Ask::Stream(true),
-        Ask::ReadTable(0),
-        Ask::BeginTable(100),
-        Ask::WriteTable {
+        Command::Forget(Forget::SelfLearned),
+        Command::Calibrate,
+        Command::ReadCalibration,
+        Command::WriteCalibration(Vec::from_slice(&CALIBRATION.to_bytes()).unwrap()),
+        Command::Stream(true),
+        Command::ReadTable(0),
+        Command::BeginTable(100),
+        Command::WriteTable {
             offset: 0,
             bytes: Vec::new(),
         },
-        Ask::CommitTable,
-        Ask::FactoryTable,
+        Command::CommitTable,
+        Command::FactoryTable,
     ]
 }
 
 #[test]
 fn four_are_answered_at_any_time_and_the_others_when_the_probe_is_free() {
-    let now = |ask: &Ask| turn(ask, true) == Turn::Now;
-    let at_any_time: vec::Vec<Ask> = all().into_iter().filter(now).collect();
+    let now = |command: &Command| turn(command, true) == Turn::Now;
+    let at_any_time: vec::Vec<Command> = all().into_iter().filter(now).collect();
     assert!(matches!(
         at_any_time[..],
         [
-            Ask::Status,
-            Ask::Stop,
-            Ask::ReadCalibration,
-            Ask::Stream(true)
+            Command::Status,
+            Command::Stop,
+            Command::ReadCalibration,
+            Command::Stream(true)
         ]
     ));
-    for ask in all() {
-        let free = turn(&ask, false);
-        match turn(&ask, true) {
+    for command in all() {
+        let free = turn(&command, false);
+        match turn(&command, true) {
             Turn::Now => assert_eq!(free, Turn::Now),
             Turn::Busy => assert_eq!(free, Turn::Queue),
-            Turn::Queue => panic!("{ask:?} is queued behind something else"),
+            Turn::Queue => panic!("{command:?} is queued behind something else"),
         }
     }
 }
@@ -234,7 +234,7 @@ fn four_are_answered_at_any_time_and_the_others_when_the_probe_is_free() {
 /// What everybody may see and touch.
 #[derive(Default)]
 struct Desk {
-    told: vec::Vec<Tell>,
+    told: vec::Vec<Event>,
     stopped: vec::Vec<bool>,
     streams: bool,
 }
@@ -272,7 +272,7 @@ impl Panel for Desk {
         self.streams = on;
     }
 
-    fn tell(&mut self, event: Tell) {
+    fn tell(&mut self, event: Event) {
         self.told.push(event);
     }
 }
@@ -280,9 +280,10 @@ impl Panel for Desk {
 #[test]
 fn what_comes_while_the_probe_is_busy_is_answered_or_refused() {
     let mut desk = Desk::default();
-    let sent = |ask: Ask, busy, desk: &mut Desk| receive(&Request { id: 9, ask }, busy, desk);
-    assert_eq!(sent(Ask::Status, true, &mut desk), Turn::Now);
-    let [Tell::Status(status), Tell::Done(9)] = &desk.told[..] else {
+    let sent =
+        |command: Command, busy, desk: &mut Desk| receive(&Request { id: 9, command }, busy, desk);
+    assert_eq!(sent(Command::Status, true, &mut desk), Turn::Now);
+    let [Event::Status(status), Event::Done(9)] = &desk.told[..] else {
         panic!("{:?}", desk.told);
     };
     assert_eq!(
@@ -300,86 +301,91 @@ fn what_comes_while_the_probe_is_busy_is_answered_or_refused() {
         }
     );
     desk.told.clear();
-    sent(Ask::ReadCalibration, true, &mut desk);
+    sent(Command::ReadCalibration, true, &mut desk);
     let bytes = CALIBRATION.to_bytes();
     assert!(
-        matches!(&desk.told[..], [Tell::Calibration(told), Tell::Done(9)] if told[..] == bytes)
+        matches!(&desk.told[..], [Event::Calibration(told), Event::Done(9)] if told[..] == bytes)
     );
     desk.told.clear();
     // nothing to stop for good where nothing was asked for
-    sent(Ask::Stop, false, &mut desk);
-    sent(Ask::Stop, true, &mut desk);
+    sent(Command::Stop, false, &mut desk);
+    sent(Command::Stop, true, &mut desk);
     assert_eq!(desk.stopped, [false, true]);
-    sent(Ask::Stream(true), false, &mut desk);
+    sent(Command::Stream(true), false, &mut desk);
     assert!(desk.streams);
-    sent(Ask::Stream(false), true, &mut desk);
+    sent(Command::Stream(false), true, &mut desk);
     assert!(!desk.streams);
     assert_eq!(
         desk.told,
-        [Tell::Done(9), Tell::Done(9), Tell::Done(9), Tell::Done(9)]
+        [
+            Event::Done(9),
+            Event::Done(9),
+            Event::Done(9),
+            Event::Done(9)
+        ]
     );
     desk.told.clear();
-    assert_eq!(sent(Ask::Home, true, &mut desk), Turn::Busy);
+    assert_eq!(sent(Command::Home, true, &mut desk), Turn::Busy);
     assert!(
-        matches!(&desk.told[..], [Tell::Refused { id: 9, why }] if why.starts_with("busy")),
+        matches!(&desk.told[..], [Event::Refused { id: 9, why }] if why.starts_with("busy")),
         "{:?}",
         desk.told
     );
     desk.told.clear();
-    assert_eq!(sent(Ask::Home, false, &mut desk), Turn::Queue);
+    assert_eq!(sent(Command::Home, false, &mut desk), Turn::Queue);
     assert_eq!(desk.told, [], "it has its answer when it is done");
 }
 
 #[test]
 fn a_request_is_answered_by_its_number_when_it_is_over() {
     let mut probe = probe();
-    let request = |id, ask| Request { id, ask };
-    block_on(probe.serve::<Plain>(&request(3, Ask::Home)));
+    let request = |id, command| Request { id, command };
+    block_on(probe.serve::<Plain>(&request(3, Command::Home)));
     probe.rig.refuses = true;
-    block_on(probe.serve::<Plain>(&request(4, Ask::Home)));
-    let jams = Tell::Refused {
+    block_on(probe.serve::<Plain>(&request(4, Command::Home)));
+    let jams = Event::Refused {
         id: 4,
         why: text("it jams"),
     };
-    assert_eq!(probe.events.told, [Tell::Done(3), jams]);
+    assert_eq!(probe.events.told, [Event::Done(3), jams]);
     assert_eq!(probe.rig.homed, 1);
 }
 
 #[test]
 fn an_exploration_is_kept_until_the_rig_moves_again() {
     let mut probe = probe();
-    let nothing = ask(&mut probe, Ask::Answer(name("elm"))).unwrap_err();
-    assert!(nothing.starts_with("nothing was felt"), "{nothing}");
+    let nothing = command(&mut probe, Command::Label(name("elm"))).unwrap_err();
+    assert!(nothing.starts_with("no slide was measured"), "{nothing}");
     feels(&mut probe, &[-32_000, -32_000, -32_000]);
-    ask(&mut probe, exploration(true)).unwrap();
+    command(&mut probe, exploration(true)).unwrap();
     assert_eq!(probe.rig.began, [1]);
     let skin = block_on(probe.memory.store().unwrap().skin()).unwrap();
     assert!(skin == probe.rig.state.skin && skin.energy_j() >= 1.0);
     // a name that cannot be; then another
-    let empty = ask(&mut probe, Ask::Answer(name(""))).unwrap_err();
+    let empty = command(&mut probe, Command::Label(name(""))).unwrap_err();
     assert!(!empty.starts_with("nothing"), "{empty}");
-    ask(&mut probe, Ask::Answer(name("elm"))).unwrap();
+    command(&mut probe, Command::Label(name("elm"))).unwrap();
     assert!(
-        matches!(probe.events.told.last(), Some(Tell::Taught { itself: false, name, .. }) if name == "elm")
+        matches!(probe.events.told.last(), Some(Event::TextureLearned { itself: false, name, .. }) if name == "elm")
     );
     let table = *probe.events.tables.last().unwrap();
     assert_eq!((table.textures, table.factory), (5, false));
     // once is enough
-    assert!(ask(&mut probe, Ask::Answer(name("elm"))).is_err());
-    for moves in [Ask::Home, Ask::Calibrate] {
+    assert!(command(&mut probe, Command::Label(name("elm"))).is_err());
+    for moves in [Command::Home, Command::Calibrate] {
         feels(&mut probe, &[-32_000, -32_000, -32_000]);
-        ask(&mut probe, exploration(false)).unwrap();
-        ask(&mut probe, moves).unwrap();
-        let nothing = ask(&mut probe, Ask::Answer(name("oak"))).unwrap_err();
-        assert!(nothing.starts_with("nothing was felt"), "{nothing}");
+        command(&mut probe, exploration(false)).unwrap();
+        command(&mut probe, moves).unwrap();
+        let nothing = command(&mut probe, Command::Label(name("oak"))).unwrap_err();
+        assert!(nothing.starts_with("no slide was measured"), "{nothing}");
     }
     // nor does one that failed leave anything to learn from
     feels(&mut probe, &[]);
     assert_eq!(
-        ask(&mut probe, exploration(false)).unwrap_err(),
+        command(&mut probe, exploration(false)).unwrap_err(),
         "the lever fell off"
     );
-    assert!(ask(&mut probe, Ask::Answer(name("oak"))).is_err());
+    assert!(command(&mut probe, Command::Label(name("oak"))).is_err());
 }
 
 #[test]
@@ -387,68 +393,68 @@ fn what_the_probe_learns_by_itself_is_told_and_in_force() {
     let mut probe = probe();
     let before = *probe.events.tables.last().unwrap();
     feels(&mut probe, &[10_000]);
-    ask(&mut probe, exploration(false)).unwrap();
+    command(&mut probe, exploration(false)).unwrap();
     assert_eq!(probe.events.tables.len(), 1, "it was not to learn");
     feels(&mut probe, &[10_000]);
-    ask(&mut probe, exploration(true)).unwrap();
+    command(&mut probe, exploration(true)).unwrap();
     let after = *probe.events.tables.last().unwrap();
     assert!(before.crc != after.crc && after.factory);
     assert!(
-        matches!(probe.events.told.last(), Some(Tell::Taught { itself: true, slides: 1, name }) if name == "t2")
+        matches!(probe.events.told.last(), Some(Event::TextureLearned { itself: true, slides: 1, name }) if name == "t2")
     );
-    ask(&mut probe, Ask::Forget(Forget::SelfTaught)).unwrap();
+    command(&mut probe, Command::Forget(Forget::SelfLearned)).unwrap();
     assert_eq!(*probe.events.tables.last().unwrap(), before);
 }
 
 #[test]
-fn textures_are_trained_renamed_and_forgotten() {
+fn textures_are_trained_renamed_and_deleted() {
     let mut probe = probe();
     feels(&mut probe, &[31_000]);
     let [.., train] = &mut all()[..6] else {
         panic!();
     };
-    ask(&mut probe, train.clone()).unwrap();
+    command(&mut probe, train.clone()).unwrap();
     assert_eq!(probe.rig.began, [3]);
     assert_eq!(probe.events.tables.last().unwrap().textures, 5);
     let skin = block_on(probe.memory.store().unwrap().skin()).unwrap();
     assert!(skin.energy_j() >= 1.0);
-    let rename = |from, to| Ask::Rename {
+    let rename = |from, to| Command::Rename {
         from: name(from),
         to: name(to),
     };
-    ask(&mut probe, rename("elm", "oak")).unwrap();
+    command(&mut probe, rename("elm", "oak")).unwrap();
     assert!(probe.memory.table().unwrap().find("oak").is_some());
-    let unknown = ask(&mut probe, rename("elm", "ash")).unwrap_err();
+    let unknown = command(&mut probe, rename("elm", "ash")).unwrap_err();
     assert_eq!(unknown, "there is no texture elm in the table");
-    ask(&mut probe, Ask::Forget(Forget::Texture(name("oak")))).unwrap();
+    command(&mut probe, Command::Forget(Forget::Texture(name("oak")))).unwrap();
     assert_eq!(probe.events.tables.last().unwrap().textures, 4);
-    assert!(ask(&mut probe, Ask::Forget(Forget::Texture(name("oak")))).is_err());
-    ask(&mut probe, Ask::FactoryTable).unwrap();
+    assert!(command(&mut probe, Command::Forget(Forget::Texture(name("oak")))).is_err());
+    command(&mut probe, Command::FactoryTable).unwrap();
     assert!(probe.events.tables.last().unwrap().factory);
 }
 
 #[test]
 fn a_calibration_is_measured_told_used_and_kept() {
     let mut probe = probe();
-    ask(&mut probe, Ask::Calibrate).unwrap();
+    command(&mut probe, Command::Calibrate).unwrap();
     assert_eq!(probe.rig.homed, 1, "it did not know where it was");
     let used = probe.rig.state.calibration;
     let (standstill, per_mm_s) = used.unloaded_a;
     assert!((standstill - 0.05).abs() < 1e-4 && (per_mm_s - 1e-3).abs() < 1e-5);
     assert_eq!(used.pressure.pdc_no_contact, 700.0);
-    let told = Tell::Calibration(Vec::from_slice(&used.to_bytes()).unwrap());
+    let told = Event::Calibration(Vec::from_slice(&used.to_bytes()).unwrap());
     assert_eq!(probe.events.told, [told]);
     let kept = |probe: &mut Tested| block_on(probe.memory.store().unwrap().calibration()).unwrap();
     assert_eq!(kept(&mut probe), Some(used));
-    let write = |bytes: &[u8]| Ask::WriteCalibration(Vec::from_slice(bytes).unwrap());
-    let short = ask(&mut probe, write(&[0; 59])).unwrap_err();
+    let write = |bytes: &[u8]| Command::WriteCalibration(Vec::from_slice(bytes).unwrap());
+    let short = command(&mut probe, write(&[0; 59])).unwrap_err();
     assert_eq!(short, "a calibration has 60 bytes");
-    assert!(ask(&mut probe, write(&[0xFF; 60])).is_err());
+    assert!(command(&mut probe, write(&[0xFF; 60])).is_err());
     assert_eq!(
         (kept(&mut probe), probe.rig.state.calibration),
         (Some(used), used)
     );
-    ask(&mut probe, write(&CALIBRATION.to_bytes())).unwrap();
+    command(&mut probe, write(&CALIBRATION.to_bytes())).unwrap();
     assert_eq!(kept(&mut probe), Some(CALIBRATION));
     // the next life begins with it
     let skin = SkinCare::after(2.0, 1.0);
@@ -465,17 +471,17 @@ fn a_calibration_is_measured_told_used_and_kept() {
 
 /// Sends a table in parts, each twice.
 fn push(probe: &mut Tested, bytes: &[u8]) -> Result<(), String> {
-    ask(probe, Ask::BeginTable(bytes.len() as u32))?;
+    command(probe, Command::BeginTable(bytes.len() as u32))?;
     for (part, offset) in bytes.chunks(PART).zip((0..).step_by(PART)) {
-        let write = Ask::WriteTable {
+        let write = Command::WriteTable {
             offset,
             bytes: Vec::from_slice(part).unwrap(),
         };
-        ask(probe, write.clone())?;
+        command(probe, write.clone())?;
         // the host did not hear the answer
-        ask(probe, write)?;
+        command(probe, write)?;
     }
-    ask(probe, Ask::CommitTable)
+    command(probe, Command::CommitTable)
 }
 
 #[test]
@@ -492,11 +498,11 @@ fn a_table_comes_and_goes_in_parts_of_which_one_may_come_twice() {
         probe.events.told.clear();
         let length = probe.memory.in_force().len() as u32;
         for offset in (0..length).step_by(PART) {
-            ask(probe, Ask::ReadTable(offset)).unwrap();
+            command(probe, Command::ReadTable(offset)).unwrap();
         }
         let mut pulled = vec::Vec::new();
         for told in &probe.events.told {
-            let Tell::TablePart {
+            let Event::TablePart {
                 offset,
                 length: all,
                 bytes,
@@ -511,17 +517,17 @@ fn a_table_comes_and_goes_in_parts_of_which_one_may_come_twice() {
     };
     assert_eq!(pull(&mut probe), pushed);
     let length = pushed.len() as u32;
-    ask(&mut probe, Ask::ReadTable(length)).unwrap();
-    let beyond = ask(&mut probe, Ask::ReadTable(length + 1)).unwrap_err();
+    command(&mut probe, Command::ReadTable(length)).unwrap();
+    let beyond = command(&mut probe, Command::ReadTable(length + 1)).unwrap_err();
     assert_eq!(beyond, "the table has no such byte");
     // a part that is missing is an error, and so is a table that is damaged: the former one stays
-    ask(&mut probe, Ask::BeginTable(600)).unwrap();
-    let early = Ask::WriteTable {
+    command(&mut probe, Command::BeginTable(600)).unwrap();
+    let early = Command::WriteTable {
         offset: 8,
         bytes: Vec::from_slice(&[0; 8]).unwrap(),
     };
     assert!(
-        ask(&mut probe, early)
+        command(&mut probe, early)
             .unwrap_err()
             .contains("send the table anew")
     );
@@ -529,7 +535,7 @@ fn a_table_comes_and_goes_in_parts_of_which_one_may_come_twice() {
     damaged[40] ^= 1;
     assert!(push(&mut probe, &damaged).unwrap_err().contains("checksum"));
     assert_eq!(pull(&mut probe), pushed);
-    ask(&mut probe, Ask::FactoryTable).unwrap();
+    command(&mut probe, Command::FactoryTable).unwrap();
     assert_eq!(pull(&mut probe), fused_table());
 }
 
@@ -538,24 +544,27 @@ fn without_a_store_it_explores_and_says_that_it_cannot_learn() {
     let mut probe = probe_with(fused_table(), None);
     assert_eq!(probe.events.tables.last().unwrap().textures, 4);
     feels(&mut probe, &[10_000]);
-    ask(&mut probe, exploration(true)).unwrap();
+    command(&mut probe, exploration(true)).unwrap();
     assert!(
         matches!(
             probe.events.told.last(),
-            Some(Tell::Verdict { sure: true, .. })
+            Some(Event::Verdict { sure: true, .. })
         ),
         "nothing is said to be learned"
     );
     feels(&mut probe, &[-32_000, -32_000, -32_000]);
     let broken = Err(String::from("the store is broken: see the log"));
-    for ask in all() {
-        let stores = turn(&ask, false) == Turn::Queue
-            && !matches!(ask, Ask::Home | Ask::Identify(_) | Ask::ReadTable(_));
-        let done = self::ask(&mut probe, ask.clone());
+    for command in all() {
+        let stores = turn(&command, false) == Turn::Queue
+            && !matches!(
+                command,
+                Command::Home | Command::Identify(_) | Command::ReadTable(_)
+            );
+        let done = self::command(&mut probe, command.clone());
         assert_eq!(
             done,
             if stores { broken.clone() } else { Ok(()) },
-            "{ask:?}"
+            "{command:?}"
         );
     }
     assert!(probe.events.trouble.is_empty());
@@ -571,8 +580,8 @@ fn settings_that_cannot_be_read_are_begun_anew_by_a_calibration() {
     let mut probe = probe_with(fused_table(), Some(block_on(Store::open(ram)).unwrap()));
     assert!(probe.memory.store().unwrap().settings().is_err());
     feels(&mut probe, &[10_000]);
-    ask(&mut probe, exploration(false)).unwrap();
-    ask(&mut probe, Ask::Calibrate).unwrap();
+    command(&mut probe, exploration(false)).unwrap();
+    command(&mut probe, Command::Calibrate).unwrap();
     let kept = block_on(probe.memory.store().unwrap().calibration()).unwrap();
     assert_eq!(kept, Some(probe.rig.state.calibration));
 }
@@ -582,7 +591,7 @@ fn without_any_table_there_is_trouble_and_no_exploration() {
     let mut probe = probe_with(vec![1, 2, 3], None);
     assert!(probe.events.trouble[0].starts_with("no table: "));
     assert!(probe.events.tables.is_empty());
-    assert!(ask(&mut probe, exploration(false)).is_err());
+    assert!(command(&mut probe, exploration(false)).is_err());
 }
 
 #[test]
@@ -594,13 +603,13 @@ fn phases_faults_and_places_are_told_as_they_change() {
         watch.look(rig, |event| told.push(event));
         told
     };
-    assert_eq!(look(&rig), [Tell::Phase(crate::wire::Phase::Parked)]);
+    assert_eq!(look(&rig), [Event::Phase(crate::wire::Phase::Parked)]);
     assert_eq!(look(&rig), []);
     rig.phase = Phase::Sliding;
     rig.at_rest = false;
     (rig.force_mn, rig.stage_mm) = (500.0, 12.5);
-    let told: vec::Vec<Tell> = (0..20).flat_map(|_| look(&rig)).collect();
-    let [Tell::Phase(_), Tell::Live(live), Tell::Live(_)] = &told[..] else {
+    let told: vec::Vec<Event> = (0..20).flat_map(|_| look(&rig)).collect();
+    let [Event::Phase(_), Event::Live(live), Event::Live(_)] = &told[..] else {
         panic!("{told:?}");
     };
     assert_eq!((live.force_mn, live.stage_um), (500, 12_500));
@@ -608,6 +617,6 @@ fn phases_faults_and_places_are_told_as_they_change() {
     let told = look(&rig);
     assert!(matches!(
         told[..],
-        [Tell::Fault(crate::rig::Fault::EStop), Tell::Phase(_)]
+        [Event::Fault(crate::rig::Fault::EStop), Event::Phase(_)]
     ));
 }

@@ -8,8 +8,8 @@ use crate::table::tests::{around, table_of};
 use std::vec;
 use std::vec::Vec as List;
 
-fn none() -> Lesson {
-    Lesson::Gaussians(Experience::default())
+fn none() -> TrainingStats {
+    TrainingStats::Gaussians(Experience::default())
 }
 
 fn wanted(name: &str) -> Wanted<'_> {
@@ -27,7 +27,7 @@ fn table(textures: usize) -> List<u8> {
     table_of(PropertySet::ALL, &vec![cell; textures])
 }
 
-fn felt(value: f32) -> Observation {
+fn observation(value: f32) -> Observation {
     Properties::new([Some(value), Some(2.0 * value), Some(3.0 * value)]).into()
 }
 
@@ -37,7 +37,7 @@ fn train(training: &mut Training) -> List<Movement> {
     while let Some(movement) = training.next() {
         made.push(movement);
         training
-            .took(None, movement, &felt(made.len() as f32 * 0.01))
+            .took(None, movement, &observation(made.len() as f32 * 0.01))
             .unwrap();
     }
     made
@@ -49,15 +49,15 @@ fn a_new_texture_is_added_and_the_others_stay_to_the_bit() {
     let old = Table::read(&bytes).unwrap();
     let mut training = Training::new(wanted("felt"), Some(&old), 4096).unwrap();
     assert_eq!((training.name(), training.table()), ("felt", None));
-    let mut room = vec![0; 4096];
+    let mut buffer = vec![0; 4096];
     let [first, second] = [0, 1].map(|m| old.movement(m).unwrap());
-    let unfinished = training.encode(Some(&old), &mut room).err();
+    let unfinished = training.encode(Some(&old), &mut buffer).err();
     assert_eq!(unfinished, Some(TrainingError::Unfinished(first)));
     assert_eq!(
         train(&mut training),
         [first, second, first, second, first, second]
     );
-    let new = training.encode(Some(&old), &mut room).unwrap();
+    let new = training.encode(Some(&old), &mut buffer).unwrap();
     assert_eq!(
         new.names().collect::<List<_>>(),
         ["t0", "t1", "t2", "t3", "t4", "felt"]
@@ -79,7 +79,7 @@ fn a_new_texture_is_added_and_the_others_stay_to_the_bit() {
         Some(&old),
         0,
     );
-    let same = known.unwrap().encode(Some(&old), &mut room).unwrap();
+    let same = known.unwrap().encode(Some(&old), &mut buffer).unwrap();
     // but for where it came from
     let (lineage, end) = (16 + 2 * 6 + 5 * 2 * 12 + 5 * 2, bytes.len() - 4);
     assert_eq!(same.as_bytes()[..lineage], bytes[..lineage]);
@@ -95,7 +95,7 @@ fn a_new_texture_is_added_and_the_others_stay_to_the_bit() {
     let mut again = vec![0; 4096];
     let again = known.encode(Some(&same), &mut again).unwrap();
     assert_eq!(again.as_bytes(), same.as_bytes());
-    let other = training.encode(None, &mut room).err();
+    let other = training.encode(None, &mut buffer).err();
     assert_eq!(other, Some(TrainingError::Table));
 }
 
@@ -107,15 +107,15 @@ fn a_known_texture_goes_on_with_its_trials() {
     assert_eq!(training.table(), Some(old.crc()));
     let (movement, two) = training.learned()[0];
     assert_eq!(two.trials(), 2);
-    let record = training.took(None, movement, &felt(0.2)).unwrap();
-    assert_eq!((record.lesson.trials(), record.table), (3, Some(old.crc())));
+    let record = training.took(None, movement, &observation(0.2)).unwrap();
+    assert_eq!((record.stats.trials(), record.table), (3, Some(old.crc())));
     assert_eq!((&record.name[..], record.movement), ("t1", movement));
     // the power is cut
     let mut training = Training::new(wanted("t1"), Some(&old), 0).unwrap();
-    training.resume(movement, record.lesson).unwrap();
+    training.resume(movement, record.stats).unwrap();
     assert_eq!(train(&mut training), [old.movement(1).unwrap()]);
-    let mut room = vec![0; 4096];
-    let new = training.encode(Some(&old), &mut room).unwrap();
+    let mut buffer = vec![0; 4096];
+    let new = training.encode(Some(&old), &mut buffer).unwrap();
     assert_eq!(
         (new.textures(), new.trials(1, 0), new.trials(1, 1)),
         (3, 3, 3)
@@ -132,7 +132,7 @@ fn a_known_texture_goes_on_with_its_trials() {
 fn what_cannot_end_in_a_table_is_refused_before_touching() {
     let bytes = table(3);
     let old = Table::read(&bytes).unwrap();
-    let refused = |wanted, room| Training::new(wanted, Some(&old), room).err();
+    let refused = |wanted, buffer| Training::new(wanted, Some(&old), buffer).err();
     let long = std::format!("{:041}", 0);
     assert_eq!(refused(wanted(""), 4096), Some(TrainingError::Name(0)));
     assert_eq!(refused(wanted(&long), 4096), Some(TrainingError::Name(41)));
@@ -146,7 +146,7 @@ fn what_cannot_end_in_a_table_is_refused_before_touching() {
     assert_eq!(refused(wanted("felt"), needed), None);
     assert_eq!(
         refused(wanted("felt"), needed - 1),
-        Some(TrainingError::Room(needed))
+        Some(TrainingError::NoSpace(needed))
     );
     let handheld = Wanted {
         measures: PropertySet::from_bits(6).unwrap(),
@@ -177,7 +177,7 @@ fn a_slide_that_lacks_a_property_does_not_count() {
     assert_eq!(training.learned()[0].1, none());
     let other = Movement::new(1000, 30_000).unwrap();
     let foreign = Err(TrainingError::Movement(other));
-    assert_eq!(training.took(None, other, &felt(1.0)), foreign);
+    assert_eq!(training.took(None, other, &observation(1.0)), foreign);
     let foreign = Err(TrainingError::Movement(other));
     assert_eq!(training.resume(other, none()), foreign);
 }
@@ -192,8 +192,8 @@ fn without_a_table_the_first_texture_makes_one() {
         let mut training = Training::new(wanted, None, 4096).unwrap();
         let made = train(&mut training);
         assert_eq!(made.len(), if pilot { 90 } else { 9 });
-        let mut room = vec![0; 4096];
-        let first = training.encode(None, &mut room).unwrap();
+        let mut buffer = vec![0; 4096];
+        let first = training.encode(None, &mut buffer).unwrap();
         assert_eq!(first.names().collect::<List<_>>(), ["felt"]);
         if !pilot {
             assert!(first.movements().eq(FIRST_MOVEMENTS));
@@ -208,8 +208,8 @@ fn without_a_table_the_first_texture_makes_one() {
         let mut training = Training::new(second, Some(&first), 4096).unwrap();
         assert!(training.makes_table());
         train(&mut training);
-        let mut room = vec![0; 4096];
-        let both = training.encode(Some(&first), &mut room).unwrap();
+        let mut buffer = vec![0; 4096];
+        let both = training.encode(Some(&first), &mut buffer).unwrap();
         assert_eq!((both.textures(), both.movements().len()), (2, 30));
     }
 }

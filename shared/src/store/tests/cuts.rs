@@ -31,8 +31,8 @@ struct Model {
     calibration: Option<RigCalibration>,
     skin: SkinCare,
     /// By texture and table.
-    trained: [[Option<Lesson>; 2]; 2],
-    self_taught: [Option<SelfTaught>; 2],
+    training_record: [[Option<TrainingStats>; 2]; 2],
+    self_learned: [Option<SelfLearnedRecord>; 2],
 }
 
 const NAMES: [&str; 2] = ["felt", "sandpaper of 100 grit"];
@@ -41,13 +41,13 @@ const TABLES: [Option<u32>; 2] = [None, Some(0x1234_5678)];
 /// Of both textures that are learned: lineage and number.
 const SELVES: [(u32, u16); 2] = [(0x89AB_CDEF, 0), (0x89AB_CDEF, 300)];
 
-fn self_taught(texture: u8, n: u8) -> SelfTaught {
+fn self_learned(texture: u8, n: u8) -> SelfLearnedRecord {
     let (lineage, number) = SELVES[usize::from(texture)];
     let whitened = Whitened {
         slides: n,
         mean: core::array::from_fn(|i| i16::from(n) * i as i16),
     };
-    SelfTaught {
+    SelfLearnedRecord {
         lineage,
         number,
         movements: (0..1 + n % 2)
@@ -67,14 +67,14 @@ impl Model {
             Operation::Skin(n) => next.skin = SkinCare::after(n.into(), n.into()),
             Operation::Train(name, on, trials) => {
                 let on = TABLES.iter().position(|t| *t == on).unwrap();
-                next.trained[usize::from(name)][on] = Some(lesson(trials));
+                next.training_record[usize::from(name)][on] = Some(stats(trials));
             }
-            Operation::Forget(name) => next.trained[usize::from(name)] = [None; 2],
+            Operation::Forget(name) => next.training_record[usize::from(name)] = [None; 2],
             Operation::Learn(texture, n) => {
-                next.self_taught[usize::from(texture)] = Some(self_taught(texture, n));
+                next.self_learned[usize::from(texture)] = Some(self_learned(texture, n));
             }
-            Operation::Unlearn(Some(texture)) => next.self_taught[usize::from(texture)] = None,
-            Operation::Unlearn(None) => next.self_taught = [None, None],
+            Operation::Unlearn(Some(texture)) => next.self_learned[usize::from(texture)] = None,
+            Operation::Unlearn(None) => next.self_learned = [None, None],
             Operation::EraseSettings => {
                 next = Self {
                     table: next.table,
@@ -89,28 +89,28 @@ impl Model {
         assert_eq!(store.settings(), Ok(()));
         let table = used(store);
         block_on(async {
-            let mut trained = [[None; 2]; 2];
-            for (name, of_name) in NAMES.into_iter().zip(&mut trained) {
+            let mut training_record = [[None; 2]; 2];
+            for (name, of_name) in NAMES.into_iter().zip(&mut training_record) {
                 for (on, found) in TABLES.into_iter().zip(of_name) {
                     *found = store
-                        .trained(name, Movement::FOR_FINENESS, on)
+                        .training_record(name, Movement::FOR_FINENESS, on)
                         .await
                         .unwrap();
                 }
             }
             let mut selves = [None, None];
-            let mut each = |record: SelfTaught| {
+            let mut each = |record: SelfLearnedRecord| {
                 let of = (record.lineage, record.number);
                 let texture = SELVES.iter().position(|s| *s == of).unwrap();
                 assert_eq!(selves[texture].replace(record), None, "once only");
             };
-            store.self_taught(SELVES[0].0, &mut each).await.unwrap();
+            store.self_learned(SELVES[0].0, &mut each).await.unwrap();
             Self {
-                self_taught: selves,
+                self_learned: selves,
                 table,
                 calibration: store.calibration().await.unwrap(),
                 skin: store.skin().await.unwrap(),
-                trained,
+                training_record,
             }
         })
     }
@@ -121,13 +121,13 @@ impl Model {
         if let Operation::Forget(name) = *operation {
             let name = usize::from(name);
             for on in 0..2 {
-                if self.trained[name][on].is_none() {
-                    like.trained[name][on] = None;
+                if self.training_record[name][on].is_none() {
+                    like.training_record[name][on] = None;
                 }
             }
         }
         if let Operation::Unlearn(None) = *operation {
-            for (like, left) in like.self_taught.iter_mut().zip(&self.self_taught) {
+            for (like, left) in like.self_learned.iter_mut().zip(&self.self_learned) {
                 if left.is_none() {
                     *like = None;
                 }
@@ -153,14 +153,18 @@ async fn perform(store: &mut Store<Ram>, operation: &Operation) -> Outcome<()> {
         }
         Operation::Train(name, on, trials) => {
             let name = NAMES[usize::from(name)];
-            let new = trained(name, Movement::FOR_FINENESS, on, trials);
-            store.set_trained(&new).await
+            let new = training_record(name, Movement::FOR_FINENESS, on, trials);
+            store.set_training_record(&new).await
         }
-        Operation::Forget(name) => store.forget_trained(NAMES[usize::from(name)]).await,
-        Operation::Learn(texture, n) => store.set_self_taught(&self_taught(texture, n)).await,
+        Operation::Forget(name) => {
+            store
+                .delete_training_records(NAMES[usize::from(name)])
+                .await
+        }
+        Operation::Learn(texture, n) => store.set_self_learned(&self_learned(texture, n)).await,
         Operation::Unlearn(texture) => {
             let of = texture.map(|texture| SELVES[usize::from(texture)]);
-            store.forget_self_taught(of).await
+            store.delete_self_learned(of).await
         }
         Operation::EraseSettings => store.erase_settings().await,
     }

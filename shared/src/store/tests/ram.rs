@@ -154,8 +154,8 @@ impl<const S: usize> NorFlash for Ram<S> {
         assert!(at + bytes.len() <= self.bytes.len(), "bounds");
         for (word, at) in bytes.as_chunks::<4>().0.iter().zip((at..).step_by(4)) {
             let torn = self.operate()?;
-            let room: &mut [u8; 4] = self.bytes[at..].first_chunk_mut().unwrap();
-            let (old, new) = (u32::from_le_bytes(*room), u32::from_le_bytes(*word));
+            let buffer: &mut [u8; 4] = self.bytes[at..].first_chunk_mut().unwrap();
+            let (old, new) = (u32::from_le_bytes(*buffer), u32::from_le_bytes(*word));
             if torn.is_none() && old & new != new {
                 return Err(RamError::Rules);
             }
@@ -166,7 +166,7 @@ impl<const S: usize> NorFlash for Ram<S> {
                 Some(Torn::End(_)) => new | 0xFFFF,
                 Some(Torn::Bits(mut seed)) => new | next(&mut seed),
             };
-            *room = (old & cleared).to_le_bytes();
+            *buffer = (old & cleared).to_le_bytes();
             if torn.is_some() {
                 return Err(RamError::Cut);
             }

@@ -1,15 +1,15 @@
 //! What an identification and a teaching wear off the chip's own sectors: counted, and stated in the book (docs/src/learning.md).
 //!
-//! The firmware stores the skin's care after every identification, and one self-taught record where it may learn and was
+//! The firmware stores the skin's care after every identification, and one self-learned record where it may learn and was
 //! certain (`probe/memory.rs`); whatever the user teaches writes the table anew.
 
-use super::self_taught::{Chip, chip, taught};
+use super::self_learned::{Chip, chip, learned_record};
 use super::*;
 
 /// Erases of a sector that the chip's data sheet promises: 10 000 cycles (DS9405, STM32F427/429, flash memory endurance).
 const ENDURANCE: u32 = 10_000;
-const VISITS: u32 = 2000;
-/// Textures of the paper's Table 1: all of them self-taught at both movements, in features of two bytes each.
+const IDENTIFICATIONS: u32 = 2000;
+/// Textures of the paper's Table 1: all of them self-learned at both movements, in features of two bytes each.
 const TEXTURES: u16 = 117;
 const FEATURES: usize = 13;
 const SIZE: i16 = 8000;
@@ -17,7 +17,7 @@ const SIZE: i16 = 8000;
 /// What identifications wear off, one texture after the other.
 #[derive(PartialEq, Debug)]
 struct Wear {
-    /// Words programmed by [`VISITS`] of them, copies of what is still valid included.
+    /// Words programmed by [`IDENTIFICATIONS`] of them, copies of what is still valid included.
     words: usize,
     /// Identifications from one erase of a settings' sector to the next: the two take turns.
     from_erase_to_erase: u32,
@@ -30,22 +30,22 @@ impl Wear {
     }
 }
 
-fn visits(store: &mut Chip, learns: bool) -> Wear {
+fn identifications(store: &mut Chip, learns: bool) -> Wear {
     let before = (store.flash.operations, store.flash.erases, store.flash.worn);
     let mut erased_at = Vec::new();
     let mut erases = before.1;
-    for visit in 0..VISITS {
-        let skin = SkinCare::after(visit as f32 * 0.1, visit as f32 * 0.2);
+    for n in 0..IDENTIFICATIONS {
+        let skin = SkinCare::after(n as f32 * 0.1, n as f32 * 0.2);
         block_on(store.set_skin(&skin)).unwrap();
         if learns {
-            let texture = (visit % u32::from(TEXTURES)) as u16;
-            let record = taught(u32::MAX, texture, 2, FEATURES, SIZE - (visit % 7) as i16);
-            block_on(store.set_self_taught(&record)).unwrap();
+            let texture = (n % u32::from(TEXTURES)) as u16;
+            let record = learned_record(u32::MAX, texture, 2, FEATURES, SIZE - (n % 7) as i16);
+            block_on(store.set_self_learned(&record)).unwrap();
         }
         if store.flash.erases > erases {
             assert_eq!(store.flash.erases, erases + 1, "one sector at a time");
             erases += 1;
-            erased_at.push(visit);
+            erased_at.push(n);
         }
     }
     let worn = store.flash.worn;
@@ -64,11 +64,11 @@ fn visits(store: &mut Chip, learns: bool) -> Wear {
 fn identifications_wear_the_settings_by_as_much_as_the_readme_says() {
     let mut store = chip();
     block_on(store.set_calibration(&calibration(1))).unwrap();
-    let plain = visits(&mut store, false);
+    let plain = identifications(&mut store, false);
     std::println!("not learning: {plain:?}, {} identifications", plain.life());
     // all textures have their record first
-    visits(&mut store, true);
-    let learning = visits(&mut store, true);
+    identifications(&mut store, true);
+    let learning = identifications(&mut store, true);
     std::println!(
         "learning: {learning:?}, {} identifications",
         learning.life()
@@ -77,7 +77,7 @@ fn identifications_wear_the_settings_by_as_much_as_the_readme_says() {
         words,
         from_erase_to_erase,
     };
-    // words: of 2000 visits, with what the sectors' changes copied
+    // words: of 2000 identifications, with what the sectors' changes copied
     assert_eq!([plain, learning], [wear(10_060, 812), wear(118_730, 68)]);
 }
 
@@ -90,8 +90,8 @@ fn a_teaching_erases_one_of_the_two_sectors_of_the_table() {
         block_on(async {
             store.begin_table(bytes.len()).await.unwrap();
             store.write_table(0, &bytes).await.unwrap();
-            let mut room = [0; SECTOR];
-            store.commit_table(&mut room).await.unwrap();
+            let mut buffer = [0; SECTOR];
+            store.commit_table(&mut buffer).await.unwrap();
         });
         assert_eq!(store.flash.erases - erases, 1);
         // the header's six words and the commit word

@@ -270,7 +270,7 @@ fn what_is_wrong_is_told() {
             EncodeError::Empty,
             "a table needs a texture, a property and 1 to 36 movements",
         ),
-        (EncodeError::Room(93), "the table takes 93 bytes"),
+        (EncodeError::NoSpace(93), "the table takes 93 bytes"),
         (
             EncodeError::Movements(0),
             "texture 1 was not learned at every movement",

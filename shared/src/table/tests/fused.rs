@@ -1,4 +1,4 @@
-//! Fused tables against one written by hand; teaching, renaming and forgetting in tables of either kind.
+//! Fused tables against one written by hand; learning, renaming and deleting in tables of either kind.
 
 use super::damage::{crc_of, read_all};
 use super::*;
@@ -235,7 +235,7 @@ fn what_is_no_fused_table_is_not_written() {
     let both = rows();
     let both = both.iter().map(|(name, known)| (*name, known.as_slice()));
     let none = encode_fused(&mut out, BANDS, &movements, both).map(|_| ());
-    assert_eq!(none, Err(EncodeError::Room(103)));
+    assert_eq!(none, Err(EncodeError::NoSpace(103)));
 }
 
 #[test]
@@ -449,7 +449,7 @@ fn a_change_that_cannot_be_is_refused() {
             .as_bytes()
             .len();
         let less = amend(&mut out[..length - 1], &table, put("oak", mine)).map(|_| ());
-        assert_eq!(less, Err(EncodeError::Room(length)));
+        assert_eq!(less, Err(EncodeError::NoSpace(length)));
     }
     // the last one
     let one = fused_of(BANDS, &[straight(4)], &[vec![super::known(1, &[0.0; 4])]]);

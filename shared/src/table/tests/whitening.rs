@@ -487,15 +487,15 @@ fn without_two_slides_of_a_texture_there_is_no_whitening() {
 fn learning_is_the_running_mean() {
     let noise = &mut Noise(11);
     for features in [1, 13, 14] {
-        let (mut taught, mut adapted) = (Whitened::default(), Whitened::default());
+        let (mut learned, mut adapted) = (Whitened::default(), Whitened::default());
         let (mut all, mut recent) = (vec![0.0; features], vec![0.0; features]);
         for n in 0..300u32 {
             let centre = if n < 100 { 0.0 } else { 1500.0 };
             let slide: Vector = (0..features)
                 .map(|_| (centre + 256.0 * noise.normal()) as i16)
                 .collect();
-            let before = (taught, adapted);
-            taught.teach(&slide);
+            let before = (learned, adapted);
+            learned.teach(&slide);
             adapted.adapt(&slide);
             let own = f64::from(n.min(255));
             let short = f64::from(n.min(3));
@@ -505,21 +505,21 @@ fn learning_is_the_running_mean() {
                     let before = f64::from(before);
                     before + (z - before) / (n + 1.0)
                 };
-                let error = f64::from(taught.mean[i]) - step(before.0.mean[i], own);
+                let error = f64::from(learned.mean[i]) - step(before.0.mean[i], own);
                 assert!(error.abs() <= 0.501, "{n}: {error}");
                 let error = f64::from(adapted.mean[i]) - step(before.1.mean[i], short);
                 assert!(error.abs() <= 0.501, "{n}: {error}");
                 all[i] += (z - all[i]) / (own + 1.0);
                 recent[i] += (z - recent[i]) / (short + 1.0);
-                let error = (f64::from(taught.mean[i]) - all[i]).abs();
+                let error = (f64::from(learned.mean[i]) - all[i]).abs();
                 assert!(error <= 0.5 + 0.25 * own, "{n}: {error}");
                 assert!(n >= 40 || error <= 4.0, "{n}: {error}");
                 let error = (f64::from(adapted.mean[i]) - recent[i]).abs();
                 assert!(error <= 4.5, "{n}: {error}");
             }
-            assert_eq!(u32::from(taught.slides), (n + 1).min(255));
+            assert_eq!(u32::from(learned.slides), (n + 1).min(255));
             assert_eq!(u32::from(adapted.slides), (n + 1).min(3));
-            let beyond = &taught.mean[features..];
+            let beyond = &learned.mean[features..];
             assert!(beyond.iter().all(|&mean| mean == 0));
         }
     }

@@ -75,7 +75,7 @@ impl Bench {
             overhead: 0,
             model: false,
         };
-        bench.overhead = bench.ask(Workload::Nothing, &[], &[])?.0;
+        bench.overhead = bench.send(Workload::Nothing, &[], &[])?.0;
         Ok(bench)
     }
 
@@ -119,7 +119,7 @@ impl Bench {
     }
 
     /// Instructions of a workload on the chip, and its results.
-    fn ask(
+    fn send(
         &mut self,
         workload: Workload,
         table: &[u8],
@@ -183,7 +183,7 @@ impl Bench {
         table: &[u8],
         words: &[i16],
     ) -> Result<Counted, BenchError> {
-        let (instructions, results) = self.ask(workload, table, words)?;
+        let (instructions, results) = self.send(workload, table, words)?;
         let mut expected = Vec::new();
         let mut put = |bytes: &[u8]| expected.extend_from_slice(bytes);
         workload::run::<Plain>(workload, &self.plan, table, words, &mut Uncounted, &mut put)

@@ -1,4 +1,4 @@
-//! What the kernels are given: a slide, tables, and what was felt.
+//! What the kernels are given: a slide, tables, and observed slides.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use tactus_core::table::{Action, Contents, Table};
 
 use super::counter::Bench;
 use super::error::BenchError;
-use super::workload::{Felt, Workload};
+use super::workload::{ObservedSlide, Workload};
 
 /// Samples of a slide of 3 s.
 pub(super) const SLIDE: usize = 6600;
@@ -113,17 +113,17 @@ pub(super) fn corners(bench: &mut Bench) -> Result<(), BenchError> {
                     }
                     let table = learn::learn(method, set, &names, &MOVEMENTS, &slides)?;
                     for _ in 0..3 {
-                        // where one was never felt, the paper's method does not look
+                        // where one was never measured, the paper's method does not look
                         let movement = match (uneven, method) {
                             (true, Method::Fused) => 1,
                             (true, _) => 0,
                             (false, _) => random.random_range(0..3),
                         };
                         let texture = random.random_range(0..textures);
-                        let felt = slides[texture][movement].first();
-                        let felt = felt.or(slides[0][0].first());
+                        let observed = slides[texture][movement].first();
+                        let observed = observed.or(slides[0][0].first());
                         let no_slide = || unsuitable(&what, "a texture without a slide");
-                        let mut slide = felt.ok_or_else(no_slide)?.clone();
+                        let mut slide = observed.ok_or_else(no_slide)?.clone();
                         if set.is_none() && random.random() {
                             slide.properties = Properties::new([Some(1e6), Some(-1e6), Some(0.0)]);
                         }
@@ -134,7 +134,7 @@ pub(super) fn corners(bench: &mut Bench) -> Result<(), BenchError> {
                                 .then_some(Property::ALL[random.random_range(0..3)]),
                         };
                         let mut words = Vec::new();
-                        Felt {
+                        ObservedSlide {
                             method,
                             action,
                             slide,
@@ -172,7 +172,7 @@ fn corner(
                 _ => 5,
             };
             let mut slide = |_| {
-                let felt: Vec<f32> = centres
+                let observed: Vec<f32> = centres
                     .iter()
                     .map(|c| c + random.random_range(-scatter..scatter))
                     .collect();
@@ -180,16 +180,16 @@ fn corner(
                 let properties = match set {
                     FeatureSet::Pressure | FeatureSet::Bands => [None; 3],
                     _ => [
-                        Some(felt[0] / 4.0),
-                        Some(felt[1] / 2.0),
-                        Some(felt[2] / 4.0),
+                        Some(observed[0] / 4.0),
+                        Some(observed[1] / 2.0),
+                        Some(observed[2] / 4.0),
                     ],
                 };
                 Observation {
                     properties: Properties::new(properties),
                     pressure: (set == FeatureSet::Pressure)
-                        .then(|| [fixed(&felt[3]), fixed(&felt[4])]),
-                    bands: felt[5..].iter().map(fixed).collect(),
+                        .then(|| [fixed(&observed[3]), fixed(&observed[4])]),
+                    bands: observed[5..].iter().map(fixed).collect(),
                 }
             };
             (0..slides).map(&mut slide).collect()
@@ -199,14 +199,14 @@ fn corner(
     (0..textures).map(&mut texture).collect()
 }
 
-/// What was felt, as words, and how many textures it leaves.
+/// An observed slide, as words, and how many textures it leaves.
 pub(super) struct Wanted {
     pub(super) words: Vec<i16>,
     pub(super) live: usize,
 }
 
 /// A slide after which so many textures are still likely, or as nearly as can be found.
-pub(super) fn felt(table: &[u8], method: Method, live: usize) -> Result<Wanted, BenchError> {
+pub(super) fn observed(table: &[u8], method: Method, live: usize) -> Result<Wanted, BenchError> {
     let table = Table::read(table).map_err(|_| unsuitable("a decision", "the table is broken"))?;
     let mut random = ChaCha8Rng::seed_from_u64(live as u64);
     let config = Config {
@@ -215,15 +215,15 @@ pub(super) fn felt(table: &[u8], method: Method, live: usize) -> Result<Wanted, 
     };
     let mut explorer = Explorer::<2000>::new(table, PropertySet::ALL, config)
         .map_err(|_| unsuitable("a decision", "the table cannot be explored"))?;
-    let mut best: Option<(usize, Felt)> = None;
+    let mut best: Option<(usize, ObservedSlide)> = None;
     for _ in 0..20_000 {
-        let felt = match table.contents() {
+        let observed = match table.contents() {
             Contents::Gaussians(_) => by_property(&table, method, &mut random),
             Contents::Fused(set, features) => by_bands(&table, set, features, &mut random),
         };
-        let Some(felt) = felt else { continue };
+        let Some(observed) = observed else { continue };
         explorer.restart();
-        if explorer.observe(felt.action, &felt.slide).is_err() {
+        if explorer.observe(observed.action, &observed.slide).is_err() {
             continue;
         }
         let left = explorer.posterior().iter().filter(|p| **p >= NEGLIGIBLE);
@@ -232,20 +232,24 @@ pub(super) fn felt(table: &[u8], method: Method, live: usize) -> Result<Wanted, 
             .as_ref()
             .is_none_or(|(best, _)| left.abs_diff(live) < best.abs_diff(live))
         {
-            best = Some((left, felt));
+            best = Some((left, observed));
         }
         if left == live {
             break;
         }
     }
-    let (live, felt) = best.ok_or_else(|| unsuitable("a decision", "no slide suits"))?;
+    let (live, observed) = best.ok_or_else(|| unsuitable("a decision", "no slide suits"))?;
     let mut words = Vec::new();
-    felt.write(|word| words.push(word));
+    observed.write(|word| words.push(word));
     Ok(Wanted { words, live })
 }
 
 /// A slide of one of the textures, looked at by one property.
-fn by_property(table: &Table<'_>, method: Method, random: &mut ChaCha8Rng) -> Option<Felt> {
+fn by_property(
+    table: &Table<'_>,
+    method: Method,
+    random: &mut ChaCha8Rng,
+) -> Option<ObservedSlide> {
     let texture = random.random_range(0..table.textures());
     let movement = random.random_range(0..table.movements().len() as u8);
     let looked_at = Property::ALL[random.random_range(0..3)];
@@ -254,7 +258,7 @@ fn by_property(table: &Table<'_>, method: Method, random: &mut ChaCha8Rng) -> Op
         let known = table.gaussian(texture, Action { movement, property })?;
         Some(known.mean + known.sd * random.random_range(-2.0..2.0))
     });
-    Some(Felt {
+    Some(ObservedSlide {
         method,
         action: Action {
             movement,
@@ -270,7 +274,7 @@ fn by_bands(
     set: FeatureSet,
     features: u8,
     random: &mut ChaCha8Rng,
-) -> Option<Felt> {
+) -> Option<ObservedSlide> {
     if set != FeatureSet::Force {
         return None;
     }
@@ -289,7 +293,7 @@ fn by_bands(
         .collect();
     let (traction, bands) = values.split_first()?;
     let properties = [Some(f32::from(*traction) / 1024.0), Some(8.0), Some(4.0)];
-    Some(Felt {
+    Some(ObservedSlide {
         method: Method::Fused,
         action: Action {
             movement,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use tactus::sim::world::Setup;
 use tactus_core::rig::lever::RETRACT_STEPS_S;
-use tactus_core::wire::{Ask, Identify, Phase, Tell};
+use tactus_core::wire::{Command, Event, Identify, Phase};
 
 use super::error::BenchError;
 use super::gates::gate;
@@ -14,7 +14,7 @@ use crate::host::exploration::among_all;
 use crate::host::talk::Talk;
 
 /// Longest that the rig takes for anything, virtual seconds.
-const PATIENCE_S: f64 = 120.0;
+const TIMEOUT_S: f64 = 120.0;
 const CORE_HZ: f64 = 168e6;
 
 /// The last sample is up to a tick of 1 ms old when the servo has the lever step up, and the first step comes a period of its rate
@@ -50,20 +50,20 @@ pub(super) fn on_the_rig(elf: &Path) -> Result<Vec<Row>, BenchError> {
     let (mut begun, mut over, mut told) = (None, None, None);
     let mut lifts_ns = None;
     let mut failed = None;
-    talk.ask(Ask::Identify(identify), PATIENCE_S, |board, report| {
+    talk.send(Command::Identify(identify), TIMEOUT_S, |board, report| {
         let mut now = |board: &mut Emulator| {
             let instructions = board.instructions();
             let instructions = instructions.map_err(|why| failed = Some(why)).unwrap_or(0);
             Some((board.now_ns(), instructions))
         };
-        match report.map(|report| &report.tell) {
-            Some(Tell::Phase(Phase::Sliding)) if begun.is_none() => {
+        match report.map(|report| &report.event) {
+            Some(Event::Phase(Phase::Sliding)) if begun.is_none() => {
                 begun = now(board);
                 let counted = board.count_handlers(handlers.clone());
                 failed = counted.err();
             }
-            Some(Tell::Phase(Phase::Lifting)) if over.is_none() => over = now(board),
-            Some(Tell::Verdict { .. }) => {
+            Some(Event::Phase(Phase::Lifting)) if over.is_none() => over = now(board),
+            Some(Event::Verdict { .. }) => {
                 told = now(board);
                 lifts_ns = begun.and_then(|(from_ns, _)| first_step_up(board, from_ns));
             }
@@ -73,8 +73,8 @@ pub(super) fn on_the_rig(elf: &Path) -> Result<Vec<Row>, BenchError> {
     if let Some(why) = failed {
         return Err(why.into());
     }
-    let spent = talk.board().handlers()?;
-    let [timer, executor] = spent[..] else {
+    let profiles = talk.board().handlers()?;
+    let [timer, executor] = profiles[..] else {
         return Err(BenchError::Rig("its handlers were not counted"));
     };
     let begun = begun.ok_or(BenchError::Rig("it says nothing of a slide"))?;

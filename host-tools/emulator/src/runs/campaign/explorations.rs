@@ -5,13 +5,13 @@ use std::path::Path;
 use rayon::prelude::*;
 use tactus::eval::evaluate::Method;
 use tactus::sim::collection::Collection;
-use tactus::sim::recorded::Lesson;
+use tactus::sim::recorded::RecordedTexture;
 use tactus_core::wire::Identify;
 
 use crate::board::Options;
 use crate::host::exploration::{Exploration, ExploreError, among_all, explore};
 use crate::host::talk::Talk;
-use crate::host::under_finger::{self, Known, LessonError, TRIALS, Unknown};
+use crate::host::under_finger::{self, Known, KnownError, TRIALS, Unknown};
 
 /// Textures of the simulated world's table.
 const AMONG: u8 = 20;
@@ -37,7 +37,7 @@ pub fn simulated(
     method: Method,
     seed: u64,
     done: impl Fn() + Sync,
-) -> Result<Group, LessonError> {
+) -> Result<Group, KnownError> {
     let collection = Collection {
         seed,
         textures: Collection::spread(1, AMONG),
@@ -60,17 +60,17 @@ pub fn simulated(
 
 /// `count` explorations of the recorded materials in turn.
 pub fn recorded(
-    lesson: &Lesson,
+    recorded_texture: &RecordedTexture,
     count: usize,
     method: Method,
     seed: u64,
-) -> Result<Group, LessonError> {
-    let known = under_finger::recorded(lesson, method.method())?;
-    let unknown = (0..lesson.names.len())
+) -> Result<Group, KnownError> {
+    let known = under_finger::recorded(recorded_texture, method.method())?;
+    let unknown = (0..recorded_texture.names.len())
         .cycle()
         .zip(seed..)
         .take(count)
-        .map(|(texture, seed)| under_finger::played(lesson, texture, seed))
+        .map(|(texture, seed)| under_finger::played(recorded_texture, texture, seed))
         .collect();
     Ok(Group {
         name: "recordings",

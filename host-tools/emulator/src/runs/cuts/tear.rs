@@ -9,7 +9,7 @@ use tactus_core::wire::Reset;
 use crate::board::{self, FlashWrite, SECTOR};
 use crate::host::exploration::ExploreError;
 use crate::host::talk::TalkError;
-use crate::host::under_finger::LessonError;
+use crate::host::under_finger::KnownError;
 
 /// Why there are no cuts to judge.
 #[derive(Debug, thiserror::Error)]
@@ -23,7 +23,7 @@ pub enum CutError {
     Explore(#[from] ExploreError),
     /// The world cannot be learned.
     #[error(transparent)]
-    Lesson(#[from] LessonError),
+    Known(#[from] KnownError),
     /// What was to be cut did not happen.
     #[error("the firmware did not {0}: nothing to cut")]
     Nothing(&'static str),
@@ -56,7 +56,7 @@ impl From<board::Error> for CutError {
 /// What the firmware holds, by its own account.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Held {
-    /// Checksum and bytes of the table in force, with what the probe has taught itself.
+    /// Checksum and bytes of the table in force, with what the probe has learned by itself.
     pub table: (u32, u32),
     /// Its textures.
     pub textures: u16,

@@ -15,15 +15,15 @@ use tactus_core::dsp::{self, Plain};
 use tactus_core::sensor::pressure::SLOTS_HZ;
 use tactus_core::store::{Store, StoreError};
 use tactus_core::table::TableError;
-use tactus_core::wire::{Ask, Forget, Identify, Tell, Text};
+use tactus_core::wire::{Command, Event, Forget, Identify, Text};
 
-use super::visits::{FACTORY, HOMINGS, MOST_N, Plan, Visits, world};
+use super::episodes::{Episodes, FACTORY, HOMINGS, MOST_N, Plan, world};
 
 /// The last exchange with the sensor may end after the tick in which it began, and the world's time with it: by less than a slot.
 const SLOT_NS: i64 = 1_000_000_000 / SLOTS_HZ as i64;
-/// The power is off for a moment after so many visits.
+/// The power is off for a moment after so many episodes.
 const RESTARTED_EVERY: u32 = 10;
-/// Something is forgotten after so many.
+/// A texture is deleted after so many.
 const FORGETS_EVERY: u32 = 15;
 
 /// Why there is no day to judge.
@@ -54,8 +54,8 @@ pub enum DayError {
 pub struct Day {
     /// Virtual seconds.
     pub virtual_s: f64,
-    /// The visits.
-    pub visits: Visits,
+    /// The episodes.
+    pub episodes: Episodes,
     /// Slots that were served, and those that the time had.
     pub slots: (u64, u64),
     /// How far the rig's clock is from the world's at the end, ns.
@@ -75,7 +75,7 @@ pub struct Day {
 impl Day {
     /// For programs.
     pub fn json(&self) -> Value {
-        let mut json = self.visits.json();
+        let mut json = self.episodes.json();
         json["virtual_seconds"] = self.virtual_s.into();
         json["slots"] = self.slots.0.into();
         json["slots_due"] = self.slots.1.into();
@@ -94,7 +94,7 @@ impl Day {
             "PC rig: {:.2} virtual hours\n  {}\n  slots {} of {}, drift {} ns, force {:.3} N at most; store opened again {} times, \
              {} sectors erased, {} skins worn out",
             self.virtual_s / 3600.0,
-            self.visits.text(),
+            self.episodes.text(),
             self.slots.0,
             self.slots.1,
             self.drift_ns,
@@ -106,7 +106,7 @@ impl Day {
     }
 }
 
-/// What a visit is told.
+/// What an episode is told.
 #[derive(Default)]
 struct Heard {
     verdict: Option<Verdict>,
@@ -123,9 +123,9 @@ struct Verdict {
 }
 
 impl Host for Heard {
-    fn tell(&mut self, event: Tell) {
+    fn tell(&mut self, event: Event) {
         match event {
-            Tell::Verdict {
+            Event::Verdict {
                 name,
                 unknown,
                 sure,
@@ -137,8 +137,8 @@ impl Host for Heard {
                     sure,
                 });
             }
-            Tell::Rejected { why, .. } => self.rejected.push(why.as_str().to_owned()),
-            Tell::Taught { .. } => self.learned = true,
+            Event::Rejected { why, .. } => self.rejected.push(why.as_str().to_owned()),
+            Event::TextureLearned { .. } => self.learned = true,
             _ => {}
         }
     }
@@ -146,7 +146,7 @@ impl Host for Heard {
 
 type Probe<'p> = SimProbe<'p, Heard>;
 
-/// Visits texture after texture for so many virtual seconds; `each` hears of the time.
+/// Explores texture after texture for so many virtual seconds; `each` hears of the time.
 ///
 /// # Errors
 /// See [`DayError`].
@@ -166,23 +166,23 @@ pub fn day(virtual_s: f64, seed: u64, mut each: impl FnMut(f64)) -> Result<Day, 
     block_on(store(&mut probe).set_calibration(&calibration))?;
     let mut day = Day::default();
     while now_s(&mut probe) < virtual_s {
-        day.visits.made += 1;
-        visit(&mut day, &mut probe, &host, Plan::draw(&mut random))?;
-        if day.visits.made.is_multiple_of(FORGETS_EVERY) {
+        day.episodes.made += 1;
+        run_episode(&mut day, &mut probe, &host, Plan::draw(&mut random))?;
+        if day.episodes.made.is_multiple_of(FORGETS_EVERY) {
             let table = probe.memory.table()?;
             let texture = random.random_range(0..table.textures());
             let name = table.name(texture).unwrap_or_default();
             let what = if random.random_range(0..3) == 0 {
-                Forget::SelfTaught
+                Forget::SelfLearned
             } else {
                 Forget::Texture(name.try_into().unwrap_or_default())
             };
-            match ask(&mut probe, Ask::Forget(what.clone())) {
-                Ok(()) => day.visits.forgotten += 1,
+            match send(&mut probe, Command::Forget(what.clone())) {
+                Ok(()) => day.episodes.forgotten += 1,
                 Err(why) => day.missed.push(format!("{what:?}: {why}")),
             }
         }
-        if day.visits.made.is_multiple_of(RESTARTED_EVERY) {
+        if day.episodes.made.is_multiple_of(RESTARTED_EVERY) {
             probe = restarted(probe, &mut day)?;
         }
         each(now_s(&mut probe));
@@ -212,8 +212,8 @@ pub fn day(virtual_s: f64, seed: u64, mut each: impl FnMut(f64)) -> Result<Day, 
 }
 
 /// Has the probe do something, as a host would; why it does not.
-fn ask(probe: &mut Probe<'_>, ask: Ask) -> Result<(), Box<Text>> {
-    block_on(probe.perform::<Plain>(&ask)).map_err(Box::new)
+fn send(probe: &mut Probe<'_>, command: Command) -> Result<(), Box<Text>> {
+    block_on(probe.perform::<Plain>(&command)).map_err(Box::new)
 }
 
 fn now_s(probe: &mut Probe<'_>) -> f64 {
@@ -226,7 +226,7 @@ fn store<'p>(probe: &'p mut Probe<'_>) -> &'p mut Store<RamFlash> {
 }
 
 /// An exploration, and what is learned from it.
-fn visit(
+fn run_episode(
     day: &mut Day,
     probe: &mut Probe<'_>,
     host: &RefCell<Heard>,
@@ -250,7 +250,7 @@ fn visit(
         learn,
         ..drawn.identify
     };
-    let done = ask(probe, Ask::Identify(identify));
+    let done = send(probe, Command::Identify(identify));
     let heard = host.take();
     let rig = probe.rig.servo.rig();
     let at_s = rig.now().as_secs_f64();
@@ -258,28 +258,28 @@ fn visit(
         .fault
         .filter(|(at_ns, _)| began_ns + at_ns <= rig.now().as_nanos() as u64);
     match (came, &done) {
-        (Some((_, fault)), done) => day.visits.broke(fault, done.is_err()),
+        (Some((_, fault)), done) => day.episodes.broke(fault, done.is_err()),
         (None, Ok(())) => {
             let sure = heard.verdict.as_ref().is_some_and(|verdict| verdict.sure);
             let found = heard.verdict.filter(|verdict| !verdict.unknown);
             let found = found.as_ref().map(|verdict| verdict.name.as_str());
-            day.visits.judge(at_s, truth, known, found, sure);
+            day.episodes.judge(at_s, truth, known, found, sure);
         }
         (None, Err(why)) => day.missed.push(format!("{at_s:.0} s: {truth}: {why}")),
     }
     if came.is_none() {
         let rejected = heard.rejected.iter();
         let rejected = rejected.map(|why| format!("{at_s:.0} s: {truth}: {why}"));
-        day.visits.rejected.extend(rejected);
+        day.episodes.rejected.extend(rejected);
     }
-    day.visits.taught.1 += u32::from(heard.learned);
+    day.episodes.learned.1 += u32::from(heard.learned);
     if came.is_none() && done.is_ok() && drawn.answer {
         let name = truth.try_into().unwrap_or_default();
-        ask(probe, Ask::Answer(name)).map_err(|why| DayError::Probe {
+        send(probe, Command::Label(name)).map_err(|why| DayError::Probe {
             at_s,
             why: why.as_str().to_owned(),
         })?;
-        day.visits.taught.0 += 1;
+        day.episodes.learned.0 += 1;
     }
     if drawn.fault.is_some() || done.is_err() {
         recover(day, probe)?;
@@ -300,7 +300,7 @@ fn recover(day: &mut Day, probe: &mut Probe<'_>) -> Result<(), DayError> {
     probe.rig.servo.rig().world().clear();
     let mut last = Ok(());
     for _ in 0..HOMINGS {
-        last = ask(probe, Ask::Home);
+        last = send(probe, Command::Home);
         if last.is_ok() {
             return Ok(());
         }
@@ -341,10 +341,10 @@ mod tests {
     #[test]
     fn minutes_of_a_day_are_as_they_must_be() {
         let day = day(400.0, 5, |_| ()).unwrap();
-        eprintln!("{}\n{:?}", day.text(), day.visits);
+        eprintln!("{}\n{:?}", day.text(), day.episodes);
         assert_eq!(day.missed, [""; 0]);
-        assert!(day.visits.sound > 5 && day.visits.broken().came > 0);
-        let (known, right) = day.visits.known;
+        assert!(day.episodes.sound > 5 && day.episodes.broken().came > 0);
+        let (known, right) = day.episodes.known;
         assert!(right * 10 >= known * 9);
     }
 

@@ -5,21 +5,21 @@ use std::path::Path;
 use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::link::{Question, ReadTable};
+use tactus::link::{ReadTable, Request};
 use tactus::sim::collection::{calibrated, texture_name};
 use tactus_core::table::{Name, Table};
-use tactus_core::wire::{Ask, Counts, Forget, Report, Reset, Status, Tell};
+use tactus_core::wire::{Command, Counts, Event, Forget, Report, Reset, Status};
 
+use super::episodes::{HOMINGS, Plan, world};
 use super::hour_report::{Hour, HourError, Restart, missed};
-use super::visits::{HOMINGS, Plan, world};
 use crate::board::{Error, FlashWrite, Options, ResetCause, StackLayout};
 use crate::host::exploration::{Exploration, ExploreError, explore};
-use crate::host::talk::{PATIENCE_S, Talk, TalkError};
+use crate::host::talk::{TIMEOUT_S, Talk, TalkError};
 use crate::host::under_finger;
 
 /// Slots a second: the timer of the firmware's `acquire`.
 const SLOTS_HZ: f64 = 84e6 / 19_091.0;
-/// Something is forgotten after so many visits.
+/// A texture is deleted after so many episodes.
 const FORGETS_EVERY: u32 = 15;
 /// A firmware that hangs is reset within this, ns: 2 s until that is noticed, 8 s for the lever's whole way up, and the watchdog;
 /// looked for so often.
@@ -70,9 +70,9 @@ struct Ear {
 
 impl Ear {
     fn hear(&mut self, now_ns: u64, report: &Report) {
-        if let Tell::Booted {
+        if let Event::Booted {
             reset, last_words, ..
-        } = &report.tell
+        } = &report.event
         {
             let words = last_words.as_ref().map(|words| words.as_str().to_owned());
             self.booted.push((*reset, words));
@@ -111,7 +111,7 @@ struct Soak<'a> {
     each: &'a mut dyn FnMut(f64),
 }
 
-/// Visits texture after texture for so many virtual seconds on an emulated board; `each` hears of the time.
+/// Explores texture after texture for so many virtual seconds on an emulated board; `each` hears of the time.
 pub(super) fn hour(
     elf: &Path,
     virtual_s: f64,
@@ -136,13 +136,13 @@ pub(super) fn hour(
         each,
     };
     soak.ready()?;
-    let write = Question::write_calibration(&calibration).map_err(TalkError::from);
-    let written = write.and_then(|write| soak.talk.run(write, PATIENCE_S, |_, _| ()));
+    let write = Request::write_calibration(&calibration).map_err(TalkError::from);
+    let written = write.and_then(|write| soak.talk.run(write, TIMEOUT_S, |_, _| ()));
     soak.talked(written)?;
     let first = soak.tally()?;
     let mut stack = Vec::new();
     while soak.now_s() < virtual_s {
-        soak.visit()?;
+        soak.run_episode()?;
         let quarters = 4.0 * soak.now_s() / virtual_s;
         if quarters >= (stack.len() + 1) as f64 && stack.len() < 4 {
             stack.push(soak.stack()?);
@@ -183,9 +183,9 @@ impl Soak<'_> {
         Ok(used.map_or(0, |used| used.used))
     }
 
-    fn ask(&mut self, ask: Ask) -> Result<Result<(), String>, HourError> {
+    fn send(&mut self, command: Command) -> Result<Result<(), String>, HourError> {
         let ear = &mut self.ear;
-        let asked = self.talk.ask(ask, PATIENCE_S, |board, report| {
+        let asked = self.talk.send(command, TIMEOUT_S, |board, report| {
             if let Some(report) = report {
                 ear.hear(board.now_ns(), report);
             }
@@ -215,7 +215,7 @@ impl Soak<'_> {
     }
 
     fn status(&mut self) -> Result<Status, HourError> {
-        let status = self.talk.run(Question::status(), PATIENCE_S, |_, _| ());
+        let status = self.talk.run(Request::status(), TIMEOUT_S, |_, _| ());
         self.talked(status)
     }
 
@@ -255,7 +255,7 @@ impl Soak<'_> {
         waited?;
         let mut refused = String::new();
         for _ in 0..HOMINGS {
-            match self.ask(Ask::Home)? {
+            match self.send(Command::Home)? {
                 Ok(()) => return Ok(()),
                 Err(why) => refused = why,
             }
@@ -266,11 +266,11 @@ impl Soak<'_> {
     }
 
     /// An exploration of what the seed draws, and what is learned from it.
-    fn visit(&mut self) -> Result<(), HourError> {
+    fn run_episode(&mut self) -> Result<(), HourError> {
         let drawn = Plan::draw(&mut self.random);
         self.place(drawn.texture)?;
         let truth = texture_name(drawn.texture);
-        let read = self.talk.run(ReadTable::default(), PATIENCE_S, |_, _| ());
+        let read = self.talk.run(ReadTable::default(), TIMEOUT_S, |_, _| ());
         let bytes = self.talked(read)?;
         let before = self.tally()?;
         let resets = self.talk.board().resets()?.len();
@@ -278,7 +278,7 @@ impl Soak<'_> {
         if let Some((at_ns, fault)) = drawn.fault {
             self.talk.board().schedule(began_ns + at_ns, fault);
         }
-        self.hour.visits.made += 1;
+        self.hour.episodes.made += 1;
         let (ear, each) = (&mut self.ear, &mut self.each);
         let mut rejected = Vec::new();
         let explored = explore(
@@ -289,7 +289,7 @@ impl Soak<'_> {
             |board, report| match report {
                 Some(report) => {
                     ear.hear(board.now_ns(), report);
-                    if let Tell::Rejected { why, .. } = &report.tell {
+                    if let Event::Rejected { why, .. } = &report.event {
                         rejected.push(why.as_str().to_owned());
                     }
                 }
@@ -314,12 +314,12 @@ impl Soak<'_> {
             Err(why) => return Err(HourError::Explore { at_s, why }),
         };
         if let Some((_, fault)) = came {
-            self.hour.visits.broke(fault, explored.is_none());
+            self.hour.episodes.broke(fault, explored.is_none());
         } else {
             let rejected = rejected
                 .iter()
                 .map(|why| format!("{at_s:.0} s: {truth}: {why}"));
-            self.hour.visits.rejected.extend(rejected);
+            self.hour.episodes.rejected.extend(rejected);
         }
         if drawn.fault.is_some() || explored.is_none() {
             self.recover()?;
@@ -327,20 +327,20 @@ impl Soak<'_> {
         if let (Some(explored), None) = (explored, came) {
             self.sound(since(explored, &before, resets), &drawn, truth)?;
         }
-        if self.hour.visits.made.is_multiple_of(FORGETS_EVERY) {
+        if self.hour.episodes.made.is_multiple_of(FORGETS_EVERY) {
             self.forget(&bytes)?;
         }
         Ok(())
     }
 
-    /// A visit in which nothing broke.
+    /// An episode in which nothing broke.
     fn sound(&mut self, explored: Exploration, drawn: &Plan, truth: &str) -> Result<(), HourError> {
         let at_s = self.now_s();
         let found = &explored.found;
         let named = (!found.unknown).then_some(found.name.as_str());
-        let visits = &mut self.hour.visits;
-        visits.judge(at_s, truth, explored.known, named, found.sure);
-        visits.taught.1 += u32::from(found.learned > 0);
+        let episodes = &mut self.hour.episodes;
+        episodes.judge(at_s, truth, explored.known, named, found.sure);
+        episodes.learned.1 += u32::from(found.learned > 0);
         self.hour.missed_slots += explored.missed_slots() as u64;
         let missed = explored.missed().into_iter();
         let missed = missed.map(|what| format!("{at_s:.0} s: {truth}: {what}"));
@@ -348,9 +348,9 @@ impl Soak<'_> {
         // what it has learned by itself has changed the table: an answer would come too late
         if drawn.answer && found.learned == 0 {
             let name = Name::try_from(truth).unwrap_or_default();
-            let taught = self.talk.run(Question::answer(name), PATIENCE_S, |_, _| ());
-            match taught {
-                Ok(_) => self.hour.visits.taught.0 += 1,
+            let learned = self.talk.run(Request::label(name), TIMEOUT_S, |_, _| ());
+            match learned {
+                Ok(_) => self.hour.episodes.learned.0 += 1,
                 Err(TalkError::Refused(why)) => {
                     self.hour
                         .missed
@@ -366,12 +366,12 @@ impl Soak<'_> {
         let names: Vec<String> = Table::read(table)?.names().map(str::to_owned).collect();
         let name = names.choose(&mut self.random).map(String::as_str);
         let what = if self.random.random_range(0..3) == 0 {
-            Forget::SelfTaught
+            Forget::SelfLearned
         } else {
             Forget::Texture(name.unwrap_or_default().try_into().unwrap_or_default())
         };
-        match self.ask(Ask::Forget(what.clone()))? {
-            Ok(()) => self.hour.visits.forgotten += 1,
+        match self.send(Command::Forget(what.clone()))? {
+            Ok(()) => self.hour.episodes.forgotten += 1,
             Err(why) => self.hour.missed.push(format!("{what:?}: {why}")),
         }
         Ok(())
@@ -413,7 +413,7 @@ impl Soak<'_> {
             if self.status()?.table_crc != table {
                 self.hour.missed.push(format!("{what}: another table"));
             }
-            self.visit()?;
+            self.run_episode()?;
         }
         Ok(())
     }
@@ -471,7 +471,7 @@ mod tests {
         let report = |at_ms| Report {
             number: 0,
             at_ms,
-            tell: Tell::Done(1),
+            event: Event::Done(1),
         };
         let mut ear = Ear::default();
         let mut hear = |reports: &[(u64, u32)]| {

@@ -5,7 +5,7 @@ use tactus::sim::rig::SimError;
 use tactus_core::table::TableError;
 use tactus_core::wire::Reset;
 
-use super::visits::{MOST_N, Visits};
+use super::episodes::{Episodes, MOST_N};
 use crate::board::Error;
 use crate::host::exploration::ExploreError;
 use crate::host::talk::TalkError;
@@ -15,10 +15,10 @@ const SLOTS_OFF: f64 = 10.0;
 /// Reports say whole milliseconds, and are looked for every one.
 const DRIFT_MS: f64 = 2.0;
 /// Bytes by which the high-water mark may rise: the exception frames of two interrupts that came when the stack was deepest, which is
-/// a matter of luck. What leaks does so at every visit.
+/// a matter of luck. What leaks does so at every episode.
 const FRAMES: u32 = 2 * 108;
-/// Visits that an hour is for; of a shorter time, its share.
-const VISITS: f64 = 30.0;
+/// Explores that an hour is for; of a shorter time, its share.
+const EPISODES: f64 = 30.0;
 /// Why there is no hour to judge.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -66,8 +66,8 @@ pub struct Restart {
 pub struct Hour {
     /// Virtual seconds over one boot, before the restarts on purpose.
     pub virtual_s: f64,
-    /// The visits.
-    pub visits: Visits,
+    /// The episodes.
+    pub episodes: Episodes,
     /// How far the firmware's clock has gone from the emulator's, ms.
     pub drift_ms: f64,
     /// Slots by the firmware's count, by the time, and sample commands that the sensor got.
@@ -104,7 +104,7 @@ impl Hour {
                 "last_words": restart.last_words,
             })
         };
-        let mut json = self.visits.json();
+        let mut json = self.episodes.json();
         json["virtual_seconds"] = self.virtual_s.into();
         json["drift_ms"] = self.drift_ms.into();
         json["slots_firmware"] = self.slots.0.into();
@@ -135,7 +135,7 @@ impl Hour {
              late, {} missed, {} samples and {} reports lost\n  stack {} bytes at the quarters; {} sectors erased; force {:.3} N at most\n  \
              {} resets, all on purpose: {}",
             self.virtual_s / 3600.0,
-            self.visits.text(),
+            self.episodes.text(),
             self.drift_ms,
             self.slots.0,
             self.slots.1,
@@ -165,12 +165,12 @@ pub(super) fn missed(hour: &Hour, virtual_s: f64) -> Vec<String> {
             missed.push(what);
         }
     };
-    let wanted = VISITS * virtual_s / 3600.0;
+    let wanted = EPISODES * virtual_s / 3600.0;
     check(
-        f64::from(hour.visits.sound) >= wanted.floor(),
+        f64::from(hour.episodes.sound) >= wanted.floor(),
         format!(
-            "{} visits without a fault, {wanted:.0} wanted",
-            hour.visits.sound
+            "{} episodes without a fault, {wanted:.0} wanted",
+            hour.episodes.sound
         ),
     );
     check(
@@ -263,7 +263,7 @@ mod tests {
             force_max_n: 2.19,
             ..Hour::default()
         };
-        hour.visits.sound = 30;
+        hour.episodes.sound = 30;
         hour
     }
 
@@ -271,7 +271,7 @@ mod tests {
     fn every_bar_can_be_missed() {
         assert_eq!(missed(&good(), 3600.0), [""; 0]);
         let breaks: [fn(&mut Hour); 11] = [
-            |hour| hour.visits.sound = 29,
+            |hour| hour.episodes.sound = 29,
             |hour| hour.drift_ms = -2.1,
             |hour| hour.slots.0 -= 11,
             |hour| hour.late_slots = 1,

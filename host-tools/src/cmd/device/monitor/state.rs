@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use tactus_core::features::Movement;
 use tactus_core::table::Action;
-use tactus_core::wire::{Felt, Live, PROTOCOL, Phase, Report, Status, Tell};
+use tactus_core::wire::{Event, Live, PROTOCOL, Phase, Report, SlideReport, Status};
 
 use crate::cmd::device::bench::recovery;
 
@@ -50,7 +50,7 @@ pub(crate) struct Monitor {
     pub(crate) live: Option<Live>,
     pub(crate) pac: VecDeque<i16>,
     pub(crate) chosen: Option<Chosen>,
-    pub(crate) felt: Option<Felt>,
+    pub(crate) observed: Option<SlideReport>,
     pub(crate) posterior: Vec<f32>,
     pub(crate) answer: Option<String>,
     pub(crate) notes: VecDeque<Note>,
@@ -74,7 +74,7 @@ impl Monitor {
             live: None,
             pac: VecDeque::new(),
             chosen: None,
-            felt: None,
+            observed: None,
             posterior: Vec::new(),
             answer: None,
             notes: VecDeque::new(),
@@ -105,9 +105,9 @@ impl Monitor {
     /// Takes in a report.
     pub(crate) fn hear(&mut self, report: &Report) {
         self.at_ms = report.at_ms;
-        match &report.tell {
-            Tell::Status(status) => self.status = status.clone(),
-            Tell::Booted {
+        match &report.event {
+            Event::Status(status) => self.status = status.clone(),
+            Event::Booted {
                 protocol,
                 version,
                 reset,
@@ -124,7 +124,7 @@ impl Monitor {
                 }
                 self.note(Weight::Fault, note);
             }
-            Tell::Phase(phase) => {
+            Event::Phase(phase) => {
                 self.status.phase = *phase;
                 if *phase != Phase::Faulted {
                     self.status.fault = None;
@@ -133,38 +133,38 @@ impl Monitor {
                     self.live = None;
                 }
             }
-            Tell::Live(live) => self.live = Some(*live),
-            Tell::Fault(fault) => {
+            Event::Live(live) => self.live = Some(*live),
+            Event::Fault(fault) => {
                 self.status.fault = Some(*fault);
                 let recovery = recovery(fault);
                 self.note(Weight::Fault, format!("{fault}: {recovery} (key h)"));
             }
-            &Tell::Chosen {
+            &Event::Chosen {
                 slide,
                 movement,
                 action,
-                ref outlook,
+                ref expected,
             } => {
                 if slide == 1 {
                     self.posterior.clear();
                     self.answer = None;
-                    self.felt = None;
+                    self.observed = None;
                 }
-                let promise = outlook.iter().find(|promise| promise.action == action);
+                let outcome = expected.iter().find(|outcome| outcome.action == action);
                 self.chosen = Some(Chosen {
                     slide,
                     movement,
                     action,
-                    leaves: promise.map(|promise| promise.uncertainty),
+                    leaves: outcome.map(|outcome| outcome.uncertainty),
                 });
             }
-            Tell::Felt {
+            Event::SlideReport {
                 slide,
-                felt,
+                observed,
                 posterior,
                 ..
             } => {
-                self.felt = Some(felt.clone());
+                self.observed = Some(observed.clone());
                 self.posterior = posterior.to_vec();
                 if let Some((p, texture)) = self.ranked().first().copied() {
                     let (name, p) = (self.name(texture), p * 100.0);
@@ -172,10 +172,10 @@ impl Monitor {
                     self.note(Weight::Message, note);
                 }
             }
-            Tell::Rejected { slide, why } => {
+            Event::Rejected { slide, why } => {
                 self.note(Weight::Message, format!("slide {slide} is repeated: {why}"));
             }
-            Tell::Verdict {
+            Event::Verdict {
                 name,
                 probability,
                 sure,
@@ -198,7 +198,7 @@ impl Monitor {
                 self.answer = Some(answer);
                 self.note(Weight::Message, note);
             }
-            Tell::Taught {
+            Event::TextureLearned {
                 name,
                 slides,
                 itself,
@@ -207,7 +207,7 @@ impl Monitor {
                 let note = format!("it has learned {name} {whom}: {slides} slides");
                 self.note(Weight::Message, note);
             }
-            Tell::Block(block) => {
+            Event::Block(block) => {
                 if block.number == 0 {
                     self.pac.clear();
                 }
@@ -215,12 +215,12 @@ impl Monitor {
                 let over = self.pac.len().saturating_sub(SHOWN);
                 self.pac.drain(..over);
             }
-            Tell::Damaged(_)
-            | Tell::Done(_)
-            | Tell::Refused { .. }
-            | Tell::Learned { .. }
-            | Tell::Calibration(_)
-            | Tell::TablePart { .. } => {}
+            Event::Damaged(_)
+            | Event::Done(_)
+            | Event::Refused { .. }
+            | Event::TrainingSlide { .. }
+            | Event::Calibration(_)
+            | Event::TablePart { .. } => {}
         }
     }
 

@@ -5,7 +5,9 @@ use ratatui::backend::TestBackend;
 use tactus_core::features::{Block, Movement, Property};
 use tactus_core::rig::Fault;
 use tactus_core::table::Action;
-use tactus_core::wire::{Counts, Felt, Live, Phase, Promise, Report, Status, Tell, Text};
+use tactus_core::wire::{
+    Counts, Event, ExpectedOutcome, Live, Phase, Report, SlideReport, Status, Text,
+};
 
 use super::state::{Monitor, NOTES, SHOWN};
 use super::{is_gone, view};
@@ -25,15 +27,15 @@ fn status() -> Status {
 }
 
 /// A monitor that has heard these.
-fn heard(tells: impl IntoIterator<Item = Tell>) -> Monitor {
+fn heard(events: impl IntoIterator<Item = Event>) -> Monitor {
     let names = ["Burlap", "Oak wood", "Velcro", "Felt"].map(str::to_owned);
     let mut monitor = Monitor::new("/dev/ttyACM0", status(), names.to_vec());
-    for (tell, number) in tells.into_iter().zip(1u16..) {
+    for (event, number) in events.into_iter().zip(1u16..) {
         let at_ms = 1000 * u32::from(number);
         monitor.hear(&Report {
             number,
             at_ms,
-            tell,
+            event,
         });
     }
     monitor
@@ -54,17 +56,17 @@ fn screen(monitor: &Monitor, width: u16, height: u16) -> Vec<String> {
         .collect()
 }
 
-fn exploration() -> Vec<Tell> {
+fn exploration() -> Vec<Event> {
     let action = Action {
         movement: 0,
         property: Some(Property::Roughness),
     };
     vec![
-        Tell::Chosen {
+        Event::Chosen {
             slide: 1,
             movement: Movement::FOR_TRACTION,
             action,
-            outlook: [Promise {
+            expected: [ExpectedOutcome {
                 action,
                 uncertainty: 0.125,
                 benefit: 0.9,
@@ -72,11 +74,11 @@ fn exploration() -> Vec<Tell> {
             .into_iter()
             .collect(),
         },
-        Tell::Phase(Phase::Sliding),
-        Tell::Felt {
+        Event::Phase(Phase::Sliding),
+        Event::SlideReport {
             slide: 1,
             action,
-            felt: Felt {
+            observed: SlideReport {
                 properties: [Some(0.512), Some(5.25), None],
                 roughness_is_bound: false,
                 background: 1.0,
@@ -85,7 +87,7 @@ fn exploration() -> Vec<Tell> {
             },
             posterior: [0.05, 0.75, 0.15, 0.05].into_iter().collect(),
         },
-        Tell::Live(Live {
+        Event::Live(Live {
             force_mn: 1050,
             steps: 1600,
             stage_um: 31_250,
@@ -119,8 +121,8 @@ fn a_slide_looks_like_this() {
 
 #[test]
 fn an_answer_a_fault_and_silence_are_said_in_words() {
-    let mut tells = exploration();
-    tells.push(Tell::Verdict {
+    let mut events = exploration();
+    events.push(Event::Verdict {
         texture: 1,
         name: "Oak wood".try_into().unwrap(),
         probability: 0.995,
@@ -128,16 +130,16 @@ fn an_answer_a_fault_and_silence_are_said_in_words() {
         unknown: false,
         log_odds: None,
         slides: 1,
-        asks: false,
+        wants_label: false,
     });
-    let mut monitor = heard(tells.clone());
+    let mut monitor = heard(events.clone());
     assert!(
         screen(&monitor, 80, 24)
             .join("\n")
             .contains("it is Oak wood: 99.5 % after 1 slide")
     );
-    tells.push(Tell::Fault(Fault::EStop));
-    monitor = heard(tells);
+    events.push(Event::Fault(Fault::EStop));
+    monitor = heard(events);
     let faulted = screen(&monitor, 80, 24);
     assert!(
         faulted[0].ends_with("FAULT: emergency stop"),
@@ -155,7 +157,7 @@ fn an_answer_a_fault_and_silence_are_said_in_words() {
     monitor.hear(&Report {
         number: 9,
         at_ms: 9000,
-        tell: Tell::Phase(Phase::Homing),
+        event: Event::Phase(Phase::Homing),
     });
     assert_eq!(monitor.status.fault, None);
     // what is lost on the line stands where everybody looks
@@ -166,13 +168,13 @@ fn an_answer_a_fault_and_silence_are_said_in_words() {
 
 #[test]
 fn a_sine_is_a_peak_at_its_frequency() {
-    let mut tells = Vec::new();
+    let mut events = Vec::new();
     for number in 0..40u16 {
         let sample = |n: u16| {
             let t = f64::from(number * 64 + n) / 2200.0;
             (200.0 * (std::f64::consts::TAU * 100.0 * t).sin()) as i16
         };
-        tells.push(Tell::Block(Block {
+        events.push(Event::Block(Block {
             number,
             still: false,
             steady: None,
@@ -181,7 +183,7 @@ fn a_sine_is_a_peak_at_its_frequency() {
             lost: 0,
         }));
     }
-    let monitor = heard(tells);
+    let monitor = heard(events);
     assert_eq!(monitor.pac.len(), SHOWN);
     let screen = screen(&monitor, 80, 24);
     let cells = |line: &str| line.chars().collect::<Vec<char>>();
@@ -214,9 +216,9 @@ fn a_sine_is_a_peak_at_its_frequency() {
 
 #[test]
 fn any_size_of_terminal_is_drawn_on() {
-    let mut tells = exploration();
-    tells.extend((0..60).map(|n| {
-        Tell::Rejected {
+    let mut events = exploration();
+    events.extend((0..60).map(|n| {
+        Event::Rejected {
             slide: n,
             why: Text::try_from(
                 "a reason that is much too long for a narrow terminal, and goes on",
@@ -224,7 +226,7 @@ fn any_size_of_terminal_is_drawn_on() {
             .unwrap(),
         }
     }));
-    let monitor = heard(tells);
+    let monitor = heard(events);
     for (width, height) in [(1, 1), (10, 5), (40, 12), (80, 24), (140, 40), (300, 90)] {
         assert_eq!(screen(&monitor, width, height).len(), usize::from(height));
     }

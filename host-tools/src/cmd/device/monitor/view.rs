@@ -283,7 +283,7 @@ fn draw_slide(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
             leaves.map_or_else(Line::default, |leaves| Line::from(dim(leaves))),
         ]);
     }
-    if let Some(felt) = &monitor.felt {
+    if let Some(observed) = &monitor.observed {
         lines.push(Line::from(dim("last slide")));
         lines.extend(Property::ALL.map(|property| {
             let unit = if property == Property::Traction {
@@ -291,7 +291,7 @@ fn draw_slide(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
             } else {
                 ""
             };
-            let value = felt.properties().get(property);
+            let value = observed.properties().get(property);
             let value = value.map_or("     -".to_owned(), |value| format!("{value:6.3}{unit}"));
             let name = dim(format!("{:<10} ", property.name()));
             Line::from(vec![name, Span::from(value)])
@@ -307,7 +307,7 @@ fn draw_textures(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     if let Some(answer) = &monitor.answer {
         lines.push(Line::from(answer.clone()).bold());
     }
-    let room = usize::from(inner.height).saturating_sub(lines.len());
+    let buffer = usize::from(inner.height).saturating_sub(lines.len());
     let width = usize::from(inner.width);
     // a name may be cut, a bar too short says nothing
     let name_width = width.saturating_sub(18).clamp(8, 24);
@@ -322,7 +322,7 @@ fn draw_textures(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
         lines.push(Line::from(dim(hint)));
     }
     // the rest takes a line
-    let most = room.saturating_sub(usize::from(ranked.len() > room));
+    let most = buffer.saturating_sub(usize::from(ranked.len() > buffer));
     let worth = ranked.iter().filter(|(p, _)| *p >= WORTH_LISTING).count();
     let listed = worth.max(1).min(most).min(ranked.len());
     let (listed, others) = ranked.split_at(listed);
@@ -348,8 +348,8 @@ fn draw_textures(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
 
 fn draw_notes(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let block = panel(" Messages ");
-    let room = usize::from(block.inner(area).height);
-    let from = monitor.notes.len().saturating_sub(room);
+    let buffer = usize::from(block.inner(area).height);
+    let from = monitor.notes.len().saturating_sub(buffer);
     let lines: Vec<Line<'_>> = monitor
         .notes
         .iter()

@@ -14,7 +14,7 @@ fn bands(x: &Vector) -> Observation {
 }
 
 /// Three textures at two movements, learned from four slides each of a world that has five; and its whitenings.
-fn taught(noise: &mut Noise) -> (World, List<Whitening>, List<u8>) {
+fn world_and_table(noise: &mut Noise) -> (World, List<Whitening>, List<u8>) {
     let world = World::new(noise, 5, 2, 6);
     let mut slides = world.slides(noise, 4);
     slides.iter_mut().for_each(|textures| textures.truncate(3));
@@ -38,7 +38,7 @@ fn taught(noise: &mut Noise) -> (World, List<Whitening>, List<u8>) {
 fn a_new_texture_is_the_whitened_mean_of_its_slides() {
     for trials in 1..=5 {
         let noise = &mut Noise(trials.into());
-        let (world, whitenings, bytes) = taught(noise);
+        let (world, whitenings, bytes) = world_and_table(noise);
         let old = Table::read(&bytes).unwrap();
         let wanted = Wanted {
             trials,
@@ -47,13 +47,13 @@ fn a_new_texture_is_the_whitened_mean_of_its_slides() {
         };
         // a texture takes 13 bytes at each movement, 5 for itself, and its name
         let needed = bytes.len() + 2 * 13 + 5 + 1 + 4;
-        let room = Training::new(wanted, Some(&old), needed - 1).err();
-        assert_eq!(room, Some(TrainingError::Room(needed)));
+        let buffer = Training::new(wanted, Some(&old), needed - 1).err();
+        assert_eq!(buffer, Some(TrainingError::NoSpace(needed)));
         let mut training = Training::new(wanted, Some(&old), needed).unwrap();
         assert_eq!((training.table(), training.makes_table()), (None, true));
         assert_eq!(training.left(), 2 * u16::from(trials));
         let mut sums = [[0.0; 6]; 2];
-        let mut stored: List<Trained> = List::new();
+        let mut stored: List<TrainingRecord> = List::new();
         while let Some(movement) = training.next() {
             let at = old.movements().position(|m| m == movement).unwrap();
             let slide = world.slide(noise, 4, at);
@@ -64,7 +64,7 @@ fn a_new_texture_is_the_whitened_mean_of_its_slides() {
             let mut again = Training::new(wanted, Some(&old), needed).unwrap();
             for movement in old.movements() {
                 if let Some(last) = stored.iter().rev().find(|t| t.movement == movement) {
-                    again.resume(movement, last.lesson).unwrap();
+                    again.resume(movement, last.stats).unwrap();
                 }
             }
             assert_eq!(again.learned(), training.learned());
@@ -73,8 +73,8 @@ fn a_new_texture_is_the_whitened_mean_of_its_slides() {
         }
         assert_eq!(stored.len(), 2 * usize::from(trials));
         assert!(stored.iter().all(|t| t.table.is_none() && t.name == "felt"));
-        let mut room = vec![0; needed];
-        let new = training.encode(Some(&old), &mut room).unwrap();
+        let mut buffer = vec![0; needed];
+        let new = training.encode(Some(&old), &mut buffer).unwrap();
         assert_eq!(new.as_bytes().len(), needed);
         for (movement, sum) in (0..).zip(sums) {
             assert_eq!(new.trials(3, movement), trials);
@@ -105,7 +105,7 @@ fn a_new_texture_is_the_whitened_mean_of_its_slides() {
 #[test]
 fn a_known_fused_texture_goes_on_with_its_slides() {
     let noise = &mut Noise(99);
-    let (world, whitenings, bytes) = taught(noise);
+    let (world, whitenings, bytes) = world_and_table(noise);
     let old = Table::read(&bytes).unwrap();
     let wanted = Wanted {
         trials: 6,
@@ -113,7 +113,10 @@ fn a_known_fused_texture_goes_on_with_its_slides() {
     };
     let mut training = Training::new(wanted, Some(&old), 0).unwrap();
     assert_eq!((training.table(), training.left()), (Some(old.crc()), 4));
-    assert_eq!(training.learned()[1].1, Lesson::Fused(old.whitened(1, 1)));
+    assert_eq!(
+        training.learned()[1].1,
+        TrainingStats::Fused(old.whitened(1, 1))
+    );
     let mut sums = [0, 1].map(|m| {
         let mean = old.whitened(1, m).mean;
         mean.map(|m| 4.0 * f64::from(m))
@@ -127,8 +130,8 @@ fn a_known_fused_texture_goes_on_with_its_slides() {
         let stored = training.took(Some(&old), movement, &bands(&slide)).unwrap();
         assert_eq!(stored.table, Some(old.crc()));
     }
-    let mut room = vec![0; 4096];
-    let new = training.encode(Some(&old), &mut room).unwrap();
+    let mut buffer = vec![0; 4096];
+    let new = training.encode(Some(&old), &mut buffer).unwrap();
     assert!(new.names().eq(old.names()));
     for (movement, sum) in (0..).zip(sums) {
         assert_eq!(new.trials(1, movement), 6);
@@ -173,36 +176,36 @@ fn what_no_fused_table_can_take_is_refused() {
     let mut training = Training::new(wanted("felt"), Some(&old), 4096).unwrap();
     let movement = training.next().unwrap();
     let before = training.learned().to_vec();
-    let traction_only = felt(0.5);
+    let traction_only = observation(0.5);
     assert_eq!(
         training.took(Some(&old), movement, &traction_only),
         Err(missing)
     );
     let whole = Observation {
         bands: heapless::Vec::from_slice(&[5; 12]).unwrap(),
-        ..felt(0.5)
+        ..observation(0.5)
     };
     assert_eq!(
         training.took(None, movement, &whole),
         Err(missing),
         "nothing to whiten with"
     );
-    let gaussians = Lesson::Gaussians(Experience::default());
+    let gaussians = TrainingStats::Gaussians(Experience::default());
     assert_eq!(
         training.resume(movement, gaussians),
-        Err(TrainingError::Lesson)
+        Err(TrainingError::Stats)
     );
     assert_eq!(training.learned(), before);
     let stored = training.took(Some(&old), movement, &whole).unwrap();
-    assert_eq!(stored.lesson.trials(), 1);
+    assert_eq!(stored.stats.trials(), 1);
     // nor does a table of Gaussians take what is whitened
     let gaussians = table(2);
     let gaussians = Table::read(&gaussians).unwrap();
     let mut other = Training::new(wanted("felt"), Some(&gaussians), 4096).unwrap();
     let movement = other.next().unwrap();
     assert_eq!(
-        other.resume(movement, stored.lesson),
-        Err(TrainingError::Lesson)
+        other.resume(movement, stored.stats),
+        Err(TrainingError::Stats)
     );
     // a pilot beside a fused table is about properties
     let pilot = Wanted {
@@ -212,5 +215,5 @@ fn what_no_fused_table_can_take_is_refused() {
     let mut pilot = Training::new(pilot, Some(&old), 0).unwrap();
     assert!(!pilot.makes_table());
     assert_eq!(train(&mut pilot).len(), 90);
-    assert!(matches!(pilot.learned()[0].1, Lesson::Gaussians(_)));
+    assert!(matches!(pilot.learned()[0].1, TrainingStats::Gaussians(_)));
 }

@@ -1,6 +1,6 @@
-//! What the day and the hour share: visits, drawn by the seed, and what becomes of them.
+//! What the day and the hour share: episodes, drawn by the seed, and what becomes of them.
 //!
-//! Both visit texture after texture; they are taught, they forget, and in every fourth visit something breaks. What lies under the
+//! Both explore texture after texture; the probe learns and deletes textures, and in every fourth episode something breaks. What lies under the
 //! finger, when what breaks, and what is learned is the seed's.
 
 use std::collections::BTreeMap;
@@ -17,9 +17,9 @@ use crate::host::exploration::among_all;
 
 /// More force than this is never on the finger, N: see the guard of the core's `rig`.
 pub const MOST_N: f64 = 2.2;
-/// A visit with a fault among so many.
+/// An episode with a fault among so many.
 const FAULTS_IN: u32 = 4;
-/// A visit takes some 15 s: when what breaks does so, ns after it began.
+/// An episode takes some 15 s: when what breaks does so, ns after it began.
 const LATEST_NS: u64 = 15_000_000_000;
 /// A rig is asked to home so often once its fault is gone.
 pub(super) const HOMINGS: usize = 3;
@@ -36,11 +36,11 @@ pub(super) fn world() -> Collection {
 /// The table that comes with the firmware.
 pub(super) const FACTORY: &[u8] = include_bytes!("../../../../../firmware/factory.tact");
 
-/// What the seed draws for a visit.
+/// What the seed draws for an episode.
 pub(super) struct Plan {
     pub(super) texture: u8,
     pub(super) identify: Identify,
-    /// What breaks, and when, ns after the visit began.
+    /// What breaks, and when, ns after the episode began.
     pub(super) fault: Option<(u64, Fault)>,
     /// The probe is told what lay there.
     pub(super) answer: bool,
@@ -64,9 +64,9 @@ impl Plan {
     }
 }
 
-/// What became of visits.
+/// What became of episodes.
 #[derive(Clone, Debug, Default)]
-pub struct Visits {
+pub struct Episodes {
     /// Explorations that were begun.
     pub made: u32,
     /// Those in which nothing broke.
@@ -79,11 +79,11 @@ pub struct Visits {
     pub wrong: Vec<String>,
     /// Wrong verdicts of which the probe was sure, on textures that it knew and on others.
     pub sure_and_wrong: (u32, u32),
-    /// Slides that were made again, and why, in visits in which nothing broke.
+    /// Slides that were made again, and why, in episodes in which nothing broke.
     pub rejected: Vec<String>,
-    /// Textures that were taught, by the user and by the probe itself.
-    pub taught: (u32, u32),
-    /// What was forgotten.
+    /// Textures that were learned, from the user and by the probe itself.
+    pub learned: (u32, u32),
+    /// What was deleted.
     pub forgotten: u32,
     /// What broke, by its name.
     pub faults: BTreeMap<String, Broken>,
@@ -94,11 +94,11 @@ pub struct Visits {
 pub struct Broken {
     /// How often it came.
     pub came: u32,
-    /// It ended the visit.
+    /// It ended the episode.
     pub noticed: u32,
 }
 
-impl Visits {
+impl Episodes {
     /// Takes a verdict in: the texture that was named, unless it is said to be unknown, and whether the probe is sure.
     pub(super) fn judge(
         &mut self,
@@ -156,14 +156,14 @@ impl Visits {
             )
         };
         json!({
-            "visits": self.made,
+            "episodes": self.made,
             "without_fault": self.sound,
-            "known": { "visits": self.known.0, "right": self.known.1, "sure_and_wrong": self.sure_and_wrong.0 },
-            "forgotten": { "visits": self.unknown.0, "noticed": self.unknown.1, "sure_and_wrong": self.sure_and_wrong.1 },
+            "known": { "episodes": self.known.0, "right": self.known.1, "sure_and_wrong": self.sure_and_wrong.0 },
+            "forgotten": { "episodes": self.unknown.0, "noticed": self.unknown.1, "sure_and_wrong": self.sure_and_wrong.1 },
             "wrong": self.wrong,
             "slides_rejected": self.rejected,
-            "taught": self.taught.0,
-            "taught_itself": self.taught.1,
+            "labelled": self.learned.0,
+            "self_learned": self.learned.1,
             "forgot": self.forgotten,
             "faults": self.faults.iter().map(kind).collect::<serde_json::Map<_, _>>(),
         })
@@ -173,8 +173,8 @@ impl Visits {
     pub fn text(&self) -> String {
         let broken = self.broken();
         format!(
-            "{} visits, {} without a fault; of textures that it knew {} of {} right, {} wrong though sure; of those it had forgotten {} \
-             of {} noticed, {} wrong though sure; {} slides made again\n  {} faults, {} ended the visit; taught {} times, itself {} \
+            "{} episodes, {} without a fault; of textures that it knew {} of {} right, {} wrong though sure; of those it had forgotten {} \
+             of {} noticed, {} wrong though sure; {} slides made again\n  {} faults, {} ended the episode; {} textures learned from the user, {} by itself \
              times, forgot {} times",
             self.made,
             self.sound,
@@ -187,8 +187,8 @@ impl Visits {
             self.rejected.len(),
             broken.came,
             broken.noticed,
-            self.taught.0,
-            self.taught.1,
+            self.learned.0,
+            self.learned.1,
             self.forgotten
         )
     }
@@ -202,28 +202,28 @@ mod tests {
 
     #[test]
     fn an_unknown_texture_is_right_only_where_the_table_lacks_it() {
-        let mut visits = Visits::default();
-        visits.judge(1.0, "elm", true, Some("elm"), true);
-        visits.judge(2.0, "elm", false, None, false);
-        assert_eq!(visits.wrong, [""; 0]);
-        visits.judge(3.0, "elm", true, None, false);
-        visits.judge(4.0, "elm", true, Some("oak"), true);
-        visits.judge(5.0, "elm", false, Some("oak"), true);
-        assert_eq!((visits.known, visits.unknown), ((3, 1), (2, 1)));
-        assert_eq!(visits.sure_and_wrong, (1, 1));
-        assert!(visits.wrong[1].contains("elm was surely taken for oak"));
-        assert!(visits.wrong[2].contains("forgotten"));
+        let mut episodes = Episodes::default();
+        episodes.judge(1.0, "elm", true, Some("elm"), true);
+        episodes.judge(2.0, "elm", false, None, false);
+        assert_eq!(episodes.wrong, [""; 0]);
+        episodes.judge(3.0, "elm", true, None, false);
+        episodes.judge(4.0, "elm", true, Some("oak"), true);
+        episodes.judge(5.0, "elm", false, Some("oak"), true);
+        assert_eq!((episodes.known, episodes.unknown), ((3, 1), (2, 1)));
+        assert_eq!(episodes.sure_and_wrong, (1, 1));
+        assert!(episodes.wrong[1].contains("elm was surely taken for oak"));
+        assert!(episodes.wrong[2].contains("forgotten"));
     }
 
     #[test]
-    fn a_quarter_of_the_visits_breaks_and_every_fault_comes() {
+    fn a_quarter_of_the_episodes_breaks_and_every_fault_comes() {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let plans: Vec<Plan> = (0..2000).map(|_| Plan::draw(&mut random)).collect();
-        let mut visits = Visits::default();
+        let mut episodes = Episodes::default();
         for (_, fault) in plans.iter().filter_map(|plan| plan.fault) {
-            visits.broke(fault, true);
+            episodes.broke(fault, true);
         }
-        assert!((400..600).contains(&visits.broken().came));
-        assert_eq!(visits.faults.len(), Fault::EXAMPLES.len());
+        assert!((400..600).contains(&episodes.broken().came));
+        assert_eq!(episodes.faults.len(), Fault::EXAMPLES.len());
     }
 }
