@@ -9,8 +9,16 @@
 //!
 //! What is not seen: methods of other values than `self`, names that macros make up, paths in documentation.
 
+mod house;
 mod names;
 mod planted;
 mod rules;
 mod source;
 mod uses;
+
+#[test]
+fn the_house_is_in_order() {
+    let here = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let faults = rules::faults(here.parent().unwrap(), &house::PACKAGES);
+    assert!(faults.is_empty(), "\n{}\n", faults.join("\n"));
+}

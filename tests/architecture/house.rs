@@ -1,0 +1,66 @@
+//! The rooms of every package, in their order.
+
+use crate::rules::Package;
+
+pub(crate) const PACKAGES: [Package; 5] = [
+    Package {
+        folder: "shared",
+        steps: &[
+            &["sensor"],
+            &["dsp"],
+            &["features"],
+            &["table"],
+            &["explorer"],
+            &["rig"],
+            &["store"],
+            &["wire"],
+            &["probe"],
+            &["handheld"],
+        ],
+        strangers: &[("explorer", "rig"), ("store", "wire")],
+        outside: &["lib"],
+    },
+    Package {
+        folder: "host-tools",
+        steps: &[
+            &["data"],
+            &["eval"],
+            &["sim"],
+            &["study"],
+            &["link"],
+            &["cmd"],
+        ],
+        // the link knows the core only
+        strangers: &[
+            ("link", "data"),
+            ("link", "eval"),
+            ("link", "sim"),
+            ("link", "study"),
+        ],
+        outside: &["lib", "main"],
+    },
+    Package {
+        folder: "firmware",
+        // an image knows no other image
+        steps: &[
+            &["board"],
+            &["chip"],
+            &["tasks"],
+            &["bench", "selftest", "handheld", "rig"],
+        ],
+        strangers: &[],
+        outside: &["lib", "bin"],
+    },
+    Package {
+        folder: "host-tools/emulator",
+        steps: &[&["board"], &["host"], &["scenario"], &["runs"]],
+        strangers: &[],
+        outside: &["lib", "main"],
+    },
+    Package {
+        folder: "host-tools/xtask",
+        steps: &[],
+        strangers: &[],
+        outside: &[],
+    },
+];
