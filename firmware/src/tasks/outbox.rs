@@ -16,11 +16,11 @@ pub(crate) static LOST_REPORTS: AtomicU32 = AtomicU32::new(0);
 pub(crate) static STREAM: AtomicBool = AtomicBool::new(false);
 
 /// Tells the host. What does not fit is lost, and counted; it leaves a gap in the numbers.
-pub(crate) fn tell(tell: Event) {
+pub(crate) fn tell(event: Event) {
     let report = Report {
         number: NUMBER.fetch_add(1, Relaxed),
         at_ms: Instant::now().as_millis() as u32,
-        tell,
+        event,
     };
     let mut buffer = [0; MAX_FRAME + 1];
     let sent = wire::encode(&report, &mut buffer).is_ok_and(|mut frame| {
