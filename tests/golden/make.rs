@@ -25,7 +25,7 @@ use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::guard::Fault;
 use tactus_core::rig::skin::SkinCare;
 use tactus_core::session;
-use tactus_core::store::{SECTORS, SelfLearnedRecord, Store, Trained};
+use tactus_core::store::{SECTORS, SelfTaught, Store, Trained};
 use tactus_core::table::{Action, Contents, Experience, Table};
 use tactus_core::teaching;
 use tactus_core::training::Lesson;
@@ -67,28 +67,28 @@ fn lines<M: Serialize>(out: &Path, name: &str, messages: Vec<M>) {
 
 fn requests() -> Vec<Request> {
     // a message that is not listed does not compile
-    let number = |ask: &Command| match ask {
-        Command::Status => 0,
-        Command::Home => 1,
-        Command::Stop => 2,
-        Command::Identify(_) => 3,
-        Command::Label(_) => 4,
-        Command::Train(_) => 5,
-        Command::Rename { .. } => 6,
-        Command::Forget(Forget::Texture(_) | Forget::SelfLearned | Forget::Training(_)) => 7,
-        Command::Calibrate => 8,
-        Command::ReadCalibration => 9,
-        Command::WriteCalibration(_) => 10,
-        Command::Stream(_) => 11,
-        Command::ReadTable(_) => 12,
-        Command::BeginTable(_) => 13,
-        Command::WriteTable { .. } => 14,
-        Command::CommitTable => 15,
-        Command::FactoryTable => 16,
+    let number = |ask: &Ask| match ask {
+        Ask::Status => 0,
+        Ask::Home => 1,
+        Ask::Stop => 2,
+        Ask::Identify(_) => 3,
+        Ask::Answer(_) => 4,
+        Ask::Train(_) => 5,
+        Ask::Rename { .. } => 6,
+        Ask::Forget(Forget::Texture(_) | Forget::SelfTaught | Forget::Training(_)) => 7,
+        Ask::Calibrate => 8,
+        Ask::ReadCalibration => 9,
+        Ask::WriteCalibration(_) => 10,
+        Ask::Stream(_) => 11,
+        Ask::ReadTable(_) => 12,
+        Ask::BeginTable(_) => 13,
+        Ask::WriteTable { .. } => 14,
+        Ask::CommitTable => 15,
+        Ask::FactoryTable => 16,
     };
     let name = |name: &str| Name::try_from(name).unwrap();
     let bytes = |n: u8| (0..n).collect::<Vec<u8>>();
-    let mut wants_label = vec![Command::Status, Command::Home, Command::Stop];
+    let mut asks = vec![Ask::Status, Ask::Home, Ask::Stop];
     let methods = [
         None,
         Some(Method::Paper),
@@ -99,7 +99,7 @@ fn requests() -> Vec<Request> {
     for method in methods {
         for strategy in [Strategy::Bayesian, Strategy::Cycling, Strategy::Random] {
             let among: &[u16] = if method.is_some() { &[0, 116, 300] } else { &[] };
-            wants_label.push(Command::Identify(Identify {
+            asks.push(Ask::Identify(Identify {
                 among: heapless(among),
                 threshold: 0.99,
                 max_slides: 10,
@@ -111,40 +111,40 @@ fn requests() -> Vec<Request> {
             }));
         }
     }
-    wants_label.extend([
-        Command::Label(name("Bath towel")),
-        Command::Train(Train {
+    asks.extend([
+        Ask::Answer(name("Bath towel")),
+        Ask::Train(Train {
             name: name("Körnerbrot"),
             trials: 5,
             pilot: true,
             seed: 7,
         }),
-        Command::Rename {
+        Ask::Rename {
             from: name("a"),
             to: name("another name of forty bytes, not one more"[..40].trim_end()),
         },
-        Command::Forget(Forget::Texture(name("cork"))),
-        Command::Forget(Forget::SelfLearned),
-        Command::Forget(Forget::Training(name("felt"))),
-        Command::Calibrate,
-        Command::ReadCalibration,
-        Command::WriteCalibration(heapless(&bytes(60))),
-        Command::Stream(true),
-        Command::Stream(false),
-        Command::ReadTable(256),
-        Command::BeginTable(12_816),
-        Command::WriteTable {
+        Ask::Forget(Forget::Texture(name("cork"))),
+        Ask::Forget(Forget::SelfTaught),
+        Ask::Forget(Forget::Training(name("felt"))),
+        Ask::Calibrate,
+        Ask::ReadCalibration,
+        Ask::WriteCalibration(heapless(&bytes(60))),
+        Ask::Stream(true),
+        Ask::Stream(false),
+        Ask::ReadTable(256),
+        Ask::BeginTable(12_816),
+        Ask::WriteTable {
             offset: 512,
             bytes: heapless(&bytes(17)),
         },
-        Command::CommitTable,
-        Command::FactoryTable,
+        Ask::CommitTable,
+        Ask::FactoryTable,
     ]);
-    let mut kinds: Vec<u8> = wants_label.iter().map(number).collect();
+    let mut kinds: Vec<u8> = asks.iter().map(number).collect();
     kinds.dedup();
     assert!(kinds.into_iter().eq(0..17), "all of them, in their order");
     let ids = [0, 1, 127, 128, 65_535].into_iter().cycle();
-    let requests = wants_label.into_iter().zip(ids);
+    let requests = asks.into_iter().zip(ids);
     requests.map(|(ask, id)| Request { id, ask }).collect()
 }
 
@@ -187,28 +187,28 @@ const PHASES: [Phase; 10] = [
 ];
 
 fn reports() -> Vec<Report> {
-    let number = |tell: &Event| match tell {
-        Event::Booted { .. } => 0,
-        Event::Status(_) => 1,
-        Event::Done(_) => 2,
-        Event::Refused { .. } => 3,
-        Event::Damaged(_) => 4,
-        Event::Phase(_) => 5,
-        Event::Chosen { .. } => 6,
-        Event::SlideReport { .. } => 7,
-        Event::Rejected { .. } => 8,
-        Event::Verdict { .. } => 9,
-        Event::TextureLearned { .. } => 10,
-        Event::TrainingSlide { .. } => 11,
-        Event::Live(_) => 12,
-        Event::Fault(_) => 13,
-        Event::Block(_) => 14,
-        Event::Calibration(_) => 15,
-        Event::TablePart { .. } => 16,
+    let number = |tell: &Tell| match tell {
+        Tell::Booted { .. } => 0,
+        Tell::Status(_) => 1,
+        Tell::Done(_) => 2,
+        Tell::Refused { .. } => 3,
+        Tell::Damaged(_) => 4,
+        Tell::Phase(_) => 5,
+        Tell::Chosen { .. } => 6,
+        Tell::Felt { .. } => 7,
+        Tell::Rejected { .. } => 8,
+        Tell::Verdict { .. } => 9,
+        Tell::Taught { .. } => 10,
+        Tell::Learned { .. } => 11,
+        Tell::Live(_) => 12,
+        Tell::Fault(_) => 13,
+        Tell::Block(_) => 14,
+        Tell::Calibration(_) => 15,
+        Tell::TablePart { .. } => 16,
     };
     let name = |name: &str| Name::try_from(name).unwrap();
     let text = |text: &str| Text::try_from(text).unwrap();
-    let observed = |bound: bool| SlideReport {
+    let felt = |bound: bool| Felt {
         properties: [(!bound).then_some(0.963), Some(7.298), Some(-2.5)],
         roughness_is_bound: bound,
         background: 2.2,
@@ -221,7 +221,7 @@ fn reports() -> Vec<Report> {
         Some(Property::Roughness),
         Some(Property::Fineness),
     ];
-    let mut events = Vec::new();
+    let mut tells = Vec::new();
     let resets = [
         Reset::Power,
         Reset::Pin,
@@ -231,7 +231,7 @@ fn reports() -> Vec<Report> {
     ];
     for reset in resets {
         let last_words = (reset == Reset::Software).then(|| text("panicked: the \"stage\""));
-        events.push(Event::Booted {
+        tells.push(Tell::Booted {
             protocol: PROTOCOL,
             version: "0.1.0".try_into().unwrap(),
             reset,
@@ -239,7 +239,7 @@ fn reports() -> Vec<Report> {
         });
     }
     for (phase, fault) in PHASES.into_iter().zip([None, Some(Fault::StageOff)].into_iter().cycle()) {
-        events.push(Event::Status(Status {
+        tells.push(Tell::Status(Status {
             phase,
             fault,
             textures: 117,
@@ -259,43 +259,43 @@ fn reports() -> Vec<Report> {
             skin_mj: (1500, 250),
         }));
     }
-    events.extend([
-        Event::Done(128),
-        Event::Refused {
+    tells.extend([
+        Tell::Done(128),
+        Tell::Refused {
             id: 3,
             why: text("busy: wait, or stop what is being done"),
         },
-        Event::Damaged(9),
+        Tell::Damaged(9),
     ]);
-    events.extend(PHASES.map(Event::Phase));
+    tells.extend(PHASES.map(Tell::Phase));
     for (property, movement) in properties.into_iter().zip(0..) {
         let action = Action { movement, property };
-        let outcome = ExpectedOutcome {
+        let promise = Promise {
             action,
             uncertainty: 0.566,
             benefit: 1.25,
         };
-        events.push(Event::Chosen {
+        tells.push(Tell::Chosen {
             slide: 1,
             movement: Movement::FOR_TRACTION,
             action,
-            expected: heapless(&vec![outcome; usize::from(movement)]),
+            outlook: heapless(&vec![promise; usize::from(movement)]),
         });
     }
     for (property, movement) in properties.into_iter().zip(0..) {
-        events.push(Event::SlideReport {
+        tells.push(Tell::Felt {
             slide: 2,
             action: Action { movement, property },
-            observed: observed(movement == 1),
+            felt: felt(movement == 1),
             posterior: heapless(&[0.0, 0.553, 0.0, 0.444, 0.0, 0.003][usize::from(movement)..]),
         });
     }
-    events.push(Event::Rejected {
+    tells.push(Tell::Rejected {
         slide: 2,
         why: text("the slide is too short"),
     });
     for log_odds in [None, Some(-12.5)] {
-        events.push(Event::Verdict {
+        tells.push(Tell::Verdict {
             texture: 46,
             name: name("Polyester felt"),
             probability: 0.998,
@@ -303,32 +303,32 @@ fn reports() -> Vec<Report> {
             unknown: log_odds.is_some(),
             log_odds,
             slides: 2,
-            wants_label: log_odds.is_some(),
+            asks: log_odds.is_some(),
         });
     }
     for itself in [false, true] {
-        events.push(Event::TextureLearned {
+        tells.push(Tell::Taught {
             name: name("cork"),
             slides: 3,
             itself,
         });
     }
-    events.push(Event::TrainingSlide {
+    tells.push(Tell::Learned {
         movement: Movement::FOR_ROUGHNESS,
         trial: 4,
         left: 11,
-        observed: observed(false),
+        felt: felt(false),
     });
-    events.push(Event::Live(Live {
+    tells.push(Tell::Live(Live {
         force_mn: -20,
         steps: -1500,
         stage_um: 12_345,
         speed_um_s: -10_000,
         current_ma: 250,
     }));
-    events.extend(FAULTS.map(Event::Fault));
+    tells.extend(FAULTS.map(Tell::Fault));
     for steady in [None, Some((110, 2310))] {
-        events.push(Event::Block(Block {
+        tells.push(Tell::Block(Block {
             number: 5,
             still: steady.is_none(),
             steady,
@@ -337,17 +337,17 @@ fn reports() -> Vec<Report> {
             lost: 3,
         }));
     }
-    events.push(Event::Calibration(heapless(&(0..60).collect::<Vec<u8>>())));
-    events.push(Event::TablePart {
+    tells.push(Tell::Calibration(heapless(&(0..60).collect::<Vec<u8>>())));
+    tells.push(Tell::TablePart {
         offset: 256,
         length: 12_816,
         bytes: heapless(&(0..PART).map(|n| n as u8).collect::<Vec<u8>>()),
     });
-    let mut kinds: Vec<u8> = events.iter().map(number).collect();
+    let mut kinds: Vec<u8> = tells.iter().map(number).collect();
     kinds.dedup();
     assert!(kinds.into_iter().eq(0..17), "all of them, in their order");
     let numbers = [0, 1, 127, 128, 65_535].into_iter().cycle();
-    let reports = events.into_iter().zip(numbers);
+    let reports = tells.into_iter().zip(numbers);
     let reports = reports.map(|(tell, number)| Report {
         number,
         at_ms: u32::from(number) * 1000,
@@ -364,8 +364,8 @@ fn tables(out: &Path, world: &Collection, calibration: RigCalibration) {
         .iter()
         .map(|slides| {
             let of = |movement| slides.iter().filter(move |slide| slide.movement == movement);
-            let observed = |movement| of(movement).map(|slide| (&measure(&plan, slide).unwrap()).into());
-            Collection::MOVEMENTS.map(|movement| observed(movement).collect()).to_vec()
+            let felt = |movement| of(movement).map(|slide| (&measure(&plan, slide).unwrap()).into());
+            Collection::MOVEMENTS.map(|movement| felt(movement).collect()).to_vec()
         })
         .collect();
     let movements = Collection::MOVEMENTS;
@@ -553,21 +553,21 @@ fn stores(out: &Path, world: &Collection, calibration: RigCalibration) {
             let bytes = base(store);
             let table = Table::read(&bytes).unwrap();
             let mut rig = rig(world, texture, calibration, slides);
-            let mut buffer = vec![0; SECTOR];
+            let mut room = vec![0; SECTOR];
             let done = session::train::<_, _, Plain>(
-                wanted, &mut rig, store, table, &plan, &mut buffer, |_| (),
+                wanted, &mut rig, store, table, &plan, &mut room, |_| (),
             );
             println!("{kind}, {}: {:?}", wanted.name, block_on(done));
         };
         // finished: a table with a fourth texture
         train(&mut store, 47, 100, &wanted("a trained one", 2, false));
-        // an episode that the probe learns from, and one that the user answers
+        // a visit that the probe learns from, and one that the user answers
         for (texture, answer) in [(10, None), (100, None), (47, Some("an answer")), (10, Some("Bath towel"))] {
             let bytes = base(&mut store);
             let table = Table::read(&bytes).unwrap();
-            let mut buffer = vec![0; SECTOR];
-            block_on(teaching::put_in_force(&table, Some(&mut store), &mut buffer)).unwrap();
-            let in_force = buffer.clone();
+            let mut room = vec![0; SECTOR];
+            block_on(teaching::put_in_force(&table, Some(&mut store), &mut room)).unwrap();
+            let in_force = room.clone();
             let identify = Identify {
                 among: heapless(&[]),
                 threshold: 0.99,
@@ -579,7 +579,7 @@ fn stores(out: &Path, world: &Collection, calibration: RigCalibration) {
                 seed: 3,
             };
             let mut rig = rig(world, texture, calibration, 100);
-            let episode = block_on(session::identify::<_, Plain>(
+            let visited = block_on(session::identify::<_, Plain>(
                 &identify,
                 &mut rig,
                 Table::read(&in_force).unwrap(),
@@ -588,11 +588,11 @@ fn stores(out: &Path, world: &Collection, calibration: RigCalibration) {
             ))
             .unwrap();
             let told = match answer {
-                None => block_on(teaching::learn_by_itself(&episode, &mut store, &mut buffer)),
+                None => block_on(teaching::learn_by_itself(&visited, &mut store, &mut room)),
                 Some(name) => {
                     let name = if texture == 10 { table.name(0).unwrap() } else { name };
-                    let learned = teaching::answer(&episode, name, &table, &mut store, &mut buffer);
-                    block_on(learned).map(Some)
+                    let taught = teaching::answer(&visited, name, &table, &mut store, &mut room);
+                    block_on(taught).map(Some)
                 }
             };
             println!("{kind}, texture {texture}: {told:?}");
@@ -610,14 +610,14 @@ fn stores(out: &Path, world: &Collection, calibration: RigCalibration) {
             table: None,
             lesson: Lesson::Gaussians(extra),
         };
-        block_on(store.set_training_record(&record)).unwrap();
+        block_on(store.set_trained(&record)).unwrap();
         let crc = Table::read(&table).unwrap().crc();
         let lineage = Table::read(&table).unwrap().lineage();
         let mut trained = Vec::new();
         for name in ["unfinished", "a pilot", "of its own", "a trained one"] {
             for table in [None, Some(crc)] {
                 for movement in Movement::grid().chain(Collection::MOVEMENTS) {
-                    let found = block_on(store.training_record(name, movement, table)).unwrap();
+                    let found = block_on(store.trained(name, movement, table)).unwrap();
                     if let Some(lesson) = found {
                         let known = json!([name, movement, table, frame(&lesson)]);
                         if !trained.contains(&known) {
@@ -627,9 +627,9 @@ fn stores(out: &Path, world: &Collection, calibration: RigCalibration) {
                 }
             }
         }
-        let mut self_learned = Vec::new();
-        let mut each = |record: SelfLearnedRecord| self_learned.push(frame(&record));
-        block_on(store.self_learned(lineage, &mut each)).unwrap();
+        let mut self_taught = Vec::new();
+        let mut each = |record: SelfTaught| self_taught.push(frame(&record));
+        block_on(store.self_taught(lineage, &mut each)).unwrap();
         let mut in_force = vec![0; SECTOR];
         let base = Table::read(&table).unwrap();
         let length = block_on(teaching::put_in_force(&base, Some(&mut store), &mut in_force)).unwrap();
@@ -643,7 +643,7 @@ fn stores(out: &Path, world: &Collection, calibration: RigCalibration) {
             "table": hex(&table),
             "in_force": hex(&in_force[..length]),
             "trained": trained,
-            "self_taught": self_learned,
+            "self_taught": self_taught,
         });
         let holds = serde_json::to_string(&holds).unwrap().replace(",\"", ",\n\"");
         fs::write(out.join(format!("store-{kind}.json")), holds + "\n").unwrap();
