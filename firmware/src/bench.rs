@@ -1,5 +1,5 @@
-//! The bench image: does the host's workloads and counts their instructions by the core's cycle counter, which on the emulated
-//! board counts one for each. No task, no interrupt: what is counted is the core's code as the rig's image has it.
+//! The bench image: does the host's workloads and counts their instructions by the core's cycle counter, which on the
+//! emulated board counts one for each. No task, no interrupt: what is counted is the core's code as the rig's image has it.
 use core::cell::UnsafeCell;
 use core::ptr::{addr_of, addr_of_mut, read_volatile, write_volatile};
 use core::sync::atomic::AtomicU32;

@@ -1,6 +1,6 @@
 //! From samples to power and spectrum: the band-pass, frames and transforms, and arithmetic in fixed point.
 //!
-//! The inner loops stand behind [`Kernels`]. Of the sensor this room knows the sample rate only.
+//! The inner loops stand behind [`Kernels`]. Of the sensor this module knows the sample rate only.
 
 mod fir;
 pub mod fixed;

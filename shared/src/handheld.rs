@@ -1,5 +1,6 @@
 //! The handheld probe: a person presses and slides, and a display says how. No motor, so no movement to choose and no
-//! traction: what is compared is one slide at about one force and pace, by [`FeatureSet::Pressure`](crate::features::FeatureSet::Pressure).
+//! traction: what is compared is one slide at about one force and pace, by
+//! [`FeatureSet::Pressure`](crate::features::FeatureSet::Pressure).
 //!
 //! [`Handheld`] has no clock. Time is what it is given: sensor words, of which there are 4400 in a second, and ticks of the
 //! button, of which there are 100. It says what the display shows ([`Handheld::screen`]), what the buzzer sounds, whether

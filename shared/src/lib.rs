@@ -24,7 +24,7 @@ pub mod store;
 pub mod table;
 pub mod wire;
 
-/// Adds as many of them as it fits for: `extend` would panic at more.
+/// Adds as many items as the buffer has space for; `extend` would panic at one more.
 fn fill<T, const N: usize>(buffer: &mut heapless::Vec<T, N>, items: impl Iterator<Item = T>) {
     for item in items {
         if buffer.push(item).is_err() {
@@ -33,7 +33,7 @@ fn fill<T, const N: usize>(buffer: &mut heapless::Vec<T, N>, items: impl Iterato
     }
 }
 
-/// As many of them as it fits for: `collect` would panic at more.
+/// Collects as many items as a buffer of `N` has space for; `collect` would panic at one more.
 fn up_to<T, const N: usize>(items: impl Iterator<Item = T>) -> heapless::Vec<T, N> {
     let mut buffer = heapless::Vec::new();
     fill(&mut buffer, items);

@@ -22,7 +22,7 @@
 //! | 12 T M | Gaussians: per texture, movement and property: mean (i16, see [`mean_step`]), standard deviation (u16, [`SD_STEP`]); 0 and 0 for a property not measured |
 //! | 2 d T M | fused: per texture and movement: mean of the d whitened features (i16, 1/256) |
 //! | T M | per texture and movement: number of trials, 255 for more |
-//! | 4 | CRC-32 of the table that this one was made from by teaching, the first of all; 0 for none |
+//! | 4 | CRC-32 of the table that this one was made from by learning, the first of all; 0 for none |
 //! | 5 T | per texture: a number that stays its own (2); slides that were learned from the factory, the user and itself (1 each, 255 for more) |
 //! | | per texture: length of its name (1), the name in UTF-8 |
 //! | 4 | CRC-32 (ISO-HDLC) of all before |

@@ -128,8 +128,8 @@ impl ObservedSlide {
     }
 }
 
-/// Does a workload with the samples or the observed slide in `words`, the background before them, and puts its results; `None` if
-/// they do not make sense.
+/// Runs a workload on the samples or the observed slide in `words`, which the background precedes, and writes its results;
+/// `None` if the words make no sense.
 pub fn run<K: Kernels>(
     workload: Workload,
     plan: &Plan,
@@ -183,7 +183,7 @@ pub fn run<K: Kernels>(
     Some(())
 }
 
-// a frame of its own: that of the larger buffer would not fit beside anything else
+// a stack frame of its own: the frame with the larger buffer would not fit beside any other
 #[inline(never)]
 fn explore<K: Kernels, const N: usize>(
     workload: Workload,

@@ -10,7 +10,7 @@ fn main() -> ! {
 #[cfg(not(target_os = "none"))]
 fn main() {
     eprintln!(
-        "tactus-handheld is firmware for the STM32F429ZI and does nothing on a PC. `cargo xtask emulate --handheld` runs it on the emulated board."
+        "tactus-handheld is firmware for the STM32F429ZI and does nothing on a PC. `cargo xtask test` plays the scenarios in host-tools/emulator/scenarios with it on the emulated board."
     );
     std::process::exit(2);
 }

@@ -23,8 +23,8 @@ const _: () = assert!(
 );
 
 /// `Kernels::confuse` of one texture at least, up to `behind`. The same operations in the same order as
-/// `tactus_core::explorer::kernels::confused` and `exp_neg` have them (VMLA rounds the product), but for the comparison of the confusion
-/// with 0: adding that changes nothing.
+/// `tactus_core::explorer::kernels::confused` and `exp_neg` have them (VMLA rounds the product), but for the comparison of
+/// the confusion with 0: adding that changes nothing.
 ///
 /// # Safety
 /// `others` begin and end there.

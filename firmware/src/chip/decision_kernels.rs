@@ -1,5 +1,5 @@
-//! The inner loops of a decision for this chip. Their plain twins are `tactus_core::dsp::Plain`: `cargo xtask bench` compares
-//! them, to the bit.
+//! The inner loops of a decision for this chip. Their plain twins are `tactus_core::dsp::Plain`: `cargo xtask bench`
+//! compares them, to the bit.
 
 use core::arch::global_asm;
 use core::mem::offset_of;
@@ -16,8 +16,8 @@ use super::dsp_kernels::Chip;
 global_asm!(
     // the assembler is not told of the FPU otherwise
     ".fpu fpv4-sp-d16",
-    // One texture: r4 to r10 are the mean that the others are compared with, two numbers each, r1 where the next texture's begins,
-    // r2 the next logarithm, r3 where they end.
+    // One texture: r4 to r10 are the mean that the others are compared with, two numbers each, r1 where the next texture's
+    // begins, r2 the next logarithm, r3 where they end.
     ".macro tactus_likelihood last",
     "2:",
     // the squared distance to r11 and r12
@@ -79,9 +79,9 @@ global_asm!(
     ".global tactus_likelihoods",
     ".type tactus_likelihoods,%function",
     ".thumb_func",
-    // r0: the mean; r1: the first texture's; r2: logarithms; r3: where they end. On the stack how far one mean is from the next
-    // (36), narrowness in Q32 (40); [`LN`], as if it began 32 parts before (44); ln 2 in Q32 (48) and 2^15 (52); weight (56), twice
-    // the norm and 1 (60), and whether there is a fourteenth number (64).
+    // r0: the mean; r1: the first texture's; r2: logarithms; r3: where they end. On the stack how far one mean is from the
+    // next (36), narrowness in Q32 (40); [`LN`], as if it began 32 parts before (44); ln 2 in Q32 (48) and 2^15 (52); weight
+    // (56), twice the norm and 1 (60), and whether there is a fourteenth number (64).
     "tactus_likelihoods:",
     "push {{r4-r11, lr}}",
     // a word at a time, which need not be aligned
@@ -101,8 +101,8 @@ global_asm!(
     ".global tactus_gaussians",
     ".type tactus_gaussians,%function",
     ".thumb_func",
-    // s0: the property, in steps of the means; s1: what its distance is multiplied with; r0: cells, r3 from one to the next; r1:
-    // logarithms, r2 where they end; on the stack [`LN`], as if it began 32 parts before, and ln 2 in Q32.
+    // s0: the property, in steps of the means; s1: what its distance is multiplied with; r0: cells, r3 from one to the next;
+    // r1: logarithms, r2 where they end; on the stack [`LN`], as if it began 32 parts before, and ln 2 in Q32.
     "tactus_gaussians:",
     "push {{r4-r11, lr}}",
     "ldrd r4, r5, [sp, #36]",
@@ -172,8 +172,8 @@ global_asm!(
     ".global tactus_weigh",
     ".type tactus_weigh,%function",
     ".thumb_func",
-    // r0: logarithms, r3 the greatest; r1: parts of that one's probability, in whole numbers, r2 where they end, behind the first;
-    // on the stack [`EXP2`] and 1 / ln 2 in Q31. The sum of the parts in r0 and r1.
+    // r0: logarithms, r3 the greatest; r1: parts of that one's probability, in whole numbers, r2 where they end, behind the
+    // first; on the stack [`EXP2`] and 1 / ln 2 in Q31. The sum of the parts in r0 and r1.
     ".macro tactus_weigh_one x",
     "sub \\x, r3, \\x",
     // 2^-46 at the least, which is 0
@@ -222,7 +222,8 @@ global_asm!(
     ".global tactus_divide",
     ".type tactus_divide,%function",
     ".thumb_func",
-    // r0: whole numbers, a multiple of 8, which become floats; r1: where they end, behind the first; s0: what they are divided by
+    // r0: whole numbers, a multiple of 8, which become floats; r1: where they end, behind the first; s0: what they are
+    // divided by
     "tactus_divide:",
     "vmov.f32 s8, s0",
     "2:",
@@ -257,8 +258,8 @@ global_asm!(
     ".global tactus_candidates",
     ".type tactus_candidates,%function",
     ".thumb_func",
-    // r0: the one mean, 14 numbers, and r2 and r3 its sum of squares; r1: the others, and the first behind them on the stack.
-    // r1 is then where the distance is.
+    // r0: the one mean, 14 numbers, and r2 and r3 its sum of squares; r1: the others, and the first behind them on the
+    // stack. r1 is then where the distance is.
     "tactus_candidates:",
     "push {{r4-r11, lr}}",
     "push {{r2, r3}}",
@@ -310,8 +311,8 @@ global_asm!(
 );
 
 unsafe extern "C" {
-    /// `from` has 13 numbers, 14 if `even`, and so has each of the `means`, `stride` bytes after each other, of which there are
-    /// as many as logarithms up to `end`, one at least; `ln` is 256 bytes before [`LN`].
+    /// `from` has 13 numbers, 14 if `even`, and so has each of the `means`, `stride` bytes after each other, of which there
+    /// are as many as logarithms up to `end`, one at least; `ln` is 256 bytes before [`LN`].
     fn tactus_likelihoods(
         from: *const i16,
         means: *const u8,
@@ -326,8 +327,8 @@ unsafe extern "C" {
         norm: i32,
         even: bool,
     ) -> *mut i32;
-    /// There are as many `cells`, 4 bytes, `stride` after each other, as logarithms up to `end`, one at least; `ln` is 256 bytes
-    /// before [`LN`].
+    /// There are as many `cells`, 4 bytes, `stride` after each other, as logarithms up to `end`, one at least; `ln` is 256
+    /// bytes before [`LN`].
     fn tactus_gaussians(
         cells: *const u8,
         logs: *mut i32,

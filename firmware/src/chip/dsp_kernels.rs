@@ -9,9 +9,9 @@ use tactus_core::dsp::{Angles, Complex32, FRAME, Folded, Kernels, Plain, TAPS, T
 /// Outputs of the band-pass that are computed at once.
 const AT_ONCE: usize = 6;
 
-// Six outputs at once, two products an instruction: r2, r4 and r6 are those that begin with the first sample of a pair, r3, r5
-// and r7 those between them; r8 to r10 are pairs of samples, r11 and r12 pairs of coefficients. Six of the 34 steps make the
-// loop: it has to fit into the flash accelerator's 1 KB, and an inline assembly block leaves too few registers.
+// Six outputs at once, two products an instruction: r2, r4 and r6 are those that begin with the first sample of a pair, r3,
+// r5 and r7 those between them; r8 to r10 are pairs of samples, r11 and r12 pairs of coefficients. Six of the 34 steps make
+// the loop: it has to fit into the flash accelerator's 1 KB, and an inline assembly block leaves too few registers.
 global_asm!(
     // the assembler is not told of the FPU otherwise
     ".fpu fpv4-sp-d16",

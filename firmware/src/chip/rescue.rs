@@ -16,7 +16,7 @@ use super::lever;
 
 const MAGIC: u32 = 0x7ac7_1a57;
 const LEVER_TOP: usize = 12;
-/// The last words hold so many callers.
+/// Callers that the last words can hold.
 const CALLERS: usize = 10;
 
 /// Last words that survive a reset; RAM that the start-up code leaves alone.

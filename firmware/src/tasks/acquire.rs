@@ -85,10 +85,10 @@ async fn due(what: u8) {
 
 /// Sends two bytes as one frame, while select is low, and gives what came in meanwhile.
 ///
-/// embassy's transfers look at the status register all the time, 104 times a slot; here it is first looked at when the frame may
-/// be over. To the chip that is the same; of the emulator's accesses to registers it was more than half.
+/// embassy's transfers look at the status register all the time, 104 times a slot; here it is first looked at when the frame
+/// may be over. To the chip that is the same; of the emulator's accesses to registers it was more than half.
 fn transfer(bytes: [u8; 2]) -> [u8; 2] {
-    // the last frame has been read: it fits, and what comes in is this one's
+    // the last frame has been read, so the data register is free and the next word received belongs to this frame
     SPI1.dr().write(|w| w.set_dr(u16::from_be_bytes(bytes)));
     // a turn of its loop takes three cycles
     cortex_m::asm::delay(FRAME_CYCLES / 3);

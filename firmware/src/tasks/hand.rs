@@ -23,8 +23,8 @@ use crate::board;
 use crate::chip::flash::{self, Bank2, MappedTable};
 use crate::chip::rescue;
 
-/// The table that comes with the handheld: textures of a simulated world under a simulated hand. It tells how the slides
-/// of a hand differ; a real probe is trained.
+/// The table that comes with the handheld: textures of a simulated world under a simulated hand. Its
+/// whitening says how slides of one texture by hand differ; the user trains a real probe.
 static FACTORY: &[u8] = include_bytes!("../../handheld.tact");
 /// The store is open by now, or will never be.
 const OPENING: Duration = Duration::from_secs(10);

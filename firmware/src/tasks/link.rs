@@ -93,7 +93,7 @@ pub(crate) async fn receive(mut uart: BufferedUartRx<'static>) {
 fn received(request: Request) {
     let busy = BUSY.load(Relaxed) || !JOBS.is_empty();
     if receive_request(&request, busy, &mut AtAnyTime) == Turn::Queue {
-        // it fits: nobody else queues
+        // the queue has space: no other task queues requests
         let _ = JOBS.try_send(request);
     }
 }

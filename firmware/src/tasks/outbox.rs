@@ -15,7 +15,8 @@ pub(crate) static LOST_REPORTS: AtomicU32 = AtomicU32::new(0);
 /// Raw samples are wanted.
 pub(crate) static STREAM: AtomicBool = AtomicBool::new(false);
 
-/// Tells the host. What does not fit is lost, and counted; it leaves a gap in the numbers.
+/// Sends an event to the host. An event that does not fit into the outbox is dropped and counted; it leaves a gap in the
+/// numbers.
 pub(crate) fn tell(event: Event) {
     let report = Report {
         number: NUMBER.fetch_add(1, Relaxed),

@@ -18,8 +18,8 @@ use crate::board;
 use crate::chip::Chip;
 use crate::chip::flash::{self, MappedTable, Storage};
 
-/// The table that comes with the firmware: textures of a simulated world, good for the emulated board. A real rig is
-/// trained, or given a table.
+/// The table that comes with the firmware: textures of a simulated world, which suit the emulated board. A real rig
+/// is trained by its user, or receives a table from the host.
 static FACTORY: &[u8] = include_bytes!("../../factory.tact");
 /// The store is open by now, or will never be: two of its sectors erased take less than 2 s.
 const OPENING: Duration = Duration::from_secs(10);

@@ -44,7 +44,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 static STOPPED: AtomicBool = AtomicBool::new(false);
 static STATE: Mutex<CriticalSectionRawMutex, Cell<RigState>> =
     Mutex::new(Cell::new(RigState::parked(UNMEASURED)));
-/// Samples that did not fit.
+/// Samples dropped because the queue to the probe was full.
 pub(crate) static LOST: AtomicU32 = AtomicU32::new(0);
 /// Milliseconds since the tasks in thread mode have checked in.
 static SILENT_MS: AtomicU32 = AtomicU32::new(0);
@@ -214,7 +214,7 @@ pub(crate) async fn servo(
         while inputs.words.len() < MAX_WORDS
             && let Some(word) = words.dequeue()
         {
-            // it fits
+            // the loop ends before `words` is full
             let _ = inputs.words.push(word);
         }
         inputs.steps = lever.steps();

@@ -18,17 +18,17 @@ pub trait Kernels {
     /// the sum of products inside i32.
     fn band_energy(taps: &Taps, samples: &[i16]) -> u64;
 
-    /// Multiplies a frame by twice the Hann window, 1 - cos(2 pi n / N), and folds it as [`Kernels::fold`] does. No sample is
-    /// outside -16384..=16383, so that sums of two are 16 bits.
+    /// Multiplies a frame by twice the Hann window, 1 - cos(2 pi n / N), and folds it as [`Kernels::fold`] does. No sample
+    /// is outside -16384..=16383, so that sums of two are 16 bits.
     fn fold_frame<'r>(
         angles: &Angles,
         frame: &[i16; FRAME],
         buffer: &'r mut MaybeUninit<Folded>,
     ) -> &'r mut Folded;
 
-    /// Halves the transform of reals, of which each of `reals` has one and that half of them later: the first half of `folded`,
-    /// transformed, is bins 1, 5, 9 and so on, and the other one has the reals, in such pairs again, whose bins are 0, 2, 4 and
-    /// so on (decimation in frequency). Both are as long as each other, a power of 2 from 8 to 128.
+    /// Halves the transform of reals, of which each of `reals` has one and that half of them later: the first half of
+    /// `folded`, transformed, is bins 1, 5, 9 and so on, and the other one has the reals, in such pairs again, whose bins
+    /// are 0, 2, 4 and so on (decimation in frequency). Both are as long as each other, a power of 2 from 8 to 128.
     fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]);
 
     /// Adds |X|^2 of each bin to its sum.

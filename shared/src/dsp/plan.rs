@@ -123,8 +123,8 @@ impl Taps {
     }
 }
 
-/// Cosine of an angle in turns, fewer than 2^31 of them. That of `libm` takes angles of any size in radians, and 5 KB of flash
-/// to tell how many turns they are.
+/// Cosine of an angle in turns, fewer than 2^31 of them. That of `libm` takes angles of any size in radians, and 5 KB of
+/// flash to tell how many turns they are.
 pub(crate) fn cos_of_turns(turns: f64) -> f64 {
     let turns = if turns < 0.0 { -turns } else { turns };
     let part = turns - f64::from(turns as u32);

@@ -27,8 +27,8 @@ pub fn confusion<K: Kernels>(a: Gaussian, b: Gaussian) -> f32 {
 }
 
 impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
-    /// The next action, where [`Explorer::expected_outcomes`] expects `outcomes`. `random` decides for [`Strategy::Random`] and is
-    /// ignored otherwise.
+    /// The next action, given the `outcomes` of [`Explorer::expected_outcomes`]. [`Strategy::Random`] takes its choice from
+    /// `random`; the other strategies ignore it.
     pub fn choose(&self, outcomes: &[ExpectedOutcome], random: u32) -> Action {
         let chosen = match self.config.strategy {
             Strategy::Bayesian => {
@@ -58,7 +58,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         })
     }
 
-    /// The expected outcome of every action now, in their order.
+    /// The expected outcome of every action after the slides so far, in the order of the actions.
     pub fn expected_outcomes(&self) -> Vec<ExpectedOutcome, MAX_ACTIONS> {
         let mut outcomes = Vec::new();
         self.evaluate_actions(&mut outcomes);
@@ -74,7 +74,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
                 0 => at_first,
                 _ => self.uncertainty(self.config.method, action),
             };
-            // it fits: as many as there are actions
+            // `outcomes` holds MAX_ACTIONS, and there are no more actions
             let _ = outcomes.push(ExpectedOutcome {
                 action,
                 uncertainty,
@@ -83,8 +83,8 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         }
     }
 
-    /// What cycling goes through: the best action of each property when nothing is known, properties in their order; where all
-    /// is looked at, every movement.
+    /// What cycling goes through: the best action of each property when nothing is known, properties in their order; where
+    /// all is looked at, every movement.
     pub fn turns(&self) -> impl Iterator<Item = Action> {
         let all = self
             .actions
@@ -117,7 +117,8 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         uncertainty_of(&mut live, properties, K::confuse, K::sqrt)
     }
 
-    /// The textures that are still likely, with what is expected of the properties that `action` looks at; how many these are.
+    /// The textures that are still likely, with what is expected of the properties that `action` looks at; how many these
+    /// are.
     // where a method is known while compiling, what the others take is left out here as well
     #[inline(always)]
     pub(super) fn gather(
@@ -141,7 +142,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
                     for (slot, property) in candidate.expected.iter_mut().zip(looked_at.iter()) {
                         *slot = expect(texture, property).unwrap_or(*slot);
                     }
-                    // it fits: `posterior` is no longer than N
+                    // `live` has space: `posterior` is no longer than N
                     let _ = live.push(candidate);
                 }
             }
@@ -162,7 +163,7 @@ fn gather(table: &Table<'_>, action: Action, posterior: &[f32], live: &mut VecVi
             if let ([slot, ..], Some(known)) = (&mut candidate.expected, known.get(texture)) {
                 *slot = known;
             }
-            // it fits: as much as for the posterior
+            // `live` has space: it is as long as the posterior
             let _ = live.push(candidate);
         }
     }

@@ -1,5 +1,5 @@
-//! Degrees of confusion that are kept: constants of table and candidates, computed once instead of at every decision. A PC has
-//! the memory for them; a chip has not, and its image has none of this.
+//! Degrees of confusion that are kept: constants of table and candidates, computed once instead of at every decision. A PC
+//! has the memory for them; a chip has not, and its image has none of this.
 
 use heapless::Vec;
 
@@ -18,8 +18,8 @@ const ROWS: usize = 4;
 /// Degrees of confusion of two textures by some actions (eq. 7).
 pub type Degrees = [f32; LANES];
 
-/// Degrees of confusion of every two candidates of an explorer by each of its actions, in memory that the caller brings. They
-/// serve every explorer of the same table, candidates and method: [`Explorer::expected_outcomes_by`].
+/// Degrees of confusion of every two candidates of an explorer by each of its actions, in memory that the caller brings.
+/// They serve every explorer of the same table, candidates and method: [`Explorer::expected_outcomes_by`].
 #[derive(Clone, Copy, Debug)]
 pub struct Confusions<M> {
     /// Square matrices, one for every few actions. A texture with itself has 0: eq. 10 leaves it out.
@@ -66,8 +66,8 @@ impl<M: AsRef<[Degrees]> + AsMut<[Degrees]>> Confusions<M> {
 }
 
 impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
-    /// As [`Explorer::expected_outcomes`], to the bit, by degrees of confusion that were computed before: of an explorer of the same
-    /// table, candidates and method.
+    /// As [`Explorer::expected_outcomes`], to the bit, by degrees of confusion that were computed before: of an explorer of
+    /// the same table, candidates and method.
     pub fn expected_outcomes_by(
         &self,
         confusions: &Confusions<impl AsRef<[Degrees]>>,
@@ -79,7 +79,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         let mut live: Vec<(u16, f32), N> = Vec::new();
         for (&probability, texture) in self.posterior.iter().zip(0..) {
             if probability >= NEGLIGIBLE {
-                // it fits: as much as for the posterior
+                // `live` has space: it is as long as the posterior
                 let _ = live.push((texture, probability));
             }
         }
@@ -97,8 +97,8 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             .collect()
     }
 
-    /// Tells the degree of confusion of every two candidates by an action, as the kernels have it: these add it to both, times
-    /// a probability that is 1 here.
+    /// Passes `tell` the degree of confusion of every two candidates by an action, as the kernels compute it: these add it
+    /// to both, times a probability that is 1 here.
     fn confuse_all(&self, action: Action, tell: impl FnMut(usize, usize, f32)) {
         let is_candidate = |log: &i32| *log >= LEAST;
         let certain: Vec<f32, N> = self

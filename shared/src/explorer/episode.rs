@@ -1,4 +1,4 @@
-//! The slides of one exploration, movement by movement, and what it can teach when it is over.
+//! The slides of one exploration, movement by movement, and what the probe can learn from it when it is over.
 
 use heapless::Vec;
 
@@ -54,7 +54,7 @@ impl MovementSums {
     }
 }
 
-/// What an exploration can teach, until the next one begins.
+/// What the probe can learn from an exploration, until the next one begins.
 #[derive(Clone, Debug)]
 pub struct EpisodeSummary {
     /// Checksum of the table that was explored with.

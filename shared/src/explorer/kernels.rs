@@ -27,8 +27,8 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// One that is not compared yet. Its mean begins where `known` does, and `mask` is of its features; what lies behind them
-    /// does not count.
+    /// One that is not compared yet. Its mean begins where `known` does, and `mask` is of its features; what lies behind
+    /// them does not count.
     // words, not bytes: copying these would take longer than all else
     #[inline]
     pub(crate) fn new(known: &[u8], mask: &Mask, probability: f32, slides: u8) -> Self {
@@ -86,8 +86,8 @@ pub(crate) fn mask(features: usize) -> Mask {
     mask
 }
 
-/// A texture that is still likely, while an expected uncertainty is computed from Gaussians. The order of the fields is fixed,
-/// as that of [`Candidate`].
+/// A texture that is still likely, while an expected uncertainty is computed from Gaussians. The order of the fields is
+/// fixed, as that of [`Candidate`].
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct LiveTexture {
@@ -192,8 +192,8 @@ pub trait Kernels: crate::dsp::Kernels {
     fn reset_to_prior(logs: &mut [i32]);
 
     /// Adds the likelihood (ln, Q16, up to a constant) of textures when the mean of some slides is `from`, to `logs`, one
-    /// texture after another. `means` has their whitened means, one at the beginning of every `stride` bytes, learned from as
-    /// many slides as `spread` is of. Returns for how many: it may stop at one that is too far away for a short way.
+    /// texture after another. `means` has their whitened means, one at the beginning of every `stride` bytes, learned from
+    /// as many slides as `spread` is of. Returns for how many: it may stop at one that is too far away for a short way.
     fn add_likelihoods(
         from: &[i16],
         means: &[u8],
@@ -202,12 +202,12 @@ pub trait Kernels: crate::dsp::Kernels {
         logs: &mut [i32],
     ) -> usize;
 
-    /// Adds the likelihood (eq. 4; ln, Q16, up to a constant) of every texture when a property is `x`, in steps of the means.
-    /// Where nothing was learned, the standard deviation is 0, it adds nothing.
+    /// Adds the likelihood (eq. 4; ln, Q16, up to a constant) of every texture when a property is `x`, in steps of the
+    /// means. Where nothing was learned, the standard deviation is 0, it adds nothing.
     fn add_gaussians(x: f32, known: &Gaussians<'_>, logs: &mut [i32]);
 
-    /// The posterior (eq. 3) from its logarithms, Q16, of which there are as many, at least one. Returns the greatest of them,
-    /// and the sum of the probabilities in parts of that one's, Q30. No two logarithms are 2^31 apart.
+    /// The posterior (eq. 3) from its logarithms, Q16, of which there are as many, at least one. Returns the greatest of
+    /// them, and the sum of the probabilities in parts of that one's, Q30. No two logarithms are 2^31 apart.
     fn posterior(logs: &[i32], posterior: &mut [f32]) -> (i32, f32);
 
     /// Sets the squared distance of each of `others` from the mean of `from`.

@@ -15,8 +15,8 @@ const MOST: i32 = 1 << 26;
 const SLIDES: u8 = 4;
 
 impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
-    /// Takes in a slide: what `action` looks at is compared with what every candidate would feel like (eq. 3, 4). The rest of
-    /// the slide is not used.
+    /// Takes in a slide: what `action` looks at is compared with what every candidate would feel like (eq. 3, 4). The rest
+    /// of the slide is not used.
     ///
     /// # Errors
     /// See [`ObserveError`]; nothing has changed then.

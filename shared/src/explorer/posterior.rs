@@ -1,7 +1,7 @@
 //! The posterior of every texture (eq. 3), and the verdict.
 //!
-//! Probabilities are kept as logarithms in fixed point, and in f32. Host and chip use the same operations in the same order, so
-//! they agree to the bit.
+//! Probabilities are kept as logarithms in fixed point, and in f32. Host and chip use the same operations in the same order,
+//! so they agree to the bit.
 
 use core::marker::PhantomData;
 
@@ -16,16 +16,16 @@ use crate::dsp::Plain;
 use crate::features::{PropertySet, Vector};
 use crate::table::{Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, Table};
 
-/// Logarithm of the posterior, Q16, of a texture that is no candidate. The slides of an exploration make it neither a candidate's
-/// nor overflow: at most 1024 are taken from it by each, and it is set again after four.
+/// Logarithm of the posterior, Q16, of a texture that is no candidate. The slides of an exploration make it neither a
+/// candidate's nor overflow: at most 1024 are taken from it by each, and it is set again after four.
 pub(super) const OUT: i32 = -(5 << 28);
 /// Logarithms of candidates are never below, those of others always.
 pub(super) const LEAST: i32 = -(1 << 30);
 /// What is left of a candidate's when the greatest is 0: however improbable, it stays one.
 const FLOOR: i32 = -(1 << 28);
 /// Log-odds for "none of these" over which a texture counts as unknown, after one slide and after more (the recipe has 2 and
-/// 0). In simulated worlds 21 to 24 a limit of 0 takes one in fifteen known textures for a new one; 1.5 rather than 1 or 2 was
-/// chosen on the BioTac recordings, one material left out, to keep false alarms below 3 %.
+/// 0). In simulated worlds 21 to 24 a limit of 0 takes one in fifteen known textures for a new one; 1.5 rather than 1 or 2
+/// was chosen on the BioTac recordings, one material left out, to keep false alarms below 3 %.
 const UNKNOWN_OVER: [f32; 2] = [2.0, 1.5];
 /// Log-odds up to which a verdict is certain enough to learn from.
 const CERTAIN: f32 = -2.0;
@@ -123,8 +123,8 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         &self.posterior
     }
 
-    /// The answer, once there is one: the threshold is exceeded, the texture is unknown, or the last slide was made. There is
-    /// none before the first slide, however few the candidates.
+    /// The answer, once there is one: the threshold is exceeded, the texture is unknown, or the last slide was made. There
+    /// is none before the first slide, however few the candidates.
     pub fn verdict(&self) -> Option<Verdict> {
         let best = self.best();
         let sure = best.sure && self.slides > 0;
@@ -156,7 +156,8 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         known && self.best().probability > self.config.threshold
     }
 
-    /// The movements made, with the number of slides and their whitened mean: what this exploration can teach a fused table.
+    /// The movements made, with the number of slides and their whitened mean: what a fused table can learn from this
+    /// exploration.
     pub fn observed(&self) -> impl Iterator<Item = (u8, u8, Vector)> + '_ {
         let features = match self.table.contents() {
             Contents::Fused(_, features) => usize::from(features),
@@ -208,7 +209,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     }
 }
 
-/// Makes the greatest logarithm 0, so that the slides to come have a range left.
+/// Subtracts the greatest logarithm from all, so that the fixed point keeps its range for later slides.
 #[inline(never)]
 pub(super) fn rebase(log: &mut [i32]) {
     let top = log.iter().copied().max().unwrap_or(0);

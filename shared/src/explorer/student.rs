@@ -145,7 +145,8 @@ mod tests {
         }
     }
 
-    /// The density integrates to 1, whatever its degrees of freedom: textures of different numbers of trials can be compared.
+    /// The density integrates to 1, whatever its degrees of freedom: textures of different numbers of trials can be
+    /// compared.
     #[test]
     fn the_density_is_one() {
         for freedom in [1.5, 4.0, 30.0, 900.0] {

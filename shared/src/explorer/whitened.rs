@@ -16,8 +16,8 @@ use crate::table::{Contents, Table};
 /// [`Kernels::add_likelihoods`].
 type AddLikelihoods = fn(&[i16], &[u8], usize, &Spread, &mut [i32]) -> usize;
 
-/// Adds the logarithms of the likelihoods (Q16, up to a constant) of all textures after the slides of an episode to `logs`; that of
-/// a texture that the table does not have, and whether the table has textures enough to tell it.
+/// Adds the logarithms of the likelihoods (Q16, up to a constant) of all textures after the slides of an episode to `logs`;
+/// that of a texture that the table does not have, and whether the table has textures enough to tell it.
 // not generic: so it is compiled with this crate, for speed
 #[inline(never)]
 pub(super) fn add_likelihoods(
@@ -134,7 +134,7 @@ pub(super) fn gather(
     for (&probability, texture) in posterior.iter().zip(0..) {
         if probability >= NEGLIGIBLE {
             let (mean, slides) = (column.mean(texture), column.slides(texture));
-            // it fits: as much as for the posterior
+            // `live` has space: it is as long as the posterior
             let _ = live.push(Candidate::new(mean, &mask, probability, slides));
         }
     }

@@ -98,7 +98,7 @@ impl Blocks {
         if let SamplePhase::Begin(steady) = phase {
             self.block.steady = Some((steady.start, steady.end));
         }
-        // it fits for it: the block is empty, or not full
+        // the block has space for the samples: it is empty, or not full
         let _ = self.block.pac.extend_from_slice(pac);
         if let Some(shear_mn) = shear_mn {
             let _ = self.block.shear_mn.push(shear_mn);

@@ -132,8 +132,8 @@ impl<'p, K: Kernels> Slide<'p, K> {
         }
     }
 
-    /// Takes the next block of the movement: of the still finger, then of the slide, the first of which says which samples are
-    /// at constant speed.
+    /// Takes the next block of the movement: of the still finger, then of the slide, the first of which says which samples
+    /// are at constant speed.
     pub fn take(&mut self, block: &Block) {
         if let Some((from, to)) = block.steady {
             self.start(from..to);
@@ -411,7 +411,7 @@ mod tests {
         assert_eq!(background(&[]), Err(SlideError::NoBackground));
     }
 
-    /// The samples of ticks, gathered into blocks, say the same as its samples.
+    /// Samples that arrive tick by tick and are gathered into blocks give the same slide as the samples one by one.
     #[test]
     fn a_slide_of_blocks_is_that_of_its_samples() {
         use super::super::block::{Blocks, SamplePhase};

@@ -462,7 +462,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
                 line.clear();
             }
             if !line.is_empty() {
-                // it fits, as was looked at
+                // the line has space: its length was checked
                 let _ = line.push(' ');
             }
             let word = cut(word, LETTERS);

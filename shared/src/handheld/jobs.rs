@@ -72,7 +72,7 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
     }
 }
 
-/// Learns the episode that was judged last.
+/// Learns the episode that was judged last, as the texture that was chosen.
 async fn teach<F: NorFlash, B: StoredBytes<F>>(
     choice: Choice,
     memory: &mut Memory<'_, F, B>,

@@ -55,7 +55,8 @@ impl fmt::Display for JudgeError {
 
 impl core::error::Error for JudgeError {}
 
-/// Compares the slides of an episode with every texture of the table. Gives what is to be shown, and what the probe can learn from them.
+/// Compares the slides of an episode with every texture of the table. Returns the judgement to show and the summary that
+/// the probe can learn from.
 ///
 /// # Errors
 /// The table is not one for a handheld probe, or a slide lacks a feature.
@@ -89,7 +90,7 @@ pub fn judge<K: Kernels>(
             .unwrap_or(leading.len());
         if place < LEADING {
             leading.truncate(leading.len().min(LEADING - 1));
-            // it fits now, and the place is at most its end
+            // one place is free now, and `place` is at most the end
             let _ = leading.insert(place, (texture, probability));
         }
     }

@@ -28,7 +28,7 @@ const LEARNED: u32 = 3 * TICKS_HZ;
 /// No word for this long is a fault, ticks: the sensor needs 10 to start.
 const NO_WORDS: u32 = 50;
 
-/// What the texture was, by the person's word.
+/// The person's label for the texture.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Choice {
     /// The texture with this index.
@@ -43,9 +43,9 @@ pub enum Choice {
 #[derive(Clone, PartialEq, Debug)]
 #[allow(clippy::large_enum_variant)] // no allocation here, and only one at a time
 pub enum Job {
-    /// Compare these slides with it: [`judge`], and tell [`Handheld::judged`].
+    /// Compare these slides with the table ([`judge`]), and call [`Handheld::judged`].
     Judge(Vec<Observation, MAX_SLIDES>),
-    /// Learn that the episode that was judged last is this, and tell [`Handheld::learned`].
+    /// Learn the episode that was judged last as this texture, and call [`Handheld::learned`].
     Teach(Choice),
 }
 
@@ -205,7 +205,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         }
     }
 
-    /// What came of [`Job::Teach`]: the name that was learned, or why none was. The table has so many textures now.
+    /// The result of [`Job::Teach`]: the name that was learned, or why none was. The table now has `textures` textures.
     pub fn learned(&mut self, learned: Result<Name, Text>, textures: u16) {
         self.textures = textures;
         if !matches!(self.page, Page::Saving) {
@@ -450,7 +450,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 }
             }
             Event::Slid(observation) => {
-                // it fits: an episode ends with its last slide
+                // the episode has space: it ends with its last slide
                 if matches!(self.page, Page::Touching) && self.episode.push(observation).is_ok() {
                     self.job = Some(Job::Judge(self.episode.clone()));
                     self.show(Page::Thinking);

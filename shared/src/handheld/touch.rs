@@ -253,7 +253,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
         if self.forces.is_full() {
             let _ = self.forces.pop_front();
         }
-        // it fits now
+        // one place is free now
         let _ = self.forces.push_back(pdc);
         if !self.has_zero() {
             return self.find_zero(pdc, lively);
@@ -368,7 +368,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
         {
             self.slide.push_still(&old);
         }
-        // it fits now
+        // one place is free now
         let _ = self.latest.push_back(self.about_rest());
     }
 
@@ -440,7 +440,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
             self.slide.push_pdc(&above);
             self.tenth += lively;
             if (self.samples - COMING_UP).is_multiple_of(10 * BLOCK as u32) {
-                // it fits: as many as the steady part has
+                // `tenths` has space: for as many as the steady part has
                 let _ = self
                     .tenths
                     .push(libm::logf(self.tenth.max(f32::MIN_POSITIVE)));

@@ -84,7 +84,7 @@ fn status(panel: &impl Panel) -> Status {
     }
 }
 
-/// These constants, as the host is told of them.
+/// The event that reports these constants to the host.
 fn told(calibration: &RigCalibration) -> Event {
     Event::Calibration(Vec::from_slice(&calibration.to_bytes()).unwrap_or_default())
 }
@@ -121,7 +121,7 @@ where
     /// Does what was asked for.
     ///
     /// # Errors
-    /// The answer: why it was not done.
+    /// The reply: why it was not done.
     pub async fn perform<K: Kernels>(&mut self, command: &Command) -> Result<(), Text> {
         let Self {
             rig,

@@ -36,7 +36,7 @@ impl Random {
 /// What an exploration does, as it does it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum ExplorationStep<'a> {
-    /// This action comes next; this was expected of it and of the others.
+    /// This action comes next; the slice has the expected outcomes of all actions.
     Chosen(Action, &'a [ExpectedOutcome]),
     /// The slide was made and taken in; the posterior of every texture.
     Measured(Action, &'a Measurement, &'a [f32]),
@@ -95,7 +95,8 @@ impl<E: fmt::Display> fmt::Display for ExploreError<E> {
 
 impl<E: fmt::Debug + fmt::Display> core::error::Error for ExploreError<E> {}
 
-/// Explores from the beginning until there is an answer. `random` serves [`crate::explorer::Strategy::Random`]; `tell` hears of everything.
+/// Explores from the beginning until there is an answer. `random` serves [`crate::explorer::Strategy::Random`]; `tell`
+/// receives every step.
 ///
 /// # Errors
 /// See [`ExploreError`].

@@ -13,7 +13,7 @@ use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
 use crate::wire::{Event, Identify, MAX_EXPECTED_OUTCOMES, Text, text};
 
-/// Explores what lies under the finger until there is an answer, which is told; the error is why there is none.
+/// Explores what lies under the finger until there is an answer, and reports it; the error is why there is none.
 ///
 /// # Errors
 /// The request makes no sense with this table, or the exploration failed: see [`crate::probe::explore::ExploreError`].
@@ -116,7 +116,7 @@ pub(super) fn best(expected: &[ExpectedOutcome]) -> Vec<ExpectedOutcome, MAX_EXP
             }
             best.pop();
         }
-        // it fits
+        // one place is free now
         let _ = best.push(*o);
         let mut rest = best.as_mut_slice();
         while let [.., before, last] = rest

@@ -161,8 +161,8 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         }
     }
 
-    /// Learns from an exploration that the probe is certain of, and tells so. The exploration has its answer whatever
-    /// becomes of that.
+    /// Learns from an exploration that the probe is certain of, and reports it. If that fails, the answer of the exploration
+    /// still stands.
     pub(super) async fn learn_by_itself(
         &mut self,
         episode: &EpisodeSummary,
@@ -184,12 +184,11 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         }
     }
 
-    /// Learns from the user's word what lay under the finger in the last exploration, puts the new table in force and tells
-    /// so.
-    /// After an error the exploration can be labelled anew: another name may do.
+    /// Learns the slides of the last exploration under the user's label, puts the new table in force and reports it. After
+    /// an error the exploration can be labelled again, with another name.
     ///
     /// # Errors
-    /// The rig has moved since the last slide, or see [`teach::label`].
+    /// The rig has moved since the exploration; those of [`teach::label`].
     pub async fn label(&mut self, name: &str, events: &mut impl Events) -> Result<(), Text> {
         let episode = self
             .episode

@@ -60,7 +60,7 @@ pub trait StoredBytes<F: NorFlash> {
 
 /// Who hears what a probe does.
 pub trait Events {
-    /// The host is told.
+    /// Sends an event to the host.
     fn tell(&mut self, event: Event);
 
     /// This table is in force now.
@@ -87,6 +87,6 @@ pub trait Panel {
     /// Whether raw samples are wanted from the next movement on.
     fn stream(&mut self, on: bool);
 
-    /// The host is told.
+    /// Sends an event to the host.
     fn tell(&mut self, event: Event);
 }

@@ -126,7 +126,7 @@ pub trait Servo {
     /// The oldest samples that nobody has taken.
     fn samples(&mut self) -> Option<Samples>;
 
-    /// Samples since boot that did not fit on their way here.
+    /// Samples since boot that were dropped because a queue to the session was full.
     fn lost(&self) -> u32;
 
     /// Stops what is being done now: the stage stands, the finger is lifted.
@@ -138,7 +138,7 @@ pub trait Servo {
     /// Whether raw samples are wanted.
     fn streams(&self) -> bool;
 
-    /// The host is told of raw samples.
+    /// Sends raw samples to the host.
     fn tell(&mut self, event: Event);
 }
 
@@ -342,7 +342,7 @@ fn feel<K: Kernels>(
         SamplePhase::Begin(steady) => slide.start(steady.clone()),
         SamplePhase::Slide => {}
     }
-    // it fits
+    // `gathered` has space for them
     let _ = gathered.extend_from_slice(&samples.pac);
     slide.push_shear(samples.shear_mn.as_slice());
 }

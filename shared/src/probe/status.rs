@@ -83,7 +83,7 @@ pub struct TableInUse {
     pub bytes: u32,
     /// Its checksum.
     pub crc: u32,
-    /// It came with the firmware: no texture was learned and no table was written.
+    /// The table came with the firmware: the probe has learned no texture and the host has written no table.
     pub factory: bool,
 }
 
@@ -97,7 +97,7 @@ impl TableInUse {
     };
 }
 
-/// Tells of every phase and fault, and where the rig is while it moves.
+/// Reports every phase and fault, and where the rig is while it moves.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Watch {
     phase: Option<Phase>,

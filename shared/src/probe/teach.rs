@@ -1,9 +1,9 @@
-//! What a probe learns from its slides: by itself where it is certain, from the user's answer where it is not; and how it
-//! deletes.
+//! What a probe learns from its slides, by itself where it is certain and from the user's label where it is not; and how it
+//! deletes what it learned.
 //!
-//! Two things are kept apart. What came with the table and what it learned from the user is in the stored table: every such change
-//! writes it anew. What the probe has learned by itself lies beside it in the settings, and is put in place of the table's
-//! own means in memory only ([`put_in_force`]); forgetting it gives back the rest to the bit.
+//! Two things are kept apart. The stored table holds what came with it and what the probe learned from the user; every such
+//! change writes the table anew. What the probe has learned by itself lies beside it in the settings, and replaces the
+//! table's own means in memory only ([`put_in_force`]); deleting it restores the table to the bit.
 
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
@@ -17,8 +17,8 @@ use crate::table::{MAX_TEXTURES, Name};
 use crate::up_to;
 use crate::wire::{Event, Forget, Text, text};
 
-/// Copies the stored table into `buffer`, with what the probe has learned by itself in its place: the table in force. Gives its
-/// length.
+/// Copies the stored table into `buffer`, with what the probe has learned by itself in its place: the table in force.
+/// Returns its length.
 ///
 /// # Errors
 /// `buffer` is too small. What cannot be read of the settings is left out.
@@ -58,8 +58,8 @@ pub async fn put_in_force<F: NorFlash>(
     Ok(length)
 }
 
-/// Learns from an episode that the probe was certain of, into the store and into the table in force in `buffer`. Gives what there
-/// is to tell; `None` where there is nothing to be learned.
+/// Learns from an episode that the probe was certain of, into the store and into the table in force in `buffer`. Returns the
+/// event to send; `None` where there is nothing to learn.
 ///
 /// # Errors
 /// The store failed; the table in force is as it was.
@@ -223,7 +223,7 @@ pub async fn label<F: NorFlash>(
     })
 }
 
-/// Deletes what a cut may have left of a texture that had the number that the next new one gets.
+/// Deletes what a power cut may have left of an earlier texture whose number the next new texture gets.
 pub(crate) async fn delete_stale<F: NorFlash>(
     base: &Table<'_>,
     store: &mut Store<F>,
@@ -263,7 +263,7 @@ pub async fn rename<F: NorFlash>(
     change(Change::Rename { texture, name: to }, base, store, buffer).await
 }
 
-/// Deletes something; a texture from the stored table.
+/// Deletes a texture from the stored table, what the probe learned by itself, or an unfinished training.
 ///
 /// # Errors
 /// There is no such texture, it is the last one, or the store failed.

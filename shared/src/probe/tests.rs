@@ -95,7 +95,7 @@ fn identified(slides: &[Option<i16>], wanted: &Identify) -> (Result<(), Text>, v
 }
 
 #[test]
-fn an_exploration_is_told_from_beginning_to_end() {
+fn an_exploration_is_reported_from_beginning_to_end() {
     let (result, told) = identified(&[None, Some(2100), Some(2000)], &wanted(&[]));
     assert_eq!(result, Ok(()));
     assert_eq!(

@@ -20,8 +20,8 @@ use crate::wire::{Event, Text, Train, text};
 /// is stored at once. In the end the store has a new table, which is to be used from then on. `buffer` holds a whole table.
 ///
 /// # Errors
-/// The texture cannot be learned, see [`crate::probe::training::TrainingError`]; the rig or the store failed; [`MAX_REJECTED`]
-/// slides in a row were no good.
+/// The texture cannot be learned, see [`crate::probe::training::TrainingError`]; the rig or the store failed;
+/// [`MAX_REJECTED`] slides in a row were no good.
 pub async fn train<R, F, K>(
     wanted: &Train,
     rig: &mut R,

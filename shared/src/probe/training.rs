@@ -1,14 +1,14 @@
 //! Learning a texture by touching it: which movement comes next, what its slide adds, and the table in the end.
 //!
-//! A [`Training`] touches nothing itself. Every [`TrainingRecord`] that it gives is to be stored before the next slide; a training
-//! begun anew with the same name and table goes on where it stood when it is given them back:
+//! A [`Training`] touches nothing itself. Every [`TrainingRecord`] that it gives is to be stored before the next slide; a
+//! training begun anew with the same name and table goes on where it stood when it is given them back:
 //!
 //! ```text
 //! new -> resume per stored movement -> [ next -> slide -> took -> store ]* -> encode -> commit the table -> delete
 //! ```
 //!
 //! A pilot (the paper's "Identifying the most useful exploratory movements") makes other movements than the table has, so
-//! what it learns does not go into that table: its result is stored and told. It makes a table only where there is none,
+//! what it learns does not go into that table: its result is stored and reported. It makes a table only where there is none,
 //! with the pilot's movements, or where the table has these already.
 
 use crate::table::TrainingStats;
@@ -48,7 +48,7 @@ pub enum TrainingError {
     Trials(u8),
     /// The table has as many textures as it may have.
     Textures,
-    /// The table would take this many bytes, and there is less room.
+    /// The table would take this many bytes, and the buffer is smaller.
     NoSpace(usize),
     /// This rig does not measure a property that the table has, or none at all.
     Measures(Option<Property>),
@@ -339,8 +339,8 @@ impl Training {
         })
     }
 
-    /// Writes the table with this texture into the beginning of `buffer`: `table`, the one in use, with all other textures as
-    /// they are to the bit, or one of this texture alone.
+    /// Writes the table with this texture into the beginning of `buffer`: `table`, the one in use, with all other textures
+    /// as they are to the bit, or one of this texture alone.
     ///
     /// # Errors
     /// [`TrainingError::Unfinished`], [`TrainingError::Pilot`], [`TrainingError::Table`], [`TrainingError::Encode`].
@@ -364,7 +364,7 @@ impl Training {
             Vec::<Whitened, MAX_MOVEMENTS>::new(),
         );
         for (_, stats) in &self.learned {
-            // it fits: all three are as long
+            // both have space: they are as long as `learned`
             let _ = match stats {
                 TrainingStats::Gaussians(e) => experience.push(*e).is_ok(),
                 TrainingStats::Fused(w) => whitened.push(*w).is_ok(),
@@ -392,7 +392,7 @@ impl Training {
         .map_err(TrainingError::Encode)
     }
 
-    /// What the table counted of the texture, and the trials from the user since.
+    /// The slides that the table counts for the texture, and the user's trials since.
     fn tally(&self, table: &Table<'_>) -> Tally {
         let known = table.find(&self.name);
         let before = known.map_or(Tally::default(), |texture| table.tally(texture));

@@ -6,7 +6,7 @@ use heapless::Vec;
 use crate::store::{Store, StoreError};
 use crate::wire::{Event, PART, Text, text};
 
-/// The part of `table` that begins at `offset`, as the host is told of it; `None` if the table ends before.
+/// The part of `table` that begins at `offset`, as the event that the host receives; `None` if the table ends before.
 pub(super) fn read(table: &[u8], offset: u32) -> Option<Event> {
     let rest = table.get(offset as usize..)?;
     let part = rest.get(..rest.len().min(PART)).unwrap_or_default();

@@ -185,8 +185,8 @@ impl Lever {
         match self.state {
             LeverState::Unknown | LeverState::Lifted | LeverState::Holding => Ok(0),
             LeverState::Homing => {
-                // Lower than it was, the lever goes on: if the switch is stuck, that is right; if steps were lost, it stands at
-                // its hard stop until the count is right again. Higher, and steps up were lost: there the top is now.
+                // Lower than it was, the lever goes on: if the switch is stuck, that is right; if steps were lost, it stands
+                // at its hard stop until the count is right again. Higher, and steps up were lost: there the top is now.
                 if at_top && (!self.known || steps - self.top <= SWITCH_STEPS) {
                     self.top = if self.known {
                         self.top.min(steps)

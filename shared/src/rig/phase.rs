@@ -30,7 +30,8 @@ pub enum Phase {
     Lifting,
     /// The stage goes without load, its current is measured.
     Unloaded,
-    /// A fault was seen; the finger is being lifted, or is. Nothing moves until [`Control::reset`](super::control::Control::reset).
+    /// A fault was seen; the finger is being lifted, or is. Nothing moves until
+    /// [`Control::reset`](super::control::Control::reset).
     Faulted(Fault),
 }
 

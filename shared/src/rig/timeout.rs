@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_timeout_ends_twice() {
+    fn a_timeout_first_stops_the_rig_and_then_gives_up() {
         let mut timeout = MovementTimeout::default();
         let mut waited = |times: u32| (0..times).map(|_| timeout.wait(10, false)).last();
         assert_eq!(waited(LONGEST_MS / 10 - 1), Some(Wait::On));

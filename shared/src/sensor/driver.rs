@@ -1,8 +1,8 @@
 //! The seam between sensor words and pressures.
 //!
 //! A sensor is a file that implements [`PressureSensor`]: which bytes ask for a channel, how long the sensor needs, and
-//! what its answer means. [`crate::sensor::biotac`] and [`crate::sensor::mcp3202`] are the two there are. Everything after this module
-//! sees [`Pressure`]s only.
+//! what its answer means. [`crate::sensor::biotac`] and [`crate::sensor::mcp3202`] are the two there are. Everything after
+//! this module sees [`Pressure`]s only.
 //!
 //! An [`Exchange`] is plain data and does no input or output itself, so there is one logic with three ways to run it:
 //! - [`Exchange::perform`] over the blocking traits of embedded-hal,

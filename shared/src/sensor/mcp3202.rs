@@ -2,8 +2,8 @@
 //!
 //! A piezoresistive transducer, a gain of 10 for P_DC, a band-pass of 10-1040 Hz and a further gain of 99.1 for P_AC
 //! around 1.65 V (Methods, "BioTac"), and a Microchip MCP3202 on 3.3 V that measures both: P_AC on channel 0, P_DC on
-//! channel 1. Counts are then the BioTac's, and [`Calibration::PAPER`](crate::sensor::pressure::Calibration::PAPER) is where the
-//! calibration starts.
+//! channel 1. Counts are then the BioTac's, and [`Calibration::PAPER`](crate::sensor::pressure::Calibration::PAPER) is where
+//! the calibration starts.
 //!
 //! The converter samples while it is read (data sheet DS21034, 5.1), the BioTac when it is asked: in split use the two
 //! differ by the gap, which shifts both channels alike.

@@ -108,7 +108,7 @@ pub enum SettingsError {
     Corrupt,
     /// They were written by another version: erase them.
     Schema(u16),
-    /// No room for more progress of training: forget a texture.
+    /// No space for more progress of training: delete a texture.
     Full,
 }
 

@@ -58,7 +58,7 @@ pub(super) trait Record: Serialize + for<'b> Deserialize<'b> {
     /// Whether this record takes the place of `old`.
     fn replaces(&self, old: &Self) -> bool;
 
-    /// Whether `old` is given up for this record when room runs out.
+    /// Whether `old` is given up for this record when space runs out.
     fn outlives(&self, old: &Self) -> bool;
 }
 

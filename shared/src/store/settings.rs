@@ -132,7 +132,7 @@ impl<F: NorFlash> Store<F> {
         Ok(found.map(|(_, stats)| stats))
     }
 
-    /// Stores how far a training has come, in place of what was stored for this texture, movement and table. When room runs
+    /// Stores how far a training has come, in place of what was stored for this texture, movement and table. When space runs
     /// out, progress on top of other tables than this record's is given up.
     ///
     /// # Errors
@@ -156,8 +156,8 @@ impl<F: NorFlash> Store<F> {
             .await
     }
 
-    /// What the probe has learned by itself of the textures of the table with this lineage, one after the other: `each` hears
-    /// of the newest record of every texture.
+    /// What the probe has learned by itself of the textures of the table with this lineage, one after the other: `each`
+    /// receives the newest record of every texture.
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`].
@@ -194,8 +194,8 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Stores what the probe has learned by itself of a texture, in place of what was stored of it. When room runs out, what
-    /// belongs to tables of another lineage is given up.
+    /// Stores what the probe has learned by itself of a texture, in place of what was stored of it. When space runs out,
+    /// what belongs to tables of another lineage is given up.
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].

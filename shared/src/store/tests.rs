@@ -271,7 +271,7 @@ fn settings_are_kept_over_many_rounds_of_the_pages() {
 }
 
 #[test]
-fn progress_on_top_of_a_former_table_makes_room() {
+fn progress_on_top_of_a_former_table_gives_way() {
     let mut store = open(Ram::new());
     block_on(async {
         // 1 KB holds about nine
@@ -303,7 +303,7 @@ fn progress_on_top_of_a_former_table_makes_room() {
 }
 
 #[test]
-fn damaged_settings_are_told_and_erased_without_the_tables() {
+fn damaged_settings_are_reported_and_erased_without_the_tables() {
     for damage in 0..3 {
         let mut store = open(Ram::new());
         block_on(push(&mut store, &table(5), 64)).unwrap();

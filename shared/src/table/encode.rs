@@ -33,7 +33,7 @@ pub enum Known<'a> {
 /// What is to be different in a table.
 #[derive(Clone, Copy, Debug)]
 pub enum Change<'a> {
-    /// A texture to learn: in place of the one of that name, or one more.
+    /// Puts a texture in: it replaces the one of that name, or is added.
     Put {
         /// Its name.
         name: &'a str,
@@ -62,7 +62,7 @@ pub enum EncodeError {
     Contents,
     /// There is no texture with this index.
     Texture(u16),
-    /// The table takes this many bytes, and there is less room.
+    /// The table takes this many bytes, and the buffer is smaller.
     NoSpace(usize),
     /// A texture has not as many experiences as there are movements.
     Movements(u16),

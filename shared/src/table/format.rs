@@ -1,4 +1,4 @@
-//! The binary form of a table (see the [room's page](crate::table)): its sizes, its contents, and what can be wrong with it.
+//! The binary form of a table (see [`crate::table`]): its sizes, its contents, and what can be wrong with it.
 
 use core::fmt;
 
@@ -73,7 +73,7 @@ pub enum Contents {
 pub struct Tally {
     /// From whoever made the table.
     pub factory: u8,
-    /// From the user, by teaching or by an answer.
+    /// From the user, by training or by a label.
     pub user: u8,
     /// From the probe's own certain verdicts.
     pub itself: u8,

@@ -205,7 +205,7 @@ pub fn whiten(scatters: &[Scatter]) -> Result<Vec<Whitening, MAX_MOVEMENTS>, Whi
                 .find(|&p| largest * f64::from(1u32 << p) < f64::from(i16::MAX))
                 .unwrap_or(0);
             let scale = f64::from(1u32 << places);
-            // it fits: a square of so many features at most
+            // both have space: for the rows of a square matrix of the most features
             bytes.extend([places]);
             words.extend(weights.map(|w| libm::round(w * scale) as i16));
         }
@@ -225,8 +225,8 @@ fn add(sum: &mut Square, more: &Square, weight: f64) {
     }
 }
 
-/// Weight of a sphere beside a covariance of `d` features from `n` degrees of freedom, by its trace and that of its square (OAS,
-/// Chen et al. 2010, eq. 23).
+/// Weight of a sphere beside a covariance of `d` features from `n` degrees of freedom, by its trace and that of its square
+/// (OAS, Chen et al. 2010, eq. 23).
 pub(crate) fn oas(trace: f64, of_square: f64, d: f64, n: f64) -> f64 {
     let above = (1.0 - 2.0 / d) * of_square + trace * trace;
     let below = (n + 1.0 - 2.0 / d) * (of_square - trace * trace / d);
@@ -301,8 +301,8 @@ fn product(left: &Square, right: &Square) -> Square {
     })
 }
 
-/// The eigenvectors of a symmetric matrix as rows, that of the largest eigenvalue first (Jacobi's rotations; Golub and Van Loan,
-/// Matrix Computations, 8.5). Of the two directions of each, that in which its largest element is positive.
+/// The eigenvectors of a symmetric matrix as rows, that of the largest eigenvalue first (Jacobi's rotations; Golub and Van
+/// Loan, Matrix Computations, 8.5). Of the two directions of each, that in which its largest element is positive.
 fn principal_axes(matrix: &Square, features: usize) -> Square {
     let features = features.min(MAX_FEATURES);
     let mut rest = *matrix;

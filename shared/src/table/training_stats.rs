@@ -1,4 +1,4 @@
-//! What a few trials teach of a texture at one movement: the statistics that a table keeps.
+//! The statistics that a table keeps of a texture at one movement, from a few trials.
 
 use serde::{Deserialize, Serialize};
 
@@ -74,12 +74,12 @@ pub struct Whitened {
 }
 
 impl Whitened {
-    /// Slides that count at most when a texture is learned on the go: the mean follows what changes slowly. With the 8 of the
-    /// recipe it lags behind a real session's drift, until nothing passes the gate any more and the texture is lost; 3 was
-    /// chosen on one half of the materials and holds on the other (tests/fused_recipe.rs).
+    /// Slides that count at most when a texture is learned on the go: the mean follows what changes slowly. With the 8 of
+    /// the recipe it lags behind a real session's drift, until nothing passes the gate any more and the texture is lost; 3
+    /// was chosen on one half of the materials and holds on the other (tests/fused_recipe.rs).
     pub const MEMORY: u8 = 3;
 
-    /// Takes in a whitened slide in teaching: all have the same weight.
+    /// Takes in a whitened slide of a training: all have the same weight.
     pub fn teach(&mut self, slide: &[i16]) {
         self.follow(slide, self.slides);
         self.slides = self.slides.saturating_add(1);

@@ -7,8 +7,8 @@ use heapless::Vec;
 
 use crate::features::{MAX_FEATURES, Vector, WHITE_STEPS};
 
-/// From features to whitened ones, z = W (x - g): canonical variates. W' W is the inverse of the covariance of slides within a
-/// texture, and the means of different textures are uncorrelated in z, those that scatter most first.
+/// From features to whitened ones, z = W (x - g): canonical variates. W' W is the inverse of the covariance of slides within
+/// a texture, and the means of different textures are uncorrelated in z, those that scatter most first.
 ///
 /// W is kept in whole numbers, row by row with a power of two of its own; means are learned through the same numbers, so
 /// their rounding adds no error.
@@ -114,7 +114,7 @@ impl<'b> View<'b> {
                     row.zip(apart).map(|(w, x)| dot(w, x)).sum()
                 }
             };
-            // it fits
+            // `white` has space for one value a row
             let _ = white.push(rounded(sum, places));
             rest = rest.get(2 * self.features..).unwrap_or_default();
         }
@@ -161,7 +161,8 @@ pub fn white(steps: i16) -> f32 {
 /// What all textures are like at a movement, whitened.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Column<'t> {
-    /// Means, the first at the beginning, numbers of 16 bits, little-endian; each begins `stride` bytes after the one before.
+    /// Means, the first at the beginning, numbers of 16 bits, little-endian; each begins `stride` bytes after the one
+    /// before.
     pub(crate) means: &'t [u8],
     pub(crate) stride: usize,
     /// Slides that they were learned from, each `movements` after the one before.

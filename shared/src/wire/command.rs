@@ -19,8 +19,8 @@ pub struct Request {
     pub command: Command,
 }
 
-/// What the host may ask for. Every request is answered with [`super::Event::Done`] or [`super::Event::Refused`] when it is over; what it
-/// does in between, and what it was asked for, is told before that.
+/// What the host may ask for. The probe ends every request with [`super::Event::Done`] or [`super::Event::Refused`]; it
+/// sends what it does in between, and the data that was asked for, before that.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub enum Command {
     /// Asks how the probe is: [`super::Event::Status`].
@@ -31,7 +31,7 @@ pub enum Command {
     Stop,
     /// Finds out what lies under the finger.
     Identify(Identify),
-    /// What lay under the finger in the last exploration: one of the textures known, or a new one. The probe learns it from
+    /// The label of the texture in the last exploration: one of the textures known, or a new one. The probe learns it from
     /// the slides of that exploration.
     #[serde(alias = "Answer")]
     Label(Name),
@@ -46,7 +46,8 @@ pub enum Command {
     },
     /// Deletes what was learned.
     Forget(Forget),
-    /// Measures the motor's current without load, takes and keeps it. [`super::Event::Calibration`].
+    /// Measures the motor's current without load, uses and stores it, and reports the constants:
+    /// [`super::Event::Calibration`].
     Calibrate,
     /// Asks for the constants in use: [`super::Event::Calibration`].
     ReadCalibration,
@@ -95,7 +96,7 @@ pub struct Identify {
 /// What is to be deleted.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum Forget {
-    /// A texture, whether the user or the probe itself gave its label.
+    /// A texture, whether the probe learned it from the user or by itself.
     Texture(Name),
     /// All that the probe has learned by itself: the table is again as the user trained it.
     #[serde(alias = "SelfTaught")]

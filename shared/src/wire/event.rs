@@ -13,7 +13,7 @@ use crate::features::{
 use crate::rig::Fault;
 use crate::table::{Action, MAX_TEXTURES, Name};
 
-/// Most expected outcomes that are sent: those of the best actions.
+/// How many expected outcomes are sent at most: those of the best actions.
 pub const MAX_EXPECTED_OUTCOMES: usize = 16;
 
 /// From the probe.
@@ -107,11 +107,11 @@ pub enum Event {
         log_odds: Option<f32>,
         /// Slides that counted.
         slides: u8,
-        /// Whether the probe would learn from [`super::Command::Label`]: it is not certain.
+        /// Whether the probe asks for [`super::Command::Label`]: the table is fused, and the probe is not certain.
         #[serde(alias = "asks")]
         wants_label: bool,
     },
-    /// The probe has learned a texture from so many slides of an exploration.
+    /// The probe has learned a texture from the slides of an exploration.
     #[serde(alias = "Taught")]
     TextureLearned {
         /// Name of the texture.
@@ -245,9 +245,9 @@ pub struct Counts {
     pub parity_errors: u32,
     /// Error frames of the sensor, and words of no sensor.
     pub error_frames: u32,
-    /// Words that did not fit on their way to the features.
+    /// Words dropped because a queue on the way to the features was full.
     pub lost_samples: u32,
-    /// Reports that did not fit on their way to the host.
+    /// Reports dropped because the queue to the host was full.
     pub lost_reports: u32,
     /// Frames from the host that were damaged.
     pub damaged_frames: u32,

@@ -1,4 +1,4 @@
-//! Degrees of confusion that are kept: the outcomes expected with them are those without them, to the bit.
+//! Degrees of confusion that are kept: the expected outcomes computed from them equal those computed afresh, to the bit.
 
 use super::*;
 
@@ -19,7 +19,7 @@ pub(super) fn expect_the_same<const N: usize>(
     assert!(by_kept.iter().map(bits).eq(computed.iter().map(bits)));
 }
 
-/// As [`expect_the_same`], with those of this explorer.
+/// As [`expect_the_same`], with the degrees of confusion of this explorer.
 pub(super) fn expect_the_same_as_kept<const N: usize>(explorer: &Explorer<'_, N>) {
     expect_the_same(explorer, &kept(explorer));
 }
@@ -29,7 +29,7 @@ proptest! {
 
     /// Any number of textures, of which some are no candidates; every way of comparing properties.
     #[test]
-    fn kept_degrees_expect_what_computed_ones_do(
+    fn kept_degrees_give_the_outcomes_of_computed_ones(
         cells in proptest::collection::vec([(-1f32..1.0, 0.1f32..0.9), (-1f32..1.0, 0.1f32..0.9), (-1f32..1.0, 0.1f32..0.9)], 4..60),
         few in 2usize..30,
         slides in proptest::collection::vec((any::<prop::sample::Index>(), -1f32..1.0), 1..6),

@@ -110,7 +110,7 @@ fn cycling_takes_the_best_action_of_each_property_in_turn() {
         let outcomes = explorer.expected_outcomes();
         let action = explorer.choose(&outcomes, turn);
         assert_eq!(action, each[turn as usize % 3]);
-        // a slide that teaches nothing is no turn
+        // a slide that is not used is no turn
         assert!(explorer.observe(action, &Observation::default()).is_err());
         assert_eq!(explorer.choose(&outcomes, turn), action);
         explorer.observe(action, &all(0.1)).unwrap();
@@ -291,7 +291,7 @@ fn far_off_values_neither_overflow_nor_stick() {
 }
 
 #[test]
-fn a_slide_without_the_property_teaches_nothing() {
+fn a_slide_without_the_property_is_not_used() {
     let bytes = plain(&[0.0, 0.2, 0.4], 2);
     let mut explorer = explorer(&bytes, Strategy::Bayesian);
     explorer

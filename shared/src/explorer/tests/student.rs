@@ -241,7 +241,7 @@ fn explores_by_the_product_of_all_properties() {
 }
 
 #[test]
-fn a_slide_without_one_of_the_properties_teaches_nothing() {
+fn a_slide_without_one_of_the_properties_is_not_used() {
     let bytes = plain(&[0.0, 0.5, 1.0], 2);
     let table = Table::read(&bytes).unwrap();
     let mut explorer = begin(table, PropertySet::ALL, Method::StudentAll);

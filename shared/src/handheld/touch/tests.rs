@@ -81,7 +81,7 @@ fn again(events: &[Event]) -> Option<Again> {
 }
 
 #[test]
-fn a_good_slide_is_a_slide_and_has_its_features() {
+fn a_good_slide_is_reported_with_its_features() {
     let slide = with(
         pressed(500.0),
         std::vec![

@@ -71,7 +71,7 @@ fn bytes() -> Vec<u8> {
 
 type Outcome = Result<Verdict, ExploreError<&'static str>>;
 
-/// Explores by this script; the outcome, what was told, and the movements that were made.
+/// Explores by this script; returns the outcome, the steps reported, and the movements made.
 fn explored(stimuli: &[Stimulus], config: Config) -> (Outcome, Vec<String>, Vec<Movement>) {
     let bytes = bytes();
     let mut rig = Script {
@@ -214,7 +214,7 @@ fn a_slide_is_judged_while_the_finger_is_lifted() {
     ];
     let stimuli = [Traction(1900), Traction(2000), Traction(0)];
     assert_eq!(outcome(&stimuli, config(1.0, 2)), (Ok(1), all.to_vec()));
-    // the answer stands, and is told; that the finger is down is told as well
+    // the answer stands and is reported; that the finger is down is reported as well
     let (failed, noted) = outcome(&stimuli[..2], config(1.0, 2));
     assert_eq!(
         (failed, noted),
@@ -242,7 +242,7 @@ fn names_the_best_after_the_last_slide() {
 }
 
 #[test]
-fn a_rejected_slide_is_repeated_and_teaches_nothing() {
+fn a_rejected_slide_is_repeated_and_not_used() {
     let straight = explored(&[Traction(1900), Traction(2000)], config(0.99, 2));
     let (outcome, told, made) = explored(
         &[Stuck, Traction(1900), NoForce, Traction(2000)],

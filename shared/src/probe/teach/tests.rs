@@ -1,4 +1,4 @@
-//! Learning by itself and from answers, against running means in f64; the power is cut at every word.
+//! Learning by itself and from labels, against running means in f64; the power is cut at every word.
 
 use super::*;
 use crate::features::{FeatureSet, MAX_FEATURES};
@@ -70,7 +70,7 @@ fn summary(table: &[u8], texture: u16, observed: &[(u8, u8, [i16; 3])]) -> Episo
     }
 }
 
-/// Room for a table, with this one at its beginning.
+/// A buffer for a table, with this one at its beginning.
 fn buffer(table: &[u8]) -> List<u8> {
     let mut buffer = table.to_vec();
     buffer.resize(900, 0x5a);
@@ -148,7 +148,7 @@ fn it_learns_by_itself_by_the_recipe() {
         &[(1, 1, [100, 1400, -300])],
         &[(1, 2, [150, 1300, -200]), (2, 4, [-500, 2000, 90])],
         &[(2, 1, [0, 1000, 0])],
-        // a third movement has no room
+        // there is no place for a third movement
         &[(0, 3, [900, 900, 900]), (1, 9, [130, 1380, -280])],
     ];
     let mut total = 0;
@@ -234,7 +234,7 @@ fn nothing_is_learned_that_is_not_certain() {
 }
 
 #[test]
-fn an_answer_teaches_a_known_texture() {
+fn a_label_updates_a_known_texture() {
     let bytes = base();
     let old = Table::read(&bytes).unwrap();
     let mut store = store(&bytes);
@@ -289,7 +289,7 @@ fn an_answer_teaches_a_known_texture() {
 }
 
 #[test]
-fn an_answer_teaches_a_new_texture() {
+fn a_label_adds_a_new_texture() {
     let bytes = base();
     let old = Table::read(&bytes).unwrap();
     let mut store = store(&bytes);
@@ -358,7 +358,7 @@ fn an_answer_to_nothing_is_refused() {
     let mut force = full.clone();
     let why = refused(&episode, "elm", &Table::read(&full).unwrap(), &mut force);
     assert!(why.contains("forget a texture first"), "{why}");
-    // no room for one more
+    // no space for one more
     let mut force = bytes.clone();
     let why = refused(&good, "elm", &old, &mut force);
     assert!(why.contains("there is less room"), "{why}");
@@ -458,7 +458,8 @@ const WAYS: [Torn; 6] = [
     Torn::All,
 ];
 
-/// Cuts an operation, which says whether it went well, at every word and in every erase; hands the store as it is afterwards to `check`.
+/// Cuts an operation, which says whether it went well, at every word and in every erase; hands the store as it is afterwards
+/// to `check`.
 fn cut_everywhere(
     ram: &Ram,
     operation: impl Fn(&mut Store<Ram>) -> bool,
@@ -565,7 +566,7 @@ fn a_cut_while_it_learns_leaves_what_it_knew_or_what_it_learned() {
 }
 
 #[test]
-fn a_flash_that_fails_is_told() {
+fn a_failing_flash_is_reported() {
     let bytes = base();
     let mut flash = store(&bytes).close().again();
     flash.cut = Some((1, Torn::Nothing));

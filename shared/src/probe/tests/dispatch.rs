@@ -389,7 +389,7 @@ fn an_exploration_is_kept_until_the_rig_moves_again() {
 }
 
 #[test]
-fn what_the_probe_learns_by_itself_is_told_and_in_force() {
+fn what_the_probe_learns_by_itself_is_reported_and_in_force() {
     let mut probe = probe();
     let before = *probe.events.tables.last().unwrap();
     feels(&mut probe, &[10_000]);
@@ -434,7 +434,7 @@ fn textures_are_trained_renamed_and_deleted() {
 }
 
 #[test]
-fn a_calibration_is_measured_told_used_and_kept() {
+fn a_calibration_is_measured_reported_used_and_kept() {
     let mut probe = probe();
     command(&mut probe, Command::Calibrate).unwrap();
     assert_eq!(probe.rig.homed, 1, "it did not know where it was");
@@ -595,7 +595,7 @@ fn without_any_table_there_is_trouble_and_no_exploration() {
 }
 
 #[test]
-fn phases_faults_and_places_are_told_as_they_change() {
+fn phases_faults_and_places_are_reported_as_they_change() {
     let mut watch = Watch::default();
     let mut rig = RigState::parked(CALIBRATION);
     let mut look = |rig: &RigState| {

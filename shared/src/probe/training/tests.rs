@@ -222,7 +222,7 @@ fn a_pilot_beside_a_table_has_only_a_result() {
         pilot: true,
         ..wanted("t1")
     };
-    // no room is asked for
+    // no space is asked for
     let mut training = Training::new(pilot, Some(&old), 0).unwrap();
     assert_eq!((training.makes_table(), training.table()), (false, None));
     let made = train(&mut training);

@@ -115,7 +115,7 @@ impl Model {
         })
     }
 
-    /// Whether this is left by a cut in `operation`: forgetting goes record by record.
+    /// Whether this is left by a cut in `operation`: deleting goes record by record.
     fn is_between(&self, before: &Self, after: &Self, operation: &Operation) -> bool {
         let mut like = before.clone();
         if let Operation::Forget(name) = *operation {

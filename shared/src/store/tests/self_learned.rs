@@ -103,7 +103,7 @@ fn when_full_records_of_another_table_are_given_up() {
     let mut store = again(store);
     let numbers: Vec<u16> = all(&mut store, 2).iter().map(|r| r.number).collect();
     assert_eq!(numbers, (2..most).chain([500, 501]).collect::<Vec<_>>());
-    // a table of a new lineage has all the room
+    // a table of a new lineage has all the space
     block_on(store.set_self_learned(&record(3, 0))).unwrap();
     assert_eq!(
         (all(&mut store, 2).len(), all(&mut store, 3).len()),

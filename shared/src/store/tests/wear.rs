@@ -1,12 +1,13 @@
-//! What an identification and a teaching wear off the chip's own sectors: counted, and stated in the book (docs/src/learning.md).
+//! How much an identification and a training wear the chip's own sectors: counted here, and stated in the book
+//! (docs/src/learning.md).
 //!
 //! The firmware stores the skin's care after every identification, and one self-learned record where it may learn and was
-//! certain (`probe/memory.rs`); whatever the user teaches writes the table anew.
+//! certain (`probe/memory.rs`); every training and every label writes the table anew.
 
 use super::self_learned::{Chip, chip, learned_record};
 use super::*;
 
-/// Erases of a sector that the chip's data sheet promises: 10 000 cycles (DS9405, STM32F427/429, flash memory endurance).
+/// Erases of a sector that the chip's data sheet guarantees: 10 000 cycles (DS9405, STM32F427/429, flash memory endurance).
 const ENDURANCE: u32 = 10_000;
 const IDENTIFICATIONS: u32 = 2000;
 /// Textures of the paper's Table 1: all of them self-learned at both movements, in features of two bytes each.
@@ -14,7 +15,7 @@ const TEXTURES: u16 = 117;
 const FEATURES: usize = 13;
 const SIZE: i16 = 8000;
 
-/// What identifications wear off, one texture after the other.
+/// The wear of identifications, one texture after the other.
 #[derive(PartialEq, Debug)]
 struct Wear {
     /// Words programmed by [`IDENTIFICATIONS`] of them, copies of what is still valid included.
@@ -82,7 +83,7 @@ fn identifications_wear_the_settings_by_as_much_as_the_readme_says() {
 }
 
 #[test]
-fn a_teaching_erases_one_of_the_two_sectors_of_the_table() {
+fn a_training_erases_one_of_the_two_sectors_of_the_table() {
     let mut store = chip();
     for n in 0..20 {
         let bytes = table(n);

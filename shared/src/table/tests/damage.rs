@@ -204,7 +204,7 @@ fn every_check_names_what_is_wrong() {
 }
 
 #[test]
-fn what_is_wrong_is_told() {
+fn every_error_says_what_is_wrong() {
     let action = act(1, Property::Fineness);
     for (error, message) in [
         (

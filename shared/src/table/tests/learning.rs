@@ -38,7 +38,7 @@ proptest! {
 }
 
 #[test]
-fn a_trial_without_the_property_teaches_nothing() {
+fn a_trial_without_the_property_is_not_used() {
     let before = learned(&[[1.0, 2.0, 3.0], [2.0, 2.5, 4.0]]);
     for (at, property) in (0..).zip(Property::ALL) {
         for value in [
