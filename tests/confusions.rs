@@ -1,4 +1,5 @@
-//! Degrees of confusion that are kept, on the worlds and on recordings: the expected outcomes are those computed without them, to the bit.
+//! Expected outcomes computed from stored degrees of confusion are those computed without them, to the bit: on the worlds
+//! and on recordings.
 
 use tactus::data::properties::PropertyTable;
 use tactus::data::recordings::RecordingSet;
@@ -8,7 +9,7 @@ use tactus::eval::experiment::{Experiment, Protocol};
 use tactus_core::explorer::{Config, ExpectedOutcome};
 use tactus_tests::data;
 
-/// Explores, and compares what every action promises at every step; the number of promises.
+/// Explores, and compares the expected outcome of every action at every step; the number of outcomes compared.
 fn compared(experiment: &Experiment, method: Method, candidates: Option<&[u16]>) -> usize {
     let config = Config {
         method: method.method(),
@@ -51,7 +52,7 @@ const METHODS: [(Method, usize); 4] = [
 ];
 
 #[test]
-fn kept_degrees_promise_the_same_in_the_worlds() {
+fn stored_degrees_give_the_same_outcomes_in_the_worlds() {
     let Some(folder) = data("worlds") else { return };
     for world in 1..=3 {
         let set = PropertyTable::read(&folder.join(format!("world_{world}.csv"))).unwrap();
@@ -67,7 +68,7 @@ fn kept_degrees_promise_the_same_in_the_worlds() {
 }
 
 #[test]
-fn kept_degrees_promise_the_same_on_recordings() {
+fn stored_degrees_give_the_same_outcomes_on_recordings() {
     let Some(folder) = data("biotac") else { return };
     let set = RecordingSet::open(&folder).unwrap();
     let names = set.textures().iter().map(|t| t.name.clone()).collect();

@@ -69,7 +69,7 @@ struct Wire {
     stopped: bool,
     busy: bool,
     requests: VecDeque<Request>,
-    /// all that was asked, for the test
+    /// all commands that came, for the test
     asked: Sender<wire::Command>,
     gone: bool,
 }
@@ -220,7 +220,7 @@ fn serve(lines: impl IntoIterator<Item = Box<dyn Line>>, hurry: u64, asked: Send
     }
 }
 
-/// A probe on a TCP port of its own: where, and what it is asked.
+/// A probe on a TCP port of its own: its address, and the commands that it gets.
 fn probe(hurry: u64) -> (String, Told<wire::Command>) {
     // before anybody waits for it
     known();
@@ -415,7 +415,7 @@ fn every_decision_of_a_session_is_computed_again_from_its_log() {
 }
 
 #[test]
-fn recorded_slides_measure_again_what_the_probe_reported() {
+fn recorded_slides_have_the_features_that_the_probe_reported() {
     let (at, _) = probe(1000);
     let temp = tempfile::tempdir().unwrap();
     let (folder, log) = (temp.path().join("slides"), temp.path().join("log"));
@@ -636,7 +636,7 @@ fn says(events: &'static [fn() -> Event]) -> String {
 }
 
 #[test]
-fn errors_name_what_is_no_probe_and_what_to_do() {
+fn a_port_without_a_probe_is_an_error_that_says_what_to_do() {
     let garbage = line(|mut stream| {
         let noise: Vec<u8> = (0..4000u32)
             .map(|n| (n.wrapping_mul(2_654_435_761) >> 13) as u8)

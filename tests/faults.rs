@@ -578,7 +578,8 @@ fn a_stuck_switch_and_a_stubborn_operator_do_not_let_the_lever_creep_down() {
     assert!(truth.indentation_mm < 0.0, "{} mm", truth.indentation_mm);
 }
 
-/// What makes the count of steps wrong, either way, and many times over: once it is repaired and homed, the rig presses as before.
+/// What makes the count of steps wrong, either way, and many times over: once it is repaired and homed, the rig presses as
+/// before.
 #[test]
 fn steps_that_were_lost_do_not_add_up() {
     let causes = [

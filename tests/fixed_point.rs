@@ -209,7 +209,8 @@ fn oracle(experiment: &Experiment, set: FeatureSet, config: Config, runs: u64) -
         .collect()
 }
 
-/// The paper's method, or the fused one with these features: holds that the answer is the same in 99.5 % of the runs; says in how many it came after the same slides too.
+/// The paper's method, or the fused one with these features: holds that the answer is the same in 99.5 % of the runs; says
+/// in how many it came after the same slides too.
 fn decided_alike(name: &str, experiment: Experiment, method: Option<FeatureSet>, runs: u64) {
     let config = Config {
         method: method.map_or(Method::Paper, |_| Method::Fused),

@@ -323,13 +323,13 @@ fn unknown_materials_are_flagged() {
     }
 }
 
-/// What came of a session of single episodes.
+/// The results of a session whose episodes have one slide each.
 #[derive(Clone, Debug)]
 struct Lived {
     episodes: f64,
     /// The gate was not passed.
     asked: f64,
-    /// Right where it did not ask; an episode where it asked ends with the right name.
+    /// Right where it did not ask; where it asks, the episode ends with the right name.
     right_or_asked: f64,
     learned_wrong: f64,
     /// Right by material.
@@ -395,8 +395,8 @@ enum Life {
     WithUser,
 }
 
-/// The first `n` slides train; then each later slide of each of `textures` is an episode of its own, in the order of time. The
-/// order of the textures at each slide number is drawn anew in each of the `lives`.
+/// The first `n` slides train; then each later slide of each of `textures` is an episode of its own, in the order of time.
+/// The order of the textures at each slide number is drawn anew in each of the `lives`.
 fn live(
     session: &Session,
     textures: &[usize],
@@ -517,7 +517,7 @@ fn a_session_is_learned_on_the_go() {
     }
 }
 
-/// Share of `right` answers from one slide of a texture that was learned from `n`, the others having been learned from five.
+/// Share of right verdicts from one slide of a texture that was learned from `n` slides, the others from five.
 fn learned_from(session: &Session, n: usize) -> f64 {
     let right: usize = (0..RUNS)
         .into_par_iter()

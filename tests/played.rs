@@ -80,7 +80,7 @@ fn what_is_cut_is_counted() {
     let counts = rig.world().played();
     assert_eq!(counts.clipped, 500);
     assert!(counts.over > 4000, "{counts:?}");
-    // without recordings the sample is played again
+    // without recordings the finger feels the sample again
     rig.world().play(Vec::new(), 1);
     rig.record(movement()).unwrap();
     assert_eq!(rig.world().played().slides, 0);

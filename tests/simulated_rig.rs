@@ -19,7 +19,7 @@ use tactus_core::rig::{Phase, Refused};
 use tactus_core::sensor::pressure::Calibration;
 use tactus_core::table::Table;
 
-/// Whether an exploration was right, what it did, and what to tell of it.
+/// Whether an exploration was right, what it did, and what to print of it.
 type Explored = (bool, Vec<(Movement, Performed)>, String);
 
 /// A count of P_DC, N.

@@ -15,7 +15,8 @@ pub(crate) const MOST_LINES: usize = 600;
 pub(crate) struct Package {
     /// Its folder; the source is in `src`.
     pub(crate) folder: &'static str,
-    /// A room knows those of the steps before its own. Rooms of one step do not know each other. None: the package has no rooms.
+    /// A room knows those of the steps before its own. Rooms of one step do not know each other. None: the package has no
+    /// rooms.
     pub(crate) steps: &'static [&'static [&'static str]],
     /// Rooms that do not know each other although their steps would let them.
     pub(crate) strangers: &'static [(&'static str, &'static str)],

@@ -321,8 +321,8 @@ impl Trained {
         *count = count.max((*count + 1.0).min(learning.memory));
     }
 
-    /// Step 8 for a whole visit. reading: once for each movement made, towards the visit's running mean, since slides of one
-    /// visit share its deviation.
+    /// Step 8 for a whole episode. reading: once for each movement made, towards the episode's running mean, since slides of
+    /// one episode share its deviation.
     pub fn learn_episode(&mut self, learning: &Learning, texture: usize, episode: &Episode) {
         for (movement, made) in episode.made.iter().enumerate() {
             if made.slides > 0 {
@@ -372,7 +372,7 @@ pub fn uncertainty(posterior: &[f64], confusion: &Matrix) -> f64 {
     (1.0 - rest.sum::<f64>()).max(0.0)
 }
 
-/// What the slides of one movement say, within one visit.
+/// What the slides of one movement say, within one episode.
 #[derive(Clone, Debug, Default)]
 pub struct Made {
     /// How many there were: k.
@@ -381,7 +381,7 @@ pub struct Made {
     pub mean: Vec<f64>,
 }
 
-/// One visit to one texture: slides of any movements.
+/// One episode on one texture: slides of any movements.
 #[derive(Clone, Debug)]
 pub struct Episode {
     /// By movement.

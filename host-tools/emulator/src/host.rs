@@ -1,4 +1,4 @@
-//! The host's side of a board: what lies under the finger, what the firmware is told, and what is made of what it says.
+//! The host's side of a board: what lies under the finger, what the firmware is given, and what is made of its reports.
 
 pub mod args;
 pub mod exploration;

@@ -108,7 +108,7 @@ pub(crate) fn at_least_two(slides: usize) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The first slides of every texture and movement, and the table that they teach.
+/// The first slides of every texture and movement, and the table learned from them.
 pub(crate) fn learn_first(
     set: &RecordingSet,
     measured: &[Vec<MeasuredSlide>],

@@ -266,7 +266,7 @@ pub enum ContentError {
         "a slide of {0} samples is too short, {1} are the least; record it again or take this movement out of the manifest"
     )]
     Short(usize, usize),
-    /// Nothing was felt.
+    /// No taxel moves.
     #[error(
         "no taxel moves: the finger did not touch, or the sensor is dead; record it again or take this movement out of the \
          manifest"

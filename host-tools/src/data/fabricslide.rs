@@ -7,7 +7,7 @@
 //! into two halves: two slides. The [`FabricSlide::repetition`] that one learns from is the manifest's `rep`, and the other
 //! one is what is tested on.
 //!
-//! All fabrics must have felt the same, so only this is taken:
+//! All fabrics must have the same movements, so only this is taken:
 //! - the direction in which the fabrics share most movements, and any other in which they share all that is taken of it;
 //! - movements of which every fabric has both repetitions in these directions;
 //! - of these a whole grid of set-points and speeds: as long as one is incomplete, the set-point or speed that lacks the
@@ -51,7 +51,7 @@ use manifest::{Entry, Manifest};
 const DROPPED_PERCENT: usize = 6;
 /// Slides that a recording is cut into.
 const CUTS: usize = 2;
-/// What was measured of the fabrics of one folder.
+/// The fabrics of one folder, measured.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FabricSet {
     /// Names, in the order of the manifest.
@@ -66,7 +66,7 @@ pub struct FabricSet {
     pub slides: Vec<FabricSlide>,
 }
 
-/// What was measured in one slide.
+/// The features of one slide.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FabricSlide {
     /// Index in [`FabricSet::fabrics`].
@@ -145,7 +145,7 @@ impl FabricSet {
 }
 
 impl Entry {
-    /// What the slides of one recording felt like.
+    /// Measures the slides of one recording.
     fn measure(
         &self,
         meter: &Meter,

@@ -1,4 +1,4 @@
-//! Recorded slides, measured with the core: as a [`Rig`] that replays them, and a whole folder at once.
+//! Recorded slides, measured by the core: a [`Rig`] replays them one by one, or a whole folder is measured at once.
 
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
@@ -73,11 +73,11 @@ pub enum MeasureError {
     },
 }
 
-/// Measures every slide of a folder, textures side by side; `done` hears of each finished texture. Per texture, its slides in
-/// the order of time.
+/// Measures every slide of a folder, several textures at once; `done` gets each texture when it is finished. Returns the
+/// slides of each texture in the order of time.
 ///
 /// # Errors
-/// The first file that cannot be read, or slide that has no properties.
+/// The first file that cannot be read, or the first slide that has no properties.
 pub fn measure_all(
     set: &RecordingSet,
     done: impl Fn(&Texture) + Sync,

@@ -133,7 +133,7 @@ pub fn play<const N: usize>(
     play_with(explorer, confusions, strategy, run, |_, _| ())
 }
 
-/// As [`play`]; `tell` hears of every action and the posterior after it.
+/// As [`play`]; `each` gets every action and the posterior after it.
 pub fn play_with<const N: usize>(
     explorer: &mut Explorer<'_, N>,
     confusions: Option<&Confusions<Vec<Degrees>>>,

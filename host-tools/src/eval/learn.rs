@@ -12,7 +12,7 @@ pub enum TableError {
     /// The table cannot be written.
     #[error("the table cannot be written")]
     Encode(#[from] EncodeError),
-    /// How slides of one texture differ cannot be told.
+    /// The slides do not show how slides of one texture differ.
     #[error(
         "the features cannot be whitened; learn from more slides, or with --features of a smaller set"
     )]
@@ -93,7 +93,7 @@ pub fn learn(
     }
 }
 
-/// What these slides teach. All of them have the properties of `measured`.
+/// The experience from these slides, which all have the properties of `measured`.
 pub fn experience(measured: PropertySet, slides: &[Observation]) -> Experience {
     let mut experience = Experience::default();
     for slide in slides {

@@ -1,5 +1,5 @@
-//! A session in time order: a few slides to learn from, then every later slide is an episode of its own, and the probe goes on
-//! learning.
+//! A session in the order of time: the probe learns a table from a few slides, then every later slide is an episode of its
+//! own, and the probe continues to learn.
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;

@@ -58,7 +58,7 @@ pub fn leave_one_out(
         .collect())
 }
 
-/// Slides over the run's texture with a table that lacks `left_out`; after which of them it is taken for unknown.
+/// Slides over the run's texture with a table that lacks `left_out`: whether it is taken for unknown after each slide.
 fn episode(
     experiment: &Experiment,
     config: Config,

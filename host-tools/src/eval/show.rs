@@ -35,7 +35,7 @@ impl<'t, W: Write> Show<'t, W> {
         }
     }
 
-    /// Shows one event.
+    /// Shows one step.
     pub fn step(&mut self, event: ExplorationStep<'_>) {
         if self.failed.is_ok() {
             self.failed = self.try_step(event);
@@ -74,7 +74,7 @@ impl<'t, W: Write> Show<'t, W> {
         self.out.flush()
     }
 
-    /// Shows what a slide said, and what is left after it.
+    /// Shows the features of a slide, and which textures are left after it.
     ///
     /// # Errors
     /// A failure to write.

@@ -29,14 +29,14 @@ pub enum FollowError {
     /// The samples of a slide never came.
     #[error("slide {0}: no samples came; ask for them with `Stream` before the exploration")]
     NoBlocks(u8),
-    /// A slide or its choice was told out of order: a report was lost.
+    /// A slide or its choice came out of order: a report was lost.
     #[error(
         "slide {got} came where slide {expected} was due; a report was lost, record the session again"
     )]
     Order {
         /// Number of the slide that was due.
         expected: u8,
-        /// Number that was told.
+        /// Number that came.
         got: u8,
     },
     /// The probe has properties of the slide, and the samples that came give none.
@@ -49,7 +49,7 @@ pub enum FollowError {
         /// Why they do not.
         why: SlideError,
     },
-    /// The explorer here could not take in what was told.
+    /// The explorer here refuses the slide that the probe reported.
     #[error(
         "slide {slide}: the explorer here cannot use the slide; read the table of the probe again (`tactus device identify --log` does)"
     )]
@@ -85,7 +85,7 @@ pub struct Agreement {
     pub posterior: f32,
     /// Choices compared.
     pub choices: u32,
-    /// Of the expected uncertainties and benefits.
+    /// Of the uncertainties and benefits expected from each action.
     pub expected: f32,
     /// Choices that are others here.
     pub other_choices: Vec<OtherChoice>,
@@ -291,7 +291,7 @@ impl<'t> Follower<'t> {
     ) -> Result<(), FollowError> {
         self.in_order(slide)?;
         let compared = self.compare(slide, observed);
-        // with what was told, so that a difference of the slide is not counted again
+        // with what the probe reported, so that a difference of the slide is not counted again
         self.explorer
             .observe(action, &observed.observation())
             .map_err(|_| FollowError::Observe { slide })?;
@@ -310,7 +310,7 @@ impl<'t> Follower<'t> {
     /// Features computed here from the samples, against those that the probe reported.
     fn compare(&mut self, slide: u8, there: &SlideReport) -> Result<(), FollowError> {
         let here = match self.samples.take() {
-            // it was said before
+            // the missing block was an error before
             None => return Ok(()),
             Some((_, 0)) => return Err(FollowError::NoBlocks(slide)),
             Some((samples, _)) => samples

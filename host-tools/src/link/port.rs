@@ -61,7 +61,7 @@ impl<S: Read + Write> Port<S> {
         }
     }
 
-    /// From now on the port takes silence for a loss after `timeout` from now on.
+    /// From now on the port takes silence for a loss after `timeout`.
     pub fn set_timeout(&mut self, timeout: Duration) {
         self.timeout = timeout;
     }

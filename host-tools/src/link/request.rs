@@ -44,7 +44,7 @@ pub struct Found {
     pub sure: bool,
     /// Whether it is rather none of the textures known; the one named is the most alike.
     pub unknown: bool,
-    /// Log-odds of that, where they can be told.
+    /// Log-odds of that, where they can be computed.
     pub log_odds: Option<f32>,
     /// Slides that counted.
     pub slides: u8,
@@ -54,7 +54,7 @@ pub struct Found {
     pub learned: u8,
 }
 
-/// What the probe has learned from an answer.
+/// What the probe has learned from a label.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Learned {
     /// Name of the texture.
@@ -194,7 +194,7 @@ impl Found {
 }
 
 impl Request<Learned> {
-    /// Tells the probe what lay under its finger in the last exploration; what it has learned from that.
+    /// Gives the probe the label of the last exploration; the outcome is what it has learned from that.
     pub fn label(name: Name) -> Self {
         Self::new(Command::Label(name), None, |event, answer| {
             if let Event::TextureLearned {

@@ -1,4 +1,4 @@
-//! Requests become frames here, and received bytes reports; and why nothing came of a request.
+//! Turns requests into frames and received bytes into reports; the errors of a transaction.
 
 use tactus_core::rig::calibration::RigCalibrationError;
 use tactus_core::table::{MAX_TEXTURES, TableError};
@@ -41,7 +41,7 @@ pub enum LinkError {
         "the other end speaks another version of the messages than this program (version {PROTOCOL}): flash the firmware of this version, `tactus device flash`"
     )]
     Foreign,
-    /// The request is over, and what was asked for was not told.
+    /// The request is over, and its answer did not come.
     #[error(
         "the probe was done without an answer: it was stopped, or the answer was lost; ask again"
     )]

@@ -68,12 +68,11 @@ impl Transaction for PushTable {
     }
 }
 
-/// Reads the table that the probe uses; its bytes, checked. Whether the probe tells one part per request or all there are
-/// is its own choice.
+/// Reads the table that the probe uses; its bytes, checked. The probe decides whether it sends one part per request or all.
 #[derive(Clone, Debug, Default)]
 pub struct ReadTable {
     bytes: Vec<u8>,
-    /// of the whole table, once told
+    /// of the whole table, once reported
     length: Option<u32>,
     /// bytes there were when the request under way was made, and how often it was made
     asked: (usize, u8),

@@ -185,8 +185,8 @@ impl Probe {
     }
 }
 
-/// Sees an errand through, the line doing to every chunk what `disturb` does; `None` if both ends wait for each other and
-/// the request may not be repeated.
+/// Runs a transaction to its end over a line that does to every chunk what `disturb` does; `None` if both ends wait for each
+/// other and the request may not be repeated.
 fn see_through<E: Transaction>(
     session: &mut Session,
     probe: &mut Probe,
@@ -327,7 +327,7 @@ fn requests_get_their_answers() {
     assert_eq!(answered, Some(Ok(learned)));
     let nameless = see_through(&mut session, &mut probe, named(""), undisturbed);
     assert!(matches!(nameless, Some(Err(LinkError::Refused(_)))));
-    // the mock tells no status: done without an answer
+    // the mock reports no status: done without an answer
     let status = see_through(&mut session, &mut probe, Request::status(), undisturbed);
     assert_eq!(status, Some(Err(LinkError::NoAnswer)));
     let trained = Request::train(Train {

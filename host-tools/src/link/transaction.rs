@@ -1,4 +1,4 @@
-//! A request, or several that follow each other, seen through whatever the line damages.
+//! A request, or several that follow each other, run to the end although the line damages frames.
 
 use std::task::Poll;
 
@@ -6,9 +6,9 @@ use tactus_core::wire::{Command, Event, Forget, PROTOCOL, Report};
 
 use super::session::{LinkError, MAX_TRIES, Session};
 
-/// Requests that follow each other, and what is to be known in the end.
+/// Requests that follow each other, and the outcome of all of them.
 pub trait Transaction {
-    /// What is known in the end.
+    /// What is known at the end.
     type Outcome;
 
     /// The next request; `None` when all is done. Asked for once the last one is done.
@@ -17,13 +17,13 @@ pub trait Transaction {
     /// The transaction cannot continue.
     fn next(&mut self) -> Result<Option<Command>, LinkError>;
 
-    /// Something that the probe said meanwhile.
+    /// Takes an event that the probe reports meanwhile.
     ///
     /// # Errors
     /// The transaction cannot continue.
     fn hear(&mut self, event: &Event) -> Result<(), LinkError>;
 
-    /// What came of it, once all is done.
+    /// The outcome, once all requests are done.
     ///
     /// # Errors
     /// [`LinkError::NoAnswer`], or the answer makes no sense.
@@ -36,15 +36,15 @@ struct Sent {
     command: Command,
     /// of all tries, the last one last
     ids: Vec<u16>,
-    /// something was told since
+    /// an event has come since
     heard: bool,
 }
 
-/// A transaction under way. It has one command under way at a time; the owner of the [`Session`] may send others in between,
-/// to stop for example.
+/// A transaction under way. One of its commands is under way at a time; the owner of the [`Session`] may send others in
+/// between, to stop for example.
 ///
-/// Where the line damages a request or a report, a request that may be made twice is. Others are left to whoever waits: a
-/// damaged report need not have been their answer.
+/// Where the line damages a request or a report, the job repeats a request that may be made twice. Any other request is left
+/// to the caller: the damaged report need not have been its answer.
 #[derive(Debug)]
 pub struct Job<E> {
     transaction: E,
@@ -95,7 +95,8 @@ impl<E: Transaction> Job<E> {
         over.map_or(Poll::Pending, Poll::Ready)
     }
 
-    /// Makes the last request again, if it may be made twice, and says whether: for whoever has heard nothing for long.
+    /// Makes the last request again, if it may be made twice, and says whether it did: for a caller that has received
+    /// nothing for long.
     ///
     /// # Errors
     /// [`LinkError::Disturbed`] or [`LinkError::Foreign`] after [`MAX_TRIES`].

@@ -154,7 +154,7 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// What was measured in a slide that was made here.
+    /// The features of a slide of this trial.
     ///
     /// # Errors
     /// [`TrialError::Slide`].

@@ -14,8 +14,8 @@ pub const TRIAL_VARIATION: f64 = 1.0;
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Conditions {
     /// How much one touch of a texture differs from the next: a factor on the deviations of the contact's state, drawn at
-    /// every touch (see [`finger`](crate::sim::finger)), and on the heterogeneity of the samples (see [`surface`](crate::sim::surface)). 0 leaves the start position
-    /// and the noise of the sensor as the only differences.
+    /// every touch (see [`finger`](crate::sim::finger)), and on the heterogeneity of the samples (see
+    /// [`surface`](crate::sim::surface)). 0 leaves the start position and the noise of the sensor as the only differences.
     pub variation: f64,
     /// Wear of the skin to begin with: 0 is new, at 1 its ridges are gone.
     pub wear: f64,

@@ -183,8 +183,8 @@ pub fn slides(
     Ok((good, bad))
 }
 
-/// Learns a handheld's table from a simulated hand: `collection.trials` slides of every texture. The numbers of those that
-/// a hand does not feel are given too; they are not in the table.
+/// Learns a handheld's table from a simulated hand: `collection.trials` slides of every texture. Returns also the
+/// numbers of textures without enough good slides; they are not in the table.
 ///
 /// # Errors
 /// See [`TableError`].

@@ -1,4 +1,4 @@
-//! Recorded slides of real textures, played to the simulated rig: see [`World::play`](crate::sim::world::World::play).
+//! Recorded slides of real textures, played on the simulated rig: see [`World::play`](crate::sim::world::World::play).
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -126,7 +126,7 @@ impl RecordedTexture {
         rig
     }
 
-    /// Learns a table for a method on the rig: the rig plays every slide to learn from once.
+    /// Learns a table for a method on the rig, which measures every slide to learn from once.
     ///
     /// # Errors
     /// The first fault of a rig, or slide without properties.

@@ -171,7 +171,7 @@ impl SimRig {
         Duration::from_nanos(self.now_ns)
     }
 
-    /// What the control told the pins last.
+    /// What the control last set the pins to.
     pub fn outputs(&self) -> &Outputs {
         &self.outputs
     }
@@ -427,7 +427,7 @@ impl SimRig {
     }
 
     /// Makes one movement, beginning at `start` (0 to 1 of the room that the sample leaves); `each` sees what every tick
-    /// told the pins.
+    /// set the pins to.
     ///
     /// # Errors
     /// See [`SimError`]. The stage stands then, and the finger is lifted.

@@ -32,7 +32,8 @@ pub const FRICTION_AT: (f64, f64) = (1.26, 25.1);
 pub const VIBRATIONS_AT: (f64, f64) = (0.5, 25.1);
 /// Lowest load and speed of the laws of both, N and mm/s (chosen: below them they stay as they are there).
 const LAWS_FROM: (f64, f64) = (0.05, 5.0);
-/// How far from where they are quoted the laws bend, in ln(speed) (chosen: about over the speeds of the paper's three movements).
+/// How far from where they are quoted the laws bend, in ln(speed) (chosen: about over the speeds of the paper's three
+/// movements).
 const BENDS: f64 = 1.0;
 
 impl Texture {

@@ -323,7 +323,7 @@ impl World {
     }
 
     /// Has the finger feel recorded slides instead of the mounted sample: each press-and-slide is the next one of an order
-    /// that `seed` gives, over and over. Without any, the sample is played again.
+    /// that `seed` gives, over and over. Without any, it feels the sample again.
     ///
     /// From where the pressed finger begins to move, P_AC is the recorded one about the simulated finger's rest, and shear
     /// the recorded force once the skin has stretched that far. The sample still carries the press, and makes P_DC; a still
@@ -386,8 +386,8 @@ impl World {
             .sort_by_key(|(at_ns, _)| std::cmp::Reverse(*at_ns));
     }
 
-    /// Repairs everything, and forgets what was scheduled; a sensor that is plugged in again starts up. What a fault has done stays: lost steps, lost counts, a lever
-    /// that ran down.
+    /// Repairs everything, and forgets what was scheduled; a sensor that is plugged in again starts up. What a fault has
+    /// done stays: lost steps, lost counts, a lever that ran down.
     pub fn clear(&mut self) {
         self.faults = Faults::default();
         self.scheduled.clear();

@@ -40,8 +40,9 @@ enum Cli {
     Check,
     /// Run every check: formatting, lints, licences, tests, documentation, firmware
     ///
-    /// All of them run even when one fails, two at a time; what each prints comes when it is over. The last lines say what ran and how long it took, and what was skipped and why;
-    /// tests that want recordings are skipped where there are none (TACTUS_REQUIRE_DATA=1 makes them fail instead).
+    /// All of them run even when one fails, two at a time; what each prints comes when it is over. The last lines say what
+    /// ran and how long it took, and what was skipped and why; tests that want recordings are skipped where there are none
+    /// (TACTUS_REQUIRE_DATA=1 makes them fail instead).
     Test {
         /// Leave out the firmware build
         #[arg(long)]
@@ -71,8 +72,9 @@ enum Cli {
     /// Say what each image takes of the chip, and how deep the rig's stack gets
     ///
     /// The stack is measured on the emulated board, during an exploration. An error if the rig's image takes more than 160 KB
-    /// of flash without its table (the handheld's 128 KB), if variables take more than 64 KB, or if twice the stack does not fit
-    /// beside them into the 192 KB there are. Lists the largest symbols, and the functions that panic with their callers.
+    /// of flash without its table (the handheld's 128 KB), if variables take more than 64 KB, or if twice the stack does not
+    /// fit beside them into the 192 KB there are. Lists the largest symbols, and the functions that panic with their
+    /// callers.
     #[command(after_help = size::EXAMPLES)]
     Size(size::Options),
     /// Make a release: images, hash sums, and how to flash them without a checkout
@@ -110,8 +112,9 @@ enum Cli {
     },
     /// Have the probe work for a day on the simulated rig and for an hour on the emulated board, with random faults
     ///
-    /// The probe learns, deletes and identifies textures, and in every fourth episode something breaks. Judged are its clock, its slots, its stack,
-    /// its restarts, what it has stored, and the force on the finger. Exit code 1 if a bar is missed.
+    /// The probe learns, deletes and identifies textures, and in every fourth episode something breaks. Judged are its
+    /// clock, its slots, its stack, its restarts, what it has stored, and the force on the finger. Exit code 1 if a bar is
+    /// missed.
     #[command(after_help = "Examples:
   cargo xtask soak                                  some 25 minutes on an idle core, 3 of them for the PC's 24 hours
   cargo xtask soak --pc-hours 1 --board-hours 0     the simulated rig only

@@ -23,7 +23,7 @@ pub fn recordings(data: &[u8]) {
     drop(read(data));
 }
 
-/// Why it is refused, as it is told to people.
+/// Why it is refused, as it is shown to people.
 fn read(data: &[u8]) -> Result<(), String> {
     let Some((&kind, body)) = data.split_first() else {
         return Ok(());

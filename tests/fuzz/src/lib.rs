@@ -150,7 +150,7 @@ pub fn table(data: &[u8]) {
     }
 }
 
-/// All that a table tells is what it says.
+/// Reads all that a table holds; its parts agree with each other.
 fn look_at(table: &Table<'_>) {
     let names: Vec<&str> = table.names().collect();
     assert_eq!(names.len(), usize::from(table.textures()));
@@ -170,7 +170,7 @@ fn look_at(table: &Table<'_>) {
     }
 }
 
-/// An exploration that feels what the bytes say, to its end.
+/// An exploration to its end, with slides made of the bytes.
 fn explore(table: &Table<'_>, method: Method, bytes: &[u8], mode: u8) {
     let config = Config {
         method,

@@ -47,7 +47,7 @@ pub(crate) enum Command {
 pub(crate) struct Driver {
     pub(crate) rig: SharedRig,
     pub(crate) commands: Receiver<Command>,
-    /// told the time whenever it is reached
+    /// gets the time whenever it is reached
     pub(crate) reached: Sender<u64>,
     pub(crate) log: Option<Log>,
     pub(crate) stack: Option<Stack>,

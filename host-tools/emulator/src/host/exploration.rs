@@ -76,7 +76,7 @@ pub struct Other {
     pub distance_sd: Option<f32>,
 }
 
-/// An exploration, as the firmware told it and as it really was.
+/// An exploration, as the firmware reported it and as it really was.
 #[derive(Clone, Debug)]
 pub struct Exploration {
     /// Name of the texture under the finger.

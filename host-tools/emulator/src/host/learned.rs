@@ -1,4 +1,4 @@
-//! What is under the finger, and what the firmware is told beforehand: learned once for a world, then kept in a file.
+//! What is under the finger, and what the firmware is given beforehand: learned once for a world, then kept in a file.
 
 use std::path::{Path, PathBuf};
 

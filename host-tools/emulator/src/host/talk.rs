@@ -125,7 +125,7 @@ impl Talk {
         Err(TalkError::Silent(timeout_s))
     }
 
-    /// Runs a transaction to its end; `each` gets all reports meanwhile, and after every look none.
+    /// Runs a transaction to its end; `each` gets all reports meanwhile, and `None` after every look.
     ///
     /// # Errors
     /// [`TalkError::Silent`] if that takes longer than `timeout_s` of virtual time; see also [`TalkError`].
@@ -153,7 +153,7 @@ impl Talk {
         Err(TalkError::Silent(timeout_s))
     }
 
-    /// Asks for something and waits until it is over; `each` sees all reports meanwhile.
+    /// Sends a command and waits until it is over; `each` gets all reports meanwhile.
     pub fn send(
         &mut self,
         command: Command,

@@ -1,4 +1,4 @@
-//! What lies under the finger, and what the firmware is told beforehand.
+//! What lies under the finger, and what the firmware is given beforehand.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ pub const TRIALS: u32 = 5;
 pub const RECORDED_LIMITS: &str = "Recordings: one movement, 3 of their 5 s are played, and what 12 bits do not hold is clipped; learned and explored \
      slides are of one session (interleaved).";
 
-/// Why there is nothing to learn, or to feel.
+/// Why there is nothing to learn, or nothing under the finger.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum KnownError {
@@ -58,7 +58,7 @@ pub enum KnownError {
     },
 }
 
-/// What the firmware is told.
+/// What the firmware is given.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Known {
     /// Constants of the rig.
@@ -110,8 +110,8 @@ pub fn mounted(collection: &Collection, texture: u8, trial: u64) -> Unknown {
     }
 }
 
-/// Recorded slides of each material that are learned from; the unknown one is played from the others. The paper's method takes
-/// the standard deviation of a few trials for the truth: with five it is wrong too often.
+/// How many recorded slides of each material the table is learned from; the unknown texture plays the others. The paper's
+/// method takes the standard deviation of a few trials for the truth: with five it is wrong too often.
 fn recorded_trials(method: Method) -> usize {
     match method {
         Method::Paper => 15,
@@ -119,7 +119,8 @@ fn recorded_trials(method: Method) -> usize {
     }
 }
 
-/// The recordings of a real finger, to be learned from and played: in `biotac` below `TACTUS_DATA`, else beside the repository in `shared/data`.
+/// The recordings of a real finger, to be learned from and played: in `biotac` below `TACTUS_DATA`, or else below
+/// `shared/data` beside the repository.
 pub fn recordings(method: Method, seed: u64) -> Result<RecordedTexture, KnownError> {
     let root = std::env::var_os("TACTUS_DATA").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),

@@ -20,10 +20,10 @@ use crate::host::{progress, under_finger};
 /// One half feels the textures of a simulated world, the other recordings of a real BioTac; each knows 20 textures. Every
 /// exploration is followed by the PC from the raw samples.
 ///
-/// Then the power is cut: at every word that the firmware programs when a texture is trained and when the probe learns by itself, and at
-/// seeded moments of an update that turns a page of its settings. It boots on what is left of the flash, in which the last
-/// word or erase is torn, and must hold the old or the new; where it repairs the flash first, the power is cut in that too.
-/// The exit code is 1 if a bar is missed.
+/// Then the power is cut: at every word that the firmware programs when a texture is trained and when the probe learns by
+/// itself, and at seeded moments of an update that turns a page of its settings. It boots on what is left of the flash, in
+/// which the last word or erase is torn, and must hold the old or the new; where it repairs the flash first, the power is
+/// cut in that too. The exit code is 1 if a bar is missed.
 #[derive(Arguments)]
 pub struct Args {
     #[command(flatten)]

@@ -1,8 +1,8 @@
 //! The power is cut while the real firmware stores something: what it makes of the flash that is left.
 //!
-//! The firmware stores once without a cut, and every word that it programs and every sector that it erases is noted. For a cut,
-//! the flash is made as it is after a part of them, with the last one torn, and the firmware boots on it: it must hold the state from before
-//! or the one from after, and say so before it has found its switches.
+//! The firmware stores once without a cut, and every word that it programs and every sector that it erases is noted. For a
+//! cut, the flash is made as it is after a part of them, with the last one torn, and the firmware boots on it: it must hold
+//! the state from before or the one from after, and say so before it has found its switches.
 
 mod outcome;
 pub mod tear;
@@ -31,7 +31,7 @@ use crate::host::under_finger::{self, Known, Unknown};
 const TEXTURE: u8 = 47;
 /// Textures of the table: few, so that every word of it can be cut.
 const AMONG: u8 = 4;
-/// The probe learns from episodes that it is certain of: one of so many.
+/// The probe learns only from episodes that it is certain of: at least one in so many.
 const EPISODES: u64 = 8;
 /// More calibrations than a page of settings holds.
 const CALIBRATIONS: u32 = 400;
@@ -47,7 +47,7 @@ const PROBED: usize = 2;
 /// What is cut, and in what world.
 #[derive(Clone, Debug)]
 pub struct Prepared {
-    /// A teaching and an update on the go, to be cut at every word, and an update that turns a page.
+    /// A label from the user and an update by the probe itself, to be cut at every word, and an update that turns a page.
     pub operations: Vec<Operation>,
     unknown: Unknown,
 }
@@ -97,7 +97,8 @@ pub fn prepare(
     })
 }
 
-/// The same with the finger as high as it may be when the power comes: it was lifted when it was cut, and every boot lifts it first.
+/// The same with the finger as high as it may be when the power comes: it was lifted when it was cut, and every boot lifts
+/// it first.
 fn lifted(unknown: Unknown) -> Unknown {
     let setups = (0..TRIALS).map(|trial_seed| Setup {
         trial_seed,
@@ -171,7 +172,7 @@ fn noted(
     })
 }
 
-/// Explores until the probe learns by itself, and stores what `wanted` is.
+/// Explores until the probe learns by itself with writes that are `wanted`.
 fn noted_update(
     name: &'static str,
     talk: &mut Talk,

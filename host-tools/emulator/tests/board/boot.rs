@@ -110,7 +110,7 @@ fn a_store_that_does_not_open_does_not_keep_the_finger_down() {
     )
     .unwrap();
     let now_ms = talk.board().now_ns() / 1_000_000;
-    // the pin is low at first, and is not told of then
+    // the pin is low at first, and is not reported then
     let mut down = false;
     let mut up_ms = |&(at_ns, output): &(u64, Output)| match output {
         Output::LeverDown(is) => {

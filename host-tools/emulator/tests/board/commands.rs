@@ -112,7 +112,7 @@ fn unharmed(board: &Emulator, after: &str) -> f64 {
     truth.force_n
 }
 
-/// A board that is told one thing after the other, each before the last is done or long after.
+/// A board that gets one command after the other, each before the last is done or long after.
 fn survives(elf: &Path, seed: u64) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let setup = Setup {

@@ -1,4 +1,4 @@
-//! Explorations by the real ELF, judged by the rig's truth, and what it keeps of what it was told and what it learned.
+//! Explorations by the real ELF, judged by the rig's truth, and whether it keeps what it was given and what it learned.
 
 use std::sync::OnceLock;
 
@@ -193,7 +193,7 @@ fn status(talk: &mut Talk) -> tactus_core::wire::Status {
 }
 
 #[test]
-fn garbage_on_the_line_is_told_and_believed_by_nobody() {
+fn garbage_on_the_line_is_reported_and_never_believed() {
     let Some(elf) = elf() else { return };
     let (collection, known) = world();
     let unknown = under_finger::mounted(collection, collection.textures[3], 2);

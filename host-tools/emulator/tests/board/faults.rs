@@ -208,7 +208,7 @@ const CASES: [Case; 17] = [
         name: "the tasks of thread mode hang",
         cause: Cause::Code("___watch_task_inner_function0E4poll", Instead::Hangs),
         when: When::Pressing,
-        // the task that would tell is the one that hangs: it is told after the restart
+        // the task that would report it is the one that hangs: the report comes after the restart
         seen: &[],
         deadline_ms: Some(2010),
     },

@@ -1,4 +1,4 @@
-//! What the real ELF learns on the go: from teaching, from the host's answers, and by itself; asked over the link, judged by
+//! What the real ELF learns on the go: from trainings, from the host's labels, and by itself; asked over the link, judged by
 //! the texture that really lies under the finger.
 
 use std::path::Path;
@@ -79,7 +79,7 @@ fn status(talk: &mut Talk) -> Status {
     talk.run(Request::status(), TIMEOUT_S, |_, _| ()).unwrap()
 }
 
-/// The table in force, which the status tells of as well.
+/// The table in force, which the status reports as well.
 fn table(talk: &mut Talk) -> Vec<u8> {
     let bytes = talk
         .run(ReadTable::default(), TIMEOUT_S, |_, _| ())
@@ -176,7 +176,7 @@ fn an_unknown_texture_is_said_to_be_and_its_name_learned() {
         "{found:?}"
     );
     assert!(explored.right() && found.log_odds > Some(0.0), "{found:?}");
-    // an unknown one teaches nothing before it has a name
+    // the probe learns nothing from an unknown texture before it has a name
     assert_eq!(found.learned, 0);
     assert_eq!(table(&mut talk), before);
     let nameless = answer(&mut talk, "");
@@ -189,7 +189,7 @@ fn an_unknown_texture_is_said_to_be_and_its_name_learned() {
         (learned.name.as_str(), learned.slides),
         ("my texture", found.slides)
     );
-    // an answer is taken once
+    // a label is taken once
     let twice = answer(&mut talk, "my texture");
     assert!(matches!(twice, Err(TalkError::Refused(_))), "{twice:?}");
     let after = table(&mut talk);
@@ -237,7 +237,7 @@ fn what_it_learns_by_itself_is_kept_and_can_be_deleted() {
     // a power cycle later it is the same
     let mut talk = again(&elf, talk, &known);
     assert_eq!(table(&mut talk), learned);
-    // forgetting it gives back what it was told, to the bit
+    // deleting it gives back the table that was pushed, to the bit
     let forget = || Request::forget(Forget::SelfLearned);
     let store = talk.board().store().unwrap();
     let mut forgetful = boot(&elf, &known, Some(store));

@@ -18,7 +18,7 @@ use super::log::Log;
 
 /// A probe that says nothing for so long is taken for gone: its longest silence is an erase of its flash, 2 s.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// Whether anybody is there is known sooner: a status is told at once.
+/// A first answer comes sooner: the probe reports its status at once.
 const GREETING: Duration = Duration::from_secs(1);
 /// An emulated board may go slower than real time.
 const EMULATED: Duration = Duration::from_secs(30);
@@ -26,7 +26,7 @@ const EMULATED: Duration = Duration::from_secs(30);
 const BOOTING: Duration = Duration::from_secs(90);
 /// Longest way up, and some: 10 mm at 2 mm/s.
 const LIFTING: Duration = Duration::from_secs(30);
-/// A faulted rig tells where it is 20 times a second until it is at rest.
+/// A faulted rig reports where it is 20 times a second until it is at rest.
 const AT_REST: Duration = Duration::from_millis(500);
 
 /// What went wrong at the bench, and what to do.
@@ -120,7 +120,7 @@ struct Heard {
     log: Option<Log>,
     /// what the rig does
     phase: Option<Phase>,
-    /// when it told last where it is
+    /// when it last reported where it is
     located: Instant,
 }
 
@@ -252,7 +252,7 @@ impl Bench {
         self.run(transaction, |_| Ok(()))
     }
 
-    /// As [`run`](Self::run), for what moves: prints a fault, and what it asks for.
+    /// As [`run`](Self::run), for commands that move the rig: prints a fault and its recovery.
     pub(crate) fn perform<E: Transaction>(
         &mut self,
         transaction: E,
@@ -261,7 +261,7 @@ impl Bench {
         self.run(transaction, |report| show_fault(report, out))
     }
 
-    /// Begins an errand, for whoever looks at something else between its [steps](Bench::step).
+    /// Begins a transaction; the caller may do something else between its [steps](Bench::step).
     pub(crate) fn begin<E: Transaction>(&mut self, transaction: E) -> Result<Job<E>, BenchError> {
         let begun = self.port.begin(transaction);
         let job = begun.map_err(|why| self.error(why, false))?;
@@ -271,10 +271,10 @@ impl Bench {
         Ok(job)
     }
 
-    /// Goes on with an errand: reads once.
+    /// Continues a transaction: reads once.
     ///
     /// # Errors
-    /// See [`BenchError`]. What moves is told to stop, should the probe still hear it.
+    /// See [`BenchError`]. A rig that moves gets a stop command, in case the probe still hears it.
     pub(crate) fn step<E: Transaction>(
         &mut self,
         job: &mut Job<E>,
@@ -296,14 +296,14 @@ impl Bench {
         })
     }
 
-    /// Asks for something beside the errand under way.
+    /// Sends a command beside the transaction under way.
     pub(crate) fn send(&mut self, command: Command) -> Result<(), BenchError> {
         self.heard.asked(&command);
         let asked = self.port.send(command);
         asked.map_err(|why| self.error(why, false))
     }
 
-    /// Reads once, without an errand.
+    /// Reads once, while no transaction is under way.
     pub(crate) fn listen(&mut self, mut each: impl FnMut(&Report)) -> Result<(), BenchError> {
         let listened = self.port.listen(|report| {
             self.heard.hear(report);
@@ -404,7 +404,7 @@ pub(crate) fn wait_for_enter(interrupt: &Interrupt, prompt: &str) -> Result<(), 
     }
 }
 
-/// Prints a fault, if it is one that is told, and what it asks for.
+/// Prints the fault and its recovery, if the report is a fault.
 pub(crate) fn show_fault(report: &Report, out: &mut impl Write) -> io::Result<()> {
     if let Event::Fault(fault) = &report.event {
         let recovery = recovery(fault);
@@ -414,7 +414,7 @@ pub(crate) fn show_fault(report: &Report, out: &mut impl Write) -> io::Result<()
     Ok(())
 }
 
-/// What a fault asks for.
+/// What the user must do about a fault.
 pub(crate) fn recovery(fault: &Fault) -> &'static str {
     fault.row().map_or("reset", |row| row.recovery)
 }

@@ -80,7 +80,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let among = if among == 0 { names.len() } else { among };
     writeln!(out, "An unknown texture, one of {among} (seed {seed}).")?;
     out.flush()?;
-    // for the log: with its samples every slide can be felt again
+    // for the log: with its samples every slide can be measured again
     bench.get(Request::command(Command::Stream(true)))?;
     let mut show = Show::new(table, &mut *out);
     let found = bench.run(Request::identify(wanted), |report| {

@@ -1,8 +1,8 @@
-//! The log of a session: a line of JSON for everything that was asked and told.
+//! The log of a session: a line of JSON for every command and every report.
 //!
 //! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":2,"port":"/dev/ttyACM0"}}`. Each other one is
-//! `{"command":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log itself: the
-//! table in use (the parts that were read), the raw samples (blocks), what was measured, chosen and answered.
+//! `{"command":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log itself:
+//! the table in use (the parts that were read), the raw samples (blocks), what was measured, chosen and answered.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -26,7 +26,7 @@ pub(crate) enum Line<'a> {
     Report(Box<Cow<'a, Report>>),
 }
 
-/// Writes the log. A failure is kept until somebody asks.
+/// Writes the log. A failure is kept until the caller asks for it.
 #[derive(Debug)]
 pub(crate) struct Log {
     path: PathBuf,

@@ -24,7 +24,7 @@ use super::identify::Args;
 /// How often the screen is drawn, and the probe asked how it is.
 const DRAWN: Duration = Duration::from_millis(100);
 const ASKED: Duration = Duration::from_secs(1);
-/// A probe that is asked every second and says nothing for so long is told to be silent.
+/// The monitor asks for the status every second, and shows a probe as silent that says nothing for so long.
 const SILENT: Duration = Duration::from_secs(3);
 
 /// What the probe is asked for, one after the other.

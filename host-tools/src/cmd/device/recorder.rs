@@ -1,15 +1,15 @@
 //! Slides of a real finger in the project's format, from the raw samples that the probe streams while it explores.
 //!
 //! The probe is asked for an exploration that takes one movement after the other and is never sure. P_AC and shear are the
-//! very samples that went into its features. P_DC is not streamed: it is computed back from the contact force, which is told
-//! 20 times a second.
+//! very samples that went into its features. P_DC is not streamed: it is computed back from the contact force, which the
+//! probe reports 20 times a second.
 
 use tactus::data::recording::{Background, PAC_RATE_HZ, Slide};
 use tactus_core::features::{Block, Movement};
 use tactus_core::sensor::pressure::Calibration;
 use tactus_core::wire::{Event, Live, Phase, Report};
 
-/// How often the force is told while the rig moves.
+/// How often the probe reports the force while the rig moves.
 const LIVE_HZ: u32 = 20;
 /// Rate of the shear samples.
 const SHEAR_HZ: u32 = 1000;
@@ -76,7 +76,7 @@ impl Recorder {
             Event::Live(Live { force_mn, .. }) if slide.sliding => {
                 slide.forces.push((report.at_ms, *force_mn));
             }
-            // what is told while it is lifted is no force of the slide
+            // a force reported while the finger is lifted is none of the slide's
             Event::Phase(_) if slide.began_ms.is_some() => slide.sliding = false,
             Event::Block(block) => {
                 let expected = slide.blocks.len() as u16;

@@ -1,4 +1,4 @@
-//! What a slide felt like: the spectrum averaged over taxels and frames, its bands, and three properties.
+//! The features of a slide: the spectrum averaged over taxels and frames, its bands, and three properties.
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -57,7 +57,7 @@ impl Meter {
     /// Measures a slide: rows of 16 little-endian 16-bit values.
     ///
     /// # Errors
-    /// If the slide is too short or no taxel felt anything, as what to say of it.
+    /// The slide is too short, or no taxel moves.
     pub(super) fn measure(&self, rows: &[u8]) -> Result<SlideSpectrum, ContentError> {
         let samples = rows.len() / ROW_BYTES;
         if samples < SHORTEST {

@@ -1,7 +1,7 @@
 //! `manifest.json` of a folder of fabrics: read, checked, and searched for what all fabrics share.
 //!
-//! What is taken from it: per file its name, fabric and both hashes, and per recording set-point, speed, direction, repetition,
-//! its number of rows and where its first value is.
+//! What is taken from it: per file its name, fabric and both hashes, and per recording set-point, speed, direction,
+//! repetition, its number of rows and where its first value is.
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::fmt;
 use std::ops::Range;

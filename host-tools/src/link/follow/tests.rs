@@ -15,7 +15,7 @@ use crate::sim::rig::{SimError, SimRig, take_samples};
 
 const UNKNOWN: u8 = 47;
 
-/// Tells as the probe does, through frames.
+/// Reports as the probe does, through frames.
 #[derive(Default)]
 struct Events(RefCell<Vec<Event>>);
 
@@ -36,7 +36,7 @@ impl Events {
     }
 }
 
-/// The simulated rig, with its samples told in blocks.
+/// The simulated rig, which reports its samples in blocks.
 struct Streamed<'a> {
     rig: SimRig,
     events: &'a Events,
@@ -130,7 +130,7 @@ fn asked() -> Identify {
     }
 }
 
-/// A fused table of three textures, and what a probe tells of an exploration with it.
+/// A fused table of three textures, and what a probe reports of an exploration with it.
 fn explored() -> &'static (Vec<u8>, Vec<Event>) {
     static EXPLORED: OnceLock<(Vec<u8>, Vec<Event>)> = OnceLock::new();
     EXPLORED.get_or_init(|| exploration(Method::Fused))
@@ -385,7 +385,7 @@ fn a_missing_report_is_said_and_the_rest_followed() {
     };
     assert_eq!(errors, [missing]);
     assert_eq!((agreement.slides, agreement.posteriors), (3, 4));
-    // what was measured is lost: nothing after it can be compared
+    // a report of a slide is lost: nothing after it can be compared
     let (agreement, errors) = without(place(1, |t| matches!(t, Event::SlideReport { .. })));
     assert_eq!(
         errors[0],

@@ -77,8 +77,8 @@ pub(super) fn panics(elf: &[u8]) -> Result<Vec<Panics>> {
     Ok(callers(&functions, &calls))
 }
 
-/// Parts of the names of functions that panic for whoever calls them: what the compiler puts into a function of its own because
-/// many end with it, and indexing.
+/// Parts of the names of functions that panic for whoever calls them: what the compiler puts into a function of its own
+/// because many end with it, and indexing.
 const WAYS: [&str; 4] = [
     "OUTLINED_FUNCTION",
     "core::slice::copy_from_slice_impl",

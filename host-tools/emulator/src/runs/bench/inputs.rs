@@ -1,4 +1,4 @@
-//! What the kernels are given: a slide, tables, and observed slides.
+//! Inputs of the kernels: the samples of a slide, tables, and observed slides.
 
 use std::path::{Path, PathBuf};
 
@@ -87,8 +87,9 @@ pub(super) fn synthetic(method: Method, textures: usize) -> Result<Vec<u8>, Benc
     Ok(learn::learn(method, None, &names, &MOVEMENTS, &slides)?)
 }
 
-/// Posteriors that the figures below do not go through: few textures and odd numbers of them, all numbers of features, textures
-/// too far away for the chip's short way, learned from different numbers of slides, or not at all, and values far from all.
+/// Posteriors that the figures below do not go through: few textures and odd numbers of them, all numbers of features,
+/// textures too far away for the chip's short way, learned from different numbers of slides, or not at all, and values far
+/// from all.
 pub(super) fn corners(bench: &mut Bench) -> Result<(), BenchError> {
     let mut random = ChaCha8Rng::seed_from_u64(4);
     for textures in [3, 8, 21] {
@@ -113,7 +114,7 @@ pub(super) fn corners(bench: &mut Bench) -> Result<(), BenchError> {
                     }
                     let table = learn::learn(method, set, &names, &MOVEMENTS, &slides)?;
                     for _ in 0..3 {
-                        // where one was never measured, the paper's method does not look
+                        // a texture lacks slides of movement 1, and without them the paper's methods cannot look there
                         let movement = match (uneven, method) {
                             (true, Method::Fused) => 1,
                             (true, _) => 0,

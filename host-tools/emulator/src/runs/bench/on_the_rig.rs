@@ -17,8 +17,8 @@ use crate::host::talk::Talk;
 const TIMEOUT_S: f64 = 120.0;
 const CORE_HZ: f64 = 168e6;
 
-/// The last sample is up to a tick of 1 ms old when the servo has the lever step up, and the first step comes a period of its rate
-/// later.
+/// The last sample is up to a tick of 1 ms old when the servo has the lever step up, and the first step comes a period of
+/// its rate later.
 const BEFORE_STEP_NS: u64 = 1_000_000 + 1_000_000_000 / RETRACT_STEPS_S.unsigned_abs() as u64;
 
 /// When the lever's driver got its first step since the slide began: the end of the slide, as the pins show it.

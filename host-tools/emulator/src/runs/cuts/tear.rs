@@ -30,7 +30,7 @@ pub enum CutError {
     /// What was noted is not what the flash has.
     #[error("{0}: the noted writes do not give the flash that the firmware left")]
     Noted(&'static str),
-    /// It does not hold what it had told of.
+    /// It does not hold what it had reported.
     #[error("{0}: without a cut the firmware does not keep what it held: {1:?}, {2:?}")]
     Kept(&'static str, Box<Held>, Box<Held>),
     /// It did not start by its power.

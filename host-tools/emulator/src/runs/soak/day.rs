@@ -19,11 +19,12 @@ use tactus_core::wire::{Command, Event, Forget, Identify, Text};
 
 use super::episodes::{Episodes, FACTORY, HOMINGS, MOST_N, Plan, world};
 
-/// The last exchange with the sensor may end after the tick in which it began, and the world's time with it: by less than a slot.
+/// The last exchange with the sensor may end after the tick in which it began, and the world's time with it: by less than a
+/// slot.
 const SLOT_NS: i64 = 1_000_000_000 / SLOTS_HZ as i64;
 /// The power is off for a moment after so many episodes.
 const RESTARTED_EVERY: u32 = 10;
-/// A texture is deleted after so many.
+/// A texture, or all that the probe learned by itself, is deleted after so many episodes.
 const FORGETS_EVERY: u32 = 15;
 
 /// Why there is no day to judge.
@@ -106,7 +107,7 @@ impl Day {
     }
 }
 
-/// What an episode is told.
+/// What the probe reports in an episode.
 #[derive(Default)]
 struct Heard {
     verdict: Option<Verdict>,
@@ -146,7 +147,7 @@ impl Host for Heard {
 
 type Probe<'p> = SimProbe<'p, Heard>;
 
-/// Explores texture after texture for so many virtual seconds; `each` hears of the time.
+/// Explores texture after texture for so many virtual seconds; `each` gets the time.
 ///
 /// # Errors
 /// See [`DayError`].
@@ -211,7 +212,7 @@ pub fn day(virtual_s: f64, seed: u64, mut each: impl FnMut(f64)) -> Result<Day, 
     Ok(day)
 }
 
-/// Has the probe do something, as a host would; why it does not.
+/// Sends the probe a command, as a host would; the error says why it refuses.
 fn send(probe: &mut Probe<'_>, command: Command) -> Result<(), Box<Text>> {
     block_on(probe.perform::<Plain>(&command)).map_err(Box::new)
 }

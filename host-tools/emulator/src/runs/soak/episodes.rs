@@ -1,7 +1,7 @@
 //! What the day and the hour share: episodes, drawn by the seed, and what becomes of them.
 //!
-//! Both explore texture after texture; the probe learns and deletes textures, and in every fourth episode something breaks. What lies under the
-//! finger, when what breaks, and what is learned is the seed's.
+//! Both explore texture after texture; the probe learns and deletes textures, and in one of four episodes something breaks.
+//! The seed draws what lies under the finger, what breaks and when, and what is learned.
 
 use std::collections::BTreeMap;
 
@@ -17,9 +17,9 @@ use crate::host::exploration::among_all;
 
 /// More force than this is never on the finger, N: see the guard of the core's `rig`.
 pub const MOST_N: f64 = 2.2;
-/// An episode with a fault among so many.
+/// One of so many episodes has a fault.
 const FAULTS_IN: u32 = 4;
-/// An episode takes some 15 s: when what breaks does so, ns after it began.
+/// Latest time of a fault, ns after the episode began: an episode takes some 15 s.
 const LATEST_NS: u64 = 15_000_000_000;
 /// A rig is asked to home so often once its fault is gone.
 pub(super) const HOMINGS: usize = 3;
@@ -42,7 +42,7 @@ pub(super) struct Plan {
     pub(super) identify: Identify,
     /// What breaks, and when, ns after the episode began.
     pub(super) fault: Option<(u64, Fault)>,
-    /// The probe is told what lay there.
+    /// The user gives the probe the label.
     pub(super) answer: bool,
 }
 
@@ -73,7 +73,7 @@ pub struct Episodes {
     pub sound: u32,
     /// Of these the ones of textures that the probe knew, and the right verdicts on them.
     pub known: (u32, u32),
-    /// Those of textures that it had forgotten, and how often it said that it does not know them.
+    /// Those of textures that had been deleted, and how often the probe said that it does not know them.
     pub unknown: (u32, u32),
     /// What was taken for what, and when, virtual s.
     pub wrong: Vec<String>,
@@ -81,9 +81,9 @@ pub struct Episodes {
     pub sure_and_wrong: (u32, u32),
     /// Slides that were made again, and why, in episodes in which nothing broke.
     pub rejected: Vec<String>,
-    /// Textures that were learned, from the user and by the probe itself.
+    /// Episodes that the probe learned from: labelled by the user, and by itself.
     pub learned: (u32, u32),
-    /// What was deleted.
+    /// How often something was deleted.
     pub forgotten: u32,
     /// What broke, by its name.
     pub faults: BTreeMap<String, Broken>,
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quarter_of_the_episodes_breaks_and_every_fault_comes() {
+    fn a_quarter_of_the_episodes_has_a_fault_and_every_fault_comes() {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let plans: Vec<Plan> = (0..2000).map(|_| Plan::draw(&mut random)).collect();
         let mut episodes = Episodes::default();

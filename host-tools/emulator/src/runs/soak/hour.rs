@@ -21,8 +21,8 @@ use crate::host::under_finger;
 const SLOTS_HZ: f64 = 84e6 / 19_091.0;
 /// A texture is deleted after so many episodes.
 const FORGETS_EVERY: u32 = 15;
-/// A firmware that hangs is reset within this, ns: 2 s until that is noticed, 8 s for the lever's whole way up, and the watchdog;
-/// looked for so often.
+/// A firmware that hangs is reset within this, ns: 2 s until that is noticed, 8 s for the lever's whole way up, and the
+/// watchdog; looked for so often.
 const LONGEST_NS: u64 = 12_000_000_000;
 /// See [`LONGEST_NS`].
 const STEP_NS: u64 = 100_000;
@@ -111,7 +111,7 @@ struct Soak<'a> {
     each: &'a mut dyn FnMut(f64),
 }
 
-/// Explores texture after texture for so many virtual seconds on an emulated board; `each` hears of the time.
+/// Explores texture after texture for so many virtual seconds on an emulated board; `each` gets the time.
 pub(super) fn hour(
     elf: &Path,
     virtual_s: f64,
@@ -345,7 +345,7 @@ impl Soak<'_> {
         let missed = explored.missed().into_iter();
         let missed = missed.map(|what| format!("{at_s:.0} s: {truth}: {what}"));
         self.hour.missed.extend(missed);
-        // what it has learned by itself has changed the table: an answer would come too late
+        // what it has learned by itself has changed the table: a label would come too late
         if drawn.answer && found.learned == 0 {
             let name = Name::try_from(truth).unwrap_or_default();
             let learned = self.talk.run(Request::label(name), TIMEOUT_S, |_, _| ());
@@ -418,7 +418,7 @@ impl Soak<'_> {
         Ok(())
     }
 
-    /// Takes in what the firmware has counted, before it forgets it or when all is over.
+    /// Adds up what the firmware has counted, before a restart clears it or at the end.
     fn over(&mut self) -> Result<(), HourError> {
         let tally = self.tally()?;
         let hour = &mut self.hour;

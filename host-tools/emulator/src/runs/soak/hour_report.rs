@@ -14,10 +14,10 @@ use crate::host::talk::TalkError;
 const SLOTS_OFF: f64 = 10.0;
 /// Reports say whole milliseconds, and are looked for every one.
 const DRIFT_MS: f64 = 2.0;
-/// Bytes by which the high-water mark may rise: the exception frames of two interrupts that came when the stack was deepest, which is
-/// a matter of luck. What leaks does so at every episode.
+/// Bytes by which the high-water mark may rise: the exception frames of two interrupts that came when the stack was deepest,
+/// which is a matter of luck. A leak would grow with every episode.
 const FRAMES: u32 = 2 * 108;
-/// Explores that an hour is for; of a shorter time, its share.
+/// Episodes that an hour must have; a shorter time, its share of them.
 const EPISODES: f64 = 30.0;
 /// Why there is no hour to judge.
 #[derive(Debug, thiserror::Error)]
@@ -84,7 +84,7 @@ pub struct Hour {
     pub stack: Vec<u32>,
     /// Resets that the emulator saw.
     pub resets: usize,
-    /// What the firmware told of them.
+    /// What the firmware reported of them.
     pub restarts: Vec<Restart>,
     /// Most force on the finger, N.
     pub force_max_n: f64,
@@ -280,7 +280,7 @@ mod tests {
             |hour| hour.lost_reports = 1,
             |hour| hour.stack[2] = 9217,
             |hour| hour.force_max_n = 2.21,
-            // one that nobody told of
+            // one that nobody reported
             |hour| hour.resets = 5,
             |hour| hour.restarts[2].last_words = None,
         ];

@@ -60,7 +60,7 @@ pub(crate) struct Monitor {
     pub(crate) silent: Option<Duration>,
     /// the messages of a probe that has started with other firmware
     pub(crate) protocol: Option<u8>,
-    /// it has started anew: what was asked of it is forgotten
+    /// it has restarted and no longer knows the commands it was given
     pub(crate) rebooted: bool,
 }
 

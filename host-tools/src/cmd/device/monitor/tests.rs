@@ -26,7 +26,7 @@ fn status() -> Status {
     }
 }
 
-/// A monitor that has heard these.
+/// A monitor that has received these events.
 fn heard(events: impl IntoIterator<Item = Event>) -> Monitor {
     let names = ["Burlap", "Oak wood", "Velcro", "Felt"].map(str::to_owned);
     let mut monitor = Monitor::new("/dev/ttyACM0", status(), names.to_vec());
