@@ -10,7 +10,7 @@
 //! | bytes | what |
 //! |---|---|
 //! | 4 | magic `TACT` |
-//! | 2 | version, 2 |
+//! | 2 | version, 3 |
 //! | 1 | contents, 0: Gaussians, 1: fused |
 //! | 1 | Gaussians: properties measured, a bit each: 1 traction, 2 roughness, 4 fineness; fused: place in [`FeatureSet::ALL`] |
 //! | 4 | length of the whole table in bytes |

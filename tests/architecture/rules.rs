@@ -138,7 +138,7 @@ impl House<'_> {
     }
 
     /// The package, the room of a file, and its step.
-    fn buffer(&self, file: FileId) -> Option<(usize, &str, usize)> {
+    fn room(&self, file: FileId) -> Option<(usize, &str, usize)> {
         let (package, first) = self.place(file)?;
         let steps = self.packages[package].steps.iter();
         let step = steps
@@ -154,7 +154,7 @@ impl House<'_> {
                 continue;
             };
             let Package { steps, outside, .. } = self.packages[package];
-            let known = steps.is_empty() || outside.contains(&first) || self.buffer(id).is_some();
+            let known = steps.is_empty() || outside.contains(&first) || self.room(id).is_some();
             if file.is_product && !known {
                 let rooms: Vec<&str> = steps.iter().copied().flatten().copied().collect();
                 let rooms = rooms.join(", ");
@@ -168,11 +168,11 @@ impl House<'_> {
     fn doors(&self) -> Vec<String> {
         let mut wrong: BTreeMap<(&str, &str, String), BTreeMap<&str, &Use>> = BTreeMap::new();
         for found in &self.uses {
-            let Some((package, user, step)) = self.buffer(found.from) else {
+            let Some((package, user, step)) = self.room(found.from) else {
                 continue;
             };
             for &used in found.through.iter().chain([&found.to]) {
-                let Some((_, buffer, later)) = self.buffer(used).filter(|used| used.0 == package)
+                let Some((_, buffer, later)) = self.room(used).filter(|used| used.0 == package)
                 else {
                     continue;
                 };

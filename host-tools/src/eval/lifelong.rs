@@ -101,13 +101,13 @@ fn play(
                 };
                 let best = look(experiment, config, &bytes, movement, slide)?;
                 let right = best.0 == texture;
-                let lesson = match learning {
+                let label = match learning {
                     Learning::None => None,
                     Learning::Itself => best.1.then_some(best.0),
                     Learning::Asking => Some(if best.1 { best.0 } else { texture }),
                 };
-                if let Some(lesson) = lesson {
-                    learn(&mut bytes, lesson, movement, slide)?;
+                if let Some(label) = label {
+                    learn(&mut bytes, label, movement, slide)?;
                 }
                 episodes.push(Episode {
                     texture,

@@ -174,8 +174,8 @@ impl Episodes {
         let broken = self.broken();
         format!(
             "{} episodes, {} without a fault; of textures that it knew {} of {} right, {} wrong though sure; of those it had forgotten {} \
-             of {} noticed, {} wrong though sure; {} slides made again\n  {} faults, {} ended the episode; {} textures learned from the user, {} by itself \
-             times, forgot {} times",
+             of {} noticed, {} wrong though sure; {} slides made again\n  {} faults, {} ended the episode; {} textures learned from the user, {} by itself, \
+             {} forgotten",
             self.made,
             self.sound,
             self.known.1,
