@@ -26,6 +26,8 @@
 //! | 5 T | per texture: a number that stays its own (2); slides that were learned from the factory, the user and itself (1 each, 255 for more) |
 //! | | per texture: length of its name (1), the name in UTF-8 |
 //! | 4 | CRC-32 (ISO-HDLC) of all before |
+//!
+//! [`FeatureSet::ALL`]: crate::features::FeatureSet::ALL
 
 mod encode;
 mod format;

@@ -43,7 +43,7 @@ pub enum Choice {
 #[derive(Clone, PartialEq, Debug)]
 #[allow(clippy::large_enum_variant)] // no allocation here, and only one at a time
 pub enum Job {
-    /// Compare these slides with the table ([`judge`]), and call [`Handheld::judged`].
+    /// Compare these slides with the table ([`judge`](super::judge())), and call [`Handheld::judged`].
     Judge(Vec<Observation, MAX_SLIDES>),
     /// Learn the episode that was judged last as this texture, and call [`Handheld::learned`].
     Teach(Choice),

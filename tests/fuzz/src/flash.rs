@@ -6,9 +6,9 @@ use embassy_futures::block_on;
 use tactus::eval::learn::learn;
 use tactus::sim::flash::RamFlash;
 use tactus_core::explorer::Method;
-use tactus_core::features::{Properties, FeatureSet, Observation, Movement};
-use tactus_core::sensor::pressure::Calibration;
+use tactus_core::features::{FeatureSet, Movement, Observation, Properties};
 use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::sensor::pressure::Calibration;
 use tactus_core::store::Store;
 
 /// Bytes of a sector: a sixteenth of the chip's, so that they fill up.

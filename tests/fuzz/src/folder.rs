@@ -7,10 +7,10 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use sha2::{Digest as _, Sha256};
-use tactus::eval::experiment::Experiment;
 use tactus::data::fabricslide::FabricSet;
 use tactus::data::properties::PropertyTable;
 use tactus::data::recordings::{RecordingError, RecordingSet};
+use tactus::eval::experiment::Experiment;
 
 /// Between manifest and file.
 const RULE: &[u8] = b"\n---\n";

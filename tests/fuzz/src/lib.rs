@@ -16,12 +16,12 @@ use embassy_futures::block_on;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use tactus_core::explorer::{Config, Explorer, Method, Strategy};
-use tactus_core::features::{FUSED_BANDS, Properties, Observation};
+use tactus_core::features::{FUSED_BANDS, Observation, Properties};
+use tactus_core::probe::teach::put_in_force;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::store::{SelfLearnedRecord, Store};
 use tactus_core::table::{Change, Table, amend};
-use tactus_core::probe::teach::put_in_force;
-use tactus_core::wire::{Command, MAX_FRAME, Receiver, Request, Event};
+use tactus_core::wire::{Command, Event, MAX_FRAME, Receiver, Request};
 
 pub use flash::{Flash, images};
 pub use folder::recordings;
@@ -183,7 +183,8 @@ fn explore(table: &Table<'_>, method: Method, bytes: &[u8], mode: u8) {
         return;
     };
     let mut observed = bytes.iter().rev().copied().cycle();
-    let mut number = || i16::from_le_bytes([observed.next().unwrap_or(0), observed.next().unwrap_or(0)]);
+    let mut number =
+        || i16::from_le_bytes([observed.next().unwrap_or(0), observed.next().unwrap_or(0)]);
     while explorer.verdict().is_none() {
         let expected = explorer.expected_outcomes();
         let action = explorer.choose(&expected, number() as u16 as u32);
@@ -331,7 +332,7 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
     let behind = |mode: u8, bytes: &[u8]| [&[mode], bytes].concat();
     match target {
         "wire" => {
-            let wants_label = [
+            let commands = [
                 Command::Status,
                 Command::Identify(tactus_core::wire::Identify {
                     among: [1, 2].into_iter().collect(),
@@ -350,9 +351,9 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
                 },
             ];
             let mut seeds = Vec::new();
-            for (id, ask) in (0..).zip(wants_label) {
+            for (id, command) in (0..).zip(commands) {
                 let mut buffer = [0; MAX_FRAME + 1];
-                let frame = tactus_core::wire::encode(&Request { id, ask }, &mut buffer);
+                let frame = tactus_core::wire::encode(&Request { id, command }, &mut buffer);
                 let frame = frame.expect("room for a frame");
                 seeds.push(behind(0, frame));
                 let mut whole = frame[..frame.len() - 1].to_vec();
