@@ -12,7 +12,7 @@
 //! | 4 | magic `TACT` |
 //! | 2 | version, 3 |
 //! | 1 | contents, 0: Gaussians, 1: fused |
-//! | 1 | Gaussians: properties measured, a bit each: 1 traction, 2 roughness, 4 fineness; fused: place in [`FeatureSet::ALL`] |
+//! | 1 | Gaussians: properties measured, a bit each: 1 traction, 2 roughness, 4 fineness; fused: place in `features::FeatureSet::ALL` |
 //! | 4 | length of the whole table in bytes |
 //! | 2 | number of textures T |
 //! | 1 | number of movements M |
@@ -26,8 +26,6 @@
 //! | 5 T | per texture: a number that stays its own (2); slides that were learned from the factory, the user and itself (1 each, 255 for more) |
 //! | | per texture: length of its name (1), the name in UTF-8 |
 //! | 4 | CRC-32 (ISO-HDLC) of all before |
-//!
-//! [`FeatureSet::ALL`]: crate::features::FeatureSet::ALL
 
 mod encode;
 mod format;
