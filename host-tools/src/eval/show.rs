@@ -129,17 +129,7 @@ impl<'t, W: Write> Show<'t, W> {
         match event {
             Event::Chosen {
                 action, expected, ..
-            } => {
-                let expected: Vec<ExpectedOutcome> = expected
-                    .iter()
-                    .map(|outcome| ExpectedOutcome {
-                        action: outcome.action,
-                        uncertainty: outcome.uncertainty,
-                        benefit: outcome.benefit,
-                    })
-                    .collect();
-                self.chosen(*action, &expected)
-            }
+            } => self.chosen(*action, expected),
             Event::SlideReport {
                 action,
                 observed,
