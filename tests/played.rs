@@ -130,7 +130,9 @@ fn explore_all(set: &RecordingSet, method: Method, train: usize, seed: u64) -> T
                 ExplorationStep::Rejected(_, why) => {
                     panic!("{}: {why}", recorded_texture.names[texture])
                 }
-                ExplorationStep::Chosen(..) | ExplorationStep::Decided { .. } => {}
+                ExplorationStep::Chosen(..)
+                | ExplorationStep::Decided { .. }
+                | ExplorationStep::CutShort(..) => {}
             },
         );
         let verdict = embassy_futures::block_on(exploration).unwrap();

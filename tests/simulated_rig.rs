@@ -60,7 +60,9 @@ fn two_hundred_explorations() {
                         movements.push(table.movement(action.movement).unwrap())
                     }
                     ExplorationStep::Rejected(_, why) => panic!("{}: {why}", texture_name(unknown)),
-                    ExplorationStep::Chosen(..) | ExplorationStep::Decided { .. } => {}
+                    ExplorationStep::Chosen(..)
+                    | ExplorationStep::Decided { .. }
+                    | ExplorationStep::CutShort(..) => {}
                 },
             ));
             let verdict = verdict.unwrap_or_else(|why| panic!("{}: {why}", texture_name(unknown)));

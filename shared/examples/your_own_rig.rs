@@ -67,7 +67,7 @@ pub(crate) fn main() {
     let mut rig = Hum(80.0);
     let explorer = Explorer::<'_, 2>::new(table, rig.measures(), Config::default());
     let mut explorer = explorer.expect("it can begin");
-    let tell = |event: ExplorationStep<'_>| {
+    let tell = |event: ExplorationStep<'_, _>| {
         if let ExplorationStep::Measured(action, _, posterior) = event {
             println!("looked at {}: {posterior:.3?}", action.what());
         }

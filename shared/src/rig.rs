@@ -24,8 +24,9 @@ use crate::features::{Movement, PropertySet, Slide};
 pub use fault::{FAULTS, Fault};
 pub use phase::{Ended, Phase, Refused, RigError};
 
-/// Slides in a row without properties, after which an exploration ends.
-pub const MAX_REJECTED: u8 = 3;
+/// Slides in a row that came to nothing, after which an exploration ends: each movement is tried twice, so these are three
+/// movements.
+pub const MAX_REJECTED: u8 = 6;
 
 /// A board, a simulator or a recording: it makes one movement and delivers the samples.
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
@@ -54,5 +55,11 @@ pub trait Rig {
     /// The finger was not lifted as it should; it is now, unless that is what fails.
     async fn lifted(&mut self) -> Result<(), Self::Error> {
         Ok(())
+    }
+
+    /// Whether a movement can be tried again after this failure, once the rig has done by itself what that takes. One that
+    /// needs a person cannot.
+    async fn recover(&mut self, _failed: &Self::Error) -> bool {
+        false
     }
 }

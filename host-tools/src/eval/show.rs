@@ -1,5 +1,6 @@
 //! Explorations and tables for people to look at.
 
+use std::fmt::Display;
 use std::io::{self, Write};
 
 use tactus_core::explorer::{ExpectedOutcome, Verdict};
@@ -36,13 +37,13 @@ impl<'t, W: Write> Show<'t, W> {
     }
 
     /// Shows one step.
-    pub fn step(&mut self, event: ExplorationStep<'_>) {
+    pub fn step<E: Display>(&mut self, event: ExplorationStep<'_, E>) {
         if self.failed.is_ok() {
             self.failed = self.try_step(event);
         }
     }
 
-    fn try_step(&mut self, event: ExplorationStep<'_>) -> io::Result<()> {
+    fn try_step<E: Display>(&mut self, event: ExplorationStep<'_, E>) -> io::Result<()> {
         match event {
             ExplorationStep::Chosen(action, expected) => self.chosen(action, expected),
             ExplorationStep::Measured(action, measurement, posterior) => self.slide_report(
@@ -54,6 +55,7 @@ impl<'t, W: Write> Show<'t, W> {
             ExplorationStep::Rejected(_, why) => self.line(&format!("  rejected: {why}")),
             // shown with the truth: see `finish`
             ExplorationStep::Decided { .. } => Ok(()),
+            ExplorationStep::CutShort(known, slides) => self.answer(*known, slides),
         }
     }
 

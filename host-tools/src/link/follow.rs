@@ -122,6 +122,8 @@ pub struct Follower<'t> {
     random: Random,
     /// The slide as far as its samples have come, and the number of the next block; `None` once a block is missing.
     samples: Option<(Slide<'t>, u16)>,
+    /// What the probe chose last.
+    chosen: Option<Action>,
     agreement: Agreement,
 }
 
@@ -153,6 +155,7 @@ impl<'t> Follower<'t> {
             plan,
             random: Random::new(asked.seed),
             samples: Some((Slide::new(plan), 0)),
+            chosen: None,
             agreement: Agreement::default(),
         })
     }
@@ -193,14 +196,17 @@ impl<'t> Follower<'t> {
                 ..
             } => {
                 self.agreement.verdicts += 1;
-                let here = self.explorer.verdict();
+                let whole = self.explorer.verdict();
+                // an exploration that was cut short says what is known so far, and asks for no label
+                let here = whole.or_else(|| Some(self.explorer.best()));
                 let is_fused = matches!(self.explorer.table().contents(), Contents::Fused(..));
                 let same = here.is_some_and(|here| {
                     here.texture == *texture
                         && here.sure == *sure
                         && here.unknown == *unknown
                         && self.explorer.slides() == *slides
-                        && (is_fused && !self.explorer.is_certain()) == *wants_label
+                        && (whole.is_some() && is_fused && !self.explorer.is_certain())
+                            == *wants_label
                 });
                 self.agreement.other_verdicts += u32::from(!same);
                 let agreement = &mut self.agreement;
@@ -237,6 +243,7 @@ impl<'t> Follower<'t> {
         told: &[ExpectedOutcome],
     ) -> Result<(), FollowError> {
         self.samples = Some((Slide::new(self.plan), 0));
+        self.chosen = Some(there);
         let random = self.random.next_u32();
         self.in_order(slide)?;
         let expected = self.explorer.expected_outcomes();
@@ -354,6 +361,9 @@ impl<'t> Follower<'t> {
             && samples.finish().is_ok()
         {
             self.agreement.rejected_only_there += 1;
+        }
+        if let Some(action) = self.chosen {
+            self.explorer.reject(action);
         }
         self.in_order(slide)
     }

@@ -15,7 +15,7 @@ use tactus_core::rig::pins::{Inputs, Outputs};
 use tactus_core::rig::stage::StageConstants;
 use tactus_core::rig::timeout::{MovementTimeout, Wait};
 use tactus_core::rig::unloaded::UnloadedRuns;
-use tactus_core::rig::{Ended, Fault, MAX_REJECTED, Phase, Refused, Rig};
+use tactus_core::rig::{Ended, Fault, MAX_REJECTED, Phase, Refused, Rig, RigError};
 use tactus_core::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ, SLOTS_HZ};
 use tactus_core::sensor::{PressureSensor as _, biotac};
 
@@ -482,11 +482,13 @@ impl SimRig {
         }
     }
 
-    /// Makes one movement and records it; a slide with a gap is repeated. Texture and number are left at 0.
+    /// Makes one movement and records it; a slide with a gap is repeated, and one that failed in a way that the rig gets over
+    /// by itself. Texture and number are left at 0.
     ///
     /// # Errors
     /// See [`SimError`].
     pub fn record(&mut self, movement: Movement) -> Result<recording::Slide, SimError> {
+        let mut failed = SimError::from(Fault::Rejected);
         for _ in 0..MAX_REJECTED {
             let mut slide = recording::Slide {
                 texture: 0,
@@ -522,13 +524,33 @@ impl SimRig {
                     .shear_mn
                     .get_or_insert_default()
                     .push(outputs.shear_mn.unwrap_or(0));
-            })?;
-            if ended == Ended::Whole {
-                slide.background = Background::Still(still);
-                return Ok(slide);
+            });
+            match ended {
+                Ok(Ended::Whole) => {
+                    slide.background = Background::Still(still);
+                    return Ok(slide);
+                }
+                Ok(_) => {}
+                Err(why) if self.go_on(&why) => failed = why,
+                Err(why) => return Err(why),
             }
         }
-        Err(Fault::Rejected.into())
+        Err(failed)
+    }
+}
+
+impl SimRig {
+    /// Whether the rig can go on after this failure; it has homed then, if it had to.
+    fn go_on(&mut self, failed: &SimError) -> bool {
+        match *failed {
+            SimError::Refused(why) => RigError::from(why).is_of_the_movement(),
+            SimError::Fault(fault) if fault.is_of_the_movement() => {
+                self.control.reset().is_ok()
+                    && self.control.home().is_ok()
+                    && self.rest(|_| ()).is_ok()
+            }
+            _ => false,
+        }
     }
 }
 
@@ -553,6 +575,10 @@ impl Rig for SimRig {
             slide.lose(samples);
         }
         Ok(())
+    }
+
+    async fn recover(&mut self, failed: &SimError) -> bool {
+        self.go_on(failed)
     }
 }
 

@@ -1,6 +1,7 @@
 //! The simulated world against what the paper and the makers observed.
 
 mod bench;
+mod collection;
 mod finger;
 mod paper;
 mod protocol;

@@ -10,6 +10,9 @@ use super::whitened;
 use crate::features::{Property, PropertySet};
 use crate::table::{Action, Gaussian, MAX_ACTIONS, Table};
 
+/// Slides of a movement that come to nothing, one after the other, before it is left out for the rest of the exploration.
+const TRIES: u8 = 2;
+
 /// What an action is expected to bring.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct ExpectedOutcome {
@@ -27,13 +30,29 @@ pub fn confusion<K: Kernels>(a: Gaussian, b: Gaussian) -> f32 {
 }
 
 impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
-    /// The next action, given the `outcomes` of [`Explorer::expected_outcomes`]. [`Strategy::Random`] takes its choice from
-    /// `random`; the other strategies ignore it.
+    /// The slide that `action` asked for came to nothing: it was not made, or it gave no features. Its movement is tried
+    /// once more, then left out for the rest of this exploration. Whether anything is left to choose from.
+    pub fn reject(&mut self, action: Action) -> bool {
+        if let Some(failed) = self.failed.get_mut(usize::from(action.movement)) {
+            *failed = failed.saturating_add(1);
+        }
+        self.actions.iter().any(|action| !self.is_left_out(*action))
+    }
+
+    fn is_left_out(&self, action: Action) -> bool {
+        let failed = self.failed.get(usize::from(action.movement));
+        failed.is_some_and(|&failed| failed >= TRIES)
+    }
+
+    /// The next action, given the `outcomes` of [`Explorer::expected_outcomes`], of those that are not left out. While all
+    /// are ([`Explorer::reject`]), it means nothing. [`Strategy::Random`] takes its choice from `random`; the other strategies
+    /// ignore it.
     pub fn choose(&self, outcomes: &[ExpectedOutcome], random: u32) -> Action {
         let chosen = match self.config.strategy {
             Strategy::Bayesian => {
                 // the first of equals
-                let best = outcomes.iter().reduce(|best, next| {
+                let outcomes = outcomes.iter().filter(|o| !self.is_left_out(o.action));
+                let best = outcomes.reduce(|best, next| {
                     if next.benefit > best.benefit {
                         next
                     } else {
@@ -47,8 +66,9 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
                 self.turns().nth(usize::from(self.slides) % turns)
             }
             Strategy::Random => {
-                let at = (u64::from(random) * self.actions.len() as u64) >> 32;
-                self.actions.get(at as usize).copied()
+                let actions = || self.actions.iter().filter(|a| !self.is_left_out(**a));
+                let at = (u64::from(random) * actions().count() as u64) >> 32;
+                actions().nth(at as usize).copied()
             }
         };
         // there is always an action: `among` refuses to begin without
@@ -84,19 +104,19 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     }
 
     /// What cycling goes through: the best action of each property when nothing is known, properties in their order; where
-    /// all is looked at, every movement.
+    /// all is looked at, every movement. What is left out is not among them.
     pub fn turns(&self) -> impl Iterator<Item = Action> {
         let all = self
             .actions
             .iter()
             .copied()
-            .filter(|a| a.property.is_none());
+            .filter(|a| a.property.is_none() && !self.is_left_out(*a));
         let each = Property::ALL.into_iter().filter_map(|property| {
             let of_property = self
                 .actions
                 .iter()
                 .zip(&self.at_first)
-                .filter(|(a, _)| a.property == Some(property));
+                .filter(|(a, _)| a.property == Some(property) && !self.is_left_out(**a));
             of_property
                 .reduce(|best, next| if next.1 < best.1 { next } else { best })
                 .map(|(&action, _)| action)

@@ -35,6 +35,9 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         if let Some(made) = self.made.get_mut(made) {
             *made = made.saturating_add(1);
         }
+        if let Some(failed) = self.failed.get_mut(usize::from(action.movement)) {
+            *failed = 0;
+        }
         self.slides = self.slides.saturating_add(1);
         Ok(())
     }

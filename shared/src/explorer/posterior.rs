@@ -63,6 +63,8 @@ pub struct Explorer<'t, const N: usize, K = Plain> {
     /// Expected uncertainty of each action when nothing is known: a constant of table and candidates.
     pub(super) at_first: Vec<f32, MAX_ACTIONS>,
     pub(super) slides: u8,
+    /// Slides of each movement that came to nothing, since one of it counted.
+    pub(super) failed: Vec<u8, MAX_MOVEMENTS>,
     /// The slides of this exploration, for the methods that take their mean.
     pub(super) episode: Episode,
     pub(super) log_odds: Option<f32>,
@@ -87,6 +89,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             made: Vec::new(),
             at_first: Vec::new(),
             slides: 0,
+            failed: Vec::new(),
             episode: Vec::new(),
             log_odds: None,
             shrinkage: Vec::new(),
@@ -104,6 +107,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         }
         self.made = self.actions.iter().map(|_| 0).collect();
         self.slides = 0;
+        self.failed = self.table.movements().map(|_| 0).collect();
         self.episode.clear();
         self.log_odds = None;
     }

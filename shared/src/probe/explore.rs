@@ -33,16 +33,15 @@ impl Random {
     }
 }
 
-/// What an exploration does, as it does it.
+/// What an exploration does, as it does it; `E` is why a rig failed.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub enum ExplorationStep<'a> {
+pub enum ExplorationStep<'a, E> {
     /// This action comes next; the slice has the expected outcomes of all actions.
     Chosen(Action, &'a [ExpectedOutcome]),
     /// The slide was made and taken in; the posterior of every texture.
     Measured(Action, &'a Measurement, &'a [f32]),
-    /// The slide was made, but has no value of the property. It does not count: the choice is made again, and is the same
-    /// unless it is random.
-    Rejected(Action, Rejection),
+    /// The slide came to nothing and does not count. The choice is made again: see [`Explorer::reject`].
+    Rejected(Action, &'a Rejection<E>),
     /// The answer, while the finger is still being lifted.
     Decided {
         /// The answer.
@@ -52,20 +51,25 @@ pub enum ExplorationStep<'a> {
         /// See [`Explorer::is_certain`].
         certain: bool,
     },
+    /// The exploration cannot go on: what is known so far, of so many slides. The error follows.
+    CutShort(&'a Verdict, u8),
 }
 
 /// Why a slide does not count.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub enum Rejection {
+pub enum Rejection<E> {
+    /// The rig did not make it.
+    Rig(E),
     /// Its samples give no properties.
     Slide(SlideError),
     /// Its properties say nothing to the explorer.
     Observe(ObserveError),
 }
 
-impl fmt::Display for Rejection {
+impl<E: fmt::Display> fmt::Display for Rejection<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Rig(why) => why.fmt(f),
             Self::Slide(why) => why.fmt(f),
             Self::Observe(why) => why.fmt(f),
         }
@@ -75,10 +79,10 @@ impl fmt::Display for Rejection {
 /// Why an exploration ended without an answer.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum ExploreError<E> {
-    /// The rig failed.
+    /// The rig failed, and a person is needed.
     Rig(E),
-    /// [`MAX_REJECTED`] slides in a row were no good, the last one for this reason.
-    Rejected(Rejection),
+    /// [`MAX_REJECTED`] slides in a row came to nothing, or no movement is left, the last one for this reason.
+    Rejected(Rejection<E>),
     /// The table has no such movement.
     Movement(u8),
 }
@@ -87,7 +91,7 @@ impl<E: fmt::Display> fmt::Display for ExploreError<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Rig(why) => why.fmt(f),
-            Self::Rejected(why) => write!(f, "{MAX_REJECTED} slides in a row were no good: {why}"),
+            Self::Rejected(why) => write!(f, "no movement gives a good slide: {why}"),
             Self::Movement(index) => write!(f, "the table has no movement {}", index + 1),
         }
     }
@@ -95,8 +99,9 @@ impl<E: fmt::Display> fmt::Display for ExploreError<E> {
 
 impl<E: fmt::Debug + fmt::Display> core::error::Error for ExploreError<E> {}
 
-/// Explores from the beginning until there is an answer. `random` serves [`crate::explorer::Strategy::Random`]; `tell`
-/// receives every step.
+/// Explores from the beginning until there is an answer. A slide that comes to nothing is made again, then another movement
+/// is chosen; only a rig that cannot go on ends it, with what is known so far. `random` serves
+/// [`crate::explorer::Strategy::Random`]; `tell` receives every step.
 ///
 /// # Errors
 /// See [`ExploreError`].
@@ -105,13 +110,27 @@ pub async fn explore<R: Rig, const N: usize, K: Kernels>(
     explorer: &mut Explorer<'_, N, K>,
     plan: &Plan,
     random: impl FnMut() -> u32,
-    tell: impl FnMut(ExplorationStep<'_>),
+    mut tell: impl FnMut(ExplorationStep<'_, R::Error>),
 ) -> Result<Verdict, ExploreError<R::Error>> {
-    let answer = slides(rig, explorer, plan, random, tell).await;
-    if !matches!(answer, Err(ExploreError::Rig(_))) {
-        rig.lifted().await.map_err(ExploreError::Rig)?;
+    match slides(rig, explorer, plan, random, &mut tell).await {
+        Ok(verdict) => rig
+            .lifted()
+            .await
+            .map_err(ExploreError::Rig)
+            .map(|()| verdict),
+        Err(why) => {
+            if explorer.slides() > 0 {
+                tell(ExplorationStep::CutShort(
+                    &explorer.best(),
+                    explorer.slides(),
+                ));
+            }
+            if !matches!(why, ExploreError::Rig(_)) {
+                rig.lifted().await.map_err(ExploreError::Rig)?;
+            }
+            Err(why)
+        }
     }
-    answer
 }
 
 /// As [`explore`]; after the last slide the finger may still be on its way up.
@@ -120,7 +139,7 @@ async fn slides<R: Rig, const N: usize, K: Kernels>(
     explorer: &mut Explorer<'_, N, K>,
     plan: &Plan,
     mut random: impl FnMut() -> u32,
-    mut tell: impl FnMut(ExplorationStep<'_>),
+    tell: &mut impl FnMut(ExplorationStep<'_, R::Error>),
 ) -> Result<Verdict, ExploreError<R::Error>> {
     explorer.restart();
     let mut rejected = 0;
@@ -142,35 +161,31 @@ async fn slides<R: Rig, const N: usize, K: Kernels>(
             .movement(action.movement)
             .ok_or(ExploreError::Movement(action.movement))?;
         let mut slide = Slide::<K>::new(plan);
-        rig.lifted().await.map_err(ExploreError::Rig)?;
-        rig.perform(movement, &mut slide)
-            .await
-            .map_err(ExploreError::Rig)?;
-        let measured = slide
-            .finish()
-            .map_err(Rejection::Slide)
-            .and_then(|measurement| {
-                explorer
-                    .observe(action, &Observation::from(&measurement))
-                    .map_err(Rejection::Observe)?;
-                Ok(measurement)
-            });
-        match measured {
-            Ok(measurement) => {
-                rejected = 0;
-                tell(ExplorationStep::Measured(
-                    action,
-                    &measurement,
-                    explorer.posterior(),
-                ));
-            }
-            Err(why) => {
-                rejected += 1;
-                tell(ExplorationStep::Rejected(action, why));
-                if rejected == MAX_REJECTED {
-                    return Err(ExploreError::Rejected(why));
-                }
-            }
+        let made = match rig.lifted().await {
+            Ok(()) => rig.perform(movement, &mut slide).await,
+            failed => failed,
+        };
+        let why = match made {
+            Err(why) if !rig.recover(&why).await => return Err(ExploreError::Rig(why)),
+            Err(why) => Rejection::Rig(why),
+            Ok(()) => match slide.finish() {
+                Err(why) => Rejection::Slide(why),
+                Ok(measurement) => match explorer.observe(action, &Observation::from(&measurement))
+                {
+                    Err(why) => Rejection::Observe(why),
+                    Ok(()) => {
+                        rejected = 0;
+                        let posterior = explorer.posterior();
+                        tell(ExplorationStep::Measured(action, &measurement, posterior));
+                        continue;
+                    }
+                },
+            },
+        };
+        rejected += 1;
+        tell(ExplorationStep::Rejected(action, &why));
+        if !explorer.reject(action) || rejected == MAX_REJECTED {
+            return Err(ExploreError::Rejected(why));
         }
     }
 }

@@ -7,7 +7,9 @@ use heapless::Vec;
 
 use super::explore::{ExplorationStep, Random, explore};
 use crate::dsp::Plan;
-use crate::explorer::{Config, EpisodeSummary, ExpectedOutcome, Explorer, Kernels, Method};
+use crate::explorer::{
+    Config, EpisodeSummary, ExpectedOutcome, Explorer, Kernels, Method, Verdict,
+};
 use crate::rig::Rig;
 use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
@@ -82,17 +84,14 @@ where
                 verdict,
                 slides,
                 certain,
-            } => tell(Event::Verdict {
-                texture: verdict.texture,
-                name: Name::try_from(table.name(verdict.texture).unwrap_or_default())
-                    .unwrap_or_default(),
-                probability: verdict.probability,
-                sure: verdict.sure,
-                unknown: verdict.unknown,
-                log_odds: verdict.log_odds,
-                slides,
-                wants_label: matches!(contents, Contents::Fused(..)) && !certain,
-            }),
+            } => {
+                let wants_label = matches!(contents, Contents::Fused(..)) && !certain;
+                tell(told(table, verdict, slides, wants_label));
+            }
+            // nothing is kept that a label could be for
+            ExplorationStep::CutShort(verdict, slides) => {
+                tell(told(table, verdict, slides, false));
+            }
         },
     )
     .await
@@ -103,6 +102,20 @@ where
         certain: explorer.is_certain(),
         observed: up_to(explorer.observed()),
     })
+}
+
+/// The event of a verdict.
+fn told(table: Table<'_>, verdict: &Verdict, slides: u8, wants_label: bool) -> Event {
+    Event::Verdict {
+        texture: verdict.texture,
+        name: Name::try_from(table.name(verdict.texture).unwrap_or_default()).unwrap_or_default(),
+        probability: verdict.probability,
+        sure: verdict.sure,
+        unknown: verdict.unknown,
+        log_odds: verdict.log_odds,
+        slides,
+        wants_label,
+    }
 }
 
 /// The most useful actions, best first. One after the other, for sorting them all takes the chip 2 KB.

@@ -322,6 +322,10 @@ impl<S: Servo> Rig for ServoRig<S> {
     async fn lifted(&mut self) -> Result<(), RigError> {
         self.rest().await.map(|_| ())
     }
+
+    async fn recover(&mut self, failed: &RigError) -> bool {
+        failed.is_of_the_movement() && self.home().await.is_ok()
+    }
 }
 
 /// Gives samples to the features. Those of a slide are gathered first: the features take many at once for little more than

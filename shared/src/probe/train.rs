@@ -61,16 +61,26 @@ where
     let mut rejected = 0;
     while let Some(movement) = training.next() {
         let mut slide = Slide::<K>::new(plan);
-        rig.perform(movement, &mut slide).await.map_err(text)?;
-        rig.lifted().await.map_err(text)?;
-        let measured = match slide.finish() {
+        let made = match rig.perform(movement, &mut slide).await {
+            Ok(()) => rig.lifted().await,
+            failed => failed,
+        };
+        if let Err(why) = &made
+            && !rig.recover(why).await
+        {
+            return Err(text(why));
+        }
+        let finished = made
+            .map_err(text)
+            .and_then(|()| slide.finish().map_err(text));
+        let measured = match finished {
             Ok(measurement) => {
                 match training.took(Some(&table), movement, &Observation::from(&measurement)) {
                     Ok(training_record) => Ok((training_record, measurement)),
                     Err(why) => Err(text(why)),
                 }
             }
-            Err(why) => Err(text(why)),
+            Err(why) => Err(why),
         };
         match measured {
             Ok((training_record, measurement)) => {

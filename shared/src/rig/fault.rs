@@ -83,8 +83,8 @@ faults! {
     /// Samples of a slide are missing.
     SlideGap, "gap in a slide", "a damaged or late word between the background and the end of the slide", 2,
         "nothing: the slide is finished", "the slide: it is repeated", "none";
-    /// Three slides in a row were rejected.
-    Rejected, "three slides rejected", "counted", 2, "the exploration ends, finger lifted", "nothing", "look at the reasons given";
+    /// Six slides in a row were rejected.
+    Rejected, "six slides rejected", "counted", 2, "the exploration ends, finger lifted", "nothing", "look at the reasons given";
     /// The lever came down all the way without contact.
     NoContact, "no contact", "lever at its lower end, P_DC unchanged", 2, BOTH, ALL, "put a sample under the finger, then reset";
     /// The lever steps and the force does not follow.
@@ -114,6 +114,15 @@ impl Fault {
     /// What the user does; from a list of its own, too.
     pub fn recovery(self) -> &'static str {
         RECOVERIES.get(self as usize).copied().unwrap_or("reset")
+    }
+
+    /// Whether it can come of one movement or pass by itself: a rig that has homed after it may go on without a person. Each
+    /// press begins with its checks of the zero, and every guard stays on.
+    pub const fn is_of_the_movement(self) -> bool {
+        matches!(
+            self,
+            Self::Unsteady | Self::LeverSlips | Self::StageOff | Self::SensorErrors
+        )
     }
 
     /// The fault's row of the table.

@@ -99,6 +99,18 @@ pub enum RigError {
     Hangs,
 }
 
+impl RigError {
+    /// Whether this is about the one movement, and the rig may try it again or try another after it has homed: see
+    /// [`Fault::is_of_the_movement`]. Of a refusal, too, that goes by force, speed or length.
+    pub const fn is_of_the_movement(&self) -> bool {
+        match self {
+            Self::Fault(fault) => fault.is_of_the_movement(),
+            Self::Refused(Refused::Force(_) | Refused::Speed(_) | Refused::Length) => true,
+            Self::Refused(_) | Self::Stopped | Self::Hangs => false,
+        }
+    }
+}
+
 impl fmt::Display for RigError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

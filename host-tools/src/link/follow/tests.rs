@@ -207,7 +207,9 @@ fn exploration(method: Method) -> (Vec<u8>, Vec<Event>) {
                     slides,
                     wants_label: method == Method::Fused && !certain,
                 },
-                ExplorationStep::Rejected(..) => panic!("{event:?}"),
+                ExplorationStep::Rejected(..) | ExplorationStep::CutShort(..) => {
+                    panic!("{event:?}")
+                }
             });
         },
     );
@@ -426,4 +428,77 @@ fn lost_samples_are_no_slide_here_either() {
     last.lost = 3;
     let (agreement, _) = follow(&[&events[..], &[rejected]].concat());
     assert_eq!((agreement.rejected, agreement.rejected_only_there), (1, 0));
+}
+
+#[test]
+fn an_exploration_that_was_cut_short_is_followed() {
+    let (bytes, whole) = explored();
+    let second = place(1, |event| matches!(event, Event::SlideReport { .. }));
+    let mut events = whole[..=second].to_vec();
+    // what is known after these two slides, by an explorer of its own
+    let config = Config {
+        method: Method::Fused,
+        open: true,
+        threshold: 1.0,
+        max_slides: 4,
+        ..Config::default()
+    };
+    let table = Table::read(bytes).unwrap();
+    let mut explorer = Explorer::<8>::new(table, PropertySet::ALL, config).unwrap();
+    for event in &events {
+        if let Event::SlideReport {
+            action, observed, ..
+        } = event
+        {
+            explorer.observe(*action, &observed.observation()).unwrap();
+        }
+    }
+    assert_eq!(explorer.verdict(), None);
+    let known = explorer.best();
+    let rejected = Event::Rejected {
+        slide: 3,
+        why: wire::Text::try_from("lever slips").unwrap(),
+    };
+    // the third choice twice; it slips both times, and another movement is chosen, which slips as well
+    let third = place(2, |event| matches!(event, Event::Chosen { .. }));
+    let Event::Chosen { action, .. } = whole[third] else {
+        panic!()
+    };
+    events.extend([whole[third].clone(), rejected.clone()]);
+    events.extend([whole[third].clone(), rejected.clone()]);
+    assert!(explorer.reject(action) && explorer.reject(action));
+    let expected = explorer.expected_outcomes();
+    let other = explorer.choose(&expected, 0);
+    assert_ne!(other.movement, action.movement);
+    events.push(Event::Chosen {
+        slide: 3,
+        movement: table.movement(other.movement).unwrap(),
+        action: other,
+        expected: expected
+            .iter()
+            .copied()
+            .take(MAX_EXPECTED_OUTCOMES)
+            .collect(),
+    });
+    events.push(rejected);
+    let verdict = |wants_label| Event::Verdict {
+        texture: known.texture,
+        name: Name::try_from(table.name(known.texture).unwrap()).unwrap(),
+        probability: known.probability,
+        sure: known.sure,
+        unknown: known.unknown,
+        log_odds: known.log_odds,
+        slides: 2,
+        wants_label,
+    };
+    let followed = |wants_label| follow(&[&events[..], &[verdict(wants_label)]].concat());
+    let (agreement, errors) = followed(false);
+    assert_eq!(
+        (errors, agreement.agrees()),
+        (vec![], true),
+        "{agreement:?}"
+    );
+    assert_eq!((agreement.rejected, agreement.choices), (3, 5));
+    let (agreement, _) = followed(true);
+    assert_eq!(agreement.other_verdicts, 1, "no label is asked for");
 }

@@ -20,10 +20,12 @@ enum Stimulus {
     NoForce,
     /// A slide that never reaches its steady part.
     Stuck,
-    /// The movement fails.
+    /// The movement fails; the rig gets over what is called `SLIPS`.
     Fault(&'static str),
 }
 use Stimulus::{Fault, NoForce, Stuck, Traction};
+
+const SLIPS: &str = "lever slips";
 
 /// A rig that feels one thing after the other, and notes its movements.
 struct Script {
@@ -60,6 +62,10 @@ impl Rig for Script {
         let sample = |n: usize| ((n * 37) % 101) as i16;
         slide.push(&(0..600).map(sample).collect::<Vec<_>>());
         Ok(())
+    }
+
+    async fn recover(&mut self, failed: &Self::Error) -> bool {
+        *failed == SLIPS
     }
 }
 
@@ -101,6 +107,10 @@ fn explored(stimuli: &[Stimulus], config: Config) -> (Outcome, Vec<String>, Vec<
                 ExplorationStep::Rejected(action, why) => {
                     format!("rejected {}: {why}", action.movement)
                 }
+                ExplorationStep::CutShort(known, slides) => {
+                    assert!(!known.sure);
+                    format!("cut short after {slides}: {:.2}", known.probability)
+                }
             });
         },
     ));
@@ -115,7 +125,7 @@ fn config(threshold: f32, max_slides: u8) -> Config {
     }
 }
 
-const STUCK: Rejection = Rejection::Slide(SlideError::NotStarted);
+const STUCK: Rejection<&str> = Rejection::Slide(SlideError::NotStarted);
 
 #[test]
 fn explores_until_it_is_sure() {
@@ -194,6 +204,7 @@ fn a_slide_is_judged_while_the_finger_is_lifted() {
                         assert_eq!(slides, 2);
                         "decided"
                     }
+                    ExplorationStep::CutShort(..) => "cut short",
                 });
             },
         );
@@ -220,8 +231,8 @@ fn a_slide_is_judged_while_the_finger_is_lifted() {
         (failed, noted),
         (Err(ExploreError::Rig("it jams")), all.to_vec())
     );
-    // three that are no good end it with the finger up
-    let (failed, noted) = outcome(&[Stuck, Stuck, Stuck, Stuck], config(1.0, 2));
+    // when no movement is left, the finger is up at the end
+    let (failed, noted) = outcome(&[Stuck; 5], config(1.0, 2));
     assert_eq!(failed, Err(ExploreError::Rejected(STUCK)));
     assert_eq!(noted.last(), Some(&"lifted"));
 }
@@ -266,39 +277,77 @@ fn a_rejected_slide_is_repeated_and_not_used() {
 }
 
 #[test]
-fn three_rejected_in_a_row_end_it() {
-    let (outcome, told, made) =
-        explored(&[Stuck, NoForce, Stuck, Traction(1900)], config(0.99, 10));
-    assert_eq!(outcome, Err(ExploreError::Rejected(STUCK)));
-    assert_eq!((told.len(), made.len()), (6, 3));
-    assert_eq!(
-        told[5],
-        "rejected 1: the slide never reached its steady part"
-    );
+fn a_movement_is_tried_twice_and_then_another_until_none_is_left() {
+    let stimuli = [Stuck, NoForce, Stuck, NoForce, Traction(1900)];
+    let (outcome, told, made) = explored(&stimuli, config(0.99, 10));
     let missing = Rejection::Observe(ObserveError::Missing(Property::Traction));
+    assert_eq!(outcome, Err(ExploreError::Rejected(missing)));
+    assert_eq!(made.len(), 4);
+    let chosen: Vec<&String> = told.iter().step_by(2).collect();
     assert_eq!(
-        explored(&[NoForce; 3], config(0.99, 10)).0,
-        Err(ExploreError::Rejected(missing))
+        chosen,
+        ["traction 1", "traction 1", "traction 0", "traction 0"]
     );
 }
 
 #[test]
+fn what_is_known_when_it_cannot_go_on_is_told() {
+    let stimuli = [Traction(1900), Stuck, Fault(SLIPS), Stuck, Stuck];
+    for strategy in [Strategy::Bayesian, Strategy::Cycling, Strategy::Random] {
+        let config = Config {
+            strategy,
+            ..config(0.99, 10)
+        };
+        let (outcome, told, made) = explored(&stimuli, config);
+        assert!(
+            matches!(outcome, Err(ExploreError::Rejected(_))),
+            "{strategy:?}"
+        );
+        assert!(
+            told.last().unwrap().starts_with("cut short after 1: "),
+            "{told:?}"
+        );
+        assert_eq!(made.len(), 5);
+    }
+}
+
+#[test]
 fn a_good_slide_in_between_resets_the_count() {
+    let bad = [Stuck, Traction(1500), Stuck, Traction(1500)];
+    let stimuli: Vec<Stimulus> = bad.into_iter().cycle().take(40).collect();
+    let (outcome, told, made) = explored(&stimuli, config(1.0, 20));
+    assert!(!outcome.unwrap().sure);
+    assert_eq!((told.len(), made.len()), (80, 40));
+}
+
+#[test]
+fn a_movement_that_failed_is_made_again_and_then_another() {
     let stimuli = [
-        Stuck,
-        Stuck,
-        Traction(1500),
-        Stuck,
-        Stuck,
-        Traction(1500),
-        Stuck,
-        Stuck,
-        Stuck,
-        Traction(1500),
+        Fault(SLIPS),
+        Traction(1900),
+        Fault(SLIPS),
+        Fault(SLIPS),
+        Traction(2000),
+        Traction(2000),
     ];
-    let (outcome, told, made) = explored(&stimuli, config(0.99, 10));
-    assert_eq!(outcome, Err(ExploreError::Rejected(STUCK)));
-    assert_eq!((told.len(), made.len()), (18, 9));
+    let (outcome, told, _) = explored(&stimuli, config(0.99, 10));
+    let verdict = outcome.unwrap();
+    assert_eq!((verdict.texture, verdict.sure), (1, true));
+    assert_eq!(
+        told,
+        [
+            "traction 1",
+            "rejected 1: lever slips",
+            "traction 1",
+            "measured 1 1.9: 0.92",
+            "traction 0",
+            "rejected 0: lever slips",
+            "traction 0",
+            "rejected 0: lever slips",
+            "traction 1",
+            "measured 1 2.0: 1.00",
+        ]
+    );
 }
 
 #[test]
@@ -335,13 +384,13 @@ fn the_errors_say_why() {
     assert_eq!(error(ExploreError::Rig("e-stop")), "e-stop");
     assert_eq!(
         error(ExploreError::Rejected(STUCK)),
-        "3 slides in a row were no good: the slide never reached its steady part"
+        "no movement gives a good slide: the slide never reached its steady part"
     );
     assert_eq!(
         error(ExploreError::Movement(2)),
         "the table has no movement 3"
     );
-    let missing = Rejection::Observe(ObserveError::Missing(Property::Fineness));
+    let missing: Rejection<&str> = Rejection::Observe(ObserveError::Missing(Property::Fineness));
     assert_eq!(
         missing.to_string(),
         "the slide did not give a value of fineness"
