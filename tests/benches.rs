@@ -12,7 +12,7 @@ use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer};
 use tactus_core::features::Movement;
 use tactus_core::features::Observation;
-use tactus_core::features::{Measurement, Properties, Property, PropertySet, Slide};
+use tactus_core::features::{Block, Measurement, Properties, Property, PropertySet, Slide};
 use tactus_core::table::{Action, Experience, Table};
 
 fn main() {
@@ -35,16 +35,15 @@ fn samples(count: usize) -> Vec<i16> {
         .collect()
 }
 
-/// A 5 s slide, all features, in blocks of 100 ms.
+/// A 5 s slide, all features, in blocks.
 #[divan::bench]
 fn features_of_a_slide(bencher: Bencher<'_, '_>) {
     let (plan, samples) = (Plan::new(), samples(11_000));
     bencher.bench(|| {
-        let mut slide = Slide::<Plain>::new(&plan);
+        let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_TRACTION);
         slide.set_background(2.0);
-        slide.start(0..11_000);
-        for block in samples.chunks(220) {
-            slide.push(block);
+        for block in Block::cut(&[], 0..11_000, &samples, &[]) {
+            slide.take(&block);
         }
         slide.finish()
     });
@@ -132,10 +131,11 @@ fn evaluate_8000_runs(bencher: Bencher<'_, '_>) {
     let plan = Plan::new();
     let samples = samples(600);
     let measurement: Measurement = {
-        let mut slide = Slide::<Plain>::new(&plan);
+        let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
         slide.set_background(2.0);
-        slide.start(0..600);
-        slide.push(&samples);
+        for block in Block::cut(&[], 0..600, &samples, &[]) {
+            slide.take(&block);
+        }
         slide.finish().unwrap()
     };
     let names: Vec<String> = (0..20).map(|t| format!("texture {t}")).collect();

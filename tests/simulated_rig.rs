@@ -1,5 +1,6 @@
 //! The whole loop on the simulated rig: learning, 200 explorations, and whatever commands come.
 
+use embassy_futures::block_on;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use rayon::prelude::*;
@@ -8,14 +9,14 @@ use tactus::sim::collection::{Collection, calibrated, record_texture, texture_na
 use tactus::sim::rig::{Performed, SimRig};
 use tactus::sim::stage::{FORCE_N_PER_A, SAMPLE_AT_MM, SAMPLE_MM};
 use tactus::sim::world::Setup;
-use tactus_core::dsp::Plan;
+use tactus_core::dsp::{Plain, Plan};
 use tactus_core::explorer::{Config, Explorer, Method};
-use tactus_core::features::Movement;
-use tactus_core::features::{Measurement, Property, PropertySet};
+use tactus_core::features::{Blocks, Measurement, Movement, Property, PropertySet, Slide};
 use tactus_core::probe::explore::{ExplorationStep, explore};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::control::Control;
-use tactus_core::rig::{Phase, Refused};
+use tactus_core::rig::pins::Outputs;
+use tactus_core::rig::{Phase, Refused, Rig as _};
 use tactus_core::sensor::pressure::Calibration;
 use tactus_core::table::Table;
 
@@ -50,7 +51,7 @@ fn two_hundred_explorations() {
             rig.control().calibrate(calibration).unwrap();
             let mut explorer = Explorer::<128>::new(table, PropertySet::ALL, config).unwrap();
             let mut movements = Vec::new();
-            let verdict = embassy_futures::block_on(explore(
+            let verdict = block_on(explore(
                 &mut rig,
                 &mut explorer,
                 &plan,
@@ -147,13 +148,8 @@ fn a_recorded_slide_has_the_properties_measured_live() {
     let plan = Plan::new();
     let mut rig = SimRig::new(setup);
     rig.control().calibrate(calibration).unwrap();
-    let mut slide = tactus_core::features::Slide::<tactus_core::dsp::Plain>::new(&plan);
-    embassy_futures::block_on(tactus_core::rig::Rig::perform(
-        &mut rig,
-        Movement::FOR_FINENESS,
-        &mut slide,
-    ))
-    .unwrap();
+    let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
+    block_on(rig.perform(&mut slide)).unwrap();
     assert_eq!(slide.finish().unwrap(), recorded);
 }
 
@@ -199,14 +195,23 @@ fn traction_is_the_shear_that_really_acts() {
         let slide = {
             rig.control().start(Movement::FOR_TRACTION, 0.5).unwrap();
             let plan = Plan::new();
-            let mut slide = tactus_core::features::Slide::<tactus_core::dsp::Plain>::new(&plan);
+            let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_TRACTION);
+            let mut blocks = Blocks::default();
             while rig.control().phase() != Phase::Ready {
-                let outputs = rig.tick().clone();
-                tactus::sim::rig::take_samples(&outputs, &mut slide);
-                if outputs.shear_mn.is_some() {
+                let Outputs {
+                    sample_phase,
+                    pac,
+                    shear_mn,
+                    ..
+                } = rig.tick().clone();
+                if let Some(block) = blocks.put(&sample_phase, &pac, shear_mn) {
+                    slide.take(&block);
+                }
+                if shear_mn.is_some() {
                     shear.push(rig.world().truth().shear_n.abs());
                 }
             }
+            slide.take(&blocks.end(0));
             slide.finish().unwrap()
         };
         let truth = shear.iter().sum::<f64>() / shear.len() as f64;

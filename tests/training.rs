@@ -47,8 +47,8 @@ fn slides(
     rig.control().calibrate(calibration).unwrap();
     let mut observed = Vec::new();
     while let Some(movement) = training.next() {
-        let mut slide = Slide::<Plain>::new(&plan);
-        block_on(rig.perform(movement, &mut slide)).unwrap();
+        let mut slide = Slide::<Plain>::new(&plan, movement);
+        block_on(rig.perform(&mut slide)).unwrap();
         let observation = Observation::from(&slide.finish().unwrap());
         training.took(Some(table), movement, &observation).unwrap();
         observed.push((movement, observation));

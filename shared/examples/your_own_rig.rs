@@ -7,7 +7,7 @@ use std::f32::consts::TAU;
 use embassy_futures::block_on;
 use tactus_core::dsp::{Kernels, Plain, Plan};
 use tactus_core::explorer::{Config, Explorer};
-use tactus_core::features::{Movement, Properties, Property, PropertySet, Slide};
+use tactus_core::features::{Block, Movement, Properties, Property, PropertySet, Slide};
 use tactus_core::probe::explore::{ExplorationStep, explore};
 use tactus_core::rig::Rig;
 use tactus_core::table::{Experience, Texture, encode};
@@ -23,27 +23,24 @@ impl Rig for Hum {
         PropertySet::ALL
     }
 
-    async fn perform<K: Kernels>(
-        &mut self,
-        movement: Movement,
-        slide: &mut Slide<'_, K>,
-    ) -> Result<(), Self::Error> {
+    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error> {
         // a real rig presses here, and measures the still finger
         slide.set_background(2.0);
-        slide.start(200..3300);
-        let hz = self.0 * movement.speed_mm_s() / 25.0;
+        let hz = self.0 * slide.movement().speed_mm_s() / 25.0;
         let sample = |n: u16| 40.0 * (f32::from(n) / 2200.0 * hz * TAU).sin();
         let samples: Vec<i16> = (0..3300).map(|n| sample(n) as i16).collect();
-        slide.push(&samples);
-        slide.push_shear(&[400; 100]);
+        // and those from 200 on are at constant speed
+        for block in Block::cut(&[], 200..3300, &samples, &[400; 100]) {
+            slide.take(&block);
+        }
         Ok(())
     }
 }
 
 /// A texture's slides, with some scatter that a real rig brings along.
 fn learn(mut rig: Hum, plan: &Plan) -> [Experience; 1] {
-    let mut slide = Slide::<Plain>::new(plan);
-    let Ok(()) = block_on(rig.perform(MOVEMENT, &mut slide));
+    let mut slide = Slide::<Plain>::new(plan, MOVEMENT);
+    let Ok(()) = block_on(rig.perform(&mut slide));
     let features = slide.finish().expect("a steady part");
     let mut experience = Experience::default();
     for scatter in [-0.02, 0.0, 0.02] {

@@ -19,7 +19,7 @@ pub mod timeout;
 pub mod unloaded;
 
 use crate::dsp::Kernels;
-use crate::features::{Movement, PropertySet, Slide};
+use crate::features::{PropertySet, Slide};
 
 pub use fault::{FAULTS, Fault};
 pub use phase::{Ended, Phase, Refused, RigError};
@@ -37,16 +37,12 @@ pub trait Rig {
     /// The properties that this rig can measure.
     fn measures(&self) -> PropertySet;
 
-    /// Presses, measures the still finger, slides, and gives all samples to `slide`, in the order that [`Slide`] asks for.
+    /// Makes the movement of `slide`: presses, measures the still finger, slides, and gives it all samples in blocks.
     /// The finger may still be on its way up: see [`Rig::lifted`].
     ///
     /// # Errors
     /// The movement failed. The stage then stands still and the finger is lifted.
-    async fn perform<K: Kernels>(
-        &mut self,
-        movement: Movement,
-        slide: &mut Slide<'_, K>,
-    ) -> Result<(), Self::Error>;
+    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error>;
 
     /// Waits until the finger is lifted, which takes longer than it takes to judge the slide. For a rig whose movements
     /// end with that, or that has no finger, there is nothing to wait for.

@@ -6,13 +6,14 @@ use core::hint::black_box;
 use heapless::Vec;
 use tactus_core::dsp::{BandPower, FRAME, HOP, Plan, SpectrumSum};
 use tactus_core::explorer::{Config, Explorer, Kernels, Method};
-use tactus_core::features::{Observation, Properties, Property, PropertySet, Slide};
+use tactus_core::features::{
+    BLOCK, Block, Movement, Observation, Properties, Property, PropertySet, Slide,
+};
+use tactus_core::sensor::pressure::RATE_HZ;
 use tactus_core::table::{Action, Table};
 
-/// Samples of P_AC in the 10 ms after which the rig's probe looks after them.
-const LOOK: usize = 22;
-/// Forces in them: one each tick of the servo's.
-const SHEARS: usize = 10;
+/// Forces in a block: one each tick of the servo's.
+const SHEARS: usize = BLOCK * 1000 / RATE_HZ as usize;
 /// Textures at most: the firmware's own.
 const CAPACITY: usize = tactus_core::table::MAX_TEXTURES;
 /// About as many as fit at all: a choice takes 64 bytes of stack for each, and posterior and distances 20.
@@ -23,11 +24,11 @@ pub const MOST_TEXTURES: usize = 1500;
 pub enum Workload {
     /// What counting itself takes.
     Nothing,
-    /// Band-pass and mean power of the samples, in parts of 10 ms.
+    /// Band-pass and mean power of the samples, in blocks.
     BandPower,
     /// One frame of the spectrum: window, FFT, power accumulated.
     Frame,
-    /// All features of a slide, in parts of 10 ms.
+    /// All features of a slide, in blocks.
     Slide,
     /// An explorer for a table, with all that is a constant of the table.
     Begin,
@@ -143,7 +144,7 @@ pub fn run<K: Kernels>(
         Workload::BandPower => {
             let mut power = BandPower::default();
             let mean = counter.count(|| {
-                for samples in black_box(words).chunks(LOOK) {
+                for samples in black_box(words).chunks(BLOCK) {
                     power.push::<K>(plan.taps(), samples);
                 }
                 power.mean::<K>(plan.taps())
@@ -160,12 +161,11 @@ pub fn run<K: Kernels>(
             psd.psd().iter().for_each(|p| put(&p.to_le_bytes()));
         }
         Workload::Slide => {
-            let mut slide = Slide::<K>::new(plan);
-            slide.set_background(2.0);
-            slide.start(0..words.len() as u32);
+            let (mut slide, mut block) = slide_of::<K>(plan, words);
             let observed = counter.count(|| {
-                for samples in black_box(words).chunks(LOOK) {
-                    look(&mut slide, samples);
+                for samples in black_box(words).chunks(BLOCK) {
+                    fill(&mut block, samples);
+                    slide.take(&block);
                 }
                 slide.finish().map(|slide| Observation::from(&slide))
             });
@@ -222,13 +222,16 @@ fn explore<K: Kernels, const N: usize>(
             Some(counter.count(|| choose(black_box(&explorer))))
         }
         Workload::Decision => {
-            let mut slide = Slide::<K>::new(plan);
-            slide.set_background(2.0);
-            slide.start(0..samples.len() as u32);
-            let (last, before) = samples.split_last()?;
-            slide.push(before);
+            let (mut slide, mut block) = slide_of::<K>(plan, samples);
+            let mut rest = samples.chunks(BLOCK);
+            let last = rest.next_back()?;
+            for samples in rest {
+                fill(&mut block, samples);
+                slide.take(&block);
+            }
+            fill(&mut block, last);
             let decided = counter.count(|| {
-                slide.push(&[*last]);
+                slide.take(&block);
                 let measured = slide.finish().map(|slide| Observation::from(&slide));
                 // the posterior is of the other slide, which leaves as many textures as are wanted
                 let seen = explorer.observe(observed.action, black_box(&observed.slide));
@@ -255,12 +258,26 @@ fn explore<K: Kernels, const N: usize>(
     Some(())
 }
 
-/// 10 ms of a slide, with the tangential force of each ms, as the rig's probe gives them.
-fn look<K: Kernels>(slide: &mut Slide<'_, K>, samples: &[i16]) {
-    for _ in 0..SHEARS {
-        slide.push_shear(&[700]);
-    }
-    slide.push(samples);
+/// The slide of so many samples, all at constant speed, after its first block, which has none.
+fn slide_of<'p, K: Kernels>(plan: &'p Plan, samples: &[i16]) -> (Slide<'p, K>, Block) {
+    let mut slide = Slide::new(plan, Movement::FOR_TRACTION);
+    slide.set_background(2.0);
+    let mut block = Block {
+        steady: Some((0, samples.len() as u32)),
+        ..Block::default()
+    };
+    slide.take(&block);
+    block.steady = None;
+    (slide, block)
+}
+
+/// Makes it the next block, with the tangential force of each ms.
+fn fill(block: &mut Block, samples: &[i16]) {
+    block.number += 1;
+    block.pac.clear();
+    // a block has space for them
+    let _ = block.pac.extend_from_slice(samples);
+    let _ = block.shear_mn.resize(SHEARS, 700);
 }
 
 fn put_observation(observed: &Observation, put: &mut impl FnMut(&[u8])) {

@@ -4,7 +4,9 @@ use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tactus_core::dsp::{Kernels, Plain, Plan};
-use tactus_core::features::{self, Measurement, Movement, Property, PropertySet, SlideError};
+use tactus_core::features::{
+    self, Block, Measurement, Movement, Property, PropertySet, SlideError,
+};
 use tactus_core::rig::Rig;
 
 use crate::data::recording::{Background, PAC_RATE_HZ, Slide, Texture};
@@ -12,26 +14,28 @@ use crate::data::recordings::{RecordingError, RecordingSet};
 
 /// Gives all samples of a recorded slide to the core, as a rig would.
 pub fn play<K: Kernels>(recorded: &Slide, slide: &mut features::Slide<'_, K>) {
-    match &recorded.background {
-        Background::Power(power) => slide.set_background(*power),
-        Background::Still(samples) => slide.push_still(samples),
-    }
+    let still: &[i16] = match &recorded.background {
+        Background::Power(power) => {
+            slide.set_background(*power);
+            &[]
+        }
+        Background::Still(samples) => samples,
+    };
+    let shear = recorded
+        .shear_mn
+        .as_ref()
+        .and_then(|s| s.get(recorded.steady(recorded.shear_rate_hz)));
     let steady = recorded.steady(PAC_RATE_HZ);
-    slide.start(steady.start as u32..steady.end as u32);
-    slide.push(&recorded.pac);
+    let steady = steady.start as u32..steady.end as u32;
+    for block in Block::cut(still, steady, &recorded.pac, shear.unwrap_or_default()) {
+        slide.take(&block);
+    }
     slide.push_pdc(
         recorded
             .pdc
             .get(recorded.steady(recorded.pdc_rate_hz))
             .unwrap_or_default(),
     );
-    if let Some(shear) = &recorded.shear_mn {
-        slide.push_shear(
-            shear
-                .get(recorded.steady(recorded.shear_rate_hz))
-                .unwrap_or_default(),
-        );
-    }
 }
 
 /// The properties of one recorded slide.
@@ -39,7 +43,7 @@ pub fn play<K: Kernels>(recorded: &Slide, slide: &mut features::Slide<'_, K>) {
 /// # Errors
 /// The slide has none: it is too short or silent.
 pub fn measure(plan: &Plan, recorded: &Slide) -> Result<Measurement, SlideError> {
-    let mut slide = features::Slide::<Plain>::new(plan);
+    let mut slide = features::Slide::<Plain>::new(plan, recorded.movement);
     play(recorded, &mut slide);
     slide.finish()
 }
@@ -142,9 +146,9 @@ impl Rig for Replay {
 
     async fn perform<K: Kernels>(
         &mut self,
-        movement: Movement,
         slide: &mut features::Slide<'_, K>,
     ) -> Result<(), NotRecorded> {
+        let movement = slide.movement();
         let recorded: Vec<&Slide> = self
             .slides
             .iter()

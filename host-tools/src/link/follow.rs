@@ -120,8 +120,8 @@ pub struct Follower<'t> {
     plan: &'t Plan,
     /// the same numbers as the probe's
     random: Random,
-    /// The slide as far as its samples have come, and the number of the next block; `None` once a block is missing.
-    samples: Option<(Slide<'t>, u16)>,
+    /// The slide as far as its samples have come; `None` once a block is missing.
+    samples: Option<Slide<'t>>,
     /// What the probe chose last.
     chosen: Option<Action>,
     agreement: Agreement,
@@ -154,7 +154,7 @@ impl<'t> Follower<'t> {
             explorer,
             plan,
             random: Random::new(asked.seed),
-            samples: Some((Slide::new(plan), 0)),
+            samples: None,
             chosen: None,
             agreement: Agreement::default(),
         })
@@ -173,10 +173,13 @@ impl<'t> Follower<'t> {
         match event {
             Event::Chosen {
                 slide,
+                movement,
                 action,
                 expected,
-                ..
-            } => self.chosen(*slide, *action, expected),
+            } => {
+                self.samples = Some(Slide::new(self.plan, *movement));
+                self.chosen(*slide, *action, expected)
+            }
             Event::Block(block) => self.block(block),
             Event::SlideReport {
                 slide,
@@ -242,7 +245,6 @@ impl<'t> Follower<'t> {
         there: Action,
         told: &[ExpectedOutcome],
     ) -> Result<(), FollowError> {
-        self.samples = Some((Slide::new(self.plan), 0));
         self.chosen = Some(there);
         let random = self.random.next_u32();
         self.in_order(slide)?;
@@ -272,11 +274,11 @@ impl<'t> Follower<'t> {
 
     fn block(&mut self, block: &Block) -> Result<(), FollowError> {
         let slide_number = self.due();
-        let Some((slide, next)) = &mut self.samples else {
+        let Some(slide) = &mut self.samples else {
             return Ok(());
         };
-        if block.number != *next {
-            let expected = *next;
+        let expected = slide.next_block();
+        if block.number != expected {
             self.samples = None;
             return Err(FollowError::MissingBlock {
                 slide: slide_number,
@@ -284,7 +286,6 @@ impl<'t> Follower<'t> {
                 got: block.number,
             });
         }
-        *next = next.wrapping_add(1);
         slide.take(block);
         Ok(())
     }
@@ -319,8 +320,10 @@ impl<'t> Follower<'t> {
         let here = match self.samples.take() {
             // the missing block was an error before
             None => return Ok(()),
-            Some((_, 0)) => return Err(FollowError::NoBlocks(slide)),
-            Some((samples, _)) => samples
+            Some(samples) if samples.next_block() == 0 => {
+                return Err(FollowError::NoBlocks(slide));
+            }
+            Some(samples) => samples
                 .finish()
                 .map_err(|why| FollowError::Slide { slide, why })?,
         };
@@ -357,7 +360,7 @@ impl<'t> Follower<'t> {
 
     fn rejected(&mut self, slide: u8) -> Result<(), FollowError> {
         self.agreement.rejected += 1;
-        if let Some((samples, 1..)) = self.samples.take()
+        if let Some(samples) = self.samples.take()
             && samples.finish().is_ok()
         {
             self.agreement.rejected_only_there += 1;

@@ -6,7 +6,7 @@ use std::time::Duration;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus_core::dsp::Kernels;
-use tactus_core::features::{Movement, PropertySet, SamplePhase, Slide};
+use tactus_core::features::{Blocks, Movement, PropertySet, SamplePhase, Slide};
 use tactus_core::probe::RigState;
 use tactus_core::rig::calibration::{LineFit, RigCalibration, RigCalibrationError};
 use tactus_core::rig::control::Control;
@@ -561,35 +561,27 @@ impl Rig for SimRig {
         PropertySet::ALL
     }
 
-    async fn perform<K: Kernels>(
-        &mut self,
-        movement: Movement,
-        slide: &mut Slide<'_, K>,
-    ) -> Result<(), SimError> {
+    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), SimError> {
         if self.control.phase() == Phase::Parked {
             self.home()?;
         }
         let start = self.random.random();
-        let ended = self.slide(movement, start, |outputs, _| take_samples(outputs, slide))?;
-        if let Ended::Gap(samples) = ended {
-            slide.lose(samples);
-        }
+        let mut blocks = Blocks::default();
+        let ended = self.slide(slide.movement(), start, |outputs, _| {
+            let (phase, pac) = (&outputs.sample_phase, &outputs.pac);
+            if let Some(block) = blocks.put(phase, pac, outputs.shear_mn) {
+                slide.take(&block);
+            }
+        })?;
+        let lost = match ended {
+            Ended::Gap(samples) => samples,
+            _ => 0,
+        };
+        slide.take(&blocks.end(lost));
         Ok(())
     }
 
     async fn recover(&mut self, failed: &SimError) -> bool {
         self.go_on(failed)
     }
-}
-
-/// Gives the samples of a tick to the core.
-pub fn take_samples<K: Kernels>(outputs: &Outputs, slide: &mut Slide<'_, K>) {
-    match &outputs.sample_phase {
-        SamplePhase::Nothing => return,
-        SamplePhase::Still => return slide.push_still(&outputs.pac),
-        SamplePhase::Begin(steady) => slide.start(steady.clone()),
-        SamplePhase::Slide => {}
-    }
-    slide.push(&outputs.pac);
-    slide.push_shear(outputs.shear_mn.as_slice());
 }

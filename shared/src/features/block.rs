@@ -1,4 +1,4 @@
-//! The one unit of samples: what a tick of the rig or a message on the link carries of a slide.
+//! The one unit in which the samples of a slide travel: from the servo to its features, on the link, in a recording.
 
 use core::ops::Range;
 
@@ -23,7 +23,7 @@ pub enum SamplePhase {
 }
 
 /// Raw samples of the still finger or of a slide, gap-free: `number` says the order.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Block {
     /// One more than the last block's of the same movement, from 0.
     pub number: u16,
@@ -39,7 +39,39 @@ pub struct Block {
     pub lost: u32,
 }
 
-/// The raw samples of one movement on their way to the host, in blocks.
+impl Block {
+    /// The blocks of a movement that is over, from all its samples: P_AC of the still finger, if it was measured, and of the
+    /// slide, and shear at constant speed, in mN.
+    pub fn cut<'s>(
+        still: &'s [i16],
+        steady: Range<u32>,
+        pac: &'s [i16],
+        shear_mn: &'s [i16],
+    ) -> impl Iterator<Item = Self> + 's {
+        let part = |samples: &[i16], n| {
+            let part = samples.chunks(BLOCK).nth(n).unwrap_or_default();
+            // a part is no longer than a block
+            Vec::from_slice(part).unwrap_or_default()
+        };
+        let background = still.chunks(BLOCK).map(move |pac| Self {
+            still: true,
+            pac: part(pac, 0),
+            ..Self::default()
+        });
+        let most = pac.len().max(shear_mn.len()).max(1);
+        let slide = (0..most.div_ceil(BLOCK)).map(move |n| Self {
+            steady: (n == 0).then_some((steady.start, steady.end)),
+            pac: part(pac, n),
+            shear_mn: part(shear_mn, n),
+            ..Self::default()
+        });
+        let numbers = (0..=u16::MAX).cycle();
+        let blocks = background.chain(slide).zip(numbers);
+        blocks.map(|(block, number)| Self { number, ..block })
+    }
+}
+
+/// The samples of one movement as they come, gathered into blocks.
 #[derive(Clone, Debug)]
 pub struct Blocks {
     block: Block,
@@ -48,30 +80,26 @@ pub struct Blocks {
 impl Default for Blocks {
     fn default() -> Self {
         Self {
-            block: Self::empty(0, true),
+            block: Block {
+                still: true,
+                ..Block::default()
+            },
         }
     }
 }
 
 impl Blocks {
-    const fn empty(number: u16, still: bool) -> Block {
-        Block {
-            number,
-            still,
-            steady: None,
-            pac: Vec::new(),
-            shear_mn: Vec::new(),
-            lost: 0,
-        }
-    }
-
     /// The block so far, and an empty one in its place.
     fn take(&mut self, still: bool) -> Option<Block> {
         if self.block.pac.is_empty() && self.block.shear_mn.is_empty() {
             self.block.still = still;
             return None;
         }
-        let next = Self::empty(self.block.number.wrapping_add(1), still);
+        let next = Block {
+            number: self.block.number.wrapping_add(1),
+            still,
+            ..Block::default()
+        };
         Some(core::mem::replace(&mut self.block, next))
     }
 

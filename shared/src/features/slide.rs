@@ -6,7 +6,8 @@ use core::fmt;
 use core::marker::PhantomData;
 use core::ops::Range;
 
-use super::block::Block;
+use super::block::{BLOCK, Block};
+use super::movement::Movement;
 use super::property::Properties;
 use crate::dsp::{BandPower, FRAME, Kernels, Plain, Plan, Spectrum, SpectrumSum, TAPS};
 
@@ -90,13 +91,13 @@ impl fmt::Display for SlideError {
 
 impl core::error::Error for SlideError {}
 
-/// One slide while its samples arrive, as [`Block`]s: [`Slide::take`].
-///
-/// Whoever has samples in another form gives them in this order: the still finger ([`Slide::push_still`], or
-/// [`Slide::set_background`] where its power is known), then [`Slide::start`], then the samples of the slide.
+/// One slide while its samples arrive, as [`Block`]s: the movement that makes it, what has come, and what was lost.
 #[derive(Clone, Debug)]
 pub struct Slide<'p, K = Plain> {
     plan: &'p Plan,
+    movement: Movement,
+    /// Number of the next block.
+    next: u16,
     still: BandPower,
     still_samples: usize,
     background: Option<f32>,
@@ -113,10 +114,12 @@ pub struct Slide<'p, K = Plain> {
 }
 
 impl<'p, K: Kernels> Slide<'p, K> {
-    /// A slide of which nothing has happened yet.
-    pub fn new(plan: &'p Plan) -> Self {
+    /// The slide of a movement, of which nothing has happened yet.
+    pub fn new(plan: &'p Plan, movement: Movement) -> Self {
         Self {
             plan,
+            movement,
+            next: 0,
             still: BandPower::default(),
             still_samples: 0,
             background: None,
@@ -132,9 +135,24 @@ impl<'p, K: Kernels> Slide<'p, K> {
         }
     }
 
+    /// The movement that makes it.
+    pub fn movement(&self) -> Movement {
+        self.movement
+    }
+
+    /// Number of the block that is to come next.
+    pub fn next_block(&self) -> u16 {
+        self.next
+    }
+
     /// Takes the next block of the movement: of the still finger, then of the slide, the first of which says which samples
-    /// are at constant speed.
+    /// are at constant speed. What a block says is lost has nothing in its place, nor has a block that does not come: the
+    /// slide has no properties then.
     pub fn take(&mut self, block: &Block) {
+        let missing = u32::from(block.number.wrapping_sub(self.next)) * BLOCK as u32;
+        self.next = block.number.wrapping_add(1);
+        self.lost = self.lost.saturating_add(missing);
+        self.lost = self.lost.saturating_add(block.lost);
         if let Some((from, to)) = block.steady {
             self.start(from..to);
         }
@@ -144,11 +162,10 @@ impl<'p, K: Kernels> Slide<'p, K> {
             self.push(&block.pac);
             self.push_shear(&block.shear_mn);
         }
-        self.lose(block.lost);
     }
 
     /// P_AC of the pressed, still finger, in counts about its baseline: the background of eq. 16.
-    pub fn push_still(&mut self, samples: &[i16]) {
+    fn push_still(&mut self, samples: &[i16]) {
         // the filter must have filled before its power counts
         let fill = (TAPS - 1)
             .saturating_sub(self.still_samples)
@@ -167,13 +184,13 @@ impl<'p, K: Kernels> Slide<'p, K> {
     }
 
     /// The slide begins: the next P_AC sample has number 0, and those in `steady` are at constant speed.
-    pub fn start(&mut self, steady: Range<u32>) {
+    fn start(&mut self, steady: Range<u32>) {
         self.steady = steady;
         self.position = 0;
     }
 
     /// P_AC of the slide in counts about the baseline of the still finger, gap-free from its start.
-    pub fn push(&mut self, samples: &[i16]) {
+    fn push(&mut self, samples: &[i16]) {
         let end = self.position.saturating_add(samples.len() as u32);
         let cut = |at: u32| at.clamp(self.position, end) - self.position;
         let before = cut(self.steady.start) as usize;
@@ -188,8 +205,8 @@ impl<'p, K: Kernels> Slide<'p, K> {
         self.position = end;
     }
 
-    /// Tangential force at constant speed in mN. A rig without force sensing never calls this.
-    pub fn push_shear(&mut self, samples_mn: &[i16]) {
+    /// Tangential force at constant speed in mN; a rig without force sensing has none.
+    fn push_shear(&mut self, samples_mn: &[i16]) {
         self.shear_mn += samples_mn.iter().copied().map(i64::from).sum::<i64>();
         self.shears += samples_mn.len() as u32;
     }
@@ -202,11 +219,6 @@ impl<'p, K: Kernels> Slide<'p, K> {
             *squares += u64::from(counts.unsigned_abs()) * u64::from(counts.unsigned_abs());
         }
         *number += samples.len() as u32;
-    }
-
-    /// So many samples were lost: nothing stands in for them, the slide has no properties.
-    pub fn lose(&mut self, samples: u32) {
-        self.lost = self.lost.saturating_add(samples);
     }
 
     /// The properties, when the steady part is over.
@@ -325,7 +337,7 @@ mod tests {
         cuts: &[usize],
     ) -> Result<Measurement, SlideError> {
         let plan = Plan::new();
-        let mut slide = Slide::<Plain>::new(&plan);
+        let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
         slide.set_background(2.0);
         slide.start(steady);
         let mut rest = samples;
@@ -373,7 +385,7 @@ mod tests {
             None
         );
         let plan = Plan::new();
-        let mut slide = Slide::<Plain>::new(&plan);
+        let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
         slide.set_background(0.0);
         slide.start(0..1000);
         slide.push(&samples);
@@ -389,7 +401,7 @@ mod tests {
         let still = texture(2000);
         let plan = Plan::new();
         let background = |blocks: &[&[i16]]| {
-            let mut slide = Slide::<Plain>::new(&plan);
+            let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
             for block in blocks {
                 slide.push_still(block);
             }
@@ -417,12 +429,15 @@ mod tests {
         use super::super::block::{Blocks, SamplePhase};
         let (still, moving) = (texture(500), texture(2000));
         let plan = Plan::new();
-        let mut by_hand = Slide::<Plain>::new(&plan);
+        let mut by_hand = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
         by_hand.push_still(&still);
         by_hand.start(100..1900);
         by_hand.push(&moving);
         by_hand.push_shear(&(0..900).map(|n| n - 300).collect::<Vec<i16>>());
-        let (mut blocks, mut slide) = (Blocks::default(), Slide::<Plain>::new(&plan));
+        let (mut blocks, mut slide) = (
+            Blocks::default(),
+            Slide::<Plain>::new(&plan, Movement::FOR_FINENESS),
+        );
         let ticks = still.chunks(2).map(|pac| (SamplePhase::Still, pac, None));
         let slid = moving.chunks(2).zip(0..).map(|(pac, ms)| match ms {
             0 => (SamplePhase::Begin(100..1900), pac, None),
@@ -440,8 +455,21 @@ mod tests {
         let mut lossy = slide.clone();
         lossy.take(&blocks.clone().end(3));
         slide.take(&blocks.end(0));
-        assert_eq!(slide.finish(), by_hand.finish());
+        let whole = by_hand.finish();
+        assert_eq!(slide.finish(), whole);
         assert_eq!(lossy.finish(), Err(SlideError::Gap(3)));
+        // as are those that are cut afterwards
+        let shear: Vec<i16> = (0..900).map(|n| n - 300).collect();
+        let of = |missing| {
+            let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
+            let blocks = Block::cut(&still, 100..1900, &moving, &shear);
+            for block in blocks.filter(|block| Some(block.number) != missing) {
+                slide.take(&block);
+            }
+            (slide.next_block(), slide.finish())
+        };
+        assert_eq!(of(None), (40, whole));
+        assert_eq!(of(Some(20)), (40, Err(SlideError::Gap(64))));
     }
 
     #[test]

@@ -7,9 +7,10 @@ use heapless::{Deque, Vec};
 
 // until all users have the new path
 pub use super::guidance::{Again, Event, Phase, View, ZONE_MN};
+use super::judge::MOVEMENT;
 use crate::dsp::Plan;
 use crate::explorer::Kernels;
-use crate::features::{Observation, Slide, SlideError};
+use crate::features::{Blocks, Observation, SamplePhase, Slide, SlideError};
 use crate::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ};
 
 /// Samples of a channel in a block: 10 ms.
@@ -62,6 +63,7 @@ const FROZEN: u16 = 220;
 pub struct Touch<'p, K> {
     plan: &'p Plan,
     slide: Slide<'p, K>,
+    blocks: Blocks,
     phase: Phase,
     /// Still blocks since the press, and the sum of their liveliness.
     still: u16,
@@ -104,7 +106,8 @@ impl<'p, K: Kernels> Touch<'p, K> {
     pub fn new(plan: &'p Plan) -> Self {
         Self {
             plan,
-            slide: Slide::new(plan),
+            slide: Slide::new(plan, MOVEMENT),
+            blocks: Blocks::default(),
             phase: Phase::Air,
             still: 0,
             still_sum: 0.0,
@@ -342,7 +345,8 @@ impl<'p, K: Kernels> Touch<'p, K> {
     fn press(&mut self) {
         self.phase = Phase::Press;
         (self.still, self.still_sum) = (0, 0.0);
-        self.slide = Slide::new(self.plan);
+        self.slide = Slide::new(self.plan, MOVEMENT);
+        self.blocks = Blocks::default();
         self.latest.clear();
     }
 
@@ -361,12 +365,19 @@ impl<'p, K: Kernels> Touch<'p, K> {
         about
     }
 
+    /// Gives P_AC of the touch to its slide.
+    fn put(&mut self, phase: &SamplePhase, pac: &[i16]) {
+        if let Some(block) = self.blocks.put(phase, pac, None) {
+            self.slide.take(&block);
+        }
+    }
+
     /// A still block: background, once it is old enough.
     fn put_still(&mut self) {
         if self.latest.is_full()
             && let Some(old) = self.latest.pop_front()
         {
-            self.slide.push_still(&old);
+            self.put(&SamplePhase::Still, &old);
         }
         // one place is free now
         let _ = self.latest.push_back(self.about_rest());
@@ -400,7 +411,6 @@ impl<'p, K: Kernels> Touch<'p, K> {
             0
         };
         if self.begins >= BEGINS {
-            self.slide.start(COMING_UP..COMING_UP + STEADY);
             self.tenths.clear();
             self.phase = Phase::Sliding;
             (self.still_mean, self.samples, self.stopped, self.tenth) = (mean, 0, 0, 0.0);
@@ -419,7 +429,11 @@ impl<'p, K: Kernels> Touch<'p, K> {
     }
 
     fn sliding(&mut self, lively: f32) -> Option<Event> {
-        self.slide.push(&self.about_rest());
+        let phase = match self.samples {
+            0 => SamplePhase::Begin(COMING_UP..COMING_UP + STEADY),
+            _ => SamplePhase::Slide,
+        };
+        self.put(&phase, &self.about_rest());
         let steady = self.samples >= COMING_UP;
         let force_mn = self.force_mn();
         if steady && force_mn > *ZONE_MN.end() {
@@ -459,7 +473,9 @@ impl<'p, K: Kernels> Touch<'p, K> {
         if deviation(&self.tenths) > UNEVEN {
             return Event::Again(Again::TooUneven);
         }
-        let slide = core::mem::replace(&mut self.slide, Slide::new(self.plan));
+        let last = core::mem::take(&mut self.blocks).end(0);
+        self.slide.take(&last);
+        let slide = core::mem::replace(&mut self.slide, Slide::new(self.plan, MOVEMENT));
         match slide.finish() {
             Ok(measurement) => Event::Slid(Observation::from(&measurement)),
             Err(SlideError::Silent) => Event::Frozen,

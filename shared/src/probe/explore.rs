@@ -160,9 +160,9 @@ async fn slides<R: Rig, const N: usize, K: Kernels>(
             .table()
             .movement(action.movement)
             .ok_or(ExploreError::Movement(action.movement))?;
-        let mut slide = Slide::<K>::new(plan);
+        let mut slide = Slide::<K>::new(plan, movement);
         let made = match rig.lifted().await {
-            Ok(()) => rig.perform(movement, &mut slide).await,
+            Ok(()) => rig.perform(&mut slide).await,
             failed => failed,
         };
         let why = match made {

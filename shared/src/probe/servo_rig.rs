@@ -7,7 +7,7 @@ use super::explore::Random;
 use super::seams::{RigHandle, UnloadedRun};
 use super::status::RigState;
 use crate::dsp::Kernels;
-use crate::features::{Blocks, Movement, PropertySet, SamplePhase, Slide};
+use crate::features::{Block, Blocks, Movement, PropertySet, SamplePhase, Slide};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::control::Control;
 use crate::rig::pins::Outputs;
@@ -18,8 +18,6 @@ use crate::wire::Event;
 
 /// How often the samples are looked after, ms.
 pub const LOOK_MS: u32 = 10;
-/// Samples of a slide that are given to the features at once: those between two looks, and some more after a late one.
-const GATHERED: usize = 32;
 
 /// What the servo shall do.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -267,34 +265,33 @@ impl<S: Servo> Rig for ServoRig<S> {
         PropertySet::ALL
     }
 
-    async fn perform<K: Kernels>(
-        &mut self,
-        movement: Movement,
-        slide: &mut Slide<'_, K>,
-    ) -> Result<(), RigError> {
+    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), RigError> {
         if self.servo.state().phase == Phase::Parked {
             self.home().await?;
         }
         while self.servo.samples().is_some() {}
         let lost_before = self.servo.lost();
         let start = self.random.next_f32();
-        self.command(RigCommand::Start(movement, start)).await?;
-        let mut blocks = self.servo.streams().then(Blocks::default);
+        self.command(RigCommand::Start(slide.movement(), start))
+            .await?;
+        let streams = self.servo.streams();
+        let mut take = |servo: &mut S, block: Block| {
+            slide.take(&block);
+            if streams {
+                servo.tell(Event::Block(block));
+            }
+        };
+        let mut blocks = Blocks::default();
         let ended = self
             .until(
                 |rig| rig.at_rest || rig.ended.is_some(),
                 |servo| {
-                    let mut gathered = Vec::new();
                     while let Some(samples) = servo.samples() {
-                        feel(&samples, &mut gathered, slide);
-                        let block = blocks.as_mut().and_then(|b| {
-                            b.put(&samples.sample_phase, &samples.pac, samples.shear_mn)
-                        });
-                        if let Some(block) = block {
-                            servo.tell(Event::Block(block));
+                        let (phase, pac) = (&samples.sample_phase, &samples.pac);
+                        if let Some(block) = blocks.put(phase, pac, samples.shear_mn) {
+                            take(servo, block);
                         }
                     }
-                    slide.push(&gathered);
                 },
             )
             .await
@@ -304,12 +301,7 @@ impl<S: Servo> Rig for ServoRig<S> {
             _ => 0,
         };
         let gap = gap + self.servo.lost().wrapping_sub(lost_before);
-        if gap > 0 {
-            slide.lose(gap);
-        }
-        if let Some(blocks) = blocks {
-            self.servo.tell(Event::Block(blocks.end(gap)));
-        }
+        take(&mut self.servo, blocks.end(gap));
         match ended? {
             Some(Ended::Whole | Ended::Gap(_)) => Ok(()),
             Some(Ended::Stopped) | None => {
@@ -326,27 +318,4 @@ impl<S: Servo> Rig for ServoRig<S> {
     async fn recover(&mut self, failed: &RigError) -> bool {
         failed.is_of_the_movement() && self.home().await.is_ok()
     }
-}
-
-/// Gives samples to the features. Those of a slide are gathered first: the features take many at once for little more than
-/// a few. The caller flushes the remainder.
-fn feel<K: Kernels>(
-    samples: &Samples,
-    gathered: &mut Vec<i16, GATHERED>,
-    slide: &mut Slide<'_, K>,
-) {
-    let is_slide = samples.sample_phase == SamplePhase::Slide;
-    if !is_slide || gathered.len() + samples.pac.len() > GATHERED {
-        slide.push(gathered);
-        gathered.clear();
-    }
-    match &samples.sample_phase {
-        SamplePhase::Nothing => return,
-        SamplePhase::Still => return slide.push_still(&samples.pac),
-        SamplePhase::Begin(steady) => slide.start(steady.clone()),
-        SamplePhase::Slide => {}
-    }
-    // `gathered` has space for them
-    let _ = gathered.extend_from_slice(&samples.pac);
-    slide.push_shear(samples.shear_mn.as_slice());
 }

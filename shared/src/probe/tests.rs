@@ -7,7 +7,7 @@ use super::identify::best;
 use super::*;
 use crate::dsp::{Kernels, Plan};
 use crate::explorer::{ExpectedOutcome, Method};
-use crate::features::{FeatureSet, Movement, Observation, Property, PropertySet, Slide};
+use crate::features::{Block, FeatureSet, Movement, Observation, Property, PropertySet, Slide};
 use crate::rig::Rig;
 use crate::store::tests::ram::Ram;
 use crate::store::{SelfLearnedRecord, Store};
@@ -29,20 +29,15 @@ impl Rig for Script {
         [Property::Traction].into_iter().collect()
     }
 
-    async fn perform<K: Kernels>(
-        &mut self,
-        _: Movement,
-        slide: &mut Slide<'_, K>,
-    ) -> Result<(), Self::Error> {
+    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error> {
         let Some(traction) = self.0.pop_front().ok_or("the lever fell off")? else {
             return Ok(());
         };
         slide.set_background(2.0);
-        slide.start(0..600);
-        slide.push(&core::array::from_fn::<i16, 600, _>(|n| {
-            ((n * 37) % 101) as i16
-        }));
-        slide.push_shear(&[traction; 10]);
+        let pac = core::array::from_fn::<i16, 600, _>(|n| ((n * 37) % 101) as i16);
+        for block in Block::cut(&[], 0..600, &pac, &[traction; 10]) {
+            slide.take(&block);
+        }
         Ok(())
     }
 }
@@ -149,8 +144,8 @@ fn random_numbers_are_spread() {
 fn fused_table() -> vec::Vec<u8> {
     let bands = {
         let plan = Plan::new();
-        let mut slide = Slide::<crate::dsp::Plain>::new(&plan);
-        block_on(Script([Some(0)].into()).perform(Movement::FOR_TRACTION, &mut slide)).unwrap();
+        let mut slide = Slide::<crate::dsp::Plain>::new(&plan, Movement::FOR_TRACTION);
+        block_on(Script([Some(0)].into()).perform(&mut slide)).unwrap();
         Observation::from(&slide.finish().unwrap()).bands
     };
     let row = |traction: f64, apart: f64| {

@@ -60,8 +60,8 @@ where
     }
     let mut rejected = 0;
     while let Some(movement) = training.next() {
-        let mut slide = Slide::<K>::new(plan);
-        let made = match rig.perform(movement, &mut slide).await {
+        let mut slide = Slide::<K>::new(plan, movement);
+        let made = match rig.perform(&mut slide).await {
             Ok(()) => rig.lifted().await,
             failed => failed,
         };

@@ -3,7 +3,7 @@ use std::sync::OnceLock;
 
 use tactus_core::dsp::Kernels;
 use tactus_core::explorer::Strategy;
-use tactus_core::features::{self, BLOCK, Movement};
+use tactus_core::features::Blocks;
 use tactus_core::probe::explore::{ExplorationStep, explore};
 use tactus_core::rig::Rig;
 use tactus_core::table::Name;
@@ -11,7 +11,7 @@ use tactus_core::wire::{self, MAX_FRAME, Receiver, Report};
 
 use super::*;
 use crate::sim::collection::{Collection, calibrated};
-use crate::sim::rig::{SimError, SimRig, take_samples};
+use crate::sim::rig::{SimError, SimRig};
 
 const UNKNOWN: u8 = 47;
 
@@ -42,30 +42,6 @@ struct Streamed<'a> {
     events: &'a Events,
 }
 
-impl Streamed<'_> {
-    fn event(&self, number: &mut u16, block: &mut Block) {
-        let steady = block.steady;
-        let still = block.still;
-        let told = std::mem::replace(
-            block,
-            Block {
-                number: 0,
-                still,
-                steady: None,
-                pac: Default::default(),
-                shear_mn: Default::default(),
-                lost: 0,
-            },
-        );
-        self.events.push(Event::Block(Block {
-            number: *number,
-            steady,
-            ..told
-        }));
-        *number += 1;
-    }
-}
-
 impl Rig for Streamed<'_> {
     type Error = SimError;
 
@@ -73,46 +49,23 @@ impl Rig for Streamed<'_> {
         PropertySet::ALL
     }
 
-    async fn perform<K: Kernels>(
-        &mut self,
-        movement: Movement,
-        slide: &mut features::Slide<'_, K>,
-    ) -> Result<(), SimError> {
+    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), SimError> {
         if self.rig.control().phase() == tactus_core::rig::Phase::Parked {
             self.rig.home()?;
         }
-        let mut ticks = Vec::new();
-        self.rig.slide(movement, 0.5, |outputs, _| {
-            take_samples(outputs, slide);
-            ticks.push(outputs.clone());
-        })?;
-        let mut number = 0;
-        let mut block = Block {
-            number: 0,
-            still: true,
-            steady: None,
-            pac: Default::default(),
-            shear_mn: Default::default(),
-            lost: 0,
+        let movement = slide.movement();
+        let mut take = |block: Block| {
+            slide.take(&block);
+            self.events.push(Event::Block(block));
         };
-        for tick in ticks {
-            let still = match &tick.sample_phase {
-                features::SamplePhase::Nothing => continue,
-                features::SamplePhase::Still => true,
-                _ => false,
-            };
-            let full = block.pac.len() + tick.pac.len() > BLOCK;
-            if (full || still != block.still) && !block.pac.is_empty() {
-                self.event(&mut number, &mut block);
+        let mut blocks = Blocks::default();
+        self.rig.slide(movement, 0.5, |outputs, _| {
+            let (phase, pac) = (&outputs.sample_phase, &outputs.pac);
+            if let Some(block) = blocks.put(phase, pac, outputs.shear_mn) {
+                take(block);
             }
-            block.still = still;
-            if let features::SamplePhase::Begin(steady) = tick.sample_phase {
-                block.steady = Some((steady.start, steady.end));
-            }
-            block.pac.extend_from_slice(&tick.pac).unwrap();
-            block.shear_mn.extend(tick.shear_mn);
-        }
-        self.event(&mut number, &mut block);
+        })?;
+        take(blocks.end(0));
         Ok(())
     }
 }

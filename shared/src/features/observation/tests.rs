@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::dsp::{Plain, Plan};
-use crate::features::Slide;
+use crate::features::{Block, Movement, Slide};
 use crate::table::tests::whitening::Noise;
 use std::vec;
 use std::vec::Vec as List;
@@ -129,9 +129,8 @@ fn a_slide_says_its_bands_and_pressure() {
     let plan = Plan::new();
     let noise = &mut Noise(5);
     for amplitude in [0.4, 3.0, 40.0, 900.0] {
-        let mut slide = Slide::<Plain>::new(&plan);
+        let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
         slide.set_background(2.0);
-        slide.start(0..3000);
         let mut last = 0.0;
         let samples: List<i16> = (0..3000)
             .map(|_| {
@@ -140,8 +139,9 @@ fn a_slide_says_its_bands_and_pressure() {
                 f64::round(last) as i16
             })
             .collect();
-        slide.push(&samples);
-        slide.push_shear(&[250, 750]);
+        for block in Block::cut(&[], 0..3000, &samples, &[250, 750]) {
+            slide.take(&block);
+        }
         let pdc: List<i16> = (0..300).map(|n| 90 + (n * 7 % 40) as i16).collect();
         slide.push_pdc(&pdc);
         let measured = slide.finish().unwrap();

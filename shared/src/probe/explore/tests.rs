@@ -1,7 +1,7 @@
 use super::*;
 use crate::dsp::Kernels;
 use crate::explorer::{Config, Explorer, Strategy};
-use crate::features::{Movement, Property, PropertySet};
+use crate::features::{Block, Movement, Property, PropertySet};
 use crate::table::Table;
 use crate::table::tests::{around, table_of};
 use embassy_futures::block_on;
@@ -40,27 +40,25 @@ impl Rig for Script {
         [Property::Traction].into_iter().collect()
     }
 
-    async fn perform<K: Kernels>(
-        &mut self,
-        movement: Movement,
-        slide: &mut Slide<'_, K>,
-    ) -> Result<(), Self::Error> {
+    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error> {
         let stimuli = self
             .stimuli
             .get(self.made.len())
             .copied()
             .unwrap_or(Fault("script over"));
-        self.made.push(movement);
-        match stimuli {
+        self.made.push(slide.movement());
+        let shear_mn = match stimuli {
             Fault(why) => return Err(why),
             Stuck => return Ok(()),
-            Traction(mn) => slide.push_shear(&[mn; 10]),
-            NoForce => {}
-        }
+            Traction(mn) => vec![mn; 10],
+            NoForce => vec![],
+        };
         slide.set_background(2.0);
-        slide.start(0..600);
         let sample = |n: usize| ((n * 37) % 101) as i16;
-        slide.push(&(0..600).map(sample).collect::<Vec<_>>());
+        let pac: Vec<i16> = (0..600).map(sample).collect();
+        for block in Block::cut(&[], 0..600, &pac, &shear_mn) {
+            slide.take(&block);
+        }
         Ok(())
     }
 
@@ -162,13 +160,9 @@ impl Rig for Slow<'_> {
         self.0.measures()
     }
 
-    async fn perform<K: Kernels>(
-        &mut self,
-        movement: Movement,
-        slide: &mut Slide<'_, K>,
-    ) -> Result<(), Self::Error> {
+    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error> {
         self.1.borrow_mut().push("performed");
-        self.0.perform(movement, slide).await
+        self.0.perform(slide).await
     }
 
     async fn lifted(&mut self) -> Result<(), Self::Error> {

@@ -36,13 +36,9 @@ impl Rig for Bench {
         PropertySet::ALL
     }
 
-    async fn perform<K: Kernels>(
-        &mut self,
-        movement: Movement,
-        slide: &mut Slide<'_, K>,
-    ) -> Result<(), Self::Error> {
+    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error> {
         self.state.skin = SkinCare::after(self.state.skin.energy_j() + 1.0, 0.5);
-        self.script.perform(movement, slide).await
+        self.script.perform(slide).await
     }
 }
 
