@@ -9,7 +9,7 @@ use crate::firmware;
 use crate::shell::{self, cargo, root, target};
 
 /// The image that every run is of.
-const RIG: &str = "tactus-rig";
+pub(crate) const RIG: &str = "tactus-rig";
 
 /// Has the firmware identify a texture, or serves its serial port where a TCP port for it is given.
 pub(crate) fn emulate(options: &[OsString]) -> Result<()> {

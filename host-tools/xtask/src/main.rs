@@ -8,6 +8,7 @@ mod firmware;
 mod flash;
 mod fuzz;
 mod reasons;
+mod seeds;
 mod shell;
 mod size;
 mod test;
@@ -125,6 +126,12 @@ enum Cli {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
+    /// Run what draws from a seed with many seeds, and list what failed and what was wrong
+    ///
+    /// Each run is a process of its own. Prints a line for each that failed, with the command that repeats it, and one for
+    /// each wrong or open verdict; a summary is left in target/seeds. An error if a run failed.
+    #[command(after_help = seeds::EXAMPLES)]
+    Seeds(seeds::Options),
     /// Show what the core's tests would miss: run them on copies of the core with one thing changed
     ///
     /// Changes the sensor, table and explorer modules (cargo-mutants). A mutant that survives is a change no test sees.
@@ -172,6 +179,7 @@ fn main() -> ExitCode {
         Cli::Size(options) => size::size(&options),
         Cli::Bundle { out } => bundle::bundle(&out),
         Cli::Factory { check } => factory::factory(check),
+        Cli::Seeds(options) => seeds::seeds(&options),
         Cli::Mutants { options } => mutants(options),
         Cli::Fuzz(options) => fuzz::fuzz(&options),
         Cli::Bench(options) => bench::bench(&options),
@@ -194,7 +202,7 @@ fn mutants(options: Vec<OsString>) -> Result<()> {
     let mut cargo = cargo();
     cargo.args(["mutants", "--package", "tactus-core"]);
     cargo.args(["--test-package", "tactus-core", "--profile", "mutants"]);
-    for module in ["biotac", "table", "explorer"] {
+    for module in ["sensor", "table", "explorer"] {
         cargo.args(["--file", &format!("shared/src/{module}*")]);
         cargo.args(["--file", &format!("shared/src/{module}*/**")]);
     }

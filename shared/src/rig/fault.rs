@@ -119,10 +119,7 @@ impl Fault {
     /// Whether it can come of one movement or pass by itself: a rig that has homed after it may go on without a person. Each
     /// press begins with its checks of the zero, and every guard stays on.
     pub const fn is_of_the_movement(self) -> bool {
-        matches!(
-            self,
-            Self::Unsteady | Self::LeverSlips | Self::StageOff | Self::SensorErrors
-        )
+        matches!(self, Self::Unsteady | Self::LeverSlips | Self::StageOff)
     }
 
     /// The fault's row of the table.

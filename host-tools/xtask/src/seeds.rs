@@ -1,0 +1,425 @@
+//! Many seeds of what draws from one: none may fail, and wrong verdicts are counted.
+use std::io::{IsTerminal as _, Write as _};
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use anyhow::{Context as _, Result, bail, ensure};
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+
+use crate::shell::{self, cargo, target};
+use crate::{emulate, firmware};
+
+pub(crate) const EXAMPLES: &str = "Examples:
+  cargo xtask seeds study                     seeds 1 to 100 of the whole study, with few simulations
+  cargo xtask seeds study --seeds 1-10 -- --simulations 8000
+  cargo xtask seeds identify --seeds 200-330  every method
+  cargo xtask seeds rig --jobs 1              on the emulated board";
+
+#[derive(Args)]
+pub(crate) struct Options {
+    /// What is run
+    #[arg(value_enum)]
+    what: What,
+    /// Which seeds; unless given, those that a release is judged by
+    #[arg(long, value_name = "A-B", value_parser = range)]
+    seeds: Option<RangeInclusive<u64>>,
+    /// How many at a time; all cores unless given
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+    /// The summary to write
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Further options of what is run
+    #[arg(last = true)]
+    options: Vec<String>,
+}
+
+/// What draws from a seed.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum What {
+    /// `tactus study all`
+    Study,
+    /// `tactus identify --simulated`, by every method
+    Identify,
+    /// `tactus simulate`
+    Simulate,
+    /// `tactus learn-by-hand`
+    LearnByHand,
+    /// An exploration on the emulated board
+    Rig,
+}
+
+/// The methods of `tactus identify`.
+const METHODS: [&str; 8] = [
+    "fused",
+    "fused-cycle",
+    "fused-random",
+    "student-all",
+    "student",
+    "paper",
+    "cycle",
+    "random",
+];
+
+/// One run: what it is called, and its arguments.
+struct Run {
+    name: String,
+    arguments: Vec<String>,
+}
+
+impl What {
+    fn name(self) -> String {
+        let value = self.to_possible_value();
+        value.map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
+    fn seeds(self) -> RangeInclusive<u64> {
+        match self {
+            Self::Study => 1..=100,
+            Self::Identify | Self::Simulate | Self::LearnByHand => 1..=50,
+            Self::Rig => 1..=20,
+        }
+    }
+
+    /// The runs of a seed; what they write goes into `scratch`, and is deleted after the run.
+    fn runs(self, seed: u64, scratch: &Path) -> Vec<Run> {
+        let out = scratch.join(seed.to_string());
+        let run = |name: String, command: &[&str]| Run {
+            name,
+            arguments: command.iter().map(|a| (*a).to_owned()).collect(),
+        };
+        let (number, out) = (seed.to_string(), out.to_string_lossy());
+        let seeded = |command: &[&str]| {
+            let with_seed = [command, &["--seed", &number]].concat();
+            run(format!("seed {seed}"), &with_seed)
+        };
+        match self {
+            // the worlds, the rig and the report are those of the whole study; only virtual explorations are fewer
+            Self::Study => vec![seeded(&[
+                "study",
+                "all",
+                "--simulations",
+                "200",
+                "--out",
+                &out,
+            ])],
+            Self::Identify => METHODS
+                .iter()
+                .map(|method| {
+                    let arguments = [
+                        "identify",
+                        "--simulated",
+                        "--method",
+                        method,
+                        "--seed",
+                        &number,
+                    ];
+                    run(format!("seed {seed}, {method}"), &arguments)
+                })
+                .collect(),
+            Self::Simulate => vec![seeded(&["simulate", "--trials", "2", "--out", &out])],
+            Self::LearnByHand => vec![seeded(&["learn-by-hand", "--out", &out])],
+            Self::Rig => vec![seeded(&["identify"])],
+        }
+    }
+}
+
+/// `A-B`, or one seed.
+fn range(text: &str) -> Result<RangeInclusive<u64>, String> {
+    let (from, to) = text.split_once('-').unwrap_or((text, text));
+    match (from.parse(), to.parse()) {
+        (Ok(from), Ok(to)) if from <= to => Ok(from..=to),
+        _ => Err("two numbers are wanted, the lower first: 1-50".into()),
+    }
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Ending {
+    Right,
+    Wrong,
+    Undecided,
+    /// It has no verdict to give.
+    Done,
+    Failed,
+}
+
+/// What a run's output says of its end. An exit code of 3 is "not identified": no failure.
+fn ending(code: Option<i32>, stdout: &str) -> Ending {
+    if !matches!(code, Some(0 | 3)) {
+        return Ending::Failed;
+    }
+    let says = |word: &str| stdout.lines().any(|line| line.starts_with(word));
+    match () {
+        () if says("Wrong") => Ending::Wrong,
+        () if says("Undecided") => Ending::Undecided,
+        () if says("Right") => Ending::Right,
+        () => Ending::Done,
+    }
+}
+
+/// Runs all seeds; an error if one failed.
+pub(crate) fn seeds(options: &Options) -> Result<()> {
+    let what = options.what;
+    let program = build(what)?;
+    let scratch = target().join("seeds").join(what.name());
+    std::fs::create_dir_all(&scratch).with_context(|| scratch.display().to_string())?;
+    let seeds = options.seeds.clone().unwrap_or_else(|| what.seeds());
+    let runs: Vec<Run> = seeds
+        .clone()
+        .flat_map(|seed| what.runs(seed, &scratch))
+        .collect();
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let jobs = options.jobs.unwrap_or(cores).clamp(1, runs.len().max(1));
+    let began = Instant::now();
+    let (next, ended) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    std::thread::scope(|scope| {
+        for _ in 0..jobs {
+            scope.spawn(|| {
+                while let Some(run) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let result = perform(&program, run, &options.options, &scratch);
+                    let mut ended = ended.lock().unwrap_or_else(|e| e.into_inner());
+                    if let Some(line) = result.line() {
+                        println!("{line}");
+                    }
+                    ended.push(result);
+                    progress(ended.len(), runs.len());
+                }
+            });
+        }
+    });
+    let ended = ended.into_inner().unwrap_or_else(|e| e.into_inner());
+    let count = |wanted| ended.iter().filter(|r| r.ending == wanted).count();
+    let listed = |wanted| {
+        let of = ended.iter().filter(|r| r.ending == wanted);
+        of.map(|r| json!({"run": r.name, "repeat": r.repeat, "said": r.said}))
+            .collect::<Vec<Value>>()
+    };
+    let failed = count(Ending::Failed);
+    let summary = json!({
+        "what": what.name(),
+        "seeds": [seeds.start(), seeds.end()],
+        "runs": ended.len(),
+        "failed": listed(Ending::Failed),
+        "wrong": listed(Ending::Wrong),
+        "undecided": listed(Ending::Undecided),
+        "right": count(Ending::Right),
+        "seconds": began.elapsed().as_secs(),
+    });
+    let file = options
+        .out
+        .clone()
+        .unwrap_or_else(|| scratch.with_extension("json"));
+    std::fs::write(&file, format!("{summary:#}\n")).with_context(|| file.display().to_string())?;
+    println!(
+        "{}, seeds {} to {}: {} runs, {failed} failed; {} right, {} wrong, {} undecided. {}",
+        what.name(),
+        seeds.start(),
+        seeds.end(),
+        ended.len(),
+        count(Ending::Right),
+        count(Ending::Wrong),
+        count(Ending::Undecided),
+        file.display()
+    );
+    ensure!(
+        failed == 0,
+        "{failed} of {} runs failed; they are listed above",
+        ended.len()
+    );
+    Ok(())
+}
+
+/// A run that is over.
+struct Ended {
+    name: String,
+    ending: Ending,
+    /// How to run it again.
+    repeat: String,
+    /// The last thing that it said.
+    said: String,
+}
+
+impl Ended {
+    /// The line for it, unless all is well.
+    fn line(&self) -> Option<String> {
+        let word = match self.ending {
+            Ending::Failed => "FAILED",
+            Ending::Wrong => "wrong",
+            Ending::Undecided => "undecided",
+            Ending::Right | Ending::Done => return None,
+        };
+        Some(format!(
+            "{}: {word}: {}\n    again: {}",
+            run.name, self.said, self.repeat
+        ))
+    }
+}
+
+/// Runs one on a single core, and removes what it wrote.
+fn perform(program: &Program, run: &Run, further: &[String], scratch: &Path) -> Ended {
+    let mut command = Command::new(&program.path);
+    command
+        .args(&run.arguments)
+        .args(&program.arguments)
+        .args(further);
+    command.env("RAYON_NUM_THREADS", "1").env("NO_COLOR", "1");
+    let repeat = std::iter::once(command.get_program())
+        .chain(command.get_args())
+        .map(|part| part.to_string_lossy().into_owned())
+        .collect::<Vec<_>>()
+        .join(" ");
+    let (ending, said) = match command.output() {
+        Err(why) => (Ending::Failed, format!("cannot be started: {why}")),
+        Ok(Output {
+            status,
+            stdout,
+            stderr,
+        }) => {
+            let (stdout, stderr) = (
+                String::from_utf8_lossy(&stdout),
+                String::from_utf8_lossy(&stderr),
+            );
+            let ending = ending(status.code(), &stdout);
+            let told = if ending == Ending::Failed {
+                stderr
+            } else {
+                stdout
+            };
+            let mut lines = told
+                .lines()
+                .rev()
+                .map(str::trim)
+                .filter(|line| !line.is_empty());
+            let says = |line: &&str| {
+                ["error", "Wrong", "Undecided"]
+                    .iter()
+                    .any(|word| line.starts_with(word))
+            };
+            let said = lines.clone().find(says).or_else(|| lines.next());
+            (
+                ending,
+                said.map_or_else(|| status.to_string(), ToOwned::to_owned),
+            )
+        }
+    };
+    if let Some(at) = run.arguments.iter().position(|a| a == "--out") {
+        let written = run.arguments.get(at + 1).map(PathBuf::from);
+        let written = written.filter(|path| path.starts_with(scratch));
+        // a folder or a file, whole, half or not there
+        let _ = written
+            .map(|path| std::fs::remove_dir_all(&path).or_else(|_| std::fs::remove_file(&path)));
+    }
+    Ended {
+        name: run.name.clone(),
+        ending,
+        repeat,
+        said,
+    }
+}
+
+fn progress(done: usize, all: usize) {
+    if std::io::stderr().is_terminal() {
+        eprint!("\r{done} of {all} ");
+        if done == all {
+            eprintln!();
+        }
+        let _ = std::io::stderr().flush();
+    }
+}
+
+/// What is run, and what is said to it each time.
+struct Program {
+    path: PathBuf,
+    arguments: Vec<String>,
+}
+
+fn build(what: What) -> Result<Program> {
+    if what == What::Rig {
+        shell::run(&mut emulate::build())?;
+        let elf = firmware::compile(&[emulate::RIG])?.remove(0);
+        let path = PathBuf::from(emulate::program("identify").get_program());
+        let arguments = vec!["--elf".into(), elf.to_string_lossy().into_owned()];
+        return Ok(Program { path, arguments });
+    }
+    shell::run(cargo().args(["build", "--release", "--package", "tactus"]))?;
+    let path = target().join("release/tactus");
+    if !path.is_file() {
+        bail!("{} was built and is not there", path.display());
+    }
+    Ok(Program {
+        path,
+        arguments: Vec::new(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_range_of_seeds_is_two_numbers_or_one() {
+        assert_eq!(range("3-7"), Ok(3..=7));
+        assert_eq!(range("5"), Ok(5..=5));
+        for wrong in ["7-3", "", "a", "1-", "-1"] {
+            assert!(range(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn an_ending_is_what_the_run_says() {
+        assert_eq!(ending(Some(0), "Slide 1\nRight.\n3 s\n"), Ending::Right);
+        assert_eq!(
+            ending(Some(3), "Undecided: it was felt.\n"),
+            Ending::Undecided
+        );
+        assert_eq!(ending(Some(0), "Wrong: it was felt.\n"), Ending::Wrong);
+        assert_eq!(ending(Some(0), "117 textures\n"), Ending::Done);
+        assert_eq!(ending(Some(1), "Right.\n"), Ending::Failed);
+        assert_eq!(ending(None, ""), Ending::Failed);
+    }
+
+    /// A program that ends so for some seeds, in the place of the real one.
+    #[test]
+    fn a_run_that_fails_says_how_to_repeat_it_and_leaves_nothing() {
+        let scratch = tempfile::tempdir().unwrap();
+        let program = Program {
+            path: "/bin/sh".into(),
+            arguments: Vec::new(),
+        };
+        let out = scratch.path().join("7");
+        let script = format!(
+            "mkdir {0}; echo 'error: force unsteady' >&2; exit 1",
+            out.display()
+        );
+        let arguments = ["-c", &script, "sh", "--out", &out.to_string_lossy()];
+        let run = Run {
+            name: "seed 7".into(),
+            arguments: arguments.map(ToOwned::to_owned).to_vec(),
+        };
+        let ended = perform(&program, &run, &[], scratch.path());
+        let line = ended.line().unwrap();
+        assert!(
+            line.starts_with("seed 7: FAILED: error: force unsteady"),
+            "{line}"
+        );
+        assert!(line.contains("again: /bin/sh -c"), "{line}");
+        assert!(!out.exists());
+    }
+
+    #[test]
+    fn every_seed_has_its_runs() {
+        let runs = What::Identify.runs(9, Path::new("x"));
+        assert_eq!(runs.len(), METHODS.len());
+        assert!(
+            runs.iter()
+                .all(|run| run.arguments.ends_with(&["--seed".into(), "9".into()]))
+        );
+        assert_eq!(What::Study.runs(9, Path::new("x")).len(), 1);
+    }
+}
