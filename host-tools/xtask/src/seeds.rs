@@ -256,7 +256,7 @@ impl Ended {
         };
         Some(format!(
             "{}: {word}: {}\n    again: {}",
-            run.name, self.said, self.repeat
+            self.name, self.said, self.repeat
         ))
     }
 }
