@@ -141,8 +141,8 @@ fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
 
 fn written(study: &Study) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    report::prepare(folder.path()).unwrap();
-    report::write(study, folder.path()).unwrap();
+    let written = report::Folder::prepare(folder.path()).unwrap();
+    report::write(study, &written).unwrap();
     folder
 }
 

@@ -121,7 +121,7 @@ impl Times {
 
 /// Makes a study, or a part of one, and writes its report.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    report::prepare(&args.out)?;
+    let folder = report::Folder::prepare(&args.out)?;
     let world = StudyWorld {
         seed: args.seed,
         variation: args.variation,
@@ -170,7 +170,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             })?;
         }
     }
-    report::write(&study, &args.out)?;
+    report::write(&study, &folder)?;
     match args.format {
         Format::Json => out.write_all(report::json(&study)?.as_bytes())?,
         Format::Text => print(args, &study, &times, out)?,
