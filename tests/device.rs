@@ -579,10 +579,12 @@ fn teaching_and_calibrating_do_what_was_meant() {
         &["forget", "--training", "a"],
         wire::Command::Forget(Forget::Training(name("a"))),
     );
-    last(
-        &["forget", "--self-taught"],
-        wire::Command::Forget(Forget::SelfLearned),
-    );
+    for flag in ["--self-learned", "--self-taught"] {
+        last(
+            &["forget", flag],
+            wire::Command::Forget(Forget::SelfLearned),
+        );
+    }
     last(&["home"], wire::Command::Home);
     last(&["stop"], wire::Command::Stop);
     assert_says(

@@ -65,7 +65,7 @@ pub(crate) struct Rename {
 Examples:
   tactus device forget --name burlap
   tactus device forget --training burlap    the slides of an unfinished training
-  tactus device forget --self-taught        only what nobody confirmed")]
+  tactus device forget --self-learned      only what nobody confirmed")]
 pub(crate) struct Forget {
     #[command(flatten)]
     at: Where,
@@ -83,8 +83,9 @@ struct What {
     #[arg(long, value_name = "NAME")]
     training: Option<String>,
     /// All that the probe has learned by itself; what it learned from you stays
-    #[arg(long)]
-    self_taught: bool,
+    // its name before the field's words came
+    #[arg(long, alias = "self-taught")]
+    self_learned: bool,
 }
 
 /// Has the probe make slides of a texture and learn it.
