@@ -37,7 +37,7 @@ fn compared(experiment: &Experiment, method: Method, candidates: Option<&[u16]>)
             );
             outcomes += kept.len();
             let action = explorer.choose(&kept, 0);
-            let slide = run.slide(action.movement.into());
+            let slide = run.slide(action.movement.into()).unwrap();
             explorer.observe(action, slide).unwrap();
         }
     }

@@ -9,7 +9,7 @@ use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::measure_all;
 use tactus::eval::evaluate::{Outcome, evaluate};
 use tactus::eval::experiment::{Experiment, Protocol, Run};
-use tactus_core::explorer::{Config, Method};
+use tactus_core::explorer::{Config, Method, Told};
 use tactus_core::features::Property;
 use tactus_core::features::{FeatureSet, Observation};
 use tactus_tests::data;
@@ -104,7 +104,7 @@ impl Oracle {
             made[action] += 1;
             // the core draws for the random strategy at every step
             let _ = run.random.next_u32();
-            let slide = run.slide(action / 3);
+            let slide = run.slide(action / 3).unwrap();
             let x = f64::from(slide.properties.get(Property::ALL[action % 3]).unwrap());
             for (texture, log) in log.iter_mut().enumerate() {
                 let (mean, sd) = (self.mean[texture][action], self.sd[texture][action]);
@@ -118,6 +118,7 @@ impl Oracle {
                     unknown: run.unknown,
                     identified: best,
                     sure,
+                    told: told(sure),
                     slides,
                     unknown_like: false,
                 };
@@ -154,7 +155,7 @@ fn explore_fused(
         let movement = (1..benefits.len()).fold(0, first);
         // the core draws for the random strategy at every step
         let _ = run.random.next_u32();
-        let slide = run.slide(movement);
+        let slide = run.slide(movement).unwrap();
         episode.slide(trained, movement, &x(slide));
         let (best, p) = episode.best(trained);
         let sure = p > f64::from(config.threshold);
@@ -163,11 +164,17 @@ fn explore_fused(
                 unknown: run.unknown,
                 identified: best,
                 sure,
+                told: told(sure),
                 slides: episode.slides() as u8,
                 unknown_like: episode.novel(trained),
             };
         }
     }
+}
+
+/// These explorations are closed.
+fn told(sure: bool) -> Told {
+    if sure { Told::Sure } else { Told::Undecided }
 }
 
 /// Features of a slide as real numbers.

@@ -8,3 +8,4 @@ pub mod learn;
 pub mod lifelong;
 pub mod novelty;
 pub mod show;
+pub mod verdicts;

@@ -18,7 +18,7 @@ pub use config::{Config, ExplorerError, Method, ObserveError, Strategy};
 pub use confusions::{Confusions, Degrees};
 pub use episode::EpisodeSummary;
 pub use kernels::Kernels;
-pub use posterior::{Explorer, Verdict};
+pub use posterior::{Explorer, Told, Verdict};
 
 #[cfg(test)]
 mod tests;

@@ -5,11 +5,12 @@ use std::io::{self, Write};
 use anyhow::ensure;
 use clap::ValueEnum as _;
 use serde::Serialize;
-use tactus::eval::evaluate::{Method, Summary, evaluate};
-use tactus::eval::experiment::Protocol;
-use tactus_core::explorer;
+use tactus::eval::evaluate::{Method, Outcome, Summary, evaluate};
+use tactus::eval::experiment::{Experiment, Protocol};
+use tactus::eval::verdicts::Verdicts;
+use tactus_core::explorer::{self, Config};
 
-use super::output::{Format, print_json};
+use super::output::{Format, percent, print_json};
 use super::progress::with_progress;
 pub(crate) use experiment::Args;
 
@@ -27,6 +28,12 @@ struct Evaluation {
     threshold: f32,
     max_slides: u8,
     seed: u64,
+    /// What users would have been told: see [`as_told`].
+    verdicts: Verdicts,
+    /// Mean number of slides until then.
+    mean_slides_told: f64,
+    /// Figures of explorations that know that the texture is one of the table's, with slides drawn with replacement: the
+    /// paper's protocol.
     #[serde(flatten)]
     summary: Summary,
 }
@@ -54,19 +61,27 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if args.novelty.is_some() {
         return novelty::leave_one_out(args, &experiment, protocol, config, out);
     }
-    let outcomes = with_progress(args.runs, "exploring", |done| {
-        evaluate(&experiment, config, args.runs, done)
+    let outcomes = with_progress(args.runs(), "exploring, 1 of 2", |done| {
+        evaluate(&experiment, config, args.runs(), done)
+    })?;
+    let max_slides = args.stop.max_slides;
+    let summary = Summary::new(&outcomes, experiment.names(), max_slides);
+    let (experiment, config) = as_told(experiment, config);
+    let told = with_progress(args.runs(), "exploring as identify does, 2 of 2", |done| {
+        evaluate(&experiment, config, args.runs(), done)
     })?;
     let evaluation = Evaluation {
         method: args.method,
         protocol,
         train_slides: experiment.train_slides(),
-        runs: args.runs,
+        runs: args.runs(),
         textures: experiment.names().len(),
         threshold: args.stop.threshold,
-        max_slides: args.stop.max_slides,
+        max_slides,
         seed: args.seed,
-        summary: Summary::new(&outcomes, experiment.names(), args.stop.max_slides),
+        verdicts: Verdicts::of(told.iter().map(Outcome::told)),
+        mean_slides_told: Summary::new(&told, experiment.names(), max_slides).mean_slides,
+        summary,
     };
     match args.format {
         Format::Json => print_json(&evaluation, out),
@@ -74,34 +89,53 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
 }
 
+/// The experiment as `identify` meets it: the texture may be none of those known, and no slide counts twice.
+fn as_told(experiment: Experiment, config: Config) -> (Experiment, Config) {
+    let config = Config {
+        open: true,
+        ..config
+    };
+    (experiment.each_slide_once(), config)
+}
+
 fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
     let name = e.method.to_possible_value();
     writeln!(
         out,
-        "{}, {}, {} training slides: {} runs over {} textures, threshold {} %, at most {} slides, seed {}",
+        "{}, {}, {} training slides: {} runs over {} textures, threshold {}, at most {} slides, seed {}",
         name.as_ref().map_or("", |name| name.get_name()),
         e.protocol,
         e.train_slides,
         e.runs,
         e.textures,
-        e.threshold * 100.0,
+        percent(e.threshold.into()),
         e.max_slides,
         e.seed
     )?;
+    let row = |name: &str, value| format!("  {name:<26} {value}");
+    let share = |share: f64| format!("{:5.1} %", share * 100.0);
+    writeln!(
+        out,
+        "what the user is told, after {:.2} slides (mean)",
+        e.mean_slides_told
+    )?;
+    for (name, value) in verdict_rows(&e.verdicts) {
+        writeln!(out, "{}", row(name, share(value)))?;
+    }
+    writeln!(out, "where the texture is known to be one of these")?;
     let s = &e.summary;
-    let percent = |share: f64| format!("{:5.1} %", share * 100.0);
     let slides = format!("median {}, mean {:.2}", s.median_slides, s.mean_slides);
     let mut rows = vec![
-        ("right answers", percent(s.accuracy)),
-        ("sure", percent(s.converged)),
-        ("wrong among the sure", percent(s.wrong_when_sure)),
+        ("most probable one right", share(s.accuracy)),
+        ("sure", share(s.converged)),
+        ("wrong among the sure", share(s.wrong_when_sure)),
         ("slides", slides),
     ];
     if e.method.method() == explorer::Method::Fused {
-        rows.push(("most like a new texture", percent(s.like_unknown)));
+        rows.push(("most like a new texture", share(s.like_unknown)));
     }
     for (name, value) in rows {
-        writeln!(out, "  {name:<26} {value}")?;
+        writeln!(out, "{}", row(name, value))?;
     }
     if !s.confused.is_empty() {
         writeln!(out, "  most confused")?;
@@ -111,4 +145,15 @@ fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "    {share:4.1} %  {right} taken for {wrong}")?;
     }
     Ok(())
+}
+
+/// Verdicts by name, as people read them.
+fn verdict_rows(v: &Verdicts) -> [(&'static str, f64); 5] {
+    [
+        ("right", v.right),
+        ("right name, but changed", v.changed),
+        ("none of those known", v.new),
+        ("wrong", v.wrong),
+        ("undecided", v.undecided),
+    ]
 }

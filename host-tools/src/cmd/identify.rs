@@ -9,7 +9,7 @@ use clap::Parser;
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus::data::recordings::RecordingSet;
-use tactus::data::replay::Replay;
+use tactus::data::replay::{Replay, ReplayError};
 use tactus::eval::evaluate::{MAX_TEXTURES, Method};
 use tactus::eval::experiment::{Experiment, Protocol};
 use tactus::eval::show::Show;
@@ -18,7 +18,7 @@ use tactus::sim::rig::SimRig;
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{self, Config, Explorer};
 use tactus_core::features::{Movement, Observation};
-use tactus_core::probe::explore::explore;
+use tactus_core::probe::explore::{ExplorationStep, ExploreError, Rejection, explore};
 use tactus_core::rig::Rig;
 use tactus_core::table::Table;
 
@@ -111,7 +111,10 @@ fn identify_recorded(
     let mut shown = set.load_texture(index)?;
     let table = if let Some((file, table)) = given {
         // a table learned from this very folder has seen the first slides of every movement
-        let trials = table.trials(0, 0).into();
+        let cells = (0..table.textures())
+            .flat_map(|texture| (0..).zip(table.movements()).map(move |(m, _)| (texture, m)));
+        let trials = cells.map(|(texture, movement)| table.trials(texture, movement));
+        let trials = trials.max().unwrap_or(0).into();
         let learned_as = Method::of(explorer::Method::of(table.contents()));
         let own = learn_first(&set, &measured, trials, learned_as, None);
         if own.is_ok_and(|own| own == table.as_bytes()) {
@@ -159,16 +162,18 @@ fn identify_recorded(
         table.textures(),
         args.seed
     )?;
-    show_exploration(&mut rig, table, args, &mut random, name, out)
+    let ran_out = |why: &ReplayError| matches!(why, ReplayError::RanOut(_));
+    show_exploration(&mut rig, table, args, &mut random, name, ran_out, out)
 }
 
-/// Explores with `rig` until there is an answer, and shows every step.
+/// Explores with `rig` until there is an answer or, after a slide at least, until it has `ran_out` of them; shows every step.
 fn show_exploration<R>(
     rig: &mut R,
     table: Table<'_>,
     args: &Args,
     random: &mut ChaCha8Rng,
     truth: &str,
+    ran_out: impl Fn(&R::Error) -> bool,
     out: &mut impl Write,
 ) -> anyhow::Result<()>
 where
@@ -187,9 +192,29 @@ where
         &mut explorer,
         &Plan::new(),
         || random.next_u32(),
-        |event| show.step(event),
+        |event| match event {
+            // shown below: recordings that run out are no failure
+            ExplorationStep::CutShort(..) => {}
+            event => show.step(event),
+        },
     ));
-    show.finish(verdict?, explorer.slides(), truth)?;
+    let verdict = match verdict {
+        Err(ExploreError::Rejected(Rejection::Rig(why)))
+            if ran_out(&why) && explorer.slides() > 0 =>
+        {
+            show.line("\nThe recordings have run out, and none counts twice.")?;
+            explorer.best()
+        }
+        Err(why) => {
+            if explorer.slides() > 0 {
+                let known = (&explorer.best(), explorer.slides());
+                show.step::<R::Error>(ExplorationStep::CutShort(known.0, known.1));
+            }
+            return Err(why.into());
+        }
+        Ok(verdict) => verdict,
+    };
+    show.finish(verdict, explorer.slides(), truth)?;
     Ok(())
 }
 
@@ -243,7 +268,8 @@ fn identify_simulated(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         table.textures(),
         args.seed
     )?;
-    show_exploration(&mut rig, table, args, &mut random, name, out)?;
+    let never = |_: &_| false;
+    show_exploration(&mut rig, table, args, &mut random, name, never, out)?;
     let seconds = rig.now().as_secs_f64();
     let skin = rig.control().skin();
     writeln!(

@@ -24,7 +24,7 @@ Examples:
 pub(crate) struct Args {
     #[command(flatten)]
     from: Recordings,
-    /// Slides to learn from, per texture and movement: the first ones of the session
+    /// Slides to learn from, per texture and movement: the first ones of the session, or as many as there are, two at least
     #[arg(long, value_name = "N", default_value_t = 5)]
     train_slides: usize,
     /// The way of deciding that the table is for: fused, or the others, which share one kind of table
@@ -73,6 +73,14 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         args.train_slides,
         bytes.len()
     )?;
+    for (texture, measured) in set.textures().iter().zip(&measured) {
+        for movement in set.movements() {
+            let there = measured.iter().filter(|s| s.movement == movement).count();
+            if there < args.train_slides {
+                writeln!(out, "{}, {movement}: only {there} slides", texture.name)?;
+            }
+        }
+    }
     Ok(())
 }
 
@@ -108,7 +116,7 @@ pub(crate) fn at_least_two(slides: usize) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The first slides of every texture and movement, and the table learned from them.
+/// The table learned from the first slides of every texture and movement: so many, or all where there are fewer.
 pub(crate) fn learn_first(
     set: &RecordingSet,
     measured: &[Vec<MeasuredSlide>],
@@ -126,8 +134,9 @@ pub(crate) fn learn_first(
             .collect();
         let there = trials.len();
         ensure!(
-            there == slides,
-            "{name}, {movement}: there are {there} slides, and --train-slides is {slides}"
+            there >= 2,
+            "{name}, {movement}: {there} {}, and how slides of one texture differ takes at least two",
+            if there == 1 { "slide" } else { "slides" }
         );
         Ok(trials)
     };

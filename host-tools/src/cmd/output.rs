@@ -26,3 +26,24 @@ pub(crate) fn print_rows(rows: &[(&str, String)], out: &mut impl Write) -> anyho
     }
     Ok(())
 }
+
+/// A share as people write it: "30 %", "99.9 %".
+pub(crate) fn percent(share: f64) -> String {
+    let percent = format!("{:.4}", share * 100.0);
+    format!("{} %", percent.trim_end_matches('0').trim_end_matches('.'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::percent;
+
+    #[test]
+    fn a_share_is_written_without_the_digits_of_its_binary_form() {
+        let written =
+            [0.3_f32, 0.99, 0.999, 1.0, 0.0, 0.123_456].map(|share| percent(share.into()));
+        assert_eq!(
+            written,
+            ["30 %", "99 %", "99.9 %", "100 %", "0 %", "12.3456 %"]
+        );
+    }
+}

@@ -2,8 +2,8 @@
 //!
 //! A CSV table with the columns `texture,movement,trial,set,traction,roughness,fineness` in any order. `texture` and
 //! `movement` are names or numbers; `trial` is a number, once per texture, movement and set; `set` is `train` or `validate`.
-//! Every texture has training trials of every movement, the same number each. Textures may do without validation trials;
-//! one that has them has the same number of every movement.
+//! Every texture has training trials of every movement, as many as there happen to be. Textures may do without validation
+//! trials; one that has them has some of every movement.
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -45,23 +45,21 @@ pub enum PropertyError {
     Row(#[from] RowError),
     /// A texture lacks trials of a movement.
     #[error(
-        "{}: texture {}, movement {}: {found} {set} trials, where texture {}, movement {} has {expected}; every movement of a \
-         texture needs as many trials",
+        "{}: texture {}, movement {}: no {set} trials, where texture {}, movement {} has {there}; give some, or leave out the \
+         movement or the texture",
         path.display(), at[0], at[1], like[0], like[1]
     )]
-    Unbalanced {
+    Missing {
         /// The table.
         path: PathBuf,
         /// `train` or `validate`.
         set: &'static str,
         /// Texture and movement.
         at: Box<[String; 2]>,
-        /// Trials that they have.
-        found: usize,
-        /// A texture and movement that have the right number.
+        /// A texture and movement that have trials.
         like: Box<[String; 2]>,
-        /// How many that is.
-        expected: usize,
+        /// How many these are.
+        there: usize,
     },
     /// A set has no trials at all.
     #[error("{}: no {set} rows; the table needs both train and validate", path.display())]
@@ -144,32 +142,24 @@ impl PropertyTable {
         let movements = 0..self.movements.len();
         let keys = |texture| movements.clone().map(move |movement| (texture, movement));
         let count = |trials: &Trials, key| trials.get(&key).map_or(0, Vec::len);
-        let unbalanced = |set, key: (usize, usize), found, like: (usize, usize), expected| {
-            let name = |(texture, movement): (usize, usize)| {
-                let names = [&self.textures[texture], &self.movements[movement]];
-                Box::new(names.map(String::clone))
-            };
-            PropertyError::Unbalanced {
-                path: path.to_owned(),
-                set,
-                at: name(key),
-                found,
-                like: name(like),
-                expected,
-            }
+        let name = |(texture, movement): (usize, usize)| {
+            let names = [&self.textures[texture], &self.movements[movement]];
+            Box::new(names.map(String::clone))
         };
-        // as many as the first pair has that was trained at all; tested, as the texture's first that was
+        // some trials, where the first pair was trained at all; tested, where the texture's first was
         let trained = train.keys().min().copied();
         for texture in 0..self.textures.len() {
             let tested = keys(texture).find(|key| count(validate, *key) > 0);
             for (set, trials, like) in [("train", train, trained), ("validate", validate, tested)] {
                 let Some(like) = like else { continue };
-                let expected = count(trials, like);
-                for key in keys(texture) {
-                    let found = count(trials, key);
-                    if found != expected {
-                        return Err(unbalanced(set, key, found, like, expected));
-                    }
+                if let Some(at) = keys(texture).find(|key| count(trials, *key) == 0) {
+                    return Err(PropertyError::Missing {
+                        path: path.to_owned(),
+                        set,
+                        at: name(at),
+                        like: name(like),
+                        there: count(trials, like),
+                    });
                 }
             }
         }
@@ -245,6 +235,19 @@ mod tests {
     }
 
     #[test]
+    fn numbers_of_trials_may_differ() {
+        let mut rows = rows();
+        rows.push("7,slow,3,train,4,4,4".to_owned());
+        rows.push("silk,slow,2,validate,7,7,7".to_owned());
+        let set = read(&rows.join("\n")).unwrap();
+        let numbers = |set: &[Vec<Vec<Properties>>]| -> Vec<usize> {
+            set.iter().flatten().map(Vec::len).collect()
+        };
+        assert_eq!(numbers(&set.train), [2, 2, 2, 3]);
+        assert_eq!(numbers(&set.validate), [1, 2, 0, 0]);
+    }
+
+    #[test]
     fn errors_name_line_and_cause() {
         for (line, from, to, parts) in [
             (1, "fineness", "finesse", [":1: ", "no column fineness"]),
@@ -291,29 +294,11 @@ mod tests {
             (3, "silk", "", [":3: column texture", "is empty"]),
             (3, "fast", "", [":3: column movement", "is empty"]),
             (
-                3,
-                "train",
-                "validate",
-                [
-                    "texture silk, movement slow: 2 train trials",
-                    "where texture silk, movement fast has 1",
-                ],
-            ),
-            (
-                3,
-                "fast",
-                "slew",
-                [
-                    "texture silk, movement slow: 2 train trials",
-                    "where texture silk, movement fast has 1",
-                ],
-            ),
-            (
                 9,
                 "7",
                 "8",
                 [
-                    "texture 7, movement slow: 1 train trials",
+                    "texture 8, movement fast: no train trials",
                     "where texture silk, movement fast has 2",
                 ],
             ),
@@ -322,8 +307,8 @@ mod tests {
                 "silk",
                 "7",
                 [
-                    "texture silk, movement slow: 0 validate trials",
-                    "needs as many",
+                    "texture silk, movement slow: no validate trials",
+                    "where texture silk, movement fast has 1",
                 ],
             ),
         ] {

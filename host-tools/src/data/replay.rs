@@ -113,51 +113,117 @@ pub fn measure_all(
         .collect()
 }
 
-/// A rig whose unknown texture is a pile of recorded slides: each movement replays one of that movement, drawn with
-/// replacement.
+/// A rig whose unknown texture is a pile of recorded slides: each movement replays one of that movement, drawn without
+/// replacement. A slide that was seen before is no fresh evidence.
 #[derive(Debug)]
 pub struct Replay {
+    /// Those that were not replayed yet.
     slides: Vec<Slide>,
+    /// The movements that were recorded.
+    movements: Vec<Movement>,
+    measures: PropertySet,
     random: ChaCha8Rng,
 }
 
-/// There is no recording of this movement.
+/// There is no slide to replay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("no slide of the movement {0} was recorded")]
-pub struct NotRecorded(pub Movement);
+pub enum ReplayError {
+    /// There never was.
+    #[error("no slide of the movement {0} was recorded")]
+    NotRecorded(Movement),
+    /// All of them were replayed.
+    #[error("no recorded slide at {0} is left")]
+    RanOut(Movement),
+}
 
 impl Replay {
     /// A rig that replays `slides`.
     pub fn new(slides: Vec<Slide>, random: ChaCha8Rng) -> Self {
-        Self { slides, random }
+        let traction = slides.iter().all(|s| s.shear_mn.is_some());
+        let mut movements = Vec::new();
+        for slide in &slides {
+            if !movements.contains(&slide.movement) {
+                movements.push(slide.movement);
+            }
+        }
+        Self {
+            measures: Property::ALL
+                .into_iter()
+                .filter(|&p| traction || p != Property::Traction)
+                .collect(),
+            slides,
+            movements,
+            random,
+        }
     }
 }
 
 impl Rig for Replay {
-    type Error = NotRecorded;
+    type Error = ReplayError;
 
     fn measures(&self) -> PropertySet {
-        let traction = self.slides.iter().all(|s| s.shear_mn.is_some());
-        Property::ALL
-            .into_iter()
-            .filter(|&p| traction || p != Property::Traction)
-            .collect()
+        self.measures
     }
 
     async fn perform<K: Kernels>(
         &mut self,
         slide: &mut features::Slide<'_, K>,
-    ) -> Result<(), NotRecorded> {
+    ) -> Result<(), ReplayError> {
         let movement = slide.movement();
-        let recorded: Vec<&Slide> = self
-            .slides
-            .iter()
-            .filter(|s| s.movement == movement)
+        let recorded = (0..).zip(&self.slides);
+        let recorded: Vec<usize> = recorded
+            .filter(|(_, s)| s.movement == movement)
+            .map(|(at, _)| at)
             .collect();
         if recorded.is_empty() {
-            return Err(NotRecorded(movement));
+            return Err(if self.movements.contains(&movement) {
+                ReplayError::RanOut(movement)
+            } else {
+                ReplayError::NotRecorded(movement)
+            });
         }
-        play(recorded[self.random.random_range(0..recorded.len())], slide);
+        let drawn = recorded[self.random.random_range(0..recorded.len())];
+        play(&self.slides.remove(drawn), slide);
         Ok(())
+    }
+
+    /// Another movement may have slides left.
+    async fn recover(&mut self, _failed: &ReplayError) -> bool {
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use embassy_futures::block_on;
+    use rand::SeedableRng as _;
+
+    use super::*;
+
+    #[test]
+    fn no_slide_is_replayed_twice() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+        let set = RecordingSet::open(folder.as_ref()).unwrap();
+        let slides = set.load_texture(0).unwrap();
+        let movement = slides[0].movement;
+        let there = slides.iter().filter(|s| s.movement == movement).count();
+        assert!(there > 2);
+        let plan = Plan::new();
+        let mut rig = Replay::new(slides, ChaCha8Rng::seed_from_u64(1));
+        let mut seen = Vec::new();
+        let mut slide = |movement| {
+            let mut slide = features::Slide::<Plain>::new(&plan, movement);
+            block_on(rig.perform(&mut slide))?;
+            Ok(slide.finish().unwrap().properties)
+        };
+        for _ in 0..there {
+            let properties = slide(movement).unwrap();
+            assert!(!seen.contains(&properties));
+            seen.push(properties);
+        }
+        assert_eq!(slide(movement), Err(ReplayError::RanOut(movement)));
+        let elsewhere = Movement::grid().find(|m| !set.movements().contains(m));
+        let elsewhere = elsewhere.unwrap();
+        assert_eq!(slide(elsewhere), Err(ReplayError::NotRecorded(elsewhere)));
     }
 }

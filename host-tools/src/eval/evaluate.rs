@@ -5,8 +5,11 @@ use std::collections::HashMap;
 use rand::Rng as _;
 use rayon::prelude::*;
 use serde::Serialize;
-use tactus_core::explorer::{self, Config, Confusions, Degrees, Explorer, ExplorerError, Strategy};
+use tactus_core::explorer::{
+    self, Config, Confusions, Degrees, Explorer, ExplorerError, Strategy, Told,
+};
 use tactus_core::features::PropertySet;
+use tactus_core::rig::MAX_REJECTED;
 use tactus_core::table::{Action, Table, TableError};
 
 use crate::eval::experiment::{Experiment, Run};
@@ -78,10 +81,19 @@ pub struct Outcome {
     pub identified: usize,
     /// Whether the threshold was exceeded.
     pub sure: bool,
+    /// What a user would have been told.
+    pub told: Told,
     /// Slides made.
     pub slides: u8,
     /// Whether it would have been called unknown, had that been an answer.
     pub unknown_like: bool,
+}
+
+impl Outcome {
+    /// What the user was told, and whether the most probable texture is the right one.
+    pub fn told(&self) -> (Told, bool) {
+        (self.told, self.identified == self.unknown)
+    }
 }
 
 /// Why an evaluation came to nothing.
@@ -142,6 +154,7 @@ pub fn play_with<const N: usize>(
     mut each: impl FnMut(Action, &[f32]),
 ) -> Outcome {
     explorer.restart();
+    let mut failed = 0;
     let verdict = loop {
         if let Some(verdict) = explorer.verdict() {
             break verdict;
@@ -157,7 +170,15 @@ pub fn play_with<const N: usize>(
             _ => Default::default(),
         };
         let action = explorer.choose(&expected, run.random.next_u32());
-        let slide = run.slide(action.movement.into());
+        let Some(slide) = run.slide(action.movement.into()) else {
+            // as the core explores on a rig: once more, then another movement, and then it ends with what is known
+            failed += 1;
+            if !explorer.reject(action) || failed == MAX_REJECTED {
+                break explorer.best();
+            }
+            continue;
+        };
+        failed = 0;
         explorer
             .observe(action, slide)
             .expect("every slide has the properties that the explorer was told of");
@@ -167,6 +188,7 @@ pub fn play_with<const N: usize>(
         unknown: run.unknown,
         identified: verdict.texture.into(),
         sure: verdict.sure,
+        told: verdict.told(),
         slides: explorer.slides(),
         unknown_like: explorer.is_unknown(),
     }
@@ -411,6 +433,7 @@ mod tests {
             unknown,
             identified,
             sure,
+            told: if sure { Told::Sure } else { Told::Undecided },
             slides,
             unknown_like: slides == 4,
         };

@@ -1,9 +1,10 @@
 //! What every quoted figure means: which slides a table is learned from, and which the unknown texture shows.
 //!
 //! A run is one virtual exploration. Its training slides are drawn anew, one texture is unknown (in turn), and each slide
-//! that an explorer asks for is drawn with replacement from that texture's test slides.
+//! that an explorer asks for is drawn from that texture's test slides: with replacement, as in the reference program, or each
+//! once, as `identify` has it.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use rand::seq::SliceRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
@@ -68,6 +69,18 @@ pub enum ExperimentError {
         /// The movement.
         movement: Movement,
     },
+    /// As [`Self::Training`], where all of them are to be used.
+    #[error(
+        "{texture}, {movement}: {there} training slide; how slides of one texture differ takes at least two"
+    )]
+    Few {
+        /// Name of the texture.
+        texture: String,
+        /// The movement.
+        movement: Movement,
+        /// Slides there are.
+        there: usize,
+    },
     /// A standard deviation needs two slides.
     #[error("--train-slides {0}: how slides of one texture differ takes at least two slides")]
     One(usize),
@@ -101,13 +114,17 @@ pub struct Experiment {
     unknowns: Vec<usize>,
     /// Textures that the unknown one can be, as far as the explorer knows; all, unless given.
     candidates: Option<Vec<u16>>,
-    /// Training slides per texture and movement.
+    /// Training slides per texture and movement; the fewest of any, where all are used.
     train_slides: usize,
     /// Training slides are drawn; otherwise they are the first.
     drawn: bool,
+    /// All training slides are used, as many as there happen to be; not with drawn ones.
+    all: bool,
     measured: PropertySet,
     /// What the fused method learns from; the best there is, unless given.
     features: Option<FeatureSet>,
+    /// No run shows a test slide twice.
+    once: bool,
     seed: u64,
 }
 
@@ -128,8 +145,10 @@ impl Experiment {
             candidates: None,
             train_slides,
             drawn: false,
+            all: false,
             measured: PropertySet::ALL,
             features: None,
+            once: false,
             seed,
         }
     }
@@ -227,8 +246,8 @@ impl Experiment {
     }
 
     /// Slides that were cut into properties elsewhere: per texture and movement, those to train from and those to test
-    /// with. Textures without test slides are never the unknown one. Without `train_slides`, all training slides are used,
-    /// else the first so many.
+    /// with. Textures without test slides are never the unknown one. Without `train_slides`, all training slides are used, not
+    /// necessarily equally many, else the first so many.
     ///
     /// The movements have no force and speed; they stand in the table as the first cells of the grid.
     ///
@@ -249,19 +268,18 @@ impl Experiment {
                 .map(|texture| texture.iter().map(slides).collect())
                 .collect()
         };
-        let there = set.train.iter().flatten().map(Vec::len).min().unwrap_or(0);
         Self::collected(
             set.textures.clone(),
             Movement::grid().take(set.movements.len()).collect(),
             wrap(&set.train),
             wrap(&set.validate),
-            train_slides.unwrap_or(there),
+            train_slides,
             seed,
         )
     }
 
-    /// Slides that were divided when they were collected: per texture and movement, those to train from, of which the first
-    /// `train_slides` are used, and those to test with. Textures without test slides are never the unknown one. A table holds
+    /// Slides that were divided when they were collected: per texture and movement, those to train from, of which all or the
+    /// first `train_slides` are used, and those to test with. Textures without test slides are never the unknown one. A table holds
     /// [`table::MAX_MOVEMENTS`] movements.
     ///
     /// # Errors
@@ -271,23 +289,33 @@ impl Experiment {
         movements: Vec<Movement>,
         train: Vec<Vec<Vec<Observation>>>,
         test: Vec<Vec<Vec<Observation>>>,
-        train_slides: usize,
+        train_slides: Option<usize>,
         seed: u64,
     ) -> Result<Self, ExperimentError> {
-        if train_slides < 2 {
-            return Err(ExperimentError::One(train_slides));
+        if let Some(one @ ..2) = train_slides {
+            return Err(ExperimentError::One(one));
         }
         for (texture, row) in names.iter().zip(&train) {
-            let short = |(_, trials): &(_, &Vec<_>)| trials.len() < train_slides;
+            let wanted = train_slides.unwrap_or(2);
+            let short = |(_, trials): &(_, &Vec<_>)| trials.len() < wanted;
             if let Some((&movement, trials)) = movements.iter().zip(row).find(short) {
-                return Err(ExperimentError::Training {
-                    texture: texture.clone(),
-                    movement,
-                    there: trials.len(),
-                    wanted: train_slides,
+                let (texture, there) = (texture.clone(), trials.len());
+                return Err(match train_slides {
+                    Some(wanted) => ExperimentError::Training {
+                        texture,
+                        movement,
+                        there,
+                        wanted,
+                    },
+                    None => ExperimentError::Few {
+                        texture,
+                        movement,
+                        there,
+                    },
                 });
             }
         }
+        let fewest = train.iter().flatten().map(Vec::len).min().unwrap_or(0);
         let tested = |slides: &Vec<Vec<_>>| slides.iter().all(|trials| !trials.is_empty());
         let unknowns = (0..names.len()).filter(|&t| tested(&test[t])).collect();
         let pool = |(train, test)| Pool {
@@ -299,7 +327,14 @@ impl Experiment {
         let pools = pools.collect();
         Ok(Self {
             unknowns,
-            ..Self::of(names, movements, pools, train_slides, seed)
+            all: train_slides.is_none(),
+            ..Self::of(
+                names,
+                movements,
+                pools,
+                train_slides.unwrap_or(fewest),
+                seed,
+            )
         })
     }
 
@@ -333,13 +368,20 @@ impl Experiment {
         let train = of(true);
         let there = train.iter().flatten().map(Vec::len).min().unwrap_or(0);
         let (names, movements) = (set.fabrics.clone(), set.movements.clone());
-        Self::collected(names, movements, train, of(false), there, seed)
+        Self::collected(names, movements, train, of(false), Some(there), seed)
     }
 
     /// The same with other features for the fused method.
     #[must_use]
     pub fn with_features(self, features: Option<FeatureSet>) -> Self {
         Self { features, ..self }
+    }
+
+    /// The same, and no run shows a slide twice: as with [`crate::data::replay::Replay`], a movement without a slide left
+    /// is not made.
+    #[must_use]
+    pub fn each_slide_once(self) -> Self {
+        Self { once: true, ..self }
     }
 
     /// The same among a few textures only: one of them is unknown, and the explorer knows that it is one of them.
@@ -384,7 +426,7 @@ impl Experiment {
         self.measured
     }
 
-    /// Training slides per texture and movement.
+    /// Training slides per texture and movement; the fewest of any, where all are used.
     pub fn train_slides(&self) -> usize {
         self.train_slides
     }
@@ -415,6 +457,7 @@ impl Experiment {
         Run {
             experiment: self,
             orders,
+            shown: HashSet::new(),
             unknown,
             random,
         }
@@ -427,6 +470,8 @@ pub struct Run<'e> {
     experiment: &'e Experiment,
     /// In which order slides are taken, by movement and how many there are; that of time, where nothing is drawn.
     orders: HashMap<(usize, usize), Vec<usize>>,
+    /// Slides that were shown, by movement and place, where each is shown once.
+    shown: HashSet<(usize, usize)>,
     /// The texture to be identified.
     pub unknown: usize,
     /// Drawn from for the slides; an explorer's own random choices go through it too.
@@ -437,7 +482,10 @@ impl<'e> Run<'e> {
     /// Training slides per texture and movement.
     pub fn training(&self) -> Vec<Vec<Vec<Observation>>> {
         let of = |(movement, pool): (usize, &Pool)| {
-            let learned = 0..self.experiment.train_slides;
+            let learned = match self.experiment.all {
+                true => 0..pool.train.len(),
+                false => 0..self.experiment.train_slides,
+            };
             let slides = learned.map(|n| pool.train[self.place(movement, pool, n)].clone());
             slides.collect()
         };
@@ -480,16 +528,33 @@ impl<'e> Run<'e> {
         learn(method, of.features, &names, &of.movements, &training)
     }
 
-    /// One more slide of the unknown texture.
-    pub fn slide(&mut self, movement: usize) -> &'e Observation {
+    /// One more slide of the unknown texture; `None` where each is shown once, and all of this movement were.
+    pub fn slide(&mut self, movement: usize) -> Option<&'e Observation> {
         let pool = &self.experiment.pools[self.unknown][movement];
-        match &pool.test {
-            Some(test) => &test[self.random.random_range(0..test.len())],
-            None => {
-                let learned = self.experiment.train_slides;
-                let n = self.random.random_range(0..pool.train.len() - learned);
-                &pool.train[self.place(movement, pool, learned + n)]
-            }
+        let learned = self.experiment.train_slides;
+        let slides = match &pool.test {
+            Some(test) => test.len(),
+            None => pool.train.len() - learned,
+        };
+        if self
+            .shown
+            .iter()
+            .filter(|slide| slide.0 == movement)
+            .count()
+            == slides
+        {
+            return None;
         }
+        let n = loop {
+            // drawn again until it is a new one: so the first slide of a run is the same either way
+            let n = self.random.random_range(0..slides);
+            if !self.experiment.once || self.shown.insert((movement, n)) {
+                break n;
+            }
+        };
+        Some(match &pool.test {
+            Some(test) => &test[n],
+            None => &pool.train[self.place(movement, pool, learned + n)],
+        })
     }
 }

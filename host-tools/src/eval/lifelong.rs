@@ -6,12 +6,13 @@ use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
-use tactus_core::explorer::Config;
+use tactus_core::explorer::{Config, Told};
 use tactus_core::features::Observation;
 use tactus_core::table::{Action, Contents, EncodeError, Table, retell};
 
 use crate::eval::evaluate::{EvaluateError, explorer};
 use crate::eval::experiment::Experiment;
+use crate::eval::verdicts::Verdicts;
 
 /// From whom the probe learns during the session.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
@@ -40,6 +41,8 @@ pub struct Lifelong {
     pub uncertain: f64,
     /// Share of wrong labels among those that the probe gave itself.
     pub wrong_updates: f64,
+    /// What the user would have been told after each episode's slide.
+    pub verdicts: Verdicts,
 }
 
 /// One episode: what was presented, and what became of it.
@@ -47,6 +50,7 @@ struct Episode {
     texture: usize,
     right: bool,
     certain: bool,
+    told: Told,
 }
 
 /// Plays so many sessions with every kind of learning; they differ in the order of the textures.
@@ -99,20 +103,20 @@ fn play(
                 let Some(slide) = later.get(time) else {
                     continue;
                 };
-                let best = look(experiment, config, &bytes, movement, slide)?;
-                let right = best.0 == texture;
+                let (best, certain, told) = look(experiment, config, &bytes, movement, slide)?;
                 let label = match learning {
                     Learning::None => None,
-                    Learning::Itself => best.1.then_some(best.0),
-                    Learning::Asking => Some(if best.1 { best.0 } else { texture }),
+                    Learning::Itself => certain.then_some(best),
+                    Learning::Asking => Some(if certain { best } else { texture }),
                 };
                 if let Some(label) = label {
                     learn(&mut bytes, label, movement, slide)?;
                 }
                 episodes.push(Episode {
                     texture,
-                    right,
-                    certain: best.1,
+                    right: best == texture,
+                    certain,
+                    told,
                 });
             }
         }
@@ -120,14 +124,18 @@ fn play(
     Ok(episodes)
 }
 
-/// The first guess from one slide, and whether it is certain.
+/// The first guess from one slide, whether it is certain, and what the user is told.
 fn look(
     experiment: &Experiment,
     config: Config,
     bytes: &[u8],
     movement: u8,
     slide: &Observation,
-) -> Result<(usize, bool), EvaluateError> {
+) -> Result<(usize, bool, Told), EvaluateError> {
+    let config = Config {
+        open: true,
+        ..config
+    };
     let mut explorer = explorer(bytes, experiment.measured(), config, None)?;
     let action = Action {
         movement,
@@ -136,7 +144,8 @@ fn look(
     explorer
         .observe(action, slide)
         .expect("every slide has the features that the table was learned from");
-    Ok((explorer.best().texture.into(), explorer.is_certain()))
+    let best = explorer.best();
+    Ok((best.texture.into(), explorer.is_certain(), best.told()))
 }
 
 /// Learns a slide of a texture, as the probe does.
@@ -180,5 +189,6 @@ fn sum_up(learning: Learning, episodes: &[Episode], names: &[String]) -> Lifelon
         }),
         uncertain: share(episodes.len() - certain.clone().count(), episodes.len()),
         wrong_updates: share(wrong, certain.count()),
+        verdicts: Verdicts::of(episodes.iter().map(|v| (v.told, v.right))),
     }
 }

@@ -5,8 +5,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::Config;
 
-use crate::eval::evaluate::{EvaluateError, explorer};
+use crate::eval::evaluate::{EvaluateError, explorer, play};
 use crate::eval::experiment::{Experiment, Run};
+use crate::eval::verdicts::Verdicts;
 
 /// Slides after which it is counted.
 pub const SLIDES: usize = 3;
@@ -22,6 +23,17 @@ pub struct After {
     pub false_alarms: f64,
 }
 
+/// What leaving textures out comes to.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Novelty {
+    /// After one slide, two, and so on.
+    pub novelty: Vec<After>,
+    /// What users would have been told of the textures that were left out: `new` is right, and `right` is 0.
+    pub verdicts_new: Verdicts,
+    /// What they would have been told of textures that the table has.
+    pub verdicts_known: Verdicts,
+}
+
 /// Leaves one texture after the other out of the table, and presents it; and one that was not left out beside it.
 ///
 /// # Errors
@@ -31,8 +43,13 @@ pub fn leave_one_out(
     config: Config,
     runs: u64,
     done: impl Fn() + Sync,
-) -> Result<Vec<After>, EvaluateError> {
-    let flagged: Vec<[[bool; SLIDES]; 2]> = (0..runs)
+) -> Result<Novelty, EvaluateError> {
+    let as_told = experiment.clone().each_slide_once();
+    let open = Config {
+        open: true,
+        ..config
+    };
+    let presented: Vec<_> = (0..runs)
         .into_par_iter()
         .map(|index| {
             let mut run = experiment.run(index);
@@ -41,21 +58,35 @@ pub fn leave_one_out(
             let other = (presented + 1 + run.random.random_range(0..textures - 1)) % textures;
             let new = episode(experiment, config, &mut run, presented)?;
             let known = episode(experiment, config, &mut run, other)?;
+            let told = |left_out| {
+                let run = as_told.run(index);
+                let bytes = run.learn_without(open.method, left_out)?;
+                let mut explorer = explorer(&bytes, as_told.measured(), open, None)?;
+                let outcome = play(&mut explorer, None, open.strategy, run);
+                // in this table the textures after the missing one are one place further to the front
+                let place = presented.checked_sub(usize::from(presented > left_out));
+                let is_right = presented != left_out && Some(outcome.identified) == place;
+                Ok::<_, EvaluateError>((outcome.told, is_right))
+            };
+            let told = [told(presented)?, told(other)?];
             done();
-            Ok([new, known])
+            Ok(([new, known], told))
         })
         .collect::<Result<_, EvaluateError>>()?;
     let share = |which: usize, after: usize| {
-        let count = flagged.iter().filter(|run| run[which][after]).count();
-        count as f64 / flagged.len().max(1) as f64
+        let flagged = presented.iter().filter(|(run, _)| run[which][after]);
+        flagged.count() as f64 / presented.len().max(1) as f64
     };
-    Ok((0..SLIDES)
-        .map(|after| After {
-            slides: after + 1,
-            detections: share(0, after),
-            false_alarms: share(1, after),
-        })
-        .collect())
+    let after = |after| After {
+        slides: after + 1,
+        detections: share(0, after),
+        false_alarms: share(1, after),
+    };
+    Ok(Novelty {
+        novelty: (0..SLIDES).map(after).collect(),
+        verdicts_new: Verdicts::of(presented.iter().map(|(_, told)| told[0])),
+        verdicts_known: Verdicts::of(presented.iter().map(|(_, told)| told[1])),
+    })
 }
 
 /// Slides over the run's texture with a table that lacks `left_out`: whether it is taken for unknown after each slide.
@@ -71,7 +102,9 @@ fn episode(
     for flag in &mut flagged {
         let expected = explorer.expected_outcomes();
         let action = explorer.choose(&expected, 0);
-        let slide = run.slide(action.movement.into());
+        let slide = run
+            .slide(action.movement.into())
+            .expect("slides are drawn with replacement, and there is one");
         explorer
             .observe(action, slide)
             .expect("every slide has the features that the table was learned from");

@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::io::{self, Write};
 
-use tactus_core::explorer::{ExpectedOutcome, Verdict};
+use tactus_core::explorer::{ExpectedOutcome, Told, Verdict};
 use tactus_core::features::{Properties, Property};
 use tactus_core::probe::explore::ExplorationStep;
 use tactus_core::table::{Action, Contents, Table, white};
@@ -266,10 +266,11 @@ impl<'t, W: Write> Show<'t, W> {
         self.answer(verdict, slides)?;
         let name = self.table.name(verdict.texture).unwrap_or("?");
         let is_known = self.table.find(truth).is_some();
-        if (verdict.unknown && !is_known) || (!verdict.unknown && name == truth) {
-            writeln!(self.out, "Right.")
-        } else {
-            writeln!(self.out, "Wrong: it was {truth}.")
+        match verdict.told() {
+            Told::Sure if name == truth => writeln!(self.out, "Right."),
+            Told::New if !is_known => writeln!(self.out, "Right."),
+            Told::Sure | Told::New => writeln!(self.out, "Wrong: it was {truth}."),
+            Told::Undecided => writeln!(self.out, "Undecided: it was {truth}."),
         }
     }
 
@@ -278,22 +279,22 @@ impl<'t, W: Write> Show<'t, W> {
         let name = self.table.name(verdict.texture).unwrap_or("?");
         let p = verdict.probability * 100.0;
         let slides = format!("{slides} slide{}", if slides == 1 { "" } else { "s" });
-        if verdict.unknown {
-            let odds = verdict
-                .log_odds
-                .map_or(String::new(), |odds| format!(" (log-odds {odds:+.1})"));
-            writeln!(
-                self.out,
-                "\nIt is not one of the {} textures I know{odds} after {slides}; it is most like {name}.",
-                self.table.textures()
-            )
-        } else if verdict.sure {
-            writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}.")
-        } else {
-            writeln!(
+        match verdict.told() {
+            Told::New => {
+                let odds = verdict
+                    .log_odds
+                    .map_or(String::new(), |odds| format!(" (log-odds {odds:+.1})"));
+                writeln!(
+                    self.out,
+                    "\nIt is not one of the {} textures I know{odds} after {slides}; it is most like {name}.",
+                    self.table.textures()
+                )
+            }
+            Told::Sure => writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}."),
+            Told::Undecided => writeln!(
                 self.out,
                 "\nNot sure after {slides}; most likely {name}, {p:.1} %."
-            )
+            ),
         }
     }
 }

@@ -63,7 +63,7 @@ pub fn experiment(recorded: &Recorded, seed: u64) -> Result<Experiment, StudyErr
         movements,
         trained,
         tested,
-        trials.unwrap_or(0),
+        Some(trials.unwrap_or(0)),
         seed,
     )?)
 }

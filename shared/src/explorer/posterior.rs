@@ -47,6 +47,28 @@ pub struct Verdict {
     pub log_odds: Option<f32>,
 }
 
+/// What a verdict tells the user. Every count of right and wrong answers goes by this.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Told {
+    /// "It is this texture": a name told as sure.
+    Sure,
+    /// "It is none of those I know."
+    New,
+    /// "Not sure; most likely this one": no answer, whatever the name.
+    Undecided,
+}
+
+impl Verdict {
+    /// What the user is told.
+    pub fn told(&self) -> Told {
+        match self {
+            Self { unknown: true, .. } => Told::New,
+            Self { sure: true, .. } => Told::Sure,
+            _ => Told::Undecided,
+        }
+    }
+}
+
 /// One exploration after another with the same table and candidates; room for `N` textures.
 #[derive(Clone, Debug)]
 pub struct Explorer<'t, const N: usize, K = Plain> {
@@ -171,7 +193,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         episode.map(move |v| (v.movement, v.slides, v.mean(features)))
     }
 
-    /// The most probable texture as things stand, the first of equals.
+    /// The most probable texture as things stand, the first of equals: the answer also where no further slide can be made.
     pub fn best(&self) -> Verdict {
         let mut best = Verdict {
             texture: 0,

@@ -20,6 +20,11 @@ Every run learns from slides drawn anew (--protocol says from which), takes one 
 choose; each slide it asks for is drawn from the test slides of that texture. It stops when a texture is more probable
 than --threshold, or after --max-slides.
 
+First comes what a user would have been told by `tactus identify`: a name as sure, which is right or wrong, \"none of those
+I know\", or \"not sure\", which is undecided. There the texture may be none of the known ones, no slide comes twice, and the
+exploration ends when the recordings run out. Then come the figures of explorations in which it must be one of the known
+ones and slides are drawn with replacement, as in the paper.
+
 With --properties FILE, slides are rows of texture,movement,trial,set,traction,roughness,fineness, where set is train or
 validate, and an action is any (movement, property) pair.
 
@@ -70,9 +75,9 @@ pub(crate) struct Args {
     /// Which slides to learn from and which to test on; --properties says so itself, in its column set
     #[arg(long, value_enum, default_value_t = Protocol::Interleaved)]
     pub(crate) protocol: Protocol,
-    /// Number of virtual explorations
-    #[arg(long, default_value_t = 8000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
-    pub(crate) runs: u64,
+    /// Number of virtual explorations, 8000 unless given; with --lifelong of sessions, 50 unless given
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    pub(crate) runs: Option<u64>,
     #[command(flatten)]
     pub(crate) stop: Stop,
     /// The same seed gives the same figures, whatever the number of cores
@@ -81,6 +86,13 @@ pub(crate) struct Args {
     /// How to print the figures
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub(crate) format: Format,
+}
+
+impl Args {
+    /// Number of virtual explorations, or of sessions.
+    pub(crate) fn runs(&self) -> u64 {
+        self.runs.unwrap_or(if self.lifelong { 50 } else { 8000 })
+    }
 }
 
 /// How novelty is tried.

@@ -7,10 +7,12 @@ use serde::Serialize;
 use tactus::eval::evaluate::Method;
 use tactus::eval::experiment::Experiment;
 use tactus::eval::lifelong::{self, Learning, Lifelong};
-use tactus::eval::novelty::{self, After};
+use tactus::eval::novelty::{self, Novelty};
+use tactus::eval::verdicts::Verdicts;
 use tactus_core::explorer::Config;
 
 use super::experiment::Args;
+use super::verdict_rows;
 use crate::cmd::output::{Format, print_json};
 use crate::cmd::progress::with_progress;
 
@@ -22,7 +24,8 @@ struct NoveltyFigures {
     train_slides: usize,
     runs: u64,
     seed: u64,
-    novelty: Vec<After>,
+    #[serde(flatten)]
+    novelty: Novelty,
 }
 
 /// What `evaluate --lifelong` prints.
@@ -34,9 +37,6 @@ struct LifelongFigures {
     seed: u64,
     lifelong: Vec<Lifelong>,
 }
-
-/// Most sessions of `--lifelong`; they differ in the order of the textures only.
-const SESSIONS: u64 = 50;
 
 /// Leaves every texture out of the table in turn.
 pub(crate) fn leave_one_out(
@@ -50,10 +50,10 @@ pub(crate) fn leave_one_out(
         experiment.names().len() >= 4,
         "--novelty needs four textures or more: record more of them"
     );
-    let novelty = with_progress(args.runs, "presenting new textures", |done| {
-        novelty::leave_one_out(experiment, config, args.runs, done)
+    let novelty = with_progress(args.runs(), "presenting new textures", |done| {
+        novelty::leave_one_out(experiment, config, args.runs(), done)
     })?;
-    let (train_slides, runs, seed) = (experiment.train_slides(), args.runs, args.seed);
+    let (train_slides, runs, seed) = (experiment.train_slides(), args.runs(), args.seed);
     if args.format == Format::Json {
         let figures = NoveltyFigures {
             method: args.method,
@@ -69,7 +69,7 @@ pub(crate) fn leave_one_out(
         out,
         "Every texture left out in turn, {protocol}, {train_slides} training slides, {runs} runs, seed {seed}"
     )?;
-    for after in novelty {
+    for after in &novelty.novelty {
         let slides = format!(
             "{} slide{}",
             after.slides,
@@ -81,6 +81,13 @@ pub(crate) fn leave_one_out(
             "  after {slides}  noticed {noticed:5.1} %, known ones taken for new {alarms:4.1} %"
         )?;
     }
+    let (new, known) = (&novelty.verdicts_new, &novelty.verdicts_known);
+    writeln!(
+        out,
+        "What the user is told, after as many slides as it takes"
+    )?;
+    writeln!(out, "  of a new texture    {}", in_words(new))?;
+    writeln!(out, "  of a known one      {}", in_words(known))?;
     Ok(())
 }
 
@@ -91,7 +98,8 @@ pub(crate) fn lifelong(
     config: Config,
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
-    let sessions = args.runs.min(SESSIONS);
+    // they differ in the order of the textures only
+    let sessions = args.runs();
     let (train_slides, seed) = (experiment.train_slides(), args.seed);
     let lifelong = with_progress(3 * sessions, "living through sessions", |done| {
         lifelong::lifelong(experiment, config, sessions, seed, done)
@@ -128,6 +136,14 @@ pub(crate) fn lifelong(
             "  {who:<22}  right at first {right:5.1} %, worst {worst:5.1} % ({}), {uncertain} {unsure:4.1} %, wrong updates {wrong:.2} %",
             life.worst.1
         )?;
+        writeln!(out, "    the user is told: {}", in_words(&life.verdicts))?;
     }
     Ok(())
+}
+
+/// Verdicts on one line.
+fn in_words(verdicts: &Verdicts) -> String {
+    let words = verdict_rows(verdicts);
+    let words = words.map(|(name, share)| format!("{name} {:.1} %", share * 100.0));
+    words.join(", ")
 }

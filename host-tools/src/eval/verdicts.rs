@@ -1,0 +1,72 @@
+//! What users would have been told at the end of explorations, and how often.
+
+use serde::Serialize;
+use tactus_core::explorer::Told;
+
+/// Shares of explorations, 0 to 1; they add up to 1.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
+pub struct Verdicts {
+    /// Told the right name as sure.
+    pub right: f64,
+    /// Told the name of a texture that is not as it was learned. No method gives this verdict yet: 0.
+    pub changed: f64,
+    /// Told that it is none of the textures known.
+    pub new: f64,
+    /// Told a wrong name as sure.
+    pub wrong: f64,
+    /// Told "not sure", whatever the most likely name.
+    pub undecided: f64,
+}
+
+impl Verdicts {
+    /// Counts what was told at the end of each exploration, and whether the most probable texture was the right one.
+    pub fn of(told: impl IntoIterator<Item = (Told, bool)>) -> Self {
+        let mut counts = Self::default();
+        let mut all = 0.0_f64;
+        for (told, is_right) in told {
+            all += 1.0;
+            *match told {
+                Told::Sure if is_right => &mut counts.right,
+                Told::Sure => &mut counts.wrong,
+                Told::New => &mut counts.new,
+                Told::Undecided => &mut counts.undecided,
+            } += 1.0;
+        }
+        let share = |count: f64| count / all.max(1.0);
+        Self {
+            right: share(counts.right),
+            changed: share(counts.changed),
+            new: share(counts.new),
+            wrong: share(counts.wrong),
+            undecided: share(counts.undecided),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_name_told_as_sure_is_right_or_wrong() {
+        let told = [
+            (Told::Sure, true),
+            (Told::Sure, true),
+            (Told::Sure, false),
+            (Told::New, true),
+            (Told::New, false),
+            (Told::Undecided, true),
+            (Told::Undecided, false),
+            (Told::Undecided, false),
+        ];
+        let expected = Verdicts {
+            right: 0.25,
+            changed: 0.0,
+            new: 0.25,
+            wrong: 0.125,
+            undecided: 0.375,
+        };
+        assert_eq!(Verdicts::of(told), expected);
+        assert_eq!(Verdicts::of([]), Verdicts::default());
+    }
+}
