@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::ensure;
+use anyhow::{Context as _, ensure};
 use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::MeasuredSlide;
 use tactus::eval::evaluate::Method;
@@ -63,7 +63,8 @@ pub(crate) struct ByHand {
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (set, measured) = measure_folder(&args.from.recordings)?;
     let features = args.features.map(Features::set);
-    let bytes = learn_first(&set, &measured, args.train_slides, args.method, features)?;
+    let bytes = learn_first(&set, &measured, args.train_slides, args.method, features)
+        .with_context(|| args.from.recordings.display().to_string())?;
     write_table(&args.out, &bytes)?;
     writeln!(
         out,

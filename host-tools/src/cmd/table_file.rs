@@ -1,9 +1,13 @@
 //! Table files: written whole, and checked when read.
 
+use std::io::Read as _;
 use std::path::Path;
 
 use anyhow::{Context as _, ensure};
 use tactus_core::table::Table;
+
+/// Most bytes of a table that are read: more textures and movements than a table can have.
+const MAX_BYTES: u64 = 64 << 20;
 
 /// An old table is replaced whole or not at all.
 pub(crate) fn write_table(file: &Path, bytes: &[u8]) -> anyhow::Result<()> {
@@ -16,13 +20,15 @@ pub(crate) fn write_table(file: &Path, bytes: &[u8]) -> anyhow::Result<()> {
 
 pub(crate) fn read_table<'b>(file: &Path, bytes: &'b mut Vec<u8>) -> anyhow::Result<Table<'b>> {
     let name = file.display();
-    *bytes = std::fs::read(file)
+    bytes.clear();
+    std::fs::File::open(file)
+        .and_then(|file| file.take(MAX_BYTES).read_to_end(bytes))
         .with_context(|| format!("{name}: no table here, `tactus learn --out FILE` writes one"))?;
     let table = Table::read(bytes).with_context(|| name.to_string())?;
     let behind = bytes.len() - table.as_bytes().len();
     ensure!(
         behind == 0,
-        "{name}: {behind} bytes follow the table; the file is not what `tactus learn` wrote"
+        "{name}: other bytes follow the table; the file is not what `tactus learn` wrote"
     );
     Ok(table)
 }

@@ -24,6 +24,7 @@ pub(crate) fn docs(options: &Options) -> Result<()> {
     if options.check || options.write {
         let mut test = cargo();
         test.args(["test", "--package", "tactus", "--test", "book"]);
+        test.args(["--test", "bad_input"]);
         if options.write {
             // one after the other: two of them may write one page
             test.env("TACTUS_BOOK", "write")

@@ -2,7 +2,7 @@
 //! its events, by the same core.
 
 use std::fs::File;
-use std::io::{self, BufRead as _, BufReader, Write};
+use std::io::{self, BufRead as _, BufReader, Read as _, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, ensure};
@@ -86,6 +86,9 @@ impl Logged {
 const NOT_READ: &str = "the log does not have the table that the probe used";
 const CHANGED: &str = "the probe's table was changed after the log read it";
 
+/// Most bytes of a line: the longest reports, many times over.
+const MAX_LINE: u64 = 1 << 20;
+
 /// The explorations of a log.
 fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
     let file = File::open(path)?;
@@ -93,8 +96,13 @@ fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
     let mut running = false;
     let mut parts = Vec::new();
     let mut table = Err(NOT_READ);
-    for (line, number) in BufReader::new(file).lines().zip(1..) {
-        let read = serde_json::from_str(&line?);
+    let (mut lines, mut line) = (BufReader::new(file), Vec::new());
+    for number in 1.. {
+        line.clear();
+        if lines.by_ref().take(MAX_LINE).read_until(b'\n', &mut line)? == 0 {
+            break;
+        }
+        let read = serde_json::from_slice(&line);
         match read.map_err(|why| ReplayError::Line { line: number, why })? {
             Line::Session { protocol, .. } if protocol != PROTOCOL => {
                 return Err(ReplayError::Protocol(protocol));
