@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use rayon::prelude::*;
-use tactus::data::recording::Slide;
+use tactus::data::recording::Recording;
 use tactus::data::recordings::RecordingSet;
 use tactus_tests::data;
 
@@ -28,7 +28,7 @@ fn public(folder: &Path) -> bool {
         .is_ok_and(|text| text.contains(PUBLIC_FEATURES))
 }
 
-fn session(folder: &Path, features: fn(&Slide) -> Vec<f64>) -> Session {
+fn session(folder: &Path, features: fn(&Recording) -> Vec<f64>) -> Session {
     let set = RecordingSet::open(folder).unwrap();
     (0..set.textures().len())
         .into_par_iter()
@@ -40,17 +40,17 @@ fn session(folder: &Path, features: fn(&Slide) -> Vec<f64>) -> Session {
         .collect()
 }
 
-fn with_traction(slide: &Slide) -> Vec<f64> {
-    let shear = slide.shear_mn.as_ref().unwrap();
+fn with_traction(slide: &Recording) -> Vec<f64> {
+    let shear = slide.shear_mn().unwrap();
     features::with_traction(
-        &slide.pac[slide.steady(2200)],
+        &slide.pac()[slide.steady(2200)],
         &shear[slide.steady(slide.shear_rate_hz)],
     )
 }
 
-fn with_pressure(slide: &Slide) -> Vec<f64> {
+fn with_pressure(slide: &Recording) -> Vec<f64> {
     features::with_pressure(
-        &slide.pac[slide.steady(2200)],
+        &slide.pac()[slide.steady(2200)],
         &slide.pdc[slide.steady(slide.pdc_rate_hz)],
     )
 }
@@ -304,7 +304,7 @@ fn leave_one_out(
 fn unknown_materials_are_flagged() {
     let Some(folder) = data("biotac") else { return };
     for (what, features) in [
-        ("traction", with_traction as fn(&Slide) -> Vec<f64>),
+        ("traction", with_traction as fn(&Recording) -> Vec<f64>),
         ("P_DC", with_pressure),
     ] {
         let session = session(&folder, features);
@@ -468,7 +468,7 @@ fn unknown_learned(session: &Session, textures: &[usize], learning: &Learning) -
 fn a_session_is_learned_on_the_go() {
     let Some(folder) = data("biotac") else { return };
     for (what, features) in [
-        ("traction", with_traction as fn(&Slide) -> Vec<f64>),
+        ("traction", with_traction as fn(&Recording) -> Vec<f64>),
         ("P_DC", with_pressure),
     ] {
         let session = session(&folder, features);

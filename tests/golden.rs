@@ -137,7 +137,7 @@ fn spectra_of_recorded_slides_are_those_of_f64() {
     for texture in 0..set.textures().len() {
         // every seventh: each material, early and late
         for slide in set.load_texture(texture).unwrap().iter().step_by(7) {
-            let steady = slide.pac[slide.steady(2200)].to_vec();
+            let steady = slide.pac()[slide.steady(2200)].to_vec();
             let what = format!("{}, slide {}", set.textures()[texture].name, slide.number);
             assert_near_oracle(&steady, &measure(&plan, slide).unwrap().spectrum, &what);
         }

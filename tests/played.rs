@@ -2,7 +2,7 @@
 //! method tells real materials by them.
 
 use rayon::prelude::*;
-use tactus::data::recording::Slide;
+use tactus::data::recording::Recording;
 use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::{MeasuredSlide, measure};
 use tactus::eval::evaluate::{Summary, evaluate};
@@ -43,17 +43,18 @@ fn every_sample_of_a_recording_is_played_once() {
     for _ in 0..3 {
         let observed = rig.record(movement()).unwrap();
         // the stage gets going within milliseconds; until then the finger is still
-        let start = observed.pac.iter().position(|&x| x > 20).unwrap();
+        let pac = observed.pac();
+        let start = pac.iter().position(|&x| x > 20).unwrap();
         assert!(start < 100, "{start}");
         let steady = observed.steady(2200);
-        let steps: Vec<i16> = observed.pac[steady.clone()]
+        let steps: Vec<i16> = pac[steady.clone()]
             .windows(2)
             .map(|w| w[1] - w[0])
             .collect();
         assert!(steps.iter().all(|&step| step == 1 || step == -499));
-        begun.push(observed.pac[steady.start] > 550);
+        begun.push(pac[steady.start] > 550);
         // 300 mN and 1 mN for every 10 ms since the movement began
-        let shear = observed.shear_mn.as_ref().unwrap();
+        let shear = observed.shear_mn().unwrap();
         let window = observed.steady(1000);
         let middle = (window.start + window.end) / 2;
         let mean = shear[window].iter().map(|&mn| f64::from(mn)).sum::<f64>()
@@ -89,6 +90,16 @@ fn what_is_cut_is_counted() {
 /// The stretch of a whole recording that the rig feels, s: its steady part begins so long after the recording's, and ends
 /// after 3 s of constant speed.
 const STRETCH_S: (f32, f32) = (0.5 + 0.225, 0.5 + 3.025);
+
+/// The same slide, of which this stretch counts.
+fn stretch(slide: &Recording, window: (f32, f32)) -> Recording {
+    let (pac, shear) = (slide.pac(), slide.shear_mn());
+    let slide = Recording {
+        window,
+        ..slide.clone()
+    };
+    slide.cut(&[], &pac, shear.as_deref()).unwrap()
+}
 
 /// What came of explorations.
 #[derive(Clone, Copy, Default, Debug)]
@@ -174,15 +185,12 @@ fn without_a_rig(set: &RecordingSet, method: Method, train: usize) -> f64 {
         .into_par_iter()
         .map(|texture| {
             let slides = set.load_texture(texture).unwrap();
-            let observed = |mut slide: Slide| {
-                slide.window = STRETCH_S;
-                MeasuredSlide {
-                    number: slide.number,
-                    movement: slide.movement,
-                    measurement: measure(&plan, &slide).unwrap(),
-                }
+            let observed = |slide: &Recording| MeasuredSlide {
+                number: slide.number,
+                movement: slide.movement,
+                measurement: measure(&plan, &stretch(slide, STRETCH_S)).unwrap(),
             };
-            slides.into_iter().map(observed).collect()
+            slides.iter().map(observed).collect()
         })
         .collect();
     let names: Vec<String> = set.textures().iter().map(|t| t.name.clone()).collect();
@@ -277,15 +285,14 @@ fn played_recordings_have_the_properties_of_the_recordings() {
             let whole = &recorded[7];
             rig.world().play(
                 vec![Played {
-                    pac: whole.pac[1100..].to_vec(),
-                    shear_mn: whole.shear_mn.as_ref().unwrap()[50..].to_vec(),
+                    pac: whole.pac()[1100..].to_vec(),
+                    shear_mn: whole.shear_mn().unwrap()[50..].to_vec(),
                 }],
                 1,
             );
             let observed = rig.record(movement()).unwrap();
-            let mut stretch = whole.clone();
-            let moved = observed.window.1 + 0.5;
-            stretch.window = (observed.window.0 + 0.5, moved);
+            let (start, end) = observed.window;
+            let stretch = stretch(whole, (start + 0.5, end + 0.5));
             let [here, there] =
                 [&observed, &stretch].map(|s| measure(&plan, s).unwrap().properties);
             Property::ALL.map(|p| f64::from(here.get(p).unwrap() - there.get(p).unwrap()))

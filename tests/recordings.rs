@@ -4,7 +4,7 @@ use std::path::Path;
 
 use tactus::data::import::import;
 use tactus::data::properties::PropertyTable;
-use tactus::data::recording::{Background, Slide};
+use tactus::data::recording::Recording;
 use tactus::data::recordings::RecordingSet;
 use tactus_tests::data;
 
@@ -24,12 +24,12 @@ fn all_slides_of_the_real_recordings_are_read() {
         assert_eq!(serde_json::json!(numbers), manifest["slides"]);
         for slide in &slides {
             assert_eq!(slide.texture, index);
-            assert_eq!((slide.pac.len(), slide.pdc.len()), (12_980, 590));
-            assert_eq!(slide.shear_mn.as_ref().map(Vec::len), Some(590));
+            assert_eq!((slide.pac().len(), slide.pdc.len()), (12_980, 590));
+            assert_eq!(slide.shear_mn().map(|s| s.len()), Some(590));
             assert_eq!((slide.pdc_rate_hz, slide.shear_rate_hz), (100, 100));
             assert_eq!(slide.steady(2200), 1100..12_100);
             assert_eq!(slide.steady(100), 50..550);
-            assert_eq!(slide.background, Background::Power(2.2));
+            assert_eq!(slide.background, Some(2.2));
             assert_eq!(slide.movement.speed_um_s(), 25_000);
             assert_eq!(slide.movement.force_mn(), 800);
         }
@@ -51,7 +51,7 @@ fn shear_force_gives_the_golden_traction() {
             let row = rows.next().unwrap();
             assert_eq!(row[0], f64::from(set.textures()[index].id));
             assert_eq!(row[1], f64::from(slide.number));
-            let shear = slide.shear_mn.as_ref().unwrap();
+            let shear = slide.shear_mn().unwrap();
             let window = &shear[slide.steady(slide.shear_rate_hz)];
             let sum: f64 = window.iter().map(|mn| f64::from(*mn)).sum();
             assert!((sum / window.len() as f64 / 1000.0 - row[2]).abs() < 1e-6);
@@ -106,13 +106,13 @@ fn import_of_rectified_recordings_rebuilds_their_signs() {
             (slide.number, slide.movement, slide.window)
         );
         assert_eq!(
-            (&rebuilt.pdc, &rebuilt.shear_mn),
-            (&slide.pdc, &slide.shear_mn)
+            (&rebuilt.pdc, rebuilt.shear_mn()),
+            (&slide.pdc, slide.shear_mn())
         );
         assert_eq!(rebuilt.background, slide.background);
         let magnitudes = |pac: &[i16]| pac.iter().map(|x| x.unsigned_abs()).collect::<Vec<_>>();
-        assert_eq!(magnitudes(&rebuilt.pac), magnitudes(&slide.pac));
-        let agreement = agreement(&rebuilt.pac, &slide.pac);
+        assert_eq!(magnitudes(&rebuilt.pac()), magnitudes(&slide.pac()));
+        let agreement = agreement(&rebuilt.pac(), &slide.pac());
         // one sign for all would give about 0.98
         assert!(agreement > 0.987, "slide over {texture}: {agreement}");
     }
@@ -131,14 +131,14 @@ fn agreement(a: &[i16], b: &[i16]) -> f64 {
 }
 
 /// Writes a slide as the publisher of the BioTac recordings did.
-fn publish(folder: &Path, material: u32, slide: &Slide) {
+fn publish(folder: &Path, material: u32, slide: &Recording) {
     let folder = folder.join(format!("raw_data/mat{material}"));
     std::fs::create_dir_all(&folder).unwrap();
     let pac: String = (1..=22).map(|n| format!(",pac{n}")).collect();
     let mut bio = format!("timestamp,pdc{pac}\n");
     let mut cw = String::from("timestamp,fx,fy,fz\n");
-    let shear = slide.shear_mn.as_ref().unwrap();
-    for (row, samples) in slide.pac.chunks(22).enumerate() {
+    let shear = slide.shear_mn().unwrap();
+    for (row, samples) in slide.pac().chunks(22).enumerate() {
         let time = 1_581_073_084.0 + row as f64 / 100.0;
         let samples: String = samples.iter().map(|x| format!(",{}", x.abs())).collect();
         writeln!(bio, "{time:.9},{}{samples},", slide.pdc[row]).unwrap();

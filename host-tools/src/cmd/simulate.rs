@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use tactus::data::recording::{Slide, Texture};
+use tactus::data::recording::{Recording, Texture};
 use tactus::data::recordings::RecordingWriter;
 use tactus::sim::collection::{Collection, calibrated, texture_name};
 
@@ -51,7 +51,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             };
             for (recorded, texture) in part.record(calibration, done)?.into_iter().zip(first..) {
                 for slide in recorded {
-                    writer.write(&Slide { texture, ..slide })?;
+                    writer.write(&Recording { texture, ..slide })?;
                     slides += 1;
                 }
             }

@@ -27,7 +27,7 @@ use rayon::prelude::*;
 use tactus_core::features::Movement;
 
 use crate::data::content::ContentError;
-use crate::data::recording::{Background, Slide, Texture};
+use crate::data::recording::{Recording, Texture};
 use crate::data::recordings::biotac::{BACKGROUND_POWER, NOMINAL_FORCE_MN};
 use crate::data::recordings::{RecordingError, RecordingSet, RecordingWriter, Result};
 use crate::data::rows::Rows;
@@ -166,7 +166,12 @@ fn names(folder: &Path) -> Result<Vec<String>> {
 }
 
 /// One slide, and how many rows it lacks.
-fn read_slide(folder: &Path, material: u32, texture: usize, number: u32) -> Result<(Slide, usize)> {
+fn read_slide(
+    folder: &Path,
+    material: u32,
+    texture: usize,
+    number: u32,
+) -> Result<(Recording, usize)> {
     let file = |kind| folder.join(format!("mat{material}_{number}_{kind}.csv"));
     let (bio_path, cw_path) = (file("bio"), file("cw"));
     let bio = read_bio(&bio_path)?;
@@ -178,21 +183,21 @@ fn read_slide(folder: &Path, material: u32, texture: usize, number: u32) -> Resu
     let shear = interpolate(&force, &bio.times).map_err(|cause| fault(&cw_path, cause))?;
     let movement =
         Movement::new(NOMINAL_FORCE_MN, SPEED_UM_S).map_err(|e| fault(&bio_path, e.into()))?;
-    let slide = Slide {
+    let slide = Recording {
         texture,
         number,
         movement,
-        pac: signs::rebuild(&bio.pac),
+        window: WINDOW,
+        blocks: Vec::new(),
+        background: Some(BACKGROUND_POWER),
         pdc: bio.pdc,
         pdc_rate_hz: ROW_RATE_HZ,
-        shear_mn: Some(shear),
+        outside_mn: None,
         shear_rate_hz: ROW_RATE_HZ,
-        window: WINDOW,
-        background: Background::Power(BACKGROUND_POWER),
     };
     let imported = |cause| fault(&bio_path, ContentError::Imported(Box::new(cause)));
-    slide.check().map_err(imported)?;
-    Ok((slide, bio.lost_rows))
+    let slide = slide.cut(&[], &signs::rebuild(&bio.pac), Some(&shear));
+    Ok((slide.map_err(imported)?, bio.lost_rows))
 }
 
 #[derive(Default)]

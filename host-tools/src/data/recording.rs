@@ -1,8 +1,9 @@
-//! One recorded slide: its samples, the movement that made it, and its steady part.
+//! One recorded slide: the movement that made it, its blocks of samples, and what no block has.
 
 use std::ops::Range;
 
-use tactus_core::features::Movement;
+use tactus_core::dsp::Kernels;
+use tactus_core::features::{Block, Movement, Slide};
 use tactus_core::sensor::pressure::RATE_HZ;
 
 use crate::data::content::ContentError;
@@ -10,39 +11,33 @@ use crate::data::recordings::npy::MAX_SAMPLES;
 
 /// Rate of P_AC in every recording: the BioTac's 2200 Hz.
 pub const PAC_RATE_HZ: u32 = RATE_HZ;
+/// Rate of the shear that the project's rig measures, Hz.
+const SHEAR_HZ: u32 = 1000;
 
 /// One slide over one texture.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Slide {
+pub struct Recording {
     /// Index of the texture in [`RecordingSet::textures`](crate::data::recordings::RecordingSet::textures).
     pub texture: usize,
     /// Number of the slide; slides of a texture were made in the order of their numbers.
     pub number: u32,
     /// The movement that made it.
     pub movement: Movement,
-    /// P_AC at [`PAC_RATE_HZ`] in counts about the still baseline, from the start of the record.
-    pub pac: Vec<i16>,
-    /// P_DC in counts about the still baseline.
+    /// Start and end of the part at constant speed, in seconds from the start of the record.
+    pub window: (f32, f32),
+    /// P_AC at [`PAC_RATE_HZ`] of the still finger and of the slide, and the tangential force at constant speed.
+    pub blocks: Vec<Block>,
+    /// Power of the still finger in counts^2 after the band-pass, where its samples are not recorded.
+    pub background: Option<f32>,
+    /// P_DC in counts about the still baseline, from the start of the record.
     pub pdc: Vec<i16>,
     /// Rate of [`pdc`](Self::pdc) in Hz.
     pub pdc_rate_hz: u32,
-    /// Tangential force in mN, positive against the motion; `None` if the rig could not measure it.
-    pub shear_mn: Option<Vec<i16>>,
-    /// Rate of [`shear_mn`](Self::shear_mn) in Hz, also where there is none.
+    /// Tangential force in mN before and after constant speed, positive against the motion; `None` if the rig could not
+    /// measure it.
+    pub outside_mn: Option<[Vec<i16>; 2]>,
+    /// Rate of the tangential force in Hz, also where there is none.
     pub shear_rate_hz: u32,
-    /// Start and end of the steady part, in seconds from the start of the record.
-    pub window: (f32, f32),
-    /// What P_AC shows without any texture.
-    pub background: Background,
-}
-
-/// P_AC of a still finger: what is subtracted from the power of a slide.
-#[derive(Clone, PartialEq, Debug)]
-pub enum Background {
-    /// Its power in counts^2 after the band-pass, measured elsewhere.
-    Power(f32),
-    /// P_AC of the finger at rest before this slide, like [`Slide::pac`].
-    Still(Vec<i16>),
 }
 
 /// One texture of a set.
@@ -57,21 +52,111 @@ pub struct Texture {
 /// What is known of a slide before its samples are read.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SlideKey {
-    /// As [`Slide::number`].
+    /// As [`Recording::number`].
     pub number: u32,
-    /// As [`Slide::movement`].
+    /// As [`Recording::movement`].
     pub movement: Movement,
 }
 
-impl Slide {
-    /// The steady window as sample numbers of a stream with `rate_hz`.
+impl Recording {
+    /// What came in blocks, with P_DC beside them, in a record of so many ms. Texture and number are left at 0. `None`: some
+    /// of the samples did not come.
+    pub fn from_blocks(
+        movement: Movement,
+        blocks: Vec<Block>,
+        pdc: Vec<i16>,
+        pdc_rate_hz: u32,
+        ms: usize,
+    ) -> Option<Self> {
+        let (from, to) = blocks.iter().find_map(|block| block.steady)?;
+        let seconds = |sample: u32| sample as f32 / PAC_RATE_HZ as f32;
+        let before = (seconds(from) * SHEAR_HZ as f32).round() as usize;
+        let inside: usize = blocks.iter().map(|block| block.shear_mn.len()).sum();
+        let after = ms.saturating_sub(before + inside);
+        let recording = Self {
+            texture: 0,
+            number: 0,
+            movement,
+            window: (seconds(from), seconds(to)),
+            blocks,
+            background: None,
+            pdc,
+            pdc_rate_hz,
+            // the rig says shear at constant speed only
+            outside_mn: Some([vec![0; before], vec![0; after]]),
+            shear_rate_hz: SHEAR_HZ,
+        };
+        recording.check().is_ok().then_some(recording)
+    }
+
+    /// Takes the samples of whole streams, from the start of the record, in place of those it has: `still` is P_AC of the
+    /// finger at rest, empty where its power is known.
+    ///
+    /// # Errors
+    /// What is wrong with the recording.
+    pub fn cut(
+        mut self,
+        still: &[i16],
+        pac: &[i16],
+        shear_mn: Option<&[i16]>,
+    ) -> Result<Self, ContentError> {
+        let steady = self.steady(self.shear_rate_hz);
+        let shear = shear_mn.map(|mn| {
+            let (rest, after) = mn.split_at(steady.end.min(mn.len()));
+            let (before, inside) = rest.split_at(steady.start.min(rest.len()));
+            (inside, [before.to_vec(), after.to_vec()])
+        });
+        let (inside, outside) = shear.unzip();
+        self.outside_mn = outside;
+        let steady = self.steady(PAC_RATE_HZ);
+        let steady = steady.start as u32..steady.end as u32;
+        self.blocks = Block::cut(still, steady, pac, inside.unwrap_or_default()).collect();
+        self.check()?;
+        Ok(self)
+    }
+
+    /// Gives all samples to the core, as a rig would.
+    pub fn play<K: Kernels>(&self, slide: &mut Slide<'_, K>) {
+        if let Some(power) = self.background {
+            slide.set_background(power);
+        }
+        for block in &self.blocks {
+            slide.take(block);
+        }
+        let steady = self.pdc.get(self.steady(self.pdc_rate_hz));
+        slide.push_pdc(steady.unwrap_or_default());
+    }
+
+    /// P_AC of the finger at rest before this slide, in counts about its baseline.
+    pub fn still(&self) -> Vec<i16> {
+        self.samples(true, |block| &block.pac)
+    }
+
+    /// P_AC of the slide in counts about the still baseline, from the start of the record.
+    pub fn pac(&self) -> Vec<i16> {
+        self.samples(false, |block| &block.pac)
+    }
+
+    /// Tangential force in mN from the start of the record, if the rig could measure it.
+    pub fn shear_mn(&self) -> Option<Vec<i16>> {
+        let [before, after] = self.outside_mn.as_ref()?;
+        let inside = self.samples(false, |block| &block.shear_mn);
+        Some([before, &inside, after].map(Vec::as_slice).concat())
+    }
+
+    fn samples(&self, still: bool, stream: fn(&Block) -> &[i16]) -> Vec<i16> {
+        let blocks = self.blocks.iter().filter(|block| block.still == still);
+        blocks.flat_map(stream).copied().collect()
+    }
+
+    /// The part at constant speed as sample numbers of a stream with `rate_hz`.
     pub fn steady(&self, rate_hz: u32) -> Range<usize> {
         // `as` saturates and turns not-a-number into 0
         let sample = |s: f32| (f64::from(s) * f64::from(rate_hz)).round() as usize;
         sample(self.window.0)..sample(self.window.1)
     }
 
-    /// Refuses a slide that cannot be used: every reader and writer asks.
+    /// Refuses a recording that cannot be used: every reader and writer asks.
     ///
     /// # Errors
     /// What is wrong with it.
@@ -81,12 +166,16 @@ impl Slide {
             return Err(ContentError::Window(start, end));
         }
         let streams = [
-            ("P_AC", PAC_RATE_HZ, Some(&self.pac)),
-            ("P_DC", self.pdc_rate_hz, Some(&self.pdc)),
-            ("shear", self.shear_rate_hz, self.shear_mn.as_ref()),
+            ("P_AC", PAC_RATE_HZ, Some(self.pac().len())),
+            ("P_DC", self.pdc_rate_hz, Some(self.pdc.len())),
+            (
+                "shear",
+                self.shear_rate_hz,
+                self.shear_mn().map(|s| s.len()),
+            ),
         ];
         for (stream, rate_hz, samples) in streams {
-            let Some(samples) = samples.map(Vec::len) else {
+            let Some(samples) = samples else {
                 continue;
             };
             if rate_hz == 0 || rate_hz > 100_000 {
@@ -104,11 +193,11 @@ impl Slide {
                 });
             }
         }
-        match &self.background {
-            Background::Power(power) if !power.is_finite() || *power < 0.0 => {
-                Err(ContentError::BackgroundPower(*power))
+        match self.background {
+            Some(power) if !power.is_finite() || power < 0.0 => {
+                Err(ContentError::BackgroundPower(power))
             }
-            Background::Still(still) if still.is_empty() => Err(ContentError::NoStill),
+            None if self.still().is_empty() => Err(ContentError::NoStill),
             _ => Ok(()),
         }
     }

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use tactus_core::features::Movement;
 
-use crate::data::recording::{Slide, SlideKey, Texture};
+use crate::data::recording::{Recording, SlideKey, Texture};
 pub use files::{RecordingError, Result};
 pub use own::RecordingWriter;
 
@@ -99,7 +99,7 @@ impl RecordingSet {
     ///
     /// # Errors
     /// If a file cannot be read, or its hash, size or format is wrong.
-    pub fn load_texture(&self, index: usize) -> Result<Vec<Slide>> {
+    pub fn load_texture(&self, index: usize) -> Result<Vec<Recording>> {
         if index >= self.textures.len() {
             return Err(RecordingError::NoTexture {
                 folder: self.folder.clone(),

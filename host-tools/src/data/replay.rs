@@ -4,47 +4,19 @@ use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tactus_core::dsp::{Kernels, Plain, Plan};
-use tactus_core::features::{
-    self, Block, Measurement, Movement, Property, PropertySet, SlideError,
-};
+use tactus_core::features::{Measurement, Movement, Property, PropertySet, Slide, SlideError};
 use tactus_core::rig::Rig;
 
-use crate::data::recording::{Background, PAC_RATE_HZ, Slide, Texture};
+use crate::data::recording::{Recording, Texture};
 use crate::data::recordings::{RecordingError, RecordingSet};
-
-/// Gives all samples of a recorded slide to the core, as a rig would.
-pub fn play<K: Kernels>(recorded: &Slide, slide: &mut features::Slide<'_, K>) {
-    let still: &[i16] = match &recorded.background {
-        Background::Power(power) => {
-            slide.set_background(*power);
-            &[]
-        }
-        Background::Still(samples) => samples,
-    };
-    let shear = recorded
-        .shear_mn
-        .as_ref()
-        .and_then(|s| s.get(recorded.steady(recorded.shear_rate_hz)));
-    let steady = recorded.steady(PAC_RATE_HZ);
-    let steady = steady.start as u32..steady.end as u32;
-    for block in Block::cut(still, steady, &recorded.pac, shear.unwrap_or_default()) {
-        slide.take(&block);
-    }
-    slide.push_pdc(
-        recorded
-            .pdc
-            .get(recorded.steady(recorded.pdc_rate_hz))
-            .unwrap_or_default(),
-    );
-}
 
 /// The properties of one recorded slide.
 ///
 /// # Errors
 /// The slide has none: it is too short or silent.
-pub fn measure(plan: &Plan, recorded: &Slide) -> Result<Measurement, SlideError> {
-    let mut slide = features::Slide::<Plain>::new(plan, recorded.movement);
-    play(recorded, &mut slide);
+pub fn measure(plan: &Plan, recorded: &Recording) -> Result<Measurement, SlideError> {
+    let mut slide = Slide::<Plain>::new(plan, recorded.movement);
+    recorded.play(&mut slide);
     slide.finish()
 }
 
@@ -118,7 +90,7 @@ pub fn measure_all(
 #[derive(Debug)]
 pub struct Replay {
     /// Those that were not replayed yet.
-    slides: Vec<Slide>,
+    slides: Vec<Recording>,
     /// The movements that were recorded.
     movements: Vec<Movement>,
     measures: PropertySet,
@@ -138,8 +110,8 @@ pub enum ReplayError {
 
 impl Replay {
     /// A rig that replays `slides`.
-    pub fn new(slides: Vec<Slide>, random: ChaCha8Rng) -> Self {
-        let traction = slides.iter().all(|s| s.shear_mn.is_some());
+    pub fn new(slides: Vec<Recording>, random: ChaCha8Rng) -> Self {
+        let traction = slides.iter().all(|s| s.outside_mn.is_some());
         let mut movements = Vec::new();
         for slide in &slides {
             if !movements.contains(&slide.movement) {
@@ -165,10 +137,7 @@ impl Rig for Replay {
         self.measures
     }
 
-    async fn perform<K: Kernels>(
-        &mut self,
-        slide: &mut features::Slide<'_, K>,
-    ) -> Result<(), ReplayError> {
+    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), ReplayError> {
         let movement = slide.movement();
         let recorded = (0..).zip(&self.slides);
         let recorded: Vec<usize> = recorded
@@ -183,7 +152,7 @@ impl Rig for Replay {
             });
         }
         let drawn = recorded[self.random.random_range(0..recorded.len())];
-        play(&self.slides.remove(drawn), slide);
+        self.slides.remove(drawn).play(slide);
         Ok(())
     }
 
@@ -212,7 +181,7 @@ mod tests {
         let mut rig = Replay::new(slides, ChaCha8Rng::seed_from_u64(1));
         let mut seen = Vec::new();
         let mut slide = |movement| {
-            let mut slide = features::Slide::<Plain>::new(&plan, movement);
+            let mut slide = Slide::<Plain>::new(&plan, movement);
             block_on(rig.perform(&mut slide))?;
             Ok(slide.finish().unwrap().properties)
         };

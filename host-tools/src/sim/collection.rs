@@ -8,7 +8,7 @@ use tactus_core::explorer::Method;
 use tactus_core::features::{Movement, Observation, SlideError};
 use tactus_core::rig::calibration::RigCalibration;
 
-use crate::data::recording;
+use crate::data::recording::Recording;
 use crate::data::replay::measure;
 use crate::eval::learn::{self, TableError};
 use crate::sim::rig::{SimError, SimRig};
@@ -79,7 +79,7 @@ impl Collection {
         &self,
         calibration: RigCalibration,
         done: impl Fn() + Sync,
-    ) -> Result<Vec<Vec<recording::Slide>>, TrialError> {
+    ) -> Result<Vec<Vec<Recording>>, TrialError> {
         self.textures
             .par_iter()
             .enumerate()
@@ -158,7 +158,7 @@ impl Trial {
     ///
     /// # Errors
     /// [`TrialError::Slide`].
-    pub fn measure(self, plan: &Plan, slide: &recording::Slide) -> Result<Observation, TrialError> {
+    pub fn measure(self, plan: &Plan, slide: &Recording) -> Result<Observation, TrialError> {
         let measured =
             measure(plan, slide).map_err(|source| TrialError::Slide { at: self, source })?;
         Ok(Observation::from(&measured))
@@ -259,7 +259,7 @@ pub fn record_texture(
     calibration: RigCalibration,
     movements: &[Movement],
     trials: u32,
-) -> Result<Vec<recording::Slide>, TrialError> {
+) -> Result<Vec<Recording>, TrialError> {
     let mut slides = Vec::new();
     let mut rig = SimRig::new(setup);
     let at = Trial {
@@ -274,7 +274,7 @@ pub fn record_texture(
         movements,
         trials,
         |_, _, slide| {
-            slides.push(recording::Slide {
+            slides.push(Recording {
                 number: slides.len() as u32 + 1,
                 ..slide
             });
@@ -294,7 +294,7 @@ pub fn record_trials(
     calibration: RigCalibration,
     movements: &[Movement],
     trials: u32,
-    mut each: impl FnMut(&mut SimRig, Trial, recording::Slide) -> Result<(), TrialError>,
+    mut each: impl FnMut(&mut SimRig, Trial, Recording) -> Result<(), TrialError>,
 ) -> Result<(), TrialError> {
     let calibrated = rig.control().calibrate(calibration).map_err(SimError::from);
     calibrated

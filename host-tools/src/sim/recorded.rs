@@ -9,7 +9,7 @@ use tactus_core::explorer::Method;
 use tactus_core::features::{Movement, Observation};
 use tactus_core::rig::calibration::RigCalibration;
 
-use crate::data::recording::{PAC_RATE_HZ, Slide};
+use crate::data::recording::{PAC_RATE_HZ, Recording};
 use crate::data::recordings::{RecordingError, RecordingSet};
 use crate::data::replay::measure;
 use crate::eval::learn;
@@ -174,13 +174,12 @@ impl RecordedTexture {
 }
 
 /// A recorded slide from where its steady part begins, so that the rig's ramp already has the texture's vibration.
-fn played(slide: &Slide) -> Option<Played> {
+fn played(slide: &Recording) -> Option<Played> {
     let shear_mn = slide
-        .shear_mn
-        .as_ref()
+        .shear_mn()
         .filter(|_| slide.shear_rate_hz == SHEAR_HZ)?;
     Some(Played {
-        pac: slide.pac.get(slide.steady(PAC_RATE_HZ))?.to_vec(),
+        pac: slide.pac().get(slide.steady(PAC_RATE_HZ))?.to_vec(),
         shear_mn: shear_mn.get(slide.steady(SHEAR_HZ))?.to_vec(),
     })
 }

@@ -19,7 +19,7 @@ use tactus_core::rig::{Ended, Fault, MAX_REJECTED, Phase, Refused, Rig, RigError
 use tactus_core::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ, SLOTS_HZ};
 use tactus_core::sensor::{PressureSensor as _, biotac};
 
-use crate::data::recording::{self, Background};
+use crate::data::recording::Recording;
 use crate::sim::conditions::Conditions;
 use crate::sim::world::{Setup, World};
 
@@ -487,48 +487,27 @@ impl SimRig {
     ///
     /// # Errors
     /// See [`SimError`].
-    pub fn record(&mut self, movement: Movement) -> Result<recording::Slide, SimError> {
+    pub fn record(&mut self, movement: Movement) -> Result<Recording, SimError> {
         let mut failed = SimError::from(Fault::Rejected);
         for _ in 0..MAX_REJECTED {
-            let mut slide = recording::Slide {
-                texture: 0,
-                number: 0,
-                movement,
-                pac: Vec::new(),
-                pdc: Vec::new(),
-                pdc_rate_hz: RATE_HZ,
-                // the first tick of a slide is its first millisecond
-                shear_mn: Some(vec![0]),
-                shear_rate_hz: 1000,
-                window: (0.0, 0.0),
-                background: Background::Power(0.0),
-            };
-            let mut still = Vec::new();
+            let (mut blocks, mut taken, mut pdc) = (Blocks::default(), Vec::new(), Vec::new());
+            // the first tick of a slide is its first millisecond
+            let mut ms = 1;
             let start = self.random.random();
             let no_contact = self.control.calibration().pressure.pdc_no_contact as i16;
-            let ended = self.slide(movement, start, |outputs, pdc| {
-                match &outputs.sample_phase {
-                    SamplePhase::Nothing => return,
-                    SamplePhase::Still => return still.extend_from_slice(&outputs.pac),
-                    SamplePhase::Begin(steady) => {
-                        let seconds = |sample: u32| sample as f32 / RATE_HZ as f32;
-                        slide.window = (seconds(steady.start), seconds(steady.end));
-                    }
-                    SamplePhase::Slide => {}
+            let ended = self.slide(movement, start, |outputs, words| {
+                let (phase, pac) = (&outputs.sample_phase, &outputs.pac);
+                taken.extend(blocks.put(phase, pac, outputs.shear_mn));
+                if let SamplePhase::Begin(_) | SamplePhase::Slide = phase {
+                    pdc.extend(words.iter().map(|&counts| counts as i16 - no_contact));
+                    ms += 1;
                 }
-                slide.pac.extend_from_slice(&outputs.pac);
-                slide
-                    .pdc
-                    .extend(pdc.iter().map(|&counts| counts as i16 - no_contact));
-                slide
-                    .shear_mn
-                    .get_or_insert_default()
-                    .push(outputs.shear_mn.unwrap_or(0));
             });
+            taken.push(blocks.end(0));
             match ended {
                 Ok(Ended::Whole) => {
-                    slide.background = Background::Still(still);
-                    return Ok(slide);
+                    let slide = Recording::from_blocks(movement, taken, pdc, RATE_HZ, ms);
+                    return slide.ok_or(failed);
                 }
                 Ok(_) => {}
                 Err(why) if self.go_on(&why) => failed = why,
@@ -537,9 +516,7 @@ impl SimRig {
         }
         Err(failed)
     }
-}
 
-impl SimRig {
     /// Whether the rig can go on after this failure; it has homed then, if it had to.
     fn go_on(&mut self, failed: &SimError) -> bool {
         match *failed {

@@ -203,18 +203,19 @@ fn example(
     let slide = slide.map_err(|source| TrialError::Rig { at, source })?;
     let measured =
         measure(&Plan::new(), &slide).map_err(|source| TrialError::Slide { at, source })?;
-    let steady = slide.steady(RATE_HZ);
+    let (steady, pac) = (slide.steady(RATE_HZ), slide.pac());
     let length = (SHOWN_S * RATE_HZ as f32) as usize;
     let shown = steady.start..(steady.start + length).min(steady.end);
     let taps = Taps::band_pass();
     let filtered = |at: usize| -> f64 {
-        let newest_first = slide.pac[at + 1 - TAPS..=at].iter().rev();
+        let newest_first = pac[at + 1 - TAPS..=at].iter().rev();
         let products = newest_first.zip(taps.as_slice());
         let sum: f64 = products.map(|(x, h)| f64::from(*x) * f64::from(*h)).sum();
         sum / 32768.0
     };
     let of_ms = slide.steady(slide.shear_rate_hz);
-    let shear = slide.shear_mn.as_ref().and_then(|s| s.get(of_ms.clone()));
+    let shear = slide.shear_mn();
+    let shear = shear.as_ref().and_then(|s| s.get(of_ms.clone()));
     let mean =
         |mn: &[i16]| mn.iter().map(|&mn| f64::from(mn)).sum::<f64>() / (1e3 * mn.len() as f64);
     Ok(Example {
@@ -223,7 +224,7 @@ fn example(
         from_s: shown.start as f64 / f64::from(RATE_HZ),
         pac_pa: shown
             .clone()
-            .map(|at| f64::from(slide.pac[at]) * PAC_PA_PER_COUNT)
+            .map(|at| f64::from(pac[at]) * PAC_PA_PER_COUNT)
             .collect(),
         filtered_pa: shown.map(|at| filtered(at) * PAC_PA_PER_COUNT).collect(),
         shear_n: shear

@@ -90,11 +90,11 @@ fn opened(folder: &Path) -> Result<(), RecordingError> {
     let set = RecordingSet::open(folder)?;
     for texture in 0..set.textures().len().min(4) {
         for slide in set.load_texture(texture)? {
-            let steady = slide.steady(2200);
-            assert!(steady.end <= slide.pac.len(), "the steady part lies in it");
+            let (steady, pac) = (slide.steady(2200), slide.pac());
+            assert!(steady.end <= pac.len(), "the steady part lies in it");
             // samples of more than the sensor's 12 bits
             #[cfg(feature = "planted")]
-            assert!(slide.pac.iter().all(|s| s.abs_diff(0) < 2048), "planted");
+            assert!(pac.iter().all(|s| s.abs_diff(0) < 2048), "planted");
             let plan = tactus_core::dsp::Plan::new();
             drop(tactus::data::replay::measure(&plan, &slide));
         }

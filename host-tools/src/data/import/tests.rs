@@ -109,7 +109,7 @@ fn the_publishers_files_are_read() {
         let slides = set.load_texture(texture).unwrap();
         for (slide, &number) in slides.iter().zip(numbers) {
             assert_eq!(slide.number, number);
-            assert_eq!(slide.pac, pac(number));
+            assert_eq!(slide.pac(), pac(number));
             assert_eq!(slide.pdc, (0..600).collect::<Vec<i16>>());
             assert_eq!(slide.movement.to_string(), "0.80 N, 25.0 mm/s");
             assert_eq!(
@@ -117,7 +117,7 @@ fn the_publishers_files_are_read() {
                 (100, 100, (0.5, 5.5))
             );
             // held at the first force before it was measured, else on the line
-            let shear = slide.shear_mn.as_ref().unwrap();
+            let shear = slide.shear_mn().unwrap();
             assert_eq!(shear[..2], [1030, 1030]);
             for (row, mn) in shear.iter().enumerate().skip(2) {
                 assert_eq!(*mn, 1000 + 20 * row as i16, "row {row}");

@@ -16,7 +16,7 @@ use super::files::{
 };
 use super::npy::{self, MAX_SAMPLES};
 use crate::data::content::ContentError;
-use crate::data::recording::{Background, PAC_RATE_HZ, Slide, SlideKey, Texture};
+use crate::data::recording::{PAC_RATE_HZ, Recording, SlideKey, Texture};
 
 /// The pressing force is not in the manifest: the arm pressed with about 0.8 N, which fell to 0.3 N over the slide.
 pub const NOMINAL_FORCE_MN: u16 = 800;
@@ -176,7 +176,7 @@ impl Manifest {
     }
 
     /// Reads all slides of one texture.
-    pub(super) fn load(&self, folder: &Path, texture: usize) -> Result<Vec<Slide>> {
+    pub(super) fn load(&self, folder: &Path, texture: usize) -> Result<Vec<Recording>> {
         let entry = &self.files[texture];
         let path = inside(folder, MANIFEST, &entry.file)?;
         let values = entry.values(&path)?;
@@ -185,26 +185,28 @@ impl Manifest {
             .iter()
             .map(|&(number, place)| {
                 let record = records[place];
-                let field = |span: Span| record[span.start..][..span.count].to_vec();
-                let shear = self.record.shear;
-                let slide = Slide {
+                let field = |span: Span| &record[span.start..][..span.count];
+                let Record {
+                    pac, pdc, shear, ..
+                } = self.record;
+                let slide = Recording {
                     texture,
                     number,
                     movement: self.movement,
-                    pac: field(self.record.pac),
-                    pdc: field(self.record.pdc),
-                    pdc_rate_hz: self.record.pdc.rate_hz,
-                    shear_mn: shear.map(field),
-                    shear_rate_hz: shear.map_or(self.record.pdc.rate_hz, |s| s.rate_hz),
                     window: self.window,
-                    background: Background::Power(BACKGROUND_POWER),
+                    blocks: Vec::new(),
+                    background: Some(BACKGROUND_POWER),
+                    pdc: field(pdc).to_vec(),
+                    pdc_rate_hz: pdc.rate_hz,
+                    outside_mn: None,
+                    shear_rate_hz: shear.unwrap_or(pdc).rate_hz,
                 };
-                slide.check().map_err(|cause| RecordingError::Entry {
+                let slide = slide.cut(&[], field(pac), shear.map(field));
+                slide.map_err(|cause| RecordingError::Entry {
                     path: self.path.clone(),
                     place: format!("slide {number} of {}", entry.file),
                     cause,
-                })?;
-                Ok(slide)
+                })
             })
             .collect()
     }

@@ -30,7 +30,7 @@ use super::files::{
 };
 use super::npy;
 use crate::data::content::ContentError;
-use crate::data::recording::{Background, PAC_RATE_HZ, Slide, SlideKey, Texture};
+use crate::data::recording::{PAC_RATE_HZ, Recording, SlideKey, Texture};
 use crate::data::rows::{Row, RowError, Rows};
 
 /// Its columns, in the order in which they are written.
@@ -69,7 +69,7 @@ struct Entry {
     number: u32,
     movement: Movement,
     window: (f32, f32),
-    background: BackgroundEntry,
+    background: Background,
     pac: Stream,
     pdc: Stream,
     pdc_rate_hz: u32,
@@ -78,7 +78,7 @@ struct Entry {
 }
 
 #[derive(Debug)]
-enum BackgroundEntry {
+enum Background {
     Power(f32),
     Still(Stream),
 }
@@ -143,7 +143,7 @@ impl Manifest {
     }
 
     /// Reads all slides of one texture.
-    pub(super) fn load(&self, folder: &Path, texture: usize) -> Result<Vec<Slide>> {
+    pub(super) fn load(&self, folder: &Path, texture: usize) -> Result<Vec<Recording>> {
         let (_, entries) = &self.textures[texture];
         entries
             .iter()
@@ -164,8 +164,8 @@ impl Entry {
         }
         let still = Stream::of(row, "background_file", "background_sha256")?;
         let background = match (row.text("background_power"), still) {
-            ("", Some(still)) => BackgroundEntry::Still(still),
-            (_, None) => BackgroundEntry::Power(row.number("background_power")?),
+            ("", Some(still)) => Background::Still(still),
+            (_, None) => Background::Power(row.number("background_power")?),
             (_, Some(_)) => {
                 return Err(row.error(Some("background_power"), ContentError::TwoBackgrounds));
             }
@@ -188,28 +188,32 @@ impl Entry {
         })
     }
 
-    fn load(&self, folder: &Path, texture: usize) -> Result<Slide> {
-        let slide = Slide {
+    fn load(&self, folder: &Path, texture: usize) -> Result<Recording> {
+        let pac = self.pac.load(folder)?;
+        let pdc = self.pdc.load(folder)?;
+        let shear = self.shear.as_ref().map(|s| s.load(folder)).transpose()?;
+        let (background, still) = match &self.background {
+            Background::Power(power) => (Some(*power), Vec::new()),
+            Background::Still(still) => (None, still.load(folder)?),
+        };
+        let slide = Recording {
             texture,
             number: self.number,
             movement: self.movement,
-            pac: self.pac.load(folder)?,
-            pdc: self.pdc.load(folder)?,
-            pdc_rate_hz: self.pdc_rate_hz,
-            shear_mn: self.shear.as_ref().map(|s| s.load(folder)).transpose()?,
-            shear_rate_hz: self.shear_rate_hz,
             window: self.window,
-            background: match &self.background {
-                BackgroundEntry::Power(power) => Background::Power(*power),
-                BackgroundEntry::Still(still) => Background::Still(still.load(folder)?),
-            },
+            blocks: Vec::new(),
+            background,
+            pdc,
+            pdc_rate_hz: self.pdc_rate_hz,
+            outside_mn: None,
+            shear_rate_hz: self.shear_rate_hz,
         };
-        slide.check().map_err(|cause| RecordingError::Entry {
+        let slide = slide.cut(&still, &pac, shear.as_deref());
+        slide.map_err(|cause| RecordingError::Entry {
             path: folder.join(MANIFEST),
             place: format!("line {}, {}", self.line, self.pac.file),
             cause,
-        })?;
-        Ok(slide)
+        })
     }
 }
 
@@ -284,7 +288,7 @@ impl RecordingWriter {
     ///
     /// # Errors
     /// If the slide makes no sense, was written before, or a file cannot be written.
-    pub fn write(&mut self, slide: &Slide) -> Result<()> {
+    pub fn write(&mut self, slide: &Recording) -> Result<()> {
         let manifest = self.folder.join(MANIFEST);
         let place = format!("slide {}", slide.number);
         let texture = self.textures.get(slide.texture);
@@ -315,14 +319,14 @@ impl RecordingWriter {
             Ok([file, sha256(&bytes)])
         };
         let none = || [String::new(), String::new()];
-        let (power, background) = match &slide.background {
-            Background::Power(power) => (power.to_string(), none()),
-            Background::Still(still) => (String::new(), stream("still", still)?),
+        let (power, background) = match slide.background {
+            Some(power) => (power.to_string(), none()),
+            None => (String::new(), stream("still", &slide.still())?),
         };
-        let pac = stream("pac", &slide.pac)?;
+        let pac = stream("pac", &slide.pac())?;
         let pdc = stream("pdc", &slide.pdc)?;
-        let shear = match &slide.shear_mn {
-            Some(shear) => stream("shear", shear)?,
+        let shear = match slide.shear_mn() {
+            Some(shear) => stream("shear", &shear)?,
             None => none(),
         };
         let mut row = vec![

@@ -7,26 +7,27 @@ use tempfile::TempDir;
 
 use super::files::*;
 use super::*;
-use crate::data::recording::Background;
 
 mod biotac_layout;
 mod random;
 
 /// A short slide; its samples tell texture and number.
-fn slide(texture: usize, number: u32) -> Slide {
+fn slide(texture: usize, number: u32) -> Recording {
     let base = texture as i16 * 1000 + number as i16 * 10;
-    Slide {
+    let pac: Vec<i16> = (0..220).map(|i| base - i).collect();
+    let slide = Recording {
         texture,
         number,
         movement: Movement::FOR_FINENESS,
-        pac: (0..220).map(|i| base - i).collect(),
+        window: (0.02, 0.1),
+        blocks: Vec::new(),
+        background: Some(2.2),
         pdc: vec![base; 10],
         pdc_rate_hz: 100,
-        shear_mn: Some(vec![-base; 11]),
+        outside_mn: None,
         shear_rate_hz: 110,
-        window: (0.02, 0.1),
-        background: Background::Power(2.2),
-    }
+    };
+    slide.cut(&[], &pac, Some(&[-base; 11])).unwrap()
 }
 
 fn texture(id: u32, name: &str) -> Texture {
@@ -36,7 +37,7 @@ fn texture(id: u32, name: &str) -> Texture {
     }
 }
 
-fn write_own(folder: &Path, slides: &[Slide]) {
+fn write_own(folder: &Path, slides: &[Recording]) {
     let textures = vec![texture(7, "cotton, washed"), texture(3, "felt")];
     let mut writer = RecordingWriter::create(folder, textures).unwrap();
     for slide in slides {
@@ -46,12 +47,16 @@ fn write_own(folder: &Path, slides: &[Slide]) {
 }
 
 /// Two textures with the slides 1 and 4, the first one without shear and with a still record.
-fn own() -> (TempDir, Vec<Slide>) {
+fn own() -> (TempDir, Vec<Recording>) {
     let folder = TempDir::new().unwrap();
     let mut slides = vec![slide(0, 1), slide(0, 4), slide(1, 1), slide(1, 4)];
-    slides[0].shear_mn = None;
-    slides[0].background = Background::Still(vec![1, -1, i16::MAX, i16::MIN]);
-    slides[0].movement = Movement::FOR_ROUGHNESS;
+    let first = Recording {
+        background: None,
+        movement: Movement::FOR_ROUGHNESS,
+        ..slide(0, 1)
+    };
+    let pac = first.pac();
+    slides[0] = first.cut(&[1, -1, i16::MAX, i16::MIN], &pac, None).unwrap();
     write_own(folder.path(), &slides);
     (folder, slides)
 }
@@ -62,7 +67,7 @@ fn edit(path: &Path, from: &str, to: &str) {
     fs::write(path, text.replacen(from, to, 1)).unwrap();
 }
 
-fn load(folder: &Path) -> Result<Vec<Slide>> {
+fn load(folder: &Path) -> Result<Vec<Recording>> {
     let set = RecordingSet::open(folder)?;
     let mut slides = Vec::new();
     for index in 0..set.textures().len() {
@@ -107,7 +112,7 @@ fn slides_come_in_the_order_of_numbers_whatever_the_order_of_rows() {
     // the texture of the first row is the first one
     slides.sort_by_key(|s| (1 - s.texture, s.number));
     let loaded = load(folder.path()).unwrap();
-    let pac = |slides: &[Slide]| slides.iter().map(|s| s.pac.clone()).collect::<Vec<_>>();
+    let pac = |slides: &[Recording]| slides.iter().map(Recording::pac).collect::<Vec<_>>();
     assert_eq!(pac(&loaded), pac(&slides));
 }
 
@@ -346,12 +351,10 @@ fn the_writer_refuses_what_the_reader_would() {
         third.contains("has 2 textures, there is none with index 2"),
         "{third}"
     );
-    let short = Slide {
-        pac: vec![0; 9],
-        ..slide(0, 2)
-    };
+    let mut short = slide(0, 2);
+    short.blocks.truncate(1);
     let short = message(writer.write(&short).unwrap_err());
-    assert!(short.contains("P_AC has 9 samples"), "{short}");
+    assert!(short.contains("P_AC has 64 samples"), "{short}");
     // a writer that ends here leaves no recordings
     let empty = message(writer.finish().unwrap_err());
     assert!(empty.contains("texture 2 (silk) has no slide"), "{empty}");

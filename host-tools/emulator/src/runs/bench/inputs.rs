@@ -36,12 +36,12 @@ pub(super) fn slide() -> Result<(Vec<i16>, &'static str), BenchError> {
     let folder = root.join("biotac");
     if folder.is_dir() {
         let slides = RecordingSet::open(&folder)?.load_texture(0)?;
-        let steady = slides
-            .first()
-            .and_then(|slide| slide.pac.get(slide.steady(PAC_RATE_HZ)));
-        let samples = steady.and_then(|steady| steady.get(..SLIDE));
+        let samples = slides.first().and_then(|slide| {
+            let steady = slide.steady(PAC_RATE_HZ).start;
+            Some(slide.pac().get(steady..steady + SLIDE)?.to_vec())
+        });
         let too_short = || unsuitable("a slide", "the first recorded material has none of 3 s");
-        return Ok((samples.ok_or_else(too_short)?.to_vec(), "a real finger's"));
+        return Ok((samples.ok_or_else(too_short)?, "a real finger's"));
     }
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let samples = (0..SLIDE).map(|n| {

@@ -68,21 +68,22 @@ fn biotac_layout_is_taken_from_the_manifest() {
         [3, 6, 30]
     );
     // number 6 is the third record of the file: values 30..45
-    assert_eq!(
-        slides[1],
-        Slide {
-            texture: 1,
-            number: 6,
-            movement,
-            pac: (930..938).collect(),
-            pdc: (940..943).collect(),
-            pdc_rate_hz: 500,
-            shear_mn: Some(vec![943, 944]),
-            shear_rate_hz: 400,
-            window: (0.001, 0.003),
-            background: Background::Power(2.2),
-        }
-    );
+    let pac: Vec<i16> = (930..938).collect();
+    let expected = Recording {
+        texture: 1,
+        number: 6,
+        movement,
+        window: (0.001, 0.003),
+        blocks: Vec::new(),
+        background: Some(2.2),
+        pdc: (940..943).collect(),
+        pdc_rate_hz: 500,
+        outside_mn: None,
+        shear_rate_hz: 400,
+    };
+    let expected = expected.cut(&[], &pac, Some(&[943, 944])).unwrap();
+    assert_eq!(slides[1], expected);
+    assert_eq!(slides[1].pac(), pac);
 }
 
 #[test]

@@ -49,20 +49,24 @@ proptest! {
         pac in proptest::collection::vec(any::<i16>(), 220..300),
         pdc_rate_hz in 1_u32..100, start in 0.0_f32..0.05, length in 0.01_f32..0.05,
         power in proptest::option::of(0.0_f32..1e9),
+        shear in proptest::option::of(proptest::collection::vec(any::<i16>(), 10..20)),
     ) {
         let folder = TempDir::new().unwrap();
-        let slide = Slide {
+        let still = if power.is_none() { &[5][..] } else { &[] };
+        let slide = Recording {
             texture: 0,
             number,
             movement: Movement::new(force_mn, speed_um_s).unwrap(),
-            pac,
+            window: (start, start + length),
+            blocks: Vec::new(),
+            background: power,
             pdc: vec![3; 10],
             pdc_rate_hz,
-            shear_mn: None,
+            outside_mn: None,
             shear_rate_hz: 100,
-            window: (start, start + length),
-            background: power.map_or_else(|| Background::Still(vec![5]), Background::Power),
         };
+        let slide = slide.cut(still, &pac, shear.as_deref()).unwrap();
+        prop_assert_eq!((slide.pac(), slide.shear_mn()), (pac, shear));
         let mut writer = RecordingWriter::create(folder.path(), vec![texture(id, &name)]).unwrap();
         writer.write(&slide).unwrap();
         writer.finish().unwrap();
