@@ -1063,3 +1063,48 @@ fn completions_and_manual_pages_know_the_commands() {
     let page = fs::read_to_string(temp.path().join("tactus-device-monitor.1")).unwrap();
     assert_says(&page, &["emulated", "serial port"]);
 }
+
+#[test]
+fn a_port_has_one_owner_and_a_second_command_is_told_who() {
+    // one that takes calls and says nothing: whoever asks it waits
+    let at = line(|stream| {
+        thread::sleep(Duration::from_secs(60));
+        drop(stream);
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let status = || {
+        let mut command = device(&["status", "--port", &at]);
+        command.env("XDG_RUNTIME_DIR", folder.path());
+        command.stdout(Stdio::null()).stderr(Stdio::piped());
+        command
+    };
+    let mut first = status().spawn().unwrap();
+    // until it has the port: its file is written then
+    let began = Instant::now();
+    let locked = || {
+        let files = fs::read_dir(folder.path().join("tactus"));
+        let mut files = files.into_iter().flatten().map(|f| f.unwrap().path());
+        files.any(|file| fs::read_to_string(file).is_ok_and(|text| text.contains("status")))
+    };
+    while !locked() {
+        assert!(began.elapsed() < Duration::from_secs(20));
+        thread::sleep(Duration::from_millis(5));
+    }
+    let refused = status().output().unwrap();
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert_eq!(refused.status.code(), Some(1), "{said}");
+    let process = format!("(process {})", first.id());
+    assert_says(
+        &said,
+        &[&at, "used by `tactus device status", &process, "since"],
+    );
+    assert!(first.try_wait().unwrap().is_none(), "the first one goes on");
+    // however the owner ends, the port is free
+    first.kill().unwrap();
+    first.wait().unwrap();
+    let mut next = status().spawn().unwrap();
+    thread::sleep(Duration::from_millis(300));
+    assert!(next.try_wait().unwrap().is_none(), "it asks the probe");
+    next.kill().unwrap();
+    next.wait().unwrap();
+}

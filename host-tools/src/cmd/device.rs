@@ -7,6 +7,7 @@ mod identify;
 mod line;
 mod log;
 mod monitor;
+mod owner;
 mod record;
 mod recorder;
 mod replay;

@@ -113,6 +113,7 @@ pub(crate) struct Bench {
     heard: Heard,
     /// ends last
     _emulator: Option<Emulator>,
+    _owner: Option<super::owner::Owner>,
 }
 
 /// What the reports have said of the rig, and the log that keeps them.
@@ -173,6 +174,7 @@ impl Bench {
                 located: Instant::now(),
             },
             _emulator: open.emulator,
+            _owner: open.owner,
         };
         let status = bench.hello()?;
         bench.port.set_timeout(timeout);

@@ -8,6 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc;
 use std::time::{Duration, SystemTime};
 
+use super::owner::{Owned, Owner};
 use clap::Args;
 use serialport::{SerialPortInfo, SerialPortType, UsbPortInfo};
 
@@ -65,6 +66,9 @@ pub(crate) enum OpenError {
          `fuser -v {0}` names it"
     )]
     Busy(String),
+    /// Another tactus has it.
+    #[error(transparent)]
+    Owned(#[from] Owned),
     /// The user may not.
     #[error(
         "{0}: you may not open this port. On Linux: sudo usermod -aG dialout $USER, then log in again"
@@ -188,8 +192,9 @@ impl<T: Read + Write + Send> Line for T {}
 pub(crate) struct Open {
     pub(crate) line: Box<dyn Line>,
     pub(crate) name: String,
-    /// ends with it
+    /// both end with it
     pub(crate) emulator: Option<Emulator>,
+    pub(crate) owner: Option<Owner>,
 }
 
 impl Where {
@@ -201,12 +206,14 @@ impl Where {
                 line: tcp(&emulator.address)?,
                 name: "the emulated board".to_owned(),
                 emulator: Some(emulator),
+                owner: None,
             });
         }
         let name = match &self.port {
             Some(port) => port.clone(),
             None => only_nucleo(found())?,
         };
+        let owner = Some(Owner::take(&name)?);
         let line = match name.strip_prefix("tcp:") {
             Some(address) => tcp(address)?,
             None => serial(&name)?,
@@ -215,6 +222,7 @@ impl Where {
             line,
             name,
             emulator: None,
+            owner,
         })
     }
 }
