@@ -263,6 +263,10 @@ fn line(answer: impl Fn(TcpStream) + Send + 'static) -> String {
 fn device(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
     command.arg("device").args(arguments);
+    // its locks, and the tables that it keeps
+    for folder in ["XDG_RUNTIME_DIR", "XDG_DATA_HOME"] {
+        command.env(folder, env!("CARGO_TARGET_TMPDIR"));
+    }
     command.stdin(Stdio::null());
     command
 }
@@ -518,9 +522,43 @@ fn a_table_is_checked_pushed_and_pulled() {
             .try_iter()
             .all(|command| !matches!(command, wire::Command::BeginTable(_)))
     );
+    // what was pushed is not replaced without a question, and nobody is there to answer
+    let changes = |asked: &mpsc::Receiver<wire::Command>| {
+        let changes = |command: &wire::Command| {
+            use wire::Command::{BeginTable, FactoryTable, Forget};
+            matches!(command, BeginTable(_) | FactoryTable | Forget(_))
+        };
+        asked.try_iter().filter(changes).count()
+    };
+    let kept = temp.path().join("kept");
+    let keep = ["--port", &at, "--backup", path(&kept)];
+    for command in [
+        &["table", "factory"][..],
+        &["table", "push", path(&pulled)],
+        &["forget", "--name", "a"],
+        &["forget", "--self-learned"],
+    ] {
+        let _ = fs::remove_file(&kept);
+        assert_says(
+            &complaint(&[command, &keep].concat()),
+            &["nothing was changed", "--yes"],
+        );
+        assert_eq!(changes(&asked), 0, "{command:?}");
+        assert_eq!(fs::read(&kept).unwrap(), fs::read(&other).unwrap());
+    }
+    let said = printed(&[&["table", "factory", "--yes"][..], &keep].concat());
     assert_says(
-        &printed(&["table", "factory", "--port", &at]),
-        &["3 textures"],
+        &said,
+        &[
+            "No longer known: a, b.",
+            "is kept: `tactus device table push",
+            "3 textures",
+        ],
+    );
+    // the firmware's own table is never lost, so that nobody is asked; what was kept is in use again
+    assert_says(
+        &printed(&["table", "push", "--port", &at, path(&kept)]),
+        &["the probe uses it now: 2 textures"],
     );
 }
 
@@ -571,17 +609,17 @@ fn teaching_and_calibrating_do_what_was_meant() {
         &["the probe refused: there is no texture velvet in the table"],
     );
     last(
-        &["forget", "--name", "felt"],
+        &["forget", "--yes", "--name", "felt"],
         wire::Command::Forget(Forget::Texture(name("felt"))),
     );
     textures("3 textures");
     last(
-        &["forget", "--training", "a"],
+        &["forget", "-y", "--training", "a"],
         wire::Command::Forget(Forget::Training(name("a"))),
     );
     for flag in ["--self-learned", "--self-taught"] {
         last(
-            &["forget", flag],
+            &["forget", "--yes", flag],
             wire::Command::Forget(Forget::SelfLearned),
         );
     }

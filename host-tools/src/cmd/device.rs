@@ -6,6 +6,7 @@ mod flash;
 mod identify;
 mod line;
 mod log;
+mod loss;
 mod monitor;
 mod owner;
 mod record;

@@ -386,22 +386,29 @@ fn moves(command: &Command) -> bool {
 
 /// Waits for Enter, or for Ctrl-C.
 pub(crate) fn wait_for_enter(interrupt: &Interrupt, prompt: &str) -> Result<(), BenchError> {
+    read_answer(interrupt, prompt).map(|_| ())
+}
+
+/// Asks, and waits for a line; Ctrl-C or the end of the input stops.
+pub(crate) fn read_answer(interrupt: &Interrupt, prompt: &str) -> Result<String, BenchError> {
     eprint!("{prompt}");
     let (entered, enter) = mpsc::channel();
     // a blocking read does not see Ctrl-C; the thread ends with the program
     std::thread::spawn(move || {
         let mut line = String::new();
-        let _ = entered.send(io::stdin().read_line(&mut line));
+        let read = io::stdin().read_line(&mut line);
+        // nobody waits any more after Ctrl-C
+        let _ = entered.send(read.map(|bytes| (bytes > 0).then_some(line)));
     });
     loop {
         if interrupt.take() {
             return Err(BenchError::Stopped);
         }
         match enter.recv_timeout(Duration::from_millis(100)) {
-            Ok(Ok(1..)) => return Ok(()),
+            Ok(Ok(Some(line))) => return Ok(line),
             Ok(Err(why)) => return Err(why.into()),
             Err(RecvTimeoutError::Timeout) => {}
-            Ok(Ok(0)) | Err(RecvTimeoutError::Disconnected) => return Err(BenchError::Stopped),
+            Ok(Ok(None)) | Err(RecvTimeoutError::Disconnected) => return Err(BenchError::Stopped),
         }
     }
 }

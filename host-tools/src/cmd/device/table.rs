@@ -12,6 +12,7 @@ use tactus_core::wire;
 
 use super::bench::Bench;
 use super::line::Where;
+use super::loss::{Consent, replaced};
 use crate::cmd::table_file::{read_table, write_table};
 
 /// Show, fetch or replace the probe's texture table
@@ -21,7 +22,8 @@ Examples:
   tactus device table show
   tactus device table pull table      a copy of it
   tactus device table push table      the probe uses it from now on
-  tactus device table factory         back to the firmware's own")]
+  tactus device table factory         back to the firmware's own
+Before a table that the probe was given or has learned is replaced, it is kept in a file, and you are asked.")]
 pub(crate) enum Command {
     /// Print what the probe's table holds
     Show(Where),
@@ -38,9 +40,16 @@ pub(crate) enum Command {
         at: Where,
         /// The table, as `tactus learn` or `table pull` wrote it
         file: PathBuf,
+        #[command(flatten)]
+        consent: Consent,
     },
     /// Go back to the table that came with the firmware
-    Factory(Where),
+    Factory {
+        #[command(flatten)]
+        at: Where,
+        #[command(flatten)]
+        consent: Consent,
+    },
 }
 
 /// Shows, fetches or changes the probe's table.
@@ -68,12 +77,16 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
                 "{file}: {textures} textures, {length} bytes, checksum {crc:08x}"
             )?;
         }
-        Command::Push { at, file } => {
+        Command::Push { at, file, consent } => {
             let mut bytes = Vec::new();
             let table = read_table(file, &mut bytes)?;
             let file = file.display();
             let push = PushTable::new(table.as_bytes()).with_context(|| file.to_string())?;
-            let (mut bench, _) = Bench::open(at)?;
+            let (mut bench, status) = Bench::open(at)?;
+            // the firmware's own table is never lost
+            if !status.factory && status.table_crc != table.crc() {
+                consent.ask(&mut bench, |old| Some(replaced(old, Some(&table))), out)?;
+            }
             bench.get(push)?;
             // not what was sent counts, but what the probe uses from now on
             let status = bench.get(Request::status())?;
@@ -87,8 +100,11 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
                 "{file}: the probe uses it now: {textures} textures, checksum {now:08x}"
             )?;
         }
-        Command::Factory(at) => {
-            let (mut bench, _) = Bench::open(at)?;
+        Command::Factory { at, consent } => {
+            let (mut bench, status) = Bench::open(at)?;
+            if !status.factory {
+                consent.ask(&mut bench, |old| Some(replaced(old, None)), out)?;
+            }
             bench.get(Request::command(wire::Command::FactoryTable))?;
             let status = bench.get(Request::status())?;
             let (textures, crc) = (status.textures, status.table_crc);

@@ -5,11 +5,12 @@ use std::io::{self, Write};
 use anyhow::ensure;
 use tactus::link::Request;
 use tactus_core::features::Property;
-use tactus_core::table::Name;
+use tactus_core::table::{Name, Table};
 use tactus_core::wire::{self, Event, Report};
 
 use super::bench::{Bench, show_fault};
 use super::line::Where;
+use super::loss::Consent;
 
 /// Have the probe learn the texture under its finger from new slides; an unfinished training goes on where it stood
 #[derive(clap::Args)]
@@ -71,6 +72,8 @@ pub(crate) struct Forget {
     at: Where,
     #[command(flatten)]
     what: What,
+    #[command(flatten)]
+    consent: Consent,
 }
 
 #[derive(clap::Args)]
@@ -120,7 +123,8 @@ pub(crate) fn rename(Rename { at, from, to }: &Rename, out: &mut impl Write) -> 
 }
 
 /// Has the probe forget something.
-pub(crate) fn forget(Forget { at, what }: &Forget, out: &mut impl Write) -> anyhow::Result<()> {
+pub(crate) fn forget(args: &Forget, out: &mut impl Write) -> anyhow::Result<()> {
+    let Forget { at, what, consent } = args;
     let (what, said) = match (&what.name, &what.training) {
         (Some(name), _) => (wire::Forget::Texture(name_of(name)?), name.clone()),
         (None, Some(name)) => {
@@ -132,7 +136,14 @@ pub(crate) fn forget(Forget { at, what }: &Forget, out: &mut impl Write) -> anyh
             (wire::Forget::SelfLearned, said)
         }
     };
-    Bench::open(at)?.0.get(Request::forget(what))?;
+    let (mut bench, _) = Bench::open(at)?;
+    let known = |table: &Table<'_>| match &what {
+        wire::Forget::Texture(name) => table.find(name).is_some(),
+        _ => true,
+    };
+    let lost = |table: &Table<'_>| known(table).then(|| format!("The probe is to forget {said}."));
+    consent.ask(&mut bench, lost, out)?;
+    bench.get(Request::forget(what))?;
     writeln!(out, "The probe has forgotten {said}.")?;
     Ok(())
 }

@@ -1,0 +1,99 @@
+//! Before the probe loses what it has learned: what that is, a copy of its table, and a question.
+
+use std::io::{IsTerminal as _, Write};
+use std::path::PathBuf;
+
+use anyhow::{Context as _, bail};
+use tactus_core::table::Table;
+
+use super::bench::{Bench, read_answer};
+use crate::cmd::table_file::write_table;
+
+/// How a command that takes something from the probe is allowed to.
+#[derive(clap::Args, Clone, Debug)]
+pub(crate) struct Consent {
+    /// Do it without asking
+    #[arg(long, short)]
+    yes: bool,
+    /// Keep the probe's table in this file first, and not in ~/.local/share/tactus/backups
+    #[arg(long, value_name = "FILE")]
+    backup: Option<PathBuf>,
+}
+
+impl Consent {
+    /// Says what will be `lost`, keeps the table that the probe uses now, and asks. Nothing has happened to the probe yet.
+    /// Where nothing is lost, none of that.
+    ///
+    /// # Errors
+    /// The table cannot be read or kept, or the answer is no.
+    pub(crate) fn ask(
+        &self,
+        bench: &mut Bench,
+        lost: impl FnOnce(&Table<'_>) -> Option<String>,
+        out: &mut impl Write,
+    ) -> anyhow::Result<()> {
+        let bytes = bench.table()?;
+        let table = Table::read(&bytes)?;
+        let Some(lost) = lost(&table) else {
+            return Ok(());
+        };
+        let file = match &self.backup {
+            Some(file) => file.clone(),
+            None => {
+                // one file for one table, however often it is kept
+                folder()?.join(format!("table-{:08x}.tact", table.crc()))
+            }
+        };
+        write_table(&file, &bytes)?;
+        let file = file.display();
+        writeln!(
+            out,
+            "{lost}\nThe probe's table is kept: `tactus device table push {file}` brings it back."
+        )?;
+        out.flush()?;
+        if self.yes {
+            return Ok(());
+        }
+        if !std::io::stdin().is_terminal() {
+            bail!("nothing was changed: there is nobody to ask; add --yes to do it");
+        }
+        let answer = read_answer(bench.interrupt(), "Go on? [y/N] ")?;
+        if !matches!(answer.trim().to_lowercase().as_str(), "y" | "yes") {
+            bail!("nothing was changed");
+        }
+        Ok(())
+    }
+}
+
+/// Where tables are kept.
+fn folder() -> anyhow::Result<PathBuf> {
+    let given = |variable| std::env::var_os(variable).map(PathBuf::from);
+    let data = given("XDG_DATA_HOME").or_else(|| Some(given("HOME")?.join(".local/share")));
+    let folder = data
+        .context("there is no home folder to keep the probe's table in: name a file with --backup")?
+        .join("tactus/backups");
+    std::fs::create_dir_all(&folder)
+        .with_context(|| format!("{}: name another file with --backup", folder.display()))?;
+    Ok(folder)
+}
+
+/// The textures of a table that are not in another, which takes its place.
+pub(crate) fn replaced(old: &Table<'_>, new: Option<&Table<'_>>) -> String {
+    let lost: Vec<&str> = (0..old.textures())
+        .filter_map(|texture| old.name(texture))
+        .filter(|name| new.is_none_or(|new| new.find(name).is_none()))
+        .collect();
+    let all = match old.textures() {
+        1 => "the texture".to_owned(),
+        n => format!("{n} textures"),
+    };
+    match lost.as_slice() {
+        [] => {
+            format!("The probe's table of {all} is replaced; all their names are in the new one.")
+        }
+        names => format!(
+            "The probe's table of {all} is replaced. No longer known: {}.",
+            names.join(", ")
+        ),
+    }
+}
