@@ -855,6 +855,25 @@ mod unix {
         );
     }
 
+    /// Whenever it comes: between two slides the rig is ready, and the training is not over yet.
+    #[test]
+    fn after_ctrl_c_in_a_training_the_probe_takes_the_next_request() {
+        let (at, asked) = probe(20);
+        for delay_ms in [20, 130, 290, 410, 560, 700] {
+            let train = ["train", "cheese", "--trials", "5", "--port", &at];
+            let mut command = device(&train);
+            command.stderr(Stdio::piped()).stdout(Stdio::null());
+            let child = command.spawn().unwrap();
+            wait_for(&asked, |command| matches!(command, wire::Command::Train(_)));
+            thread::sleep(Duration::from_millis(delay_ms));
+            interrupt(&child);
+            let out = child.wait_with_output().unwrap();
+            let said = String::from_utf8_lossy(&out.stderr);
+            assert_eq!(out.status.code(), Some(130), "{delay_ms}: {said}");
+            printed(&["home", "--port", &at]);
+        }
+    }
+
     #[test]
     fn a_second_ctrl_c_says_that_the_finger_may_be_down() {
         let sliding = says(&[

@@ -120,7 +120,8 @@ impl<E: Transaction> Job<E> {
         self.sent.as_ref().map(|sent| &sent.command)
     }
 
-    fn last_id(&self) -> Option<u16> {
+    /// Number of the request that is under way, as it was sent last.
+    pub fn last_id(&self) -> Option<u16> {
         self.sent.as_ref()?.ids.last().copied()
     }
 

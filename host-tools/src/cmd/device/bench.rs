@@ -28,6 +28,8 @@ const BOOTING: Duration = Duration::from_secs(90);
 const LIFTING: Duration = Duration::from_secs(30);
 /// A faulted rig reports where it is 20 times a second until it is at rest.
 const AT_REST: Duration = Duration::from_millis(500);
+/// Longest that a request which was stopped takes to answer: something may be stored first.
+const ANSWERED: Duration = Duration::from_secs(5);
 
 /// What went wrong at the bench, and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -123,6 +125,8 @@ struct Heard {
     phase: Option<Phase>,
     /// when it last reported where it is
     located: Instant,
+    /// the request that moves the rig, until it is over
+    moving: Option<u16>,
 }
 
 impl Heard {
@@ -134,6 +138,9 @@ impl Heard {
             Event::Phase(now) => self.phase = Some(*now),
             Event::Status(status) => self.phase = Some(status.phase),
             Event::Live(_) => self.located = Instant::now(),
+            Event::Done(id) | Event::Refused { id, .. } if self.moving == Some(*id) => {
+                self.moving = None;
+            }
             _ => {}
         }
     }
@@ -172,6 +179,7 @@ impl Bench {
                 log: log.transpose()?,
                 phase: None,
                 located: Instant::now(),
+                moving: None,
             },
             _emulator: open.emulator,
             _owner: open.owner,
@@ -283,6 +291,9 @@ impl Bench {
         mut each: impl FnMut(&Report),
     ) -> Result<Poll<E::Outcome>, BenchError> {
         let moving = job.command().is_some_and(moves);
+        if moving {
+            self.heard.moving = job.last_id();
+        }
         let polled = self.port.step(job, |report| {
             self.heard.hear(report);
             each(report);
@@ -357,6 +368,10 @@ impl Bench {
                     fault = status.fault;
                 }
             })?;
+            // between two slides the rig is ready, and what it was asked for is not over; an answer can be lost
+            if self.heard.moving.is_some() && began.elapsed() < ANSWERED {
+                continue;
+            }
             let at_rest = self.heard.located.elapsed() > AT_REST;
             match self.heard.phase {
                 Some(Phase::Ready | Phase::Parked) => return Ok(None),
