@@ -15,11 +15,11 @@ fn tactus(arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// What a command that must succeed printed.
+/// What a command that must succeed printed; 3 is an exploration that ended without a name.
 fn printed(arguments: &[&str]) -> String {
     let out = tactus(arguments);
     assert!(
-        out.status.success(),
+        matches!(out.status.code(), Some(0 | 3)),
         "{arguments:?}: {}",
         String::from_utf8_lossy(&out.stderr)
     );
@@ -149,7 +149,9 @@ fn the_simulated_probe_is_given_the_texture_asked_for() {
         "{shown}"
     );
     assert!(
-        shown.contains("Right.") || shown.contains("Wrong: it was Burlap"),
+        ["Right.", "Wrong: it was Burlap", "Undecided: it was Burlap"]
+            .iter()
+            .any(|end| shown.contains(end)),
         "{shown}"
     );
     assert_eq!(shown, printed(&arguments), "the same seed");
@@ -279,7 +281,7 @@ fn features_prints_the_golden_columns() {
     let ours = printed(&["features", "--recordings", path(&folder), "--format", "csv"]);
     let golden = fs::read_to_string(folder.join("features.csv")).unwrap();
     let header = "material,slide,traction_n,roughness_ln,fineness_unfiltered_ln,ln_psd_band0,ln_psd_band1,ln_psd_band2,\
-                  ln_psd_band3,ln_psd_band4,ln_psd_band5,ln_psd_band6,ln_psd_band7";
+                  ln_psd_band3,ln_psd_band4,ln_psd_band5,ln_psd_band6,ln_psd_band7,name,force_n,speed_mm_s,trial";
     assert_eq!(ours.lines().next(), Some(header));
     let key = |line: &str| {
         line.split(',')
@@ -334,7 +336,7 @@ fn a_table_is_learned_shown_checked_and_used() {
         "--out",
         path(&file),
     ]);
-    assert!(printed(&["table", "check", path(&file)]).contains("good; 20 textures, 1 movements"));
+    assert!(printed(&["table", "check", path(&file)]).contains("good; 20 textures, 1 movement,"));
     let shown = printed(&["table", "show", path(&file)]);
     assert!(
         shown.contains("0.80 N, 25.0 mm/s")
@@ -371,7 +373,13 @@ fn a_table_is_learned_shown_checked_and_used() {
         "{explored}"
     );
     assert!(
-        explored.contains("Right.") || explored.contains("Wrong: it was bath towel."),
+        [
+            "Right.",
+            "Wrong: it was bath towel.",
+            "Undecided: it was bath towel."
+        ]
+        .iter()
+        .any(|end| explored.contains(end)),
         "{explored}"
     );
 }
@@ -392,7 +400,7 @@ fn a_bad_table_is_refused_with_the_check_that_failed() {
     for (bytes, check) in [
         (flipped, "checksum"),
         (other_version, "version 9"),
-        (longer, "3 bytes follow"),
+        (longer, "bytes follow"),
         (good[..200].to_vec(), "truncated: 200 bytes of 1309"),
         (b"texture,movement".to_vec(), "not a texture table"),
         (Vec::new(), "truncated: 0 bytes"),

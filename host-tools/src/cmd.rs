@@ -6,8 +6,10 @@ mod evaluate;
 mod features;
 mod identify;
 mod import;
+mod known;
 mod learn;
 mod manual;
+mod names;
 mod output;
 mod progress;
 mod simulate;
@@ -21,12 +23,13 @@ use std::io::{self, Write as _};
 use clap::{CommandFactory as _, Parser, Subcommand};
 
 pub(crate) use device::BenchError;
+pub(crate) use output::{Done, UsageError};
 
 /// Tactus tells what a surface is by touching it.
 #[derive(Parser)]
 #[command(version, about = "Tactus tells what a surface is by touching it", long_about = "Tactus tells what a surface is by touching it: it slides a BioTac fingertip, measures traction, roughness and \
 fineness, and chooses each next movement so as to tell the remaining candidates apart (Bayesian exploration, Fishel & \
-Loeb 2012).\n\nThis command runs the core of the firmware, the same code, on recordings and on a simulated rig.", after_help = identify::FIRST_STEPS)]
+Loeb 2012).\n\nThis command runs the core of the firmware, the same code, on recordings and on a simulated rig.", after_help = after_help())]
 struct Tactus {
     #[command(subcommand)]
     command: Option<Command>,
@@ -46,31 +49,46 @@ enum Command {
     Study(study::Args),
     #[command(subcommand)]
     Device(device::Command),
+    Textures(known::Args),
     Completions(manual::Completions),
     Man(manual::Man),
     Import(import::Args),
 }
 
+/// What to try first, and what scripts need to know.
+fn after_help() -> String {
+    format!("{}\n\n{CONVENTIONS}", identify::FIRST_STEPS)
+}
+
+const CONVENTIONS: &str = "\
+Environment:
+  TACTUS_RECORDINGS   the folder, where --recordings is not given
+  TACTUS_PORT         the probe's port, where --port is not given
+
+Exit codes: 0 done; 1 an error; 2 wrong usage; 3 not identified: none of those known, or not sure; 130 after Ctrl-C.";
+
 /// Runs what the arguments ask for.
-pub(crate) fn run() -> anyhow::Result<()> {
+pub(crate) fn run() -> anyhow::Result<Done> {
     let out = &mut io::BufWriter::new(io::stdout().lock());
+    let mut done = Done::Fully;
     match Tactus::parse().command {
         None => identify::demonstrate(out)?,
         Some(Command::Features(args)) => features::run(&args, out)?,
         Some(Command::Learn(args)) => learn::run(&args, out)?,
         Some(Command::Table(command)) => table::run(&command, out)?,
-        Some(Command::Identify(args)) => identify::run(&args, out)?,
+        Some(Command::Identify(args)) => done = identify::run(&args, out)?,
         Some(Command::Evaluate(args)) => evaluate::run(&args, out)?,
         Some(Command::Simulate(args)) => simulate::run(&args, out)?,
         Some(Command::LearnByHand(args)) => learn::by_hand(&args, out)?,
         Some(Command::Study(args)) => study::run(&args, out)?,
         Some(Command::Device(command)) => device::run(&command, out)?,
-        Some(Command::Completions(args)) => manual::completions(&args, Tactus::command(), out),
+        Some(Command::Textures(args)) => known::run(&args, out)?,
+        Some(Command::Completions(args)) => manual::completions(&args, Tactus::command(), out)?,
         Some(Command::Man(args)) => manual::pages(&args, Tactus::command(), out)?,
         Some(Command::Import(args)) => import::run(&args, out)?,
     }
     out.flush()?;
-    Ok(())
+    Ok(done)
 }
 
 #[cfg(test)]

@@ -8,4 +8,6 @@ pub mod learn;
 pub mod lifelong;
 pub mod novelty;
 pub mod show;
+pub mod table_summary;
+pub mod transcript;
 pub mod verdicts;

@@ -7,11 +7,28 @@ use tactus::eval::evaluate::Method;
 use tactus_core::explorer::Config;
 use tactus_core::features::FeatureSet;
 
-#[derive(Args)]
+use super::output::UsageError;
+
+#[derive(Args, Clone)]
 pub(crate) struct Recordings {
-    /// Folder of recordings
+    /// Folder of recordings; that of TACTUS_RECORDINGS unless given
     #[arg(long, value_name = "DIR")]
-    pub(crate) recordings: PathBuf,
+    pub(crate) recordings: Option<PathBuf>,
+}
+
+impl Recordings {
+    /// The folder that was given, or that the environment names.
+    ///
+    /// # Errors
+    /// Neither does.
+    pub(crate) fn folder(&self) -> Result<PathBuf, UsageError> {
+        let named = || std::env::var_os("TACTUS_RECORDINGS").filter(|folder| !folder.is_empty());
+        let folder = self.recordings.clone();
+        folder.or_else(|| named().map(PathBuf::from)).ok_or_else(|| {
+            let say = "give a folder of recordings: --recordings DIR, or TACTUS_RECORDINGS in the environment";
+            UsageError(say.to_owned())
+        })
+    }
 }
 
 #[derive(Args, Clone)]

@@ -3,6 +3,8 @@
 use std::io::Write;
 
 use clap::ValueEnum;
+use serde::Serialize;
+use tactus::data::replay::MeasuredSlide;
 use tactus_core::features::{BAND_EDGES, Property};
 
 use super::args::Recordings;
@@ -26,27 +28,52 @@ pub(crate) struct Args {
 enum Rows {
     /// Comma-separated, for programs
     Csv,
+    /// An object for every slide on a line of its own, for programs
+    Json,
     /// Aligned, for people
     Text,
 }
 
+/// A slide, for programs.
+#[derive(Serialize)]
+struct SlideFeatures<'s> {
+    material: u32,
+    name: &'s str,
+    slide: u32,
+    trial: usize,
+    force_n: f32,
+    speed_mm_s: f32,
+    traction_n: Option<f32>,
+    roughness_ln: Option<f32>,
+    roughness_is_bound: bool,
+    fineness_unfiltered_ln: Option<f32>,
+    ln_psd_bands: Vec<f32>,
+}
+
 /// Prints a row for every slide.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let (set, measured) = measure_folder(&args.from.recordings)?;
+    let (set, measured) = measure_folder(&args.from.folder()?)?;
+    // the number of the trial counts the slides of one texture and movement
+    let trial = |slides: &[MeasuredSlide], at: usize| {
+        let before = slides.iter().take(at + 1);
+        before.filter(|s| s.movement == slides[at].movement).count()
+    };
     let rows = set
         .textures()
         .iter()
         .zip(&measured)
-        .flat_map(|(texture, slides)| slides.iter().map(move |s| (texture, s)));
+        .flat_map(|(texture, slides)| {
+            (0..slides.len()).map(move |at| (texture, &slides[at], trial(slides, at)))
+        });
     match args.format {
         Rows::Csv => {
             let bands = (0..BAND_EDGES.len() - 1).map(|band| format!(",ln_psd_band{band}"));
             writeln!(
                 out,
-                "material,slide,traction_n,roughness_ln,fineness_unfiltered_ln{}",
+                "material,slide,traction_n,roughness_ln,fineness_unfiltered_ln{},name,force_n,speed_mm_s,trial",
                 bands.collect::<String>()
             )?;
-            for (texture, slide) in rows {
+            for (texture, slide, trial) in rows {
                 write!(out, "{},{}", texture.id, slide.number)?;
                 for property in Property::ALL {
                     let value = slide.measurement.properties.get(property);
@@ -59,7 +86,29 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
                 for band in slide.measurement.ln_bands() {
                     write!(out, ",{band:.6}")?;
                 }
-                writeln!(out)?;
+                let (force_n, speed_mm_s) = (slide.movement.force_n(), slide.movement.speed_mm_s());
+                let name = csv_field(&texture.name);
+                writeln!(out, ",{name},{force_n:.3},{speed_mm_s:.3},{trial}")?;
+            }
+        }
+        Rows::Json => {
+            for (texture, slide, trial) in rows {
+                let measurement = &slide.measurement;
+                let value = |property| measurement.properties.get(property);
+                let features = SlideFeatures {
+                    material: texture.id,
+                    name: &texture.name,
+                    slide: slide.number,
+                    trial,
+                    force_n: slide.movement.force_n(),
+                    speed_mm_s: slide.movement.speed_mm_s(),
+                    traction_n: value(Property::Traction),
+                    roughness_ln: value(Property::Roughness),
+                    roughness_is_bound: measurement.roughness_is_bound,
+                    fineness_unfiltered_ln: value(Property::Fineness),
+                    ln_psd_bands: measurement.ln_bands().into_iter().collect(),
+                };
+                writeln!(out, "{}", serde_json::to_string(&features)?)?;
             }
         }
         Rows::Text => {
@@ -68,7 +117,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
                 "no. {:<24} slide  {:<20} traction N  roughness   fineness  ln of eight bands, 20 to 1000 Hz",
                 "texture", "movement"
             )?;
-            for (texture, slide) in rows {
+            for (texture, slide, _) in rows {
                 let (id, name, number) = (texture.id, &texture.name, slide.number);
                 let movement = slide.movement.to_string();
                 write!(out, "{id:>3} {name:<24} {number:>5}  {movement:<20}")?;
@@ -95,4 +144,24 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+/// A text as a field of a CSV table.
+fn csv_field(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::csv_field;
+
+    #[test]
+    fn a_name_with_a_comma_is_one_field() {
+        assert_eq!(csv_field("Denim twill"), "Denim twill");
+        assert_eq!(csv_field("5\" mesh, red"), "\"5\"\" mesh, red\"");
+    }
 }

@@ -8,11 +8,13 @@ use anyhow::{Context as _, ensure};
 use clap::Parser;
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::{Replay, ReplayError};
 use tactus::eval::evaluate::{MAX_TEXTURES, Method};
 use tactus::eval::experiment::{Experiment, Protocol};
-use tactus::eval::show::Show;
+use tactus::eval::show::{Show, is_right};
+use tactus::eval::transcript::{Answer, Transcript};
 use tactus::sim::collection::{Collection, calibrated, texture_name};
 use tactus::sim::rig::SimRig;
 use tactus_core::dsp::Plan;
@@ -22,8 +24,9 @@ use tactus_core::probe::explore::{ExplorationStep, ExploreError, Rejection, expl
 use tactus_core::rig::Rig;
 use tactus_core::table::Table;
 
-use super::args::Stop;
+use super::args::{Recordings, Stop};
 use super::learn::{at_least_two, learn_first};
+use super::output::{Done, Format, print_json};
 use super::progress::with_progress;
 use super::table_file::read_table;
 use super::textures::{find_material, find_textures, measure_folder, names};
@@ -52,9 +55,8 @@ Examples:
   tactus identify --recordings DIR --material 'bath towel'
   tactus identify --recordings DIR --material 3 --table FILE  with a table that `tactus learn` wrote")]
 pub(crate) struct Args {
-    /// Folder of recordings
-    #[arg(long, value_name = "DIR", required_unless_present = "simulated")]
-    recordings: Option<PathBuf>,
+    #[command(flatten)]
+    from: Recordings,
     /// The recorded texture to present as unknown: its number or its name
     #[arg(long, value_name = "M", required_unless_present = "simulated")]
     material: Option<String>,
@@ -81,14 +83,47 @@ pub(crate) struct Args {
     /// Another seed draws other slides; with --simulated also another world, and another texture unless one is given
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// How to print the exploration
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What `identify --format json` prints.
+#[derive(Serialize)]
+struct Identification {
+    /// What was presented.
+    presented: String,
+    /// Whether the table holds it.
+    known: bool,
+    /// Whether the answer is right; `null` where it is undecided.
+    right: Option<bool>,
+    /// Textures of the table.
+    textures: u16,
+    method: Method,
+    threshold: f32,
+    max_slides: u8,
+    seed: u64,
+    slides: Transcript,
+    /// Whether it ended for want of recordings.
+    recordings_ran_out: bool,
+    verdict: Answer,
+    /// Time of the simulated rig, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rig_s: Option<f64>,
+    /// Work of sliding that wore the simulated skin, J.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    skin_j: Option<f32>,
 }
 
 /// Explores on recordings or on the simulated rig.
-pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    match (&args.recordings, &args.material) {
-        (Some(folder), Some(material)) => identify_recorded(args, folder, material, out),
-        _ => identify_simulated(args, out),
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
+    if args.simulated {
+        return identify_simulated(args, out);
     }
+    let folder = args.from.folder()?;
+    let material = args.material.as_deref();
+    let material = material.context("--material")?;
+    identify_recorded(args, &folder, material, out)
 }
 
 fn identify_recorded(
@@ -96,7 +131,7 @@ fn identify_recorded(
     folder: &Path,
     material: &str,
     out: &mut impl Write,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<Done> {
     let set = RecordingSet::open(folder)?;
     let index = find_material(&set, material)?;
     let name = &set.textures()[index].name;
@@ -148,7 +183,8 @@ fn identify_recorded(
         });
         Table::read(&learned)?
     };
-    if table.find(name).is_none() {
+    let is_text = args.format == Format::Text;
+    if is_text && table.find(name).is_none() {
         writeln!(
             out,
             "The table does not hold {name}, so the right answer is that it is none of the known textures."
@@ -156,18 +192,34 @@ fn identify_recorded(
     }
     let shown_count = shown.len();
     let mut rig = Replay::new(shown, ChaCha8Rng::from_rng(&mut random));
-    writeln!(
-        out,
-        "An unknown texture, one of {}. Presented: {name}, {shown_count} slides that were not learned from (seed {}).",
-        table.textures(),
-        args.seed
-    )?;
+    if is_text {
+        writeln!(
+            out,
+            "An unknown texture, one of {}. Presented: {name}, {shown_count} slides that were not learned from (seed {}).",
+            table.textures(),
+            args.seed
+        )?;
+    }
     let ran_out = |why: &ReplayError| matches!(why, ReplayError::RanOut(_));
-    show_exploration(&mut rig, table, args, &mut random, name, ran_out, out)
+    let found = explore_and_show(&mut rig, table, args, &mut random, name, ran_out, out)?;
+    if !is_text {
+        print_json(&found, out)?;
+    }
+    Ok(found.done())
 }
 
-/// Explores with `rig` until there is an answer or, after a slide at least, until it has `ran_out` of them; shows every step.
-fn show_exploration<R>(
+impl Identification {
+    fn done(&self) -> Done {
+        match self.verdict.told {
+            "sure" => Done::Fully,
+            _ => Done::NotIdentified,
+        }
+    }
+}
+
+/// Explores with `rig` until there is an answer or, after a slide at least, until it has `ran_out` of them; as text, shows
+/// every step.
+fn explore_and_show<R>(
     rig: &mut R,
     table: Table<'_>,
     args: &Args,
@@ -175,38 +227,49 @@ fn show_exploration<R>(
     truth: &str,
     ran_out: impl Fn(&R::Error) -> bool,
     out: &mut impl Write,
-) -> anyhow::Result<()>
+) -> anyhow::Result<Identification>
 where
     R: Rig<Error: std::error::Error + Send + Sync + 'static>,
 {
     let best = Method::of(explorer::Method::of(table.contents()));
+    let method = args.method.unwrap_or(best);
     let config = Config {
         open: true,
-        ..args.stop.config(args.method.unwrap_or(best))
+        ..args.stop.config(method)
     };
     let mut explorer = Explorer::<MAX_TEXTURES>::new(table, rig.measures(), config)?;
     out.flush()?;
+    let mut slides = Transcript::default();
+    let is_text = args.format == Format::Text;
     let mut show = Show::new(table, out);
     let verdict = embassy_futures::block_on(explore(
         rig,
         &mut explorer,
         &Plan::new(),
         || random.next_u32(),
-        |event| match event {
-            // shown below: recordings that run out are no failure
-            ExplorationStep::CutShort(..) => {}
-            event => show.step(event),
+        |event| {
+            slides.step(&event, table);
+            match event {
+                // shown below: recordings that run out are no failure
+                ExplorationStep::CutShort(..) => {}
+                event if is_text => show.step(event),
+                _ => {}
+            }
         },
     ));
+    let mut recordings_ran_out = false;
     let verdict = match verdict {
         Err(ExploreError::Rejected(Rejection::Rig(why)))
             if ran_out(&why) && explorer.slides() > 0 =>
         {
-            show.line("\nThe recordings have run out, and none counts twice.")?;
+            if is_text {
+                show.line("\nThe recordings have run out, and none counts twice.")?;
+            }
+            recordings_ran_out = true;
             explorer.best()
         }
         Err(why) => {
-            if explorer.slides() > 0 {
+            if is_text && explorer.slides() > 0 {
                 let known = (&explorer.best(), explorer.slides());
                 show.step::<R::Error>(ExplorationStep::CutShort(known.0, known.1));
             }
@@ -214,8 +277,24 @@ where
         }
         Ok(verdict) => verdict,
     };
-    show.finish(verdict, explorer.slides(), truth)?;
-    Ok(())
+    if is_text {
+        show.finish(verdict, explorer.slides(), truth)?;
+    }
+    Ok(Identification {
+        presented: truth.to_owned(),
+        known: table.find(truth).is_some(),
+        right: is_right(verdict, truth, table),
+        textures: table.textures(),
+        method,
+        threshold: args.stop.threshold,
+        max_slides: args.stop.max_slides,
+        seed: args.seed,
+        slides,
+        recordings_ran_out,
+        verdict: Answer::new(verdict, explorer.slides(), table),
+        rig_s: None,
+        skin_j: None,
+    })
 }
 
 /// The arguments of the demonstration: those of the command.
@@ -240,7 +319,7 @@ pub(crate) fn demonstrate(out: &mut impl Write) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn identify_simulated(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+fn identify_simulated(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     let mut random = ChaCha8Rng::seed_from_u64(args.seed);
     let unknown = match &args.texture {
         Some(name) => find_textures(std::slice::from_ref(name))?[0],
@@ -262,21 +341,33 @@ fn identify_simulated(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let mut rig = SimRig::new(collection.setup(unknown, 1 + u64::from(random.next_u32() % 1000)));
     rig.control().calibrate(calibration)?;
     let name = texture_name(unknown);
-    writeln!(
-        out,
-        "An unknown texture, one of {}. Under the finger: {name} (seed {}).",
-        table.textures(),
-        args.seed
-    )?;
+    let is_text = args.format == Format::Text;
+    if is_text {
+        writeln!(
+            out,
+            "An unknown texture, one of {}. Under the finger: {name} (seed {}).",
+            table.textures(),
+            args.seed
+        )?;
+    }
     let never = |_: &_| false;
-    show_exploration(&mut rig, table, args, &mut random, name, never, out)?;
+    let found = explore_and_show(&mut rig, table, args, &mut random, name, never, out)?;
     let seconds = rig.now().as_secs_f64();
     let skin = rig.control().skin();
-    writeln!(
-        out,
-        "{seconds:.0} s of the rig's time; skin: {:.2} J of sliding{}.",
-        skin.energy_j(),
-        if skin.is_worn() { ", look at it" } else { "" }
-    )?;
-    Ok(())
+    let found = Identification {
+        rig_s: Some(seconds),
+        skin_j: Some(skin.energy_j()),
+        ..found
+    };
+    if is_text {
+        writeln!(
+            out,
+            "{seconds:.0} s of the rig's time; skin: {:.2} J of sliding{}.",
+            skin.energy_j(),
+            if skin.is_worn() { ", look at it" } else { "" }
+        )?;
+    } else {
+        print_json(&found, out)?;
+    }
+    Ok(found.done())
 }

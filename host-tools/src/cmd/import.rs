@@ -3,6 +3,9 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+use serde::Serialize;
+
+use super::output::{Format, print_json};
 use super::progress::progress;
 
 /// Convert recordings into the project's format (.npy files and a CSV manifest)
@@ -16,16 +19,38 @@ pub(crate) struct Args {
     from: PathBuf,
     /// The folder to write; it must not hold recordings yet
     to: PathBuf,
+    /// How to print what was written
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What `import --format json` prints.
+#[derive(Serialize)]
+struct Imported {
+    folder: String,
+    textures: usize,
+    slides: usize,
+    /// Rows of 10 ms that are missing from the publisher's files.
+    lost_rows: usize,
 }
 
 /// Imports a folder into another.
-pub(crate) fn run(Args { from, to }: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+pub(crate) fn run(Args { from, to, format }: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let bar = progress(0, "importing slides");
     let imported = tactus::data::import::import(from, to, &mut |done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
+    if *format == Format::Json {
+        let imported = Imported {
+            folder: to.display().to_string(),
+            textures: imported.textures,
+            slides: imported.slides,
+            lost_rows: imported.lost_rows,
+        };
+        return print_json(&imported, out);
+    }
     let (to, textures, slides) = (to.display(), imported.textures, imported.slides);
     writeln!(out, "{to}: {textures} textures, {slides} slides")?;
     if imported.lost_rows > 0 {

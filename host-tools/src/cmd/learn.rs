@@ -4,14 +4,18 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context as _, ensure};
+use serde::Serialize;
 use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::MeasuredSlide;
 use tactus::eval::evaluate::Method;
+use tactus::eval::show::count;
 use tactus::sim::collection::texture_name;
 use tactus_core::features::{FeatureSet, Movement, Observation};
+use tactus_core::table::Table;
 
 use super::args::{Features, Recordings};
-use super::table_file::write_table;
+use super::output::{Format, print_json};
+use super::table_file::{TableFile, write_table};
 use super::textures::{collection, measure_folder, names};
 
 /// Learn a texture table from the first slides of every texture
@@ -36,6 +40,33 @@ pub(crate) struct Args {
     /// The file to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// How to print what was learned
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What `learn` and `learn-by-hand` print as JSON.
+#[derive(Serialize)]
+struct Learned {
+    #[serde(flatten)]
+    table: TableFile,
+    /// Slides of each texture and movement that were to be learned from.
+    train_slides: usize,
+    /// Textures that have fewer of a movement.
+    short: Vec<Short>,
+    /// Textures without a good slide.
+    left_out: Vec<String>,
+}
+
+/// A texture with fewer slides of a movement than were asked for.
+#[derive(Serialize)]
+struct Short {
+    texture: String,
+    force_n: f32,
+    speed_mm_s: f32,
+    slides: usize,
+    #[serde(skip)]
+    movement: Movement,
 }
 
 /// Learn a handheld probe's table from slides of a simulated hand
@@ -57,15 +88,43 @@ pub(crate) struct ByHand {
     /// Another seed is another world, and another hand
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// How to print what was learned
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 /// Learns a table from recordings.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let (set, measured) = measure_folder(&args.from.recordings)?;
+    let folder = args.from.folder()?;
+    let (set, measured) = measure_folder(&folder)?;
     let features = args.features.map(Features::set);
     let bytes = learn_first(&set, &measured, args.train_slides, args.method, features)
-        .with_context(|| args.from.recordings.display().to_string())?;
+        .with_context(|| folder.display().to_string())?;
     write_table(&args.out, &bytes)?;
+    let mut short = Vec::new();
+    for (texture, measured) in set.textures().iter().zip(&measured) {
+        for movement in set.movements() {
+            let slides = measured.iter().filter(|s| s.movement == movement).count();
+            if slides < args.train_slides {
+                short.push(Short {
+                    texture: texture.name.clone(),
+                    force_n: movement.force_n(),
+                    speed_mm_s: movement.speed_mm_s(),
+                    slides,
+                    movement,
+                });
+            }
+        }
+    }
+    let learned = Learned {
+        table: TableFile::new(&args.out, Table::read(&bytes)?),
+        train_slides: args.train_slides,
+        short,
+        left_out: Vec::new(),
+    };
+    if args.format == Format::Json {
+        return print_json(&learned, out);
+    }
     writeln!(
         out,
         "{}: {} textures learned from the first {} slides of each, {} bytes",
@@ -74,13 +133,9 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         args.train_slides,
         bytes.len()
     )?;
-    for (texture, measured) in set.textures().iter().zip(&measured) {
-        for movement in set.movements() {
-            let there = measured.iter().filter(|s| s.movement == movement).count();
-            if there < args.train_slides {
-                writeln!(out, "{}, {movement}: only {there} slides", texture.name)?;
-            }
-        }
+    for short in &learned.short {
+        let slides = count(short.slides as u64, "slide");
+        writeln!(out, "{}, {}: only {slides}", short.texture, short.movement)?;
     }
     Ok(())
 }
@@ -90,20 +145,26 @@ pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()>
     let collection = collection(&args.textures, args.trials, args.seed)?;
     let (bytes, left_out) = tactus::sim::handheld::learn(&collection)?;
     write_table(&args.out, &bytes)?;
+    let left_out = left_out.into_iter().map(|n| texture_name(n).to_owned());
+    let learned = Learned {
+        table: TableFile::new(&args.out, Table::read(&bytes)?),
+        train_slides: args.trials as usize,
+        short: Vec::new(),
+        left_out: left_out.collect(),
+    };
+    if args.format == Format::Json {
+        return print_json(&learned, out);
+    }
     writeln!(
         out,
         "{}: {} textures learned from {} slides of each by hand, {} bytes",
         args.out.display(),
-        collection.textures.len() - left_out.len(),
+        collection.textures.len() - learned.left_out.len(),
         args.trials,
         bytes.len()
     )?;
-    for number in left_out {
-        writeln!(
-            out,
-            "left out, no good slide of it: {}",
-            texture_name(number)
-        )?;
+    for name in &learned.left_out {
+        writeln!(out, "left out, no good slide of it: {name}")?;
     }
     Ok(())
 }

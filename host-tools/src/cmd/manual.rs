@@ -31,8 +31,15 @@ pub(crate) struct Man {
 }
 
 /// Writes completions of a command for a shell.
-pub(crate) fn completions(args: &Completions, mut command: Command, out: &mut impl Write) {
-    clap_complete::generate(args.shell, &mut command, "tactus", out);
+pub(crate) fn completions(
+    args: &Completions,
+    mut command: Command,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    // it panics where it cannot write, as into a pipe that nobody reads any more
+    let mut text = Vec::new();
+    clap_complete::generate(args.shell, &mut command, "tactus", &mut text);
+    out.write_all(&text)
 }
 
 /// Writes a page for a command and each below it into a folder, or the first one to `out`.

@@ -5,6 +5,20 @@ use std::io::Write;
 use clap::ValueEnum;
 use serde::Serialize;
 
+/// How a command ended that did what it was to do.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Done {
+    /// With all that was asked for.
+    Fully,
+    /// An exploration without a name that is sure.
+    NotIdentified,
+}
+
+/// Arguments that make no sense together, as clap says it.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}\n\nFor more information, try '--help'.")]
+pub(crate) struct UsageError(pub(crate) String);
+
 /// For whom figures are printed.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Format {

@@ -3,10 +3,12 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+use serde::Serialize;
 use tactus::data::recording::{Recording, Texture};
 use tactus::data::recordings::RecordingWriter;
 use tactus::sim::collection::{Collection, calibrated, texture_name};
 
+use super::output::{Format, print_json};
 use super::progress::with_progress;
 use super::textures::collection;
 
@@ -28,6 +30,18 @@ pub(crate) struct Args {
     trials: u32,
     /// Another seed is another world: other textures of the same names
     #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// How to print what was written
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What `simulate --format json` prints.
+#[derive(Serialize)]
+struct Simulated {
+    folder: String,
+    textures: usize,
+    slides: u64,
     seed: u64,
 }
 
@@ -59,6 +73,15 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         anyhow::Ok(())
     })?;
     writer.finish()?;
+    if args.format == Format::Json {
+        let simulated = Simulated {
+            folder: args.out.display().to_string(),
+            textures,
+            slides,
+            seed: args.seed,
+        };
+        return print_json(&simulated, out);
+    }
     let (folder, seed) = (args.out.display(), args.seed);
     writeln!(
         out,

@@ -4,9 +4,11 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Subcommand;
-use tactus::eval::show::show_table;
+use tactus::eval::show::{count, show_table};
+use tactus::eval::table_summary::TableSummary;
 
-use super::table_file::read_table;
+use super::output::{Format, print_json};
+use super::table_file::{TableFile, read_table};
 
 /// Look into a texture table
 #[derive(Subcommand)]
@@ -19,11 +21,17 @@ pub(crate) enum Command {
     Show {
         /// The table
         file: PathBuf,
+        /// How to print it
+        #[arg(long, value_enum, default_value_t = Format::Text)]
+        format: Format,
     },
     /// Check the table, and say which check fails
     Check {
         /// The table
         file: PathBuf,
+        /// How to print that it is good
+        #[arg(long, value_enum, default_value_t = Format::Text)]
+        format: Format,
     },
 }
 
@@ -31,18 +39,27 @@ pub(crate) enum Command {
 pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()> {
     let mut bytes = Vec::new();
     match command {
-        Command::Show { file } => show_table(read_table(file, &mut bytes)?, out)?,
-        Command::Check { file } => {
+        Command::Show { file, format } => {
             let table = read_table(file, &mut bytes)?;
-            writeln!(
-                out,
-                "{}: good; {} textures, {} movements, {} bytes, checksum {:08x}",
-                file.display(),
-                table.textures(),
-                table.movements().len(),
-                table.as_bytes().len(),
-                table.crc()
-            )?;
+            match format {
+                Format::Text => show_table(table, out)?,
+                Format::Json => print_json(&TableSummary::new(table), out)?,
+            }
+        }
+        Command::Check { file, format } => {
+            let table = read_table(file, &mut bytes)?;
+            match format {
+                Format::Text => writeln!(
+                    out,
+                    "{}: good; {}, {}, {} bytes, checksum {:08x}",
+                    file.display(),
+                    count(table.textures(), "texture"),
+                    count(table.movements().len() as u64, "movement"),
+                    table.as_bytes().len(),
+                    table.crc()
+                )?,
+                Format::Json => print_json(&TableFile::new(file, table), out)?,
+            }
         }
     }
     Ok(())

@@ -4,10 +4,34 @@ use std::io::Read as _;
 use std::path::Path;
 
 use anyhow::{Context as _, ensure};
+use serde::Serialize;
 use tactus_core::table::Table;
 
 /// Most bytes of a table that are read: more textures and movements than a table can have.
 const MAX_BYTES: u64 = 64 << 20;
+
+/// A good table file, for programs.
+#[derive(Serialize)]
+pub(crate) struct TableFile {
+    file: String,
+    textures: u16,
+    movements: usize,
+    bytes: usize,
+    /// CRC-32, in hexadecimal digits.
+    checksum: String,
+}
+
+impl TableFile {
+    pub(crate) fn new(file: &Path, table: Table<'_>) -> Self {
+        Self {
+            file: file.display().to_string(),
+            textures: table.textures(),
+            movements: table.movements().len(),
+            bytes: table.as_bytes().len(),
+            checksum: format!("{:08x}", table.crc()),
+        }
+    }
+}
 
 /// An old table is replaced whole or not at all.
 pub(crate) fn write_table(file: &Path, bytes: &[u8]) -> anyhow::Result<()> {

@@ -8,6 +8,7 @@ use tactus::data::replay::{MeasuredSlide, measure_all};
 use tactus::sim::collection::{Collection, texture_number};
 use tactus::sim::textures::TEXTURES;
 
+use super::names::{nearest, unknown};
 use super::progress::with_progress;
 
 /// Opens a folder and measures all of its slides.
@@ -36,9 +37,16 @@ pub(crate) fn find_material(set: &RecordingSet, wanted: &str) -> anyhow::Result<
         .position(|t| t.name.eq_ignore_ascii_case(wanted));
     let numbered = || textures.iter().position(|t| Some(t.id) == number);
     named.or_else(numbered).with_context(|| {
-        let known = textures.iter().map(|t| format!("{} {}", t.id, t.name));
-        let (folder, known) = (set.folder().display(), known.collect::<Vec<_>>().join(", "));
-        format!("--material {wanted}: not in {folder}, which has: {known}")
+        let folder = set.folder().display();
+        let names: Vec<&str> = textures.iter().map(|t| t.name.as_str()).collect();
+        match nearest(wanted, &names) {
+            Some(name) => format!("--material {wanted}: not in {folder}; did you mean {name}?"),
+            None => {
+                let known = textures.iter().map(|t| format!("{} {}", t.id, t.name));
+                let known = known.collect::<Vec<_>>().join(", ");
+                format!("--material {wanted}: not in {folder}, which has: {known}")
+            }
+        }
     })
 }
 
@@ -48,11 +56,8 @@ pub(crate) fn find_textures(wanted: &[String]) -> anyhow::Result<Vec<u8>> {
         return Ok(TEXTURES.iter().map(|t| t.number).collect());
     }
     let number = |name: &String| {
-        texture_number(name.trim()).with_context(|| {
-            let known: Vec<&str> = TEXTURES.iter().map(|t| t.name).collect();
-            let known = known.join(", ");
-            format!("no texture {name} in Table 1, which has: {known}")
-        })
+        texture_number(name.trim())
+            .with_context(|| unknown(name.trim(), TEXTURES.iter().map(|t| t.name)))
     };
     wanted.iter().map(number).collect()
 }

@@ -264,13 +264,10 @@ impl<'t, W: Write> Show<'t, W> {
     pub fn finish(mut self, verdict: Verdict, slides: u8, truth: &str) -> io::Result<()> {
         std::mem::replace(&mut self.failed, Ok(()))?;
         self.answer(verdict, slides)?;
-        let name = self.table.name(verdict.texture).unwrap_or("?");
-        let is_known = self.table.find(truth).is_some();
-        match verdict.told() {
-            Told::Sure if name == truth => writeln!(self.out, "Right."),
-            Told::New if !is_known => writeln!(self.out, "Right."),
-            Told::Sure | Told::New => writeln!(self.out, "Wrong: it was {truth}."),
-            Told::Undecided => writeln!(self.out, "Undecided: it was {truth}."),
+        match is_right(verdict, truth, self.table) {
+            Some(true) => writeln!(self.out, "Right."),
+            Some(false) => writeln!(self.out, "Wrong: it was {truth}."),
+            None => writeln!(self.out, "Undecided: it was {truth}."),
         }
     }
 
@@ -278,7 +275,7 @@ impl<'t, W: Write> Show<'t, W> {
     fn answer(&mut self, verdict: Verdict, slides: u8) -> io::Result<()> {
         let name = self.table.name(verdict.texture).unwrap_or("?");
         let p = verdict.probability * 100.0;
-        let slides = format!("{slides} slide{}", if slides == 1 { "" } else { "s" });
+        let slides = count(slides, "slide");
         match verdict.told() {
             Told::New => {
                 let odds = verdict
@@ -299,6 +296,23 @@ impl<'t, W: Write> Show<'t, W> {
     }
 }
 
+/// A number of things: "1 movement", "3 movements".
+pub fn count(number: impl Into<u64>, thing: &str) -> String {
+    match number.into() {
+        1 => format!("1 {thing}"),
+        number => format!("{number} {thing}s"),
+    }
+}
+
+/// Whether a verdict is right about the texture of this name; `None` where it is undecided.
+pub fn is_right(verdict: Verdict, truth: &str, table: Table<'_>) -> Option<bool> {
+    match verdict.told() {
+        Told::Sure => Some(table.name(verdict.texture) == Some(truth)),
+        Told::New => Some(table.find(truth).is_none()),
+        Told::Undecided => None,
+    }
+}
+
 /// Prints what a table holds.
 ///
 /// # Errors
@@ -306,9 +320,9 @@ impl<'t, W: Write> Show<'t, W> {
 pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
     writeln!(
         out,
-        "{} textures, {} movements, {} bytes, checksum {:08x}",
-        table.textures(),
-        table.movements().len(),
+        "{}, {}, {} bytes, checksum {:08x}",
+        count(table.textures(), "texture"),
+        count(table.movements().len() as u64, "movement"),
         table.as_bytes().len(),
         table.crc()
     )?;
@@ -385,7 +399,7 @@ fn show_whitened(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
 }
 
 /// How far the means of two textures are apart at a movement, in standard deviations within a texture.
-fn apart(table: Table<'_>, movement: u8, textures: [u16; 2]) -> Option<f32> {
+pub(super) fn apart(table: Table<'_>, movement: u8, textures: [u16; 2]) -> Option<f32> {
     if textures
         .iter()
         .any(|&texture| table.trials(texture, movement) == 0)

@@ -24,7 +24,7 @@ const STARTING: Duration = Duration::from_secs(120);
 /// Which probe.
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct Where {
-    /// Its serial port, or tcp:HOST:PORT; the only NUCLEO that is plugged in, unless given
+    /// Its serial port, or HOST:PORT; that of TACTUS_PORT or the only NUCLEO that is plugged in, unless given
     #[arg(long, value_name = "PORT", conflicts_with = "emulated")]
     pub(crate) port: Option<String>,
     /// Start the emulated board with the real firmware, and end it afterwards
@@ -209,12 +209,15 @@ impl Where {
                 owner: None,
             });
         }
-        let name = match &self.port {
-            Some(port) => port.clone(),
+        let named = || std::env::var("TACTUS_PORT").ok().filter(|p| !p.is_empty());
+        let name = match self.port.clone().or_else(named) {
+            Some(port) => port,
             None => only_nucleo(found())?,
         };
-        let owner = Some(Owner::take(&name)?);
-        let line = match name.strip_prefix("tcp:") {
+        // however its address was written
+        let same = tcp_address(&name).map(|address| format!("tcp:{address}"));
+        let owner = Some(Owner::take(same.as_ref().unwrap_or(&name))?);
+        let line = match tcp_address(&name) {
             Some(address) => tcp(address)?,
             None => serial(&name)?,
         };
@@ -234,6 +237,15 @@ fn only_nucleo(found: Vec<Found>) -> Result<String, OpenError> {
         1 => Ok(nucleos.remove(0).name),
         _ => Err(OpenError::Several(nucleos)),
     }
+}
+
+/// The address in "tcp:HOST:PORT" or in "HOST:PORT", which no serial port is called.
+fn tcp_address(name: &str) -> Option<&str> {
+    name.strip_prefix("tcp:").or_else(|| {
+        let (host, port) = name.rsplit_once(':')?;
+        let is_address = !host.is_empty() && port.parse::<u16>().is_ok();
+        (is_address && !Path::new(name).exists()).then_some(name)
+    })
 }
 
 fn serial(port: &str) -> Result<Box<dyn Line>, OpenError> {
@@ -402,6 +414,23 @@ mod tests {
         Found {
             name: name.into(),
             usb: Some(usb),
+        }
+    }
+
+    #[test]
+    fn an_address_is_no_serial_port() {
+        for (name, address) in [
+            ("tcp:127.0.0.1:7429", Some("127.0.0.1:7429")),
+            ("127.0.0.1:7429", Some("127.0.0.1:7429")),
+            ("bench.local:7429", Some("bench.local:7429")),
+            ("[::1]:7429", Some("[::1]:7429")),
+            ("/dev/ttyACM0", None),
+            ("COM3", None),
+            ("COM3:", None),
+            (":7429", None),
+            ("host:99999", None),
+        ] {
+            assert_eq!(tcp_address(name), address, "{name}");
         }
     }
 

@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::Context as _;
 use clap::ValueEnum;
 use tactus::data::fabricslide::FabricSet;
 use tactus::data::properties::PropertyTable;
 use tactus::eval::evaluate::Method;
 use tactus::eval::experiment::{Experiment, Protocol};
 
-use crate::cmd::args::{Features, Stop};
+use crate::cmd::args::{Features, Recordings, Stop};
 use crate::cmd::output::Format;
 use crate::cmd::textures::{measure_folder, names};
 
@@ -42,9 +42,8 @@ Examples:
   tactus evaluate --recordings DIR --novelty leave-one-out
   tactus evaluate --recordings DIR --lifelong")]
 pub(crate) struct Args {
-    /// Folder of recordings
-    #[arg(long, value_name = "DIR", required_unless_present_any = ["properties", "fabrics"])]
-    pub(crate) recordings: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) from: Recordings,
     /// CSV file of properties in place of recordings
     #[arg(long, value_name = "FILE", conflicts_with_all = ["recordings", "fabrics"])]
     pub(crate) properties: Option<PathBuf>,
@@ -55,7 +54,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", default_value_t = 1, requires = "fabrics", value_parser = clap::value_parser!(u8).range(1..=2))]
     pub(crate) repetition: u8,
     /// Folder to take the test slides from; training slides still come from --recordings
-    #[arg(long, value_name = "DIR", requires = "recordings")]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["properties", "fabrics"])]
     pub(crate) test: Option<PathBuf>,
     /// How to decide and to choose the next movement
     #[arg(long, value_enum, default_value_t = Method::Fused)]
@@ -113,8 +112,8 @@ pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
         let experiment = Experiment::given(&set, args.train_slides, args.seed)
             .with_context(|| file.display().to_string())?;
         (experiment, "properties")
-    } else if let Some(folder) = &args.recordings {
-        let (set, measured) = measure_folder(folder)?;
+    } else {
+        let (set, measured) = measure_folder(&args.from.folder()?)?;
         let test = args.test.as_deref().map(measure_folder).transpose()?;
         let test = test.map(|(set, measured)| (names(&set), measured));
         let test = test
@@ -129,8 +128,6 @@ pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
             Protocol::Drift => "drift",
         };
         (experiment, protocol)
-    } else {
-        bail!("give --recordings, --properties or --fabrics");
     };
     let features = args.features.map(Features::set);
     Ok((experiment.with_features(features), name))

@@ -1,0 +1,128 @@
+//! What a table holds, as one object for programs: the JSON of `tactus table show`.
+
+use serde::Serialize;
+use tactus_core::features::Property;
+use tactus_core::table::{Action, Contents, Table};
+
+use crate::eval::show::apart;
+
+/// A table.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct TableSummary {
+    /// Length of its binary form.
+    pub bytes: usize,
+    /// CRC-32 of it, in hexadecimal digits.
+    pub checksum: String,
+    /// What slides are compared by: the three properties, or a set of whitened features.
+    pub features: &'static str,
+    /// The movements.
+    pub movements: Vec<MovementSummary>,
+    /// The textures, in the order of the table.
+    pub textures: Vec<TextureSummary>,
+}
+
+/// A movement of a table.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct MovementSummary {
+    /// Contact force.
+    pub force_n: f32,
+    /// Speed.
+    pub speed_mm_s: f32,
+}
+
+/// A texture of a table.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct TextureSummary {
+    /// Its name.
+    pub name: String,
+    /// Slides that the factory learned it from, that a user taught, and that the probe learned by itself.
+    pub slides_factory: u32,
+    /// See [`Self::slides_factory`].
+    pub slides_user: u32,
+    /// See [`Self::slides_factory`].
+    pub slides_itself: u32,
+    /// What is known of it at each movement, in the order of the movements.
+    pub movements: Vec<KnownSummary>,
+}
+
+/// What is known of a texture at a movement.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct KnownSummary {
+    /// Slides it was learned from.
+    pub trials: u8,
+    /// Mean and standard deviation; `null` where it was not learned, as in a table of whitened features.
+    pub traction_n: Option<[f32; 2]>,
+    /// Mean and standard deviation of the logarithm.
+    pub roughness_ln: Option<[f32; 2]>,
+    /// Mean and standard deviation of the logarithm.
+    pub fineness_ln: Option<[f32; 2]>,
+    /// The texture that is most like it here, in a table of whitened features.
+    pub nearest: Option<String>,
+    /// How far the two are apart, in standard deviations within a texture.
+    pub nearest_sd: Option<f32>,
+}
+
+impl TableSummary {
+    /// Of a table.
+    pub fn new(table: Table<'_>) -> Self {
+        Self {
+            bytes: table.as_bytes().len(),
+            checksum: format!("{:08x}", table.crc()),
+            features: match table.contents() {
+                Contents::Gaussians(_) => "properties",
+                Contents::Fused(set, _) => set.name(),
+            },
+            movements: table
+                .movements()
+                .map(|movement| MovementSummary {
+                    force_n: movement.force_n(),
+                    speed_mm_s: movement.speed_mm_s(),
+                })
+                .collect(),
+            textures: (0..table.textures())
+                .map(|texture| TextureSummary::new(table, texture))
+                .collect(),
+        }
+    }
+}
+
+impl TextureSummary {
+    fn new(table: Table<'_>, texture: u16) -> Self {
+        let tally = table.tally(texture);
+        let movements = (0..).zip(table.movements());
+        Self {
+            name: table.name(texture).unwrap_or_default().to_owned(),
+            slides_factory: tally.factory.into(),
+            slides_user: tally.user.into(),
+            slides_itself: tally.itself.into(),
+            movements: movements
+                .map(|(movement, _)| KnownSummary::new(table, texture, movement))
+                .collect(),
+        }
+    }
+}
+
+impl KnownSummary {
+    fn new(table: Table<'_>, texture: u16, movement: u8) -> Self {
+        let gaussian = |property| {
+            let action = Action {
+                movement,
+                property: Some(property),
+            };
+            table.gaussian(texture, action).map(|g| [g.mean, g.sd])
+        };
+        let is_fused = matches!(table.contents(), Contents::Fused(..));
+        let others = (0..table.textures()).filter(|&other| is_fused && other != texture);
+        let nearest = others
+            .filter_map(|other| Some((apart(table, movement, [texture, other])?, other)))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        Self {
+            trials: table.trials(texture, movement),
+            traction_n: gaussian(Property::Traction),
+            roughness_ln: gaussian(Property::Roughness),
+            fineness_ln: gaussian(Property::Fineness),
+            nearest: nearest.and_then(|(_, other)| Some(table.name(other)?.to_owned())),
+            nearest_sd: nearest.map(|(sd, _)| sd),
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! An exploration as one object for programs: the JSON of `tactus identify`.
+
+use std::fmt::Display;
+
+use serde::Serialize;
+use tactus_core::explorer::{ExpectedOutcome, Told, Verdict};
+use tactus_core::features::{Measurement, Property};
+use tactus_core::probe::explore::ExplorationStep;
+use tactus_core::table::{Action, Table};
+
+/// Textures less probable than this are left out of a slide's posterior.
+const LISTED: f32 = 1e-6;
+
+/// The slides of an exploration, as they come.
+#[derive(Clone, PartialEq, Debug, Default, Serialize)]
+#[serde(transparent)]
+pub struct Transcript {
+    slides: Vec<SlideRecord>,
+}
+
+/// A slide: why it was made, what it measured, and what is known after it.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct SlideRecord {
+    /// Contact force of the movement.
+    pub force_n: Option<f32>,
+    /// Speed of the movement.
+    pub speed_mm_s: Option<f32>,
+    /// The one property that was looked at; `null` for all features.
+    pub property: Option<&'static str>,
+    /// Uncertainty that was expected after it (eq. 11), 0 to 1.
+    pub expected_uncertainty: Option<f32>,
+    /// Mean traction, N.
+    pub traction_n: Option<f32>,
+    /// Roughness, a logarithm.
+    pub roughness_ln: Option<f32>,
+    /// Whether the surface is at most as rough as that.
+    pub roughness_is_bound: bool,
+    /// Fineness, a logarithm.
+    pub fineness_ln: Option<f32>,
+    /// Why the slide does not count, if it does not.
+    pub rejected: Option<String>,
+    /// The textures after the slide, the most probable first.
+    pub posterior: Vec<Candidate>,
+}
+
+/// A texture and its posterior probability.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Candidate {
+    /// Name of the texture.
+    pub texture: String,
+    /// 0 to 1.
+    pub probability: f32,
+}
+
+/// What the user is told.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Answer {
+    /// `sure`, `new` or `undecided`.
+    pub told: &'static str,
+    /// The most probable texture; only with `sure` it is the answer.
+    pub texture: String,
+    /// Its posterior probability, 0 to 1.
+    pub probability: f32,
+    /// Log-odds that it is none of those known, where the method can tell.
+    pub log_odds: Option<f32>,
+    /// Slides that counted.
+    pub slides: u8,
+}
+
+impl Answer {
+    /// A verdict in words for programs.
+    pub fn new(verdict: Verdict, slides: u8, table: Table<'_>) -> Self {
+        Self {
+            told: match verdict.told() {
+                Told::Sure => "sure",
+                Told::New => "new",
+                Told::Undecided => "undecided",
+            },
+            texture: table.name(verdict.texture).unwrap_or_default().to_owned(),
+            probability: verdict.probability,
+            log_odds: verdict.log_odds,
+            slides,
+        }
+    }
+}
+
+impl Transcript {
+    /// Takes a step of an exploration with `table`.
+    pub fn step<E: Display>(&mut self, event: &ExplorationStep<'_, E>, table: Table<'_>) {
+        match event {
+            ExplorationStep::Chosen(action, expected) => {
+                self.slides.push(SlideRecord::new(*action, expected, table));
+            }
+            ExplorationStep::Measured(_, measurement, posterior) => {
+                if let Some(slide) = self.slides.last_mut() {
+                    slide.measured(measurement, posterior, table);
+                }
+            }
+            ExplorationStep::Rejected(_, why) => {
+                if let Some(slide) = self.slides.last_mut() {
+                    slide.rejected = Some(why.to_string());
+                }
+            }
+            // the answer is beside the slides: see [`Answer`]
+            ExplorationStep::Decided { .. } | ExplorationStep::CutShort(..) => {}
+        }
+    }
+}
+
+impl SlideRecord {
+    fn new(action: Action, expected: &[ExpectedOutcome], table: Table<'_>) -> Self {
+        let movement = table.movement(action.movement);
+        let chosen = expected.iter().find(|o| o.action == action);
+        Self {
+            force_n: movement.map(|movement| movement.force_n()),
+            speed_mm_s: movement.map(|movement| movement.speed_mm_s()),
+            property: action.property.map(Property::name),
+            expected_uncertainty: chosen.map(|chosen| chosen.uncertainty),
+            traction_n: None,
+            roughness_ln: None,
+            roughness_is_bound: false,
+            fineness_ln: None,
+            rejected: None,
+            posterior: Vec::new(),
+        }
+    }
+
+    fn measured(&mut self, measurement: &Measurement, posterior: &[f32], table: Table<'_>) {
+        let value = |property| measurement.properties.get(property);
+        self.traction_n = value(Property::Traction);
+        self.roughness_ln = value(Property::Roughness);
+        self.roughness_is_bound = measurement.roughness_is_bound;
+        self.fineness_ln = value(Property::Fineness);
+        let candidates = table.names().zip(posterior);
+        self.posterior = candidates
+            .filter(|(_, probability)| **probability >= LISTED)
+            .map(|(name, &probability)| Candidate {
+                texture: name.to_owned(),
+                probability,
+            })
+            .collect();
+        self.posterior
+            .sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    }
+}

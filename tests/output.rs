@@ -1,0 +1,253 @@
+//! What commands print for programs, how they end, and what they make of names, folders and ports.
+
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+const SIMULATED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+
+fn command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    command
+        .args(arguments)
+        .env_remove("TACTUS_RECORDINGS")
+        .env_remove("TACTUS_PORT");
+    command
+}
+
+fn tactus(arguments: &[&str]) -> Output {
+    command(arguments).output().unwrap()
+}
+
+/// The object that a command printed which ends with this code.
+fn json(arguments: &[&str], code: i32) -> serde_json::Value {
+    let out = tactus(arguments);
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(code), "{arguments:?}: {said}");
+    serde_json::from_slice(&out.stdout).unwrap()
+}
+
+fn said(arguments: &[&str], code: i32) -> String {
+    let out = tactus(arguments);
+    let said = String::from_utf8(out.stderr).unwrap();
+    assert_eq!(out.status.code(), Some(code), "{arguments:?}: {said}");
+    said
+}
+
+fn path(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+#[test]
+fn an_exploration_is_one_object() {
+    let identify = [
+        "identify",
+        "--recordings",
+        SIMULATED,
+        "--material",
+        "corduroy",
+        "--train-slides",
+        "2",
+        "--format",
+        "json",
+    ];
+    let found = json(&identify, 0);
+    assert_eq!(found["presented"], "Corduroy");
+    assert_eq!(
+        (&found["right"], &found["known"]),
+        (&true.into(), &true.into())
+    );
+    assert_eq!(found["verdict"]["told"], "sure");
+    assert_eq!(found["verdict"]["texture"], "Corduroy");
+    let slides = found["slides"].as_array().unwrap();
+    assert_eq!(
+        slides.len() as u64,
+        found["verdict"]["slides"].as_u64().unwrap()
+    );
+    for slide in slides {
+        for field in [
+            "force_n",
+            "speed_mm_s",
+            "traction_n",
+            "roughness_ln",
+            "fineness_ln",
+            "expected_uncertainty",
+        ] {
+            assert!(slide[field].is_number(), "{field}: {slide}");
+        }
+        let posterior = slide["posterior"].as_array().unwrap();
+        let sum: f64 = posterior
+            .iter()
+            .map(|p| p["probability"].as_f64().unwrap())
+            .sum();
+        assert!((sum - 1.0).abs() < 1e-3, "{slide}");
+    }
+    // not sure: 3, and the object is whole all the same
+    let strict: Vec<&str> = identify.into_iter().chain(["--threshold", "1"]).collect();
+    let found = json(&strict, 3);
+    assert_eq!(found["verdict"]["told"], "undecided");
+    assert!(found["right"].is_null());
+    let found = json(
+        &[
+            "identify",
+            "--simulated",
+            "--among",
+            "3",
+            "--train-slides",
+            "2",
+            "--format",
+            "json",
+        ],
+        0,
+    );
+    assert!(found["rig_s"].as_f64().unwrap() > 1.0 && found["skin_j"].is_number());
+}
+
+#[test]
+fn tables_and_features_are_objects() {
+    let temp = tempfile::tempdir().unwrap();
+    let file = temp.path().join("table");
+    let learn = [
+        "learn",
+        "--recordings",
+        SIMULATED,
+        "--out",
+        path(&file),
+        "--format",
+        "json",
+    ];
+    // five slides are asked for by default, and there are three
+    let learned = json(&learn, 0);
+    assert_eq!(learned["textures"], 6);
+    assert_eq!(learned["short"].as_array().unwrap().len(), 18);
+    assert_eq!(learned["short"][0]["slides"], 3);
+    let shown = json(&["table", "show", path(&file), "--format", "json"], 0);
+    assert_eq!(shown["checksum"], learned["checksum"]);
+    assert_eq!(shown["movements"].as_array().unwrap().len(), 3);
+    let texture = &shown["textures"][0];
+    assert_eq!(texture["movements"][0]["trials"], 3);
+    assert!(texture["movements"][0]["nearest_sd"].as_f64().unwrap() > 0.0);
+    let checked = json(&["table", "check", path(&file), "--format", "json"], 0);
+    assert_eq!(checked["checksum"], learned["checksum"]);
+    let known = json(&["textures", "--table", path(&file), "--format", "json"], 0);
+    assert_eq!(known.as_array().unwrap().len(), 6);
+
+    let features = tactus(&["features", "--recordings", SIMULATED, "--format", "json"]);
+    let lines = String::from_utf8(features.stdout).unwrap();
+    let lines: Vec<serde_json::Value> = lines
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(lines.len(), 54);
+    assert_eq!(lines[1]["trial"], 2);
+    assert!((lines[0]["force_n"].as_f64().unwrap() - 1.262).abs() < 1e-3);
+    let csv = tactus(&["features", "--recordings", SIMULATED, "--format", "csv"]);
+    let csv = String::from_utf8(csv.stdout).unwrap();
+    assert!(
+        csv.lines()
+            .nth(2)
+            .unwrap()
+            .ends_with(",Computer paper,1.262,10.000,2"),
+        "{csv}"
+    );
+}
+
+#[test]
+fn names_are_found_whatever_their_case_and_slips_are_named() {
+    let identify = |material| {
+        [
+            "identify",
+            "--recordings",
+            SIMULATED,
+            "--train-slides",
+            "2",
+            "--material",
+            material,
+        ]
+    };
+    assert_eq!(tactus(&identify("CORDUROY")).status.code(), Some(0));
+    assert!(said(&identify("cordoroy"), 1).contains("did you mean Corduroy?"));
+    let simulated = ["identify", "--simulated", "--texture", "burlpa"];
+    assert!(said(&simulated, 1).contains("did you mean Burlap?"));
+    let textures = String::from_utf8(tactus(&["textures"]).stdout).unwrap();
+    assert_eq!(textures.lines().count(), 117);
+    assert!(textures.contains("  1 Computer paper"));
+    let recorded = tactus(&["textures", "--recordings", SIMULATED]).stdout;
+    assert_eq!(String::from_utf8(recorded).unwrap().lines().count(), 6);
+}
+
+#[test]
+fn the_environment_names_the_recordings_and_the_port() {
+    let features = command(&["features", "--format", "csv"])
+        .env("TACTUS_RECORDINGS", SIMULATED)
+        .output()
+        .unwrap();
+    assert_eq!(
+        String::from_utf8(features.stdout).unwrap().lines().count(),
+        55
+    );
+    for arguments in [
+        &["features"][..],
+        &["evaluate"],
+        &["identify", "--material", "1"],
+    ] {
+        let said = said(arguments, 2);
+        assert!(
+            said.contains("--recordings") && said.contains("TACTUS_RECORDINGS"),
+            "{said}"
+        );
+    }
+    // it does not stand in the way of what was asked for
+    let simulated = command(&["evaluate", "--properties", "no/such/file"])
+        .env("TACTUS_RECORDINGS", SIMULATED)
+        .output()
+        .unwrap();
+    assert!(
+        String::from_utf8(simulated.stderr)
+            .unwrap()
+            .contains("no/such/file")
+    );
+    // nobody is there, but it is understood
+    let status = command(&["device", "status"])
+        .env("TACTUS_PORT", "127.0.0.1:1")
+        .output()
+        .unwrap();
+    let said = String::from_utf8(status.stderr).unwrap();
+    assert!(
+        said.contains("127.0.0.1:1") && said.contains("emulated board"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_closed_pipe_ends_completions_quietly() {
+    let mut child = command(&["completions", "bash"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let out = child.wait_with_output().unwrap();
+    assert!(out.status.success());
+    assert_eq!(String::from_utf8_lossy(&out.stderr), "");
+}
+
+#[test]
+fn figures_are_written_for_people() {
+    let evaluate = [
+        "evaluate",
+        "--recordings",
+        SIMULATED,
+        "--train-slides",
+        "2",
+        "--runs",
+        "20",
+        "--threshold",
+        "0.3",
+    ];
+    let shown = String::from_utf8(tactus(&evaluate).stdout).unwrap();
+    assert!(shown.contains("threshold 30 %,"), "{shown}");
+    let help = String::from_utf8(tactus(&["--help"]).stdout).unwrap();
+    for part in ["Exit codes", "3 not identified", "TACTUS_PORT"] {
+        assert!(help.contains(part), "{help}");
+    }
+}
