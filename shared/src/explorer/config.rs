@@ -103,9 +103,10 @@ impl Config {
 }
 
 /// Why an exploration cannot begin.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum ExplorerError {
     /// The table has more textures than the explorer has room for.
+    #[error("the table has {textures} textures, and there is room for {capacity}")]
     NoSpace {
         /// Textures of the table.
         textures: u16,
@@ -113,68 +114,44 @@ pub enum ExplorerError {
         capacity: usize,
     },
     /// A candidate that the table does not have, or none at all.
+    #[error("the candidates are not textures of the table")]
     Candidates,
     /// No property that the rig measures was learned of every candidate, at least twice, at any one movement.
+    #[error(
+        "no property that this rig measures was learned of every candidate at one movement, from two trials or more"
+    )]
     NothingToMeasure,
     /// The rig does not measure the features that the table was learned from.
+    #[error("the table was learned from {}, and this rig does not measure them", .0.name())]
     Features(FeatureSet),
     /// The method cannot use this kind of table.
+    #[error(fmt = wrong_table)]
     Method(Method),
 }
 
-impl fmt::Display for ExplorerError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoSpace { textures, capacity } => write!(f, "the table has {textures} textures, and there is room for {capacity}"),
-            Self::Candidates => f.write_str("the candidates are not textures of the table"),
-            Self::NothingToMeasure => f.write_str(
-                "no property that this rig measures was learned of every candidate at one movement, from two trials or more",
-            ),
-            Self::Features(set) => write!(
-                f,
-                "the table was learned from {}, and this rig does not measure them",
-                set.name()
-            ),
-            Self::Method(Method::Fused) => f.write_str(
-                "the method fused needs a table with whitened features; learn one, or take student-all",
-            ),
-            Self::Method(method) => write!(
-                f,
-                "the method {} needs a table of the three properties; this one is for the method fused",
-                method.name()
-            ),
-        }
+fn wrong_table(method: &Method, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    match method {
+        Method::Fused => f.write_str(
+            "the method fused needs a table with whitened features; learn one, or take student-all",
+        ),
+        method => write!(
+            f,
+            "the method {} needs a table of the three properties; this one is for the method fused",
+            method.name()
+        ),
     }
 }
-
-impl core::error::Error for ExplorerError {}
 
 /// Why a slide was not used. The exploration stands as it was.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 pub enum ObserveError {
     /// The slide has no such property, or it is not a finite number.
+    #[error("the slide did not give a value of {0}")]
     Missing(Property),
     /// The slide lacks one of the features of the table.
+    #[error("the slide did not give {}", .0.name())]
     Features(FeatureSet),
     /// The explorer does not know the action.
+    #[error("{} of movement {} is none of the actions", .0.what(), .0.movement + 1)]
     Action(Action),
 }
-
-impl fmt::Display for ObserveError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Missing(property) => write!(f, "the slide did not give a value of {property}"),
-            Self::Features(set) => write!(f, "the slide did not give {}", set.name()),
-            Self::Action(action) => {
-                write!(
-                    f,
-                    "{} of movement {} is none of the actions",
-                    action.what(),
-                    action.movement + 1
-                )
-            }
-        }
-    }
-}
-
-impl core::error::Error for ObserveError {}

@@ -16,34 +16,25 @@ pub struct Movement {
 }
 
 /// Why a force and a speed are no movement of this rig.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum MovementError {
     /// Contact force in mN outside [`Movement::FORCE_MN`].
+    #[error(
+        "contact force {} mN is outside {}..={} mN",
+        .0,
+        Movement::FORCE_MN.start(),
+        Movement::FORCE_MN.end()
+    )]
     Force(u32),
     /// Sliding speed in um/s outside [`Movement::SPEED_UM_S`].
+    #[error(
+        "sliding speed {} um/s is outside {}..={} um/s",
+        .0,
+        Movement::SPEED_UM_S.start(),
+        Movement::SPEED_UM_S.end()
+    )]
     Speed(u32),
 }
-
-impl fmt::Display for MovementError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Force(mn) => write!(
-                f,
-                "contact force {mn} mN is outside {}..={} mN",
-                Movement::FORCE_MN.start(),
-                Movement::FORCE_MN.end()
-            ),
-            Self::Speed(um_s) => write!(
-                f,
-                "sliding speed {um_s} um/s is outside {}..={} um/s",
-                Movement::SPEED_UM_S.start(),
-                Movement::SPEED_UM_S.end()
-            ),
-        }
-    }
-}
-
-impl core::error::Error for MovementError {}
 
 /// Force in mN and speed in um/s.
 impl TryFrom<(u16, u32)> for Movement {

@@ -2,7 +2,6 @@
 //!
 //! Everything streams: a slide is taken in blocks of any size, and nothing but the final logarithms waits for its end.
 
-use core::fmt;
 use core::marker::PhantomData;
 use core::ops::Range;
 
@@ -43,11 +42,13 @@ pub fn roughness(power: f32, background: f32) -> (f32, bool) {
 }
 
 /// Why a slide has no properties. A rig repeats such a slide.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum SlideError {
     /// The steady window was never set.
+    #[error("the slide never reached its steady part")]
     NotStarted,
     /// Samples arrived for only part of the steady window.
+    #[error("only {got} of {wanted} samples of the steady part arrived")]
     Unfinished {
         /// Samples of P_AC inside the window.
         got: u32,
@@ -55,41 +56,20 @@ pub enum SlideError {
         wanted: u32,
     },
     /// The steady window is shorter than one frame of the spectrum.
+    #[error(
+        "the steady part has {0} samples, and the spectrum needs {FRAME}: slide longer or slower"
+    )]
     TooShort(u32),
     /// The still finger was not measured before the slide, and its power is not known otherwise.
+    #[error("the background of the still finger was not measured")]
     NoBackground,
     /// P_AC does not move at all: no sensor, or one that hangs.
+    #[error("P_AC never changed: is the sensor connected?")]
     Silent,
     /// So many samples between the background and the end of the slide were lost.
+    #[error("{0} samples were lost")]
     Gap(u32),
 }
-
-impl fmt::Display for SlideError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotStarted => f.write_str("the slide never reached its steady part"),
-            Self::Unfinished { got, wanted } => {
-                write!(
-                    f,
-                    "only {got} of {wanted} samples of the steady part arrived"
-                )
-            }
-            Self::TooShort(got) => {
-                write!(
-                    f,
-                    "the steady part has {got} samples, and the spectrum needs {FRAME}: slide longer or slower"
-                )
-            }
-            Self::NoBackground => {
-                f.write_str("the background of the still finger was not measured")
-            }
-            Self::Silent => f.write_str("P_AC never changed: is the sensor connected?"),
-            Self::Gap(lost) => write!(f, "{lost} samples were lost"),
-        }
-    }
-}
-
-impl core::error::Error for SlideError {}
 
 /// One slide while its samples arrive, as [`Block`]s: the movement that makes it, what has come, and what was lost.
 #[derive(Clone, Debug)]
@@ -148,6 +128,8 @@ impl<'p, K: Kernels> Slide<'p, K> {
     /// Takes the next block of the movement: of the still finger, then of the slide, the first of which says which samples
     /// are at constant speed. What a block says is lost has nothing in its place, nor has a block that does not come: the
     /// slide has no properties then.
+    // one function on the chip: what moves samples in it is judged under its own name (xtask's reasons.rs)
+    #[inline(never)]
     pub fn take(&mut self, block: &Block) {
         let missing = u32::from(block.number.wrapping_sub(self.next)) * BLOCK as u32;
         self.next = block.number.wrapping_add(1);

@@ -1,7 +1,5 @@
 //! What the slides of an episode say: which textures of the table are the most probable.
 
-use core::fmt;
-
 use heapless::Vec;
 
 use crate::explorer::{
@@ -33,27 +31,18 @@ pub struct Judgement {
 }
 
 /// Why an episode cannot be judged.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 pub enum JudgeError {
     /// The table cannot be used by a handheld probe.
+    #[error(transparent)]
     Table(ExplorerError),
     /// A slide lacks what the table compares.
+    #[error(transparent)]
     Slide(ObserveError),
     /// The table has no movement.
+    #[error("the table has no movement")]
     Movement,
 }
-
-impl fmt::Display for JudgeError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Table(why) => why.fmt(f),
-            Self::Slide(why) => why.fmt(f),
-            Self::Movement => f.write_str("the table has no movement"),
-        }
-    }
-}
-
-impl core::error::Error for JudgeError {}
 
 /// Compares the slides of an episode with every texture of the table. Returns the judgement to show and the summary that
 /// the probe can learn from.

@@ -1,7 +1,5 @@
 //! An exploration: slide by slide, the explorer chooses, the rig moves, and the explorer takes in what was measured.
 
-use core::fmt;
-
 use crate::dsp::Plan;
 use crate::explorer::{ExpectedOutcome, Explorer, Kernels, ObserveError, Verdict};
 use crate::features::{Measurement, Observation, Slide, SlideError};
@@ -56,48 +54,32 @@ pub enum ExplorationStep<'a, E> {
 }
 
 /// Why a slide does not count.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 pub enum Rejection<E> {
     /// The rig did not make it.
+    #[error(transparent)]
     Rig(E),
     /// Its samples give no properties.
+    #[error(transparent)]
     Slide(SlideError),
     /// Its properties say nothing to the explorer.
+    #[error(transparent)]
     Observe(ObserveError),
 }
 
-impl<E: fmt::Display> fmt::Display for Rejection<E> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Rig(why) => why.fmt(f),
-            Self::Slide(why) => why.fmt(f),
-            Self::Observe(why) => why.fmt(f),
-        }
-    }
-}
-
 /// Why an exploration ended without an answer.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 pub enum ExploreError<E> {
     /// The rig failed, and a person is needed.
+    #[error(transparent)]
     Rig(E),
     /// [`MAX_REJECTED`] slides in a row came to nothing, or no movement is left, the last one for this reason.
+    #[error("no movement gives a good slide: {0}")]
     Rejected(Rejection<E>),
     /// The table has no such movement.
+    #[error("the table has no movement {}", .0 + 1)]
     Movement(u8),
 }
-
-impl<E: fmt::Display> fmt::Display for ExploreError<E> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Rig(why) => why.fmt(f),
-            Self::Rejected(why) => write!(f, "no movement gives a good slide: {why}"),
-            Self::Movement(index) => write!(f, "the table has no movement {}", index + 1),
-        }
-    }
-}
-
-impl<E: fmt::Debug + fmt::Display> core::error::Error for ExploreError<E> {}
 
 /// Explores from the beginning until there is an answer. A slide that comes to nothing is made again, then another movement
 /// is chosen; only a rig that cannot go on ends it, with what is known so far. `random` serves

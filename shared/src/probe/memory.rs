@@ -1,7 +1,5 @@
 //! What a probe knows: the store, and the table in force.
 
-use core::fmt;
-
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::seams::{Events, StoredBytes};
@@ -31,24 +29,15 @@ pub struct Memory<'m, F, B> {
 }
 
 /// Why nothing can be learned.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 pub enum MemoryError {
     /// The store could not be opened.
+    #[error("the store is broken: see the log")]
     Broken,
     /// There is no table to begin with: the firmware's own cannot be read.
+    #[error("there is no table: see the log")]
     NoTable,
 }
-
-impl fmt::Display for MemoryError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Broken => "the store is broken: see the log",
-            Self::NoTable => "there is no table: see the log",
-        })
-    }
-}
-
-impl core::error::Error for MemoryError {}
 
 /// The table that all learning begins with: the stored one, or the factory's.
 #[inline(never)]

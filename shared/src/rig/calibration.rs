@@ -123,37 +123,24 @@ impl RigCalibration {
 }
 
 /// Why a calibration is not used.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum RigCalibrationError {
     /// The fingertip's constants.
+    #[error(transparent)]
     Pressure(CalibrationError),
     /// The stage's constants.
+    #[error("the stage's current must be finite, and newtons per ampere above 0")]
     Current,
     /// The stored record has changed since it was written.
+    #[error("the stored calibration is damaged: calibrate again")]
     Damaged,
     /// Fewer than three points, or all at the same place.
+    #[error("a line takes three points or more, at different places")]
     Points,
     /// The points do not lie on a line: R^2 below 0.99.
+    #[error("the points do not lie on a line (R^2 below 0.99): measure again")]
     NoLine,
 }
-
-impl core::fmt::Display for RigCalibrationError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Pressure(why) => why.fmt(f),
-            Self::Current => {
-                f.write_str("the stage's current must be finite, and newtons per ampere above 0")
-            }
-            Self::Damaged => f.write_str("the stored calibration is damaged: calibrate again"),
-            Self::Points => f.write_str("a line takes three points or more, at different places"),
-            Self::NoLine => {
-                f.write_str("the points do not lie on a line (R^2 below 0.99): measure again")
-            }
-        }
-    }
-}
-
-impl core::error::Error for RigCalibrationError {}
 
 /// Contact force per count that a fingertip can have, mN: the paper's 11.5, half of it and twice as much (chosen).
 const PLAUSIBLE_MN: core::ops::RangeInclusive<f32> = 5.75..=23.0;

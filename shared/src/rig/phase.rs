@@ -1,7 +1,5 @@
 //! What the rig is doing, how a movement ended, and why one was not made.
 
-use core::fmt;
-
 use super::calibration::RigCalibrationError;
 use super::fault::Fault;
 use crate::features::{Movement, MovementError};
@@ -47,55 +45,47 @@ pub enum Ended {
 }
 
 /// Why a command is refused.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum Refused {
     /// Something else is being done.
+    #[error("the rig is busy; stop it first")]
     Busy,
     /// The positions of lever and stage are unknown: home first.
+    #[error("lever and stage do not know where they are; home them first")]
     NotHomed,
     /// A fault has to be reset first.
+    #[error("{}: {}", .0, .0.recovery())]
     Fault(Fault),
     /// The force is over what this rig may press.
+    #[error(
+        "{0} mN is more than this rig may press; {HIGH_FORCE_MN} mN unless high forces are allowed"
+    )]
     Force(u16),
     /// No speed of this stage, um/s.
+    #[error("{}", MovementError::Speed(*.0))]
     Speed(u32),
     /// The slide does not fit on the sample.
+    #[error("the slide does not fit on the sample")]
     Length,
     /// The constants cannot be used.
+    #[error(transparent)]
     Calibration(RigCalibrationError),
 }
 
-impl fmt::Display for Refused {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Busy => f.write_str("the rig is busy; stop it first"),
-            Self::NotHomed => {
-                f.write_str("lever and stage do not know where they are; home them first")
-            }
-            Self::Fault(fault) => write!(f, "{fault}: {}", fault.recovery()),
-            Self::Force(mn) => write!(
-                f,
-                "{mn} mN is more than this rig may press; {HIGH_FORCE_MN} mN unless high forces are allowed"
-            ),
-            Self::Speed(um_s) => MovementError::Speed(*um_s).fmt(f),
-            Self::Length => f.write_str("the slide does not fit on the sample"),
-            Self::Calibration(why) => why.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for Refused {}
-
 /// Why a rig with a stage and a lever did not make a movement.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum RigError {
     /// The movement was refused; nothing moved.
+    #[error(transparent)]
     Refused(Refused),
     /// A fault was seen: the stage stands and the finger is lifted, unless the fault is [`Fault::LeverNotHome`].
+    #[error("{}: {}", .0, .0.recovery())]
     Fault(Fault),
     /// It was stopped, and the finger is lifted.
+    #[error("stopped")]
     Stopped,
     /// It did not come to an end by itself, and was stopped: see [`super::timeout`].
+    #[error("the rig does not come to an end: home it")]
     Hangs,
 }
 
@@ -110,19 +100,6 @@ impl RigError {
         }
     }
 }
-
-impl fmt::Display for RigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Refused(why) => why.fmt(f),
-            Self::Fault(fault) => write!(f, "{fault}: {}", fault.recovery()),
-            Self::Stopped => f.write_str("stopped"),
-            Self::Hangs => f.write_str("the rig does not come to an end: home it"),
-        }
-    }
-}
-
-impl core::error::Error for RigError {}
 
 impl From<Refused> for RigError {
     fn from(why: Refused) -> Self {

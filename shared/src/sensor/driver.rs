@@ -11,7 +11,6 @@
 //!   [`Exchange::read`] at a tick at least [`Exchange::gap_us`] later, and give what came in to
 //!   [`PressureSensor::decode`].
 
-use core::fmt;
 use core::marker::PhantomData;
 use core::ops::RangeInclusive;
 
@@ -181,22 +180,12 @@ impl<S: PressureSensor, SPI: AsyncSpiDevice, D: AsyncDelayNs> Driver<S, SPI, D> 
 }
 
 /// Why there is no sample: the bus failed, or the sensor did.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum Error<B, S> {
     /// The bus or the chip select failed.
+    #[error("SPI bus failed: {0:?}")]
     Bus(B),
     /// The bus worked; the answer is not what the sensor should say.
+    #[error(transparent)]
     Sensor(S),
 }
-
-impl<B: fmt::Debug, S: fmt::Display> fmt::Display for Error<B, S> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            // errors of embedded-hal have no text of their own
-            Self::Bus(bus) => write!(f, "SPI bus failed: {bus:?}"),
-            Self::Sensor(sensor) => sensor.fmt(f),
-        }
-    }
-}
-
-impl<B: fmt::Debug, S: core::error::Error> core::error::Error for Error<B, S> {}

@@ -8,7 +8,6 @@
 //! The converter samples while it is read (data sheet DS21034, 5.1), the BioTac when it is asked: in split use the two
 //! differ by the gap, which shifts both channels alike.
 
-use core::fmt;
 use core::ops::RangeInclusive;
 
 use crate::sensor::driver::{Exchange, PressureSensor};
@@ -56,18 +55,9 @@ impl PressureSensor for Mcp3202 {
 /// The bit before the sample was 1: the converter does not drive the line.
 ///
 /// A line that is pulled low reads as 0 counts instead; [`Counts::is_clipped`] tells.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
+#[error("no converter answers (null bit is 1): check power, cable, chip select and SPI mode 0")]
 pub struct NullBit;
-
-impl fmt::Display for NullBit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(
-            "no converter answers (null bit is 1): check power, cable, chip select and SPI mode 0",
-        )
-    }
-}
-
-impl core::error::Error for NullBit {}
 
 #[cfg(test)]
 mod tests {

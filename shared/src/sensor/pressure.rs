@@ -4,8 +4,6 @@
 //! Words, parity and commands end at [`crate::sensor`]. From here on there are [`Counts`] of two channels and one
 //! [`Calibration`] record for each fingertip.
 
-use core::fmt;
-
 /// Samples of one channel in a second (Methods, "BioTac": both pressures are sampled at 2200 Hz).
 pub const RATE_HZ: u32 = 2200;
 /// Slots in a second: the channels take turns, see [`Channel::PATTERN`].
@@ -201,7 +199,10 @@ impl Calibration {
 }
 
 /// A force was asked for that P_DC cannot tell.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[error(
+    "contact force {force_mn} mN is beyond {linear_mn} mN, where the skin touches the core: ask for less"
+)]
 pub struct BeyondLinear {
     /// The force asked for, mN.
     pub force_mn: u16,
@@ -209,43 +210,22 @@ pub struct BeyondLinear {
     pub linear_mn: f32,
 }
 
-impl fmt::Display for BeyondLinear {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "contact force {} mN is beyond {} mN, where the skin touches the core: ask for less",
-            self.force_mn, self.linear_mn
-        )
-    }
-}
-
-impl core::error::Error for BeyondLinear {}
-
 /// What is wrong with a calibration record.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum CalibrationError {
     /// A scale, or the end of the linear range, is not a number above 0.
+    #[error("a scale of the calibration is not above 0: calibrate again")]
     Scale,
     /// P_AC at rest is outside the converter's range.
+    #[error("P_AC at rest is outside 0..4095 counts: measure it again without contact")]
     PacRest,
     /// P_DC without contact is outside the converter's range, or leaves too little of it for the linear range.
+    #[error(
+        "P_DC without contact leaves no room for the linear range below 4095 counts: \
+         lift the finger and measure it again; if it stays, the sensor is over-inflated or broken"
+    )]
     PdcNoContact,
 }
-
-impl fmt::Display for CalibrationError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Scale => "a scale of the calibration is not above 0: calibrate again",
-            Self::PacRest => "P_AC at rest is outside 0..4095 counts: measure it again without contact",
-            Self::PdcNoContact => {
-                "P_DC without contact leaves no room for the linear range below 4095 counts: \
-                 lift the finger and measure it again; if it stays, the sensor is over-inflated or broken"
-            }
-        })
-    }
-}
-
-impl core::error::Error for CalibrationError {}
 
 #[cfg(test)]
 mod tests {

@@ -1,7 +1,5 @@
 //! Why the store did not do what it was told.
 
-use core::fmt;
-
 use sequential_storage::Error;
 
 use super::layout::{SCHEMA, SECTORS};
@@ -9,13 +7,16 @@ use crate::rig::calibration::RigCalibrationError;
 use crate::table::TableError;
 
 /// Why the store did not do what it was told.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 pub enum StoreError<E> {
     /// The flash itself failed.
+    #[error("the flash failed: {0:?}")]
     Flash(E),
     /// The flash has fewer than four sectors.
+    #[error("{0} bytes of flash, and the store takes {SECTORS} sectors")]
     NoSpace(usize),
     /// The table does not fit into its sector.
+    #[error("the table takes {length} bytes, and there is room for {capacity}")]
     TooLong {
         /// Bytes of the table.
         length: usize,
@@ -23,8 +24,10 @@ pub enum StoreError<E> {
         capacity: usize,
     },
     /// No table is being written.
+    #[error("no table is being written: begin one")]
     NoTable,
     /// A part that does not follow on the one before, or that reaches beyond the length that was announced.
+    #[error("a part of the table at {offset}, and {wanted} comes next: send the table anew")]
     Part {
         /// Where it was to go.
         offset: usize,
@@ -32,6 +35,7 @@ pub enum StoreError<E> {
         wanted: usize,
     },
     /// The table was to be committed before all of it was there.
+    #[error("{got} of the {wanted} bytes of the table have come")]
     Unfinished {
         /// Bytes written.
         got: usize,
@@ -39,51 +43,21 @@ pub enum StoreError<E> {
         wanted: usize,
     },
     /// The buffer for reading the table back is smaller than the table.
+    #[error("reading the table back takes {0} bytes")]
     Buffer(usize),
     /// What was written does not read as a table.
+    #[error(transparent)]
     Table(TableError),
     /// The flash does not hold what was written to it: it is worn out.
+    #[error("the flash does not keep what was written: its sector is worn out")]
     Worn,
     /// The settings cannot be used.
+    #[error(transparent)]
     Settings(SettingsError),
     /// The calibration that is stored cannot be used.
+    #[error(transparent)]
     Calibration(RigCalibrationError),
 }
-
-impl<E: fmt::Debug> fmt::Display for StoreError<E> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Flash(why) => write!(f, "the flash failed: {why:?}"),
-            Self::NoSpace(bytes) => write!(
-                f,
-                "{bytes} bytes of flash, and the store takes {SECTORS} sectors"
-            ),
-            Self::TooLong { length, capacity } => {
-                write!(
-                    f,
-                    "the table takes {length} bytes, and there is room for {capacity}"
-                )
-            }
-            Self::NoTable => f.write_str("no table is being written: begin one"),
-            Self::Part { offset, wanted } => write!(
-                f,
-                "a part of the table at {offset}, and {wanted} comes next: send the table anew"
-            ),
-            Self::Unfinished { got, wanted } => {
-                write!(f, "{got} of the {wanted} bytes of the table have come")
-            }
-            Self::Buffer(wanted) => write!(f, "reading the table back takes {wanted} bytes"),
-            Self::Table(why) => why.fmt(f),
-            Self::Worn => {
-                f.write_str("the flash does not keep what was written: its sector is worn out")
-            }
-            Self::Settings(why) => why.fmt(f),
-            Self::Calibration(why) => why.fmt(f),
-        }
-    }
-}
-
-impl<E: fmt::Debug> core::error::Error for StoreError<E> {}
 
 impl<E> From<Error<E>> for StoreError<E> {
     fn from(why: Error<E>) -> Self {
@@ -102,31 +76,17 @@ impl<E> From<SettingsError> for StoreError<E> {
 }
 
 /// Why settings cannot be used.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum SettingsError {
     /// They cannot be read: erase them.
+    #[error("the settings are damaged: erase them, and calibrate again")]
     Corrupt,
     /// They were written by another version: erase them.
+    #[error(
+        "the settings are of version {0}, and this program knows {SCHEMA}: erase them, and calibrate again"
+    )]
     Schema(u16),
     /// No space for more progress of training: delete a texture.
+    #[error("no room for more unfinished training: finish or forget a texture")]
     Full,
 }
-
-impl fmt::Display for SettingsError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Corrupt => {
-                f.write_str("the settings are damaged: erase them, and calibrate again")
-            }
-            Self::Schema(found) => write!(
-                f,
-                "the settings are of version {found}, and this program knows {SCHEMA}: erase them, and calibrate again"
-            ),
-            Self::Full => {
-                f.write_str("no room for more unfinished training: finish or forget a texture")
-            }
-        }
-    }
-}
-
-impl core::error::Error for SettingsError {}

@@ -279,8 +279,9 @@ pub fn retell(
     let features = usize::from(features);
     let cell = usize::from(texture) * usize::from(table.movements) + usize::from(movement);
     let mut put = |at: usize, new: &[u8]| {
-        if let Some(buffer) = bytes.get_mut(at..at + new.len()) {
-            buffer.copy_from_slice(new);
+        // byte by byte: `copy_from_slice` has a panic that the compiler does not always see through
+        for (to, from) in bytes.iter_mut().skip(at).zip(new) {
+            *to = *from;
         }
     };
     for (mean, at) in whitened.mean.iter().take(features).zip((0..).step_by(2)) {

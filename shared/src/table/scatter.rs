@@ -1,7 +1,5 @@
 //! How slides and textures scatter, and the whitening that follows from it.
 
-use core::fmt;
-
 use heapless::Vec;
 
 use super::format::MAX_MOVEMENTS;
@@ -18,31 +16,18 @@ const SWEEPS: usize = 12;
 const LEAST_PIVOT: f64 = 1e-6;
 
 /// Why a whitening cannot be learned.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum WhitenError {
     /// No texture has two slides of this movement.
+    #[error("movement {}: no texture has two slides, and how slides of one texture differ takes two", .0 + 1)]
     Trials(u8),
     /// Slides have different numbers of features, or none.
+    #[error("the slides do not have the same features")]
     Features,
     /// No movement, or more than a table holds.
+    #[error("a table has 1 to {MAX_MOVEMENTS} movements")]
     Movements,
 }
-
-impl fmt::Display for WhitenError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Trials(movement) => write!(
-                f,
-                "movement {}: no texture has two slides, and how slides of one texture differ takes two",
-                movement + 1
-            ),
-            Self::Features => f.write_str("the slides do not have the same features"),
-            Self::Movements => write!(f, "a table has 1 to {MAX_MOVEMENTS} movements"),
-        }
-    }
-}
-
-impl core::error::Error for WhitenError {}
 
 type Square = [[f64; MAX_FEATURES]; MAX_FEATURES];
 

@@ -1,7 +1,5 @@
 //! Frames: a message in postcard's format, its CRC-32, both in COBS, and a closing 0.
 
-use core::fmt;
-
 use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::Vec;
 use serde::Serialize;
@@ -18,16 +16,9 @@ const CRC_BYTES: usize = 4;
 const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Why a message does not fit into a frame.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("the message is longer than {MAX_MESSAGE} bytes")]
 pub struct TooLong;
-
-impl fmt::Display for TooLong {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the message is longer than {MAX_MESSAGE} bytes")
-    }
-}
-
-impl core::error::Error for TooLong {}
 
 /// A frame of `message`, its closing 0 included, at the beginning of `buffer`.
 ///
@@ -57,30 +48,21 @@ pub fn encode<'r, M: Serialize>(
 }
 
 /// What is wrong with a frame.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum FrameError {
     /// More bytes without a 0 than any frame has.
+    #[error("the frame is too long")]
     TooLong,
     /// No COBS.
+    #[error("the frame is damaged (COBS)")]
     Cobs,
     /// The CRC differs.
+    #[error("the frame is damaged (CRC)")]
     Crc,
     /// Whole, and no message of this protocol.
+    #[error("the frame is no message: do both ends have the same version?")]
     Message,
 }
-
-impl fmt::Display for FrameError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::TooLong => "the frame is too long",
-            Self::Cobs => "the frame is damaged (COBS)",
-            Self::Crc => "the frame is damaged (CRC)",
-            Self::Message => "the frame is no message: do both ends have the same version?",
-        })
-    }
-}
-
-impl core::error::Error for FrameError {}
 
 /// The message in a frame without its closing 0; the frame is used up.
 ///

@@ -208,13 +208,16 @@ impl<SPI: AsyncSpiDevice, D: AsyncDelayNs> Driver<BioTac, SPI, D> {
 }
 
 /// Why the answer to a property is not one.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
 pub enum PropertyError {
     /// All bytes are 00 or all are FF.
+    #[error("no answer for the {0} (all 00 or FF): check power, cable and chip select")]
     NoAnswer(Property),
     /// The sensor reports an error.
+    #[error("sensor reports {1} when asked for its {0}")]
     ErrorFrame(Property, ErrorCode),
     /// `byte`, the one at index `at`, is no printable character, or comes after the text has ended.
+    #[error("{property} is not text (byte {at} is {byte:02X}): check SPI mode 0 and the clock")]
     NotText {
         /// The property that was read.
         property: Property,
@@ -224,32 +227,11 @@ pub enum PropertyError {
         byte: u8,
     },
     /// The serial number is text but does not begin with "BT".
+    #[error(
+        "serial number {0:?} does not begin with BT: something else answers on this chip select"
+    )]
     NotABioTac(Ascii<16>),
 }
-
-impl fmt::Display for PropertyError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoAnswer(property) => write!(
-                f,
-                "no answer for the {property} (all 00 or FF): check power, cable and chip select"
-            ),
-            Self::ErrorFrame(property, code) => {
-                write!(f, "sensor reports {code} when asked for its {property}")
-            }
-            Self::NotText { property, at, byte } => write!(
-                f,
-                "{property} is not text (byte {at} is {byte:02X}): check SPI mode 0 and the clock"
-            ),
-            Self::NotABioTac(serial) => write!(
-                f,
-                "serial number {serial:?} does not begin with BT: something else answers on this chip select"
-            ),
-        }
-    }
-}
-
-impl core::error::Error for PropertyError {}
 
 #[cfg(test)]
 mod tests {

@@ -70,15 +70,22 @@ const fn is_odd(byte: u8) -> bool {
 }
 
 /// Why a word is no sample.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
 pub enum WordError {
     /// The sensor reports an error in the command or its timing.
+    #[error("sensor reports {0}")]
     ErrorFrame(ErrorCode),
     /// FF FF or 00 00: nothing drives the line.
+    #[error("no sensor: the line stays high or low; check power, cable and chip select")]
     NoSensor,
     /// A byte has even parity.
+    #[error("bad parity in {}: a flipped bit; if most words fail, check the clock phase", .0.place())]
     Parity(BadParity),
     /// Good parity with a padding bit set; holds byte 1.
+    #[error(
+        "padding bits set in byte 1 ({0:02X}) with good parity: not a sample; \
+         if it repeats, check the clock phase"
+    )]
     Padding(u8),
 }
 
@@ -91,6 +98,16 @@ pub enum BadParity {
     Byte1,
     /// Both bytes.
     Both,
+}
+
+impl BadParity {
+    const fn place(self) -> &'static str {
+        match self {
+            Self::Byte0 => "byte 0",
+            Self::Byte1 => "byte 1",
+            Self::Both => "both bytes",
+        }
+    }
 }
 
 /// Byte 1 of an error frame (SPM names the first three, HDR all).
@@ -170,35 +187,6 @@ impl fmt::Display for ErrorCode {
         write!(f, "A5 {:02X}: {text}", self.byte())
     }
 }
-
-impl fmt::Display for WordError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::ErrorFrame(code) => write!(f, "sensor reports {code}"),
-            Self::NoSensor => f.write_str(
-                "no sensor: the line stays high or low; check power, cable and chip select",
-            ),
-            Self::Parity(bad) => {
-                let which = match bad {
-                    BadParity::Byte0 => "byte 0",
-                    BadParity::Byte1 => "byte 1",
-                    BadParity::Both => "both bytes",
-                };
-                write!(
-                    f,
-                    "bad parity in {which}: a flipped bit; if most words fail, check the clock phase"
-                )
-            }
-            Self::Padding(byte1) => write!(
-                f,
-                "padding bits set in byte 1 ({byte1:02X}) with good parity: not a sample; \
-                 if it repeats, check the clock phase"
-            ),
-        }
-    }
-}
-
-impl core::error::Error for WordError {}
 
 #[cfg(test)]
 mod tests {
