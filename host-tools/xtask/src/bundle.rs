@@ -52,10 +52,7 @@ fn files(images: Vec<(String, Vec<u8>)>, tables: Files) -> Result<Files> {
         files.insert(format!("{name}.elf"), elf);
     }
     files.extend(tables);
-    files.insert(
-        "FLASHING.md".into(),
-        flashing(env!("CARGO_PKG_VERSION")).into(),
-    );
+    files.insert("FLASHING.md".into(), flashing().into());
     files.insert(SUMS.into(), sums(&files).into());
     Ok(files)
 }
@@ -159,64 +156,11 @@ fn intel_hex(address: u32, bytes: &[u8]) -> String {
     text
 }
 
-fn flashing(version: &str) -> String {
-    let chip = crate::flash::CHIP;
-    format!(
-        "\
-# Tactus {version} onto a NUCLEO-F429ZI
-
-| file | what it is |
-|---|---|
-| tactus-rig.elf, .bin, .hex | the rig's firmware |
-| tactus-handheld.elf, .bin, .hex | the handheld probe's firmware |
-| tactus-selftest.elf, .bin, .hex | a test of board and rig: flash it first |
-| factory.tact, handheld.tact | the texture tables inside the firmware, of a simulated world |
-| {SUMS} | hash sums |
-
-An ELF has the symbols that the log is read with; .bin and .hex hold the same image without them.
-
-## Check the files
-
-    sha256sum --check {SUMS}              # Linux
-    shasum -a 256 --check {SUMS}          # macOS
-    Get-FileHash tactus-rig.bin           # Windows PowerShell: compare with {SUMS}
-
-The same commit built by the same Rust gives the same sums: `cargo xtask bundle` in a checkout.
-
-## Flash
-
-The board's USB socket is CN1, on the side of the debug probe. Each of these writes only the first megabyte, where the image
-is; what the rig has learned is in the second. Read the table out before you let a programmer erase the whole chip.
-
-With probe-rs (https://probe.rs):
-
-    probe-rs download --chip {chip} --verify tactus-rig.elf
-    probe-rs reset --chip {chip}
-    probe-rs attach --chip {chip} tactus-rig.elf     # the log
-
-With STM32CubeProgrammer:
-
-    STM32_Programmer_CLI -c port=SWD -w tactus-rig.hex -v -rst
-
-Without any program: the board is a disk, NODE_F429ZI. Copy tactus-rig.bin onto it; LD1 of the probe blinks, then the
-firmware starts. A FAIL.TXT on the disk says what went wrong. Older probes erase the whole chip when they do this.
-
-## Test the board
-
-Take the finger off the lever, flash the self-test and read its report:
-
-    probe-rs run --chip {chip} tactus-selftest.elf
-
-Three seconds after the blue LED begins to blink, lever and stage move by a few mm. One line per check says PASS or FAIL, what
-was measured and what to do. In the end the green LED is good, the red one is not. Without probe-rs there are the LEDs only.
-Then flash the rig's firmware.
-
-## Talk to it
-
-The serial port of the same USB plug (USART3): 921600 baud, 8 data bits, no parity, 1 stop bit, no flow control.
-Frames are COBS with a CRC, ended by a zero byte; the module `wire` of tactus-core describes them.
-"
-    )
+fn flashing() -> String {
+    include_str!("../flashing.md")
+        .replace("{version}", env!("CARGO_PKG_VERSION"))
+        .replace("{chip}", crate::flash::CHIP)
+        .replace("{SUMS}", SUMS)
 }
 
 #[cfg(test)]

@@ -24,11 +24,6 @@ const KB: u64 = 1024;
 const MAX_FLASH: [(&str, u64); 2] = [(RIG, 160 * KB), (HANDHELD, 128 * KB)];
 const HANDHELD: &str = "tactus-handheld";
 const MAX_VARIABLES: u64 = 64 * KB;
-/// Limits that are not kept yet, by image, and what was measured: it may become smaller, but not larger ([`LEEWAY`]). A limit
-/// that is kept is to be taken out of here.
-const NOT_YET: [(&str, &str, u64); 0] = [];
-/// The part of it that a compiler's next version may add.
-const LEEWAY: u64 = 100;
 /// Twice the deepest stack has to fit into what the variables leave.
 const MARGIN: u64 = 2;
 /// RAM in memory.x; stack and variables are both in it.
@@ -64,25 +59,22 @@ struct Measured {
     stack: Option<Value>,
 }
 
-/// The sizes, and an error if one is over its limit that was not, or has grown further.
+/// The sizes, and an error if one is over its limit.
 pub(crate) fn gates() -> Result<()> {
-    let images = measure(false)?;
-    print!("{}", text(&images));
-    let wrong = wrong(&images, &NOT_YET);
-    ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
-    Ok(())
+    show(false, Format::Text)
 }
 
 pub(crate) fn size(options: &Options) -> Result<()> {
-    let images = measure(options.no_stack)?;
-    match options.format {
+    show(options.no_stack, options.format)
+}
+
+fn show(no_stack: bool, format: Format) -> Result<()> {
+    let images = measure(no_stack)?;
+    match format {
         Format::Text => print!("{}", text(&images)),
         Format::Json => println!("{}", Value::from_iter(images.iter().map(json))),
     }
-    let too_much = images.iter().flat_map(limits).filter_map(|l| l.missed());
-    let wrong: Vec<String> = too_much
-        .chain(images.iter().flat_map(unexplained))
-        .collect();
+    let wrong = wrong(&images);
     ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
     Ok(())
 }
@@ -146,51 +138,31 @@ fn max_flash(image: &Measured) -> Option<u64> {
     Some(most + image.table)
 }
 
-/// What an image may take, and takes.
-struct Limit {
-    image: String,
-    what: &'static str,
-    bytes: u64,
-    most: u64,
-}
-
-impl Limit {
-    /// What is said if it is missed.
-    fn missed(&self) -> Option<String> {
-        let Self {
-            image,
-            what,
-            bytes,
-            most,
-        } = self;
-        (bytes > most)
-            .then(|| format!("{image}: {what} take {bytes} bytes, at most {most} are allowed"))
-    }
-}
-
-const FLASH: &str = "code and constants";
-const VARIABLES: &str = "variables";
-
-/// The limits of an image, as far as they were measured.
-fn limits(image: &Measured) -> Vec<Limit> {
+/// The limits that an image misses, as far as they were measured.
+fn missed(image: &Measured) -> Vec<String> {
     let Size { flash, ram, .. } = image.size;
-    let mut limits = Vec::new();
-    let mut limit = |what, bytes, most| {
-        limits.push(Limit {
-            image: image.name.clone(),
-            what,
-            bytes,
-            most,
-        });
-    };
-    if let Some(most) = max_flash(image) {
-        limit(FLASH, flash, most);
-    }
-    limit(VARIABLES, ram, MAX_VARIABLES);
-    if let Some(stack) = worst_stack(image) {
-        limit("variables and twice the stack", ram + MARGIN * stack, RAM);
-    }
-    limits
+    let stack = worst_stack(image);
+    let limits = [
+        (
+            "code and constants",
+            Some(flash),
+            max_flash(image).unwrap_or(u64::MAX),
+        ),
+        ("variables", Some(ram), MAX_VARIABLES),
+        (
+            "variables and twice the stack",
+            stack.map(|stack| ram + MARGIN * stack),
+            RAM,
+        ),
+    ];
+    let missed = limits.into_iter().filter_map(|(what, bytes, most)| {
+        let bytes = bytes.filter(|bytes| *bytes > most)?;
+        let name = &image.name;
+        Some(format!(
+            "{name}: {what} take {bytes} bytes, at most {most} are allowed"
+        ))
+    });
+    missed.collect()
 }
 
 /// Panics of the rig's image of which nothing says why they cannot happen.
@@ -209,35 +181,10 @@ fn unexplained(image: &Measured) -> Vec<String> {
     unexplained
 }
 
-/// What is wrong with the images: limits that are missed, but those that are not met yet and have not become worse.
-fn wrong(images: &[Measured], not_yet: &[(&str, &str, u64)]) -> Vec<String> {
-    let mut wrong: Vec<String> = images.iter().flat_map(unexplained).collect();
-    let limits: Vec<Limit> = images.iter().flat_map(limits).collect();
-    for limit in &limits {
-        let known = not_yet
-            .iter()
-            .find(|(image, what, _)| *image == limit.image && *what == limit.what);
-        match (limit.missed(), known) {
-            (None, None) => {}
-            (None, Some(_)) => wrong.push(format!(
-                "{}: {}: the limit is kept: take it out of NOT_YET",
-                limit.image, limit.what
-            )),
-            (Some(missed), None) => wrong.push(missed),
-            (Some(missed), Some((_, _, was))) if limit.bytes <= was + was / LEEWAY => {
-                println!("missed, was {was}: {missed}");
-            }
-            (Some(missed), Some((_, _, was))) => {
-                wrong.push(format!("{missed}; was {was}, and has become worse"));
-            }
-        }
-    }
-    for (image, what, _) in not_yet {
-        if !limits.iter().any(|l| l.image == *image && l.what == *what) {
-            wrong.push(format!("{image}: {what}: in NOT_YET, and not measured"));
-        }
-    }
-    wrong
+/// What is wrong with the images.
+fn wrong(images: &[Measured]) -> Vec<String> {
+    let missed = images.iter().flat_map(missed);
+    missed.chain(images.iter().flat_map(unexplained)).collect()
 }
 
 fn json(image: &Measured) -> Value {
@@ -375,7 +322,7 @@ mod tests {
     #[test]
     fn each_limit_is_a_limit() {
         let most = 160 * KB + 1000;
-        let too_much = |image: Measured| wrong(&[image], &[]);
+        let too_much = |image: Measured| wrong(&[image]);
         assert!(too_much(image(most, MAX_VARIABLES, Some(64 * KB))).is_empty());
         assert!(too_much(image(0, 0, None)).is_empty());
         let error = |image: Measured| too_much(image).join("");
@@ -394,30 +341,12 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_that_is_not_kept_yet_may_not_be_missed_by_more() {
-        let was = [(RIG, FLASH, 200 * KB)];
-        let error = |flash| wrong(&[image(flash, 0, None)], &was).join("");
-        assert_eq!(error(200 * KB), "");
-        assert_eq!(error(170 * KB), "");
-        assert!(error(203 * KB).contains("has become worse"));
-        assert!(error(160 * KB).contains("take it out of NOT_YET"));
-        // the others are as strict as before
-        let fat = image(200 * KB, MAX_VARIABLES + 1, None);
-        assert!(
-            wrong(&[fat], &was)
-                .join("")
-                .contains("variables take 65537")
-        );
-        assert!(wrong(&[], &was).join("").contains("not measured"));
-    }
-
-    #[test]
     fn a_panic_that_nobody_explains_is_wrong() {
         let with = |name: &str, caller: &str| {
             let mut image = image(0, 0, None);
             image.name = name.into();
             image.panics[0].callers.push(caller.into());
-            wrong(&[image], &[]).join("")
+            wrong(&[image]).join("")
         };
         assert_eq!(with(RIG, "embassy_stm32::rcc::init_pll"), "");
         let said = with(RIG, "tactus_core::rig::stage::Stage::tick");
