@@ -23,11 +23,3 @@ pub use picture::Picture;
 pub use screen::{About, Screen, Trouble};
 pub use spelling::{Place, WHEEL};
 pub use states::{Choice, Handheld, Job, TICKS_HZ};
-
-// until all users have the new path
-/// See [`screen`] and [`draw`](mod@draw).
-pub mod screens {
-    pub use super::draw::*;
-    pub use super::screen::*;
-    pub use super::{Place, WHEEL};
-}

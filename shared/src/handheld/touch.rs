@@ -5,8 +5,7 @@
 
 use heapless::{Deque, Vec};
 
-// until all users have the new path
-pub use super::guidance::{Again, Event, Phase, View, ZONE_MN};
+use super::guidance::{Again, Event, Phase, View, ZONE_MN};
 use super::judge::MOVEMENT;
 use crate::dsp::Plan;
 use crate::explorer::Kernels;

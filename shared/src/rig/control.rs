@@ -17,8 +17,7 @@ use super::stage::{MARGIN_MM, Stage, StageConstants, StageState};
 use crate::features::Movement;
 use crate::sensor::pressure::{Calibration, Channel};
 
-// until all users have the new path
-pub use super::phase::{Ended, Phase, Refused};
+use super::phase::{Ended, Phase, Refused};
 
 /// How long the still finger is measured.
 pub const BACKGROUND_MS: u32 = 1000;

@@ -3,8 +3,7 @@
 use super::force::ForceMeter;
 use crate::sensor::pressure::{Calibration, Pressure};
 
-// until all users have the new path
-pub use super::fault::{FAULTS, Fault, Row};
+use super::fault::Fault;
 
 /// Force by P_DC at which the finger is lifted, mN, so that it never feels more than 2.2 N.
 ///

@@ -1,3 +1,4 @@
+use super::super::fault::FAULTS;
 use super::*;
 use crate::sensor::pressure::{Channel, Counts};
 
