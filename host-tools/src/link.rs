@@ -12,7 +12,7 @@ mod table;
 mod transaction;
 
 pub use port::{Port, PortError};
-pub use request::{Found, Learned, Request};
+pub use request::{Found, Request};
 pub use session::{LinkError, MAX_TRIES, Session};
 pub use table::{PushTable, ReadTable};
 pub use transaction::{Job, Transaction};

@@ -14,6 +14,7 @@ pub use crate::explorer::ExpectedOutcome;
 pub use command::{Command, Forget, Identify, PART, Request, Train};
 pub use event::{
     Counts, Event, Live, MAX_EXPECTED_OUTCOMES, Phase, Report, Reset, SlideReport, Status,
+    TextureLearned, Verdict,
 };
 pub use frame::{FrameError, MAX_FRAME, MAX_MESSAGE, PROTOCOL, Receiver, TooLong, decode, encode};
 pub use text::{Text, text};

@@ -2,9 +2,84 @@
 
 pub mod bench;
 pub mod campaign;
-pub mod cuts;
-pub mod error;
-pub mod identify;
-pub mod serve;
-pub mod soak;
-pub mod stack_depth;
+mod cuts;
+mod error;
+mod identify;
+mod serve;
+mod soak;
+mod stack_depth;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use error::RunError;
+
+/// Runs the firmware's ELF, unmodified, on a NUCLEO-F429ZI in software with the simulated rig on its pins.
+#[derive(Parser)]
+#[command(version)]
+enum Cli {
+    /// Have the firmware identify a texture
+    ///
+    /// Learns some textures of a simulated world, gives their table to the firmware, puts one of them under its finger and has
+    /// it find out which.
+    #[command(after_help = "Examples:
+  tactus-emulator identify --elf tactus-rig                       a texture drawn by the seed
+  tactus-emulator identify --elf tactus-rig --texture 10 --log    with the firmware's own log
+  tactus-emulator identify --elf tactus-rig --recording 3         slides of a real BioTac
+`cargo xtask emulate` builds both and does this. With --port N it serves the board's serial port on that TCP port instead.")]
+    Identify(identify::Args),
+    /// Serve the board's serial port on a TCP port of this PC
+    ///
+    /// Virtual time then goes no faster than real time.
+    #[command(after_help = "Example:
+  tactus-emulator serve --elf tactus-rig --port 7429              talk to it yourself")]
+    Serve(serve::Args),
+    /// Have it identify many textures, and cut its power, against the bars
+    Campaign(campaign::Args),
+    /// Have it work for a day on the simulated rig and for an hour on the board, with random faults
+    Soak(soak::Args),
+    /// Count the instructions of the core's kernels
+    Bench(bench::Args),
+    /// Measure how deep its stack gets
+    Stack(stack_depth::Args),
+}
+
+/// Whether all bars are met.
+fn run(cli: &Cli) -> Result<ExitCode, RunError> {
+    let met = |met| {
+        if met {
+            ExitCode::SUCCESS
+        } else {
+            ExitCode::FAILURE
+        }
+    };
+    match cli {
+        Cli::Identify(args) => identify::run(args).map(|()| ExitCode::SUCCESS),
+        Cli::Serve(args) => serve::run(args).map(|()| ExitCode::SUCCESS),
+        Cli::Campaign(args) => campaign::run(args).map(met),
+        Cli::Soak(args) => soak::run(args).map(met),
+        Cli::Bench(args) => bench::run(args),
+        Cli::Stack(args) => stack_depth::run(args).map(|()| ExitCode::SUCCESS),
+    }
+}
+
+/// The program, from its arguments to its exit code.
+pub fn main() -> ExitCode {
+    run(&Cli::parse()).unwrap_or_else(|why| {
+        eprintln!("error: {why}");
+        ExitCode::FAILURE
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+}

@@ -145,24 +145,7 @@ impl<'t, W: Write> Show<'t, W> {
             ),
             Event::Rejected { why, .. } => self.line(&format!("  rejected: {why}")),
             Event::Fault(fault) => self.line(&format!("  fault: {fault}")),
-            Event::Verdict {
-                texture,
-                probability,
-                sure,
-                unknown,
-                log_odds,
-                slides,
-                ..
-            } => {
-                let verdict = Verdict {
-                    texture: *texture,
-                    probability: *probability,
-                    sure: *sure,
-                    unknown: *unknown,
-                    log_odds: *log_odds,
-                };
-                self.answer(verdict, *slides)
-            }
+            Event::Verdict(verdict) => self.answer(verdict.into(), verdict.slides),
             _ => Ok(()),
         }
     }

@@ -2,11 +2,13 @@
 //! same core, and compares.
 
 use tactus_core::dsp::Plan;
-use tactus_core::explorer::{Config, Explorer, ExplorerError, Method};
+use tactus_core::explorer::{Explorer, ExplorerError};
 use tactus_core::features::{Block, FEATURE_STEPS, PropertySet, Slide, SlideError};
 use tactus_core::probe::explore::Random;
 use tactus_core::table::{Action, Contents, MAX_TEXTURES, Table};
-use tactus_core::wire::{Event, ExpectedOutcome, Identify, MAX_EXPECTED_OUTCOMES, SlideReport};
+use tactus_core::wire::{
+    Event, ExpectedOutcome, Identify, MAX_EXPECTED_OUTCOMES, SlideReport, Verdict,
+};
 
 /// Chip and PC do the same operations in the same order and agree to the bit; more than this apart they do not agree.
 pub const ALLOWED: f32 = 1e-4;
@@ -138,13 +140,7 @@ impl<'t> Follower<'t> {
         asked: &Identify,
         plan: &'t Plan,
     ) -> Result<Self, ExplorerError> {
-        let config = Config {
-            method: asked.method.unwrap_or(Method::of(table.contents())),
-            strategy: asked.strategy,
-            threshold: asked.threshold,
-            max_slides: asked.max_slides,
-            open: asked.open,
-        };
+        let config = asked.config(table.contents());
         let explorer = if asked.among.is_empty() {
             Explorer::new(table, measured, config)?
         } else {
@@ -188,41 +184,33 @@ impl<'t> Follower<'t> {
                 posterior,
             } => self.observed(*slide, *action, observed, posterior),
             Event::Rejected { slide, .. } => self.rejected(*slide),
-            Event::Verdict {
-                texture,
-                probability,
-                sure,
-                unknown,
-                log_odds,
-                slides,
-                wants_label,
-                ..
-            } => {
-                self.agreement.verdicts += 1;
-                let whole = self.explorer.verdict();
-                // an exploration that was cut short says what is known so far, and asks for no label
-                let here = whole.or_else(|| Some(self.explorer.best()));
-                let is_fused = matches!(self.explorer.table().contents(), Contents::Fused(..));
-                let same = here.is_some_and(|here| {
-                    here.texture == *texture
-                        && here.sure == *sure
-                        && here.unknown == *unknown
-                        && self.explorer.slides() == *slides
-                        && (whole.is_some() && is_fused && !self.explorer.is_certain())
-                            == *wants_label
-                });
-                self.agreement.other_verdicts += u32::from(!same);
-                let agreement = &mut self.agreement;
-                let probable = here.map(|here| here.probability);
-                widen(
-                    &mut agreement.posterior,
-                    apart(probable, Some(*probability)),
-                );
-                let odds = here.and_then(|here| here.log_odds);
-                widen(&mut agreement.posterior, apart(odds, *log_odds));
+            Event::Verdict(there) => {
+                self.verdict(there);
                 Ok(())
             }
             _ => Ok(()),
+        }
+    }
+
+    fn verdict(&mut self, there: &Verdict) {
+        let whole = self.explorer.verdict();
+        // an exploration that was cut short says what is known so far, and asks for no label
+        let here = whole.unwrap_or(self.explorer.best());
+        let is_fused = matches!(self.explorer.table().contents(), Contents::Fused(..));
+        let wants_label = whole.is_some() && is_fused && !self.explorer.is_certain();
+        let same = here.texture == there.texture
+            && here.sure == there.sure
+            && here.unknown == there.unknown
+            && self.explorer.slides() == there.slides
+            && wants_label == there.wants_label;
+        let agreement = &mut self.agreement;
+        agreement.verdicts += 1;
+        agreement.other_verdicts += u32::from(!same);
+        for (here, there) in [
+            (Some(here.probability), Some(there.probability)),
+            (here.log_odds, there.log_odds),
+        ] {
+            widen(&mut agreement.posterior, apart(here, there));
         }
     }
 

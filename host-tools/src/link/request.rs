@@ -2,7 +2,7 @@
 
 use tactus_core::rig::calibration::{RigCalibration, RigCalibrationError};
 use tactus_core::table::Name;
-use tactus_core::wire::{Command, Event, Forget, Identify, Status, Train};
+use tactus_core::wire::{Command, Event, Forget, Identify, Status, TextureLearned, Train, Verdict};
 
 use super::session::LinkError;
 use super::transaction::Transaction;
@@ -34,33 +34,10 @@ impl<T> Transaction for Request<T> {
 /// What an exploration found.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Found {
-    /// Index of the texture in the probe's table.
-    pub texture: u16,
-    /// Its name there.
-    pub name: Name,
-    /// Posterior probability.
-    pub probability: f32,
-    /// Whether it is over the threshold.
-    pub sure: bool,
-    /// Whether it is rather none of the textures known; the one named is the most alike.
-    pub unknown: bool,
-    /// Log-odds of that, where they can be computed.
-    pub log_odds: Option<f32>,
-    /// Slides that counted.
-    pub slides: u8,
-    /// Whether the probe would learn from [`Request::label`].
-    pub wants_label: bool,
+    /// The verdict.
+    pub verdict: Verdict,
     /// Slides that the probe has learned from by itself.
     pub learned: u8,
-}
-
-/// What the probe has learned from a label.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Learned {
-    /// Name of the texture.
-    pub name: Name,
-    /// How many slides.
-    pub slides: u8,
 }
 
 impl<T> Request<T> {
@@ -144,69 +121,31 @@ impl Request<Found> {
     /// Has the probe find out what lies under its finger.
     pub fn identify(how: Identify) -> Self {
         Self::new(Command::Identify(how), None, |event, answer| {
-            if let Some(found) = Found::of(event) {
-                *answer = Some(found);
-            }
-            if let (
-                Event::TextureLearned {
-                    slides,
-                    itself: true,
-                    ..
-                },
-                Some(found),
-            ) = (event, answer)
-            {
-                found.learned = *slides;
+            match (event, answer) {
+                (Event::Verdict(verdict), answer) => {
+                    *answer = Some(Found {
+                        verdict: verdict.clone(),
+                        learned: 0,
+                    });
+                }
+                (Event::TextureLearned(learned), Some(found)) if learned.itself => {
+                    found.learned = learned.slides;
+                }
+                _ => {}
             }
             Ok(())
         })
     }
 }
 
-impl Found {
-    /// What a verdict says.
-    fn of(event: &Event) -> Option<Self> {
-        let Event::Verdict {
-            texture,
-            ref name,
-            probability,
-            sure,
-            unknown,
-            log_odds,
-            slides,
-            wants_label,
-        } = *event
-        else {
-            return None;
-        };
-        Some(Self {
-            texture,
-            name: name.clone(),
-            probability,
-            sure,
-            unknown,
-            log_odds,
-            slides,
-            wants_label,
-            learned: 0,
-        })
-    }
-}
-
-impl Request<Learned> {
+impl Request<TextureLearned> {
     /// Gives the probe the label of the last exploration; the outcome is what it has learned from that.
     pub fn label(name: Name) -> Self {
         Self::new(Command::Label(name), None, |event, answer| {
-            if let Event::TextureLearned {
-                name,
-                slides,
-                itself: false,
-            } = event
+            if let Event::TextureLearned(learned) = event
+                && !learned.itself
             {
-                *answer = Some(Learned {
-                    name: name.clone(),
-                    slides: *slides,
-                });
+                *answer = Some(learned.clone());
             }
             Ok(())
         })

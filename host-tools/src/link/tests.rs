@@ -13,7 +13,7 @@ use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::{MAX_TEXTURES, Name, Table, TableError};
 use tactus_core::wire::{
     self, Command, Event, Forget, Identify, MAX_FRAME, PART, PROTOCOL, Receiver, Report, Reset,
-    Train,
+    TextureLearned, Train, Verdict,
 };
 
 use super::*;
@@ -155,7 +155,7 @@ impl Probe {
                     shear_mn: Default::default(),
                     lost: 0,
                 }),
-                Event::Verdict {
+                Event::Verdict(Verdict {
                     texture: how.among[0],
                     name: Name::try_from("velcro").unwrap(),
                     probability: 0.995,
@@ -164,19 +164,19 @@ impl Probe {
                     log_odds: Some(-7.5),
                     slides: 3,
                     wants_label: false,
-                },
-                Event::TextureLearned {
+                }),
+                Event::TextureLearned(TextureLearned {
                     name: Name::try_from("velcro").unwrap(),
                     slides: 3,
                     itself: true,
-                },
+                }),
             ],
             Command::Label(name) if name.is_empty() => return vec![refused("a name, please")],
-            Command::Label(name) => vec![Event::TextureLearned {
+            Command::Label(name) => vec![Event::TextureLearned(TextureLearned {
                 name,
                 slides: 2,
                 itself: false,
-            }],
+            })],
             Command::Home => vec![Event::Phase(Phase::Homing), Event::Phase(Phase::Ready)],
             _ => vec![],
         };
@@ -316,13 +316,15 @@ fn requests_get_their_answers() {
         undisturbed,
     );
     let found = found.unwrap().unwrap();
-    assert_eq!((found.name.as_str(), found.slides), ("velcro", 3));
-    assert_eq!((found.learned, found.log_odds), (3, Some(-7.5)));
+    let Found { verdict, learned } = found;
+    assert_eq!((verdict.name.as_str(), verdict.slides), ("velcro", 3));
+    assert_eq!((learned, verdict.log_odds), (3, Some(-7.5)));
     let named = |name| Request::label(Name::try_from(name).unwrap());
     let answered = see_through(&mut session, &mut probe, named("felt"), undisturbed);
-    let learned = Learned {
+    let learned = TextureLearned {
         name: Name::try_from("felt").unwrap(),
         slides: 2,
+        itself: false,
     };
     assert_eq!(answered, Some(Ok(learned)));
     let nameless = see_through(&mut session, &mut probe, named(""), undisturbed);

@@ -7,13 +7,11 @@ use heapless::Vec;
 
 use super::explore::{ExplorationStep, Random, explore};
 use crate::dsp::Plan;
-use crate::explorer::{
-    Config, EpisodeSummary, ExpectedOutcome, Explorer, Kernels, Method, Verdict,
-};
+use crate::explorer::{self, EpisodeSummary, ExpectedOutcome, Explorer, Kernels};
 use crate::rig::Rig;
 use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
-use crate::wire::{Event, Identify, MAX_EXPECTED_OUTCOMES, Text, text};
+use crate::wire::{Event, Identify, MAX_EXPECTED_OUTCOMES, Text, Verdict, text};
 
 /// Explores what lies under the finger until there is an answer, and reports it; the error is why there is none.
 ///
@@ -32,13 +30,6 @@ where
     K: Kernels,
 {
     let contents = table.contents();
-    let config = Config {
-        method: wanted.method.unwrap_or(Method::of(contents)),
-        strategy: wanted.strategy,
-        threshold: wanted.threshold,
-        max_slides: wanted.max_slides,
-        open: wanted.open,
-    };
     let all = if wanted.among.is_empty() {
         0..table.textures()
     } else {
@@ -47,7 +38,7 @@ where
     let candidates = wanted.among.iter().copied().chain(all);
     let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
     explorer
-        .consider(rig.measures(), config, candidates)
+        .consider(rig.measures(), wanted.config(contents), candidates)
         .map_err(text)?;
     let mut random = Random::new(wanted.seed);
     let mut slide: u8 = 1;
@@ -105,8 +96,8 @@ where
 }
 
 /// The event of a verdict.
-fn told(table: Table<'_>, verdict: &Verdict, slides: u8, wants_label: bool) -> Event {
-    Event::Verdict {
+fn told(table: Table<'_>, verdict: &explorer::Verdict, slides: u8, wants_label: bool) -> Event {
+    Event::Verdict(Verdict {
         texture: verdict.texture,
         name: Name::try_from(table.name(verdict.texture).unwrap_or_default()).unwrap_or_default(),
         probability: verdict.probability,
@@ -115,7 +106,7 @@ fn told(table: Table<'_>, verdict: &Verdict, slides: u8, wants_label: bool) -> E
         log_odds: verdict.log_odds,
         slides,
         wants_label,
-    }
+    })
 }
 
 /// The most useful actions, best first. One after the other, for sorting them all takes the chip 2 KB.

@@ -15,7 +15,7 @@ use crate::table::Whitened;
 use crate::table::{Change, EncodeError, Known, MAX_MOVEMENTS, Table, Tally, amend, retell};
 use crate::table::{MAX_TEXTURES, Name};
 use crate::up_to;
-use crate::wire::{Event, Forget, Text, text};
+use crate::wire::{Event, Forget, Text, TextureLearned, text};
 
 /// Copies the stored table into `buffer`, with what the probe has learned by itself in its place: the table in force.
 /// Returns its length.
@@ -108,11 +108,11 @@ pub async fn learn_by_itself<F: NorFlash>(
     for (movement, _, whitened) in &record.movements {
         retell(buffer, texture, *movement, whitened, tally).map_err(text)?;
     }
-    Ok(Some(Event::TextureLearned {
+    Ok(Some(Event::TextureLearned(TextureLearned {
         name,
         slides: learned,
         itself: true,
-    }))
+    })))
 }
 
 /// The record's entry of a movement; `None` where it has as many as it may have.
@@ -216,11 +216,11 @@ pub async fn label<F: NorFlash>(
             store.set_self_learned(&record).await.map_err(text)?;
         }
     }
-    Ok(Event::TextureLearned {
+    Ok(Event::TextureLearned(TextureLearned {
         name: Name::try_from(name).unwrap_or_default(),
         slides,
         itself: false,
-    })
+    }))
 }
 
 /// Deletes what a power cut may have left of an earlier texture whose number the next new texture gets.

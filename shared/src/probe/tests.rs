@@ -13,7 +13,7 @@ use crate::store::tests::ram::Ram;
 use crate::store::{SelfLearnedRecord, Store};
 use crate::table::tests::{around, fused_of, known, straight, table_of};
 use crate::table::{Action, Name, Table};
-use crate::wire::{Event, Identify, MAX_EXPECTED_OUTCOMES, Text, Train, text};
+use crate::wire::{Event, Identify, MAX_EXPECTED_OUTCOMES, Text, Train, Verdict, text};
 use embassy_futures::block_on;
 use heapless::Vec;
 use std::string::String;
@@ -79,9 +79,9 @@ fn identified(slides: &[Option<i16>], wanted: &Identify) -> (Result<(), Text>, v
                     slide, posterior, ..
                 } => format!("measured {slide} {posterior:.2?}"),
                 Event::Rejected { slide, why } => format!("rejected {slide}: {why}"),
-                Event::Verdict {
+                Event::Verdict(Verdict {
                     name, sure, slides, ..
-                } => format!("{name} {sure} {slides}"),
+                }) => format!("{name} {sure} {slides}"),
                 other => format!("{other:?}"),
             });
         },
@@ -183,7 +183,7 @@ fn a_fused_exploration_says_whether_it_is_certain() {
         (episode, told.pop().unwrap())
     };
     let (episode, verdict) = explored(&[Some(10_000)], true);
-    let Event::Verdict {
+    let Event::Verdict(Verdict {
         texture: 2,
         sure: true,
         unknown: false,
@@ -191,7 +191,7 @@ fn a_fused_exploration_says_whether_it_is_certain() {
         slides: 1,
         log_odds,
         ..
-    } = verdict
+    }) = verdict
     else {
         panic!("{verdict:?}");
     };
@@ -207,27 +207,27 @@ fn a_fused_exploration_says_whether_it_is_certain() {
     assert!(mean.clone().count() == 13 && mean.clone().all(|(a, b)| a.abs_diff(b) <= 1));
     // far from all
     let (episode, verdict) = explored(&[Some(-32_000), Some(-32_000)], true);
-    let Event::Verdict {
+    let Event::Verdict(Verdict {
         texture: 0,
         sure: false,
         unknown: true,
         wants_label: true,
         slides: 2,
         ..
-    } = verdict
+    }) = verdict
     else {
         panic!("{verdict:?}");
     };
     assert!(!episode.certain);
     assert_eq!(episode.observed[0].1, 2);
     let (episode, verdict) = explored(&[Some(-32_000)], false);
-    let Event::Verdict {
+    let Event::Verdict(Verdict {
         texture: 0,
         sure: true,
         unknown: false,
         wants_label: true,
         ..
-    } = verdict
+    }) = verdict
     else {
         panic!("{verdict:?}");
     };

@@ -3,8 +3,8 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::explorer::{Method, Strategy};
-use crate::table::{MAX_TEXTURES, Name};
+use crate::explorer::{Config, Method, Strategy};
+use crate::table::{Contents, MAX_TEXTURES, Name};
 
 /// Bytes of a table in one message.
 pub const PART: usize = 256;
@@ -91,6 +91,35 @@ pub struct Identify {
     pub learn: bool,
     /// For random choices, and for where on the sample slides begin.
     pub seed: u32,
+}
+
+impl Default for Identify {
+    /// Among all textures, by the table's own method: until one is more probable than 0.99, with at most 10 slides (PAPER).
+    fn default() -> Self {
+        Self {
+            among: Vec::new(),
+            threshold: 0.99,
+            max_slides: 10,
+            method: None,
+            strategy: Strategy::default(),
+            open: true,
+            learn: false,
+            seed: 0,
+        }
+    }
+}
+
+impl Identify {
+    /// What it means for a table of such contents.
+    pub fn config(&self, contents: Contents) -> Config {
+        Config {
+            method: self.method.unwrap_or(Method::of(contents)),
+            strategy: self.strategy,
+            threshold: self.threshold,
+            max_slides: self.max_slides,
+            open: self.open,
+        }
+    }
 }
 
 /// What is to be deleted.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::command::PART;
 use super::sparse;
 use super::text::Text;
-use crate::explorer::ExpectedOutcome;
+use crate::explorer::{self, ExpectedOutcome};
 use crate::features::{
     Block, FUSED_BANDS, Measurement, Movement, Observation, Properties, Property,
 };
@@ -92,35 +92,10 @@ pub enum Event {
         why: Text,
     },
     /// What lies under the finger.
-    Verdict {
-        /// Index in the table.
-        texture: u16,
-        /// Name in the table.
-        name: Name,
-        /// Posterior probability.
-        probability: f32,
-        /// Whether it is over the threshold.
-        sure: bool,
-        /// Whether it is rather none of the textures known; the one named is the most alike.
-        unknown: bool,
-        /// Log-odds of that, where they can be told.
-        log_odds: Option<f32>,
-        /// Slides that counted.
-        slides: u8,
-        /// Whether the probe asks for [`super::Command::Label`]: the table is fused, and the probe is not certain.
-        #[serde(alias = "asks")]
-        wants_label: bool,
-    },
+    Verdict(Verdict),
     /// The probe has learned a texture from the slides of an exploration.
     #[serde(alias = "Taught")]
-    TextureLearned {
-        /// Name of the texture.
-        name: Name,
-        /// How many slides.
-        slides: u8,
-        /// Whether by itself; otherwise from the user.
-        itself: bool,
-    },
+    TextureLearned(TextureLearned),
     /// A movement of a texture that is learned was made.
     #[serde(alias = "Learned")]
     TrainingSlide {
@@ -299,6 +274,51 @@ impl From<&Measurement> for SlideReport {
             pressure,
         }
     }
+}
+
+/// What lies under the finger.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Index in the table.
+    pub texture: u16,
+    /// Name in the table.
+    pub name: Name,
+    /// Posterior probability.
+    pub probability: f32,
+    /// Whether it is over the threshold.
+    pub sure: bool,
+    /// Whether it is rather none of the textures known; the one named is the most alike.
+    pub unknown: bool,
+    /// Log-odds of that, where they can be told.
+    pub log_odds: Option<f32>,
+    /// Slides that counted.
+    pub slides: u8,
+    /// Whether the probe asks for [`super::Command::Label`]: the table is fused, and the probe is not certain.
+    #[serde(alias = "asks")]
+    pub wants_label: bool,
+}
+
+impl From<&Verdict> for explorer::Verdict {
+    fn from(told: &Verdict) -> Self {
+        Self {
+            texture: told.texture,
+            probability: told.probability,
+            sure: told.sure,
+            unknown: told.unknown,
+            log_odds: told.log_odds,
+        }
+    }
+}
+
+/// What the probe has learned from the slides of an exploration.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct TextureLearned {
+    /// Name of the texture.
+    pub name: Name,
+    /// How many slides.
+    pub slides: u8,
+    /// Whether by itself; otherwise from the user.
+    pub itself: bool,
 }
 
 /// What the rig is at.

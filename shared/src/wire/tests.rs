@@ -85,7 +85,7 @@ fn longest() -> vec::Vec<Report> {
             reset: Reset::Watchdog,
             last_words: Some(text()),
         }),
-        report(Event::Verdict {
+        report(Event::Verdict(Verdict {
             texture: u16::MAX,
             name: name('n'),
             probability: 0.999,
@@ -94,12 +94,12 @@ fn longest() -> vec::Vec<Report> {
             log_odds: Some(-1e9),
             slides: 255,
             wants_label: true,
-        }),
-        report(Event::TextureLearned {
+        })),
+        report(Event::TextureLearned(TextureLearned {
             name: name('t'),
             slides: 255,
             itself: true,
-        }),
+        })),
         report(Event::TrainingSlide {
             movement: Movement::FOR_ROUGHNESS,
             trial: 255,
@@ -210,7 +210,7 @@ fn a_verdict_and_an_answer_have_these_bytes() {
         let length = message(&mut buffer);
         buffer[..length].to_vec()
     };
-    let verdict = report(Event::Verdict {
+    let verdict = report(Event::Verdict(Verdict {
         texture: 300,
         name: Name::try_from("oak").unwrap(),
         probability: 0.5,
@@ -219,7 +219,7 @@ fn a_verdict_and_an_answer_have_these_bytes() {
         log_odds: Some(2.0),
         slides: 2,
         wants_label: true,
-    });
+    }));
     let bytes = body(&|buffer| postcard::to_slice(&verdict, buffer).unwrap().len());
     // number 7, 1234 ms as a varint, variant 9, 300 as a varint, length and name, two f32, little-endian
     assert_eq!(

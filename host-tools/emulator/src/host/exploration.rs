@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
+use tactus::link::Request;
 use tactus::link::follow::{ALLOWED, Agreement, Follower};
-use tactus::link::{Found, Request};
 use tactus::sim::played::PlayCounts;
 use tactus_core::dsp::Plan;
 use tactus_core::features::{Movement, Property, PropertySet};
 use tactus_core::table::{Action, Contents, Table, TableError, white};
-use tactus_core::wire::{Command, Counts, Event, Identify, Report, SlideReport};
+use tactus_core::wire::{Command, Counts, Event, Identify, Report, SlideReport, Verdict};
 
 use super::talk::{TIMEOUT_S, Talk, TalkError};
 use crate::board::{self, Emulator, Slide};
@@ -84,7 +84,9 @@ pub struct Exploration {
     /// Whether the table has it.
     pub known: bool,
     /// The verdict.
-    pub found: Found,
+    pub found: Verdict,
+    /// Slides that the probe has learned from by itself.
+    pub learned: u8,
     /// From power-up to the end, virtual seconds.
     pub virtual_s: f64,
     /// How every slide was really made, and what it should have been.
@@ -105,21 +107,6 @@ pub struct Exploration {
     pub lost_reports: u64,
     /// What was played of recordings, all 0 without any.
     pub played: PlayCounts,
-}
-
-/// An exploration among all textures, by the table's own method: until one is more probable than 0.99, with at most 10
-/// slides (PAPER).
-pub fn among_all(seed: u32) -> Identify {
-    Identify {
-        among: Default::default(),
-        threshold: 0.99,
-        max_slides: 10,
-        method: None,
-        strategy: Default::default(),
-        open: true,
-        learn: false,
-        seed,
-    }
 }
 
 /// Has the firmware find out what lies under its finger, and follows it. It must know `table` and be ready; `each` sees all
@@ -177,7 +164,8 @@ pub fn explore(
     Ok(Exploration {
         truth: truth.to_owned(),
         known: table.find(truth).is_some(),
-        found,
+        found: found.verdict,
+        learned: found.learned,
         virtual_s: board.now_ns() as f64 * 1e-9,
         slides,
         steps,
@@ -427,7 +415,7 @@ impl Exploration {
             "sure": self.found.sure,
             "unknown": self.found.unknown,
             "unknown_log_odds": self.found.log_odds,
-            "slides_learned_by_itself": self.found.learned,
+            "slides_learned_by_itself": self.learned,
             "slides": self.found.slides,
             "virtual_seconds": self.virtual_s,
             "lost_samples": self.counts.lost_samples,

@@ -2,7 +2,7 @@
 //! that it counted are read, and the plain kernels do the same on this PC.
 
 mod counter;
-pub mod error;
+pub(crate) mod error;
 mod gates;
 mod inputs;
 mod on_the_rig;
@@ -31,7 +31,7 @@ use crate::host::args::{Firmware, Format};
 
 /// What is counted.
 #[derive(Arguments)]
-pub struct Args {
+pub(crate) struct Args {
     /// The bench image.
     #[command(flatten)]
     firmware: Firmware,
@@ -55,7 +55,7 @@ const TEXTURES: usize = 117;
 const MISSED: u8 = 2;
 
 /// Counts, and says by its exit code whether every gate is met.
-pub fn run(args: &Args) -> Result<ExitCode, RunError> {
+pub(crate) fn run(args: &Args) -> Result<ExitCode, RunError> {
     let met = count(args)?;
     Ok(if met {
         ExitCode::SUCCESS

@@ -8,7 +8,7 @@ use std::time::Instant;
 use clap::Args as Arguments;
 use tactus::eval::evaluate::Method;
 
-pub use self::explorations::{Bars, Group, Results, recorded, run as explore, simulated};
+pub use self::explorations::{Group, Results, recorded, run as explore, simulated};
 use self::report::Report;
 use super::cuts::{self, Cuts};
 use super::error::RunError;
@@ -25,7 +25,7 @@ use crate::host::{progress, under_finger};
 /// which the last word or erase is torn, and must hold the old or the new; where it repairs the flash first, the power is
 /// cut in that too. The exit code is 1 if a bar is missed.
 #[derive(Arguments)]
-pub struct Args {
+pub(crate) struct Args {
     #[command(flatten)]
     firmware: Firmware,
     /// Explorations in the simulated world
@@ -48,7 +48,7 @@ pub struct Args {
 }
 
 /// Whether all bars are met.
-pub fn run(args: &Args) -> Result<bool, RunError> {
+pub(crate) fn run(args: &Args) -> Result<bool, RunError> {
     let elf = &args.firmware.elf;
     let sha256 = args.firmware.show(false)?;
     let began = Instant::now();

@@ -5,14 +5,14 @@
 //! the state from before or the one from after, and say so before it has found its switches.
 
 mod outcome;
-pub mod tear;
+pub(crate) mod tear;
 
 use std::path::Path;
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tactus::link::{Found, ReadTable, Request};
+use tactus::link::{ReadTable, Request};
 use tactus::sim::collection::Collection;
 use tactus::sim::world::{Setup, World};
 use tactus_core::explorer::Method;
@@ -20,10 +20,10 @@ use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::Name;
 use tactus_core::wire::{Event, Identify, Reset};
 
-pub use self::outcome::{Cuts, Outcome};
+pub(crate) use self::outcome::{Cuts, Outcome};
 use self::tear::{Cut, CutError, Held, Left, Operation, Torn, judge, left_by};
 use crate::board::{FlashWrite, Options};
-use crate::host::exploration::{among_all, explore};
+use crate::host::exploration::{Exploration, explore};
 use crate::host::talk::{TIMEOUT_S, Talk, TalkError};
 use crate::host::under_finger::{self, Known, Unknown};
 
@@ -46,14 +46,14 @@ const PROBED: usize = 2;
 
 /// What is cut, and in what world.
 #[derive(Clone, Debug)]
-pub struct Prepared {
+pub(crate) struct Prepared {
     /// A label from the user and an update by the probe itself, to be cut at every word, and an update that turns a page.
-    pub operations: Vec<Operation>,
+    pub(crate) operations: Vec<Operation>,
     unknown: Unknown,
 }
 
 /// Has the firmware store all that is to be cut, each once and whole; `each` hears what it does.
-pub fn prepare(
+pub(crate) fn prepare(
     elf: &Path,
     seed: u64,
     mut each: impl FnMut(&'static str),
@@ -131,14 +131,14 @@ fn run_episode(
     unknown: &Unknown,
     seed: u32,
     learn: bool,
-) -> Result<Found, CutError> {
+) -> Result<Exploration, CutError> {
     let table = talk.run(ReadTable::default(), TIMEOUT_S, |_, _| ())?;
     let identify = Identify {
         learn,
-        ..among_all(seed)
+        seed,
+        ..Identify::default()
     };
-    let explored = explore(talk, &table, identify, &unknown.name, |_, _| ())?;
-    Ok(explored.found)
+    Ok(explore(talk, &table, identify, &unknown.name, |_, _| ())?)
 }
 
 /// The store and what is held, before something is stored.
@@ -181,7 +181,7 @@ fn noted_update(
 ) -> Result<Operation, CutError> {
     for seed in 1..=EPISODES {
         let (before, held_before) = begin(talk)?;
-        let found = run_episode(talk, unknown, seed as u32, true)?;
+        let explored = run_episode(talk, unknown, seed as u32, true)?;
         // first the skin is kept, then what was learned
         let update = noted(name, talk, before, held_before, |before, after| {
             let between = Held {
@@ -190,7 +190,7 @@ fn noted_update(
             };
             vec![before, between, after]
         })?;
-        if found.learned > 0 && wanted(&update.writes) {
+        if explored.learned > 0 && wanted(&update.writes) {
             return Ok(update);
         }
     }
@@ -293,7 +293,7 @@ fn tasks(operations: &[Operation], turned: usize, seed: u64) -> Vec<Task> {
 }
 
 /// How many cuts [`run`] makes.
-pub fn count(prepared: &Prepared, turned: usize) -> usize {
+pub(crate) fn count(prepared: &Prepared, turned: usize) -> usize {
     tasks(&prepared.operations, turned, 0).len()
 }
 
@@ -302,7 +302,7 @@ pub fn count(prepared: &Prepared, turned: usize) -> usize {
 ///
 /// # Errors
 /// [`CutError::Kept`]: an operation is not kept without a cut.
-pub fn run(
+pub(crate) fn run(
     elf: &Path,
     prepared: &Prepared,
     turned: usize,
@@ -408,7 +408,7 @@ fn one(
 /// It homes, and finds out what lies under its finger.
 fn identifies(talk: &mut Talk, unknown: &Unknown) -> Result<(), CutError> {
     talk.ready(|_, _| ())?;
-    let found = run_episode(talk, unknown, 1, false)?;
+    let found = run_episode(talk, unknown, 1, false)?.found;
     // what was trained last is the same texture
     let names = [unknown.name.as_str(), "trained"];
     if found.unknown || !names.contains(&found.name.as_str()) {

@@ -6,14 +6,13 @@ use std::time::Instant;
 
 use clap::Args as Arguments;
 use tactus::eval::show::Show;
-use tactus_core::explorer::Verdict;
 use tactus_core::table::Table;
 use tactus_core::wire::{Event, Identify, Phase, Report};
 
 use super::error::RunError;
 use crate::board::{self, Emulator, Options};
 use crate::host::args::{Format, World};
-use crate::host::exploration::{self, ExploreError, among_all};
+use crate::host::exploration::{self, ExploreError};
 use crate::host::learned::Chosen;
 use crate::host::progress;
 use crate::host::talk::Talk;
@@ -21,7 +20,7 @@ use crate::host::under_finger::RECORDED_LIMITS;
 
 /// What is identified, and how.
 #[derive(Arguments)]
-pub struct Args {
+pub(crate) struct Args {
     #[command(flatten)]
     world: World,
     /// Table to give to the firmware instead of one learned for this world
@@ -39,7 +38,7 @@ pub struct Args {
 }
 
 /// Prints what the firmware logged.
-pub fn print_log(board: &mut Emulator) -> Result<(), board::Error> {
+pub(crate) fn print_log(board: &mut Emulator) -> Result<(), board::Error> {
     for (at_ns, line) in board.log()? {
         eprintln!("{:10.3} s  {line}", at_ns as f64 * 1e-9);
     }
@@ -47,7 +46,7 @@ pub fn print_log(board: &mut Emulator) -> Result<(), board::Error> {
 }
 
 /// Has the firmware identify what lies under its finger, and shows it as it goes.
-pub fn run(args: &Args) -> Result<(), RunError> {
+pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     let world = &args.world;
     let text = args.format == Format::Text;
     let sha256 = world.firmware.show(text)?;
@@ -95,7 +94,8 @@ pub fn run(args: &Args) -> Result<(), RunError> {
         // a table from a file may be for any method
         method: args.table.is_none().then(|| world.method.method()),
         strategy: world.method.strategy(),
-        ..among_all(chosen.seed)
+        seed: chosen.seed,
+        ..Identify::default()
     };
     let mut out: Box<dyn std::io::Write> = if text {
         Box::new(std::io::stdout())
@@ -131,7 +131,7 @@ pub fn run(args: &Args) -> Result<(), RunError> {
                     Ok(())
                 }
                 // shown at the end, with whether it is right
-                Event::Verdict { .. } => Ok(()),
+                Event::Verdict(_) => Ok(()),
                 Event::SlideReport { .. } => show
                     .line(&pressed(&forces))
                     .and_then(|()| show.event(event)),
@@ -143,14 +143,8 @@ pub fn run(args: &Args) -> Result<(), RunError> {
         })?;
     bar.finish_and_clear();
     failed?;
-    let verdict = Verdict {
-        texture: explored.found.texture,
-        probability: explored.found.probability,
-        sure: explored.found.sure,
-        unknown: explored.found.unknown,
-        log_odds: explored.found.log_odds,
-    };
-    show.finish(verdict, explored.found.slides, truth)?;
+    let found = &explored.found;
+    show.finish(found.into(), found.slides, truth)?;
     let wall_s = began.elapsed().as_secs_f64();
     if text {
         println!(

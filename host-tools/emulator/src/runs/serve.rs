@@ -14,7 +14,7 @@ use crate::host::learned::Chosen;
 
 /// What is served, and where.
 #[derive(Arguments)]
-pub struct Args {
+pub(crate) struct Args {
     #[command(flatten)]
     world: World,
     /// TCP port of this PC; 0 is any free one
@@ -26,7 +26,7 @@ pub struct Args {
 const STEP_MS: u64 = 1;
 
 /// Gives the line to whoever connects last, until the process ends.
-pub fn run(args: &Args) -> Result<(), RunError> {
+pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     let Args { world, port } = args;
     world.firmware.show(true)?;
     let chosen = Chosen::new(world)?;

@@ -1,9 +1,9 @@
 //! A day on the simulated rig and an hour on the emulated board, with random faults, against the bars.
 
-pub mod day;
-pub mod episodes;
+pub(crate) mod day;
+mod episodes;
 mod hour;
-pub mod hour_report;
+pub(crate) mod hour_report;
 
 use std::time::Instant;
 
@@ -33,7 +33,7 @@ use crate::host::progress;
   cargo xtask soak                                     24 hours and one
   cargo xtask soak --pc-hours 0 --board-hours 0.1      six minutes on the board only
   cargo xtask soak --seed 7 --format json --out soak.json")]
-pub struct Args {
+pub(crate) struct Args {
     #[command(flatten)]
     firmware: Firmware,
     /// Virtual hours on the simulated rig of the PC; 0 leaves it out
@@ -58,7 +58,7 @@ fn hours(text: &str) -> Result<f64, &'static str> {
 }
 
 /// Whether all bars are met.
-pub fn run(args: &Args) -> Result<bool, RunError> {
+pub(crate) fn run(args: &Args) -> Result<bool, RunError> {
     let sha256 = args.firmware.show(false)?;
     let mut report = Report::default();
     let left = " virtual s, {eta} left";

@@ -10,12 +10,11 @@ use tactus_core::wire::{Command, Event, Identify, Phase};
 use super::error::RunError;
 use crate::board::{Emulator, Options, StackLayout, StackLevel, StackUse};
 use crate::host::args::Firmware;
-use crate::host::exploration::among_all;
 use crate::host::talk::Talk;
 
 /// What is measured.
 #[derive(Arguments)]
-pub struct Args {
+pub(crate) struct Args {
     #[command(flatten)]
     firmware: Firmware,
     /// Slides
@@ -27,7 +26,7 @@ pub struct Args {
 const TIMEOUT_S: f64 = 120.0;
 
 /// Measures the stack of the rig's firmware while it identifies a texture among those of its factory table.
-pub fn run(args: &Args) -> Result<(), RunError> {
+pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     let elf = &args.firmware.elf;
     let mut layout = StackLayout::of(elf)?;
     let found = loop {
@@ -66,7 +65,8 @@ fn explore(elf: &Path, layout: StackLayout, slides: u8) -> Result<StackUse, RunE
         threshold: 1.0,
         max_slides: slides,
         learn: true,
-        ..among_all(1)
+        seed: 1,
+        ..Identify::default()
     };
     talk.send(Command::Identify(identify), TIMEOUT_S, |board, report| {
         if let Some(report) = report

@@ -4,11 +4,11 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use tactus::link::{Found, ReadTable, Request};
+use tactus::link::{ReadTable, Request};
 use tactus::sim::collection::Collection;
 use tactus_core::explorer::Method;
 use tactus_core::table::{Name, Table, Tally};
-use tactus_core::wire::{Event, Forget, Identify, Status, Train};
+use tactus_core::wire::{Event, Forget, Identify, Status, TextureLearned, Train, Verdict};
 use tactus_emulator::host::exploration::{Exploration, explore};
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk, TalkError};
 use tactus_emulator::host::under_finger::{self, Known, Unknown};
@@ -64,14 +64,8 @@ fn name(name: &str) -> Name {
 
 fn identify(seed: u32) -> Identify {
     Identify {
-        among: Default::default(),
-        threshold: 0.99,
-        max_slides: 10,
-        method: None,
-        strategy: Default::default(),
-        open: true,
-        learn: false,
         seed,
+        ..Identify::default()
     }
 }
 
@@ -106,7 +100,7 @@ fn run_episode(talk: &mut Talk, asked: Identify, truth: &str) -> Exploration {
     explored
 }
 
-fn assert_is(found: &Found, name: &str) {
+fn assert_is(found: &Verdict, name: &str) {
     assert!(found.sure && !found.unknown, "{found:?}");
     assert_eq!(found.name.as_str(), name);
 }
@@ -177,7 +171,7 @@ fn an_unknown_texture_is_said_to_be_and_its_name_learned() {
     );
     assert!(explored.right() && found.log_odds > Some(0.0), "{found:?}");
     // the probe learns nothing from an unknown texture before it has a name
-    assert_eq!(found.learned, 0);
+    assert_eq!(explored.learned, 0);
     assert_eq!(table(&mut talk), before);
     let nameless = answer(&mut talk, "");
     assert!(
@@ -215,21 +209,21 @@ fn what_it_learns_by_itself_is_kept_and_can_be_deleted() {
     };
     let mut told = None;
     let explored = explore(&mut talk, &base, asked, &known.name, |_, report| {
-        if let Some(Event::TextureLearned {
-            name,
-            slides,
-            itself,
-        }) = report.map(|report| &report.event)
-        {
-            told = Some((name.clone(), *slides, *itself));
+        if let Some(Event::TextureLearned(learned)) = report.map(|report| &report.event) {
+            told = Some(learned.clone());
         }
     })
     .unwrap();
     assert_eq!(explored.missed(), [""; 0]);
     assert_is(&explored.found, &known.name);
     let found = &explored.found;
-    assert_eq!(told, Some((found.name.clone(), found.slides, true)));
-    assert_eq!(found.learned, found.slides);
+    let learned = TextureLearned {
+        name: found.name.clone(),
+        slides: found.slides,
+        itself: true,
+    };
+    assert_eq!(told, Some(learned));
+    assert_eq!(explored.learned, found.slides);
     let learned = table(&mut talk);
     assert_ne!(learned, base);
     let tally = Table::read(&learned).unwrap().tally(found.texture);

@@ -94,7 +94,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             found.learned
         )?;
     }
-    if found.wants_label {
+    if found.verdict.wants_label {
         writeln!(
             out,
             "It is not certain. If you know what it is: tactus device teach NAME"

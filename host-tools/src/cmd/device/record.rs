@@ -60,14 +60,12 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         }
         // never sure: all slides are made
         let wanted = Identify {
-            among: Default::default(),
             threshold: 1.0,
             max_slides: *slides,
-            method: None,
             strategy: Strategy::Cycling,
             open: false,
-            learn: false,
             seed: args.seed.unwrap_or_else(seed_of_now),
+            ..Identify::default()
         };
         let mut recorder = Recorder::new(calibration.pressure);
         let (mut lost, mut kept) = (Vec::new(), Vec::new());

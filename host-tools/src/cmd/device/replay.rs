@@ -12,7 +12,7 @@ use tactus::link::follow::{ALLOWED, Agreement, Follower};
 use tactus_core::dsp::Plan;
 use tactus_core::features::PropertySet;
 use tactus_core::table::Table;
-use tactus_core::wire::{self, Event, Forget, Identify, PROTOCOL};
+use tactus_core::wire::{self, Event, Forget, Identify, PROTOCOL, Verdict};
 
 use super::log::Line;
 
@@ -143,10 +143,10 @@ fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
                     }
                 }
                 event => {
-                    if matches!(event, Event::TextureLearned { .. }) {
+                    if matches!(event, Event::TextureLearned(_)) {
                         table = Err(CHANGED);
                     }
-                    let over = matches!(event, Event::Verdict { .. } | Event::Refused { .. });
+                    let over = matches!(event, Event::Verdict(_) | Event::Refused { .. });
                     if running && let Some(last) = explorations.last_mut() {
                         last.events.push(event);
                         running = !over;
@@ -274,7 +274,7 @@ fn follow(logged: &Logged, out: &mut impl Write) -> anyhow::Result<Agreement> {
                 writeln!(out, "           {observed}, {posterior}")?;
             }
             Event::Rejected { slide, why } => writeln!(out, "  slide {slide}: rejected: {why}")?,
-            Event::Verdict { name, slides, .. } => {
+            Event::Verdict(Verdict { name, slides, .. }) => {
                 let same = now.other_verdicts == before.other_verdicts;
                 let here = if same {
                     "the same here"

@@ -2,7 +2,7 @@ use std::cell::RefCell;
 use std::sync::OnceLock;
 
 use tactus_core::dsp::Kernels;
-use tactus_core::explorer::Strategy;
+use tactus_core::explorer::{Config, Method, Strategy};
 use tactus_core::features::Blocks;
 use tactus_core::probe::explore::{ExplorationStep, explore};
 use tactus_core::rig::Rig;
@@ -150,7 +150,7 @@ fn exploration(method: Method) -> (Vec<u8>, Vec<Event>) {
                     verdict,
                     slides,
                     certain,
-                } => Event::Verdict {
+                } => Event::Verdict(Verdict {
                     texture: verdict.texture,
                     name: Name::try_from(table.name(verdict.texture).unwrap()).unwrap(),
                     probability: verdict.probability,
@@ -159,7 +159,7 @@ fn exploration(method: Method) -> (Vec<u8>, Vec<Event>) {
                     log_odds: verdict.log_odds,
                     slides,
                     wants_label: method == Method::Fused && !certain,
-                },
+                }),
                 ExplorationStep::Rejected(..) | ExplorationStep::CutShort(..) => {
                     panic!("{event:?}")
                 }
@@ -270,7 +270,7 @@ fn a_changed_posterior_property_or_outcome_is_found() {
     });
     assert!((agreement.expected - 1e-3).abs() < 1e-6 && !agreement.agrees());
     let (agreement, _) = changed(|event| match event {
-        Event::Verdict { sure, .. } => {
+        Event::Verdict(Verdict { sure, .. }) => {
             *sure = !*sure;
             true
         }
@@ -278,7 +278,7 @@ fn a_changed_posterior_property_or_outcome_is_found() {
     });
     assert_eq!(agreement.other_verdicts, 1);
     let (agreement, _) = changed(|event| match event {
-        Event::Verdict { unknown, .. } => {
+        Event::Verdict(Verdict { unknown, .. }) => {
             *unknown = !*unknown;
             true
         }
@@ -286,7 +286,7 @@ fn a_changed_posterior_property_or_outcome_is_found() {
     });
     assert_eq!(agreement.other_verdicts, 1);
     let (agreement, _) = changed(|event| match event {
-        Event::Verdict { log_odds, .. } => {
+        Event::Verdict(Verdict { log_odds, .. }) => {
             *log_odds = log_odds.map(|odds| odds + 0.5);
             true
         }
@@ -434,15 +434,17 @@ fn an_exploration_that_was_cut_short_is_followed() {
             .collect(),
     });
     events.push(rejected);
-    let verdict = |wants_label| Event::Verdict {
-        texture: known.texture,
-        name: Name::try_from(table.name(known.texture).unwrap()).unwrap(),
-        probability: known.probability,
-        sure: known.sure,
-        unknown: known.unknown,
-        log_odds: known.log_odds,
-        slides: 2,
-        wants_label,
+    let verdict = |wants_label| {
+        Event::Verdict(Verdict {
+            texture: known.texture,
+            name: Name::try_from(table.name(known.texture).unwrap()).unwrap(),
+            probability: known.probability,
+            sure: known.sure,
+            unknown: known.unknown,
+            log_odds: known.log_odds,
+            slides: 2,
+            wants_label,
+        })
     };
     let followed = |wants_label| follow(&[&events[..], &[verdict(wants_label)]].concat());
     let (agreement, errors) = followed(false);

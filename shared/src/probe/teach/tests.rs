@@ -88,11 +88,11 @@ fn recipe(mut mean: f64, mut n: f64, slides: u8, z: i16) -> (f64, f64) {
 
 fn learned_event(name: &str, slides: u8, itself: bool) -> Event {
     let name = Name::try_from(name).unwrap();
-    Event::TextureLearned {
+    Event::TextureLearned(TextureLearned {
         name,
         slides,
         itself,
-    }
+    })
 }
 
 /// What is known of these textures is the same to the bit, and from whom.

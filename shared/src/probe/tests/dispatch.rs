@@ -6,7 +6,7 @@ use crate::probe::seams::{Events, Panel, RigHandle, StoredBytes, UnloadedRun};
 use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
-use crate::wire::{Command, Counts, Forget, PART, Request, Status};
+use crate::wire::{Command, Counts, Forget, PART, Request, Status, TextureLearned};
 use std::boxed::Box;
 
 const SECTOR: usize = 16_384;
@@ -362,7 +362,7 @@ fn an_exploration_is_kept_until_the_rig_moves_again() {
     assert!(!empty.starts_with("nothing"), "{empty}");
     command(&mut probe, Command::Label(name("elm"))).unwrap();
     assert!(
-        matches!(probe.events.told.last(), Some(Event::TextureLearned { itself: false, name, .. }) if name == "elm")
+        matches!(probe.events.told.last(), Some(Event::TextureLearned(TextureLearned { itself: false, name, .. })) if name == "elm")
     );
     let table = *probe.events.tables.last().unwrap();
     assert_eq!((table.textures, table.factory), (5, false));
@@ -396,7 +396,7 @@ fn what_the_probe_learns_by_itself_is_reported_and_in_force() {
     let after = *probe.events.tables.last().unwrap();
     assert!(before.crc != after.crc && after.factory);
     assert!(
-        matches!(probe.events.told.last(), Some(Event::TextureLearned { itself: true, slides: 1, name }) if name == "t2")
+        matches!(probe.events.told.last(), Some(Event::TextureLearned(TextureLearned { itself: true, slides: 1, name })) if name == "t2")
     );
     command(&mut probe, Command::Forget(Forget::SelfLearned)).unwrap();
     assert_eq!(*probe.events.tables.last().unwrap(), before);
@@ -544,7 +544,7 @@ fn without_a_store_it_explores_and_says_that_it_cannot_learn() {
     assert!(
         matches!(
             probe.events.told.last(),
-            Some(Event::Verdict { sure: true, .. })
+            Some(Event::Verdict(Verdict { sure: true, .. }))
         ),
         "nothing is said to be learned"
     );

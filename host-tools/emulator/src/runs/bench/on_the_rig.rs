@@ -10,7 +10,6 @@ use super::error::BenchError;
 use super::gates::gate;
 use super::row::Row;
 use crate::board::{Emulator, Options, Output};
-use crate::host::exploration::among_all;
 use crate::host::talk::Talk;
 
 /// Longest that the rig takes for anything, virtual seconds.
@@ -44,7 +43,8 @@ pub(super) fn on_the_rig(elf: &Path) -> Result<Vec<Row>, BenchError> {
         threshold: 1.0,
         max_slides: 1,
         open: false,
-        ..among_all(1)
+        seed: 1,
+        ..Identify::default()
     };
     // times in ns and instructions so far
     let (mut begun, mut over, mut told) = (None, None, None);
@@ -63,7 +63,7 @@ pub(super) fn on_the_rig(elf: &Path) -> Result<Vec<Row>, BenchError> {
                 failed = counted.err();
             }
             Some(Event::Phase(Phase::Lifting)) if over.is_none() => over = now(board),
-            Some(Event::Verdict { .. }) => {
+            Some(Event::Verdict(_)) => {
                 told = now(board);
                 lifts_ns = begun.and_then(|(from_ns, _)| first_step_up(board, from_ns));
             }

@@ -9,7 +9,7 @@ use tactus::sim::recorded::RecordedTexture;
 use tactus_core::wire::Identify;
 
 use crate::board::Options;
-use crate::host::exploration::{Exploration, ExploreError, among_all, explore};
+use crate::host::exploration::{Exploration, ExploreError, explore};
 use crate::host::talk::Talk;
 use crate::host::under_finger::{self, Known, KnownError, TRIALS, Unknown};
 
@@ -121,7 +121,8 @@ fn one(elf: &Path, group: &Group, index: usize) -> Result<Exploration, ExploreEr
     let identify = Identify {
         method: Some(group.method.method()),
         strategy: group.method.strategy(),
-        ..among_all((group.seed as u32).wrapping_mul(1009) + index as u32 + 1)
+        seed: (group.seed as u32).wrapping_mul(1009) + index as u32 + 1,
+        ..Identify::default()
     };
     explore(&mut talk, table, identify, &unknown.name, |_, _| ())
 }

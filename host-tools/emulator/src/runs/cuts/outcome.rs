@@ -4,35 +4,31 @@ use serde_json::{Value, json};
 
 /// What became of the cuts of an operation.
 #[derive(Clone, Debug, Default)]
-pub struct Outcome {
+pub(crate) struct Outcome {
     /// What was stored.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// Words that the firmware programmed and sectors that it erased.
-    pub writes: usize,
-    /// See [`Outcome::writes`].
-    pub erases: usize,
+    pub(crate) writes: usize,
+    pub(crate) erases: usize,
     /// Cuts by what was left.
-    pub old: usize,
-    /// See [`Outcome::old`].
-    pub between: usize,
-    /// See [`Outcome::old`].
-    pub new: usize,
+    pub(crate) old: usize,
+    pub(crate) between: usize,
+    pub(crate) new: usize,
     /// Cuts in what the firmware repaired after the first cut; they are among the others.
-    pub in_recovery: usize,
+    pub(crate) in_recovery: usize,
     /// After so many of them the probe homed and identified what lay under its finger.
-    pub probed: usize,
+    pub(crate) probed: usize,
     /// What was neither, or did not work.
-    pub wrong: Vec<String>,
+    pub(crate) wrong: Vec<String>,
 }
 
 impl Outcome {
     /// All cuts.
-    pub fn cuts(&self) -> usize {
+    pub(crate) fn cuts(&self) -> usize {
         self.old + self.between + self.new + self.wrong.len()
     }
 
-    /// For programs.
-    pub fn json(&self) -> Value {
+    pub(crate) fn json(&self) -> Value {
         json!({
             "stored": self.name,
             "words_programmed": self.writes - self.erases,
@@ -50,16 +46,16 @@ impl Outcome {
 
 /// What became of all cuts.
 #[derive(Clone, Debug)]
-pub struct Cuts {
+pub(crate) struct Cuts {
     /// Operation by operation.
-    pub outcomes: Vec<Outcome>,
+    pub(crate) outcomes: Vec<Outcome>,
     /// A firmware that erases before it has copied is told from this one.
-    pub planted_seen: bool,
+    pub(crate) planted_seen: bool,
 }
 
 impl Cuts {
     /// What is not as it must be.
-    pub fn missed(&self) -> Vec<String> {
+    pub(crate) fn missed(&self) -> Vec<String> {
         let wrong = self.outcomes.iter().flat_map(|outcome| {
             let named = |wrong| format!("{}: {wrong}", outcome.name);
             outcome.wrong.iter().map(named)
@@ -69,8 +65,7 @@ impl Cuts {
         wrong.chain(planted).collect()
     }
 
-    /// For programs.
-    pub fn json(&self) -> Value {
+    pub(crate) fn json(&self) -> Value {
         json!({
             "operations": self.outcomes.iter().map(Outcome::json).collect::<Vec<_>>(),
             "planted_error_seen": self.planted_seen,
@@ -78,8 +73,7 @@ impl Cuts {
         })
     }
 
-    /// For people.
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let mut lines = vec![format!(
             "\npower cuts\n{:14} {:>6} {:>6} {:>5} {:>5} {:>8} {:>5} {:>12} {:>7} {:>6}",
             "stored",

@@ -2,9 +2,8 @@
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::link::Found;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::wire::Reset;
+use tactus_core::wire::{Reset, Verdict};
 
 use crate::board::{self, FlashWrite, SECTOR};
 use crate::host::exploration::ExploreError;
@@ -13,38 +12,27 @@ use crate::host::under_finger::KnownError;
 
 /// Why there are no cuts to judge.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum CutError {
-    /// The firmware did not do what it was asked for.
+pub(crate) enum CutError {
     #[error(transparent)]
     Talk(#[from] TalkError),
-    /// It did not explore.
     #[error(transparent)]
     Explore(#[from] ExploreError),
-    /// The world cannot be learned.
     #[error(transparent)]
     Known(#[from] KnownError),
-    /// What was to be cut did not happen.
     #[error("the firmware did not {0}: nothing to cut")]
     Nothing(&'static str),
-    /// What was noted is not what the flash has.
     #[error("{0}: the noted writes do not give the flash that the firmware left")]
     Noted(&'static str),
-    /// It does not hold what it had reported.
     #[error("{0}: without a cut the firmware does not keep what it held: {1:?}, {2:?}")]
     Kept(&'static str, Box<Held>, Box<Held>),
-    /// It did not start by its power.
     #[error("it says that it started by {0:?}")]
     Started(Reset),
-    /// It puts no table in force.
     #[error("no table in {0} virtual s")]
     NoTable(f64),
-    /// It holds what it never held.
     #[error("neither old nor new: {0:?}")]
     Neither(Box<Held>),
-    /// It does not work on what was left.
     #[error("it identifies {0:?}")]
-    Identifies(Box<Found>),
+    Identifies(Box<Verdict>),
 }
 
 impl From<board::Error> for CutError {
@@ -55,22 +43,22 @@ impl From<board::Error> for CutError {
 
 /// What the firmware holds, by its own account.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Held {
+pub(crate) struct Held {
     /// Checksum and bytes of the table in force, with what the probe has learned by itself.
-    pub table: (u32, u32),
+    pub(crate) table: (u32, u32),
     /// Its textures.
-    pub textures: u16,
+    pub(crate) textures: u16,
     /// It came with the firmware.
-    pub factory: bool,
+    pub(crate) factory: bool,
     /// Constants of the rig.
-    pub calibration: [u8; RigCalibration::BYTES],
+    pub(crate) calibration: [u8; RigCalibration::BYTES],
     /// Work that the skin has seen, mJ, and that part of it that wears.
-    pub skin_mj: (u32, u32),
+    pub(crate) skin_mj: (u32, u32),
 }
 
 /// What is left by a cut.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Left {
+pub(crate) enum Left {
     /// The state from before.
     Old,
     /// One of several records is stored.
@@ -80,7 +68,7 @@ pub enum Left {
 }
 
 /// Which of the states, the oldest first, was found; `None` is neither.
-pub fn judge(states: &[Held], found: &Held) -> Option<Left> {
+pub(crate) fn judge(states: &[Held], found: &Held) -> Option<Left> {
     let last = states.len().checked_sub(1)?;
     // where nothing changed, it is old and new
     match states.iter().rposition(|state| state == found)? {
@@ -92,20 +80,20 @@ pub fn judge(states: &[Held], found: &Held) -> Option<Left> {
 
 /// Something that the firmware stores.
 #[derive(Clone, Debug)]
-pub struct Operation {
+pub(crate) struct Operation {
     /// What it is.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// The store before it.
-    pub before: Vec<u8>,
+    pub(crate) before: Vec<u8>,
     /// What the firmware does to it.
-    pub writes: Vec<FlashWrite>,
+    pub(crate) writes: Vec<FlashWrite>,
     /// What may be held after a cut, the oldest first.
-    pub states: Vec<Held>,
+    pub(crate) states: Vec<Held>,
 }
 
 /// How a write is torn.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Torn {
+pub(crate) enum Torn {
     /// It had not begun.
     Nothing,
     /// The lower half of the word; the sector's first part is erased.
@@ -118,18 +106,18 @@ pub enum Torn {
 
 impl Torn {
     /// All ways.
-    pub const ALL: [Self; 4] = [Self::Nothing, Self::Begin, Self::End, Self::Bits];
+    pub(crate) const ALL: [Self; 4] = [Self::Nothing, Self::Begin, Self::End, Self::Bits];
 }
 
 /// The power is off in this write of an operation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Cut {
+pub(crate) struct Cut {
     /// Writes before it.
-    pub at: usize,
+    pub(crate) at: usize,
     /// What is left of it.
-    pub torn: Torn,
+    pub(crate) torn: Torn,
     /// For the bits.
-    pub seed: u64,
+    pub(crate) seed: u64,
 }
 
 fn word(store: &mut [u8], at: usize, change: impl FnOnce(u32) -> u32) {
@@ -187,7 +175,7 @@ fn tear(store: &mut [u8], write: FlashWrite, cut: Cut) {
 }
 
 /// The flash after some writes and a cut.
-pub fn left_by(before: &[u8], writes: &[FlashWrite], cut: Cut) -> Vec<u8> {
+pub(crate) fn left_by(before: &[u8], writes: &[FlashWrite], cut: Cut) -> Vec<u8> {
     let mut store = before.to_vec();
     for write in writes.iter().take(cut.at) {
         apply(&mut store, *write);

@@ -15,7 +15,7 @@ use tactus_core::dsp::{self, Plain};
 use tactus_core::sensor::pressure::SLOTS_HZ;
 use tactus_core::store::{Store, StoreError};
 use tactus_core::table::TableError;
-use tactus_core::wire::{Command, Event, Forget, Identify, Text};
+use tactus_core::wire::{Command, Event, Forget, Identify, Text, Verdict};
 
 use super::episodes::{Episodes, FACTORY, HOMINGS, MOST_N, Plan, world};
 
@@ -29,53 +29,41 @@ const FORGETS_EVERY: u32 = 15;
 
 /// Why there is no day to judge.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DayError {
-    /// The rig.
+pub(crate) enum DayError {
     #[error("the simulated rig: {0}")]
     Rig(#[from] SimError),
-    /// The store.
     #[error("the store: {0}")]
     Store(#[from] StoreError<Infallible>),
-    /// The table.
     #[error("the table: {0}")]
     Table(#[from] TableError),
-    /// The probe refuses what it should do.
     #[error("at {at_s:.0} s: {why}")]
-    Probe {
-        /// When, virtual s.
-        at_s: f64,
-        /// What it says.
-        why: String,
-    },
+    Probe { at_s: f64, why: String },
 }
 
 /// What became of a day.
 #[derive(Clone, Debug, Default)]
-pub struct Day {
+pub(crate) struct Day {
     /// Virtual seconds.
-    pub virtual_s: f64,
+    pub(crate) virtual_s: f64,
     /// The episodes.
-    pub episodes: Episodes,
+    pub(crate) episodes: Episodes,
     /// Slots that were served, and those that the time had.
-    pub slots: (u64, u64),
+    pub(crate) slots: (u64, u64),
     /// How far the rig's clock is from the world's at the end, ns.
-    pub drift_ns: i64,
+    pub(crate) drift_ns: i64,
     /// Most force on the finger, N.
-    pub force_max_n: f64,
+    pub(crate) force_max_n: f64,
     /// Times that the store was opened again, and erases of its sectors.
-    pub restarts: u32,
-    /// See [`Day::restarts`].
-    pub erases: u32,
+    pub(crate) restarts: u32,
+    pub(crate) erases: u32,
     /// Skins that were worn out.
-    pub skins: u32,
+    pub(crate) skins: u32,
     /// What is not as it must be.
-    pub missed: Vec<String>,
+    pub(crate) missed: Vec<String>,
 }
 
 impl Day {
-    /// For programs.
-    pub fn json(&self) -> Value {
+    pub(crate) fn json(&self) -> Value {
         let mut json = self.episodes.json();
         json["virtual_seconds"] = self.virtual_s.into();
         json["slots"] = self.slots.0.into();
@@ -89,8 +77,7 @@ impl Day {
         json
     }
 
-    /// For people.
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         format!(
             "PC rig: {:.2} virtual hours\n  {}\n  slots {} of {}, drift {} ns, force {:.3} N at most; store opened again {} times, \
              {} sectors erased, {} skins worn out",
@@ -116,30 +103,12 @@ struct Heard {
     learned: bool,
 }
 
-/// What the probe says lies under its finger.
-struct Verdict {
-    name: String,
-    unknown: bool,
-    sure: bool,
-}
-
 impl Host for Heard {
     fn tell(&mut self, event: Event) {
         match event {
-            Event::Verdict {
-                name,
-                unknown,
-                sure,
-                ..
-            } => {
-                self.verdict = Some(Verdict {
-                    name: name.as_str().to_owned(),
-                    unknown,
-                    sure,
-                });
-            }
+            Event::Verdict(verdict) => self.verdict = Some(verdict),
             Event::Rejected { why, .. } => self.rejected.push(why.as_str().to_owned()),
-            Event::TextureLearned { .. } => self.learned = true,
+            Event::TextureLearned(_) => self.learned = true,
             _ => {}
         }
     }
@@ -151,7 +120,7 @@ type Probe<'p> = SimProbe<'p, Heard>;
 ///
 /// # Errors
 /// See [`DayError`].
-pub fn day(virtual_s: f64, seed: u64, mut each: impl FnMut(f64)) -> Result<Day, DayError> {
+pub(crate) fn day(virtual_s: f64, seed: u64, mut each: impl FnMut(f64)) -> Result<Day, DayError> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let setup = world().setup(1, 1 + seed);
     let mut rig = SimRig::new(setup);

@@ -13,10 +13,8 @@ use tactus::sim::collection::Collection;
 use tactus::sim::faults::Fault;
 use tactus_core::wire::Identify;
 
-use crate::host::exploration::among_all;
-
 /// More force than this is never on the finger, N: see the guard of the core's `rig`.
-pub const MOST_N: f64 = 2.2;
+pub(crate) const MOST_N: f64 = 2.2;
 /// One of so many episodes has a fault.
 const FAULTS_IN: u32 = 4;
 /// Latest time of a fault, ns after the episode began: an episode takes some 15 s.
@@ -56,7 +54,8 @@ impl Plan {
             identify: Identify {
                 // the draws in this order
                 learn: random.random(),
-                ..among_all(random.random())
+                seed: random.random(),
+                ..Identify::default()
             },
             fault: fault.filter(|_| breaks).map(|fault| (at_ns, fault)),
             answer: random.random_range(0..4) == 0,
@@ -66,36 +65,36 @@ impl Plan {
 
 /// What became of episodes.
 #[derive(Clone, Debug, Default)]
-pub struct Episodes {
+pub(crate) struct Episodes {
     /// Explorations that were begun.
-    pub made: u32,
+    pub(crate) made: u32,
     /// Those in which nothing broke.
-    pub sound: u32,
+    pub(crate) sound: u32,
     /// Of these the ones of textures that the probe knew, and the right verdicts on them.
-    pub known: (u32, u32),
+    pub(crate) known: (u32, u32),
     /// Those of textures that had been deleted, and how often the probe said that it does not know them.
-    pub unknown: (u32, u32),
+    pub(crate) unknown: (u32, u32),
     /// What was taken for what, and when, virtual s.
-    pub wrong: Vec<String>,
+    pub(crate) wrong: Vec<String>,
     /// Wrong verdicts of which the probe was sure, on textures that it knew and on others.
-    pub sure_and_wrong: (u32, u32),
+    pub(crate) sure_and_wrong: (u32, u32),
     /// Slides that were made again, and why, in episodes in which nothing broke.
-    pub rejected: Vec<String>,
+    pub(crate) rejected: Vec<String>,
     /// Episodes that the probe learned from: labelled by the user, and by itself.
-    pub learned: (u32, u32),
+    pub(crate) learned: (u32, u32),
     /// How often something was deleted.
-    pub forgotten: u32,
+    pub(crate) forgotten: u32,
     /// What broke, by its name.
-    pub faults: BTreeMap<String, Broken>,
+    pub(crate) faults: BTreeMap<String, Broken>,
 }
 
 /// What became of a kind of fault.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Broken {
+pub(crate) struct Broken {
     /// How often it came.
-    pub came: u32,
+    pub(crate) came: u32,
     /// It ended the episode.
-    pub noticed: u32,
+    pub(crate) noticed: u32,
 }
 
 impl Episodes {
@@ -139,7 +138,7 @@ impl Episodes {
     }
 
     /// All faults together.
-    pub fn broken(&self) -> Broken {
+    pub(crate) fn broken(&self) -> Broken {
         let sum = |of: fn(&Broken) -> u32| self.faults.values().map(of).sum();
         Broken {
             came: sum(|kind| kind.came),
@@ -147,8 +146,7 @@ impl Episodes {
         }
     }
 
-    /// For programs.
-    pub fn json(&self) -> Value {
+    pub(crate) fn json(&self) -> Value {
         let kind = |(name, kind): (&String, &Broken)| {
             (
                 name.clone(),
@@ -169,8 +167,7 @@ impl Episodes {
         })
     }
 
-    /// For people.
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let broken = self.broken();
         format!(
             "{} episodes, {} without a fault; of textures that it knew {} of {} right, {} wrong though sure; of those it had forgotten {} \

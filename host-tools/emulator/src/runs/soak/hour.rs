@@ -340,13 +340,13 @@ impl Soak<'_> {
         let named = (!found.unknown).then_some(found.name.as_str());
         let episodes = &mut self.hour.episodes;
         episodes.judge(at_s, truth, explored.known, named, found.sure);
-        episodes.learned.1 += u32::from(found.learned > 0);
+        episodes.learned.1 += u32::from(explored.learned > 0);
         self.hour.missed_slots += explored.missed_slots() as u64;
         let missed = explored.missed().into_iter();
         let missed = missed.map(|what| format!("{at_s:.0} s: {truth}: {what}"));
         self.hour.missed.extend(missed);
         // what it has learned by itself has changed the table: a label would come too late
-        if drawn.answer && found.learned == 0 {
+        if drawn.answer && explored.learned == 0 {
             let name = Name::try_from(truth).unwrap_or_default();
             let learned = self.talk.run(Request::label(name), TIMEOUT_S, |_, _| ());
             match learned {

@@ -21,82 +21,63 @@ const FRAMES: u32 = 2 * 108;
 const EPISODES: f64 = 30.0;
 /// Why there is no hour to judge.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum HourError {
-    /// The board.
+pub(crate) enum HourError {
     #[error(transparent)]
     Emulator(#[from] Error),
-    /// The firmware.
     #[error("at {at_s:.0} virtual s: {why}")]
-    Talk {
-        /// When.
-        at_s: f64,
-        /// Why.
-        why: TalkError,
-    },
-    /// The exploration.
+    Talk { at_s: f64, why: TalkError },
     #[error("at {at_s:.0} virtual s: {why}")]
-    Explore {
-        /// When.
-        at_s: f64,
-        /// Why.
-        why: ExploreError,
-    },
-    /// The rig's constants.
+    Explore { at_s: f64, why: ExploreError },
     #[error("the simulated rig: {0}")]
     Rig(#[from] SimError),
-    /// The table.
     #[error("the table in force: {0}")]
     Table(#[from] TableError),
 }
 
 /// A reset of the chip, and what the firmware said of it.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Restart {
+pub(crate) struct Restart {
     /// What was done to it; nothing for one that nobody wanted.
-    pub done: Option<&'static str>,
+    pub(crate) done: Option<&'static str>,
     /// Why it started, by its own account.
-    pub reset: Reset,
+    pub(crate) reset: Reset,
     /// What it said before it gave up.
-    pub last_words: Option<String>,
+    pub(crate) last_words: Option<String>,
 }
 
 /// What became of an hour.
 #[derive(Clone, Debug, Default)]
-pub struct Hour {
+pub(crate) struct Hour {
     /// Virtual seconds over one boot, before the restarts on purpose.
-    pub virtual_s: f64,
+    pub(crate) virtual_s: f64,
     /// The episodes.
-    pub episodes: Episodes,
+    pub(crate) episodes: Episodes,
     /// How far the firmware's clock has gone from the emulator's, ms.
-    pub drift_ms: f64,
+    pub(crate) drift_ms: f64,
     /// Slots by the firmware's count, by the time, and sample commands that the sensor got.
-    pub slots: (u64, f64, u64),
+    pub(crate) slots: (u64, f64, u64),
     /// What the firmware counted, over all boots.
-    pub late_slots: u64,
-    /// See [`Hour::late_slots`].
-    pub lost_samples: u64,
-    /// See [`Hour::late_slots`].
-    pub lost_reports: u64,
+    pub(crate) late_slots: u64,
+    pub(crate) lost_samples: u64,
+    pub(crate) lost_reports: u64,
     /// Slots of slides in which the sensor was not asked, by the sensor.
-    pub missed_slots: u64,
+    pub(crate) missed_slots: u64,
     /// Most bytes of stack at each quarter of the time.
-    pub stack: Vec<u32>,
+    pub(crate) stack: Vec<u32>,
     /// Resets that the emulator saw.
-    pub resets: usize,
+    pub(crate) resets: usize,
     /// What the firmware reported of them.
-    pub restarts: Vec<Restart>,
+    pub(crate) restarts: Vec<Restart>,
     /// Most force on the finger, N.
-    pub force_max_n: f64,
+    pub(crate) force_max_n: f64,
     /// Sectors of the store that were erased.
-    pub erases: usize,
+    pub(crate) erases: usize,
     /// What is not as it must be.
-    pub missed: Vec<String>,
+    pub(crate) missed: Vec<String>,
 }
 
 impl Hour {
-    /// For programs.
-    pub fn json(&self) -> Value {
+    pub(crate) fn json(&self) -> Value {
         let restart = |restart: &Restart| {
             json!({
                 "done_to_it": restart.done,
@@ -123,8 +104,7 @@ impl Hour {
         json
     }
 
-    /// For people.
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let told: Vec<String> = self
             .restarts
             .iter()

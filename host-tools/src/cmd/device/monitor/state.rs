@@ -175,20 +175,14 @@ impl Monitor {
             Event::Rejected { slide, why } => {
                 self.note(Weight::Message, format!("slide {slide} is repeated: {why}"));
             }
-            Event::Verdict {
-                name,
-                probability,
-                sure,
-                unknown,
-                slides,
-                ..
-            } => {
-                let p = probability * 100.0;
-                let after = format!("{slides} slide{}", if *slides == 1 { "" } else { "s" });
-                let (answer, note) = if *unknown {
+            Event::Verdict(verdict) => {
+                let (name, slides) = (&verdict.name, verdict.slides);
+                let p = verdict.probability * 100.0;
+                let after = format!("{slides} slide{}", if slides == 1 { "" } else { "s" });
+                let (answer, note) = if verdict.unknown {
                     let note = format!("none that I know, most like {name}, after {after}");
                     ("It is none that I know".to_owned(), note)
-                } else if *sure {
+                } else if verdict.sure {
                     let note = format!("it is {name}: {p:.1} % after {after}");
                     (format!("It is {name}"), note)
                 } else {
@@ -198,12 +192,13 @@ impl Monitor {
                 self.answer = Some(answer);
                 self.note(Weight::Message, note);
             }
-            Event::TextureLearned {
-                name,
-                slides,
-                itself,
-            } => {
-                let whom = if *itself { "by itself" } else { "from you" };
+            Event::TextureLearned(learned) => {
+                let (name, slides) = (&learned.name, learned.slides);
+                let whom = if learned.itself {
+                    "by itself"
+                } else {
+                    "from you"
+                };
                 let note = format!("it has learned {name} {whom}: {slides} slides");
                 self.note(Weight::Message, note);
             }

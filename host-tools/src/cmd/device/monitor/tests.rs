@@ -6,7 +6,7 @@ use tactus_core::features::{Block, Movement, Property};
 use tactus_core::rig::Fault;
 use tactus_core::table::Action;
 use tactus_core::wire::{
-    Counts, Event, ExpectedOutcome, Live, Phase, Report, SlideReport, Status, Text,
+    Counts, Event, ExpectedOutcome, Live, Phase, Report, SlideReport, Status, Text, Verdict,
 };
 
 use super::state::{Monitor, NOTES, SHOWN};
@@ -122,7 +122,7 @@ fn a_slide_looks_like_this() {
 #[test]
 fn an_answer_a_fault_and_silence_are_said_in_words() {
     let mut events = exploration();
-    events.push(Event::Verdict {
+    events.push(Event::Verdict(Verdict {
         texture: 1,
         name: "Oak wood".try_into().unwrap(),
         probability: 0.995,
@@ -131,7 +131,7 @@ fn an_answer_a_fault_and_silence_are_said_in_words() {
         log_odds: None,
         slides: 1,
         wants_label: false,
-    });
+    }));
     let mut monitor = heard(events.clone());
     assert!(
         screen(&monitor, 80, 24)
