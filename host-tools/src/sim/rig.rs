@@ -522,9 +522,7 @@ impl SimRig {
         match *failed {
             SimError::Refused(why) => RigError::from(why).is_of_the_movement(),
             SimError::Fault(fault) if fault.is_of_the_movement() => {
-                self.control.reset().is_ok()
-                    && self.control.home().is_ok()
-                    && self.rest(|_| ()).is_ok()
+                self.control.recover().is_ok() && self.rest(|_| ()).is_ok()
             }
             _ => false,
         }

@@ -26,6 +26,8 @@ pub enum RigCommand {
     Lift,
     /// Ends a fault if there is one, then finds the limit switches.
     Home,
+    /// The same without a person: see [`Control::recover`].
+    Recover,
     /// A movement, and where on the sample it begins, 0 to 1.
     Start(Movement, f32),
     /// A run without load at this speed, um/s.
@@ -49,6 +51,7 @@ impl RigCommand {
                 control.reset()?;
                 control.home()
             }
+            Self::Recover => control.recover(),
             Self::Lift => {
                 control.home()?;
                 control.stop();
@@ -316,6 +319,13 @@ impl<S: Servo> Rig for ServoRig<S> {
     }
 
     async fn recover(&mut self, failed: &RigError) -> bool {
-        failed.is_of_the_movement() && self.home().await.is_ok()
+        match failed {
+            RigError::Refused(_) => failed.is_of_the_movement(),
+            _ => {
+                failed.is_of_the_movement()
+                    && self.command(RigCommand::Recover).await.is_ok()
+                    && self.rest().await.is_ok_and(|rig| rig.phase == Phase::Ready)
+            }
+        }
     }
 }
