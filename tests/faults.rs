@@ -190,6 +190,18 @@ const CASES: &[Case] = &[
         since: Since::Own,
     },
     Case {
+        fault: Fault::PressureDead,
+        cause: Cause::PdcStuck,
+        when: &[When::Approaching, When::Touching],
+        since: Since::Own,
+    },
+    Case {
+        fault: Fault::PressureDead,
+        cause: Cause::PdcFades { seconds: 0.0 },
+        when: &[When::Touching],
+        since: Since::Own,
+    },
+    Case {
         fault: Fault::StageNotHome,
         cause: Cause::EncoderCut(Cut::Both),
         when: &[When::Homing],
@@ -301,8 +313,14 @@ fn judge(case: &Case, when: When, seed: u64, unguarded: Unguarded) -> Result<(),
         })
         .unwrap();
         if when == When::Settling {
+            // a P_DC that sinks before the force is reached is dead, and no unsteady force
+            let share = if case.fault == Fault::Unsteady {
+                0.97
+            } else {
+                0.9
+            };
             until(&mut rig, "touching", |rig| {
-                rig.world().truth().force_n > 0.9 * f64::from(movement.force_n())
+                rig.world().truth().force_n > share * f64::from(movement.force_n())
             })
             .unwrap();
         }
@@ -844,7 +862,8 @@ fn a_finger_that_nobody_calibrated_is_guarded_before_its_first_zero() {
 /// A movement that does not come to an end: before anybody says so the finger is lifted.
 #[test]
 fn a_rig_that_hangs_lifts_its_finger_before_it_says_so() {
-    let mut rig = SimRig::unguarded(Setup::default(), Unguarded::against(Fault::Unsteady));
+    let unguarded = Unguarded::against(Fault::Unsteady).and(Fault::PressureDead);
+    let mut rig = SimRig::unguarded(Setup::default(), unguarded.and(Fault::LeverSlips));
     rig.home().unwrap();
     rig.control().start(Movement::FOR_TRACTION, 0.3).unwrap();
     until(&mut rig, "touching", |rig| {

@@ -18,6 +18,7 @@ mod noise;
 pub mod person;
 pub use person as hand;
 pub mod played;
+pub mod press;
 pub mod probe;
 pub mod recorded;
 pub mod rig;

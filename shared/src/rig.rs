@@ -10,6 +10,7 @@ pub mod guard;
 pub mod lever;
 pub mod phase;
 pub mod pins;
+mod progress;
 pub mod skin;
 mod slide;
 pub mod slide_path;

@@ -28,6 +28,18 @@ pub enum Fault {
         /// Counts of P_DC per second, of either sign.
         counts_per_s: f64,
     },
+    /// The converter of the static pressure sticks: P_DC says the same from now on, while P_AC lives.
+    PdcStuck,
+    /// The amplifier of the static pressure loses its gain: P_DC goes back to what it says at rest, while P_AC lives.
+    PdcFades {
+        /// Time in which the gain falls to 1/e, s; 0: it is gone at once.
+        seconds: f64,
+    },
+    /// The skin is torn: the fluid runs out while it is pressed, and its pressure goes with it, for both signals.
+    SkinLeaks {
+        /// Time in which the pressure of a still finger falls to 1/e, s.
+        seconds: f64,
+    },
     /// The stage is held by something; its motor can still push.
     StageJammed,
     /// A wire of the encoder is cut.
@@ -59,7 +71,7 @@ pub enum Fault {
 
 impl Fault {
     /// One of each kind, for campaigns.
-    pub const EXAMPLES: [Self; 18] = [
+    pub const EXAMPLES: [Self; 21] = [
         Self::SensorUnplugged,
         Self::BitFlips { share: 0.05 },
         Self::MisoStuck { high: false },
@@ -68,6 +80,9 @@ impl Fault {
         Self::PdcDrift {
             counts_per_s: -20.0,
         },
+        Self::PdcStuck,
+        Self::PdcFades { seconds: 0.0 },
+        Self::SkinLeaks { seconds: 0.3 },
         Self::StageJammed,
         Self::EncoderCut(Cut::A),
         Self::EncoderCut(Cut::B),
@@ -92,7 +107,7 @@ impl Fault {
     ];
 }
 
-/// The faults that are there now, as far as they are neither the lever's nor the stage's nor the encoder's own.
+/// The faults that are there now, as far as they are not the finger's, the lever's, the stage's or the encoder's own.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Faults {
     pub(super) e_stop: bool,
@@ -101,6 +116,7 @@ pub(super) struct Faults {
     pub(super) flip_share: f64,
     pub(super) miso_stuck: Option<bool>,
     pub(super) frozen: bool,
+    pub(super) pdc_stuck: bool,
     /// counts per second, and since when
     pub(super) drift: Option<(f64, u64)>,
 }
@@ -133,8 +149,9 @@ impl Miso {
             self.command = mosi;
         } else if let [byte0, byte1, ..] = line {
             let last = &mut self.last[usize::from(self.command)];
+            let sticks = faults.frozen || (faults.pdc_stuck && self.command == SAMPLE_PDC);
             match *last {
-                Some(word) if faults.frozen => [*byte0, *byte1] = word,
+                Some(word) if sticks => [*byte0, *byte1] = word,
                 _ => {
                     *last = is_sample([*byte0, *byte1])
                         .then_some([*byte0, *byte1])

@@ -113,6 +113,9 @@ pub struct Finger {
     slipping: bool,
     shear_n: f64,
     wear: f64,
+    /// time in which the fluid's pressure runs out of a torn skin, s, and the force that it no longer carries, N (faults)
+    leak_s: Option<f64>,
+    leaked_n: f64,
     /// recorded slides instead of what the surface does
     playback: Option<Playback>,
 }
@@ -138,6 +141,8 @@ impl Finger {
             slipping: false,
             shear_n: 0.0,
             wear: conditions.wear.clamp(0.0, 1.0),
+            leak_s: None,
+            leaked_n: 0.0,
             playback: None,
             noise,
         }
@@ -183,13 +188,24 @@ impl Finger {
             }
         }
         let detuned = self.touch.map_or(1.0, |touch| touch.detuned);
-        let force = self.skin.fluid_n();
+        let force = self.carried_n();
         let fluid_pa = self
             .vibrations
             .fluid(pressure_pa + PA_PER_N * force, force, detuned);
         let dc_n = force + SHEAR_TO_PDC * self.shear_n.abs();
         self.amplifiers
             .tick(fluid_pa, PA_PER_N * dc_n, &mut self.noise);
+    }
+
+    /// What of the force the fluid carries at this tick, N. What has run out of a torn skin does not come back; a slack
+    /// skin has no pressure below that of the air.
+    fn carried_n(&mut self) -> f64 {
+        let Some(seconds) = self.leak_s else {
+            return self.skin.fluid_n();
+        };
+        let carried_n = (self.skin.fluid_n() - self.leaked_n).max(0.0);
+        self.leaked_n += carried_n * TICK_S / seconds.max(TICK_S);
+        carried_n
     }
 
     /// A tick in contact; gives the pressure of vibrations, Pa.
@@ -285,6 +301,22 @@ impl Finger {
     /// Puts on a new skin.
     pub fn replace_skin(&mut self) {
         self.wear = 0.0;
+    }
+
+    /// From now on the skin leaks: see `Fault::SkinLeaks`.
+    pub fn leak(&mut self, seconds: f64) {
+        self.leak_s = Some(seconds);
+    }
+
+    /// From now on P_DC fades: see `Fault::PdcFades`.
+    pub fn fade_pdc(&mut self, seconds: f64) {
+        self.amplifiers.fade_pdc(seconds);
+    }
+
+    /// Fills a torn skin, and mends the amplifier.
+    pub fn mend(&mut self) {
+        (self.leak_s, self.leaked_n) = (None, 0.0);
+        self.amplifiers.mend();
     }
 
     /// Samples P_AC, in counts, `fraction` (0..1) of a tick after the last but one.

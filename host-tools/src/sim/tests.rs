@@ -17,9 +17,10 @@ use super::finger::{Contact, Finger};
 use super::sensor::{POWER_UP_NS, SensorPeer};
 
 /// What drives the world with the core's control, and learns from it: these files know both, and the world none of them.
-const DRIVERS: [&str; 6] = [
+const DRIVERS: [&str; 7] = [
     "collection",
     "handheld",
+    "press",
     "probe",
     "recorded",
     "rig",

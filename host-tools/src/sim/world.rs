@@ -362,6 +362,9 @@ impl World {
             Fault::MisoStuck { high } => faults.miso_stuck = Some(high),
             Fault::SensorFrozen => faults.frozen = true,
             Fault::PdcDrift { counts_per_s } => faults.drift = Some((counts_per_s, at_ns)),
+            Fault::PdcStuck => faults.pdc_stuck = true,
+            Fault::PdcFades { seconds } => self.finger.fade_pdc(seconds),
+            Fault::SkinLeaks { seconds } => self.finger.leak(seconds),
             Fault::StageJammed => self.stage.jam(true),
             Fault::EncoderCut(cut) => self.encoder.set_cut(Some(cut), position_mm, at_ns),
             Fault::StageLimitStuck {
@@ -392,6 +395,7 @@ impl World {
         self.faults = Faults::default();
         self.scheduled.clear();
         self.sensor.plug(self.now_ns);
+        self.finger.mend();
         self.stage.jam(false);
         let position_mm = self.stage.position_at_mm(self.fraction());
         self.encoder.set_cut(None, position_mm, self.now_ns);

@@ -76,7 +76,7 @@ impl Control {
         unguarded: Unguarded,
     ) -> Self {
         Self {
-            lever: Lever::default(),
+            lever: Lever::new(unguarded),
             stage: Stage::new(constants),
             guard: Guard::new(unguarded),
             meter: ForceMeter::new(calibration.pressure.pdc_no_contact),
@@ -316,7 +316,7 @@ impl Control {
             self.stage.stop();
             if fault == Fault::LeverNotHome {
                 // it is somewhere else than its steps say, and may be moved by hand now
-                self.lever = Lever::default();
+                self.lever.lose();
             } else {
                 self.lever.reset();
             }
@@ -352,8 +352,9 @@ impl Control {
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
         self.ms = self.ms.saturating_add(1);
         for word in inputs.words.iter().flatten() {
-            if word.channel == Channel::Pdc {
-                self.meter.push(word.counts);
+            match word.channel {
+                Channel::Pac => self.lever.hear(word.counts, &self.calibration.pressure),
+                Channel::Pdc => self.meter.push(word.counts),
             }
         }
         if self.phase != Phase::Parked && self.knows_only_default() {

@@ -88,7 +88,7 @@ faults! {
     /// The lever came down all the way without contact.
     NoContact, "no contact", "lever at its lower end, P_DC unchanged", 2, BOTH, ALL, "put a sample under the finger, then reset";
     /// The lever steps and the force does not follow.
-    LeverSlips, "lever slips", "3 mm of steps after contact and the force not reached, or still in contact when lifted, or not lifted where a press begins", 2, BOTH, ALL,
+    LeverSlips, "lever slips", "steps after contact no longer raise P_DC as finger and sample gave way before, or the lower end before the force, or still in contact when lifted, or not lifted where a press begins", 2, BOTH, ALL,
         "check the lever's motor and its current, then reset";
     /// The contact force does not stay where it was put.
     Unsteady, "force unsteady", "six trims and still more than 1 count and 5 % off, trims that add up to 15 %, or a zero that has moved by 8 counts", 2, BOTH, ALL,
@@ -102,6 +102,9 @@ faults! {
     /// The stage did not find its limit switch.
     StageNotHome, "stage not home", "limit switch not reached: the stage falls behind, or has gone 1.25 times the travel", 2, BOTH, ALL,
         "clear the stage's way and check the switch, then reset";
+    /// The finger presses, and P_DC does not say so.
+    PressureDead, "pressure dead", "P_AC shows contact and P_DC does not rise within 0.5 mm, or no longer rises while P_AC shows that the pressure does", 2,
+        BOTH, ALL, "check the fingertip and the sensor's P_DC, then reset";
 }
 
 impl Fault {

@@ -29,6 +29,12 @@ impl Unguarded {
         Self(fault.bit())
     }
 
+    /// And this one.
+    #[must_use]
+    pub const fn and(self, fault: Fault) -> Self {
+        Self(self.0 | fault.bit())
+    }
+
     /// Whether `fault` is not looked for.
     pub const fn ignores(self, fault: Fault) -> bool {
         self.0 & fault.bit() != 0

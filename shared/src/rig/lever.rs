@@ -5,7 +5,9 @@
 
 use super::fault::Fault;
 use super::force::ForceMeter;
-use crate::sensor::pressure::Counts;
+use super::guard::Unguarded;
+use super::progress::Progress;
+use crate::sensor::pressure::{Calibration, Counts};
 
 /// Travel of the reference lever per step, um: lead 2 mm, 200 steps, 1/16.
 pub const STEP_UM: f32 = 0.625;
@@ -20,6 +22,8 @@ const CLEARANCE_STEPS: i32 = 1600;
 /// The lever goes at most this far below the limit switch: 16 mm, just above its lower end. Where nothing was touched
 /// by then, there is no sample.
 pub const MAX_STEPS: i32 = 25_600;
+/// A finger that presses on something thin goes on to the lower end itself: 17 mm below the limit switch.
+const END_STEPS: i32 = 27_200;
 /// Contact is seen when the mean of P_DC has risen by this many counts: thirty times its noise.
 const CONTACT_COUNTS: f32 = 3.0;
 /// Nearer to the top than this the limit switch may be closed, further down it must be open: 1 mm, the switch's
@@ -27,8 +31,8 @@ const CONTACT_COUNTS: f32 = 3.0;
 const NEAR_TOP_STEPS: i32 = 1600;
 /// The switch closes at the same place each time, this exactly: one sixteenth of a millimetre.
 const SWITCH_STEPS: i32 = 100;
-/// From contact to 2 N the finger gives way by less than 3 mm; more steps than that without the force are lost steps.
-const PRESS_STEPS: i32 = 4800;
+/// A trim makes no more steps than this: 0.75 mm.
+const TRIM_STEPS: f32 = 1200.0;
 /// The skin creeps after it was pressed, and P_DC with it.
 const SETTLE_MS: u32 = 250;
 /// Mean of P_DC from which the force is trimmed: 100 ms, 220 samples.
@@ -107,10 +111,37 @@ pub struct Lever {
     known: bool,
     /// Count of steps at the last contact.
     contact: Option<i32>,
+    progress: Progress,
     ms: u32,
 }
 
 impl Lever {
+    /// A lever that does not know where it is, with all guards but `unguarded`.
+    pub fn new(unguarded: Unguarded) -> Self {
+        Self {
+            progress: Progress::new(unguarded),
+            ..Self::default()
+        }
+    }
+
+    /// Forgets where it is: it may be moved by hand now.
+    pub fn lose(&mut self) {
+        let progress = core::mem::take(&mut self.progress);
+        *self = Self {
+            progress,
+            ..Self::default()
+        };
+    }
+
+    /// Takes a sample of P_AC.
+    pub fn hear(&mut self, pac: Counts, calibration: &Calibration) {
+        match self.state {
+            LeverState::Lifted | LeverState::Zeroing => self.progress.rest(pac.get()),
+            LeverState::Approaching(_) => self.progress.hear(pac.get(), calibration),
+            _ => {}
+        }
+    }
+
     /// What it is doing.
     pub fn state(&self) -> LeverState {
         self.state
@@ -171,6 +202,9 @@ impl Lever {
     }
 
     fn enter(&mut self, state: LeverState) {
+        if state == LeverState::Lifted {
+            self.progress.lifted();
+        }
         self.state = state;
         self.ms = 0;
     }
@@ -273,14 +307,16 @@ impl Lever {
         let counts = meter.counts_now();
         let contact = contact.or_else(|| (meter.counts() > CONTACT_COUNTS).then_some(steps));
         self.state = LeverState::Approaching(contact);
+        self.progress
+            .judge(steps, meter.counts(), contact.is_some())?;
+        let lowest = contact.map_or(MAX_STEPS, |_| END_STEPS);
+        let at_end = self.ms > APPROACH_MS || steps - self.top >= lowest;
         match contact {
             // less than no contact: the zero has drifted, and with it the force that would be pressed
             None if meter.counts() < -CONTACT_COUNTS => return Err(Fault::Unsteady),
-            None if self.ms > APPROACH_MS || steps - self.top >= MAX_STEPS => {
-                return Err(Fault::NoContact);
-            }
+            None if at_end => return Err(Fault::NoContact),
             None => return Ok(APPROACH_STEPS_S),
-            Some(at) if steps - at > PRESS_STEPS => return Err(Fault::LeverSlips),
+            Some(_) if at_end => return Err(Fault::LeverSlips),
             Some(at) => self.contact = Some(at),
         }
         // stiffness over the last part of the way, for the trims
@@ -327,8 +363,8 @@ impl Lever {
         if self.crept > most.max(0.0) {
             return Err(Fault::Unsteady);
         }
-        let most = PRESS_STEPS as f32 / 4.0;
-        let correction = libm::roundf(off / self.counts_per_step).clamp(-most, most) as i32;
+        let correction =
+            libm::roundf(off / self.counts_per_step).clamp(-TRIM_STEPS, TRIM_STEPS) as i32;
         let correction = if correction == 0 {
             if off > 0.0 { 1 } else { -1 }
         } else {

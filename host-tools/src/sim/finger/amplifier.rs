@@ -45,6 +45,9 @@ pub(super) struct Amplifiers {
     air: f64,
     warm: f64,
     drift_in: u32,
+    /// gain of P_DC relative to a sound amplifier's, and what is left of it after a tick (faults)
+    pdc_gain: f64,
+    pdc_kept: f64,
     high_pass: HighPass,
     low_pass: LowPass,
     /// P_AC and P_DC without noise, counts, at the last two ticks
@@ -66,6 +69,8 @@ impl Amplifiers {
             air: 0.0,
             warm: 0.0,
             drift_in: 0,
+            pdc_gain: 1.0,
+            pdc_kept: 1.0,
             high_pass: HighPass::default(),
             low_pass: LowPass::new(BAND_HZ.1),
             pac: [pac_rest; 2],
@@ -75,6 +80,16 @@ impl Amplifiers {
 
     pub(super) fn set_pac_noise(&mut self, pa: f64) {
         self.pac_noise_pa = pa;
+    }
+
+    /// From now on the gain of P_DC falls to 1/e in this time.
+    pub(super) fn fade_pdc(&mut self, seconds: f64) {
+        self.pdc_kept = (-TICK_S / seconds).exp();
+    }
+
+    /// P_DC has its gain again.
+    pub(super) fn mend(&mut self) {
+        (self.pdc_gain, self.pdc_kept) = (1.0, 1.0);
     }
 
     /// A tick with this pressure in the fluid, and this slow part of it.
@@ -89,9 +104,10 @@ impl Amplifiers {
         self.drift_in -= 1;
         let band = self.low_pass.tick(self.high_pass.tick(fluid_pa));
         self.pac = [self.pac[1], self.pac_rest + band / PAC_PA_PER_COUNT];
+        self.pdc_gain *= self.pdc_kept;
         self.pdc = [
             self.pdc[1],
-            self.pdc_rest + self.warm + slow_pa / PDC_PA_PER_COUNT,
+            self.pdc_rest + self.warm + self.pdc_gain * (slow_pa / PDC_PA_PER_COUNT),
         ];
     }
 
