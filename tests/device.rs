@@ -278,8 +278,46 @@ fn printed(arguments: &[&str]) -> String {
         stderr,
     } = device(arguments).output().unwrap();
     let said = String::from_utf8(stderr).unwrap();
-    assert!(status.success(), "{arguments:?}: {said}");
+    // 3: an exploration that ended without a name
+    assert!(
+        matches!(status.code(), Some(0 | 3)),
+        "{arguments:?}: {said}"
+    );
     String::from_utf8(stdout).unwrap()
+}
+
+#[test]
+fn an_exploration_and_a_table_are_objects() {
+    let (at, _) = probe(1000);
+    let identify = ["identify", "--port", &at, "--seed", "7", "--format", "json"];
+    let object = |arguments: &[&str], code: i32| -> serde_json::Value {
+        let out = device(arguments).output().unwrap();
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(code), "{arguments:?}: {said}");
+        serde_json::from_slice(&out.stdout).unwrap()
+    };
+    // nothing is ever more probable than 1
+    let undecided = [&identify[..], &["--threshold", "1", "--max-slides", "2"]].concat();
+    let found = object(&undecided, 3);
+    assert_eq!(found["among"], 3);
+    assert_eq!(found["verdict"]["told"], "undecided");
+    assert_eq!(found["slides"].as_array().unwrap().len(), 2);
+    assert!(found["slides"][0]["roughness_ln"].is_number(), "{found}");
+    assert!(
+        found["slides"][1]["posterior"][0]["probability"]
+            .as_f64()
+            .unwrap()
+            > 0.3
+    );
+    let table = object(&["table", "show", "--port", &at, "--format", "json"], 0);
+    let name = table["textures"][0]["name"].as_str().unwrap().to_owned();
+    let mut slip = name.clone();
+    slip.pop();
+    let meant = format!("Did you mean {name}?");
+    assert_says(
+        &complaint(&["identify", "--port", &at, "--among", &slip]),
+        &[&meant],
+    );
 }
 
 fn complaint(arguments: &[&str]) -> String {

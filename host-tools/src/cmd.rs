@@ -81,7 +81,7 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         Some(Command::Simulate(args)) => simulate::run(&args, out)?,
         Some(Command::LearnByHand(args)) => learn::by_hand(&args, out)?,
         Some(Command::Study(args)) => study::run(&args, out)?,
-        Some(Command::Device(command)) => device::run(&command, out)?,
+        Some(Command::Device(command)) => done = device::run(&command, out)?,
         Some(Command::Textures(args)) => known::run(&args, out)?,
         Some(Command::Completions(args)) => manual::completions(&args, Tactus::command(), out)?,
         Some(Command::Man(args)) => manual::pages(&args, Tactus::command(), out)?,

@@ -20,6 +20,8 @@ use std::io::Write;
 
 use clap::Subcommand;
 
+use crate::cmd::output::Done;
+
 pub(crate) use bench::BenchError;
 
 /// Work with a probe at its serial port, or with the emulated board
@@ -32,7 +34,8 @@ Try first:
   tactus device identify --log session.jsonl   what lies under its finger
   tactus device log replay session.jsonl       the same decisions, computed again on this PC
 
-Ctrl-C stops the rig and waits until the finger is lifted; the exit code is 130 then.")]
+Ctrl-C stops the rig and waits until the finger is lifted; the exit code is 130 then.
+Where `identify` ends without a name that is sure, it is 3.")]
 pub(crate) enum Command {
     /// List the serial ports, boards first
     #[command(after_help = "\
@@ -47,7 +50,7 @@ Examples:
   tactus device monitor
   tactus device monitor --emulated --texture burlap    the emulated board, over simulated burlap")]
     Monitor(identify::Args),
-    Identify(identify::Args),
+    Identify(identify::Run),
     Train(train::Train),
     Teach(train::Teach),
     Rename(train::Rename),
@@ -72,12 +75,12 @@ Examples:
 }
 
 /// Does what is asked for.
-pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()> {
-    match command {
+pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<Done> {
+    let done = match command {
         Command::List => Ok(line::list(out)?),
         Command::Status(args) => status::run(args, out),
         Command::Monitor(args) => monitor::run(args),
-        Command::Identify(args) => identify::run(args, out),
+        Command::Identify(args) => return identify::run(args, out),
         Command::Train(args) => train::train(args, out),
         Command::Teach(args) => train::teach(args, out),
         Command::Rename(args) => train::rename(args, out),
@@ -89,5 +92,6 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
         Command::Stop(at) => calibrate::stop(at, out),
         Command::Flash(args) => flash::run(args, out),
         Command::Log(command) => replay::run(command, out),
-    }
+    };
+    done.map(|()| Done::Fully)
 }

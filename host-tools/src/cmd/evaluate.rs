@@ -10,7 +10,7 @@ use tactus::eval::experiment::{Experiment, Protocol};
 use tactus::eval::verdicts::Verdicts;
 use tactus_core::explorer::{self, Config};
 
-use super::output::{Format, percent, print_json};
+use super::output::{Format, percent, print_json, verdict_rows};
 use super::progress::with_progress;
 pub(crate) use experiment::Args;
 
@@ -145,15 +145,4 @@ fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "    {share:4.1} %  {right} taken for {wrong}")?;
     }
     Ok(())
-}
-
-/// Verdicts by name, as people read them.
-fn verdict_rows(v: &Verdicts) -> [(&'static str, f64); 5] {
-    [
-        ("right", v.right),
-        ("right name, but changed", v.changed),
-        ("none of those known", v.new),
-        ("wrong", v.wrong),
-        ("undecided", v.undecided),
-    ]
 }

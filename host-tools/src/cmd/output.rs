@@ -4,6 +4,7 @@ use std::io::Write;
 
 use clap::ValueEnum;
 use serde::Serialize;
+use tactus::eval::verdicts::Verdicts;
 
 /// How a command ended that did what it was to do.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -45,6 +46,17 @@ pub(crate) fn print_rows(rows: &[(&str, String)], out: &mut impl Write) -> anyho
 pub(crate) fn percent(share: f64) -> String {
     let percent = format!("{:.4}", share * 100.0);
     format!("{} %", percent.trim_end_matches('0').trim_end_matches('.'))
+}
+
+/// Verdicts by name, as people read them.
+pub(crate) fn verdict_rows(v: &Verdicts) -> [(&'static str, f64); 5] {
+    [
+        ("right", v.right),
+        ("right name, but changed", v.changed),
+        ("none of those known", v.new),
+        ("wrong", v.wrong),
+        ("undecided", v.undecided),
+    ]
 }
 
 #[cfg(test)]

@@ -21,6 +21,7 @@ pub struct Show<'t, W> {
     table: Table<'t>,
     out: W,
     slides: u32,
+    answered: Option<(Verdict, u8)>,
     /// The first failure to write, kept until the end.
     failed: io::Result<()>,
 }
@@ -32,6 +33,7 @@ impl<'t, W: Write> Show<'t, W> {
             table,
             out,
             slides: 0,
+            answered: None,
             failed: Ok(()),
         }
     }
@@ -150,6 +152,11 @@ impl<'t, W: Write> Show<'t, W> {
         }
     }
 
+    /// The verdict that was shown, and the slides that it took.
+    pub fn answered(&self) -> Option<(Verdict, u8)> {
+        self.answered
+    }
+
     /// What an action looks at: "fineness", "all features".
     fn looked_at(&self, action: Action) -> &'static str {
         match (action.property, self.table.contents()) {
@@ -256,6 +263,7 @@ impl<'t, W: Write> Show<'t, W> {
 
     /// Shows the answer.
     fn answer(&mut self, verdict: Verdict, slides: u8) -> io::Result<()> {
+        self.answered = Some((verdict, slides));
         let name = self.table.name(verdict.texture).unwrap_or("?");
         let p = verdict.probability * 100.0;
         let slides = count(slides, "slide");

@@ -1,12 +1,13 @@
-//! An exploration as one object for programs: the JSON of `tactus identify`.
+//! An exploration as one object for programs: the JSON of `tactus identify` and `tactus device identify`.
 
 use std::fmt::Display;
 
 use serde::Serialize;
 use tactus_core::explorer::{ExpectedOutcome, Told, Verdict};
-use tactus_core::features::{Measurement, Property};
+use tactus_core::features::{Properties, Property};
 use tactus_core::probe::explore::ExplorationStep;
 use tactus_core::table::{Action, Table};
+use tactus_core::wire::Event;
 
 /// Textures less probable than this are left out of a slide's posterior.
 const LISTED: f32 = 1e-6;
@@ -92,17 +93,63 @@ impl Transcript {
                 self.slides.push(SlideRecord::new(*action, expected, table));
             }
             ExplorationStep::Measured(_, measurement, posterior) => {
-                if let Some(slide) = self.slides.last_mut() {
-                    slide.measured(measurement, posterior, table);
-                }
+                let bound = measurement.roughness_is_bound;
+                self.measured(&measurement.properties, bound, posterior, table);
             }
-            ExplorationStep::Rejected(_, why) => {
-                if let Some(slide) = self.slides.last_mut() {
-                    slide.rejected = Some(why.to_string());
-                }
-            }
+            ExplorationStep::Rejected(_, why) => self.rejected(why),
             // the answer is beside the slides: see [`Answer`]
             ExplorationStep::Decided { .. } | ExplorationStep::CutShort(..) => {}
+        }
+    }
+
+    /// Takes what a probe with `table` says of an exploration; anything else is nothing of it.
+    pub fn event(&mut self, event: &Event, table: Table<'_>) {
+        match event {
+            Event::Chosen {
+                action, expected, ..
+            } => self.slides.push(SlideRecord::new(*action, expected, table)),
+            Event::SlideReport {
+                observed,
+                posterior,
+                ..
+            } => {
+                let bound = observed.roughness_is_bound;
+                self.measured(&observed.properties(), bound, posterior, table);
+            }
+            Event::Rejected { why, .. } => self.rejected(why),
+            _ => {}
+        }
+    }
+
+    fn rejected(&mut self, why: &impl Display) {
+        if let Some(slide) = self.slides.last_mut() {
+            slide.rejected = Some(why.to_string());
+        }
+    }
+
+    fn measured(
+        &mut self,
+        properties: &Properties,
+        bound: bool,
+        posterior: &[f32],
+        table: Table<'_>,
+    ) {
+        if let Some(slide) = self.slides.last_mut() {
+            slide.traction_n = properties.get(Property::Traction);
+            slide.roughness_ln = properties.get(Property::Roughness);
+            slide.roughness_is_bound = bound;
+            slide.fineness_ln = properties.get(Property::Fineness);
+            let candidates = table.names().zip(posterior);
+            slide.posterior = candidates
+                .filter(|(_, probability)| **probability >= LISTED)
+                .map(|(name, &probability)| Candidate {
+                    texture: name.to_owned(),
+                    probability,
+                })
+                .collect();
+            slide
+                .posterior
+                .sort_by(|a, b| b.probability.total_cmp(&a.probability));
         }
     }
 }
@@ -123,23 +170,5 @@ impl SlideRecord {
             rejected: None,
             posterior: Vec::new(),
         }
-    }
-
-    fn measured(&mut self, measurement: &Measurement, posterior: &[f32], table: Table<'_>) {
-        let value = |property| measurement.properties.get(property);
-        self.traction_n = value(Property::Traction);
-        self.roughness_ln = value(Property::Roughness);
-        self.roughness_is_bound = measurement.roughness_is_bound;
-        self.fineness_ln = value(Property::Fineness);
-        let candidates = table.names().zip(posterior);
-        self.posterior = candidates
-            .filter(|(_, probability)| **probability >= LISTED)
-            .map(|(name, &probability)| Candidate {
-                texture: name.to_owned(),
-                probability,
-            })
-            .collect();
-        self.posterior
-            .sort_by(|a, b| b.probability.total_cmp(&a.probability));
     }
 }

@@ -1,11 +1,14 @@
 //! `tactus device identify`: an exploration of the probe, shown step by step.
 
-use std::io::Write;
+use std::io::{self, Write};
 
 use anyhow::Context as _;
+use serde::Serialize;
 use tactus::eval::evaluate::Method;
 use tactus::eval::show::Show;
+use tactus::eval::transcript::{Answer, Transcript};
 use tactus::link::Request;
+use tactus_core::explorer::Told;
 use tactus_core::table::Table;
 use tactus_core::wire::{Command, Identify};
 
@@ -13,6 +16,8 @@ use super::bench::Bench;
 use super::line::Where;
 use super::train::seed_of_now;
 use crate::cmd::args::Stop;
+use crate::cmd::names::nearest;
+use crate::cmd::output::{Done, Format, print_json};
 
 /// Have the probe identify what lies under its finger, and show every step
 #[derive(clap::Args)]
@@ -21,6 +26,16 @@ Examples:
   tactus device identify --log session.jsonl          every report is kept, and can be computed again
   tactus device identify --among burlap,silk --closed it is one of these two
   tactus device identify --emulated --texture burlap  on the emulated board")]
+pub(crate) struct Run {
+    #[command(flatten)]
+    args: Args,
+    /// How to print the exploration
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What to identify, where, and how.
+#[derive(clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
     pub(crate) at: Where,
@@ -51,8 +66,12 @@ impl Args {
             let index = names.iter().position(|n| n.eq_ignore_ascii_case(wanted));
             let index = index.and_then(|index| u16::try_from(index).ok());
             index.with_context(|| {
-                let names = names.join(", ");
-                format!("--among {wanted}: the probe does not know it. It knows: {names}")
+                let known: Vec<&str> = names.iter().map(String::as_str).collect();
+                let known = match nearest(wanted, &known) {
+                    Some(name) => format!("Did you mean {name}?"),
+                    None => format!("It knows: {}", known.join(", ")),
+                };
+                format!("--among {wanted}: the probe does not know it. {known}")
             })
         };
         Ok(Identify {
@@ -68,8 +87,30 @@ impl Args {
     }
 }
 
+/// What `device identify --format json` prints.
+#[derive(Serialize)]
+struct Identification {
+    /// Textures that it may be.
+    among: usize,
+    threshold: f32,
+    max_slides: u8,
+    seed: u32,
+    slides: Transcript,
+    verdict: Option<Answer>,
+    /// Slides that the probe has learned from by itself.
+    learned_slides: u8,
+    frames_damaged: u64,
+    reports_lost: u64,
+}
+
 /// Has the probe explore.
-pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
+    let Run { args, format } = run;
+    let (stdout, mut nowhere) = (out, io::sink());
+    let out: &mut dyn Write = match format {
+        Format::Text => &mut *stdout,
+        Format::Json => &mut nowhere,
+    };
     let (mut bench, _) = Bench::open(&args.at)?;
     // it is in the log then, too
     let bytes = bench.table()?;
@@ -83,9 +124,12 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     // for the log: with its samples every slide can be measured again
     bench.get(Request::command(Command::Stream(true)))?;
     let mut show = Show::new(table, &mut *out);
+    let mut slides = Transcript::default();
     let found = bench.run(Request::identify(wanted), |report| {
+        slides.event(&report.event, table);
         show.event(&report.event)
     })?;
+    let answered = show.answered();
     bench.get(Request::command(Command::Stream(false)))?;
     if found.learned > 0 {
         writeln!(
@@ -107,5 +151,22 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             "On the line {damaged} frames were damaged and {missing} reports lost."
         )?;
     }
-    Ok(())
+    if *format == Format::Json {
+        let identification = Identification {
+            among,
+            threshold: args.stop.threshold,
+            max_slides: args.stop.max_slides,
+            seed,
+            slides,
+            verdict: answered.map(|(verdict, slides)| Answer::new(verdict, slides, table)),
+            learned_slides: found.learned,
+            frames_damaged: damaged,
+            reports_lost: missing,
+        };
+        print_json(&identification, stdout)?;
+    }
+    Ok(match answered.map(|(verdict, _)| verdict.told()) {
+        Some(Told::Sure) => Done::Fully,
+        _ => Done::NotIdentified,
+    })
 }

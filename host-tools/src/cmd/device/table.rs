@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, ensure};
 use clap::Subcommand;
 use tactus::eval::show::show_table;
+use tactus::eval::table_summary::TableSummary;
 use tactus::link::{PushTable, Request};
 use tactus_core::table::Table;
 use tactus_core::wire;
@@ -13,6 +14,7 @@ use tactus_core::wire;
 use super::bench::Bench;
 use super::line::Where;
 use super::loss::{Consent, replaced};
+use crate::cmd::output::{Format, print_json};
 use crate::cmd::table_file::{read_table, write_table};
 
 /// Show, fetch or replace the probe's texture table
@@ -26,7 +28,13 @@ Examples:
 Before a table that the probe was given or has learned is replaced, it is kept in a file, and you are asked.")]
 pub(crate) enum Command {
     /// Print what the probe's table holds
-    Show(Where),
+    Show {
+        #[command(flatten)]
+        at: Where,
+        /// How to print it
+        #[arg(long, value_enum, default_value_t = Format::Text)]
+        format: Format,
+    },
     /// Write the probe's table to a file
     Pull {
         #[command(flatten)]
@@ -55,9 +63,12 @@ pub(crate) enum Command {
 /// Shows, fetches or changes the probe's table.
 pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()> {
     match command {
-        Command::Show(at) => {
+        Command::Show { at, format } => {
             let (mut bench, status) = Bench::open(at)?;
             let bytes = bench.table()?;
+            if *format == Format::Json {
+                return print_json(&TableSummary::new(Table::read(&bytes)?), out);
+            }
             let whose = if status.factory {
                 "came with the firmware"
             } else {

@@ -12,8 +12,7 @@ use tactus::eval::verdicts::Verdicts;
 use tactus_core::explorer::Config;
 
 use super::experiment::Args;
-use super::verdict_rows;
-use crate::cmd::output::{Format, print_json};
+use crate::cmd::output::{Format, print_json, verdict_rows};
 use crate::cmd::progress::with_progress;
 
 /// What `evaluate --novelty` prints.
