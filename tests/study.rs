@@ -15,12 +15,15 @@ use tactus::study::pilot::Pilot;
 use tactus::study::published::{IDENTIFIED, PILOT_TEXTURES};
 use tactus::study::report;
 use tactus::study::signals::Signals;
-use tactus::study::slides::{Recorded, Session, StudyWorld, TextureTrials, VISIBLE_WEAR};
+use tactus::study::slides::{
+    NotReached, Recorded, Session, StudyWorld, TextureTrials, VISIBLE_WEAR,
+};
 use tactus::study::training::{Training, Worn};
 use tactus::study::{Study, VARIATION};
 use tactus_core::features::Movement;
 use tactus_core::features::Observation;
 use tactus_core::features::{Properties, Property};
+use tactus_core::rig::Fault;
 use tactus_core::table::Table;
 use tactus_tests::skipped;
 
@@ -60,6 +63,7 @@ fn invented(textures: &[u8], movements: usize, trials: usize, seed: u64) -> Vec<
             slides: slides.collect(),
             wear: (0..=movements).map(|m| 0.001 * m as f64).collect(),
             new_skin: texture == 60,
+            not_reached: Vec::new(),
         }
     };
     textures.iter().map(of).collect()
@@ -170,6 +174,7 @@ fn session<'a>(textures: &'a [u8], number: u64) -> Session<'a> {
         trials: 2,
         number,
         force_guard: true,
+        may_miss: false,
     }
 }
 
@@ -264,6 +269,52 @@ fn values(trials: &[[f32; 3]], property: usize) -> Vec<f64> {
 fn confusion(a: (f64, f64), b: (f64, f64)) -> f64 {
     let variances = a.1 * a.1 + b.1 * b.1;
     (2.0 * a.1 * b.1 / variances).sqrt() * (-(a.0 - b.0).powi(2) / (4.0 * variances)).exp()
+}
+
+/// What the rig cannot press is shown as that, and nothing else changes.
+#[test]
+fn a_movement_that_is_not_reached_is_a_result() {
+    let grid: Vec<Movement> = Movement::grid().collect();
+    let mut trials = invented(&PILOT_TEXTURES, 36, 6, 3);
+    let all = Pilot::of(&grid, &trials).unwrap();
+    let foam = trials.iter_mut().find(|t| t.texture == 30).unwrap();
+    foam.slides[30].truncate(2);
+    foam.not_reached.push(NotReached {
+        movement: 30,
+        trial: 3,
+        why: Fault::LeverSlips.into(),
+    });
+    let pilot = Pilot::of(&grid, &trials).unwrap();
+    for (movement, (without, with)) in pilot.movements.iter().zip(&all.movements).enumerate() {
+        if movement == 30 {
+            assert_eq!(without.uncertainty, [1.0; 3]);
+            assert_eq!(without.not_reached.len(), 1);
+        } else {
+            assert_eq!(without, with);
+        }
+    }
+    let study = Study {
+        pilot: Some(pilot),
+        training: None,
+        pairs: None,
+        identification: None,
+        signals: None,
+        worlds: Vec::new(),
+        ..shared().clone()
+    };
+    let folder = written(&study);
+    let said = files(folder.path())
+        .into_iter()
+        .map(|(_, bytes)| String::from_utf8_lossy(&bytes).into_owned());
+    let naming = said.filter(|text| text.contains("not reached: T30, trial 3: lever slips"));
+    // the page and the table of movements
+    assert_eq!(naming.count(), 2);
+    let json: serde_json::Value = serde_json::from_str(&report::json(&study).unwrap()).unwrap();
+    let missed = &json["pilot"]["movements"][30]["not_reached"][0];
+    assert_eq!(
+        (&missed["texture"], &missed["trial"]),
+        (&30.into(), &3.into())
+    );
 }
 
 #[test]

@@ -113,7 +113,7 @@ impl Times {
         work: impl FnOnce(&(dyn Fn() + Sync)) -> Result<T, study::StudyError>,
     ) -> Result<T, study::StudyError> {
         let begun = Instant::now();
-        let done = with_progress(length, what, work)?;
+        let done = with_progress(length, what, work).map_err(|e| e.in_stage(what))?;
         self.0.push((what, begun.elapsed().as_secs_f64()));
         Ok(done)
     }

@@ -154,6 +154,14 @@ pub struct Trial {
 }
 
 impl Trial {
+    /// What the rig made in this trial.
+    ///
+    /// # Errors
+    /// [`TrialError::Rig`].
+    pub fn made<T>(self, made: Result<T, SimError>) -> Result<T, TrialError> {
+        made.map_err(|source| TrialError::Rig { at: self, source })
+    }
+
     /// The features of a slide of this trial.
     ///
     /// # Errors
@@ -273,18 +281,28 @@ pub fn record_texture(
         calibration,
         movements,
         trials,
-        |_, _, slide| {
+        |_, at, slide| {
             slides.push(Recording {
                 number: slides.len() as u32 + 1,
-                ..slide
+                ..at.made(slide)?
             });
-            Ok(())
+            Ok(Next::Trial)
         },
     )?;
     Ok(slides)
 }
 
-/// Powers up a rig and makes trials of what lies under it, movement by movement; `each` gets every slide.
+/// What comes after a trial.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Next {
+    /// The next one.
+    Trial,
+    /// The next movement, on a rig that has homed again.
+    Movement,
+}
+
+/// Powers up a rig and makes trials of what lies under it, movement by movement; `each` gets every slide, or why the rig did
+/// not make it, and says what comes next.
 ///
 /// # Errors
 /// See [`TrialError`], and what `each` returns.
@@ -294,12 +312,10 @@ pub fn record_trials(
     calibration: RigCalibration,
     movements: &[Movement],
     trials: u32,
-    mut each: impl FnMut(&mut SimRig, Trial, Recording) -> Result<(), TrialError>,
+    mut each: impl FnMut(&mut SimRig, Trial, Result<Recording, SimError>) -> Result<Next, TrialError>,
 ) -> Result<(), TrialError> {
     let calibrated = rig.control().calibrate(calibration).map_err(SimError::from);
-    calibrated
-        .and_then(|()| rig.home())
-        .map_err(|source| TrialError::Rig { at, source })?;
+    at.made(calibrated.and_then(|()| rig.home()))?;
     for &movement in movements {
         for trial in 1..=trials {
             let at = Trial {
@@ -307,11 +323,11 @@ pub fn record_trials(
                 ..at
             };
             let slide = rig.record(movement);
-            each(
-                rig,
-                at,
-                slide.map_err(|source| TrialError::Rig { at, source })?,
-            )?;
+            if each(rig, at, slide)? == Next::Movement {
+                let reset = rig.control().reset().map_err(SimError::from);
+                at.made(reset.and_then(|()| rig.home()))?;
+                break;
+            }
         }
     }
     Ok(())

@@ -9,6 +9,14 @@ use crate::sim::rig::SimError;
 /// Why a study comes to nothing.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
+    /// A stage of the study came to nothing.
+    #[error("{stage}")]
+    Stage {
+        /// Its name.
+        stage: &'static str,
+        /// Why.
+        source: Box<StudyError>,
+    },
     /// The rig of a world fails before the first texture.
     #[error(
         "world {world}: the simulated rig cannot be calibrated; another --seed makes another world"
@@ -31,4 +39,15 @@ pub enum StudyError {
     /// Explorations failed.
     #[error(transparent)]
     Evaluate(#[from] EvaluateError),
+}
+
+impl StudyError {
+    /// The same, and in which stage of the study.
+    #[must_use]
+    pub fn in_stage(self, stage: &'static str) -> Self {
+        Self::Stage {
+            stage,
+            source: Box::new(self),
+        }
+    }
 }

@@ -41,8 +41,23 @@ pub struct PilotMovement {
     pub high_wear: bool,
     /// How much of the ridges 100 slides took, mean over the textures, %.
     pub wear: f64,
-    /// Uncertainty that one slide leaves among the textures, by property (eq. 11).
+    /// Uncertainty that one slide leaves among the textures, by property (eq. 11); 1, which is all, for a movement that was
+    /// not reached on every texture.
     pub uncertainty: [f32; 3],
+    /// Where the rig could not make it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_reached: Vec<Missed>,
+}
+
+/// A texture on which the rig could not make a movement.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Missed {
+    /// Number of the texture.
+    pub texture: u8,
+    /// Number of the trial that failed, from 1.
+    pub trial: u32,
+    /// Why.
+    pub reason: String,
 }
 
 /// The best movement for a property.
@@ -74,6 +89,7 @@ impl Pilot {
             trials: PILOT_TRIALS,
             number: SESSION,
             force_guard: false,
+            may_miss: true,
         };
         let trials = world.record(&session, world.calibration()?, done)?;
         Self::of(&movements, &trials)
@@ -84,7 +100,21 @@ impl Pilot {
     /// # Errors
     /// See [`StudyError`].
     pub fn of(movements: &[Movement], trials: &[TextureTrials]) -> Result<Self, StudyError> {
-        let uncertainty = uncertainty(movements, trials)?;
+        let missed = |movement: usize| {
+            let of = |t: &TextureTrials| {
+                let missed = t.not_reached.iter().find(|m| m.movement == movement)?;
+                Some(Missed {
+                    texture: t.texture,
+                    trial: missed.trial,
+                    reason: missed.why.to_string(),
+                })
+            };
+            trials.iter().filter_map(of).collect::<Vec<_>>()
+        };
+        let reached: Vec<usize> = (0..movements.len())
+            .filter(|&movement| missed(movement).is_empty())
+            .collect();
+        let uncertainty = uncertainty(movements, &reached, trials)?;
         let slides = trials.iter().flat_map(|t| t.slides.first()).map(Vec::len);
         let slides = slides.sum::<usize>().max(1) as f64;
         let rows = movements.iter().zip(&uncertainty).enumerate();
@@ -97,6 +127,7 @@ impl Pilot {
                 high_wear: movement.is_high_wear(),
                 wear: 1e4 * grown.sum::<f64>() / slides,
                 uncertainty: *uncertainty,
+                not_reached: missed(m),
             }
         });
         let best = |property: Property, may: fn(&Movement) -> bool| {
@@ -123,21 +154,26 @@ impl Pilot {
     }
 }
 
-/// Uncertainty of every movement and property when all textures are equally probable, by the core's explorer.
+/// Uncertainty of every movement and property when all textures are equally probable, by the core's explorer; 1 for
+/// movements that were not `reached`.
 fn uncertainty(
     movements: &[Movement],
+    reached: &[usize],
     trials: &[TextureTrials],
 ) -> Result<Vec<[f32; 3]>, StudyError> {
     let names = trials.iter().map(|t| texture_name(t.texture).to_owned());
-    let slides: Vec<_> = trials.iter().map(|t| t.slides.clone()).collect();
+    let slides = |t: &TextureTrials| reached.iter().map(|&m| t.slides[m].clone()).collect();
+    let slides: Vec<Vec<_>> = trials.iter().map(slides).collect();
     let names: Vec<String> = names.collect();
-    let bytes = learn(Method::Paper, None, &names, movements, &slides)?;
+    let made: Vec<Movement> = reached.iter().map(|&m| movements[m]).collect();
+    let bytes = learn(Method::Paper, None, &names, &made, &slides)?;
     let table = Table::read(&bytes).map_err(EvaluateError::from)?;
     let explorer = Explorer::<128>::new(table, PropertySet::ALL, Config::default())
         .map_err(EvaluateError::from)?;
     let mut left = vec![[1.0; 3]; movements.len()];
     for outcome in explorer.expected_outcomes() {
-        let of_movement = left.get_mut(usize::from(outcome.action.movement));
+        let movement = reached.get(usize::from(outcome.action.movement));
+        let of_movement = movement.and_then(|&movement| left.get_mut(movement));
         if let (Some(left), Some(property)) = (of_movement, outcome.action.property) {
             left[property.index()] = outcome.uncertainty;
         }

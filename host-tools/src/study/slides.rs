@@ -16,9 +16,9 @@ use tactus_core::rig::slide_path::SlidePath;
 
 use super::error::StudyError;
 use super::published::{IDENTIFIED, TRIALS};
-use crate::sim::collection::{Collection, Trial, calibrated, record_trials, texture_name};
+use crate::sim::collection::{Collection, Next, Trial, calibrated, record_trials, texture_name};
 use crate::sim::finger::wear_per_mm;
-use crate::sim::rig::SimRig;
+use crate::sim::rig::{SimError, SimRig};
 use crate::sim::{Conditions, textures};
 
 /// Wear at which the ridges look worn: the skin is changed before the next texture (paper: at any visible sign). Chosen, so
@@ -49,6 +49,19 @@ pub struct TextureTrials {
     pub wear: Vec<f64>,
     /// Whether the skin was changed before the first slide.
     pub new_skin: bool,
+    /// Movements that the rig could not make on this texture.
+    pub not_reached: Vec<NotReached>,
+}
+
+/// A movement that a rig could not make.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct NotReached {
+    /// Place of the movement in the session.
+    pub movement: usize,
+    /// Number of the trial, from 1; those before it were made.
+    pub trial: u32,
+    /// Why not.
+    pub why: SimError,
 }
 
 /// What is slid over in one go: the same finger, movement by movement on each texture.
@@ -65,6 +78,8 @@ pub struct Session<'a> {
     /// Whether the guard of the force watches. The paper's rig had none, and its pilot study needs forces up to 2 N, where
     /// the shear on a sticky texture alone takes P_DC over the guard's limit.
     pub force_guard: bool,
+    /// Whether a movement that the rig cannot make is a result, [`TextureTrials::not_reached`], and no failure.
+    pub may_miss: bool,
 }
 
 impl StudyWorld {
@@ -164,8 +179,8 @@ impl StudyWorld {
             slides: Vec::with_capacity(movements.len()),
             wear: vec![wear],
             new_skin: false,
+            not_reached: Vec::new(),
         };
-        let mut trial = 0;
         let at = Trial {
             world: self.seed,
             texture,
@@ -178,19 +193,30 @@ impl StudyWorld {
             movements,
             trials,
             |rig, at, slide| {
-                if trial % trials == 0 {
+                let trial = at.slide.map_or(1, |(_, trial)| trial);
+                if trial == 1 {
                     measured.slides.push(Vec::with_capacity(trials as usize));
                     measured.wear.push(0.0);
                 }
-                trial += 1;
-                let observation = at.measure(plan, &slide)?;
+                let slide = match slide {
+                    Err(why) if session.may_miss => {
+                        measured.not_reached.push(NotReached {
+                            movement: measured.slides.len() - 1,
+                            trial,
+                            why,
+                        });
+                        None
+                    }
+                    made => Some(at.measure(plan, &at.made(made)?)?),
+                };
+                let next = slide.as_ref().map_or(Next::Movement, |_| Next::Trial);
                 if let (Some(slides), Some(wear)) =
                     (measured.slides.last_mut(), measured.wear.last_mut())
                 {
-                    slides.push(observation);
+                    slides.extend(slide);
                     *wear = rig.world().truth().wear;
                 }
-                Ok(())
+                Ok(next)
             },
         )?;
         Ok(measured)
@@ -251,6 +277,7 @@ impl StudyWorld {
             trials: TRIALS,
             number,
             force_guard: true,
+            may_miss: false,
         };
         let (training, validation) = rayon::join(
             || self.record(&session(&all, TRAINING), calibration, &done),

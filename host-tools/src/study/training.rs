@@ -358,6 +358,7 @@ impl Worn {
             trials: WEAR_TRIALS,
             number: WEAR_SESSION,
             force_guard: true,
+            may_miss: false,
         };
         let at = |&wear: &f64| {
             let trials = world.record_worn(&session, wear, calibration, &done)?;

@@ -3,9 +3,9 @@
 use serde_json::json;
 use tactus_core::features::Movement;
 
-use super::model::{Report, axis, cells, movement_name, owned};
+use super::model::{Cell, Report, axis, cells, movement_name, owned};
 use crate::eval::chart::{Chart, DrawError, Figure, Mark, Series, Tile, grid};
-use crate::study::pilot::{MostUseful, Pilot, PilotMovement};
+use crate::study::pilot::{Missed, MostUseful, Pilot, PilotMovement};
 use crate::study::published::PILOT_TRIALS;
 
 /// The textures of fig. 6 whose centroid rises with speed.
@@ -40,7 +40,10 @@ pub(super) fn add(pilot: &Pilot, report: &mut Report) -> Result<(), DrawError> {
         pilot.most_useful.iter().map(useful).collect(),
     );
     let movement = |m: &PilotMovement| {
-        let [traction, roughness, fineness] = m.uncertainty.map(|u| (u, 3));
+        let [traction, roughness, fineness] = match not_reached(m) {
+            Some(why) => [why, String::new(), String::new()].map(Cell::from),
+            None => m.uncertainty.map(|u| Cell::from((u, 3))),
+        };
         cells![
             (m.force_n, 2),
             (m.speed_mm_s, 1),
@@ -109,6 +112,13 @@ pub(super) fn add(pilot: &Pilot, report: &mut Report) -> Result<(), DrawError> {
     Ok(())
 }
 
+/// What stands in place of the uncertainty of a movement that the rig could not make on every texture.
+fn not_reached(m: &PilotMovement) -> Option<String> {
+    let missed = |m: &Missed| format!("T{}, trial {}: {}", m.texture, m.trial, m.reason);
+    let missed: Vec<String> = m.not_reached.iter().map(missed).collect();
+    (!missed.is_empty()).then(|| format!("not reached: {}", missed.join("; ")))
+}
+
 fn name(m: &PilotMovement) -> String {
     movement_name((m.force_n, m.speed_mm_s))
 }
@@ -143,6 +153,7 @@ fn fig6(pilot: &Pilot) -> Result<Figure, DrawError> {
     for (texture, movements) in pilot.textures.iter().zip(&pilot.properties) {
         let at_lightest = movements.iter().zip(&pilot.movements);
         let at_lightest = at_lightest.filter(|(_, m)| m.force_n == lightest);
+        let at_lightest = at_lightest.filter(|(trials, _)| !trials.is_empty());
         let centroid = at_lightest.map(|(trials, m)| {
             let sum: f64 = trials.iter().map(|p| f64::from(p[2])).sum();
             let hz = (sum / trials.len().max(1) as f64).exp();
@@ -168,13 +179,23 @@ fn fig6(pilot: &Pilot) -> Result<Figure, DrawError> {
 fn fig7(pilot: &Pilot, useful: &MostUseful) -> Result<Figure, DrawError> {
     let property = useful.property;
     let left = |m: &PilotMovement| f64::from(m.uncertainty[property.index()]);
+    let reached = |m: &&PilotMovement| m.not_reached.is_empty();
     let (low, high) = pilot
         .movements
         .iter()
+        .filter(reached)
         .map(left)
         .fold((1.0, 0.0), |(l, h): (f64, f64), u| (l.min(u), h.max(u)));
     let tile = |(at, m): (usize, &PilotMovement)| {
         let paper = if at == useful.paper { "*" } else { "" };
+        if !reached(&m) {
+            return Tile {
+                text: format!("none{paper}"),
+                shade: 0.0,
+                avoided: m.high_wear,
+                framed: false,
+            };
+        }
         Tile {
             text: format!("{:.2}{paper}", left(m)),
             shade: (high - left(m)) / (high - low).max(1e-9),
@@ -183,6 +204,11 @@ fn fig7(pilot: &Pilot, useful: &MostUseful) -> Result<Figure, DrawError> {
         }
     };
     let tiles: Vec<Tile> = pilot.movements.iter().enumerate().map(tile).collect();
+    let none = if pilot.movements.iter().all(|m| reached(&m)) {
+        ""
+    } else {
+        " (none: not reached on every texture)"
+    };
     // forces upwards
     let rows: Vec<&[Tile]> = tiles.chunks(6).rev().collect();
     let speeds = pilot.movements.iter().take(6);
@@ -191,7 +217,7 @@ fn fig7(pilot: &Pilot, useful: &MostUseful) -> Result<Figure, DrawError> {
     let forces: Vec<String> = forces.map(|m| format!("{:.2}", m.force_n)).collect();
     grid(
         &format!("fig7-{property}"),
-        format!("Uncertainty by {property}"),
+        format!("Uncertainty by {property}{none}"),
         ("sliding speed (mm/s)", &speeds),
         ("contact force (N)", &forces),
         &rows,
