@@ -3,6 +3,7 @@
 
 mod calibrate;
 mod dispatch;
+mod error;
 pub mod explore;
 mod identify;
 mod memory;
@@ -16,8 +17,9 @@ mod transfer;
 
 pub use calibrate::restore;
 pub use dispatch::{Probe, Turn, receive, turn};
+pub use error::{IdentifyError, MemoryError, ProbeError};
 pub use identify::identify;
-pub use memory::{Memory, MemoryError};
+pub use memory::Memory;
 pub use status::{RigState, TableInUse, Watch};
 pub use train::train;
 

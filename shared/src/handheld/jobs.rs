@@ -89,6 +89,6 @@ async fn teach<F: NorFlash, B: StoredBytes<F>>(
     if memory.episode.is_none() {
         return Err(text("no slide was measured: slide first"));
     }
-    memory.label(&name, events).await?;
+    memory.label(&name, events).await.map_err(text)?;
     Ok(name)
 }

@@ -1,22 +1,20 @@
 //! The constants of this rig: measured, kept, and restored at boot.
 
-use core::fmt;
-
 use embedded_storage_async::nor_flash::NorFlash;
 
+use super::error::ProbeError;
 use super::seams::{RigHandle, UnloadedRun};
 use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::unloaded::UnloadedRuns;
 use crate::store::{Store, StoreError};
-use crate::wire::{Text, text};
 
 /// Measures the motor's current without load and P_DC in the air, and uses them from now on.
-pub(super) async fn calibrate<R: RigHandle<Error: fmt::Display>>(
+pub(super) async fn calibrate<R: RigHandle, E>(
     rig: &mut R,
-) -> Result<RigCalibration, Text> {
+) -> Result<RigCalibration, ProbeError<R::Error, E>> {
     if rig.state().phase == Phase::Parked {
-        rig.home().await.map_err(text)?;
+        rig.home().await.map_err(ProbeError::Rig)?;
     }
     let mut runs = UnloadedRuns::default();
     while let Some(speed_um_s) = runs.next_speed() {
@@ -24,16 +22,21 @@ pub(super) async fn calibrate<R: RigHandle<Error: fmt::Display>>(
             from_mm,
             to_mm,
             mean_current_a,
-        } = rig.run_unloaded(speed_um_s).await.map_err(text)?;
+        } = rig
+            .run_unloaded(speed_um_s)
+            .await
+            .map_err(ProbeError::Rig)?;
         runs.took(from_mm, to_mm, mean_current_a);
     }
     let state = rig.state();
-    let mut calibration = runs.finish(&state.calibration).map_err(text)?;
+    let mut calibration = runs.finish(&state.calibration)?;
     if let Some(air_counts) = state.air_counts {
         calibration.pressure.pdc_no_contact = air_counts;
     }
-    calibration.check().map_err(text)?;
-    rig.set_calibration(calibration).await.map_err(text)?;
+    calibration.check()?;
+    rig.set_calibration(calibration)
+        .await
+        .map_err(ProbeError::Rig)?;
     Ok(calibration)
 }
 
@@ -41,11 +44,11 @@ pub(super) async fn calibrate<R: RigHandle<Error: fmt::Display>>(
 pub(super) async fn keep<F: NorFlash>(
     store: &mut Store<F>,
     calibration: &RigCalibration,
-) -> Result<(), Text> {
+) -> Result<(), StoreError<F::Error>> {
     if store.settings().is_err() {
-        store.erase_settings().await.map_err(text)?;
+        store.erase_settings().await?;
     }
-    store.set_calibration(calibration).await.map_err(text)
+    store.set_calibration(calibration).await
 }
 
 /// Gives the rig its skin and its calibration as they are stored; each whatever becomes of the other.

@@ -7,6 +7,7 @@ use core::pin::pin;
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
+use super::error::{MemoryError, ProbeError};
 use super::memory::Memory;
 use super::seams::{Events, Panel, RigHandle, StoredBytes};
 use super::{calibrate, identify, teach, train, transfer};
@@ -14,7 +15,7 @@ use crate::dsp::Plan;
 use crate::explorer::Kernels;
 use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
-use crate::wire::{Command, Event, Request, Status, Text, text};
+use crate::wire::{Command, Event, Request, Status, text};
 
 /// When a request is dealt with.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -114,7 +115,7 @@ where
         let id = request.id;
         self.events.tell(match done {
             Ok(()) => Event::Done(id),
-            Err(why) => Event::Refused { id, why },
+            Err(why) => Event::Refused { id, why: text(why) },
         });
     }
 
@@ -122,7 +123,10 @@ where
     ///
     /// # Errors
     /// The reply: why it was not done.
-    pub async fn perform<K: Kernels>(&mut self, command: &Command) -> Result<(), Text> {
+    pub async fn perform<K: Kernels>(
+        &mut self,
+        command: &Command,
+    ) -> Result<(), ProbeError<R::Error, F::Error>> {
         let Self {
             rig,
             memory,
@@ -132,12 +136,12 @@ where
         match command {
             Command::Home => {
                 memory.episode = None;
-                rig.home().await.map_err(text)
+                rig.home().await.map_err(ProbeError::Rig)
             }
             Command::Identify(wanted) => {
                 memory.episode = None;
                 rig.begin(wanted.seed).await;
-                let table = memory.table().map_err(text)?;
+                let table = memory.table().map_err(MemoryError::from)?;
                 // awaited where it lies: moving it would take its size of the stack, twice
                 let done = {
                     let tell = |event| events.tell(event);
@@ -145,18 +149,18 @@ where
                     exploration.await
                 };
                 memory.keep_skin(&rig.state().skin).await;
-                let episode = done?;
+                let episode = done.map_err(ProbeError::Identify)?;
                 if wanted.learn {
                     memory.learn_by_itself(&episode, events).await;
                 }
                 memory.episode = Some(episode);
                 Ok(())
             }
-            Command::Label(name) => memory.label(name, events).await,
+            Command::Label(name) => Ok(memory.label(name, events).await?),
             Command::Train(wanted) => {
                 memory.episode = None;
                 rig.begin(wanted.seed).await;
-                let (store, base, buffer) = memory.lend().map_err(text)?;
+                let (store, base, buffer) = memory.lend()?;
                 let tell = |event| events.tell(event);
                 let done = train::<_, _, K>(wanted, rig, store, base, plan, buffer, tell).await;
                 memory.reload(events).await;
@@ -164,58 +168,54 @@ where
                 done
             }
             Command::Rename { from, to } => {
-                let (store, base, buffer) = memory.lend().map_err(text)?;
+                let (store, base, buffer) = memory.lend()?;
                 let done = teach::rename(from, to, &base, store, buffer).await;
                 memory.reload(events).await;
-                done
+                Ok(done?)
             }
             Command::Forget(what) => {
-                let (store, base, buffer) = memory.lend().map_err(text)?;
+                let (store, base, buffer) = memory.lend()?;
                 let done = teach::delete(what, &base, store, buffer).await;
                 memory.reload(events).await;
-                done
+                Ok(done?)
             }
             Command::Calibrate => {
                 memory.episode = None;
                 let calibration = calibrate::calibrate(rig).await?;
                 events.tell(told(&calibration));
-                calibrate::keep(memory.store().map_err(text)?, &calibration).await
+                Ok(calibrate::keep(memory.store()?, &calibration).await?)
             }
             Command::WriteCalibration(bytes) => {
                 let bytes = bytes
                     .as_slice()
                     .try_into()
-                    .map_err(|_| text("a calibration has 60 bytes"))?;
-                let calibration = RigCalibration::from_bytes(bytes).map_err(text)?;
-                rig.set_calibration(calibration).await.map_err(text)?;
-                calibrate::keep(memory.store().map_err(text)?, &calibration).await
+                    .map_err(|_| ProbeError::CalibrationLength)?;
+                let calibration = RigCalibration::from_bytes(bytes)?;
+                rig.set_calibration(calibration)
+                    .await
+                    .map_err(ProbeError::Rig)?;
+                Ok(calibrate::keep(memory.store()?, &calibration).await?)
             }
             Command::ReadTable(offset) => {
                 let part = transfer::read(memory.in_force(), *offset);
-                events.tell(part.ok_or_else(|| text("the table has no such byte"))?);
+                events.tell(part.ok_or(ProbeError::NoSuchByte)?);
                 Ok(())
             }
             Command::BeginTable(length) => {
-                let store = memory.store().map_err(text)?;
-                store.begin_table(*length as usize).await.map_err(text)
+                Ok(memory.store()?.begin_table(*length as usize).await?)
             }
             Command::WriteTable { offset, bytes } => {
-                transfer::write(memory.store().map_err(text)?, *offset, bytes).await
+                Ok(transfer::write(memory.store()?, *offset, bytes).await?)
             }
             Command::CommitTable => {
                 let done = memory.commit().await;
                 memory.reload(events).await;
-                done
+                Ok(done?)
             }
             Command::FactoryTable => {
-                let done = memory
-                    .store()
-                    .map_err(text)?
-                    .factory_table()
-                    .await
-                    .map_err(text);
+                let done = memory.store()?.factory_table().await;
                 memory.reload(events).await;
-                done
+                Ok(done?)
             }
             // answered when they came, see `receive`
             Command::Status | Command::Stop | Command::Stream(_) | Command::ReadCalibration => {

@@ -5,13 +5,14 @@ use core::fmt;
 
 use heapless::Vec;
 
+use super::error::IdentifyError;
 use super::explore::{ExplorationStep, Random, explore};
 use crate::dsp::Plan;
 use crate::explorer::{self, EpisodeSummary, ExpectedOutcome, Explorer, Kernels};
 use crate::rig::Rig;
 use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
-use crate::wire::{Event, Identify, MAX_EXPECTED_OUTCOMES, Text, Verdict, text};
+use crate::wire::{Event, Identify, MAX_EXPECTED_OUTCOMES, Verdict, text};
 
 /// Explores what lies under the finger until there is an answer, and reports it; the error is why there is none.
 ///
@@ -23,7 +24,7 @@ pub async fn identify<R, K>(
     table: Table<'_>,
     plan: &Plan,
     mut tell: impl FnMut(Event),
-) -> Result<EpisodeSummary, Text>
+) -> Result<EpisodeSummary, IdentifyError<R::Error>>
 where
     R: Rig,
     R::Error: fmt::Display,
@@ -39,7 +40,7 @@ where
     let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
     explorer
         .consider(rig.measures(), wanted.config(contents), candidates)
-        .map_err(text)?;
+        .map_err(IdentifyError::Explorer)?;
     let mut random = Random::new(wanted.seed);
     let mut slide: u8 = 1;
     let verdict = explore(
@@ -86,7 +87,7 @@ where
         },
     )
     .await
-    .map_err(text)?;
+    .map_err(IdentifyError::Explore)?;
     Ok(EpisodeSummary {
         table: table.crc(),
         texture: verdict.texture,

@@ -2,6 +2,7 @@
 
 use embedded_storage_async::nor_flash::NorFlash;
 
+use super::error::MemoryError;
 use super::seams::{Events, StoredBytes};
 use super::status::TableInUse;
 use super::teach::{self, put_in_force};
@@ -9,7 +10,7 @@ use crate::explorer::EpisodeSummary;
 use crate::rig::skin::SkinCare;
 use crate::store::Store;
 use crate::table::{Table, TableError};
-use crate::wire::{Text, text};
+use crate::wire::text;
 
 /// What a probe knows.
 pub struct Memory<'m, F, B> {
@@ -26,17 +27,6 @@ pub struct Memory<'m, F, B> {
     is_factory: bool,
     /// Summary of the last exploration, until the rig moves again.
     pub episode: Option<EpisodeSummary>,
-}
-
-/// Why nothing can be learned.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-pub enum MemoryError {
-    /// The store could not be opened.
-    #[error("the store is broken: see the log")]
-    Broken,
-    /// There is no table to begin with: the firmware's own cannot be read.
-    #[error("there is no table: see the log")]
-    NoTable,
 }
 
 /// The table that all learning begins with: the stored one, or the factory's.
@@ -122,13 +112,15 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
     ///
     /// # Errors
     /// It could not be opened.
-    pub fn store(&mut self) -> Result<&mut Store<F>, MemoryError> {
+    pub fn store(&mut self) -> Result<&mut Store<F>, MemoryError<F::Error>> {
         self.store.as_mut().ok_or(MemoryError::Broken)
     }
 
     /// The store, the table that learning begins with, and the buffer for a new one; [`Memory::reload`] is due after it.
     #[inline(never)]
-    pub(super) fn lend(&mut self) -> Result<(&mut Store<F>, Table<'_>, &mut [u8]), MemoryError> {
+    pub(super) fn lend(
+        &mut self,
+    ) -> Result<(&mut Store<F>, Table<'_>, &mut [u8]), MemoryError<F::Error>> {
         let bytes = base(self.store.as_mut(), &mut self.stored, self.factory);
         let base = Table::read(bytes).map_err(|_| MemoryError::NoTable)?;
         let store = self.store.as_mut().ok_or(MemoryError::Broken)?;
@@ -136,11 +128,10 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
     }
 
     /// Commits the table that was written to the store.
-    pub(super) async fn commit(&mut self) -> Result<(), Text> {
-        let store = self.store.as_mut();
-        let store = store.ok_or_else(|| text(MemoryError::Broken))?;
-        let committed = store.commit_table(self.buffer).await;
-        committed.map(|_| ()).map_err(text)
+    pub(super) async fn commit(&mut self) -> Result<(), MemoryError<F::Error>> {
+        let store = self.store.as_mut().ok_or(MemoryError::Broken)?;
+        store.commit_table(self.buffer).await?;
+        Ok(())
     }
 
     /// Keeps what the skin has been through: worth keeping, but no reason to fail.
@@ -178,12 +169,13 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
     ///
     /// # Errors
     /// The rig has moved since the exploration; those of [`teach::label`].
-    pub async fn label(&mut self, name: &str, events: &mut impl Events) -> Result<(), Text> {
-        let episode = self
-            .episode
-            .take()
-            .ok_or_else(|| text("no slide was measured since the rig moved last: explore first"))?;
-        let (store, base, buffer) = self.lend().map_err(text)?;
+    pub async fn label(
+        &mut self,
+        name: &str,
+        events: &mut impl Events,
+    ) -> Result<(), MemoryError<F::Error>> {
+        let episode = self.episode.take().ok_or(MemoryError::NoEpisode)?;
+        let (store, base, buffer) = self.lend()?;
         let learned = teach::label(&episode, name, &base, store, buffer).await;
         self.reload(events).await;
         match learned {

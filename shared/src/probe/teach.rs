@@ -8,14 +8,15 @@
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
+use super::error::MemoryError;
 use crate::explorer::EpisodeSummary;
 use crate::features::Vector;
-use crate::store::{SelfLearnedRecord, Store};
+use crate::store::{SelfLearnedRecord, Store, StoreError};
 use crate::table::Whitened;
 use crate::table::{Change, EncodeError, Known, MAX_MOVEMENTS, Table, Tally, amend, retell};
 use crate::table::{MAX_TEXTURES, Name};
 use crate::up_to;
-use crate::wire::{Event, Forget, Text, TextureLearned, text};
+use crate::wire::{Event, Forget, TextureLearned};
 
 /// Copies the stored table into `buffer`, with what the probe has learned by itself in its place: the table in force.
 /// Returns its length.
@@ -67,8 +68,8 @@ pub async fn learn_by_itself<F: NorFlash>(
     episode: &EpisodeSummary,
     store: &mut Store<F>,
     buffer: &mut [u8],
-) -> Result<Option<Event>, Text> {
-    let table = Table::read(buffer).map_err(text)?;
+) -> Result<Option<Event>, MemoryError<F::Error>> {
+    let table = Table::read(buffer)?;
     if !episode.certain || episode.table != table.crc() {
         return Ok(None);
     }
@@ -84,8 +85,7 @@ pub async fn learn_by_itself<F: NorFlash>(
             record = kept;
         }
     };
-    let kept = store.self_learned(lineage, &mut each).await;
-    kept.map_err(text)?;
+    store.self_learned(lineage, &mut each).await?;
     let mut learned = 0u8;
     for (movement, slides, mean) in &episode.observed {
         let known = table.whitened(texture, *movement);
@@ -98,15 +98,15 @@ pub async fn learn_by_itself<F: NorFlash>(
     if learned == 0 {
         return Ok(None);
     }
-    let name = Name::try_from(table.name(texture).unwrap_or_default()).unwrap_or_default();
+    let name = name_of(table.name(texture).unwrap_or_default());
     let before = table.tally(texture);
     let tally = Tally {
         itself: before.itself.saturating_add(learned),
         ..before
     };
-    store.set_self_learned(&record).await.map_err(text)?;
+    store.set_self_learned(&record).await?;
     for (movement, _, whitened) in &record.movements {
-        retell(buffer, texture, *movement, whitened, tally).map_err(text)?;
+        retell(buffer, texture, *movement, whitened, tally)?;
     }
     Ok(Some(Event::TextureLearned(TextureLearned {
         name,
@@ -150,19 +150,17 @@ pub async fn label<F: NorFlash>(
     base: &Table<'_>,
     store: &mut Store<F>,
     buffer: &mut [u8],
-) -> Result<Event, Text> {
-    let in_force = Table::read(buffer).map_err(text)?.crc();
+) -> Result<Event, MemoryError<F::Error>> {
+    let in_force = Table::read(buffer)?.crc();
     if episode.table != in_force {
-        return Err(text(
-            "the table has changed since the exploration: explore again",
-        ));
+        return Err(MemoryError::TableChanged);
     }
     if episode.observed.is_empty() {
-        return Err(text("this kind of table learns by `train` only"));
+        return Err(MemoryError::TrainOnly);
     }
     let known = base.find(name);
     if known.is_none() && usize::from(base.textures()) >= MAX_TEXTURES {
-        return Err(text("the table is full: forget a texture first"));
+        return Err(MemoryError::Full);
     }
     let mut whitened: Vec<Whitened, MAX_MOVEMENTS> = up_to(
         (0..base.movements().len() as u8)
@@ -204,8 +202,7 @@ pub async fn label<F: NorFlash>(
                 record = Some(kept);
             }
         };
-        let kept = store.self_learned(lineage, &mut each).await;
-        kept.map_err(text)?;
+        store.self_learned(lineage, &mut each).await?;
         if let Some(mut record) = record {
             for (movement, count, mean) in &episode.observed {
                 let of_movement = record.movements.iter_mut().find(|m| m.0 == *movement);
@@ -213,11 +210,11 @@ pub async fn label<F: NorFlash>(
                     adapt(whitened, *count, mean);
                 }
             }
-            store.set_self_learned(&record).await.map_err(text)?;
+            store.set_self_learned(&record).await?;
         }
     }
     Ok(Event::TextureLearned(TextureLearned {
-        name: Name::try_from(name).unwrap_or_default(),
+        name: name_of(name),
         slides,
         itself: false,
     }))
@@ -227,9 +224,9 @@ pub async fn label<F: NorFlash>(
 pub(crate) async fn delete_stale<F: NorFlash>(
     base: &Table<'_>,
     store: &mut Store<F>,
-) -> Result<(), Text> {
+) -> Result<(), StoreError<F::Error>> {
     let of = Some((base.lineage(), base.next_number()));
-    store.delete_self_learned(of).await.map_err(text)
+    store.delete_self_learned(of).await
 }
 
 /// Stores the table with one change.
@@ -238,11 +235,12 @@ async fn change<F: NorFlash>(
     base: &Table<'_>,
     store: &mut Store<F>,
     buffer: &mut [u8],
-) -> Result<(), Text> {
+) -> Result<(), MemoryError<F::Error>> {
     let most = Store::<F>::MAX_TABLE.min(buffer.len());
     let buffer = buffer.get_mut(..most).unwrap_or_default();
-    let length = amend(buffer, base, change).map_err(text)?.as_bytes().len();
-    store.replace_table(buffer, length).await.map_err(text)
+    let length = amend(buffer, base, change)?.as_bytes().len();
+    store.replace_table(buffer, length).await?;
+    Ok(())
 }
 
 /// Gives a texture of the stored table another name.
@@ -255,10 +253,12 @@ pub async fn rename<F: NorFlash>(
     base: &Table<'_>,
     store: &mut Store<F>,
     buffer: &mut [u8],
-) -> Result<(), Text> {
-    let texture = base.find(from).ok_or_else(|| unknown(from))?;
+) -> Result<(), MemoryError<F::Error>> {
+    let texture = base
+        .find(from)
+        .ok_or_else(|| MemoryError::Unknown(name_of(from)))?;
     if base.find(to).is_some() {
-        return Err(text(format_args!("there is a texture {to} already")));
+        return Err(MemoryError::Taken(name_of(to)));
     }
     change(Change::Rename { texture, name: to }, base, store, buffer).await
 }
@@ -272,24 +272,28 @@ pub async fn delete<F: NorFlash>(
     base: &Table<'_>,
     store: &mut Store<F>,
     buffer: &mut [u8],
-) -> Result<(), Text> {
+) -> Result<(), MemoryError<F::Error>> {
     match what {
         Forget::Texture(name) => {
-            let texture = base.find(name).ok_or_else(|| unknown(name))?;
+            let texture = base
+                .find(name)
+                .ok_or_else(|| MemoryError::Unknown(name_of(name)))?;
             if base.textures() == 1 {
-                return Err(text("a table cannot be without any texture"));
+                return Err(MemoryError::LastTexture);
             }
             change(Change::Forget(texture), base, store, buffer).await?;
             let of = Some((base.lineage(), base.number(texture)));
-            store.delete_self_learned(of).await.map_err(text)
+            store.delete_self_learned(of).await?;
         }
-        Forget::SelfLearned => store.delete_self_learned(None).await.map_err(text),
-        Forget::Training(name) => store.delete_training_records(name).await.map_err(text),
+        Forget::SelfLearned => store.delete_self_learned(None).await?,
+        Forget::Training(name) => store.delete_training_records(name).await?,
     }
+    Ok(())
 }
 
-fn unknown(name: &str) -> Text {
-    text(format_args!("there is no texture {name} in the table"))
+/// A name as the probe has it; one that is longer than any is none.
+fn name_of(name: &str) -> Name {
+    Name::try_from(name).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -86,7 +86,7 @@ fn identified(slides: &[Option<i16>], wanted: &Identify) -> (Result<(), Text>, v
             });
         },
     ));
-    (result.map(|_| ()), told)
+    (result.map(|_| ()).map_err(text), told)
 }
 
 #[test]

@@ -5,16 +5,17 @@ use core::fmt;
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
+use super::error::ProbeError;
 use super::teach::delete_stale;
 use super::training::{Training, Wanted};
 use crate::dsp::Plan;
 use crate::explorer::Kernels;
 use crate::features::{Movement, Observation, Slide};
-use crate::rig::{Fault, MAX_REJECTED, Rig};
+use crate::rig::{MAX_REJECTED, Rig};
 use crate::store::Store;
 use crate::table::{MAX_MOVEMENTS, Table};
 use crate::up_to;
-use crate::wire::{Event, Text, Train, text};
+use crate::wire::{Event, Train, text};
 
 /// Learns the texture under the finger on top of `table`, and goes on where an earlier training of it stopped: every trial
 /// is stored at once. In the end the store has a new table, which is to be used from then on. `buffer` holds a whole table.
@@ -30,7 +31,7 @@ pub async fn train<R, F, K>(
     plan: &Plan,
     buffer: &mut [u8],
     mut tell: impl FnMut(Event),
-) -> Result<(), Text>
+) -> Result<(), ProbeError<R::Error, F::Error>>
 where
     R: Rig,
     R::Error: fmt::Display,
@@ -47,15 +48,14 @@ where
         },
         Some(&table),
         Store::<F>::MAX_TABLE.min(buffer.len()),
-    )
-    .map_err(text)?;
+    )?;
     let movements: Vec<Movement, MAX_MOVEMENTS> = up_to(training.learned().iter().map(|(m, _)| *m));
     for &movement in &movements {
         let before = store
             .training_record(name, movement, training.table())
             .await;
-        if let Some(stats) = before.map_err(text)? {
-            training.resume(movement, stats).map_err(text)?;
+        if let Some(stats) = before? {
+            training.resume(movement, stats)?;
         }
     }
     let mut rejected = 0;
@@ -65,30 +65,19 @@ where
             Ok(()) => rig.lifted().await,
             failed => failed,
         };
-        if let Err(why) = &made
-            && !rig.recover(why).await
-        {
-            return Err(text(why));
-        }
-        let finished = made
-            .map_err(text)
-            .and_then(|()| slide.finish().map_err(text));
-        let measured = match finished {
-            Ok(measurement) => {
-                match training.took(Some(&table), movement, &Observation::from(&measurement)) {
-                    Ok(training_record) => Ok((training_record, measurement)),
-                    Err(why) => Err(text(why)),
-                }
-            }
-            Err(why) => Err(why),
+        let measured = match made {
+            Err(why) if !rig.recover(&why).await => return Err(ProbeError::Rig(why)),
+            Err(why) => Err(text(why)),
+            Ok(()) => slide.finish().map_err(text).and_then(|measurement| {
+                let observed = Observation::from(&measurement);
+                let took = training.took(Some(&table), movement, &observed);
+                Ok((took.map_err(text)?, measurement))
+            }),
         };
         match measured {
             Ok((training_record, measurement)) => {
                 rejected = 0;
-                store
-                    .set_training_record(&training_record)
-                    .await
-                    .map_err(text)?;
+                store.set_training_record(&training_record).await?;
                 tell(Event::TrainingSlide {
                     movement,
                     trial: training_record.stats.trials(),
@@ -103,26 +92,25 @@ where
                     why,
                 });
                 if rejected == MAX_REJECTED {
-                    return Err(text(Fault::Rejected));
+                    return Err(ProbeError::Rejected);
                 }
             }
         }
     }
     if training.makes_table() {
-        let new = training.encode(Some(&table), buffer).map_err(text)?;
+        let new = training.encode(Some(&table), buffer)?;
         let number = new.find(name).map(|texture| new.number(texture));
         let (length, lineage) = (new.as_bytes().len(), new.lineage());
         if table.find(name).is_none() {
             delete_stale(&table, store).await?;
         }
-        store.replace_table(buffer, length).await.map_err(text)?;
+        store.replace_table(buffer, length).await?;
         if let Some(number) = number {
             // the user's training replaces what the probe had learned by itself
-            let self_learned = store.delete_self_learned(Some((lineage, number))).await;
-            self_learned.map_err(text)?;
+            store.delete_self_learned(Some((lineage, number))).await?;
         }
         // what the table holds now need not be kept beside it
-        store.delete_training_records(name).await.map_err(text)?;
+        store.delete_training_records(name).await?;
     }
     Ok(())
 }

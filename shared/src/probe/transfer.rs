@@ -4,7 +4,7 @@ use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
 use crate::store::{Store, StoreError};
-use crate::wire::{Event, PART, Text, text};
+use crate::wire::{Event, PART};
 
 /// The part of `table` that begins at `offset`, as the event that the host receives; `None` if the table ends before.
 pub(super) fn read(table: &[u8], offset: u32) -> Option<Event> {
@@ -23,13 +23,13 @@ pub(super) async fn write<F: NorFlash>(
     store: &mut Store<F>,
     offset: u32,
     bytes: &[u8],
-) -> Result<(), Text> {
+) -> Result<(), StoreError<F::Error>> {
     match store.write_table(offset as usize, bytes).await {
         Err(StoreError::Part { offset, wanted })
             if offset.checked_add(bytes.len()) == Some(wanted) =>
         {
             Ok(())
         }
-        written => written.map_err(text),
+        written => written,
     }
 }

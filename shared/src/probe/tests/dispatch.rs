@@ -8,6 +8,7 @@ use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::wire::{Command, Counts, Forget, PART, Request, Status, TextureLearned};
 use std::boxed::Box;
+use std::string::ToString;
 
 const SECTOR: usize = 16_384;
 type Flash = Ram<SECTOR>;
@@ -149,7 +150,7 @@ fn probe() -> Tested {
 
 fn command(probe: &mut Tested, command: Command) -> Result<(), String> {
     let done = block_on(probe.perform::<Plain>(&command));
-    done.map_err(|why| why.as_str().into())
+    done.map_err(|why| why.to_string())
 }
 
 fn name(name: &str) -> Name {

@@ -15,7 +15,7 @@ use tactus_core::dsp::{self, Plain};
 use tactus_core::sensor::pressure::SLOTS_HZ;
 use tactus_core::store::{Store, StoreError};
 use tactus_core::table::TableError;
-use tactus_core::wire::{Command, Event, Forget, Identify, Text, Verdict};
+use tactus_core::wire::{Command, Event, Forget, Identify, Text, Verdict, text};
 
 use super::episodes::{Episodes, FACTORY, HOMINGS, MOST_N, Plan, world};
 
@@ -183,7 +183,7 @@ pub(crate) fn day(virtual_s: f64, seed: u64, mut each: impl FnMut(f64)) -> Resul
 
 /// Sends the probe a command, as a host would; the error says why it refuses.
 fn send(probe: &mut Probe<'_>, command: Command) -> Result<(), Box<Text>> {
-    block_on(probe.perform::<Plain>(&command)).map_err(Box::new)
+    block_on(probe.perform::<Plain>(&command)).map_err(|why| Box::new(text(why)))
 }
 
 fn now_s(probe: &mut Probe<'_>) -> f64 {
