@@ -1,6 +1,9 @@
 //! What performs a movement: the seam [`Rig`], and what stands behind it on a rig with a stage and a lever.
 //!
 //! A property means something only for the movement that made it, so moving and sensing are one act.
+//!
+//! What is done every millisecond is `#[inline]` here: so it is compiled with the firmware, which is optimised for size,
+//! and not with the kernels of this crate.
 
 pub mod calibration;
 pub mod control;

@@ -62,6 +62,7 @@ pub struct Taps {
 
 impl Taps {
     /// Designs the band-pass: the ideal response, cut by a Hamming window and scaled to gain 1 in the middle of the band.
+    #[inline]
     pub fn band_pass() -> Self {
         let (low, high) = (
             PASS_BAND_HZ.0 / f64::from(RATE_HZ),
@@ -125,6 +126,7 @@ impl Taps {
 
 /// Cosine of an angle in turns, fewer than 2^31 of them. That of `libm` takes angles of any size in radians, and 5 KB of
 /// flash to tell how many turns they are.
+#[inline]
 pub(crate) fn cos_of_turns(turns: f64) -> f64 {
     let turns = if turns < 0.0 { -turns } else { turns };
     let part = turns - f64::from(turns as u32);

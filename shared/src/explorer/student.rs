@@ -103,6 +103,7 @@ impl Student {
 }
 
 /// Derivative of ln Gamma: the recurrence up to 6, then the asymptotic series.
+#[inline]
 fn digamma(mut x: f64) -> f64 {
     let mut below = 0.0;
     while x < 6.0 {
@@ -114,6 +115,7 @@ fn digamma(mut x: f64) -> f64 {
 }
 
 /// Derivative of [`digamma`].
+#[inline]
 fn trigamma(mut x: f64) -> f64 {
     let mut below = 0.0;
     while x < 6.0 {

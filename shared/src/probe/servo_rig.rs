@@ -319,13 +319,8 @@ impl<S: Servo> Rig for ServoRig<S> {
     }
 
     async fn recover(&mut self, failed: &RigError) -> bool {
-        match failed {
-            RigError::Refused(_) => failed.is_of_the_movement(),
-            _ => {
-                failed.is_of_the_movement()
-                    && self.command(RigCommand::Recover).await.is_ok()
-                    && self.rest().await.is_ok_and(|rig| rig.phase == Phase::Ready)
-            }
-        }
+        failed.is_of_the_movement()
+            && self.command(RigCommand::Recover).await.is_ok()
+            && self.rest().await.is_ok()
     }
 }

@@ -164,6 +164,7 @@ impl Control {
     ///
     /// # Errors
     /// See [`Refused`].
+    #[inline]
     pub fn home(&mut self) -> Result<(), Refused> {
         match self.phase {
             Phase::Parked | Phase::Ready => {
@@ -186,6 +187,7 @@ impl Control {
     ///
     /// # Errors
     /// As [`Control::reset`] and [`Control::home`].
+    #[inline]
     pub fn recover(&mut self) -> Result<(), Refused> {
         let before = self.zeroed.then(|| self.meter.no_contact());
         self.reset()?;
@@ -217,6 +219,7 @@ impl Control {
     ///
     /// # Errors
     /// See [`Refused`].
+    #[inline]
     pub fn start(&mut self, movement: Movement, start: f32) -> Result<(), Refused> {
         self.may_start()?;
         let pressable = self
@@ -240,6 +243,7 @@ impl Control {
     ///
     /// # Errors
     /// See [`Refused`].
+    #[inline]
     pub fn start_unloaded(&mut self, speed_um_s: u32) -> Result<(), Refused> {
         self.may_start()?;
         if !Movement::SPEED_UM_S.contains(&speed_um_s) {
@@ -281,6 +285,7 @@ impl Control {
     }
 
     /// Stops the stage and lifts the finger.
+    #[inline]
     pub fn stop(&mut self) {
         match self.phase {
             Phase::Positioning
@@ -307,6 +312,7 @@ impl Control {
     ///
     /// # Errors
     /// [`Refused::Busy`] while the finger is still being lifted.
+    #[inline]
     pub fn reset(&mut self) -> Result<(), Refused> {
         if let Phase::Faulted(fault) = self.phase {
             if !self.is_at_rest() {
@@ -341,6 +347,7 @@ impl Control {
         self.ms = 0;
     }
 
+    #[inline]
     fn fail(&mut self, fault: Fault) {
         self.stage.stop();
         self.lever.home();
@@ -349,6 +356,7 @@ impl Control {
     }
 
     /// One millisecond.
+    #[inline]
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
         self.ms = self.ms.saturating_add(1);
         for word in inputs.words.iter().flatten() {
@@ -414,6 +422,7 @@ impl Control {
 
     /// A fault that lever or stage have found themselves. That the finger cannot be lifted is worse than what it was to be
     /// lifted for.
+    #[inline]
     fn check(&mut self, fault: Fault) {
         if !self.guard.looks_for(fault) {
             return;
@@ -426,6 +435,7 @@ impl Control {
         }
     }
 
+    #[inline]
     fn watch(&mut self, inputs: &Inputs) -> Option<Fault> {
         let moving = match self.stage.state() {
             StageState::Moving(profile) => profile.velocity_mm_s(),
@@ -457,6 +467,7 @@ impl Control {
         (!idle || (fault == Fault::ForceHigh && self.phase != Phase::Parked)).then_some(fault)
     }
 
+    #[inline]
     fn advance(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
         let moves = outputs.lever_steps_s != 0 || self.phase != Phase::Pressing;
         self.run.press(inputs, moves);

@@ -120,6 +120,7 @@ impl Guard {
 
     /// One millisecond. `limit_mn` is the force at which the finger is lifted, at most [`FORCE_LIMIT_MN`]. The first of
     /// several faults is the one that can hurt most.
+    #[inline]
     pub fn tick(
         &mut self,
         seen: &Seen<'_>,
@@ -149,6 +150,7 @@ impl Guard {
         .find(|&fault| self.looks_for(fault))
     }
 
+    #[inline]
     fn sensor(&mut self, words: &[Option<Pressure>]) -> [Option<Fault>; 3] {
         for frozen in &mut self.frozen_ms {
             *frozen = frozen.saturating_add(1);
@@ -199,6 +201,7 @@ impl Guard {
         ]
     }
 
+    #[inline]
     fn stage(&mut self, seen: &Seen<'_>) -> Option<Fault> {
         let wanted = libm::fabsf(seen.stage_wanted_mm_s);
         let Some(slot) = self

@@ -214,6 +214,7 @@ impl Lever {
     ///
     /// # Errors
     /// The motor is to stand; the guard then lifts the finger.
+    #[inline]
     pub fn tick(&mut self, meter: &mut ForceMeter, steps: i32, at_top: bool) -> Result<i32, Fault> {
         self.ms = self.ms.saturating_add(1);
         match self.state {
@@ -298,6 +299,7 @@ impl Lever {
         }
     }
 
+    #[inline]
     fn approach(
         &mut self,
         meter: &ForceMeter,
@@ -341,6 +343,7 @@ impl Lever {
     }
 
     /// The skin has settled: is the force right, or how many steps is it off?
+    #[inline]
     fn weigh(&mut self, meter: &ForceMeter, steps: i32) -> Result<i32, Fault> {
         let Some(counts) = meter.long_counts() else {
             return Err(Fault::Unsteady);

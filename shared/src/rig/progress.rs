@@ -100,6 +100,7 @@ impl Progress {
     }
 
     /// P_AC while the lever comes down, counts.
+    #[inline]
     pub(super) fn hear(&mut self, pac: u16, calibration: &Calibration) {
         self.same = if pac == self.last {
             self.same.saturating_add(1)
@@ -122,6 +123,7 @@ impl Progress {
     ///
     /// # Errors
     /// [`Fault::PressureDead`] or [`Fault::LeverSlips`].
+    #[inline]
     pub(super) fn judge(&mut self, steps: i32, counts: f32, contact: bool) -> Result<(), Fault> {
         if self.same >= FROZEN_SAMPLES {
             return Ok(());
@@ -137,6 +139,7 @@ impl Progress {
             .map_or(Ok(()), Err)
     }
 
+    #[inline]
     fn judge_touch(&mut self, now: Mark) -> Option<Fault> {
         if self.lately < TOUCH_COUNTS {
             self.touched = None;
@@ -151,6 +154,7 @@ impl Progress {
         (now.steps - since.steps >= SEEN_STEPS && rise < SEEN_COUNTS).then(|| self.stalled(rise))
     }
 
+    #[inline]
     fn judge_piece(&mut self, now: Mark) -> Option<Fault> {
         let Some(since) = self.piece else {
             self.contact = now.steps;

@@ -211,6 +211,7 @@ impl Stage {
 
     /// Moves to `to_mm`, kept [`MARGIN_MM`] from the limit switches. Only a standing stage does; the profile says how long
     /// it takes.
+    #[inline]
     pub fn go(&mut self, to_mm: f32, speed_mm_s: f32) -> Option<Profile> {
         if self.state != StageState::Standing {
             return None;
@@ -247,6 +248,7 @@ impl Stage {
     ///
     /// # Errors
     /// The motor is to be off.
+    #[inline]
     pub fn tick(&mut self, count: i32, at_left: bool) -> Result<f32, Fault> {
         self.counts.rotate_left(1);
         let [.., newest] = &mut self.counts;
