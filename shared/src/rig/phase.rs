@@ -54,7 +54,7 @@ pub enum Refused {
     #[error("lever and stage do not know where they are; home them first")]
     NotHomed,
     /// A fault has to be reset first.
-    #[error("{}: {}", .0, .0.recovery())]
+    #[error("{}: {}, then reset", .0, .0.recovery())]
     Fault(Fault),
     /// The force is over what this rig may press.
     #[error(
@@ -79,7 +79,7 @@ pub enum RigError {
     #[error(transparent)]
     Refused(Refused),
     /// A fault was seen: the stage stands and the finger is lifted, unless the fault is [`Fault::LeverNotHome`].
-    #[error("{}: {}", .0, .0.recovery())]
+    #[error("{}: {}, then reset", .0, .0.recovery())]
     Fault(Fault),
     /// It was stopped, and the finger is lifted.
     #[error("stopped")]
