@@ -285,7 +285,7 @@ fn cell(input: &Input, damage: Damage) -> String {
         Damage::AnotherVersion => fs::write(&file, (input.another_version)(good)).unwrap(),
         Damage::NoPermission => {
             use std::os::unix::fs::PermissionsExt as _;
-            fs::set_permissions(&file, fs::Permissions::from_mode(0)).unwrap();
+            fs::set_permissions(&file, fs::Permissions::from_mode(0o0)).unwrap();
             if fs::read(&file).is_ok() {
                 // root: another way to be unreadable
                 fs::remove_file(&file).unwrap();

@@ -12,6 +12,9 @@ use crate::store::Store;
 use crate::table::{Table, TableError};
 use crate::wire::text;
 
+/// What learning needs: the store, the table that it begins with, and the buffer for a new one.
+type Lent<'a, F> = (&'a mut Store<F>, Table<'a>, &'a mut [u8]);
+
 /// What a probe knows.
 pub struct Memory<'m, F, B> {
     store: Option<Store<F>>,
@@ -116,11 +119,9 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         self.store.as_mut().ok_or(MemoryError::Broken)
     }
 
-    /// The store, the table that learning begins with, and the buffer for a new one; [`Memory::reload`] is due after it.
+    /// What learning needs; [`Memory::reload`] is due after it.
     #[inline(never)]
-    pub(super) fn lend(
-        &mut self,
-    ) -> Result<(&mut Store<F>, Table<'_>, &mut [u8]), MemoryError<F::Error>> {
+    pub(super) fn lend(&mut self) -> Result<Lent<'_, F>, MemoryError<F::Error>> {
         let bytes = base(self.store.as_mut(), &mut self.stored, self.factory);
         let base = Table::read(bytes).map_err(|_| MemoryError::NoTable)?;
         let store = self.store.as_mut().ok_or(MemoryError::Broken)?;

@@ -68,11 +68,14 @@ where
         let measured = match made {
             Err(why) if !rig.recover(&why).await => return Err(ProbeError::Rig(why)),
             Err(why) => Err(text(why)),
-            Ok(()) => slide.finish().map_err(text).and_then(|measurement| {
-                let observed = Observation::from(&measurement);
-                let took = training.took(Some(&table), movement, &observed);
-                Ok((took.map_err(text)?, measurement))
-            }),
+            Ok(()) => match slide.finish() {
+                Ok(measurement) => {
+                    let observed = Observation::from(&measurement);
+                    let took = training.took(Some(&table), movement, &observed);
+                    took.map_err(text).map(|record| (record, measurement))
+                }
+                Err(why) => Err(text(why)),
+            },
         };
         match measured {
             Ok((training_record, measurement)) => {
