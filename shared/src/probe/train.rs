@@ -23,6 +23,7 @@ use crate::wire::{Event, Train, text};
 /// # Errors
 /// The texture cannot be learned, see [`crate::probe::training::TrainingError`]; the rig or the store failed;
 /// [`MAX_REJECTED`] slides in a row were no good.
+#[allow(clippy::result_large_err)] // a text is large, and none is made but where a slide is rejected
 pub async fn train<R, F, K>(
     wanted: &Train,
     rig: &mut R,
@@ -68,14 +69,11 @@ where
         let measured = match made {
             Err(why) if !rig.recover(&why).await => return Err(ProbeError::Rig(why)),
             Err(why) => Err(text(why)),
-            Ok(()) => match slide.finish() {
-                Ok(measurement) => {
-                    let observed = Observation::from(&measurement);
-                    let took = training.took(Some(&table), movement, &observed);
-                    took.map_err(text).map(|record| (record, measurement))
-                }
-                Err(why) => Err(text(why)),
-            },
+            Ok(()) => slide.finish().map_err(text).and_then(|measurement| {
+                let observed = Observation::from(&measurement);
+                let took = training.took(Some(&table), movement, &observed);
+                Ok((took.map_err(text)?, measurement))
+            }),
         };
         match measured {
             Ok((training_record, measurement)) => {
