@@ -32,7 +32,9 @@ const LEAST_SHARE: f32 = 0.75;
 /// sample's own heights make a difference: there the mean counts, and ...
 const EVEN_COUNTS: f32 = 15.0;
 /// ... the steps are divided by this.
-const EARLY_SHARE: f32 = 0.6;
+const EARLY_SHARE: f32 = 0.4;
+/// No later piece takes more: 0.38 mm for 69 mN, twice what the softest foam takes.
+const LATER_STEPS: f32 = 600.0;
 /// And so far it takes 1 mm at most: a sample of 4 mm/N.
 const EARLY_STEPS: i32 = 1600;
 /// By so many counts of P_DC the two signals differ before they contradict each other.
@@ -177,15 +179,17 @@ impl Progress {
         }
         let steps = |compliance: f32, share: f32| (finger + compliance) * SEGMENT_COUNTS / share;
         let (early, counts) = self.early;
-        let by_early = if counts > 0.0 && since.counts >= EVEN_COUNTS {
-            steps((early / counts).max(0.0), EARLY_SHARE)
+        let by_early = if since.counts < EVEN_COUNTS {
+            SEEN_STEPS as f32
+        } else if counts > 0.0 {
+            steps((early / counts).max(0.0), EARLY_SHARE).min(LATER_STEPS)
         } else {
-            f32::INFINITY
+            LATER_STEPS
         };
         let by_least = self
             .compliance
             .map_or(f32::INFINITY, |least| steps(least, LEAST_SHARE));
-        let most = by_early.min(by_least).min(SEEN_STEPS as f32);
+        let most = by_early.min(by_least);
         let late = now.counts < EVEN_COUNTS && now.steps - self.contact > EARLY_STEPS;
         (made > most || late).then(|| self.stalled(rise))
     }
