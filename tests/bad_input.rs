@@ -8,6 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use tactus_tests::properties_csv;
 use tempfile::TempDir;
 
 /// The page with the answers.
@@ -83,6 +84,17 @@ fn replaced(bytes: Vec<u8>, old: &str, new: &str) -> Vec<u8> {
     text.replacen(old, new, 1).into_bytes()
 }
 
+/// Reads all of a folder, and writes a table.
+const LEARN: &[&str] = &[
+    "learn",
+    "--recordings",
+    "DIR",
+    "--train-slides",
+    "2",
+    "--out",
+    "OUT",
+];
+
 const INPUTS: [Input; 5] = [
     Input {
         name: "A recording folder's manifest",
@@ -90,15 +102,7 @@ const INPUTS: [Input; 5] = [
             recordings(folder);
             folder.join("manifest.csv")
         },
-        command: &[
-            "learn",
-            "--recordings",
-            "DIR",
-            "--train-slides",
-            "2",
-            "--out",
-            "OUT",
-        ],
+        command: LEARN,
         another_version: (|bytes| replaced(bytes, "pac_rate_hz", "pac_rate_khz")),
         has_end: true,
     },
@@ -108,15 +112,7 @@ const INPUTS: [Input; 5] = [
             recordings(folder);
             folder.join("t001_s001_pac.npy")
         },
-        command: &[
-            "learn",
-            "--recordings",
-            "DIR",
-            "--train-slides",
-            "2",
-            "--out",
-            "OUT",
-        ],
+        command: LEARN,
         another_version: (|mut bytes| {
             // behind \x93NUMPY
             bytes[6] = 9;
@@ -127,20 +123,8 @@ const INPUTS: [Input; 5] = [
     Input {
         name: "A table of properties (CSV)",
         make: |folder| {
-            let mut text = String::from("texture,movement,trial,set,traction,roughness,fineness\n");
-            for (texture, trial) in (0..3).flat_map(|t| (1..=10).map(move |n| (t, n))) {
-                for movement in 1..=3 {
-                    let set = if trial <= 5 { "train" } else { "validate" };
-                    let x = f64::from(texture) + 0.1 * f64::from(trial * movement % 7);
-                    text += &format!(
-                        "t{texture},{movement},{trial},{set},{x:.3},{:.3},{:.3}\n",
-                        x + 3.0,
-                        x + 5.0
-                    );
-                }
-            }
             let file = folder.join("properties.csv");
-            fs::write(&file, text).unwrap();
+            fs::write(&file, properties_csv(3, 3, |_, _, _| 5)).unwrap();
             file
         },
         command: &[

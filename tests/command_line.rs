@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 use sha2::{Digest as _, Sha256};
-use tactus_tests::data;
+use tactus_tests::{data, properties_csv};
 
 fn tactus(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_tactus"))
@@ -689,17 +689,7 @@ fn imported_recordings_evaluate_to_the_same_figures() {
 fn properties_are_evaluated_and_checked() {
     let temp = tempfile::tempdir().unwrap();
     let file = temp.path().join("world.csv");
-    let mut csv = "texture,movement,trial,set,traction,roughness,fineness\n".to_owned();
-    for texture in 1..=4 {
-        for movement in 1..=2 {
-            for trial in 1..=3 {
-                for set in ["train", "validate"] {
-                    let x = f64::from(texture) + 0.01 * f64::from(trial * trial);
-                    csv += &format!("{texture},{movement},{trial},{set},{x},{x},{x}\n");
-                }
-            }
-        }
-    }
+    let csv = properties_csv(4, 2, |_, _, _| 3);
     fs::write(&file, &csv).unwrap();
     let evaluate = [
         "evaluate",

@@ -1,4 +1,4 @@
-//! What the tests share: where the recordings are, and how a test says that it was skipped.
+//! What the tests share: where the recordings are, how a test says that it was skipped, a table of properties.
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -41,4 +41,25 @@ pub fn skipped(why: &str) {
             .and_then(|mut f| f.write_all(line.as_bytes()))
             .expect("the file named by TACTUS_SKIP_LOG can be written");
     }
+}
+
+/// A table of properties for `tactus evaluate --properties`. Each set, "train" and "validate", has `trials` of a texture, a
+/// movement and a set. Textures lie 1 apart in each property, their trials up to a hundredth of their squares.
+pub fn properties_csv(
+    textures: i32,
+    movements: i32,
+    trials: impl Fn(i32, i32, &str) -> i32,
+) -> String {
+    let mut csv = "texture,movement,trial,set,traction,roughness,fineness\n".to_owned();
+    for texture in 1..=textures {
+        for movement in 1..=movements {
+            for set in ["train", "validate"] {
+                for trial in 1..=trials(texture, movement, set) {
+                    let x = f64::from(texture) + 0.01 * f64::from(trial * trial);
+                    csv += &format!("{texture},{movement},{trial},{set},{x},{x},{x}\n");
+                }
+            }
+        }
+    }
+    csv
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use tactus_tests::data;
+use tactus_tests::{data, properties_csv};
 
 /// What a command printed that must succeed or, as `identify`, end without a name.
 fn printed(arguments: &[&str]) -> String {
@@ -209,20 +209,10 @@ fn a_lifelong_session_is_played_as_often_as_asked() {
 fn numbers_of_trials_may_differ() {
     let temp = tempfile::tempdir().unwrap();
     let file = temp.path().join("world.csv");
-    let mut csv = "texture,movement,trial,set,traction,roughness,fineness\n".to_owned();
-    for texture in 1..=4 {
-        for movement in 1..=2 {
-            for (set, trials) in [
-                ("train", 2 + (texture + movement) % 3),
-                ("validate", texture),
-            ] {
-                for trial in 1..=trials {
-                    let x = f64::from(texture) + 0.01 * f64::from(trial * trial);
-                    csv += &format!("{texture},{movement},{trial},{set},{x},{x},{x}\n");
-                }
-            }
-        }
-    }
+    let csv = properties_csv(4, 2, |texture, movement, set| match set {
+        "train" => 2 + (texture + movement) % 3,
+        _ => texture,
+    });
     fs::write(&file, &csv).unwrap();
     let evaluate = [
         "evaluate",

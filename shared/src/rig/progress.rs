@@ -63,7 +63,7 @@ pub(super) struct Progress {
     /// The last P_AC, and how many samples have been the same.
     last: u16,
     same: u32,
-    /// Rise of the pressure by P_AC in counts of P_DC: of the last second, and of this piece.
+    /// Rise of the pressure by P_AC in counts of P_DC: over [`MEMORY_S`], and of this piece.
     lately: f32,
     of_piece: f32,
     /// Since when P_AC shows a contact that P_DC does not.

@@ -84,7 +84,7 @@ pub enum Event {
         #[serde(with = "sparse")]
         posterior: Vec<f32, MAX_TEXTURES>,
     },
-    /// The slide was made and does not count; it is repeated.
+    /// The slide failed, or gave no features: it does not count. It is made again, then another movement is chosen.
     Rejected {
         /// Number of the slide, from 1.
         slide: u8,
