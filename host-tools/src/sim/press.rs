@@ -23,7 +23,8 @@ pub const FORCE_LIMIT_N: f64 = 2.2;
 const TEXTURES: usize = 10;
 /// Stream of the seeds that a campaign draws from.
 const STREAM: u64 = 0x9e55;
-/// Times in which a torn skin loses its pressure, s: see [`Trouble::Leaking`].
+/// Times in which a torn skin loses its pressure, s: see [`Trouble::Leaking`]. Faster ones show contact in neither signal, much
+/// slower ones look like a soft sample: the guard does not notice these in time, as the book's page of limits says.
 const LEAK_S: (f64, f64) = (0.2, 2.0);
 
 /// What is wrong with P_DC.
