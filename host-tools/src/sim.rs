@@ -4,7 +4,10 @@
 //! import them (a test looks): what is simulated has to be hard to fool. Every constant is a figure of the paper (PAPER:
 //! Fishel & Loeb 2012), of the makers' documents (SPM, HDR, OUT: see shared/facts/biotac.md) or says "chosen".
 //!
-//! A world is its seeds: the same seeds give the same words.
+//! A world is its seeds: the same seeds give the same words, bit for bit on every machine.
+
+// for that; its tests compare with tolerances
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod collection;
 mod conditions;
@@ -14,6 +17,7 @@ pub mod finger;
 pub mod flash;
 pub mod handheld;
 pub mod lever;
+mod maths;
 mod noise;
 pub mod person;
 pub use person as hand;

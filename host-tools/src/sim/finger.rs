@@ -8,6 +8,7 @@ mod skin;
 mod vibration;
 
 use super::conditions::{Conditions, TICK_S};
+use super::maths::exp;
 use super::noise::Noise;
 use super::played::{PlayCounts, Playback, Played};
 use super::surface::Surface;
@@ -218,7 +219,7 @@ impl Finger {
         let texture = surface.texture();
         let force = self.skin.fluid_n();
         let deviation = touch::VIBRATION + touch::VIBRATION_PER_N * force;
-        let amplitude = (deviation * touch.vibration).exp();
+        let amplitude = exp(deviation * touch.vibration);
         let follow_um =
             self.vibrations
                 .follow_um(surface, contact.x_mm, force, amplitude, self.wear);
@@ -234,7 +235,7 @@ impl Finger {
             self.look_again = FRICTION_TICKS;
             self.friction = surface.friction(contact.x_mm, speed, load_n);
             let deviation = touch::FRICTION * (1.0 + speed / touch::FRICTION_SPEED_MM_S);
-            self.friction *= (deviation * touch.friction).exp();
+            self.friction *= exp(deviation * touch.friction);
         }
         self.look_again -= 1;
         self.shear(contact.speed_mm_s, load_n, texture.stiction, touch);
@@ -254,7 +255,7 @@ impl Finger {
             friction: draw(),
             adhesion: draw(),
             vibration: draw(),
-            detuned: (touch::RESONANCE * draw()).exp(),
+            detuned: exp(touch::RESONANCE * draw()),
         };
         self.touch = Some(touch);
         touch

@@ -15,6 +15,7 @@ use tactus_core::sensor::pressure::{Channel, Pressure, SLOTS_HZ};
 
 use crate::eval::learn::{self, TableError};
 use crate::sim::collection::{Collection, texture_name};
+use crate::sim::maths::exp;
 use crate::sim::person::{Hand, Manner};
 use crate::sim::world::{Setup, Truth, World};
 
@@ -124,8 +125,8 @@ impl Person {
     pub fn slide(&mut self, touch: &mut Touch<'_, Plain>) -> Option<Result<Observation, Again>> {
         let target_n = f64::from(<(u16, u32)>::from(MOVEMENT).0) * 1e-3;
         let pace_mm_s = f64::from(<(u16, u32)>::from(MOVEMENT).1) * 1e-3;
-        let force_n = target_n * (FORCE_SPREAD * self.normal()).exp();
-        let pace_mm_s = pace_mm_s * (PACE_SPREAD * self.normal()).exp();
+        let force_n = target_n * exp(FORCE_SPREAD * self.normal());
+        let pace_mm_s = pace_mm_s * exp(PACE_SPREAD * self.normal());
         self.intend(force_n, 0.0);
         self.run_until(touch, 5.0, |event| *event == Event::Still);
         let reaction_s = self.random.random_range(REACTION_S.0..REACTION_S.1);

@@ -11,6 +11,7 @@
 use std::f64::consts::TAU;
 
 use super::conditions::TICK_S;
+use super::maths::{cos, sin};
 use super::noise::Noise;
 
 /// Movement of the tip per microstep: 2 mm / (200 x 16).
@@ -334,8 +335,8 @@ impl Lever {
     fn screw_um(&self) -> f64 {
         let angle = self.rotor * TAU / PERIOD as f64;
         self.rotor * STEP_UM
-            + STEP_ERROR_UM[0] * (angle + self.error_phase[0]).sin()
-            + STEP_ERROR_UM[1] * (4.0 * angle + self.error_phase[1]).sin()
+            + STEP_ERROR_UM[0] * sin(angle + self.error_phase[0])
+            + STEP_ERROR_UM[1] * sin(4.0 * angle + self.error_phase[1])
     }
 
     fn place_tip(&mut self) {
@@ -407,8 +408,8 @@ impl Hum {
             let phase = noise.between(0.0, TAU);
             let pa = noise.about(HUM_PA, HUM_SPREAD);
             Tone {
-                at: [pa * phase.cos(), pa * phase.sin()],
-                turn: [per_tick.cos(), per_tick.sin()],
+                at: [pa * cos(phase), pa * sin(phase)],
+                turn: [cos(per_tick), sin(per_tick)],
             }
         }))
     }

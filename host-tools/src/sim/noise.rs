@@ -5,6 +5,8 @@ use std::f64::consts::TAU;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
+use super::maths::{cos, exp, ln};
+
 /// A stream of random numbers.
 #[derive(Clone, Debug)]
 pub(super) struct Noise(ChaCha8Rng);
@@ -30,12 +32,12 @@ impl Noise {
     /// Standard normal (Box and Muller).
     pub(super) fn normal(&mut self) -> f64 {
         let (u, v) = (1.0 - self.uniform(), self.uniform());
-        (-2.0 * u.ln()).sqrt() * (TAU * v).cos()
+        (-2.0 * ln(u)).sqrt() * cos(TAU * v)
     }
 
     /// `median` times a log-normal factor of deviation `spread`, at most two and a half of which are drawn.
     pub(super) fn about(&mut self, median: f64, spread: f64) -> f64 {
-        median * self.within(spread).exp()
+        median * exp(self.within(spread))
     }
 
     /// Normal with mean 0, cut at two and a half deviations.

@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 
 use super::conditions::TICK_S;
+use super::maths::exp;
 use super::noise::Noise;
 use super::surface::LENGTH_MM;
 
@@ -126,7 +127,7 @@ impl Hand {
                 self.x_mm = self.noise.between(BEGINS_MM.0, BEGINS_MM.1);
             }
         }
-        let pace = self.pace_mm_s * (self.manner.uneven * self.uneven).exp();
+        let pace = self.pace_mm_s * exp(self.manner.uneven * self.uneven);
         self.speed_mm_s += (pace - self.speed_mm_s) * TICK_S / PACE_S;
         self.x_mm = (self.x_mm + self.speed_mm_s * TICK_S).clamp(0.0, LENGTH_MM);
         if self.x_mm >= LENGTH_MM {

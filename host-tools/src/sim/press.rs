@@ -12,6 +12,7 @@ use tactus_core::rig::{Ended, Phase};
 use super::collection::{Collection, texture_name};
 use super::conditions::Conditions;
 use super::faults::Fault as Cause;
+use super::maths::pow;
 use super::noise::Noise;
 use super::rig::{SimError, SimRig};
 use super::textures;
@@ -47,7 +48,7 @@ impl Trouble {
     /// A cause, and the share of the wanted force at which it comes.
     fn draw(self, noise: &mut Noise) -> Option<(Cause, f64)> {
         let (which, share, time) = (noise.uniform(), noise.uniform(), noise.uniform());
-        let between = |low: f64, high: f64| low * (high / low).powf(time);
+        let between = |low: f64, high: f64| low * pow(high / low, time);
         match self {
             Self::Sound => None,
             Self::Dead if which < 0.5 => Some((Cause::PdcStuck, 0.0)),

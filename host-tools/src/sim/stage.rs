@@ -14,6 +14,7 @@
 use std::f64::consts::TAU;
 
 use super::conditions::TICK_S;
+use super::maths::{exp, sin};
 use super::noise::Noise;
 
 /// Supply of the H-bridge, V (chosen).
@@ -225,13 +226,11 @@ impl Stage {
 
     fn along(&self) -> Along {
         let turns = self.position_mm / LEAD_MM;
-        let ripple = (turns * RIPPLES_PER_TURN * TAU + self.ripple_phase).sin();
+        let ripple = sin(turns * RIPPLES_PER_TURN * TAU + self.ripple_phase);
         let over_travel: f64 = FRICTION_WAVES
             .iter()
             .zip(self.friction_phase)
-            .map(|((share, wave_mm), phase)| {
-                share * (self.position_mm / wave_mm * TAU + phase).sin()
-            })
+            .map(|((share, wave_mm), phase)| share * sin(self.position_mm / wave_mm * TAU + phase))
             .sum();
         Along {
             force_n_per_a: FORCE_N_PER_A * (1.0 + RIPPLE * ripple),
@@ -240,7 +239,7 @@ impl Stage {
     }
 
     fn dry_friction_n(&self) -> f64 {
-        let slow = (-self.speed_mm_s.abs() / STRIBECK_MM_S).exp();
+        let slow = exp(-self.speed_mm_s.abs() / STRIBECK_MM_S);
         COULOMB_N * self.friction_scale * self.along.friction * (1.0 + (BREAKAWAY - 1.0) * slow)
     }
 

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use super::maths::{exp, ln, pow, sin, sin_cos, square};
 use super::noise::Noise;
 use super::textures::{CLAMPED_N, Texture};
 
@@ -46,13 +47,13 @@ impl Texture {
     fn law(&self, speed_mm_s: f64, load_n: f64) -> f64 {
         let [load, speed] = relative([load_n, speed_mm_s.abs()], FRICTION_AT);
         let of_speed = bent(self.friction_speed, self.friction_bend, speed);
-        (self.friction_load * load + of_speed).exp()
+        exp(self.friction_load * load + of_speed)
     }
 
     /// Vibrations relative to those at [`VIBRATIONS_AT`], but for what speed does to those of all textures.
     pub(super) fn vibrations(&self, speed_mm_s: f64) -> f64 {
         let [_, speed] = relative([0.0, speed_mm_s], VIBRATIONS_AT);
-        bent(self.vibration_speed, self.vibration_bend, speed).exp()
+        exp(bent(self.vibration_speed, self.vibration_bend, speed))
     }
 
     /// What of the vibrations passes under a load, the skin being clamped the more it is pressed: at [`VIBRATIONS_AT`] all
@@ -67,21 +68,21 @@ impl Texture {
     /// Centre of the spectrum of the impulses, Hz.
     pub(super) fn impulse_centre_hz(&self, speed_mm_s: f64, load_n: f64) -> f64 {
         let [load, speed] = relative([load_n, speed_mm_s], VIBRATIONS_AT);
-        self.impulse_hz * (self.impulse_load * load + bent(0.0, self.impulse_bend, speed)).exp()
+        self.impulse_hz * exp(self.impulse_load * load + bent(0.0, self.impulse_bend, speed))
     }
 }
 
 /// ln of load and speed relative to those at which something is quoted.
 fn relative([load_n, speed_mm_s]: [f64; 2], at: (f64, f64)) -> [f64; 2] {
     [
-        (load_n.max(LAWS_FROM.0) / at.0).ln(),
-        (speed_mm_s.max(LAWS_FROM.1) / at.1).ln(),
+        ln(load_n.max(LAWS_FROM.0) / at.0),
+        ln(speed_mm_s.max(LAWS_FROM.1) / at.1),
     ]
 }
 
 /// A power law that bends up to [`BENDS`] from where it is quoted: ln of its value at ln(speed).
 fn bent(power: f64, bend: f64, speed: f64) -> f64 {
-    power * speed + bend * speed.clamp(-BENDS, BENDS).powi(2)
+    power * speed + bend * square(speed.clamp(-BENDS, BENDS))
 }
 
 /// One sample of a texture, 75 mm long in the direction of the slide.
@@ -113,8 +114,8 @@ impl Surface {
         scale_to_rms(&mut coarse, texture.relief_um);
         add_weave(&mut coarse, texture, &mut noise);
         let mut fine = random_profile(&mut noise, |wavelength_mm| {
-            let x = (wavelength_mm / texture.fine_mm).ln() / FINE_WIDTH;
-            (-0.5 * x * x).exp()
+            let x = ln(wavelength_mm / texture.fine_mm) / FINE_WIDTH;
+            exp(-0.5 * x * x)
         });
         scale_to_rms(&mut fine, texture.fine_um);
 
@@ -131,7 +132,7 @@ impl Surface {
         let rest = height
             .iter()
             .zip(&followed)
-            .map(|(h, f)| f64::from(h - f).powi(2));
+            .map(|(h, f)| square(f64::from(h - f)));
         let unresolved_um = (rest.sum::<f64>() / POINTS as f64).sqrt();
         Self {
             texture: texture.clone(),
@@ -189,7 +190,7 @@ impl Surface {
         let mut carried = 1.0 + contrast;
         let mut sum = carried * at(i);
         let mut weights = carried;
-        let scale = (pitch_mm / half_mm).powi(2);
+        let scale = square(pitch_mm / half_mm);
         let mut k = 1_usize;
         loop {
             let pressure = 1.0 - scale * (k * k) as f64;
@@ -221,12 +222,12 @@ fn slow(points: &[f64], x_mm: f64) -> f64 {
 
 /// A factor about 1 that wanders along the sample: log-normal with this deviation.
 fn wandering(noise: &mut Noise, deviation: f64) -> Vec<f64> {
-    let memory = (-SLOW_MM / WANDER_MM).exp();
+    let memory = exp(-SLOW_MM / WANDER_MM);
     let mut x = noise.normal();
     (0..SLOW_POINTS)
         .map(|_| {
             x = memory * x + (1.0 - memory * memory).sqrt() * noise.normal();
-            (deviation * x).exp()
+            exp(deviation * x)
         })
         .collect()
 }
@@ -259,7 +260,7 @@ fn add_weave(profile: &mut [f64], texture: &Texture, noise: &mut Noise) {
         .map(|_| TAU * noise.uniform())
         .collect();
     let falls: Vec<f64> = (1..=weave.harmonics)
-        .map(|k| f64::from(k).powf(-weave.falloff))
+        .map(|k| pow(f64::from(k), -weave.falloff))
         .collect();
     // a sine of amplitude a has power a^2 / 2
     let scale = weave.rms_um / (falls.iter().map(|a| a * a / 2.0).sum::<f64>()).sqrt();
@@ -272,7 +273,7 @@ fn add_weave(profile: &mut [f64], texture: &Texture, noise: &mut Noise) {
         }
         phase += step;
         for (k, (fall, offset)) in falls.iter().zip(&phases).enumerate() {
-            *height += scale * fall * ((k + 1) as f64 * phase + offset).sin();
+            *height += scale * fall * sin((k + 1) as f64 * phase + offset);
         }
     }
 }
@@ -309,7 +310,7 @@ fn fourier(re: &mut [f64], im: &mut [f64]) {
     let mut half = 1;
     while half < n {
         for k in 0..half {
-            let (sin, cos) = (TAU / 2.0 * k as f64 / half as f64).sin_cos();
+            let (sin, cos) = sin_cos(TAU / 2.0 * k as f64 / half as f64);
             for a in (k..n).step_by(2 * half) {
                 let b = a + half;
                 let (r, i) = (re[b] * cos - im[b] * sin, re[b] * sin + im[b] * cos);

@@ -9,6 +9,7 @@ mod recipes;
 
 pub use names::{Group, Named, TEXTURES};
 
+use super::maths::{pow, square};
 use super::noise::Noise;
 use recipes::recipe;
 
@@ -86,8 +87,8 @@ impl Texture {
     /// Relative power density of the relief at a wavelength in mm: 1/f^a at short wavelengths, flat about `relief_mm`, and
     /// nothing much at [`LONGEST`] times that and more: samples lie flat on their magnets.
     pub(super) fn relief(&self, wavelength_mm: f64) -> f64 {
-        let short = (self.relief_mm / wavelength_mm).powf(self.relief_exponent);
-        let long = (wavelength_mm / (LONGEST * self.relief_mm)).powi(4);
+        let short = pow(self.relief_mm / wavelength_mm, self.relief_exponent);
+        let long = square(square(wavelength_mm / (LONGEST * self.relief_mm)));
         1.0 / (1.0 + short + long)
     }
 }
@@ -168,7 +169,7 @@ pub fn draw(number: u8, seed: u64) -> Texture {
     // smooth surfaces touch all over (Hertz: -1/3), rough ones at points whose number grows with load (Amontons: 0)
     let smoothness = 1.0 / (1.0 + fine_um);
     // the smoother of two surfaces of a kind has the more contact
-    let friction = noise.about(medians.friction, spread.friction) * height.powf(SMOOTHER);
+    let friction = noise.about(medians.friction, spread.friction) * pow(height, SMOOTHER);
     let friction_load = -0.15 * smoothness * noise.between(0.7, 1.3);
     let movement = spread.movement;
     Texture {

@@ -4,6 +4,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use super::skin::N_PER_COUNT;
 use crate::sim::conditions::{TICK_S, TICKS_PER_S};
+use crate::sim::maths::{exp, tan};
 use crate::sim::noise::Noise;
 
 /// P_AC for each count, Pa (PAPER: 2.16 mV/Pa, 12 bits over 3.3 V).
@@ -84,7 +85,7 @@ impl Amplifiers {
 
     /// From now on the gain of P_DC falls to 1/e in this time.
     pub(super) fn fade_pdc(&mut self, seconds: f64) {
-        self.pdc_kept = (-TICK_S / seconds).exp();
+        self.pdc_kept = exp(-TICK_S / seconds);
     }
 
     /// P_DC has its gain again.
@@ -162,7 +163,7 @@ struct LowPass {
 
 impl LowPass {
     fn new(hz: f64) -> Self {
-        let k = (PI * hz * TICK_S).tan();
+        let k = tan(PI * hz * TICK_S);
         let norm = 1.0 / (1.0 + k / FRAC_1_SQRT_2 + k * k);
         Self {
             b: k * k * norm,

@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 
 use super::amplifier::PA_PER_N;
 use crate::sim::conditions::TICK_S;
+use crate::sim::maths::{cbrt, pow};
 use crate::sim::surface::{Surface, VIBRATIONS_AT};
 
 /// Distance of the ridges, mm (PAPER).
@@ -130,7 +131,7 @@ impl Vibrations {
             * surface.amplitude(x_mm)
             * rate.sqrt()
             * self.impulse[1];
-        let speeding = (speed / VIBRATIONS_AT.1).powf(FRICTION_SPEED_POWER);
+        let speeding = pow(speed / VIBRATIONS_AT.1, FRICTION_SPEED_POWER);
         let relative = texture.friction_noise * speeding * FRICTION_PATCH_MM / self.patch_mm();
         let friction = PA_PER_N * shear_n * relative * pink;
         self.passed * texture.vibrations(speed) * (impulses + friction)
@@ -153,7 +154,7 @@ impl Vibrations {
             let omega = TAU * detune * (RESONANCE_HZ.0 + RESONANCE_HZ.1 * load_n.sqrt());
             self.stiffness = omega * omega;
             self.drag = 2.0 * omega * (RESONANCE_DAMPING.0 + RESONANCE_DAMPING.1 * load_n);
-            self.patch_mm = PATCH_MM * load_n.cbrt();
+            self.patch_mm = PATCH_MM * cbrt(load_n);
         }
         self.tune_in -= 1;
         let lag = pressure_pa - self.fluid;
