@@ -16,11 +16,18 @@ use flate2::read::GzDecoder;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
+use tactus_core::explorer::{ExplorerError, ObserveError};
+use tactus_core::features::SlideError;
 use tactus_core::features::{FeatureSet, Movement, Property};
 use tactus_core::probe::teach::put_in_force;
-use tactus_core::store::Store;
-use tactus_core::table::{Action, Contents, Table};
-use tactus_core::wire::{MAX_FRAME, Report, Request, decode, encode};
+use tactus_core::rig::calibration::RigCalibrationError;
+use tactus_core::rig::{Fault, Refused, RigError};
+use tactus_core::store::{FlashFault, Store, StoreError};
+use tactus_core::table::{Action, Contents, EncodeError, Name, Table, TableError};
+use tactus_core::wire::{
+    Event, Failure, MAX_FRAME, MemoryError, Rejection, Report, Request, Text, TrainingError,
+    decode, encode,
+};
 
 fn golden(name: &str) -> PathBuf {
     let here = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
@@ -57,13 +64,21 @@ fn frame(message: &impl Serialize) -> String {
     hex(encode(message, &mut [0; MAX_FRAME + 1]).unwrap())
 }
 
-/// Every line has a message as JSON, with the names of its day, and its frame.
-fn assert_frames<M: Serialize + DeserializeOwned + PartialEq + Debug>(file: &str, wanted: usize) {
+/// Every line has a message as JSON, with the names of its day, and its frame, unless the message `was_text`: those have
+/// other frames now.
+fn assert_frames<M: Serialize + DeserializeOwned + PartialEq + Debug>(
+    file: &str,
+    wanted: usize,
+    was_text: fn(&M) -> bool,
+) {
     let lines = text(file);
     for line in lines.lines() {
         let line: Value = serde_json::from_str(line).unwrap();
         let message: M = serde_json::from_value(line["message"].clone())
             .unwrap_or_else(|why| panic!("{}: {why}", line["message"]));
+        if was_text(&message) {
+            continue;
+        }
         assert_eq!(line["frame"], frame(&message), "{message:?}");
         let mut frame = bytes(&line["frame"]);
         assert_eq!(frame.pop(), Some(0));
@@ -74,12 +89,117 @@ fn assert_frames<M: Serialize + DeserializeOwned + PartialEq + Debug>(file: &str
 
 #[test]
 fn frames_of_every_request_are_what_they_were() {
-    assert_frames::<Request>("requests.jsonl", 34);
+    assert_frames::<Request>("requests.jsonl", 34, |_| false);
 }
 
 #[test]
 fn frames_of_every_report_are_what_they_were() {
-    assert_frames::<Report>("reports.jsonl", 65);
+    assert_frames::<Report>("reports.jsonl", 65, |report| match &report.event {
+        Event::Refused { why, .. } => {
+            let busy = Text::try_from("busy: wait, or stop what is being done").unwrap();
+            *why == Failure::Said(busy)
+        }
+        Event::Rejected { why, .. } => {
+            *why == Failure::Said(Text::try_from("the slide is too short").unwrap())
+        }
+        _ => false,
+    });
+}
+
+/// Version 4 of the messages: every kind of reason, alone in a frame.
+#[test]
+fn reasons_are_what_they_were_on_the_line() {
+    let name = Name::try_from("silk").unwrap();
+    let table = TableError::Truncated { got: 3, wanted: 16 };
+    let reasons = [
+        (
+            Failure::Said(Text::try_from("so").unwrap()),
+            "010802736f8e5ddffb00",
+        ),
+        (Failure::Busy, "06011bdf05a500"),
+        (
+            Failure::Rig(RigError::Fault(Fault::LeverSlips)),
+            "0802010d80406f9b00",
+        ),
+        (
+            Failure::Rig(RigError::Refused(Refused::Force(2000))),
+            "02020803d00faac223af00",
+        ),
+        (
+            Failure::Explorer(ExplorerError::Candidates),
+            "070301aa71f31d00",
+        ),
+        (
+            Failure::Slide(Rejection::Slide(SlideError::Gap(5))),
+            "0904010505b622f9a200",
+        ),
+        (
+            Failure::Slide(Rejection::Rig(RigError::Stopped)),
+            "02040602e210461600",
+        ),
+        (
+            Failure::NoGoodSlide(Rejection::Observe(ObserveError::Missing(
+                Property::Fineness,
+            ))),
+            "03050206026c9a10fb00",
+        ),
+        (Failure::Movement(2), "07060255d48df900"),
+        (
+            Failure::Training(TrainingError::Trials(1)),
+            "0807010140ce129400",
+        ),
+        (Failure::Rejected, "0608bf67d9dc00"),
+        (
+            Failure::Memory(MemoryError::Unknown(name)),
+            "0c09060473696c6bd6bc890600",
+        ),
+        (
+            Failure::Memory(MemoryError::Broken(StoreError::Silent)),
+            "0209060b153b426700",
+        ),
+        (
+            Failure::Memory(MemoryError::NoTable(table)),
+            "030901070310aeb1144500",
+        ),
+        (
+            Failure::Memory(StoreError::Flash(FlashFault::Work).into()),
+            "03090b06025b1e17be00",
+        ),
+        (
+            Failure::Calibration(RigCalibrationError::Points),
+            "070a03cfab3f2200",
+        ),
+        (Failure::CalibrationLength, "060b0536d04500"),
+        (Failure::NoSuchByte, "060ca6a3b4db00"),
+        (
+            Failure::NotLearned(MemoryError::Encode(EncodeError::NoSpace(300))),
+            "0a0d0a03ac0258fff5bf00",
+        ),
+    ];
+    for (why, wanted) in reasons {
+        assert_eq!(frame(&why), wanted, "{why:?}");
+        for event in [
+            Event::Refused {
+                id: 7,
+                why: why.clone(),
+            },
+            Event::Rejected {
+                slide: 7,
+                why: why.clone(),
+            },
+            Event::Trouble(why.clone()),
+        ] {
+            let logged = serde_json::to_string(&event).unwrap();
+            let read: Event = serde_json::from_str(&logged).unwrap();
+            assert_eq!(read, event, "{logged}");
+        }
+    }
+    for damaged in [
+        r#"{"Refused":{"id":7,"why":{"Nobody":1}}}"#,
+        r#"{"Refused":{"id":7,"why":3}}"#,
+    ] {
+        assert!(serde_json::from_str::<Event>(damaged).is_err());
+    }
 }
 
 /// What a table holds; of a large one, every thirteenth texture.

@@ -16,7 +16,7 @@ use embassy_stm32::interrupt;
 use heapless::spsc::Queue;
 use static_cell::ConstStaticCell;
 use tactus_core::probe::servo_rig::Samples;
-use tactus_core::wire::{Event, PROTOCOL, text};
+use tactus_core::wire::{Event, PROTOCOL};
 
 use crate::board;
 use crate::chip::rescue;
@@ -40,7 +40,7 @@ pub async fn rig(thread: Spawner) {
     let (reset, last_words) = rescue::reset_cause();
     rescue::watch_start();
     let r = board::start();
-    let no_clock = (!board::has_clock()).then(|| text(&board::NO_CLOCK));
+    let no_clock = (!board::has_clock()).then_some(board::NO_CLOCK);
     defmt::info!("tactus-rig {=str}", env!("CARGO_PKG_VERSION"));
     let (words_in, words_out) = WORD_QUEUE.take().split();
     let (samples_in, samples_out) = SAMPLE_QUEUE.take().split();
@@ -55,7 +55,7 @@ pub async fn rig(thread: Spawner) {
         protocol: PROTOCOL,
         version: env!("CARGO_PKG_VERSION").try_into().unwrap_or_default(),
         reset,
-        last_words: last_words.or(no_clock),
+        last_words: last_words.or_else(|| no_clock?.try_into().ok()),
     });
     match servo::servo(
         r.lever, r.stage, r.switches, r.watchdog, words_out, samples_in,

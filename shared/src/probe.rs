@@ -3,7 +3,6 @@
 
 mod calibrate;
 mod dispatch;
-mod error;
 pub mod explore;
 mod identify;
 mod memory;
@@ -17,7 +16,6 @@ mod transfer;
 
 pub use calibrate::restore;
 pub use dispatch::{Probe, Turn, receive, turn};
-pub use error::{IdentifyError, MemoryError, ProbeError};
 pub use identify::identify;
 pub use memory::Memory;
 pub use status::{RigState, TableInUse, Watch};

@@ -38,7 +38,7 @@ mod sectors;
 mod settings;
 mod tables;
 
-pub use error::{SettingsError, StoreError};
+pub use error::{FlashFault, SettingsError, StoreError};
 pub use layout::{SCHEMA, SECTORS, StoredTable};
 pub use records::{MAX_RECORDS, SELF_MOVEMENTS, SelfLearnedRecord, TrainingRecord};
 pub use sectors::Store;

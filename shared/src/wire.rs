@@ -6,6 +6,7 @@
 
 mod command;
 mod event;
+mod failure;
 mod frame;
 mod sparse;
 mod text;
@@ -16,6 +17,7 @@ pub use event::{
     Counts, Event, Live, MAX_EXPECTED_OUTCOMES, Phase, Report, Reset, SlideReport, Status,
     TextureLearned, Verdict,
 };
+pub use failure::{Failure, LEAST_TRIALS, MemoryError, Rejection, TrainingError};
 pub use frame::{FrameError, MAX_FRAME, MAX_MESSAGE, PROTOCOL, Receiver, TooLong, decode, encode};
 pub use text::{Text, text};
 

@@ -1,8 +1,7 @@
 //! The store in bank 2, which is read where it lies.
 use embassy_stm32::flash::{Async, Bank2Region1, Flash};
 use tactus_core::probe::seams::StoredBytes;
-use tactus_core::store::Store;
-use tactus_core::wire::text;
+use tactus_core::store::{Store, StoreError};
 
 use crate::board;
 
@@ -13,18 +12,15 @@ const STORE_LENGTH: usize = 64 * 1024;
 pub(crate) type Bank2 = Bank2Region1<'static, Async>;
 pub(crate) type Storage = Store<Bank2>;
 
-/// The store; `None` if it cannot be opened, which is logged.
-pub(crate) async fn open(flash: board::Storage) -> Option<Storage> {
+/// The store.
+///
+/// # Errors
+/// It cannot be opened.
+pub(crate) async fn open(flash: board::Storage) -> Result<Storage, StoreError> {
     let flash = Flash::new(flash.flash, board::Irqs)
         .into_regions()
         .bank2_region1;
-    match Store::open(flash).await {
-        Ok(store) => Some(store),
-        Err(why) => {
-            defmt::error!("the store cannot be opened: {=str}", text(&why).as_str());
-            None
-        }
-    }
+    Store::open(flash).await
 }
 
 /// The stored table, where it lies.

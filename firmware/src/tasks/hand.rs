@@ -15,7 +15,8 @@ use tactus_core::handheld::jobs::{Outcome, work};
 use tactus_core::handheld::{About, Handheld, Picture, Screen, TICKS_HZ, draw};
 use tactus_core::probe::seams::Events;
 use tactus_core::probe::{Memory, TableInUse};
-use tactus_core::wire::{Event, Text, text};
+use tactus_core::store::StoreError;
+use tactus_core::wire::{Event, text};
 
 use super::acquire::{self, Word};
 use super::display;
@@ -155,7 +156,7 @@ pub(crate) async fn hand(
         CountingMode::EdgeAlignedUp,
     );
     let store = with_timeout(OPENING, flash::open(flash)).await;
-    let store = store.unwrap_or(None);
+    let store = store.unwrap_or(Err(StoreError::Silent));
     let mut memory = Memory::new(store, MappedTable, FACTORY, BUFFER.take());
     memory.reload(&mut Logged).await;
     let textures = memory.table().map_or(0, |table| table.textures());
@@ -247,13 +248,13 @@ type Knowledge = Memory<'static, Bank2, MappedTable>;
 struct Logged;
 
 impl Events for Logged {
-    fn tell(&mut self, _: Event) {}
+    fn tell(&mut self, event: Event) {
+        if let Event::Trouble(why) = event {
+            defmt::error!("{=str}", text(why).as_str());
+        }
+    }
 
     fn table(&mut self, _: TableInUse) {}
-
-    fn trouble(&mut self, what: Text) {
-        defmt::error!("{=str}", what.as_str());
-    }
 }
 
 /// Logs what came of a job.

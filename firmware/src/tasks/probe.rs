@@ -8,7 +8,8 @@ use tactus_core::dsp::Plan;
 use tactus_core::probe::seams::{Events, RigHandle as _};
 use tactus_core::probe::servo_rig::{Samples, ServoRig};
 use tactus_core::probe::{self, Memory, Probe, TableInUse};
-use tactus_core::wire::{Event, Text, text};
+use tactus_core::store::StoreError;
+use tactus_core::wire::{Event, Failure};
 
 use super::link::{BUSY, JOBS, TABLE};
 use super::outbox::tell;
@@ -37,10 +38,10 @@ pub(crate) async fn probe(flash: board::Storage, samples: Consumer<'static, Samp
     let _ = rig.lift().await;
     let store = with_timeout(OPENING, open(flash, &mut rig))
         .await
-        .unwrap_or_else(|_| {
-            defmt::error!("the store does not answer");
-            None
-        });
+        .unwrap_or(Err(StoreError::Silent));
+    if let Err(why) = &store {
+        trouble((*why).into());
+    }
     let mut probe = Probe {
         rig,
         memory: Memory::new(store, MappedTable, FACTORY, BUFFER.take()),
@@ -61,12 +62,21 @@ pub(crate) async fn probe(flash: board::Storage, samples: Consumer<'static, Samp
 }
 
 /// The store, its settings in use.
-async fn open(flash: board::Storage, rig: &mut ServoRig<ServoHandle>) -> Option<Storage> {
+async fn open(
+    flash: board::Storage,
+    rig: &mut ServoRig<ServoHandle>,
+) -> Result<Storage, StoreError> {
     let mut store = flash::open(flash).await?;
     if let Err(why) = probe::restore(&mut store, rig).await {
-        defmt::error!("settings are not read: {=str}", text(&why).as_str());
+        trouble(why.into());
     }
-    Some(store)
+    Ok(store)
+}
+
+/// The words for it are the host's.
+fn trouble(why: Failure) {
+    defmt::error!("trouble: the host is told what it is");
+    tell(Event::Trouble(why));
 }
 
 /// Tells the host, and the tasks that answer it meanwhile.
@@ -79,9 +89,5 @@ impl Events for Told {
 
     fn table(&mut self, table: TableInUse) {
         TABLE.lock(|cell| cell.set(table));
-    }
-
-    fn trouble(&mut self, what: Text) {
-        defmt::error!("{=str}", what.as_str());
     }
 }

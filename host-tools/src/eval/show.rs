@@ -147,6 +147,7 @@ impl<'t, W: Write> Show<'t, W> {
             ),
             Event::Rejected { why, .. } => self.line(&format!("  rejected: {why}")),
             Event::Fault(fault) => self.line(&format!("  fault: {fault}")),
+            Event::Trouble(why) => self.line(&format!("  trouble: {why}")),
             Event::Verdict(verdict) => self.answer(verdict.into(), verdict.slides),
             _ => Ok(()),
         }

@@ -3,7 +3,8 @@
 use tactus_core::rig::calibration::RigCalibrationError;
 use tactus_core::table::{MAX_TEXTURES, TableError};
 use tactus_core::wire::{
-    self, Command, Event, FrameError, MAX_FRAME, PROTOCOL, Receiver, Report, Reset, TooLong,
+    self, Command, Event, Failure, FrameError, MAX_FRAME, PROTOCOL, Receiver, Report, Reset,
+    TooLong,
 };
 
 /// A request that may be made twice is made so often before the line is given up.
@@ -14,7 +15,7 @@ pub const MAX_TRIES: u8 = 5;
 pub enum LinkError {
     /// The probe says why and what to do.
     #[error("the probe refused: {0}")]
-    Refused(String),
+    Refused(Box<Failure>),
     /// The probe started anew before it answered.
     #[error("the probe restarted ({reset:?}) before it answered{}: ask again", quoted(.last_words))]
     Rebooted {

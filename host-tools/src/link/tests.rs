@@ -12,8 +12,8 @@ use tactus_core::wire::{Phase, Text};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::{MAX_TEXTURES, Name, Table, TableError};
 use tactus_core::wire::{
-    self, Command, Event, Forget, Identify, MAX_FRAME, PART, PROTOCOL, Receiver, Report, Reset,
-    TextureLearned, Train, Verdict,
+    self, Command, Event, Failure, Forget, Identify, MAX_FRAME, PART, PROTOCOL, Receiver, Report,
+    Reset, TextureLearned, Train, Verdict,
 };
 
 use super::*;
@@ -106,7 +106,7 @@ impl Probe {
         self.asked.push(command.clone());
         let refused = |why: &str| Event::Refused {
             id,
-            why: Text::try_from(why).unwrap(),
+            why: Failure::Said(Text::try_from(why).unwrap()),
         };
         let calibration = |bytes: &[u8]| Event::Calibration(bytes.iter().copied().collect());
         let mut events = match command {

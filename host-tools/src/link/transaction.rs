@@ -146,7 +146,7 @@ impl<E: Transaction> Job<E> {
             }
             // a try before the last one may be refused because of the one before it
             Event::Refused { id, why } if sent.ids.last() == Some(id) => {
-                return Err(LinkError::Refused(why.as_str().to_owned()));
+                return Err(LinkError::Refused(Box::new(why.clone())));
             }
             Event::Damaged(_) if repeatable => {
                 self.repeat(session, send)?;

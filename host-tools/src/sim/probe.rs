@@ -2,7 +2,6 @@
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
-use std::convert::Infallible;
 use std::time::Duration;
 
 use embassy_futures::block_on;
@@ -12,7 +11,7 @@ use tactus_core::probe::servo_rig::{LOOK_MS, RigCommand, Samples, Servo, ServoRi
 use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
 use tactus_core::rig::{Ended, Refused};
 use tactus_core::store::{Store, StoreError};
-use tactus_core::wire::{Event, Text};
+use tactus_core::wire::Event;
 
 use super::flash::RamFlash;
 use super::rig::SimRig;
@@ -154,10 +153,6 @@ impl<H: Host> Events for Told<'_, H> {
     fn table(&mut self, table: TableInUse) {
         self.0.borrow_mut().table(table);
     }
-
-    fn trouble(&mut self, what: Text) {
-        eprintln!("the simulated probe: {what}");
-    }
 }
 
 /// A simulated probe.
@@ -175,13 +170,13 @@ pub fn switch_on<'p, H: Host>(
     buffer: &'p mut [u8],
     plan: &'p Plan,
     host: &'p RefCell<H>,
-) -> Result<SimProbe<'p, H>, StoreError<Infallible>> {
+) -> Result<SimProbe<'p, H>, StoreError> {
     let mut rig = ServoRig::new(SimServo::new(rig, host));
     let mut store = block_on(Store::open(flash))?;
     block_on(probe::restore(&mut store, &mut rig))?;
     let mut probe = Probe {
         rig,
-        memory: Memory::new(Some(store), TableCopy::default(), factory, buffer),
+        memory: Memory::new(Ok(store), TableCopy::default(), factory, buffer),
         events: Told(host),
         plan,
     };
@@ -193,14 +188,12 @@ pub fn switch_on<'p, H: Host>(
 ///
 /// # Errors
 /// See [`switch_on`].
-pub fn switch_off_and_on<H: Host>(
-    probe: SimProbe<'_, H>,
-) -> Result<SimProbe<'_, H>, StoreError<Infallible>> {
+pub fn switch_off_and_on<H: Host>(probe: SimProbe<'_, H>) -> Result<SimProbe<'_, H>, StoreError> {
     let Probe {
         rig, memory, plan, ..
     } = probe;
     let (store, factory, buffer) = memory.close();
-    let flash = store.map_or_else(RamFlash::blank, Store::close);
+    let flash = store.map_or_else(|_| RamFlash::blank(), Store::close);
     let SimServo { rig, host, .. } = rig.servo;
     switch_on(rig, flash, factory, buffer, plan, host)
 }

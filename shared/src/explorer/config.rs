@@ -103,7 +103,7 @@ impl Config {
 }
 
 /// Why an exploration cannot begin.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum ExplorerError {
     /// The table has more textures than the explorer has room for.
     #[error("the table has {textures} textures, and there is room for {capacity}")]
@@ -143,7 +143,7 @@ fn wrong_table(method: &Method, f: &mut fmt::Formatter<'_>) -> fmt::Result {
 }
 
 /// Why a slide was not used. The exploration stands as it was.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum ObserveError {
     /// The slide has no such property, or it is not a finite number.
     #[error("the slide did not give a value of {0}")]

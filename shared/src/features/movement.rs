@@ -16,7 +16,7 @@ pub struct Movement {
 }
 
 /// Why a force and a speed are no movement of this rig.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum MovementError {
     /// Contact force in mN outside [`Movement::FORCE_MN`].
     #[error(

@@ -5,6 +5,8 @@
 use core::marker::PhantomData;
 use core::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use super::block::{BLOCK, Block};
 use super::movement::Movement;
 use super::property::Properties;
@@ -42,7 +44,7 @@ pub fn roughness(power: f32, background: f32) -> (f32, bool) {
 }
 
 /// Why a slide has no properties. A rig repeats such a slide.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum SlideError {
     /// The steady window was never set.
     #[error("the slide never reached its steady part")]

@@ -2,19 +2,17 @@
 
 use embedded_storage_async::nor_flash::NorFlash;
 
-use super::error::ProbeError;
 use super::seams::{RigHandle, UnloadedRun};
 use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::unloaded::UnloadedRuns;
 use crate::store::{Store, StoreError};
+use crate::wire::Failure;
 
 /// Measures the motor's current without load and P_DC in the air, and uses them from now on.
-pub(super) async fn calibrate<R: RigHandle, E>(
-    rig: &mut R,
-) -> Result<RigCalibration, ProbeError<R::Error, E>> {
+pub(super) async fn calibrate<R: RigHandle>(rig: &mut R) -> Result<RigCalibration, Failure> {
     if rig.state().phase == Phase::Parked {
-        rig.home().await.map_err(ProbeError::Rig)?;
+        rig.home().await.map_err(Failure::Rig)?;
     }
     let mut runs = UnloadedRuns::default();
     while let Some(speed_um_s) = runs.next_speed() {
@@ -22,10 +20,7 @@ pub(super) async fn calibrate<R: RigHandle, E>(
             from_mm,
             to_mm,
             mean_current_a,
-        } = rig
-            .run_unloaded(speed_um_s)
-            .await
-            .map_err(ProbeError::Rig)?;
+        } = rig.run_unloaded(speed_um_s).await.map_err(Failure::Rig)?;
         runs.took(from_mm, to_mm, mean_current_a);
     }
     let state = rig.state();
@@ -36,7 +31,7 @@ pub(super) async fn calibrate<R: RigHandle, E>(
     calibration.check()?;
     rig.set_calibration(calibration)
         .await
-        .map_err(ProbeError::Rig)?;
+        .map_err(Failure::Rig)?;
     Ok(calibration)
 }
 
@@ -44,7 +39,7 @@ pub(super) async fn calibrate<R: RigHandle, E>(
 pub(super) async fn keep<F: NorFlash>(
     store: &mut Store<F>,
     calibration: &RigCalibration,
-) -> Result<(), StoreError<F::Error>> {
+) -> Result<(), StoreError> {
     if store.settings().is_err() {
         store.erase_settings().await?;
     }
@@ -58,7 +53,7 @@ pub(super) async fn keep<F: NorFlash>(
 pub async fn restore<F: NorFlash, R: RigHandle>(
     store: &mut Store<F>,
     rig: &mut R,
-) -> Result<(), StoreError<F::Error>> {
+) -> Result<(), StoreError> {
     let skin = store.skin().await;
     if let Ok(skin) = &skin {
         rig.set_skin(*skin).await;

@@ -1,13 +1,11 @@
 //! Every request, once: what is answered at any time, what waits for its turn, what is refused because the probe is busy;
 //! and what is done when its turn has come.
 
-use core::fmt;
 use core::pin::pin;
 
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
-use super::error::{MemoryError, ProbeError};
 use super::memory::Memory;
 use super::seams::{Events, Panel, RigHandle, StoredBytes};
 use super::{calibrate, identify, teach, train, transfer};
@@ -15,7 +13,7 @@ use crate::dsp::Plan;
 use crate::explorer::Kernels;
 use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
-use crate::wire::{Command, Event, Request, Status, text};
+use crate::wire::{Command, Event, Failure, Request, Status};
 
 /// When a request is dealt with.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -48,7 +46,7 @@ pub fn receive(request: &Request, busy: bool, panel: &mut impl Panel) -> Turn {
         Turn::Queue => return turn,
         Turn::Busy => panel.tell(Event::Refused {
             id,
-            why: text("busy: wait, or stop what is being done"),
+            why: Failure::Busy,
         }),
         Turn::Now => {
             match request.command {
@@ -104,7 +102,7 @@ pub struct Probe<'m, R, F, B, E> {
 
 impl<R, F, B, E> Probe<'_, R, F, B, E>
 where
-    R: RigHandle<Error: fmt::Display>,
+    R: RigHandle,
     F: NorFlash,
     B: StoredBytes<F>,
     E: Events,
@@ -115,7 +113,7 @@ where
         let id = request.id;
         self.events.tell(match done {
             Ok(()) => Event::Done(id),
-            Err(why) => Event::Refused { id, why: text(why) },
+            Err(why) => Event::Refused { id, why },
         });
     }
 
@@ -123,10 +121,7 @@ where
     ///
     /// # Errors
     /// The reply: why it was not done.
-    pub async fn perform<K: Kernels>(
-        &mut self,
-        command: &Command,
-    ) -> Result<(), ProbeError<R::Error, F::Error>> {
+    pub async fn perform<K: Kernels>(&mut self, command: &Command) -> Result<(), Failure> {
         let Self {
             rig,
             memory,
@@ -136,12 +131,12 @@ where
         match command {
             Command::Home => {
                 memory.episode = None;
-                rig.home().await.map_err(ProbeError::Rig)
+                rig.home().await.map_err(Failure::Rig)
             }
             Command::Identify(wanted) => {
                 memory.episode = None;
                 rig.begin(wanted.seed).await;
-                let table = memory.table().map_err(MemoryError::from)?;
+                let table = memory.table()?;
                 // awaited where it lies: moving it would take its size of the stack, twice
                 let done = {
                     let tell = |event| events.tell(event);
@@ -149,7 +144,7 @@ where
                     exploration.await
                 };
                 memory.keep_skin(&rig.state().skin).await;
-                let episode = done.map_err(ProbeError::Identify)?;
+                let episode = done?;
                 if wanted.learn {
                     memory.learn_by_itself(&episode, events).await;
                 }
@@ -189,16 +184,16 @@ where
                 let bytes = bytes
                     .as_slice()
                     .try_into()
-                    .map_err(|_| ProbeError::CalibrationLength)?;
+                    .map_err(|_| Failure::CalibrationLength)?;
                 let calibration = RigCalibration::from_bytes(bytes)?;
                 rig.set_calibration(calibration)
                     .await
-                    .map_err(ProbeError::Rig)?;
+                    .map_err(Failure::Rig)?;
                 Ok(calibrate::keep(memory.store()?, &calibration).await?)
             }
             Command::ReadTable(offset) => {
                 let part = transfer::read(memory.in_force(), *offset);
-                events.tell(part.ok_or(ProbeError::NoSuchByte)?);
+                events.tell(part.ok_or(Failure::NoSuchByte)?);
                 Ok(())
             }
             Command::BeginTable(length) => {

@@ -1,10 +1,12 @@
 //! An exploration: slide by slide, the explorer chooses, the rig moves, and the explorer takes in what was measured.
 
 use crate::dsp::Plan;
-use crate::explorer::{ExpectedOutcome, Explorer, Kernels, ObserveError, Verdict};
-use crate::features::{Measurement, Observation, Slide, SlideError};
-use crate::rig::{MAX_REJECTED, Rig};
+use crate::explorer::{ExpectedOutcome, Explorer, Kernels, Verdict};
+use crate::features::{Measurement, Observation, Slide};
+use crate::rig::{MAX_REJECTED, Rig, RigError};
 use crate::table::Action;
+use crate::wire::Failure;
+pub use crate::wire::Rejection;
 
 /// Random numbers for choices and for where slides begin (xorshift, Marsaglia 2003); not for secrets.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -53,20 +55,6 @@ pub enum ExplorationStep<'a, E> {
     CutShort(&'a Verdict, u8),
 }
 
-/// Why a slide does not count.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-pub enum Rejection<E> {
-    /// The rig did not make it.
-    #[error(transparent)]
-    Rig(E),
-    /// Its samples give no properties.
-    #[error(transparent)]
-    Slide(SlideError),
-    /// Its properties say nothing to the explorer.
-    #[error(transparent)]
-    Observe(ObserveError),
-}
-
 /// Why an exploration ended without an answer.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 pub enum ExploreError<E> {
@@ -79,6 +67,16 @@ pub enum ExploreError<E> {
     /// The table has no such movement.
     #[error("the table has no movement {}", .0 + 1)]
     Movement(u8),
+}
+
+impl From<ExploreError<RigError>> for Failure {
+    fn from(why: ExploreError<RigError>) -> Self {
+        match why {
+            ExploreError::Rig(why) => Self::Rig(why),
+            ExploreError::Rejected(why) => Self::NoGoodSlide(why),
+            ExploreError::Movement(movement) => Self::Movement(movement),
+        }
+    }
 }
 
 /// Explores from the beginning until there is an answer. A slide that comes to nothing is made again, then another movement

@@ -1,18 +1,15 @@
 //! What a host asks a probe for, from beginning to end: an exploration. Every step of it is told in the words of
 //! [`crate::wire`], so that the host can follow each decision.
 
-use core::fmt;
-
 use heapless::Vec;
 
-use super::error::IdentifyError;
 use super::explore::{ExplorationStep, Random, explore};
 use crate::dsp::Plan;
 use crate::explorer::{self, EpisodeSummary, ExpectedOutcome, Explorer, Kernels};
-use crate::rig::Rig;
+use crate::rig::{Rig, RigError};
 use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
-use crate::wire::{Event, Identify, MAX_EXPECTED_OUTCOMES, Verdict, text};
+use crate::wire::{Event, Failure, Identify, MAX_EXPECTED_OUTCOMES, Verdict};
 
 /// Explores what lies under the finger until there is an answer, and reports it; the error is why there is none.
 ///
@@ -24,10 +21,9 @@ pub async fn identify<R, K>(
     table: Table<'_>,
     plan: &Plan,
     mut tell: impl FnMut(Event),
-) -> Result<EpisodeSummary, IdentifyError<R::Error>>
+) -> Result<EpisodeSummary, Failure>
 where
-    R: Rig,
-    R::Error: fmt::Display,
+    R: Rig<Error = RigError>,
     K: Kernels,
 {
     let contents = table.contents();
@@ -40,7 +36,7 @@ where
     let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
     explorer
         .consider(rig.measures(), wanted.config(contents), candidates)
-        .map_err(IdentifyError::Explorer)?;
+        .map_err(Failure::Explorer)?;
     let mut random = Random::new(wanted.seed);
     let mut slide: u8 = 1;
     let verdict = explore(
@@ -70,7 +66,7 @@ where
             }
             ExplorationStep::Rejected(_, why) => tell(Event::Rejected {
                 slide,
-                why: text(why),
+                why: Failure::Slide(*why),
             }),
             ExplorationStep::Decided {
                 verdict,
@@ -86,8 +82,7 @@ where
             }
         },
     )
-    .await
-    .map_err(IdentifyError::Explore)?;
+    .await?;
     Ok(EpisodeSummary {
         table: table.crc(),
         texture: verdict.texture,

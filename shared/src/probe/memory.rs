@@ -2,30 +2,30 @@
 
 use embedded_storage_async::nor_flash::NorFlash;
 
-use super::error::MemoryError;
 use super::seams::{Events, StoredBytes};
 use super::status::TableInUse;
 use super::teach::{self, put_in_force};
 use crate::explorer::EpisodeSummary;
 use crate::rig::skin::SkinCare;
-use crate::store::Store;
-use crate::table::{Table, TableError};
-use crate::wire::text;
+use crate::store::{Store, StoreError};
+use crate::table::Table;
+use crate::wire::{Event, Failure, MemoryError};
 
 /// What learning needs: the store, the table that it begins with, and the buffer for a new one.
 type Lent<'a, F> = (&'a mut Store<F>, Table<'a>, &'a mut [u8]);
 
 /// What a probe knows.
 pub struct Memory<'m, F, B> {
-    store: Option<Store<F>>,
+    /// Or why it could not be opened.
+    store: Result<Store<F>, StoreError>,
     stored: B,
     /// The table that comes with the firmware.
     factory: &'m [u8],
     /// Begins with the table in force: the stored one or the factory's, with what the probe has learned by itself. A new
     /// table is made here too; afterwards [`Memory::reload`] is due.
     buffer: &'m mut [u8],
-    /// Bytes of the table in force.
-    length: usize,
+    /// Bytes of the table in force, or why there is none.
+    length: Result<usize, MemoryError>,
     /// No texture was learned and no table was written.
     is_factory: bool,
     /// Summary of the last exploration, until the rig moves again.
@@ -35,10 +35,11 @@ pub struct Memory<'m, F, B> {
 /// The table that all learning begins with: the stored one, or the factory's.
 #[inline(never)]
 fn base<'b, F: NorFlash, B: StoredBytes<F>>(
-    store: Option<&mut Store<F>>,
+    store: &mut Result<Store<F>, StoreError>,
     stored: &'b mut B,
     factory: &'b [u8],
 ) -> &'b [u8] {
+    let store = store.as_mut().ok();
     store
         .and_then(|store| stored.bytes(store))
         // one that another version of this firmware wrote is not understood
@@ -49,7 +50,7 @@ fn base<'b, F: NorFlash, B: StoredBytes<F>>(
 impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
     /// A memory without a table in force: [`Memory::reload`] is due. `buffer` takes the longest table.
     pub fn new(
-        store: Option<Store<F>>,
+        store: Result<Store<F>, StoreError>,
         stored: B,
         factory: &'m [u8],
         buffer: &'m mut [u8],
@@ -59,31 +60,30 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
             stored,
             factory,
             buffer,
-            length: 0,
+            length: Ok(0),
             is_factory: true,
             episode: None,
         }
     }
 
     /// Gives store, factory's table and buffer back.
-    pub fn close(self) -> (Option<Store<F>>, &'m [u8], &'m mut [u8]) {
+    pub fn close(self) -> (Result<Store<F>, StoreError>, &'m [u8], &'m mut [u8]) {
         (self.store, self.factory, self.buffer)
     }
 
     /// Puts the table in force, which `events` hears of.
     pub async fn reload(&mut self, events: &mut impl Events) {
-        let base = base(self.store.as_mut(), &mut self.stored, self.factory);
+        let base = base(&mut self.store, &mut self.stored, self.factory);
         self.is_factory = core::ptr::eq(base, self.factory);
-        let in_force = match Table::read(base) {
-            Ok(base) => put_in_force(&base, self.store.as_mut(), self.buffer)
+        self.length = match Table::read(base) {
+            Ok(base) => put_in_force(&base, self.store.as_mut().ok(), self.buffer)
                 .await
-                .map_err(|why| text(format_args!("no table in force: {why}"))),
-            Err(why) => Err(text(format_args!("no table: {why}"))),
+                .map_err(MemoryError::from),
+            Err(why) => Err(MemoryError::NoTable(why)),
         };
-        self.length = in_force.unwrap_or_else(|why| {
-            events.trouble(why);
-            0
-        });
+        if let Err(why) = &self.length {
+            events.tell(Event::Trouble(why.clone().into()));
+        }
         self.publish(events);
     }
 
@@ -91,7 +91,7 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         if let Ok(table) = self.table() {
             events.table(TableInUse {
                 textures: table.textures(),
-                bytes: self.length as u32,
+                bytes: self.in_force().len() as u32,
                 crc: table.crc(),
                 factory: self.is_factory,
             });
@@ -100,44 +100,54 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
 
     /// The bytes of the table in force.
     pub fn in_force(&self) -> &[u8] {
-        self.buffer.get(..self.length).unwrap_or_default()
+        let length = *self.length.as_ref().unwrap_or(&0);
+        self.buffer.get(..length).unwrap_or_default()
     }
 
     /// The table in force.
     ///
     /// # Errors
     /// There is none.
-    pub fn table(&self) -> Result<Table<'_>, TableError> {
-        Table::read(self.in_force())
+    pub fn table(&self) -> Result<Table<'_>, MemoryError> {
+        match &self.length {
+            Ok(_) => Ok(Table::read(self.in_force())?),
+            Err(why) => Err(why.clone()),
+        }
     }
 
     /// The store.
     ///
     /// # Errors
     /// It could not be opened.
-    pub fn store(&mut self) -> Result<&mut Store<F>, MemoryError<F::Error>> {
-        self.store.as_mut().ok_or(MemoryError::Broken)
+    pub fn store(&mut self) -> Result<&mut Store<F>, MemoryError> {
+        self.store.as_mut().map_err(|why| MemoryError::Broken(*why))
     }
 
     /// What learning needs; [`Memory::reload`] is due after it.
     #[inline(never)]
-    pub(super) fn lend(&mut self) -> Result<Lent<'_, F>, MemoryError<F::Error>> {
-        let bytes = base(self.store.as_mut(), &mut self.stored, self.factory);
-        let base = Table::read(bytes).map_err(|_| MemoryError::NoTable)?;
-        let store = self.store.as_mut().ok_or(MemoryError::Broken)?;
+    pub(super) fn lend(&mut self) -> Result<Lent<'_, F>, MemoryError> {
+        let bytes = base(&mut self.store, &mut self.stored, self.factory);
+        let base = Table::read(bytes).map_err(MemoryError::NoTable)?;
+        let store = self
+            .store
+            .as_mut()
+            .map_err(|why| MemoryError::Broken(*why))?;
         Ok((store, base, self.buffer))
     }
 
     /// Commits the table that was written to the store.
-    pub(super) async fn commit(&mut self) -> Result<(), MemoryError<F::Error>> {
-        let store = self.store.as_mut().ok_or(MemoryError::Broken)?;
+    pub(super) async fn commit(&mut self) -> Result<(), MemoryError> {
+        let store = self
+            .store
+            .as_mut()
+            .map_err(|why| MemoryError::Broken(*why))?;
         store.commit_table(self.buffer).await?;
         Ok(())
     }
 
     /// Keeps what the skin has been through: worth keeping, but no reason to fail.
     pub(super) async fn keep_skin(&mut self, skin: &SkinCare) {
-        if let Some(store) = &mut self.store {
+        if let Ok(store) = &mut self.store {
             let _ = store.set_skin(skin).await;
         }
     }
@@ -149,7 +159,7 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         episode: &EpisodeSummary,
         events: &mut impl Events,
     ) {
-        let Some(store) = &mut self.store else {
+        let Ok(store) = &mut self.store else {
             return;
         };
         match teach::learn_by_itself(episode, store, self.buffer).await {
@@ -159,7 +169,7 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
             }
             Ok(None) => {}
             Err(why) => {
-                events.trouble(text(format_args!("not learned: {why}")));
+                events.tell(Event::Trouble(Failure::NotLearned(why)));
                 self.reload(events).await;
             }
         }
@@ -170,11 +180,7 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
     ///
     /// # Errors
     /// The rig has moved since the exploration; those of [`teach::label`].
-    pub async fn label(
-        &mut self,
-        name: &str,
-        events: &mut impl Events,
-    ) -> Result<(), MemoryError<F::Error>> {
+    pub async fn label(&mut self, name: &str, events: &mut impl Events) -> Result<(), MemoryError> {
         let episode = self.episode.take().ok_or(MemoryError::NoEpisode)?;
         let (store, base, buffer) = self.lend()?;
         let learned = teach::label(&episode, name, &base, store, buffer).await;

@@ -3,11 +3,11 @@
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::status::{RigState, TableInUse};
-use crate::rig::Rig;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
+use crate::rig::{Rig, RigError};
 use crate::store::Store;
-use crate::wire::{Counts, Event, Text};
+use crate::wire::{Counts, Event};
 
 /// A run of the stage without load.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -22,7 +22,7 @@ pub struct UnloadedRun {
 
 /// A [`Rig`] that a probe owns: besides its movements it homes, is calibrated, and shows its state.
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
-pub trait RigHandle: Rig {
+pub trait RigHandle: Rig<Error = RigError> {
     /// What the rig is doing now.
     fn state(&self) -> RigState;
 
@@ -33,19 +33,19 @@ pub trait RigHandle: Rig {
     ///
     /// # Errors
     /// The rig is not homed.
-    async fn home(&mut self) -> Result<(), Self::Error>;
+    async fn home(&mut self) -> Result<(), RigError>;
 
     /// Moves the stage without load from one end to the other, at this speed in um/s.
     ///
     /// # Errors
     /// The run was refused, failed, or was stopped.
-    async fn run_unloaded(&mut self, speed_um_s: u32) -> Result<UnloadedRun, Self::Error>;
+    async fn run_unloaded(&mut self, speed_um_s: u32) -> Result<UnloadedRun, RigError>;
 
     /// Uses this calibration from now on.
     ///
     /// # Errors
     /// The rig refuses it.
-    async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), Self::Error>;
+    async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), RigError>;
 
     /// Goes on from this wear of the skin.
     async fn set_skin(&mut self, skin: SkinCare);
@@ -65,9 +65,6 @@ pub trait Events {
 
     /// This table is in force now.
     fn table(&mut self, table: TableInUse);
-
-    /// Something went wrong that is no answer to a request: a line for the log.
-    fn trouble(&mut self, what: Text);
 }
 
 /// What is answered at any time, whatever the probe is busy with.

@@ -8,7 +8,6 @@
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
-use super::error::MemoryError;
 use crate::explorer::EpisodeSummary;
 use crate::features::Vector;
 use crate::store::{SelfLearnedRecord, Store, StoreError};
@@ -16,7 +15,7 @@ use crate::table::Whitened;
 use crate::table::{Change, EncodeError, Known, MAX_MOVEMENTS, Table, Tally, amend, retell};
 use crate::table::{MAX_TEXTURES, Name};
 use crate::up_to;
-use crate::wire::{Event, Forget, TextureLearned};
+use crate::wire::{Event, Forget, MemoryError, TextureLearned};
 
 /// Copies the stored table into `buffer`, with what the probe has learned by itself in its place: the table in force.
 /// Returns its length.
@@ -68,7 +67,7 @@ pub async fn learn_by_itself<F: NorFlash>(
     episode: &EpisodeSummary,
     store: &mut Store<F>,
     buffer: &mut [u8],
-) -> Result<Option<Event>, MemoryError<F::Error>> {
+) -> Result<Option<Event>, MemoryError> {
     let table = Table::read(buffer)?;
     if !episode.certain || episode.table != table.crc() {
         return Ok(None);
@@ -150,7 +149,7 @@ pub async fn label<F: NorFlash>(
     base: &Table<'_>,
     store: &mut Store<F>,
     buffer: &mut [u8],
-) -> Result<Event, MemoryError<F::Error>> {
+) -> Result<Event, MemoryError> {
     let in_force = Table::read(buffer)?.crc();
     if episode.table != in_force {
         return Err(MemoryError::TableChanged);
@@ -224,7 +223,7 @@ pub async fn label<F: NorFlash>(
 pub(crate) async fn delete_stale<F: NorFlash>(
     base: &Table<'_>,
     store: &mut Store<F>,
-) -> Result<(), StoreError<F::Error>> {
+) -> Result<(), StoreError> {
     let of = Some((base.lineage(), base.next_number()));
     store.delete_self_learned(of).await
 }
@@ -235,7 +234,7 @@ async fn change<F: NorFlash>(
     base: &Table<'_>,
     store: &mut Store<F>,
     buffer: &mut [u8],
-) -> Result<(), MemoryError<F::Error>> {
+) -> Result<(), MemoryError> {
     let most = Store::<F>::MAX_TABLE.min(buffer.len());
     let buffer = buffer.get_mut(..most).unwrap_or_default();
     let length = amend(buffer, base, change)?.as_bytes().len();
@@ -253,7 +252,7 @@ pub async fn rename<F: NorFlash>(
     base: &Table<'_>,
     store: &mut Store<F>,
     buffer: &mut [u8],
-) -> Result<(), MemoryError<F::Error>> {
+) -> Result<(), MemoryError> {
     let texture = base
         .find(from)
         .ok_or_else(|| MemoryError::Unknown(name_of(from)))?;
@@ -272,7 +271,7 @@ pub async fn delete<F: NorFlash>(
     base: &Table<'_>,
     store: &mut Store<F>,
     buffer: &mut [u8],
-) -> Result<(), MemoryError<F::Error>> {
+) -> Result<(), MemoryError> {
     match what {
         Forget::Texture(name) => {
             let texture = base

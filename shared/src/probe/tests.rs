@@ -8,7 +8,7 @@ use super::*;
 use crate::dsp::{Kernels, Plan};
 use crate::explorer::{ExpectedOutcome, Method};
 use crate::features::{Block, FeatureSet, Movement, Observation, Property, PropertySet, Slide};
-use crate::rig::Rig;
+use crate::rig::{Rig, RigError};
 use crate::store::tests::ram::Ram;
 use crate::store::{SelfLearnedRecord, Store};
 use crate::table::tests::{around, fused_of, known, straight, table_of};
@@ -23,14 +23,14 @@ use std::{format, vec};
 struct Script(std::collections::VecDeque<Option<i16>>);
 
 impl Rig for Script {
-    type Error = &'static str;
+    type Error = RigError;
 
     fn measures(&self) -> PropertySet {
         [Property::Traction].into_iter().collect()
     }
 
     async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error> {
-        let Some(traction) = self.0.pop_front().ok_or("the lever fell off")? else {
+        let Some(traction) = self.0.pop_front().ok_or(RigError::Hangs)? else {
             return Ok(());
         };
         slide.set_background(2.0);
@@ -119,7 +119,7 @@ fn of_a_pair_only_one_can_be_the_answer() {
 fn what_goes_wrong_is_said() {
     assert_eq!(
         identified(&[], &wanted(&[])).0.unwrap_err(),
-        "the lever fell off"
+        "the rig does not come to an end: home it"
     );
     let error = identified(&[], &wanted(&[7])).0.unwrap_err();
     assert!(error.contains("not textures of the table"), "{error}");

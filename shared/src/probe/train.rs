@@ -1,29 +1,25 @@
 //! A training performed: movement after movement, every trial stored at once.
 
-use core::fmt;
-
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
-use super::error::ProbeError;
 use super::teach::delete_stale;
 use super::training::{Training, Wanted};
 use crate::dsp::Plan;
 use crate::explorer::Kernels;
 use crate::features::{Movement, Observation, Slide};
-use crate::rig::{MAX_REJECTED, Rig};
+use crate::rig::{MAX_REJECTED, Rig, RigError};
 use crate::store::Store;
 use crate::table::{MAX_MOVEMENTS, Table};
 use crate::up_to;
-use crate::wire::{Event, Train, text};
+use crate::wire::{Event, Failure, Rejection, Train};
 
 /// Learns the texture under the finger on top of `table`, and goes on where an earlier training of it stopped: every trial
 /// is stored at once. In the end the store has a new table, which is to be used from then on. `buffer` holds a whole table.
 ///
 /// # Errors
-/// The texture cannot be learned, see [`crate::probe::training::TrainingError`]; the rig or the store failed;
+/// The texture cannot be learned, see [`crate::wire::TrainingError`]; the rig or the store failed;
 /// [`MAX_REJECTED`] slides in a row were no good.
-#[allow(clippy::result_large_err)] // a text is large, and none is made but where a slide is rejected
 pub async fn train<R, F, K>(
     wanted: &Train,
     rig: &mut R,
@@ -32,10 +28,9 @@ pub async fn train<R, F, K>(
     plan: &Plan,
     buffer: &mut [u8],
     mut tell: impl FnMut(Event),
-) -> Result<(), ProbeError<R::Error, F::Error>>
+) -> Result<(), Failure>
 where
-    R: Rig,
-    R::Error: fmt::Display,
+    R: Rig<Error = RigError>,
     F: NorFlash,
     K: Kernels,
 {
@@ -67,13 +62,16 @@ where
             failed => failed,
         };
         let measured = match made {
-            Err(why) if !rig.recover(&why).await => return Err(ProbeError::Rig(why)),
-            Err(why) => Err(text(why)),
-            Ok(()) => slide.finish().map_err(text).and_then(|measurement| {
-                let observed = Observation::from(&measurement);
-                let took = training.took(Some(&table), movement, &observed);
-                Ok((took.map_err(text)?, measurement))
-            }),
+            Err(why) if !rig.recover(&why).await => return Err(Failure::Rig(why)),
+            Err(why) => Err(Rejection::Rig(why)),
+            Ok(()) => slide
+                .finish()
+                .map_err(Rejection::Slide)
+                .and_then(|measurement| {
+                    let observed = Observation::from(&measurement);
+                    let took = training.took(Some(&table), movement, &observed);
+                    Ok((took.map_err(Rejection::Training)?, measurement))
+                }),
         };
         match measured {
             Ok((training_record, measurement)) => {
@@ -90,10 +88,10 @@ where
                 rejected += 1;
                 tell(Event::Rejected {
                     slide: rejected,
-                    why,
+                    why: Failure::Slide(why),
                 });
                 if rejected == MAX_REJECTED {
-                    return Err(ProbeError::Rejected);
+                    return Err(Failure::Rejected);
                 }
             }
         }

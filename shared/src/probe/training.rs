@@ -12,17 +12,16 @@
 //! with the pilot's movements, or where the table has these already.
 
 use crate::table::TrainingStats;
-use core::fmt;
-
 use heapless::Vec;
 
-use crate::features::{FeatureSet, Movement, Observation, Property, PropertySet};
+use crate::features::{Movement, Observation, PropertySet};
 use crate::fill;
 use crate::store::TrainingRecord;
 use crate::table::{
-    Change, Contents, EncodeError, Experience, Known, MAX_MOVEMENTS, MAX_TEXTURES, Name, Table,
-    Tally, Texture, Whitened, amend, encode, encoded_len,
+    Change, Contents, Experience, Known, MAX_MOVEMENTS, MAX_TEXTURES, Name, Table, Tally, Texture,
+    Whitened, amend, encode, encoded_len,
 };
+use crate::wire::{LEAST_TRIALS, TrainingError};
 
 /// The movements of a table that is begun: the three that the paper chose.
 pub const FIRST_MOVEMENTS: [Movement; 3] = [
@@ -31,89 +30,10 @@ pub const FIRST_MOVEMENTS: [Movement; 3] = [
     Movement::FOR_ROUGHNESS,
 ];
 
-/// Fewest trials that a standard deviation can be had of. A fused table has those of all textures and needs one.
-pub const LEAST_TRIALS: u8 = 2;
-
 /// Movements of a pilot: the grid up to 1.26 N; with more force the skin touches the core (fig. 3).
 pub fn pilot_movements() -> impl Iterator<Item = Movement> {
     Movement::grid().filter(|m| m.force_mn() <= Movement::FOR_TRACTION.force_mn())
 }
-
-/// Why a texture is not learned.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub enum TrainingError {
-    /// Its name is empty or longer than a [`Name`].
-    Name(usize),
-    /// Fewer trials are wanted than [`LEAST_TRIALS`].
-    Trials(u8),
-    /// The table has as many textures as it may have.
-    Textures,
-    /// The table would take this many bytes, and the buffer is smaller.
-    NoSpace(usize),
-    /// This rig does not measure a property that the table has, or none at all.
-    Measures(Option<Property>),
-    /// The slide has no value of this property; it does not count.
-    Missing(Property),
-    /// This rig, or the slide, does not have the features of the table.
-    Features(FeatureSet),
-    /// What was stored of this training is for another kind of table.
-    Stats,
-    /// A movement that is none of this training's.
-    Movement(Movement),
-    /// Trials are missing.
-    Unfinished(Movement),
-    /// A pilot's movements are not those of the table.
-    Pilot,
-    /// The table is another one than that this training was begun with.
-    Table,
-    /// The table cannot be written.
-    Encode(EncodeError),
-}
-
-impl fmt::Display for TrainingError {
-    #[inline]
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Name(length) => write!(
-                f,
-                "a texture's name has 1 to {} bytes, not {length}",
-                Name::new().capacity()
-            ),
-            Self::Trials(trials) => write!(
-                f,
-                "{trials} trials give no standard deviation: {LEAST_TRIALS} or more, 1 or more for a fused table"
-            ),
-            Self::Textures => write!(f, "the table has {MAX_TEXTURES} textures: it is full"),
-            Self::NoSpace(bytes) => write!(
-                f,
-                "the table is full: it would take {bytes} bytes, and there is less room"
-            ),
-            Self::Measures(Some(property)) => {
-                write!(
-                    f,
-                    "the table has {property}, and this rig does not measure it"
-                )
-            }
-            Self::Measures(None) => f.write_str("this rig measures no property"),
-            Self::Missing(property) => write!(f, "the slide has no {property}: slide again"),
-            Self::Features(set) => {
-                write!(f, "the table was learned from {}, which are not measured here", set.name())
-            }
-            Self::Stats => f.write_str(
-                "what is stored of this training is for another kind of table: forget it, and begin again",
-            ),
-            Self::Movement(movement) => write!(f, "{movement} is no part of this training"),
-            Self::Unfinished(movement) => write!(f, "trials at {movement} are missing"),
-            Self::Pilot => f.write_str("the movements of the pilot are not those of the table"),
-            Self::Table => {
-                f.write_str("the table was replaced during the training: begin it again")
-            }
-            Self::Encode(why) => why.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for TrainingError {}
 
 /// A texture to learn.
 #[derive(Clone, Copy, Debug)]

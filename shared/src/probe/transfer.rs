@@ -23,7 +23,7 @@ pub(super) async fn write<F: NorFlash>(
     store: &mut Store<F>,
     offset: u32,
     bytes: &[u8],
-) -> Result<(), StoreError<F::Error>> {
+) -> Result<(), StoreError> {
     match store.write_table(offset as usize, bytes).await {
         Err(StoreError::Part { offset, wanted })
             if offset.checked_add(bytes.len()) == Some(wanted) =>

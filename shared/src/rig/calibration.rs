@@ -1,6 +1,7 @@
 //! The constants of one rig, and how they are found: lines through measured points.
 
 use crc::{CRC_32_ISO_HDLC, Crc};
+use serde::{Deserialize, Serialize};
 
 use crate::sensor::pressure::{Calibration, CalibrationError};
 
@@ -123,7 +124,7 @@ impl RigCalibration {
 }
 
 /// Why a calibration is not used.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum RigCalibrationError {
     /// The fingertip's constants.
     #[error(transparent)]

@@ -1,5 +1,7 @@
 //! What the rig is doing, how a movement ended, and why one was not made.
 
+use serde::{Deserialize, Serialize};
+
 use super::calibration::RigCalibrationError;
 use super::fault::Fault;
 use crate::features::{Movement, MovementError};
@@ -45,7 +47,7 @@ pub enum Ended {
 }
 
 /// Why a command is refused.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum Refused {
     /// Something else is being done.
     #[error("the rig is busy; stop it first")]
@@ -73,7 +75,7 @@ pub enum Refused {
 }
 
 /// Why a rig with a stage and a lever did not make a movement.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum RigError {
     /// The movement was refused; nothing moved.
     #[error(transparent)]

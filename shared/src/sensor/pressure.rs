@@ -4,6 +4,8 @@
 //! Words, parity and commands end at [`crate::sensor`]. From here on there are [`Counts`] of two channels and one
 //! [`Calibration`] record for each fingertip.
 
+use serde::{Deserialize, Serialize};
+
 /// Samples of one channel in a second (Methods, "BioTac": both pressures are sampled at 2200 Hz).
 pub const RATE_HZ: u32 = 2200;
 /// Slots in a second: the channels take turns, see [`Channel::PATTERN`].
@@ -211,7 +213,7 @@ pub struct BeyondLinear {
 }
 
 /// What is wrong with a calibration record.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum CalibrationError {
     /// A scale, or the end of the linear range, is not a number above 0.
     #[error("a scale of the calibration is not above 0: calibrate again")]

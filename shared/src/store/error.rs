@@ -1,17 +1,43 @@
 //! Why the store did not do what it was told.
 
+use embedded_storage_async::nor_flash::{NorFlashError, NorFlashErrorKind};
 use sequential_storage::Error;
+use serde::{Deserialize, Serialize};
 
 use super::layout::{SCHEMA, SECTORS};
 use crate::rig::calibration::RigCalibrationError;
 use crate::table::TableError;
 
-/// Why the store did not do what it was told.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-pub enum StoreError<E> {
+/// What a flash did not do.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
+pub enum FlashFault {
+    /// It read, wrote or erased at a place that is no whole number of its units.
+    #[error("not at a whole unit of it")]
+    Unaligned,
+    /// It was to read, write or erase where it is not.
+    #[error("beyond its end")]
+    Bounds,
+    /// It did not take a word, or did not erase a sector.
+    #[error("it does not write or erase")]
+    Work,
+}
+
+impl<E: NorFlashError> From<E> for FlashFault {
+    fn from(why: E) -> Self {
+        match why.kind() {
+            NorFlashErrorKind::NotAligned => Self::Unaligned,
+            NorFlashErrorKind::OutOfBounds => Self::Bounds,
+            _ => Self::Work,
+        }
+    }
+}
+
+/// Why the store did not do what it was told. Its order is that of the messages: new ones go to the end.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize, thiserror::Error)]
+pub enum StoreError {
     /// The flash itself failed.
-    #[error("the flash failed: {0:?}")]
-    Flash(E),
+    #[error("the flash failed: {0}")]
+    Flash(FlashFault),
     /// The flash has fewer than four sectors.
     #[error("{0} bytes of flash, and the store takes {SECTORS} sectors")]
     NoSpace(usize),
@@ -57,26 +83,36 @@ pub enum StoreError<E> {
     /// The calibration that is stored cannot be used.
     #[error(transparent)]
     Calibration(RigCalibrationError),
+    /// The flash did not come to an end with opening the store.
+    #[error("the flash does not answer: switch the probe off and on")]
+    Silent,
 }
 
-impl<E> From<Error<E>> for StoreError<E> {
+impl StoreError {
+    /// The flash failed in this way.
+    pub(super) fn flash(why: impl Into<FlashFault>) -> Self {
+        Self::Flash(why.into())
+    }
+}
+
+impl<E: NorFlashError> From<Error<E>> for StoreError {
     fn from(why: Error<E>) -> Self {
         match why {
-            Error::Storage { value, .. } => Self::Flash(value),
+            Error::Storage { value, .. } => Self::flash(value),
             Error::FullStorage => SettingsError::Full.into(),
             _ => SettingsError::Corrupt.into(),
         }
     }
 }
 
-impl<E> From<SettingsError> for StoreError<E> {
+impl From<SettingsError> for StoreError {
     fn from(why: SettingsError) -> Self {
         Self::Settings(why)
     }
 }
 
 /// Why settings cannot be used.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum SettingsError {
     /// They cannot be read: erase them.
     #[error("the settings are damaged: erase them, and calibrate again")]

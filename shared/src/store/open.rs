@@ -13,7 +13,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::NoSpace`].
-    pub async fn open(flash: F) -> Result<Self, StoreError<F::Error>> {
+    pub async fn open(flash: F) -> Result<Self, StoreError> {
         let () = Self::CHECK;
         let mut store = Self {
             flash,

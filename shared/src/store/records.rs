@@ -125,7 +125,7 @@ impl<'m, 'f, F: NorFlash, T: Record> Records<'m, 'f, F, T> {
     }
 
     /// Place and record, `None` for a place that was cleared.
-    pub(super) async fn next(&mut self) -> Result<Option<(u8, Option<T>)>, StoreError<F::Error>> {
+    pub(super) async fn next(&mut self) -> Result<Option<(u8, Option<T>)>, StoreError> {
         let mut record = None;
         let mut decode = |bytes: &[u8]| {
             record = postcard::from_bytes(bytes).ok();
@@ -142,7 +142,7 @@ async fn next<F: NorFlash>(
     items: &mut Items<'_, '_, F>,
     keys: Range<u8>,
     decode: &mut dyn FnMut(&[u8]) -> bool,
-) -> Result<Option<u8>, StoreError<F::Error>> {
+) -> Result<Option<u8>, StoreError> {
     let mut buffer = [0; RECORD];
     while let Some((key, bytes)) = items.next::<&[u8]>(&mut buffer).await? {
         if keys.contains(&key) {
@@ -155,6 +155,6 @@ async fn next<F: NorFlash>(
     Ok(None)
 }
 
-pub(super) fn decode<'b, T: Deserialize<'b>, E>(bytes: &'b [u8]) -> Result<T, StoreError<E>> {
+pub(super) fn decode<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Result<T, StoreError> {
     postcard::from_bytes(bytes).map_err(|_| SettingsError::Corrupt.into())
 }

@@ -23,25 +23,17 @@ impl<F: NorFlash> Store<F> {
             && F::ERASE_SIZE >= 256
     );
 
-    pub(super) async fn read(
-        &mut self,
-        offset: u32,
-        buffer: &mut [u8],
-    ) -> Result<(), StoreError<F::Error>> {
+    pub(super) async fn read(&mut self, offset: u32, buffer: &mut [u8]) -> Result<(), StoreError> {
         self.flash
             .read(offset, buffer)
             .await
-            .map_err(StoreError::Flash)
+            .map_err(StoreError::flash)
     }
 
-    pub(super) async fn program(
-        &mut self,
-        offset: u32,
-        words: &[u8],
-    ) -> Result<(), StoreError<F::Error>> {
+    pub(super) async fn program(&mut self, offset: u32, words: &[u8]) -> Result<(), StoreError> {
         self.flash
             .write(offset, words)
             .await
-            .map_err(StoreError::Flash)
+            .map_err(StoreError::flash)
     }
 }

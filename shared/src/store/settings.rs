@@ -43,12 +43,12 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`].
-    pub async fn erase_settings(&mut self) -> Result<(), StoreError<F::Error>> {
+    pub async fn erase_settings(&mut self) -> Result<(), StoreError> {
         self.settings = Err(SettingsError::Corrupt);
         Pages(&mut self.flash)
             .wipe()
             .await
-            .map_err(StoreError::Flash)?;
+            .map_err(StoreError::flash)?;
         self.open_settings().await
     }
 
@@ -56,7 +56,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Calibration`].
-    pub async fn calibration(&mut self) -> Result<Option<RigCalibration>, StoreError<F::Error>> {
+    pub async fn calibration(&mut self) -> Result<Option<RigCalibration>, StoreError> {
         let mut buffer = [0; RECORD];
         let Some(bytes) = self.fetch(KEY_CALIBRATION, &mut buffer).await? else {
             return Ok(None);
@@ -75,7 +75,7 @@ impl<F: NorFlash> Store<F> {
     pub async fn set_calibration(
         &mut self,
         calibration: &RigCalibration,
-    ) -> Result<(), StoreError<F::Error>> {
+    ) -> Result<(), StoreError> {
         calibration.check().map_err(StoreError::Calibration)?;
         self.store(KEY_CALIBRATION, &calibration.to_bytes()).await
     }
@@ -84,7 +84,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`].
-    pub async fn skin(&mut self) -> Result<SkinCare, StoreError<F::Error>> {
+    pub async fn skin(&mut self) -> Result<SkinCare, StoreError> {
         let mut buffer = [0; RECORD];
         let Some(bytes) = self.fetch(KEY_SKIN, &mut buffer).await? else {
             return Ok(SkinCare::default());
@@ -97,7 +97,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
-    pub async fn set_skin(&mut self, skin: &SkinCare) -> Result<(), StoreError<F::Error>> {
+    pub async fn set_skin(&mut self, skin: &SkinCare) -> Result<(), StoreError> {
         self.encode(KEY_SKIN, &(skin.energy_j(), skin.wear_j()))
             .await
     }
@@ -112,7 +112,7 @@ impl<F: NorFlash> Store<F> {
         name: &str,
         movement: Movement,
         table: Option<u32>,
-    ) -> Result<Option<TrainingStats>, StoreError<F::Error>> {
+    ) -> Result<Option<TrainingStats>, StoreError> {
         self.settings?;
         let mut found = None;
         let mut buffer = [0; RECORD];
@@ -137,10 +137,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
-    pub async fn set_training_record(
-        &mut self,
-        new: &TrainingRecord,
-    ) -> Result<(), StoreError<F::Error>> {
+    pub async fn set_training_record(&mut self, new: &TrainingRecord) -> Result<(), StoreError> {
         self.put(new).await
     }
 
@@ -148,10 +145,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
-    pub async fn delete_training_records(
-        &mut self,
-        name: &str,
-    ) -> Result<(), StoreError<F::Error>> {
+    pub async fn delete_training_records(&mut self, name: &str) -> Result<(), StoreError> {
         self.clear(&|record: &TrainingRecord| record.name == name)
             .await
     }
@@ -165,7 +159,7 @@ impl<F: NorFlash> Store<F> {
         &mut self,
         lineage: u32,
         each: &mut dyn FnMut(SelfLearnedRecord),
-    ) -> Result<(), StoreError<F::Error>> {
+    ) -> Result<(), StoreError> {
         self.settings?;
         // which record of every place is the last: only that one counts
         let mut last = [0u16; MAX_TEXTURES];
@@ -199,10 +193,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
-    pub async fn set_self_learned(
-        &mut self,
-        new: &SelfLearnedRecord,
-    ) -> Result<(), StoreError<F::Error>> {
+    pub async fn set_self_learned(&mut self, new: &SelfLearnedRecord) -> Result<(), StoreError> {
         self.put(new).await
     }
 
@@ -210,10 +201,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
-    pub async fn delete_self_learned(
-        &mut self,
-        of: Option<(u32, u16)>,
-    ) -> Result<(), StoreError<F::Error>> {
+    pub async fn delete_self_learned(&mut self, of: Option<(u32, u16)>) -> Result<(), StoreError> {
         let is_its =
             |record: &SelfLearnedRecord| of.is_none_or(|of| (record.lineage, record.number) == of);
         self.clear(&is_its).await
@@ -221,7 +209,7 @@ impl<F: NorFlash> Store<F> {
 
     /// Stores a record in the place of the one that it replaces; otherwise in a free place, or in that of one that it
     /// outlives.
-    async fn put<T: Record>(&mut self, new: &T) -> Result<(), StoreError<F::Error>> {
+    async fn put<T: Record>(&mut self, new: &T) -> Result<(), StoreError> {
         let seen = |old: &T| {
             if new.replaces(old) {
                 Use::Same
@@ -242,10 +230,7 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Clears the places of such records.
-    async fn clear<T: Record>(
-        &mut self,
-        is_such: &dyn Fn(&T) -> bool,
-    ) -> Result<(), StoreError<F::Error>> {
+    async fn clear<T: Record>(&mut self, is_such: &dyn Fn(&T) -> bool) -> Result<(), StoreError> {
         let such = |record: &T| {
             if is_such(record) {
                 Use::Same
@@ -266,7 +251,7 @@ impl<F: NorFlash> Store<F> {
     async fn uses<T: Record>(
         &mut self,
         of: &dyn Fn(&T) -> Use,
-    ) -> Result<[Use; MAX_TEXTURES], StoreError<F::Error>> {
+    ) -> Result<[Use; MAX_TEXTURES], StoreError> {
         self.settings?;
         let mut uses = [Use::Free; MAX_TEXTURES];
         let mut buffer = [0; RECORD];
@@ -281,11 +266,11 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Brings the pages into order, and looks whether they can be read.
-    pub(super) async fn open_settings(&mut self) -> Result<(), StoreError<F::Error>> {
+    pub(super) async fn open_settings(&mut self) -> Result<(), StoreError> {
         Pages(&mut self.flash)
             .recover()
             .await
-            .map_err(StoreError::Flash)?;
+            .map_err(StoreError::flash)?;
         self.settings = match self.read_all().await {
             Ok(schema_written) => Ok(schema_written),
             Err(StoreError::Settings(why)) => Err(why),
@@ -295,11 +280,11 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Reads every record once; whether there is any.
-    async fn read_all(&mut self) -> Result<bool, StoreError<F::Error>> {
+    async fn read_all(&mut self) -> Result<bool, StoreError> {
         let mut buffer = [0; RECORD];
         let mut map = self.map();
         let schema = map.fetch_item::<&[u8]>(&mut buffer, &KEY_SCHEMA).await?;
-        match schema.map(decode::<u16, F::Error>).transpose()? {
+        match schema.map(decode::<u16>).transpose()? {
             Some(SCHEMA) => {}
             Some(other) => return Err(SettingsError::Schema(other).into()),
             None => {
@@ -335,23 +320,19 @@ impl<F: NorFlash> Store<F> {
         &mut self,
         key: u8,
         buffer: &'b mut [u8; RECORD],
-    ) -> Result<Option<&'b [u8]>, StoreError<F::Error>> {
+    ) -> Result<Option<&'b [u8]>, StoreError> {
         self.settings?;
         Ok(self.map().fetch_item(buffer, &key).await?)
     }
 
-    async fn encode(
-        &mut self,
-        key: u8,
-        value: &impl Serialize,
-    ) -> Result<(), StoreError<F::Error>> {
+    async fn encode(&mut self, key: u8, value: &impl Serialize) -> Result<(), StoreError> {
         let mut buffer = [0; RECORD];
         let bytes = postcard::to_slice(value, &mut buffer).map_err(|_| SettingsError::Corrupt)?;
         self.store(key, bytes).await
     }
 
     /// Stores a record and reads it back.
-    async fn store(&mut self, key: u8, bytes: &[u8]) -> Result<(), StoreError<F::Error>> {
+    async fn store(&mut self, key: u8, bytes: &[u8]) -> Result<(), StoreError> {
         let schema_written = self.settings?;
         let mut buffer = [0; RECORD];
         let mut map = self.map();

@@ -35,7 +35,7 @@ impl<F: NorFlash> Store<F> {
     pub async fn read_table<'r>(
         &mut self,
         buffer: &'r mut [u8],
-    ) -> Result<Option<Table<'r>>, StoreError<F::Error>> {
+    ) -> Result<Option<Table<'r>>, StoreError> {
         match self.table() {
             Some(table) => self
                 .read_back(table.offset, table.length, buffer)
@@ -50,7 +50,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::TooLong`].
-    pub async fn begin_table(&mut self, length: usize) -> Result<(), StoreError<F::Error>> {
+    pub async fn begin_table(&mut self, length: usize) -> Result<(), StoreError> {
         self.slots.push = None;
         if length > Self::MAX_TABLE {
             return Err(StoreError::TooLong {
@@ -68,7 +68,7 @@ impl<F: NorFlash> Store<F> {
         self.flash
             .erase(start, start + F::ERASE_SIZE as u32)
             .await
-            .map_err(StoreError::Flash)?;
+            .map_err(StoreError::flash)?;
         self.slots.push = Some(Push {
             slot,
             length,
@@ -83,11 +83,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::NoTable`], [`StoreError::Part`]; [`StoreError::Flash`], after which the table must be begun anew.
-    pub async fn write_table(
-        &mut self,
-        offset: usize,
-        bytes: &[u8],
-    ) -> Result<(), StoreError<F::Error>> {
+    pub async fn write_table(&mut self, offset: usize, bytes: &[u8]) -> Result<(), StoreError> {
         // taken out, so that a part that fails or is cancelled ends the table
         let mut push = self.slots.push.take().ok_or(StoreError::NoTable)?;
         if offset != push.at || bytes.len() > push.length - push.at {
@@ -131,7 +127,7 @@ impl<F: NorFlash> Store<F> {
     pub async fn commit_table<'r>(
         &mut self,
         buffer: &'r mut [u8],
-    ) -> Result<(StoredTable, Table<'r>), StoreError<F::Error>> {
+    ) -> Result<(StoredTable, Table<'r>), StoreError> {
         let push = self.slots.push.as_ref().ok_or(StoreError::NoTable)?;
         let (slot, length, got) = (push.slot, push.length, push.at);
         if got != length {
@@ -184,7 +180,7 @@ impl<F: NorFlash> Store<F> {
         &mut self,
         buffer: &mut [u8],
         length: usize,
-    ) -> Result<(), StoreError<F::Error>> {
+    ) -> Result<(), StoreError> {
         self.begin_table(length).await?;
         let table = buffer.get(..length).unwrap_or_default();
         self.write_table(0, table).await?;
@@ -196,7 +192,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`].
-    pub async fn factory_table(&mut self) -> Result<(), StoreError<F::Error>> {
+    pub async fn factory_table(&mut self) -> Result<(), StoreError> {
         self.slots.push = None;
         let Some((active, _)) = self.slots.active else {
             return Ok(());
@@ -213,7 +209,7 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Looks for the table to be used.
-    pub(super) async fn find_tables(&mut self) -> Result<(), StoreError<F::Error>> {
+    pub(super) async fn find_tables(&mut self) -> Result<(), StoreError> {
         for slot in [Slot::A, Slot::B] {
             let Some(table) = self.slot_header(slot).await? else {
                 continue;
@@ -230,10 +226,7 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    async fn slot_header(
-        &mut self,
-        slot: Slot,
-    ) -> Result<Option<StoredTable>, StoreError<F::Error>> {
+    async fn slot_header(&mut self, slot: Slot) -> Result<Option<StoredTable>, StoreError> {
         let start = slot.start::<F>();
         let mut bytes = [0; HEADER];
         self.read(start, &mut bytes).await?;
@@ -253,14 +246,14 @@ impl<F: NorFlash> Store<F> {
         Ok((bytes == header(&table) && table.length <= Self::MAX_TABLE).then_some(table))
     }
 
-    async fn commit_word(&mut self, slot: Slot) -> Result<u32, StoreError<F::Error>> {
+    async fn commit_word(&mut self, slot: Slot) -> Result<u32, StoreError> {
         let mut word = [0; WORD];
         self.read(slot.start::<F>() + COMMIT_AT, &mut word).await?;
         Ok(u32::from_le_bytes(word))
     }
 
     /// Whether the bytes of a table still have its checksum.
-    async fn is_whole(&mut self, table: &StoredTable) -> Result<bool, StoreError<F::Error>> {
+    async fn is_whole(&mut self, table: &StoredTable) -> Result<bool, StoreError> {
         let Some(body) = table.length.checked_sub(WORD) else {
             return Ok(false);
         };
@@ -285,7 +278,7 @@ impl<F: NorFlash> Store<F> {
         offset: u32,
         length: usize,
         buffer: &'r mut [u8],
-    ) -> Result<Table<'r>, StoreError<F::Error>> {
+    ) -> Result<Table<'r>, StoreError> {
         let buffer = buffer.get_mut(..length).ok_or(StoreError::Buffer(length))?;
         let (words, tail) = buffer.split_at_mut(length - length % WORD);
         self.read(offset, words).await?;

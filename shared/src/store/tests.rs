@@ -14,11 +14,11 @@ use crate::table::Name;
 use crate::table::tests::{around, table_of};
 use crate::table::{Experience, Table, TableError, TrainingStats};
 use embassy_futures::block_on;
-use ram::{Ram, RamError, SECTOR};
+use ram::{Ram, SECTOR};
 use std::vec;
 use std::vec::Vec;
 
-type Outcome<T> = Result<T, StoreError<RamError>>;
+type Outcome<T> = Result<T, StoreError>;
 
 /// A small table, unlike that of every other `n`; lengths of every remainder of 4.
 fn table(n: u8) -> Vec<u8> {

@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use serde::{Deserialize, Serialize};
+
 use super::format::{
     Action, CELL_BYTES, CRC_BYTES, CRC32, Contents, LABEL_BYTES, MAGIC, MAX_MOVEMENTS, TableError,
     Tally, VERSION,
@@ -54,7 +56,7 @@ pub enum Change<'a> {
 }
 
 /// Why a table was not written.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub enum EncodeError {
     /// No texture, movement or property, or more movements than [`MAX_MOVEMENTS`].
     Empty,

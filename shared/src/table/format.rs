@@ -80,7 +80,7 @@ pub struct Tally {
 }
 
 /// Why bytes are no texture table.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum TableError {
     /// Fewer bytes than the table needs.
     Truncated {

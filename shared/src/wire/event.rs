@@ -4,6 +4,7 @@ use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
 
 use super::command::PART;
+use super::failure::{self, Failure};
 use super::sparse;
 use super::text::Text;
 use crate::explorer::{self, ExpectedOutcome};
@@ -52,7 +53,8 @@ pub enum Event {
         /// Its number.
         id: u16,
         /// Why, and what to do next.
-        why: Text,
+        #[serde(deserialize_with = "failure::deserialize")]
+        why: Failure,
     },
     /// A frame was damaged; so many were since the probe booted.
     Damaged(u32),
@@ -89,7 +91,8 @@ pub enum Event {
         /// Number of the slide, from 1.
         slide: u8,
         /// Why.
-        why: Text,
+        #[serde(deserialize_with = "failure::deserialize")]
+        why: Failure,
     },
     /// What lies under the finger.
     Verdict(Verdict),
@@ -126,6 +129,8 @@ pub enum Event {
         /// The bytes.
         bytes: Vec<u8, PART>,
     },
+    /// Something went wrong that is no answer to a request.
+    Trouble(Failure),
 }
 
 /// Why the chip started.

@@ -77,7 +77,7 @@ fn longest() -> vec::Vec<Report> {
         }),
         report(Event::Refused {
             id: u16::MAX,
-            why: text(),
+            why: Failure::Said(text()),
         }),
         report(Event::Booted {
             protocol: PROTOCOL,
@@ -108,7 +108,7 @@ fn longest() -> vec::Vec<Report> {
         }),
         report(Event::Rejected {
             slide: 255,
-            why: text(),
+            why: Failure::Said(text()),
         }),
         report(Event::Calibration(Vec::from_slice(&[0; 64]).unwrap())),
         report(Event::Status(Status {

@@ -40,7 +40,7 @@ pub enum TalkError {
 impl From<LinkError> for TalkError {
     fn from(why: LinkError) -> Self {
         match why {
-            LinkError::Refused(why) => Self::Refused(why),
+            LinkError::Refused(why) => Self::Refused(why.to_string()),
             LinkError::Rebooted { reset, .. } => Self::Rebooted(reset),
             why => Self::Link(why),
         }

@@ -430,12 +430,15 @@ pub(crate) fn read_answer(interrupt: &Interrupt, prompt: &str) -> Result<String,
 
 /// Prints the fault and its recovery, if the report is a fault.
 pub(crate) fn show_fault(report: &Report, out: &mut impl Write) -> io::Result<()> {
-    if let Event::Fault(fault) = &report.event {
-        let recovery = recovery(fault);
-        writeln!(out, "FAULT: {fault}. {recovery}: tactus device home")?;
-        out.flush()?;
+    match &report.event {
+        Event::Fault(fault) => {
+            let recovery = recovery(fault);
+            writeln!(out, "FAULT: {fault}. {recovery}: tactus device home")?;
+        }
+        Event::Trouble(why) => writeln!(out, "trouble: {why}")?,
+        _ => return Ok(()),
     }
-    Ok(())
+    out.flush()
 }
 
 /// What the user must do about a fault.

@@ -3,6 +3,7 @@
 
 use std::fs::File;
 use std::io::{self, BufRead as _, BufReader, Read as _, Write};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, ensure};
@@ -44,6 +45,9 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
     done.with_context(|| file.display().to_string())
 }
 
+/// Versions of the messages whose logs are read: since the first of them only reasons have become more than sentences.
+const LOGGED: RangeInclusive<u8> = 3..=PROTOCOL;
+
 /// Why a log cannot be replayed.
 #[derive(Debug, thiserror::Error)]
 enum ReplayError {
@@ -54,8 +58,9 @@ enum ReplayError {
     Line { line: usize, why: serde_json::Error },
     /// Messages of another version.
     #[error(
-        "written with version {0} of the messages, this program has version {PROTOCOL}: replay it with the tactus that \
-         wrote it"
+        "written with version {0} of the messages, this program reads {oldest} to {PROTOCOL}: replay it with the tactus \
+         that wrote it",
+        oldest = LOGGED.start()
     )]
     Protocol(u8),
     /// Nothing to replay.
@@ -104,7 +109,7 @@ fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
         }
         let read = serde_json::from_slice(&line);
         match read.map_err(|why| ReplayError::Line { line: number, why })? {
-            Line::Session { protocol, .. } if protocol != PROTOCOL => {
+            Line::Session { protocol, .. } if !LOGGED.contains(&protocol) => {
                 return Err(ReplayError::Protocol(protocol));
             }
             Line::Session { .. } => {}

@@ -3,11 +3,11 @@ use std::sync::OnceLock;
 
 use tactus_core::dsp::Kernels;
 use tactus_core::explorer::{Config, Method, Strategy};
-use tactus_core::features::Blocks;
+use tactus_core::features::{Blocks, SlideError};
 use tactus_core::probe::explore::{ExplorationStep, explore};
-use tactus_core::rig::Rig;
+use tactus_core::rig::{Fault, Rig};
 use tactus_core::table::Name;
-use tactus_core::wire::{self, MAX_FRAME, Receiver, Report};
+use tactus_core::wire::{self, Failure, MAX_FRAME, Receiver, Rejection, Report};
 
 use super::*;
 use crate::sim::collection::{Collection, calibrated};
@@ -370,7 +370,7 @@ fn lost_samples_are_no_slide_here_either() {
     let mut events = explored().1[..at].to_vec();
     let rejected = Event::Rejected {
         slide: 1,
-        why: wire::Text::try_from("3 samples were lost").unwrap(),
+        why: Failure::Slide(Rejection::Slide(SlideError::Gap(3))),
     };
     let (agreement, errors) = follow(&[&events[..], std::slice::from_ref(&rejected)].concat());
     assert_eq!((agreement.rejected, agreement.rejected_only_there), (1, 1));
@@ -410,7 +410,7 @@ fn an_exploration_that_was_cut_short_is_followed() {
     let known = explorer.best();
     let rejected = Event::Rejected {
         slide: 3,
-        why: wire::Text::try_from("lever slips").unwrap(),
+        why: Failure::Slide(Rejection::Rig(Fault::LeverSlips.into())),
     };
     // the third choice twice; it slips both times, and another movement is chosen, which slips as well
     let third = place(2, |event| matches!(event, Event::Chosen { .. }));

@@ -1,6 +1,8 @@
 use super::*;
 use crate::dsp::Kernels;
+use crate::explorer::ObserveError;
 use crate::explorer::{Config, Explorer, Strategy};
+use crate::features::SlideError;
 use crate::features::{Block, Movement, Property, PropertySet};
 use crate::table::Table;
 use crate::table::tests::{around, table_of};

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::features::{FeatureSet, MAX_FEATURES};
-use crate::store::tests::ram::{Ram, RamError, Torn};
-use crate::store::{StoreError, TrainingRecord};
+use crate::store::tests::ram::{Ram, Torn};
+use crate::store::{FlashFault, StoreError, TrainingRecord};
 use crate::table::TrainingStats;
 use crate::table::tests::{fused_of, known, straight};
 use embassy_futures::block_on;
@@ -575,6 +575,6 @@ fn a_failing_flash_is_reported() {
     let mut force = buffer(&bytes);
     let episode = summary(&bytes, 2, &[(1, 1, [100, 1400, -300])]);
     let why = block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap_err();
-    assert_eq!(why, MemoryError::Store(StoreError::Flash(RamError::Cut)));
+    assert_eq!(why, MemoryError::Store(StoreError::Flash(FlashFault::Work)));
     assert_eq!(force, buffer(&bytes));
 }

@@ -3,10 +3,11 @@
 use super::*;
 use crate::dsp::Plain;
 use crate::probe::seams::{Events, Panel, RigHandle, StoredBytes, UnloadedRun};
-use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
-use crate::wire::{Command, Counts, Forget, PART, Request, Status, TextureLearned};
+use crate::rig::{Fault, Phase};
+use crate::store::StoreError;
+use crate::wire::{Command, Counts, Failure, Forget, PART, Request, Status, TextureLearned};
 use std::boxed::Box;
 use std::string::ToString;
 
@@ -21,6 +22,8 @@ const CALIBRATION: RigCalibration = RigCalibration {
     serial: [b'0'; 16],
 };
 
+const JAMS: RigError = RigError::Fault(Fault::LeverNotHome);
+
 /// A rig that feels what its script says, at whatever is commanded.
 struct Bench {
     script: Script,
@@ -31,7 +34,7 @@ struct Bench {
 }
 
 impl Rig for Bench {
-    type Error = &'static str;
+    type Error = RigError;
 
     fn measures(&self) -> PropertySet {
         PropertySet::ALL
@@ -54,7 +57,7 @@ impl RigHandle for Bench {
 
     async fn home(&mut self) -> Result<(), Self::Error> {
         if self.refuses {
-            return Err("it jams");
+            return Err(JAMS);
         }
         self.homed += 1;
         self.state.phase = Phase::Ready;
@@ -98,7 +101,6 @@ impl StoredBytes<Flash> for Copied {
 struct Heard {
     told: vec::Vec<Event>,
     tables: vec::Vec<TableInUse>,
-    trouble: vec::Vec<String>,
 }
 
 impl Events for Heard {
@@ -108,10 +110,6 @@ impl Events for Heard {
 
     fn table(&mut self, table: TableInUse) {
         self.tables.push(table);
-    }
-
-    fn trouble(&mut self, what: Text) {
-        self.trouble.push(what.as_str().into());
     }
 }
 
@@ -129,7 +127,7 @@ fn probe_with(factory: vec::Vec<u8>, store: Option<Store<Flash>>) -> Tested {
             refuses: false,
         },
         memory: Memory::new(
-            store,
+            store.ok_or(StoreError::Silent),
             Copied::default(),
             leaked(factory),
             leaked(vec![0; SECTOR]),
@@ -324,7 +322,7 @@ fn what_comes_while_the_probe_is_busy_is_answered_or_refused() {
     desk.told.clear();
     assert_eq!(sent(Command::Home, true, &mut desk), Turn::Busy);
     assert!(
-        matches!(&desk.told[..], [Event::Refused { id: 9, why }] if why.starts_with("busy")),
+        matches!(&desk.told[..], [Event::Refused { id: 9, why }] if *why == Failure::Busy),
         "{:?}",
         desk.told
     );
@@ -342,7 +340,7 @@ fn a_request_is_answered_by_its_number_when_it_is_over() {
     block_on(probe.serve::<Plain>(&request(4, Command::Home)));
     let jams = Event::Refused {
         id: 4,
-        why: text("it jams"),
+        why: Failure::Rig(JAMS),
     };
     assert_eq!(probe.events.told, [Event::Done(3), jams]);
     assert_eq!(probe.rig.homed, 1);
@@ -380,7 +378,7 @@ fn an_exploration_is_kept_until_the_rig_moves_again() {
     feels(&mut probe, &[]);
     assert_eq!(
         command(&mut probe, exploration(false)).unwrap_err(),
-        "the lever fell off"
+        "the rig does not come to an end: home it"
     );
     assert!(command(&mut probe, Command::Label(name("oak"))).is_err());
 }
@@ -550,7 +548,9 @@ fn without_a_store_it_explores_and_says_that_it_cannot_learn() {
         "nothing is said to be learned"
     );
     feels(&mut probe, &[-32_000, -32_000, -32_000]);
-    let broken = Err(String::from("the store is broken: see the log"));
+    let broken = Err(String::from(
+        "the store is broken: the flash does not answer: switch the probe off and on",
+    ));
     for command in all() {
         let stores = turn(&command, false) == Turn::Queue
             && !matches!(
@@ -564,7 +564,8 @@ fn without_a_store_it_explores_and_says_that_it_cannot_learn() {
             "{command:?}"
         );
     }
-    assert!(probe.events.trouble.is_empty());
+    let trouble = |event: &Event| matches!(event, Event::Trouble(_));
+    assert!(!probe.events.told.iter().any(trouble));
 }
 
 #[test]
@@ -586,9 +587,14 @@ fn settings_that_cannot_be_read_are_begun_anew_by_a_calibration() {
 #[test]
 fn without_any_table_there_is_trouble_and_no_exploration() {
     let mut probe = probe_with(vec![1, 2, 3], None);
-    assert!(probe.events.trouble[0].starts_with("no table: "));
+    let Event::Trouble(why) = &probe.events.told[0] else {
+        panic!("{:?}", probe.events.told);
+    };
+    let why = why.to_string();
+    assert_eq!(why, "there is no table: truncated: 3 bytes of 16");
     assert!(probe.events.tables.is_empty());
-    assert!(command(&mut probe, exploration(false)).is_err());
+    // who asks is told the same
+    assert_eq!(command(&mut probe, exploration(false)), Err(why));
 }
 
 #[test]

@@ -4,6 +4,7 @@ mod fused;
 
 use super::*;
 use crate::features::Properties;
+use crate::features::Property;
 use crate::table::tests::{around, table_of};
 use std::vec;
 use std::vec::Vec as List;

@@ -200,7 +200,7 @@ fn cut_everywhere(ram: &Ram, before: &Model, operation: &Operation) -> (Ram, usi
             flash.cut = Some((at, torn));
             let mut store = open(flash);
             let why = block_on(perform(&mut store, operation));
-            assert_eq!(why, Err(StoreError::Flash(RamError::Cut)));
+            assert_eq!(why, Err(StoreError::Flash(FlashFault::Work)));
             let mut store = open(store.close().again());
             let left = Model::of(&mut store);
             assert!(
@@ -347,7 +347,7 @@ proptest! {
             let done = block_on(perform(&mut store, &operation));
             let after = model.after(&operation);
             if done.is_err() {
-                prop_assert_eq!(done, Err(StoreError::Flash(RamError::Cut)));
+                prop_assert_eq!(done, Err(StoreError::Flash(FlashFault::Work)));
                 store = open(store.close().again());
                 let left = Model::of(&mut store);
                 prop_assert!(left.is_between(&model, &after, &operation), "{:?}: {:?}", operation, left);

@@ -33,7 +33,7 @@ pub(crate) enum DayError {
     #[error("the simulated rig: {0}")]
     Rig(#[from] SimError),
     #[error("the store: {0}")]
-    Store(#[from] StoreError<Infallible>),
+    Store(#[from] StoreError),
     #[error("the table: {0}")]
     Table(#[from] TableError),
     #[error("at {at_s:.0} s: {why}")]
@@ -107,7 +107,7 @@ impl Host for Heard {
     fn tell(&mut self, event: Event) {
         match event {
             Event::Verdict(verdict) => self.verdict = Some(verdict),
-            Event::Rejected { why, .. } => self.rejected.push(why.as_str().to_owned()),
+            Event::Rejected { why, .. } => self.rejected.push(why.to_string()),
             Event::TextureLearned(_) => self.learned = true,
             _ => {}
         }
@@ -247,7 +247,7 @@ fn run_episode(
         let name = truth.try_into().unwrap_or_default();
         send(probe, Command::Label(name)).map_err(|why| DayError::Probe {
             at_s,
-            why: why.as_str().to_owned(),
+            why: why.to_string(),
         })?;
         day.episodes.learned.0 += 1;
     }

@@ -290,7 +290,7 @@ impl Soak<'_> {
                 Some(report) => {
                     ear.hear(board.now_ns(), report);
                     if let Event::Rejected { why, .. } = &report.event {
-                        rejected.push(why.as_str().to_owned());
+                        rejected.push(why.to_string());
                     }
                 }
                 None => each(board.now_ns() as f64 * 1e-9),

@@ -175,6 +175,7 @@ impl Monitor {
             Event::Rejected { slide, why } => {
                 self.note(Weight::Message, format!("slide {slide} is repeated: {why}"));
             }
+            Event::Trouble(why) => self.note(Weight::Message, why.to_string()),
             Event::Verdict(verdict) => {
                 let (name, slides) = (&verdict.name, verdict.slides);
                 let p = verdict.probability * 100.0;

@@ -6,7 +6,8 @@ use tactus_core::features::{Block, Movement, Property};
 use tactus_core::rig::Fault;
 use tactus_core::table::Action;
 use tactus_core::wire::{
-    Counts, Event, ExpectedOutcome, Live, Phase, Report, SlideReport, Status, Text, Verdict,
+    Counts, Event, ExpectedOutcome, Failure, Live, Phase, Report, SlideReport, Status, Text,
+    Verdict,
 };
 
 use super::state::{Monitor, NOTES, SHOWN};
@@ -220,10 +221,10 @@ fn any_size_of_terminal_is_drawn_on() {
     events.extend((0..60).map(|n| {
         Event::Rejected {
             slide: n,
-            why: Text::try_from(
-                "a reason that is much too long for a narrow terminal, and goes on",
-            )
-            .unwrap(),
+            why: Failure::Said(
+                Text::try_from("a reason that is much too long for a narrow terminal, and goes on")
+                    .unwrap(),
+            ),
         }
     }));
     let monitor = heard(events);

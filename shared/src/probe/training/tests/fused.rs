@@ -1,6 +1,7 @@
 //! Training for a fused table: one slide is enough, and what comes is whitened as the table has it.
 
 use super::*;
+use crate::features::FeatureSet;
 use crate::features::Vector;
 use crate::table::Whitening;
 use crate::table::tests::whitening::{Noise, World, learned};
