@@ -168,7 +168,7 @@ pub enum Failure {
     #[error(transparent)]
     Explorer(ExplorerError),
     /// The slide does not count.
-    #[error(transparent)]
+    #[error(fmt = uncounted)]
     Slide(Rejection),
     /// [`MAX_REJECTED`](crate::rig::MAX_REJECTED) slides in a row came to nothing, or no movement is left, the last one for
     /// this reason.
@@ -198,6 +198,16 @@ pub enum Failure {
     /// There is an answer, but the probe did not learn from it.
     #[error("not learned: {0}")]
     NotLearned(MemoryError),
+}
+
+/// What a rig gets over by itself asks nothing of a person.
+fn uncounted(why: &Rejection, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    match why {
+        Rejection::Rig(RigError::Fault(fault)) if fault.is_of_the_movement() => {
+            f.write_str(fault.name())
+        }
+        why => write!(f, "{why}"),
+    }
 }
 
 impl From<StoreError> for Failure {

@@ -1,7 +1,9 @@
 use super::*;
 use crate::explorer::Method;
-use crate::features::{BLOCK, Block, FUSED_BANDS, Movement, Properties, Property, PropertySet};
-use crate::rig::Fault;
+use crate::features::{
+    BLOCK, Block, FUSED_BANDS, Movement, Properties, Property, PropertySet, SlideError,
+};
+use crate::rig::{Fault, RigError};
 use crate::table::{Action, MAX_TEXTURES, Name};
 use heapless::{String, Vec};
 use proptest::prelude::*;
@@ -384,5 +386,28 @@ proptest! {
         bytes[at] ^= flip;
         let got = receive::<Report>(&bytes);
         prop_assert!(got.iter().all(Result::is_err), "{got:?}");
+    }
+}
+
+#[test]
+fn what_a_rig_gets_over_by_itself_asks_nothing_of_a_person() {
+    let of = |fault| Rejection::Rig(RigError::Fault(fault));
+    for (why, said) in [
+        (Failure::Slide(of(Fault::LeverSlips)), "lever slips"),
+        (
+            Failure::Slide(of(Fault::EStop)),
+            "emergency stop: release it, then reset",
+        ),
+        // the end of an exploration does
+        (
+            Failure::NoGoodSlide(of(Fault::LeverSlips)),
+            "no movement gives a good slide: lever slips: check the lever's motor and its current, then reset",
+        ),
+        (
+            Failure::Slide(Rejection::Slide(SlideError::Gap(3))),
+            "3 samples were lost",
+        ),
+    ] {
+        assert_eq!(super::text(why).as_str(), said);
     }
 }
