@@ -608,7 +608,9 @@ fn the_page_is_whole() {
             (svg.tag_name().name(), svg.attribute("role")),
             ("svg", Some("img"))
         );
-        assert!(!svg.attribute("aria-label").unwrap().is_empty());
+        let title = svg.first_element_child().unwrap();
+        assert_eq!(title.tag_name().name(), "title");
+        assert!(title.text().is_some_and(|title| !title.is_empty()));
         let words: String = svg
             .descendants()
             .filter(|n| n.tag_name().name() == "text")

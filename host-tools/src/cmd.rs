@@ -11,6 +11,7 @@ mod learn;
 mod manual;
 mod names;
 mod output;
+mod plot;
 mod progress;
 mod simulate;
 mod study;
@@ -31,6 +32,9 @@ pub(crate) use output::{Done, UsageError};
 fineness, and chooses each next movement so as to tell the remaining candidates apart (Bayesian exploration, Fishel & \
 Loeb 2012).\n\nThis command runs the core of the firmware, the same code, on recordings and on a simulated rig.", after_help = after_help())]
 struct Tactus {
+    /// Show no progress and no notices on the terminal, only results and errors
+    #[arg(long, short, global = true)]
+    quiet: bool,
     #[command(subcommand)]
     command: Option<Command>,
 }
@@ -71,7 +75,11 @@ Exit codes: 0 done; 1 an error; 2 wrong usage; 3 not identified: none of those k
 pub(crate) fn run() -> anyhow::Result<Done> {
     let out = &mut io::BufWriter::new(io::stdout().lock());
     let mut done = Done::Fully;
-    match Tactus::parse().command {
+    let Tactus { quiet, command } = Tactus::parse();
+    if quiet {
+        progress::be_quiet();
+    }
+    match command {
         None => identify::demonstrate(out)?,
         Some(Command::Features(args)) => features::run(&args, out)?,
         Some(Command::Learn(args)) => learn::run(&args, out)?,

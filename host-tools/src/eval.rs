@@ -2,11 +2,14 @@
 
 #[cfg(feature = "plots")]
 pub mod chart;
+pub mod courses;
 pub mod evaluate;
 pub mod experiment;
 pub mod learn;
 pub mod lifelong;
 pub mod novelty;
+#[cfg(feature = "plots")]
+pub mod pictures;
 pub mod show;
 pub mod table_summary;
 pub mod transcript;

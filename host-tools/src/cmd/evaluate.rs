@@ -5,8 +5,10 @@ use std::io::{self, Write};
 use anyhow::ensure;
 use clap::ValueEnum as _;
 use serde::Serialize;
+use tactus::eval::courses::courses;
 use tactus::eval::evaluate::{Method, Outcome, Summary, evaluate};
 use tactus::eval::experiment::{Experiment, Protocol};
+use tactus::eval::pictures::evaluation::figures;
 use tactus::eval::verdicts::Verdicts;
 use tactus_core::explorer::{self, Config};
 
@@ -53,6 +55,11 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         is_fused || !args.lifelong && args.novelty.is_none(),
         "--novelty and --lifelong need --method fused: the other methods do not recognise new textures"
     );
+    let canvas = args.plot.open()?;
+    ensure!(
+        canvas.is_none() || !args.lifelong && args.novelty.is_none(),
+        "--plot draws plain explorations: leave out --novelty and --lifelong"
+    );
     let (experiment, protocol) = experiment::open(args)?;
     let config = args.stop.config(args.method);
     if args.lifelong {
@@ -84,9 +91,17 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         summary,
     };
     match args.format {
-        Format::Json => print_json(&evaluation, out),
-        Format::Text => Ok(print_evaluation(&evaluation, out)?),
+        Format::Json => print_json(&evaluation, out)?,
+        Format::Text => print_evaluation(&evaluation, out)?,
     }
+    if let Some(canvas) = canvas {
+        let courses = with_progress(args.runs(), "exploring for the pictures", |done| {
+            courses(&experiment, config, args.runs(), done)
+        })?;
+        let figures = figures(&courses, experiment.names(), args.stop.threshold)?;
+        canvas.write("tactus evaluate", &figures, out)?;
+    }
+    Ok(())
 }
 
 /// The experiment as `identify` meets it: the texture may be none of those known, and no slide counts twice.

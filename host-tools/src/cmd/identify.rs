@@ -1,8 +1,10 @@
 //! `tactus identify`: an exploration shown step by step, on recordings and on the simulated rig.
 
 use std::collections::HashMap;
+use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context as _, ensure};
 use clap::Parser;
@@ -13,6 +15,8 @@ use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::{Replay, ReplayError};
 use tactus::eval::evaluate::{MAX_TEXTURES, Method};
 use tactus::eval::experiment::{Experiment, Protocol};
+use tactus::eval::pictures::exploration::Exploration;
+use tactus::eval::pictures::timeline::{Timeline, Watch};
 use tactus::eval::show::{Show, is_right};
 use tactus::eval::transcript::{Answer, Transcript};
 use tactus::sim::collection::{Collection, calibrated, texture_name};
@@ -27,6 +31,7 @@ use tactus_core::table::Table;
 use super::args::{Recordings, Stop};
 use super::learn::{at_least_two, learn_first};
 use super::output::{Done, Format, print_json};
+use super::plot::{Canvas, Plot};
 use super::progress::with_progress;
 use super::table_file::read_table;
 use super::textures::{find_material, find_textures, measure_folder, names};
@@ -53,7 +58,11 @@ Examples:
   tactus identify --simulated --texture burlap
   tactus identify --simulated --among 117 --method paper      as published: one property a slide, 117 textures
   tactus identify --recordings DIR --material 'bath towel'
-  tactus identify --recordings DIR --material 3 --table FILE  with a table that `tactus learn` wrote")]
+  tactus identify --recordings DIR --material 3 --table FILE  with a table that `tactus learn` wrote
+  tactus identify --simulated --plot burlap.svg               with pictures
+
+--plot draws how probable each texture was (posterior), the unknown beside its two best candidates (spectrum), and the last
+slide over time (timeline).")]
 pub(crate) struct Args {
     #[command(flatten)]
     from: Recordings,
@@ -86,6 +95,8 @@ pub(crate) struct Args {
     /// How to print the exploration
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
+    #[command(flatten)]
+    plot: Plot,
 }
 
 /// What `identify --format json` prints.
@@ -117,19 +128,21 @@ struct Identification {
 
 /// Explores on recordings or on the simulated rig.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
+    let canvas = args.plot.open()?;
     if args.simulated {
-        return identify_simulated(args, out);
+        return identify_simulated(args, canvas, out);
     }
     let folder = args.from.folder()?;
     let material = args.material.as_deref();
     let material = material.context("--material")?;
-    identify_recorded(args, &folder, material, out)
+    identify_recorded(args, &folder, material, canvas, out)
 }
 
 fn identify_recorded(
     args: &Args,
     folder: &Path,
     material: &str,
+    canvas: Option<Canvas>,
     out: &mut impl Write,
 ) -> anyhow::Result<Done> {
     let set = RecordingSet::open(folder)?;
@@ -201,9 +214,22 @@ fn identify_recorded(
         )?;
     }
     let ran_out = |why: &ReplayError| matches!(why, ReplayError::RanOut(_));
-    let found = explore_and_show(&mut rig, table, args, &mut random, name, ran_out, out)?;
+    let mut pictures = Pictures::new(table);
+    let found = explore_and_show(
+        &mut rig,
+        &mut pictures,
+        args,
+        &mut random,
+        name,
+        ran_out,
+        out,
+    )?;
     if !is_text {
         print_json(&found, out)?;
+    }
+    if let Some(canvas) = canvas {
+        let last = rig.last().map(Timeline::of_recording);
+        pictures.draw(canvas, args, last.as_ref(), out)?;
     }
     Ok(found.done())
 }
@@ -217,11 +243,53 @@ impl Identification {
     }
 }
 
+/// What is to be drawn of an exploration.
+struct Pictures<'t> {
+    exploration: Exploration<'t>,
+    /// The slide in progress, where the rig reports it.
+    watch: Arc<Mutex<Watch>>,
+}
+
+impl<'t> Pictures<'t> {
+    fn new(table: Table<'t>) -> Self {
+        Self {
+            exploration: Exploration::new(table),
+            watch: Arc::default(),
+        }
+    }
+
+    fn step<E: Display>(&mut self, step: &ExplorationStep<'_, E>, table: Table<'_>) {
+        self.exploration.step(step);
+        let mut watch = self.watch.lock().unwrap_or_else(PoisonError::into_inner);
+        match step {
+            ExplorationStep::Chosen(action, _) => {
+                if let Some(movement) = table.movement(action.movement) {
+                    watch.begin(movement);
+                }
+            }
+            ExplorationStep::Measured(..) => watch.counted(),
+            _ => {}
+        }
+    }
+
+    fn draw(
+        &self,
+        canvas: Canvas,
+        args: &Args,
+        last: Option<&Timeline>,
+        out: &mut impl Write,
+    ) -> anyhow::Result<()> {
+        let mut figures = self.exploration.figures(args.stop.threshold)?;
+        figures.extend(last.map(Timeline::figure).transpose()?);
+        canvas.write("tactus identify", &figures, out)
+    }
+}
+
 /// Explores with `rig` until there is an answer or, after a slide at least, until it has `ran_out` of them; as text, shows
 /// every step.
 fn explore_and_show<R>(
     rig: &mut R,
-    table: Table<'_>,
+    pictures: &mut Pictures<'_>,
     args: &Args,
     random: &mut ChaCha8Rng,
     truth: &str,
@@ -231,6 +299,7 @@ fn explore_and_show<R>(
 where
     R: Rig<Error: std::error::Error + Send + Sync + 'static>,
 {
+    let table = pictures.exploration.table();
     let best = Method::of(explorer::Method::of(table.contents()));
     let method = args.method.unwrap_or(best);
     let config = Config {
@@ -249,6 +318,7 @@ where
         || random.next_u32(),
         |event| {
             slides.step(&event, table);
+            pictures.step(&event, table);
             match event {
                 // shown below: recordings that run out are no failure
                 ExplorationStep::CutShort(..) => {}
@@ -314,12 +384,16 @@ pub(crate) fn demonstrate(out: &mut impl Write) -> anyhow::Result<()> {
     )?;
     out.flush()?;
     let Demonstration { args } = Demonstration::parse_from(["identify", "--simulated"]);
-    identify_simulated(&args, out)?;
+    identify_simulated(&args, None, out)?;
     writeln!(out, "\n{FIRST_STEPS}\n\nAll commands: tactus --help")?;
     Ok(())
 }
 
-fn identify_simulated(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
+fn identify_simulated(
+    args: &Args,
+    canvas: Option<Canvas>,
+    out: &mut impl Write,
+) -> anyhow::Result<Done> {
     let mut random = ChaCha8Rng::seed_from_u64(args.seed);
     let unknown = match &args.texture {
         Some(name) => find_textures(std::slice::from_ref(name))?[0],
@@ -351,7 +425,15 @@ fn identify_simulated(args: &Args, out: &mut impl Write) -> anyhow::Result<Done>
         )?;
     }
     let never = |_: &_| false;
-    let found = explore_and_show(&mut rig, table, args, &mut random, name, never, out)?;
+    let mut pictures = Pictures::new(table);
+    if canvas.is_some() {
+        let watch = Arc::clone(&pictures.watch);
+        rig.listen(Box::new(move |at_ms, event| {
+            let mut watch = watch.lock().unwrap_or_else(PoisonError::into_inner);
+            watch.report(at_ms, &event);
+        }));
+    }
+    let found = explore_and_show(&mut rig, &mut pictures, args, &mut random, name, never, out)?;
     let seconds = rig.now().as_secs_f64();
     let skin = rig.control().skin();
     let found = Identification {
@@ -368,6 +450,13 @@ fn identify_simulated(args: &Args, out: &mut impl Write) -> anyhow::Result<Done>
         )?;
     } else {
         print_json(&found, out)?;
+    }
+    if let Some(canvas) = canvas {
+        let watch = pictures
+            .watch
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        pictures.draw(canvas, args, watch.last(), out)?;
     }
     Ok(found.done())
 }

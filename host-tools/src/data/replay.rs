@@ -91,6 +91,7 @@ pub fn measure_all(
 pub struct Replay {
     /// Those that were not replayed yet.
     slides: Vec<Recording>,
+    last: Option<Recording>,
     /// The movements that were recorded.
     movements: Vec<Movement>,
     measures: PropertySet,
@@ -124,9 +125,15 @@ impl Replay {
                 .filter(|&p| traction || p != Property::Traction)
                 .collect(),
             slides,
+            last: None,
             movements,
             random,
         }
+    }
+
+    /// The slide that was replayed last.
+    pub fn last(&self) -> Option<&Recording> {
+        self.last.as_ref()
     }
 }
 
@@ -152,7 +159,7 @@ impl Rig for Replay {
             });
         }
         let drawn = recorded[self.random.random_range(0..recorded.len())];
-        self.slides.remove(drawn).play(slide);
+        self.last.insert(self.slides.remove(drawn)).play(slide);
         Ok(())
     }
 

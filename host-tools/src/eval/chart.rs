@@ -1,28 +1,15 @@
-//! Charts and matrices as SVG: how they are drawn, whatever they show.
+//! Charts as SVG: how they are drawn, whatever they show.
 
-use std::fmt::Write as _;
-use std::io;
+pub(crate) mod grid;
+mod labels;
+mod svg;
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use serde::Serialize;
 
-/// Colours that differ for every eye (Okabe & Ito), without the yellow, which is too light for white paper.
-pub(crate) const COLOURS: [RGBColor; 7] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(230, 159, 0),
-    RGBColor(0, 0, 0),
-];
-/// For what is only there for comparison.
-const GREY: RGBColor = RGBColor(110, 110, 110);
-/// Height of the letters, px.
-const TEXT: u32 = 13;
-const FONT: &str = "sans-serif";
+use labels::{Area, lines, place, width};
+pub(crate) use svg::{COLOURS, EM, GREY, WIDTH};
+pub use svg::{DrawError, Figure};
+use svg::{FONT, Failed, From, INK, Root, TEXT, Tip, caption, figure, write};
 
 /// What stands at a point.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -35,6 +22,9 @@ pub(crate) enum Mark {
     Square,
 }
 
+/// The marks in the order in which series take them: the colour alone is not enough for every eye.
+pub(crate) const MARKS: [Mark; 4] = [Mark::Circle, Mark::Triangle, Mark::Square, Mark::Cross];
+
 /// Points of one kind.
 pub(crate) struct Series {
     /// Written at the last point, or in the legend; empty for none.
@@ -43,7 +33,15 @@ pub(crate) struct Series {
     pub(crate) mark: Mark,
     /// Whether a line joins them; dashed if they are only there for comparison.
     pub(crate) line: Option<Line>,
+    /// Of the line, px.
+    pub(crate) width: u32,
     pub(crate) points: Vec<(f64, f64)>,
+    /// Lower and upper end of each point's error bar; none where it is empty.
+    pub(crate) bars: Vec<(f64, f64)>,
+    /// Written beside each point where there is room; nothing where it is empty.
+    pub(crate) labels: Vec<String>,
+    /// What each point says to those who point at it; nothing where it is empty.
+    pub(crate) says: Vec<String>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -65,7 +63,11 @@ impl Series {
             colour: COLOURS[colour % COLOURS.len()],
             mark,
             line: None,
+            width: 2,
             points,
+            bars: Vec::new(),
+            labels: Vec::new(),
+            says: Vec::new(),
         }
     }
 
@@ -95,6 +97,8 @@ impl Series {
 /// A chart.
 pub(crate) struct Chart<'a> {
     pub(crate) title: String,
+    /// What it shows, for those who cannot see it; empty where the title says it.
+    pub(crate) about: String,
     /// What an axis shows, with its unit.
     pub(crate) x: &'a str,
     pub(crate) y: &'a str,
@@ -103,38 +107,23 @@ pub(crate) struct Chart<'a> {
     /// Number of marks on the x axis, and what stands there.
     pub(crate) x_marks: usize,
     pub(crate) x_text: &'a dyn Fn(f64) -> String,
+    /// Number of marks on the y axis.
+    pub(crate) y_marks: usize,
+    /// A part of the x axis that is shaded, and why.
+    pub(crate) span: Option<((f64, f64), &'a str)>,
     /// Names at the ends of the lines rather than in a legend.
     pub(crate) named_at_end: bool,
+    /// Words below it.
+    pub(crate) below: &'a str,
     /// px
     pub(crate) size: (u32, u32),
     pub(crate) series: Vec<Series>,
 }
 
-/// A figure, or a panel of one.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub(crate) struct Figure {
-    /// Name of its file, without the ending.
-    pub(crate) id: String,
-    /// What it shows, for those who cannot see it.
-    pub(crate) title: String,
-    /// The drawing.
-    pub(crate) svg: String,
-}
-
 /// Of one panel, px.
-const PANEL: (u32, u32) = (440, 320);
-
-/// Why a drawing fails: drawing into a string does not, but the library says it might.
-type Failed = DrawingAreaErrorKind<io::Error>;
-
-/// A figure was not drawn.
-#[derive(Debug, thiserror::Error)]
-#[error("the figure \"{figure}\" cannot be drawn; please report this")]
-pub struct DrawError {
-    /// Its title.
-    figure: String,
-    source: Failed,
-}
+pub(crate) const PANEL: (u32, u32) = (WIDTH, 350);
+/// Height of a line of words, px.
+const LINE: i32 = TEXT as i32 + 2;
 
 /// Range that holds all values, with a little room.
 pub(crate) fn buffer(values: impl Iterator<Item = f64>) -> (f64, f64) {
@@ -166,12 +155,11 @@ pub fn curves(
     y: &str,
     curves: &[(&str, Vec<(f64, f64)>)],
 ) -> Result<String, DrawError> {
-    let marks = [Mark::Circle, Mark::Triangle, Mark::Square, Mark::Cross];
     let series = curves.iter().enumerate();
     let series = series.map(|(n, (name, points))| {
         Series::curve(
-            n % marks.len(),
-            marks[n % marks.len()],
+            n % MARKS.len(),
+            MARKS[n % MARKS.len()],
             *name,
             points.clone(),
         )
@@ -182,10 +170,7 @@ pub fn curves(
             .flat_map(|(_, points)| points)
             .map(|(x, _)| *x),
     );
-    let chart = Chart {
-        size: (640, 400),
-        ..Chart::new(title, x, y, x_range, series.collect())
-    };
+    let chart = Chart::new(title, x, y, x_range, series.collect());
     Ok(chart.figure("")?.svg)
 }
 
@@ -198,18 +183,30 @@ impl<'a> Chart<'a> {
         x_range: (f64, f64),
         series: Vec<Series>,
     ) -> Self {
+        let bars = series.iter().flat_map(|s| &s.bars);
+        let bars = bars.flat_map(|&(low, high)| [low, high]);
+        let points = series.iter().flat_map(|s| &s.points).map(|p| p.1);
         Self {
             title: title.into(),
+            about: String::new(),
             x,
             y,
             x_range,
-            y_range: buffer(series.iter().flat_map(|s| &s.points).map(|p| p.1)),
+            y_range: buffer(points.chain(bars)),
             x_marks: 6,
             x_text: &plain,
+            y_marks: 6,
+            span: None,
             named_at_end: false,
+            below: "",
             size: PANEL,
             series,
         }
+    }
+
+    /// Height of these words below a chart, px.
+    pub(crate) fn height_of(below: &str) -> u32 {
+        (LINE * lines(below, EM, WIDTH as i32 - 16).len() as i32) as u32
     }
 
     /// Draws it.
@@ -217,23 +214,42 @@ impl<'a> Chart<'a> {
     /// # Errors
     /// See [`DrawError`].
     pub(crate) fn figure(self, id: impl Into<String>) -> Result<Figure, DrawError> {
-        let (svg, _) = svg(&self.title, self.size, |root| self.draw(root))?;
-        Ok(Figure {
-            id: id.into(),
-            title: self.title,
-            svg,
+        figure(id, &self.title, &self.about, self.size, |root| {
+            Ok(self.draw(root)?.1)
         })
     }
 
-    /// Draws it, and says where in the drawing the area between the axes is: left, right, top and bottom in px.
-    fn draw(&self, root: &Root<'_>) -> Result<[i32; 4], Failed> {
-        let right = if self.named_at_end { 62 } else { 14 };
+    /// Draws it, and says where in the drawing the area between the axes is, and what its points say.
+    fn draw(&self, root: &Root<'_>) -> Result<(Area, Vec<Tip>), Failed> {
+        let (full, tall) = (self.size.0 as i32, self.size.1 as i32);
+        let mut top = match self.title.as_str() {
+            "" => 4,
+            title => caption(root, title, self.size.0)? as i32,
+        };
+        if !self.named_at_end {
+            top = self.legend(root, top)?;
+        }
+        let names = self.series.iter().map(|s| width(&s.name, EM));
+        let right = match names.max() {
+            Some(longest) if self.named_at_end => longest + 30,
+            _ => 16,
+        };
+        let below = lines(self.below, EM, full - 16);
+        let below: Vec<&String> = below.iter().filter(|line| !line.is_empty()).collect();
+        let under = LINE * below.len() as i32;
+        for (line, y) in below
+            .iter()
+            .zip((tall - under + 4..).step_by(LINE as usize))
+        {
+            write(root, line, (8, y), From::Left, BLACK)?;
+        }
         let mut on = ChartBuilder::on(root);
         on.margin(6)
+            .margin_top(top)
             .margin_right(right)
-            .caption(&self.title, (FONT, TEXT + 2))
-            .x_label_area_size(42)
-            .y_label_area_size(58);
+            .margin_bottom(6 + under)
+            .x_label_area_size(if self.x.is_empty() { 24 } else { 48 })
+            .y_label_area_size(70);
         let (x_range, y_range) = (self.x_range, self.y_range);
         let mut drawn = on.build_cartesian_2d(x_range.0..x_range.1, y_range.0..y_range.1)?;
         let (x_text, y_text) = (|x: &f64| (self.x_text)(*x), |y: &f64| plain(*y));
@@ -241,7 +257,7 @@ impl<'a> Chart<'a> {
         mesh.x_desc(self.x)
             .y_desc(self.y)
             .x_labels(self.x_marks)
-            .y_labels(6)
+            .y_labels(self.y_marks)
             .x_label_formatter(&x_text)
             .y_label_formatter(&y_text)
             .light_line_style(TRANSPARENT)
@@ -252,8 +268,12 @@ impl<'a> Chart<'a> {
             mesh.disable_mesh();
         }
         mesh.draw()?;
+        if let Some(((from, to), _)) = self.span {
+            let corners = [(from, y_range.0), (to, y_range.1)];
+            drawn.draw_series([Rectangle::new(corners, SPAN.mix(SPAN_SHADE).filled())])?;
+        }
         for series in &self.series {
-            let style = series.colour.stroke_width(2);
+            let style = series.colour.stroke_width(series.width);
             match series.line {
                 Some(Line::Whole) => {
                     drawn.draw_series([PathElement::new(series.points.clone(), style)])?;
@@ -265,53 +285,94 @@ impl<'a> Chart<'a> {
                 }
                 None => {}
             }
-            let at = series.points.iter().copied();
-            let filled = series.colour.filled();
-            match series.mark {
-                Mark::None => {}
-                Mark::Circle => {
-                    drawn.draw_series(at.map(|p| Circle::new(p, 3, filled)))?;
-                }
-                Mark::Cross => {
-                    drawn.draw_series(at.map(|p| Cross::new(p, 3, style)))?;
-                }
-                Mark::Triangle => {
-                    drawn.draw_series(at.map(|p| TriangleMarker::new(p, 4, filled)))?;
-                }
-                Mark::Square => {
-                    let corners = [(-3, -3), (3, 3)];
-                    let square = |p| EmptyElement::at(p) + Rectangle::new(corners, filled);
-                    drawn.draw_series(at.map(square))?;
-                }
-            }
+            let bars = series.points.iter().zip(&series.bars);
+            let bars = bars.map(|(&(x, _), &(low, high))| vec![(x, low), (x, high)]);
+            drawn.draw_series(bars.map(|bar| PathElement::new(bar, style)))?;
         }
         let area = drawn.plotting_area();
         let (x, y) = (area.get_x_axis_pixel_range(), area.get_y_axis_pixel_range());
         let [left, right] = [x.start.min(x.end), x.start.max(x.end)];
         let [top, bottom] = [y.start.min(y.end), y.start.max(y.end)];
-        let mut taken: Vec<i32> = Vec::new();
-        let named = self.series.iter().filter(|s| !s.name.is_empty());
-        for (nth, series) in (0..).zip(named) {
-            let style = (FONT, TEXT).into_font().color(&series.colour);
-            let style = style.pos(Pos::new(HPos::Left, VPos::Center));
-            if self.named_at_end {
-                let Some(last) = series.points.last() else {
-                    continue;
-                };
-                let (x, mut y) = area.map_coordinate(last);
+        let mut tips = Vec::new();
+        let (mut ends, mut points, mut labels): (Vec<i32>, Vec<_>, Vec<_>) = Default::default();
+        for series in &self.series {
+            let at: Vec<(i32, i32)> = series
+                .points
+                .iter()
+                .map(|p| area.map_coordinate(p))
+                .collect();
+            for &at in &at {
+                mark(root, series, at)?;
+            }
+            tips.extend(at.iter().zip(&series.says).map(|(&(x, y), says)| Tip {
+                area: [x - 8, y - 8, x + 8, y + 8],
+                says: says.clone(),
+            }));
+            points.extend(at.iter().zip(&series.labels).map(|(at, _)| *at));
+            labels.extend(series.labels.iter().cloned());
+            if let (true, false, Some(&(x, mut y))) =
+                (self.named_at_end, series.name.is_empty(), at.last())
+            {
                 // names do not cover each other, nor what is written below the axis
                 let away = if y > (top + bottom) / 2 { -1 } else { 1 };
-                while taken.iter().any(|other| (other - y).abs() < TEXT as i32) {
+                while ends.iter().any(|other| (other - y).abs() < LINE - 3) {
                     y += away;
                 }
-                taken.push(y);
-                root.draw(&Text::new(series.name.clone(), (x + 6, y), style))?;
-            } else {
-                let name = format!("{} {}", sign(series), series.name);
-                root.draw(&Text::new(name, (left + 8, top + 12 + 16 * nth), style))?;
+                ends.push(y);
+                mark(root, series, (x + 13, y))?;
+                write(root, &series.name, (x + 21, y), From::Left, BLACK)?;
             }
         }
-        Ok([left, right, top, bottom])
+        let inside = [left + 2, top + 2, right - 2, bottom - 2];
+        let placed = place(&points, &labels, EM, inside, &[]);
+        for ((at, label), middle) in points.iter().zip(&labels).zip(placed) {
+            let Some((x, y)) = middle else { continue };
+            let half = width(label, EM) / 2;
+            let near = ((at.0).clamp(x - half, x + half), (at.1).clamp(y - 8, y + 8));
+            if (near.0 - at.0).abs() + (near.1 - at.1).abs() > 12 {
+                root.draw(&PathElement::new(vec![*at, near], BLACK.mix(0.4)))?;
+            }
+            write(root, label, (x, y), From::Middle, INK)?;
+        }
+        Ok(([left, top, right, bottom], tips))
+    }
+
+    /// Writes the legend below the title, in as many lines as it takes; gives the px down to its end.
+    fn legend(&self, root: &Root<'_>, top: i32) -> Result<i32, Failed> {
+        const SIGN: i32 = 30;
+        let (mut x, mut y) = (10, top + 8);
+        let mut next = |name: &str| {
+            let wide = SIGN + width(name, EM) + 12;
+            if x > 10 && x + wide > self.size.0 as i32 {
+                (x, y) = (10, y + LINE);
+            }
+            x += wide;
+            (x - wide, y)
+        };
+        let mut is_empty = true;
+        for series in self.series.iter().filter(|s| !s.name.is_empty()) {
+            let (x, y) = next(&series.name);
+            let style = series.colour.stroke_width(2);
+            let lines: &[[i32; 2]] = match series.line {
+                Some(Line::Whole) => &[[0, 24]],
+                Some(Line::Dashed) => &[[0, 9], [14, 24]],
+                None => &[],
+            };
+            for [from, to] in lines {
+                root.draw(&PathElement::new(vec![(x + from, y), (x + to, y)], style))?;
+            }
+            mark(root, series, (x + 12, y))?;
+            write(root, &series.name, (x + SIGN, y), From::Left, BLACK)?;
+            is_empty = false;
+        }
+        if let Some((_, name)) = self.span.filter(|(_, name)| !name.is_empty()) {
+            let (x, y) = next(name);
+            let corners = [(x, y - 6), (x + 24, y + 6)];
+            root.draw(&Rectangle::new(corners, SPAN.mix(SPAN_SHADE).filled()))?;
+            write(root, name, (x + SIGN, y), From::Left, BLACK)?;
+            is_empty = false;
+        }
+        Ok(if is_empty { top } else { y + LINE - 6 })
     }
 
     /// Cuts a line into dashes of about a 60th of the chart.
@@ -329,182 +390,21 @@ impl<'a> Chart<'a> {
     }
 }
 
-type Root<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// Colour of a part of an axis, and how much of it.
+const SPAN: RGBColor = COLOURS[4];
+const SPAN_SHADE: f64 = 0.25;
 
-/// A drawing of this size in px on white paper, and what `draw` says of it.
-fn svg<T>(
-    title: &str,
-    size: (u32, u32),
-    draw: impl FnOnce(&Root<'_>) -> Result<T, Failed>,
-) -> Result<(String, T), DrawError> {
-    let mut svg = String::new();
-    let drawn = {
-        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        let drawn = root.fill(&WHITE).and_then(|()| draw(&root));
-        drawn.and_then(|drawn| root.present().map(|()| drawn))
-    };
-    let drawn = drawn.map_err(|source| DrawError {
-        figure: title.to_owned(),
-        source,
-    })?;
-    Ok((svg, drawn))
-}
-
-/// What stands before a name in a legend: the colour alone is not enough for every eye.
-fn sign(series: &Series) -> &'static str {
-    match (series.mark, series.line) {
-        (Mark::Circle, _) => "\u{25cf}",
-        (Mark::Cross, _) => "\u{d7}",
-        (Mark::Triangle, _) => "\u{25b2}",
-        (Mark::Square, _) => "\u{25a0}",
-        (Mark::None, Some(Line::Dashed)) => "\u{2013} \u{2013}",
-        (Mark::None, _) => "\u{2014}",
-    }
-}
-
-/// A cell of a [`grid`].
-pub(crate) struct Tile {
-    pub(crate) text: String,
-    /// 0 is white, 1 the darkest blue.
-    pub(crate) shade: f64,
-    /// Greyed out.
-    pub(crate) avoided: bool,
-    /// With a thick frame.
-    pub(crate) framed: bool,
-}
-
-/// A table of shaded cells, row by row from the top, with names at the left and below.
-///
-/// # Errors
-/// See [`DrawError`].
-pub(crate) fn grid(
-    id: &str,
-    title: String,
-    (x, columns): (&str, &[String]),
-    (y, rows): (&str, &[String]),
-    tiles: &[&[Tile]],
-) -> Result<Figure, DrawError> {
-    const LEFT: i32 = 66;
-    const TOP: i32 = 30;
-    const BELOW: i32 = 46;
-    let size = (PANEL.0, PANEL.1 + 20);
-    let (width, height) = (size.0 as i32 - LEFT - 10, size.1 as i32 - TOP - BELOW);
-    let (svg, ()) = svg(&title, size, |root| {
-        let style = |font: FontDesc<'static>, colour: &RGBColor, horizontal| {
-            font.color(colour).pos(Pos::new(horizontal, VPos::Center))
-        };
-        let font = || (FONT, TEXT).into_font();
-        let write =
-            |text: &str, at: (i32, i32), style| root.draw(&Text::new(text.to_owned(), at, style));
-        let middle = |colour| style(font(), colour, HPos::Center);
-        let bold = style((FONT, TEXT + 2).into_font(), &BLACK, HPos::Center);
-        write(&title, (size.0 as i32 / 2, 14), bold)?;
-        write(x, (LEFT + width / 2, size.1 as i32 - 12), middle(&BLACK))?;
-        let turned = font().transform(FontTransform::Rotate270);
-        write(
-            y,
-            (12, TOP + height / 2),
-            style(turned, &BLACK, HPos::Center),
-        )?;
-        let column = |c: usize| LEFT + width * c as i32 / columns.len().max(1) as i32;
-        let row = |r: usize| TOP + height * r as i32 / rows.len().max(1) as i32;
-        for (c, name) in columns.iter().enumerate() {
-            let at = ((column(c) + column(c + 1)) / 2, TOP + height + 12);
-            write(name, at, middle(&BLACK))?;
-        }
-        let mut frames = Vec::new();
-        for (r, (name, tiles)) in rows.iter().zip(tiles).enumerate() {
-            let y = (row(r) + row(r + 1)) / 2;
-            write(name, (LEFT - 6, y), style(font(), &BLACK, HPos::Right))?;
-            for (c, tile) in tiles.iter().enumerate() {
-                let corners = [(column(c), row(r)), (column(c + 1), row(r + 1))];
-                let dark = tile.avoided || tile.shade > 0.55;
-                let ink = if dark { &WHITE } else { &BLACK };
-                let of = |dark: f64| (255.0 - (255.0 - dark) * tile.shade) as u8;
-                let fill = if tile.avoided {
-                    RGBColor(150, 150, 150)
-                } else {
-                    RGBColor(of(0.0), of(84.0), of(140.0))
-                };
-                root.draw(&Rectangle::new(corners, fill.filled()))?;
-                root.draw(&Rectangle::new(corners, WHITE.stroke_width(1)))?;
-                write(
-                    &tile.text,
-                    ((corners[0].0 + corners[1].0) / 2, y),
-                    middle(ink),
-                )?;
-                if tile.framed {
-                    frames.push(corners);
-                }
-            }
-        }
-        for [from, to] in frames {
-            let inner = [(from.0 + 2, from.1 + 2), (to.0 - 2, to.1 - 2)];
-            root.draw(&Rectangle::new(inner, COLOURS[1].stroke_width(4)))?;
-        }
-        Ok(())
-    })?;
-    Ok(Figure {
-        id: id.to_owned(),
-        title,
-        svg,
-    })
-}
-
-/// Lower ends of the shades of a [`matrix`]: what is less is white.
-pub(crate) const SHADES: [f32; 5] = [0.05, 0.2, 0.4, 0.6, 0.8];
-
-/// A symmetric matrix of degrees from 0 to 1 as an image, `title` above it: black is 1. `told` is for those who cannot see it.
-///
-/// # Errors
-/// See [`DrawError`].
-pub(crate) fn matrix(
-    id: impl Into<String>,
-    title: &str,
-    told: impl Into<String>,
-    axis: &str,
-    of: &[Vec<f32>],
-) -> Result<Figure, DrawError> {
-    let n = of.len() as f64;
-    let chart = Chart {
-        y_range: (n + 0.5, 0.5),
-        size: (PANEL.0, PANEL.0),
-        ..Chart::new(title, axis, axis, (0.5, n + 0.5), Vec::new())
-    };
-    let (svg, area) = svg(title, chart.size, |root| chart.draw(root))?;
-    let [left, right, top, bottom] = area.map(f64::from);
-    // one path for each shade: 13 689 rectangles would be megabytes
-    let mut paths = String::new();
-    for (level, least) in SHADES.iter().enumerate() {
-        let most = SHADES.get(level + 1).copied().unwrap_or(f32::INFINITY);
-        let is = |degree: &f32| (*least..most).contains(degree);
-        let mut path = String::new();
-        for (r, row) in of.iter().enumerate() {
-            let mut c = 0;
-            while c < row.len() {
-                let run = row[c..].iter().take_while(|degree| is(degree)).count();
-                if run > 0 {
-                    // in cells; the transformation makes pixels of them
-                    let _ = write!(path, "M{c} {r}h{run}v1h-{run}z");
-                }
-                c += run.max(1);
-            }
-        }
-        let grey = 255 - 51 * (level as u32 + 1);
-        if !path.is_empty() {
-            let _ = writeln!(
-                paths,
-                "<path fill=\"rgb({grey},{grey},{grey})\" d=\"{path}\"/>"
-            );
+/// Draws the mark of a series.
+fn mark(root: &Root<'_>, series: &Series, at: (i32, i32)) -> Result<(), Failed> {
+    let filled = series.colour.filled();
+    match series.mark {
+        Mark::None => Ok(()),
+        Mark::Circle => root.draw(&Circle::new(at, 3, filled)),
+        Mark::Cross => root.draw(&Cross::new(at, 3, series.colour.stroke_width(2))),
+        Mark::Triangle => root.draw(&TriangleMarker::new(at, 4, filled)),
+        Mark::Square => {
+            let (x, y) = at;
+            root.draw(&Rectangle::new([(x - 3, y - 3), (x + 3, y + 3)], filled))
         }
     }
-    let (width, height) = ((right - left) / n, (bottom - top) / n);
-    let image = format!(
-        "<g shape-rendering=\"crispEdges\" transform=\"translate({left} {top}) scale({width} {height})\">\n{paths}</g>\n</svg>"
-    );
-    Ok(Figure {
-        id: id.into(),
-        title: told.into(),
-        svg: svg.replacen("</svg>", &image, 1),
-    })
 }

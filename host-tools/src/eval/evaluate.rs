@@ -145,13 +145,13 @@ pub fn play<const N: usize>(
     play_with(explorer, confusions, strategy, run, |_, _| ())
 }
 
-/// As [`play`]; `each` gets every action and the posterior after it.
+/// As [`play`]; `each` gets every action and the explorer after it.
 pub fn play_with<const N: usize>(
     explorer: &mut Explorer<'_, N>,
     confusions: Option<&Confusions<Vec<Degrees>>>,
     strategy: Strategy,
     mut run: Run<'_>,
-    mut each: impl FnMut(Action, &[f32]),
+    mut each: impl FnMut(Action, &Explorer<'_, N>),
 ) -> Outcome {
     explorer.restart();
     let mut failed = 0;
@@ -182,7 +182,7 @@ pub fn play_with<const N: usize>(
         explorer
             .observe(action, slide)
             .expect("every slide has the properties that the explorer was told of");
-        each(action, explorer.posterior());
+        each(action, explorer);
     };
     Outcome {
         unknown: run.unknown,
@@ -205,13 +205,36 @@ pub fn evaluate(
     runs: u64,
     done: impl Fn() + Sync,
 ) -> Result<Vec<Outcome>, EvaluateError> {
+    evaluate_by(
+        experiment,
+        config,
+        runs,
+        done,
+        |explorer, confusions, run| play(explorer, confusions, config.strategy, run),
+    )
+}
+
+/// Plays `runs` runs on all cores, each by `play`: see [`evaluate`].
+pub(super) fn evaluate_by<T: Send>(
+    experiment: &Experiment,
+    config: Config,
+    runs: u64,
+    done: impl Fn() + Sync,
+    play: impl Fn(&mut Explorer<'_, MAX_TEXTURES>, Kept<'_>, Run<'_>) -> T + Sync,
+) -> Result<Vec<T>, EvaluateError> {
     // where every run learns from the same slides, one table serves all
     if experiment.is_fixed() {
         let bytes = experiment.run(0).learn(config.method)?;
         let candidates = experiment.candidates();
         let explorer = explorer(&bytes, experiment.measured(), config, candidates)?;
         let shared = Shared::new(explorer, config.strategy);
-        return Ok(play_all(experiment, config.strategy, &shared, runs, done));
+        let run = |explorer: &mut Box<Explorer<'_, MAX_TEXTURES>>, index| {
+            let outcome = play(explorer, shared.confusions.as_ref(), experiment.run(index));
+            done();
+            outcome
+        };
+        let all = (0..runs).into_par_iter();
+        return Ok(all.map_init(|| shared.explorer.clone(), run).collect());
     }
     (0..runs)
         .into_par_iter()
@@ -220,34 +243,15 @@ pub fn evaluate(
             let bytes = run.learn(config.method)?;
             let candidates = experiment.candidates();
             let mut explorer = explorer(&bytes, experiment.measured(), config, candidates)?;
-            let outcome = play(&mut explorer, None, config.strategy, run);
+            let outcome = play(&mut explorer, None, run);
             done();
             Ok(outcome)
         })
         .collect()
 }
 
-/// Runs that all begin with the same.
-fn play_all(
-    experiment: &Experiment,
-    strategy: Strategy,
-    shared: &Shared<'_>,
-    runs: u64,
-    done: impl Fn() + Sync,
-) -> Vec<Outcome> {
-    (0..runs)
-        .into_par_iter()
-        .map_init(
-            || shared.explorer.clone(),
-            |explorer, index| {
-                let run = experiment.run(index);
-                let outcome = play(explorer, shared.confusions.as_ref(), strategy, run);
-                done();
-                outcome
-            },
-        )
-        .collect()
-}
+/// Degrees of confusion, where they are kept.
+pub(super) type Kept<'k> = Option<&'k Confusions<Vec<Degrees>>>;
 
 /// An explorer on the heap: it is large, and the threads' stacks are not. Without `candidates`, all textures are.
 ///

@@ -287,9 +287,9 @@ fn evolution(
         None,
         Method::Paper.strategy(),
         run,
-        |action, posterior| {
+        |action, explorer| {
             steps.extend(action.property.map(|property| (action.movement, property)));
-            posteriors.push(posterior.to_vec());
+            posteriors.push(explorer.posterior().to_vec());
         },
     );
     let named = |index: usize| Named::new(index as u8 + 1);

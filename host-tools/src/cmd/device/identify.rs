@@ -5,6 +5,8 @@ use std::io::{self, Write};
 use anyhow::Context as _;
 use serde::Serialize;
 use tactus::eval::evaluate::Method;
+use tactus::eval::pictures::exploration::Exploration;
+use tactus::eval::pictures::timeline::{Timeline, Watch};
 use tactus::eval::show::Show;
 use tactus::eval::transcript::{Answer, Transcript};
 use tactus::link::Request;
@@ -18,6 +20,7 @@ use super::train::seed_of_now;
 use crate::cmd::args::Stop;
 use crate::cmd::names::nearest;
 use crate::cmd::output::{Done, Format, print_json};
+use crate::cmd::plot::Plot;
 
 /// Have the probe identify what lies under its finger, and show every step
 #[derive(clap::Args)]
@@ -25,13 +28,16 @@ use crate::cmd::output::{Done, Format, print_json};
 Examples:
   tactus device identify --log session.jsonl          every report is kept, and can be computed again
   tactus device identify --among burlap,silk --closed it is one of these two
-  tactus device identify --emulated --texture burlap  on the emulated board")]
+  tactus device identify --emulated --texture burlap  on the emulated board
+  tactus device identify --plot pictures              as `tactus identify` draws them")]
 pub(crate) struct Run {
     #[command(flatten)]
     args: Args,
     /// How to print the exploration
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
+    #[command(flatten)]
+    plot: Plot,
 }
 
 /// What to identify, where, and how.
@@ -105,7 +111,8 @@ struct Identification {
 
 /// Has the probe explore.
 pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
-    let Run { args, format } = run;
+    let Run { args, format, plot } = run;
+    let canvas = plot.open()?;
     let (stdout, mut nowhere) = (out, io::sink());
     let out: &mut dyn Write = match format {
         Format::Text => &mut *stdout,
@@ -125,8 +132,13 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
     bench.get(Request::command(Command::Stream(true)))?;
     let mut show = Show::new(table, &mut *out);
     let mut slides = Transcript::default();
+    let (mut exploration, mut watch) = (Exploration::new(table), Watch::default());
     let found = bench.run(Request::identify(wanted), |report| {
         slides.event(&report.event, table);
+        if canvas.is_some() {
+            exploration.event(&report.event);
+            watch.report(report.at_ms, &report.event);
+        }
         show.event(&report.event)
     })?;
     let answered = show.answered();
@@ -164,6 +176,11 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
             reports_lost: missing,
         };
         print_json(&identification, stdout)?;
+    }
+    if let Some(canvas) = canvas {
+        let mut figures = exploration.figures(args.stop.threshold)?;
+        figures.extend(watch.last().map(Timeline::figure).transpose()?);
+        canvas.write("tactus device identify", &figures, stdout)?;
     }
     Ok(match answered.map(|(verdict, _)| verdict.told()) {
         Some(Told::Sure) => Done::Fully,

@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, ensure};
 use clap::Subcommand;
+use tactus::eval::chart::{DrawError, Figure};
+use tactus::eval::pictures::exploration::Exploration;
+use tactus::eval::pictures::timeline::{Timeline, Watch};
 use tactus::eval::show::Show;
 use tactus::link::follow::{ALLOWED, Agreement, Follower};
 use tactus_core::dsp::Plan;
@@ -16,33 +19,69 @@ use tactus_core::table::Table;
 use tactus_core::wire::{self, Event, Forget, Identify, PROTOCOL, Verdict};
 
 use super::log::Line;
+use crate::cmd::plot::Plot;
 
 /// Show the log of a session (--log), or compute its decisions again
 #[derive(Subcommand)]
 #[command(after_help = "\
 Examples:
   tactus device log show session.jsonl
+  tactus device log show session.jsonl --plot pictures     as `tactus identify` draws them
   tactus device log replay session.jsonl    computes every decision again; exit code 1 if one differs")]
 pub(crate) enum Command {
     /// Compute every decision of the session again, and compare
     Replay {
         /// The log
         file: PathBuf,
+        #[command(flatten)]
+        plot: Plot,
     },
     /// Show the session's explorations as they were shown live
     Show {
         /// The log
         file: PathBuf,
+        #[command(flatten)]
+        plot: Plot,
     },
 }
 
 /// Shows or replays a log.
 pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()> {
+    let (Command::Replay { plot, .. } | Command::Show { plot, .. }) = command;
+    let canvas = plot.open()?;
     let (file, done) = match command {
-        Command::Replay { file } => (file, replay(file, out)),
-        Command::Show { file } => (file, show(file, out)),
+        Command::Replay { file, .. } => (file, replay(file, out)),
+        Command::Show { file, .. } => (file, show(file, out)),
     };
-    done.with_context(|| file.display().to_string())
+    done.with_context(|| file.display().to_string())?;
+    if let Some(canvas) = canvas {
+        canvas.write("tactus device log", &pictures(&explorations(file)?)?, out)?;
+    }
+    Ok(())
+}
+
+/// The pictures of the explorations whose table the log has. Where there are several, their names begin with their number.
+fn pictures(explorations: &[Logged]) -> Result<Vec<Figure>, DrawError> {
+    let mut all = Vec::new();
+    for (logged, number) in explorations.iter().zip(1..) {
+        let Some(table) = logged.table() else {
+            continue;
+        };
+        let (mut exploration, mut watch) = (Exploration::new(table), Watch::default());
+        for (event, at_ms) in logged.events.iter().zip(&logged.at_ms) {
+            exploration.event(event);
+            watch.report(*at_ms, event);
+        }
+        let mut figures = exploration.figures(logged.asked.threshold)?;
+        figures.extend(watch.last().map(Timeline::figure).transpose()?);
+        for figure in &mut figures {
+            if explorations.len() > 1 {
+                figure.id = format!("{number}-{}", figure.id);
+            }
+        }
+        all.extend(figures);
+    }
+    Ok(all)
 }
 
 /// Versions of the messages whose logs are read: since the first of them only reasons have become more than sentences.
@@ -80,6 +119,8 @@ struct Logged {
     /// The table in use, or why it is not known.
     table: Result<Vec<u8>, &'static str>,
     events: Vec<Event>,
+    /// When each of them was reported, since the probe booted.
+    at_ms: Vec<u32>,
 }
 
 impl Logged {
@@ -120,6 +161,7 @@ fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
                         asked,
                         table: table.clone(),
                         events: Vec::new(),
+                        at_ms: Vec::new(),
                     });
                 }
                 wire::Command::Label(_)
@@ -131,7 +173,7 @@ fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
                 | wire::Command::FactoryTable => table = Err(CHANGED),
                 _ => {}
             },
-            Line::Report(report) => match report.into_owned().event {
+            Line::Report(ref report) => match report.event.clone() {
                 Event::TablePart {
                     offset,
                     length,
@@ -154,6 +196,7 @@ fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
                     let over = matches!(event, Event::Verdict(_) | Event::Refused { .. });
                     if running && let Some(last) = explorations.last_mut() {
                         last.events.push(event);
+                        last.at_ms.push(report.at_ms);
                         running = !over;
                     }
                 }

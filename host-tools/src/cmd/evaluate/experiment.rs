@@ -11,6 +11,7 @@ use tactus::eval::experiment::{Experiment, Protocol};
 
 use crate::cmd::args::{Features, Recordings, Stop};
 use crate::cmd::output::Format;
+use crate::cmd::plot::Plot;
 use crate::cmd::textures::{measure_folder, names};
 
 /// Play thousands of virtual explorations and count the right answers
@@ -36,10 +37,14 @@ is taken for new. --lifelong plays a session in time order: the first slides are
 episode of its own.
 Both need the method fused.
 
+--plot draws what is told of each texture (confusion), how often it was right when it said 99 % (reliability), and slides and
+errors by threshold (slides-by-threshold, errors-by-threshold).
+
 Examples:
   tactus evaluate --recordings DIR --protocol drift
   tactus evaluate --recordings DIR --method paper
   tactus evaluate --recordings DIR --novelty leave-one-out
+  tactus evaluate --recordings DIR --plot pictures
   tactus evaluate --recordings DIR --lifelong")]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -85,6 +90,8 @@ pub(crate) struct Args {
     /// How to print the figures
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub(crate) format: Format,
+    #[command(flatten)]
+    pub(crate) plot: Plot,
 }
 
 impl Args {

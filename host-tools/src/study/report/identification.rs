@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::model::{Cell, Report, Rows, cells};
-use crate::eval::chart::{Chart, DrawError, Figure, Mark, Series};
+use crate::eval::chart::{Chart, DrawError, Figure, MARKS, Mark, Series};
 use crate::eval::evaluate::Method;
 use crate::sim::collection::Collection;
 use crate::study::identify::{
@@ -146,7 +146,6 @@ fn fig10_panel(n: u8, evolution: &Evolution) -> Result<Figure, DrawError> {
                 format!("M{} {}", movement + 1, property.name()[..1].to_uppercase())
             })
     };
-    let marks = [Mark::Circle, Mark::Triangle, Mark::Square, Mark::Cross];
     // the unknown one first: it keeps its colour in all panels
     let all = &evolution.probabilities;
     let (unknown, others): (Vec<_>, Vec<_>) = all
@@ -160,28 +159,24 @@ fn fig10_panel(n: u8, evolution: &Evolution) -> Result<Figure, DrawError> {
         let name = format!("T{}", texture.number);
         series.push(Series::curve(
             n,
-            marks[n % marks.len()],
+            MARKS[n % MARKS.len()],
             name,
             points.collect(),
         ));
     }
     series.push(Series::dashed("", vec![(0.0, 0.99), (steps, 0.99)]));
     let title = format!("{}: {}", evolution.unknown, evolution.example);
-    let told = format!("{title}; the answer was {}", evolution.identified);
+    let told = format!("The answer was {}", evolution.identified);
     let (x, y) = ("movement and property", "probability");
-    let drawn = Chart {
+    Chart {
+        about: told,
         y_range: (0.0, 1.04),
         x_marks: evolution.steps.len() + 1,
         x_text: &step,
         named_at_end: true,
-        size: (520, 320),
         ..Chart::new(title, x, y, (-0.2, steps + 0.2), series)
     }
-    .figure(format!("fig10-{n}"))?;
-    Ok(Figure {
-        title: told,
-        ..drawn
-    })
+    .figure(format!("fig10-{n}"))
 }
 
 /// Adds what came out in each world, and what was asked.
@@ -237,7 +232,6 @@ pub(super) fn add_worlds(worlds: &[WorldRow], report: &mut Report) -> Result<(),
         x_marks: worlds.len().min(20),
         x_text: &seed,
         named_at_end: true,
-        size: (600, 360),
         ..Chart::new(title, x, y, (0.7, worlds.len() as f64 + 0.3), series)
     }
     .figure("worlds")?;

@@ -4,7 +4,8 @@ use serde_json::json;
 use tactus_core::features::Movement;
 
 use super::model::{Cell, Report, axis, cells, movement_name, owned};
-use crate::eval::chart::{Chart, DrawError, Figure, Mark, Series, Tile, grid};
+use crate::eval::chart::grid::{AVOIDED, Grid, Tile};
+use crate::eval::chart::{COLOURS, Chart, DrawError, Figure, Mark, PANEL, Series};
 use crate::study::pilot::{Missed, MostUseful, Pilot, PilotMovement};
 use crate::study::published::PILOT_TRIALS;
 
@@ -169,7 +170,7 @@ fn fig6(pilot: &Pilot) -> Result<Figure, DrawError> {
     Chart {
         x_text: &|x| format!("{:.0}", 10f64.powf(x)),
         named_at_end: true,
-        size: (560, 420),
+        size: (PANEL.0, 420),
         ..Chart::new(title, x, y, (0.96, 2.04), series)
     }
     .figure("fig6")
@@ -188,38 +189,48 @@ fn fig7(pilot: &Pilot, useful: &MostUseful) -> Result<Figure, DrawError> {
         .fold((1.0, 0.0), |(l, h): (f64, f64), u| (l.min(u), h.max(u)));
     let tile = |(at, m): (usize, &PilotMovement)| {
         let paper = if at == useful.paper { "*" } else { "" };
-        if !reached(&m) {
-            return Tile {
-                text: format!("none{paper}"),
-                shade: 0.0,
-                avoided: m.high_wear,
-                framed: false,
-            };
-        }
+        let shade = (high - left(m)) / (high - low).max(1e-9);
+        let (text, shade) = match (reached(&m), m.high_wear) {
+            (true, false) => (format!("{:.2}{paper}", left(m)), shade),
+            (true, true) => (format!("{:.2}{paper}", left(m)), 1.0),
+            (false, _) => (format!("none{paper}"), f64::from(u8::from(m.high_wear))),
+        };
         Tile {
-            text: format!("{:.2}{paper}", left(m)),
-            shade: (high - left(m)) / (high - low).max(1e-9),
-            avoided: m.high_wear,
-            framed: at == useful.movement,
+            text,
+            shade,
+            colour: if m.high_wear { AVOIDED } else { COLOURS[0] },
+            framed: at == useful.movement && reached(&m),
+            says: String::new(),
         }
     };
-    let tiles: Vec<Tile> = pilot.movements.iter().enumerate().map(tile).collect();
+    let mut tiles = pilot.movements.iter().enumerate().map(tile);
+    let mut rows: Vec<Vec<Tile>> = Vec::new();
+    loop {
+        let row: Vec<Tile> = tiles.by_ref().take(6).collect();
+        if row.is_empty() {
+            break;
+        }
+        rows.push(row);
+    }
+    // forces upwards
+    rows.reverse();
     let none = if pilot.movements.iter().all(|m| reached(&m)) {
         ""
     } else {
         " (none: not reached on every texture)"
     };
-    // forces upwards
-    let rows: Vec<&[Tile]> = tiles.chunks(6).rev().collect();
     let speeds = pilot.movements.iter().take(6);
     let speeds: Vec<String> = speeds.map(|m| format!("{:.1}", m.speed_mm_s)).collect();
     let forces = pilot.movements.iter().rev().step_by(6);
     let forces: Vec<String> = forces.map(|m| format!("{:.2}", m.force_n)).collect();
-    grid(
-        &format!("fig7-{property}"),
-        format!("Uncertainty by {property}{none}"),
-        ("sliding speed (mm/s)", &speeds),
-        ("contact force (N)", &forces),
-        &rows,
-    )
+    Grid {
+        id: format!("fig7-{property}"),
+        title: format!("Uncertainty by {property}{none}"),
+        about: "",
+        x: ("sliding speed (mm/s)", speeds),
+        y: ("contact force (N)", forces),
+        tiles: rows,
+        below: "",
+    }
+    .figure()
 }

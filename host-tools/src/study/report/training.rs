@@ -4,7 +4,8 @@ use serde_json::json;
 use tactus_core::features::{Movement, Property};
 
 use super::model::{Report, Rows, axis, cells, movement_name, owned};
-use crate::eval::chart::{Chart, DrawError, Figure, Mark, SHADES, Series, buffer, matrix};
+use crate::eval::chart::grid::{SHADES, matrix};
+use crate::eval::chart::{Chart, DrawError, Figure, MARKS, Mark, Series, buffer};
 use crate::study::published::{MOST_USEFUL, TRIALS};
 use crate::study::training::Training;
 
@@ -131,7 +132,6 @@ fn fig8(
     let series = vec![Series::points(0, Mark::Circle, "", values)];
     Chart {
         x_marks: 7,
-        size: (480, 300),
         ..Chart::new(title, TEXTURES, axis(property), (0.0, 118.0), series)
     }
     .figure(format!("fig8-{property}"))
@@ -148,7 +148,7 @@ fn fig9(training: &Training) -> Result<Vec<Figure>, DrawError> {
         );
         let id = format!("fig9-{}-{}", c.movement + 1, c.property);
         let told = format!("Degrees of confusion by {title}");
-        panels.push(matrix(id, &title, told, TEXTURES, &c.matrix)?);
+        panels.push(matrix(id, &title, &told, TEXTURES, &c.matrix)?);
     }
     let (nine, three) = (
         &training.geometric_mean,
@@ -190,12 +190,11 @@ fn wear(training: &Training) -> Result<Figure, DrawError> {
 
 /// What wear does to roughness, by movement.
 fn roughness(training: &Training) -> Result<Figure, DrawError> {
-    let marks = [Mark::Circle, Mark::Triangle, Mark::Square];
     let mut series = Vec::new();
     for (m, &movement) in training.movements.iter().enumerate() {
         let effects = training.skin.effects.iter().filter(|e| e.movement == m);
         let points = effects.map(|e| (e.wear, e.shift[Property::Roughness.index()]));
-        let mark = marks[m % marks.len()];
+        let mark = MARKS[m % MARKS.len()];
         series.push(Series::curve(
             m,
             mark,
@@ -205,9 +204,5 @@ fn roughness(training: &Training) -> Result<Figure, DrawError> {
     }
     let title = "Change of roughness with wear";
     let (x, y) = ("ridges lost (%)", "change (standard deviations)");
-    let mut chart = Chart::new(title, x, y, (-4.0, 104.0), series);
-    // room for the legend
-    let (low, high) = chart.y_range;
-    chart.y_range.1 = high + 0.25 * (high - low);
-    chart.figure("skin-and-roughness")
+    Chart::new(title, x, y, (-4.0, 104.0), series).figure("skin-and-roughness")
 }

@@ -1,0 +1,194 @@
+//! Tables of shaded cells, and matrices of degrees, as SVG.
+
+use std::fmt::Write as _;
+
+use plotters::prelude::*;
+
+use super::labels::{lines, width};
+use super::svg::{COLOURS, DrawError, EM, Figure, From, GREY, Tip, WIDTH, caption, figure, write};
+use super::{Chart, Series};
+
+/// A cell of a [`Grid`].
+pub(crate) struct Tile {
+    /// Written in it, where it has room.
+    pub(crate) text: String,
+    /// How much of its colour it has, 0 to 1.
+    pub(crate) shade: f64,
+    pub(crate) colour: RGBColor,
+    /// With a thick frame.
+    pub(crate) framed: bool,
+    /// For those who point at it; empty for nothing.
+    pub(crate) says: String,
+}
+
+/// A table of shaded cells.
+pub(crate) struct Grid<'a> {
+    pub(crate) id: String,
+    pub(crate) title: String,
+    /// What it shows, for those who cannot see it.
+    pub(crate) about: &'a str,
+    /// What the columns are, and the name of each.
+    pub(crate) x: (&'a str, Vec<String>),
+    /// What the rows are, and the name of each, from the top.
+    pub(crate) y: (&'a str, Vec<String>),
+    /// Row by row.
+    pub(crate) tiles: Vec<Vec<Tile>>,
+    /// Words below it.
+    pub(crate) below: &'a str,
+}
+
+/// Height of a row that has only a name, and of a line of words, px.
+const LINE: i32 = 18;
+/// Height of the cells of a small table, all together, px.
+const TALL: i32 = 270;
+
+impl Grid<'_> {
+    /// Draws it.
+    ///
+    /// # Errors
+    /// See [`DrawError`].
+    pub(crate) fn figure(self) -> Result<Figure, DrawError> {
+        let (columns, rows) = (&self.x.1, &self.y.1);
+        let longest = |names: &[String]| names.iter().map(|n| width(n, EM)).max().unwrap_or(0);
+        let left = 28 + longest(rows);
+        let wide = WIDTH as i32 - left - 8;
+        let row_height = (TALL / rows.len().max(1) as i32).clamp(LINE, 44);
+        let height = row_height * rows.len() as i32;
+        let below = lines(self.below, EM, WIDTH as i32 - 16);
+        let below: Vec<&String> = below.iter().filter(|line| !line.is_empty()).collect();
+        let title_lines = lines(&self.title, EM * 1.1, WIDTH as i32 - 12).len() as i32;
+        let top = 8 + 20 * title_lines + 2;
+        let size = top + height + 48 + LINE * below.len() as i32;
+        let column = |c: usize| left + wide * c as i32 / columns.len().max(1) as i32;
+        let row = |r: usize| top + row_height * r as i32;
+        // names that would cover each other are left out
+        let room = wide / columns.len().max(1) as i32;
+        let every = (longest(columns) + 4).div_euclid(room.max(1)) as usize + 1;
+        figure(
+            self.id.as_str(),
+            &self.title,
+            self.about,
+            (WIDTH, size as u32),
+            |root| {
+                caption(root, &self.title, WIDTH)?;
+                let middle = left + wide / 2;
+                let under = top + height;
+                write(root, self.x.0, (middle, under + 34), From::Middle, BLACK)?;
+                let side = (11, top + height / 2);
+                write(root, self.y.0, side, From::Upwards, BLACK)?;
+                for (line, y) in below
+                    .iter()
+                    .zip((under + 34 + LINE..).step_by(LINE as usize))
+                {
+                    write(root, line, (8, y), From::Left, BLACK)?;
+                }
+                for (c, name) in columns.iter().enumerate() {
+                    let at = ((column(c) + column(c + 1)) / 2, under + 12);
+                    // the last ones are no numbers, and have room at their sides
+                    let is_shown =
+                        c % every == 0 && c + every <= columns.len() || c + 1 == columns.len();
+                    if is_shown {
+                        write(root, name, at, From::Middle, BLACK)?;
+                    }
+                }
+                let (mut frames, mut tips) = (Vec::new(), Vec::new());
+                for (r, (name, tiles)) in rows.iter().zip(&self.tiles).enumerate() {
+                    let y = (row(r) + row(r + 1)) / 2;
+                    write(root, name, (left - 6, y), From::Right, BLACK)?;
+                    for (c, tile) in tiles.iter().enumerate() {
+                        let corners = [(column(c), row(r)), (column(c + 1), row(r + 1))];
+                        let [(x0, y0), (x1, y1)] = corners;
+                        let fill = tile.colour.mix(tile.shade);
+                        root.draw(&Rectangle::new(corners, fill.filled()))?;
+                        if x1 - x0 > 6 {
+                            root.draw(&Rectangle::new(corners, BLACK.mix(0.15)))?;
+                        }
+                        let ink = if tile.shade > 0.55 { WHITE } else { BLACK };
+                        if width(&tile.text, EM) <= x1 - x0 {
+                            write(root, &tile.text, ((x0 + x1) / 2, y), From::Middle, ink)?;
+                        }
+                        if !tile.says.is_empty() {
+                            tips.push(Tip {
+                                area: [x0, y0, x1, y1],
+                                says: tile.says.clone(),
+                            });
+                        }
+                        if tile.framed {
+                            frames.push(corners);
+                        }
+                    }
+                }
+                let all = [(left, top), (left + wide, top + height)];
+                root.draw(&Rectangle::new(all, BLACK.mix(0.3)))?;
+                for [from, to] in frames {
+                    let inner = [(from.0 + 2, from.1 + 2), (to.0 - 2, to.1 - 2)];
+                    root.draw(&Rectangle::new(inner, COLOURS[1].stroke_width(4)))?;
+                }
+                Ok(tips)
+            },
+        )
+    }
+}
+
+/// Colour of a cell that is to be left out of account.
+pub(crate) const AVOIDED: RGBColor = GREY;
+
+/// Lower ends of the shades of a [`matrix`]: what is less is white.
+pub(crate) const SHADES: [f32; 5] = [0.05, 0.2, 0.4, 0.6, 0.8];
+
+/// A symmetric matrix of degrees from 0 to 1 as an image, `title` above it: black is 1. `told` is for those who cannot see it.
+///
+/// # Errors
+/// See [`DrawError`].
+pub(crate) fn matrix(
+    id: impl Into<String>,
+    title: &str,
+    told: &str,
+    axis: &str,
+    of: &[Vec<f32>],
+) -> Result<Figure, DrawError> {
+    let n = of.len() as f64;
+    let chart = Chart {
+        y_range: (n + 0.5, 0.5),
+        size: (WIDTH, WIDTH),
+        about: told.to_owned(),
+        ..Chart::new(title, axis, axis, (0.5, n + 0.5), Vec::<Series>::new())
+    };
+    let mut area = [0; 4];
+    let mut drawn = figure(id, title, told, chart.size, |root| {
+        let (between, tips) = chart.draw(root)?;
+        area = between;
+        Ok(tips)
+    })?;
+    let [left, top, right, bottom] = area.map(f64::from);
+    // one path for each shade: 13 689 rectangles would be megabytes
+    let mut paths = String::new();
+    for (level, least) in SHADES.iter().enumerate() {
+        let most = SHADES.get(level + 1).copied().unwrap_or(f32::INFINITY);
+        let is = |degree: &f32| (*least..most).contains(degree);
+        let mut path = String::new();
+        for (r, row) in of.iter().enumerate() {
+            let mut c = 0;
+            while c < row.len() {
+                let run = row[c..].iter().take_while(|degree| is(degree)).count();
+                if run > 0 {
+                    // in cells; the transformation makes pixels of them
+                    let _ = write!(path, "M{c} {r}h{run}v1h-{run}z");
+                }
+                c += run.max(1);
+            }
+        }
+        let share = 0.2 * (level + 1) as f64;
+        if !path.is_empty() {
+            let _ = writeln!(
+                paths,
+                "<path fill=\"#000000\" fill-opacity=\"{share:.1}\" d=\"{path}\"/>"
+            );
+        }
+    }
+    let (width, height) = ((right - left) / n, (bottom - top) / n);
+    drawn.add(&format!(
+        "<g shape-rendering=\"crispEdges\" transform=\"translate({left} {top}) scale({width} {height})\">\n{paths}</g>\n"
+    ));
+    Ok(drawn)
+}

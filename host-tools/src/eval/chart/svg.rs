@@ -1,0 +1,205 @@
+//! A drawing as SVG: its colours and letters, light and dark, and what it says to those who cannot see it.
+
+use std::fmt::Write as _;
+use std::io;
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use serde::Serialize;
+
+use super::labels::{Area, lines};
+
+/// Colours that differ for every eye (Okabe & Ito), without the yellow, which is too light for white paper.
+pub(crate) const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(230, 159, 0),
+    RGBColor(0, 0, 0),
+];
+/// For what is only there for comparison.
+pub(crate) const GREY: RGBColor = RGBColor(110, 110, 110);
+/// Black for words that lie on lines: paper is left round them.
+pub(super) const INK: RGBColor = RGBColor(1, 1, 1);
+
+/// Height of the letters as the library counts it: from the highest to the lowest of any letter, px.
+pub(super) const TEXT: u32 = 17;
+/// Height of the letters as browsers count it, px: at the width of a phone, 390 px, [`WIDTH`] leaves 11 of them.
+pub(crate) const EM: f64 = TEXT as f64 / 1.24;
+/// Width of a drawing, px.
+pub(crate) const WIDTH: u32 = 480;
+pub(super) const FONT: &str = "sans-serif";
+
+/// The colours on a dark screen: what is white becomes dark and what is black light, and the darker colours brighter.
+const STYLE: &str = "<style>[fill=\"#010101\"]{paint-order:stroke;stroke:#fff;stroke-width:3px;stroke-linejoin:round}\
+@media screen and (prefers-color-scheme:dark){\
+rect[fill=\"#FFFFFF\"]{fill:#15181c}[stroke=\"#FFFFFF\"]{stroke:#15181c}\
+[fill=\"#010101\"]{fill:#ececec;stroke:#15181c}[fill=\"#000000\"]{fill:#ececec}[stroke=\"#000000\"]{stroke:#ececec}\
+[fill=\"#6E6E6E\"]{fill:#9a9a9a}[stroke=\"#6E6E6E\"]{stroke:#9a9a9a}\
+[fill=\"#0072B2\"]{fill:#2b8fd0}[stroke=\"#0072B2\"]{stroke:#2b8fd0}}</style>";
+/// How the outermost drawing fits its place.
+const FITS: &str = "style=\"max-width:100%;height:auto\"";
+
+/// Why drawing fails: drawing into a string does not, but the library says it might.
+pub(super) type Failed = DrawingAreaErrorKind<io::Error>;
+pub(super) type Root<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// A figure was not drawn.
+#[derive(Debug, thiserror::Error)]
+#[error("the figure \"{figure}\" cannot be drawn; please report this")]
+pub struct DrawError {
+    /// Its title.
+    figure: String,
+    source: Failed,
+}
+
+/// A figure, or a panel of one.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Figure {
+    /// Name of its file, without the ending.
+    pub id: String,
+    /// What it shows, for those who cannot see it.
+    pub title: String,
+    /// The drawing.
+    pub svg: String,
+    /// Its width and height, px.
+    #[serde(skip)]
+    size: (u32, u32),
+}
+
+/// What a part of a drawing says to those who point at it or cannot see it.
+pub(super) struct Tip {
+    pub(super) area: Area,
+    pub(super) says: String,
+}
+
+/// A drawing of this size in px on white paper; `draw` gives what its parts say. `about` is its description.
+pub(super) fn figure(
+    id: impl Into<String>,
+    title: &str,
+    about: &str,
+    size: (u32, u32),
+    draw: impl FnOnce(&Root<'_>) -> Result<Vec<Tip>, Failed>,
+) -> Result<Figure, DrawError> {
+    let mut drawing = String::new();
+    let drawn = {
+        let root = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
+        let drawn = root.fill(&WHITE).and_then(|()| draw(&root));
+        drawn.and_then(|tips| root.present().map(|()| tips))
+    };
+    let tips = drawn.map_err(|source| DrawError {
+        figure: title.to_owned(),
+        source,
+    })?;
+    let mut says = format!("<title>{}</title>\n", escaped(title));
+    if !about.is_empty() {
+        let _ = writeln!(says, "<desc>{}</desc>", escaped(about));
+    }
+    let open = format!("<svg {FITS} role=\"img\" ");
+    let drawing = drawing.replacen("<svg ", &open, 1);
+    let drawing = drawing.replacen(">\n", &format!(">\n{says}{STYLE}\n"), 1);
+    let mut figure = Figure {
+        id: id.into(),
+        title: title.to_owned(),
+        svg: drawing,
+        size,
+    };
+    let tips = tips.iter().map(|tip| {
+        let [left, top, right, bottom] = tip.area;
+        format!(
+            "<rect x=\"{left}\" y=\"{top}\" width=\"{}\" height=\"{}\" fill=\"transparent\"><title>{}</title></rect>\n",
+            right - left,
+            bottom - top,
+            escaped(&tip.says)
+        )
+    });
+    figure.add(&tips.collect::<String>());
+    Ok(figure)
+}
+
+impl Figure {
+    /// Draws more over it.
+    pub(super) fn add(&mut self, drawing: &str) {
+        if let Some(end) = self.svg.rfind("</svg>") {
+            self.svg.insert_str(end, drawing);
+        }
+    }
+
+    /// All figures in one, one below the other.
+    pub fn stacked(id: &str, title: &str, figures: &[Self]) -> Self {
+        let width = figures.iter().map(|f| f.size.0).max().unwrap_or(0);
+        let height: u32 = figures.iter().map(|f| f.size.1).sum();
+        let mut svg = format!(
+            "<svg {FITS} width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" xmlns=\"http://www.w3.org/2000/svg\">\n<title>{}</title>\n",
+            escaped(title)
+        );
+        let mut y = 0;
+        for figure in figures {
+            let place = format!("y=\"{y}\"");
+            svg += &figure.svg.replacen(FITS, &place, 1);
+            y += figure.size.1;
+        }
+        svg += "</svg>\n";
+        Self {
+            id: id.to_owned(),
+            title: title.to_owned(),
+            svg,
+            size: (width, height),
+        }
+    }
+}
+
+/// Text as XML has it.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+}
+
+/// Where the words of [`write`] are from their place.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum From {
+    /// They begin there.
+    Left,
+    /// They end there.
+    Right,
+    /// They are about it.
+    Middle,
+    /// They are about it, and go upwards.
+    Upwards,
+}
+
+/// Writes words at the height of `at`.
+pub(super) fn write(
+    root: &Root<'_>,
+    words: &str,
+    at: (i32, i32),
+    from: From,
+    colour: RGBColor,
+) -> Result<(), Failed> {
+    let font = (FONT, TEXT).into_font();
+    let (font, horizontal) = match from {
+        From::Left => (font, HPos::Left),
+        From::Right => (font, HPos::Right),
+        From::Middle => (font, HPos::Center),
+        From::Upwards => (font.transform(FontTransform::Rotate270), HPos::Center),
+    };
+    let style = font.color(&colour).pos(Pos::new(horizontal, VPos::Center));
+    root.draw(&Text::new(words.to_owned(), at, style))
+}
+
+/// Writes the title at the top, in as many lines as it takes; gives the px that they take.
+pub(super) fn caption(root: &Root<'_>, title: &str, width: u32) -> Result<u32, Failed> {
+    const LINE: i32 = TEXT as i32 + 3;
+    let mut y = 14;
+    for line in lines(title, EM * 1.1, width as i32 - 12) {
+        let style = (FONT, TEXT + 2).into_font().color(&BLACK);
+        let style = style.pos(Pos::new(HPos::Center, VPos::Center));
+        root.draw(&Text::new(line, (width as i32 / 2, y), style))?;
+        y += LINE;
+    }
+    Ok((y - LINE + 14) as u32)
+}

@@ -1,0 +1,7 @@
+//! The pictures that commands draw with `--plot`: what each shows, and how it is counted.
+
+pub mod evaluation;
+pub mod exploration;
+pub mod map;
+mod spectrum;
+pub mod timeline;

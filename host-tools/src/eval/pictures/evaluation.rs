@@ -1,0 +1,297 @@
+//! What `tactus evaluate` draws: what was told of each texture, how often it was right when it said so, and what another
+//! threshold would change.
+
+use tactus_core::explorer::Told;
+
+use crate::eval::chart::grid::{AVOIDED, Grid, Tile};
+use crate::eval::chart::{COLOURS, Chart, DrawError, Figure, MARKS, Series};
+use crate::eval::courses::Course;
+use crate::eval::verdicts::Verdicts;
+
+/// The three pictures of explorations that went like this, among textures of these names, at this threshold.
+///
+/// # Errors
+/// See [`DrawError`].
+pub fn figures(
+    courses: &[Course],
+    names: &[String],
+    threshold: f32,
+) -> Result<Vec<Figure>, DrawError> {
+    let mut figures = vec![
+        confusion(courses, names, threshold)?,
+        reliability(courses, threshold)?,
+    ];
+    figures.extend(by_threshold(courses, threshold)?);
+    Ok(figures)
+}
+
+/// More names than this are written as numbers below the columns, and no share is written into a cell.
+const FEW: usize = 12;
+
+/// What was told, row by row: textures presented, and columns of what was told.
+fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Figure, DrawError> {
+    let known = names.len();
+    let mut counts = vec![vec![0_u64; known + 2]; known];
+    for course in courses {
+        let (told, _, texture) = course.told(threshold);
+        let column = match told {
+            Told::Sure => texture,
+            Told::New => known,
+            Told::Undecided => known + 1,
+        };
+        counts[course.presented][column] += 1;
+    }
+    let presented: Vec<usize> = (0..known)
+        .filter(|&t| counts[t].iter().sum::<u64>() > 0)
+        .collect();
+    let tiles = presented.iter().map(|&texture| {
+        let all: u64 = counts[texture].iter().sum();
+        let tile = |(column, &count): (usize, &u64)| {
+            let share = count as f64 / all as f64;
+            let name = &names[texture];
+            let (told, colour) = match column {
+                c if c == texture => ("told as sure, right".to_owned(), COLOURS[0]),
+                c if c == known => ("told to be none of those known".to_owned(), AVOIDED),
+                c if c > known => ("told as not sure".to_owned(), AVOIDED),
+                c => (format!("told as sure to be {}", names[c]), COLOURS[1]),
+            };
+            Tile {
+                text: if count == 0 || known > FEW {
+                    String::new()
+                } else {
+                    format!("{:.0}", 100.0 * share)
+                },
+                // the least is to be seen, too
+                shade: if count == 0 { 0.0 } else { 0.15 + 0.85 * share },
+                colour,
+                framed: false,
+                says: if count == 0 {
+                    String::new()
+                } else {
+                    format!("{name}: {told}, {count} of {all} ({:.1} %)", 100.0 * share)
+                },
+            }
+        };
+        counts[texture].iter().enumerate().map(tile).collect()
+    });
+    let tiles = tiles.collect();
+    let rows = presented
+        .iter()
+        .map(|&t| format!("{}: {}", t + 1, names[t]));
+    let numbers = (1..=known).map(|number| number.to_string());
+    let columns = numbers.chain(["N".to_owned(), "?".to_owned()]);
+    let verdicts = verdicts(courses, threshold);
+    let about = format!(
+        "Of {} explorations {:.1} % ended with the right name, {:.1} % with a wrong one, {:.1} % with none of those known and {:.1} % undecided.",
+        courses.len(),
+        100.0 * verdicts.right,
+        100.0 * verdicts.wrong,
+        100.0 * verdicts.new,
+        100.0 * verdicts.undecided
+    );
+    let below = if known > FEW {
+        "Darker is more often. Blue: the right name, told as sure. Orange: a wrong one. Grey: none of those known (N), not sure (?)."
+    } else {
+        "In % of the row. Blue: the right name, told as sure. Orange: a wrong one. Grey: none of those known (N), not sure (?)."
+    };
+    Grid {
+        id: "confusion".to_owned(),
+        title: format!("What is told of each texture, at {} %", percent(threshold)),
+        about: &about,
+        x: ("told: the texture of this number", columns.collect()),
+        y: ("presented", rows.collect()),
+        tiles,
+        below,
+    }
+    .figure()
+}
+
+fn verdicts(courses: &[Course], threshold: f32) -> Verdicts {
+    Verdicts::of(courses.iter().map(|course| {
+        let (told, _, texture) = course.told(threshold);
+        (told, texture == course.presented)
+    }))
+}
+
+/// A share in %, without the digits of its binary form.
+fn percent(share: f32) -> f64 {
+    (f64::from(share) * 1e6).round() / 1e4
+}
+
+/// Lower ends of the probabilities that are counted together.
+const SAID: [f32; 8] = [0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 0.999, f32::INFINITY];
+
+/// Statements of about the same probability.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+struct Statements {
+    count: u64,
+    right: u64,
+    /// Sum of the probabilities that were said.
+    said: f64,
+}
+
+/// How often the most probable texture was the right one, by the probability that was said: after every slide, until the
+/// exploration ended.
+fn statements(courses: &[Course], threshold: f32) -> [Statements; SAID.len() - 1] {
+    let mut bins = [Statements::default(); SAID.len() - 1];
+    for course in courses {
+        let (_, slides, _) = course.told(threshold);
+        for belief in course.beliefs.iter().take(slides) {
+            let above = SAID.iter().take_while(|&&low| belief.probability >= low);
+            let bin = &mut bins[above.count().clamp(1, bins.len()) - 1];
+            bin.count += 1;
+            bin.right += u64::from(belief.texture == course.presented);
+            bin.said += f64::from(belief.probability);
+        }
+    }
+    bins
+}
+
+/// Between which shares the true one is, 95 times of 100, if `right` of `count` were found (Wilson 1927).
+fn wilson(right: u64, count: u64) -> (f64, f64) {
+    const Z: f64 = 1.96;
+    let (n, p) = (count as f64, right as f64 / count as f64);
+    let middle = (p + Z * Z / (2.0 * n)) / (1.0 + Z * Z / n);
+    let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt() / (1.0 + Z * Z / n);
+    ((middle - half).max(0.0), (middle + half).min(1.0))
+}
+
+fn reliability(courses: &[Course], threshold: f32) -> Result<Figure, DrawError> {
+    let bins = statements(courses, threshold);
+    let mut right = Series::points(
+        0,
+        MARKS[0],
+        "was right (bar: 95 % of such counts)",
+        Vec::new(),
+    );
+    let mut said = Series::dashed("what it said (mean)", Vec::new());
+    for (bin, x) in bins.iter().zip(1..).filter(|(bin, _)| bin.count > 0) {
+        let (x, of) = (f64::from(x), bin.count as f64);
+        let share = 100.0 * bin.right as f64 / of;
+        let (low, high) = wilson(bin.right, bin.count);
+        right.points.push((x, share));
+        right.bars.push((100.0 * low, 100.0 * high));
+        right.labels.push(format!("{share:.1}"));
+        right.says.push(format!(
+            "said {}: right {} of {} times ({share:.1} %, from {:.1} to {:.1} %); said {:.2} % on average",
+            range(x),
+            bin.right,
+            bin.count,
+            100.0 * low,
+            100.0 * high,
+            100.0 * bin.said / of
+        ));
+        said.points.push((x, 100.0 * bin.said / of));
+    }
+    let about = "Counted after every slide until the exploration ended; slides of one exploration are not independent, \
+                 so the bars are rather too short.";
+    Chart {
+        about: about.to_owned(),
+        y_range: (0.0, 108.0),
+        x_marks: bins.len(),
+        x_text: &range,
+        below: "Points below the dashed line: it said more than was so.",
+        ..Chart::new(
+            "How often it is right when it says so",
+            "probability that was said of the most probable (%)",
+            "how often that was right (%)",
+            (0.5, bins.len() as f64 + 0.5),
+            vec![said, right],
+        )
+    }
+    .figure("reliability")
+}
+
+/// The probabilities that are counted together, in %.
+fn range(bin: f64) -> String {
+    let at = (bin.round() as usize).clamp(1, SAID.len() - 1);
+    match (SAID.get(at - 1), SAID.get(at)) {
+        (Some(low), Some(high)) if *low == 0.0 => format!("<{}", percent(*high)),
+        (Some(low), Some(high)) if high.is_finite() => {
+            format!("{}\u{2013}{}", percent(*low), percent(*high))
+        }
+        (Some(low), _) => format!("\u{2265}{}", percent(*low)),
+        _ => String::new(),
+    }
+}
+
+/// Thresholds that are compared, besides the one that was asked for.
+const THRESHOLDS: [f32; 8] = [0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999];
+
+/// Slides, and what is told, by the threshold.
+fn by_threshold(courses: &[Course], threshold: f32) -> Result<Vec<Figure>, DrawError> {
+    let mut thresholds: Vec<f32> = THRESHOLDS.to_vec();
+    if !thresholds.contains(&threshold) {
+        thresholds.push(threshold);
+        thresholds.sort_by(f32::total_cmp);
+    }
+    let at = thresholds.iter().position(|&t| t == threshold);
+    let at = at.unwrap_or(0) as f64 + 1.0;
+    let text = |x: f64| {
+        let at = (x.round() as usize).wrapping_sub(1);
+        thresholds
+            .get(at)
+            .map_or_else(String::new, |&t| percent(t).to_string())
+    };
+    let x_range = (0.5, thresholds.len() as f64 + 0.5);
+    let x = "threshold: sure above this probability (%)";
+    let mut slides = Series::curve(0, MARKS[0], "", Vec::new());
+    let mut told = [
+        ("told a wrong name as sure", 1),
+        ("told none of those known", 2),
+        ("undecided", 0),
+    ]
+    .map(|(name, colour)| Series::curve(colour, MARKS[colour], name, Vec::new()));
+    for (&threshold, n) in thresholds.iter().zip(1..) {
+        let n = f64::from(n);
+        let made = courses.iter().map(|course| course.told(threshold).1 as f64);
+        let mean = made.sum::<f64>() / courses.len().max(1) as f64;
+        slides.points.push((n, mean));
+        let shown = percent(threshold);
+        slides.says.push(format!("at {shown} %: {mean:.2} slides"));
+        let v = verdicts(courses, threshold);
+        for (series, share) in told.iter_mut().zip([v.wrong, v.new, v.undecided]) {
+            let share = 100.0 * share;
+            series.points.push((n, share));
+            let name = &series.name;
+            series
+                .says
+                .push(format!("at {shown} %: {share:.2} % {name}"));
+        }
+    }
+    let used = |top: f64| Series::dashed("the threshold in use", vec![(at, 0.0), (at, top)]);
+    let most = |series: &[Series]| {
+        let points = series.iter().flat_map(|s| &s.points);
+        1.1 * points.map(|p| p.1).fold(0.1, f64::max)
+    };
+    let top = most(std::slice::from_ref(&slides));
+    let slides = Chart {
+        y_range: (0.0, top),
+        x_marks: thresholds.len(),
+        x_text: &text,
+        ..Chart::new(
+            "Slides by threshold",
+            x,
+            "slides until the answer (mean)",
+            x_range,
+            vec![used(top), slides],
+        )
+    }
+    .figure("slides-by-threshold")?;
+    let top = most(&told);
+    let [wrong, new, undecided] = told;
+    let errors = Chart {
+        y_range: (0.0, top),
+        x_marks: thresholds.len(),
+        x_text: &text,
+        ..Chart::new(
+            "Errors by threshold",
+            x,
+            "explorations (%)",
+            x_range,
+            vec![used(top), wrong, new, undecided],
+        )
+    }
+    .figure("errors-by-threshold")?;
+    Ok(vec![slides, errors])
+}
