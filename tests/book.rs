@@ -219,6 +219,54 @@ fn the_moving_picture_is_small_and_moves() {
     assert!(svg.contains("@keyframes") && svg.contains(&EXPLORATION.join(" ")));
 }
 
+/// The pictures of the page about pictures, the command of each, and what comes before it.
+const PLOTS: [(&str, &[&str]); 3] = [
+    (
+        "evaluate --recordings tests/recordings/simulated --train-slides 2 --method paper --runs 2000 --seed 1",
+        &["confusion", "reliability"],
+    ),
+    (
+        "identify --simulated --texture burlap --among 20 --seed 2",
+        &["spectrum", "timeline"],
+    ),
+    ("table show TABLE", &["map"]),
+];
+
+#[test]
+fn plots_are_what_their_commands_draw() {
+    let temp = tempfile::tempdir().unwrap();
+    let [table, drawn] = ["table", "drawn"].map(|name| temp.path().join(name));
+    let [table, drawn] = [&table, &drawn].map(|path| path.to_str().unwrap());
+    let learn = "learn --recordings tests/recordings/simulated --train-slides 3 --out TABLE";
+    let page = read("docs/src/pictures.md");
+    let mut wrong = Vec::new();
+    for (command, pictures) in [(learn, &[][..])].into_iter().chain(PLOTS) {
+        assert!(page.contains(&format!("\ntactus {command}")), "{command}");
+        let mut arguments = words(command);
+        for argument in &mut arguments {
+            if argument == "TABLE" {
+                table.clone_into(argument);
+            }
+        }
+        let mut arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        if !pictures.is_empty() {
+            arguments.extend(["--plot", drawn]);
+        }
+        tactus(&arguments);
+        for picture in pictures {
+            let svg = fs::read(Path::new(drawn).join(format!("{picture}.svg"))).unwrap();
+            assert!(svg.len() < 60_000, "{picture}: {} bytes", svg.len());
+            let path = format!("docs/src/plot-{picture}.svg");
+            assert!(
+                page.contains(&format!("](plot-{picture}.svg)")),
+                "{picture}"
+            );
+            wrong.extend(compare(&path, &svg).err());
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
 #[test]
 fn the_readme_is_short() {
     let lines = read("README.md").lines().count();

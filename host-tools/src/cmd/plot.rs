@@ -71,7 +71,7 @@ impl Plot {
         let try_it = || {
             let folder = match is_file {
                 true => canvas.path.parent(),
-                false => canvas.path.ancestors().find(|folder| folder.is_dir()),
+                false => canvas.path.ancestors().find(|folder| folder.exists()),
             };
             // the folder of a bare name has no name
             let folder = folder.filter(|folder| !folder.as_os_str().is_empty());

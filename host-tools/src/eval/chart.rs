@@ -97,6 +97,8 @@ impl Series {
 /// A chart.
 pub(crate) struct Chart<'a> {
     pub(crate) title: String,
+    /// Whether the title is written above it, too.
+    pub(crate) titled: bool,
     /// What it shows, for those who cannot see it; empty where the title says it.
     pub(crate) about: String,
     /// What an axis shows, with its unit.
@@ -188,6 +190,7 @@ impl<'a> Chart<'a> {
         let points = series.iter().flat_map(|s| &s.points).map(|p| p.1);
         Self {
             title: title.into(),
+            titled: true,
             about: String::new(),
             x,
             y,
@@ -222,9 +225,9 @@ impl<'a> Chart<'a> {
     /// Draws it, and says where in the drawing the area between the axes is, and what its points say.
     fn draw(&self, root: &Root<'_>) -> Result<(Area, Vec<Tip>), Failed> {
         let (full, tall) = (self.size.0 as i32, self.size.1 as i32);
-        let mut top = match self.title.as_str() {
-            "" => 4,
-            title => caption(root, title, self.size.0)? as i32,
+        let mut top = match self.titled {
+            true => caption(root, &self.title, self.size.0)? as i32,
+            false => 4,
         };
         if !self.named_at_end {
             top = self.legend(root, top)?;

@@ -72,9 +72,10 @@ impl Timeline {
                     self.title.as_str(),
                     format!("The features are made of {from:.2} to {to:.2} s."),
                 ),
-                _ => ("", String::new()),
+                _ => (*what, String::new()),
             };
             let panel = Chart {
+                titled: n == 0,
                 about,
                 span: Some((self.window, if n == 0 { window } else { "" })),
                 y_marks: 4,
