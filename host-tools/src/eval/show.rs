@@ -391,7 +391,7 @@ fn show_whitened(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
 }
 
 /// How far the means of two textures are apart at a movement, in standard deviations within a texture.
-pub(super) fn apart(table: Table<'_>, movement: u8, textures: [u16; 2]) -> Option<f32> {
+pub(crate) fn apart(table: Table<'_>, movement: u8, textures: [u16; 2]) -> Option<f32> {
     if textures
         .iter()
         .any(|&texture| table.trials(texture, movement) == 0)

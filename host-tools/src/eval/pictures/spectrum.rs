@@ -8,6 +8,7 @@ use tactus_core::table::{Action, Contents, Table};
 
 use super::exploration::Counted;
 use crate::eval::chart::{Chart, DrawError, Figure, MARKS, Series, WIDTH};
+use crate::eval::show::apart;
 
 /// Mean and standard deviation.
 type Feature = (f64, f64);
@@ -26,10 +27,8 @@ pub(super) fn figure(
         return Ok(None);
     };
     let unknown = mean(made(movement).filter_map(|slide| features(table, slide)));
-    let candidates: Vec<(String, Vec<Feature>)> = best
-        .iter()
-        .take(2)
-        .filter_map(|&(texture, p)| {
+    let candidates: Vec<(String, Vec<Feature>)> = two_best(table, best, movement)
+        .filter_map(|(texture, p)| {
             let name = format!("{} ({:.1} %)", table.name(texture)?, 100.0 * p);
             Some((name, known(table, texture, movement)?))
         })
@@ -46,6 +45,28 @@ pub(super) fn figure(
         }
     };
     bands(others, &unknown, &candidates, &at).map(Some)
+}
+
+/// The two most probable textures. Where no second one is probable at all, it is the one most like the first.
+fn two_best(
+    table: Table<'_>,
+    best: &[(u16, f32)],
+    movement: u8,
+) -> impl Iterator<Item = (u16, f32)> {
+    let first = best.first().copied();
+    let others = best.get(1..).unwrap_or_default();
+    let second = match others.first() {
+        Some((_, p)) if *p <= 0.0 => {
+            let to_first = |texture: u16| apart(table, movement, [first?.0, texture]);
+            let near = others
+                .iter()
+                .filter_map(|other| Some((to_first(other.0)?, other)));
+            let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
+            nearest.map(|(_, other)| *other).or(others.first().copied())
+        }
+        other => other.copied(),
+    };
+    first.into_iter().chain(second)
 }
 
 /// The features of a slide as the table compares them, in their units.
