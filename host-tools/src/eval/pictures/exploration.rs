@@ -8,7 +8,7 @@ use tactus_core::table::{Action, Table};
 use tactus_core::wire::Event;
 
 use crate::eval::chart::{Chart, DrawError, Figure, MARKS, Series};
-use crate::eval::pictures::spectrum;
+use crate::eval::pictures::spectrum::{self, Counted};
 
 /// Textures that were never more probable than this have no line of their own.
 const LIKELY: f32 = 0.05;
@@ -20,15 +20,6 @@ const MOST: usize = 6;
 pub struct Exploration<'t> {
     table: Table<'t>,
     slides: Vec<Counted>,
-}
-
-/// A slide that counted.
-#[derive(Clone, Debug)]
-pub(super) struct Counted {
-    pub(super) action: Action,
-    pub(super) observed: Observation,
-    /// Of every texture of the table.
-    posterior: Vec<f32>,
 }
 
 impl<'t> Exploration<'t> {

@@ -2,13 +2,21 @@
 
 use tactus_core::dsp::BIN_HZ;
 use tactus_core::features::{
-    FEATURE_STEPS, FUSED_BANDS, FUSED_EDGES, FeatureSet, Property, WHITE_STEPS,
+    FEATURE_STEPS, FUSED_BANDS, FUSED_EDGES, FeatureSet, Observation, Property, WHITE_STEPS,
 };
 use tactus_core::table::{Action, Contents, Table};
 
-use super::exploration::Counted;
 use crate::eval::chart::{Chart, DrawError, Figure, MARKS, Series, WIDTH};
 use crate::eval::show::apart;
+
+/// A slide that counted.
+#[derive(Clone, Debug)]
+pub(super) struct Counted {
+    pub(super) action: Action,
+    pub(super) observed: Observation,
+    /// Of every texture of the table.
+    pub(super) posterior: Vec<f32>,
+}
 
 /// Mean and standard deviation.
 type Feature = (f64, f64);
