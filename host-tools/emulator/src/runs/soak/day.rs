@@ -1,7 +1,6 @@
 //! The day: a simulated probe, asked as a host would ask it.
 
 use std::cell::RefCell;
-use std::convert::Infallible;
 
 use embassy_futures::block_on;
 use rand::{RngExt as _, SeedableRng as _};
@@ -14,8 +13,7 @@ use tactus::sim::rig::{SimError, SimRig};
 use tactus_core::dsp::{self, Plain};
 use tactus_core::sensor::pressure::SLOTS_HZ;
 use tactus_core::store::{Store, StoreError};
-use tactus_core::table::TableError;
-use tactus_core::wire::{Command, Event, Forget, Identify, Text, Verdict, text};
+use tactus_core::wire::{Command, Event, Forget, Identify, MemoryError, Text, Verdict, text};
 
 use super::episodes::{Episodes, FACTORY, HOMINGS, MOST_N, Plan, world};
 
@@ -35,7 +33,7 @@ pub(crate) enum DayError {
     #[error("the store: {0}")]
     Store(#[from] StoreError),
     #[error("the table: {0}")]
-    Table(#[from] TableError),
+    Table(#[from] MemoryError),
     #[error("at {at_s:.0} s: {why}")]
     Probe { at_s: f64, why: String },
 }
