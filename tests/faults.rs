@@ -748,8 +748,8 @@ fn a_finger_that_is_not_in_the_air_is_neither_dragged_nor_pressed_further() {
         let slid = rig.slide(Movement::FOR_TRACTION, 0.5, |_, _| ());
         assert_eq!(slid, Ok(Ended::Whole));
         assert_eq!(rig.control().calibration(), &calibration);
-        // and without the guard it does harm
-        let unguarded = Unguarded::against(Fault::LeverNotHome);
+        // and without the guards of the zero it does harm
+        let unguarded = Unguarded::against(Fault::LeverNotHome).and(Fault::Unsteady);
         let (mut rig, _, _, dragged_mm) = booted(unguarded, like_the_firmware);
         let truth = rig.world().truth();
         assert!(truth.force_max_n > 2.2 && dragged_mm > 10.0, "{truth:?}");

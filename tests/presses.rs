@@ -5,7 +5,12 @@
 
 use std::collections::BTreeMap;
 
-use tactus::sim::press::{Bench, Campaign, Press, Trouble};
+use tactus::sim::collection::Collection;
+use tactus::sim::faults::Fault as Cause;
+use tactus::sim::press::{self, Bench, Campaign, FORCE_LIMIT_N, Press, Trouble};
+use tactus::sim::rig::SimRig;
+use tactus::sim::world::Setup;
+use tactus_core::features::Movement;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Ended, Fault};
 
@@ -109,6 +114,66 @@ fn the_softest_foam_is_pressed_with_two_newtons() {
             assert_eq!(press.ended, Ok(Ended::Whole), "{press}");
             assert!(press.force_max_n > 0.9 * wanted_n, "{press}");
             assert!(!press.is_too_hard(), "{press}");
+        }
+    }
+}
+
+/// A rig over a stiff, a soft, a rough and a furry sample of worlds.
+fn rigs() -> impl Iterator<Item = (String, SimRig)> {
+    let samples = (1..=2).flat_map(|world| [45, 30, 100, 117].map(|texture| (world, texture)));
+    samples.map(|(seed, texture)| {
+        let world = Collection {
+            seed,
+            textures: Vec::new(),
+            trials: 1,
+        };
+        let setup = Setup {
+            shimmed: true,
+            ..world.setup(texture, 950)
+        };
+        (format!("world {seed}, T{texture}"), SimRig::new(setup))
+    })
+}
+
+/// At the forces that a probe makes, however slowly the skin leaks.
+#[test]
+fn no_leak_of_a_tenth_of_a_second_or_more_presses_too_hard() {
+    for (sample, mut rig) in rigs() {
+        for force_mn in [200, 500, 1259] {
+            let movement = Movement::new(force_mn, 39_811).unwrap();
+            for seconds in [0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0] {
+                for share in [0.0, 0.5] {
+                    let leak = Some((Cause::SkinLeaks { seconds }, share));
+                    let ended = press::make(&mut rig, movement, leak);
+                    let most_n = rig.world().truth().force_max_n;
+                    assert!(
+                        most_n <= FORCE_LIMIT_N,
+                        "{sample}, {movement}, {seconds} s at {share}: {most_n:.2} N, {ended:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// A skin that tears at once shows contact in neither signal: the place of the last contact has to stop the lever.
+#[test]
+fn a_torn_skin_is_not_pressed_further_than_a_sound_one() {
+    for (sample, mut rig) in rigs() {
+        for seconds in [0.0, 0.01, 0.05] {
+            let movement = Movement::new(500, 39_811).unwrap();
+            assert_eq!(
+                press::make(&mut rig, movement, None),
+                Ok(Ended::Whole),
+                "{sample}"
+            );
+            let torn = Some((Cause::SkinLeaks { seconds }, 0.0));
+            let ended = press::make(&mut rig, movement, torn);
+            let most_n = rig.world().truth().force_max_n;
+            assert!(
+                most_n < 1.5 && ended.is_err(),
+                "{sample}, {seconds} s: {most_n:.2} N, {ended:?}"
+            );
         }
     }
 }

@@ -124,17 +124,18 @@ pub struct Finger {
 impl Finger {
     /// A finger with a new skin.
     pub fn new(seed: u64) -> Self {
-        Self::under(seed, Conditions::default())
+        Self::under([seed; 2], Conditions::default())
     }
 
-    /// A finger under other conditions than the usual ones.
-    pub fn under(seed: u64, conditions: Conditions) -> Self {
-        let mut noise = Noise::new(seed, 500);
+    /// A finger under other conditions than the usual ones. The first seed draws what it was made like, the second one what
+    /// happens in this trial: its landings and its noise.
+    pub fn under([made, trial]: [u64; 2], conditions: Conditions) -> Self {
+        let mut noise = Noise::new(trial, 500);
         Self {
             variation: conditions.variation,
             skin: Skin::default(),
             vibrations: Vibrations::default(),
-            amplifiers: Amplifiers::new(&mut noise),
+            amplifiers: Amplifiers::new(&mut Noise::new(made, 501), &mut noise),
             touch: None,
             unsteady: 0.0,
             friction: 0.0,

@@ -43,8 +43,8 @@ const CLOSES_PLAY_N: f64 = 0.05;
 /// Largest error of a microstep's place, um: 5 % of a full step, not accumulating (usual for such motors), once per full
 /// step and once per period.
 const STEP_ERROR_UM: [f64; 2] = [0.25, 0.25];
-/// Height of the fingertip over the steel plate with the lever at the upper hard stop, mm (chosen: over nearly every sample;
-/// foams and furs have 6 to 16 mm, so that some touch the finger before it has homed).
+/// Height of the fingertip over the steel plate with the lever at the upper hard stop, mm (chosen: over every sample;
+/// foams and furs have 6 to 15 mm, so that some touch the finger before it has homed).
 pub const TOP_MM: f64 = 16.0;
 /// Way from the upper to the lower hard stop, mm (chosen).
 pub const TRAVEL_MM: f64 = 17.5;

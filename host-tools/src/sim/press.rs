@@ -24,8 +24,8 @@ pub const FORCE_LIMIT_N: f64 = 2.2;
 const TEXTURES: usize = 10;
 /// Stream of the seeds that a campaign draws from.
 const STREAM: u64 = 0x9e55;
-/// Times in which a torn skin loses its pressure, s: see [`Trouble::Leaking`]. Faster ones show contact in neither signal, much
-/// slower ones look like a soft sample: the guard does not notice these in time, as the book's page of limits says.
+/// Times in which a torn skin loses its pressure, s: see [`Trouble::Leaking`]. Within 0.05 s it shows contact in neither
+/// signal, over 5 to 20 s it looks like a soft sample: at 2 N these press too hard, as the book's page of limits says.
 const LEAK_S: (f64, f64) = (0.2, 2.0);
 
 /// What is wrong with P_DC.
@@ -220,8 +220,11 @@ impl Bench {
     }
 }
 
-/// Makes one movement, on a rig that is repaired before it.
-fn make(
+/// Makes one movement, on a rig that is repaired before it; the cause comes at a share of the movement's force.
+///
+/// # Errors
+/// See [`SimError`].
+pub fn make(
     rig: &mut SimRig,
     movement: Movement,
     cause: Option<(Cause, f64)>,

@@ -9,6 +9,7 @@ mod recipes;
 
 pub use names::{Group, Named, TEXTURES};
 
+use super::lever::{LIMIT_MM, TOP_MM};
 use super::maths::{pow, square};
 use super::noise::Noise;
 use recipes::recipe;
@@ -77,7 +78,7 @@ pub struct Texture {
     pub vibration_bend: f64,
     /// Deviation of ln(local height amplitude) over the sample.
     pub heterogeneity: f64,
-    /// Thickness, mm.
+    /// Thickness, mm; at most [`FITS_MM`].
     pub thickness_mm: f64,
     /// How much it gives way under the finger, mm/N.
     pub compliance_mm_per_n: f64,
@@ -92,6 +93,9 @@ impl Texture {
         1.0 / (1.0 + short + long)
     }
 }
+
+/// Samples are cut to this thickness, mm: half a millimetre below the homed finger (chosen).
+const FITS_MM: f64 = TOP_MM - LIMIT_MM - 0.5;
 
 /// Deviations of ln(parameter) among the textures of a group, or of one texture among worlds.
 struct Spread {
@@ -187,7 +191,7 @@ pub fn draw(number: u8, seed: u64) -> Texture {
         weave,
         damping: medians.damping,
         heterogeneity: noise.about(medians.heterogeneity, 0.3),
-        thickness_mm: noise.about(medians.thickness_mm, 0.2),
+        thickness_mm: noise.about(medians.thickness_mm, 0.2).min(FITS_MM),
         compliance_mm_per_n: noise.about(medians.compliance_mm_per_n, 0.2),
         friction_load: friction_load + noise.within(movement * FRICTION_POWERS.0),
         friction_bend: noise.within(movement * FRICTION_POWERS.2),

@@ -142,7 +142,7 @@ impl World {
     /// The same under other conditions than the usual ones.
     pub fn under(setup: Setup, conditions: Conditions) -> Self {
         let mut trial = Noise::new(setup.trial_seed, 0x3071d);
-        // the finger draws its landings and its noise from one seed: another trial, other ones
+        // one finger in all trials, but each has landings and noise of its own
         let finger_noise = setup.finger_seed.rotate_left(32) ^ trial.uniform().to_bits();
         let [tip_mm, stage_mm] = Self::POWER_UP_MM.map(|(low, high)| trial.between(low, high));
         let mut world = Self {
@@ -156,7 +156,7 @@ impl World {
             stage: Stage::new(stage_mm, setup.world_seed, setup.trial_seed),
             encoder: Encoder::new(stage_mm, setup.keep_edges),
             surface: sample(setup.texture, setup.world_seed, conditions.variation),
-            finger: Finger::under(finger_noise, conditions),
+            finger: Finger::under([setup.finger_seed, finger_noise], conditions),
             sensor: SensorPeer::new(setup.finger_seed),
             selected: None,
             miso: Miso::new(setup.trial_seed),

@@ -91,7 +91,7 @@ faults! {
     LeverSlips, "lever slips", "steps after contact no longer raise P_DC as finger and sample gave way before, or the lower end before the force, or still in contact when lifted, or not lifted where a press begins", 2, BOTH, ALL,
         "check the lever's motor and its current" ", then reset";
     /// The contact force does not stay where it was put.
-    Unsteady, "force unsteady", "six trims and still more than 1 count and 5 % off, trims that add up to 15 %, or a zero that has moved by 8 counts", 2, BOTH, ALL,
+    Unsteady, "force unsteady", "six trims and still more than 1 count and 5 % off, trims that add up to 15 %, a zero that has moved by 8 counts, or contact within 0.1 mm of where the zero was taken", 2, BOTH, ALL,
         "check that sample and lever are fixed" ", then reset";
     /// The probe's own tasks do nothing any more.
     TasksHung, "tasks hung", "the firmware's tasks have not checked in for 2 s, or what was asked for makes no progress for 30 s", 2, BOTH, ALL,
@@ -103,7 +103,7 @@ faults! {
     StageNotHome, "stage not home", "limit switch not reached: the stage falls behind, or has gone 1.25 times the travel", 2, BOTH, ALL,
         "clear the stage's way and check the switch" ", then reset";
     /// The finger presses, and P_DC does not say so.
-    PressureDead, "pressure dead", "P_AC shows contact and P_DC does not rise within 0.5 mm, or no longer rises while P_AC shows that the pressure does", 2,
+    PressureDead, "pressure dead", "P_AC shows contact and P_DC does not rise within 0.5 mm, or no longer rises while P_AC shows that the pressure does, or no contact 1 mm below that of the last press on this sample", 2,
         BOTH, ALL, "check the fingertip and the sensor's P_DC" ", then reset";
 }
 

@@ -17,7 +17,8 @@ pub const APPROACH_STEPS_S: i32 = 800;
 pub const RETRACT_STEPS_S: i32 = -3200;
 /// Steps per second while the force is trimmed: slow enough to stop on a step.
 const TRIM_STEPS_S: i32 = 200;
-/// Between trials the finger hangs this far above the last contact: 1 mm.
+/// Between trials the finger hangs this far above the last contact: 1 mm. It is pressed on no further below that than this
+/// while P_DC shows no contact: that is 1 N on a hard sample.
 const CLEARANCE_STEPS: i32 = 1600;
 /// The lever goes at most this far below the limit switch: 16 mm, just above its lower end. Where nothing was touched
 /// by then, there is no sample.
@@ -26,6 +27,9 @@ pub const MAX_STEPS: i32 = 25_600;
 const END_STEPS: i32 = 27_200;
 /// Contact is seen when the mean of P_DC has risen by this many counts: thirty times its noise.
 const CONTACT_COUNTS: f32 = 3.0;
+/// The zero was taken in the air if P_DC does not rise by a third of that in the first 0.1 mm of the way down, 200 ms: the
+/// softest sample would show 1.6 counts.
+const CLEAR_MS: u32 = 200;
 /// Nearer to the top than this the limit switch may be closed, further down it must be open: 1 mm, the switch's
 /// own way and the half millimetre from it to the hard stop.
 const NEAR_TOP_STEPS: i32 = 1600;
@@ -306,16 +310,24 @@ impl Lever {
         steps: i32,
         contact: Option<i32>,
     ) -> Result<i32, Fault> {
-        let counts = meter.counts_now();
-        let contact = contact.or_else(|| (meter.counts() > CONTACT_COUNTS).then_some(steps));
+        let (counts, mean) = (meter.counts_now(), meter.counts());
+        let contact = contact.or_else(|| (mean > CONTACT_COUNTS).then_some(steps));
         self.state = LeverState::Approaching(contact);
-        self.progress
-            .judge(steps, meter.counts(), contact.is_some())?;
+        self.progress.judge(steps, mean, contact.is_some())?;
         let lowest = contact.map_or(MAX_STEPS, |_| END_STEPS);
         let at_end = self.ms > APPROACH_MS || steps - self.top >= lowest;
         match contact {
-            // less than no contact: the zero has drifted, and with it the force that would be pressed
-            None if meter.counts() < -CONTACT_COUNTS => return Err(Fault::Unsteady),
+            // less than no contact: the zero has drifted, and with it the force that would be pressed. More at once: something
+            // pressed when it was taken
+            None if mean < -CONTACT_COUNTS
+                || (self.ms < CLEAR_MS && mean > CONTACT_COUNTS / 3.0) =>
+            {
+                return Err(Fault::Unsteady);
+            }
+            // the sample is the same, and a finger whose skin is torn shows nothing in either signal
+            None if self.contact.is_some_and(|at| steps - at > CLEARANCE_STEPS) => {
+                return Err(Fault::PressureDead);
+            }
             None if at_end => return Err(Fault::NoContact),
             None => return Ok(APPROACH_STEPS_S),
             Some(_) if at_end => return Err(Fault::LeverSlips),
@@ -377,3 +389,6 @@ impl Lever {
         Ok(TRIM_STEPS_S * correction.signum())
     }
 }
+
+#[cfg(test)]
+mod tests;

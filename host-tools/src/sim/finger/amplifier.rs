@@ -29,8 +29,8 @@ const PDC_NOISE: f64 = 0.3;
 /// Highest count of 12 bits.
 const FULL: f64 = 4095.0;
 
-/// P_DC's rest follows the temperature of the finger: its deviation, counts, and the times, s, over which the air wanders
-/// and the finger follows. Chosen.
+/// P_DC's rest follows the temperature of the finger, about a value of that finger (OUT: three fingers, each steady): its
+/// deviation, counts, and the times, s, over which the air wanders and the finger follows. Chosen.
 const DRIFT_COUNTS: f64 = 2.0;
 const AIR_S: f64 = 600.0;
 const WARM_S: f64 = 60.0;
@@ -57,25 +57,27 @@ pub(super) struct Amplifiers {
 }
 
 impl Amplifiers {
-    pub(super) fn new(noise: &mut Noise) -> Self {
-        let pac_rest = noise.between(PAC_REST.0, PAC_REST.1);
-        let pdc_rest = noise.between(
+    /// Amplifiers that rest where `made` has it, at the temperature that `noise` draws.
+    pub(super) fn new(made: &mut Noise, noise: &mut Noise) -> Self {
+        let pac_rest = made.between(PAC_REST.0, PAC_REST.1);
+        let pdc_rest = made.between(
             PDC_REST.0 + 2.0 * DRIFT_COUNTS,
             PDC_REST.1 - 2.0 * DRIFT_COUNTS,
         );
+        let warm = noise.within(DRIFT_COUNTS);
         Self {
             pac_rest,
             pac_noise_pa: PAC_NOISE_PA,
             pdc_rest,
-            air: 0.0,
-            warm: 0.0,
+            air: warm,
+            warm,
             drift_in: 0,
             pdc_gain: 1.0,
             pdc_kept: 1.0,
             high_pass: HighPass::default(),
             low_pass: LowPass::new(BAND_HZ.1),
             pac: [pac_rest; 2],
-            pdc: [pdc_rest; 2],
+            pdc: [pdc_rest + warm; 2],
         }
     }
 

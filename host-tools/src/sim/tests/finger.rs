@@ -265,7 +265,7 @@ fn textures_differ_in_what_load_and_speed_do_to_their_vibrations() {
     let usual = texture(0.6, 0.0, 0.0);
     let level = |surface: &Surface, force: f64, speed: f64| {
         let mut finger = Finger::under(
-            3,
+            [3; 2],
             Conditions {
                 variation: 0.0,
                 ..Conditions::default()

@@ -127,6 +127,35 @@ fn ticks_do_not_drift() {
 }
 
 #[test]
+fn a_fingertip_rests_alike_in_all_trials_and_each_otherwise() {
+    let rest = |finger_seed, trial_seed| {
+        let setup = Setup {
+            trial_seed,
+            finger_seed,
+            ..Setup::default()
+        };
+        Bench::new(setup).pdc()
+    };
+    let mut fingers = Vec::new();
+    for finger in 1..=50 {
+        let trials: Vec<f64> = (0..5)
+            .map(|trial| rest(finger, 100 * finger + trial))
+            .collect();
+        let apart = trials.iter().map(|r| (r - trials[0]).abs());
+        let apart = apart.fold(0.0, f64::max);
+        // two temperatures, each within two and a half deviations of 2 counts
+        assert!(
+            (0.1..12.0).contains(&apart),
+            "finger {finger}: {trials:.1?}"
+        );
+        fingers.push(trials[0]);
+    }
+    // facts/biotac.md: those of three real ones were 112 apart
+    fingers.sort_by(f64::total_cmp);
+    assert!(fingers[49] - fingers[0] > 80.0, "{fingers:.0?}");
+}
+
+#[test]
 fn the_sensor_answers_through_its_pins() {
     let mut world = World::new(Setup::default());
     let mut miso = [0; 2];

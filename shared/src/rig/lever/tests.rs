@@ -1,0 +1,129 @@
+use super::*;
+
+/// P_DC of a finger in the air, counts.
+const REST: f32 = 2640.0;
+
+/// A lever over a sample.
+struct Bench {
+    lever: Lever,
+    meter: ForceMeter,
+    /// Steps down from the limit switch.
+    way: f32,
+    seed: u32,
+    /// The sample's surface below the homed finger, mm, and how much it gives way, mm/N.
+    clear_mm: f32,
+    compliance: f32,
+    /// The skin is torn: the finger feels nothing.
+    torn: bool,
+}
+
+impl Bench {
+    fn new(clear_mm: f32, compliance: f32) -> Self {
+        let mut lever = Lever::default();
+        lever.home();
+        Self {
+            lever,
+            meter: ForceMeter::new(REST),
+            way: 0.0,
+            seed: 1,
+            clear_mm,
+            compliance,
+            torn: false,
+        }
+    }
+
+    /// Force on the finger in counts of P_DC. Hertz: 1 N at 1 mm of the skin alone.
+    fn counts(&self) -> f32 {
+        let mm = self.way * STEP_UM * 1e-3 - self.clear_mm;
+        let (mut low, mut high) = (0.0, mm.max(0.0));
+        for _ in 0..40 {
+            let skin: f32 = (low + high) / 2.0;
+            let over = skin + self.compliance * skin * libm::sqrtf(skin) > mm;
+            (low, high) = if over { (low, skin) } else { (skin, high) };
+        }
+        low * libm::sqrtf(low) / 0.0115
+    }
+
+    /// Lets the lever go on until it is in this state.
+    fn until(&mut self, wanted: LeverState) -> Result<(), Fault> {
+        for _ in 0..60_000 {
+            let counts = if self.torn { 0.0 } else { self.counts() };
+            for _ in 0..2 {
+                self.seed = self
+                    .seed
+                    .wrapping_mul(1_664_525)
+                    .wrapping_add(1_013_904_223);
+                let noise = (self.seed >> 8) as f32 / (1 << 23) as f32 - 1.0;
+                let sample = libm::roundf(REST + counts + 0.5 * noise);
+                self.meter.push(Counts::new(sample as u16).unwrap());
+            }
+            let (steps, at_top) = (self.way as i32, self.way <= 0.0);
+            let rate = self.lever.tick(&mut self.meter, steps, at_top)?;
+            self.way += rate as f32 * 1e-3;
+            if self.lever.state() == wanted {
+                return Ok(());
+            }
+        }
+        panic!("no end in a minute");
+    }
+
+    /// Presses to 0.5 N: how that ended, and the force at its end in counts.
+    fn press(&mut self) -> (Result<(), Fault>, f32) {
+        let ended = self.until(LeverState::Lifted).and_then(|()| {
+            assert!(self.lever.press(43.5));
+            self.until(LeverState::Holding)
+        });
+        (ended, self.counts())
+    }
+}
+
+fn press(clear_mm: f32, compliance: f32) -> (Result<(), Fault>, f32) {
+    Bench::new(clear_mm, compliance).press()
+}
+
+#[test]
+fn a_zero_that_was_taken_under_load_is_no_zero() {
+    for compliance in [0.0, 0.1, 1.0, 2.0] {
+        for clear_mm in [1.0, 0.2, 0.1] {
+            let (ended, counts) = press(clear_mm, compliance);
+            assert_eq!(ended, Ok(()), "{clear_mm} mm, {compliance} mm/N");
+            assert!((counts - 43.5).abs() < 1.0, "{counts}");
+        }
+        for pressed_mm in [0.0, 0.05, 0.25, 1.0] {
+            let (ended, counts) = press(-pressed_mm, compliance);
+            assert_eq!(
+                ended,
+                Err(Fault::Unsteady),
+                "{pressed_mm} mm, {compliance} mm/N"
+            );
+            // it has gone on for 0.1 mm at most
+            let (_, before) = press(-pressed_mm - 0.11, compliance);
+            assert!(counts < before + 1.0, "{counts}, {before}");
+        }
+    }
+}
+
+#[test]
+fn a_finger_that_feels_nothing_where_it_felt_the_sample_stops() {
+    for compliance in [0.0, 0.1, 1.0, 2.0] {
+        let mut bench = Bench::new(3.0, compliance);
+        assert_eq!(bench.press().0, Ok(()));
+        bench.lever.lift(bench.way as i32);
+        assert_eq!(bench.press().0, Ok(()));
+        bench.lever.lift(bench.way as i32);
+        bench.torn = true;
+        let (ended, counts) = bench.press();
+        assert_eq!(ended, Err(Fault::PressureDead), "{compliance} mm/N");
+        assert!(counts * 0.0115 < 1.3, "{counts}");
+    }
+}
+
+#[test]
+fn another_sample_may_be_lower() {
+    let mut bench = Bench::new(3.0, 0.1);
+    assert_eq!(bench.press().0, Ok(()));
+    bench.lever.lift(bench.way as i32);
+    bench.clear_mm = 6.0;
+    bench.lever.forget_contact();
+    assert_eq!(bench.press().0, Ok(()));
+}
