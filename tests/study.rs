@@ -145,8 +145,8 @@ fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
 
 fn written(study: &Study) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let written = report::Folder::prepare(folder.path()).unwrap();
-    report::write(study, &written).unwrap();
+    let written = report::Folder::prepare(folder.path(), "a test").unwrap();
+    report::write(study, written).unwrap();
     folder
 }
 

@@ -4,6 +4,7 @@ pub mod content;
 #[cfg(feature = "fabrics")]
 pub mod fabricslide;
 pub mod import;
+pub mod program;
 pub mod properties;
 pub mod recording;
 pub mod recordings;

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use serde::Serialize;
+use tactus::eval::show::count;
 
 use super::output::{Format, print_json};
 use super::progress::progress;
@@ -51,13 +52,14 @@ pub(crate) fn run(Args { from, to, format }: &Args, out: &mut impl Write) -> any
         };
         return print_json(&imported, out);
     }
-    let (to, textures, slides) = (to.display(), imported.textures, imported.slides);
-    writeln!(out, "{to}: {textures} textures, {slides} slides")?;
+    let textures = count(imported.textures as u64, "texture");
+    let slides = count(imported.slides as u64, "slide");
+    writeln!(out, "{}: {textures}, {slides}", to.display())?;
     if imported.lost_rows > 0 {
         writeln!(
             out,
-            "{} rows of 10 ms are missing from the publisher's files; what lies before and after them was joined",
-            imported.lost_rows
+            "{} of 10 ms missing from the publisher's files; what lies before and after was joined",
+            count(imported.lost_rows as u64, "row")
         )?;
     }
     Ok(())

@@ -15,6 +15,7 @@ use tactus_core::table::Table;
 
 use super::args::{Features, Recordings};
 use super::output::{Format, print_json};
+use super::progress::with_progress;
 use super::table_file::{TableFile, write_table};
 use super::textures::{collection, measure_folder, names};
 
@@ -127,9 +128,9 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     writeln!(
         out,
-        "{}: {} textures learned from the first {} slides of each, {} bytes",
+        "{}: {} learned from the first {} slides of each, {} bytes",
         args.out.display(),
-        set.textures().len(),
+        count(set.textures().len() as u64, "texture"),
         args.train_slides,
         bytes.len()
     )?;
@@ -143,7 +144,10 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
 /// Learns a handheld probe's table.
 pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()> {
     let collection = collection(&args.textures, args.trials, args.seed)?;
-    let (bytes, left_out) = tactus::sim::handheld::learn(&collection)?;
+    let textures = collection.textures.len() as u64;
+    let (bytes, left_out) = with_progress(textures, "sliding by hand", |done| {
+        tactus::sim::handheld::learn(&collection, done)
+    })?;
     write_table(&args.out, &bytes)?;
     let left_out = left_out.into_iter().map(|n| texture_name(n).to_owned());
     let learned = Learned {
@@ -157,9 +161,12 @@ pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()>
     }
     writeln!(
         out,
-        "{}: {} textures learned from {} slides of each by hand, {} bytes",
+        "{}: {} learned from {} slides of each by hand, {} bytes",
         args.out.display(),
-        collection.textures.len() - learned.left_out.len(),
+        count(
+            (collection.textures.len() - learned.left_out.len()) as u64,
+            "texture"
+        ),
         args.trials,
         bytes.len()
     )?;

@@ -6,10 +6,11 @@ use std::path::PathBuf;
 use serde::Serialize;
 use tactus::data::recording::{Recording, Texture};
 use tactus::data::recordings::RecordingWriter;
+use tactus::eval::show::count;
 use tactus::sim::collection::{Collection, calibrated, texture_name};
 
 use super::output::{Format, print_json};
-use super::progress::with_progress;
+use super::progress::progress;
 use super::textures::collection;
 
 /// Record slides on the simulated rig, in the project's format
@@ -17,7 +18,8 @@ use super::textures::collection;
 #[command(after_help = "\
 Examples:
   tactus simulate --out DIR --textures burlap,47 --trials 10
-  tactus simulate --out DIR --seed 2                       all 117 textures of another world")]
+  tactus simulate --out DIR --seed 2                       all 117 textures of another world
+The same command goes on where an interrupted one stopped.")]
 pub(crate) struct Args {
     /// The folder to write; it must not hold recordings yet
     #[arg(long, value_name = "DIR")]
@@ -41,7 +43,7 @@ pub(crate) struct Args {
 struct Simulated {
     folder: String,
     textures: usize,
-    slides: u64,
+    slides: usize,
     seed: u64,
 }
 
@@ -52,26 +54,41 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         id: number.into(),
         name: texture_name(number).to_owned(),
     });
-    let mut writer = RecordingWriter::create(&args.out, named.collect())?;
-    let calibration = calibrated(collection.setup(collection.textures[0], 0))?;
     let textures = collection.textures.len();
-    let mut slides = 0;
-    with_progress(textures as u64, "sliding over textures", |done| {
-        // a few textures at a time: a large set does not fit into memory
-        for (part, first) in collection.textures.chunks(8).zip((0..).step_by(8)) {
-            let part = Collection {
-                textures: part.to_vec(),
-                ..collection.clone()
-            };
-            for (recorded, texture) in part.record(calibration, done)?.into_iter().zip(first..) {
-                for slide in recorded {
+    let numbers: Vec<String> = collection.textures.iter().map(u8::to_string).collect();
+    let command = format!(
+        "tactus simulate --seed {} --trials {} --textures {}",
+        args.seed,
+        args.trials,
+        numbers.join(",")
+    );
+    let mut writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
+    let calibration = calibrated(collection.setup(collection.textures[0], 0))?;
+    let each = Collection::MOVEMENTS.len() * args.trials as usize;
+    // those that an interrupted command has not come to
+    let todo: Vec<(usize, u8)> = (0..)
+        .zip(collection.textures.iter().copied())
+        .filter(|&(texture, _)| writer.slides(texture) < each)
+        .collect();
+    let bar = progress(textures as u64, "sliding over textures");
+    bar.set_position((textures - todo.len()) as u64);
+    // a few textures at a time: a large set does not fit into memory
+    for some in todo.chunks(rayon::current_num_threads().min(8)) {
+        let part = Collection {
+            textures: some.iter().map(|(_, number)| *number).collect(),
+            ..collection.clone()
+        };
+        let recorded = part.record(calibration, || bar.inc(1))?;
+        for (slides, &(texture, _)) in recorded.into_iter().zip(some) {
+            for slide in slides {
+                if !writer.has(texture, slide.number) {
                     writer.write(&Recording { texture, ..slide })?;
-                    slides += 1;
                 }
             }
         }
-        anyhow::Ok(())
-    })?;
+    }
+    bar.finish_and_clear();
+    let slides = textures * each;
     writer.finish()?;
     if args.format == Format::Json {
         let simulated = Simulated {
@@ -85,7 +102,9 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (folder, seed) = (args.out.display(), args.seed);
     writeln!(
         out,
-        "{folder}: {textures} textures, {slides} slides, world {seed}"
+        "{folder}: {}, {}, world {seed}",
+        count(textures as u64, "texture"),
+        count(slides as u64, "slide")
     )?;
     Ok(())
 }

@@ -5,8 +5,10 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::ValueEnum;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use tactus::study::identify::{
-    Column, Identification, METHODS, WorldRow, experiment, of_pair, pairs,
+    Column, Identification, METHODS, WorldRow, experiment, of_pair, pairs, short_name,
 };
 use tactus::study::pilot::Pilot;
 use tactus::study::published::PAIRS;
@@ -17,7 +19,7 @@ use tactus::study::training::{Training, Worn};
 use tactus::study::{self, Study};
 
 use super::output::Format;
-use super::progress::with_progress;
+use super::progress::{notice, with_progress};
 
 /// Make the paper's whole study on the simulated rig, and report it beside the published numbers
 #[derive(clap::Args)]
@@ -29,7 +31,8 @@ identify  16 textures among 117 at 99 %: cycling, random, Bayesian exploration, 
 all       all of it
 
 The folder gets report.html, which needs nothing else, every figure as .svg, every table as .csv, the tables in the chip's
-format, and study.json. The same command gives the same files on any number of cores.
+format, and study.json. The same command gives the same files on any number of cores. Until all is there it is called DIR.part;
+the same command goes on where an interrupted one stopped.
 
 Examples:
   tactus study all --out study
@@ -61,6 +64,17 @@ pub(crate) struct Args {
 impl Args {
     fn includes(&self, stage: Stage) -> bool {
         self.stage == stage || self.stage == Stage::All
+    }
+
+    /// How many stages it takes, with so many other worlds.
+    fn stages(&self, worlds: usize) -> usize {
+        let pilot = usize::from(self.includes(Stage::Pilot));
+        if self.stage == Stage::Pilot {
+            return pilot;
+        }
+        let own = |(stage, number)| if self.includes(stage) { number } else { 0 };
+        let own = [(Stage::Train, 1), (Stage::Pairs, 1), (Stage::Identify, 2)].map(own);
+        pilot + 1 + own.iter().sum::<usize>() + worlds
     }
 }
 
@@ -100,33 +114,69 @@ fn variation(text: &str) -> Result<f64, String> {
     }
 }
 
-/// What the stages took, for people to see: no part of the report, which is the same each time.
-#[derive(Default)]
-struct Times(Vec<(&'static str, f64)>);
+/// The stages of a study, one after the other.
+struct Stages {
+    /// those that are done are kept in it
+    folder: report::Folder,
+    all: usize,
+    begun: usize,
+    /// what they took, for people to see: no part of the report, which is the same each time
+    times: Vec<(String, f64)>,
+}
 
-impl Times {
-    /// Does a stage with a bar of this length.
-    fn stage<T>(
+impl Stages {
+    /// Does a stage with a bar of this length, or takes what an interrupted study has kept of it.
+    fn stage<T: Serialize + DeserializeOwned>(
         &mut self,
         what: &'static str,
         length: u64,
         work: impl FnOnce(&(dyn Fn() + Sync)) -> Result<T, study::StudyError>,
-    ) -> Result<T, study::StudyError> {
+    ) -> anyhow::Result<T> {
+        self.stage_of(what, None, length, work)
+    }
+
+    /// As [`stage`](Self::stage), of one of several worlds.
+    fn stage_of<T: Serialize + DeserializeOwned>(
+        &mut self,
+        what: &'static str,
+        world: Option<u64>,
+        length: u64,
+        work: impl FnOnce(&(dyn Fn() + Sync)) -> Result<T, study::StudyError>,
+    ) -> anyhow::Result<T> {
+        self.begun += 1;
+        let name = match world {
+            Some(world) => format!("{what} {world}"),
+            None => what.to_owned(),
+        };
+        let file = name.replace(' ', "-");
+        if let Some(kept) = self.folder.kept(&file) {
+            notice(&format!("{name}: was done before the interruption"));
+            return Ok(kept);
+        }
         let begun = Instant::now();
-        let done = with_progress(length, what, work).map_err(|e| e.in_stage(what))?;
-        self.0.push((what, begun.elapsed().as_secs_f64()));
+        let bar = format!("stage {} of {}: {name}", self.begun, self.all);
+        let done = with_progress(length, bar, work).map_err(|e| e.in_stage(what))?;
+        self.folder.keep(&file, &done)?;
+        self.times.push((name, begun.elapsed().as_secs_f64()));
         Ok(done)
     }
 }
 
 /// Makes a study, or a part of one, and writes its report.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let folder = report::Folder::prepare(&args.out)?;
+    let folder = report::Folder::prepare(&args.out, &command(args))?;
     let world = StudyWorld {
         seed: args.seed,
         variation: args.variation,
     };
-    let mut times = Times::default();
+    let worlds = args.seeds.map(|Seeds(first, last)| first..=last);
+    let worlds: Vec<u64> = worlds.into_iter().flatten().collect();
+    let mut stages = Stages {
+        folder,
+        all: args.stages(worlds.len()),
+        begun: 0,
+        times: Vec::new(),
+    };
     let mut study = Study {
         version: env!("CARGO_PKG_VERSION"),
         command: command(args),
@@ -141,36 +191,34 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         worlds: Vec::new(),
     };
     if args.includes(Stage::Pilot) {
-        let pilot = times.stage("pilot study", Pilot::TEXTURES, |done| {
+        let pilot = stages.stage("pilot study", Pilot::TEXTURES, |done| {
             Pilot::run(world, done)
         })?;
         study.pilot = Some(pilot);
     }
     if args.stage != Stage::Pilot {
-        let recorded = times.stage("training and validation", StudyWorld::RECORDED, |done| {
+        let recorded = stages.stage("training and validation", StudyWorld::RECORDED, |done| {
             world.train_and_validate(done)
         })?;
         if args.includes(Stage::Train) {
-            let worn = times.stage("worn skins", Worn::TEXTURES, |done| {
+            let worn = stages.stage("worn skins", Worn::TEXTURES, |done| {
                 Worn::record(world, done)
             })?;
             study.training = Some(Training::of(&recorded.training, &worn)?);
         }
-        explore(args, world, &recorded, &mut study, &mut times)?;
-        if let Some(Seeds(first, last)) = args.seeds {
-            let explorations = WorldRow::explorations(args.simulations);
-            let length = (last - first + 1) * (StudyWorld::RECORDED + explorations);
-            study.worlds = times.stage("worlds", length, |done| {
-                let row = |seed| {
-                    let world = StudyWorld { seed, ..world };
-                    let recorded = world.train_and_validate(done)?;
-                    WorldRow::run(world, &recorded, args.simulations, done)
-                };
-                (first..=last).map(row).collect()
+        explore(args, world, &recorded, &mut study, &mut stages)?;
+        for seed in worlds {
+            let length = StudyWorld::RECORDED + WorldRow::explorations(args.simulations);
+            let row = stages.stage_of("world", Some(seed), length, |done| {
+                let world = StudyWorld { seed, ..world };
+                let recorded = world.train_and_validate(done)?;
+                WorldRow::run(world, &recorded, args.simulations, done)
             })?;
+            study.worlds.push(row);
         }
     }
-    report::write(&study, &folder)?;
+    let Stages { folder, times, .. } = stages;
+    report::write(&study, folder)?;
     match args.format {
         Format::Json => out.write_all(report::json(&study)?.as_bytes())?,
         Format::Text => print(args, &study, &times, out)?,
@@ -184,24 +232,24 @@ fn explore(
     world: StudyWorld,
     recorded: &Recorded,
     study: &mut Study,
-    times: &mut Times,
+    stages: &mut Stages,
 ) -> anyhow::Result<()> {
     let simulations = args.simulations;
     let experiment = experiment(recorded, world.seed)?;
     if args.includes(Stage::Pairs) {
         let each = of_pair(simulations);
-        let rows = times.stage("pairs", PAIRS.len() as u64 * each, |done| {
+        let rows = stages.stage("pairs", PAIRS.len() as u64 * each, |done| {
             pairs(&experiment, each, done)
         })?;
         study.pairs = Some(rows);
     }
     if args.includes(Stage::Identify) {
         let length = METHODS.len() as u64 * simulations;
-        let identification = times.stage("identification", length, |done| {
+        let identification = stages.stage("identification", length, |done| {
             Identification::run(&experiment, simulations, done)
         })?;
         study.identification = Some(identification);
-        study.signals = Some(times.stage("signals", 0, |_| Signals::run(world))?);
+        study.signals = Some(stages.stage("signals", 0, |_| Signals::run(world))?);
     }
     Ok(())
 }
@@ -222,7 +270,12 @@ fn command(args: &Args) -> String {
     )
 }
 
-fn print(args: &Args, study: &Study, times: &Times, out: &mut impl Write) -> std::io::Result<()> {
+fn print(
+    args: &Args,
+    study: &Study,
+    times: &[(String, f64)],
+    out: &mut impl Write,
+) -> std::io::Result<()> {
     writeln!(
         out,
         "World {}, variation {}: {}",
@@ -251,7 +304,7 @@ fn print(args: &Args, study: &Study, times: &Times, out: &mut impl Write) -> std
         writeln!(out, "World {}: pairs {:.1} %", world.seed, world.pairs)?;
         print_columns(&world.columns, out)?;
     }
-    for (what, seconds) in &times.0 {
+    for (what, seconds) in times {
         writeln!(out, "{seconds:8.1} s  {what}")?;
     }
     if let Some(mib) = peak_mib() {
@@ -262,7 +315,7 @@ fn print(args: &Args, study: &Study, times: &Times, out: &mut impl Write) -> std
 
 fn print_columns(columns: &[Column], out: &mut impl Write) -> std::io::Result<()> {
     for (method, column) in METHODS.into_iter().zip(columns) {
-        let method = format!("{method:?}").to_lowercase();
+        let method = short_name(method);
         writeln!(
             out,
             "  {method:<10} {:5.1} % right, {:5.1} % right and sure, median {} movements",

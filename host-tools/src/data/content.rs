@@ -160,6 +160,11 @@ pub enum ContentError {
     /// The JSON reader complains; a folder with that layout.
     #[error("{0}; the layout is that of {1}")]
     Json(serde_json::Error, &'static str),
+    /// Another layout, of another sensor.
+    #[error(
+        "this is FabricSlide, slides of another finger without P_AC: `tactus evaluate --fabrics DIR` plays it"
+    )]
+    Fabrics,
     /// A field of a record is too long.
     #[error("{0} with {1} values; a slide has 1 to {MAX_SAMPLES}")]
     FieldLength(String, usize),

@@ -54,8 +54,8 @@ pub struct Imported {
     pub lost_rows: usize,
 }
 
-/// Converts the recordings in the folder `from` to the project's own format in the folder `to`. `progress` is called with
-/// the number of slides done, and of slides in all.
+/// Converts the recordings in the folder `from` to the project's own format in the folder `to`, where an import that was
+/// interrupted goes on. `progress` is called with the number of slides done, and of slides in all.
 ///
 /// # Errors
 /// If there are no recordings in `from`, a file is damaged, or `to` already holds recordings or cannot be written.
@@ -73,10 +73,12 @@ fn copy(set: &RecordingSet, to: &Path, progress: &mut dyn FnMut(usize, usize)) -
         ..Imported::default()
     };
     let total = (0..done.textures).map(|t| set.slides(t).len()).sum();
-    let mut writer = RecordingWriter::create(to, set.textures().to_vec())?;
+    let mut writer = begin(set.folder(), to, set.textures().to_vec())?;
     for texture in 0..done.textures {
         for slide in set.load_texture(texture)? {
-            writer.write(&slide)?;
+            if !writer.has(texture, slide.number) {
+                writer.write(&slide)?;
+            }
             done.slides += 1;
             progress(done.slides, total);
         }
@@ -101,7 +103,7 @@ fn import_csv(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) ->
         id,
         name: format!("mat{id}"),
     });
-    let mut writer = RecordingWriter::create(to, textures.collect())?;
+    let mut writer = begin(from, to, textures.collect())?;
     for (texture, (&material, numbers)) in materials.iter().enumerate() {
         let folder = raw.join(format!("mat{material}"));
         // a few slides at a time: rebuilding the signs takes most of a second each
@@ -109,10 +111,18 @@ fn import_csv(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) ->
         for some in numbers.chunks(2 * rayon::current_num_threads()) {
             let slides: Vec<_> = some
                 .par_iter()
-                .map(|&number| read_slide(&folder, material, texture, number))
+                .map(|&number| {
+                    let files = SlideFiles::read(&folder, material, number)?;
+                    let lost_rows = files.bio.lost_rows;
+                    let slide =
+                        (!writer.has(texture, number)).then(|| files.slide(texture, number));
+                    Ok((slide.transpose()?, lost_rows))
+                })
                 .collect::<Result<_>>()?;
             for (slide, lost_rows) in slides {
-                writer.write(&slide)?;
+                if let Some(slide) = slide {
+                    writer.write(&slide)?;
+                }
                 done.slides += 1;
                 done.lost_rows += lost_rows;
                 progress(done.slides, total);
@@ -165,39 +175,60 @@ fn names(folder: &Path) -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// One slide, and how many rows it lacks.
-fn read_slide(
-    folder: &Path,
-    material: u32,
-    texture: usize,
-    number: u32,
-) -> Result<(Recording, usize)> {
-    let file = |kind| folder.join(format!("mat{material}_{number}_{kind}.csv"));
-    let (bio_path, cw_path) = (file("bio"), file("cw"));
-    let bio = read_bio(&bio_path)?;
-    let force = read_force(&cw_path)?;
-    let fault = |path: &PathBuf, cause| RecordingError::Samples {
-        path: path.clone(),
-        cause,
-    };
-    let shear = interpolate(&force, &bio.times).map_err(|cause| fault(&cw_path, cause))?;
-    let movement =
-        Movement::new(NOMINAL_FORCE_MN, SPEED_UM_S).map_err(|e| fault(&bio_path, e.into()))?;
-    let slide = Recording {
-        texture,
-        number,
-        movement,
-        window: WINDOW,
-        blocks: Vec::new(),
-        background: Some(BACKGROUND_POWER),
-        pdc: bio.pdc,
-        pdc_rate_hz: ROW_RATE_HZ,
-        outside_mn: None,
-        shear_rate_hz: ROW_RATE_HZ,
-    };
-    let imported = |cause| fault(&bio_path, ContentError::Imported(Box::new(cause)));
-    let slide = slide.cut(&[], &signs::rebuild(&bio.pac), Some(&shear));
-    Ok((slide.map_err(imported)?, bio.lost_rows))
+/// A writer that goes on with an import of this folder.
+fn begin(from: &Path, to: &Path, textures: Vec<Texture>) -> Result<RecordingWriter> {
+    let from = fs::canonicalize(from).unwrap_or_else(|_| from.to_owned());
+    let command = format!("tactus import {} ...", from.display());
+    RecordingWriter::begin(to, textures, &command)
+}
+
+/// The files of one slide.
+struct SlideFiles {
+    bio_path: PathBuf,
+    bio: Bio,
+    shear: Vec<i16>,
+}
+
+impl SlideFiles {
+    fn read(folder: &Path, material: u32, number: u32) -> Result<Self> {
+        let file = |kind| folder.join(format!("mat{material}_{number}_{kind}.csv"));
+        let (bio_path, cw_path) = (file("bio"), file("cw"));
+        let bio = read_bio(&bio_path)?;
+        let force = read_force(&cw_path)?;
+        let shear = interpolate(&force, &bio.times).map_err(|cause| RecordingError::Samples {
+            path: cw_path,
+            cause,
+        })?;
+        Ok(Self {
+            bio_path,
+            bio,
+            shear,
+        })
+    }
+
+    /// The slide, with the signs of its P_AC, which take most of a second.
+    fn slide(self, texture: usize, number: u32) -> Result<Recording> {
+        let fault = |cause| RecordingError::Samples {
+            path: self.bio_path.clone(),
+            cause,
+        };
+        let movement = Movement::new(NOMINAL_FORCE_MN, SPEED_UM_S).map_err(|e| fault(e.into()))?;
+        let slide = Recording {
+            texture,
+            number,
+            movement,
+            window: WINDOW,
+            blocks: Vec::new(),
+            background: Some(BACKGROUND_POWER),
+            pdc: self.bio.pdc,
+            pdc_rate_hz: ROW_RATE_HZ,
+            outside_mn: None,
+            shear_rate_hz: ROW_RATE_HZ,
+        };
+        let imported = |cause| fault(ContentError::Imported(Box::new(cause)));
+        let slide = slide.cut(&[], &signs::rebuild(&self.bio.pac), Some(&self.shear));
+        slide.map_err(imported)
+    }
 }
 
 #[derive(Default)]

@@ -10,6 +10,7 @@ pub mod biotac;
 pub mod files;
 pub mod npy;
 pub mod own;
+mod writer;
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +18,7 @@ use tactus_core::features::Movement;
 
 use crate::data::recording::{Recording, SlideKey, Texture};
 pub use files::{RecordingError, Result};
-pub use own::RecordingWriter;
+pub use writer::RecordingWriter;
 
 /// The recordings of one folder.
 #[derive(Debug)]
@@ -57,6 +58,8 @@ impl RecordingSet {
             let manifest = biotac::Manifest::read(&biotac)?;
             let (textures, slides) = manifest.contents();
             (Source::Biotac(manifest), textures, slides)
+        } else if let Ok(by) = std::fs::read_to_string(folder.join(files::INCOMPLETE)) {
+            return Err(RecordingError::Unfinished(folder.to_owned(), by));
         } else {
             return Err(RecordingError::NoManifest(folder.to_owned()));
         };

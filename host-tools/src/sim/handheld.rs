@@ -189,13 +189,18 @@ pub fn slides(
 ///
 /// # Errors
 /// See [`TableError`].
-pub fn learn(collection: &Collection) -> Result<(Vec<u8>, Vec<u8>), TableError> {
+pub fn learn(
+    collection: &Collection,
+    done: impl Fn() + Sync,
+) -> Result<(Vec<u8>, Vec<u8>), TableError> {
     let measured: Vec<_> = collection
         .textures
         .par_iter()
         .map(|&texture| {
             let setup = collection.setup(texture, 0);
-            slides(setup, Manner::default(), collection.trials)
+            let made = slides(setup, Manner::default(), collection.trials);
+            done();
+            made
         })
         .collect();
     let (mut names, mut known, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
@@ -264,7 +269,7 @@ mod tests {
     #[test]
     fn a_hand_recognises_what_a_hand_trained() {
         let collection = world(12);
-        let (table, left_out) = learn(&collection).unwrap();
+        let (table, left_out) = learn(&collection, || ()).unwrap();
         assert_eq!(left_out, [0u8; 0]);
         let [all, right, _, wrong, made] = explore(&collection, &table);
         assert_eq!(all, 12);
@@ -314,7 +319,7 @@ mod tests {
             .map(|r| r.1)
             .sum();
         eprintln!("{bad} slides rejected");
-        let (table, left_out) = learn(&collection).unwrap();
+        let (table, left_out) = learn(&collection, || ()).unwrap();
         eprintln!("no good slide: {left_out:?}; {} bytes", table.len());
         explore(&collection, &table);
         // none of another world's textures is known

@@ -1,7 +1,7 @@
 //! Identification among all textures (Table 5), and discrimination of pairs (Table 4): thousands of virtual explorations,
 //! each slide drawn from the validation trials.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tactus_core::explorer::{Config, Explorer};
 use tactus_core::features::Property;
 
@@ -16,13 +16,23 @@ use crate::sim::collection::{Collection, texture_name};
 
 /// The ways of exploring that are compared, the paper's three and the project's own.
 pub const METHODS: [Method; 4] = [Method::Cycle, Method::Random, Method::Paper, Method::Fused];
+/// What a way of exploring is called, in short.
+pub fn short_name(method: Method) -> &'static str {
+    match method {
+        Method::Cycle => "cycling",
+        Method::Random => "random",
+        Method::Paper => "Bayesian",
+        _ => "fused",
+    }
+}
+
 /// Movements after which there is an answer, sure or not (paper).
 pub const MAX_SLIDES: u8 = 10;
 /// Most movements for a pair. The paper gives no limit; no pair comes near this one.
 const MAX_PAIR_SLIDES: u8 = 254;
 
 /// How a way of exploring did: a column of Table 5.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Column {
     /// Right answers, %.
     pub correct: f64,
@@ -112,7 +122,7 @@ pub fn identify(
 }
 
 /// A row of Table 4.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct PairRow {
     /// The textures.
     pub textures: [Named; 2],
@@ -167,7 +177,7 @@ pub(super) fn percent(part: usize, of: usize) -> f64 {
 }
 
 /// Identification in one world: Table 5.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Identification {
     /// Virtual explorations of each way of exploring.
     pub simulations: u64,
@@ -182,10 +192,10 @@ pub struct Identification {
 }
 
 /// One exploration, step by step.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Evolution {
     /// What it is an example of.
-    pub example: &'static str,
+    pub example: String,
     /// Which of the simulations it is.
     pub simulation: u64,
     /// The unknown texture.
@@ -297,7 +307,7 @@ fn evolution(
     let likely = (0..experiment.names().len())
         .filter(|&texture| of(texture).any(|p| p >= LIKELY) || texture == outcome.unknown);
     Evolution {
-        example,
+        example: example.to_owned(),
         simulation,
         unknown: named(outcome.unknown),
         identified: named(outcome.identified),
@@ -308,7 +318,7 @@ fn evolution(
 }
 
 /// What came out in one of several worlds.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct WorldRow {
     /// The world.
     pub seed: u64,

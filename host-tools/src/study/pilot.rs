@@ -1,6 +1,6 @@
 //! The pilot study: which of 36 movements tells ten textures best apart by which property (figs. 5, 6, 7).
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{Movement, Property, PropertySet};
 use tactus_core::table::Table;
@@ -16,7 +16,7 @@ use crate::sim::collection::texture_name;
 const SESSION: u64 = 3;
 
 /// What the pilot study found.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Pilot {
     /// The textures.
     pub textures: Vec<Named>,
@@ -29,7 +29,7 @@ pub struct Pilot {
 }
 
 /// One of the 36 movements.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct PilotMovement {
     /// Contact force, N.
     pub force_n: f32,
@@ -45,12 +45,12 @@ pub struct PilotMovement {
     /// not reached on every texture.
     pub uncertainty: [f32; 3],
     /// Where the rig could not make it.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub not_reached: Vec<Missed>,
 }
 
 /// A texture on which the rig could not make a movement.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Missed {
     /// Number of the texture.
     pub texture: u8,
@@ -61,7 +61,7 @@ pub struct Missed {
 }
 
 /// The best movement for a property.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct MostUseful {
     /// The property.
     pub property: Property,

@@ -1,7 +1,7 @@
 //! What the sensor says while it is pressed (fig. 3) and while it slides (fig. 4).
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tactus_core::dsp::{BIN_HZ, Plan, TAPS, Taps};
 use tactus_core::features::Movement;
 use tactus_core::rig::calibration::RigCalibration;
@@ -42,7 +42,7 @@ const SHOWN: [(u8, Movement); 3] = [
 const SHOWN_S: f32 = 0.25;
 
 /// Figs. 3 and 4.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Signals {
     /// Force against P_DC.
     pub press: Press,
@@ -51,7 +51,7 @@ pub struct Signals {
 }
 
 /// A press and a release on a hard plate.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Press {
     /// Change of P_DC in counts and force in N while the force grows.
     pub loading: Vec<(f64, f64)>,
@@ -64,7 +64,7 @@ pub struct Press {
 }
 
 /// A slide as it was sampled.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Example {
     /// The texture.
     pub texture: Named,

@@ -6,7 +6,7 @@
 use std::fmt;
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 use tactus_core::dsp::Plan;
 use tactus_core::features::{Movement, Observation, Property};
 use tactus_core::rig::Fault;
@@ -39,7 +39,7 @@ pub struct StudyWorld {
 }
 
 /// All trials of one texture.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct TextureTrials {
     /// Number of the texture.
     pub texture: u8,
@@ -49,7 +49,8 @@ pub struct TextureTrials {
     pub wear: Vec<f64>,
     /// Whether the skin was changed before the first slide.
     pub new_skin: bool,
-    /// Movements that the rig could not make on this texture.
+    /// Movements that the rig could not make on this texture. Only those of the pilot, which keeps them in its own way.
+    #[serde(skip)]
     pub not_reached: Vec<NotReached>,
 }
 
@@ -252,7 +253,7 @@ fn slide_mm(movement: Movement) -> f64 {
 }
 
 /// What a world's identification needs: the training of all textures, and the validation trials of those of Tables 4 and 5.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Recorded {
     /// All 117.
     pub training: Vec<TextureTrials>,
@@ -297,6 +298,17 @@ pub struct Named {
     pub number: u8,
     /// The name.
     pub name: &'static str,
+}
+
+impl<'de> Deserialize<'de> for Named {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        /// The number says it all.
+        #[derive(Deserialize)]
+        struct Numbered {
+            number: u8,
+        }
+        Numbered::deserialize(from).map(|Numbered { number }| Self::new(number))
+    }
 }
 
 impl Named {

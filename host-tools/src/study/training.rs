@@ -2,7 +2,7 @@
 //! and what a worn skin does to the data.
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tactus_core::explorer::{Method, confusion};
 use tactus_core::features::Property;
 use tactus_core::table::{Action, Gaussian, Table};
@@ -151,12 +151,12 @@ impl Training {
         let slides: Vec<_> = trials.iter().map(|t| t.slides.clone()).collect();
         let [gaussians, fused] = [
             (
-                "gaussians.table",
+                "gaussians.tact",
                 Method::Paper,
                 "one Gaussian per movement and property: the paper's way",
             ),
             (
-                "fused.table",
+                "fused.tact",
                 Method::Fused,
                 "all features of a slide, whitened",
             ),
@@ -334,7 +334,7 @@ pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Slides over textures with a skin that is so worn before each of them.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Worn {
     /// The wear.
     pub wear: f64,

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use anyhow::ensure;
 use tactus::data::recording::Texture;
 use tactus::data::recordings::RecordingWriter;
+use tactus::eval::show::count;
 use tactus::link::Request;
 use tactus_core::explorer::Strategy;
 use tactus_core::wire::{Command, Identify};
@@ -20,7 +21,8 @@ use super::train::seed_of_now;
 #[command(after_help = "\
 Examples:
   tactus device record burlap silk --out recordings     asks for the next texture when it is due
-  tactus evaluate --recordings recordings")]
+  tactus evaluate --recordings recordings
+The same command goes on with the texture at which an interrupted one stopped.")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,
@@ -48,12 +50,24 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         name: name.trim().to_owned(),
     });
     // before anything moves
-    let mut writer = RecordingWriter::create(&args.out, named.collect())?;
+    let command = format!(
+        "tactus device record {} --slides {slides}",
+        textures.join(" ")
+    );
+    let mut writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
     let (mut bench, _) = Bench::open(&args.at)?;
     let calibration = bench.get(Request::read_calibration())?;
     bench.get(Request::command(Command::Stream(true)))?;
     let mut written = 0;
     for (index, name) in textures.iter().enumerate() {
+        let there = writer.slides(index);
+        if there == usize::from(*slides) {
+            writeln!(out, "{name}: its slides were recorded before.")?;
+            written += there;
+            continue;
+        }
+        // some of an interrupted recording, where nobody knows how the sample lay
+        writer.forget(index)?;
         if textures.len() > 1 {
             let prompt = format!("Lay {name} under the finger and press Enter: ");
             wait_for_enter(bench.interrupt(), &prompt)?;
@@ -97,9 +111,10 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     writer.finish()?;
     writeln!(
         out,
-        "{}: {written} slides of {} textures. Next: tactus features --recordings {0}",
+        "{}: {} of {}. Next: tactus features --recordings {0}",
         args.out.display(),
-        textures.len()
+        count(written as u64, "slide"),
+        count(textures.len() as u64, "texture")
     )?;
     Ok(())
 }

@@ -17,6 +17,8 @@ use crate::data::rows::RowError;
 pub const OWN_MANIFEST: &str = "manifest.csv";
 /// Name of the manifest of folders like `data/biotac`.
 pub const BIOTAC_MANIFEST: &str = "manifest.json";
+/// What a folder has in it while it is not whole.
+pub const INCOMPLETE: &str = "INCOMPLETE";
 /// Largest manifest that is read, in bytes.
 pub(crate) const MAX_MANIFEST: u64 = 64 << 20;
 
@@ -111,6 +113,12 @@ pub enum RecordingError {
         /// How many textures there are.
         count: usize,
     },
+    /// Recordings that were begun and are not whole.
+    #[error("{}: recordings that are not whole, by: {}", .0.display(), .1.trim_end())]
+    Unfinished(PathBuf, String),
+    /// Other files would lie among the recordings.
+    #[error("{}: is not empty; give a new folder, so that nothing is mixed up", .0.display())]
+    NotEmpty(PathBuf),
     /// The folder to write to is taken.
     #[error("{}: already holds recordings ({manifest}); give a new folder, or remove these first", folder.display())]
     Taken {

@@ -17,16 +17,13 @@
 //! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it; each is a
 //! one-dimensional array of `<i2` (numpy.int16). The hash is the SHA-256 of the whole file in hexadecimal. The rows may come
 //! in any order; textures are taken in the order of their first row.
-use std::collections::HashSet;
-use std::fs::{self, File};
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use tactus_core::features::Movement;
 
 use super::files::{
-    BIOTAC_MANIFEST, OWN_MANIFEST as MANIFEST, RecordingError, Result, check_hash,
-    distinct_textures, in_order_of_time, inside, read_bounded, sha256,
+    OWN_MANIFEST as MANIFEST, RecordingError, Result, check_hash, distinct_textures,
+    in_order_of_time, inside, read_bounded,
 };
 use super::npy;
 use crate::data::content::ContentError;
@@ -243,155 +240,5 @@ impl Stream {
             path,
             cause: why.into(),
         })
-    }
-}
-
-/// Writes a folder in this format, slide by slide.
-///
-/// The manifest comes last, under another name first: a writer that is interrupted leaves samples without a manifest, which
-/// is no recording, and a new writer may take the folder over.
-#[derive(Debug)]
-pub struct RecordingWriter {
-    folder: PathBuf,
-    textures: Vec<Texture>,
-    /// rows of the manifest
-    rows: Vec<Vec<String>>,
-    /// texture and number of each
-    keys: HashSet<(usize, u32)>,
-}
-
-impl RecordingWriter {
-    /// Starts the recordings of `textures` in `folder`, which is made if it is not there.
-    ///
-    /// # Errors
-    /// If the folder cannot be made or already holds recordings, or two textures have one number.
-    pub fn create(folder: &Path, textures: Vec<Texture>) -> Result<Self> {
-        distinct_textures(&folder.join(MANIFEST), &textures)?;
-        fs::create_dir_all(folder).map_err(|e| io_error(folder, e))?;
-        for manifest in [MANIFEST, BIOTAC_MANIFEST] {
-            if folder.join(manifest).exists() {
-                return Err(RecordingError::Taken {
-                    folder: folder.to_owned(),
-                    manifest,
-                });
-            }
-        }
-        Ok(Self {
-            folder: folder.to_owned(),
-            textures,
-            rows: Vec::new(),
-            keys: HashSet::new(),
-        })
-    }
-
-    /// Writes the samples of one slide.
-    ///
-    /// # Errors
-    /// If the slide makes no sense, was written before, or a file cannot be written.
-    pub fn write(&mut self, slide: &Recording) -> Result<()> {
-        let manifest = self.folder.join(MANIFEST);
-        let place = format!("slide {}", slide.number);
-        let texture = self.textures.get(slide.texture);
-        let texture = texture.ok_or_else(|| RecordingError::NoTexture {
-            folder: self.folder.clone(),
-            index: slide.texture,
-            count: self.textures.len(),
-        })?;
-        slide.check().map_err(|cause| RecordingError::Entry {
-            path: manifest.clone(),
-            place: format!("texture {}, {place}", texture.id),
-            cause,
-        })?;
-        if self.keys.contains(&(slide.texture, slide.number)) {
-            return Err(RecordingError::DuplicateSlide {
-                manifest,
-                place,
-                id: texture.id,
-                number: slide.number,
-            });
-        }
-
-        let stream = |stream: &str, samples: &[i16]| -> Result<[String; 2]> {
-            let file = format!("t{:03}_s{:03}_{stream}.npy", texture.id, slide.number);
-            let path = self.folder.join(&file);
-            let bytes = npy::write(samples);
-            fs::write(&path, &bytes).map_err(|e| io_error(&path, e))?;
-            Ok([file, sha256(&bytes)])
-        };
-        let none = || [String::new(), String::new()];
-        let (power, background) = match slide.background {
-            Some(power) => (power.to_string(), none()),
-            None => (String::new(), stream("still", &slide.still())?),
-        };
-        let pac = stream("pac", &slide.pac())?;
-        let pdc = stream("pdc", &slide.pdc)?;
-        let shear = match slide.shear_mn() {
-            Some(shear) => stream("shear", &shear)?,
-            None => none(),
-        };
-        let mut row = vec![
-            texture.id.to_string(),
-            texture.name.trim().to_owned(),
-            slide.number.to_string(),
-            thousandths(u32::from(slide.movement.force_mn())),
-            thousandths(slide.movement.speed_um_s()),
-            slide.window.0.to_string(),
-            slide.window.1.to_string(),
-            power,
-        ];
-        row.extend(background);
-        for ([file, sha256], rate) in [
-            (pac, PAC_RATE_HZ),
-            (pdc, slide.pdc_rate_hz),
-            (shear, slide.shear_rate_hz),
-        ] {
-            row.extend([file, rate.to_string(), sha256]);
-        }
-        self.rows.push(row);
-        self.keys.insert((slide.texture, slide.number));
-        Ok(())
-    }
-
-    /// Writes the manifest: from here on the folder holds recordings.
-    ///
-    /// # Errors
-    /// If a texture has no slide, or the manifest cannot be written.
-    pub fn finish(self) -> Result<()> {
-        let manifest = self.folder.join(MANIFEST);
-        for (index, texture) in self.textures.iter().enumerate() {
-            if !self.keys.iter().any(|(t, _)| *t == index) {
-                return Err(RecordingError::EmptyTexture {
-                    manifest,
-                    id: texture.id,
-                    name: texture.name.clone(),
-                });
-            }
-        }
-        let mut csv = csv::Writer::from_writer(Vec::new());
-        let text = csv
-            .write_record(COLUMNS)
-            .and_then(|()| self.rows.iter().try_for_each(|row| csv.write_record(row)))
-            .map_err(std::io::Error::from)
-            .and_then(|()| csv.into_inner().map_err(|e| e.into_error()))
-            .map_err(|e| io_error(&manifest, e))?;
-        let part = self.folder.join("manifest.csv.part");
-        let written = File::create(&part).and_then(|mut file| {
-            file.write_all(&text)?;
-            file.sync_all()
-        });
-        written.map_err(|e| io_error(&part, e))?;
-        fs::rename(&part, &manifest).map_err(|e| io_error(&manifest, e))
-    }
-}
-
-/// A value in thousandths as a decimal number.
-fn thousandths(value: u32) -> String {
-    format!("{}.{:03}", value / 1000, value % 1000)
-}
-
-fn io_error(path: &Path, cause: std::io::Error) -> RecordingError {
-    RecordingError::Io {
-        path: path.to_owned(),
-        cause,
     }
 }

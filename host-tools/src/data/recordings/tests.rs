@@ -1,4 +1,5 @@
 //! Every way in which a folder of recordings can be wrong, each with the message that it must give.
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
@@ -39,7 +40,7 @@ fn texture(id: u32, name: &str) -> Texture {
 
 fn write_own(folder: &Path, slides: &[Recording]) {
     let textures = vec![texture(7, "cotton, washed"), texture(3, "felt")];
-    let mut writer = RecordingWriter::create(folder, textures).unwrap();
+    let mut writer = RecordingWriter::begin(folder, textures, "test").unwrap();
     for slide in slides {
         writer.write(slide).unwrap();
     }
@@ -338,7 +339,7 @@ fn a_changed_byte_is_a_wrong_hash() {
 fn the_writer_refuses_what_the_reader_would() {
     let folder = TempDir::new().unwrap();
     let textures = vec![texture(1, "felt"), texture(2, "silk")];
-    let mut writer = RecordingWriter::create(folder.path(), textures.clone()).unwrap();
+    let mut writer = RecordingWriter::begin(folder.path(), textures.clone(), "test").unwrap();
     writer.write(&slide(0, 1)).unwrap();
     let message = |e: RecordingError| e.to_string();
     let twice = message(writer.write(&slide(0, 1)).unwrap_err());
@@ -358,21 +359,82 @@ fn the_writer_refuses_what_the_reader_would() {
     // a writer that ends here leaves no recordings
     let empty = message(writer.finish().unwrap_err());
     assert!(empty.contains("texture 2 (silk) has no slide"), "{empty}");
-    fails(folder.path(), &["neither manifest.csv nor manifest.json"]);
+    fails(folder.path(), &["recordings that are not whole, by: test"]);
+    let other = RecordingWriter::begin(folder.path(), textures.clone(), "another");
+    let other = message(other.unwrap_err());
+    assert!(other.contains("not whole, by: test"), "{other}");
 
-    // and another one may take its place, once
-    let mut writer = RecordingWriter::create(folder.path(), textures.clone()).unwrap();
-    writer.write(&slide(0, 1)).unwrap();
+    // and the same one goes on, once
+    let mut writer = RecordingWriter::begin(folder.path(), textures.clone(), "test").unwrap();
+    assert!(writer.has(0, 1) && !writer.has(1, 1));
     writer.write(&slide(1, 1)).unwrap();
     writer.finish().unwrap();
-    let taken = message(RecordingWriter::create(folder.path(), textures).unwrap_err());
+    let taken = message(RecordingWriter::begin(folder.path(), textures, "test").unwrap_err());
     assert!(
         taken.contains("already holds recordings (manifest.csv)"),
         "{taken}"
     );
     let twins = vec![texture(1, "felt"), texture(1, "silk")];
-    let twins = message(RecordingWriter::create(&folder.path().join("new"), twins).unwrap_err());
+    let twins =
+        message(RecordingWriter::begin(&folder.path().join("new"), twins, "test").unwrap_err());
     assert!(twins.contains("texture 1"), "{twins}");
+}
+
+/// The files of a folder, by name.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap());
+    entries
+        .map(|entry| {
+            let name = entry.file_name().into_string().unwrap();
+            (name, fs::read(entry.path()).unwrap())
+        })
+        .collect()
+}
+
+#[test]
+fn a_writer_goes_on_wherever_the_last_one_was_cut_off() {
+    let textures = vec![texture(7, "cotton, \"washed\""), texture(3, "felt")];
+    let slides = [slide(0, 1), slide(0, 4), slide(1, 2)];
+    let begin = |folder: &Path| RecordingWriter::begin(folder, textures.clone(), "test").unwrap();
+    let whole = TempDir::new().unwrap();
+    let mut writer = begin(whole.path());
+    for slide in &slides {
+        writer.write(slide).unwrap();
+    }
+    let rows = fs::read(whole.path().join("manifest.csv.part")).unwrap();
+    writer.finish().unwrap();
+    let whole = files(whole.path());
+    let mut gone_on = [0; 4];
+    for cut in (0..=rows.len()).step_by(7) {
+        let folder = TempDir::new().unwrap();
+        let mut writer = begin(folder.path());
+        slides.iter().for_each(|slide| writer.write(slide).unwrap());
+        drop(writer);
+        fs::write(folder.path().join("manifest.csv.part"), &rows[..cut]).unwrap();
+        // of a full disk
+        if cut % 2 == 0 {
+            fs::write(folder.path().join("t007_s004_pac.npy"), b"").unwrap();
+        }
+        assert!(RecordingSet::open(folder.path()).is_err());
+        let mut writer = begin(folder.path());
+        let todo = slides.iter().filter(|s| !writer.has(s.texture, s.number));
+        let todo: Vec<&Recording> = todo.collect();
+        gone_on[slides.len() - todo.len()] += 1;
+        todo.iter().for_each(|slide| writer.write(slide).unwrap());
+        writer.finish().unwrap();
+        assert_eq!(files(folder.path()), whole, "{cut}");
+    }
+    assert!(gone_on[..3].iter().all(|n| *n > 0), "{gone_on:?}");
+}
+
+#[test]
+fn nothing_is_written_among_other_files() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("mine"), b"").unwrap();
+    let begun = RecordingWriter::begin(folder.path(), vec![texture(1, "felt")], "test");
+    let said = begun.unwrap_err().to_string();
+    assert!(said.contains("is not empty"), "{said}");
+    assert_eq!(files(folder.path()).len(), 1);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use crate::eval::chart::{Chart, DrawError, Figure, MARKS, Mark, Series};
 use crate::eval::evaluate::Method;
 use crate::sim::collection::Collection;
 use crate::study::identify::{
-    Column, Evolution, Identification, METHODS, PairRow, WorldRow, of_pair,
+    Column, Evolution, Identification, METHODS, PairRow, WorldRow, of_pair, short_name,
 };
 use crate::study::published;
 
@@ -57,16 +57,13 @@ fn mean<T>(rows: &[T], of: impl Fn(&T) -> f64) -> f64 {
 
 /// What a way of exploring is called, in full and in short, and its column of the paper's Table 5.
 fn names(method: Method) -> (&'static str, &'static str, Option<published::Column>) {
-    match method {
-        Method::Cycle => ("uninformed cycling", "cycling", Some(published::CYCLING)),
-        Method::Random => ("random selection", "random", Some(published::RANDOM)),
-        Method::Paper => (
-            "Bayesian exploration",
-            "Bayesian",
-            Some(published::BAYESIAN),
-        ),
-        _ => ("fused (not in the paper)", "fused", None),
-    }
+    let (in_full, paper) = match method {
+        Method::Cycle => ("uninformed cycling", Some(published::CYCLING)),
+        Method::Random => ("random selection", Some(published::RANDOM)),
+        Method::Paper => ("Bayesian exploration", Some(published::BAYESIAN)),
+        _ => ("fused (not in the paper)", None),
+    };
+    (in_full, short_name(method), paper)
 }
 
 /// Adds Table 5 and fig. 10.

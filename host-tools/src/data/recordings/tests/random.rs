@@ -67,7 +67,7 @@ proptest! {
         };
         let slide = slide.cut(still, &pac, shear.as_deref()).unwrap();
         prop_assert_eq!((slide.pac(), slide.shear_mn()), (pac, shear));
-        let mut writer = RecordingWriter::create(folder.path(), vec![texture(id, &name)]).unwrap();
+        let mut writer = RecordingWriter::begin(folder.path(), vec![texture(id, &name)], "test").unwrap();
         writer.write(&slide).unwrap();
         writer.finish().unwrap();
         let set = RecordingSet::open(folder.path()).unwrap();

@@ -1,0 +1,348 @@
+//! Writing recordings in the project's own format, so that what is interrupted can go on.
+//!
+//! Files of samples come first, then the slide's row, in `manifest.csv.part`, which becomes the manifest when all is there.
+//! Beside it lies [`INCOMPLETE`], which says what is being recorded: the same command goes on where the last one ended,
+//! however it ended, and no other one writes into the folder.
+
+use std::collections::HashSet;
+use std::fs::{self, File, OpenOptions};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::files::{
+    BIOTAC_MANIFEST, INCOMPLETE, OWN_MANIFEST as MANIFEST, RecordingError, Result, check_hash,
+    distinct_textures, inside, read_bounded, sha256,
+};
+use super::npy;
+use super::own::COLUMNS;
+use crate::data::program::program;
+use crate::data::recording::{PAC_RATE_HZ, Recording, Texture};
+
+/// What becomes the manifest.
+const ROWS: &str = "manifest.csv.part";
+/// Columns of [`COLUMNS`]: texture, name, slide; and of files, each followed by or before its hash.
+const KEY: [usize; 3] = [0, 1, 2];
+const FILES: [(usize, usize); 4] = [(8, 9), (10, 12), (13, 15), (16, 18)];
+
+/// Writes a folder in the project's own format, slide by slide.
+#[derive(Debug)]
+pub struct RecordingWriter {
+    folder: PathBuf,
+    textures: Vec<Texture>,
+    rows: Vec<Vec<String>>,
+    /// texture and number of each
+    keys: HashSet<(usize, u32)>,
+    /// of the rows
+    journal: File,
+    /// the folder was not there before
+    made: bool,
+}
+
+impl RecordingWriter {
+    /// Starts the recordings of `textures` in `folder`, which is made if it is not there, or goes on with what the same
+    /// `command` has left unfinished there: [`has`](Self::has) tells which slides are there.
+    ///
+    /// # Errors
+    /// If the folder cannot be made, or holds recordings, or what another command has left unfinished, or other files; or two
+    /// textures have one number.
+    pub fn begin(folder: &Path, textures: Vec<Texture>, command: &str) -> Result<Self> {
+        let note = note(command);
+        // the last moment of a command that ended after all was whole
+        if folder.join(MANIFEST).exists() && read_note(folder)? == Some(note.clone()) {
+            return Err(RecordingError::Taken {
+                folder: folder.to_owned(),
+                manifest: MANIFEST,
+            })
+            .inspect_err(|_| drop(fs::remove_file(folder.join(INCOMPLETE))));
+        }
+        let made = !folder.exists();
+        Self::check(folder, &textures)?;
+        let rows = match read_note(folder)? {
+            Some(there) if there == note => rows_there(folder, &textures)?,
+            // it had not come to its first slide
+            Some(_) if read_rows(folder)?.lines().count() < 2 => Vec::new(),
+            Some(there) => return Err(RecordingError::Unfinished(folder.to_owned(), there)),
+            None if is_empty(folder)? => Vec::new(),
+            None => return Err(RecordingError::NotEmpty(folder.to_owned())),
+        };
+        let keys = rows.iter().filter_map(|row| key(row, &textures)).collect();
+        replace(folder, INCOMPLETE, note.as_bytes())?;
+        Ok(Self {
+            journal: journal(folder, &rows)?,
+            folder: folder.to_owned(),
+            textures,
+            rows,
+            keys,
+            made,
+        })
+    }
+
+    fn check(folder: &Path, textures: &[Texture]) -> Result<()> {
+        distinct_textures(&folder.join(MANIFEST), textures)?;
+        fs::create_dir_all(folder).map_err(|e| io_error(folder, e))?;
+        for manifest in [MANIFEST, BIOTAC_MANIFEST] {
+            if folder.join(manifest).exists() {
+                return Err(RecordingError::Taken {
+                    folder: folder.to_owned(),
+                    manifest,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// How many slides of a texture are there.
+    pub fn slides(&self, texture: usize) -> usize {
+        self.keys.iter().filter(|(t, _)| *t == texture).count()
+    }
+
+    /// Whether this slide of a texture is there.
+    pub fn has(&self, texture: usize, number: u32) -> bool {
+        self.keys.contains(&(texture, number))
+    }
+
+    /// Leaves out what was written of a texture.
+    ///
+    /// # Errors
+    /// If the rows cannot be written again.
+    pub fn forget(&mut self, texture: usize) -> Result<()> {
+        self.keys.retain(|(t, _)| *t != texture);
+        let (textures, keys) = (&self.textures, &self.keys);
+        self.rows
+            .retain(|row| key(row, textures).is_some_and(|key| keys.contains(&key)));
+        self.journal = journal(&self.folder, &self.rows)?;
+        Ok(())
+    }
+
+    /// Writes the samples of one slide.
+    ///
+    /// # Errors
+    /// If the slide makes no sense, was written before, or a file cannot be written.
+    pub fn write(&mut self, slide: &Recording) -> Result<()> {
+        let manifest = self.folder.join(MANIFEST);
+        let place = format!("slide {}", slide.number);
+        let texture = self.textures.get(slide.texture);
+        let texture = texture.ok_or_else(|| RecordingError::NoTexture {
+            folder: self.folder.clone(),
+            index: slide.texture,
+            count: self.textures.len(),
+        })?;
+        slide.check().map_err(|cause| RecordingError::Entry {
+            path: manifest.clone(),
+            place: format!("texture {}, {place}", texture.id),
+            cause,
+        })?;
+        if self.has(slide.texture, slide.number) {
+            return Err(RecordingError::DuplicateSlide {
+                manifest,
+                place,
+                id: texture.id,
+                number: slide.number,
+            });
+        }
+
+        let stream = |stream: &str, samples: &[i16]| -> Result<[String; 2]> {
+            let file = format!("t{:03}_s{:03}_{stream}.npy", texture.id, slide.number);
+            let path = self.folder.join(&file);
+            let bytes = npy::write(samples);
+            fs::write(&path, &bytes).map_err(|e| io_error(&path, e))?;
+            Ok([file, sha256(&bytes)])
+        };
+        let none = || [String::new(), String::new()];
+        let (power, background) = match slide.background {
+            Some(power) => (power.to_string(), none()),
+            None => (String::new(), stream("still", &slide.still())?),
+        };
+        let pac = stream("pac", &slide.pac())?;
+        let pdc = stream("pdc", &slide.pdc)?;
+        let shear = match slide.shear_mn() {
+            Some(shear) => stream("shear", &shear)?,
+            None => none(),
+        };
+        let mut row = vec![
+            texture.id.to_string(),
+            texture.name.trim().to_owned(),
+            slide.number.to_string(),
+            thousandths(u32::from(slide.movement.force_mn())),
+            thousandths(slide.movement.speed_um_s()),
+            slide.window.0.to_string(),
+            slide.window.1.to_string(),
+            power,
+        ];
+        row.extend(background);
+        for ([file, sha256], rate) in [
+            (pac, PAC_RATE_HZ),
+            (pdc, slide.pdc_rate_hz),
+            (shear, slide.shear_rate_hz),
+        ] {
+            row.extend([file, rate.to_string(), sha256]);
+        }
+        let written = csv(std::iter::once(&row)).and_then(|row| self.journal.write_all(&row));
+        written.map_err(|e| io_error(&self.folder.join(ROWS), e))?;
+        self.rows.push(row);
+        self.keys.insert((slide.texture, slide.number));
+        Ok(())
+    }
+
+    /// Gives the manifest its name: from here on the folder holds recordings.
+    ///
+    /// # Errors
+    /// If a texture has no slide, or the manifest cannot be written.
+    pub fn finish(self) -> Result<()> {
+        let manifest = self.folder.join(MANIFEST);
+        for (index, texture) in self.textures.iter().enumerate() {
+            if !self.keys.iter().any(|(t, _)| *t == index) {
+                return Err(RecordingError::EmptyTexture {
+                    manifest,
+                    id: texture.id,
+                    name: texture.name.clone(),
+                });
+            }
+        }
+        self.journal
+            .sync_all()
+            .and_then(|()| fs::rename(self.folder.join(ROWS), &manifest))
+            .map_err(|e| io_error(&manifest, e))?;
+        let note = self.folder.join(INCOMPLETE);
+        fs::remove_file(&note).map_err(|e| io_error(&note, e))
+    }
+}
+
+impl Drop for RecordingWriter {
+    /// What came to nothing leaves nothing; a part of a slide stays, for the same command to go on.
+    fn drop(&mut self) {
+        let is_ours = |entry: std::io::Result<fs::DirEntry>| {
+            entry.is_ok_and(|entry| {
+                [ROWS, INCOMPLETE, PART]
+                    .map(Into::into)
+                    .contains(&entry.file_name())
+            })
+        };
+        let is_bare = fs::read_dir(&self.folder).is_ok_and(|mut entries| entries.all(is_ours));
+        if self.rows.is_empty() && is_bare {
+            // they may be gone already
+            let _ = fs::remove_file(self.folder.join(ROWS));
+            let _ = fs::remove_file(self.folder.join(INCOMPLETE));
+            if self.made {
+                let _ = fs::remove_dir(&self.folder);
+            }
+        }
+    }
+}
+
+/// What the folder says while it is not whole.
+fn note(command: &str) -> String {
+    format!(
+        "{command}\nThe same command goes on here where it stopped; to begin anew, remove this folder.\n({})\n",
+        program()
+    )
+}
+
+fn read_note(folder: &Path) -> Result<Option<String>> {
+    match fs::read_to_string(folder.join(INCOMPLETE)) {
+        Ok(note) => Ok(Some(note)),
+        Err(why) if why.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(why) => Err(io_error(&folder.join(INCOMPLETE), why)),
+    }
+}
+
+/// Whether nobody's files are in it.
+fn is_empty(folder: &Path) -> Result<bool> {
+    let mut names = fs::read_dir(folder).map_err(|e| io_error(folder, e))?;
+    // a command that ended when it had only begun leaves a part of its note
+    Ok(names.all(|entry| entry.is_ok_and(|entry| entry.file_name() == PART)))
+}
+
+/// The index of a row's texture, and the number of its slide.
+fn key(row: &[String], textures: &[Texture]) -> Option<(usize, u32)> {
+    let [id, name, number] = KEY.map(|column| row.get(column));
+    let (id, number): (u32, u32) = (id?.parse().ok()?, number?.parse().ok()?);
+    let same = |t: &Texture| t.id == id && Some(t.name.trim()) == name.map(String::as_str);
+    Some((textures.iter().position(same)?, number))
+}
+
+fn read_rows(folder: &Path) -> Result<String> {
+    let path = folder.join(ROWS);
+    match fs::read(&path) {
+        // a character that is cut is in the last row
+        Ok(bytes) => Ok(String::from_utf8_lossy(&bytes).into_owned()),
+        Err(why) if why.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
+        Err(why) => Err(io_error(&path, why)),
+    }
+}
+
+/// The rows of a command that ended, up to the first that is not whole, or whose files are not.
+fn rows_there(folder: &Path, textures: &[Texture]) -> Result<Vec<Vec<String>>> {
+    let text = read_rows(folder)?;
+    // of a row that was cut short, nothing is believed
+    let (whole, _) = text.rsplit_once('\n').unwrap_or_default();
+    let mut reader = csv::Reader::from_reader(whole.as_bytes());
+    if reader.headers().is_ok_and(|there| there != &COLUMNS[..]) {
+        return Ok(Vec::new());
+    }
+    let is_whole = |row: &Vec<String>| {
+        row.len() == COLUMNS.len()
+            && key(row, textures).is_some()
+            && FILES
+                .iter()
+                .all(|&(file, hash)| is_there(folder, &row[file], &row[hash]))
+    };
+    Ok(reader
+        .records()
+        .map_while(std::result::Result::ok)
+        .map(|row| row.iter().map(str::to_owned).collect::<Vec<String>>())
+        .take_while(is_whole)
+        .collect())
+}
+
+/// Whether a file that a row names is the one that was written; a stream that was not measured has none.
+fn is_there(folder: &Path, file: &str, hash: &str) -> bool {
+    file.is_empty()
+        || inside(folder, ROWS, file)
+            .and_then(|path| {
+                let bytes = read_bounded(&path, npy::MAX_BYTES)?;
+                check_hash(&path, "the file", &bytes, hash)
+            })
+            .is_ok()
+}
+
+/// A file of these rows, to which others can be added.
+fn journal(folder: &Path, rows: &[Vec<String>]) -> Result<File> {
+    let path = folder.join(ROWS);
+    let header = COLUMNS.map(str::to_owned).to_vec();
+    let text = csv(std::iter::once(&header).chain(rows)).map_err(|e| io_error(&path, e))?;
+    replace(folder, ROWS, &text)?;
+    let journal = OpenOptions::new().append(true).open(&path);
+    journal.map_err(|e| io_error(&path, e))
+}
+
+fn csv<'r>(rows: impl Iterator<Item = &'r Vec<String>>) -> std::io::Result<Vec<u8>> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        csv.write_record(row)?;
+    }
+    csv.into_inner().map_err(|e| e.into_error())
+}
+
+/// A file while it is written.
+const PART: &str = "INCOMPLETE.part";
+
+/// Writes a file of the folder, whole or not at all.
+fn replace(folder: &Path, name: &str, bytes: &[u8]) -> Result<()> {
+    let (part, path) = (folder.join(PART), folder.join(name));
+    fs::write(&part, bytes)
+        .and_then(|()| fs::rename(&part, &path))
+        .map_err(|e| io_error(&path, e))
+}
+
+/// A value in thousandths as a decimal number.
+fn thousandths(value: u32) -> String {
+    format!("{}.{:03}", value / 1000, value % 1000)
+}
+
+fn io_error(path: &Path, cause: std::io::Error) -> RecordingError {
+    RecordingError::Io {
+        path: path.to_owned(),
+        cause,
+    }
+}
