@@ -12,7 +12,7 @@ use std::sync::mpsc::{self, Receiver as Told, Sender};
 use std::time::{Duration, Instant};
 use std::{fs, thread};
 
-use tactus::sim::collection::{Collection, calibrated};
+use tactus::sim::collection::{Collection, calibrated, texture_name};
 use tactus::sim::flash::{RamFlash, SECTOR};
 use tactus::sim::probe::{self, Host};
 use tactus::sim::rig::SimRig;
@@ -473,7 +473,7 @@ fn recorded_slides_have_the_features_that_the_probe_reported() {
         "--log",
         path(&log),
     ]);
-    assert_says(&said, &["slide 3 of 3", "3 slides of 1 textures"]);
+    assert_says(&said, &["slide 3 of 3", "3 slides of 1 texture."]);
     let told: Vec<[f64; 3]> = fs::read_to_string(&log)
         .unwrap()
         .lines()
@@ -628,9 +628,16 @@ fn teaching_and_calibrating_do_what_was_meant() {
         "7",
     ];
     printed(&[&identify[..], &["--port", &at]].concat());
+    // it is the very texture that the table has under another name
+    let twin = texture_name(UNKNOWN);
     assert_says(
         &last(&["teach", "velvet"], wire::Command::Label(name("velvet"))),
-        &["learned velvet from 2 slides"],
+        &[
+            "learned velvet from 2 slides",
+            &format!("Most like {twin}: "),
+            &format!("WARNING: velvet feels the same as {twin}"),
+            "consider more trials",
+        ],
     );
     let textures = |count: &str| {
         let status = printed(&["status", "--port", &at]);
@@ -641,13 +648,16 @@ fn teaching_and_calibrating_do_what_was_meant() {
         from: name("velvet"),
         to: name("felt"),
     };
-    last(&["rename", "velvet", "felt"], rename);
-    assert_says(
-        &refused(&["forget", "--name", "velvet"]),
-        &["the probe refused: there is no texture velvet in the table"],
-    );
+    last(&["rename", "VELVET", "felt"], rename);
+    for wanted in ["forget --name fel", "rename fel silk"] {
+        let arguments: Vec<&str> = wanted.split(' ').collect();
+        assert_says(
+            &refused(&arguments),
+            &["no texture fel; did you mean felt?"],
+        );
+    }
     last(
-        &["forget", "--yes", "--name", "felt"],
+        &["forget", "--yes", "--name", "Felt"],
         wire::Command::Forget(Forget::Texture(name("felt"))),
     );
     textures("3 textures");
@@ -665,7 +675,7 @@ fn teaching_and_calibrating_do_what_was_meant() {
     last(&["stop"], wire::Command::Stop);
     assert_says(
         &refused(&["rename", "cheese", "felt"]),
-        &["the probe refused: there is no texture cheese in the table"],
+        &["no texture cheese; there are: "],
     );
     let long = "x".repeat(41);
     assert_says(&complaint(&["teach", &long, "--port", &at]), &["40 bytes"]);
@@ -913,6 +923,50 @@ mod unix {
     }
 
     #[test]
+    fn a_recording_that_is_killed_goes_on_with_the_texture_it_was_at() {
+        let (at, asked) = probe(200);
+        let temp = tempfile::tempdir().unwrap();
+        let folder = temp.path().join("slides");
+        let record = ["record", "Burlap", "Silk", "--slides", "2", "--port", &at];
+        // Enter, whenever it asks
+        let start = || {
+            let mut command = device(&record);
+            command.args(["--out", path(&folder)]);
+            command.stdin(Stdio::piped()).stdout(Stdio::piped());
+            let mut child = command.spawn().unwrap();
+            child.stdin.take().unwrap().write_all(b"\n\n").unwrap();
+            child
+        };
+        let mut child = start();
+        for _ in 0..2 {
+            wait_for(&asked, |command| {
+                matches!(command, wire::Command::Identify(_))
+            });
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let features = || {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+            command.args(["features", "--format", "csv", "--recordings", path(&folder)]);
+            command.output().unwrap()
+        };
+        let said = String::from_utf8(features().stderr).unwrap();
+        assert_says(&said, &["not whole, by: tactus device record Burlap Silk"]);
+        let out = start().wait_with_output().unwrap();
+        assert!(out.status.success());
+        let said = String::from_utf8(out.stdout).unwrap();
+        assert_says(
+            &said,
+            &[
+                "Burlap: its slides were recorded before",
+                "4 slides of 2 textures",
+            ],
+        );
+        let rows = String::from_utf8(features().stdout).unwrap();
+        assert_eq!(rows.lines().count(), 5, "{rows}");
+    }
+
+    #[test]
     fn a_second_ctrl_c_says_that_the_finger_may_be_down() {
         let sliding = says(&[
             || {
@@ -1038,7 +1092,7 @@ mod unix {
             "phase   ready",
             "i: find out",
             "nothing lost",
-            "stop and lift",
+            "s  stop",
         ]);
         assert!(
             screen.lines().all(|line| line.chars().count() <= 80),
@@ -1146,6 +1200,10 @@ fn completions_and_manual_pages_know_the_commands() {
         assert!(out.status.success(), "{arguments:?}");
         String::from_utf8(out.stdout).unwrap()
     };
+    // those that complete the values of options
+    for shell in ["bash", "zsh", "fish"] {
+        assert_says(&tactus(&["completions", shell]), &["plastic-mesh-5-mm"]);
+    }
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         assert_says(
             &tactus(&["completions", shell]),

@@ -1,5 +1,6 @@
 //! Texture tables learned from recorded slides, and how well they tell textures apart.
 
+pub mod alike;
 #[cfg(feature = "plots")]
 pub mod chart;
 pub mod courses;

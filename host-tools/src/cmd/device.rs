@@ -11,6 +11,7 @@ mod monitor;
 mod owner;
 mod record;
 mod recorder;
+mod rename;
 mod replay;
 mod status;
 mod table;
@@ -20,7 +21,7 @@ use std::io::Write;
 
 use clap::Subcommand;
 
-use crate::cmd::output::Done;
+use crate::cmd::output::{Done, Format};
 
 pub(crate) use bench::BenchError;
 
@@ -41,8 +42,13 @@ pub(crate) enum Command {
     #[command(after_help = "\
 Examples:
   tactus device list
+  tactus device list --format json
   tactus device status --port PORT    one of those listed")]
-    List,
+    List {
+        /// How to print them
+        #[arg(long, value_enum, default_value_t = Format::Text)]
+        format: Format,
+    },
     Status(status::Args),
     /// Watch the probe live, and have it identify, home or stop by a key
     #[command(after_help = "\
@@ -53,8 +59,8 @@ Examples:
     Identify(identify::Run),
     Train(train::Train),
     Teach(train::Teach),
-    Rename(train::Rename),
-    Forget(train::Forget),
+    Rename(rename::Rename),
+    Forget(rename::Forget),
     Record(record::Args),
     #[command(subcommand)]
     Table(table::Command),
@@ -77,14 +83,14 @@ Examples:
 /// Does what is asked for.
 pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<Done> {
     let done = match command {
-        Command::List => Ok(line::list(out)?),
+        Command::List { format } => line::list(*format, out),
         Command::Status(args) => status::run(args, out),
         Command::Monitor(args) => monitor::run(args),
         Command::Identify(args) => return identify::run(args, out),
         Command::Train(args) => train::train(args, out),
         Command::Teach(args) => train::teach(args, out),
-        Command::Rename(args) => train::rename(args, out),
-        Command::Forget(args) => train::forget(args, out),
+        Command::Rename(args) => rename::rename(args, out),
+        Command::Forget(args) => rename::forget(args, out),
         Command::Record(args) => record::run(args, out),
         Command::Table(command) => table::run(command, out),
         Command::Calibrate(args) => calibrate::run(args, out),

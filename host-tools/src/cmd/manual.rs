@@ -5,9 +5,12 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::Command;
+use clap::builder::PossibleValuesParser;
 use clap_complete::Shell;
+use tactus::sim::collection::plain_name;
+use tactus::sim::textures::TEXTURES;
 
-/// Print completions for a shell
+/// Print completions for a shell: commands, options, and the textures of the simulated world
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -33,13 +36,37 @@ pub(crate) struct Man {
 /// Writes completions of a command for a shell.
 pub(crate) fn completions(
     args: &Completions,
-    mut command: Command,
+    command: Command,
     out: &mut impl Write,
 ) -> io::Result<()> {
+    let mut command = with_textures(command);
     // it panics where it cannot write, as into a pipe that nobody reads any more
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut command, "tactus", &mut text);
     out.write_all(&text)
+}
+
+/// The command whose arguments for textures of the simulated world say which there are: for completion only, as they may also
+/// be given by number, and with their real names.
+fn with_textures(mut command: Command) -> Command {
+    let below: Vec<String> = command
+        .get_subcommands()
+        .map(|below| below.get_name().to_owned())
+        .collect();
+    for name in below {
+        command = command.mut_subcommand(name, with_textures);
+    }
+    for name in ["texture", "textures"] {
+        if command
+            .get_arguments()
+            .any(|a| a.get_id() == name && a.get_long().is_some())
+        {
+            // clap wants them for as long as the program lasts, which is until they are printed
+            let names = TEXTURES.iter().map(|t| &*plain_name(t.name).leak());
+            command = command.mut_arg(name, |a| a.value_parser(PossibleValuesParser::new(names)));
+        }
+    }
+    command
 }
 
 /// Writes a page for a command and each below it into a folder, or the first one to `out`.
@@ -56,4 +83,22 @@ pub(crate) fn pages(args: &Man, command: Command, out: &mut impl Write) -> anyho
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use tactus::sim::collection::texture_number;
+
+    use super::*;
+
+    #[test]
+    fn every_texture_is_found_by_the_name_that_a_shell_completes() {
+        for texture in TEXTURES {
+            let plain = plain_name(texture.name);
+            assert!(!plain.contains(|c: char| c != '-' && !c.is_alphanumeric()));
+            assert_eq!(texture_number(&plain), Some(texture.number), "{plain}");
+            assert_eq!(texture_number(texture.name), Some(texture.number));
+        }
+        assert_eq!(texture_number(""), None);
+    }
 }

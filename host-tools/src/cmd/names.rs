@@ -9,6 +9,23 @@ pub(crate) fn unknown<'n>(wanted: &str, known: impl IntoIterator<Item = &'n str>
     }
 }
 
+/// The name that was typed, however its capitals are.
+///
+/// # Errors
+/// There is none: [`unknown`].
+pub(crate) fn find<'n>(wanted: &str, known: &[&'n str]) -> Result<&'n str, String> {
+    let wanted = wanted.trim();
+    let as_typed = known.iter().find(|name| **name == wanted);
+    let capitals = || {
+        let same = |name: &&&str| name.to_lowercase() == wanted.to_lowercase();
+        known.iter().find(same)
+    };
+    as_typed
+        .or_else(capitals)
+        .copied()
+        .ok_or_else(|| unknown(wanted, known.iter().copied()))
+}
+
 /// The name that differs least, if it differs by a slip: a third of its letters at most, or by words that were left out.
 pub(crate) fn nearest<'n>(wanted: &str, known: &[&'n str]) -> Option<&'n str> {
     let wanted = wanted.to_lowercase();
@@ -67,5 +84,9 @@ mod tests {
             "no texture burlpa; did you mean Burlap?"
         );
         assert!(unknown("granite", known).ends_with("bath towel, Denim twill, Jean denim"));
+        assert_eq!(find(" bath TOWEL ", &known), Ok("bath towel"));
+        // of two that differ by their capitals, the one that was typed
+        assert_eq!(find("felt", &["Felt", "felt"]), Ok("felt"));
+        assert_eq!(find("bath towe", &known), Err(unknown("bath towe", known)));
     }
 }

@@ -239,12 +239,20 @@ pub fn texture_name(number: u8) -> &'static str {
         .map_or("?", |t| t.name)
 }
 
-/// Number of a texture by its name in Table 1, whatever the case, or by its number.
+/// A name as a shell takes it without quotes: "plastic-mesh-5-mm".
+pub fn plain_name(name: &str) -> String {
+    let words = name.split(|c: char| !c.is_alphanumeric());
+    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
+    words.join("-").to_lowercase()
+}
+
+/// Number of a texture by its name in Table 1, whatever its capitals and what is between its words, or by its number.
 pub fn texture_number(name: &str) -> Option<u8> {
     let number = name.trim_start_matches(['T', 't']).parse().ok();
+    let plain = plain_name(name);
     TEXTURES
         .iter()
-        .find(|t| t.name.eq_ignore_ascii_case(name) || Some(t.number) == number)
+        .find(|t| plain_name(t.name) == plain || Some(t.number) == number)
         .map(|t| t.number)
 }
 

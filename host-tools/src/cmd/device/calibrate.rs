@@ -3,13 +3,14 @@
 use std::io::Write;
 
 use anyhow::ensure;
+use serde::Serialize;
 use tactus::link::Request;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::Command;
 
 use super::bench::{Bench, BenchError};
 use super::line::Where;
-use crate::cmd::output::print_rows;
+use crate::cmd::output::{Format, print_json, print_rows};
 
 /// Measure what differs from rig to rig, or show and set it
 #[derive(clap::Args)]
@@ -38,6 +39,51 @@ pub(crate) struct Args {
     /// Contact force per count of P_DC, mN, from presses on a scale
     #[arg(long, value_name = "X")]
     force_mn_per_count: Option<f32>,
+    /// How to print what is in use
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What `device calibrate --format json` prints, and a part of `device status`.
+#[derive(Serialize)]
+pub(crate) struct CalibrationSummary {
+    /// The day, as "2026-11-21"; `null` for factory defaults.
+    date: Option<String>,
+    sensor: Option<String>,
+    pdc_in_the_air_counts: f32,
+    force_mn_per_count: f32,
+    /// Motor current without load at standstill, and more of it for each mm/s.
+    unloaded_ma: f32,
+    unloaded_ma_per_mm_s: f32,
+    shear_n_per_a: f32,
+}
+
+impl CalibrationSummary {
+    pub(crate) fn new(c: &RigCalibration) -> Self {
+        let (unloaded_a, a_per_mm_s) = c.unloaded_a;
+        Self {
+            date: date(c),
+            sensor: sensor(c),
+            pdc_in_the_air_counts: c.pressure.pdc_no_contact,
+            force_mn_per_count: c.pressure.force_mn_per_count,
+            unloaded_ma: unloaded_a * 1e3,
+            unloaded_ma_per_mm_s: a_per_mm_s * 1e3,
+            shear_n_per_a: c.newton_per_ampere,
+        }
+    }
+}
+
+/// "2026-11-21"; nothing for factory defaults.
+fn date(c: &RigCalibration) -> Option<String> {
+    let (year, month, day) = (c.date / 10_000, c.date / 100 % 100, c.date % 100);
+    (c.date != 0).then(|| format!("{year}-{month:02}-{day:02}"))
+}
+
+/// The sensor's serial number.
+fn sensor(c: &RigCalibration) -> Option<String> {
+    let serial = String::from_utf8_lossy(&c.serial);
+    let serial = serial.trim_matches('\0');
+    (!serial.is_empty()).then(|| serial.to_owned())
 }
 
 /// Measures, shows or sets the rig's constants.
@@ -45,16 +91,23 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (mut bench, _) = Bench::open(&how.at)?;
     let mut calibration = bench.get(Request::read_calibration())?;
     if how.show {
-        return print_rows(&calibration_rows(&calibration), out);
+        return print(how.format, &calibration, out);
     }
+    // a fault is told on the way; an object is all there is otherwise
+    let mut nowhere = std::io::sink();
+    let told: &mut dyn Write = match how.format {
+        Format::Text => &mut *out,
+        Format::Json => &mut nowhere,
+    };
+    let mut told = told;
     if how.drifted {
         calibration.date = 0;
         bench.get(Request::write_calibration(&calibration)?)?;
-        bench.perform(Request::command(Command::Home), out)?;
+        bench.perform(Request::command(Command::Home), &mut told)?;
     }
-    writeln!(out, "Measuring the motor's current without load ...")?;
-    out.flush()?;
-    calibration = bench.perform(Request::calibrate(), out)?;
+    writeln!(told, "Measuring the motor's current without load ...")?;
+    told.flush()?;
+    calibration = bench.perform(Request::calibrate(), &mut told)?;
     calibration.date = how.date.unwrap_or_else(today);
     if let Some(newton_per_ampere) = how.newton_per_ampere {
         calibration.newton_per_ampere = newton_per_ampere;
@@ -68,7 +121,14 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         kept == calibration,
         "the probe keeps other constants than it was given: calibrate again"
     );
-    print_rows(&calibration_rows(&kept), out)
+    print(how.format, &kept, out)
+}
+
+fn print(format: Format, c: &RigCalibration, out: &mut impl Write) -> anyhow::Result<()> {
+    match format {
+        Format::Text => print_rows(&calibration_rows(c), out),
+        Format::Json => print_json(&CalibrationSummary::new(c), out),
+    }
 }
 
 fn today() -> u32 {
@@ -78,24 +138,16 @@ fn today() -> u32 {
 
 /// The constants in words.
 pub(crate) fn calibration_rows(c: &RigCalibration) -> [(&'static str, String); 6] {
-    let (year, month, day) = (c.date / 10_000, c.date / 100 % 100, c.date % 100);
-    let serial = String::from_utf8_lossy(&c.serial);
     let (offset_ma, slope_ma) = (c.unloaded_a.0 * 1e3, c.unloaded_a.1 * 1e3);
     let motor = format!("{offset_ma:.1} mA + {slope_ma:.3} mA per mm/s without load");
     [
         (
             "calibrated",
-            match c.date {
-                0 => "never: factory defaults".to_owned(),
-                _ => format!("{year}-{month:02}-{day:02}"),
-            },
+            date(c).unwrap_or_else(|| "never: factory defaults".to_owned()),
         ),
         (
             "sensor",
-            match serial.trim_matches('\0') {
-                "" => "not known".to_owned(),
-                serial => serial.to_owned(),
-            },
+            sensor(c).unwrap_or_else(|| "not known".to_owned()),
         ),
         (
             "P_DC",

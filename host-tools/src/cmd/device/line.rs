@@ -9,7 +9,9 @@ use std::sync::mpsc;
 use std::time::{Duration, SystemTime};
 
 use super::owner::{Owned, Owner};
+use crate::cmd::output::{Format, print_json};
 use clap::Args;
+use serde::Serialize;
 use serialport::{SerialPortInfo, SerialPortType, UsbPortInfo};
 
 /// The probe's line.
@@ -169,19 +171,52 @@ pub(crate) fn found() -> Vec<Found> {
     ports
 }
 
+/// A port in `device list --format json`.
+#[derive(Serialize)]
+struct Listed<'a> {
+    port: &'a str,
+    is_nucleo: bool,
+    usb_vendor: Option<u16>,
+    usb_product: Option<u16>,
+    manufacturer: Option<&'a str>,
+    product: Option<&'a str>,
+    serial_number: Option<&'a str>,
+}
+
+impl<'a> From<&'a Found> for Listed<'a> {
+    fn from(found: &'a Found) -> Self {
+        let usb = found.usb.as_ref();
+        Self {
+            port: &found.name,
+            is_nucleo: found.is_nucleo(),
+            usb_vendor: usb.map(|usb| usb.vid),
+            usb_product: usb.map(|usb| usb.pid),
+            manufacturer: usb.and_then(|usb| usb.manufacturer.as_deref()),
+            product: usb.and_then(|usb| usb.product.as_deref()),
+            serial_number: usb.and_then(|usb| usb.serial_number.as_deref()),
+        }
+    }
+}
+
 /// Prints the ports, and what to do with them.
-pub(crate) fn list(out: &mut impl Write) -> io::Result<()> {
-    match found().as_slice() {
+pub(crate) fn list(format: Format, out: &mut impl Write) -> anyhow::Result<()> {
+    let found = found();
+    if format == Format::Json {
+        let listed: Vec<Listed<'_>> = found.iter().map(Listed::from).collect();
+        return print_json(&listed, out);
+    }
+    match found.as_slice() {
         [] => writeln!(
             out,
             "No serial port here. Plug in the board's USB socket CN1 (LD4 must be lit), or try the emulated board:\n  \
              tactus device monitor --emulated"
-        ),
+        )?,
         ports @ [first, ..] => {
             let (ports, name) = (lines(ports), &first.name);
-            writeln!(out, "{ports}\n\nTry: tactus device status --port {name}")
+            writeln!(out, "{ports}\n\nTry: tactus device status --port {name}")?;
         }
     }
+    Ok(())
 }
 
 /// What carries bytes to the probe and back; reads come back soon, with or without any.
@@ -460,10 +495,17 @@ mod tests {
             port("/dev/ttyACM0", ST).to_string(),
             "/dev/ttyACM0      0483:374b  STM32 STLink  066EFF  <- a NUCLEO: try this one"
         );
+        let json = serde_json::to_value(Listed::from(&port("/dev/ttyACM0", ST))).unwrap();
+        assert_eq!(json["usb_vendor"], 0x0483);
+        assert_eq!(
+            (&json["is_nucleo"], &json["serial_number"]),
+            (&true.into(), &"066EFF".into())
+        );
         let plain = Found {
             name: "/dev/ttyAMA0".into(),
             usb: None,
         };
+        assert!(serde_json::to_value(Listed::from(&plain)).unwrap()["usb_vendor"].is_null());
         assert_eq!(plain.to_string(), "/dev/ttyAMA0      no USB device");
     }
 }

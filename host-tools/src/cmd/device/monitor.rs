@@ -3,6 +3,7 @@
 //! [`Monitor`] is all that is known, from the reports alone; [`view`] draws it; [`run`] brings keys, reports and time
 //! together.
 
+mod keys;
 mod state;
 mod view;
 
@@ -12,11 +13,12 @@ use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use ratatui::DefaultTerminal;
-use ratatui::crossterm::event::{self, KeyCode, KeyModifiers};
+use ratatui::crossterm::event;
 use tactus::link::{Job, LinkError, PortError, ReadTable, Request};
 use tactus_core::table::Table;
 use tactus_core::wire::{Command, Identify, Report};
 
+use self::keys::Act;
 use self::state::{Monitor, Weight};
 use super::bench::{Bench, BenchError};
 use super::identify::Args;
@@ -100,9 +102,7 @@ fn watch(
             Some(Doing::Table(job)) => {
                 let polled = bench.step(job, &mut hear)?;
                 if let Poll::Ready(bytes) = &polled {
-                    let table = Table::read(bytes)?;
-                    monitor.names = table.names().map(str::to_owned).collect();
-                    monitor.table_crc = table.crc();
+                    monitor.take_table(Table::read(bytes)?);
                 }
                 Ok(polled.map(|_| ()))
             }
@@ -157,33 +157,35 @@ fn watch(
             let Some(key) = event::read()?.as_key_press_event() else {
                 continue;
             };
-            let control = key.modifiers.contains(KeyModifiers::CONTROL);
             let busy = doing.is_some() || !to_do.is_empty();
-            match key.code {
-                KeyCode::Char('c') if control => return Ok(End::Interrupt),
-                KeyCode::Char('q') => return Ok(End::Quit),
-                KeyCode::Char('s') | KeyCode::Esc => {
+            match keys::press(monitor, key, busy) {
+                Some(Act::Interrupt) => return Ok(End::Interrupt),
+                Some(Act::Quit) => return Ok(End::Quit),
+                Some(Act::Stop) => {
                     to_do.clear();
                     bench.send(Command::Stop)?;
-                    monitor.note(Weight::Message, "stopping");
+                    monitor.stop();
                 }
-                KeyCode::Char('i' | 'h') if busy => {
-                    monitor.note(Weight::Message, "it is busy: wait, or stop it with s");
-                }
-                KeyCode::Char('i') => {
+                Some(Act::Identify) => {
                     if monitor.table_crc != monitor.status.table_crc {
                         to_do.push_back(Command::ReadTable(0));
                     }
                     to_do.push_back(Command::Identify(wanted.clone()));
                     // the next one begins elsewhere on the sample
                     wanted.seed = wanted.seed.wrapping_add(1);
-                    monitor.note(Weight::Message, "identify");
+                    monitor.identify();
                 }
-                KeyCode::Char('h') => {
+                Some(Act::Home) => {
                     to_do.push_back(Command::Home);
                     monitor.note(Weight::Message, "home");
                 }
-                _ => {}
+                Some(Act::Teach(name)) => {
+                    monitor.note(Weight::Message, format!("teach {name}"));
+                    to_do.push_back(Command::Label(name));
+                    // what it feels most like now
+                    to_do.push_back(Command::ReadTable(0));
+                }
+                None => {}
             }
         }
     }

@@ -8,10 +8,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, ensure};
 use clap::Subcommand;
+use serde::Serialize;
 use tactus::eval::chart::{DrawError, Figure};
 use tactus::eval::pictures::exploration::Exploration;
 use tactus::eval::pictures::timeline::{Timeline, Watch};
-use tactus::eval::show::Show;
+use tactus::eval::show::{Show, count};
 use tactus::link::follow::{ALLOWED, Agreement, Follower};
 use tactus_core::dsp::Plan;
 use tactus_core::features::PropertySet;
@@ -19,6 +20,7 @@ use tactus_core::table::Table;
 use tactus_core::wire::{self, Event, Forget, Identify, PROTOCOL, Verdict};
 
 use super::log::Line;
+use crate::cmd::output::{Format, percent};
 use crate::cmd::plot::Plot;
 
 /// Show the log of a session (--log), or compute its decisions again
@@ -35,6 +37,9 @@ pub(crate) enum Command {
         file: PathBuf,
         #[command(flatten)]
         plot: Plot,
+        /// How to print what came of it
+        #[arg(long, value_enum, default_value_t = Format::Text)]
+        format: Format,
     },
     /// Show the session's explorations as they were shown live
     Show {
@@ -50,7 +55,7 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
     let (Command::Replay { plot, .. } | Command::Show { plot, .. }) = command;
     let canvas = plot.open()?;
     let (file, done) = match command {
-        Command::Replay { file, .. } => (file, replay(file, out)),
+        Command::Replay { file, format, .. } => (file, replay(file, *format, out)),
         Command::Show { file, .. } => (file, show(file, out)),
     };
     done.with_context(|| file.display().to_string())?;
@@ -227,26 +232,34 @@ fn show(path: &Path, out: &mut impl Write) -> Result<(), ReplayError> {
 }
 
 /// Computes every decision of a log again and says what came of it.
-fn replay(path: &Path, out: &mut impl Write) -> Result<(), ReplayError> {
-    let (mut slides, mut choices, mut posteriors, mut answers) = (0, 0, 0, 0);
-    let mut largest = 0.0f32;
-    let mut same = true;
+fn replay(path: &Path, format: Format, stdout: &mut impl Write) -> Result<(), ReplayError> {
+    let mut nowhere = io::sink();
+    let mut out: &mut dyn Write = match format {
+        Format::Text => &mut *stdout,
+        Format::Json => &mut nowhere,
+    };
+    let mut all = Replayed {
+        same: true,
+        ..Replayed::default()
+    };
     for (logged, number) in explorations(path)?.iter().zip(1..) {
-        headline(number, logged, out)?;
-        let agreement = match follow(logged, out) {
+        all.explorations += 1;
+        headline(number, logged, &mut out)?;
+        let agreement = match follow(logged, &mut out) {
             Ok(agreement) => agreement,
             Err(why) => {
                 writeln!(out, "  cannot be replayed: {why}")?;
-                same = false;
+                all.same = false;
                 continue;
             }
         };
-        slides += agreement.slides;
-        choices += agreement.choices;
-        posteriors += agreement.posteriors;
-        answers += agreement.verdicts;
+        all.slides += agreement.slides;
+        all.choices += agreement.choices;
+        all.posteriors += agreement.posteriors;
+        all.answers += agreement.verdicts;
         let here = agreement.properties.max(agreement.signal);
-        largest = largest
+        all.largest_difference = all
+            .largest_difference
             .max(here)
             .max(agreement.posterior)
             .max(agreement.expected);
@@ -255,33 +268,58 @@ fn replay(path: &Path, out: &mut impl Write) -> Result<(), ReplayError> {
             .events
             .iter()
             .any(|t| matches!(t, Event::SlideReport { .. }));
-        same &= agreement.agrees()
+        all.same &= agreement.agrees()
             || !observed && agreement.other_choices.is_empty() && agreement.expected <= ALLOWED;
     }
-    if !same {
-        return Err(ReplayError::Differs);
+    if format == Format::Json {
+        let json = serde_json::to_string_pretty(&all).map_err(io::Error::from)?;
+        writeln!(stdout, "{json}")?;
+    } else if all.same {
+        writeln!(
+            stdout,
+            "\nEvery decision is the same here: {}, {} measured again from their samples, {}, {}; largest difference {:e}.",
+            count(all.choices, "choice"),
+            count(all.slides, "slide"),
+            count(all.posteriors, "posterior"),
+            count(all.answers, "answer"),
+            all.largest_difference
+        )?;
     }
-    writeln!(
-        out,
-        "\nEvery decision is the same here: {choices} choices, {slides} slides measured again from their samples, \
-         {posteriors} posteriors, {answers} answers; largest difference {largest:e}."
-    )?;
-    Ok(())
+    if all.same {
+        Ok(())
+    } else {
+        Err(ReplayError::Differs)
+    }
 }
 
-fn headline(number: usize, logged: &Logged, out: &mut impl Write) -> io::Result<()> {
+/// What `device log replay --format json` prints: what was compared.
+#[derive(Default, Serialize)]
+struct Replayed {
+    explorations: u32,
+    choices: u32,
+    /// Measured again from their samples.
+    slides: u32,
+    posteriors: u32,
+    answers: u32,
+    /// Of features, posteriors and expected outcomes.
+    largest_difference: f32,
+    /// Whether every decision is the same here.
+    same: bool,
+}
+
+fn headline(number: usize, logged: &Logged, out: &mut (impl Write + ?Sized)) -> io::Result<()> {
     let textures = logged.table().map(|t| format!(" among {}", t.textures()));
     writeln!(
         out,
-        "Exploration {number}{}, threshold {}, at most {} slides",
+        "Exploration {number}{}, threshold {}, at most {}",
         textures.unwrap_or_default(),
-        logged.asked.threshold,
-        logged.asked.max_slides
+        percent(logged.asked.threshold.into()),
+        count(logged.asked.max_slides, "slide")
     )
 }
 
 /// Follows one exploration step by step.
-fn follow(logged: &Logged, out: &mut impl Write) -> anyhow::Result<Agreement> {
+fn follow(logged: &Logged, out: &mut (impl Write + ?Sized)) -> anyhow::Result<Agreement> {
     let table = Table::read(logged.table.as_ref().map_err(|why| anyhow!(*why))?)?;
     let plan = Plan::new();
     // a handheld probe feels no traction, from its first slide on

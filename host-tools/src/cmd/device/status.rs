@@ -2,11 +2,13 @@
 
 use std::io::Write;
 
+use serde::Serialize;
+use tactus::eval::show::count;
 use tactus::link::Request;
-use tactus_core::wire::Phase;
+use tactus_core::wire::{Phase, Status};
 
 use super::bench::{Bench, recovery};
-use super::calibrate::calibration_rows;
+use super::calibrate::{CalibrationSummary, calibration_rows};
 use super::line::Where;
 use crate::cmd::output::{Format, print_json, print_rows};
 
@@ -24,13 +26,45 @@ pub(crate) struct Args {
     format: Format,
 }
 
+/// What `device status --format json` prints.
+#[derive(Serialize)]
+struct Summary<'a> {
+    port: &'a str,
+    #[serde(flatten)]
+    status: &'a Status,
+    /// CRC-32, in hexadecimal digits.
+    table_checksum: String,
+    /// What to do about the fault.
+    recovery: Option<&'static str>,
+    /// Work of sliding, and that part of it that wears the skin.
+    skin_j: f64,
+    wear_j: f64,
+    frames_damaged: u64,
+    reports_lost: u64,
+    calibration: CalibrationSummary,
+}
+
 /// Prints the probe's status.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (mut bench, status) = Bench::open(&args.at)?;
-    if args.format == Format::Json {
-        return print_json(&status, out);
-    }
     let calibration = bench.get(Request::read_calibration())?;
+    let (damaged, missing) = bench.losses();
+    let (joule, wear) = status.skin_mj;
+    let [joule, wear] = [joule, wear].map(|mj| f64::from(mj) * 1e-3);
+    if args.format == Format::Json {
+        let summary = Summary {
+            port: &bench.name,
+            status: &status,
+            table_checksum: format!("{:08x}", status.table_crc),
+            recovery: status.fault.as_ref().map(recovery),
+            skin_j: joule,
+            wear_j: wear,
+            frames_damaged: damaged,
+            reports_lost: missing,
+            calibration: CalibrationSummary::new(&calibration),
+        };
+        return print_json(&summary, out);
+    }
     let mut rows = vec![
         ("probe", format!("at {}", bench.name)),
         ("rig", phase_name(status.phase).to_owned()),
@@ -45,15 +79,10 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         ""
     };
     let counts = &status.counts;
-    let (damaged, missing) = bench.losses();
-    let (joule, wear) = (
-        f64::from(status.skin_mj.0) * 1e-3,
-        f64::from(status.skin_mj.1) * 1e-3,
-    );
     rows.extend([
         ("table", format!(
-            "{} textures, {} bytes, checksum {:08x}{whose}",
-            status.textures, status.table_bytes, status.table_crc
+            "{}, {} bytes, checksum {:08x}{whose}",
+            count(status.textures, "texture"), status.table_bytes, status.table_crc
         )),
         ("acquisition", format!(
             "{} slots; {} late, {} parity errors, {} error frames, {} samples lost",

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, ensure};
 use clap::Subcommand;
-use tactus::eval::show::show_table;
+use tactus::eval::show::{count, show_table};
 use tactus::eval::table_summary::TableSummary;
 use tactus::link::{PushTable, Request};
 use tactus_core::table::Table;
@@ -81,11 +81,11 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
             let bytes = Bench::open(at)?.0.table()?;
             write_table(file, &bytes)?;
             let table = Table::read(&bytes)?;
-            let (file, textures, crc) = (file.display(), table.textures(), table.crc());
-            let length = bytes.len();
+            let textures = count(table.textures(), "texture");
+            let (file, length, crc) = (file.display(), bytes.len(), table.crc());
             writeln!(
                 out,
-                "{file}: {textures} textures, {length} bytes, checksum {crc:08x}"
+                "{file}: {textures}, {length} bytes, checksum {crc:08x}"
             )?;
         }
         Command::Push { at, file, consent } => {
@@ -101,14 +101,15 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
             bench.get(push)?;
             // not what was sent counts, but what the probe uses from now on
             let status = bench.get(Request::status())?;
-            let (textures, now, pushed) = (status.textures, status.table_crc, table.crc());
+            let textures = count(status.textures, "texture");
+            let (now, pushed) = (status.table_crc, table.crc());
             ensure!(
                 now == pushed,
                 "the probe uses the table {now:08x} and not {pushed:08x}, the one pushed: push it again"
             );
             writeln!(
                 out,
-                "{file}: the probe uses it now: {textures} textures, checksum {now:08x}"
+                "{file}: the probe uses it now: {textures}, checksum {now:08x}"
             )?;
         }
         Command::Factory { at, consent } => {
@@ -118,10 +119,10 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
             }
             bench.get(Request::command(wire::Command::FactoryTable))?;
             let status = bench.get(Request::status())?;
-            let (textures, crc) = (status.textures, status.table_crc);
+            let (textures, crc) = (count(status.textures, "texture"), status.table_crc);
             writeln!(
                 out,
-                "The probe uses the firmware's own table: {textures} textures, checksum {crc:08x}"
+                "The probe uses the firmware's own table: {textures}, checksum {crc:08x}"
             )?;
         }
     }

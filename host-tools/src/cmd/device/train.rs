@@ -1,8 +1,11 @@
-//! `tactus device train`, `teach`, `rename` and `forget`: what the probe learns and forgets.
+//! `tactus device train` and `teach`: what the probe learns, and what that feels most like.
 
 use std::io::{self, Write};
 
 use anyhow::ensure;
+use serde::Serialize;
+use tactus::eval::alike::{self, Alike};
+use tactus::eval::show::count;
 use tactus::link::Request;
 use tactus_core::features::Property;
 use tactus_core::table::{Name, Table};
@@ -10,7 +13,8 @@ use tactus_core::wire::{self, Event, Report};
 
 use super::bench::{Bench, show_fault};
 use super::line::Where;
-use super::loss::Consent;
+use crate::cmd::names;
+use crate::cmd::output::{Format, print_json};
 
 /// Have the probe learn the texture under its finger from new slides; an unfinished training goes on where it stood
 #[derive(clap::Args)]
@@ -32,6 +36,9 @@ pub(crate) struct Train {
     /// Where on the sample slides begin; drawn anew unless given
     #[arg(long)]
     seed: Option<u32>,
+    /// How to print what came of it
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 /// Tell the probe which texture it explored last; it learns from those slides
@@ -44,111 +51,132 @@ pub(crate) struct Teach {
     at: Where,
     /// What lies under the finger: a texture that it knows, or a new one
     name: String,
+    /// How to print what came of it
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
-/// Give a texture of the probe another name
-#[derive(clap::Args)]
-#[command(after_help = "\
-Examples:
-  tactus device rename burlap 'coarse burlap'")]
-pub(crate) struct Rename {
-    #[command(flatten)]
-    at: Where,
-    /// Its name
-    from: String,
-    /// Its new name
-    to: String,
-}
-
-/// Have the probe forget a texture, an unfinished training, or all that it learned by itself
-#[derive(clap::Args)]
-#[command(after_help = "\
-Examples:
-  tactus device forget --name burlap
-  tactus device forget --training burlap    the slides of an unfinished training
-  tactus device forget --self-learned      only what nobody confirmed")]
-pub(crate) struct Forget {
-    #[command(flatten)]
-    at: Where,
-    #[command(flatten)]
-    what: What,
-    #[command(flatten)]
-    consent: Consent,
-}
-
-#[derive(clap::Args)]
-#[group(required = true, multiple = false)]
-struct What {
-    /// A texture, whether the factory, you or the probe itself added it
-    #[arg(long, value_name = "NAME", id = "forgotten")]
-    name: Option<String>,
-    /// An unfinished training
-    #[arg(long, value_name = "NAME")]
-    training: Option<String>,
-    /// All that the probe has learned by itself; what it learned from you stays
-    // its name before the field's words came
-    #[arg(long, alias = "self-taught")]
-    self_learned: bool,
+/// What `device train` and `device teach` print with `--format json`.
+#[derive(Serialize)]
+struct Learned {
+    name: String,
+    /// Whether the probe did not know it before.
+    is_new: bool,
+    /// Slides that were made for it, or that it was taught from.
+    slides: u32,
+    /// What it feels most like; `null` where the probe knows no other, and after a pilot.
+    nearest: Option<Alike>,
 }
 
 /// Has the probe make slides of a texture and learn it.
 pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
+    let typed = name_of(&args.name)?;
+    let (mut bench, _) = Bench::open(&args.at)?;
+    let before = bench.names()?;
+    let name = known_as(typed, &before)?;
     let wanted = wire::Train {
-        name: name_of(&args.name)?,
+        name: name.clone(),
         trials: args.trials,
         pilot: args.pilot,
         seed: args.seed.unwrap_or_else(seed_of_now),
     };
-    let (mut bench, _) = Bench::open(&args.at)?;
-    let slides = bench.run(Request::train(wanted), |report| show_slide(report, out))?;
-    writeln!(out, "{}: {slides} slides made.", args.name)?;
-    Ok(())
+    let text = args.format == Format::Text;
+    let slides = bench.run(Request::train(wanted), |report| match text {
+        true => show_slide(report, out),
+        false => Ok(()),
+    })?;
+    if text {
+        writeln!(out, "{name}: {} made.", count(slides, "slide"))?;
+    }
+    let learned = Learned::new(&mut bench, &name, slides, &before)?;
+    learned.print(args.format, out)
 }
 
 /// Names the texture of the last exploration.
-pub(crate) fn teach(Teach { at, name }: &Teach, out: &mut impl Write) -> anyhow::Result<()> {
-    let request = Request::label(name_of(name)?);
-    let learned = Bench::open(at)?.0.get(request)?;
-    let (name, slides) = (learned.name, learned.slides);
-    writeln!(out, "The probe has learned {name} from {slides} slides.")?;
-    Ok(())
-}
-
-/// Gives a texture another name.
-pub(crate) fn rename(Rename { at, from, to }: &Rename, out: &mut impl Write) -> anyhow::Result<()> {
-    let request = Request::rename(name_of(from)?, name_of(to)?);
-    Bench::open(at)?.0.get(request)?;
-    writeln!(out, "{from} is {to} now.")?;
-    Ok(())
-}
-
-/// Has the probe forget something.
-pub(crate) fn forget(args: &Forget, out: &mut impl Write) -> anyhow::Result<()> {
-    let Forget { at, what, consent } = args;
-    let (what, said) = match (&what.name, &what.training) {
-        (Some(name), _) => (wire::Forget::Texture(name_of(name)?), name.clone()),
-        (None, Some(name)) => {
-            let said = format!("the training of {name}");
-            (wire::Forget::Training(name_of(name)?), said)
-        }
-        (None, None) => {
-            let said = "what it learned by itself".to_owned();
-            (wire::Forget::SelfLearned, said)
-        }
-    };
+pub(crate) fn teach(
+    Teach { at, name, format }: &Teach,
+    out: &mut impl Write,
+) -> anyhow::Result<()> {
+    let typed = name_of(name)?;
     let (mut bench, _) = Bench::open(at)?;
-    let known = |table: &Table<'_>| match &what {
-        wire::Forget::Texture(name) => table.find(name).is_some(),
-        _ => true,
-    };
-    let lost = |table: &Table<'_>| known(table).then(|| format!("The probe is to forget {said}."));
-    consent.ask(&mut bench, lost, out)?;
-    bench.get(Request::forget(what))?;
-    writeln!(out, "The probe has forgotten {said}.")?;
-    Ok(())
+    let before = bench.names()?;
+    let taught = bench.get(Request::label(known_as(typed, &before)?))?;
+    let (name, slides) = (&taught.name, u32::from(taught.slides));
+    if *format == Format::Text {
+        let slides = count(slides, "slide");
+        writeln!(out, "The probe has learned {name} from {slides}.")?;
+    }
+    let learned = Learned::new(&mut bench, name, slides, &before)?;
+    learned.print(*format, out)
 }
 
-fn name_of(name: &str) -> anyhow::Result<Name> {
+impl Learned {
+    /// Compares what was learned with the rest of the probe's table.
+    fn new(bench: &mut Bench, name: &str, slides: u32, before: &[String]) -> anyhow::Result<Self> {
+        let bytes = bench.table()?;
+        let table = Table::read(&bytes)?;
+        let texture = table.find(name);
+        Ok(Self {
+            name: name.to_owned(),
+            is_new: !before.iter().any(|known| known == name),
+            slides,
+            nearest: texture.and_then(|texture| alike::nearest(table, texture)),
+        })
+    }
+
+    fn print(&self, format: Format, out: &mut impl Write) -> anyhow::Result<()> {
+        match (format, &self.nearest) {
+            (Format::Json, _) => return print_json(self, out),
+            (Format::Text, None) => {}
+            (Format::Text, Some(nearest)) => self.compare(nearest, out)?,
+        }
+        Ok(())
+    }
+
+    fn compare(&self, nearest: &Alike, out: &mut impl Write) -> io::Result<()> {
+        let (name, other) = (&self.name, &nearest.texture);
+        let (force_n, speed_mm_s) = (nearest.force_n, nearest.speed_mm_s);
+        let like = most_like(nearest);
+        writeln!(
+            out,
+            "{like}, at {force_n:.2} N, {speed_mm_s:.1} mm/s, the movement that tells the two apart best."
+        )?;
+        if !nearest.feels_the_same {
+            return Ok(());
+        }
+        write!(
+            out,
+            "WARNING: {name} feels the same as {other}: ten slides would not tell them apart. "
+        )?;
+        if self.is_new {
+            writeln!(
+                out,
+                "If it is {other}: tactus device forget --name '{name}', then teach it as '{other}'. If not: consider more trials."
+            )
+        } else {
+            writeln!(out, "Consider more trials.")
+        }
+    }
+}
+
+/// "Most like Canvas: 31 % of slides could be taken for it"
+pub(super) fn most_like(nearest: &Alike) -> String {
+    let other = &nearest.texture;
+    match (nearest.taken_for * 100.0).round() {
+        share if share < 1.0 => {
+            format!("Most like {other}: less than 1 % of slides could be taken for it")
+        }
+        share => format!("Most like {other}: {share:.0} % of slides could be taken for it"),
+    }
+}
+
+/// The probe's name for a texture whose capitals were typed otherwise; any other stays as it is.
+fn known_as(typed: Name, before: &[String]) -> anyhow::Result<Name> {
+    let before: Vec<&str> = before.iter().map(String::as_str).collect();
+    names::find(&typed, &before).map_or(Ok(typed.clone()), name_of)
+}
+
+pub(super) fn name_of(name: &str) -> anyhow::Result<Name> {
     let name = name.trim();
     ensure!(
         !name.is_empty(),

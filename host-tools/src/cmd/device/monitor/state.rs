@@ -3,11 +3,14 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use tactus::eval::alike;
+use tactus::eval::show::count;
 use tactus_core::features::Movement;
-use tactus_core::table::Action;
+use tactus_core::table::{Action, Name, Table};
 use tactus_core::wire::{Event, Live, PROTOCOL, Phase, Report, SlideReport, Status};
 
 use crate::cmd::device::bench::recovery;
+use crate::cmd::device::train::most_like;
 
 /// P_AC samples that are shown: a second.
 pub(crate) const SHOWN: usize = 2200;
@@ -62,6 +65,14 @@ pub(crate) struct Monitor {
     pub(crate) protocol: Option<u8>,
     /// it has restarted and no longer knows the commands it was given
     pub(crate) rebooted: bool,
+    /// the user has had the rig stopped: what is still on the line is of what was stopped
+    stopped: bool,
+    /// the help is shown
+    pub(crate) help: bool,
+    /// a name that is typed, to teach
+    pub(crate) typed: Option<String>,
+    /// it has learned a texture from the user since its table was read
+    learned: Option<Name>,
 }
 
 impl Monitor {
@@ -82,6 +93,10 @@ impl Monitor {
             silent: None,
             protocol: None,
             rebooted: false,
+            stopped: false,
+            help: false,
+            typed: None,
+            learned: None,
             status,
         }
     }
@@ -98,6 +113,46 @@ impl Monitor {
         }
     }
 
+    /// The user has had the rig stopped: what it was at says nothing any more.
+    pub(crate) fn stop(&mut self) {
+        self.forget_exploration();
+        self.stopped = true;
+        self.note(Weight::Message, "stopping");
+    }
+
+    /// The user has begun an exploration.
+    pub(crate) fn identify(&mut self) {
+        self.forget_exploration();
+        self.stopped = false;
+        self.note(Weight::Message, "identify");
+    }
+
+    fn forget_exploration(&mut self) {
+        self.chosen = None;
+        self.observed = None;
+        self.posterior.clear();
+        self.answer = None;
+    }
+
+    /// Whether samples come now: only while the finger is at rest before a slide, and slides.
+    pub(crate) fn is_sampling(&self) -> bool {
+        matches!(self.status.phase, Phase::Background | Phase::Sliding)
+    }
+
+    /// Takes in the probe's table, and compares what was learned last with the rest of it.
+    pub(crate) fn take_table(&mut self, table: Table<'_>) {
+        self.names = table.names().map(str::to_owned).collect();
+        self.table_crc = table.crc();
+        let learned = self.learned.take().and_then(|name| table.find(&name));
+        if let Some(nearest) = learned.and_then(|texture| alike::nearest(table, texture)) {
+            self.note(Weight::Message, most_like(&nearest));
+            if nearest.feels_the_same {
+                let note = "to it the two feel the same: one texture? If not, consider more trials";
+                self.note(Weight::Fault, note);
+            }
+        }
+    }
+
     pub(crate) fn name(&self, texture: usize) -> &str {
         self.names.get(texture).map_or("?", String::as_str)
     }
@@ -106,6 +161,7 @@ impl Monitor {
     pub(crate) fn hear(&mut self, report: &Report) {
         self.at_ms = report.at_ms;
         match &report.event {
+            Event::Chosen { .. } | Event::SlideReport { .. } if self.stopped => {}
             Event::Status(status) => self.status = status.clone(),
             Event::Booted {
                 protocol,
@@ -125,6 +181,9 @@ impl Monitor {
                 self.note(Weight::Fault, note);
             }
             Event::Phase(phase) => {
+                if self.status.phase == Phase::Homing && *phase == Phase::Ready {
+                    self.note(Weight::Message, "homed: the rig is ready");
+                }
                 self.status.phase = *phase;
                 if *phase != Phase::Faulted {
                     self.status.fault = None;
@@ -179,7 +238,7 @@ impl Monitor {
             Event::Verdict(verdict) => {
                 let (name, slides) = (&verdict.name, verdict.slides);
                 let p = verdict.probability * 100.0;
-                let after = format!("{slides} slide{}", if slides == 1 { "" } else { "s" });
+                let after = count(slides, "slide");
                 let (answer, note) = if verdict.unknown {
                     let note = format!("none that I know, most like {name}, after {after}");
                     ("It is none that I know".to_owned(), note)
@@ -200,7 +259,9 @@ impl Monitor {
                 } else {
                     "from you"
                 };
-                let note = format!("it has learned {name} {whom}: {slides} slides");
+                let slides = count(slides, "slide");
+                let note = format!("it has learned {name} {whom}: {slides}");
+                self.learned = (!learned.itself).then(|| name.clone());
                 self.note(Weight::Message, note);
             }
             Event::Block(block) => {

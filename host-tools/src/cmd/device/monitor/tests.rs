@@ -2,6 +2,7 @@ use std::time::Duration;
 
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use tactus_core::features::{Block, Movement, Property};
 use tactus_core::rig::Fault;
 use tactus_core::table::Action;
@@ -10,6 +11,7 @@ use tactus_core::wire::{
     Verdict,
 };
 
+use super::keys::{Act, KEYS, press};
 use super::state::{Monitor, NOTES, SHOWN};
 use super::{is_gone, view};
 
@@ -232,6 +234,192 @@ fn any_size_of_terminal_is_drawn_on() {
         assert_eq!(screen(&monitor, width, height).len(), usize::from(height));
     }
     assert_eq!(monitor.notes.len(), NOTES);
+}
+
+#[test]
+fn from_60_to_200_columns_nothing_lies_over_anything_else() {
+    let mut monitor = heard(exploration());
+    monitor.losses = (12, 345);
+    for width in 60..=200 {
+        for height in [21, 24, 33, 34, 50] {
+            let screen = screen(&monitor, width, height);
+            let all = screen.join("\n");
+            // what is wrong is whole, and the panels are
+            let losses = "line 12 damaged 345 lost, slots 0 late 0 lost";
+            assert!(screen[0].ends_with(losses), "{all}");
+            let corners = |corner| all.matches(corner).count();
+            assert_eq!(corners('╭'), 6, "{all}");
+            assert_eq!(corners('╯'), 6, "{all}");
+            for part in [
+                "P_AC",
+                "Spectrum",
+                "sliding",
+                "Oak wood",
+                "1.26 N, 10.0 mm/s",
+            ] {
+                assert!(all.contains(part), "{width} x {height}: no {part}\n{all}");
+            }
+            let keys = &screen[usize::from(height) - 1];
+            for (key, what, _) in KEYS {
+                assert!(keys.contains(&format!(" {key}  {what}")), "{keys}");
+            }
+            // frequencies that can be read
+            let axis = screen.iter().find(|line| line.contains("1000 Hz")).unwrap();
+            let of_spectrum = axis
+                .chars()
+                .skip(usize::from(width) / 2)
+                .collect::<String>();
+            let of_spectrum = of_spectrum.replace('│', " ");
+            let marks: Vec<&str> = of_spectrum.split_whitespace().collect();
+            let allowed = ["17", "50", "100", "200", "500", "1000", "Hz"];
+            assert!(
+                marks.iter().all(|mark| allowed.contains(mark)),
+                "{marks:?}\n{all}"
+            );
+            assert!(marks.len() >= 4, "{marks:?}");
+        }
+    }
+}
+
+#[test]
+fn a_terminal_that_is_too_small_is_told_so() {
+    let monitor = heard(exploration());
+    for (width, height) in [(59, 24), (80, 20), (30, 5)] {
+        let all = screen(&monitor, width, height).join("\n");
+        let said = format!("Too small: {width} x {height}.");
+        assert!(all.contains(&said) && all.contains("60 x 21"), "{all}");
+        assert!(!all.contains("P_AC"));
+    }
+}
+
+fn key(code: KeyCode) -> KeyEvent {
+    KeyEvent::new(code, KeyModifiers::NONE)
+}
+
+#[test]
+fn the_help_has_every_key_and_any_key_closes_it() {
+    let mut monitor = heard(exploration());
+    assert_eq!(press(&mut monitor, key(KeyCode::Char('?')), true), None);
+    for (width, height) in [(60, 21), (80, 24), (200, 60)] {
+        let all = screen(&monitor, width, height).join("\n");
+        for (key, _, what) in KEYS {
+            assert!(all.contains(&format!(" {key}   {what}")), "{all}");
+        }
+    }
+    assert_eq!(press(&mut monitor, key(KeyCode::Char('q')), true), None);
+    assert!(!screen(&monitor, 80, 24).join("\n").contains(" Keys "));
+    let quit = press(&mut monitor, key(KeyCode::Char('q')), true);
+    assert_eq!(quit, Some(Act::Quit));
+}
+
+#[test]
+fn a_name_is_typed_and_taught() {
+    let mut monitor = heard(exploration());
+    let type_in = |monitor: &mut Monitor, text: &str| {
+        for c in text.chars() {
+            assert_eq!(press(monitor, key(KeyCode::Char(c)), false), None);
+        }
+    };
+    // not while it is at something
+    assert_eq!(press(&mut monitor, key(KeyCode::Char('t')), true), None);
+    assert_eq!(monitor.typed, None);
+    // q is a letter of the name
+    type_in(&mut monitor, "tquilt");
+    assert!(screen(&monitor, 60, 21)[20].contains("teach  quilt"));
+    let taught = |name: &str| Some(Act::Teach(name.try_into().unwrap()));
+    assert_eq!(
+        press(&mut monitor, key(KeyCode::Enter), false),
+        taught("quilt")
+    );
+    assert_eq!(monitor.typed, None);
+    // a known name, whatever its capitals; and from its first letters
+    type_in(&mut monitor, "tOAK wood");
+    assert_eq!(
+        press(&mut monitor, key(KeyCode::Enter), false),
+        taught("Oak wood")
+    );
+    type_in(&mut monitor, "tbu");
+    assert_eq!(press(&mut monitor, key(KeyCode::Tab), false), None);
+    assert_eq!(
+        press(&mut monitor, key(KeyCode::Enter), false),
+        taught("Burlap")
+    );
+    // nothing, and not at all
+    type_in(&mut monitor, "t");
+    assert_eq!(press(&mut monitor, key(KeyCode::Enter), false), None);
+    type_in(&mut monitor, "tfelt");
+    assert_eq!(press(&mut monitor, key(KeyCode::Esc), false), None);
+    assert_eq!(monitor.typed, None);
+    let control_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
+    type_in(&mut monitor, "tfelt");
+    assert_eq!(press(&mut monitor, control_c, false), Some(Act::Interrupt));
+}
+
+#[test]
+fn what_was_stopped_is_shown_no_more() {
+    let mut monitor = heard(exploration());
+    let shown = |monitor: &Monitor| screen(monitor, 80, 24)[..19].join("\n");
+    assert!(shown(&monitor).contains("Slide 1") && shown(&monitor).contains("Oak wood"));
+    monitor.stop();
+    // reports of it are still on the line
+    for event in exploration() {
+        monitor.hear(&Report {
+            number: 9,
+            at_ms: 9000,
+            event,
+        });
+    }
+    let screen = shown(&monitor);
+    assert!(
+        !screen.contains("Slide 1") && !screen.contains("0.512"),
+        "{screen}"
+    );
+    assert!(screen.contains("i: find out"), "{screen}");
+    monitor.identify();
+    monitor.hear(&Report {
+        number: 10,
+        at_ms: 9500,
+        event: exploration().remove(0),
+    });
+    assert!(shown(&monitor).contains("Slide 1"));
+}
+
+#[test]
+fn between_slides_the_trace_is_said_to_be_the_last_ones() {
+    let block = Event::Block(Block {
+        number: 0,
+        still: false,
+        steady: None,
+        pac: (0..64).collect(),
+        shear_mn: Default::default(),
+        lost: 0,
+    });
+    let phase = |phase| Event::Phase(phase);
+    let nothing = heard([phase(Phase::Ready)]);
+    assert!(
+        screen(&nothing, 60, 21)
+            .join("\n")
+            .contains("drawn while sliding")
+    );
+    let mut events = vec![phase(Phase::Sliding), block];
+    let sliding = heard(events.clone());
+    assert!(screen(&sliding, 60, 21)[1].contains("P_AC, counts, 1 s"));
+    events.push(phase(Phase::Lifting));
+    let after = heard(events);
+    assert!(screen(&after, 60, 21)[1].contains("P_AC of the last slide"));
+}
+
+#[test]
+fn the_end_of_homing_is_told() {
+    let monitor = heard([Event::Phase(Phase::Homing), Event::Phase(Phase::Ready)]);
+    assert!(
+        screen(&monitor, 80, 24)
+            .join("\n")
+            .contains("homed: the rig is ready")
+    );
+    // not after every slide
+    let monitor = heard([Event::Phase(Phase::Lifting), Event::Phase(Phase::Ready)]);
+    assert!(monitor.notes.is_empty());
 }
 
 #[cfg(unix)]

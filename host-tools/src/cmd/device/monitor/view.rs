@@ -2,15 +2,19 @@
 //! nothing that is not also said in words.
 
 use ratatui::Frame;
-use ratatui::layout::{Alignment, Constraint, Layout, Rect};
+use ratatui::layout::{Constraint, Flex, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize as _};
 use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::{Axis, Block, BorderType, Chart, Dataset, GraphType, Paragraph, Sparkline};
+use ratatui::widgets::{
+    Axis, Block, BorderType, Chart, Clear, Dataset, GraphType, Paragraph, Sparkline,
+};
+use tactus::eval::show::count;
 use tactus_core::dsp::{BIN_HZ, Plain, SpectrumSum, angles};
 use tactus_core::features::Property;
 use tactus_core::wire::Phase;
 
+use super::keys::KEYS;
 use super::state::{Monitor, SHOWN, Weight};
 use crate::cmd::device::status::phase_name;
 
@@ -31,9 +35,22 @@ const WORTH_LISTING: f32 = 0.001;
 /// The lever's step, mm (the reference rig's).
 const STEP_MM: f32 = 0.000_625;
 
+/// Columns and lines that it needs; and columns from which three panels stand side by side.
+const LEAST: (u16, u16) = (60, 21);
+const WIDE: u16 = 76;
+
 /// Draws all.
 pub(crate) fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
     let area = frame.area();
+    let (width, height) = LEAST;
+    if area.width < width || area.height < height {
+        let text = format!(
+            "Too small: {} x {}.\nThe monitor needs {width} x {height}.\nq: quit",
+            area.width, area.height
+        );
+        frame.render_widget(Paragraph::new(text), area);
+        return;
+    }
     let roomy = area.height >= 34;
     let [header, charts, panels, notes, keys] = Layout::vertical([
         Constraint::Length(1),
@@ -44,12 +61,14 @@ pub(crate) fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
     ])
     .areas(area);
     let [trace, spectrum] = Layout::horizontal([Constraint::Fill(1); 2]).areas(charts);
-    let [rig, slide, textures] = Layout::horizontal([
-        Constraint::Length(24),
-        Constraint::Length(22),
-        Constraint::Fill(1),
-    ])
-    .areas(panels);
+    let [rig, rest] =
+        Layout::horizontal([Constraint::Length(24), Constraint::Fill(1)]).areas(panels);
+    let [slide, textures] = if area.width >= WIDE {
+        Layout::horizontal([Constraint::Length(22), Constraint::Fill(1)]).areas(rest)
+    } else {
+        // what is measured gives way to what it may be
+        Layout::vertical([Constraint::Length(3), Constraint::Fill(1)]).areas(rest)
+    };
     draw_header(monitor, frame, header);
     draw_trace(monitor, frame, trace);
     draw_spectrum(monitor, frame, spectrum);
@@ -57,7 +76,23 @@ pub(crate) fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
     draw_slide(monitor, frame, slide);
     draw_textures(monitor, frame, textures);
     draw_notes(monitor, frame, notes);
-    frame.render_widget(key_line(), keys);
+    frame.render_widget(last_line(monitor, keys.width), keys);
+    if monitor.help {
+        draw_help(frame, area);
+    }
+}
+
+fn draw_help(frame: &mut Frame<'_>, area: Rect) {
+    let lines = KEYS.map(|(key, _, what)| {
+        let key = Span::from(format!(" {key} ")).bold().reversed();
+        Line::from(vec![key, Span::from(format!("  {what}"))])
+    });
+    let widest = lines.iter().map(Line::width).max().unwrap_or(0);
+    let size = [widest + 2, lines.len() + 2].map(|size| Constraint::Length(size as u16));
+    let [area] = Layout::horizontal([size[0]]).flex(Flex::Center).areas(area);
+    let [area] = Layout::vertical([size[1]]).flex(Flex::Center).areas(area);
+    frame.render_widget(Clear, area);
+    frame.render_widget(Paragraph::new(lines.to_vec()).block(panel(" Keys ")), area);
 }
 
 fn panel(title: impl Into<Line<'static>>) -> Block<'static> {
@@ -77,7 +112,7 @@ fn draw_header(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let left = Line::from(vec![
         Span::from(" Tactus ").bold().reversed(),
         Span::from(format!(" {}  ", monitor.place)),
-        dim(format!("{} textures{whose}", status.textures)),
+        dim(format!("{}{whose}", count(status.textures, "texture"))),
     ]);
     let (damaged, missing) = monitor.losses;
     let late = status.counts.late_slots;
@@ -91,8 +126,11 @@ fn draw_header(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
         ),
         (None, None) => dim(format!("nothing lost, up {} ", clock(monitor.at_ms))),
     };
-    frame.render_widget(left, area);
-    frame.render_widget(Line::from(right).alignment(Alignment::Right), area);
+    // what is wrong goes before what is always the same
+    let width = Constraint::Length(right.width() as u16 + 1);
+    let [at_left, at_right] = Layout::horizontal([Constraint::Fill(1), width]).areas(area);
+    frame.render_widget(left, at_left);
+    frame.render_widget(Line::from(right).right_aligned(), at_right);
 }
 
 fn warning(text: String) -> Span<'static> {
@@ -125,9 +163,13 @@ fn draw_trace(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let line = Dataset::default()
         .marker(Marker::Braille)
         .graph_type(GraphType::Line);
-    let line = line.fg(BLUE).data(&points);
+    let (title, color) = match (monitor.is_sampling(), pac.is_empty()) {
+        (true, _) | (_, true) => (" P_AC, counts, 1 s ", BLUE),
+        (false, false) => (" P_AC of the last slide ", DIM),
+    };
+    let line = line.fg(color).data(&points);
     let chart = Chart::new(vec![line])
-        .block(panel(" P_AC, counts, 1 s "))
+        .block(panel(title))
         .x_axis(Axis::default().bounds([0.0, SHOWN as f64]).fg(DIM))
         .y_axis(
             Axis::default()
@@ -143,13 +185,17 @@ fn draw_trace(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
             width: area.width.saturating_sub(9),
             height: 1,
         };
-        let text = Line::from(dim("drawn while the finger slides"));
+        let text = Line::from(dim("drawn while sliding"));
         frame.render_widget(text, hint);
     }
 }
 
 fn draw_spectrum(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
-    let block = panel(format!(" Spectrum, 0 to {SPECTRUM_DB} dB "));
+    let (title, color) = match (monitor.is_sampling(), monitor.pac.is_empty()) {
+        (true, _) | (_, true) => (format!(" Spectrum, 0 to {SPECTRUM_DB} dB "), ORANGE),
+        (false, false) => (" Its spectrum, 0 to 60 dB ".to_owned(), DIM),
+    };
+    let block = panel(title);
     let inner = block.inner(area);
     frame.render_widget(block, area);
     if inner.height < 2 || inner.width < 20 {
@@ -172,21 +218,20 @@ fn draw_spectrum(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
             .map(|column| (power(column).max(1.0).log10() * 10.0) as u64)
             .collect();
         let line = Sparkline::default().data(height).max(SPECTRUM_DB as u64);
-        frame.render_widget(line.fg(ORANGE), bars);
-    }
-    let mut labels = vec![' '; inner.width.into()];
-    let mut write = |at: usize, text: &str| {
-        for (place, character) in labels.iter_mut().skip(at).zip(text.chars()) {
-            *place = character;
-        }
-    };
-    for mark in [17.0f32, 50.0, 100.0, 200.0, 500.0] {
-        let at = (mark / low).ln() / (high / low).ln() * f32::from(inner.width);
-        write(at as usize, &mark.to_string());
+        frame.render_widget(line.fg(color), bars);
     }
     let end = "1000 Hz";
-    write(usize::from(inner.width).saturating_sub(end.len()), end);
-    frame.render_widget(Line::from(dim(String::from_iter(labels))), axis);
+    let space = usize::from(inner.width) - end.len();
+    let mut labels = String::new();
+    for mark in [17.0f32, 50.0, 100.0, 200.0, 500.0] {
+        let at = (mark / low).ln() / (high / low).ln() * f32::from(inner.width);
+        let (at, mark) = (at as usize, mark.to_string());
+        // one that would touch its neighbour is left out
+        if (labels.is_empty() || at > labels.len()) && at + mark.len() < space {
+            labels = format!("{labels:<at$}{mark}");
+        }
+    }
+    frame.render_widget(Line::from(dim(format!("{labels:<space$}{end}"))), axis);
 }
 
 /// "force   0.998 N"
@@ -270,6 +315,17 @@ fn gauge(force_n: f32, wanted_n: Option<f32>, width: u16) -> Line<'static> {
 fn draw_slide(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let mut title = " Slide ".to_owned();
     let mut lines = Vec::new();
+    if area.height < 5 {
+        // a single line: what is made, and for what
+        let made = monitor.chosen.map_or_else(String::new, |chosen| {
+            title += &format!("{} ", chosen.slide);
+            let property = chosen.action.property;
+            let looked_at = property.map_or("all features", Property::name);
+            format!("{}, for {looked_at}", chosen.movement)
+        });
+        frame.render_widget(Paragraph::new(made).block(panel(title)), area);
+        return;
+    }
     if let Some(chosen) = monitor.chosen {
         title += &format!("{} ", chosen.slide);
         let property = chosen.action.property;
@@ -367,16 +423,19 @@ fn draw_notes(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     frame.render_widget(Paragraph::new(lines).block(block), area);
 }
 
-fn key_line() -> Line<'static> {
-    let keys = [
-        ("i", "identify"),
-        ("h", "home"),
-        ("s", "stop and lift"),
-        ("q", "quit"),
-    ];
-    let spans = keys.map(|(key, what)| {
+/// The keys, or the name that is typed.
+fn last_line(monitor: &Monitor, width: u16) -> Line<'static> {
+    if let Some(typed) = &monitor.typed {
+        return Line::from(vec![
+            Span::from(" teach ").bold().reversed(),
+            Span::from(format!(" {typed}▏ ")),
+            dim("Enter, Tab: a known name, Esc: not"),
+        ]);
+    }
+    let gap = if width >= 90 { "   " } else { "" };
+    let spans = KEYS.map(|(key, what, _)| {
         let key = Span::from(format!(" {key} ")).bold().reversed();
-        [key, Span::from(format!(" {what}   "))]
+        [key, Span::from(format!(" {what} {gap}"))]
     });
     Line::from(spans.concat())
 }
