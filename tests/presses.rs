@@ -1,7 +1,8 @@
 //! Presses on soft and hard things, with P_DC sound, dead, dying and leaking. What counts is the world's own force.
 //!
 //! The whole campaign takes about an hour: `cargo test --release -p tactus-tests --test presses -- --ignored --nocapture`,
-//! or every seventh rig of it with `TACTUS_PRESSES_EVERY=7`.
+//! every seventh rig of it with `TACTUS_PRESSES_EVERY=7`, or one of its worlds with `TACTUS_PRESSES_WORLD=63`, as `cargo xtask
+//! seeds press` does.
 
 use std::collections::BTreeMap;
 
@@ -67,9 +68,11 @@ fn a_sample_of_the_campaign_presses_nothing_too_hard() {
 #[ignore = "an hour"]
 fn the_whole_campaign_presses_nothing_too_hard() {
     let every = std::env::var("TACTUS_PRESSES_EVERY");
+    let world = std::env::var("TACTUS_PRESSES_WORLD");
+    let world = world.as_ref().map(|text| text.parse().unwrap());
     for unguarded in [Unguarded::default(), Unguarded::against(Fault::ForceHigh)] {
         let campaign = Campaign {
-            worlds: 1..=100,
+            worlds: world.map_or(1..=100, |world| world..=world),
             every: every.as_ref().map_or(1, |text| text.parse().unwrap()),
             unguarded,
         };

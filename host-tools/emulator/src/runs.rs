@@ -4,6 +4,7 @@ pub mod bench;
 pub mod campaign;
 mod cuts;
 mod error;
+mod handheld;
 mod identify;
 mod serve;
 mod soak;
@@ -29,6 +30,12 @@ enum Cli {
   tactus-emulator identify --elf tactus-rig --recording 3         slides of a real BioTac
 `cargo xtask emulate` builds both and does this. With --port N it serves the board's serial port on that TCP port instead.")]
     Identify(identify::Args),
+    /// Have a simulated hand find out with the handheld's firmware what a texture is
+    ///
+    /// What the display says in the end is the answer.
+    #[command(after_help = "Example:
+  tactus-emulator handheld --elf tactus-handheld --seed 7         a texture drawn by the seed")]
+    Handheld(handheld::Args),
     /// Serve the board's serial port on a TCP port of this PC
     ///
     /// Virtual time then goes no faster than real time.
@@ -56,6 +63,7 @@ fn run(cli: &Cli) -> Result<ExitCode, RunError> {
     };
     match cli {
         Cli::Identify(args) => identify::run(args).map(|()| ExitCode::SUCCESS),
+        Cli::Handheld(args) => handheld::run(args).map(|()| ExitCode::SUCCESS),
         Cli::Serve(args) => serve::run(args).map(|()| ExitCode::SUCCESS),
         Cli::Campaign(args) => campaign::run(args).map(met),
         Cli::Soak(args) => soak::run(args).map(met),

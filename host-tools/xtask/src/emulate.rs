@@ -10,6 +10,8 @@ use crate::shell::{self, cargo, root, target};
 
 /// The image that every run is of.
 pub(crate) const RIG: &str = "tactus-rig";
+/// The image that a hand holds.
+pub(crate) const HANDHELD: &str = "tactus-handheld";
 
 /// Has the firmware identify a texture, or serves its serial port where a TCP port for it is given.
 pub(crate) fn emulate(options: &[OsString]) -> Result<()> {
@@ -97,7 +99,7 @@ pub(crate) fn with_images<'t>(
     let images = [
         ("TACTUS_ELF", RIG),
         ("TACTUS_SELFTEST_ELF", "tactus-selftest"),
-        ("TACTUS_HANDHELD_ELF", "tactus-handheld"),
+        ("TACTUS_HANDHELD_ELF", HANDHELD),
     ];
     for (variable, name) in images {
         tests.env(variable, firmware::image(elves, name)?);

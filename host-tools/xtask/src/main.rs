@@ -89,7 +89,7 @@ enum Cli {
     },
     /// Make the tables that come with the firmware, firmware/factory.tact and firmware/handheld.tact
     ///
-    /// Simulates 5 trials of 3 movements on each of the 117 textures of world 1 and learns them, and 5 slides of a hand for
+    /// Simulates 5 trials of 3 movements on each of the 117 textures of world 1 and learns them, and 15 slides of a hand for
     /// the handheld probe, which takes a minute or two.
     Factory {
         /// Leave the committed file alone; an error if it is not byte for byte what is made now

@@ -2,7 +2,7 @@
 use std::io::{IsTerminal as _, Write as _};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -18,7 +18,9 @@ pub(crate) const EXAMPLES: &str = "Examples:
   cargo xtask seeds study                     seeds 1 to 100 of the whole study, with few simulations
   cargo xtask seeds study --seeds 1-10 -- --simulations 8000
   cargo xtask seeds identify --seeds 200-330  every method
-  cargo xtask seeds rig --jobs 1              on the emulated board";
+  cargo xtask seeds rig --jobs 1              on the emulated board
+  cargo xtask seeds handheld                  the handheld, in a hand that differs from seed to seed
+  cargo xtask seeds press --seeds 63          all presses of a world, with P_DC sound, dead, dying and leaking";
 
 #[derive(Args)]
 pub(crate) struct Options {
@@ -52,6 +54,10 @@ enum What {
     LearnByHand,
     /// An exploration on the emulated board
     Rig,
+    /// An exploration by the handheld on the emulated board
+    Handheld,
+    /// All presses of a world; every n-th rig with TACTUS_PRESSES_EVERY
+    Press,
 }
 
 /// The methods of `tactus identify`.
@@ -70,6 +76,8 @@ const METHODS: [&str; 8] = [
 struct Run {
     name: String,
     arguments: Vec<String>,
+    /// A variable of its environment.
+    variable: Option<(&'static str, String)>,
 }
 
 impl What {
@@ -80,9 +88,9 @@ impl What {
 
     fn seeds(self) -> RangeInclusive<u64> {
         match self {
-            Self::Study => 1..=100,
+            Self::Study | Self::Press => 1..=100,
             Self::Identify | Self::Simulate | Self::LearnByHand => 1..=50,
-            Self::Rig => 1..=20,
+            Self::Rig | Self::Handheld => 1..=20,
         }
     }
 
@@ -92,6 +100,7 @@ impl What {
         let run = |name: String, command: &[&str]| Run {
             name,
             arguments: command.iter().map(|a| (*a).to_owned()).collect(),
+            variable: None,
         };
         let (number, out) = (seed.to_string(), out.to_string_lossy());
         let seeded = |command: &[&str]| {
@@ -125,6 +134,14 @@ impl What {
             Self::Simulate => vec![seeded(&["simulate", "--trials", "2", "--out", &out])],
             Self::LearnByHand => vec![seeded(&["learn-by-hand", "--out", &out])],
             Self::Rig => vec![seeded(&["identify"])],
+            Self::Handheld => vec![seeded(&["handheld"])],
+            Self::Press => {
+                let test = ["the_whole_campaign", "--ignored", "--nocapture"];
+                vec![Run {
+                    variable: Some(("TACTUS_PRESSES_WORLD", number)),
+                    ..run(format!("world {seed}"), &test)
+                }]
+            }
         }
     }
 }
@@ -269,11 +286,14 @@ fn perform(program: &Program, run: &Run, further: &[String], scratch: &Path) -> 
         .args(&program.arguments)
         .args(further);
     command.env("RAYON_NUM_THREADS", "1").env("NO_COLOR", "1");
-    let repeat = std::iter::once(command.get_program())
-        .chain(command.get_args())
-        .map(|part| part.to_string_lossy().into_owned())
-        .collect::<Vec<_>>()
-        .join(" ");
+    let set = run
+        .variable
+        .as_ref()
+        .map(|(name, value)| format!("{name}={value}"));
+    command.envs(run.variable.clone());
+    let parts = std::iter::once(command.get_program()).chain(command.get_args());
+    let parts = parts.map(|part| part.to_string_lossy().into_owned());
+    let repeat = set.into_iter().chain(parts).collect::<Vec<_>>().join(" ");
     let (ending, said) = match command.output() {
         Err(why) => (Ending::Failed, format!("cannot be started: {why}")),
         Ok(Output {
@@ -291,6 +311,9 @@ fn perform(program: &Program, run: &Run, further: &[String], scratch: &Path) -> 
             } else {
                 stdout
             };
+            // what a test that fails says is in the line after that
+            let mut panicked = told.lines().skip_while(|l| !l.contains("panicked at"));
+            let panicked = panicked.nth(1);
             let mut lines = told
                 .lines()
                 .rev()
@@ -301,7 +324,9 @@ fn perform(program: &Program, run: &Run, further: &[String], scratch: &Path) -> 
                     .iter()
                     .any(|word| line.starts_with(word))
             };
-            let said = lines.clone().find(says).or_else(|| lines.next());
+            let said = panicked
+                .or_else(|| lines.clone().find(says))
+                .or_else(|| lines.next());
             (
                 ending,
                 said.map_or_else(|| status.to_string(), ToOwned::to_owned),
@@ -340,12 +365,23 @@ struct Program {
 }
 
 fn build(what: What) -> Result<Program> {
-    if what == What::Rig {
+    let image = match what {
+        What::Rig => Some(emulate::RIG),
+        What::Handheld => Some(emulate::HANDHELD),
+        _ => None,
+    };
+    if let Some(image) = image {
         shell::run(&mut emulate::build())?;
-        let elf = firmware::compile(&[emulate::RIG])?.remove(0);
+        let elf = firmware::compile(&[image])?.remove(0);
         let path = PathBuf::from(emulate::program("identify").get_program());
         let arguments = vec!["--elf".into(), elf.to_string_lossy().into_owned()];
         return Ok(Program { path, arguments });
+    }
+    if what == What::Press {
+        return Ok(Program {
+            path: test_program("tactus-tests", "presses")?,
+            arguments: Vec::new(),
+        });
     }
     shell::run(cargo().args(["build", "--release", "--package", "tactus"]))?;
     let path = target().join("release/tactus");
@@ -356,6 +392,33 @@ fn build(what: What) -> Result<Program> {
         path,
         arguments: Vec::new(),
     })
+}
+
+/// Builds a test of a package, and finds its program.
+fn test_program(package: &str, test: &str) -> Result<PathBuf> {
+    let mut build = cargo();
+    build.args([
+        "test",
+        "--release",
+        "--no-run",
+        "--package",
+        package,
+        "--test",
+        test,
+    ]);
+    build.arg("--message-format=json-render-diagnostics");
+    let built = build.stderr(Stdio::inherit()).output();
+    let built = built.context("cannot start cargo")?;
+    ensure!(built.status.success(), "the test {test} does not build");
+    let messages = String::from_utf8_lossy(&built.stdout);
+    let mut programs = messages.lines().filter_map(|line| {
+        let message: Value = serde_json::from_str(line).ok()?;
+        let is_it = message["target"]["name"] == test && message["profile"]["test"] == true;
+        is_it.then(|| message["executable"].as_str().map(PathBuf::from))?
+    });
+    programs
+        .next()
+        .with_context(|| format!("cargo does not say where the test {test} is"))
 }
 
 #[cfg(test)]
@@ -401,6 +464,7 @@ mod tests {
         let run = Run {
             name: "seed 7".into(),
             arguments: arguments.map(ToOwned::to_owned).to_vec(),
+            variable: None,
         };
         let ended = perform(&program, &run, &[], scratch.path());
         let line = ended.line().unwrap();
@@ -410,6 +474,16 @@ mod tests {
         );
         assert!(line.contains("again: /bin/sh -c"), "{line}");
         assert!(!out.exists());
+        // a test that fails, in an environment of its own
+        let script = "echo \"thread panicked at x.rs:1\n$SEED too hard\nnote\" >&2; exit 101";
+        let run = Run {
+            arguments: ["-c", script].map(ToOwned::to_owned).to_vec(),
+            variable: Some(("SEED", "63".into())),
+            ..run
+        };
+        let line = perform(&program, &run, &[], scratch.path()).line().unwrap();
+        assert!(line.contains("FAILED: 63 too hard"), "{line}");
+        assert!(line.contains("again: SEED=63 /bin/sh"), "{line}");
     }
 
     #[test]
@@ -420,6 +494,8 @@ mod tests {
             runs.iter()
                 .all(|run| run.arguments.ends_with(&["--seed".into(), "9".into()]))
         );
-        assert_eq!(What::Study.runs(9, Path::new("x")).len(), 1);
+        for what in [What::Study, What::Handheld, What::Press] {
+            assert_eq!(what.runs(9, Path::new("x")).len(), 1);
+        }
     }
 }

@@ -92,8 +92,17 @@ impl Display {
 
     /// Whether a text is seen, in any of the fonts, dark on light as well.
     pub fn shows(&self, text: &str) -> bool {
+        self.shows_in(text, &FONTS)
+    }
+
+    /// Whether a text is seen in one of the larger fonts, as headlines of up to 18 letters are.
+    pub fn shows_large(&self, text: &str) -> bool {
+        self.shows_in(text, &[&FONT_7X13_BOLD, &FONT_10X20])
+    }
+
+    fn shows_in(&self, text: &str, fonts: &[&MonoFont<'_>]) -> bool {
         self.picture().is_some_and(|picture| {
-            FONTS.iter().any(|font| {
+            fonts.iter().any(|font| {
                 let width = font.character_size.width as usize * text.chars().count();
                 let height = font.character_size.height as usize;
                 width <= WIDTH && is_in(&picture, &write(text, font), width, height)

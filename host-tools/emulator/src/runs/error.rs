@@ -5,6 +5,7 @@ use crate::host::args::WriteError;
 use crate::host::exploration::ExploreError;
 use crate::host::talk::TalkError;
 use crate::host::under_finger::KnownError;
+use crate::scenario::PlayError;
 
 use super::bench::error::BenchError;
 use super::cuts::tear::CutError;
@@ -38,6 +39,10 @@ pub(crate) enum RunError {
     Hour(#[from] HourError),
     #[error(transparent)]
     Bench(#[from] BenchError),
+    #[error(transparent)]
+    Play(#[from] PlayError),
     #[error("the exploration had no slide: the stack that was measured says nothing")]
     NoSlide,
+    #[error("the display has no verdict in its headline")]
+    NoVerdict,
 }
