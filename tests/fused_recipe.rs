@@ -12,11 +12,16 @@ use tactus_tests::data;
 
 #[path = "oracle/mod.rs"]
 mod oracle;
+#[path = "oracle/verdicts.rs"]
+mod verdicts;
 
 use oracle::{Episode, LIMIT, Learning, SURE, Trained, features};
+use verdicts::{Drift, Judge, Told};
 
 /// Virtual explorations of a protocol, unless a test says otherwise.
 const RUNS: u64 = 2000;
+/// Of those whose tables are calibrated, which takes longer.
+const JUDGED: u64 = 600;
 /// SHA-256 of the features.csv of the public slides, which their manifest names: the floors are for these.
 const PUBLIC_FEATURES: &str = "461bc916e92fa5a26fc1ba98e4064c34f8b75f2c2bb9ab40915ba5794d05e9ed";
 
@@ -320,6 +325,95 @@ fn unknown_materials_are_flagged() {
                 assert!(flagged.unknown[1] >= 0.80 && flagged.known[1] <= 0.03);
             }
         }
+    }
+}
+
+/// Shares told after one slide, two and three: new, changed, changed with the right name, right, wrong, undecided.
+type ToldShares = [[f64; 6]; verdicts::SLIDES];
+
+/// Leaves each texture out in turn, learns the others from `n` slides, and shows slides of the one that was left out and of
+/// another, none twice: what is told of the known one, and of the new one.
+fn told(
+    session: &Session,
+    protocol: Protocol,
+    n: usize,
+    drift: Drift,
+    alpha: f64,
+) -> [ToldShares; 2] {
+    let each: Vec<[ToldShares; 2]> = (0..JUDGED)
+        .into_par_iter()
+        .map(|run| {
+            let mut random = Random::new(4, run);
+            let left_out = run as usize % session.len();
+            let other = (left_out + 1 + random.below(session.len() - 1)) % session.len();
+            let known: Vec<usize> = (0..session.len()).filter(|&t| t != left_out).collect();
+            let (picks, test) = split(protocol, n, session[left_out].len(), &mut random);
+            let slides = |&t: &usize| picks.iter().map(|&p| session[t][p].clone()).collect();
+            let judge = Judge::learn(&known.iter().map(slides).collect::<Vec<_>>(), drift);
+            let place = known.iter().position(|&t| t == other);
+            [(other, place), (left_out, None)].map(|(texture, place)| {
+                let order = random.order(test.len());
+                let mut sum = vec![0.0; session[texture][0].len()];
+                std::array::from_fn(|more| {
+                    let z = judge.z(&session[texture][test[order[more]]]);
+                    sum.iter_mut().zip(z).for_each(|(sum, z)| *sum += z);
+                    let k = more + 1;
+                    let mean: Vec<f64> = sum.iter().map(|s| s / k as f64).collect();
+                    let (told, best) = judge.tell(&mean, k, alpha);
+                    let right = Some(best) == place;
+                    let is = |told_so: bool| f64::from(u8::from(told_so));
+                    [
+                        is(told == Told::New),
+                        is(told == Told::Changed),
+                        is(told == Told::Changed && right),
+                        is(told == Told::Sure && right),
+                        is(told == Told::Sure && !right),
+                        is(told == Told::Undecided),
+                    ]
+                })
+            })
+        })
+        .collect();
+    let mean = |which: usize, k: usize, what: usize| {
+        each.iter().map(|told| told[which][k][what]).sum::<f64>() / each.len() as f64
+    };
+    std::array::from_fn(|which| {
+        std::array::from_fn(|k| std::array::from_fn(|what| mean(which, k, what)))
+    })
+}
+
+#[test]
+fn known_changed_and_new_are_told_apart() {
+    let Some(folder) = data("biotac") else { return };
+    let session = session(&folder, with_traction);
+    let cases = [
+        (Protocol::Interleaved, 5, Drift::USUAL, 0.01),
+        (Protocol::Interleaved, 5, Drift::USUAL, 0.02),
+        (Protocol::Interleaved, 5, Drift::NONE, 0.01),
+        (Protocol::Interleaved, 15, Drift::USUAL, 0.01),
+        (Protocol::Blocked, 5, Drift::USUAL, 0.01),
+        (Protocol::Drift, 5, Drift::USUAL, 0.01),
+    ];
+    for (protocol, n, drift, alpha) in cases {
+        let [known, new] = told(&session, protocol, n, drift, alpha);
+        println!("{protocol:?} {n}, drift {}, alpha {alpha}", drift.bands);
+        for (k, (known, new)) in (1..).zip(known.iter().zip(&new)) {
+            let percent =
+                |shares: &[f64; 6]| shares.map(|s| format!("{:5.1}", 100.0 * s)).join(" ");
+            println!("  {k}: known {}   new {}", percent(known), percent(new));
+        }
+        if !public(&folder) || drift == Drift::NONE || alpha > 0.01 {
+            continue;
+        }
+        for ([called_new, changed, named, right, wrong, _], new) in known.into_iter().zip(new) {
+            let drifts = matches!(protocol, Protocol::Drift);
+            assert!(called_new <= if drifts { 0.05 } else { 0.03 });
+            assert!(wrong <= 0.01 && right >= if drifts { 0.56 } else { 0.75 });
+            assert!(changed <= 0.3 && named >= 0.6 * changed);
+            assert!(new[4] <= 0.08, "sure of a name that is wrong");
+        }
+        // after three slides
+        assert!(new[2][0] + new[2][1] >= 0.85);
     }
 }
 
