@@ -17,7 +17,7 @@ pub(crate) const PACKAGES: [Package; 5] = [
             &["probe"],
             &["handheld"],
         ],
-        strangers: &[("explorer", "rig"), ("store", "wire")],
+        strangers: &[("explorer", "rig")],
         outside: &["lib"],
     },
     Package {
