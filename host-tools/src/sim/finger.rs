@@ -108,6 +108,8 @@ pub struct Finger {
     touch: Option<Touch>,
     /// relative unsteadiness of friction
     unsteady: f64,
+    /// ln of the amplitude of vibrations, and the amplitude: both stay the same while the finger is still
+    amplitude: (f64, f64),
     /// coefficient of friction as last looked up, and when to look again
     friction: f64,
     look_again: u32,
@@ -138,6 +140,7 @@ impl Finger {
             amplifiers: Amplifiers::new(&mut Noise::new(made, 501), &mut noise),
             touch: None,
             unsteady: 0.0,
+            amplitude: (0.0, 1.0),
             friction: 0.0,
             look_again: 0,
             slipping: false,
@@ -220,7 +223,14 @@ impl Finger {
         let texture = surface.texture();
         let force = self.skin.fluid_n();
         let deviation = touch::VIBRATION + touch::VIBRATION_PER_N * force;
-        let amplitude = exp(deviation * touch.vibration);
+        let amplitude = deviation * touch.vibration;
+        if self.amplitude.0 != amplitude {
+            self.amplitude = (amplitude, exp(amplitude));
+        }
+        let amplitude = self.amplitude.1;
+        if landed {
+            self.vibrations.land();
+        }
         let follow_um =
             self.vibrations
                 .follow_um(surface, contact.x_mm, force, amplitude, self.wear);

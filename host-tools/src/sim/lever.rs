@@ -79,6 +79,8 @@ pub struct Lever {
     field: i64,
     /// the same for the rotor; between microsteps only without current
     rotor: f64,
+    /// way of the nut at this place of the rotor: its sines take longer than the rest of a step
+    screw: (f64, f64),
     /// how much of the play is above the tip, um
     play_um: f64,
     height_mm: f64,
@@ -135,6 +137,7 @@ impl Lever {
             standing: true,
             field: rotor as i64,
             rotor,
+            screw: (f64::NAN, 0.0),
             play_um: BACKLASH_UM,
             height_mm,
             error_phase: [motor.between(0.0, TAU), motor.between(0.0, TAU)],
@@ -320,9 +323,10 @@ impl Lever {
     }
 
     fn turn(&mut self, microsteps: f64, load_n: f64) {
-        let before_um = self.screw_um();
+        let (_, before_um) = self.screw;
         self.rotor = (self.rotor + microsteps).clamp(0.0, TRAVEL_MM * 1e3 / STEP_UM);
-        let down_um = self.screw_um() - before_um;
+        self.turn_screw();
+        let down_um = self.screw.1 - before_um;
         self.play_um = if load_n > CLOSES_PLAY_N {
             BACKLASH_UM
         } else {
@@ -331,16 +335,21 @@ impl Lever {
         self.place_tip();
     }
 
-    /// Way of the nut below its place at the upper hard stop, um.
-    fn screw_um(&self) -> f64 {
+    /// Brings the nut to where the rotor has it: um below its place at the upper hard stop.
+    fn turn_screw(&mut self) {
+        if self.screw.0 == self.rotor {
+            return;
+        }
         let angle = self.rotor * TAU / PERIOD as f64;
-        self.rotor * STEP_UM
+        let way_um = self.rotor * STEP_UM
             + STEP_ERROR_UM[0] * sin(angle + self.error_phase[0])
-            + STEP_ERROR_UM[1] * sin(4.0 * angle + self.error_phase[1])
+            + STEP_ERROR_UM[1] * sin(4.0 * angle + self.error_phase[1]);
+        self.screw = (self.rotor, way_um);
     }
 
     fn place_tip(&mut self) {
-        let down_mm = (self.screw_um() - self.play_um) * 1e-3;
+        self.turn_screw();
+        let down_mm = (self.screw.1 - self.play_um) * 1e-3;
         self.height_mm = TOP_MM - down_mm;
         let opens_at_mm = LIMIT_MM
             + if self.at_top {

@@ -200,11 +200,8 @@ impl SimRig {
     /// One millisecond: the slots and steps in it, then the control.
     pub fn tick(&mut self) -> &Outputs {
         let end = self.now_ns + TICK_NS;
+        let mut slot_ns = self.slot_ns();
         loop {
-            // slots from a timer of 4400 Hz: no drift, and no overflow
-            let hz = u64::from(SLOTS_HZ);
-            let (seconds, slot) = (self.slot / hz, self.slot % hz);
-            let slot_ns = seconds * 1_000_000_000 + slot * 1_000_000_000 / hz;
             let step_ns = if self.rate == 0 {
                 u64::MAX
             } else {
@@ -215,6 +212,7 @@ impl SimRig {
             }
             if slot_ns <= step_ns {
                 self.sample(slot_ns);
+                slot_ns = self.slot_ns();
             } else {
                 self.step(step_ns);
             }
@@ -245,6 +243,13 @@ impl SimRig {
         self.world.stage_pwm(end, self.outputs.stage_duty.into());
         self.set_rate(self.outputs.lever_steps_s);
         &self.outputs
+    }
+
+    /// When the next slot is due, from a timer of 4400 Hz: no drift, and no overflow.
+    fn slot_ns(&self) -> u64 {
+        let hz = u64::from(SLOTS_HZ);
+        let (seconds, slot) = (self.slot / hz, self.slot % hz);
+        seconds * 1_000_000_000 + slot * 1_000_000_000 / hz
     }
 
     /// A slot: the command, and its answer after the gap.

@@ -159,6 +159,11 @@ impl Stage {
         let v = self.speed_mm_s * 1e-3;
         // as if there were no dry friction ...
         let push_n = force_n_per_a * drive_v * conductance + shear_n;
+        self.position_before_mm = self.position_mm;
+        if self.speed_mm_s == 0.0 && push_n == 0.0 {
+            self.current_a = drive_v * conductance;
+            return;
+        }
         let drag = force_n_per_a * force_n_per_a * conductance + VISCOUS_N_S_PER_M;
         let inertia = MASS_KG / TICK_S + drag;
         let free = (MASS_KG / TICK_S * v + push_n) / inertia;
@@ -170,7 +175,6 @@ impl Stage {
             free - dry * free.signum()
         };
         self.current_a = (drive_v - force_n_per_a * after) * conductance;
-        self.position_before_mm = self.position_mm;
         self.position_mm += after * 1e3 * TICK_S;
         self.speed_mm_s = after * 1e3;
         if !(0.0..=TRAVEL_MM).contains(&self.position_mm) {
@@ -239,7 +243,12 @@ impl Stage {
     }
 
     fn dry_friction_n(&self) -> f64 {
-        let slow = exp(-self.speed_mm_s.abs() / STRIBECK_MM_S);
+        let slow = match self.speed_mm_s.abs() {
+            // it often stands, and much faster there is nothing left beside 1 in an f64
+            0.0 => 1.0,
+            speed if speed > 40.0 * STRIBECK_MM_S => 0.0,
+            speed => exp(-speed / STRIBECK_MM_S),
+        };
         COULOMB_N * self.friction_scale * self.along.friction * (1.0 + (BREAKAWAY - 1.0) * slow)
     }
 

@@ -77,6 +77,9 @@ pub(super) struct Vibrations {
     drag: f64,
     /// half length of the patch, mm
     patch_mm: f64,
+    /// how far the surface comes at a place, um, with a half length of the patch, mm, and so worn a skin: a sum over the
+    /// patch, and the same while the finger is still
+    contact_um: Option<([f64; 3], f64)>,
 }
 
 impl Vibrations {
@@ -93,8 +96,19 @@ impl Vibrations {
         let texture = surface.texture();
         self.passed = amplitude * ridges * (1.0 - texture.damping) * texture.passed(load_n);
         self.load_n = load_n;
-        // a point on every ridge and one between, which carries nothing while the ridges stand
-        self.passed * surface.contact_um(x_mm, self.patch_mm(), RIDGE_MM / 2.0, 1.0 - wear)
+        let at = [x_mm, self.patch_mm(), wear];
+        let contact_um = match self.contact_um {
+            Some((same, contact_um)) if same == at => contact_um,
+            // a point on every ridge and one between, which carries nothing while the ridges stand
+            _ => surface.contact_um(x_mm, self.patch_mm(), RIDGE_MM / 2.0, 1.0 - wear),
+        };
+        self.contact_um = Some((at, contact_um));
+        self.passed * contact_um
+    }
+
+    /// The finger lands on what may be another surface.
+    pub(super) fn land(&mut self) {
+        self.contact_um = None;
     }
 
     /// Half length of the contact patch.
