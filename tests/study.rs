@@ -659,13 +659,8 @@ fn the_page_is_whole() {
                 .filter(move |n| n.tag_name().name() == name)
         };
         let header = of("th").count();
-        assert!(
-            of("caption")
-                .next()
-                .unwrap()
-                .text()
-                .is_some_and(|t| !t.is_empty())
-        );
+        let caption = of("caption").next().unwrap();
+        assert!(caption.descendants().any(|n| n.is_text()));
         for row in of("tbody")
             .next()
             .unwrap()

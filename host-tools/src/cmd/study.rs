@@ -244,7 +244,7 @@ fn explore(
         study.pairs = Some(rows);
     }
     if args.includes(Stage::Identify) {
-        let length = METHODS.len() as u64 * simulations;
+        let length = Identification::explorations(simulations);
         let identification = stages.stage("identification", length, |done| {
             Identification::run(&experiment, simulations, done)
         })?;

@@ -1,10 +1,10 @@
 //! What users would have been told at the end of explorations, and how often.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tactus_core::explorer::Told;
 
 /// Shares of explorations, 0 to 1; they add up to 1.
-#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Verdicts {
     /// Told the right name as sure.
     pub right: f64,

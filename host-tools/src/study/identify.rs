@@ -12,6 +12,7 @@ use crate::eval::evaluate::{
     MAX_TEXTURES, Method, Outcome, Summary, evaluate, explorer, play_with,
 };
 use crate::eval::experiment::Experiment;
+use crate::eval::verdicts::Verdicts;
 use crate::sim::collection::{Collection, texture_name};
 
 /// The ways of exploring that are compared, the paper's three and the project's own.
@@ -187,8 +188,40 @@ pub struct Identification {
     pub cycled: Vec<(usize, Property)>,
     /// The ways of exploring, as [`METHODS`].
     pub columns: Vec<Column>,
+    /// What users would have been told, by each way of exploring.
+    pub told: Vec<ToldColumn>,
     /// Explorations by Bayesian exploration, as in fig. 10.
     pub evolutions: Vec<Evolution>,
+}
+
+/// What users would have been told: `tactus identify` knows that the texture may be none of its own, and no slide counts
+/// twice.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct ToldColumn {
+    /// Shares of the explorations.
+    pub verdicts: Verdicts,
+    /// Mean number of movements.
+    pub mean: f64,
+}
+
+impl ToldColumn {
+    fn run(
+        experiment: &Experiment,
+        method: Method,
+        simulations: u64,
+        done: impl Fn() + Sync,
+    ) -> Result<Self, StudyError> {
+        let config = Config {
+            open: true,
+            ..config(method)
+        };
+        let experiment = experiment.clone().each_slide_once();
+        let outcomes = evaluate(&experiment, config, simulations, done)?;
+        Ok(Self {
+            verdicts: Verdicts::of(outcomes.iter().map(Outcome::told)),
+            mean: Summary::new(&outcomes, experiment.names(), MAX_SLIDES).mean_slides,
+        })
+    }
 }
 
 /// One exploration, step by step.
@@ -223,12 +256,13 @@ impl Identification {
         simulations: u64,
         done: impl Fn() + Sync,
     ) -> Result<Self, StudyError> {
-        let mut columns = Vec::new();
+        let (mut columns, mut told) = (Vec::new(), Vec::new());
         let mut evolutions = Vec::new();
         let mut cycled = Vec::new();
         for method in METHODS {
             let (column, outcomes) = identify(experiment, method, simulations, &done)?;
             columns.push(column);
+            told.push(ToldColumn::run(experiment, method, simulations, &done)?);
             if method == Method::Paper {
                 let bytes = experiment.run(0).learn(method.method())?;
                 let mut explorer = explorer(&bytes, experiment.measured(), config(method), None)?;
@@ -247,8 +281,14 @@ impl Identification {
             textures: IDENTIFIED.map(Named::new).to_vec(),
             cycled,
             columns,
+            told,
             evolutions,
         })
+    }
+
+    /// Explorations of [`Identification::run`], for a progress bar.
+    pub fn explorations(simulations: u64) -> u64 {
+        2 * METHODS.len() as u64 * simulations
     }
 
     /// The column of a way of exploring.

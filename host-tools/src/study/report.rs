@@ -9,6 +9,7 @@ mod identification;
 mod model;
 mod pilot;
 mod signals;
+mod summary;
 mod training;
 
 use minijinja::Environment;
@@ -89,6 +90,7 @@ fn report(study: &Study) -> Result<Report, DrawError> {
     if !study.worlds.is_empty() {
         identification::add_worlds(&study.worlds, &mut report)?;
     }
+    summary::add(study, &mut report);
     Ok(report)
 }
 

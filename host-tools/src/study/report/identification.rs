@@ -7,7 +7,7 @@ use crate::eval::chart::{Chart, DrawError, Figure, MARKS, Mark, Series};
 use crate::eval::evaluate::Method;
 use crate::sim::collection::Collection;
 use crate::study::identify::{
-    Column, Evolution, Identification, METHODS, PairRow, WorldRow, of_pair, short_name,
+    Column, Evolution, Identification, METHODS, PairRow, ToldColumn, WorldRow, of_pair, short_name,
 };
 use crate::study::published;
 
@@ -112,6 +112,7 @@ pub(super) fn add(identification: &Identification, report: &mut Report) -> Resul
     }
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
     report.table("table5-identification", &header, rows);
+    add_told(identification, report);
     let fig10 = (1_u8..).zip(&identification.evolutions);
     let fig10 = fig10.map(|(n, evolution)| fig10_panel(n, evolution));
     report
@@ -129,6 +130,29 @@ pub(super) fn add(identification: &Identification, report: &mut Report) -> Resul
     let words = json!({"simulations": identification.simulations, "cycled": cycled.collect::<Vec<_>>(), "against": against.into_iter().collect::<Option<Vec<_>>>()});
     report.words.insert("identification", words);
     Ok(())
+}
+
+/// Adds what users would have been told.
+fn add_told(identification: &Identification, report: &mut Report) {
+    let row = |(method, told): (Method, &ToldColumn)| {
+        let v = &told.verdicts;
+        let percent = |share: f64| Cell::from((100.0 * share, 1));
+        let mut row = cells![names(method).0];
+        row.extend([v.right, v.changed, v.new, v.wrong, v.undecided].map(percent));
+        row.extend(cells![(told.mean, 2)]);
+        row
+    };
+    let rows = METHODS.into_iter().zip(&identification.told).map(row);
+    let header = [
+        "way of exploring",
+        "right, %",
+        "right name, but changed, %",
+        "none of those known, %",
+        "wrong, %",
+        "undecided, %",
+        "mean number of movements",
+    ];
+    report.table("verdicts", &header, rows.collect());
 }
 
 /// How the probabilities evolve in one exploration.
