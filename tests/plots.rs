@@ -367,7 +367,7 @@ fn the_posterior_is_that_of_the_json() {
         "--method",
         "paper",
         "--threshold",
-        "0.9999",
+        "1",
         "--format",
         "json",
         "--plot",
