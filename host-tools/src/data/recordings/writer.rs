@@ -277,7 +277,7 @@ fn rows_there(folder: &Path, textures: &[Texture]) -> Result<Vec<Vec<String>>> {
     // of a row that was cut short, nothing is believed
     let (whole, _) = text.rsplit_once('\n').unwrap_or_default();
     let mut reader = csv::Reader::from_reader(whole.as_bytes());
-    if reader.headers().is_ok_and(|there| there != &COLUMNS[..]) {
+    if reader.headers().is_ok_and(|there| *there != COLUMNS[..]) {
         return Ok(Vec::new());
     }
     let is_whole = |row: &Vec<String>| {
