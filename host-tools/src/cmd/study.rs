@@ -318,8 +318,11 @@ fn print_columns(columns: &[Column], out: &mut impl Write) -> std::io::Result<()
         let method = short_name(method);
         writeln!(
             out,
-            "  {method:<10} {:5.1} % right, {:5.1} % right and sure, median {} movements",
-            column.correct, column.converged, column.median
+            "  {method:<10} {:5.1} % right, {:5.1} % right and sure, median {} movement{}",
+            column.correct,
+            column.converged,
+            column.median,
+            if column.median == 1.0 { "" } else { "s" }
         )?;
     }
     Ok(())
