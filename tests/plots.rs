@@ -376,7 +376,10 @@ fn the_posterior_is_that_of_the_json() {
     let out = run(&[&["identify"], &RECORDINGS[..], &command].concat());
     let json: Value = serde_json::from_slice(&out.stdout).unwrap();
     let drawn = says(&fs::read_to_string(temp.path().join("posterior.svg")).unwrap());
+    // not those for which no recording was left
+    let counted = |slide: &&Value| slide["rejected"].is_null();
     let slides = json["slides"].as_array().unwrap();
+    let slides: Vec<&Value> = slides.iter().filter(counted).collect();
     assert!(slides.len() >= 2);
     let mut compared = 0;
     for (slide, number) in slides.iter().zip(1..) {
