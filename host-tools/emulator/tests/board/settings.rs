@@ -1,8 +1,8 @@
 //! The store of the real firmware, over many writes: its pages turn in time, and it loses nothing.
 
+use tactus::sim::collection::calibrated;
 use tactus::sim::world::Setup;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::sensor::pressure::Calibration;
 use tactus_core::wire::{Command, Event, Train};
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::talk::{Talk, TalkError};
@@ -11,16 +11,6 @@ use crate::common::{elf, ready};
 
 /// The tasks of thread mode are taken for hung after 2 s: half of it is the most that a write may keep them.
 const LONGEST_MS: u64 = 1000;
-
-fn calibration(date: u32) -> RigCalibration {
-    RigCalibration {
-        pressure: Calibration::PAPER,
-        unloaded_a: (0.037, 0.001),
-        newton_per_ampere: 16.4,
-        date,
-        serial: *b"BT000000SIMULATE",
-    }
-}
 
 fn boot(elf: &std::path::Path, store: Option<Vec<u8>>) -> Talk {
     let options = Options {
@@ -37,6 +27,8 @@ fn pages_turn_in_time_and_nothing_is_lost() {
     let Some(elf) = elf() else { return };
     let mut talk = boot(&elf, None);
     // a calibration takes 84 bytes of a page of 16 KB: two pages and some
+    let measured = calibrated(Setup::default()).unwrap();
+    let calibration = |date| RigCalibration { date, ..measured };
     let mut longest_ms = (0, 0);
     for n in 1..=430 {
         let bytes = calibration(20_260_000 + n).to_bytes();
