@@ -76,9 +76,9 @@ fn eigen(matrix: &Matrix) -> (Vec<f64>, Matrix) {
                 // the angle that makes a[p][q] vanish
                 let angle = 0.5 * (2.0 * a[p][q]).atan2(a[p][p] - a[q][q]);
                 let (s, c) = angle.sin_cos();
-                for k in 0..d {
-                    let (x, y) = (a[k][p], a[k][q]);
-                    (a[k][p], a[k][q]) = (c * x + s * y, c * y - s * x);
+                for row in &mut a {
+                    let (x, y) = (row[p], row[q]);
+                    (row[p], row[q]) = (c * x + s * y, c * y - s * x);
                 }
                 for k in 0..d {
                     let (x, y) = (a[p][k], a[q][k]);
