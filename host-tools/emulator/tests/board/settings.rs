@@ -1,6 +1,5 @@
 //! The store of the real firmware, over many writes: its pages turn in time, and it loses nothing.
 
-use tactus::sim::collection::calibrated;
 use tactus::sim::world::Setup;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::{Command, Event, Train};
@@ -22,12 +21,24 @@ fn boot(elf: &std::path::Path, store: Option<Vec<u8>>) -> Talk {
     talk
 }
 
+/// The calibration that a command is answered with.
+fn calibration_after(talk: &mut Talk, command: Command) -> RigCalibration {
+    let mut told = None;
+    let hear = |_: &mut Emulator, report: Option<&tactus_core::wire::Report>| {
+        if let Some(Event::Calibration(bytes)) = report.map(|r| &r.event) {
+            told = bytes.as_slice().try_into().ok();
+        }
+    };
+    talk.send(command, 120.0, hear).unwrap();
+    RigCalibration::from_bytes(&told.unwrap()).unwrap()
+}
+
 #[test]
 fn pages_turn_in_time_and_nothing_is_lost() {
     let Some(elf) = elf() else { return };
     let mut talk = boot(&elf, None);
     // a calibration takes 84 bytes of a page of 16 KB: two pages and some
-    let measured = calibrated(Setup::default()).unwrap();
+    let measured = calibration_after(&mut talk, Command::Calibrate);
     let calibration = |date| RigCalibration { date, ..measured };
     let mut longest_ms = (0, 0);
     for n in 1..=430 {
@@ -46,17 +57,8 @@ fn pages_turn_in_time_and_nothing_is_lost() {
 
     let store = talk.board().store().unwrap();
     let mut talk = boot(&elf, Some(store));
-    let mut kept = None;
-    let hear = |_: &mut Emulator, report: Option<&tactus_core::wire::Report>| {
-        if let Some(Event::Calibration(bytes)) = report.map(|r| &r.event) {
-            kept = bytes.as_slice().try_into().ok();
-        }
-    };
-    talk.send(Command::ReadCalibration, 5.0, hear).unwrap();
-    assert_eq!(
-        RigCalibration::from_bytes(&kept.unwrap()),
-        Ok(calibration(20_260_430))
-    );
+    let kept = calibration_after(&mut talk, Command::ReadCalibration);
+    assert_eq!(kept, calibration(20_260_430));
     // and a training that cannot be is refused before anything moves
     let nameless = Command::Train(Train {
         name: Default::default(),
