@@ -49,7 +49,7 @@ impl Course {
     }
 }
 
-/// Plays runs as [`evaluate`] does, but whatever the threshold: see [`Course::told`].
+/// Plays runs as [`evaluate`](super::evaluate::evaluate) does, but whatever the threshold: see [`Course::told`].
 ///
 /// # Errors
 /// See [`EvaluateError`].

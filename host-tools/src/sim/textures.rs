@@ -78,7 +78,7 @@ pub struct Texture {
     pub vibration_bend: f64,
     /// Deviation of ln(local height amplitude) over the sample.
     pub heterogeneity: f64,
-    /// Thickness, mm; at most [`FITS_MM`].
+    /// Thickness, mm; at most `FITS_MM`.
     pub thickness_mm: f64,
     /// How much it gives way under the finger, mm/N.
     pub compliance_mm_per_n: f64,
