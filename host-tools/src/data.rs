@@ -10,3 +10,4 @@ pub mod recording;
 pub mod recordings;
 pub mod replay;
 pub mod rows;
+pub mod whole;

@@ -4,6 +4,7 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use tactus::data::whole::write_whole;
 use tactus::eval::chart::Figure;
 
 use super::progress::notice;
@@ -109,11 +110,11 @@ impl Canvas {
             return Ok(());
         }
         if self.is_file {
-            write_whole(&self.path, &Figure::stacked("", title, figures).svg)?;
+            draw(&self.path, &Figure::stacked("", title, figures).svg)?;
         } else {
             fs::create_dir_all(&self.path).map_err(|source| failed(&self.path, source))?;
             for figure in figures {
-                write_whole(&self.path.join(format!("{}.svg", figure.id)), &figure.svg)?;
+                draw(&self.path.join(format!("{}.svg", figure.id)), &figure.svg)?;
             }
         }
         let ids: Vec<&str> = figures.iter().map(|figure| figure.id.as_str()).collect();
@@ -127,10 +128,6 @@ fn failed(path: &Path, source: io::Error) -> PlotError {
     PlotError::Write { path, source }
 }
 
-fn write_whole(path: &Path, svg: &str) -> Result<(), PlotError> {
-    let mut part = path.as_os_str().to_owned();
-    part.push(".part");
-    fs::write(&part, svg)
-        .and_then(|()| fs::rename(&part, path))
-        .map_err(|source| failed(path, source))
+fn draw(path: &Path, svg: &str) -> Result<(), PlotError> {
+    write_whole(path, svg).map_err(|source| failed(path, source))
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context as _, ensure};
 use serde::Serialize;
+use tactus::data::whole::write_whole;
 use tactus_core::table::Table;
 
 /// Most bytes of a table that are read: more textures and movements than a table can have.
@@ -35,11 +36,7 @@ impl TableFile {
 
 /// An old table is replaced whole or not at all.
 pub(crate) fn write_table(file: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    let mut part = file.as_os_str().to_owned();
-    part.push(".part");
-    std::fs::write(&part, bytes)
-        .and_then(|()| std::fs::rename(&part, file))
-        .with_context(|| file.display().to_string())
+    write_whole(file, bytes).with_context(|| file.display().to_string())
 }
 
 pub(crate) fn read_table<'b>(file: &Path, bytes: &'b mut Vec<u8>) -> anyhow::Result<Table<'b>> {

@@ -27,7 +27,7 @@ const BOTH: &str = "stage motor braked, finger lifted to the limit switch";
 const ALL: &str = "every movement, until reset";
 
 macro_rules! faults {
-    ($($(#[$doc:meta])* $fault:ident, $name:literal, $detected:literal, $deadline:literal, $stops:expr, $refused:expr, $recovery:literal $($then:literal)?;)*) => {
+    ($($(#[$doc:meta])* $fault:ident, $name:literal, $detected:literal, $deadline:literal, $stops:expr, $refused:expr, $recovery:literal;)*) => {
         /// A fault of the rig. Messages and logs number them in this order.
         #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
         pub enum Fault {
@@ -42,7 +42,7 @@ macro_rules! faults {
             deadline_ms: $deadline,
             stops: $stops,
             refused: $refused,
-            recovery: concat!($recovery $(, $then)?),
+            recovery: $recovery,
         }),*];
 
         const NAMES: &[&str] = &[$($name),*];
@@ -50,61 +50,61 @@ macro_rules! faults {
     };
 }
 
-// the fault, its name, how it is detected, the deadline in ms, what stops, what is refused, what the user does, and then
+// the fault, its name, how it is detected, the deadline in ms, what stops, what is refused, what the user does
 faults! {
     /// The finger is pressed too hard.
     ForceHigh, "force too high", "P_DC means more than 2.05 N, mean of 10 ms made up for its lag; it bends: that is 2.1 N", 12,
-        "lever driver off at once, then finger lifted; stage motor braked", ALL, "look at the lever and the sample" ", then reset";
+        "lever driver off at once, then finger lifted; stage motor braked", ALL, "look at the lever and the sample, then reset";
     /// The emergency stop is pressed.
-    EStop, "emergency stop", "its input", 2, BOTH, ALL, "release it" ", then reset";
+    EStop, "emergency stop", "its input", 2, BOTH, ALL, "release it, then reset";
     /// The limit switch of the lever is pressed while the finger presses.
     LeverLimit, "lever at its limit", "upper limit switch closed more than 1 mm below it, 3 ms", 5, BOTH, ALL,
-        "check the switch and its wire" ", then reset";
+        "check the switch and its wire, then reset";
     /// The stage is at a limit switch while it should not be.
     StageLimit, "stage at its limit", "the limit switch that it is moving towards, and it is not looking for it, 3 ms", 5, BOTH, ALL,
-        "clear the stage's way" ", then reset";
+        "clear the stage's way, then reset";
     /// The motor of the stage is driven and does not turn.
     StageStall, "stage blocked", "less than a tenth of the way made in 30 ms, and the motor has no back-EMF", 35, BOTH, ALL,
-        "clear the stage's way" ", then reset";
+        "clear the stage's way, then reset";
     /// The motor of the stage turns, and the encoder says nothing.
     EncoderSilent, "encoder silent", "less than a tenth of the way made in 30 ms, and the motor's back-EMF says that it turns", 35,
-        BOTH, ALL, "check the encoder's wires" ", then reset";
+        BOTH, ALL, "check the encoder's wires, then reset";
     /// The stage does not follow its profile.
     StageOff, "stage off its path", "more than 1 mm and the way of 40 ms off the profile, or not arrived 0.3 s after its end", 2, BOTH, ALL,
-        "check load, supply and encoder" ", then reset";
+        "check load, supply and encoder, then reset";
     /// No readable word from the sensor.
-    SensorSilent, "sensor silent", "no readable word of P_AC or of P_DC for 10 ms", 12, BOTH, ALL, "check the sensor's cable and power" ", then reset";
+    SensorSilent, "sensor silent", "no readable word of P_AC or of P_DC for 10 ms", 12, BOTH, ALL, "check the sensor's cable and power, then reset";
     /// Too many words are damaged.
     SensorErrors, "sensor link bad", "23 damaged words within a second: half a percent", 2, BOTH, ALL,
-        "check cable length, ground and clock phase" ", then reset";
+        "check cable length, ground and clock phase, then reset";
     /// The sensor says the same thing again and again.
     SensorFrozen, "sensor frozen", "P_AC the same for 100 ms, which always has noise", 102, BOTH, ALL,
-        "switch the sensor's power off and on" ", then reset";
+        "switch the sensor's power off and on, then reset";
     /// Samples of a slide are missing.
     SlideGap, "gap in a slide", "a damaged or late word between the background and the end of the slide", 2,
         "nothing: the slide is finished", "the slide: it is repeated", "none";
     /// Six slides in a row were rejected.
     Rejected, "six slides rejected", "counted", 2, "the exploration ends, finger lifted", "nothing", "look at the reasons given";
     /// The lever came down all the way without contact.
-    NoContact, "no contact", "lever at its lower end, P_DC unchanged", 2, BOTH, ALL, "put a sample under the finger" ", then reset";
+    NoContact, "no contact", "lever at its lower end, P_DC unchanged", 2, BOTH, ALL, "put a sample under the finger, then reset";
     /// The lever steps and the force does not follow.
     LeverSlips, "lever slips", "steps after contact no longer raise P_DC as finger and sample gave way before, or the lower end before the force, or still in contact when lifted, or not lifted where a press begins", 2, BOTH, ALL,
-        "check the lever's motor and its current" ", then reset";
+        "check the lever's motor and its current, then reset";
     /// The contact force does not stay where it was put.
     Unsteady, "force unsteady", "six trims and still more than 1 count and 5 % off, trims that add up to 15 %, a zero that has moved by 8 counts, or contact within 0.1 mm of where the zero was taken", 2, BOTH, ALL,
-        "check that sample and lever are fixed" ", then reset";
+        "check that sample and lever are fixed, then reset";
     /// The probe's own tasks do nothing any more.
     TasksHung, "tasks hung", "the firmware's tasks have not checked in for 2 s, or what was asked for makes no progress for 30 s", 2, BOTH, ALL,
         "none: the watchdog restarts the probe once the finger is lifted";
     /// The lever did not find its limit switch.
     LeverNotHome, "lever not home", "limit switch not reached in 1.25 times the travel, or P_DC there or at the first zero more than 40 counts off the calibration's", 2,
-        "lever motor off, stage motor braked", ALL, "lift the finger by hand and check the switch; calibrate a finger that has drifted" ", then reset";
+        "lever motor off, stage motor braked", ALL, "lift the finger by hand and check the switch; calibrate a finger that has drifted, then reset";
     /// The stage did not find its limit switch.
     StageNotHome, "stage not home", "limit switch not reached: the stage falls behind, or has gone 1.25 times the travel", 2, BOTH, ALL,
-        "clear the stage's way and check the switch" ", then reset";
+        "clear the stage's way and check the switch, then reset";
     /// The finger presses, and P_DC does not say so.
     PressureDead, "pressure dead", "P_AC shows contact and P_DC does not rise within 0.5 mm, or no longer rises while P_AC shows that the pressure does, or no contact 1 mm below that of the last press on this sample", 2,
-        BOTH, ALL, "check the fingertip and the sensor's P_DC" ", then reset";
+        BOTH, ALL, "check the fingertip and the sensor's P_DC, then reset";
 }
 
 impl Fault {
@@ -114,7 +114,7 @@ impl Fault {
         NAMES.get(self as usize).copied().unwrap_or("unknown fault")
     }
 
-    /// What the user does before the reset; from a list of its own, too.
+    /// What the user does; from a list of its own, too.
     pub fn recovery(self) -> &'static str {
         RECOVERIES.get(self as usize).copied().unwrap_or("reset")
     }

@@ -56,7 +56,7 @@ pub enum Refused {
     #[error("lever and stage do not know where they are; home them first")]
     NotHomed,
     /// A fault has to be reset first.
-    #[error("{}: {}, then reset", .0, .0.recovery())]
+    #[error("{}: {}", .0, .0.recovery())]
     Fault(Fault),
     /// The force is over what this rig may press.
     #[error(
@@ -81,7 +81,7 @@ pub enum RigError {
     #[error(transparent)]
     Refused(Refused),
     /// A fault was seen: the stage stands and the finger is lifted, unless the fault is [`Fault::LeverNotHome`].
-    #[error("{}: {}, then reset", .0, .0.recovery())]
+    #[error("{}: {}", .0, .0.recovery())]
     Fault(Fault),
     /// It was stopped, and the finger is lifted.
     #[error("stopped")]

@@ -432,16 +432,11 @@ pub(crate) fn read_answer(interrupt: &Interrupt, prompt: &str) -> Result<String,
 pub(crate) fn show_fault(report: &Report, out: &mut impl Write) -> io::Result<()> {
     match &report.event {
         Event::Fault(fault) => {
-            let recovery = recovery(fault);
+            let recovery = fault.recovery();
             writeln!(out, "FAULT: {fault}. {recovery}: tactus device home")?;
         }
         Event::Trouble(why) => writeln!(out, "trouble: {why}")?,
         _ => return Ok(()),
     }
     out.flush()
-}
-
-/// What the user must do about a fault.
-pub(crate) fn recovery(fault: &Fault) -> &'static str {
-    fault.row().map_or("reset", |row| row.recovery)
 }

@@ -5,9 +5,10 @@ use std::io::Write;
 use serde::Serialize;
 use tactus::eval::show::count;
 use tactus::link::Request;
+use tactus_core::rig::Fault;
 use tactus_core::wire::{Phase, Status};
 
-use super::bench::{Bench, recovery};
+use super::bench::Bench;
 use super::calibrate::{CalibrationSummary, calibration_rows};
 use super::line::Where;
 use crate::cmd::output::{Format, print_json, print_rows};
@@ -56,7 +57,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             port: &bench.name,
             status: &status,
             table_checksum: format!("{:08x}", status.table_crc),
-            recovery: status.fault.as_ref().map(recovery),
+            recovery: status.fault.map(Fault::recovery),
             skin_j: joule,
             wear_j: wear,
             frames_damaged: damaged,
@@ -70,7 +71,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         ("rig", phase_name(status.phase).to_owned()),
     ];
     if let Some(fault) = &status.fault {
-        let fault = format!("{fault}: {} (tactus device home)", recovery(fault));
+        let fault = format!("{fault}: {} (tactus device home)", fault.recovery());
         rows.push(("FAULT", fault));
     }
     let whose = if status.factory {

@@ -10,6 +10,7 @@ use serde::de::DeserializeOwned;
 
 use super::error::ReportError;
 use crate::data::program::program;
+use crate::data::whole::write_whole;
 
 /// What a folder has in it while it is not whole: which study it is.
 const INCOMPLETE: &str = "INCOMPLETE";
@@ -100,11 +101,10 @@ impl Folder {
     /// # Errors
     /// See [`ReportError`].
     pub fn keep(&self, stage: &str, result: &impl Serialize) -> Result<(), ReportError> {
-        let (path, part) = (self.stage(stage), self.part.join("stage.part"));
+        let path = self.stage(stage);
         let json = serde_json::to_vec(result).map_err(ReportError::Json)?;
         fs::create_dir_all(self.part.join(STAGES))
-            .and_then(|()| fs::write(&part, json))
-            .and_then(|()| fs::rename(&part, &path))
+            .and_then(|()| write_whole(&path, json))
             .map_err(|source| error(&path, source))
     }
 

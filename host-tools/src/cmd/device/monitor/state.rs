@@ -9,7 +9,6 @@ use tactus_core::features::Movement;
 use tactus_core::table::{Action, Name, Table};
 use tactus_core::wire::{Event, Live, PROTOCOL, Phase, Report, SlideReport, Status};
 
-use crate::cmd::device::bench::recovery;
 use crate::cmd::device::train::most_like;
 
 /// P_AC samples that are shown: a second.
@@ -195,7 +194,7 @@ impl Monitor {
             Event::Live(live) => self.live = Some(*live),
             Event::Fault(fault) => {
                 self.status.fault = Some(*fault);
-                let recovery = recovery(fault);
+                let recovery = fault.recovery();
                 self.note(Weight::Fault, format!("{fault}: {recovery} (key h)"));
             }
             &Event::Chosen {
