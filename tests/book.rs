@@ -220,7 +220,7 @@ fn the_moving_picture_is_small_and_moves() {
 }
 
 /// The pictures of the page about pictures, the command of each, and what comes before it.
-const PLOTS: [(&str, &[&str]); 3] = [
+const PLOTS: [(&str, &[&str]); 4] = [
     (
         "evaluate --recordings tests/recordings/simulated --train-slides 2 --method paper --runs 2000 --seed 1",
         &["confusion", "reliability"],
@@ -230,6 +230,10 @@ const PLOTS: [(&str, &[&str]); 3] = [
         &["spectrum", "timeline"],
     ),
     ("table show TABLE", &["map"]),
+    (
+        "gauge --recordings tests/recordings/simulated",
+        &["control-roughness-1"],
+    ),
 ];
 
 #[test]

@@ -251,3 +251,61 @@ fn figures_are_written_for_people() {
         assert!(help.contains(part), "{help}");
     }
 }
+
+#[test]
+fn a_gauge_study_is_one_object_and_compares_operators_of_several_folders() {
+    let alone = json(&["gauge", "--recordings", SIMULATED, "--format", "json"], 0);
+    assert_eq!((&alone["parts"], &alone["slides"]), (&6.into(), &54.into()));
+    let movements = alone["movements"].as_array().unwrap();
+    assert_eq!(movements.len(), 3);
+    for gauge in movements
+        .iter()
+        .flat_map(|m| m["properties"].as_array().unwrap())
+    {
+        let sd = |name: &str| gauge["sd"][name].as_f64();
+        assert_eq!((sd("operator"), sd("operator_by_part")), (None, None));
+        let all = sd("gauge").unwrap().hypot(sd("part").unwrap());
+        assert!((all - sd("total").unwrap()).abs() < 1e-9, "{gauge}");
+    }
+    // the same slides by two operators: nobody reads more than the other
+    let temp = tempfile::tempdir().unwrap();
+    let folders = ["Anna", "Ben"].map(|name| {
+        let folder = temp.path().join(name);
+        std::fs::create_dir(&folder).unwrap();
+        for file in std::fs::read_dir(SIMULATED).unwrap() {
+            let file = file.unwrap();
+            std::fs::copy(file.path(), folder.join(file.file_name())).unwrap();
+        }
+        let manifest = folder.join("manifest.csv");
+        let text = std::fs::read_to_string(&manifest).unwrap();
+        let named: Vec<String> = text
+            .lines()
+            .map(|line| {
+                line.strip_suffix(",,")
+                    .map_or(line.to_owned(), |l| format!("{l},{name},"))
+            })
+            .collect();
+        std::fs::write(&manifest, named.join("\n")).unwrap();
+        folder
+    });
+    let [anna, ben] = [&folders[0], &folders[1]].map(|folder| path(folder));
+    let both = [
+        "gauge",
+        "--recordings",
+        anna,
+        "--and",
+        ben,
+        "--format",
+        "json",
+    ];
+    let both = json(&both, 0);
+    assert_eq!(both["operators"], serde_json::json!(["Anna", "Ben"]));
+    for (one, two) in movements.iter().zip(both["movements"].as_array().unwrap()) {
+        let of = |m: &serde_json::Value| m["properties"][1]["sd"].clone();
+        assert_eq!(of(two)["operator"], 0.0);
+        let [one, two] = [of(one), of(two)].map(|sd| sd["part"].as_f64().unwrap());
+        assert!((one - two).abs() < 0.1 * one, "{one} and {two}");
+    }
+    let twice = said(&["gauge", "--recordings", SIMULATED, "--and", SIMULATED], 2);
+    assert!(twice.contains("was given before"), "{twice}");
+}

@@ -4,6 +4,7 @@ mod args;
 mod device;
 mod evaluate;
 mod features;
+mod gauge;
 mod identify;
 mod import;
 mod known;
@@ -48,6 +49,7 @@ enum Command {
     Table(table::Command),
     Identify(identify::Args),
     Evaluate(evaluate::Args),
+    Gauge(gauge::Args),
     Simulate(simulate::Args),
     LearnByHand(learn::ByHand),
     Study(study::Args),
@@ -86,6 +88,7 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         Some(Command::Table(command)) => table::run(&command, out)?,
         Some(Command::Identify(args)) => done = identify::run(&args, out)?,
         Some(Command::Evaluate(args)) => evaluate::run(&args, out)?,
+        Some(Command::Gauge(args)) => gauge::run(&args, out)?,
         Some(Command::Simulate(args)) => simulate::run(&args, out)?,
         Some(Command::LearnByHand(args)) => learn::by_hand(&args, out)?,
         Some(Command::Study(args)) => study::run(&args, out)?,

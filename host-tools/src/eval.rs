@@ -6,6 +6,7 @@ pub mod chart;
 pub mod courses;
 pub mod evaluate;
 pub mod experiment;
+pub mod gauge;
 pub mod learn;
 pub mod lifelong;
 pub mod novelty;

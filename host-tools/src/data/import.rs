@@ -250,7 +250,7 @@ fn read_bio(path: &Path) -> Result<Bio> {
     const COUNT: &str = "a count of 0 to 4095";
     let mut columns = vec!["timestamp", "pdc"];
     columns.extend(PAC_COLUMNS);
-    let mut rows = Rows::open(path, &columns)?;
+    let mut rows = Rows::open(path, &columns, &[])?;
     let mut bio = Bio::default();
     while let Some(row) = rows.next_row()? {
         let count = |column| -> Result<u16> {
@@ -283,7 +283,7 @@ fn read_bio(path: &Path) -> Result<Bio> {
 
 /// Times in s and tangential forces in N.
 fn read_force(path: &Path) -> Result<Vec<(f64, f64)>> {
-    let mut rows = Rows::open(path, &["timestamp", "fz"])?;
+    let mut rows = Rows::open(path, &["timestamp", "fz"], &[])?;
     let mut force: Vec<(f64, f64)> = Vec::new();
     while let Some(row) = rows.next_row()? {
         let time = row.number("timestamp")?;

@@ -80,7 +80,7 @@ impl PropertyTable {
     /// # Errors
     /// If it cannot be read, a row makes no sense, or trials are missing.
     pub fn read(path: &Path) -> Result<Self, PropertyError> {
-        let mut rows = Rows::open(path, &COLUMNS)?;
+        let mut rows = Rows::open(path, &COLUMNS, &[])?;
         let (mut textures, mut movements) = (Vec::new(), Vec::new());
         let (mut train, mut validate) = (Trials::new(), Trials::new());
         let mut seen = HashSet::new();

@@ -50,12 +50,25 @@ pub struct Texture {
 }
 
 /// What is known of a slide before its samples are read.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub struct SlideKey {
     /// As [`Recording::number`].
     pub number: u32,
     /// As [`Recording::movement`].
     pub movement: Movement,
+    /// Of what it was made, and by whom.
+    pub labels: Labels,
+}
+
+/// What quality control asks of a slide besides its texture; empty where nobody said.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Labels {
+    /// Batch or piece that the sample was taken from.
+    pub lot: String,
+    /// Who made the slide.
+    pub operator: String,
+    /// Anything else.
+    pub note: String,
 }
 
 impl Recording {

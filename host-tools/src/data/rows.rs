@@ -42,11 +42,15 @@ pub struct Row<'a> {
 }
 
 impl Rows {
-    /// Opens the table at `path`, which must have `columns`, in any order; it may have others.
+    /// Opens the table at `path`, which must have `columns`, in any order; it may have the `optional` ones, and others.
     ///
     /// # Errors
-    /// If the file cannot be read or a column is missing.
-    pub fn open(path: &Path, columns: &[&'static str]) -> Result<Self, RowError> {
+    /// If the file cannot be read or a column is missing or there twice.
+    pub fn open(
+        path: &Path,
+        columns: &[&'static str],
+        optional: &[&'static str],
+    ) -> Result<Self, RowError> {
         let header_error = |cause| RowError {
             path: path.to_owned(),
             line: 1,
@@ -64,8 +68,10 @@ impl Rows {
             .headers()
             .map_err(|e| header_error(cause_of(e)))?
             .clone();
+        let there = |name: &&&'static str| header.iter().any(|h| h == **name);
         let columns = columns
             .iter()
+            .chain(optional.iter().filter(there))
             .map(|&name| {
                 let mut at = (0..).zip(&header).filter(|(_, h)| *h == name);
                 match (at.next(), at.next()) {
@@ -201,7 +207,7 @@ mod tests {
     fn errors(text: &[u8]) -> (usize, String) {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
-        let mut rows = match Rows::open(file.path(), &["a", "b"]) {
+        let mut rows = match Rows::open(file.path(), &["a", "b"], &["c"]) {
             Ok(rows) => rows,
             Err(e) => return (0, e.to_string()),
         };

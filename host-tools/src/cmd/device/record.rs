@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::ensure;
-use tactus::data::recording::Texture;
+use tactus::data::recording::{Labels, Texture};
 use tactus::data::recordings::RecordingWriter;
 use tactus::eval::show::count;
 use tactus::link::Request;
@@ -22,6 +22,7 @@ use super::train::seed_of_now;
 Examples:
   tactus device record burlap silk --out recordings     asks for the next texture when it is due
   tactus evaluate --recordings recordings
+  tactus device record burlap silk --out anna --operator Anna --lot 7     what tactus gauge asks for
 The same command goes on with the texture at which an interrupted one stopped.")]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -38,6 +39,25 @@ pub(crate) struct Args {
     /// Where on the sample slides begin; drawn anew unless given
     #[arg(long)]
     seed: Option<u32>,
+    /// Batch or piece that the samples are from, for `tactus gauge`
+    #[arg(long, default_value = "", hide_default_value = true)]
+    lot: String,
+    /// Who makes the slides, for `tactus gauge`
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "",
+        hide_default_value = true
+    )]
+    operator: String,
+    /// Anything else that is to stand beside every slide
+    #[arg(
+        long,
+        value_name = "TEXT",
+        default_value = "",
+        hide_default_value = true
+    )]
+    note: String,
 }
 
 /// Records each texture in turn.
@@ -54,7 +74,12 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         "tactus device record {} --slides {slides}",
         textures.join(" ")
     );
-    let mut writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
+    let writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
+    let mut writer = writer.labelled(Labels {
+        lot: args.lot.trim().to_owned(),
+        operator: args.operator.trim().to_owned(),
+        note: args.note.trim().to_owned(),
+    });
     let (mut bench, _) = Bench::open(&args.at)?;
     let calibration = bench.get(Request::read_calibration())?;
     bench.get(Request::command(Command::Stream(true)))?;

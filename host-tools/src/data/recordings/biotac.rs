@@ -16,7 +16,7 @@ use super::files::{
 };
 use super::npy::{self, MAX_SAMPLES};
 use crate::data::content::ContentError;
-use crate::data::recording::{PAC_RATE_HZ, Recording, SlideKey, Texture};
+use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, SlideKey, Texture};
 
 /// The pressing force is not in the manifest: the arm pressed with about 0.8 N, which fell to 0.3 N over the slide.
 pub const NOMINAL_FORCE_MN: u16 = 800;
@@ -173,6 +173,7 @@ impl Manifest {
         let key = |&(number, _): &(u32, usize)| SlideKey {
             number,
             movement: self.movement,
+            labels: Labels::default(),
         };
         let slides: Vec<SlideKey> = self.slides.iter().map(key).collect();
         (

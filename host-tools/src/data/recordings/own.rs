@@ -13,6 +13,7 @@
 //! | `pac_file`, `pac_rate_hz`, `pac_sha256` | P_AC in counts about the still baseline; the rate is 2200 |
 //! | `pdc_file`, `pdc_rate_hz`, `pdc_sha256` | P_DC in counts about the still baseline |
 //! | `shear_file`, `shear_rate_hz`, `shear_sha256` | tangential force in mN, positive against the motion; file and hash are empty where it was not measured |
+//! | `lot`, `operator`, `note` | batch or piece of the sample, who made the slide, anything else; may be empty or missing |
 //!
 //! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it; each is a
 //! one-dimensional array of `<i2` (numpy.int16). The hash is the SHA-256 of the whole file in hexadecimal. The rows may come
@@ -27,7 +28,7 @@ use super::files::{
 };
 use super::npy;
 use crate::data::content::ContentError;
-use crate::data::recording::{PAC_RATE_HZ, Recording, SlideKey, Texture};
+use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, SlideKey, Texture};
 use crate::data::rows::{Row, RowError, Rows};
 
 /// Its columns, in the order in which they are written.
@@ -53,6 +54,9 @@ pub const COLUMNS: [&str; 19] = [
     "shear_sha256",
 ];
 
+/// Columns that follow them, which older manifests do not have.
+pub const LABELS: [&str; 3] = ["lot", "operator", "note"];
+
 /// What the manifest says, checked.
 #[derive(Debug)]
 pub struct Manifest {
@@ -65,6 +69,7 @@ struct Entry {
     line: u64,
     number: u32,
     movement: Movement,
+    labels: Labels,
     window: (f32, f32),
     background: Background,
     pac: Stream,
@@ -94,7 +99,7 @@ impl Manifest {
     /// If it cannot be read, a row makes no sense, or two rows contradict each other.
     pub fn read(path: &Path) -> Result<Self> {
         let mut textures: Vec<(Texture, Vec<Entry>)> = Vec::new();
-        let mut rows = Rows::open(path, &COLUMNS)?;
+        let mut rows = Rows::open(path, &COLUMNS, &LABELS)?;
         while let Some(row) = rows.next_row()? {
             let texture = Texture {
                 id: row.parse("texture", "the number of a texture")?,
@@ -132,6 +137,7 @@ impl Manifest {
         let key = |e: &Entry| SlideKey {
             number: e.number,
             movement: e.movement,
+            labels: e.labels.clone(),
         };
         self.textures
             .iter()
@@ -171,10 +177,16 @@ impl Entry {
             Stream::of(row, file, sha256)?
                 .ok_or_else(|| row.error(Some(file), ContentError::NoFile))
         };
+        let [lot, operator, note] = LABELS.map(|column| row.text(column).to_owned());
         Ok(Self {
             line: row.line(),
             number: row.parse("slide", "the number of a slide")?,
             movement,
+            labels: Labels {
+                lot,
+                operator,
+                note,
+            },
             window: (row.number("window_start_s")?, row.number("window_end_s")?),
             background,
             pac: needed("pac_file", "pac_sha256")?,

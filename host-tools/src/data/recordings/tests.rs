@@ -8,6 +8,7 @@ use tempfile::TempDir;
 
 use super::files::*;
 use super::*;
+use crate::data::recording::Labels;
 
 mod biotac_layout;
 mod random;
@@ -181,7 +182,7 @@ fn own_manifest_errors_name_line_and_column() {
         (
             ",4,",
             ",4,,",
-            ["manifest.csv:3:", "20 fields where the header has 19"],
+            ["manifest.csv:3: column force_n", "\"\" is not a number"],
         ),
         (
             ",2200,",
@@ -466,4 +467,44 @@ fn npyz_reads_what_is_written_and_writes_what_is_read() {
     ]
     .concat();
     assert_eq!(npy::read(&bytes), Ok(vec![0x102]));
+}
+
+#[test]
+fn labels_come_back_and_older_manifests_have_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let given = Labels {
+        lot: "7, front".to_owned(),
+        operator: "Ánna \"A\"".to_owned(),
+        note: String::new(),
+    };
+    let texture = |id: u32| Texture {
+        id,
+        name: format!("t{id}"),
+    };
+    let textures = vec![texture(1), texture(2)];
+    let writer = RecordingWriter::begin(folder.path(), textures, "test").unwrap();
+    let mut writer = writer.labelled(given.clone());
+    writer.write(&slide(0, 1)).unwrap();
+    let mut writer = writer.labelled(Labels::default());
+    writer.write(&slide(1, 1)).unwrap();
+    writer.finish().unwrap();
+    let labels = |texture| {
+        let set = RecordingSet::open(folder.path()).unwrap();
+        set.slides(texture)[0].labels.clone()
+    };
+    assert_eq!([labels(0), labels(1)], [given, Labels::default()]);
+    // as they were written before there were labels
+    let manifest = folder.path().join("manifest.csv");
+    let text = fs::read_to_string(&manifest).unwrap();
+    let older = text.replace(",lot,operator,note", "");
+    let older = older.replace(",\"7, front\",\"Ánna \"\"A\"\"\",", "");
+    let older: String = older
+        .lines()
+        .map(|line| format!("{}\n", line.strip_suffix(",,,").unwrap_or(line)))
+        .collect();
+    fs::write(&manifest, older).unwrap();
+    assert_eq!(
+        [labels(0), labels(1)],
+        [Labels::default(), Labels::default()]
+    );
 }

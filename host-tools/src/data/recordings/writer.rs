@@ -14,9 +14,9 @@ use super::files::{
     distinct_textures, inside, read_bounded, sha256,
 };
 use super::npy;
-use super::own::COLUMNS;
+use super::own::{COLUMNS, LABELS};
 use crate::data::program::program;
-use crate::data::recording::{PAC_RATE_HZ, Recording, Texture};
+use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
 
 /// What becomes the manifest.
 const ROWS: &str = "manifest.csv.part";
@@ -29,6 +29,7 @@ const FILES: [(usize, usize); 4] = [(8, 9), (10, 12), (13, 15), (16, 18)];
 pub struct RecordingWriter {
     folder: PathBuf,
     textures: Vec<Texture>,
+    labels: Labels,
     rows: Vec<Vec<String>>,
     /// texture and number of each
     keys: HashSet<(usize, u32)>,
@@ -71,10 +72,18 @@ impl RecordingWriter {
             journal: journal(folder, &rows)?,
             folder: folder.to_owned(),
             textures,
+            labels: Labels::default(),
             rows,
             keys,
             made,
         })
+    }
+
+    /// The slides that are written from now on have these labels.
+    #[must_use]
+    pub fn labelled(mut self, labels: Labels) -> Self {
+        self.labels = labels;
+        self
     }
 
     fn check(folder: &Path, textures: &[Texture]) -> Result<()> {
@@ -177,6 +186,8 @@ impl RecordingWriter {
         ] {
             row.extend([file, rate.to_string(), sha256]);
         }
+        let labels = &self.labels;
+        row.extend([&labels.lot, &labels.operator, &labels.note].map(Clone::clone));
         let written = csv(std::iter::once(&row)).and_then(|row| self.journal.write_all(&row));
         written.map_err(|e| io_error(&self.folder.join(ROWS), e))?;
         self.rows.push(row);
@@ -253,6 +264,12 @@ fn is_empty(folder: &Path) -> Result<bool> {
     Ok(names.all(|entry| entry.is_ok_and(|entry| entry.file_name() == PART)))
 }
 
+/// The columns, as they are written.
+fn header() -> Vec<String> {
+    let columns = COLUMNS.into_iter().chain(LABELS);
+    columns.map(str::to_owned).collect()
+}
+
 /// The index of a row's texture, and the number of its slide.
 fn key(row: &[String], textures: &[Texture]) -> Option<(usize, u32)> {
     let [id, name, number] = KEY.map(|column| row.get(column));
@@ -277,11 +294,11 @@ fn rows_there(folder: &Path, textures: &[Texture]) -> Result<Vec<Vec<String>>> {
     // of a row that was cut short, nothing is believed
     let (whole, _) = text.rsplit_once('\n').unwrap_or_default();
     let mut reader = csv::Reader::from_reader(whole.as_bytes());
-    if reader.headers().is_ok_and(|there| *there != COLUMNS[..]) {
+    if reader.headers().is_ok_and(|there| *there != header()) {
         return Ok(Vec::new());
     }
     let is_whole = |row: &Vec<String>| {
-        row.len() == COLUMNS.len()
+        row.len() == header().len()
             && key(row, textures).is_some()
             && FILES
                 .iter()
@@ -309,7 +326,7 @@ fn is_there(folder: &Path, file: &str, hash: &str) -> bool {
 /// A file of these rows, to which others can be added.
 fn journal(folder: &Path, rows: &[Vec<String>]) -> Result<File> {
     let path = folder.join(ROWS);
-    let header = COLUMNS.map(str::to_owned).to_vec();
+    let header = header();
     let text = csv(std::iter::once(&header).chain(rows)).map_err(|e| io_error(&path, e))?;
     replace(folder, ROWS, &text)?;
     let journal = OpenOptions::new().append(true).open(&path);
