@@ -5,12 +5,14 @@
 //! [`encode`]; or the mean of all features of a slide in whitened space, learned as [`Whitened`] and written by
 //! [`encode_fused`]. [`amend`] learns, renames and deletes textures of either kind.
 //!
-//! # Binary form, version 3, little-endian
+//! # Binary form, version 4, little-endian
+//!
+//! A table without sections is written as version 3, which is the same otherwise. Both are read.
 //!
 //! | bytes | what |
 //! |---|---|
 //! | 4 | magic `TACT` |
-//! | 2 | version, 3 |
+//! | 2 | version, 4, or 3 |
 //! | 1 | contents, 0: Gaussians, 1: fused |
 //! | 1 | Gaussians: properties measured, a bit each: 1 traction, 2 roughness, 4 fineness; fused: place in `features::FeatureSet::ALL` |
 //! | 4 | length of the whole table in bytes |
@@ -25,25 +27,46 @@
 //! | 4 | CRC-32 of the table that this one was made from by learning, the first of all; 0 for none |
 //! | 5 T | per texture: a number that stays its own (2); slides that were learned from the factory, the user and itself (1 each, 255 for more) |
 //! | | per texture: length of its name (1), the name in UTF-8 |
+//! | | version 4: sections, each its kind (2), the length of its contents (2), and these; an unknown kind is skipped |
 //! | 4 | CRC-32 (ISO-HDLC) of all before |
+//!
+//! Sections of a fused table; numbers are f32:
+//!
+//! | kind | bytes | what |
+//! |---|---|---|
+//! | 1 | 8 | the drift that is expected: [`Drift::bands`], [`Drift::traction`] |
+//! | | 4 d M | per movement: variances of the drift along the whitened axes |
+//! | 2 | 48 | [`Limits`] of scores with drift after 1, 2, 3 slides, then without: begin and mean excess of their upper tenth |
+//! | | M (7 d + 2 d d) | per movement the [`Population`] of textures: axes as a whitening of whitened features, in their steps; d variances |
 
+mod drift;
 mod encode;
 mod format;
 mod gaussian;
+mod limits;
+mod matrix;
+mod population;
 mod scatter;
+mod sections;
 mod training_stats;
 mod view;
 mod whitening;
 
+pub use drift::{Drift, Drifts};
 pub use encode::{
     Change, EncodeError, Known, Texture, amend, encode, encode_fused, encoded_len, retell,
+    with_sections,
 };
 pub use format::{
     Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, Name, TableError, Tally, VERSION,
 };
 pub use gaussian::{Gaussian, Gaussians, SD_LEAST, SD_STEP, mean_step};
+pub(crate) use limits::Numbers;
+pub use limits::{Against, EPISODES, FALSE_ALARM, Limits, Tail};
+pub use population::{POPULATION, Population};
 pub(crate) use scatter::oas;
-pub use scatter::{Scatter, WhitenError, whiten};
+pub use scatter::{Scatter, WhitenError, whiten, whiten_drifting};
+pub use sections::Sections;
 pub use training_stats::{Experience, TrainingStats, Whitened};
 pub use view::Table;
 pub use whitening::{Whitening, white};

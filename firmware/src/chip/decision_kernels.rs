@@ -400,7 +400,9 @@ impl Kernels for Chip {
     ) -> usize {
         let many = logs.len().min(there(means, stride, 2 * from.len()));
         let even = from.len() == MAX_FEATURES;
-        if many == 0 || !even && from.len() != MAX_FEATURES - 1 || spread.narrowness >= 1 << 16 {
+        let [narrowness, ref others @ ..] = spread.narrowness;
+        let differ = others.iter().any(|other| *other != narrowness);
+        if many == 0 || !even && from.len() != MAX_FEATURES - 1 || narrowness >= 1 << 16 || differ {
             return Plain::add_likelihoods(from, means, stride, spread, logs);
         }
         let logs = logs.as_mut_ptr();
@@ -412,7 +414,7 @@ impl Kernels for Chip {
                 logs,
                 logs.add(many),
                 stride,
-                spread.narrowness << 16,
+                narrowness << 16,
                 before_ln(),
                 LN_2,
                 1 << 15,

@@ -49,6 +49,7 @@ impl Stop {
             threshold: self.threshold,
             max_slides: self.max_slides,
             open: false,
+            ..Config::default()
         }
     }
 }

@@ -17,6 +17,8 @@ pub struct Belief {
     rather_new: bool,
     /// Whether a user would be told so.
     is_new: bool,
+    /// Whether it is not as it was learned.
+    is_changed: bool,
 }
 
 /// A run that no threshold ended: what was believed after each of its slides.
@@ -32,20 +34,24 @@ impl Course {
     /// What the user is told at this threshold, the slides until then, and the most probable texture. The choice of
     /// movements does not depend on the threshold, so the run at one is the beginning of the run at a higher one.
     pub fn told(&self, threshold: f32) -> (Told, usize, usize) {
-        let is_sure = |b: &Belief| b.probability > threshold && !b.rather_new;
-        let sure = self.beliefs.iter().position(is_sure);
-        let last = self.beliefs.len().saturating_sub(1);
-        let texture = self
-            .beliefs
-            .get(sure.unwrap_or(last))
-            .map_or(0, |b| b.texture);
-        match sure {
-            Some(at) => (Told::Sure, at + 1, texture),
-            None if self.beliefs.last().is_some_and(|b| b.is_new) => {
-                (Told::New, self.beliefs.len(), texture)
-            }
-            None => (Told::Undecided, self.beliefs.len(), texture),
-        }
+        let is_sure = |b: &Belief| b.probability > threshold && !b.rather_new && !b.is_changed;
+        // that takes two slides: see `Explorer::verdict`
+        let is_changed = |at, b: &Belief| at > 0 && b.probability > threshold && b.is_changed;
+        let mut beliefs = self.beliefs.iter().enumerate();
+        let over = beliefs.position(|(at, b)| is_sure(b) || is_changed(at, b));
+        let at = over.unwrap_or(self.beliefs.len().saturating_sub(1));
+        let last = self.beliefs.get(at);
+        let told = match last {
+            Some(b) if over.is_some() && is_sure(b) => Told::Sure,
+            Some(b) if b.is_new => Told::New,
+            Some(b) if b.is_changed => Told::Changed,
+            _ => Told::Undecided,
+        };
+        (
+            told,
+            last.map_or(0, |_| at + 1),
+            last.map_or(0, |b| b.texture),
+        )
     }
 }
 
@@ -78,6 +84,7 @@ pub fn courses(
                     probability: best.probability,
                     rather_new: config.open && best.log_odds.is_some_and(|odds| odds > 0.0),
                     is_new: best.unknown,
+                    is_changed: best.changed,
                 });
             });
             Course {

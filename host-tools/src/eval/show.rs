@@ -279,6 +279,10 @@ impl<'t, W: Write> Show<'t, W> {
                     self.table.textures()
                 )
             }
+            Told::Changed => writeln!(
+                self.out,
+                "\nIt is like {name}, but not as I learned it, after {slides}: worn, drifted, or something much like it."
+            ),
             Told::Sure => writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}."),
             Told::Undecided => writeln!(
                 self.out,
@@ -301,6 +305,8 @@ pub fn is_right(verdict: Verdict, truth: &str, table: Table<'_>) -> Option<bool>
     match verdict.told() {
         Told::Sure => Some(table.name(verdict.texture) == Some(truth)),
         Told::New => Some(table.find(truth).is_none()),
+        // of another texture it is no wrong answer: that is not as I learned this one
+        Told::Changed => (table.name(verdict.texture) == Some(truth)).then_some(true),
         Told::Undecided => None,
     }
 }

@@ -56,9 +56,9 @@ pub struct Candidate {
 /// What the user is told.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Answer {
-    /// `sure`, `new` or `undecided`.
+    /// `sure`, `changed`, `new` or `undecided`.
     pub told: &'static str,
-    /// The most probable texture; only with `sure` it is the answer.
+    /// The most probable texture; it is the answer with `sure`, and with `changed` if the user says so.
     pub texture: String,
     /// Its posterior probability, 0 to 1.
     pub probability: f32,
@@ -75,6 +75,7 @@ impl Answer {
             told: match verdict.told() {
                 Told::Sure => "sure",
                 Told::New => "new",
+                Told::Changed => "changed",
                 Told::Undecided => "undecided",
             },
             texture: table.name(verdict.texture).unwrap_or_default().to_owned(),

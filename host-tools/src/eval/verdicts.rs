@@ -8,7 +8,7 @@ use tactus_core::explorer::Told;
 pub struct Verdicts {
     /// Told the right name as sure.
     pub right: f64,
-    /// Told the name of a texture that is not as it was learned. No method gives this verdict yet: 0.
+    /// Told the name of a texture that is not as it was learned. Only calibrated tables give this verdict.
     pub changed: f64,
     /// Told that it is none of the textures known.
     pub new: f64,
@@ -28,6 +28,7 @@ impl Verdicts {
             *match told {
                 Told::Sure if is_right => &mut counts.right,
                 Told::Sure => &mut counts.wrong,
+                Told::Changed => &mut counts.changed,
                 Told::New => &mut counts.new,
                 Told::Undecided => &mut counts.undecided,
             } += 1.0;

@@ -153,7 +153,7 @@ pub fn pairs(
         strategy: Method::Paper.strategy(),
         threshold: Config::PAIR_THRESHOLD,
         max_slides: MAX_PAIR_SLIDES,
-        open: false,
+        ..Config::default()
     };
     let row = |pair: &super::published::Pair| {
         let candidates = pair.textures.map(|number| u16::from(number) - 1);

@@ -5,7 +5,7 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::features::{FeatureSet, Property};
-use crate::table::{Action, Contents};
+use crate::table::{Action, Contents, FALSE_ALARM};
 
 /// Textures less probable than this are left out of the expected uncertainty: each changes it by at most about twice its
 /// probability, all of 117 by about 2e-4.
@@ -82,6 +82,9 @@ pub struct Config {
     pub max_slides: u8,
     /// Whether the answer may be that it is none of the candidates.
     pub open: bool,
+    /// Share of the known textures that may be taken for new ones, if the answer may be that: with a table that is
+    /// calibrated.
+    pub false_alarm: f32,
 }
 
 impl Default for Config {
@@ -93,6 +96,7 @@ impl Default for Config {
             threshold: 0.99,
             max_slides: 10,
             open: false,
+            false_alarm: FALSE_ALARM,
         }
     }
 }

@@ -111,7 +111,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         let method = self.config.method;
         if method == Method::Fused {
             let mut live: Vec<Candidate, N> = Vec::new();
-            whitened::gather(&self.table, action.movement, &certain, &mut live);
+            whitened::gather(&self.table, action.movement, &certain, &mut live, K::sqrt);
             let confuse = |a: &mut Candidate, others: &mut [Candidate]| {
                 K::candidate_distances(a, others);
                 whitened::confuse_with(a, others);

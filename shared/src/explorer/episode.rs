@@ -39,6 +39,19 @@ pub(super) fn one_more(episode: &mut Episode, movement: u8) -> Option<&mut Movem
 }
 
 impl MovementSums {
+    /// So many slides of this whitened mean.
+    pub(super) fn of(movement: u8, slides: u8, mean: &[i16]) -> Self {
+        let mut sums = Self {
+            movement,
+            slides,
+            ..Self::default()
+        };
+        for (sum, z) in sums.white.iter_mut().zip(mean) {
+            *sum = i32::from(*z) * i32::from(slides);
+        }
+        sums
+    }
+
     /// Mean of so many whitened features, to the nearest step.
     pub(super) fn mean(&self, features: usize) -> Vector {
         if self.slides == 1 {

@@ -5,7 +5,7 @@
 use crate::dsp::Plain;
 use crate::dsp::fixed::{exp_neg_q30, ln_q16};
 use crate::features::{MAX_FEATURES, Property};
-use crate::table::{Gaussian, Gaussians};
+use crate::table::{Gaussian, Gaussians, Numbers};
 
 /// A texture that is still likely, while a movement is weighed. The order of the fields is fixed, for kernels that are not
 /// written in Rust.
@@ -29,24 +29,47 @@ pub struct Candidate {
 impl Candidate {
     /// One that is not compared yet. Its mean begins where `known` does, and `mask` is of its features; what lies behind
     /// them does not count.
-    // words, not bytes: copying these would take longer than all else
     #[inline]
     pub(crate) fn new(known: &[u8], mask: &Mask, probability: f32, slides: u8) -> Self {
+        Self::turned(known, mask, (|word, _| word, mask), probability, slides)
+    }
+
+    /// As [`Candidate::new`], each number [`shrunk`] by one of `by`.
+    #[inline]
+    pub(crate) fn scaled(
+        known: &[u8],
+        mask: &Mask,
+        by: &Mask,
+        probability: f32,
+        slides: u8,
+    ) -> Self {
+        Self::turned(known, mask, (shrunk, by), probability, slides)
+    }
+
+    // words, not bytes: copying these would take longer than all else
+    #[inline(always)]
+    fn turned(
+        known: &[u8],
+        mask: &Mask,
+        (turn, by): (impl Fn(u32, u32) -> u32, &Mask),
+        probability: f32,
+        slides: u8,
+    ) -> Self {
         let mut mean = [0; MAX_FEATURES];
         let mut square = 0;
-        let mut take = |pair: &mut [i16; 2], word: u32, mask: u32| {
-            let word = word & mask;
+        let mut take = |pair: &mut [i16; 2], word: u32, (mask, by): (&u32, &u32)| {
+            let word = turn(word & mask, *by);
             *pair = [word as i16, (word >> 16) as i16];
             square += pair
                 .map(|m| i64::from(m) * i64::from(m))
                 .iter()
                 .sum::<i64>();
         };
-        let pairs = mean.as_chunks_mut().0.iter_mut().zip(mask);
+        let pairs = mean.as_chunks_mut().0.iter_mut().zip(mask.iter().zip(by));
         if let Some(known) = known.first_chunk::<{ 2 * MAX_FEATURES }>() {
             // all of them, in steps that the compiler knows the number of
             for ((pair, mask), word) in pairs.zip(known.as_chunks().0) {
-                take(pair, u32::from_le_bytes(*word), *mask);
+                take(pair, u32::from_le_bytes(*word), mask);
             }
         } else {
             // the last of a table
@@ -55,7 +78,7 @@ impl Candidate {
                 take(
                     pair,
                     bytes.fold(0, |word, byte| word << 8 | u32::from(*byte)),
-                    *mask,
+                    mask,
                 );
             }
         }
@@ -129,56 +152,99 @@ pub(crate) fn confused(a: Gaussian, b: Gaussian, sqrt: fn(f32) -> f32) -> f32 {
 /// Degrees of freedom of Student's t in the fused way of deciding.
 pub(crate) const DEGREES_OF_FREEDOM: u8 = 8;
 
-/// What Student's t makes of `k` slides against a mean of `n`, whose difference has the variance v = 1/k + 1/n.
+/// Shrinks two numbers in a word by two others, in 1/2^15.
+#[inline]
+pub(crate) fn shrunk(word: u32, by: u32) -> u32 {
+    let low = (i32::from(word as i16) * i32::from(by as i16)) >> 15;
+    let high = ((word as i32 >> 16) * (by as i32 >> 16)) >> 15;
+    (high as u32) << 16 | (low as u32 & 0xffff)
+}
+
+/// By what the axes of a movement are shrunk, to compare textures learned from `n` slides in spite of this drift: there the
+/// mean of a slide has the variance 1 + 1/n + delta instead of 1 + 1/n.
+pub(crate) fn scales(drifts: Numbers<'_>, n: u8, sqrt: fn(f32) -> f32) -> Mask {
+    let v = 1.0 + 1.0 / f32::from(n.max(1));
+    let mut scales = [0x7fff_7fff; MAX_FEATURES / 2];
+    let mut drifts = drifts.map(|drift| (sqrt(v / (v + drift)) * 32767.0) as u32);
+    for pair in &mut scales {
+        let (low, high) = (drifts.next(), drifts.next());
+        *pair = high.unwrap_or(0) << 16 | low.unwrap_or(0);
+    }
+    scales
+}
+
+/// What Student's t makes of `k` slides against a mean of `n`, whose difference has the variance v = 1/k + 1/n, and along
+/// each axis that of the drift.
 #[derive(Clone, Copy, Debug)]
 pub struct Spread {
     /// n.
     pub slides: u8,
-    /// 1/(8 v) in Q16: 20 bits at most.
-    pub narrowness: u32,
-    /// -(d/2) ln v of d features, Q16.
+    /// 1/(8 v) along each axis in Q16: 20 bits at most.
+    pub narrowness: [u32; MAX_FEATURES],
+    /// -1/2 of the sum of ln v, Q16.
     pub norm: i32,
     /// 8 + d.
     pub weight: i32,
 }
 
 impl Spread {
-    /// Of `k` slides against a mean of `n`, none of them 0.
-    pub(crate) fn new(k: u8, n: u8, features: usize) -> Self {
-        let (k32, n32) = (u32::from(k), u32::from(n));
-        let of_v = u64::from(u32::from(DEGREES_OF_FREEDOM) * (k32 + n32));
-        // 20 bits at most, as k and n have 8 each
-        let narrowness = ((u64::from(k32 * n32) << 16) / of_v.max(1)) as u32;
-        let ln_v = -i64::from(ln_q16(
-            u64::from(DEGREES_OF_FREEDOM) * u64::from(narrowness),
-        ));
+    /// Of `k` slides against a mean of `n`, none of them 0, of so many features that drift so much.
+    pub(crate) fn new(k: u8, n: u8, features: usize, drifts: Option<Numbers<'_>>) -> Self {
+        let weight = i32::from(DEGREES_OF_FREEDOM) + features as i32;
+        let Some(drifts) = drifts else {
+            let (k32, n32) = (u32::from(k), u32::from(n));
+            let of_v = u64::from(u32::from(DEGREES_OF_FREEDOM) * (k32 + n32));
+            // 20 bits at most, as k and n have 8 each
+            let narrowness = ((u64::from(k32 * n32) << 16) / of_v.max(1)) as u32;
+            let ln_v = -i64::from(ln_q16(
+                u64::from(DEGREES_OF_FREEDOM) * u64::from(narrowness),
+            ));
+            return Self {
+                slides: n,
+                narrowness: [narrowness; MAX_FEATURES],
+                // ln v is 5 at most, times 14/2
+                norm: (-(features as i64) * ln_v / 2) as i32,
+                weight,
+            };
+        };
+        let v = 1.0 / f32::from(k) + 1.0 / f32::from(n);
+        let mut narrowness = [0; MAX_FEATURES];
+        // two logarithms for all: variances are 2^-7 to 2^18, and products of seven numbers still
+        let mut products = [1.0; 2];
+        for ((slot, drift), at) in narrowness.iter_mut().zip(drifts).zip(0..) {
+            let total = v + drift;
+            *slot = (65536.0 / f32::from(DEGREES_OF_FREEDOM) / total) as u32;
+            let [first, second] = &mut products;
+            *(if at < MAX_FEATURES / 2 { first } else { second }) *= total;
+        }
+        let ln: f32 = products.into_iter().map(libm::logf).sum();
         Self {
             slides: n,
             narrowness,
-            // ln v is 5 at most, times 14/2
-            norm: (-(features as i64) * ln_v / 2) as i32,
-            weight: i32::from(DEGREES_OF_FREEDOM) + features as i32,
+            norm: (ln * -32768.0) as i32,
+            weight,
         }
     }
 
-    /// ln of the likelihood up to a constant, Q16, at a squared distance in Q16.
+    /// ln of the likelihood up to a constant, Q16, at such a [`distance`].
     pub(crate) fn likelihood(&self, distance: u64) -> i32 {
-        // 34 bits, as differences are 16, and 20
-        let odds = (1 << 16) + ((distance * u64::from(self.narrowness)) >> 16);
-        // the odds are at least 1, their logarithm is 16 at most: neither is negative, nor beyond 20 bits times 22
+        let odds = (1 << 16) + (distance >> 16);
+        // the odds are at least 1, their logarithm is 27 at most: neither is negative, nor beyond 21 bits times 22
         let tail = (self.weight * ln_q16(odds)) >> 1;
-        // some 40 at most: 2^22 in Q16
+        // some 100 at most: 2^23 in Q16
         self.norm - tail
     }
 }
 
-/// Squared distance of two whitened means, Q16; what is more than 128 standard deviations apart counts as 128.
+/// Squared distance of two whitened means with these weights, Q32 where they are Q16: 54 bits at most. What is more than 128
+/// standard deviations apart counts as 128.
 #[inline]
-pub(crate) fn distance(from: &[i16], mean: &[u8]) -> u64 {
+pub(crate) fn distance(from: &[i16], mean: &[u8], weights: &[u32; MAX_FEATURES]) -> u64 {
     let (mean, _) = mean.as_chunks();
-    let squares = from.iter().zip(mean).map(|(a, b)| {
-        let apart = i64::from(a.saturating_sub(i16::from_le_bytes(*b)));
-        (apart * apart) as u64
+    let squares = from.iter().zip(mean).zip(weights).map(|((a, b), weight)| {
+        let apart = i32::from(a.saturating_sub(i16::from_le_bytes(*b)));
+        // 2^30 at most
+        u64::from((apart * apart) as u32) * u64::from(*weight)
     });
     squares.sum()
 }
@@ -235,7 +301,7 @@ impl Kernels for Plain {
     ) -> usize {
         let known = logs.iter_mut().zip(means.chunks(stride.max(1)));
         known
-            .map(|(log, mean)| *log += spread.likelihood(distance(from, mean)))
+            .map(|(log, mean)| *log += spread.likelihood(distance(from, mean, &spread.narrowness)))
             .count()
     }
 

@@ -7,7 +7,7 @@ use super::posterior::{Explorer, rebase};
 use super::student::{ShrinkagePrior, Student};
 use super::whitened;
 use crate::features::{Observation, Property};
-use crate::table::{Action, Contents, Gaussian, mean_step};
+use crate::table::{Action, Against, Contents, Gaussian, mean_step};
 
 /// Most that the likelihood of a slide takes from a logarithm.
 const MOST: i32 = 1 << 26;
@@ -155,12 +155,22 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             &self.table,
             &self.episode,
             &self.novelty_models,
+            true,
             &mut self.log,
+            // overwritten below
+            &mut self.posterior,
             K::add_likelihoods,
         );
-        let average = self.normalize();
-        self.log_odds =
-            elsewhere.and_then(|(elsewhere, can_tell)| can_tell.then_some(elsewhere - average));
+        let (top, sum) = self.normalize();
+        let limits = self.table.limits();
+        self.log_odds = elsewhere.and_then(|(elsewhere, can_tell)| match limits {
+            Some(limits) => {
+                let slides = self.slides.saturating_add(1);
+                let limit = limits.limit(Against::Drifted, slides, self.config.false_alarm);
+                Some(elsewhere - top - limit)
+            }
+            None => can_tell.then(|| elsewhere - (top + self.mean_of(sum))),
+        });
         Ok(())
     }
 

@@ -1,4 +1,4 @@
-//! What a texture that the table does not have is like.
+//! What a texture that the table does not have is like: as its table says, or where that does not say, by its means.
 
 use super::kernels::DEGREES_OF_FREEDOM;
 use crate::features::{MAX_FEATURES, Vector};
@@ -17,12 +17,27 @@ pub(super) struct NoveltyModel {
     variance: [f32; MAX_FEATURES],
     /// Whether there are textures enough to tell.
     pub(super) known: bool,
+    /// Whether the table says it: then mean and variances here are not used.
+    pub(super) calibrated: bool,
     /// From how many slides all textures were learned, if it was as many.
     pub(super) slides: Option<u8>,
 }
 
 impl NoveltyModel {
     pub(super) fn new(table: &Table<'_>, movement: u8) -> Self {
+        let slides = table.trials(0, movement);
+        let same = (0..table.textures()).all(|texture| table.trials(texture, movement) == slides);
+        let slides = same.then_some(slides);
+        if table.limits().is_some() {
+            return Self {
+                movement,
+                mean: [0.0; MAX_FEATURES],
+                variance: [0.0; MAX_FEATURES],
+                known: true,
+                calibrated: true,
+                slides,
+            };
+        }
         let mut count = 0;
         let mut sum = [0i64; MAX_FEATURES];
         let mut squares = [0i64; MAX_FEATURES];
@@ -36,15 +51,14 @@ impl NoveltyModel {
         }
         let n = count.max(1) as f32;
         let known = count >= POPULATION;
-        let slides = table.trials(0, movement);
-        let same = (0..table.textures()).all(|texture| table.trials(texture, movement) == slides);
         let step = white(1);
         let mut model = Self {
             movement,
             mean: sum.map(|sum| sum as f32 / n * step),
             variance: [WIDE; MAX_FEATURES],
             known,
-            slides: same.then_some(slides),
+            calibrated: false,
+            slides,
         };
         if known {
             for ((variance, sum), squares) in model.variance.iter_mut().zip(sum).zip(squares) {
@@ -62,7 +76,10 @@ impl NoveltyModel {
     }
 
     /// As [`Spread::likelihood`], of the mean of `k` slides.
-    pub(super) fn likelihood(&self, mean: &Vector, k: u8) -> f32 {
+    pub(super) fn likelihood(&self, table: &Table<'_>, mean: &Vector, k: u8) -> f32 {
+        if self.calibrated {
+            return population_likelihood(table, self.movement, mean, k);
+        }
         let v = 1.0 / f32::from(k);
         let (mut norm, mut distance) = (0.0, 0.0);
         // two logarithms for all: variances are 2^-8 to 2^14, and products of seven numbers still
@@ -82,6 +99,26 @@ impl NoveltyModel {
         let tail = (freedom + mean.len() as f32) / 2.0;
         -0.5 * norm - tail * libm::log1pf(distance / freedom)
     }
+}
+
+/// ln of the likelihood of a texture that the table does not have, whose `k` slides have this mean: means of textures are
+/// a Gaussian's, as a calibrated table says. 0 in another one.
+pub(super) fn population_likelihood(table: &Table<'_>, movement: u8, mean: &Vector, k: u8) -> f32 {
+    let Some(population) = table.population(movement) else {
+        return 0.0;
+    };
+    let v = 1.0 / f32::from(k);
+    let (mut products, mut distance) = ([1.0; 2], 0.0);
+    let along = population.axes.apply(mean);
+    for ((z, variance), at) in along.iter().zip(population.variances).zip(0..) {
+        let total = variance + v;
+        let apart = white(*z);
+        distance += apart * apart / total;
+        let [first, second] = &mut products;
+        *(if at < MAX_FEATURES / 2 { first } else { second }) *= total;
+    }
+    let norm: f32 = products.into_iter().map(libm::logf).sum();
+    -0.5 * (norm + distance)
 }
 
 /// Draws the variances along the axes of a covariance of `n` towards their mean, by as much as so few deserve ([`oas`]):

@@ -8,13 +8,15 @@ use core::marker::PhantomData;
 use heapless::Vec;
 
 use super::config::Config;
-use super::episode::Episode;
+use super::episode::{Episode, MovementSums};
 use super::kernels::Kernels;
 use super::novelty::NoveltyModel;
 use super::student::ShrinkagePrior;
+use super::whitened;
 use crate::dsp::Plain;
 use crate::features::{PropertySet, Vector};
-use crate::table::{Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, Table};
+use crate::table::{Action, Against, Contents, MAX_ACTIONS, MAX_MOVEMENTS, Table};
+use crate::up_to;
 
 /// Logarithm of the posterior, Q16, of a texture that is no candidate. The slides of an exploration make it neither a
 /// candidate's nor overflow: at most 1024 are taken from it by each, and it is set again after four.
@@ -43,7 +45,10 @@ pub struct Verdict {
     pub sure: bool,
     /// Whether it is rather none of them.
     pub unknown: bool,
-    /// Log-odds of that, where the method can tell.
+    /// Whether it is the most probable one, but not as it was learned: worn, drifted, or something much like it.
+    pub changed: bool,
+    /// Log-odds that it is none of them, where the method can tell; with a calibrated table, by how much its score exceeds
+    /// the limit.
     pub log_odds: Option<f32>,
 }
 
@@ -52,6 +57,8 @@ pub struct Verdict {
 pub enum Told {
     /// "It is this texture": a name told as sure.
     Sure,
+    /// "It is this texture, but not as I learned it."
+    Changed,
     /// "It is none of those I know."
     New,
     /// "Not sure; most likely this one": no answer, whatever the name.
@@ -63,6 +70,7 @@ impl Verdict {
     pub fn told(&self) -> Told {
         match self {
             Self { unknown: true, .. } => Told::New,
+            Self { changed: true, .. } => Told::Changed,
             Self { sure: true, .. } => Told::Sure,
             _ => Told::Undecided,
         }
@@ -154,7 +162,9 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     pub fn verdict(&self) -> Option<Verdict> {
         let best = self.best();
         let sure = best.sure && self.slides > 0;
-        let unknown = best.unknown && self.slides >= UNKNOWN_SLIDES;
+        let probable = best.probability > self.config.threshold;
+        let unknown = best.unknown || best.changed && probable;
+        let unknown = unknown && self.slides >= UNKNOWN_SLIDES;
         (sure || unknown || self.slides >= self.config.max_slides).then_some(best)
     }
 
@@ -166,6 +176,9 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
 
     /// Whether the texture is rather none of the candidates, as far as can be told.
     pub fn is_unknown(&self) -> bool {
+        if self.is_calibrated() {
+            return self.log_odds.is_some_and(|over| over > 0.0);
+        }
         let [at_once, later] = UNKNOWN_OVER;
         let limit = if self.slides < UNKNOWN_SLIDES {
             at_once
@@ -175,10 +188,63 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         self.log_odds.is_some_and(|log_odds| log_odds > limit)
     }
 
+    fn is_calibrated(&self) -> bool {
+        let models = &self.novelty_models;
+        !models.is_empty() && models.iter().all(|model| model.calibrated)
+    }
+
+    /// Whether the texture, if it is one of the candidates, is not as it was learned: without the drift that the table
+    /// expects it would be none of them. Never with a table that is not calibrated, or expects no drift.
+    pub fn is_changed(&self) -> bool {
+        let drifts = self.table.drift().is_some_and(|drift| !drift.is_none());
+        let limits = self.table.limits().filter(|_| drifts && self.slides > 0);
+        let Some(limits) = limits.filter(|_| self.is_calibrated()) else {
+            return false;
+        };
+        let limit = limits.limit(Against::Same, self.slides, self.config.false_alarm);
+        let score = self.score(&self.episode, Against::Same);
+        score.is_some_and(|score| score > limit)
+    }
+
+    /// How much an episode looks like none of the candidates, by the movements made, their slides and the whitened mean of
+    /// these: what the limits of a calibrated table are limits of. `None` where the table is not.
+    pub fn score_of(&self, visits: &[(u8, u8, Vector)], against: Against) -> Option<f32> {
+        let mut episode = Episode::new();
+        for (movement, slides, mean) in visits {
+            episode
+                .push(MovementSums::of(*movement, *slides, mean))
+                .ok()?;
+        }
+        self.score(&episode, against)
+    }
+
+    fn score(&self, episode: &Episode, against: Against) -> Option<f32> {
+        if !self.is_calibrated() {
+            return None;
+        }
+        let mut log: Vec<i32, N> = up_to(self.log.iter().map(|l| if *l < LEAST { OUT } else { 0 }));
+        let mut odds: Vec<f32, N> = up_to(log.iter().map(|_| 0.0));
+        let (elsewhere, _) = whitened::add_likelihoods(
+            &self.table,
+            episode,
+            &self.novelty_models,
+            against == Against::Drifted,
+            &mut log,
+            &mut odds,
+            K::add_likelihoods,
+        )?;
+        let top = log.iter().copied().max().unwrap_or(0);
+        Some(elsewhere - top as f32 / 65536.0)
+    }
+
     /// Whether the posterior is certain enough for the probe to learn from it by itself. Never by the paper's properties
     /// alone: one in ten such updates would be wrong.
     pub fn is_certain(&self) -> bool {
-        let known = self.log_odds.is_some_and(|log_odds| log_odds <= CERTAIN);
+        let known = if self.is_calibrated() {
+            !self.is_unknown() && !self.is_changed()
+        } else {
+            self.log_odds.is_some_and(|log_odds| log_odds <= CERTAIN)
+        };
         known && self.best().probability > self.config.threshold
     }
 
@@ -200,15 +266,17 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             probability: 0.0,
             sure: false,
             unknown: self.config.open && self.is_unknown(),
+            changed: false,
             log_odds: self.log_odds,
         };
+        best.changed = self.config.open && !best.unknown && self.is_changed();
         let rather_new = self.config.open && self.log_odds.is_some_and(|log_odds| log_odds > 0.0);
         for (&probability, texture) in self.posterior.iter().zip(0..) {
             if probability > best.probability {
                 best = Verdict {
                     texture,
                     probability,
-                    sure: probability > self.config.threshold && !rather_new,
+                    sure: probability > self.config.threshold && !rather_new && !best.changed,
                     ..best
                 };
             }
@@ -227,11 +295,15 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         }
     }
 
-    /// The posterior from its logarithms; the logarithm of the candidates' mean likelihood.
-    pub(super) fn normalize(&mut self) -> f32 {
+    /// The posterior from its logarithms; the logarithm of the greatest likelihood, and the sum of all in parts of it, Q30.
+    pub(super) fn normalize(&mut self) -> (f32, f32) {
         let (top, sum) = K::posterior(&self.log, &mut self.posterior);
-        let mean = sum / (1 << 30) as f32 / f32::from(self.candidates);
-        top as f32 / 65536.0 + libm::logf(mean)
+        (top as f32 / 65536.0, sum)
+    }
+
+    /// The logarithm of the candidates' mean likelihood in parts of the greatest one, from their sum.
+    pub(super) fn mean_of(&self, sum: f32) -> f32 {
+        libm::logf(sum / (1 << 30) as f32 / f32::from(self.candidates))
     }
 }
 

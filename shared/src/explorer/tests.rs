@@ -1,6 +1,7 @@
 //! The explorer against the paper's equations, written out in f64.
 
 mod confusions;
+mod drift;
 mod fused;
 mod rules;
 mod student;

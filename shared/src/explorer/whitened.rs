@@ -8,41 +8,55 @@ use heapless::{Vec, VecView};
 
 use super::config::NEGLIGIBLE;
 use super::episode::Episode;
-use super::kernels::{Candidate, Kernels, Spread, distance, mask};
-use super::novelty::NoveltyModel;
-use crate::dsp::fixed::exp_neg_q30;
+use super::kernels::{Candidate, DEGREES_OF_FREEDOM, Kernels, Spread, distance, mask, scales};
+use super::novelty::{NoveltyModel, population_likelihood};
+use crate::dsp::fixed::{exp_neg_q30, ln_q16};
 use crate::table::{Contents, Table};
 
 /// [`Kernels::add_likelihoods`].
 type AddLikelihoods = fn(&[i16], &[u8], usize, &Spread, &mut [i32]) -> usize;
 
 /// Adds the logarithms of the likelihoods (Q16, up to a constant) of all textures after the slides of an episode to `logs`;
-/// that of a texture that the table does not have, and whether the table has textures enough to tell it.
+/// that of a texture that the table does not have, and whether the table has textures enough to tell it. The drift that the
+/// table expects counts, or not.
+///
+/// With a calibrated table, the movements of an episode have one tail together: for that `odds` has space for as many
+/// numbers.
 // not generic: so it is compiled with this crate, for speed
 #[inline(never)]
 pub(super) fn add_likelihoods(
     table: &Table<'_>,
     episode: &Episode,
     novelty_models: &[NoveltyModel],
+    drifting: bool,
     logs: &mut [i32],
+    odds: &mut [f32],
     add: AddLikelihoods,
 ) -> Option<(f32, bool)> {
     let Contents::Fused(_, features) = table.contents() else {
         return None;
     };
     let features = usize::from(features);
+    let calibrated = novelty_models.iter().all(|model| model.calibrated);
+    if calibrated && episode.len() > 1 {
+        return add_jointly(table, episode, features, drifting, logs, odds);
+    }
     let (mut elsewhere, mut can_tell) = (0.0, true);
     for sums in episode {
         let mean = sums.mean(features);
         let background = novelty_models
             .iter()
             .find(|b| b.movement == sums.movement)?;
-        let unknown = background.likelihood(&mean, sums.slides);
+        let mut unknown = background.likelihood(table, &mean, sums.slides);
+        if calibrated {
+            unknown -= student_norm(features);
+        }
         elsewhere += unknown;
         can_tell &= background.known;
         // as little is known of a texture that was never measured here as of one that the table does not have
-        let untaught = (unknown * 65536.0) as i32;
+        let untaught = q16(unknown);
         let column = table.column(sums.movement);
+        let drifts = table.drifts(sums.movement).filter(|_| drifting);
         let mut rest = &mut *logs;
         let mut texture = 0;
         while !rest.is_empty() {
@@ -61,7 +75,7 @@ pub(super) fn add_likelihoods(
             if slides == 0 {
                 these.iter_mut().for_each(|log| *log += untaught);
             } else {
-                let spread = Spread::new(sums.slides, slides, features);
+                let spread = Spread::new(sums.slides, slides, features, drifts);
                 let mut done = 0;
                 loop {
                     let to_do = these.get_mut(done..).unwrap_or_default();
@@ -71,7 +85,8 @@ pub(super) fn add_likelihoods(
                     let Some(log) = these.get_mut(done) else {
                         break;
                     };
-                    *log += spread.likelihood(distance(&mean, column.mean(texture + done)));
+                    let far = column.mean(texture + done);
+                    *log += spread.likelihood(distance(&mean, far, &spread.narrowness));
                     done += 1;
                 }
             }
@@ -80,6 +95,77 @@ pub(super) fn add_likelihoods(
         }
     }
     Some((elsewhere, can_tell))
+}
+
+/// [`add_likelihoods`] of an episode of several movements: the squared distances of all of them have one Student's t. A
+/// movement at which a texture was never measured is for it as for a texture that the table does not have.
+#[inline(never)]
+fn add_jointly(
+    table: &Table<'_>,
+    episode: &Episode,
+    features: usize,
+    drifting: bool,
+    logs: &mut [i32],
+    odds: &mut [f32],
+) -> Option<(f32, bool)> {
+    let odds = odds.get_mut(..logs.len())?;
+    odds.fill(0.0);
+    let of_all = student_norm(features * episode.len());
+    let mut elsewhere = -of_all;
+    for sums in episode {
+        let mean = sums.mean(features);
+        let unknown = population_likelihood(table, sums.movement, &mean, sums.slides);
+        elsewhere += unknown;
+        let column = table.column(sums.movement);
+        let drifts = table.drifts(sums.movement).filter(|_| drifting);
+        let mut spread: Option<Spread> = None;
+        for ((log, odds), texture) in logs.iter_mut().zip(&mut *odds).zip(0..) {
+            let slides = column.slides(texture);
+            if slides == 0 {
+                *log += q16(unknown);
+                continue;
+            }
+            // mostly that of the texture before, which has as many slides
+            let spread = match spread {
+                Some(ref last) if last.slides == slides => last,
+                _ => spread.insert(Spread::new(sums.slides, slides, features, drifts)),
+            };
+            *odds += (distance(&mean, column.mean(texture), &spread.narrowness) >> 16) as f32;
+            *log += spread.norm;
+        }
+    }
+    for ((log, odds), texture) in logs.iter_mut().zip(odds).zip(0..) {
+        let taught = episode.iter();
+        let taught = taught.filter(|sums| table.trials(texture, sums.movement) > 0);
+        let taught = taught.count() * features;
+        let weight = i64::from(DEGREES_OF_FREEDOM) + taught as i64;
+        let tail = weight * i64::from(ln_q16((1 << 16) + *odds as u64));
+        // 512/2 times 31 in Q16: 29 bits
+        *log -= (tail >> 1) as i32;
+        if taught < features * episode.len() {
+            *log += q16(student_norm(taught) - of_all);
+        }
+    }
+    Some((elsewhere, true))
+}
+
+/// A logarithm in Q16; none of an episode's is below -256, so that sums stay within 32 bits.
+fn q16(ln: f32) -> i32 {
+    (ln.max(-256.0) * 65536.0) as i32
+}
+
+/// ln of the constant of Student's t in so many dimensions in parts of that of a Gaussian: ln G((8+P)/2) - ln G(4)
+/// - P/2 ln 4 (Stirling's series, to 1e-5 from P = 1 on).
+fn student_norm(dimensions: usize) -> f32 {
+    if dimensions == 0 {
+        return 0.0;
+    }
+    let half = dimensions as f32 / 2.0;
+    let x = f32::from(DEGREES_OF_FREEDOM) / 2.0 + half;
+    let ln_gamma =
+        (x - 0.5) * libm::logf(x) - x + 0.918_938_5 + (1.0 - 1.0 / (30.0 * x * x)) / (12.0 * x);
+    // ln G(4) = ln 6
+    ln_gamma - 1.791_759_5 - half * 1.386_294_4
 }
 
 /// e^(-x) is 0 from here on, Q16: [`exp_neg_q30`].
@@ -107,7 +193,7 @@ pub(super) fn uncertainty<K: Kernels, const N: usize>(
     posterior: &[f32],
 ) -> f32 {
     let mut live: Vec<Candidate, N> = Vec::new();
-    gather(table, movement, posterior, &mut live);
+    gather(table, movement, posterior, &mut live, K::sqrt);
     let mut rest = live.as_mut_slice();
     while let Some((a, others)) = rest.split_first_mut() {
         K::candidate_distances(a, others);
@@ -125,17 +211,25 @@ pub(super) fn gather(
     movement: u8,
     posterior: &[f32],
     live: &mut VecView<Candidate>,
+    sqrt: fn(f32) -> f32,
 ) {
     let Contents::Fused(_, features) = table.contents() else {
         return;
     };
     let column = table.column(movement);
     let mask = mask(features.into());
+    let drifts = table.drifts(movement);
+    // exact where all were learned from as many slides as the first one
+    let scales = drifts.map(|drifts| scales(drifts, column.slides(0), sqrt));
     for (&probability, texture) in posterior.iter().zip(0..) {
         if probability >= NEGLIGIBLE {
             let (mean, slides) = (column.mean(texture), column.slides(texture));
+            let candidate = match &scales {
+                None => Candidate::new(mean, &mask, probability, slides),
+                Some(by) => Candidate::scaled(mean, &mask, by, probability, slides),
+            };
             // `live` has space: it is as long as the posterior
-            let _ = live.push(Candidate::new(mean, &mask, probability, slides));
+            let _ = live.push(candidate);
         }
     }
 }

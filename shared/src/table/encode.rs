@@ -5,10 +5,11 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, CRC32, Contents, LABEL_BYTES, MAGIC, MAX_MOVEMENTS, TableError,
-    Tally, VERSION,
+    Action, CELL_BYTES, CRC_BYTES, CRC32, Contents, LABEL_BYTES, MAGIC, MAX_MOVEMENTS,
+    PLAIN_VERSION, TableError, Tally, VERSION,
 };
 use super::gaussian::{SD_LEAST, SD_STEP, mean_step};
+use super::sections::Sections;
 use super::training_stats::{Experience, Whitened};
 use super::view::Table;
 use super::whitening::Whitening;
@@ -133,7 +134,7 @@ impl fmt::Display for EncodeError {
 
 impl core::error::Error for EncodeError {}
 
-/// Bytes that a table takes, names and their lengths included in `names`.
+/// Bytes that a table without sections takes, names and their lengths included in `names`.
 pub const fn encoded_len(
     contents: Contents,
     textures: usize,
@@ -164,7 +165,8 @@ pub fn encode<'o, 'a>(
         Row::new(texture.name, number, known, slides)
     });
     let contents = Contents::Gaussians(measured);
-    write(out, contents, movements.iter().copied(), |_| (), 0, rows)
+    let movements = movements.iter().copied();
+    write(out, contents, movements, |_| (), 0, rows, (0, |_| ()))
 }
 
 /// Writes a fused table into `out` and reads it back: every movement with its whitening, every texture with its name and
@@ -195,7 +197,54 @@ pub fn encode_fused<'o, 'a>(
     };
     let contents = Contents::Fused(set, features as u8);
     let moved = movements.iter().map(|(movement, _)| *movement);
-    write(out, contents, moved, whitenings, 0, rows)
+    write(out, contents, moved, whitenings, 0, rows, (0, |_| ()))
+}
+
+/// Writes `old`, a fused table, into `out` with these sections instead of its own.
+///
+/// # Errors
+/// As [`encode`].
+pub fn with_sections<'o>(
+    out: &'o mut [u8],
+    old: &Table<'_>,
+    sections: &Sections<'_>,
+) -> Result<Table<'o>, EncodeError> {
+    let Contents::Fused(_, features) = old.contents else {
+        return Err(EncodeError::Contents);
+    };
+    let features = usize::from(features);
+    rewrite(
+        out,
+        old,
+        0,
+        old.names()
+            .zip(0..)
+            .map(|(name, texture)| Row::old(old, texture, name)),
+        (sections.length(features), |writer: &mut Writer<'_>| {
+            sections.write(features, |bytes| writer.put(bytes));
+        }),
+    )
+}
+
+/// Writes these rows with all else as `old` has it.
+fn rewrite<'o, 'a>(
+    out: &'o mut [u8],
+    old: &Table<'_>,
+    lineage: u32,
+    rows: impl Iterator<Item = Row<'a>> + Clone,
+    sections: (usize, impl FnOnce(&mut Writer<'_>)),
+) -> Result<Table<'o>, EncodeError> {
+    let layout = old.layout();
+    let whitenings = old.bytes.get(layout.whitenings..layout.cells);
+    write(
+        out,
+        old.contents,
+        old.movements(),
+        |writer| writer.put(whitenings.unwrap_or_default()),
+        lineage,
+        rows,
+        sections,
+    )
 }
 
 /// Writes `old` into `out` with one change. All other textures stay the same to the bit.
@@ -227,12 +276,7 @@ pub fn amend<'o>(
         _ => None,
     };
     let kept = old.names().zip(0..).filter_map(|(name, texture)| {
-        let row = Row {
-            name,
-            number: old.number(texture),
-            tally: old.tally(texture),
-            cells: Cells::Old(*old, texture),
-        };
+        let row = Row::old(old, texture, name);
         match change {
             Change::Forget(gone) if gone == texture => None,
             Change::Rename { texture: it, name } if it == texture => Some(Row { name, ..row }),
@@ -244,15 +288,15 @@ pub fn amend<'o>(
             _ => Some(row),
         }
     });
-    let layout = old.layout();
-    let whitenings = old.bytes.get(layout.whitenings..layout.cells);
-    write(
+    let sections = old.sections;
+    rewrite(
         out,
-        old.contents,
-        old.movements(),
-        |writer| writer.put(whitenings.unwrap_or_default()),
+        old,
         old.lineage(),
         kept.chain(added),
+        (sections.len(), |writer: &mut Writer<'_>| {
+            writer.put(sections)
+        }),
     )
 }
 
@@ -319,6 +363,16 @@ struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
+    /// As a table has it.
+    fn old(table: &Table<'a>, texture: u16, name: &'a str) -> Self {
+        Self {
+            name,
+            number: table.number(texture),
+            tally: table.tally(texture),
+            cells: Cells::Old(*table, texture),
+        }
+    }
+
     /// Of a table that is made.
     fn new(name: &'a str, number: u16, known: Known<'a>, slides: impl Iterator<Item = u8>) -> Self {
         Self {
@@ -427,11 +481,17 @@ fn write<'o, 'a>(
     whitenings: impl FnOnce(&mut Writer<'_>),
     lineage: u32,
     rows: impl Iterator<Item = Row<'a>> + Clone,
+    (of_sections, sections): (usize, impl FnOnce(&mut Writer<'_>)),
 ) -> Result<Table<'o>, EncodeError> {
     let (count, names) = rows.clone().fold((0usize, 0), |(n, names), row| {
         (n + 1, names + 1 + row.name.len())
     });
-    let length = encoded_len(contents, count, movements.len(), names);
+    let length = encoded_len(contents, count, movements.len(), names) + of_sections;
+    let version = if of_sections > 0 {
+        VERSION
+    } else {
+        PLAIN_VERSION
+    };
     let (Ok(count), Ok(length_field)) = (u16::try_from(count), u32::try_from(length)) else {
         return Err(EncodeError::NoSpace(length));
     };
@@ -445,7 +505,7 @@ fn write<'o, 'a>(
     };
     let [code, what, features] = contents.codes();
     writer.put(&MAGIC);
-    writer.put(&VERSION.to_le_bytes());
+    writer.put(&version.to_le_bytes());
     writer.put(&[code, what]);
     writer.put(&length_field.to_le_bytes());
     writer.put(&count.to_le_bytes());
@@ -478,6 +538,7 @@ fn write<'o, 'a>(
         writer.put(&[u8::try_from(row.name.len()).map_err(|_| EncodeError::Name(index))?]);
         writer.put(row.name.as_bytes());
     }
+    sections(&mut writer);
     let crc = CRC32.checksum(writer.written());
     writer.put(&crc.to_le_bytes());
     Table::read(writer.buffer).map_err(EncodeError::Invalid)

@@ -10,8 +10,10 @@ use super::whitening::Whitening;
 use crate::features::{FeatureSet, MovementError, Property, PropertySet};
 
 pub(super) const MAGIC: [u8; 4] = *b"TACT";
-/// Version of the binary form that this code reads and writes.
-pub const VERSION: u16 = 3;
+/// Version of the binary form of tables with sections.
+pub const VERSION: u16 = 4;
+/// Version of those without, which is the same otherwise.
+pub(super) const PLAIN_VERSION: u16 = 3;
 pub(super) const GAUSSIANS: u8 = 0;
 pub(super) const FUSED: u8 = 1;
 pub(super) const HEADER: usize = 16;
@@ -128,6 +130,10 @@ pub enum TableError {
     Name(u16),
     /// A texture has the number of another one.
     Number(u16),
+    /// What follows the names is no row of sections.
+    Sections,
+    /// A section of this kind is damaged, there twice, or not for such a table.
+    Section(u16),
 }
 
 impl fmt::Display for TableError {
@@ -143,7 +149,7 @@ impl fmt::Display for TableError {
             Self::Version(found) => {
                 write!(
                     f,
-                    "version {found}, and this program reads version {VERSION}: learn the table anew"
+                    "version {found}, and this program reads versions {PLAIN_VERSION} and {VERSION}: learn the table anew"
                 )
             }
             Self::Method(found) => write!(f, "method {found} is unknown to this program"),
@@ -174,6 +180,10 @@ impl fmt::Display for TableError {
             Self::Whitening(index) => {
                 write!(f, "the whitening of movement {} is damaged", index + 1)
             }
+            Self::Sections => f.write_str("what follows the names is damaged"),
+            Self::Section(1) => f.write_str("the drift that it expects is damaged"),
+            Self::Section(2) => f.write_str("its limits of new and changed textures are damaged"),
+            Self::Section(kind) => write!(f, "section {kind} is damaged"),
             Self::Number(texture) => {
                 write!(f, "texture {} has another's number", texture + 1)
             }

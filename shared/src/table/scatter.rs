@@ -2,18 +2,19 @@
 
 use heapless::Vec;
 
+use super::drift::{Drift, Drifts};
 use super::format::MAX_MOVEMENTS;
+use super::limits::MOST_VARIANCE;
+use super::matrix::{
+    Square, add, inverse_cholesky, principal_axes, product, transposed, variances,
+};
 use super::whitening::Whitening;
-use crate::features::{FEATURE_STEPS, MAX_FEATURES, Vector};
+use crate::features::{FEATURE_STEPS, FeatureSet, MAX_FEATURES, Vector};
 
 /// Weight of the average over all movements, in trials: with few trials of its own a movement's covariance is mostly that.
 const SHARED_TRIALS: f64 = 15.0;
 /// Variance of what rounding to whole steps adds, in steps^2: no feature is more certain than that.
 const ROUNDING: f64 = 1.0 / 12.0;
-/// Rounds of rotations for the axes along which textures differ.
-const SWEEPS: usize = 12;
-/// Least part of a feature's variance that the features before it may leave unexplained.
-const LEAST_PIVOT: f64 = 1e-6;
 
 /// Why a whitening cannot be learned.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
@@ -28,8 +29,6 @@ pub enum WhitenError {
     #[error("a table has 1 to {MAX_MOVEMENTS} movements")]
     Movements,
 }
-
-type Square = [[f64; MAX_FEATURES]; MAX_FEATURES];
 
 /// How the slides of each texture differ at one movement, all textures taken together, and how textures differ.
 #[derive(Clone, Debug)]
@@ -131,6 +130,23 @@ impl Scatter {
 /// # Errors
 /// See [`WhitenError`].
 pub fn whiten(scatters: &[Scatter]) -> Result<Vec<Whitening, MAX_MOVEMENTS>, WhitenError> {
+    let learned = whiten_drifting(scatters, FeatureSet::Bands, Drift::NONE)?;
+    Ok(learned
+        .into_iter()
+        .map(|(whitening, _)| whitening)
+        .collect())
+}
+
+/// As [`whiten`], for features of which is known how they drift: turned into the axes along which the drift has no
+/// covariances, and its variances along these.
+///
+/// # Errors
+/// See [`WhitenError`].
+pub fn whiten_drifting(
+    scatters: &[Scatter],
+    set: FeatureSet,
+    drift: Drift,
+) -> Result<Vec<(Whitening, Drifts), MAX_MOVEMENTS>, WhitenError> {
     let features = scatters.first().ok_or(WhitenError::Movements)?.features;
     if features == 0 || features > MAX_FEATURES || scatters.iter().any(|s| s.features != features) {
         return Err(WhitenError::Features);
@@ -165,49 +181,37 @@ pub fn whiten(scatters: &[Scatter]) -> Result<Vec<Whitening, MAX_MOVEMENTS>, Whi
         }
         shrink(&mut correlation, features, freedom);
         let inverse = inverse_cholesky(&correlation, features);
-        let mut between = scatter.between();
-        for (row, sd_row) in between.iter_mut().zip(&deviations) {
-            row.iter_mut()
-                .zip(&deviations)
-                .for_each(|(c, sd)| *c /= sd_row * sd);
-        }
-        let axes = principal_axes(
-            &product(&product(&inverse, &between), &transposed(&inverse)),
-            features,
-        );
+        let in_deviations = |mut covariance: Square| {
+            for (row, sd_row) in covariance.iter_mut().zip(&deviations) {
+                row.iter_mut()
+                    .zip(&deviations)
+                    .for_each(|(c, sd)| *c /= sd_row * sd);
+            }
+            product(&product(&inverse, &covariance), &transposed(&inverse))
+        };
+        let mean = scatter
+            .sum
+            .map(|sum| sum / f64::from(scatter.slides.max(1)));
+        let drifted = in_deviations(drift.covariance(set, features, &mean));
+        let apart = if drift.is_none() {
+            in_deviations(scatter.between())
+        } else {
+            drifted
+        };
+        let axes = principal_axes(&apart, features);
+        let drifts = variances(&axes, &drifted).map(|v| (v as f32).clamp(0.0, MOST_VARIANCE));
         let canonical = product(&axes, &inverse);
-        let mean = scatter.sum.iter().take(features);
-        let mean = mean.map(|sum| libm::round(sum / f64::from(scatter.slides.max(1))) as i16);
-        let mut bytes: Vec<u8, _> = mean.flat_map(i16::to_le_bytes).collect();
-        let mut words: Vec<i16, { MAX_FEATURES * MAX_FEATURES }> = Vec::new();
-        for row in canonical.iter().take(features) {
-            // per unit of the feature, not per step
-            let weights = row.iter().zip(&deviations).take(features);
-            let weights = weights.map(|(w, sd)| w / sd * f64::from(FEATURE_STEPS));
-            let largest = weights.clone().fold(0.0, |most: f64, w| most.max(w.abs()));
-            let places = (0..=30u8)
-                .rev()
-                .find(|&p| largest * f64::from(1u32 << p) < f64::from(i16::MAX))
-                .unwrap_or(0);
-            let scale = f64::from(1u32 << places);
-            // both have space: for the rows of a square matrix of the most features
-            bytes.extend([places]);
-            words.extend(weights.map(|w| libm::round(w * scale) as i16));
-        }
-        bytes.extend(words.into_iter().flat_map(i16::to_le_bytes));
+        // per unit of the feature, not per step
+        let rows = canonical.iter().take(features).map(|row| {
+            let weights = row.iter().zip(&deviations);
+            weights.map(|(w, sd)| w / sd * f64::from(FEATURE_STEPS))
+        });
+        let whitening = Whitening::new(features, &mean, rows);
         whitenings
-            .push(Whitening { features, bytes })
+            .push((whitening, drifts))
             .map_err(|_| WhitenError::Movements)?;
     }
     Ok(whitenings)
-}
-
-fn add(sum: &mut Square, more: &Square, weight: f64) {
-    for (row, more) in sum.iter_mut().zip(more) {
-        for (sum, more) in row.iter_mut().zip(more) {
-            *sum += weight * more;
-        }
-    }
 }
 
 /// Weight of a sphere beside a covariance of `d` features from `n` degrees of freedom, by its trace and that of its square
@@ -234,113 +238,5 @@ fn shrink(correlation: &mut Square, features: usize, freedom: f64) {
                 (1.0 - lambda) * *c
             };
         }
-    }
-}
-
-/// Inverse of the lower Cholesky factor of a correlation matrix.
-fn inverse_cholesky(matrix: &Square, features: usize) -> Square {
-    let mut lower = [[0.0; MAX_FEATURES]; MAX_FEATURES];
-    let mut inverse = [[0.0; MAX_FEATURES]; MAX_FEATURES];
-    // indices, as in every book; all are below `features`, which is at most the matrices' size
-    #[allow(clippy::indexing_slicing, clippy::needless_range_loop)]
-    for i in 0..features.min(MAX_FEATURES) {
-        for j in 0..=i {
-            let dot: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
-            let rest = matrix[i][j] - dot;
-            lower[i][j] = if i == j {
-                libm::sqrt(rest.max(LEAST_PIVOT))
-            } else {
-                rest / lower[j][j]
-            };
-        }
-        for j in 0..i {
-            let dot: f64 = (j..i).map(|k| lower[i][k] * inverse[k][j]).sum();
-            inverse[i][j] = -dot / lower[i][i];
-        }
-        inverse[i][i] = 1.0 / lower[i][i];
-    }
-    inverse
-}
-
-fn transposed(matrix: &Square) -> Square {
-    let mut other = [[0.0; MAX_FEATURES]; MAX_FEATURES];
-    for (row, at) in matrix.iter().zip(0..) {
-        for (c, other) in row.iter().zip(&mut other) {
-            if let Some(other) = other.get_mut::<usize>(at) {
-                *other = *c;
-            }
-        }
-    }
-    other
-}
-
-fn product(left: &Square, right: &Square) -> Square {
-    left.map(|row| {
-        let mut sum = [0.0; MAX_FEATURES];
-        for (weight, other) in row.iter().zip(right) {
-            sum.iter_mut()
-                .zip(other)
-                .for_each(|(sum, c)| *sum += weight * c);
-        }
-        sum
-    })
-}
-
-/// The eigenvectors of a symmetric matrix as rows, that of the largest eigenvalue first (Jacobi's rotations; Golub and Van
-/// Loan, Matrix Computations, 8.5). Of the two directions of each, that in which its largest element is positive.
-fn principal_axes(matrix: &Square, features: usize) -> Square {
-    let features = features.min(MAX_FEATURES);
-    let mut rest = *matrix;
-    let mut axes = [[0.0; MAX_FEATURES]; MAX_FEATURES];
-    // indices, as in every book; all are below `features`, which is at most the matrices' size
-    #[allow(clippy::indexing_slicing, clippy::needless_range_loop)]
-    {
-        for i in 0..features {
-            axes[i][i] = 1.0;
-        }
-        // each sweep squares what is left beside the diagonal: a few do
-        for _ in 0..SWEEPS {
-            for p in 0..features {
-                for q in p + 1..features {
-                    if rest[p][q] == 0.0 {
-                        continue;
-                    }
-                    let tau = (rest[q][q] - rest[p][p]) / (2.0 * rest[p][q]);
-                    let t = 1.0 / (libm::fabs(tau) + libm::sqrt(1.0 + tau * tau));
-                    let t = if tau < 0.0 { -t } else { t };
-                    let c = 1.0 / libm::sqrt(1.0 + t * t);
-                    let s = t * c;
-                    for k in 0..features {
-                        let (a, b) = (rest[k][p], rest[k][q]);
-                        (rest[k][p], rest[k][q]) = (c * a - s * b, s * a + c * b);
-                    }
-                    for k in 0..features {
-                        let (a, b) = (rest[p][k], rest[q][k]);
-                        (rest[p][k], rest[q][k]) = (c * a - s * b, s * a + c * b);
-                        let (a, b) = (axes[p][k], axes[q][k]);
-                        (axes[p][k], axes[q][k]) = (c * a - s * b, s * a + c * b);
-                    }
-                }
-            }
-        }
-        // the rows beyond the features stay last, and 0
-        let mut order: [usize; MAX_FEATURES] = core::array::from_fn(|i| i);
-        order[..features]
-            .sort_unstable_by(|&i, &j| rest[j][j].total_cmp(&rest[i][i]).then(i.cmp(&j)));
-        order.map(|i| {
-            let axis = axes[i];
-            let largest = axis.iter().fold(0.0, |most: f64, &c| {
-                if libm::fabs(c) > libm::fabs(most) {
-                    c
-                } else {
-                    most
-                }
-            });
-            if largest < 0.0 {
-                axis.map(|c| -c)
-            } else {
-                axis
-            }
-        })
     }
 }

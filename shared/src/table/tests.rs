@@ -3,6 +3,7 @@
 mod damage;
 mod fused;
 mod learning;
+mod sections;
 pub(crate) mod whitening;
 
 use super::format::*;

@@ -2,7 +2,7 @@
 
 use super::format::{
     Action, CELL_BYTES, CRC_BYTES, CRC32, Contents, HEADER, LABEL_BYTES, Layout, MAGIC,
-    MAX_MOVEMENTS, MOVEMENT_BYTES, TableError, Tally, VERSION, array,
+    MAX_MOVEMENTS, MOVEMENT_BYTES, PLAIN_VERSION, TableError, Tally, VERSION, array,
 };
 use super::gaussian::{Gaussian, Gaussians, SD_STEP, mean_step};
 use super::training_stats::{Experience, Whitened};
@@ -16,6 +16,8 @@ pub struct Table<'a> {
     pub(super) textures: u16,
     pub(super) movements: u8,
     pub(super) contents: Contents,
+    /// What is behind the names.
+    pub(super) sections: &'a [u8],
 }
 
 impl<'a> Table<'a> {
@@ -52,7 +54,7 @@ impl<'a> Table<'a> {
             return Err(TableError::Magic([m0, m1, m2, m3]));
         }
         let version = u16::from_le_bytes([v0, v1]);
-        if version != VERSION {
+        if version != VERSION && version != PLAIN_VERSION {
             return Err(TableError::Version(version));
         }
         let length = u32::from_le_bytes([l0, l1, l2, l3]) as usize;
@@ -70,18 +72,28 @@ impl<'a> Table<'a> {
         if textures == 0 || movements == 0 || usize::from(movements) > MAX_MOVEMENTS {
             return Err(TableError::Header);
         }
-        let table = Self {
+        let mut table = Self {
             bytes,
             textures,
             movements,
             contents,
+            sections: &[],
         };
-        table.check()?;
+        let end = table.check()?;
+        table.sections = body.get(end..).unwrap_or_default();
+        if version == PLAIN_VERSION && !table.sections.is_empty() {
+            return Err(TableError::Length {
+                header: length,
+                contents: end + CRC_BYTES,
+            });
+        }
+        table.check_sections()?;
         Ok(table)
     }
 
+    /// Where the names end.
     #[inline]
-    fn check(&self) -> Result<(), TableError> {
+    fn check(&self) -> Result<usize, TableError> {
         let mut at = self.layout().names;
         let length = |end| TableError::Length {
             header: self.bytes.len(),
@@ -123,10 +135,7 @@ impl<'a> Table<'a> {
                 return Err(TableError::Name(texture));
             }
         }
-        if at + CRC_BYTES != self.bytes.len() {
-            return Err(length(at));
-        }
-        Ok(())
+        Ok(at)
     }
 
     #[inline]

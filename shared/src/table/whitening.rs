@@ -25,6 +25,32 @@ impl Whitening {
         3 * features + 2 * features * features
     }
 
+    /// Of `features` features with these means, and rows of weights for each: what a step of theirs is in standard
+    /// deviations, times [`crate::features::FEATURE_STEPS`].
+    pub(super) fn new(
+        features: usize,
+        mean: &[f64],
+        rows: impl Iterator<Item = impl Iterator<Item = f64> + Clone>,
+    ) -> Self {
+        let mean = mean.iter().take(features).map(|m| libm::round(*m) as i16);
+        let mut bytes: Vec<u8, _> = mean.flat_map(i16::to_le_bytes).collect();
+        let mut words: Vec<i16, { MAX_FEATURES * MAX_FEATURES }> = Vec::new();
+        for row in rows {
+            let weights = row.take(features);
+            let largest = weights.clone().fold(0.0, |most: f64, w| most.max(w.abs()));
+            let places = (0..=30u8)
+                .rev()
+                .find(|&p| largest * f64::from(1u32 << p) < f64::from(i16::MAX))
+                .unwrap_or(0);
+            let scale = f64::from(1u32 << places);
+            // both have space: for the rows of a square matrix of the most features
+            bytes.extend([places]);
+            words.extend(weights.map(|w| libm::round(w * scale) as i16));
+        }
+        bytes.extend(words.into_iter().flat_map(i16::to_le_bytes));
+        Self { features, bytes }
+    }
+
     /// Reads it from a table; `None` if these are not the bytes of one of so many features.
     pub fn read(bytes: &[u8], features: usize) -> Option<Self> {
         View::new(bytes, features)?;
@@ -53,7 +79,7 @@ impl Whitening {
 }
 
 /// A [`Whitening`] where its table lies: copying it takes as long as applying it.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct View<'b> {
     features: usize,
     bytes: &'b [u8],

@@ -118,6 +118,7 @@ impl Identify {
             threshold: self.threshold,
             max_slides: self.max_slides,
             open: self.open,
+            ..Config::default()
         }
     }
 }

@@ -310,6 +310,7 @@ impl From<&Verdict> for explorer::Verdict {
             probability: told.probability,
             sure: told.sure,
             unknown: told.unknown,
+            changed: false,
             log_odds: told.log_odds,
         }
     }

@@ -31,13 +31,14 @@ const FEW: usize = 12;
 /// What was told, row by row: textures presented, and columns of what was told.
 fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Figure, DrawError> {
     let known = names.len();
-    let mut counts = vec![vec![0_u64; known + 2]; known];
+    let mut counts = vec![vec![0_u64; known + 3]; known];
     for course in courses {
         let (told, _, texture) = course.told(threshold);
         let column = match told {
             Told::Sure => texture,
-            Told::New => known,
-            Told::Undecided => known + 1,
+            Told::Changed => known,
+            Told::New => known + 1,
+            Told::Undecided => known + 2,
         };
         counts[course.presented][column] += 1;
     }
@@ -51,7 +52,8 @@ fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Fig
             let name = &names[texture];
             let (told, colour) = match column {
                 c if c == texture => ("told as sure, right".to_owned(), COLOURS[0]),
-                c if c == known => ("told to be none of those known".to_owned(), AVOIDED),
+                c if c == known => ("told to have changed".to_owned(), AVOIDED),
+                c if c == known + 1 => ("told to be none of those known".to_owned(), AVOIDED),
                 c if c > known => ("told as not sure".to_owned(), AVOIDED),
                 c => (format!("told as sure to be {}", names[c]), COLOURS[1]),
             };
@@ -79,20 +81,21 @@ fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Fig
         .iter()
         .map(|&t| format!("{}: {}", t + 1, names[t]));
     let numbers = (1..=known).map(|number| number.to_string());
-    let columns = numbers.chain(["N".to_owned(), "?".to_owned()]);
+    let columns = numbers.chain(["C", "N", "?"].map(str::to_owned));
     let verdicts = verdicts(courses, threshold);
     let about = format!(
-        "Of {} explorations {:.1} % ended with the right name, {:.1} % with a wrong one, {:.1} % with none of those known and {:.1} % undecided.",
+        "Of {} explorations {:.1} % ended with the right name, {:.1} % with a wrong one, {:.1} % with a changed one, {:.1} % with none of those known and {:.1} % undecided.",
         courses.len(),
         100.0 * verdicts.right,
         100.0 * verdicts.wrong,
+        100.0 * verdicts.changed,
         100.0 * verdicts.new,
         100.0 * verdicts.undecided
     );
     let below = if known > FEW {
-        "Darker is more often. Blue: the right name, told as sure. Orange: a wrong one. Grey: none of those known (N), not sure (?)."
+        "Darker is more often. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of those known (N), not sure (?)."
     } else {
-        "In % of the row. Blue: the right name, told as sure. Orange: a wrong one. Grey: none of those known (N), not sure (?)."
+        "In % of the row. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of those known (N), not sure (?)."
     };
     Grid {
         id: "confusion".to_owned(),
@@ -239,6 +242,7 @@ fn by_threshold(courses: &[Course], threshold: f32) -> Result<Vec<Figure>, DrawE
     let mut told = [
         ("told a wrong name as sure", 1),
         ("told none of those known", 2),
+        ("told a changed one", 3),
         ("undecided", 0),
     ]
     .map(|(name, colour)| Series::curve(colour, MARKS[colour], name, Vec::new()));
@@ -250,7 +254,10 @@ fn by_threshold(courses: &[Course], threshold: f32) -> Result<Vec<Figure>, DrawE
         let shown = percent(threshold);
         slides.says.push(format!("at {shown} %: {mean:.2} slides"));
         let v = verdicts(courses, threshold);
-        for (series, share) in told.iter_mut().zip([v.wrong, v.new, v.undecided]) {
+        for (series, share) in told
+            .iter_mut()
+            .zip([v.wrong, v.new, v.changed, v.undecided])
+        {
             let share = 100.0 * share;
             series.points.push((n, share));
             let name = &series.name;
@@ -279,7 +286,7 @@ fn by_threshold(courses: &[Course], threshold: f32) -> Result<Vec<Figure>, DrawE
     }
     .figure("slides-by-threshold")?;
     let top = most(&told);
-    let [wrong, new, undecided] = told;
+    let [wrong, new, changed, undecided] = told;
     let errors = Chart {
         y_range: (0.0, top),
         x_marks: thresholds.len(),
@@ -289,7 +296,7 @@ fn by_threshold(courses: &[Course], threshold: f32) -> Result<Vec<Figure>, DrawE
             x,
             "explorations (%)",
             x_range,
-            vec![used(top), wrong, new, undecided],
+            vec![used(top), wrong, new, changed, undecided],
         )
     }
     .figure("errors-by-threshold")?;

@@ -110,6 +110,7 @@ fn exploration(method: Method) -> (Vec<u8>, Vec<Event>) {
         threshold: asked().threshold,
         max_slides: asked().max_slides,
         strategy: asked().strategy,
+        ..Config::default()
     };
     let mut explorer = Explorer::<8>::new(table, PropertySet::ALL, config).unwrap();
     let (mut slide, plan) = (1, Plan::new());

@@ -145,6 +145,7 @@ impl Recipe {
 }
 
 const OPEN: Config = Config {
+    false_alarm: 0.02,
     method: Method::Fused,
     strategy: Strategy::Bayesian,
     threshold: 0.99,

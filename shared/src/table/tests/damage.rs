@@ -217,7 +217,7 @@ fn every_error_says_what_is_wrong() {
         ),
         (
             TableError::Version(1),
-            "version 1, and this program reads version 3: learn the table anew",
+            "version 1, and this program reads versions 3 and 4: learn the table anew",
         ),
         (TableError::Method(7), "method 7 is unknown"),
         (
@@ -252,6 +252,16 @@ fn every_error_says_what_is_wrong() {
             "the whitening of movement 3 is damaged",
         ),
         (TableError::Number(3), "texture 4 has another's number"),
+        (TableError::Sections, "what follows the names is damaged"),
+        (
+            TableError::Section(1),
+            "the drift that it expects is damaged",
+        ),
+        (
+            TableError::Section(2),
+            "its limits of new and changed textures are damaged",
+        ),
+        (TableError::Section(9), "section 9 is damaged"),
         (
             TableError::Name(0),
             "the name of texture 1 is empty, not UTF-8, or another's as well",

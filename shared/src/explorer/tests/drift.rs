@@ -1,0 +1,305 @@
+//! Tables with drift and limits against the recipe in f64: posterior, choice, new and changed.
+
+use super::*;
+use crate::table::tests::whitening::Noise;
+use crate::table::tests::{fused_of, known, straight};
+use crate::table::{
+    Against, Drift, Drifts, Limits, Population, Sections, Tail, Whitened, with_sections,
+};
+
+/// The recipe on what a table was made from: whitening is straight.
+struct Recipe {
+    d: usize,
+    /// Slides and mean of every texture at every movement.
+    known: Vec<Vec<(f64, Vec<f64>)>>,
+    /// Variances of the drift at every movement.
+    drifts: Vec<Vec<f64>>,
+    limits: Limits,
+}
+
+const NU: f64 = 8.0;
+
+/// ln of the gamma function for 1, 1.5, 2...
+fn ln_gamma(x: f64) -> f64 {
+    match x {
+        0.5 => std::f64::consts::PI.sqrt().ln(),
+        1.0 => 0.0,
+        _ => (x - 1.0).ln() + ln_gamma(x - 1.0),
+    }
+}
+
+/// Inverse and ln |V| of a positive matrix, by Gauss and Jordan.
+fn inverse(matrix: &[Vec<f64>]) -> (Vec<Vec<f64>>, f64) {
+    let d = matrix.len();
+    let unit = |i: usize| (0..d).map(move |j| f64::from(u8::from(i == j)));
+    let mut rows: Vec<Vec<f64>> = (0..d)
+        .map(|i| matrix[i].iter().copied().chain(unit(i)).collect())
+        .collect();
+    let mut ln = 0.0;
+    for i in 0..d {
+        let pivot = rows[i][i];
+        ln += pivot.ln();
+        rows[i].iter_mut().for_each(|x| *x /= pivot);
+        let row = rows[i].clone();
+        for (_, other) in rows.iter_mut().enumerate().filter(|(j, _)| *j != i) {
+            let by = other[i];
+            other.iter_mut().zip(&row).for_each(|(x, r)| *x -= by * r);
+        }
+    }
+    (rows.iter().map(|row| row[d..].to_vec()).collect(), ln)
+}
+
+impl Recipe {
+    /// ln of the likelihood of a texture that nobody knows: the covariance of the means, shrunk (OAS), less what their own
+    /// slides scatter.
+    fn background(&self, movement: usize, k: f64, z: &[f64]) -> f64 {
+        let cells = self.known.iter().map(|row| &row[movement]);
+        let means: Vec<&(f64, Vec<f64>)> = cells.filter(|(n, _)| *n > 0.0).collect();
+        let (count, d) = (means.len() as f64, self.d as f64);
+        let centre = |i: usize| means.iter().map(|(_, m)| m[i]).sum::<f64>() / count;
+        let of_slides = means.iter().map(|(n, _)| 1.0 / n).sum::<f64>() / count;
+        let c = |i: usize, j: usize| {
+            let each = means
+                .iter()
+                .map(|(_, m)| (m[i] - centre(i)) * (m[j] - centre(j)));
+            each.sum::<f64>() / (count - 1.0)
+        };
+        let all = || (0..self.d).flat_map(|i| (0..self.d).map(move |j| (i, j)));
+        let trace: f64 = (0..self.d).map(|i| c(i, i)).sum();
+        let squares: f64 = all().map(|(i, j)| c(i, j).powi(2)).sum();
+        let above = (1.0 - 2.0 / d) * squares + trace * trace;
+        let below = (count - 2.0 / d) * (squares - trace * trace / d);
+        let rho = if above < below { above / below } else { 1.0 };
+        // no variance of these worlds is below the least: the matrix itself will do
+        let v = |i: usize, j: usize| {
+            let sphere = if i == j {
+                rho * trace / d - of_slides + 1.0 / k
+            } else {
+                0.0
+            };
+            (1.0 - rho) * c(i, j) + sphere
+        };
+        let matrix: Vec<Vec<f64>> = (0..self.d)
+            .map(|i| (0..self.d).map(|j| v(i, j)).collect())
+            .collect();
+        let (inverse, ln) = inverse(&matrix);
+        let apart: Vec<f64> = (0..self.d).map(|i| z[i] - centre(i)).collect();
+        let distance: f64 = all()
+            .map(|(i, j)| apart[i] * inverse[i][j] * apart[j])
+            .sum();
+        -0.5 * (ln + distance)
+    }
+
+    /// -A_j of every texture after so many slides of these means, and the background.
+    fn decide(
+        &self,
+        episode: &BTreeMap<usize, (f64, Vec<f64>)>,
+        drifting: bool,
+    ) -> (Vec<f64>, f64) {
+        let background: BTreeMap<usize, f64> = episode
+            .iter()
+            .map(|(&m, (k, z))| (m, self.background(m, *k, z)))
+            .collect();
+        let of = |row: &Vec<(f64, Vec<f64>)>| {
+            let (mut t, mut ln, mut p, mut elsewhere) = (0.0, 0.0, 0.0, 0.0);
+            for (&movement, (k, z)) in episode {
+                let (n, mean) = &row[movement];
+                if *n == 0.0 {
+                    elsewhere += background[&movement];
+                    continue;
+                }
+                p += self.d as f64;
+                for ((z, m), delta) in z.iter().zip(mean).zip(&self.drifts[movement]) {
+                    let v = 1.0 / k + 1.0 / n + if drifting { *delta } else { 0.0 };
+                    t += (z - m).powi(2) / v;
+                    ln += v.ln();
+                }
+            }
+            let half = (NU + p) / 2.0;
+            ln_gamma(half)
+                - ln_gamma(NU / 2.0)
+                - p / 2.0 * (NU / 2.0).ln()
+                - 0.5 * ln
+                - half * (1.0 + t / NU).ln()
+                + elsewhere
+        };
+        let likelihoods = self.known.iter().map(of).collect();
+        (likelihoods, background.values().sum())
+    }
+
+    /// Eq. 11, where all textures were learned from as many slides.
+    fn uncertainty(&self, movement: usize, p: &[f64]) -> f64 {
+        let confusion = |i: usize, j: usize| {
+            let ((n, a), (_, b)) = (&self.known[i][movement], &self.known[j][movement]);
+            let each = a.iter().zip(b).zip(&self.drifts[movement]);
+            let t = each.map(|((a, b), delta)| (a - b).powi(2) / (1.0 + 1.0 / n + delta));
+            (-t.sum::<f64>() / 8.0).exp()
+        };
+        let term = |i: usize| {
+            let sum: f64 = p.iter().enumerate().map(|(j, p)| confusion(i, j) * p).sum();
+            p[i] * p[i] / sum
+        };
+        1.0 - (0..p.len()).map(term).sum::<f64>()
+    }
+}
+
+/// A world with its table: whitened means of textures, movements by movements.
+fn world(noise: &mut Noise, drift: Drift, evenly: bool) -> (Recipe, Vec<u8>) {
+    let mut whole = |least: usize, below: usize| least + noise.below(below - least);
+    let (d, textures, movements) = (whole(2, 13), whole(8, 20), whole(1, 4));
+    let slides = whole(2, 9) as u8;
+    let mut known_means = vec![vec![Whitened::default(); movements]; textures];
+    for (texture, row) in known_means.iter_mut().enumerate() {
+        for (movement, cell) in row.iter_mut().enumerate() {
+            let mean: Vec<f64> = (0..d).map(|_| 3.0 * noise.normal()).collect();
+            let n = match (texture * 7 + movement * 3) % 10 {
+                _ if evenly => slides,
+                0 => 0,
+                other => other as u8,
+            };
+            *cell = known(n, &mean);
+        }
+    }
+    let drifts: Vec<Drifts> = (0..movements)
+        .map(|_| {
+            let mut drifts = Drifts::default();
+            if !drift.is_none() {
+                drifts[..d].fill_with(|| (1.5 * noise.normal()).exp() as f32);
+            }
+            drifts
+        })
+        .collect();
+    let of = |movement: usize| {
+        let means = known_means.iter().map(|row| &row[movement]);
+        Population::new(d, means.map(|cell| (cell.slides, &cell.mean[..]))).unwrap()
+    };
+    let populations: Vec<Population> = (0..movements).map(of).collect();
+    let tail = |begin| Tail { begin, excess: 2.0 };
+    let limits = Limits {
+        drifted: [tail(-3.0), tail(-4.0), tail(-3.5)],
+        same: [tail(-4.5), tail(-4.0), tail(-6.0)],
+    };
+    let whitenings = vec![straight(d); movements];
+    let plain = fused_of(FeatureSet::Bands, &whitenings, &known_means);
+    let mut out = vec![0; 100_000];
+    let sections = Sections {
+        drift: (drift, &drifts),
+        novelty: Some((limits, &populations)),
+    };
+    let table = with_sections(&mut out, &Table::read(&plain).unwrap(), &sections).unwrap();
+    let row = |row: &Vec<Whitened>| {
+        let cell = |cell: &Whitened| {
+            let mean = cell.mean[..d].iter().map(|m| f64::from(*m) / 256.0);
+            (f64::from(cell.slides), mean.collect())
+        };
+        row.iter().map(cell).collect()
+    };
+    let recipe = Recipe {
+        d,
+        known: known_means.iter().map(row).collect(),
+        drifts: drifts
+            .iter()
+            .map(|v| v[..d].iter().map(|v| f64::from(*v)).collect())
+            .collect(),
+        limits,
+    };
+    (recipe, table.as_bytes().to_vec())
+}
+
+/// What is told after each slide, and how often the recipe tells the same: limits are exceeded by less than the fixed
+/// point's error now and then.
+#[test]
+fn known_changed_and_new_are_the_recipes() {
+    let mut noise = Noise(7);
+    let config = Config {
+        method: Method::Fused,
+        max_slides: 254,
+        open: true,
+        ..Config::default()
+    };
+    let (mut all, mut same, mut news, mut changes) = (0, 0, 0, 0);
+    for number in 0..120 {
+        let drift = if number % 4 == 0 {
+            Drift::NONE
+        } else {
+            Drift::default()
+        };
+        let evenly = number % 3 > 0;
+        let (recipe, bytes) = world(&mut noise, drift, evenly);
+        let table = Table::read(&bytes).unwrap();
+        let mut explorer = Explorer::<20>::new(table, PropertySet::ALL, config).unwrap();
+        let textures = recipe.known.len();
+        for presented in 0..textures {
+            explorer.restart();
+            let mut episode: BTreeMap<usize, (f64, Vec<f64>)> = BTreeMap::new();
+            // some are as they were learned, some drift, some are new
+            let off = [0.0, 1.0, 2.5][presented % 3];
+            let movements = recipe.known[0].len();
+            let offs: Vec<Vec<f64>> = (0..movements)
+                .map(|_| (0..recipe.d).map(|_| off * noise.normal()).collect())
+                .collect();
+            for slides in 1..=4u8 {
+                let movement = (usize::from(slides) * 5 + presented) % movements;
+                let mean = &recipe.known[presented][movement].1;
+                let x: Vec<i16> = mean
+                    .iter()
+                    .zip(&offs[movement])
+                    .map(|(m, off)| ((m + off + noise.normal()) * 1024.0).round() as i16)
+                    .collect();
+                let slide = Observation {
+                    bands: x.iter().copied().collect(),
+                    ..Observation::default()
+                };
+                let action = Action {
+                    movement: movement as u8,
+                    property: None,
+                };
+                if explorer.observe(action, &slide).is_err() {
+                    break;
+                }
+                let white = table.whiten(movement as u8, &x).unwrap();
+                let zero = || (0.0, vec![0.0; recipe.d]);
+                let (k, mean) = episode.entry(movement).or_insert_with(zero);
+                *k += 1.0;
+                for (mean, z) in mean.iter_mut().zip(&white) {
+                    *mean += (f64::from(*z) / 256.0 - *mean) / *k;
+                }
+                let (likelihoods, background) = recipe.decide(&episode, true);
+                let most = likelihoods.iter().copied().fold(f64::MIN, f64::max);
+                let sum: f64 = likelihoods.iter().map(|l| (l - most).exp()).sum();
+                for (found, l) in explorer.posterior().iter().zip(&likelihoods) {
+                    let p = (l - most).exp() / sum;
+                    assert!((f64::from(*found) - p).abs() < 3e-3, "{found} {p}");
+                }
+                let limit =
+                    |against| f64::from(recipe.limits.limit(against, slides, config.false_alarm));
+                let over = background - most - limit(Against::Drifted);
+                let found = f64::from(explorer.log_odds().unwrap());
+                assert!(
+                    (found - over).abs() < 0.03 + 2e-3 * over.abs(),
+                    "{found} {over}"
+                );
+                let (likelihoods, background) = recipe.decide(&episode, false);
+                let most = likelihoods.iter().copied().fold(f64::MIN, f64::max);
+                let changed = background - most > limit(Against::Same) && !drift.is_none();
+                all += 1;
+                let told = (over > 0.0, over <= 0.0 && changed);
+                let best = explorer.best();
+                same += i32::from(told == (best.unknown, best.changed));
+                news += i32::from(best.unknown);
+                changes += i32::from(best.changed);
+                if evenly {
+                    let p: Vec<f64> = explorer.posterior().iter().map(|p| (*p).into()).collect();
+                    for outcome in explorer.expected_outcomes() {
+                        let found = f64::from(outcome.uncertainty);
+                        let expected = recipe.uncertainty(outcome.action.movement.into(), &p);
+                        assert!((found - expected).abs() < 2e-3, "{found} {expected}");
+                    }
+                }
+            }
+        }
+    }
+    std::println!("{same} of {all}, {news} new, {changes} changed");
+    assert!(f64::from(same) > 0.995 * f64::from(all), "{same} of {all}");
+    assert!(all > 4000 && news > 200 && changes > 200);
+}

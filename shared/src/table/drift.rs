@@ -1,0 +1,78 @@
+//! How a finger, and what it touches, changes from one session to the next.
+//!
+//! Features drift more than the scatter of a session's slides explains. In the raw features it is plain how: neighbouring
+//! bands go together, and whatever is no band goes by itself. The whitened axes are turned so that this covariance is
+//! diagonal there: a table holds its variances, which come on top of those of means everywhere.
+//!
+//! The two numbers were chosen on twenty materials of one rig.
+
+use serde::{Deserialize, Serialize};
+
+use super::matrix::Square;
+use crate::features::{FEATURE_STEPS, FeatureSet, MAX_FEATURES};
+
+/// Variances of the drift along the axes of a whitening; 0 beyond its features.
+pub type Drifts = [f32; MAX_FEATURES];
+
+/// How much is expected.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Drift {
+    /// Standard deviation of the logarithm of a band's power.
+    pub bands: f32,
+    /// Standard deviation of traction, and of whatever is no band, as a share of its mean.
+    pub traction: f32,
+}
+
+impl Default for Drift {
+    /// What was seen between the begin and the end of a session: 0.4 dB, and 4 %.
+    fn default() -> Self {
+        Self {
+            bands: 0.1,
+            traction: 0.04,
+        }
+    }
+}
+
+impl Drift {
+    /// One session, and a sample that stays where it is.
+    pub const NONE: Self = Self {
+        bands: 0.0,
+        traction: 0.0,
+    };
+
+    /// Whether none is expected.
+    pub fn is_none(self) -> bool {
+        self == Self::NONE
+    }
+
+    /// Whether these can be a drift: neither negative nor more than anything could be learned with.
+    pub fn is_possible(self) -> bool {
+        let possible = |sd: f32| (0.0..=10.0).contains(&sd);
+        possible(self.bands) && possible(self.traction)
+    }
+
+    /// Covariance of the features of `set`, which have these means, in steps^2.
+    pub(super) fn covariance(
+        self,
+        set: FeatureSet,
+        features: usize,
+        mean: &[f64; MAX_FEATURES],
+    ) -> Square {
+        let others = set.others();
+        let mut covariance = [[0.0; MAX_FEATURES]; MAX_FEATURES];
+        for (i, (row, mean)) in covariance.iter_mut().zip(mean).enumerate().take(features) {
+            for (j, c) in row.iter_mut().enumerate().take(features) {
+                *c = if i >= others && j >= others {
+                    let band = f64::from(self.bands * FEATURE_STEPS);
+                    band * band * libm::exp(-0.5 * i.abs_diff(j) as f64)
+                } else if i == j {
+                    let sd = f64::from(self.traction) * mean;
+                    sd * sd
+                } else {
+                    0.0
+                };
+            }
+        }
+        covariance
+    }
+}

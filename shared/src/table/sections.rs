@@ -1,0 +1,217 @@
+//! What a table may have behind its names, each with its kind and length: who does not know a kind skips it.
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 2 | kind |
+//! | 2 | length n |
+//! | n | contents |
+//!
+//! Numbers are f32. Kind 1, how it drifts: [`Drift::bands`], [`Drift::traction`]; per movement d variances along the axes of
+//! its whitening. Kind 2, what textures are like, and the limits of scores: [`Limits`], begin and excess of six tails; per
+//! movement the axes of the population as a whitening, and d variances along them.
+
+use heapless::Vec;
+
+use super::drift::{Drift, Drifts};
+use super::format::{Contents, MAX_MOVEMENTS, TableError, array};
+use super::limits::{Limits, Numbers};
+use super::population::{LEAST, Population};
+use super::view::Table;
+use super::whitening::{View, Whitening};
+
+/// Bytes of kind and length.
+const HEAD: usize = 4;
+const DRIFT: u16 = 1;
+const NOVELTY: u16 = 2;
+/// Bytes of the drift's two numbers.
+const TWO: usize = 8;
+
+/// What a fused table is made with beside textures.
+#[derive(Clone, Copy, Debug)]
+pub struct Sections<'a> {
+    /// How it drifts, and the variances of every movement.
+    pub drift: (Drift, &'a [Drifts]),
+    /// The limits, and the population of every movement; `None` for a table of too few textures.
+    pub novelty: Option<(Limits, &'a [Population])>,
+}
+
+impl Sections<'_> {
+    /// Bytes that they take, of so many features.
+    pub fn length(&self, features: usize) -> usize {
+        let (_, drifts) = self.drift;
+        let novelty = self.novelty.map_or(0, |(_, populations)| {
+            HEAD + Limits::BYTES + populations.len() * of_population(features)
+        });
+        HEAD + TWO + drifts.len() * 4 * features + novelty
+    }
+
+    /// Gives the bytes, piece by piece, of so many features.
+    pub(super) fn write(&self, features: usize, mut put: impl FnMut(&[u8])) {
+        let head = |put: &mut dyn FnMut(&[u8]), kind: u16, length: usize| {
+            put(&kind.to_le_bytes());
+            put(&(length as u16).to_le_bytes());
+        };
+        let (drift, drifts) = self.drift;
+        head(&mut put, DRIFT, TWO + drifts.len() * 4 * features);
+        for number in [drift.bands, drift.traction] {
+            put(&number.to_le_bytes());
+        }
+        for variance in drifts.iter().flat_map(|d| d.iter().take(features)) {
+            put(&variance.to_le_bytes());
+        }
+        let Some((limits, populations)) = self.novelty else {
+            return;
+        };
+        let length = Limits::BYTES + populations.len() * of_population(features);
+        head(&mut put, NOVELTY, length);
+        limits.bytes().for_each(|number| put(&number));
+        for population in populations {
+            put(population.axes.as_bytes());
+            for variance in population.variances.iter().take(features) {
+                put(&variance.to_le_bytes());
+            }
+        }
+    }
+}
+
+/// Bytes of a movement's population.
+const fn of_population(features: usize) -> usize {
+    Whitening::bytes(features) + 4 * features
+}
+
+/// A [`Population`] where its table lies.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PopulationView<'t> {
+    pub(crate) axes: View<'t>,
+    pub(crate) variances: Numbers<'t>,
+}
+
+/// Kinds and contents of sections; `None` for the rest where it is no section.
+fn each(bytes: &[u8]) -> impl Iterator<Item = Option<(u16, &[u8])>> {
+    let mut rest = bytes;
+    core::iter::from_fn(move || {
+        if rest.is_empty() {
+            return None;
+        }
+        let section = rest.split_first_chunk::<HEAD>().and_then(|(head, after)| {
+            let [k0, k1, l0, l1] = *head;
+            let (contents, after) = after.split_at_checked(u16::from_le_bytes([l0, l1]).into())?;
+            rest = after;
+            Some((u16::from_le_bytes([k0, k1]), contents))
+        });
+        if section.is_none() {
+            rest = &[];
+        }
+        Some(section)
+    })
+}
+
+impl<'a> Table<'a> {
+    fn section(&self, wanted: u16) -> Option<&'a [u8]> {
+        let mut each = each(self.sections).flatten();
+        each.find_map(|(kind, contents)| (kind == wanted).then_some(contents))
+    }
+
+    /// Number of features of a fused table.
+    fn features(&self) -> usize {
+        match self.contents {
+            Contents::Fused(_, features) => features.into(),
+            Contents::Gaussians(_) => 0,
+        }
+    }
+
+    /// How much drift the table was made for; `None` for one that does not say, of an older version.
+    pub fn drift(&self) -> Option<Drift> {
+        let section = self.section(DRIFT)?;
+        Some(Drift {
+            bands: f32::from_le_bytes(array(section, 0)?),
+            traction: f32::from_le_bytes(array(section, 4)?),
+        })
+    }
+
+    /// Variances of the drift along the axes of a movement, where there is any.
+    pub(crate) fn drifts(&self, movement: u8) -> Option<Numbers<'a>> {
+        self.drift().filter(|drift| !drift.is_none())?;
+        let bytes = 4 * self.features();
+        let at = TWO + usize::from(movement) * bytes;
+        Some(Numbers::new(self.section(DRIFT)?.get(at..at + bytes)?))
+    }
+
+    /// From which scores on a texture is new, or has changed; `None` for a table that is not calibrated: of an older
+    /// version, or of fewer than three textures when it was made.
+    pub fn limits(&self) -> Option<Limits> {
+        Limits::read(self.section(NOVELTY)?.get(..Limits::BYTES)?)
+    }
+
+    /// What textures are like at a movement, in a table that is calibrated.
+    pub(crate) fn population(&self, movement: u8) -> Option<PopulationView<'a>> {
+        let (axes, variances) = self.population_bytes(movement)?;
+        Some(PopulationView {
+            axes: View::checked(axes, self.features()),
+            variances: Numbers::new(variances),
+        })
+    }
+
+    fn population_bytes(&self, movement: u8) -> Option<(&'a [u8], &'a [u8])> {
+        let features = self.features();
+        let at = Limits::BYTES + usize::from(movement) * of_population(features);
+        let population = self
+            .section(NOVELTY)?
+            .get(at..)?
+            .get(..of_population(features))?;
+        population.split_at_checked(Whitening::bytes(features))
+    }
+
+    /// The populations of all movements, in a table that is calibrated.
+    pub fn populations(&self) -> Option<Vec<Population, MAX_MOVEMENTS>> {
+        (0..self.movements)
+            .map(|movement| {
+                let (axes, numbers) = self.population_bytes(movement)?;
+                let mut variances = Drifts::default();
+                for (to, from) in variances.iter_mut().zip(Numbers::new(numbers)) {
+                    *to = from;
+                }
+                Some(Population {
+                    axes: Whitening::read(axes, self.features())?,
+                    variances,
+                })
+            })
+            .collect()
+    }
+
+    /// That the sections are sections, and those that are known what they say.
+    pub(super) fn check_sections(&self) -> Result<(), TableError> {
+        let (features, movements) = (self.features(), usize::from(self.movements));
+        let mut seen = [false; 2];
+        for section in each(self.sections) {
+            let (kind, contents) = section.ok_or(TableError::Sections)?;
+            let fits = match kind {
+                DRIFT => {
+                    let rest = contents.get(TWO..).unwrap_or_default();
+                    let variances = rest.chunks(4 * features.max(1));
+                    rest.len() == movements * 4 * features
+                        && self.drift().is_some_and(Drift::is_possible)
+                        && variances.map(Numbers::new).all(|v| v.are_variances(0.0))
+                }
+                NOVELTY => {
+                    contents.len() == Limits::BYTES + movements * of_population(features)
+                        && self.limits().is_some()
+                        && (0..self.movements).all(|movement| {
+                            let found = self.population_bytes(movement);
+                            found.is_some_and(|(axes, variances)| {
+                                View::new(axes, features).is_some()
+                                    && Numbers::new(variances).are_variances(LEAST)
+                            })
+                        })
+                }
+                _ => continue,
+            };
+            let first = seen.get_mut(usize::from(kind == NOVELTY));
+            let again = first.is_none_or(|seen| core::mem::replace(seen, true));
+            if features == 0 || again || !fits {
+                return Err(TableError::Section(kind));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,339 @@
+//! Sections behind the names of a table: what they hold, what is skipped, what is refused.
+
+use super::damage::{crc_of, read_all};
+use super::whitening::{Noise, World};
+use super::*;
+use crate::table::{
+    Against, Drift, Drifts, EPISODES, Limits, Population, Sections, Tail, whiten_drifting,
+    with_sections,
+};
+
+fn tail(begin: f32) -> Tail {
+    Tail { begin, excess: 2.5 }
+}
+
+fn limits() -> Limits {
+    Limits {
+        drifted: [tail(-1.0), tail(-3.0), tail(-2.0)],
+        same: [tail(1.0), tail(2.0), tail(3.0)],
+    }
+}
+
+/// Four textures, two movements and two features, with drift and limits.
+fn full() -> Vec<u8> {
+    let known = |n: i16| {
+        let mean = [f64::from(n), f64::from(n * n)];
+        vec![super::known(5, &mean), super::known(4, &mean)]
+    };
+    let textures: Vec<_> = (0..4).map(known).collect();
+    let plain = fused_of(FeatureSet::Bands, &[straight(2), straight(2)], &textures);
+    let means = textures.iter().map(|row| (row[0].slides, &row[0].mean[..]));
+    let population = Population::new(2, means).unwrap();
+    let mut drifts = Drifts::default();
+    drifts[..2].copy_from_slice(&[0.5, 4.0]);
+    let sections = Sections {
+        drift: (Drift::default(), &[drifts, drifts]),
+        novelty: Some((limits(), &[population.clone(), population])),
+    };
+    let mut out = vec![0; 4000];
+    let table = with_sections(&mut out, &Table::read(&plain).unwrap(), &sections).unwrap();
+    assert_eq!(
+        table.as_bytes().len(),
+        plain.len() + 4 + 8 + 16 + 4 + 48 + 2 * (14 + 8)
+    );
+    table.as_bytes().to_vec()
+}
+
+/// Where the sections begin in [`full`].
+fn begin(bytes: &[u8]) -> usize {
+    bytes.len() - CRC_BYTES - (4 + 8 + 16 + 4 + 48 + 2 * (14 + 8))
+}
+
+fn changed(change: impl FnOnce(&mut Vec<u8>, usize)) -> Vec<u8> {
+    let mut bytes = full();
+    let at = begin(&bytes);
+    bytes.truncate(bytes.len() - CRC_BYTES);
+    change(&mut bytes, at);
+    let length = (bytes.len() + CRC_BYTES) as u32;
+    bytes[8..12].copy_from_slice(&length.to_le_bytes());
+    seal(bytes)
+}
+
+#[test]
+fn sections_read_back_and_stay_when_textures_change() {
+    let bytes = full();
+    assert_eq!(bytes[4], 4, "version");
+    let table = Table::read(&bytes).unwrap();
+    let agrees = |table: &Table<'_>| {
+        assert_eq!(table.drift(), Some(Drift::default()));
+        assert!(table.drifts(1).unwrap().eq([0.5, 4.0]));
+        assert!(table.drifts(2).is_none());
+        assert_eq!(table.limits(), Some(limits()));
+        assert!(table.population(1).unwrap().variances.zip([0.0; 2]).count() == 2);
+        assert!(table.population(2).is_none());
+    };
+    agrees(&table);
+    let mut out = vec![0; 4000];
+    let new = [known(3, &[9.0, 9.0]), known(3, &[9.0, 9.0])];
+    for change in [
+        Change::Forget(1),
+        Change::Rename {
+            texture: 2,
+            name: "x",
+        },
+        Change::Put {
+            name: "new",
+            known: Known::Fused(&new),
+            tally: Tally::default(),
+        },
+    ] {
+        let amended = amend(&mut out, &table, change).unwrap();
+        assert_eq!(amended.lineage(), table.crc());
+        agrees(&amended);
+    }
+    let mut told = bytes.clone();
+    retell(&mut told, 1, 0, &new[0], Tally::default()).unwrap();
+    agrees(&Table::read(&told).unwrap());
+    // a table without any is as version 3 had it
+    let plain = fused_of(
+        FeatureSet::Bands,
+        &[straight(2)],
+        &[vec![known(2, &[1.0, 2.0])]],
+    );
+    let plain = Table::read(&plain).unwrap();
+    assert_eq!(
+        (plain.as_bytes()[4], plain.drift(), plain.limits()),
+        (3, None, None)
+    );
+    assert_eq!(
+        amend(
+            &mut out,
+            &plain,
+            Change::Rename {
+                texture: 0,
+                name: "x"
+            }
+        )
+        .unwrap()
+        .as_bytes()[4],
+        3
+    );
+}
+
+#[test]
+fn unknown_sections_are_skipped() {
+    let bytes = changed(|bytes, at| {
+        let new = [0x07, 0x80, 3, 0, 1, 2, 3];
+        bytes.splice(at..at, new);
+        bytes.extend([0x63, 0, 0, 0]);
+    });
+    let table = Table::read(&bytes).unwrap();
+    assert_eq!(table.limits(), Some(limits()));
+    let mut out = vec![0; 4000];
+    let amended = amend(&mut out, &table, Change::Forget(0)).unwrap();
+    assert!(
+        amended
+            .as_bytes()
+            .windows(7)
+            .any(|w| w == [7, 0x80, 3, 0, 1, 2, 3])
+    );
+}
+
+#[test]
+fn damaged_sections_are_refused() {
+    let not_a_number = f32::NAN.to_le_bytes();
+    let put = |at: usize, new: [u8; 4]| {
+        changed(|bytes, begin| bytes[begin + at..begin + at + 4].copy_from_slice(&new))
+    };
+    let drift = TableError::Section(1);
+    let novelty = TableError::Section(2);
+    let limits_at = 4 + 8 + 16 + 4;
+    for (what, bytes, error) in [
+        ("drift", put(4, (-0.1_f32).to_le_bytes()), drift),
+        ("drift's number", put(8, not_a_number), drift),
+        ("variance", put(12, (-1.0_f32).to_le_bytes()), drift),
+        ("large variance", put(16, 1e6_f32.to_le_bytes()), drift),
+        ("limit", put(limits_at, not_a_number), novelty),
+        ("excess", put(limits_at + 4, 0.0_f32.to_le_bytes()), novelty),
+        (
+            "infinite",
+            put(limits_at + 44, f32::INFINITY.to_le_bytes()),
+            novelty,
+        ),
+        ("axis", put(limits_at + 48 + 4, [31, 0, 0, 0]), novelty),
+        (
+            "population",
+            put(limits_at + 48 + 14, 0.0_f32.to_le_bytes()),
+            novelty,
+        ),
+        (
+            "twice",
+            changed(|bytes, at| {
+                let again = bytes[at..at + 28].to_vec();
+                bytes.extend(again);
+            }),
+            drift,
+        ),
+        (
+            "short",
+            changed(|bytes, at| bytes[at + 2] -= 4),
+            TableError::Sections,
+        ),
+        (
+            "cut",
+            changed(|bytes, _| bytes.truncate(bytes.len() - 1)),
+            TableError::Sections,
+        ),
+        (
+            "a byte too many",
+            changed(|bytes, _| bytes.push(1)),
+            TableError::Sections,
+        ),
+    ] {
+        let found = Table::read(&bytes).map(|_| ()).unwrap_err();
+        if found != error && !matches!(found, TableError::Section(_)) {
+            panic!("{what}: {found:?}");
+        }
+        if what != "short" && what != "cut" {
+            assert_eq!(found, error, "{what}");
+        }
+    }
+    // of version 3 there are none
+    let old = changed(|bytes, _| bytes[4] = 3);
+    assert!(matches!(Table::read(&old), Err(TableError::Length { .. })));
+    // and none in a table of Gaussians
+    let mut gaussians = small();
+    let section = full()[begin(&full())..][..28].to_vec();
+    gaussians.truncate(gaussians.len() - CRC_BYTES);
+    gaussians.extend(section);
+    gaussians[4] = 4;
+    let length = (gaussians.len() + CRC_BYTES) as u32;
+    gaussians[8..12].copy_from_slice(&length.to_le_bytes());
+    assert_eq!(Table::read(&seal(gaussians)).unwrap_err(), drift);
+}
+
+#[test]
+fn no_damage_to_sections_panics() {
+    let good = full();
+    for at in begin(&good)..good.len() - CRC_BYTES {
+        for bits in [1, 0x80, 0xff] {
+            let bytes = changed(|bytes, _| bytes[at] ^= bits);
+            assert_ne!(crc_of(&bytes), crc_of(&good));
+            read_all(&bytes);
+        }
+    }
+}
+
+#[test]
+fn the_limit_follows_the_false_alarm_and_never_rises_with_slides() {
+    let limits = limits();
+    // the tail begins at 10 % of its own promise, and twice as many alarms come
+    assert_eq!(limits.limit(Against::Same, 1, 0.2), 1.0);
+    let tenth = limits.limit(Against::Same, 1, 0.02) - 1.0;
+    assert!((tenth - 2.5 * 10_f32.ln()).abs() < 1e-5, "{tenth}");
+    let drifted = [1, 2, 3, 9].map(|slides| limits.limit(Against::Drifted, slides, 0.2));
+    assert_eq!(drifted, [-1.0, -3.0, -3.0, -3.0]);
+    assert_eq!(limits.limit(Against::Same, 0, 0.2), 1.0);
+    assert_eq!(EPISODES, 3);
+}
+
+/// W D W' is diagonal and has the variances that are told, for the drift of the raw features.
+#[test]
+fn the_drift_is_diagonal_in_whitened_space() {
+    let mut noise = Noise(5);
+    let world = World::new(&mut noise, 9, 2, 13);
+    let slides = world.slides(&mut noise, 6);
+    let scatters: Vec<Scatter> = slides
+        .iter()
+        .map(|textures| {
+            let mut scatter = Scatter::new(13);
+            textures
+                .iter()
+                .for_each(|slides| scatter.push(slides).unwrap());
+            scatter
+        })
+        .collect();
+    let drift = Drift {
+        bands: 0.3,
+        traction: 0.1,
+    };
+    let learned = whiten_drifting(&scatters, FeatureSet::Force, drift).unwrap();
+    for ((whitening, variances), textures) in learned.iter().zip(&slides) {
+        let d = 13;
+        let all: Vec<f64> = textures.iter().flatten().map(|x| x[0].into()).collect();
+        let mean = all.iter().sum::<f64>() / all.len() as f64 / 1024.0;
+        let raw = |i: usize, j: usize| match (i, j) {
+            (0, 0) => (0.1 * mean).powi(2),
+            (0, _) | (_, 0) => 0.0,
+            _ => 0.09 * (-0.5 * i.abs_diff(j) as f64).exp(),
+        };
+        let bytes = whitening.as_bytes();
+        let w = |row: usize, column: usize| {
+            let at = 3 * d + 2 * (row * d + column);
+            let weight = f64::from(i16::from_le_bytes([bytes[at], bytes[at + 1]]));
+            weight / f64::from(1u32 << bytes[2 * d + row])
+        };
+        for a in 0..d {
+            for b in 0..d {
+                let sum: f64 = (0..d)
+                    .flat_map(|i| (0..d).map(move |j| (i, j)))
+                    .map(|(i, j)| w(a, i) * raw(i, j) * w(b, j))
+                    .sum();
+                let expected = if a == b { f64::from(variances[a]) } else { 0.0 };
+                let scale = f64::from(variances[a] * variances[b]).sqrt().max(0.01);
+                assert!(
+                    (sum - expected).abs() < 2e-3 * scale,
+                    "{a} {b}: {sum} {expected}"
+                );
+            }
+            assert!(a == 0 || variances[a - 1] >= variances[a]);
+        }
+        // slides of a texture still scatter by 1
+        let mut products = vec![vec![0.0; d]; d];
+        let mut freedom = 0.0;
+        for slides in textures {
+            let white: Vec<_> = slides.iter().map(|x| whitening.apply(x)).collect();
+            for i in 0..d {
+                let m = |i: usize| white.iter().map(|z| f64::from(z[i])).sum::<f64>() / 6.0;
+                for j in 0..d {
+                    let of = white
+                        .iter()
+                        .map(|z| (f64::from(z[i]) - m(i)) * (f64::from(z[j]) - m(j)));
+                    products[i][j] += of.sum::<f64>() / 65536.0;
+                }
+            }
+            freedom += 5.0;
+        }
+        let trace: f64 = (0..d).map(|i| products[i][i] / freedom).sum();
+        assert!((trace / d as f64 - 1.0).abs() < 0.3, "{trace}");
+    }
+}
+
+/// Two clouds of textures along a diagonal: axes, variances and shrinking by hand.
+#[test]
+fn a_population_is_its_covariance_shrunk() {
+    let means = [[768, 768], [-768, -768], [64, -64], [-64, 64]];
+    let population = Population::new(2, means.iter().map(|m| (4, &m[..]))).unwrap();
+    // along the diagonal 36/3, across 1/12; OAS of 3 degrees of freedom
+    let (trace, squares) = (12.0 + 1.0 / 12.0, 144.0 + 1.0 / 144.0);
+    let rho: f64 = trace * trace / (3.0 * (squares - trace * trace / 2.0));
+    assert!((0.5..0.9).contains(&rho));
+    let shrunk = |v: f64| (1.0 - rho) * v + rho * trace / 2.0 - 0.25;
+    for (found, v) in population.variances.iter().zip([12.0, 1.0 / 12.0]) {
+        assert!(
+            (f64::from(*found) - shrunk(v)).abs() < 1e-4,
+            "{found} {}",
+            shrunk(v)
+        );
+    }
+    let along = population.axes.apply(&[256, 256]);
+    assert!(
+        (i32::from(along[0]) - 362).abs() <= 1 && along[1].abs() <= 1,
+        "{along:?}"
+    );
+    let across = population.axes.apply(&[256, -256]);
+    assert!(across[0].abs() <= 1 && (i32::from(across[1]).abs() - 362).abs() <= 1);
+    // two textures, or three of which one was never touched, are none
+    let few = |slides| Population::new(2, means[..3].iter().zip(slides).map(|(m, n)| (n, &m[..])));
+    assert!(few([1, 1, 0]).is_none() && few([1, 1, 1]).is_some());
+}
