@@ -12,7 +12,7 @@ use std::sync::mpsc::{self, Receiver as Told, Sender};
 use std::time::{Duration, Instant};
 use std::{fs, thread};
 
-use tactus::sim::collection::{Collection, calibrated, texture_name};
+use tactus::sim::collection::{Collection, calibrated, plain_name, texture_name};
 use tactus::sim::flash::{RamFlash, SECTOR};
 use tactus::sim::probe::{self, Host};
 use tactus::sim::rig::SimRig;
@@ -23,7 +23,7 @@ use tactus_core::probe::seams::{Panel, RigHandle as _};
 use tactus_core::probe::{RigState, TableInUse, Turn, Watch, receive};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::skin::SkinCare;
-use tactus_core::table::Name;
+use tactus_core::table::{Name, Table};
 use tactus_core::wire::{
     self, Counts, Event, Forget, MAX_FRAME, PROTOCOL, Phase, Receiver, Report, Request, Reset,
     Status,
@@ -286,16 +286,75 @@ fn printed(arguments: &[&str]) -> String {
     String::from_utf8(stdout).unwrap()
 }
 
+/// The object that a command printed which ends with this code.
+fn object(arguments: &[&str], code: i32) -> serde_json::Value {
+    let out = device(arguments).output().unwrap();
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(code), "{arguments:?}: {said}");
+    serde_json::from_slice(&out.stdout).unwrap()
+}
+
+#[test]
+fn what_changes_the_probe_prints_one_object() {
+    let (at, _) = probe(1000);
+    let temp = tempfile::tempdir().unwrap();
+    let [slides, pulled, kept] = ["slides", "pulled", "kept"].map(|name| temp.path().join(name));
+    let done = |arguments: &[&str]| {
+        let at = ["--port", &at, "--format", "json"];
+        object(&[arguments, &at].concat(), 0)
+    };
+    let keep = ["--yes", "--backup", path(&kept)];
+    let factory = done(&["table", "show"]);
+
+    let record = ["record", "Burlap", "--slides", "2", "--out", path(&slides)];
+    let recorded = done(&record);
+    assert_eq!(recorded["folder"], path(&slides));
+    assert_eq!(
+        (&recorded["textures"], &recorded["slides"]),
+        (&1.into(), &2.into())
+    );
+    assert_eq!(recorded["lost"].as_array().unwrap().len(), 0);
+
+    let name = factory["textures"][0]["name"].as_str().unwrap();
+    let renamed = done(&["rename", &name.to_uppercase(), "coarse"]);
+    assert_eq!(renamed, serde_json::json!({"from": name, "to": "coarse"}));
+    let written = done(&["table", "pull", path(&pulled)]);
+    assert_eq!(
+        (&written["textures"], &written["movements"]),
+        (&3.into(), &3.into())
+    );
+    assert_eq!(written["file"], path(&pulled));
+    assert_eq!(written["bytes"], fs::metadata(&pulled).unwrap().len());
+
+    let forgotten = done(&[&["forget", "--name", "Coarse"][..], &keep].concat());
+    assert_eq!(
+        (&forgotten["what"], &forgotten["name"]),
+        (&"texture".into(), &"coarse".into())
+    );
+    assert_eq!(forgotten["backup"], path(&kept));
+    assert_eq!(fs::read(&kept).unwrap(), fs::read(&pulled).unwrap());
+    let forgotten = done(&[&["forget", "--self-learned"][..], &keep].concat());
+    assert_eq!(forgotten["what"], "self-learned");
+    assert!(forgotten["name"].is_null());
+
+    let pushed = done(&[&["table", "push", path(&pulled)][..], &keep].concat());
+    assert_eq!(pushed["file"], path(&pulled));
+    for field in ["textures", "bytes", "checksum"] {
+        assert_eq!(pushed[field], written[field], "{field}");
+    }
+    assert_eq!(pushed["backup"], path(&kept));
+    let back = done(&[&["table", "factory"][..], &keep].concat());
+    assert!(back["file"].is_null());
+    assert_eq!(back["checksum"], factory["checksum"]);
+    // nothing is lost with the firmware's own table
+    let again = done(&["table", "push", path(&pulled)]);
+    assert!(again["backup"].is_null());
+}
+
 #[test]
 fn an_exploration_and_a_table_are_objects() {
     let (at, _) = probe(1000);
     let identify = ["identify", "--port", &at, "--seed", "7", "--format", "json"];
-    let object = |arguments: &[&str], code: i32| -> serde_json::Value {
-        let out = device(arguments).output().unwrap();
-        let said = String::from_utf8_lossy(&out.stderr);
-        assert_eq!(out.status.code(), Some(code), "{arguments:?}: {said}");
-        serde_json::from_slice(&out.stdout).unwrap()
-    };
     // nothing is ever more probable than 1
     let undecided = [&identify[..], &["--threshold", "1", "--max-slides", "2"]].concat();
     let found = object(&undecided, 3);
@@ -1209,6 +1268,22 @@ fn completions_and_manual_pages_know_the_commands() {
             &tactus(&["completions", shell]),
             &["device", "monitor", "emulated"],
         );
+    }
+    // and the names that only this user has
+    let temp = tempfile::tempdir().unwrap();
+    let table = temp.path().join("table");
+    fs::write(&table, &known().1).unwrap();
+    let simulated = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+    let theirs = ["--recordings", simulated, "--table", path(&table)];
+    let in_table = plain_name(Table::read(&known().1).unwrap().name(0).unwrap());
+    for shell in ["bash", "zsh", "fish"] {
+        let before = tactus(&["completions", shell]);
+        let with = tactus(&[&["completions", shell][..], &theirs].concat());
+        for name in ["corduroy", &in_table] {
+            // the simulated world has them, too: here they stand for --material and for the probe's textures
+            let [before, with] = [&before, &with].map(|said| said.matches(name).count());
+            assert!(with > before, "{shell}, {name}: {before}, {with}");
+        }
     }
     assert_says(&tactus(&["man"]), &[".TH tactus 1", "touching it"]);
     let temp = tempfile::tempdir().unwrap();

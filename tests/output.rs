@@ -309,3 +309,45 @@ fn a_gauge_study_is_one_object_and_compares_operators_of_several_folders() {
     let twice = said(&["gauge", "--recordings", SIMULATED, "--and", SIMULATED], 2);
     assert!(twice.contains("was given before"), "{twice}");
 }
+
+#[test]
+fn an_evaluation_says_how_reliable_it_is_and_what_another_threshold_would_give() {
+    let evaluate = ["evaluate", "--recordings", SIMULATED, "--train-slides", "2"];
+    let options = ["--runs", "60", "--threshold", "0.97", "--format", "json"];
+    let found = json(&[&evaluate[..], &options].concat(), 0);
+    let list = |field: &str| found[field].as_array().unwrap().clone();
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+
+    let reliability = list("reliability");
+    assert_eq!(number(&reliability[0]["from"]), 0.0);
+    assert_eq!(number(&reliability[6]["to"]), 1.0);
+    let mut slides = 0.0;
+    for (bin, next) in reliability.iter().zip(reliability.iter().skip(1)) {
+        assert_eq!(bin["to"], next["from"]);
+    }
+    for bin in &reliability {
+        let [from, to, count, right] = ["from", "to", "count", "right"].map(|f| number(&bin[f]));
+        assert!(right <= count, "{bin}");
+        match bin["said"].as_f64() {
+            Some(said) => assert!((from..=to).contains(&said), "{bin}"),
+            None => assert_eq!(count, 0.0, "{bin}"),
+        }
+        slides += count;
+    }
+    // one statement after each slide until the answer
+    let told = number(&found["mean_slides_told"]);
+    assert!((slides / 60.0 - told).abs() < 1e-9, "{slides} {told}");
+
+    let by_threshold = list("by_threshold");
+    let used = by_threshold
+        .iter()
+        .find(|at| (number(&at["threshold"]) - 0.97).abs() < 1e-6)
+        .unwrap();
+    assert_eq!(used["verdicts"], found["verdicts"]);
+    assert!((number(&used["mean_slides"]) - told).abs() < 1e-9);
+    assert!(
+        by_threshold
+            .windows(2)
+            .all(|pair| number(&pair[0]["mean_slides"]) <= number(&pair[1]["mean_slides"]))
+    );
+}

@@ -12,6 +12,7 @@ pub mod lifelong;
 pub mod novelty;
 #[cfg(feature = "plots")]
 pub mod pictures;
+pub mod reliability;
 pub mod show;
 pub mod table_summary;
 pub mod transcript;

@@ -9,6 +9,7 @@ use tactus::eval::courses::courses;
 use tactus::eval::evaluate::{Method, Outcome, Summary, evaluate};
 use tactus::eval::experiment::{Experiment, Protocol};
 use tactus::eval::pictures::evaluation::figures;
+use tactus::eval::reliability::{AtThreshold, Statements, by_threshold, statements};
 use tactus::eval::verdicts::Verdicts;
 use tactus_core::explorer::{self, Config};
 
@@ -34,6 +35,10 @@ struct Evaluation {
     verdicts: Verdicts,
     /// Mean number of slides until then.
     mean_slides_told: f64,
+    /// How often it was right when it said so, by what it said.
+    reliability: Vec<Statements>,
+    /// What another threshold would change.
+    by_threshold: Vec<AtThreshold>,
     /// Figures of explorations that know that the texture is one of the table's, with slides drawn with replacement: the
     /// paper's protocol.
     #[serde(flatten)]
@@ -68,16 +73,29 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if args.novelty.is_some() {
         return novelty::leave_one_out(args, &experiment, protocol, config, out);
     }
-    let outcomes = with_progress(args.runs(), "exploring, 1 of 2", |done| {
+    // a program gets what the pictures show
+    let with_courses = canvas.is_some() || args.format == Format::Json;
+    let stages = if with_courses { 3 } else { 2 };
+    let stage = |number: u32| format!("exploring, {number} of {stages}");
+    let outcomes = with_progress(args.runs(), stage(1), |done| {
         evaluate(&experiment, config, args.runs(), done)
     })?;
     let max_slides = args.stop.max_slides;
     let summary = Summary::new(&outcomes, experiment.names(), max_slides);
     let (experiment, config) = as_told(experiment, config);
-    let told = with_progress(args.runs(), "exploring as identify does, 2 of 2", |done| {
+    let told = with_progress(args.runs(), stage(2), |done| {
         evaluate(&experiment, config, args.runs(), done)
     })?;
+    let courses = if with_courses {
+        with_progress(args.runs(), stage(3), |done| {
+            courses(&experiment, config, args.runs(), done)
+        })?
+    } else {
+        Vec::new()
+    };
     let evaluation = Evaluation {
+        reliability: statements(&courses, args.stop.threshold),
+        by_threshold: by_threshold(&courses, args.stop.threshold),
         method: args.method,
         protocol,
         train_slides: experiment.train_slides(),
@@ -95,9 +113,6 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         Format::Text => print_evaluation(&evaluation, out)?,
     }
     if let Some(canvas) = canvas {
-        let courses = with_progress(args.runs(), "exploring for the pictures", |done| {
-            courses(&experiment, config, args.runs(), done)
-        })?;
         let figures = figures(&courses, experiment.names(), args.stop.threshold)?;
         canvas.write("tactus evaluate", &figures, out)?;
     }

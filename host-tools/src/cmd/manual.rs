@@ -4,22 +4,34 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use clap::Command;
 use clap::builder::PossibleValuesParser;
+use clap::{Arg, Command};
 use clap_complete::Shell;
+use tactus::data::recordings::RecordingSet;
 use tactus::sim::collection::plain_name;
 use tactus::sim::textures::TEXTURES;
 
-/// Print completions for a shell: commands, options, and the textures of the simulated world
+use super::table_file::read_table;
+
+/// Print completions for a shell: commands, options and textures
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   tactus completions bash > ~/.local/share/bash-completion/completions/tactus
   tactus completions zsh > ~/.zfunc/_tactus
-  tactus completions fish > ~/.config/fish/completions/tactus.fish")]
+  tactus completions fish > ~/.config/fish/completions/tactus.fish
+Those of the simulated world are always completed. Of recordings, and of a probe, they are as they are now:
+  tactus device table pull probe.tact
+  tactus completions bash --recordings DIR --table probe.tact > ~/.local/share/bash-completion/completions/tactus")]
 pub(crate) struct Completions {
     /// The shell
     shell: Shell,
+    /// Complete the names of these recordings, too, for --material
+    #[arg(long, value_name = "DIR")]
+    recordings: Option<PathBuf>,
+    /// And those of this table, for `tactus device`
+    #[arg(long, value_name = "FILE")]
+    table: Option<PathBuf>,
 }
 
 /// Write the manual pages
@@ -38,32 +50,63 @@ pub(crate) fn completions(
     args: &Completions,
     command: Command,
     out: &mut impl Write,
-) -> io::Result<()> {
-    let mut command = with_textures(command);
+) -> anyhow::Result<()> {
+    let plain = |names: &mut dyn Iterator<Item = &str>| names.map(plain_name).collect();
+    let recorded: Vec<String> = match &args.recordings {
+        Some(folder) => {
+            let set = RecordingSet::open(folder)?;
+            plain(&mut set.textures().iter().map(|t| &t.name[..]))
+        }
+        None => Vec::new(),
+    };
+    let mut bytes = Vec::new();
+    let of_probe = match &args.table {
+        Some(file) => plain(&mut read_table(file, &mut bytes)?.names()),
+        None => Vec::new(),
+    };
+    let simulated = plain(&mut TEXTURES.iter().map(|t| t.name));
+    let mut command = with_textures(command, &|path, argument| match (
+        path,
+        argument.get_id().as_str(),
+    ) {
+        // those of `device record` have any names
+        (_, "texture" | "textures") if argument.get_long().is_some() => &simulated,
+        (_, "material") => &recorded,
+        (["device", ..], "among" | "name" | "from" | "forgotten") => &of_probe,
+        _ => &[],
+    });
     // it panics where it cannot write, as into a pipe that nobody reads any more
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut command, "tactus", &mut text);
-    out.write_all(&text)
+    Ok(out.write_all(&text)?)
 }
 
-/// The command whose arguments for textures of the simulated world say which there are: for completion only, as they may also
-/// be given by number, and with their real names.
-fn with_textures(mut command: Command) -> Command {
-    let below: Vec<String> = command
-        .get_subcommands()
-        .map(|below| below.get_name().to_owned())
-        .collect();
-    for name in below {
-        command = command.mut_subcommand(name, with_textures);
+/// Textures that an argument of a command, which is named from the first word behind the program's on, may be one of.
+type Known<'k> = dyn Fn(&[&str], &Arg) -> &'k [String] + 'k;
+
+/// The command whose arguments for textures say which there are: for completion only, as they may also be given by number, and
+/// with their real names.
+fn with_textures(command: Command, known: &Known<'_>) -> Command {
+    below(command, &[], known)
+}
+
+/// The same for a command under these.
+fn below(mut command: Command, path: &[&str], known: &Known<'_>) -> Command {
+    let names = |subcommand: &Command| subcommand.get_name().to_owned();
+    for name in command.get_subcommands().map(names).collect::<Vec<_>>() {
+        let path = [path, &[&name]].concat();
+        command = command.mut_subcommand(&name, |under| below(under, &path, known));
     }
-    for name in ["texture", "textures"] {
-        if command
-            .get_arguments()
-            .any(|a| a.get_id() == name && a.get_long().is_some())
-        {
+    let arguments = command.get_arguments();
+    let arguments: Vec<_> = arguments
+        .map(|a| (a.get_id().clone(), known(path, a)))
+        .collect();
+    for (argument, textures) in arguments {
+        if !textures.is_empty() {
             // clap wants them for as long as the program lasts, which is until they are printed
-            let names = TEXTURES.iter().map(|t| &*plain_name(t.name).leak());
-            command = command.mut_arg(name, |a| a.value_parser(PossibleValuesParser::new(names)));
+            let textures = textures.iter().map(|name| &*name.clone().leak());
+            let parser = PossibleValuesParser::new(textures);
+            command = command.mut_arg(argument, |a| a.value_parser(parser));
         }
     }
     command

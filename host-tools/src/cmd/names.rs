@@ -1,5 +1,7 @@
 //! Names that somebody typed, and the ones that were meant.
 
+use tactus::sim::collection::plain_name;
+
 /// "no texture X; did you mean Y?", or all that there are where nothing is near.
 pub(crate) fn unknown<'n>(wanted: &str, known: impl IntoIterator<Item = &'n str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();
@@ -9,7 +11,7 @@ pub(crate) fn unknown<'n>(wanted: &str, known: impl IntoIterator<Item = &'n str>
     }
 }
 
-/// The name that was typed, however its capitals are.
+/// The name that was typed, however its capitals are; or as a shell completes it, if that is one name only.
 ///
 /// # Errors
 /// There is none: [`unknown`].
@@ -20,8 +22,15 @@ pub(crate) fn find<'n>(wanted: &str, known: &[&'n str]) -> Result<&'n str, Strin
         let same = |name: &&&str| name.to_lowercase() == wanted.to_lowercase();
         known.iter().find(same)
     };
+    let as_completed = || {
+        let mut same = known
+            .iter()
+            .filter(|name| !wanted.is_empty() && plain_name(name) == wanted.to_lowercase());
+        same.next().filter(|_| same.next().is_none())
+    };
     as_typed
         .or_else(capitals)
+        .or_else(as_completed)
         .copied()
         .ok_or_else(|| unknown(wanted, known.iter().copied()))
 }
@@ -85,6 +94,9 @@ mod tests {
         );
         assert!(unknown("granite", known).ends_with("bath towel, Denim twill, Jean denim"));
         assert_eq!(find(" bath TOWEL ", &known), Ok("bath towel"));
+        // as a shell completes it; of two, neither
+        assert_eq!(find("bath-towel", &known), Ok("bath towel"));
+        assert!(find("bath-towel", &["bath towel", "Bath, towel"]).is_err());
         // of two that differ by their capitals, the one that was typed
         assert_eq!(find("felt", &["Felt", "felt"]), Ok("felt"));
         assert_eq!(find("bath towe", &known), Err(unknown("bath towe", known)));

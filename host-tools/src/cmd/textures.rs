@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::Context as _;
 use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::{MeasuredSlide, measure_all};
-use tactus::sim::collection::{Collection, texture_number};
+use tactus::sim::collection::{Collection, plain_name, texture_number};
 use tactus::sim::textures::TEXTURES;
 
 use super::names::{nearest, unknown};
@@ -35,8 +35,13 @@ pub(crate) fn find_material(set: &RecordingSet, wanted: &str) -> anyhow::Result<
     let named = textures
         .iter()
         .position(|t| t.name.eq_ignore_ascii_case(wanted));
+    let as_completed = || {
+        let plain = |name: &str| !wanted.is_empty() && plain_name(name) == wanted.to_lowercase();
+        textures.iter().position(|t| plain(&t.name))
+    };
     let numbered = || textures.iter().position(|t| Some(t.id) == number);
-    named.or_else(numbered).with_context(|| {
+    let found = named.or_else(as_completed).or_else(numbered);
+    found.with_context(|| {
         let folder = set.folder().display();
         let names: Vec<&str> = textures.iter().map(|t| t.name.as_str()).collect();
         match nearest(wanted, &names) {

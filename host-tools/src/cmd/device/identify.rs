@@ -18,7 +18,7 @@ use super::bench::Bench;
 use super::line::Where;
 use super::train::seed_of_now;
 use crate::cmd::args::Stop;
-use crate::cmd::names::nearest;
+use crate::cmd::names::{find, nearest};
 use crate::cmd::output::{Done, Format, print_json};
 use crate::cmd::plot::Plot;
 
@@ -69,10 +69,11 @@ impl Args {
     pub(crate) fn wanted(&self, names: &[String]) -> anyhow::Result<Identify> {
         let index = |wanted: &String| {
             let wanted = wanted.trim();
-            let index = names.iter().position(|n| n.eq_ignore_ascii_case(wanted));
+            let known: Vec<&str> = names.iter().map(String::as_str).collect();
+            let index = find(wanted, &known).ok();
+            let index = index.and_then(|name| known.iter().position(|known| *known == name));
             let index = index.and_then(|index| u16::try_from(index).ok());
             index.with_context(|| {
-                let known: Vec<&str> = names.iter().map(String::as_str).collect();
                 let known = match nearest(wanted, &known) {
                     Some(name) => format!("Did you mean {name}?"),
                     None => format!("It knows: {}", known.join(", ")),

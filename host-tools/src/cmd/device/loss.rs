@@ -7,6 +7,7 @@ use anyhow::{Context as _, bail};
 use tactus_core::table::Table;
 
 use super::bench::{Bench, read_answer};
+use crate::cmd::output::Format;
 use crate::cmd::table_file::write_table;
 
 /// How a command that takes something from the probe is allowed to.
@@ -22,21 +23,20 @@ pub(crate) struct Consent {
 
 impl Consent {
     /// Says what will be `lost`, keeps the table that the probe uses now, and asks. Nothing has happened to the probe yet.
-    /// Where nothing is lost, none of that.
+    /// Where the output is for programs, that is said on standard error. The file that the table is kept in.
     ///
     /// # Errors
     /// The table cannot be read or kept, or the answer is no.
     pub(crate) fn ask(
         &self,
         bench: &mut Bench,
-        lost: impl FnOnce(&Table<'_>) -> Option<String>,
+        lost: impl FnOnce(&Table<'_>) -> String,
+        format: Format,
         out: &mut impl Write,
-    ) -> anyhow::Result<()> {
+    ) -> anyhow::Result<String> {
         let bytes = bench.table()?;
         let table = Table::read(&bytes)?;
-        let Some(lost) = lost(&table) else {
-            return Ok(());
-        };
+        let lost = lost(&table);
         let file = match &self.backup {
             Some(file) => file.clone(),
             None => {
@@ -45,14 +45,17 @@ impl Consent {
             }
         };
         write_table(&file, &bytes)?;
-        let file = file.display();
-        writeln!(
-            out,
+        let file = file.display().to_string();
+        let said = format!(
             "{lost}\nThe probe's table is kept: `tactus device table push {file}` brings it back."
-        )?;
+        );
+        match format {
+            Format::Text => writeln!(out, "{said}")?,
+            Format::Json => eprintln!("{said}"),
+        }
         out.flush()?;
         if self.yes {
-            return Ok(());
+            return Ok(file);
         }
         if !std::io::stdin().is_terminal() {
             bail!("nothing was changed: there is nobody to ask; add --yes to do it");
@@ -61,7 +64,7 @@ impl Consent {
         if !matches!(answer.trim().to_lowercase().as_str(), "y" | "yes") {
             bail!("nothing was changed");
         }
-        Ok(())
+        Ok(file)
     }
 }
 

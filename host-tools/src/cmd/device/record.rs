@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::ensure;
+use serde::Serialize;
 use tactus::data::recording::{Labels, Texture};
 use tactus::data::recordings::RecordingWriter;
 use tactus::eval::show::count;
@@ -15,6 +16,7 @@ use super::bench::{Bench, show_fault, wait_for_enter};
 use super::line::Where;
 use super::recorder::Recorder;
 use super::train::seed_of_now;
+use crate::cmd::output::{Format, print_json};
 
 /// Record slides in the project's format, for `tactus learn` and `tactus evaluate`
 #[derive(clap::Args)]
@@ -58,6 +60,26 @@ pub(crate) struct Args {
         hide_default_value = true
     )]
     note: String,
+    /// How to print what was recorded
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What `device record` prints with `--format json`.
+#[derive(Serialize)]
+struct Recorded<'a> {
+    folder: String,
+    textures: usize,
+    /// In the folder, those of an interrupted recording included.
+    slides: usize,
+    lost: Vec<Lost<'a>>,
+}
+
+/// A slide that was made and is not recorded.
+#[derive(Serialize)]
+struct Lost<'a> {
+    texture: &'a str,
+    why: String,
 }
 
 /// Records each texture in turn.
@@ -83,11 +105,14 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (mut bench, _) = Bench::open(&args.at)?;
     let calibration = bench.get(Request::read_calibration())?;
     bench.get(Request::command(Command::Stream(true)))?;
-    let mut written = 0;
+    let (mut written, mut all_lost) = (0, Vec::new());
+    let text = args.format == Format::Text;
     for (index, name) in textures.iter().enumerate() {
         let there = writer.slides(index);
         if there == usize::from(*slides) {
-            writeln!(out, "{name}: its slides were recorded before.")?;
+            if text {
+                writeln!(out, "{name}: its slides were recorded before.")?;
+            }
             written += there;
             continue;
         }
@@ -112,11 +137,14 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             match recorder.hear(index, report) {
                 Some(Ok(slide)) => {
                     let (number, movement) = (slide.number, slide.movement);
-                    writeln!(out, "{name}, slide {number} of {slides}: {movement}")?;
+                    if text {
+                        writeln!(out, "{name}, slide {number} of {slides}: {movement}")?;
+                    }
                     kept.push(slide);
                 }
                 Some(Err(why)) => lost.push(why),
-                None => show_fault(report, out)?,
+                None if text => show_fault(report, out)?,
+                None => {}
             }
             out.flush()
         })?;
@@ -124,9 +152,15 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             writer.write(slide)?;
         }
         written += kept.len();
-        for why in &lost {
-            writeln!(out, "{name}: a slide is not recorded: {why}")?;
+        if text {
+            for why in &lost {
+                writeln!(out, "{name}: a slide is not recorded: {why}")?;
+            }
         }
+        all_lost.extend(lost.into_iter().map(|why| Lost {
+            texture: name.trim(),
+            why: why.to_string(),
+        }));
         ensure!(
             !kept.is_empty(),
             "{name}: no slide arrived whole; check the cable, then record again"
@@ -134,10 +168,19 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     bench.get(Request::command(Command::Stream(false)))?;
     writer.finish()?;
+    let folder = args.out.display();
+    if !text {
+        let recorded = Recorded {
+            folder: folder.to_string(),
+            textures: textures.len(),
+            slides: written,
+            lost: all_lost,
+        };
+        return print_json(&recorded, out);
+    }
     writeln!(
         out,
-        "{}: {} of {}. Next: tactus features --recordings {0}",
-        args.out.display(),
+        "{folder}: {} of {}. Next: tactus features --recordings {folder}",
         count(written as u64, "slide"),
         count(textures.len() as u64, "texture")
     )?;

@@ -2,6 +2,7 @@
 
 use std::io::Write;
 
+use serde::Serialize;
 use tactus::link::Request;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire;
@@ -11,6 +12,7 @@ use super::line::Where;
 use super::loss::Consent;
 use super::train::name_of;
 use crate::cmd::names;
+use crate::cmd::output::{Format, print_json};
 
 /// Give a texture of the probe another name
 #[derive(clap::Args)]
@@ -24,6 +26,16 @@ pub(crate) struct Rename {
     from: String,
     /// Its new name
     to: String,
+    /// How to print that it is done
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What `device rename` prints with `--format json`.
+#[derive(Serialize)]
+struct Renamed<'n> {
+    from: &'n str,
+    to: &'n str,
 }
 
 /// Have the probe forget a texture, an unfinished training, or all that it learned by itself
@@ -40,6 +52,20 @@ pub(crate) struct Forget {
     what: What,
     #[command(flatten)]
     consent: Consent,
+    /// How to print that it is done
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What `device forget` prints with `--format json`.
+#[derive(Serialize)]
+struct Forgotten {
+    /// "texture", "training" or "self-learned".
+    what: &'static str,
+    /// Its name; `null` for what the probe learned by itself.
+    name: Option<String>,
+    /// Where the probe's table is kept as it was.
+    backup: String,
 }
 
 #[derive(clap::Args)]
@@ -58,38 +84,56 @@ struct What {
 }
 
 /// Gives a texture another name.
-pub(crate) fn rename(Rename { at, from, to }: &Rename, out: &mut impl Write) -> anyhow::Result<()> {
-    let to = name_of(to)?;
-    let (mut bench, _) = Bench::open(at)?;
-    let from = known(&bench.table()?, from)?;
+pub(crate) fn rename(args: &Rename, out: &mut impl Write) -> anyhow::Result<()> {
+    let to = name_of(&args.to)?;
+    let (mut bench, _) = Bench::open(&args.at)?;
+    let from = known(&bench.table()?, &args.from)?;
     bench.get(Request::rename(from.clone(), to.clone()))?;
-    writeln!(out, "{from} is {to} now.")?;
+    match args.format {
+        Format::Text => writeln!(out, "{from} is {to} now.")?,
+        Format::Json => {
+            let (from, to) = (&from[..], &to[..]);
+            print_json(&Renamed { from, to }, out)?;
+        }
+    }
     Ok(())
 }
 
 /// Has the probe forget something.
 pub(crate) fn forget(args: &Forget, out: &mut impl Write) -> anyhow::Result<()> {
-    let Forget { at, what, consent } = args;
-    let (mut bench, _) = Bench::open(at)?;
-    let (what, said) = match (&what.name, &what.training) {
+    let (mut bench, _) = Bench::open(&args.at)?;
+    let (what, kind, name, said) = match (&args.what.name, &args.what.training) {
         (Some(name), _) => {
             let name = known(&bench.table()?, name)?;
             let said = name.to_string();
-            (wire::Forget::Texture(name), said)
+            let what = wire::Forget::Texture(name.clone());
+            (what, "texture", Some(name), said)
         }
         (None, Some(name)) => {
             let said = format!("the training of {name}");
-            (wire::Forget::Training(name_of(name)?), said)
+            let name = name_of(name)?;
+            let what = wire::Forget::Training(name.clone());
+            (what, "training", Some(name), said)
         }
         (None, None) => {
             let said = "what it learned by itself".to_owned();
-            (wire::Forget::SelfLearned, said)
+            (wire::Forget::SelfLearned, "self-learned", None, said)
         }
     };
-    let lost = |_: &Table<'_>| Some(format!("The probe is to forget {said}."));
-    consent.ask(&mut bench, lost, out)?;
+    let lost = |_: &Table<'_>| format!("The probe is to forget {said}.");
+    let backup = args.consent.ask(&mut bench, lost, args.format, out)?;
     bench.get(Request::forget(what))?;
-    writeln!(out, "The probe has forgotten {said}.")?;
+    match args.format {
+        Format::Text => writeln!(out, "The probe has forgotten {said}.")?,
+        Format::Json => {
+            let forgotten = Forgotten {
+                what: kind,
+                name: name.map(|name| name.to_string()),
+                backup,
+            };
+            print_json(&forgotten, out)?;
+        }
+    }
     Ok(())
 }
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, ensure};
 use clap::Subcommand;
+use serde::Serialize;
 use tactus::eval::show::{count, show_table};
 use tactus::eval::table_summary::TableSummary;
 use tactus::link::{PushTable, Request};
@@ -15,7 +16,7 @@ use super::bench::Bench;
 use super::line::Where;
 use super::loss::{Consent, replaced};
 use crate::cmd::output::{Format, print_json};
-use crate::cmd::table_file::{read_table, write_table};
+use crate::cmd::table_file::{TableFile, read_table, write_table};
 
 /// Show, fetch or replace the probe's texture table
 #[derive(Subcommand)]
@@ -41,6 +42,9 @@ pub(crate) enum Command {
         at: Where,
         /// The file to write
         file: PathBuf,
+        /// How to print what was written
+        #[arg(long, value_enum, default_value_t = Format::Text)]
+        format: Format,
     },
     /// Check a table, send it to the probe, and compare what the probe uses then
     Push {
@@ -50,6 +54,9 @@ pub(crate) enum Command {
         file: PathBuf,
         #[command(flatten)]
         consent: Consent,
+        /// How to print what the probe uses then
+        #[arg(long, value_enum, default_value_t = Format::Text)]
+        format: Format,
     },
     /// Go back to the table that came with the firmware
     Factory {
@@ -57,7 +64,57 @@ pub(crate) enum Command {
         at: Where,
         #[command(flatten)]
         consent: Consent,
+        /// How to print what the probe uses then
+        #[arg(long, value_enum, default_value_t = Format::Text)]
+        format: Format,
     },
+}
+
+/// What `device table push` and `factory` print with `--format json`.
+#[derive(Serialize)]
+struct InUse {
+    /// The table that was pushed; `null`: the firmware's own.
+    file: Option<String>,
+    textures: u16,
+    bytes: u32,
+    /// CRC-32, in hexadecimal digits.
+    checksum: String,
+    /// Where the table is kept that the probe used before; `null`: nothing was lost.
+    backup: Option<String>,
+}
+
+impl InUse {
+    fn print(&self, format: Format, out: &mut impl Write) -> anyhow::Result<()> {
+        let (textures, checksum) = (count(self.textures, "texture"), &self.checksum);
+        match (format, &self.file) {
+            (Format::Json, _) => print_json(self, out)?,
+            (Format::Text, Some(file)) => writeln!(
+                out,
+                "{file}: the probe uses it now: {textures}, checksum {checksum}"
+            )?,
+            (Format::Text, None) => writeln!(
+                out,
+                "The probe uses the firmware's own table: {textures}, checksum {checksum}"
+            )?,
+        }
+        Ok(())
+    }
+
+    /// As the probe says it now.
+    fn new(
+        bench: &mut Bench,
+        file: Option<String>,
+        backup: Option<String>,
+    ) -> anyhow::Result<Self> {
+        let status = bench.get(Request::status())?;
+        Ok(Self {
+            file,
+            textures: status.textures,
+            bytes: status.table_bytes,
+            checksum: format!("{:08x}", status.table_crc),
+            backup,
+        })
+    }
 }
 
 /// Shows, fetches or changes the probe's table.
@@ -77,10 +134,13 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
             writeln!(out, "The table {whose}.")?;
             show_table(Table::read(&bytes)?, out)?;
         }
-        Command::Pull { at, file } => {
+        Command::Pull { at, file, format } => {
             let bytes = Bench::open(at)?.0.table()?;
             write_table(file, &bytes)?;
             let table = Table::read(&bytes)?;
+            if *format == Format::Json {
+                return print_json(&TableFile::new(file, table), out);
+            }
             let textures = count(table.textures(), "texture");
             let (file, length, crc) = (file.display(), bytes.len(), table.crc());
             writeln!(
@@ -88,42 +148,44 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
                 "{file}: {textures}, {length} bytes, checksum {crc:08x}"
             )?;
         }
-        Command::Push { at, file, consent } => {
+        Command::Push {
+            at,
+            file,
+            consent,
+            format,
+        } => {
             let mut bytes = Vec::new();
             let table = read_table(file, &mut bytes)?;
-            let file = file.display();
-            let push = PushTable::new(table.as_bytes()).with_context(|| file.to_string())?;
+            let file = file.display().to_string();
+            let push = PushTable::new(table.as_bytes()).with_context(|| file.clone())?;
             let (mut bench, status) = Bench::open(at)?;
             // the firmware's own table is never lost
-            if !status.factory && status.table_crc != table.crc() {
-                consent.ask(&mut bench, |old| Some(replaced(old, Some(&table))), out)?;
-            }
+            let loses = !status.factory && status.table_crc != table.crc();
+            let lost = |old: &Table<'_>| replaced(old, Some(&table));
+            let backup = loses.then(|| consent.ask(&mut bench, lost, *format, out));
+            let backup = backup.transpose()?;
             bench.get(push)?;
             // not what was sent counts, but what the probe uses from now on
-            let status = bench.get(Request::status())?;
-            let textures = count(status.textures, "texture");
-            let (now, pushed) = (status.table_crc, table.crc());
+            let now = InUse::new(&mut bench, Some(file), backup)?;
+            let pushed = format!("{:08x}", table.crc());
             ensure!(
-                now == pushed,
-                "the probe uses the table {now:08x} and not {pushed:08x}, the one pushed: push it again"
+                now.checksum == pushed,
+                "the probe uses the table {} and not {pushed}, the one pushed: push it again",
+                now.checksum
             );
-            writeln!(
-                out,
-                "{file}: the probe uses it now: {textures}, checksum {now:08x}"
-            )?;
+            now.print(*format, out)?;
         }
-        Command::Factory { at, consent } => {
+        Command::Factory {
+            at,
+            consent,
+            format,
+        } => {
             let (mut bench, status) = Bench::open(at)?;
-            if !status.factory {
-                consent.ask(&mut bench, |old| Some(replaced(old, None)), out)?;
-            }
+            let lost = |old: &Table<'_>| replaced(old, None);
+            let backup = (!status.factory).then(|| consent.ask(&mut bench, lost, *format, out));
+            let backup = backup.transpose()?;
             bench.get(Request::command(wire::Command::FactoryTable))?;
-            let status = bench.get(Request::status())?;
-            let (textures, crc) = (count(status.textures, "texture"), status.table_crc);
-            writeln!(
-                out,
-                "The probe uses the firmware's own table: {textures}, checksum {crc:08x}"
-            )?;
+            InUse::new(&mut bench, None, backup)?.print(*format, out)?;
         }
     }
     Ok(())

@@ -6,7 +6,7 @@ use tactus_core::explorer::Told;
 use crate::eval::chart::grid::{AVOIDED, Grid, Tile};
 use crate::eval::chart::{COLOURS, Chart, DrawError, Figure, MARKS, Series};
 use crate::eval::courses::Course;
-use crate::eval::verdicts::Verdicts;
+use crate::eval::reliability::{self, Statements, statements, verdicts};
 
 /// The three pictures of explorations that went like this, among textures of these names, at this threshold.
 ///
@@ -109,45 +109,9 @@ fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Fig
     .figure()
 }
 
-fn verdicts(courses: &[Course], threshold: f32) -> Verdicts {
-    Verdicts::of(courses.iter().map(|course| {
-        let (told, _, texture) = course.told(threshold);
-        (told, texture == course.presented)
-    }))
-}
-
 /// A share in %, without the digits of its binary form.
 fn percent(share: f32) -> f64 {
     (f64::from(share) * 1e6).round() / 1e4
-}
-
-/// Lower ends of the probabilities that are counted together.
-const SAID: [f32; 8] = [0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 0.999, f32::INFINITY];
-
-/// Statements of about the same probability.
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
-struct Statements {
-    count: u64,
-    right: u64,
-    /// Sum of the probabilities that were said.
-    said: f64,
-}
-
-/// How often the most probable texture was the right one, by the probability that was said: after every slide, until the
-/// exploration ended.
-fn statements(courses: &[Course], threshold: f32) -> [Statements; SAID.len() - 1] {
-    let mut bins = [Statements::default(); SAID.len() - 1];
-    for course in courses {
-        let (_, slides, _) = course.told(threshold);
-        for belief in course.beliefs.iter().take(slides) {
-            let above = SAID.iter().take_while(|&&low| belief.probability >= low);
-            let bin = &mut bins[above.count().clamp(1, bins.len()) - 1];
-            bin.count += 1;
-            bin.right += u64::from(belief.texture == course.presented);
-            bin.said += f64::from(belief.probability);
-        }
-    }
-    bins
 }
 
 /// Between which shares the true one is, 95 times of 100, if `right` of `count` were found (Wilson 1927).
@@ -170,29 +134,33 @@ fn reliability(courses: &[Course], threshold: f32) -> Result<Figure, DrawError> 
     let mut said = Series::dashed("what it said (mean)", Vec::new());
     for (bin, x) in bins.iter().zip(1..).filter(|(bin, _)| bin.count > 0) {
         let (x, of) = (f64::from(x), bin.count as f64);
+        let mean = 100.0 * bin.said.unwrap_or_default();
         let share = 100.0 * bin.right as f64 / of;
         let (low, high) = wilson(bin.right, bin.count);
         right.points.push((x, share));
         right.bars.push((100.0 * low, 100.0 * high));
         right.labels.push(format!("{share:.1}"));
         right.says.push(format!(
-            "said {}: right {} of {} times ({share:.1} %, from {:.1} to {:.1} %); said {:.2} % on average",
-            range(x),
+            "said {}: right {} of {} times ({share:.1} %, from {:.1} to {:.1} %); said {mean:.2} % on average",
+            range(bin),
             bin.right,
             bin.count,
             100.0 * low,
             100.0 * high,
-            100.0 * bin.said / of
         ));
-        said.points.push((x, 100.0 * bin.said / of));
+        said.points.push((x, mean));
     }
+    let text = |x: f64| {
+        let bin = bins.get((x.round() as usize).wrapping_sub(1));
+        bin.map_or_else(String::new, range)
+    };
     let about = "Counted after every slide until the exploration ended; slides of one exploration are not independent, \
                  so the bars are rather too short.";
     Chart {
         about: about.to_owned(),
         y_range: (0.0, 108.0),
         x_marks: bins.len(),
-        x_text: &range,
+        x_text: &text,
         below: "Points below the dashed line: it said more than was so.",
         ..Chart::new(
             "How often it is right when it says so",
@@ -206,28 +174,18 @@ fn reliability(courses: &[Course], threshold: f32) -> Result<Figure, DrawError> 
 }
 
 /// The probabilities that are counted together, in %.
-fn range(bin: f64) -> String {
-    let at = (bin.round() as usize).clamp(1, SAID.len() - 1);
-    match (SAID.get(at - 1), SAID.get(at)) {
-        (Some(low), Some(high)) if *low == 0.0 => format!("<{}", percent(*high)),
-        (Some(low), Some(high)) if high.is_finite() => {
-            format!("{}\u{2013}{}", percent(*low), percent(*high))
-        }
-        (Some(low), _) => format!("\u{2265}{}", percent(*low)),
-        _ => String::new(),
+fn range(bin: &Statements) -> String {
+    match (percent(bin.from), percent(bin.to)) {
+        (low, high) if low == 0.0 => format!("<{high}"),
+        (low, high) if high == 100.0 => format!("\u{2265}{low}"),
+        (low, high) => format!("{low}\u{2013}{high}"),
     }
 }
 
-/// Thresholds that are compared, besides the one that was asked for.
-const THRESHOLDS: [f32; 8] = [0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999];
-
 /// Slides, and what is told, by the threshold.
 fn by_threshold(courses: &[Course], threshold: f32) -> Result<Vec<Figure>, DrawError> {
-    let mut thresholds: Vec<f32> = THRESHOLDS.to_vec();
-    if !thresholds.contains(&threshold) {
-        thresholds.push(threshold);
-        thresholds.sort_by(f32::total_cmp);
-    }
+    let by_threshold = reliability::by_threshold(courses, threshold);
+    let thresholds: Vec<f32> = by_threshold.iter().map(|at| at.threshold).collect();
     let at = thresholds.iter().position(|&t| t == threshold);
     let at = at.unwrap_or(0) as f64 + 1.0;
     let text = |x: f64| {
@@ -246,14 +204,12 @@ fn by_threshold(courses: &[Course], threshold: f32) -> Result<Vec<Figure>, DrawE
         ("undecided", 0),
     ]
     .map(|(name, colour)| Series::curve(colour, MARKS[colour], name, Vec::new()));
-    for (&threshold, n) in thresholds.iter().zip(1..) {
+    for (at, n) in by_threshold.iter().zip(1..) {
         let n = f64::from(n);
-        let made = courses.iter().map(|course| course.told(threshold).1 as f64);
-        let mean = made.sum::<f64>() / courses.len().max(1) as f64;
+        let (mean, v) = (at.mean_slides, at.verdicts);
         slides.points.push((n, mean));
-        let shown = percent(threshold);
+        let shown = percent(at.threshold);
         slides.says.push(format!("at {shown} %: {mean:.2} slides"));
-        let v = verdicts(courses, threshold);
         for (series, share) in told
             .iter_mut()
             .zip([v.wrong, v.new, v.changed, v.undecided])
