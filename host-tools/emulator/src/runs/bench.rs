@@ -21,7 +21,7 @@ use tactus_core::explorer::Method;
 use self::counter::Bench;
 use self::error::BenchError;
 use self::gates::{GATES, gate};
-use self::inputs::{SLIDE, Wanted, corners, observed, slide, synthetic};
+use self::inputs::{SLIDE, Wanted, corners, observed, of_gates, slide, synthetic};
 use self::on_the_rig::on_the_rig;
 use self::plot::{Curve, draw};
 use self::row::{Row, print};
@@ -49,8 +49,6 @@ pub(crate) struct Args {
     plot: Option<PathBuf>,
 }
 
-/// Textures of the paper, and of the table that comes with the firmware.
-const TEXTURES: usize = 117;
 /// Exit code when gates are missed and every result is right. `cargo xtask test` knows it.
 const MISSED: u8 = 2;
 
@@ -169,11 +167,10 @@ fn kernels(bench: &mut Bench, samples: &[i16]) -> Result<Vec<Row>, BenchError> {
         frame.cmsis(2.0 * 14_162.0).count(bench)?,
         all.cmsis(1_650_000.0).count(bench)?,
     ];
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware/factory.tact");
-    let factory = std::fs::read(&path).map_err(|source| BenchError::Factory { path, source })?;
-    let paper = synthetic(Method::Paper, TEXTURES)?;
-    rows.extend(decisions(bench, samples, &paper, Method::Paper)?);
-    rows.extend(decisions(bench, samples, &factory, Method::Fused)?);
+    for method in [Method::Paper, Method::Fused] {
+        let table = of_gates(method)?;
+        rows.extend(decisions(bench, samples, &table, method)?);
+    }
     Ok(rows)
 }
 
