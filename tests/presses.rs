@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use tactus::sim::collection::Collection;
 use tactus::sim::faults::Fault as Cause;
+use tactus::sim::mount::Mount;
 use tactus::sim::press::{self, Bench, Campaign, FORCE_LIMIT_N, Press, Trouble};
 use tactus::sim::rig::SimRig;
 use tactus::sim::world::Setup;
@@ -159,6 +160,34 @@ fn no_leak_of_a_tenth_of_a_second_or_more_presses_too_hard() {
     }
 }
 
+/// Over seconds a leak looks like a sample that gives way: beyond the probe's forces the lever stands on its way and looks.
+#[test]
+fn no_slow_leak_presses_too_hard_at_two_newtons() {
+    for (sample, mut rig) in rigs() {
+        rig.control().allow_high_force(true);
+        for force_mn in [1585, 1995] {
+            let movement = Movement::new(force_mn, 39_811).unwrap();
+            // near 2 N the guard may end the slide, and nothing else
+            let sound = press::make(&mut rig, movement, None);
+            let good = sound == Ok(Ended::Whole) || sound == Err(Fault::ForceHigh.into());
+            assert!(good, "{sample}, {movement}: {sound:?}");
+            for seconds in [
+                0.1, 0.5, 2.0, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 50.0, 100.0,
+            ] {
+                for share in [0.0, 0.3, 0.55, 0.8] {
+                    let leak = Some((Cause::SkinLeaks { seconds }, share));
+                    let ended = press::make(&mut rig, movement, leak);
+                    let most_n = rig.world().truth().force_max_n;
+                    assert!(
+                        most_n <= FORCE_LIMIT_N,
+                        "{sample}, {movement}, {seconds} s at {share}: {most_n:.2} N, {ended:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
 /// A skin that tears at once shows contact in neither signal: the place of the last contact has to stop the lever.
 #[test]
 fn a_torn_skin_is_not_pressed_further_than_a_sound_one() {
@@ -179,4 +208,36 @@ fn a_torn_skin_is_not_pressed_further_than_a_sound_one() {
             );
         }
     }
+}
+
+/// Where nothing was felt before, no signal shows a torn skin: what keeps the finger whole then is a mount that yields.
+#[test]
+fn a_sprung_mount_holds_a_torn_finger_at_its_first_press() {
+    let mut hardest_n: f64 = 0.0;
+    for sprung in [true, false] {
+        for (sample, mut rig) in rigs() {
+            if sprung {
+                rig.world().mount(Mount::SPRUNG);
+            }
+            for force_mn in [200, 1259] {
+                let movement = Movement::new(force_mn, 39_811).unwrap();
+                // it yields to none of the probe's own forces
+                let ended = press::make(&mut rig, movement, None);
+                assert_eq!(ended, Ok(Ended::Whole), "{sample}, {movement}");
+                assert_eq!(rig.world().truth().mount_mm, 0.0, "{sample}, {movement}");
+                for seconds in [0.0, 0.01, 0.05] {
+                    rig.control().sample_changed();
+                    let torn = Some((Cause::SkinLeaks { seconds }, 0.0));
+                    let ended = press::make(&mut rig, movement, torn);
+                    let most_n = rig.world().truth().force_max_n;
+                    let case = format!("{sample}, {movement}, {seconds} s: {most_n:.2} N");
+                    assert!(ended.is_err(), "{case}");
+                    assert!(!sprung || most_n <= FORCE_LIMIT_N, "{case}");
+                    hardest_n = hardest_n.max(most_n);
+                }
+            }
+        }
+    }
+    // else this would show nothing of the mount
+    assert!(hardest_n > 8.0, "{hardest_n:.2} N without it");
 }

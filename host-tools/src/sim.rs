@@ -18,6 +18,7 @@ pub mod flash;
 pub mod handheld;
 pub mod lever;
 mod maths;
+pub mod mount;
 mod noise;
 pub mod person;
 pub use person as hand;

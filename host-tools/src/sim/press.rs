@@ -25,8 +25,8 @@ const TEXTURES: usize = 10;
 /// Stream of the seeds that a campaign draws from.
 const STREAM: u64 = 0x9e55;
 /// Times in which a torn skin loses its pressure, s: see [`Trouble::Leaking`]. Within 0.05 s it shows contact in neither
-/// signal, over 5 to 20 s it looks like a soft sample: at 2 N these press too hard, as the book's page of limits says.
-const LEAK_S: (f64, f64) = (0.2, 2.0);
+/// signal, as the book's page of limits says.
+const LEAK_S: (f64, f64) = (0.1, 50.0);
 
 /// What is wrong with P_DC.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -37,7 +37,7 @@ pub enum Trouble {
     Dead,
     /// It dies while the finger presses, at once or within three seconds.
     Dying,
-    /// The skin leaks from the start or from somewhere in the press on, in 0.2 to 2 s.
+    /// The skin leaks from the start or from somewhere in the press on, in 0.1 to 50 s.
     Leaking,
 }
 

@@ -15,6 +15,7 @@ use super::encoder::{Edge, Encoder};
 use super::faults::{Fault, Faults, Miso};
 use super::finger::{Contact, Finger};
 use super::lever::Lever;
+use super::mount::Mount;
 use super::person::Hand;
 use super::played::{PlayCounts, Played};
 use super::sensor::SensorPeer;
@@ -84,6 +85,8 @@ pub struct Truth {
     pub speed_mm_s: f64,
     /// Motor current, A.
     pub current_a: f64,
+    /// How far the finger's mount has yielded, mm.
+    pub mount_mm: f64,
     /// Work that the finger's shear took since power-up, J: what wears the skin.
     pub sliding_j: f64,
     /// Wear of the skin, as the finger has it.
@@ -107,6 +110,7 @@ pub struct World {
     tick_began_ns: u64,
     tick_ends_ns: u64,
     lever: Lever,
+    mount: Mount,
     stage: Stage,
     encoder: Encoder,
     surface: Surface,
@@ -153,6 +157,7 @@ impl World {
             tick_began_ns: 0,
             tick_ends_ns: 0,
             lever: Lever::new(tip_mm, setup.world_seed, setup.trial_seed),
+            mount: Mount::STIFF,
             stage: Stage::new(stage_mm, setup.world_seed, setup.trial_seed),
             encoder: Encoder::new(stage_mm, setup.keep_edges),
             surface: sample(setup.texture, setup.world_seed, conditions.variation),
@@ -312,6 +317,11 @@ impl World {
         self.pull_n = -pull_n;
     }
 
+    /// Fixes the finger to the lever by another mount; it is stiff unless this is called.
+    pub fn mount(&mut self, mount: Mount) {
+        self.mount = mount;
+    }
+
     /// Has a hand hold the finger from now on, in place of lever and stage: they stand still.
     pub fn hold(&mut self, hand: Hand) {
         self.hand = Some(hand);
@@ -421,6 +431,7 @@ impl World {
             sample_mm: hand.map_or_else(|| self.stage.on_sample_mm(), Hand::x_mm),
             speed_mm_s: hand.map_or_else(|| self.stage.speed_mm_s(), Hand::speed_mm_s),
             current_a: self.stage.current_a(),
+            mount_mm: self.mount.pushed_mm(),
             sliding_j: self.sliding_j,
             wear: self.finger.wear(),
         }
@@ -457,6 +468,7 @@ impl World {
             return;
         }
         self.lever.tick(self.tick_ends_ns, self.finger.force_n());
+        self.mount.tick(self.finger.force_n());
         let from_mm = self.stage.position_mm();
         self.stage.tick(shear_n + self.pull_n);
         let to_mm = self.stage.position_mm();
@@ -498,7 +510,7 @@ impl World {
         } else {
             thickness_mm
         };
-        top_mm - self.lever.height_mm()
+        top_mm - self.lever.height_mm() - self.mount.pushed_mm()
     }
 
     fn must_be_over(&self, surface: &Surface) -> Result<(), NotLifted> {
