@@ -132,7 +132,7 @@ pub(super) async fn sensor(pins: board::Acquire, account: &mut Account) {
         diagnosis == Diagnosis::Good && late == 0,
         "sensor words",
         format_args!(
-            "{} words, {} garbled, {} error frames, {} silent, {late} late: {diagnosis}",
+            "words: {}, {} garbled, error frames: {}, {} silent, {late} late: {diagnosis}",
             stats.words,
             stats.parity + stats.padding,
             stats.error_frames,

@@ -265,7 +265,7 @@ fn log(outcome: Outcome<'_>) {
             leading: (name, p),
             judgement,
         } => defmt::info!(
-            "{=usize} slides: {=str} {=f32}, sure {=bool}, unknown {=bool}",
+            "slides {=usize}: {=str} {=f32}, sure {=bool}, unknown {=bool}",
             slides,
             name,
             p,

@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use tactus::eval::show::count;
 use tactus::sim::faults::Fault;
 use tactus::sim::person::Hand;
 use tactus::sim::scenario::{InvalidScenario, Scenario, Step, TIMEOUT_S, texture};
@@ -69,7 +70,7 @@ pub enum Unmet {
     #[error("the display does not want a slide")]
     NoSlideWanted,
     /// There should be a verdict.
-    #[error("{0} slides were not enough")]
+    #[error("not enough: {}", count(*.0, "slide"))]
     NotEnough(u32),
 }
 

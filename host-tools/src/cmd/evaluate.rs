@@ -10,6 +10,7 @@ use tactus::eval::evaluate::{Method, Outcome, Summary, evaluate};
 use tactus::eval::experiment::{Experiment, Protocol};
 use tactus::eval::pictures::evaluation::figures;
 use tactus::eval::reliability::{AtThreshold, Statements, by_threshold, statements};
+use tactus::eval::show::count;
 use tactus::eval::verdicts::Verdicts;
 use tactus_core::explorer::{self, Config};
 
@@ -132,14 +133,14 @@ fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
     let name = e.method.to_possible_value();
     writeln!(
         out,
-        "{}, {}, {} training slides: {} runs over {} textures, threshold {}, at most {} slides, seed {}",
+        "{}, {}, {}: {} over {}, threshold {}, at most {}, seed {}",
         name.as_ref().map_or("", |name| name.get_name()),
         e.protocol,
-        e.train_slides,
-        e.runs,
-        e.textures,
+        count(e.train_slides as u64, "training slide"),
+        count(e.runs, "run"),
+        count(e.textures as u64, "texture"),
         percent(e.threshold.into()),
-        e.max_slides,
+        count(e.max_slides, "slide"),
         e.seed
     )?;
     let row = |name: &str, value| format!("  {name:<26} {value}");

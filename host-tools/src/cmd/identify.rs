@@ -17,7 +17,7 @@ use tactus::eval::evaluate::{MAX_TEXTURES, Method};
 use tactus::eval::experiment::{Experiment, Protocol};
 use tactus::eval::pictures::exploration::Exploration;
 use tactus::eval::pictures::timeline::{Timeline, Watch};
-use tactus::eval::show::{Show, is_right};
+use tactus::eval::show::{Show, count, is_right};
 use tactus::eval::transcript::{Answer, Transcript};
 use tactus::sim::collection::{Collection, calibrated, texture_name};
 use tactus::sim::rig::SimRig;
@@ -203,12 +203,12 @@ fn identify_recorded(
             "The table does not hold {name}, so the right answer is that it is none of the known textures."
         )?;
     }
-    let shown_count = shown.len();
+    let slides = count(shown.len() as u64, "slide");
     let mut rig = Replay::new(shown, ChaCha8Rng::from_rng(&mut random));
     if is_text {
         writeln!(
             out,
-            "An unknown texture, one of {}. Presented: {name}, {shown_count} slides that were not learned from (seed {}).",
+            "An unknown texture, one of {}. Presented: {name}, {slides} not learned from (seed {}).",
             table.textures(),
             args.seed
         )?;

@@ -128,10 +128,10 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     writeln!(
         out,
-        "{}: {} learned from the first {} slides of each, {} bytes",
+        "{}: {} learned from the first {} of each, {} bytes",
         args.out.display(),
         count(set.textures().len() as u64, "texture"),
-        args.train_slides,
+        count(args.train_slides as u64, "slide"),
         bytes.len()
     )?;
     for short in &learned.short {
@@ -161,13 +161,13 @@ pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()>
     }
     writeln!(
         out,
-        "{}: {} learned from {} slides of each by hand, {} bytes",
+        "{}: {} learned from {} of each by hand, {} bytes",
         args.out.display(),
         count(
             (collection.textures.len() - learned.left_out.len()) as u64,
             "texture"
         ),
-        args.trials,
+        count(args.trials, "slide"),
         bytes.len()
     )?;
     for name in &learned.left_out {

@@ -84,11 +84,11 @@ pub enum ContentError {
     #[error("{0} Hz; all of Tactus counts on {RATE_HZ} Hz")]
     PacRate(u32),
     /// A stream is too long.
-    #[error("{0} samples of {1} are more than a slide can have ({MAX_SAMPLES})")]
+    #[error("the samples of {1} are {0}, more than a slide can have ({MAX_SAMPLES})")]
     Samples(usize, &'static str),
     /// A stream is shorter than the steady part.
     #[error(
-        "{stream} has {samples} samples at {rate_hz} Hz and ends before the steady window does ({end_s} s)"
+        "{stream} (samples: {samples}, at {rate_hz} Hz) ends before the steady window does ({end_s} s)"
     )]
     EndsEarly {
         /// The stream.
@@ -181,11 +181,11 @@ pub enum ContentError {
     #[error("no material is listed")]
     NoMaterial,
     /// A material has another number of slides than the manifest.
-    #[error("n_slides is {0}, but {1} slides are listed under \"slides\"; they must agree")]
+    #[error("n_slides is {0}, but \"slides\" lists {1}; they must agree")]
     SlidesDisagree(usize, usize),
     /// The length of a file, its slides, and the values of a slide.
     #[error(
-        "bytes_raw is {0}, but {1} slides of {2} 16-bit values are not that many bytes; they must agree"
+        "bytes_raw is {0}, but slides ({1}) of {2} 16-bit values are not that many bytes; they must agree"
     )]
     LengthDisagrees(u64, usize, usize),
     /// A file is too long for the memory.
@@ -203,7 +203,7 @@ pub enum ContentError {
     #[error("before that of the row before; fetch the file again")]
     Before,
     /// More rows than a slide has.
-    #[error("more than {0} rows are no slide")]
+    #[error("a slide has fewer rows than {0}")]
     Rows(usize),
     /// A force, N.
     #[error("{0} N would tear the finger off; fetch the file again")]
@@ -223,14 +223,14 @@ pub enum ContentError {
     #[error("a second file of the fabric {0:?}; give each fabric one file and one name")]
     SecondFile(String),
     /// How many slides are listed, and may be at most.
-    #[error("{0} slides are listed; 1 to {1} can be: add some, or split the file")]
+    #[error("the slides listed are {0}, and 1 to {1} can be: add some, or split the file")]
     SlideCount(usize, usize),
     /// A third repetition.
     #[error("rep is {0}; the two repetitions are 0 and 1: correct the manifest")]
     Repetition(u8),
     /// Rows of a recording, its first value, and the most values of a file.
     #[error(
-        "{0} rows of 16 values from value {1} on: a recording has 1 row at least, and a file no more than {2} values; correct \
+        "the rows, {0} of 16 values from value {1} on: a recording has 1 row at least, and a file no more than {2} values; correct \
          the manifest"
     )]
     Span(u64, u64, u64),

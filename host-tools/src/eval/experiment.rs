@@ -18,6 +18,7 @@ use crate::data::fabricslide::{FabricSet, FabricSlide};
 use crate::data::properties::PropertyTable;
 use crate::data::replay::MeasuredSlide;
 use crate::eval::learn::{TableError, learn};
+use crate::eval::show::count;
 
 /// How slides are divided into training and test.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
@@ -47,7 +48,7 @@ const BLOCKED_ABOVE: u32 = 34;
 pub enum ExperimentError {
     /// Too few slides.
     #[error(
-        "{texture}, {movement}: {there} slides to train from, and --train-slides is {wanted}; ask for fewer"
+        "{texture}, {movement}: {} to train from, and --train-slides is {wanted}; ask for fewer", count(*there as u64, "slide")
     )]
     Training {
         /// Name of the texture.
@@ -90,7 +91,7 @@ pub enum ExperimentError {
     )]
     Missing(String),
     /// More movements than a table holds.
-    #[error("{0} movements; a table holds {max} at most", max = table::MAX_MOVEMENTS)]
+    #[error("too many movements, {0}; a table holds {max} at most", max = table::MAX_MOVEMENTS)]
     Movements(usize),
 }
 

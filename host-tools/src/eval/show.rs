@@ -275,8 +275,8 @@ impl<'t, W: Write> Show<'t, W> {
                     .map_or(String::new(), |odds| format!(" (log-odds {odds:+.1})"));
                 writeln!(
                     self.out,
-                    "\nIt is not one of the {} textures I know{odds} after {slides}; it is most like {name}.",
-                    self.table.textures()
+                    "\nIt is not one of the {} I know{odds} after {slides}; it is most like {name}.",
+                    count(self.table.textures(), "texture")
                 )
             }
             Told::Changed => writeln!(
@@ -325,7 +325,8 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
         table.crc()
     )?;
     if let Contents::Fused(set, features) = table.contents() {
-        writeln!(out, "{features} features: {}", set.name())?;
+        let features = count(features, "feature");
+        writeln!(out, "{features}: {}", set.name())?;
         return show_whitened(table, out);
     }
     for (movement, index) in table.movements().zip(0..) {

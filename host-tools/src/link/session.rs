@@ -51,7 +51,7 @@ pub enum LinkError {
     #[error("this is no table for the probe")]
     Table(#[from] TableError),
     /// More textures than the probe holds.
-    #[error("the table has {0} textures, the probe holds {MAX_TEXTURES}: learn fewer")]
+    #[error("the table's textures are {0}, the probe holds {MAX_TEXTURES}: learn fewer")]
     Textures(u16),
     /// The table in use became another one while it was read.
     #[error("the table was changed while it was read: read it again")]

@@ -13,6 +13,7 @@ use crate::data::recording::{PAC_RATE_HZ, Recording};
 use crate::data::recordings::{RecordingError, RecordingSet};
 use crate::data::replay::measure;
 use crate::eval::learn;
+use crate::eval::show::count;
 use crate::sim::collection::LearnError;
 use crate::sim::played::{Played, SHEAR_HZ};
 use crate::sim::rig::SimRig;
@@ -35,11 +36,11 @@ pub enum PlayError {
         number: u32,
     },
     /// Slides of other movements cannot be told apart while they are played.
-    #[error("the recordings have {0} movements; play those of one movement")]
+    #[error("the recordings are of {}; play those of one movement", count(*.0 as u64, "movement"))]
     Movements(usize),
     /// Nothing is left to learn from or to be tested with.
     #[error(
-        "{texture} has {there} slides; learning from {train} takes 2 or more, and one must be left"
+        "{texture} has {}; learning from {train} takes 2 or more, and one must be left", count(*there as u64, "slide")
     )]
     Slides {
         /// Name of the texture.

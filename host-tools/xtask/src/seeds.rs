@@ -234,7 +234,7 @@ pub(crate) fn seeds(options: &Options) -> Result<()> {
         .unwrap_or_else(|| scratch.with_extension("json"));
     std::fs::write(&file, format!("{summary:#}\n")).with_context(|| file.display().to_string())?;
     println!(
-        "{}, seeds {} to {}: {} runs, {failed} failed; {} right, {} wrong, {} undecided. {}",
+        "{}, seeds {} to {}: of {} {failed} failed; {} right, {} wrong, {} undecided. {}",
         what.name(),
         seeds.start(),
         seeds.end(),
@@ -246,7 +246,7 @@ pub(crate) fn seeds(options: &Options) -> Result<()> {
     );
     ensure!(
         failed == 0,
-        "{failed} of {} runs failed; they are listed above",
+        "runs that failed: {failed} of {}; they are listed above",
         ended.len()
     );
     Ok(())

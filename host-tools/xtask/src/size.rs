@@ -283,7 +283,7 @@ fn stack_text(stack: &Value, line: &mut impl FnMut(std::fmt::Arguments<'_>)) {
         let name = level.get("name").and_then(Value::as_str).unwrap_or("?");
         let deepest = number(level, "deepest");
         match level.get("runs").and_then(Value::as_u64) {
-            Some(runs) => line(format_args!("{deepest:>7}  {name}, {runs} runs")),
+            Some(runs) => line(format_args!("{deepest:>7}  {name}, runs: {runs}")),
             None => line(format_args!("{deepest:>7}  {name}")),
         }
     }

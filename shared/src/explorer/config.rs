@@ -110,7 +110,7 @@ impl Config {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum ExplorerError {
     /// The table has more textures than the explorer has room for.
-    #[error("the table has {textures} textures, and there is room for {capacity}")]
+    #[error("the textures of the table are {textures}, and there is room for {capacity}")]
     NoSpace {
         /// Textures of the table.
         textures: u16,

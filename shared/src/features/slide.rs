@@ -59,7 +59,7 @@ pub enum SlideError {
     },
     /// The steady window is shorter than one frame of the spectrum.
     #[error(
-        "the steady part has {0} samples, and the spectrum needs {FRAME}: slide longer or slower"
+        "the steady part is too short, {0} of the {FRAME} samples that the spectrum needs: slide longer or slower"
     )]
     TooShort(u32),
     /// The still finger was not measured before the slide, and its power is not known otherwise.
@@ -69,7 +69,7 @@ pub enum SlideError {
     #[error("P_AC never changed: is the sensor connected?")]
     Silent,
     /// So many samples between the background and the end of the slide were lost.
-    #[error("{0} samples were lost")]
+    #[error("samples were lost: {0}")]
     Gap(u32),
 }
 

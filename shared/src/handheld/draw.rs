@@ -317,7 +317,8 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
 /// The screens that take more than a few lines.
 impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
     fn ready(&mut self, textures: u16) -> Done<D> {
-        self.title("Tactus", &say(format_args!("{textures} textures")))?;
+        let ending = if textures == 1 { "" } else { "s" };
+        self.title("Tactus", &say(format_args!("{textures} texture{ending}")))?;
         // a finger on a surface
         self.fill(8, 16, 21, 17, false)?;
         self.disc(18, 32, 10, false)?;

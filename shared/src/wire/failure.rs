@@ -60,7 +60,7 @@ impl fmt::Display for TrainingError {
             ),
             Self::Trials(trials) => write!(
                 f,
-                "{trials} trials give no standard deviation: {LEAST_TRIALS} or more, 1 or more for a fused table"
+                "no standard deviation comes of so few trials, {trials}: {LEAST_TRIALS} or more, 1 or more for a fused table"
             ),
             Self::Textures => write!(f, "the table has {MAX_TEXTURES} textures: it is full"),
             Self::NoSpace(bytes) => write!(

@@ -405,7 +405,7 @@ fn what_a_rig_gets_over_by_itself_asks_nothing_of_a_person() {
         ),
         (
             Failure::Slide(Rejection::Slide(SlideError::Gap(3))),
-            "3 samples were lost",
+            "samples were lost: 3",
         ),
     ] {
         assert_eq!(super::text(why).as_str(), said);

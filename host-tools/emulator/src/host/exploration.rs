@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
+use tactus::eval::show::count;
 use tactus::link::Request;
 use tactus::link::follow::{ALLOWED, Agreement, Follower};
 use tactus::sim::played::PlayCounts;
@@ -338,17 +339,17 @@ impl Exploration {
         let counts = self.counts;
         check(
             counts.lost_samples == 0,
-            format!("{} samples lost", counts.lost_samples),
+            format!("{} lost", count(counts.lost_samples, "sample")),
         );
         check(
             counts.late_slots == 0,
-            format!("{} slots late", counts.late_slots),
+            format!("{} late", count(counts.late_slots, "slot")),
         );
         check(
             self.missed_slots() as u64 <= u64::from(counts.late_slots),
             format!(
-                "the sensor missed {} slots, the firmware tells of {}",
-                self.missed_slots(),
+                "the sensor missed {}, the firmware tells of {}",
+                count(self.missed_slots() as u64, "slot"),
                 counts.late_slots
             ),
         );
@@ -357,27 +358,29 @@ impl Exploration {
         let possible = self.commands.0..=self.commands.1 + u64::from(counts.late_slots) + 1;
         check(
             possible.contains(&slots),
-            format!("{slots} slots are told, the sensor saw {possible:?}"),
+            format!("slots told: {slots}, the sensor saw {possible:?}"),
         );
         check(
             counts.parity_errors == 0 && counts.error_frames == 0,
             format!(
-                "{} parity errors and {} error frames, and the sensor sent none",
-                counts.parity_errors, counts.error_frames
+                "{} and {}, and the sensor sent none",
+                count(counts.parity_errors, "parity error"),
+                count(counts.error_frames, "error frame")
             ),
         );
         check(
             counts.lost_reports == 0 && self.lost_reports == 0,
             format!(
-                "{} reports lost by the firmware's account, {} by the PC's",
-                counts.lost_reports, self.lost_reports
+                "{} lost by the firmware's account, {} by the PC's",
+                count(counts.lost_reports, "report"),
+                self.lost_reports
             ),
         );
         check(
             !self.slides.is_empty() && self.steps.len() == usize::from(self.found.slides),
             format!(
-                "{} slides made, {} observed, {} counted",
-                self.slides.len(),
+                "{} made, {} observed, {} counted",
+                count(self.slides.len() as u64, "slide"),
                 self.steps.len(),
                 self.found.slides
             ),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args as Arguments;
-use tactus::eval::show::Show;
+use tactus::eval::show::{Show, count};
 use tactus_core::table::Table;
 use tactus_core::wire::{Event, Identify, Phase, Report};
 
@@ -157,8 +157,8 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
         println!("{}.", explored.followed());
         if world.recording.is_some() {
             println!(
-                "{RECORDED_LIMITS} {} samples were clipped.",
-                explored.played.clipped
+                "{RECORDED_LIMITS} Clipped: {}.",
+                count(explored.played.clipped, "sample")
             );
         }
     } else {

@@ -7,7 +7,7 @@ use serde::Serialize;
 use tactus::eval::evaluate::Method;
 use tactus::eval::pictures::exploration::Exploration;
 use tactus::eval::pictures::timeline::{Timeline, Watch};
-use tactus::eval::show::Show;
+use tactus::eval::show::{Show, count};
 use tactus::eval::transcript::{Answer, Transcript};
 use tactus::link::Request;
 use tactus_core::explorer::Told;
@@ -161,7 +161,9 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
     if damaged + missing > 0 {
         writeln!(
             out,
-            "On the line {damaged} frames were damaged and {missing} reports lost."
+            "Damaged or lost on the line: {} and {}.",
+            count(damaged, "frame"),
+            count(missing, "report")
         )?;
     }
     if *format == Format::Json {

@@ -4,6 +4,7 @@ use std::io::{IsTerminal as _, Write};
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
+use tactus::eval::show::count;
 use tactus_core::table::Table;
 
 use super::bench::{Bench, read_answer};
@@ -88,7 +89,7 @@ pub(crate) fn replaced(old: &Table<'_>, new: Option<&Table<'_>>) -> String {
         .collect();
     let all = match old.textures() {
         1 => "the texture".to_owned(),
-        n => format!("{n} textures"),
+        n => count(n, "texture"),
     };
     match lost.as_slice() {
         [] => {

@@ -81,19 +81,40 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     };
     let counts = &status.counts;
     rows.extend([
-        ("table", format!(
-            "{}, {} bytes, checksum {:08x}{whose}",
-            count(status.textures, "texture"), status.table_bytes, status.table_crc
-        )),
-        ("acquisition", format!(
-            "{} slots; {} late, {} parity errors, {} error frames, {} samples lost",
-            counts.slots, counts.late_slots, counts.parity_errors, counts.error_frames, counts.lost_samples
-        )),
-        ("link", format!(
-            "probe: {} reports dropped, {} requests damaged; PC: {damaged} frames damaged, {missing} reports lost",
-            counts.lost_reports, counts.damaged_frames
-        )),
-        ("skin", format!("{joule:.1} J of sliding, {wear:.1} J of it wear")),
+        (
+            "table",
+            format!(
+                "{}, {} bytes, checksum {:08x}{whose}",
+                count(status.textures, "texture"),
+                status.table_bytes,
+                status.table_crc
+            ),
+        ),
+        (
+            "acquisition",
+            format!(
+                "{}; {} late, {}, {}, {} lost",
+                count(counts.slots, "slot"),
+                counts.late_slots,
+                count(counts.parity_errors, "parity error"),
+                count(counts.error_frames, "error frame"),
+                count(counts.lost_samples, "sample")
+            ),
+        ),
+        (
+            "link",
+            format!(
+                "probe: {} dropped, {} damaged; PC: {} damaged, {} lost",
+                count(counts.lost_reports, "report"),
+                count(counts.damaged_frames, "request"),
+                count(damaged, "frame"),
+                count(missing, "report")
+            ),
+        ),
+        (
+            "skin",
+            format!("{joule:.1} J of sliding, {wear:.1} J of it wear"),
+        ),
     ]);
     rows.extend(calibration_rows(&calibration));
     print_rows(&rows, out)

@@ -8,6 +8,7 @@ use tactus::eval::evaluate::Method;
 use tactus::eval::experiment::Experiment;
 use tactus::eval::lifelong::{self, Learning, Lifelong};
 use tactus::eval::novelty::{self, Novelty};
+use tactus::eval::show::count;
 use tactus::eval::verdicts::Verdicts;
 use tactus_core::explorer::Config;
 
@@ -66,7 +67,9 @@ pub(crate) fn leave_one_out(
     }
     writeln!(
         out,
-        "Every texture left out in turn, {protocol}, {train_slides} training slides, {runs} runs, seed {seed}"
+        "Every texture left out in turn, {protocol}, {}, {}, seed {seed}",
+        count(train_slides as u64, "training slide"),
+        count(runs, "run")
     )?;
     for after in &novelty.novelty {
         let slides = format!(
@@ -115,7 +118,9 @@ pub(crate) fn lifelong(
     }
     writeln!(
         out,
-        "A session in time order: {train_slides} slides to learn from, then episodes of one slide; {sessions} orders of the textures, seed {seed}"
+        "A session in time order: {} to learn from, then episodes of one slide; {} of the textures, seed {seed}",
+        count(train_slides as u64, "slide"),
+        count(sessions, "order")
     )?;
     for life in lifelong {
         let (who, uncertain) = match life.learning {

@@ -104,7 +104,7 @@ pub enum RecordingError {
         number: u32,
     },
     /// Asked for a texture that the set does not have.
-    #[error("{}: has {count} textures, there is none with index {index}", folder.display())]
+    #[error("{}: there is no texture with index {index}, but {count} in all", folder.display())]
     NoTexture {
         /// The folder of the set.
         folder: PathBuf,

@@ -26,7 +26,7 @@ pub enum NpyError {
     )]
     Odd(usize),
     /// Samples by the header, and in the file.
-    #[error("the .npy header says {0} samples, the file has {1}; fetch or record it again")]
+    #[error("samples by the .npy header: {0}; in the file: {1}; fetch or record it again")]
     Length(u64, usize),
 }
 

@@ -115,7 +115,7 @@ pub(super) fn corners(bench: &mut Bench) -> Result<(), BenchError> {
         {
             for uneven in [false, true] {
                 let slides = corner(&mut random, textures, set, *far || uneven, uneven);
-                let what = format!("{textures} textures by {}, uneven: {uneven}", set.name());
+                let what = format!("textures: {textures}, by {}, uneven: {uneven}", set.name());
                 for method in [Method::Fused, Method::Paper] {
                     let names: Vec<String> = (0..textures).map(|t| format!("t{t}")).collect();
                     let set = (method == Method::Fused).then_some(set);

@@ -199,7 +199,7 @@ impl Results {
         if let (Some(most), Some(median)) = (bars.median_slides, self.median_slides())
             && median > most
         {
-            missed.push(format!("{median} slides at the median, {most} wanted"));
+            missed.push(format!("slides at the median: {median}, {most} wanted"));
         }
         missed.extend(self.troubles());
         missed

@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 use tactus::eval::evaluate::Method;
+use tactus::eval::show::count;
 
 use super::explorations::{Bars, Results};
 use crate::host::exploration::{Exploration, FORCE_N, FORCE_SHARE, JITTER_US, SPEED_SHARE};
@@ -127,11 +128,11 @@ fn group(lines: &mut Vec<String>, results: &Results, bars: Bars) {
     }
     let largest = |of: fn(&Exploration) -> f64| results.verdicts().map(of).fold(0.0, f64::max);
     lines.push(format!(
-        "\n{} of {} right, {} slides at the median. Off at most: force {:.1} %, speed {:.2} %, slots {:.2} us; PC: features \
+        "\n{} of {} right, {} at the median. Off at most: force {:.1} %, speed {:.2} %, slots {:.2} us; PC: features \
          {:.1e}, posterior {:.1e}.",
         results.right(),
         results.explorations.len(),
-        results.median_slides().unwrap_or_default(),
+        count(results.median_slides().unwrap_or_default(), "slide"),
         largest(|e| e.force_error().1) * 100.0,
         largest(|e| e.speed_error()) * 100.0,
         largest(|e| e.jitter_us()),
@@ -140,7 +141,8 @@ fn group(lines: &mut Vec<String>, results: &Results, bars: Bars) {
     ));
     if results.name == "recordings" {
         let clipped: u32 = results.verdicts().map(|e| e.played.clipped).sum();
-        lines.push(format!("{RECORDED_LIMITS} {clipped} samples were clipped."));
+        let clipped = count(clipped, "sample");
+        lines.push(format!("{RECORDED_LIMITS} Clipped: {clipped}."));
     }
     let missed = results.missed(bars);
     lines.extend(missed.iter().map(|missed| format!("MISSED: {missed}")));

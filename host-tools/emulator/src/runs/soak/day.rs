@@ -168,7 +168,7 @@ pub(crate) fn day(virtual_s: f64, seed: u64, mut each: impl FnMut(f64)) -> Resul
     day.erases = store.map_or(0, |store| store.close().erases);
     if day.slots.0 != day.slots.1 {
         let (served, due) = day.slots;
-        day.missed.push(format!("{served} slots of {due}"));
+        day.missed.push(format!("slots served: {served} of {due}"));
     }
     if day.drift_ns.abs() >= SLOT_NS {
         day.missed.push(format!("clock off by {} ns", day.drift_ns));

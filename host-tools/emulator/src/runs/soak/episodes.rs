@@ -9,6 +9,7 @@ use rand::RngExt as _;
 use rand::seq::IndexedRandom as _;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
+use tactus::eval::show::count;
 use tactus::sim::collection::Collection;
 use tactus::sim::faults::Fault;
 use tactus_core::wire::Identify;
@@ -170,10 +171,10 @@ impl Episodes {
     pub(crate) fn text(&self) -> String {
         let broken = self.broken();
         format!(
-            "{} episodes, {} without a fault; of textures that it knew {} of {} right, {} wrong though sure; of those it had forgotten {} \
-             of {} noticed, {} wrong though sure; {} slides made again\n  {} faults, {} ended the episode; {} textures learned from the user, {} by itself, \
+            "{}, {} without a fault; of textures that it knew {} of {} right, {} wrong though sure; of those it had forgotten {} \
+             of {} noticed, {} wrong though sure; {} made again\n  {}, {} ended the episode; {} learned from the user, {} by itself, \
              {} forgotten",
-            self.made,
+            count(self.made, "episode"),
             self.sound,
             self.known.1,
             self.known.0,
@@ -181,10 +182,10 @@ impl Episodes {
             self.unknown.1,
             self.unknown.0,
             self.sure_and_wrong.1,
-            self.rejected.len(),
-            broken.came,
+            count(self.rejected.len() as u64, "slide"),
+            count(broken.came, "fault"),
             broken.noticed,
-            self.learned.0,
+            count(self.learned.0, "texture"),
             self.learned.1,
             self.forgotten
         )

@@ -1,6 +1,7 @@
 //! What became of an hour on the emulated board, and what it must be.
 
 use serde_json::{Value, json};
+use tactus::eval::show::count;
 use tactus::sim::rig::SimError;
 use tactus_core::table::TableError;
 use tactus_core::wire::Reset;
@@ -111,8 +112,8 @@ impl Hour {
             .map(|r| format!("{:?}", r.reset))
             .collect();
         format!(
-            "emulated board: {:.3} virtual hours over one boot\n  {}\n  clock {:.2} ms off; {} slots of {:.1} ({} by the sensor), {} \
-             late, {} missed, {} samples and {} reports lost\n  stack {} bytes at the quarters; {} sectors erased; force {:.3} N at most\n  \
+            "emulated board: {:.3} virtual hours over one boot\n  {}\n  clock {:.2} ms off; slots: {} of {:.1} ({} by the sensor), {} \
+             late, {} missed; {} and {} lost\n  stack {} bytes at the quarters; {} sectors erased; force {:.3} N at most\n  \
              {} resets, all on purpose: {}",
             self.virtual_s / 3600.0,
             self.episodes.text(),
@@ -122,8 +123,8 @@ impl Hour {
             self.slots.2,
             self.late_slots,
             self.missed_slots,
-            self.lost_samples,
-            self.lost_reports,
+            count(self.lost_samples, "sample"),
+            count(self.lost_reports, "report"),
             self.stack
                 .iter()
                 .map(u32::to_string)
@@ -149,8 +150,8 @@ pub(super) fn missed(hour: &Hour, virtual_s: f64) -> Vec<String> {
     check(
         f64::from(hour.episodes.sound) >= wanted.floor(),
         format!(
-            "{} episodes without a fault, {wanted:.0} wanted",
-            hour.episodes.sound
+            "{} without a fault, {wanted:.0} wanted",
+            count(hour.episodes.sound, "episode")
         ),
     );
     check(
@@ -160,7 +161,7 @@ pub(super) fn missed(hour: &Hour, virtual_s: f64) -> Vec<String> {
     let (told, due, seen) = hour.slots;
     check(
         (told as f64 - due).abs() <= SLOTS_OFF && (seen as f64 - told as f64).abs() <= SLOTS_OFF,
-        format!("{told} slots are told, {due:.1} are due, the sensor saw {seen}"),
+        format!("slots told: {told}, {due:.1} are due, the sensor saw {seen}"),
     );
     let lost = [
         (hour.late_slots, "slots late"),
