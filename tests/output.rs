@@ -351,3 +351,63 @@ fn an_evaluation_says_how_reliable_it_is_and_what_another_threshold_would_give()
             .all(|pair| number(&pair[0]["mean_slides"]) <= number(&pair[1]["mean_slides"]))
     );
 }
+
+#[test]
+fn a_table_has_a_report_as_text_as_an_object_and_as_a_page() {
+    let temp = tempfile::tempdir().unwrap();
+    let [table, page] = ["table", "page.html"].map(|name| temp.path().join(name));
+    let (table, page) = (path(&table), path(&page));
+    let learn = [
+        "learn",
+        "--recordings",
+        SIMULATED,
+        "--train-slides",
+        "2",
+        "--out",
+        table,
+    ];
+    assert!(tactus(&learn).status.success());
+    let report = ["report", table, "--recordings", SIMULATED, "--out", page];
+    let object: Vec<&str> = report.into_iter().chain(["--format", "json"]).collect();
+    let object = json(&object, 0);
+    let textures = object["textures"].as_array().unwrap();
+    assert_eq!(textures.len(), 6);
+    let verdicts = &object["recorded"]["known"];
+    let shares = ["right", "changed", "new", "wrong", "undecided"];
+    let sum: f64 = shares
+        .iter()
+        .map(|name| verdicts[name].as_f64().unwrap())
+        .sum();
+    assert!((sum - 1.0).abs() < 1e-9, "{verdicts}");
+    // of three slides two were learned from: every exploration has three slides at most, one a movement
+    for texture in textures {
+        let slides = texture["recorded"]["mean_slides"].as_f64().unwrap();
+        assert!((1.0..=3.0).contains(&slides), "{texture}");
+        assert!(texture["nearest"]["taken_for"].as_f64().unwrap() <= 1.0);
+    }
+    let text = String::from_utf8(tactus(&report).stdout).unwrap();
+    assert!(
+        text.contains("What users would be told, by 150 explorations"),
+        "{text}"
+    );
+    assert!(text.contains("What would help:"), "{text}");
+    // well-formed, complete, and the map is in it
+    let html = std::fs::read_to_string(page).unwrap();
+    let html = html.strip_prefix("<!DOCTYPE html>").unwrap_or(&html);
+    let html = roxmltree::Document::parse(html.trim()).unwrap();
+    let has = |id: &str| html.descendants().any(|n| n.attribute("id") == Some(id));
+    assert!(
+        ["advice", "recorded", "textures", "movements"]
+            .into_iter()
+            .all(has)
+    );
+    let rows = html.descendants().filter(|n| n.has_tag_name("tr")).count();
+    assert_eq!(rows, 2 + 7);
+    assert!(html.descendants().any(|n| n.tag_name().name() == "svg"));
+    let lines = html.descendants().filter(|n| n.has_tag_name("li")).count();
+    assert_eq!(lines, 3 + object["advice"].as_array().unwrap().len());
+    // without recordings there is nothing that users would be told
+    assert!(json(&["report", table, "--format", "json"], 0)["recorded"].is_null());
+    let lost = said(&["report", table, "--recordings", "nowhere"], 1);
+    assert!(lost.contains("nowhere: no such folder"), "{lost}");
+}

@@ -14,6 +14,7 @@ mod names;
 mod output;
 mod plot;
 mod progress;
+mod report;
 mod simulate;
 mod study;
 mod table;
@@ -47,6 +48,7 @@ enum Command {
     Learn(learn::Args),
     #[command(subcommand)]
     Table(table::Command),
+    Report(report::Args),
     Identify(identify::Args),
     Evaluate(evaluate::Args),
     Gauge(gauge::Args),
@@ -86,6 +88,7 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         Some(Command::Features(args)) => features::run(&args, out)?,
         Some(Command::Learn(args)) => learn::run(&args, out)?,
         Some(Command::Table(command)) => table::run(&command, out)?,
+        Some(Command::Report(args)) => report::run(&args, out)?,
         Some(Command::Identify(args)) => done = identify::run(&args, out)?,
         Some(Command::Evaluate(args)) => evaluate::run(&args, out)?,
         Some(Command::Gauge(args)) => gauge::run(&args, out)?,

@@ -10,9 +10,12 @@ pub mod gauge;
 pub mod learn;
 pub mod lifelong;
 pub mod novelty;
+#[cfg(feature = "study")]
+pub mod page;
 #[cfg(feature = "plots")]
 pub mod pictures;
 pub mod reliability;
+pub mod report;
 pub mod show;
 pub mod table_summary;
 pub mod transcript;

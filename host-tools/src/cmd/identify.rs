@@ -1,6 +1,5 @@
 //! `tactus identify`: an exploration shown step by step, on recordings and on the simulated rig.
 
-use std::collections::HashMap;
 use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -23,13 +22,13 @@ use tactus::sim::collection::{Collection, calibrated, texture_name};
 use tactus::sim::rig::SimRig;
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{self, Config, Explorer};
-use tactus_core::features::{Movement, Observation};
+use tactus_core::features::Observation;
 use tactus_core::probe::explore::{ExplorationStep, ExploreError, Rejection, explore};
 use tactus_core::rig::Rig;
 use tactus_core::table::Table;
 
 use super::args::{Recordings, Stop};
-use super::learn::{at_least_two, learn_first};
+use super::learn::{at_least_two, learned_here};
 use super::output::{Done, Format, print_json};
 use super::plot::{Canvas, Plot};
 use super::progress::with_progress;
@@ -158,21 +157,8 @@ fn identify_recorded(
     let (_, measured) = measure_folder(folder)?;
     let mut shown = set.load_texture(index)?;
     let table = if let Some((file, table)) = given {
-        // a table learned from this very folder has seen the first slides of every movement
-        let cells = (0..table.textures())
-            .flat_map(|texture| (0..).zip(table.movements()).map(move |(m, _)| (texture, m)));
-        let trials = cells.map(|(texture, movement)| table.trials(texture, movement));
-        let trials = trials.max().unwrap_or(0).into();
-        let learned_as = Method::of(explorer::Method::of(table.contents()));
-        let own = learn_first(&set, &measured, trials, learned_as, None);
-        if own.is_ok_and(|own| own == table.as_bytes()) {
-            let mut seen: HashMap<Movement, usize> = HashMap::new();
-            shown.retain(|slide| {
-                let before = seen.entry(slide.movement).or_default();
-                *before += 1;
-                *before > trials
-            });
-        }
+        let mut first = learned_here(&set, &measured, table);
+        shown.retain(|slide| !first.is_one(name, slide.movement));
         ensure!(
             !shown.is_empty(),
             "{}: learned from every slide of {name} here; none is left to present",

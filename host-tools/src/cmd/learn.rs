@@ -1,5 +1,6 @@
 //! `tactus learn` and `tactus learn-by-hand`: tables of textures from slides.
 
+use std::collections::HashMap;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -10,6 +11,7 @@ use tactus::data::replay::MeasuredSlide;
 use tactus::eval::evaluate::Method;
 use tactus::eval::show::count;
 use tactus::sim::collection::texture_name;
+use tactus_core::explorer;
 use tactus_core::features::{FeatureSet, Movement, Observation};
 use tactus_core::table::Table;
 
@@ -183,6 +185,40 @@ pub(crate) fn at_least_two(slides: usize) -> anyhow::Result<()> {
         "--train-slides {slides}: how slides of one texture differ takes at least two slides"
     );
     Ok(())
+}
+
+/// The slides of a folder that a table has seen: the first of every texture and movement, if it was learned from this folder.
+pub(crate) struct LearnedHere {
+    first: usize,
+    met: HashMap<(String, Movement), usize>,
+}
+
+impl LearnedHere {
+    /// Whether the next slide of this texture and movement, in the order of time, is one of them.
+    pub(crate) fn is_one(&mut self, texture: &str, movement: Movement) -> bool {
+        let before = self.met.entry((texture.to_owned(), movement)).or_default();
+        *before += 1;
+        *before <= self.first
+    }
+}
+
+/// Which slides of this folder the table was learned from.
+pub(crate) fn learned_here(
+    set: &RecordingSet,
+    measured: &[Vec<MeasuredSlide>],
+    table: Table<'_>,
+) -> LearnedHere {
+    let cells = (0..table.textures())
+        .flat_map(|texture| (0..).zip(table.movements()).map(move |(m, _)| (texture, m)));
+    let trials = cells.map(|(texture, movement)| table.trials(texture, movement));
+    let trials = trials.max().unwrap_or(0).into();
+    let learned_as = Method::of(explorer::Method::of(table.contents()));
+    let own = learn_first(set, measured, trials, learned_as, None);
+    let is_own = own.is_ok_and(|own| own == table.as_bytes());
+    LearnedHere {
+        first: if is_own { trials } else { 0 },
+        met: HashMap::new(),
+    }
 }
 
 /// The table learned from the first slides of every texture and movement: so many, or all where there are fewer.

@@ -21,6 +21,8 @@ pub struct Alike {
     pub force_n: f32,
     /// Its speed.
     pub speed_mm_s: f32,
+    /// Slides of that movement that leave less than 1 % to chance; `None` where it is more than ten.
+    pub slides: Option<u8>,
     /// Whether ten slides of that movement would leave more than 1 % to chance.
     pub feels_the_same: bool,
 }
@@ -28,18 +30,24 @@ pub struct Alike {
 /// The texture that slides of `texture` would be taken for most often; `None` where there is no other to compare with.
 pub fn nearest(table: Table<'_>, texture: u16) -> Option<Alike> {
     let others = (0..table.textures()).filter(|&other| other != texture);
-    let compared = others.filter_map(|other| {
-        let (movement, taken_for) = compare(table, [texture, other])?;
-        Some((other, movement, taken_for))
-    });
-    let (other, movement, taken_for) = compared.max_by(|a, b| a.2.total_cmp(&b.2))?;
+    let compared = others.filter_map(|other| alike(table, texture, other));
+    compared.max_by(|a, b| a.taken_for.total_cmp(&b.taken_for))
+}
+
+/// How slides of `texture` would be taken for another one's; `None` where no movement was learned of both.
+pub fn alike(table: Table<'_>, texture: u16, other: u16) -> Option<Alike> {
+    let (movement, deviation) = compare(table, [texture, other])?;
     let movement: Movement = table.movement(movement)?;
+    // the mean of n slides deviates by sqrt(n) less
+    let slides = (SURE / deviation.min(0.0)).powi(2).ceil();
+    let slides = (slides <= SLIDES).then_some(slides as u8);
     Some(Alike {
         texture: table.name(other)?.to_owned(),
-        taken_for,
+        taken_for: normal_below(deviation),
         force_n: movement.force_n(),
         speed_mm_s: movement.speed_mm_s(),
-        feels_the_same: taken_for > normal_below(-SURE / SLIDES.sqrt()),
+        slides,
+        feels_the_same: slides.is_none(),
     })
 }
 
@@ -55,7 +63,7 @@ struct Apart {
     preferred: f64,
 }
 
-/// The movement that tells two textures apart best, and the share of slides that it would leave to be taken for the other's.
+/// The movement that tells two textures apart best, and the normal deviation below which slides would be taken for the other's.
 ///
 /// A slide goes to the nearer mean, so that the share is Phi(-d/2) where the means are d apart. Means of few slides are further
 /// apart than the textures are, by chance: their difference over all movements and features is shrunk as James and Stein
@@ -73,10 +81,7 @@ fn compare(table: Table<'_>, textures: [u16; 2]) -> Option<(u8, f64)> {
         .iter()
         .map(|a| {
             let off = kept * a.square + 2.0 * a.preferred;
-            (
-                a.movement,
-                normal_below(-off / (a.square * (4.0 + a.variance)).sqrt()),
-            )
+            (a.movement, -off / (a.square * (4.0 + a.variance)).sqrt())
         })
         .min_by(|a, b| a.1.total_cmp(&b.1))
 }

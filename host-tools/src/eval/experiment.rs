@@ -339,6 +339,25 @@ impl Experiment {
         })
     }
 
+    /// Slides to show to a table that is there, per texture and movement; none of them is to be learned from.
+    pub fn shown(
+        names: Vec<String>,
+        movements: Vec<Movement>,
+        slides: Vec<Vec<Vec<Observation>>>,
+        seed: u64,
+    ) -> Self {
+        let pool = |slides| Pool {
+            train: Vec::new(),
+            test: Some(slides),
+        };
+        let pools = slides.into_iter();
+        let pools = pools.map(|texture| texture.into_iter().map(pool).collect());
+        Self {
+            all: true,
+            ..Self::of(names, movements, pools.collect(), 0, seed)
+        }
+    }
+
     #[cfg(feature = "fabrics")]
     /// Fabrics, learned from all slides of one repetition and tested on the other.
     ///

@@ -12,13 +12,11 @@ mod signals;
 mod summary;
 mod training;
 
-use minijinja::Environment;
-use minijinja::syntax::SyntaxConfig;
-use minijinja::value::Serde;
 use serde_json::json;
 
 use super::results::Study;
 pub use crate::eval::chart::{DrawError, curves};
+use crate::eval::page::render;
 pub use error::ReportError;
 pub use folder::Folder;
 use model::Report;
@@ -49,7 +47,9 @@ pub fn write(study: &Study, folder: Folder) -> Result<(), ReportError> {
     put("study.json", json(study)?.as_bytes())?;
     put(
         "report.html",
-        page(&report).map_err(ReportError::Page)?.as_bytes(),
+        render(include_str!("report/page.html"), &report)
+            .map_err(ReportError::Page)?
+            .as_bytes(),
     )?;
     folder.finish()
 }
@@ -92,16 +92,4 @@ fn report(study: &Study) -> Result<Report, DrawError> {
     }
     summary::add(study, &mut report);
     Ok(report)
-}
-
-/// The page: HTML that needs no other file and no script. It is well-formed XML as well, so that a small parser can check it.
-fn page(report: &Report) -> Result<String, minijinja::Error> {
-    let lines = SyntaxConfig::builder()
-        .trim_blocks(true)
-        .lstrip_blocks(true)
-        .build()?;
-    let mut templates = Environment::new();
-    templates.set_syntax(lines);
-    templates.add_template("page.html", include_str!("report/page.html"))?;
-    templates.get_template("page.html")?.render(Serde(report))
 }

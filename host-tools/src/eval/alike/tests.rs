@@ -139,7 +139,8 @@ fn said_and_seen(learn: Learn, features: usize, apart: [f64; 3], trials: [u8; 2]
         let pair = Pair::new(features, apart, random);
         let (bytes, length) = learn(&pair, trials, random);
         let table = Table::read(&bytes[..length]).unwrap();
-        let (movement, share) = compare(table, [0, 1]).unwrap();
+        let (movement, deviation) = compare(table, [0, 1]).unwrap();
+        let share = normal_below(deviation);
         said += share;
         for _ in 0..SLIDES {
             let slide = pair.slide(0, movement.into(), random);

@@ -1,0 +1,375 @@
+//! What a table is good for: how well its textures are told apart, what recorded slides make of it, and what would help.
+
+use rayon::prelude::*;
+use serde::Serialize;
+use tactus_core::explorer::{self, Config};
+use tactus_core::features::{Observation, WHITE_STEPS};
+use tactus_core::table::{Contents, Table};
+
+use crate::data::replay::MeasuredSlide;
+use crate::eval::alike::{Alike, alike, nearest};
+use crate::eval::evaluate::{EvaluateError, Method, Shared, explorer, play};
+use crate::eval::experiment::Experiment;
+use crate::eval::show::count;
+use crate::eval::table_summary::TableSummary;
+use crate::eval::verdicts::Verdicts;
+
+/// Explorations for each texture of recordings.
+pub const RUNS: u64 = 25;
+/// Fewest slides that a texture should be learned from.
+const ENOUGH: u8 = 3;
+/// A pair whose slides are taken for each other's less often is not worth a line.
+const WORTH_SAYING: f64 = 0.01;
+/// Most pairs that are listed.
+const PAIRS: usize = 20;
+/// Recorded slides whose mean is so many standard deviations of the mean away say that a texture is not as it was learned.
+const MOVED: f64 = 3.0;
+/// A slide of a texture that scatters so much more than others do says less than the table believes.
+const WIDE: f64 = 1.5;
+
+/// A table, and what it is good for.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Report {
+    /// What stands in it.
+    pub table: TableSummary,
+    /// The textures, in the order of the table.
+    pub textures: Vec<TextureReport>,
+    /// Textures that slides are taken for most often, most often first.
+    pub pairs: Vec<Pair>,
+    /// What recordings made of it, where there are some.
+    pub recorded: Option<Recorded>,
+    /// What would help, in words.
+    pub advice: Vec<String>,
+}
+
+/// A texture of the table.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct TextureReport {
+    /// Its name.
+    pub name: String,
+    /// Slides it was learned from at each movement, in the order of the movements.
+    pub trials: Vec<u8>,
+    /// The texture that it is most like.
+    pub nearest: Option<Alike>,
+    /// What recordings make of it.
+    pub recorded: Option<RecordedTexture>,
+}
+
+/// Two textures that are taken for each other.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Pair {
+    /// The texture that is touched ...
+    pub texture: String,
+    /// ... and what it is taken for.
+    #[serde(flatten)]
+    pub other: Alike,
+}
+
+/// What recorded slides make of a table.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Recorded {
+    /// Explorations of textures that the table has.
+    pub explorations: usize,
+    /// What a user would have been told of them.
+    pub known: Verdicts,
+    /// What of textures that the table does not have; `None`: the recordings have no others.
+    pub unknown: Option<Verdicts>,
+    /// Mean number of slides until then, of the known ones.
+    pub mean_slides: f64,
+    /// Textures of the recordings that the table does not have.
+    pub not_in_table: Vec<String>,
+}
+
+/// What recorded slides make of one texture.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct RecordedTexture {
+    /// What a user would have been told.
+    pub verdicts: Verdicts,
+    /// Mean number of slides until then.
+    pub mean_slides: f64,
+    /// Scatter of its slides, 1 where it is as in all textures together; of a table of whitened features.
+    pub spread: Option<f64>,
+    /// How far their mean is from the table's, in standard deviations of that difference, root mean square over features and
+    /// movements: about 1 where nothing changed.
+    pub moved: Option<f64>,
+}
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The table cannot be explored.
+    #[error(transparent)]
+    Evaluate(#[from] EvaluateError),
+    /// Nothing in common.
+    #[error(
+        "none of the recorded textures has slides at all movements of the table; record with this table on the probe"
+    )]
+    NothingToPlay,
+}
+
+/// Slides of a texture that is in the recordings.
+#[derive(Clone, Debug)]
+pub struct Slides {
+    /// Its name.
+    pub name: String,
+    /// Its slides, but those that the table was learned from.
+    pub slides: Vec<MeasuredSlide>,
+}
+
+impl Report {
+    /// Of a table, and of recorded slides if there are any.
+    ///
+    /// # Errors
+    /// See [`ReportError`].
+    pub fn new(
+        table: Table<'_>,
+        slides: Option<&[Slides]>,
+        seed: u64,
+        done: impl Fn() + Sync,
+    ) -> Result<Self, ReportError> {
+        let textures = (0..table.textures()).map(|texture| TextureReport {
+            name: table.name(texture).unwrap_or_default().to_owned(),
+            trials: (0..)
+                .zip(table.movements())
+                .map(|(m, _)| table.trials(texture, m))
+                .collect(),
+            nearest: nearest(table, texture),
+            recorded: None,
+        });
+        let mut report = Self {
+            table: TableSummary::new(table),
+            textures: textures.collect(),
+            pairs: pairs(table),
+            recorded: None,
+            advice: Vec::new(),
+        };
+        if let Some(slides) = slides {
+            report.play(table, slides, seed, done)?;
+        }
+        report.advice = advice(&report);
+        Ok(report)
+    }
+
+    /// Explores recorded slides, each once, as `tactus identify --table` does.
+    fn play(
+        &mut self,
+        table: Table<'_>,
+        slides: &[Slides],
+        seed: u64,
+        done: impl Fn() + Sync,
+    ) -> Result<(), ReportError> {
+        let at = |texture: &Slides| -> Vec<Vec<Observation>> {
+            let of = |movement| {
+                let same = texture
+                    .slides
+                    .iter()
+                    .filter(move |s| s.movement == movement);
+                same.map(|s| Observation::from(&s.measurement)).collect()
+            };
+            table.movements().map(of).collect()
+        };
+        let is_whole = |texture: &&Slides| at(texture).iter().all(|slides| !slides.is_empty());
+        let whole: Vec<&Slides> = slides.iter().filter(is_whole).collect();
+        if whole.is_empty() {
+            return Err(ReportError::NothingToPlay);
+        }
+        let observed: Vec<_> = whole.iter().map(|texture| at(texture)).collect();
+        let names: Vec<String> = whole.iter().map(|texture| texture.name.clone()).collect();
+        let movements = table.movements().collect();
+        let experiment = Experiment::shown(names, movements, observed.clone(), seed);
+        let experiment = experiment.each_slide_once();
+        let method = Method::of(explorer::Method::of(table.contents()));
+        let config = Config {
+            method: method.method(),
+            strategy: method.strategy(),
+            open: true,
+            ..Config::default()
+        };
+        let measured = whole.iter().flat_map(|texture| &texture.slides);
+        let measured = measured.fold(experiment.measured(), |set, s| {
+            set.and(s.measurement.properties.measured())
+        });
+        let explorer = explorer(table.as_bytes(), measured, config, None)?;
+        let shared = Shared::new(explorer, config.strategy);
+        let outcomes: Vec<_> = (0..RUNS * whole.len() as u64)
+            .into_par_iter()
+            .map_init(
+                || shared.explorer.clone(),
+                |explorer, run| {
+                    let run = experiment.run(run);
+                    let outcome = play(explorer, shared.confusions.as_ref(), config.strategy, run);
+                    done();
+                    outcome
+                },
+            )
+            .collect();
+        let known = |at: usize| table.find(&whole[at].name);
+        let told = |of: &dyn Fn(usize) -> bool| {
+            let of: Vec<_> = outcomes.iter().filter(|o| of(o.unknown)).collect();
+            let told = of.iter().map(|o| {
+                let is_right = known(o.unknown).map(usize::from) == Some(o.identified);
+                (o.told, is_right)
+            });
+            let slides: f64 = of.iter().map(|o| f64::from(o.slides)).sum();
+            (
+                Verdicts::of(told),
+                slides / of.len().max(1) as f64,
+                of.len(),
+            )
+        };
+        for (at, texture) in whole.iter().enumerate() {
+            let Some(texture) = table.find(&texture.name) else {
+                continue;
+            };
+            let (verdicts, mean_slides, _) = told(&|unknown| unknown == at);
+            let (spread, moved) = scatter(table, texture, &observed[at]).unzip();
+            if let Some(report) = self.textures.get_mut(usize::from(texture)) {
+                report.recorded = Some(RecordedTexture {
+                    verdicts,
+                    mean_slides,
+                    spread,
+                    moved,
+                });
+            }
+        }
+        let (verdicts, mean_slides, explorations) = told(&|at| known(at).is_some());
+        let (unknown, _, others) = told(&|at| known(at).is_none());
+        let missing = |at: &usize| known(*at).is_none();
+        self.recorded = Some(Recorded {
+            explorations,
+            known: verdicts,
+            unknown: (others > 0).then_some(unknown),
+            mean_slides,
+            not_in_table: (0..whole.len())
+                .filter(missing)
+                .map(|at| whole[at].name.clone())
+                .collect(),
+        });
+        Ok(())
+    }
+}
+
+/// Pairs that are worth a line.
+fn pairs(table: Table<'_>) -> Vec<Pair> {
+    let all = (0..table.textures()).flat_map(|a| {
+        (0..table.textures())
+            .filter(move |b| *b != a)
+            .map(move |b| (a, b))
+    });
+    let mut pairs: Vec<Pair> = all
+        .filter_map(|(a, b)| {
+            let other = alike(table, a, b).filter(|other| other.taken_for >= WORTH_SAYING)?;
+            let texture = table.name(a)?.to_owned();
+            Some(Pair { texture, other })
+        })
+        .collect();
+    pairs.sort_by(|a, b| b.other.taken_for.total_cmp(&a.other.taken_for));
+    pairs.truncate(PAIRS);
+    pairs
+}
+
+/// Scatter of slides about their own mean, and how far that is from the table's. One slide a movement says nothing of scatter.
+fn scatter(table: Table<'_>, texture: u16, slides: &[Vec<Observation>]) -> Option<(f64, f64)> {
+    let Contents::Fused(set, length) = table.contents() else {
+        return None;
+    };
+    let (mut within, mut freedoms, mut away, mut features) = (0.0, 0.0, 0.0, 0.0);
+    for (movement, slides) in (0..).zip(slides) {
+        let n = f64::from(table.trials(texture, movement));
+        let white: Vec<Vec<f64>> = slides
+            .iter()
+            .filter_map(|slide| {
+                let white = table.whiten(movement, &slide.vector(set, length.into())?)?;
+                Some(
+                    white
+                        .iter()
+                        .map(|&z| f64::from(z) / f64::from(WHITE_STEPS))
+                        .collect(),
+                )
+            })
+            .collect();
+        let k = white.len() as f64;
+        if k < 2.0 || n == 0.0 {
+            continue;
+        }
+        for (i, learned) in table.white_mean(texture, movement).enumerate() {
+            let learned = f64::from(learned) / f64::from(WHITE_STEPS);
+            let of = || white.iter().filter_map(|z| z.get(i));
+            let mean = of().sum::<f64>() / k;
+            within += of().map(|z| (z - mean).powi(2)).sum::<f64>();
+            freedoms += k - 1.0;
+            away += (mean - learned).powi(2) / (1.0 / k + 1.0 / n);
+            features += 1.0;
+        }
+    }
+    (features > 0.0).then(|| ((within / freedoms).sqrt(), (away / features).sqrt()))
+}
+
+/// What would help whoever uses the table.
+fn advice(report: &Report) -> Vec<String> {
+    let mut advice = Vec::new();
+    let mut told: Vec<(&str, &str)> = Vec::new();
+    for Pair { texture, other } in &report.pairs {
+        let (a, b) = (texture.as_str(), other.texture.as_str());
+        if told.contains(&(b, a)) {
+            continue;
+        }
+        told.push((a, b));
+        let share = format!("{:.0} %", 100.0 * other.taken_for);
+        match other.slides {
+            None => advice.push(format!(
+                "{a} and {b} cannot be told apart with these movements: {share} of the slides of {a} would be taken for {b}, and \
+                 ten slides do not settle it. Give them one name, or learn them at another movement."
+            )),
+            Some(n @ 4..) => advice.push(format!(
+                "{a} and {b} take about {} to tell apart; more trials of both would help.",
+                count(n, "slide")
+            )),
+            Some(_) => {}
+        }
+    }
+    for few in 0..ENOUGH {
+        let fewest = |t: &&TextureReport| t.trials.iter().min() == Some(&few);
+        let names = report
+            .textures
+            .iter()
+            .filter(fewest)
+            .map(|t| t.name.as_str());
+        let names: Vec<&str> = names.collect();
+        if !names.is_empty() {
+            advice.push(format!(
+                "Learned from {} of a movement: {}. Five make a texture much surer: record more, or teach it again.",
+                if few == 0 { "no slide".to_owned() } else { count(few, "slide") },
+                names.join(", ")
+            ));
+        }
+    }
+    for texture in &report.textures {
+        let name = &texture.name;
+        let Some(recorded) = texture.recorded else {
+            continue;
+        };
+        if let Some(moved) = recorded.moved.filter(|moved| *moved > MOVED) {
+            advice.push(format!(
+                "{name} is not as it was learned: the mean of its recorded slides is off by {moved:.1} times what chance explains. \
+                 If finger or sample changed, learn it again."
+            ));
+        }
+        if let Some(spread) = recorded.spread.filter(|spread| *spread > WIDE) {
+            advice.push(format!(
+                "Slides of {name} scatter {spread:.1} times as much as the table expects: it may differ from place to place. \
+                 Learn it from more places of the sample."
+            ));
+        }
+    }
+    if report.table.movements.len() == 1 && report.table.textures.len() > 1 {
+        advice.push(
+            "The table has one movement, so there is nothing to choose: a second one, at another force and speed, tells more."
+                .to_owned(),
+        );
+    }
+    advice
+}
+
+#[cfg(test)]
+mod tests;
