@@ -287,7 +287,7 @@ fn new_materials_are_noticed_and_a_session_is_followed() {
         told.0.new >= 0.8 && told.0.right == 0.0 && told.1.right >= 0.9,
         "{told:?}"
     );
-    assert!(after[1].detections >= 0.80 && after[1].false_alarms <= 0.03);
+    assert!(after[1].unknown.noticed() >= 0.80 && after[1].known.new <= 0.03);
     let drift = recorded(&folder, Protocol::Drift, 5);
     let lives = lifelong(&drift, config, 10, 1, || ()).unwrap();
     println!("{lives:?}");

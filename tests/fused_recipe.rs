@@ -417,6 +417,93 @@ fn known_changed_and_new_are_told_apart() {
     }
 }
 
+/// A table that the product learns has the limits of the recipe, as far as draws go, and tells the same.
+#[test]
+fn a_learned_table_is_calibrated_as_the_recipe_says() {
+    use tactus_core::explorer::{Config, Explorer, Method, Told as Product};
+    use tactus_core::features::{Movement, Observation, Properties, PropertySet};
+    use tactus_core::table::Table;
+    let (textures, d) = (19, 13);
+    let mut random = Random::new(11, 0);
+    let mut normals =
+        |sd: f64| -> Vec<f64> { (0..d).map(|_| sd * verdicts::normal(&mut random)).collect() };
+    let means: Vec<Vec<f64>> = (0..textures).map(|_| normals(0.5)).collect();
+    // neighbouring bands scatter together
+    let mut slide = |texture: usize, off: f64| -> Vec<f64> {
+        let (own, away) = (normals(0.12), normals(off));
+        let of = |i: usize| own[i] + 0.8 * own[i.saturating_sub(1)] + away[i] + means[texture][i];
+        let x: Vec<f64> = (0..d).map(of).collect();
+        let traction = 0.7 + 0.2 * x[0];
+        let x = std::iter::once(traction).chain(x[1..].iter().copied());
+        x.map(|x| (x * 1024.0).round() / 1024.0).collect()
+    };
+    let observed = |x: &Vec<f64>| Observation {
+        properties: Properties::new([Some(x[0] as f32), None, None]),
+        bands: x[1..].iter().map(|x| (x * 1024.0) as i16).collect(),
+        pressure: None,
+    };
+    let training: Session = (0..textures)
+        .map(|texture| (0..5).map(|_| slide(texture, 0.0)).collect())
+        .collect();
+    let judge = Judge::learn(&training, Drift::USUAL);
+    let slides: Vec<Vec<Vec<Observation>>> = training
+        .iter()
+        .map(|slides| vec![slides.iter().map(observed).collect()])
+        .collect();
+    let names: Vec<String> = (0..textures).map(|t| t.to_string()).collect();
+    let movements = [Movement::FOR_TRACTION];
+    let bytes = tactus::eval::learn::learn(Method::Fused, None, &names, &movements, &slides);
+    let bytes = bytes.unwrap();
+    let table = Table::read(&bytes).unwrap();
+    let limits = table.limits().unwrap();
+    for (which, tails) in [limits.drifted, limits.same].into_iter().enumerate() {
+        for (tail, [begin, excess]) in tails.into_iter().zip(judge.limits[which]) {
+            let limit = f64::from(tail.begin) + f64::from(tail.excess) * 10f64.ln();
+            let expected = begin + excess * 10f64.ln();
+            println!("limit {limit:.2}, the recipe's {expected:.2}");
+            // both scatter by 0.15 or so
+            assert!((limit - expected).abs() < 0.9, "{limit} {expected}");
+        }
+    }
+    let config = Config {
+        method: Method::Fused,
+        open: true,
+        // alpha is half of what comes
+        false_alarm: Some(0.02),
+        ..Config::default()
+    };
+    let mut explorer = Explorer::<32>::new(table, PropertySet::ALL, config).unwrap();
+    let action = explorer.choose(&explorer.expected_outcomes(), 0);
+    let (mut same, mut all, mut kinds) = (0, 0, [0; 4]);
+    for run in 0..600 {
+        let off = [0.0, 0.1, 0.25, 0.6][run % 4];
+        explorer.restart();
+        let mut mean = vec![0.0; d];
+        for k in 1..=3 {
+            let x = slide(run % textures, off);
+            explorer.observe(action, &observed(&x)).unwrap();
+            for (mean, z) in mean.iter_mut().zip(judge.z(&x)) {
+                *mean += (z - *mean) / k as f64;
+            }
+            let (told, best) = judge.tell(&mean, k, 0.01);
+            let here = explorer.best();
+            let kind = match here.told() {
+                Product::New => Told::New,
+                Product::Changed => Told::Changed,
+                Product::Sure => Told::Sure,
+                Product::Undecided => Told::Undecided,
+            };
+            kinds[kind as usize] += 1;
+            all += 1;
+            let named = matches!(told, Told::New) || usize::from(here.texture) == best;
+            same += usize::from(kind == told && named);
+        }
+    }
+    println!("{same} of {all} told alike, {kinds:?}");
+    assert!(same as f64 >= 0.95 * all as f64, "{same} of {all}");
+    assert!(kinds[..3].iter().all(|count| *count > 100), "{kinds:?}");
+}
+
 /// The results of a session whose episodes have one slide each.
 #[derive(Clone, Debug)]
 struct Lived {

@@ -1,6 +1,7 @@
 //! Texture tables learned from recorded slides, and how well they tell textures apart.
 
 pub mod alike;
+mod calibrate;
 #[cfg(feature = "plots")]
 pub mod chart;
 pub mod courses;

@@ -35,8 +35,8 @@
 //! | kind | bytes | what |
 //! |---|---|---|
 //! | 1 | 8 | the drift that is expected: [`Drift::bands`], [`Drift::traction`] |
-//! | | 4 d M | per movement: variances of the drift along the whitened axes |
-//! | 2 | 48 | [`Limits`] of scores with drift after 1, 2, 3 slides, then without: begin and mean excess of their upper tenth |
+//! | | 4 M d/2, rounded up | per movement: variance of the drift along each two of the whitened axes |
+//! | 2 | 52 | [`Limits`]: the share of false alarms; of scores with drift after 1, 2, 3 slides, then without: begin and mean excess of their upper tenth |
 //! | | M (7 d + 2 d d) | per movement the [`Population`] of textures: axes as a whitening of whitened features, in their steps; d variances |
 
 mod drift;
@@ -52,7 +52,7 @@ mod training_stats;
 mod view;
 mod whitening;
 
-pub use drift::{Drift, Drifts};
+pub use drift::{Drift, Drifts, PAIRS};
 pub use encode::{
     Change, EncodeError, Known, Texture, amend, encode, encode_fused, encoded_len, retell,
     with_sections,
@@ -62,7 +62,7 @@ pub use format::{
 };
 pub use gaussian::{Gaussian, Gaussians, SD_LEAST, SD_STEP, mean_step};
 pub(crate) use limits::Numbers;
-pub use limits::{Against, EPISODES, FALSE_ALARM, Limits, Tail};
+pub use limits::{Against, EPISODES, FALSE_ALARM, Limits, Tail, is_false_alarm};
 pub use population::{POPULATION, Population};
 pub(crate) use scatter::oas;
 pub use scatter::{Scatter, WhitenError, whiten, whiten_drifting};

@@ -1,5 +1,4 @@
-//! Known, changed or new, in f64 and straight from the recipe, for one movement: what a fixed-point form is held against. The
-//! explorer still decides by constant limits.
+//! Known, changed or new, in f64 and straight from the recipe, for one movement: what the fixed-point form is held against.
 //!
 //! V = (1/k + 1/n) I + D is left as it is, a full matrix in the space of the whitener of `oracle`.
 #![allow(unreachable_pub)]
@@ -53,7 +52,7 @@ pub struct Judge {
     centre: Vec<f64>,
     spread: Vec<f64>,
     /// u and beta of both scores, after one slide, two, three.
-    limits: [[[f64; 2]; SLIDES]; 2],
+    pub limits: [[[f64; 2]; SLIDES]; 2],
 }
 
 fn times(matrix: &Matrix, x: &[f64]) -> Vec<f64> {
@@ -284,7 +283,7 @@ impl Judge {
 }
 
 /// A standard normal number (Box and Muller).
-fn normal(random: &mut Random) -> f64 {
+pub fn normal(random: &mut Random) -> f64 {
     let mut uniform = || ((random.next() >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
     let radius = (-2.0 * uniform().ln()).sqrt();
     radius * (std::f64::consts::TAU * uniform()).cos()

@@ -8,7 +8,7 @@ use tactus_core::dsp::Plain;
 use tactus_core::dsp::fixed::{EXP2, LN, LN_2, LOG2_E, PARTS};
 use tactus_core::explorer::kernels::{Candidate, Kernels, LiveTexture, Spread};
 use tactus_core::features::MAX_FEATURES;
-use tactus_core::table::Gaussians;
+use tactus_core::table::{Gaussians, PAIRS};
 
 use super::confusion_kernel::confuse;
 use super::dsp_kernels::Chip;
@@ -20,46 +20,44 @@ global_asm!(
     // begins, r2 the next logarithm, r3 where they end.
     ".macro tactus_likelihood last",
     "2:",
-    // the squared distance to r11 and r12
-    "mov r12, #0",
+    // the odds to r11 and r12, Q32: pairs of squares, each with its weight
     "ldr r0, [r1]",
     "qsub16 r0, r4, r0",
-    "smuad r11, r0, r0",
+    "smuad r0, r0, r0",
+    "ldr lr, [sp, #64]",
+    "umull r11, r12, r0, lr",
     "tactus_square r5, 4",
     "tactus_square r6, 8",
     "tactus_square r7, 12",
     "tactus_square r8, 16",
     "tactus_square r9, 20",
-    "\\last r0, [r1, #24]",
-    "qsub16 r0, r10, r0",
-    "smlald r11, r12, r0, r0",
+    "tactus_square r10, 24, \\last",
     "ldr lr, [sp, #36]",
     "add r1, r1, lr",
-    // the odds to r0, if they are below 2^30
-    "ldr lr, [sp, #40]",
-    "umull r0, lr, r11, lr",
-    "orr r12, lr, r12, lsl #30",
-    "cmp r12, #0x3f000000",
+    // to r0, Q16, if they are below 2^30
+    "cmp r12, #0x3f00",
     "bhs 3f",
-    "add r0, lr, #65536",
+    "lsr r0, r11, #16",
+    "orr r0, r0, r12, lsl #16",
+    "add r0, r0, #65536",
     // their logarithm: octaves in r11, the mantissa in r12
     "clz r11, r0",
     "lsl r12, r0, r11",
     "rsb r11, r11, #15",
     "lsr r0, r12, #26",
-    "ldr lr, [sp, #44]",
+    "ldr lr, [sp, #40]",
     "add r0, lr, r0, lsl #3",
     "ldrd r0, lr, [r0]",
     "lsl r12, r12, #6",
     "umull r12, lr, r12, lr",
     "add r0, r0, lr",
     // ln 2, and half of what is shifted out
-    "ldrd r12, lr, [sp, #48]",
+    "ldrd r12, lr, [sp, #44]",
     "umaal r0, lr, r11, r12",
     "lsr r0, r0, #16",
     "orr r0, r0, lr, lsl #16",
     // half of twice the norm and 1 less the weighted logarithm: the norm less its half, rounded down
-    "ldrd r11, r12, [sp, #56]",
+    "ldrd r11, r12, [sp, #52]",
     "mls r0, r0, r11, r12",
     "ldr lr, [r2]",
     "add lr, lr, r0, asr #1",
@@ -70,25 +68,28 @@ global_asm!(
     "mov r0, r2",
     "pop {{r4-r11, pc}}",
     ".endm",
-    ".macro tactus_square a, at",
-    "ldr r0, [r1, #\\at]",
+    ".macro tactus_square a, at, load=ldr",
+    "\\load r0, [r1, #\\at]",
     "qsub16 r0, \\a, r0",
-    "smlald r11, r12, r0, r0",
+    // 2^31 at most
+    "smuad r0, r0, r0",
+    "ldr lr, [sp, #64 + \\at]",
+    "umlal r11, r12, r0, lr",
     ".endm",
     ".section .text.tactus_likelihoods,\"ax\",%progbits",
     ".global tactus_likelihoods",
     ".type tactus_likelihoods,%function",
     ".thumb_func",
     // r0: the mean; r1: the first texture's; r2: logarithms; r3: where they end. On the stack how far one mean is from the
-    // next (36), narrowness in Q32 (40); [`LN`], as if it began 32 parts before (44); ln 2 in Q32 (48) and 2^15 (52); weight
-    // (56), twice the norm and 1 (60), and whether there is a fourteenth number (64).
+    // next (36); [`LN`], as if it began 32 parts before (40); ln 2 in Q32 (44) and 2^15 (48); weight (52), twice the norm
+    // and 1 (56), whether there is a fourteenth number (60), and the narrowness of each pair of axes in Q16 (64).
     "tactus_likelihoods:",
     "push {{r4-r11, lr}}",
     // a word at a time, which need not be aligned
     ".irp pair, 4, 5, 6, 7, 8, 9",
     "ldr r\\pair, [r0, #(\\pair - 4) * 4]",
     ".endr",
-    "ldr r10, [sp, #64]",
+    "ldr r10, [sp, #60]",
     "cmp r10, #0",
     "beq 1f",
     "ldr r10, [r0, #24]",
@@ -310,6 +311,10 @@ global_asm!(
     size = const size_of::<Candidate>(),
 );
 
+/// [`Spread::narrowness`] on the stack, one after the other.
+#[repr(C)]
+struct Narrowness([u32; PAIRS]);
+
 unsafe extern "C" {
     /// `from` has 13 numbers, 14 if `even`, and so has each of the `means`, `stride` bytes after each other, of which there
     /// are as many as logarithms up to `end`, one at least; `ln` is 256 bytes before [`LN`].
@@ -319,13 +324,13 @@ unsafe extern "C" {
         logs: *mut i32,
         end: *const i32,
         stride: usize,
-        narrowness: u32,
         ln: *const u32,
         ln_2: u32,
         half: u32,
         weight: i32,
         norm: i32,
         even: bool,
+        narrowness: Narrowness,
     ) -> *mut i32;
     /// There are as many `cells`, 4 bytes, `stride` after each other, as logarithms up to `end`, one at least; `ln` is 256
     /// bytes before [`LN`].
@@ -400,9 +405,7 @@ impl Kernels for Chip {
     ) -> usize {
         let many = logs.len().min(there(means, stride, 2 * from.len()));
         let even = from.len() == MAX_FEATURES;
-        let [narrowness, ref others @ ..] = spread.narrowness;
-        let differ = others.iter().any(|other| *other != narrowness);
-        if many == 0 || !even && from.len() != MAX_FEATURES - 1 || narrowness >= 1 << 16 || differ {
+        if many == 0 || !even && from.len() != MAX_FEATURES - 1 {
             return Plain::add_likelihoods(from, means, stride, spread, logs);
         }
         let logs = logs.as_mut_ptr();
@@ -414,13 +417,13 @@ impl Kernels for Chip {
                 logs,
                 logs.add(many),
                 stride,
-                narrowness << 16,
                 before_ln(),
                 LN_2,
                 1 << 15,
                 spread.weight,
                 2 * spread.norm + 1,
                 even,
+                Narrowness(spread.narrowness),
             );
             done.offset_from_unsigned(logs)
         }

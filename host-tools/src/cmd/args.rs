@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use tactus::eval::evaluate::Method;
 use tactus_core::explorer::Config;
 use tactus_core::features::FeatureSet;
+use tactus_core::table::{Drift, is_false_alarm};
 
 use super::output::UsageError;
 
@@ -39,6 +40,41 @@ pub(crate) struct Stop {
     /// Stop after this many slides
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u8).range(1..=254))]
     pub(crate) max_slides: u8,
+    /// Share of the known textures that may be taken for new ones, such as 0.02; the table's own unless given
+    #[arg(long, value_name = "SHARE", value_parser = false_alarm)]
+    pub(crate) false_alarm: Option<f32>,
+}
+
+/// What a fused table that is learned expects.
+#[derive(Args, Clone)]
+pub(crate) struct Expecting {
+    /// How much fingers and samples change from one session to the next, for a table that is learned with the method fused:
+    /// standard deviations of band powers, ln, and of traction as a share of its mean; 0 for one session and samples that
+    /// stay where they are
+    #[arg(long, value_name = "BANDS,TRACTION|0", default_value = "0.1,0.04", value_parser = drift)]
+    pub(crate) drift: Drift,
+}
+
+fn drift(text: &str) -> Result<Drift, String> {
+    let number = |text: &str| text.trim().parse::<f32>().ok();
+    let drift = match text.split_once(',') {
+        Some((bands, traction)) => number(bands)
+            .zip(number(traction))
+            .map(|(bands, traction)| Drift { bands, traction }),
+        None => number(text)
+            .filter(|none| *none == 0.0)
+            .map(|_| Drift::NONE),
+    };
+    drift.filter(|drift| drift.is_possible()).ok_or_else(|| {
+        "two numbers from 0 to 10, such as 0.1,0.04, or 0 for no drift at all".to_owned()
+    })
+}
+
+pub(crate) fn false_alarm(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        Ok(share) if is_false_alarm(share) => Ok(share),
+        _ => Err("a share from 0.0005 to 0.2, such as 0.02".to_owned()),
+    }
 }
 
 impl Stop {
@@ -49,7 +85,7 @@ impl Stop {
             threshold: self.threshold,
             max_slides: self.max_slides,
             open: false,
-            ..Config::default()
+            false_alarm: self.false_alarm,
         }
     }
 }

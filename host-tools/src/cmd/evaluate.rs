@@ -63,8 +63,8 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     );
     let canvas = args.plot.open()?;
     ensure!(
-        canvas.is_none() || !args.lifelong && args.novelty.is_none(),
-        "--plot draws plain explorations: leave out --novelty and --lifelong"
+        canvas.is_none() || !args.lifelong,
+        "--plot draws no sessions: leave out --lifelong"
     );
     let (experiment, protocol) = experiment::open(args)?;
     let config = args.stop.config(args.method);
@@ -72,7 +72,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         return novelty::lifelong(args, &experiment, config, out);
     }
     if args.novelty.is_some() {
-        return novelty::leave_one_out(args, &experiment, protocol, config, out);
+        return novelty::leave_one_out(args, &experiment, protocol, config, canvas, out);
     }
     // a program gets what the pictures show
     let with_courses = canvas.is_some() || args.format == Format::Json;

@@ -14,6 +14,7 @@ use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::{Replay, ReplayError};
 use tactus::eval::evaluate::{MAX_TEXTURES, Method};
 use tactus::eval::experiment::{Experiment, Protocol};
+use tactus::eval::learn::Expected;
 use tactus::eval::pictures::exploration::Exploration;
 use tactus::eval::pictures::timeline::{Timeline, Watch};
 use tactus::eval::show::{Show, count, is_right};
@@ -27,7 +28,7 @@ use tactus_core::probe::explore::{ExplorationStep, ExploreError, Rejection, expl
 use tactus_core::rig::Rig;
 use tactus_core::table::Table;
 
-use super::args::{Recordings, Stop};
+use super::args::{Expecting, Recordings, Stop};
 use super::learn::{at_least_two, learned_here};
 use super::output::{Done, Format, print_json};
 use super::plot::{Canvas, Plot};
@@ -86,6 +87,8 @@ pub(crate) struct Args {
     /// How to decide, and how the next movement is chosen: fused, or what the table is for
     #[arg(long, value_enum)]
     method: Option<Method>,
+    #[command(flatten)]
+    expecting: Expecting,
     #[command(flatten)]
     stop: Stop,
     /// Another seed draws other slides; with --simulated also another world, and another texture unless one is given
@@ -169,6 +172,10 @@ fn identify_recorded(
         let (slides, interleaved) = (args.train_slides, Protocol::Interleaved);
         let experiment =
             Experiment::recorded(names(&set), &measured, None, interleaved, slides, args.seed)?;
+        let experiment = experiment.expecting(Expected {
+            drift: Some(args.expecting.drift),
+            ..Expected::default()
+        });
         let run = experiment.run(index as u64);
         learned = run.learn(args.method.unwrap_or(Method::Fused).method())?;
         let seen = &run.training()[index];

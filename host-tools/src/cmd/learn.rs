@@ -9,13 +9,14 @@ use serde::Serialize;
 use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::MeasuredSlide;
 use tactus::eval::evaluate::Method;
+use tactus::eval::learn::Expected;
 use tactus::eval::show::count;
 use tactus::sim::collection::texture_name;
 use tactus_core::explorer;
 use tactus_core::features::{FeatureSet, Movement, Observation};
-use tactus_core::table::Table;
+use tactus_core::table::{FALSE_ALARM, Table};
 
-use super::args::{Features, Recordings};
+use super::args::{Expecting, Features, Recordings, false_alarm};
 use super::output::{Format, print_json};
 use super::progress::with_progress;
 use super::table_file::{TableFile, write_table};
@@ -40,6 +41,11 @@ pub(crate) struct Args {
     /// What a fused table is learned from; the best that every slide has, unless given
     #[arg(long, value_enum)]
     features: Option<Features>,
+    #[command(flatten)]
+    expecting: Expecting,
+    /// Share of the known textures that may be taken for new ones, unless `identify` says otherwise
+    #[arg(long, value_name = "SHARE", default_value_t = FALSE_ALARM, value_parser = false_alarm)]
+    false_alarm: f32,
     /// The file to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -101,8 +107,19 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let folder = args.from.folder()?;
     let (set, measured) = measure_folder(&folder)?;
     let features = args.features.map(Features::set);
-    let bytes = learn_first(&set, &measured, args.train_slides, args.method, features)
-        .with_context(|| folder.display().to_string())?;
+    let expected = Expected {
+        drift: Some(args.expecting.drift),
+        false_alarm: args.false_alarm,
+    };
+    let bytes = learn_first(
+        &set,
+        &measured,
+        args.train_slides,
+        args.method,
+        features,
+        &expected,
+    )
+    .with_context(|| folder.display().to_string())?;
     write_table(&args.out, &bytes)?;
     let mut short = Vec::new();
     for (texture, measured) in set.textures().iter().zip(&measured) {
@@ -213,7 +230,11 @@ pub(crate) fn learned_here(
     let trials = cells.map(|(texture, movement)| table.trials(texture, movement));
     let trials = trials.max().unwrap_or(0).into();
     let learned_as = Method::of(explorer::Method::of(table.contents()));
-    let own = learn_first(set, measured, trials, learned_as, None);
+    let expected = Expected {
+        drift: table.drift(),
+        false_alarm: table.limits().map_or(FALSE_ALARM, |l| l.false_alarm),
+    };
+    let own = learn_first(set, measured, trials, learned_as, None, &expected);
     let is_own = own.is_ok_and(|own| own == table.as_bytes());
     LearnedHere {
         first: if is_own { trials } else { 0 },
@@ -228,6 +249,7 @@ pub(crate) fn learn_first(
     slides: usize,
     method: Method,
     features: Option<FeatureSet>,
+    expected: &Expected,
 ) -> anyhow::Result<Vec<u8>> {
     at_least_two(slides)?;
     let movements = set.movements();
@@ -257,7 +279,8 @@ pub(crate) fn learn_first(
         });
     let first: Vec<Vec<Vec<Observation>>> = first.collect::<anyhow::Result<_>>()?;
     let method = method.method();
-    Ok(tactus::eval::learn::learn(
+    Ok(tactus::eval::learn::learn_for(
+        expected,
         method,
         features,
         &names(set),

@@ -17,7 +17,7 @@ use tactus_core::table;
 use crate::data::fabricslide::{FabricSet, FabricSlide};
 use crate::data::properties::PropertyTable;
 use crate::data::replay::MeasuredSlide;
-use crate::eval::learn::{TableError, learn};
+use crate::eval::learn::{Expected, TableError, learn_for};
 use crate::eval::show::count;
 
 /// How slides are divided into training and test.
@@ -124,6 +124,8 @@ pub struct Experiment {
     measured: PropertySet,
     /// What the fused method learns from; the best there is, unless given.
     features: Option<FeatureSet>,
+    /// And what else it expects.
+    expected: Expected,
     /// No run shows a test slide twice.
     once: bool,
     seed: u64,
@@ -149,6 +151,7 @@ impl Experiment {
             all: false,
             measured: PropertySet::ALL,
             features: None,
+            expected: Expected::default(),
             once: false,
             seed,
         }
@@ -391,6 +394,12 @@ impl Experiment {
         Self::collected(names, movements, train, of(false), Some(there), seed)
     }
 
+    /// The same with fused tables that expect this.
+    #[must_use]
+    pub fn expecting(self, expected: Expected) -> Self {
+        Self { expected, ..self }
+    }
+
     /// The same with other features for the fused method.
     #[must_use]
     pub fn with_features(self, features: Option<FeatureSet>) -> Self {
@@ -527,7 +536,8 @@ impl<'e> Run<'e> {
     /// See [`TableError`].
     pub fn learn(&self, method: Method) -> Result<Vec<u8>, TableError> {
         let of = self.experiment;
-        learn(
+        learn_for(
+            &of.expected,
             method,
             of.features,
             &of.names,
@@ -545,7 +555,15 @@ impl<'e> Run<'e> {
         let (mut names, mut training) = (of.names.clone(), self.training());
         names.remove(texture);
         training.remove(texture);
-        learn(method, of.features, &names, &of.movements, &training)
+        let expected = &of.expected;
+        learn_for(
+            expected,
+            method,
+            of.features,
+            &names,
+            &of.movements,
+            &training,
+        )
     }
 
     /// One more slide of the unknown texture; `None` where each is shown once, and all of this movement were.

@@ -1,10 +1,15 @@
 //! Texture tables learned from slides, for every way of deciding.
 
+use tactus_core::explorer::ExplorerError;
 use tactus_core::explorer::Method;
 use tactus_core::features::{FeatureSet, Movement, Observation, PropertySet, Vector};
 use tactus_core::table::{
-    self, Contents, EncodeError, Experience, Scatter, WhitenError, Whitened, whiten,
+    self, Contents, Drift, Drifts, EncodeError, Experience, FALSE_ALARM, Limits, Population,
+    Scatter, Sections, Table, Tail, WhitenError, Whitened, Whitening, whiten_drifting,
+    with_sections,
 };
+
+use super::calibrate::limits;
 
 /// Why slides do not make a table.
 #[derive(Debug, thiserror::Error)]
@@ -28,6 +33,9 @@ pub enum TableError {
     /// There is nothing to learn from.
     #[error("there are no slides to learn from")]
     Empty,
+    /// Its limits cannot be calibrated.
+    #[error("the table cannot be calibrated")]
+    Calibrate(#[from] ExplorerError),
 }
 
 /// Slides to learn from: per texture and movement.
@@ -65,7 +73,7 @@ fn length(set: FeatureSet, slide: &Observation) -> usize {
     }
 }
 
-/// Learns a table for a method; the fused one from `features`, or the best there are.
+/// Learns a table for a method; the fused one from `features`, or the best there are, for the usual drift.
 ///
 /// # Errors
 /// See [`TableError`].
@@ -76,9 +84,43 @@ pub fn learn(
     movements: &[Movement],
     slides: &Slides,
 ) -> Result<Vec<u8>, TableError> {
+    let usual = Expected::default();
+    learn_for(&usual, method, features, names, movements, slides)
+}
+
+/// What a fused table is to expect.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Expected {
+    /// How fingers and samples change; `None` for a table as version 3 had it, without limits.
+    pub drift: Option<Drift>,
+    /// Share of known textures that may be taken for new ones.
+    pub false_alarm: f32,
+}
+
+impl Default for Expected {
+    fn default() -> Self {
+        Self {
+            drift: Some(Drift::default()),
+            false_alarm: FALSE_ALARM,
+        }
+    }
+}
+
+/// As [`learn`], for what else is expected.
+///
+/// # Errors
+/// See [`TableError`].
+pub fn learn_for(
+    expected: &Expected,
+    method: Method,
+    features: Option<FeatureSet>,
+    names: &[String],
+    movements: &[Movement],
+    slides: &Slides,
+) -> Result<Vec<u8>, TableError> {
     if method == Method::Fused {
         let set = features.unwrap_or_else(|| best_features(slides));
-        learn_fused(set, names, movements, slides)
+        learn_fused(expected, set, names, movements, slides)
     } else {
         let measured = measured(slides);
         let experience: Vec<Vec<Experience>> = slides
@@ -128,6 +170,7 @@ fn buffer(contents: Contents, names: &[String], movements: usize) -> Vec<u8> {
 }
 
 fn learn_fused(
+    expected: &Expected,
     set: FeatureSet,
     names: &[String],
     movements: &[Movement],
@@ -159,26 +202,67 @@ fn learn_fused(
             scatter.push(slides)?;
         }
     }
-    let whitenings = whiten(&scatters)?;
-    let whitened: Vec<Vec<Whitened>> = vectors
+    let drift = expected.drift.unwrap_or(Drift::NONE);
+    let learned = whiten_drifting(&scatters, set, drift)?;
+    let (whitenings, drifts): (Vec<Whitening>, Vec<Drifts>) = learned.into_iter().unzip();
+    let of_texture = |row: &Vec<Vec<Vector>>| -> Vec<Vec<Vector>> {
+        let cells = row.iter().zip(&whitenings);
+        cells
+            .map(|(slides, whitening)| slides.iter().map(|x| whitening.apply(x)).collect())
+            .collect()
+    };
+    let white: Vec<Vec<Vec<Vector>>> = vectors.iter().map(of_texture).collect();
+    let known: Vec<Vec<Whitened>> = white
         .iter()
-        .map(|row| {
-            row.iter()
-                .zip(&whitenings)
-                .map(|(slides, whitening)| {
-                    let white: Vec<Vector> = slides.iter().map(|x| whitening.apply(x)).collect();
-                    mean(&white, features)
-                })
-                .collect()
-        })
+        .map(|row| row.iter().map(|slides| mean(slides, features)).collect())
         .collect();
     let movements: Vec<_> = movements.iter().copied().zip(whitenings).collect();
     let contents = Contents::Fused(set, features as u8);
-    let mut bytes = buffer(contents, names, movements.len());
+    let mut plain = buffer(contents, names, movements.len());
     let textures = names.iter().map(String::as_str);
-    let textures = textures.zip(whitened.iter().map(Vec::as_slice));
-    table::encode_fused(&mut bytes, set, &movements, textures)?;
-    Ok(bytes)
+    let textures = textures.zip(known.iter().map(Vec::as_slice));
+    let plain = table::encode_fused(&mut plain, set, &movements, textures)?;
+
+    if expected.drift.is_none() {
+        return Ok(plain.as_bytes().to_vec());
+    }
+    let population = |movement: usize| {
+        let means = known.iter().map(|row| &row[movement]);
+        Population::new(features, means.map(|cell| (cell.slides, &cell.mean[..])))
+    };
+    let populations: Option<Vec<Population>> = (0..movements.len()).map(population).collect();
+    let write = |novelty: Option<(Limits, &[Population])>| {
+        let sections = Sections {
+            drift: (drift, &drifts),
+            novelty,
+        };
+        let mut bytes = vec![0; plain.as_bytes().len() + sections.length(features)];
+        with_sections(&mut bytes, &plain, &sections)?;
+        Ok::<_, EncodeError>(bytes)
+    };
+    let Some(populations) = populations else {
+        return Ok(write(None)?);
+    };
+    // scores take a table; they do not depend on its limits
+    let any = [Tail {
+        begin: 0.0,
+        excess: 1.0,
+    }; 3];
+    let any = Limits {
+        false_alarm: expected.false_alarm,
+        drifted: any,
+        same: any,
+    };
+    let scored = write(Some((any, &populations)))?;
+    let scored = Table::read(&scored).map_err(EncodeError::Invalid)?;
+    let limits = limits(
+        expected.false_alarm,
+        scored,
+        &known,
+        &white,
+        (!drift.is_none()).then_some(&drifts[..]),
+    )?;
+    Ok(write(Some((limits, &populations)))?)
 }
 
 /// The mean of whitened slides, rounded once.

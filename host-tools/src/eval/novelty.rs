@@ -3,7 +3,7 @@
 use rand::RngExt as _;
 use rayon::prelude::*;
 use serde::Serialize;
-use tactus_core::explorer::Config;
+use tactus_core::explorer::{Config, Told};
 
 use crate::eval::evaluate::{EvaluateError, explorer, play};
 use crate::eval::experiment::{Experiment, Run};
@@ -12,15 +12,66 @@ use crate::eval::verdicts::Verdicts;
 /// Slides after which it is counted.
 pub const SLIDES: usize = 3;
 
-/// What is counted after so many slides.
+/// What users would be told after so many slides, whatever was told before.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct After {
     /// Slides of the episode.
     pub slides: usize,
-    /// Share of the textures that were left out of the table and are noticed.
-    pub detections: f64,
-    /// Share of the textures of the table that are taken for new ones.
-    pub false_alarms: f64,
+    /// Of textures of the table.
+    pub known: Verdicts,
+    /// Of textures that were left out of it.
+    pub unknown: OfUnknown,
+}
+
+/// Shares of what is told of a texture that the table does not have, 0 to 1; they add up to 1.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct OfUnknown {
+    /// Told that it is none of the textures known: right.
+    pub new: f64,
+    /// Told that it is like one of them, but not as that was learned: noticed, too.
+    pub changed: f64,
+    /// Told to be one of them, as sure.
+    pub wrong: f64,
+    /// Told "not sure".
+    pub undecided: f64,
+}
+
+impl OfUnknown {
+    /// Share that was noticed, as new or as changed.
+    pub fn noticed(&self) -> f64 {
+        self.new + self.changed
+    }
+}
+
+impl After {
+    /// What is told of textures that were left out, in the words of those that were not: `right` is 0.
+    pub fn unknown(&self) -> Verdicts {
+        let OfUnknown {
+            new,
+            changed,
+            wrong,
+            undecided,
+        } = self.unknown;
+        Verdicts {
+            right: 0.0,
+            new,
+            changed,
+            wrong,
+            undecided,
+        }
+    }
+}
+
+impl From<Verdicts> for OfUnknown {
+    fn from(told: Verdicts) -> Self {
+        Self {
+            new: told.new,
+            changed: told.changed,
+            // no name is right
+            wrong: told.right + told.wrong,
+            undecided: told.undecided,
+        }
+    }
 }
 
 /// What leaving textures out comes to.
@@ -56,8 +107,8 @@ pub fn leave_one_out(
             let presented = run.unknown;
             let textures = experiment.names().len();
             let other = (presented + 1 + run.random.random_range(0..textures - 1)) % textures;
-            let new = episode(experiment, config, &mut run, presented)?;
-            let known = episode(experiment, config, &mut run, other)?;
+            let new = episode(experiment, open, &mut run, presented)?;
+            let known = episode(experiment, open, &mut run, other)?;
             let told = |left_out| {
                 let run = as_told.run(index);
                 let bytes = run.learn_without(open.method, left_out)?;
@@ -73,14 +124,13 @@ pub fn leave_one_out(
             Ok(([new, known], told))
         })
         .collect::<Result<_, EvaluateError>>()?;
-    let share = |which: usize, after: usize| {
-        let flagged = presented.iter().filter(|(run, _)| run[which][after]);
-        flagged.count() as f64 / presented.len().max(1) as f64
+    let told = |which: usize, after: usize| {
+        Verdicts::of(presented.iter().map(|(run, _)| run[which][after]))
     };
     let after = |after| After {
         slides: after + 1,
-        detections: share(0, after),
-        false_alarms: share(1, after),
+        known: told(1, after),
+        unknown: told(0, after).into(),
     };
     Ok(Novelty {
         novelty: (0..SLIDES).map(after).collect(),
@@ -89,17 +139,20 @@ pub fn leave_one_out(
     })
 }
 
-/// Slides over the run's texture with a table that lacks `left_out`: whether it is taken for unknown after each slide.
+/// Slides over the run's texture with a table that lacks `left_out`: what is told after each, and whether the most probable
+/// texture is the right one.
 fn episode(
     experiment: &Experiment,
     config: Config,
     run: &mut Run<'_>,
     left_out: usize,
-) -> Result<[bool; SLIDES], EvaluateError> {
+) -> Result<[(Told, bool); SLIDES], EvaluateError> {
     let bytes = run.learn_without(config.method, left_out)?;
     let mut explorer = explorer(&bytes, experiment.measured(), config, None)?;
-    let mut flagged = [false; SLIDES];
-    for flag in &mut flagged {
+    // in this table the textures after the missing one are one place further to the front
+    let place = run.unknown.checked_sub(usize::from(run.unknown > left_out));
+    let mut told = [(Told::Undecided, false); SLIDES];
+    for told in &mut told {
         let expected = explorer.expected_outcomes();
         let action = explorer.choose(&expected, 0);
         let slide = run
@@ -108,7 +161,9 @@ fn episode(
         explorer
             .observe(action, slide)
             .expect("every slide has the features that the table was learned from");
-        *flag = explorer.is_unknown();
+        let best = explorer.best();
+        let is_right = run.unknown != left_out && Some(best.texture.into()) == place;
+        *told = (best.told(), is_right);
     }
-    Ok(flagged)
+    Ok(told)
 }

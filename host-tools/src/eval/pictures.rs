@@ -4,5 +4,6 @@ pub mod control;
 pub mod evaluation;
 pub mod exploration;
 pub mod map;
+pub mod novelty;
 mod spectrum;
 pub mod timeline;

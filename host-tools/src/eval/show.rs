@@ -327,6 +327,24 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
     if let Contents::Fused(set, features) = table.contents() {
         let features = count(features, "feature");
         writeln!(out, "{features}: {}", set.name())?;
+        let share = |share: f32| format!("{:.1} %", 100.0 * share);
+        match table.drift() {
+            None => writeln!(out, "no drift and no limits: of an older version")?,
+            Some(drift) if drift.is_none() => writeln!(out, "no drift is expected")?,
+            Some(drift) => writeln!(
+                out,
+                "drift: band powers {:.2} (ln), traction {} of its mean",
+                drift.bands,
+                share(drift.traction)
+            )?,
+        }
+        match (table.limits(), table.drift()) {
+            (Some(limits), _) => {
+                writeln!(out, "limits for {} false alarms", share(limits.false_alarm))?
+            }
+            (None, Some(_)) => writeln!(out, "no limits: it had fewer than three textures")?,
+            (None, None) => {}
+        }
         return show_whitened(table, out);
     }
     for (movement, index) in table.movements().zip(0..) {

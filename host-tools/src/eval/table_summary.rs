@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use tactus_core::features::Property;
-use tactus_core::table::{Action, Contents, Table};
+use tactus_core::table::{Action, Contents, Drift, Table};
 
 use crate::eval::show::apart;
 
@@ -15,6 +15,10 @@ pub struct TableSummary {
     pub checksum: String,
     /// What slides are compared by: the three properties, or a set of whitened features.
     pub features: &'static str,
+    /// The drift that it expects; `null` in a table of properties or of an older version.
+    pub drift: Option<Drift>,
+    /// The share of false alarms that its limits are for; `null` where it has none.
+    pub false_alarm: Option<f32>,
     /// The movements.
     pub movements: Vec<MovementSummary>,
     /// The textures, in the order of the table.
@@ -72,6 +76,8 @@ impl TableSummary {
                 Contents::Gaussians(_) => "properties",
                 Contents::Fused(set, _) => set.name(),
             },
+            drift: table.drift(),
+            false_alarm: table.limits().map(|limits| limits.false_alarm),
             movements: table
                 .movements()
                 .map(|movement| MovementSummary {

@@ -49,6 +49,7 @@ fn identify() -> Identify {
         open: true,
         learn: true,
         seed: u32::MAX,
+        false_alarm: Some(0.05),
     }
 }
 
@@ -164,6 +165,7 @@ impl Probe {
                     log_odds: Some(-7.5),
                     slides: 3,
                     wants_label: false,
+                    changed: false,
                 }),
                 Event::TextureLearned(TextureLearned {
                     name: Name::try_from("velcro").unwrap(),

@@ -5,7 +5,7 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::features::{FeatureSet, Property};
-use crate::table::{Action, Contents, FALSE_ALARM};
+use crate::table::{Action, Contents};
 
 /// Textures less probable than this are left out of the expected uncertainty: each changes it by at most about twice its
 /// probability, all of 117 by about 2e-4.
@@ -83,8 +83,8 @@ pub struct Config {
     /// Whether the answer may be that it is none of the candidates.
     pub open: bool,
     /// Share of the known textures that may be taken for new ones, if the answer may be that: with a table that is
-    /// calibrated.
-    pub false_alarm: f32,
+    /// calibrated, whose own share it is unless given.
+    pub false_alarm: Option<f32>,
 }
 
 impl Default for Config {
@@ -96,7 +96,7 @@ impl Default for Config {
             threshold: 0.99,
             max_slides: 10,
             open: false,
-            false_alarm: FALSE_ALARM,
+            false_alarm: None,
         }
     }
 }

@@ -5,7 +5,7 @@
 use crate::dsp::Plain;
 use crate::dsp::fixed::{exp_neg_q30, ln_q16};
 use crate::features::{MAX_FEATURES, Property};
-use crate::table::{Gaussian, Gaussians, Numbers};
+use crate::table::{Gaussian, Gaussians, Numbers, PAIRS};
 
 /// A texture that is still likely, while a movement is weighed. The order of the fields is fixed, for kernels that are not
 /// written in Rust.
@@ -164,11 +164,10 @@ pub(crate) fn shrunk(word: u32, by: u32) -> u32 {
 /// mean of a slide has the variance 1 + 1/n + delta instead of 1 + 1/n.
 pub(crate) fn scales(drifts: Numbers<'_>, n: u8, sqrt: fn(f32) -> f32) -> Mask {
     let v = 1.0 + 1.0 / f32::from(n.max(1));
-    let mut scales = [0x7fff_7fff; MAX_FEATURES / 2];
-    let mut drifts = drifts.map(|drift| (sqrt(v / (v + drift)) * 32767.0) as u32);
-    for pair in &mut scales {
-        let (low, high) = (drifts.next(), drifts.next());
-        *pair = high.unwrap_or(0) << 16 | low.unwrap_or(0);
+    let mut scales = [0; PAIRS];
+    for (pair, drift) in scales.iter_mut().zip(drifts) {
+        let scale = (sqrt(v / (v + drift)) * 32767.0) as u32;
+        *pair = scale << 16 | scale;
     }
     scales
 }
@@ -179,8 +178,8 @@ pub(crate) fn scales(drifts: Numbers<'_>, n: u8, sqrt: fn(f32) -> f32) -> Mask {
 pub struct Spread {
     /// n.
     pub slides: u8,
-    /// 1/(8 v) along each axis in Q16: 20 bits at most.
-    pub narrowness: [u32; MAX_FEATURES],
+    /// 1/(8 v) along each two axes in Q16: 20 bits at most.
+    pub narrowness: [u32; PAIRS],
     /// -1/2 of the sum of ln v, Q16.
     pub norm: i32,
     /// 8 + d.
@@ -201,21 +200,24 @@ impl Spread {
             ));
             return Self {
                 slides: n,
-                narrowness: [narrowness; MAX_FEATURES],
+                narrowness: [narrowness; PAIRS],
                 // ln v is 5 at most, times 14/2
                 norm: (-(features as i64) * ln_v / 2) as i32,
                 weight,
             };
         };
         let v = 1.0 / f32::from(k) + 1.0 / f32::from(n);
-        let mut narrowness = [0; MAX_FEATURES];
+        let mut narrowness = [0; PAIRS];
         // two logarithms for all: variances are 2^-7 to 2^18, and products of seven numbers still
         let mut products = [1.0; 2];
         for ((slot, drift), at) in narrowness.iter_mut().zip(drifts).zip(0..) {
             let total = v + drift;
             *slot = (65536.0 / f32::from(DEGREES_OF_FREEDOM) / total) as u32;
             let [first, second] = &mut products;
-            *(if at < MAX_FEATURES / 2 { first } else { second }) *= total;
+            *first *= total;
+            if 2 * at + 1 < features {
+                *second *= total;
+            }
         }
         let ln: f32 = products.into_iter().map(libm::logf).sum();
         Self {
@@ -236,17 +238,22 @@ impl Spread {
     }
 }
 
-/// Squared distance of two whitened means with these weights, Q32 where they are Q16: 54 bits at most. What is more than 128
-/// standard deviations apart counts as 128.
+/// Squared distance of two whitened means with a weight for each two numbers, Q32 where the weights are Q16: 54 bits at most.
+/// What is more than 128 standard deviations apart counts as 128.
 #[inline]
-pub(crate) fn distance(from: &[i16], mean: &[u8], weights: &[u32; MAX_FEATURES]) -> u64 {
+pub(crate) fn distance(from: &[i16], mean: &[u8], weights: &[u32; PAIRS]) -> u64 {
     let (mean, _) = mean.as_chunks();
-    let squares = from.iter().zip(mean).zip(weights).map(|((a, b), weight)| {
+    let mut squares = from.iter().zip(mean).map(|(a, b)| {
         let apart = i32::from(a.saturating_sub(i16::from_le_bytes(*b)));
         // 2^30 at most
-        u64::from((apart * apart) as u32) * u64::from(*weight)
+        (apart * apart) as u32
     });
-    squares.sum()
+    let mut sum = 0;
+    for weight in weights {
+        let pair = squares.next().unwrap_or(0) + squares.next().unwrap_or(0);
+        sum += u64::from(pair) * u64::from(*weight);
+    }
+    sum
 }
 
 /// A property this many standard deviations off, squared and halved, counts as no farther: 1024 in Q16.

@@ -9,21 +9,38 @@ const POPULATION: usize = 3;
 /// Variance of textures' means where there are too few to say, standard deviations within a texture squared.
 const WIDE: f32 = 400.0;
 
+/// Where it is known from what textures are like.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Source {
+    /// There are too few of them to tell.
+    Nowhere,
+    /// Their means.
+    Means,
+    /// The table says it: mean and variances of a [`NoveltyModel`] are not used.
+    Table,
+}
+
+/// A squared distance from all textures that is so many of its standard deviations above its mean counts as no greater: what
+/// is unlike everything must not become known by being unlike other new textures, too.
+const FARTHEST: f32 = 8.0;
+
 /// The likelihood of a texture that the table does not have: means of textures scatter as those of the table do.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoveltyModel {
     pub(super) movement: u8,
     mean: [f32; MAX_FEATURES],
     variance: [f32; MAX_FEATURES],
-    /// Whether there are textures enough to tell.
-    pub(super) known: bool,
-    /// Whether the table says it: then mean and variances here are not used.
-    pub(super) calibrated: bool,
+    pub(super) source: Source,
     /// From how many slides all textures were learned, if it was as many.
     pub(super) slides: Option<u8>,
 }
 
 impl NoveltyModel {
+    /// Whether the table says it, and has limits.
+    pub(super) fn is_calibrated(&self) -> bool {
+        self.source == Source::Table
+    }
+
     pub(super) fn new(table: &Table<'_>, movement: u8) -> Self {
         let slides = table.trials(0, movement);
         let same = (0..table.textures()).all(|texture| table.trials(texture, movement) == slides);
@@ -33,8 +50,7 @@ impl NoveltyModel {
                 movement,
                 mean: [0.0; MAX_FEATURES],
                 variance: [0.0; MAX_FEATURES],
-                known: true,
-                calibrated: true,
+                source: Source::Table,
                 slides,
             };
         }
@@ -56,8 +72,11 @@ impl NoveltyModel {
             movement,
             mean: sum.map(|sum| sum as f32 / n * step),
             variance: [WIDE; MAX_FEATURES],
-            known,
-            calibrated: false,
+            source: if known {
+                Source::Means
+            } else {
+                Source::Nowhere
+            },
             slides,
         };
         if known {
@@ -77,7 +96,7 @@ impl NoveltyModel {
 
     /// As [`Spread::likelihood`], of the mean of `k` slides.
     pub(super) fn likelihood(&self, table: &Table<'_>, mean: &Vector, k: u8) -> f32 {
-        if self.calibrated {
+        if self.source == Source::Table {
             return population_likelihood(table, self.movement, mean, k);
         }
         let v = 1.0 / f32::from(k);
@@ -118,7 +137,9 @@ pub(super) fn population_likelihood(table: &Table<'_>, movement: u8, mean: &Vect
         *(if at < MAX_FEATURES / 2 { first } else { second }) *= total;
     }
     let norm: f32 = products.into_iter().map(libm::logf).sum();
-    -0.5 * (norm + distance)
+    let d = mean.len() as f32;
+    let farthest = d + FARTHEST * libm::sqrtf(2.0 * d);
+    -0.5 * (norm + distance.min(farthest))
 }
 
 /// Draws the variances along the axes of a covariance of `n` towards their mean, by as much as so few deserve ([`oas`]):

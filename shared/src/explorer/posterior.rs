@@ -190,7 +190,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
 
     fn is_calibrated(&self) -> bool {
         let models = &self.novelty_models;
-        !models.is_empty() && models.iter().all(|model| model.calibrated)
+        !models.is_empty() && models.iter().all(NoveltyModel::is_calibrated)
     }
 
     /// Whether the texture, if it is one of the candidates, is not as it was learned: without the drift that the table

@@ -9,7 +9,7 @@ use heapless::{Vec, VecView};
 use super::config::NEGLIGIBLE;
 use super::episode::Episode;
 use super::kernels::{Candidate, DEGREES_OF_FREEDOM, Kernels, Spread, distance, mask, scales};
-use super::novelty::{NoveltyModel, population_likelihood};
+use super::novelty::{NoveltyModel, Source, population_likelihood};
 use crate::dsp::fixed::{exp_neg_q30, ln_q16};
 use crate::table::{Contents, Table};
 
@@ -37,7 +37,7 @@ pub(super) fn add_likelihoods(
         return None;
     };
     let features = usize::from(features);
-    let calibrated = novelty_models.iter().all(|model| model.calibrated);
+    let calibrated = novelty_models.iter().all(NoveltyModel::is_calibrated);
     if calibrated && episode.len() > 1 {
         return add_jointly(table, episode, features, drifting, logs, odds);
     }
@@ -52,7 +52,7 @@ pub(super) fn add_likelihoods(
             unknown -= student_norm(features);
         }
         elsewhere += unknown;
-        can_tell &= background.known;
+        can_tell &= background.source != Source::Nowhere;
         // as little is known of a texture that was never measured here as of one that the table does not have
         let untaught = q16(unknown);
         let column = table.column(sums.movement);

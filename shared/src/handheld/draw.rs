@@ -277,6 +277,14 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             brush.rows(rows, 20)?;
             brush.button("next", "teach")
         }
+        Screen::Changed { rows } => {
+            let name = rows.first().map_or("?", |row| row.name);
+            brush.headline(&say(format_args!("{}?", cut(name, 20))), -1)?;
+            brush.left("feels like it, but it", 1, 19)?;
+            brush.left("is not as I learned.", 1, 30)?;
+            brush.left("Is it? Then teach it", 1, 41)?;
+            brush.button("next", "teach")
+        }
         Screen::Unknown { like } => {
             brush.headline("Unknown", -1)?;
             brush.left("none of those known,", 1, 19)?;

@@ -26,6 +26,8 @@ pub struct Judgement {
     pub sure: bool,
     /// It is rather none of them.
     pub unknown: bool,
+    /// It is the first one, but not as it was learned.
+    pub changed: bool,
     /// Further slides may tell more.
     pub open: bool,
 }
@@ -88,6 +90,7 @@ pub fn judge<K: Kernels>(
         leading,
         sure: verdict.is_some_and(|verdict| verdict.sure),
         unknown: verdict.is_some_and(|verdict| verdict.unknown),
+        changed: verdict.is_some_and(|verdict| verdict.changed),
         open: verdict.is_none(),
     };
     let episode = EpisodeSummary {

@@ -110,6 +110,11 @@ pub enum Screen<'a> {
         /// The first one is 99 % sure.
         sure: bool,
     },
+    /// It is one of those known, but not as it was learned.
+    Changed {
+        /// The leading candidates, that one first.
+        rows: Vec<Row<'a>, LEADING>,
+    },
     /// It is none of those known.
     Unknown {
         /// What it is most like.

@@ -291,6 +291,9 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             Page::Verdict(judgement) if judgement.unknown => Screen::Unknown {
                 like: rows(judgement),
             },
+            Page::Verdict(judgement) if judgement.changed => Screen::Changed {
+                rows: rows(judgement),
+            },
             Page::Verdict(judgement) => Screen::Verdict {
                 rows: rows(judgement),
                 sure: judgement.sure,

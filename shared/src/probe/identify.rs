@@ -102,6 +102,7 @@ fn told(table: Table<'_>, verdict: &explorer::Verdict, slides: u8, wants_label: 
         log_odds: verdict.log_odds,
         slides,
         wants_label,
+        changed: verdict.changed,
     })
 }
 

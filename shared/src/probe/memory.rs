@@ -8,7 +8,7 @@ use super::teach::{self, put_in_force};
 use crate::explorer::EpisodeSummary;
 use crate::rig::skin::SkinCare;
 use crate::store::{Store, StoreError};
-use crate::table::Table;
+use crate::table::{Table, TableError};
 use crate::wire::{Event, Failure, MemoryError};
 
 /// What learning needs: the store, the table that it begins with, and the buffer for a new one.
@@ -32,19 +32,22 @@ pub struct Memory<'m, F, B> {
     pub episode: Option<EpisodeSummary>,
 }
 
-/// The table that all learning begins with: the stored one, or the factory's.
+/// The table that all learning begins with: the stored one, or the factory's, and then why the stored one is none.
 #[inline(never)]
 fn base<'b, F: NorFlash, B: StoredBytes<F>>(
     store: &mut Result<Store<F>, StoreError>,
     stored: &'b mut B,
     factory: &'b [u8],
-) -> &'b [u8] {
+) -> (&'b [u8], Option<TableError>) {
     let store = store.as_mut().ok();
-    store
-        .and_then(|store| stored.bytes(store))
+    match store.and_then(|store| stored.bytes(store)) {
+        None => (factory, None),
         // one that another version of this firmware wrote is not understood
-        .filter(|bytes| Table::read(bytes).is_ok())
-        .unwrap_or(factory)
+        Some(bytes) => match Table::read(bytes) {
+            Ok(_) => (bytes, None),
+            Err(why) => (factory, Some(why)),
+        },
+    }
 }
 
 impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
@@ -73,7 +76,10 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
 
     /// Puts the table in force, which `events` hears of.
     pub async fn reload(&mut self, events: &mut impl Events) {
-        let base = base(&mut self.store, &mut self.stored, self.factory);
+        let (base, why) = base(&mut self.store, &mut self.stored, self.factory);
+        if let Some(why) = why {
+            events.tell(Event::Trouble(MemoryError::StoredTable(why).into()));
+        }
         self.is_factory = core::ptr::eq(base, self.factory);
         self.length = match Table::read(base) {
             Ok(base) => put_in_force(&base, self.store.as_mut().ok(), self.buffer)
@@ -126,7 +132,7 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
     /// What learning needs; [`Memory::reload`] is due after it.
     #[inline(never)]
     pub(super) fn lend(&mut self) -> Result<Lent<'_, F>, MemoryError> {
-        let bytes = base(&mut self.store, &mut self.stored, self.factory);
+        let (bytes, _) = base(&mut self.store, &mut self.stored, self.factory);
         let base = Table::read(bytes).map_err(MemoryError::NoTable)?;
         let store = self
             .store

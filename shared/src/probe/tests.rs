@@ -57,6 +57,7 @@ fn wanted(among: &[u16]) -> Identify {
         open: false,
         learn: false,
         seed: 1,
+        false_alarm: None,
     }
 }
 

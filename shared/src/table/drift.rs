@@ -11,8 +11,11 @@ use serde::{Deserialize, Serialize};
 use super::matrix::Square;
 use crate::features::{FEATURE_STEPS, FeatureSet, MAX_FEATURES};
 
-/// Variances of the drift along the axes of a whitening; 0 beyond its features.
-pub type Drifts = [f32; MAX_FEATURES];
+/// Variances of the drift along the axes of a whitening, of each two their mean: those next to each other are much alike, for
+/// axes are in the order of their variances. 0 beyond the features.
+pub type Drifts = [f32; PAIRS];
+/// Pairs of axes; the last has one where the features are an odd number.
+pub const PAIRS: usize = MAX_FEATURES / 2;
 
 /// How much is expected.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]

@@ -15,6 +15,11 @@ const REAL: f32 = 2.0;
 /// Share of false alarms that people are content with, unless they say otherwise.
 pub const FALSE_ALARM: f32 = 0.02;
 
+/// Whether people can be content with this share: a limit for less would be a guess, and for more none is needed.
+pub fn is_false_alarm(share: f32) -> bool {
+    (0.0005..=0.2).contains(&share)
+}
+
 /// The upper tail of the scores of known textures, which falls exponentially.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Tail {
@@ -36,6 +41,8 @@ pub enum Against {
 /// The limits of a table.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Limits {
+    /// Share of false alarms that the table is for, unless somebody says otherwise.
+    pub false_alarm: f32,
     /// See [`Against::Drifted`]; after one slide, two, three or more.
     pub drifted: [Tail; EPISODES],
     /// See [`Against::Same`].
@@ -44,10 +51,11 @@ pub struct Limits {
 
 impl Limits {
     /// Bytes that they take in a table.
-    pub(super) const BYTES: usize = 2 * EPISODES * 8;
+    pub(super) const BYTES: usize = 4 + 2 * EPISODES * 8;
 
-    /// The limit after so many slides, for so many real false alarms.
-    pub fn limit(&self, against: Against, slides: u8, false_alarm: f32) -> f32 {
+    /// The limit after so many slides, for this share of real false alarms, or the table's own.
+    pub fn limit(&self, against: Against, slides: u8, false_alarm: Option<f32>) -> f32 {
+        let false_alarm = false_alarm.unwrap_or(self.false_alarm);
         let tails = match against {
             Against::Drifted => &self.drifted,
             Against::Same => &self.same,
@@ -64,14 +72,19 @@ impl Limits {
     }
 
     pub(super) fn bytes(&self) -> impl Iterator<Item = [u8; 4]> {
-        let numbers = self.tails().flat_map(|tail| [tail.begin, tail.excess]);
+        let tails = self.tails().flat_map(|tail| [tail.begin, tail.excess]);
+        let numbers = core::iter::once(self.false_alarm).chain(tails);
         numbers.map(f32::to_le_bytes)
     }
 
     /// `None` if these are not the bytes of any.
     pub(super) fn read(bytes: &[u8]) -> Option<Self> {
+        let (share, bytes) = bytes.split_first_chunk()?;
         let (pairs, rest) = bytes.as_chunks::<8>();
-        let mut limits = Self::default();
+        let mut limits = Self {
+            false_alarm: f32::from_le_bytes(*share),
+            ..Self::default()
+        };
         if pairs.len() != 2 * EPISODES || !rest.is_empty() {
             return None;
         }
@@ -85,7 +98,8 @@ impl Limits {
         }
         // scores are below 1e4: logarithms of likelihoods of a few slides
         let fits = |t: Tail| t.begin.abs() < 1e4 && t.excess > 0.0 && t.excess < 1e4;
-        limits.tails().all(fits).then_some(limits)
+        let is_share = is_false_alarm(limits.false_alarm);
+        (is_share && limits.tails().all(fits)).then_some(limits)
     }
 }
 

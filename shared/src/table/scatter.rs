@@ -199,7 +199,13 @@ pub fn whiten_drifting(
             drifted
         };
         let axes = principal_axes(&apart, features);
-        let drifts = variances(&axes, &drifted).map(|v| (v as f32).clamp(0.0, MOST_VARIANCE));
+        let along = variances(&axes, &drifted);
+        let mut drifts = Drifts::default();
+        let pairs = along.get(..features).unwrap_or_default().chunks(2);
+        for (drift, pair) in drifts.iter_mut().zip(pairs) {
+            let mean = pair.iter().sum::<f64>() / pair.len() as f64;
+            *drift = (mean as f32).clamp(0.0, MOST_VARIANCE);
+        }
         let canonical = product(&axes, &inverse);
         // per unit of the feature, not per step
         let rows = canonical.iter().take(features).map(|row| {

@@ -6,8 +6,8 @@
 //! | 2 | length n |
 //! | n | contents |
 //!
-//! Numbers are f32. Kind 1, how it drifts: [`Drift::bands`], [`Drift::traction`]; per movement d variances along the axes of
-//! its whitening. Kind 2, what textures are like, and the limits of scores: [`Limits`], begin and excess of six tails; per
+//! Numbers are f32. Kind 1, how it drifts: [`Drift::bands`], [`Drift::traction`]; per movement variances along each two axes
+//! of its whitening. Kind 2, what textures are like, and the limits of scores: [`Limits`], begin and excess of six tails; per
 //! movement the axes of the population as a whitening, and d variances along them.
 
 use heapless::Vec;
@@ -18,6 +18,7 @@ use super::limits::{Limits, Numbers};
 use super::population::{LEAST, Population};
 use super::view::Table;
 use super::whitening::{View, Whitening};
+use crate::features::MAX_FEATURES;
 
 /// Bytes of kind and length.
 const HEAD: usize = 4;
@@ -42,7 +43,7 @@ impl Sections<'_> {
         let novelty = self.novelty.map_or(0, |(_, populations)| {
             HEAD + Limits::BYTES + populations.len() * of_population(features)
         });
-        HEAD + TWO + drifts.len() * 4 * features + novelty
+        HEAD + TWO + drifts.len() * of_drift(features) + novelty
     }
 
     /// Gives the bytes, piece by piece, of so many features.
@@ -52,11 +53,14 @@ impl Sections<'_> {
             put(&(length as u16).to_le_bytes());
         };
         let (drift, drifts) = self.drift;
-        head(&mut put, DRIFT, TWO + drifts.len() * 4 * features);
+        head(&mut put, DRIFT, TWO + drifts.len() * of_drift(features));
         for number in [drift.bands, drift.traction] {
             put(&number.to_le_bytes());
         }
-        for variance in drifts.iter().flat_map(|d| d.iter().take(features)) {
+        for variance in drifts
+            .iter()
+            .flat_map(|d| d.iter().take(features.div_ceil(2)))
+        {
             put(&variance.to_le_bytes());
         }
         let Some((limits, populations)) = self.novelty else {
@@ -72,6 +76,11 @@ impl Sections<'_> {
             }
         }
     }
+}
+
+/// Bytes of a movement's variances of the drift.
+const fn of_drift(features: usize) -> usize {
+    4 * features.div_ceil(2)
 }
 
 /// Bytes of a movement's population.
@@ -129,10 +138,10 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// Variances of the drift along the axes of a movement, where there is any.
+    /// Variances of the drift along each two axes of a movement, where there is any.
     pub(crate) fn drifts(&self, movement: u8) -> Option<Numbers<'a>> {
         self.drift().filter(|drift| !drift.is_none())?;
-        let bytes = 4 * self.features();
+        let bytes = of_drift(self.features());
         let at = TWO + usize::from(movement) * bytes;
         Some(Numbers::new(self.section(DRIFT)?.get(at..at + bytes)?))
     }
@@ -167,7 +176,7 @@ impl<'a> Table<'a> {
         (0..self.movements)
             .map(|movement| {
                 let (axes, numbers) = self.population_bytes(movement)?;
-                let mut variances = Drifts::default();
+                let mut variances = [0.0; MAX_FEATURES];
                 for (to, from) in variances.iter_mut().zip(Numbers::new(numbers)) {
                     *to = from;
                 }
@@ -188,8 +197,8 @@ impl<'a> Table<'a> {
             let fits = match kind {
                 DRIFT => {
                     let rest = contents.get(TWO..).unwrap_or_default();
-                    let variances = rest.chunks(4 * features.max(1));
-                    rest.len() == movements * 4 * features
+                    let variances = rest.chunks(of_drift(features).max(1));
+                    rest.len() == movements * of_drift(features)
                         && self.drift().is_some_and(Drift::is_possible)
                         && variances.map(Numbers::new).all(|v| v.are_variances(0.0))
                 }

@@ -4,7 +4,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::explorer::{Config, Method, Strategy};
-use crate::table::{Contents, MAX_TEXTURES, Name};
+use crate::table::{Contents, MAX_TEXTURES, Name, is_false_alarm};
 
 /// Bytes of a table in one message.
 pub const PART: usize = 256;
@@ -91,6 +91,9 @@ pub struct Identify {
     pub learn: bool,
     /// For random choices, and for where on the sample slides begin.
     pub seed: u32,
+    /// Share of the known textures that may be taken for new ones; the table's own, unless given. New in version 5.
+    #[serde(default)]
+    pub false_alarm: Option<f32>,
 }
 
 impl Default for Identify {
@@ -105,6 +108,7 @@ impl Default for Identify {
             open: true,
             learn: false,
             seed: 0,
+            false_alarm: None,
         }
     }
 }
@@ -118,7 +122,7 @@ impl Identify {
             threshold: self.threshold,
             max_slides: self.max_slides,
             open: self.open,
-            ..Config::default()
+            false_alarm: self.false_alarm.filter(|share| is_false_alarm(*share)),
         }
     }
 }

@@ -301,6 +301,9 @@ pub struct Verdict {
     /// Whether the probe asks for [`super::Command::Label`]: the table is fused, and the probe is not certain.
     #[serde(alias = "asks")]
     pub wants_label: bool,
+    /// Whether it is the texture named, but not as it was learned. New in version 5.
+    #[serde(default)]
+    pub changed: bool,
 }
 
 impl From<&Verdict> for explorer::Verdict {
@@ -310,7 +313,7 @@ impl From<&Verdict> for explorer::Verdict {
             probability: told.probability,
             sure: told.sure,
             unknown: told.unknown,
-            changed: false,
+            changed: told.changed,
             log_odds: told.log_odds,
         }
     }

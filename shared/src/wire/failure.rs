@@ -133,6 +133,9 @@ pub enum MemoryError {
     /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// The table that was stored cannot be read: the firmware's own is in force instead. New in version 5.
+    #[error("the stored table cannot be read, and that of the firmware is in its place: {0}")]
+    StoredTable(TableError),
 }
 
 /// Why a slide does not count; `E` is why a rig failed.

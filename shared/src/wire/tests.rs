@@ -96,6 +96,7 @@ fn longest() -> vec::Vec<Report> {
             log_odds: Some(-1e9),
             slides: 255,
             wants_label: true,
+            changed: true,
         })),
         report(Event::TextureLearned(TextureLearned {
             name: name('t'),
@@ -152,6 +153,7 @@ fn requests() -> vec::Vec<Request> {
             open,
             learn: !open,
             seed: u32::MAX,
+            false_alarm: Some(0.02),
         })
     };
     let methods = [
@@ -221,12 +223,13 @@ fn a_verdict_and_an_answer_have_these_bytes() {
         log_odds: Some(2.0),
         slides: 2,
         wants_label: true,
+        changed: false,
     }));
     let bytes = body(&|buffer| postcard::to_slice(&verdict, buffer).unwrap().len());
     // number 7, 1234 ms as a varint, variant 9, 300 as a varint, length and name, two f32, little-endian
     assert_eq!(
         bytes,
-        *b"\x07\xd2\x09\x09\xac\x02\x03oak\0\0\0\x3f\0\x01\x01\0\0\0\x40\x02\x01"
+        *b"\x07\xd2\x09\x09\xac\x02\x03oak\0\0\0\x3f\0\x01\x01\0\0\0\x40\x02\x01\0"
     );
     let answer = Request {
         id: 5,

@@ -90,6 +90,7 @@ impl Args {
             open: !self.closed,
             learn: self.learn,
             seed: self.seed.unwrap_or_else(seed_of_now),
+            false_alarm: self.stop.false_alarm,
         })
     }
 }

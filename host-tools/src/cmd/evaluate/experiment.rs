@@ -8,8 +8,9 @@ use tactus::data::fabricslide::FabricSet;
 use tactus::data::properties::PropertyTable;
 use tactus::eval::evaluate::Method;
 use tactus::eval::experiment::{Experiment, Protocol};
+use tactus::eval::learn::Expected;
 
-use crate::cmd::args::{Features, Recordings, Stop};
+use crate::cmd::args::{Expecting, Features, Recordings, Stop};
 use crate::cmd::output::Format;
 use crate::cmd::plot::Plot;
 use crate::cmd::textures::{measure_folder, names};
@@ -37,7 +38,7 @@ is taken for new. --lifelong plays a session in time order: the first slides are
 episode of its own.
 Both need the method fused.
 
---plot draws what is told of each texture (confusion), how often it was right when it said 99 % (reliability), and slides and
+With --novelty, --plot draws what is told of known and of new textures (known-by-slides, new-by-slides). Else it draws what is told of each texture (confusion), how often it was right when it said 99 % (reliability), and slides and
 errors by threshold (slides-by-threshold, errors-by-threshold).
 
 Examples:
@@ -82,6 +83,8 @@ pub(crate) struct Args {
     /// Number of virtual explorations, 8000 unless given; with --lifelong of sessions, 50 unless given
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     pub(crate) runs: Option<u64>,
+    #[command(flatten)]
+    pub(crate) expecting: Expecting,
     #[command(flatten)]
     pub(crate) stop: Stop,
     /// The same seed gives the same figures, whatever the number of cores
@@ -137,5 +140,9 @@ pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
         (experiment, protocol)
     };
     let features = args.features.map(Features::set);
+    let experiment = experiment.expecting(Expected {
+        drift: Some(args.expecting.drift),
+        ..Expected::default()
+    });
     Ok((experiment.with_features(features), name))
 }

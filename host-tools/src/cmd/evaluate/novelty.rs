@@ -8,12 +8,14 @@ use tactus::eval::evaluate::Method;
 use tactus::eval::experiment::Experiment;
 use tactus::eval::lifelong::{self, Learning, Lifelong};
 use tactus::eval::novelty::{self, Novelty};
+use tactus::eval::pictures::novelty::figures;
 use tactus::eval::show::count;
 use tactus::eval::verdicts::Verdicts;
 use tactus_core::explorer::Config;
 
 use super::experiment::Args;
 use crate::cmd::output::{Format, print_json, verdict_rows};
+use crate::cmd::plot::Canvas;
 use crate::cmd::progress::with_progress;
 
 /// What `evaluate --novelty` prints.
@@ -44,6 +46,7 @@ pub(crate) fn leave_one_out(
     experiment: &Experiment,
     protocol: &'static str,
     config: Config,
+    canvas: Option<Canvas>,
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
     ensure!(
@@ -53,6 +56,9 @@ pub(crate) fn leave_one_out(
     let novelty = with_progress(args.runs(), "presenting new textures", |done| {
         novelty::leave_one_out(experiment, config, args.runs(), done)
     })?;
+    if let Some(canvas) = canvas {
+        canvas.write("tactus evaluate", &figures(&novelty)?, out)?;
+    }
     let (train_slides, runs, seed) = (experiment.train_slides(), args.runs(), args.seed);
     if args.format == Format::Json {
         let figures = NoveltyFigures {
@@ -77,10 +83,13 @@ pub(crate) fn leave_one_out(
             after.slides,
             if after.slides == 1 { " " } else { "s" }
         );
-        let (noticed, alarms) = (after.detections * 100.0, after.false_alarms * 100.0);
+        let new = in_words(&after.unknown());
+        writeln!(out, "  after {slides}  of a new texture  {new}")?;
         writeln!(
             out,
-            "  after {slides}  noticed {noticed:5.1} %, known ones taken for new {alarms:4.1} %"
+            "  {:14}  of a known one    {}",
+            "",
+            in_words(&after.known)
         )?;
     }
     let (new, known) = (&novelty.verdicts_new, &novelty.verdicts_known);

@@ -80,6 +80,7 @@ fn asked() -> Identify {
         open: true,
         learn: false,
         seed: 1,
+        false_alarm: None,
     }
 }
 
@@ -160,6 +161,7 @@ fn exploration(method: Method) -> (Vec<u8>, Vec<Event>) {
                     log_odds: verdict.log_odds,
                     slides,
                     wants_label: method == Method::Fused && !certain,
+                    changed: verdict.changed,
                 }),
                 ExplorationStep::Rejected(..) | ExplorationStep::CutShort(..) => {
                     panic!("{event:?}")
@@ -445,6 +447,7 @@ fn an_exploration_that_was_cut_short_is_followed() {
             log_odds: known.log_odds,
             slides: 2,
             wants_label,
+            changed: known.changed,
         })
     };
     let followed = |wants_label| follow(&[&events[..], &[verdict(wants_label)]].concat());

@@ -87,7 +87,8 @@ impl Recipe {
         let distance: f64 = all()
             .map(|(i, j)| apart[i] * inverse[i][j] * apart[j])
             .sum();
-        -0.5 * (ln + distance)
+        let farthest = d + 8.0 * (2.0 * d).sqrt();
+        -0.5 * (ln + distance.min(farthest))
     }
 
     /// -A_j of every texture after so many slides of these means, and the background.
@@ -164,7 +165,7 @@ fn world(noise: &mut Noise, drift: Drift, evenly: bool) -> (Recipe, Vec<u8>) {
         .map(|_| {
             let mut drifts = Drifts::default();
             if !drift.is_none() {
-                drifts[..d].fill_with(|| (1.5 * noise.normal()).exp() as f32);
+                drifts[..d.div_ceil(2)].fill_with(|| (1.5 * noise.normal()).exp() as f32);
             }
             drifts
         })
@@ -176,6 +177,7 @@ fn world(noise: &mut Noise, drift: Drift, evenly: bool) -> (Recipe, Vec<u8>) {
     let populations: Vec<Population> = (0..movements).map(of).collect();
     let tail = |begin| Tail { begin, excess: 2.0 };
     let limits = Limits {
+        false_alarm: 0.02,
         drifted: [tail(-3.0), tail(-4.0), tail(-3.5)],
         same: [tail(-4.5), tail(-4.0), tail(-6.0)],
     };
@@ -199,7 +201,7 @@ fn world(noise: &mut Noise, drift: Drift, evenly: bool) -> (Recipe, Vec<u8>) {
         known: known_means.iter().map(row).collect(),
         drifts: drifts
             .iter()
-            .map(|v| v[..d].iter().map(|v| f64::from(*v)).collect())
+            .map(|pairs| (0..d).map(|axis| pairs[axis / 2].into()).collect())
             .collect(),
         limits,
     };

@@ -145,7 +145,7 @@ impl Recipe {
 }
 
 const OPEN: Config = Config {
-    false_alarm: 0.02,
+    false_alarm: None,
     method: Method::Fused,
     strategy: Strategy::Bayesian,
     threshold: 0.99,

@@ -316,7 +316,7 @@ proptest! {
                 Happens::Judged(texture, sure, unknown, open) => {
                     let leading = (0..3).map(|n| (texture.wrapping_add(n), random.next_f32()));
                     let leading = leading.collect();
-                    probe.judged(Ok(Judgement { leading, sure, unknown, open }));
+                    probe.judged(Ok(Judgement { leading, sure, unknown, open, changed: false }));
                     judged = true;
                 }
                 Happens::Learned(ok, textures) => {

@@ -146,6 +146,43 @@ fn probe() -> Tested {
     )
 }
 
+/// A stored table as the chip's flash has it, whatever it is.
+struct Mapped(vec::Vec<u8>);
+
+impl StoredBytes<Flash> for Mapped {
+    fn bytes(&mut self, _: &mut Store<Flash>) -> Option<&[u8]> {
+        Some(&self.0)
+    }
+}
+
+#[test]
+fn a_stored_table_that_cannot_be_read_is_reported() {
+    let factory = fused_table();
+    let mut damaged = factory.clone();
+    damaged[60] ^= 4;
+    for (stored, told) in [(factory.clone(), 0), (damaged, 1)] {
+        let store = block_on(Store::open(Ram::new())).unwrap();
+        let mut buffer = vec![0; SECTOR];
+        let mut memory = Memory::new(Ok(store), Mapped(stored), &factory, &mut buffer);
+        let mut heard = Heard::default();
+        block_on(memory.reload(&mut heard));
+        let trouble = |event: &&Event| {
+            let Event::Trouble(Failure::Memory(why)) = event else {
+                return false;
+            };
+            matches!(why, crate::wire::MemoryError::StoredTable(_))
+        };
+        assert_eq!(
+            heard.told.iter().filter(trouble).count(),
+            told,
+            "{:?}",
+            heard.told
+        );
+        assert_eq!(heard.tables.len(), 1);
+        assert_eq!(heard.tables[0].factory, told == 1);
+    }
+}
+
 fn command(probe: &mut Tested, command: Command) -> Result<(), String> {
     let done = block_on(probe.perform::<Plain>(&command));
     done.map_err(|why| why.to_string())

@@ -134,6 +134,7 @@ fn an_answer_a_fault_and_silence_are_said_in_words() {
         log_odds: None,
         slides: 1,
         wants_label: false,
+        changed: false,
     }));
     let mut monitor = heard(events.clone());
     assert!(
