@@ -52,7 +52,7 @@ pub(crate) fn percent(share: f64) -> String {
 pub(crate) fn verdict_rows(v: &Verdicts) -> [(&'static str, f64); 5] {
     [
         ("right", v.right),
-        ("right name, but changed", v.changed),
+        ("like one, but changed", v.changed),
         ("none of those known", v.new),
         ("wrong", v.wrong),
         ("undecided", v.undecided),

@@ -10,10 +10,10 @@ use tactus_core::explorer::{Config, Explorer, ExplorerError, Method};
 use tactus_core::features::{PropertySet, Vector, WHITE_STEPS};
 use tactus_core::table::{Against, Drifts, EPISODES, Limits, Table, Tail, Whitened};
 
-use super::evaluate::MAX_TEXTURES;
-
 /// Most textures that an explorer of a probe holds.
 const FEW: usize = tactus_core::table::MAX_TEXTURES;
+/// Most textures that a PC learns.
+const MOST: usize = 2048;
 /// Draws for every training slide.
 const DRAWS: usize = 8;
 /// Most that a slide is thought to be farther off than it looks, squared.
@@ -49,7 +49,7 @@ pub(crate) fn limits(
     let of = if known.len() <= FEW {
         limits_of::<FEW>
     } else {
-        limits_of::<MAX_TEXTURES>
+        limits_of::<MOST>
     };
     of(false_alarm, table, known, white, drifts)
 }
