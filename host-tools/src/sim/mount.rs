@@ -53,6 +53,7 @@ mod tests {
         assert_eq!(after(&mut mount, 1.44), 0.0);
         assert!((after(&mut mount, 1.65) - 5.0).abs() < 0.1);
         assert_eq!(after(&mut mount, 1.4), 0.0);
-        assert_eq!(after(&mut Mount::STIFF, 12.0), 0.0);
+        let mut stiff = Mount::STIFF;
+        assert_eq!(after(&mut stiff, 12.0), 0.0);
     }
 }
