@@ -4,8 +4,10 @@ use super::*;
 use crate::features::{FeatureSet, MAX_FEATURES};
 use crate::store::tests::ram::{Ram, Torn};
 use crate::store::{FlashFault, StoreError, TrainingRecord};
-use crate::table::TrainingStats;
 use crate::table::tests::{fused_of, known, straight};
+use crate::table::{
+    Drift, EPISODES, Limits, PAIRS, Population, Sections, Tail, TrainingStats, with_sections,
+};
 use embassy_futures::block_on;
 use std::string::ToString;
 use std::vec;
@@ -22,6 +24,33 @@ fn base() -> List<u8> {
     let known: List<List<Whitened>> = ends.iter().map(|end| vec![known(5, end); 3]).collect();
     let whitenings = [straight(3), straight(3), straight(3)];
     fused_of(FeatureSet::Bands, &whitenings, &known)
+}
+
+/// The same with drift and limits.
+fn calibrated() -> List<u8> {
+    let plain = base();
+    let table = Table::read(&plain).unwrap();
+    let means: List<Whitened> = (0..4).map(|texture| table.whitened(texture, 0)).collect();
+    let population = Population::new(3, means.iter().map(|m| (m.slides, &m.mean[..]))).unwrap();
+    let tails = [Tail {
+        begin: -1.0,
+        excess: 2.0,
+    }; EPISODES];
+    let limits = Limits {
+        false_alarm: 0.02,
+        drifted: tails,
+        same: tails,
+    };
+    let sections = Sections {
+        drift: (Drift::default(), &[[0.5; PAIRS]; 3]),
+        novelty: Some((
+            limits,
+            &[population.clone(), population.clone(), population],
+        )),
+    };
+    let mut out = vec![0; 2000];
+    let table = with_sections(&mut out, &table, &sections).unwrap();
+    table.as_bytes().to_vec()
 }
 
 /// A store with this table.
@@ -488,10 +517,22 @@ fn cut_everywhere(
 
 #[test]
 fn a_cut_in_an_answer_leaves_the_old_or_the_new_table() {
-    let bytes = base();
-    let old = Table::read(&bytes).unwrap();
-    let mut store = store(&bytes);
-    let mut force = buffer(&bytes);
+    cut_in_an_answer(&base());
+}
+
+/// "It is like t1, but changed": yes moves it, another name begins a texture.
+#[test]
+fn a_cut_while_a_changed_texture_is_confirmed_or_denied_loses_nothing() {
+    let bytes = calibrated();
+    let table = Table::read(&bytes).unwrap();
+    assert!(table.limits().is_some() && table.drift().is_some());
+    cut_in_an_answer(&bytes);
+}
+
+fn cut_in_an_answer(bytes: &[u8]) {
+    let old = Table::read(bytes).unwrap();
+    let mut store = store(bytes);
+    let mut force = buffer(bytes);
     let episode = summary(&force, 1, &[(0, 2, [-1600, 40, 50])]);
     block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap();
     let ram = store.close().again();
@@ -527,7 +568,8 @@ fn a_cut_in_an_answer_leaves_the_old_or_the_new_table() {
             olds += usize::from(table == before.0);
             news += usize::from(table == after.0);
             let force = in_force(store);
-            assert!(Table::read(&force).is_ok());
+            let force = Table::read(&force).unwrap();
+            assert_eq!((force.limits(), force.drift()), (old.limits(), old.drift()));
         });
         assert!(olds > 100 && news > 0, "{olds} {news} of {cuts}");
     }
