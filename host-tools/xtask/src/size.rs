@@ -20,8 +20,9 @@ Examples:
   cargo xtask size --format json     everything on one line, for programs";
 
 const KB: u64 = 1024;
-/// Flash of an image, without the table that comes with it. An image that is not listed is not gated.
-const MAX_FLASH: [(&str, u64); 2] = [(RIG, 160 * KB), (HANDHELD, 128 * KB)];
+/// Flash of an image, without the table that comes with it. An image that is not listed is not gated. The handheld had 128 KB
+/// before it compared textures in spite of drift, and has the room for a link.
+const MAX_FLASH: [(&str, u64); 2] = [(RIG, 160 * KB), (HANDHELD, 160 * KB)];
 const HANDHELD: &str = "tactus-handheld";
 const MAX_VARIABLES: u64 = 64 * KB;
 /// Twice the deepest stack has to fit into what the variables leave.
