@@ -3,7 +3,8 @@
 //! | executor | task | does | tells |
 //! |---|---|---|---|
 //! | UART4's interrupt, woken by TIM2's | `acquire` | a sensor word every 227 us, while they are wanted | words to `hand` |
-//! | UART7's interrupt, woken by the clock's | `hand` | states, button, buzzer, table; owns the store | pictures to `show` |
+//! | UART7's interrupt, woken by the clock's | `hand` | states, button, buzzer, table, requests; owns the store | pictures to `show`, reports to `send` |
+//! | UART7's interrupt | `receive`, `send` | frames of USART3 | requests to `hand` |
 //! | UART7's interrupt | `show` | the display, by I2C1 and its DMA | |
 //! | UART7's interrupt | `watch` | the watchdog, as long as `hand` gets on | |
 //! | thread mode | | sleeps, and counts for how long | `hand` |
@@ -16,7 +17,7 @@ use static_cell::ConstStaticCell;
 use crate::board;
 use crate::chip::rescue;
 use crate::tasks::acquire::{self, ACQUIRE, WORDS, Word};
-use crate::tasks::{display, hand};
+use crate::tasks::{display, hand, link};
 
 static HAND: InterruptExecutor = InterruptExecutor::new();
 
@@ -29,11 +30,11 @@ fn UART7() {
 /// Starts everything, and sleeps whenever nothing is to be done. To be called once, from thread mode.
 pub fn handheld() -> ! {
     static WORD_QUEUE: ConstStaticCell<Queue<Word, WORDS>> = ConstStaticCell::new(Queue::new());
-    let (_, last_words) = rescue::reset_cause();
+    let (reset, last_words) = rescue::reset_cause();
     rescue::watch_start();
     let r = board::start();
     defmt::info!("tactus-handheld {=str}", env!("CARGO_PKG_VERSION"));
-    if let Some(words) = last_words {
+    if let Some(words) = &last_words {
         defmt::error!("before the reset: {=str}", words.as_str());
     }
     let (words_in, words_out) = WORD_QUEUE.take().split();
@@ -43,12 +44,22 @@ pub fn handheld() -> ! {
     irq::DMA1_STREAM6.set_priority(Priority::P6);
     irq::UART7.set_priority(Priority::P7);
     let hands = HAND.start(interrupt::UART7);
+    hand::booted(reset, last_words);
     // until `hand` can take them
     acquire::listen(false);
     let slots = ACQUIRE.start(interrupt::UART4);
     match acquire::acquire(r.acquire, words_in) {
         Ok(task) => slots.spawn(task),
         Err(_) => defmt::error!("no acquisition"),
+    }
+    if let Some((tx, rx)) = link::open(r.link) {
+        match (link::send(tx), link::receive(rx, &hand::BODY)) {
+            (Ok(send), Ok(receive)) => {
+                hands.spawn(send);
+                hands.spawn(receive);
+            }
+            _ => defmt::error!("no link"),
+        }
     }
     match (
         hand::hand(r.store, r.handle, words_out),

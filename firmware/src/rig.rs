@@ -49,7 +49,7 @@ pub async fn rig(thread: Spawner) {
     let acquire = ACQUIRE.start(interrupt::UART4);
     if let Some((tx, rx)) = link::open(r.link) {
         spawn(&thread, link::send(tx));
-        spawn(&thread, link::receive(rx));
+        spawn(&thread, link::receive(rx, &servo::BODY));
     }
     outbox::tell(Event::Booted {
         protocol: PROTOCOL,

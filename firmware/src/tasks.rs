@@ -2,6 +2,7 @@
 pub(crate) mod acquire;
 pub(crate) mod display;
 pub(crate) mod hand;
+mod level;
 pub(crate) mod link;
 pub(crate) mod outbox;
 pub(crate) mod probe;

@@ -7,6 +7,7 @@
 //! the sensor is wanted, and what is to be done with the table, which it does not own: [`Job`].
 
 mod button;
+pub mod by_hand;
 pub mod draw;
 pub mod guidance;
 pub mod jobs;
@@ -22,4 +23,4 @@ pub use judge::{FEATURES, JudgeError, Judgement, LEADING, MAX_SLIDES, MOVEMENT, 
 pub use picture::Picture;
 pub use screen::{About, Screen, Trouble};
 pub use spelling::{Place, WHEEL};
-pub use states::{Choice, Handheld, Job, TICKS_HZ};
+pub use states::{Answer, Asked, Choice, Handheld, Job, TICKS_HZ};

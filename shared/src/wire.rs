@@ -8,6 +8,7 @@ mod command;
 mod event;
 mod failure;
 mod frame;
+mod prompt;
 mod sparse;
 mod text;
 
@@ -19,6 +20,7 @@ pub use event::{
 };
 pub use failure::{Failure, LEAST_TRIALS, MemoryError, Rejection, TrainingError};
 pub use frame::{FrameError, MAX_FRAME, MAX_MESSAGE, PROTOCOL, Receiver, TooLong, decode, encode};
+pub use prompt::{Again, Prompt};
 pub use text::{Text, text};
 
 #[cfg(test)]

@@ -1,16 +1,12 @@
 //! The handheld's display: an SSD1306 on I2C1, told of a whole picture at a time, by DMA while the core sleeps.
-use display_interface::DisplayError;
-use embassy_stm32::i2c::{self, I2c};
+use embassy_stm32::i2c::{self, I2c, Master};
+use embassy_stm32::mode::Async;
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{bind_interrupts, dma, peripherals};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::Mutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer, with_timeout};
-use ssd1306::command::AddrMode;
-use ssd1306::prelude::DisplayRotation;
-use ssd1306::size::DisplaySize128x64;
-use ssd1306::{I2CDisplayInterface, Ssd1306Async};
 use tactus_core::handheld::picture::{HEIGHT, Picture, WIDTH};
 
 use crate::board;
@@ -44,64 +40,102 @@ pub(crate) fn picture(picture: Option<&Picture>) {
 /// A display that does not answer is looked for again after this.
 const AGAIN: Duration = Duration::from_secs(1);
 
+/// SA0 to ground.
+const ADDRESS: u8 = 0x3C;
+/// The first byte of a transfer: commands follow, or points.
+const COMMANDS: u8 = 0x00;
+const POINTS: u8 = 0x40;
+/// A module of 128 x 64 after its power came (SSD1306 rev 1.1, chapters 9 and 10; application note, figure 2).
+const INIT: [u8; 26] = [
+    COMMANDS, 0xAE, // off
+    0xD5, 0x80, // its own clock
+    0xA8, 63, // 64 rows
+    0xD3, 0, 0x40, // from the first one on
+    0x8D, 0x14, // the charge pump makes its voltage
+    0x20, 0, // along the rows
+    0xDA, 0x12, 0xA1, 0xC8, // as these modules are wired and mounted
+    0x81, 0x5F, 0xD9, 0x21, 0xDB, 0x40, // contrast
+    0xA4, 0xA6, 0x2E, // what is in its memory, lit where it is 1, standing
+];
+const ON: [u8; 2] = [COMMANDS, 0xAF];
+const OFF: [u8; 2] = [COMMANDS, 0xAE];
+/// The next points are those of a whole picture.
+const AREA: [u8; 7] = [
+    COMMANDS,
+    0x21,
+    0,
+    WIDTH as u8 - 1,
+    0x22,
+    0,
+    HEIGHT as u8 / 8 - 1,
+];
+
+type Bus = I2c<'static, Async, Master>;
+
+/// The picture that was sent last, as it goes over the bus.
+struct Sent {
+    bytes: [u8; 1 + WIDTH * HEIGHT / 8],
+    /// Whether there is one.
+    any: bool,
+}
+
+impl Sent {
+    /// Takes a picture, and says whether it differs.
+    fn take(&mut self, picture: &Picture) -> bool {
+        let [_, points @ ..] = &mut self.bytes;
+        let differs = !self.any || points != picture.bytes();
+        *points = *picture.bytes();
+        self.any = true;
+        differs
+    }
+}
+
 #[embassy_executor::task]
 pub(crate) async fn show(pins: board::Display) {
     let mut config = i2c::Config::default();
     config.frequency = Hertz(400_000);
     config.timeout = Duration::from_millis(50);
-    let bus = I2c::new(pins.i2c, pins.scl, pins.sda, pins.tx, pins.rx, Irqs, config);
-    let mut display = Ssd1306Async::new(
-        I2CDisplayInterface::new(bus),
-        DisplaySize128x64,
-        DisplayRotation::Rotate0,
-    );
-    let mut last = None;
+    let mut bus = I2c::new(pins.i2c, pins.scl, pins.sda, pins.tx, pins.rx, Irqs, config);
+    let mut sent = Sent {
+        bytes: [0; 1 + WIDTH * HEIGHT / 8],
+        any: false,
+    };
+    if let Some(first) = sent.bytes.first_mut() {
+        *first = POINTS;
+    }
     loop {
         // its power may come late, or its plug be loose
-        if let Err(why) = run(&mut display, &mut last).await {
-            let why = match why {
-                DisplayError::BusWriteError => "it does not answer",
-                _ => "it is told what no display is",
-            };
-            defmt::warn!("no display: {=str}", why);
+        if run(&mut bus, &mut sent).await.is_err() {
+            defmt::warn!("no display: it does not answer");
         }
         Timer::after(AGAIN).await;
     }
 }
 
 /// Shows one picture after the other, beginning with the last one, until the display does not answer.
-async fn run<D>(
-    display: &mut Ssd1306Async<D, DisplaySize128x64, ssd1306::mode::BasicMode>,
-    last: &mut Option<Picture>,
-) -> Result<(), DisplayError>
-where
-    D: display_interface::AsyncWriteOnlyDataCommand,
-{
-    const END: (u8, u8) = (WIDTH as u8, HEIGHT as u8);
-    display.init_with_addr_mode(AddrMode::Horizontal).await?;
-    let (mut lit, mut due) = (true, last.is_some());
+async fn run(bus: &mut Bus, sent: &mut Sent) -> Result<(), i2c::Error> {
+    bus.write(ADDRESS, &INIT).await?;
+    bus.write(ADDRESS, &ON).await?;
+    let (mut lit, mut due) = (true, sent.any);
     let mut answered = Instant::now();
     loop {
-        if let Some(picture) = last.as_ref().filter(|_| due) {
-            display.set_draw_area((0, 0), END).await?;
-            display.draw(picture.bytes()).await?;
+        if due {
+            bus.write(ADDRESS, &AREA).await?;
+            bus.write(ADDRESS, &sent.bytes).await?;
             answered = Instant::now();
         }
         due = false;
         if let Ok(next) = with_timeout(AGAIN, SHOW.wait()).await {
             if next != lit {
                 lit = next;
-                display.set_display_on(lit).await?;
+                bus.write(ADDRESS, if lit { &ON } else { &OFF }).await?;
             }
             let picture = NEXT.lock().await;
-            if lit && last.as_ref() != Some(&*picture) {
-                *last = Some(picture.clone());
-                due = true;
-            }
+            due = lit && sent.take(&picture);
         }
         if !due && answered.elapsed() >= AGAIN {
             // nothing new: is it still there?
-            display.set_display_on(lit).await?;
+            bus.write(ADDRESS, if lit { &ON } else { &OFF }).await?;
             answered = Instant::now();
         }
     }

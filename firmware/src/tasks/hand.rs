@@ -1,27 +1,35 @@
 //! The handheld in a hand: states, button, buzzer and table; and how long the core sleeps between them.
-use core::sync::atomic::AtomicU32;
+use core::cell::Cell;
 use core::sync::atomic::Ordering::Relaxed;
+use core::sync::atomic::{AtomicBool, AtomicU32};
 
 use embassy_stm32::gpio::{Input, OutputType, Pull};
 use embassy_stm32::peripherals;
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
-use embassy_time::{Duration, Instant, Ticker, Timer, with_timeout};
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_time::{Duration, Instant, Ticker, with_timeout};
 use heapless::spsc::Consumer;
 use static_cell::{ConstStaticCell, StaticCell};
 use tactus_core::dsp::{Plain, Plan};
-use tactus_core::handheld::jobs::{Outcome, work};
+use tactus_core::handheld::by_hand::{self, ByHand, Hand, Shown};
+use tactus_core::handheld::jobs::{self, Outcome};
 use tactus_core::handheld::{About, Handheld, Picture, Screen, TICKS_HZ, draw};
 use tactus_core::probe::seams::Events;
-use tactus_core::probe::{Memory, TableInUse};
+use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::sensor::pressure::Calibration;
 use tactus_core::store::StoreError;
-use tactus_core::wire::{Event, text};
+use tactus_core::wire::{Event, PROTOCOL, Reset, Text};
 
 use super::acquire::{self, Word};
 use super::display;
+use super::level::OneLevel;
+use super::link::{BUSY, Body, HEARD, JOBS, TABLE};
+use super::outbox::{self, STREAM};
 use crate::board;
-use crate::chip::flash::{self, Bank2, MappedTable};
+use crate::chip::flash::{self, MappedTable};
 use crate::chip::rescue;
 
 /// The table that comes with the handheld: textures of a simulated world under a simulated hand. Its
@@ -29,8 +37,6 @@ use crate::chip::rescue;
 static FACTORY: &[u8] = include_bytes!("../../handheld.tact");
 /// The store is open by now, or will never be.
 const OPENING: Duration = Duration::from_secs(10);
-/// Ticks from one picture to the next: 20 a second.
-const PICTURE: u32 = TICKS_HZ / 20;
 /// Ticks from one word in the log about sleep to the next.
 const SAY: u32 = 5 * TICKS_HZ;
 /// `hand` gets on at least this often; the longest that it does is to erase two sectors, ms.
@@ -136,17 +142,153 @@ fn sound(buzzer: &mut Buzzer, tone: Option<u16>) {
     }
 }
 
+/// So the probe is, for who asks at any time.
+static STATE: Mutex<OneLevel, Cell<RigState>> = Mutex::new(Cell::new(RigState::parked(UNMEASURED)));
+/// The host stopped what it asked for.
+static STOPPED: AtomicBool = AtomicBool::new(false);
+
+/// The probe as the link asks it at any time.
+pub(crate) static BODY: Body = Body {
+    state: || STATE.lock(Cell::get),
+    stop: |all| STOPPED.store(all, Relaxed),
+    lost: || 0,
+};
+
+/// A fingertip that nobody has measured; what belongs to motors is not used.
+const UNMEASURED: RigCalibration = RigCalibration {
+    pressure: Calibration::PAPER,
+    unloaded_a: (0.0, 0.0),
+    newton_per_ampere: 1.0,
+    date: 0,
+    serial: [0; 16],
+};
+
+/// The parts in the hand.
+struct Parts {
+    words: Consumer<'static, Word>,
+    button: Input<'static>,
+    buzzer: Buzzer,
+    ticker: Ticker,
+    awake: Awake,
+    /// Whether words come, whether that was so for the whole second, and ticks.
+    listens: bool,
+    same: bool,
+    ticks: u32,
+}
+
+impl Hand for Parts {
+    async fn wait(&mut self) {
+        self.ticker.next().await;
+        PROGRESS_MS.store(Instant::now().as_millis() as u32, Relaxed);
+        self.ticks = self.ticks.wrapping_add(1);
+        if self.ticks.is_multiple_of(TICKS_HZ) {
+            self.awake.was(self.same.then_some(self.listens));
+            self.same = true;
+        }
+    }
+
+    fn word(&mut self) -> Option<Word> {
+        self.words.dequeue()
+    }
+
+    fn is_pressed(&mut self) -> bool {
+        self.button.is_high()
+    }
+
+    fn listen(&mut self, on: bool) {
+        if on && !self.listens {
+            // what was done meanwhile took its time
+            self.ticker.reset();
+        }
+        (self.listens, self.same) = (on, false);
+        acquire::listen(on);
+    }
+
+    fn sound(&mut self, tone: Option<u16>) {
+        sound(&mut self.buzzer, tone);
+    }
+
+    fn show(&mut self, screen: &Screen<'_>) {
+        if matches!(screen, Screen::Dark) {
+            return display::picture(None);
+        }
+        let mut picture = Picture::new();
+        let Ok(()) = draw(screen, &mut picture);
+        display::picture(Some(&picture));
+    }
+
+    fn about(&self) -> About {
+        About {
+            version: env!("CARGO_PKG_VERSION"),
+            awake: self.awake.listening.get(),
+            awake_at_rest: self.awake.resting.get(),
+            late: acquire::LATE.load(Relaxed),
+            lost: acquire::LOST.load(Relaxed),
+            ..About::default()
+        }
+    }
+
+    fn publish(&mut self, state: &RigState) {
+        STATE.lock(|cell| cell.set(*state));
+    }
+
+    fn is_stopped(&self) -> bool {
+        STOPPED.load(Relaxed)
+    }
+
+    fn streams(&self) -> bool {
+        STREAM.load(Relaxed)
+    }
+
+    fn tell(&mut self, event: Event) {
+        tell(event);
+    }
+}
+
+/// Says that the probe has booted; from thread mode, before the tasks run.
+pub(crate) fn booted(reset: Reset, last_words: Option<Text>) {
+    outbox::tell(Event::Booted {
+        protocol: PROTOCOL,
+        version: env!("CARGO_PKG_VERSION").try_into().unwrap_or_default(),
+        reset,
+        last_words,
+    });
+}
+
+/// Tells the host, once one has asked for something: a probe without a host saves the work.
+fn tell(event: Event) {
+    if let Event::Trouble(_) = &event {
+        // its words are the host's; what the person must know is on the display
+        defmt::error!("trouble: the host is told what it is");
+    }
+    if HEARD.load(Relaxed) {
+        outbox::tell(event);
+    }
+}
+
+/// Tells the host, and who answers it meanwhile.
+struct Told;
+
+impl Events for Told {
+    fn tell(&mut self, event: Event) {
+        tell(event);
+    }
+
+    fn table(&mut self, table: TableInUse) {
+        TABLE.lock(|cell| cell.set(table));
+    }
+}
+
 #[embassy_executor::task]
 pub(crate) async fn hand(
     flash: board::Storage,
     handle: board::Handle,
-    mut words: Consumer<'static, Word>,
+    words: Consumer<'static, Word>,
 ) {
     static PLAN: StaticCell<Plan> = StaticCell::new();
     static BUFFER: ConstStaticCell<[u8; 16 * 1024]> = ConstStaticCell::new([0; 16 * 1024]);
     let plan: &'static Plan = PLAN.init_with(Plan::new);
-    let button = Input::new(handle.button, Pull::Down);
-    let mut buzzer = SimplePwm::new(
+    let buzzer = SimplePwm::new(
         handle.tones,
         None,
         None,
@@ -157,104 +299,53 @@ pub(crate) async fn hand(
     );
     let store = with_timeout(OPENING, flash::open(flash)).await;
     let store = store.unwrap_or(Err(StoreError::Silent));
+    let mut events = Shown::new(Told);
     let mut memory = Memory::new(store, MappedTable, FACTORY, BUFFER.take());
-    memory.reload(&mut Logged).await;
+    memory.reload(&mut events).await;
     let textures = memory.table().map_or(0, |table| table.textures());
-    let mut probe = Handheld::<Plain>::new(plan, textures);
+    let mut handheld = Handheld::<Plain>::new(plan, textures);
     if let Err(why) = memory.table() {
-        probe.memory_failed(text(why));
+        handheld.memory_failed(jobs::words(&why));
     }
     let mut awake = Awake::default();
     awake.was(None);
-    let (mut listens, mut same, mut tone, mut tick, mut say) = (true, false, None, 0u32, 0);
-    let mut ticker = Ticker::every(Duration::from_hz(TICKS_HZ.into()));
-    acquire::listen(true);
+    let parts = Parts {
+        words,
+        button: Input::new(handle.button, Pull::Down),
+        buzzer,
+        ticker: Ticker::every(Duration::from_hz(TICKS_HZ.into())),
+        awake,
+        listens: false,
+        same: false,
+        ticks: 0,
+    };
+    let mut probe = Probe {
+        rig: ByHand::new(parts, handheld, UNMEASURED),
+        memory,
+        events,
+        plan,
+    };
+    if let Ok(store) = probe.memory.store()
+        && let Err(why) = probe::restore(store, &mut probe.rig).await
+    {
+        tell(Event::Trouble(why.into()));
+    }
+    let mut said = 0;
     loop {
-        ticker.next().await;
-        PROGRESS_MS.store(Instant::now().as_millis() as u32, Relaxed);
-        tick = tick.wrapping_add(1);
-        while let Some(word) = words.dequeue() {
-            probe.word(word);
+        by_hand::step(&mut probe, log).await;
+        if let Ok(request) = JOBS.try_receive() {
+            STOPPED.store(false, Relaxed);
+            BUSY.store(true, Relaxed);
+            by_hand::serve(&mut probe, &request).await;
+            BUSY.store(false, Relaxed);
         }
-        probe.tick(button.is_high());
-        if probe.tone() != tone {
-            tone = probe.tone();
-            sound(&mut buzzer, tone);
-        }
-        let job = probe.job();
-        if (job.is_some() || tick.is_multiple_of(PICTURE)) && probe.is_new() {
-            show(&probe, &memory, &awake);
-        }
-        if let Some(job) = job {
-            // nobody takes words meanwhile: they are not asked for, and what comes next does not follow what came
-            acquire::listen(false);
-            while let Some(word) = words.dequeue() {
-                probe.word(word);
-            }
-            probe.lose(1);
-            // the picture goes out meanwhile
-            Timer::after_millis(1).await;
-            work(job, &mut probe, &mut memory, &mut Logged, log).await;
-            ticker.reset();
-            same = false;
-            listens = probe.listens();
-            acquire::listen(listens);
-        }
-        if probe.listens() != listens {
-            listens = probe.listens();
-            same = false;
-            acquire::listen(listens);
-        }
-        if tick.is_multiple_of(TICKS_HZ) {
-            awake.was(same.then_some(listens));
-            same = true;
-        }
-        say += 1;
+        let parts = &probe.rig.hand;
         // the log is written with interrupts off, which may cost a slide a sensor slot
-        if say >= SAY && !probe.is_touched() {
-            awake.say();
-            say = 0;
+        if parts.ticks.wrapping_sub(said) >= SAY && !probe.rig.handheld.is_touched() {
+            parts.awake.say();
+            said = parts.ticks;
         }
     }
-}
-
-/// Draws what the probe shows.
-fn show(probe: &Handheld<'_, Plain>, memory: &Knowledge, awake: &Awake) {
-    // reading a table means checking it, which takes milliseconds
-    let table = if probe.names_textures() {
-        memory.table().ok()
-    } else {
-        None
-    };
-    let about = About {
-        version: env!("CARGO_PKG_VERSION"),
-        awake: awake.listening.get(),
-        awake_at_rest: awake.resting.get(),
-        late: acquire::LATE.load(Relaxed),
-        lost: acquire::LOST.load(Relaxed),
-    };
-    let screen = probe.screen(table.as_ref(), &about);
-    if matches!(screen, Screen::Dark) {
-        return display::picture(None);
-    }
-    let mut picture = Picture::new();
-    let Ok(()) = draw(&screen, &mut picture);
-    display::picture(Some(&picture));
-}
-
-type Knowledge = Memory<'static, Bank2, MappedTable>;
-
-/// There is no host to tell: what goes wrong goes to the log.
-struct Logged;
-
-impl Events for Logged {
-    fn tell(&mut self, event: Event) {
-        if let Event::Trouble(why) = event {
-            defmt::error!("{=str}", text(why).as_str());
-        }
-    }
-
-    fn table(&mut self, _: TableInUse) {}
 }
 
 /// Logs what came of a job.
@@ -273,6 +364,6 @@ fn log(outcome: Outcome<'_>) {
             judgement.unknown
         ),
         Outcome::Learned(name) => defmt::info!("learned {=str}", name.as_str()),
-        Outcome::NotLearned(why) => defmt::error!("not learned: {=str}", why.as_str()),
+        Outcome::NotLearned(why) => defmt::error!("not learned: {=str}", why),
     }
 }

@@ -4,7 +4,6 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
 use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, BufferedUartTx};
 use embassy_sync::blocking_mutex::Mutex;
-use embassy_sync::blocking_mutex::raw::ThreadModeRawMutex;
 use embassy_sync::channel::Channel;
 use embedded_io_async::{Read as _, Write as _};
 use static_cell::ConstStaticCell;
@@ -12,8 +11,9 @@ use tactus_core::probe::seams::Panel;
 use tactus_core::probe::{RigState, TableInUse, Turn, receive as receive_request};
 use tactus_core::wire::{Counts, Event, Receiver, Request};
 
+use super::acquire;
+use super::level::OneLevel;
 use super::outbox::{self, OUTBOX, STREAM, tell};
-use super::{acquire, servo};
 use crate::board::{self, Irqs};
 
 /// embassy's buffer for the line, and the longest write: a longer one would fail, and the flush after it never end.
@@ -21,12 +21,14 @@ const CHUNK: usize = 256;
 
 static DAMAGED_FRAMES: AtomicU32 = AtomicU32::new(0);
 /// Requests for the session.
-pub(crate) static JOBS: Channel<ThreadModeRawMutex, Request, 1> = Channel::new();
+pub(crate) static JOBS: Channel<OneLevel, Request, 1> = Channel::new();
 /// The session works on a request.
 pub(crate) static BUSY: AtomicBool = AtomicBool::new(false);
+/// Somebody has asked for something since the probe booted.
+pub(crate) static HEARD: AtomicBool = AtomicBool::new(false);
 
 /// The table in force.
-pub(crate) static TABLE: Mutex<ThreadModeRawMutex, Cell<TableInUse>> =
+pub(crate) static TABLE: Mutex<OneLevel, Cell<TableInUse>> =
     Mutex::new(Cell::new(TableInUse::NONE));
 
 /// Opens the line.
@@ -66,8 +68,18 @@ pub(crate) async fn send(mut uart: BufferedUartTx<'static>) {
     }
 }
 
+/// What the probe runs on, for what is answered at any time.
+pub(crate) struct Body {
+    /// What the rig is doing.
+    pub(crate) state: fn() -> RigState,
+    /// Stops it; whether all that was asked for.
+    pub(crate) stop: fn(bool),
+    /// Samples that were lost behind the acquisition.
+    pub(crate) lost: fn() -> u32,
+}
+
 #[embassy_executor::task]
-pub(crate) async fn receive(mut uart: BufferedUartRx<'static>) {
+pub(crate) async fn receive(mut uart: BufferedUartRx<'static>, body: &'static Body) {
     static RECEIVER: ConstStaticCell<Receiver> = ConstStaticCell::new(Receiver::new());
     let receiver = RECEIVER.take();
     let mut bytes = [0; 64];
@@ -79,7 +91,7 @@ pub(crate) async fn receive(mut uart: BufferedUartRx<'static>) {
         for &byte in bytes.get(..length).unwrap_or_default() {
             match receiver.push::<Request>(byte) {
                 None => {}
-                Some(Ok(request)) => received(request),
+                Some(Ok(request)) => received(request, body),
                 Some(Err(_)) => {
                     let frames = DAMAGED_FRAMES.fetch_add(1, Relaxed) + 1;
                     tell(Event::Damaged(frames));
@@ -90,20 +102,21 @@ pub(crate) async fn receive(mut uart: BufferedUartRx<'static>) {
 }
 
 /// A request that has just come.
-fn received(request: Request) {
+fn received(request: Request, body: &'static Body) {
+    HEARD.store(true, Relaxed);
     let busy = BUSY.load(Relaxed) || !JOBS.is_empty();
-    if receive_request(&request, busy, &mut AtAnyTime) == Turn::Queue {
+    if receive_request(&request, busy, &mut AtAnyTime(body)) == Turn::Queue {
         // the queue has space: no other task queues requests
         let _ = JOBS.try_send(request);
     }
 }
 
 /// What is answered while the probe works on something else.
-struct AtAnyTime;
+struct AtAnyTime(&'static Body);
 
 impl Panel for AtAnyTime {
     fn rig(&self) -> RigState {
-        servo::state()
+        (self.0.state)()
     }
 
     fn table(&self) -> TableInUse {
@@ -116,18 +129,14 @@ impl Panel for AtAnyTime {
             late_slots: acquire::LATE.load(Relaxed),
             parity_errors: acquire::PARITY.load(Relaxed),
             error_frames: acquire::ERROR_FRAMES.load(Relaxed),
-            lost_samples: acquire::LOST.load(Relaxed) + servo::LOST.load(Relaxed),
+            lost_samples: acquire::LOST.load(Relaxed) + (self.0.lost)(),
             lost_reports: outbox::LOST_REPORTS.load(Relaxed),
             damaged_frames: DAMAGED_FRAMES.load(Relaxed),
         }
     }
 
     fn stop(&mut self, all: bool) {
-        if all {
-            servo::stop_for_good();
-        } else {
-            servo::stop();
-        }
+        (self.0.stop)(all);
     }
 
     fn stream(&mut self, on: bool) {

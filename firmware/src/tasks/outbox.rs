@@ -1,15 +1,16 @@
 //! What the probe tells the host, on its way to the line.
 use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering::Relaxed};
 
-use embassy_sync::blocking_mutex::raw::ThreadModeRawMutex;
 use embassy_sync::pipe::Pipe;
 use embassy_time::Instant;
 use tactus_core::wire::{self, Event, MAX_FRAME, Report};
 
-/// What is on its way to the host: 90 ms of the line.
-const OUT: usize = 8192;
+use super::level::OneLevel;
 
-pub(crate) static OUTBOX: Pipe<ThreadModeRawMutex, OUT> = Pipe::new();
+/// What is on its way to the host: 66 ms of the line.
+const OUT: usize = 6144;
+
+pub(crate) static OUTBOX: Pipe<OneLevel, OUT> = Pipe::new();
 static NUMBER: AtomicU16 = AtomicU16::new(0);
 pub(crate) static LOST_REPORTS: AtomicU32 = AtomicU32::new(0);
 /// Raw samples are wanted.
@@ -25,7 +26,7 @@ pub(crate) fn tell(event: Event) {
     };
     let mut buffer = [0; MAX_FRAME + 1];
     let sent = wire::encode(&report, &mut buffer).is_ok_and(|mut frame| {
-        // all writers are in thread mode and none is interrupted by another: what is free stays free
+        // all writers are at one level and none is interrupted by another: what is free stays free
         if OUTBOX.free_capacity() < frame.len() {
             return false;
         }

@@ -28,6 +28,7 @@ use tactus_core::rig::stage::StageConstants;
 use tactus_core::sensor::pressure::Calibration;
 
 use super::acquire::Word;
+use super::link::Body;
 use crate::board;
 use crate::chip::{lever, rescue};
 
@@ -124,6 +125,13 @@ pub(crate) fn progress() {
 pub(crate) fn waits() {
     STUCK_MS.store(WAITS, Relaxed);
 }
+
+/// The servo as the link asks it at any time.
+pub(crate) static BODY: Body = Body {
+    state,
+    stop: |all| if all { stop_for_good() } else { stop() },
+    lost: || LOST.load(Relaxed),
+};
 
 /// Amperes of the stage's motor by the amplifier's 12 bits over 3.3 V: 1 V/A about 2048.
 fn amperes(adc: u16) -> f32 {

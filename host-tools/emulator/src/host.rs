@@ -3,6 +3,7 @@
 pub mod args;
 pub mod exploration;
 pub mod learned;
+pub mod person;
 pub mod progress;
 pub mod talk;
 pub mod under_finger;

@@ -10,7 +10,6 @@ mod loss;
 mod monitor;
 mod owner;
 mod record;
-mod recorder;
 mod rename;
 mod replay;
 mod status;

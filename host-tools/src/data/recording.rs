@@ -95,8 +95,8 @@ impl Recording {
             background: None,
             pdc,
             pdc_rate_hz,
-            // the rig says shear at constant speed only
-            outside_mn: Some([vec![0; before], vec![0; after]]),
+            // a rig says shear at constant speed only, a handheld none
+            outside_mn: (inside > 0).then(|| [vec![0; before], vec![0; after]]),
             shear_rate_hz: SHEAR_HZ,
         };
         recording.check().is_ok().then_some(recording)

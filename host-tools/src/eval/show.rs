@@ -7,7 +7,7 @@ use tactus_core::explorer::{ExpectedOutcome, Told, Verdict};
 use tactus_core::features::{Properties, Property};
 use tactus_core::probe::explore::ExplorationStep;
 use tactus_core::table::{Action, Contents, Table, white};
-use tactus_core::wire::Event;
+use tactus_core::wire::{Event, Prompt};
 
 const BAR: usize = 24;
 /// Most candidates listed after a slide.
@@ -21,6 +21,8 @@ pub struct Show<'t, W> {
     table: Table<'t>,
     out: W,
     slides: u32,
+    /// What a person was asked to do last.
+    prompt: Option<Prompt>,
     answered: Option<(Verdict, u8)>,
     /// The first failure to write, kept until the end.
     failed: io::Result<()>,
@@ -33,6 +35,7 @@ impl<'t, W: Write> Show<'t, W> {
             table,
             out,
             slides: 0,
+            prompt: None,
             answered: None,
             failed: Ok(()),
         }
@@ -148,6 +151,9 @@ impl<'t, W: Write> Show<'t, W> {
             Event::Rejected { why, .. } => self.line(&format!("  rejected: {why}")),
             Event::Fault(fault) => self.line(&format!("  fault: {fault}")),
             Event::Trouble(why) => self.line(&format!("  trouble: {why}")),
+            Event::Prompt(prompt) if self.prompt.replace(*prompt) != Some(*prompt) => {
+                self.line(&format!("  the display says: {prompt}"))
+            }
             Event::Verdict(verdict) => self.answer(verdict.into(), verdict.slides),
             _ => Ok(()),
         }

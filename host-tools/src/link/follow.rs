@@ -124,6 +124,9 @@ pub struct Follower<'t> {
     random: Random,
     /// The slide as far as its samples have come; `None` once a block is missing.
     samples: Option<Slide<'t>>,
+    /// P_DC of the slide so far, and which samples are at constant speed.
+    pdc: Vec<i16>,
+    steady: Option<(u32, u32)>,
     /// What the probe chose last.
     chosen: Option<Action>,
     agreement: Agreement,
@@ -151,6 +154,8 @@ impl<'t> Follower<'t> {
             plan,
             random: Random::new(asked.seed),
             samples: None,
+            pdc: Vec::new(),
+            steady: None,
             chosen: None,
             agreement: Agreement::default(),
         })
@@ -177,6 +182,10 @@ impl<'t> Follower<'t> {
                 self.chosen(*slide, *action, expected)
             }
             Event::Block(block) => self.block(block),
+            Event::Pdc(counts) => {
+                self.pdc.extend_from_slice(counts);
+                Ok(())
+            }
             Event::SlideReport {
                 slide,
                 action,
@@ -265,6 +274,12 @@ impl<'t> Follower<'t> {
         let Some(slide) = &mut self.samples else {
             return Ok(());
         };
+        if block.number == 0 {
+            // a person has pressed anew
+            *slide = Slide::new(self.plan, slide.movement());
+            self.pdc.clear();
+        }
+        self.steady = block.steady.or(self.steady);
         let expected = slide.next_block();
         if block.number != expected {
             self.samples = None;
@@ -311,9 +326,15 @@ impl<'t> Follower<'t> {
             Some(samples) if samples.next_block() == 0 => {
                 return Err(FollowError::NoBlocks(slide));
             }
-            Some(samples) => samples
-                .finish()
-                .map_err(|why| FollowError::Slide { slide, why })?,
+            Some(mut samples) => {
+                let pdc = core::mem::take(&mut self.pdc);
+                let (from, to) = self.steady.take().unwrap_or_default();
+                let steady = pdc.get(from as usize..to as usize);
+                samples.push_pdc(steady.unwrap_or_default());
+                samples
+                    .finish()
+                    .map_err(|why| FollowError::Slide { slide, why })?
+            }
         };
         let here = SlideReport::from(&here);
         let agreement = &mut self.agreement;

@@ -108,6 +108,18 @@ impl Request<RigCalibration> {
     }
 }
 
+impl Request<f32> {
+    /// Has a handheld probe measure P_DC under a weight of so many mN: counts above that of the lifted finger.
+    pub fn weigh(mn: u16) -> Self {
+        Self::new(Command::Weigh(mn), None, |event, answer| {
+            if let Event::Weighed { counts, .. } = event {
+                *answer = Some(*counts);
+            }
+            Ok(())
+        })
+    }
+}
+
 fn take_calibration(event: &Event, answer: &mut Option<RigCalibration>) -> Result<(), LinkError> {
     if let Event::Calibration(bytes) = event {
         let bytes = bytes.as_slice().try_into();

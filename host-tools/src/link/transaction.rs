@@ -202,6 +202,7 @@ fn may_repeat(command: &Command) -> bool {
         | Command::Rename { .. }
         | Command::Forget(Forget::Texture(_))
         | Command::Calibrate
+        | Command::Weigh(_)
         | Command::CommitTable => false,
     }
 }

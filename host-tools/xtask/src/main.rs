@@ -72,8 +72,8 @@ enum Cli {
     Flash(flash::Options),
     /// Say what each image takes of the chip, and how deep the rig's stack gets
     ///
-    /// The stack is measured on the emulated board, during an exploration. An error if the rig's image takes more than 160 KB
-    /// of flash without its table (the handheld's 128 KB), if variables take more than 64 KB, or if twice the stack does not
+    /// The stack is measured on the emulated board, during an exploration. An error if the rig's image or the handheld's
+    /// takes more than 160 KB of flash without its table, if variables take more than 64 KB, or if twice the stack does not
     /// fit beside them into the 192 KB there are. Lists the largest symbols, and the functions that panic with their
     /// callers.
     #[command(after_help = size::EXAMPLES)]

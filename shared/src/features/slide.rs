@@ -127,6 +127,21 @@ impl<'p, K: Kernels> Slide<'p, K> {
         self.next
     }
 
+    /// Takes over all that another slide of the same movement has measured: its kernels differ in speed only.
+    pub fn adopt<L>(&mut self, other: &Slide<'_, L>) {
+        self.next = other.next;
+        self.still = other.still.clone();
+        self.still_samples = other.still_samples;
+        self.background = other.background;
+        self.steady = other.steady.clone();
+        self.position = other.position;
+        self.power = other.power.clone();
+        self.spectrum = other.spectrum.clone();
+        (self.shear_mn, self.shears) = (other.shear_mn, other.shears);
+        self.pdc = other.pdc;
+        self.lost = other.lost;
+    }
+
     /// Takes the next block of the movement: of the still finger, then of the slide, the first of which says which samples
     /// are at constant speed. What a block says is lost has nothing in its place, nor has a block that does not come: the
     /// slide has no properties then.

@@ -197,6 +197,19 @@ fn percent(p: f32) -> String<8> {
     text
 }
 
+/// Year, month and day of a number such as 20261121.
+const fn date(day: u32) -> (u32, u32, u32) {
+    (day / 10_000, day / 100 % 100, day % 100)
+}
+
+/// "slide 2 of 5", "slide 2" where nobody knows how many there are.
+fn count(slide: u8, of: u8) -> String<40> {
+    match of {
+        0 => say(format_args!("slide {slide}")),
+        of => say(format_args!("slide {slide} of {of}")),
+    }
+}
+
 /// Writes a short text.
 fn say(text: core::fmt::Arguments<'_>) -> String<40> {
     let mut said = String::new();
@@ -225,7 +238,7 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             force_mn,
             down,
         } => {
-            brush.title("Press", &say(format_args!("slide {slide} of {of}")))?;
+            brush.title("Press", &count(*slide, *of))?;
             let order = match *force_mn {
                 _ if !down => "Press",
                 mn if mn < *ZONE_MN.start() => "Harder",
@@ -241,9 +254,30 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             force_mn,
             progress,
         } => {
-            brush.title("Slide", &say(format_args!("slide {slide} of {of}")))?;
-            brush.pace(*progress)?;
+            brush.title("Slide", &count(*slide, *of))?;
+            brush.pace(*progress, *force_mn)?;
             brush.force(*force_mn, 48)
+        }
+        Screen::Lift { slide } => {
+            match slide {
+                0 => brush.title("Tactus", "")?,
+                _ => brush.title("Good", &say(format_args!("slide {slide}")))?,
+            }
+            brush.centre("Lift", 18, &FONT_10X20)?;
+            brush.centre("the finger", 38, &FONT_10X20)
+        }
+        Screen::Weigh { mn, force_mn } => {
+            brush.title("Calibrate", "keep still")?;
+            brush.centre("Weight", 13, &FONT_10X20)?;
+            let newton = say(format_args!("{}.{:02} N", mn / 1000, mn % 1000 / 10));
+            brush.centre(&newton, 32, &FONT_10X20)?;
+            let reads = *force_mn as u16;
+            let reads = say(format_args!(
+                "reads {}.{:02} N",
+                reads / 1000,
+                reads % 1000 / 10
+            ));
+            brush.centre(&reads, 54, &FONT_6X10)
         }
         Screen::Again { why, lift } => {
             brush.title("Again", "")?;
@@ -346,7 +380,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
     }
 
     /// How far the slide is, and how far it ought to be: 5 cm while the bar fills.
-    fn pace(&mut self, progress: Option<f32>) -> Done<D> {
+    fn pace(&mut self, progress: Option<f32>, force_mn: f32) -> Done<D> {
         let Some(progress) = progress else {
             self.centre("Slide", 12, &FONT_10X20)?;
             return self.centre("5 cm in 2 s", 31, &FONT_6X10);
@@ -359,7 +393,12 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         }
         // the finger's place
         self.triangle(end, 14, 11, false)?;
-        self.left("on, on", if end > 60 { 4 } else { 84 }, 14)
+        let order = match force_mn {
+            mn if mn < *ZONE_MN.start() => "press harder",
+            mn if mn > *ZONE_MN.end() => "press lighter",
+            _ => "keep going",
+        };
+        self.centre(order, 34, &FONT_6X10)
     }
 
     fn choose(&mut self, at: u16, count: u16, entries: &[Entry<'_>]) -> Done<D> {
@@ -437,7 +476,6 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
 
     fn about_probe(&mut self, about: &About) -> Done<D> {
         self.title("About", &say(format_args!("Tactus {}", about.version)))?;
-        self.left("Core awake", 1, 14)?;
         let share = |p: Option<f32>| match p {
             // whole numbers: code to write others takes 9 kB
             Some(p) => {
@@ -446,14 +484,29 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
             }
             None => say(format_args!("-")),
         };
-        self.left("listening", 7, 24)?;
-        self.right(&share(about.awake), 24)?;
-        self.left("at rest", 7, 34)?;
-        self.right(&share(about.awake_at_rest), 34)?;
+        let left = 100 - libm::roundf(100.0 * about.memory.clamp(0.0, 1.0)) as u32;
+        self.row("Memory left", &say(format_args!("{left} %")), 12)?;
+        let (year, month, day) = date(about.calibrated);
+        let calibrated = match about.calibrated {
+            0 => say(format_args!("never")),
+            _ => say(format_args!("{year}-{month:02}-{day:02}")),
+        };
+        self.row("Force set", &calibrated, 22)?;
+        let both = say(format_args!(
+            "{}/{}",
+            share(about.awake),
+            share(about.awake_at_rest)
+        ));
+        self.row("Awake", &both, 32)?;
         let slots = say(format_args!("late {}, lost {}", about.late, about.lost));
-        self.left("Slots", 1, 44)?;
-        self.right(&cut(&slots, 15), 44)?;
+        self.row("Slots", &cut(&slots, 15), 42)?;
         self.button("go on", "")
+    }
+
+    /// A name and its value.
+    fn row(&mut self, name: &str, value: &str, y: i32) -> Done<D> {
+        self.left(name, 1, y)?;
+        self.right(value, y)
     }
 
     /// A sentence over so many lines, broken at blanks.

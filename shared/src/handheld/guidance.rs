@@ -1,6 +1,5 @@
 //! What a person who presses and slides is told.
 
-use core::fmt;
 use core::ops::RangeInclusive;
 
 use crate::features::Observation;
@@ -8,39 +7,7 @@ use crate::features::Observation;
 /// The force that is asked for, mN: about [`super::judge::MOVEMENT`]'s, as wide as people hold it without looking.
 pub const ZONE_MN: RangeInclusive<f32> = 300.0..=750.0;
 
-/// What is wrong with a slide.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Again {
-    /// Pressed too hard.
-    TooHard,
-    /// Pressed too lightly.
-    TooLight,
-    /// It ended before its time.
-    TooShort,
-    /// It was not made at one pace.
-    TooUneven,
-    /// A word of the sensor was lost or damaged.
-    Disturbed,
-}
-
-impl Again {
-    /// In words.
-    pub const fn why(self) -> &'static str {
-        match self {
-            Self::TooHard => "too hard",
-            Self::TooLight => "too light",
-            Self::TooShort => "too short",
-            Self::TooUneven => "too uneven",
-            Self::Disturbed => "disturbed",
-        }
-    }
-}
-
-impl fmt::Display for Again {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.why())
-    }
-}
+pub use crate::wire::Again;
 
 /// What happens in a touch.
 #[derive(Clone, PartialEq, Debug)]

@@ -7,8 +7,9 @@ use super::states::{Choice, Handheld, Job};
 use crate::explorer::Kernels;
 use crate::probe::Memory;
 use crate::probe::seams::{Events, StoredBytes};
+use crate::store::StoreError;
 use crate::table::Name;
-use crate::wire::{Text, text};
+use crate::wire::MemoryError;
 
 /// What came of a job, for the log.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -25,7 +26,7 @@ pub enum Outcome<'j> {
     /// This texture was learned.
     Learned(&'j Name),
     /// Nothing was learned.
-    NotLearned(&'j Text),
+    NotLearned(&'static str),
 }
 
 /// Does a job, and tells the handheld what came of it; `log` hears it first.
@@ -40,7 +41,7 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
         Job::Judge(slides) => {
             let table = match memory.table() {
                 Ok(table) => table,
-                Err(why) => return handheld.memory_failed(text(why)),
+                Err(why) => return handheld.memory_failed(words(&why)),
             };
             let judged = judge::<K>(table, &slides).map(|(judgement, episode)| {
                 if let Some((texture, p)) = judgement.leading.first() {
@@ -77,8 +78,8 @@ async fn teach<F: NorFlash, B: StoredBytes<F>>(
     choice: Choice,
     memory: &mut Memory<'_, F, B>,
     events: &mut impl Events,
-) -> Result<Name, Text> {
-    let table = memory.table().map_err(text)?;
+) -> Result<Name, &'static str> {
+    let table = memory.table().map_err(|why| words(&why))?;
     let name = match choice {
         Choice::Known(texture) => {
             Name::try_from(table.name(texture).unwrap_or_default()).unwrap_or_default()
@@ -87,8 +88,31 @@ async fn teach<F: NorFlash, B: StoredBytes<F>>(
         Choice::Spelled(name) => name,
     };
     if memory.episode.is_none() {
-        return Err(text("no slide was measured: slide first"));
+        return Err(words(&MemoryError::NoEpisode));
     }
-    memory.label(&name, events).await.map_err(text)?;
+    let learned = memory.label(&name, events).await;
+    learned.map_err(|why| words(&why))?;
     Ok(name)
+}
+
+/// What the display says of it, in its four lines of 21 letters; the host is told what it is made of.
+pub fn words(why: &MemoryError) -> &'static str {
+    match why {
+        MemoryError::NoEpisode => "There is no slide to learn from. Slide first.",
+        MemoryError::TableChanged => "The textures changed meanwhile. Slide again.",
+        MemoryError::TrainOnly => "This table learns only with a computer.",
+        MemoryError::Full | MemoryError::Encode(_) => {
+            "The memory is full. Forget a texture with a computer."
+        }
+        MemoryError::Unknown(_) | MemoryError::Taken(_) | MemoryError::LastTexture => {
+            "The textures do not allow that."
+        }
+        MemoryError::Store(StoreError::Worn) => "The memory is worn out and keeps nothing new.",
+        MemoryError::NoTable(_) | MemoryError::Table(_) => {
+            "The textures cannot be read. Load them with a computer."
+        }
+        MemoryError::Broken(_) | MemoryError::Store(_) => {
+            "The memory does not answer. Switch off and on."
+        }
+    }
 }

@@ -6,6 +6,7 @@ use crate::explorer::{
     Config, EpisodeSummary, Explorer, ExplorerError, Kernels, Method, ObserveError,
 };
 use crate::features::{FeatureSet, Movement, Observation, PropertySet};
+use crate::probe::consider_fused;
 use crate::table::{Action, MAX_TEXTURES, Name, Table};
 
 /// What a person is asked to do: half a newton, 25 mm/s.
@@ -62,8 +63,7 @@ pub fn judge<K: Kernels>(
         ..Config::default()
     };
     let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
-    explorer
-        .consider(PropertySet::default(), config, 0..table.textures())
+    consider_fused(&mut explorer, PropertySet::default(), config, &[])
         .map_err(JudgeError::Table)?;
     let action = Action {
         movement: movement(&table).ok_or(JudgeError::Movement)?,
@@ -73,21 +73,9 @@ pub fn judge<K: Kernels>(
         explorer.observe(action, slide).map_err(JudgeError::Slide)?;
     }
     let best = explorer.best();
-    let mut leading: Vec<(u16, f32), LEADING> = Vec::new();
-    for (&probability, texture) in explorer.posterior().iter().zip(0..) {
-        let place = leading
-            .iter()
-            .position(|(_, other)| probability > *other)
-            .unwrap_or(leading.len());
-        if place < LEADING {
-            leading.truncate(leading.len().min(LEADING - 1));
-            // one place is free now, and `place` is at most the end
-            let _ = leading.insert(place, (texture, probability));
-        }
-    }
     let verdict = explorer.verdict();
     let judgement = Judgement {
-        leading,
+        leading: leading(explorer.posterior()),
         sure: verdict.is_some_and(|verdict| verdict.sure),
         unknown: verdict.is_some_and(|verdict| verdict.unknown),
         changed: verdict.is_some_and(|verdict| verdict.changed),
@@ -100,6 +88,23 @@ pub fn judge<K: Kernels>(
         observed: explorer.observed().collect(),
     };
     Ok((judgement, episode))
+}
+
+/// The most probable textures, the first one leading.
+pub(super) fn leading(posterior: &[f32]) -> Vec<(u16, f32), LEADING> {
+    let mut leading: Vec<(u16, f32), LEADING> = Vec::new();
+    for (&probability, texture) in posterior.iter().zip(0..) {
+        let place = leading
+            .iter()
+            .position(|(_, other)| probability > *other)
+            .unwrap_or(leading.len());
+        if place < LEADING {
+            leading.truncate(leading.len().min(LEADING - 1));
+            // one place is free now, and `place` is at most the end
+            let _ = leading.insert(place, (texture, probability));
+        }
+    }
+    leading
 }
 
 /// The movement of the table that the person makes: the one nearest to [`MOVEMENT`] is the only one in a handheld's table.

@@ -6,7 +6,6 @@ use super::guidance::{Again, Phase, View};
 use super::judge::LEADING;
 use super::spelling::{Place, WHEEL};
 use crate::table::Name;
-use crate::wire::Text;
 
 /// Entries of a list that are shown at once.
 pub const LINES: usize = 4;
@@ -19,7 +18,7 @@ pub enum Trouble {
     /// P_AC never changes, which always has noise.
     Frozen,
     /// The table or the store.
-    Memory(Text),
+    Memory(&'static str),
 }
 
 /// A texture and its probability.
@@ -57,6 +56,10 @@ pub struct About {
     pub late: u32,
     /// Words that were lost.
     pub lost: u32,
+    /// Day of the calibration, as 20261121; 0 for factory defaults.
+    pub calibrated: u32,
+    /// Share of the memory for textures that is taken, 0 to 1.
+    pub memory: f32,
 }
 
 /// What the display shows.
@@ -90,6 +93,18 @@ pub enum Screen<'a> {
         force_mn: f32,
         /// How much is done, 0 to 1; `None` before it begins.
         progress: Option<f32>,
+    },
+    /// The slide is made: the finger is to be lifted.
+    Lift {
+        /// Which it was.
+        slide: u8,
+    },
+    /// A known weight is to be put on the finger.
+    Weigh {
+        /// The weight, mN.
+        mn: u16,
+        /// Contact force, mN.
+        force_mn: f32,
     },
     /// A slide was no good.
     Again {

@@ -2,6 +2,8 @@
 
 use heapless::Vec;
 
+mod asked;
+
 use super::button::{Button, Press};
 use super::guidance::{Again, Event};
 use super::judge::{JudgeError, Judgement, MAX_SLIDES, free_name};
@@ -13,7 +15,6 @@ use crate::explorer::Kernels;
 use crate::features::Observation;
 use crate::sensor::pressure::Pressure;
 use crate::table::{Name, Table};
-use crate::wire::{Text, text};
 
 /// Ticks in a second.
 pub const TICKS_HZ: u32 = 100;
@@ -56,6 +57,12 @@ enum Page {
     Ready,
     /// An episode: the finger is to be pressed and slid.
     Touching,
+    /// The host's slide is made: the finger is to be lifted.
+    Lift,
+    /// The host wants P_DC in the air.
+    Air,
+    /// The host wants P_DC under a weight of so many mN.
+    Weigh(u16),
     /// A slide was no good; the slides before it stand.
     Again(Again),
     /// The job is being done.
@@ -65,7 +72,7 @@ enum Page {
     Choose(u16),
     Spell(Spelling),
     Saving,
-    Learned(Result<Name, Text>),
+    Learned(Result<Name, &'static str>),
     Fault(Trouble),
     About,
     Dark,
@@ -96,6 +103,9 @@ pub struct Handheld<'p, K> {
     note: u8,
     /// The page was changed and not looked at since.
     fresh: bool,
+    /// What the host wants of the person, and what came of it.
+    asked: Option<Asked>,
+    answer: Option<Answer>,
 }
 
 const CLICK: &[Note] = &[(2000, 2)];
@@ -105,6 +115,8 @@ const BAD: &[Note] = &[(900, 12), (0, 6), (900, 12)];
 const SURE_IT_IS: &[Note] = &[(2000, 8), (2400, 8), (2700, 16)];
 const NOT_KNOWN: &[Note] = &[(1800, 10), (0, 4), (1400, 16)];
 const ALARM: &[Note] = &[(700, 30), (0, 10), (700, 30)];
+
+pub use asked::{Answer, Asked};
 
 impl<'p, K: Kernels> Handheld<'p, K> {
     /// A probe that was just switched on, with a table of so many textures.
@@ -124,6 +136,8 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             melody: &[],
             note: 0,
             fresh: true,
+            asked: None,
+            answer: None,
         }
     }
 
@@ -161,6 +175,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         match &self.page {
             Page::Learned(_) if self.shown >= LEARNED => self.begin(),
             Page::Thinking | Page::Saving | Page::Fault(_) | Page::Dark => {}
+            _ if self.idle >= DARK_AFTER && self.asked.is_some() => self.end(Answer::Nobody),
             _ if self.idle >= DARK_AFTER => self.show(Page::Dark),
             _ => {}
         }
@@ -178,7 +193,11 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         }
         let judgement = match judged {
             Ok(judgement) => judgement,
-            Err(why) => return self.fail(Trouble::Memory(text(why))),
+            Err(_) => {
+                return self.fail(Trouble::Memory(
+                    "These textures are not for a handheld. Load others.",
+                ));
+            }
         };
         let (open, unknown, sure) = (judgement.open, judgement.unknown, judgement.sure);
         self.judgement = Some(judgement.clone());
@@ -206,7 +225,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 
     /// The result of [`Job::Teach`]: the name that was learned, or why none was. The table now has `textures` textures.
-    pub fn learned(&mut self, learned: Result<Name, Text>, textures: u16) {
+    pub fn learned(&mut self, learned: Result<Name, &'static str>, textures: u16) {
         self.textures = textures;
         if !matches!(self.page, Page::Saving) {
             return;
@@ -216,16 +235,21 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 
     /// The store or the table cannot be used.
-    pub fn memory_failed(&mut self, why: Text) {
+    pub fn memory_failed(&mut self, why: &'static str) {
         self.fail(Trouble::Memory(why));
     }
 
     /// Whether the sensor's words are wanted.
     pub fn listens(&self) -> bool {
         match &self.page {
-            Page::Ready | Page::Touching | Page::Again(_) | Page::Thinking | Page::Verdict(_) => {
-                true
-            }
+            Page::Ready
+            | Page::Touching
+            | Page::Lift
+            | Page::Air
+            | Page::Weigh(_)
+            | Page::Again(_)
+            | Page::Thinking
+            | Page::Verdict(_) => true,
             // it may come back
             Page::Fault(trouble) => !matches!(trouble, Trouble::Memory(_)),
             Page::Choose(_)
@@ -250,7 +274,10 @@ impl<'p, K: Kernels> Handheld<'p, K> {
 
     /// Whether the display is to be drawn anew since this was asked last.
     pub fn is_new(&mut self) -> bool {
-        let moves = matches!(self.page, Page::Ready | Page::Touching | Page::Again(_));
+        let moves = matches!(
+            self.page,
+            Page::Ready | Page::Touching | Page::Lift | Page::Weigh(_) | Page::Again(_)
+        );
         core::mem::take(&mut self.fresh) || moves
     }
 
@@ -271,18 +298,23 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 })
                 .collect()
         };
-        let slide = self.episode.len() as u8 + 1;
-        let of = if self.training {
-            TRAINING_SLIDES
-        } else {
-            MAX_SLIDES
-        } as u8;
+        let (slide, of) = match &self.asked {
+            Some(asked) => (asked.slide, asked.of),
+            None if self.training => (self.episode.len() as u8 + 1, TRAINING_SLIDES as u8),
+            None => (self.episode.len() as u8 + 1, MAX_SLIDES as u8),
+        };
         match &self.page {
             Page::Ready if !self.touch.has_zero() => Screen::Air,
             Page::Ready => Screen::Ready {
                 textures: self.textures,
             },
             Page::Touching => Screen::touching(&self.touch.view(), slide, of),
+            Page::Lift => Screen::Lift { slide },
+            Page::Air => Screen::Air,
+            Page::Weigh(mn) => Screen::Weigh {
+                mn: *mn,
+                force_mn: self.touch.view().force_mn,
+            },
             Page::Again(why) => Screen::Again {
                 why: *why,
                 lift: self.touch.is_down(),
@@ -308,7 +340,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 wheel: spelling.wheel(),
             },
             Page::Saving => Screen::Saving,
-            Page::Learned(learned) => Screen::Learned(learned.as_ref().map_err(Text::as_str)),
+            Page::Learned(learned) => Screen::Learned(learned.as_ref().map_err(|why| *why)),
             Page::Fault(trouble) => Screen::Fault(trouble),
             Page::About => Screen::About(about.clone()),
             Page::Dark => Screen::Dark,
@@ -385,6 +417,9 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             self.sound(ALARM);
             self.clear_episode();
             self.job = None;
+            if self.asked.take().is_some() {
+                self.answer = Some(Answer::Trouble);
+            }
             self.show(Page::Fault(trouble));
         }
     }
@@ -440,8 +475,10 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 }
                 _ => {}
             },
-            Event::Still => self.sound(SLIDE),
+            Event::Still if matches!(self.page, Page::Touching) => self.sound(SLIDE),
+            Event::Still => {}
             Event::Up => match self.page {
+                Page::Touching if self.asked.is_some() => {}
                 Page::Touching if self.episode.is_empty() && !self.training => self.begin(),
                 Page::Again(_) if self.shown >= AGAIN => self.show(Page::Touching),
                 _ => {}
@@ -450,6 +487,13 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 if matches!(self.page, Page::Touching) {
                     self.sound(BAD);
                     self.show(Page::Again(why));
+                }
+            }
+            Event::Slid(_) if self.asked.is_some() => {
+                if matches!(self.page, Page::Touching) {
+                    self.sound(GOOD);
+                    self.answer = Some(Answer::Slid);
+                    self.show(Page::Lift);
                 }
             }
             Event::Slid(observation) => {
@@ -474,8 +518,11 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 self.training = true;
                 self.show(Page::Touching);
             }
+            (_, Press::Short) if self.asked.is_some() => {}
+            (_, Press::Long) if self.asked.is_some() => self.end(Answer::GivenUp),
             (Page::Touching | Page::Again(_), Press::Short) => {}
             (Page::Touching | Page::Again(_), Press::Long) => self.begin(),
+            (Page::Lift | Page::Air | Page::Weigh(_), _) => self.begin(),
             (Page::Verdict(_), Press::Short) => self.begin(),
             (Page::Verdict(_), Press::Long) => self.show(Page::Choose(0)),
             (Page::Choose(at), Press::Short) => {
@@ -505,7 +552,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 
     fn teach(&mut self, choice: Choice) {
-        if self.episode.is_empty() || self.judgement.is_none() {
+        if self.judgement.is_none() {
             // no slide was measured
             return self.begin();
         }

@@ -9,13 +9,13 @@ use super::guidance::{Again, Event, Phase, View, ZONE_MN};
 use super::judge::MOVEMENT;
 use crate::dsp::Plan;
 use crate::explorer::Kernels;
-use crate::features::{Blocks, Observation, SamplePhase, Slide, SlideError};
+use crate::features::{BLOCK, Block, Blocks, Observation, SamplePhase, Slide, SlideError};
 use crate::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ};
 
-/// Samples of a channel in a block: 10 ms.
-const BLOCK: usize = 22;
-/// Blocks in a second.
-const BLOCKS_HZ: u16 = (RATE_HZ as usize / BLOCK) as u16;
+/// Samples of a channel that are looked at together: 10 ms.
+const LOOK: usize = 22;
+/// Such looks in a second.
+const BLOCKS_HZ: u16 = (RATE_HZ as usize / LOOK) as u16;
 
 /// The finger is down from this force on, mN, ...
 const DOWN_MN: f32 = 100.0;
@@ -30,8 +30,8 @@ const STEADY_FORCE: usize = 10;
 const ZEROING: u16 = 20;
 /// Share of a block in the air that the zero follows: half a second.
 const FOLLOW: f32 = 0.02;
-/// The zero was taken with the finger down when P_DC falls this far below it, counts.
-const BELOW_ZERO: f32 = 5.0;
+/// The zero was taken with the finger down when P_DC falls this far below it, mN.
+const BELOW_ZERO_MN: f32 = 57.5;
 
 /// A finger is still while P_AC is at most this many times as lively as in the air: a hand trembles.
 const STILL: f32 = 4.0;
@@ -45,11 +45,11 @@ const LIVELY: f32 = 2.0;
 const BEGINS: u8 = 3;
 const STOPPED: u8 = 8;
 /// From where a slide begins to where it is steady, samples: 150 ms to come up to speed.
-const COMING_UP: u32 = 15 * BLOCK as u32;
+const COMING_UP: u32 = 15 * LOOK as u32;
 /// The steady part, samples: 1.2 s.
-const STEADY: u32 = 120 * BLOCK as u32;
+const STEADY: u32 = 120 * LOOK as u32;
 /// Tenths of a second of the steady part, whose liveliness must agree.
-const TENTHS: usize = STEADY as usize / BLOCK / 10;
+const TENTHS: usize = STEADY as usize / LOOK / 10;
 /// Standard deviation of ln(liveliness) of the tenths from which a slide is too uneven.
 const UNEVEN: f32 = 0.8;
 
@@ -58,9 +58,21 @@ const SILENT: u16 = 440;
 /// Equal samples of P_AC in a row that mean that it hangs: 100 ms.
 const FROZEN: u16 = 220;
 
+/// Samples of a touch as they came with the last word: what a slide is measured from.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Taken {
+    /// Blocks of the touch that are full; a block of number 0 begins the touch anew.
+    pub blocks: Vec<Block, 2>,
+    /// P_DC since the slide began, counts about that of the lifted finger.
+    pub pdc: Vec<i16, BLOCK>,
+}
+
 /// Follows touches.
 pub struct Touch<'p, K> {
     plan: &'p Plan,
+    /// Contact force of one count of P_DC, mN.
+    mn_per_count: f32,
+    taken: Taken,
     slide: Slide<'p, K>,
     blocks: Blocks,
     phase: Phase,
@@ -76,8 +88,8 @@ pub struct Touch<'p, K> {
     stopped: u8,
     tenth: f32,
     /// The block so far: samples in counts, words that have passed, and those that are missing.
-    pac: Vec<i16, BLOCK>,
-    pdc: Vec<i16, BLOCK>,
+    pac: Vec<i16, LOOK>,
+    pdc: Vec<i16, LOOK>,
     words: usize,
     missing: u32,
     /// Unreadable words in a row; equal samples of P_AC, and that sample.
@@ -96,7 +108,7 @@ pub struct Touch<'p, K> {
     /// Blocks in a row that say down, or up.
     changes: u8,
     /// Still P_AC that is not yet old enough to be background.
-    latest: Deque<[i16; BLOCK], DELAY>,
+    latest: Deque<[i16; LOOK], DELAY>,
     tenths: Vec<f32, TENTHS>,
 }
 
@@ -105,6 +117,8 @@ impl<'p, K: Kernels> Touch<'p, K> {
     pub fn new(plan: &'p Plan) -> Self {
         Self {
             plan,
+            mn_per_count: Calibration::PAPER.force_mn_per_count,
+            taken: Taken::default(),
             slide: Slide::new(plan, MOVEMENT),
             blocks: Blocks::default(),
             phase: Phase::Air,
@@ -135,7 +149,37 @@ impl<'p, K: Kernels> Touch<'p, K> {
 
     /// Words come again after a pause: whatever was known is not so any more.
     pub fn restart(&mut self) {
-        *self = Self::new(self.plan);
+        *self = Self {
+            mn_per_count: self.mn_per_count,
+            ..Self::new(self.plan)
+        };
+    }
+
+    /// From now on a count of P_DC means so many mN.
+    pub fn calibrate(&mut self, mn_per_count: f32) {
+        self.mn_per_count = mn_per_count;
+    }
+
+    /// The slide that was good last, until the finger is pressed again.
+    pub fn slide(&self) -> &Slide<'p, K> {
+        &self.slide
+    }
+
+    /// What came with the last word.
+    pub fn taken(&self) -> &Taken {
+        &self.taken
+    }
+
+    /// Mean P_DC of the latest 100 ms in counts above that in the air; `None` before it is known.
+    pub fn counts_above_air(&self) -> Option<f32> {
+        let known = self.has_zero() && self.forces.is_full();
+        let sum: f32 = self.forces.iter().sum();
+        known.then(|| sum / self.forces.len() as f32 - self.zero)
+    }
+
+    /// P_DC in the air, counts; `None` before it is known.
+    pub fn air_counts(&self) -> Option<f32> {
+        self.has_zero().then_some(self.zero)
     }
 
     /// Whether P_DC in the air is known.
@@ -170,6 +214,8 @@ impl<'p, K: Kernels> Touch<'p, K> {
     /// Takes a word; `None` is a damaged one.
     pub fn word(&mut self, word: Option<Pressure>) -> Option<Event> {
         self.words += 1;
+        self.taken.blocks.clear();
+        self.taken.pdc.clear();
         let mut event = None;
         match word {
             Some(Pressure { channel, counts }) => {
@@ -198,7 +244,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
             self.restart();
             return event;
         }
-        if self.words >= 2 * BLOCK {
+        if self.words >= 2 * LOOK {
             event = self.block();
             self.pac.clear();
             self.pdc.clear();
@@ -226,7 +272,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
     }
 
     fn newtons(&self, pdc: f32) -> f32 {
-        (pdc - self.zero) * Calibration::PAPER.force_mn_per_count
+        (pdc - self.zero) * self.mn_per_count
     }
 
     /// How lively P_AC is: mean square of its second difference. It takes the place of a filter: a tremor of 10 Hz comes
@@ -261,7 +307,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
             return self.find_zero(pdc, lively);
         }
         let now_mn = self.newtons(pdc);
-        if pdc < self.zero - BELOW_ZERO {
+        if now_mn < -BELOW_ZERO_MN {
             // it was down when the zero was taken
             self.zero = pdc;
         }
@@ -355,9 +401,9 @@ impl<'p, K: Kernels> Touch<'p, K> {
     }
 
     /// P_AC of the block in counts about its rest.
-    fn about_rest(&self) -> [i16; BLOCK] {
+    fn about_rest(&self) -> [i16; LOOK] {
         let rest = libm::roundf(self.rest) as i16;
-        let mut about = [0; BLOCK];
+        let mut about = [0; LOOK];
         for (to, from) in about.iter_mut().zip(&self.pac) {
             *to = from - rest;
         }
@@ -367,8 +413,14 @@ impl<'p, K: Kernels> Touch<'p, K> {
     /// Gives P_AC of the touch to its slide.
     fn put(&mut self, phase: &SamplePhase, pac: &[i16]) {
         if let Some(block) = self.blocks.put(phase, pac, None) {
-            self.slide.take(&block);
+            self.take(block);
         }
+    }
+
+    fn take(&mut self, block: Block) {
+        self.slide.take(&block);
+        // two places: a word fills a block and ends a slide at most
+        let _ = self.taken.blocks.push(block);
     }
 
     /// A still block: background, once it is old enough.
@@ -446,13 +498,13 @@ impl<'p, K: Kernels> Touch<'p, K> {
         if self.stopped >= STOPPED {
             return Some(self.again(Again::TooShort));
         }
-        self.samples += BLOCK as u32;
+        self.samples += LOOK as u32;
+        let zero = libm::roundf(self.zero) as i16;
+        self.taken.pdc = self.pdc.iter().map(|counts| counts - zero).collect();
         if steady {
-            let zero = libm::roundf(self.zero) as i16;
-            let above: Vec<i16, BLOCK> = self.pdc.iter().map(|counts| counts - zero).collect();
-            self.slide.push_pdc(&above);
+            self.slide.push_pdc(&self.taken.pdc);
             self.tenth += lively;
-            if (self.samples - COMING_UP).is_multiple_of(10 * BLOCK as u32) {
+            if (self.samples - COMING_UP).is_multiple_of(10 * LOOK as u32) {
                 // `tenths` has space: for as many as the steady part has
                 let _ = self
                     .tenths
@@ -473,8 +525,9 @@ impl<'p, K: Kernels> Touch<'p, K> {
             return Event::Again(Again::TooUneven);
         }
         let last = core::mem::take(&mut self.blocks).end(0);
-        self.slide.take(&last);
-        let slide = core::mem::replace(&mut self.slide, Slide::new(self.plan, MOVEMENT));
+        self.take(last);
+        let mut slide = Slide::<K>::new(self.plan, MOVEMENT);
+        slide.adopt(&self.slide);
         match slide.finish() {
             Ok(measurement) => Event::Slid(Observation::from(&measurement)),
             Err(SlideError::Silent) => Event::Frozen,

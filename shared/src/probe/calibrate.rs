@@ -10,7 +10,7 @@ use crate::store::{Store, StoreError};
 use crate::wire::Failure;
 
 /// Measures the motor's current without load and P_DC in the air, and uses them from now on.
-pub(super) async fn calibrate<R: RigHandle>(rig: &mut R) -> Result<RigCalibration, Failure> {
+pub(super) async fn by_motor<R: RigHandle>(rig: &mut R) -> Result<RigCalibration, Failure> {
     if rig.state().phase == Phase::Parked {
         rig.home().await.map_err(Failure::Rig)?;
     }

@@ -176,7 +176,7 @@ where
             }
             Command::Calibrate => {
                 memory.episode = None;
-                let calibration = calibrate::calibrate(rig).await?;
+                let calibration = rig.calibrate().await?;
                 events.tell(told(&calibration));
                 Ok(calibrate::keep(memory.store()?, &calibration).await?)
             }
@@ -211,6 +211,12 @@ where
                 let done = memory.store()?.factory_table().await;
                 memory.reload(events).await;
                 Ok(done?)
+            }
+            Command::Weigh(mn) => {
+                memory.episode = None;
+                let counts = rig.weigh(*mn).await?;
+                events.tell(Event::Weighed { mn: *mn, counts });
+                Ok(())
             }
             // answered when they came, see `receive`
             Command::Status | Command::Stop | Command::Stream(_) | Command::ReadCalibration => {

@@ -7,7 +7,7 @@ use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::rig::{Rig, RigError};
 use crate::store::Store;
-use crate::wire::{Counts, Event};
+use crate::wire::{Counts, Event, Failure};
 
 /// A run of the stage without load.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -49,6 +49,21 @@ pub trait RigHandle: Rig<Error = RigError> {
 
     /// Goes on from this wear of the skin.
     async fn set_skin(&mut self, skin: SkinCare);
+
+    /// Measures what a rig can measure of itself, and uses it from now on: with motors their current without load and P_DC in
+    /// the air, in a hand P_DC in the air.
+    ///
+    /// # Errors
+    /// It was not measured; the constants are those of before.
+    async fn calibrate(&mut self) -> Result<RigCalibration, Failure>;
+
+    /// Measures P_DC under a weight of so many mN that a person puts on the finger, in counts above that in the air.
+    ///
+    /// # Errors
+    /// No such weight was put on the finger; [`Failure::OtherProbe`]: the rig presses by itself.
+    async fn weigh(&mut self, _mn: u16) -> Result<f32, Failure> {
+        Err(Failure::OtherProbe)
+    }
 }
 
 /// Where the bytes of the stored table are read: mapped flash on the chip, a copy on a PC. They must stay readable beside

@@ -3,6 +3,7 @@
 
 use heapless::Vec;
 
+use super::calibrate;
 use super::explore::Random;
 use super::seams::{RigHandle, UnloadedRun};
 use super::status::RigState;
@@ -14,7 +15,7 @@ use crate::rig::pins::Outputs;
 use crate::rig::skin::SkinCare;
 use crate::rig::timeout::{MovementTimeout, Wait};
 use crate::rig::{Ended, Phase, Refused, Rig, RigError};
-use crate::wire::Event;
+use crate::wire::{Event, Failure};
 
 /// How often the samples are looked after, ms.
 pub const LOOK_MS: u32 = 10;
@@ -248,6 +249,10 @@ impl<S: Servo> RigHandle for ServoRig<S> {
             }),
             _ => Err(RigError::Stopped),
         }
+    }
+
+    async fn calibrate(&mut self) -> Result<RigCalibration, Failure> {
+        calibrate::by_motor(self).await
     }
 
     async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), RigError> {

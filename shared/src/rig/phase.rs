@@ -89,6 +89,14 @@ pub enum RigError {
     /// It did not come to an end by itself, and was stopped: see [`super::timeout`].
     #[error("the rig does not come to an end: home it")]
     Hangs,
+    /// Nobody made the movement by hand in time.
+    #[error("nobody touched anything for a minute: ask again")]
+    NobodyThere,
+    /// A hand does not make this movement.
+    #[error(
+        "a hand makes one movement, 0.5 N and 25 mm/s, and the table has another: push one that was recorded by hand"
+    )]
+    NotByHand,
 }
 
 impl RigError {
@@ -98,7 +106,11 @@ impl RigError {
         match self {
             Self::Fault(fault) => fault.is_of_the_movement(),
             Self::Refused(Refused::Force(_) | Refused::Speed(_) | Refused::Length) => true,
-            Self::Refused(_) | Self::Stopped | Self::Hangs => false,
+            Self::Refused(_)
+            | Self::Stopped
+            | Self::Hangs
+            | Self::NobodyThere
+            | Self::NotByHand => false,
         }
     }
 }

@@ -70,6 +70,8 @@ pub enum Command {
     CommitTable,
     /// Goes back to the table that came with the firmware.
     FactoryTable,
+    /// Measures P_DC under a weight of so many mN that a person puts on the finger: [`super::Event::Weighed`].
+    Weigh(u16),
 }
 
 /// An exploration.

@@ -5,11 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use super::command::PART;
 use super::failure::{self, Failure};
+use super::prompt::Prompt;
 use super::sparse;
 use super::text::Text;
 use crate::explorer::{self, ExpectedOutcome};
 use crate::features::{
-    Block, FUSED_BANDS, Measurement, Movement, Observation, Properties, Property,
+    BLOCK, Block, FUSED_BANDS, Measurement, Movement, Observation, Properties, Property,
 };
 use crate::rig::Fault;
 use crate::table::{Action, MAX_TEXTURES, Name};
@@ -131,6 +132,17 @@ pub enum Event {
     },
     /// Something went wrong that is no answer to a request.
     Trouble(Failure),
+    /// A probe without motors asks the person who holds it to do this: when it changes, and once a second.
+    Prompt(Prompt),
+    /// P_DC of a slide by hand from its begin on, gap-free, counts about that of the lifted finger.
+    Pdc(Vec<i16, BLOCK>),
+    /// Mean P_DC under a known weight.
+    Weighed {
+        /// The weight, mN.
+        mn: u16,
+        /// Counts above that of the lifted finger.
+        counts: f32,
+    },
 }
 
 /// Why the chip started.

@@ -201,6 +201,9 @@ pub enum Failure {
     /// There is an answer, but the probe did not learn from it.
     #[error("not learned: {0}")]
     NotLearned(MemoryError),
+    /// This kind of probe cannot do that.
+    #[error("this kind of probe cannot do that")]
+    OtherProbe,
 }
 
 /// What a rig gets over by itself asks nothing of a person.

@@ -7,6 +7,7 @@ mod common;
 mod explore;
 mod faults;
 mod handheld;
+mod handheld_link;
 mod selftest;
 mod serve;
 mod settings;

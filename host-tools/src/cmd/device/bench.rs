@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use tactus::link::{Job, LinkError, Port, PortError, ReadTable, Request, Transaction};
 use tactus_core::rig::Fault;
 use tactus_core::table::{Table, TableError};
-use tactus_core::wire::{Command, Event, Phase, Report, Status};
+use tactus_core::wire::{Command, Event, Phase, Prompt, Report, Status};
 
 use super::line::{Emulator, Line, OpenError, Where};
 use super::log::Log;
@@ -262,13 +262,14 @@ impl Bench {
         self.run(transaction, |_| Ok(()))
     }
 
-    /// As [`run`](Self::run), for commands that move the rig: prints a fault and its recovery.
+    /// As [`run`](Self::run), for commands that move the rig: prints what a person is asked to do, and a fault and its recovery.
     pub(crate) fn perform<E: Transaction>(
         &mut self,
         transaction: E,
         out: &mut impl Write,
     ) -> Result<E::Outcome, BenchError> {
-        self.run(transaction, |report| show_fault(report, out))
+        let mut prompts = Prompts::default();
+        self.run(transaction, |report| prompts.show(report, out))
     }
 
     /// Begins a transaction; the caller may do something else between its [steps](Bench::step).
@@ -395,7 +396,11 @@ impl Bench {
 fn moves(command: &Command) -> bool {
     matches!(
         command,
-        Command::Home | Command::Identify(_) | Command::Train(_) | Command::Calibrate
+        Command::Home
+            | Command::Identify(_)
+            | Command::Train(_)
+            | Command::Calibrate
+            | Command::Weigh(_)
     )
 }
 
@@ -439,4 +444,22 @@ pub(crate) fn show_fault(report: &Report, out: &mut impl Write) -> io::Result<()
         _ => return Ok(()),
     }
     out.flush()
+}
+
+/// What a handheld probe asks the person who holds it, for the terminal beside it: each once, although the probe repeats it.
+#[derive(Debug, Default)]
+pub(crate) struct Prompts(Option<Prompt>);
+
+impl Prompts {
+    /// Prints what the person is asked to do, or a fault and its recovery, if the report is one of these.
+    pub(crate) fn show(&mut self, report: &Report, out: &mut impl Write) -> io::Result<()> {
+        match report.event {
+            Event::Prompt(prompt) if self.0.replace(prompt) != Some(prompt) => {
+                writeln!(out, "the display says: {prompt}")?;
+                out.flush()
+            }
+            Event::Prompt(_) => Ok(()),
+            _ => show_fault(report, out),
+        }
+    }
 }

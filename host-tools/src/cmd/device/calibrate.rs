@@ -5,7 +5,7 @@ use std::io::Write;
 use anyhow::ensure;
 use serde::Serialize;
 use tactus::link::Request;
-use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::calibration::{LineFit, RigCalibration};
 use tactus_core::wire::Command;
 
 use super::bench::{Bench, BenchError};
@@ -19,13 +19,15 @@ Examples:
   tactus device calibrate                   measures the motor's current without load; the date is today's
   tactus device calibrate --show            what is in use
   tactus device calibrate --drifted         if a finger in the air seems to touch something: takes its P_DC anew
+  tactus device calibrate --weights 0.49,0.98,1.47
+                                            a handheld: asks for these weights on its finger, N
   tactus device calibrate --newton-per-ampere 16.2 --force-mn-per-count 11.4
                                             also takes what was measured on an incline and on a scale")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,
     /// Print what is in use, and change nothing
-    #[arg(long, conflicts_with_all = ["drifted", "date", "newton_per_ampere", "force_mn_per_count"])]
+    #[arg(long, conflicts_with_all = ["drifted", "date", "newton_per_ampere", "force_mn_per_count", "weights"])]
     show: bool,
     /// The finger has drifted further than the probe allows: discard the P_DC that it had in the air, and measure it anew
     #[arg(long)]
@@ -39,6 +41,10 @@ pub(crate) struct Args {
     /// Contact force per count of P_DC, mN, from presses on a scale
     #[arg(long, value_name = "X")]
     force_mn_per_count: Option<f32>,
+    /// A handheld's finger: three known weights or more, N, which it asks for one after the other; with its tip up, each is
+    /// laid on it
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', conflicts_with = "force_mn_per_count", value_parser = newton)]
+    weights: Vec<u16>,
     /// How to print what is in use
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
@@ -105,7 +111,10 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         bench.get(Request::write_calibration(&calibration)?)?;
         bench.perform(Request::command(Command::Home), &mut told)?;
     }
-    writeln!(told, "Measuring the motor's current without load ...")?;
+    writeln!(
+        told,
+        "Measuring the motor's current without load; of a handheld P_DC in the air ..."
+    )?;
     told.flush()?;
     calibration = bench.perform(Request::calibrate(), &mut told)?;
     calibration.date = how.date.unwrap_or_else(today);
@@ -115,6 +124,9 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if let Some(force_mn_per_count) = how.force_mn_per_count {
         calibration.pressure.force_mn_per_count = force_mn_per_count;
     }
+    if !how.weights.is_empty() {
+        calibration.pressure.force_mn_per_count = weigh(&mut bench, &how.weights, &mut told)?;
+    }
     bench.get(Request::write_calibration(&calibration)?)?;
     let kept = bench.get(Request::read_calibration())?;
     ensure!(
@@ -122,6 +134,31 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         "the probe keeps other constants than it was given: calibrate again"
     );
     print(how.format, &kept, out)
+}
+
+/// Contact force per count, mN: the line through known weights. It goes through 0, where the finger is in the air.
+fn weigh(bench: &mut Bench, weights: &[u16], told: &mut impl Write) -> anyhow::Result<f32> {
+    let mut line = LineFit::default();
+    line.push(0.0, 0.0);
+    for &mn in weights {
+        let counts = bench.perform(Request::weigh(mn), told)?;
+        writeln!(told, "{mn} mN: {counts:.1} counts")?;
+        line.push(counts, f32::from(mn));
+    }
+    let (_, mn_per_count) = line.line()?;
+    Ok(mn_per_count)
+}
+
+/// A weight in N as mN: what a fingertip's line holds for.
+fn newton(text: &str) -> Result<u16, String> {
+    let newton: f32 = text
+        .trim()
+        .parse()
+        .map_err(|_| "a weight is a number of N".to_owned())?;
+    match newton {
+        0.2..=2.0 => Ok((newton * 1e3).round() as u16),
+        _ => Err("a weight has 0.2 to 2 N (100 g are 0.98 N)".to_owned()),
+    }
 }
 
 fn print(format: Format, c: &RigCalibration, out: &mut impl Write) -> anyhow::Result<()> {

@@ -8,13 +8,12 @@ use serde::Serialize;
 use tactus::data::recording::{Labels, Texture};
 use tactus::data::recordings::RecordingWriter;
 use tactus::eval::show::count;
-use tactus::link::Request;
+use tactus::link::{Recorder, Request};
 use tactus_core::explorer::Strategy;
 use tactus_core::wire::{Command, Identify};
 
-use super::bench::{Bench, show_fault, wait_for_enter};
+use super::bench::{Bench, Prompts, wait_for_enter};
 use super::line::Where;
-use super::recorder::Recorder;
 use super::train::seed_of_now;
 use crate::cmd::output::{Format, print_json};
 
@@ -133,6 +132,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         };
         let mut recorder = Recorder::new(calibration.pressure);
         let (mut lost, mut kept) = (Vec::new(), Vec::new());
+        let mut prompts = Prompts::default();
         bench.run(Request::identify(wanted), |report| {
             match recorder.hear(index, report) {
                 Some(Ok(slide)) => {
@@ -143,7 +143,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
                     kept.push(slide);
                 }
                 Some(Err(why)) => lost.push(why),
-                None if text => show_fault(report, out)?,
+                None if text => prompts.show(report, out)?,
                 None => {}
             }
             out.flush()

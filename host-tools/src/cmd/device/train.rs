@@ -11,7 +11,7 @@ use tactus_core::features::Property;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire::{self, Event, Report};
 
-use super::bench::{Bench, show_fault};
+use super::bench::{Bench, Prompts};
 use super::line::Where;
 use crate::cmd::names;
 use crate::cmd::output::{Format, print_json};
@@ -81,8 +81,9 @@ pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
         seed: args.seed.unwrap_or_else(seed_of_now),
     };
     let text = args.format == Format::Text;
+    let mut prompts = Prompts::default();
     let slides = bench.run(Request::train(wanted), |report| match text {
-        true => show_slide(report, out),
+        true => show_slide(report, &mut prompts, out),
         false => Ok(()),
     })?;
     if text {
@@ -194,7 +195,7 @@ pub(crate) fn seed_of_now() -> u32 {
 }
 
 /// What a training shows of a report.
-fn show_slide(report: &Report, out: &mut impl Write) -> io::Result<()> {
+fn show_slide(report: &Report, prompts: &mut Prompts, out: &mut impl Write) -> io::Result<()> {
     match &report.event {
         Event::TrainingSlide {
             movement,
@@ -211,7 +212,7 @@ fn show_slide(report: &Report, out: &mut impl Write) -> io::Result<()> {
             )?;
         }
         Event::Rejected { why, .. } => writeln!(out, "rejected, and repeated: {why}")?,
-        _ => show_fault(report, out)?,
+        _ => prompts.show(report, out)?,
     }
     out.flush()
 }

@@ -7,10 +7,13 @@ use std::string::String as Text;
 use std::vec::Vec as List;
 
 use super::*;
+use crate::handheld::jobs::words;
 use crate::handheld::picture::{HEIGHT, Picture, WIDTH};
 use crate::handheld::screen::LINES;
 use crate::handheld::spelling::Spelling;
+use crate::store::StoreError;
 use crate::table::Name;
+use crate::wire::MemoryError;
 use heapless::Vec;
 
 const LONG: &str = "Corduroy, fine wale, well worn at the knee";
@@ -58,6 +61,12 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
     ] {
         each(name, &Screen::Again { why, lift });
     }
+    each("lift", &Screen::Lift { slide: 2 });
+    let weigh = Screen::Weigh {
+        mn: 490,
+        force_mn: 472.0,
+    };
+    each("weigh", &weigh);
     each("thinking", &Screen::Thinking { slide: 2 });
     let sure = Screen::Verdict {
         rows: rows(&[
@@ -133,13 +142,11 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
     each("taught", &Screen::Learned(Ok(&name)));
     each(
         "taught-not",
-        &Screen::Learned(Err("the table is full: forget a texture first")),
+        &Screen::Learned(Err(words(&MemoryError::Full))),
     );
     each("fault-silent", &Screen::Fault(&Trouble::Silent));
     each("fault-frozen", &Screen::Fault(&Trouble::Frozen));
-    let memory = Trouble::Memory(crate::wire::text(
-        "the flash does not keep what was written: its sector is worn out",
-    ));
+    let memory = Trouble::Memory(words(&MemoryError::Store(StoreError::Worn)));
     each("fault-memory", &Screen::Fault(&memory));
     let about = About {
         version: "0.1.0",
@@ -147,6 +154,8 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
         awake_at_rest: Some(0.0021),
         late: 0,
         lost: 0,
+        calibrated: 20_261_123,
+        memory: 0.365,
     };
     each("about", &Screen::About(about));
     each("dark", &Screen::Dark);

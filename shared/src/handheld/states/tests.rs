@@ -214,7 +214,7 @@ fn faults_show_and_go() {
     bench.probe.on_touch(Event::Silent);
     assert_eq!(bench.shown(), "Fault");
     assert!(bench.probe.episode.is_empty() && bench.probe.listens());
-    bench.probe.memory_failed(crate::wire::text("worn"));
+    bench.probe.memory_failed("worn");
     assert!(!bench.probe.listens());
     bench.press(10);
     assert_eq!(bench.probe.page, Page::Ready);
@@ -320,10 +320,10 @@ proptest! {
                     judged = true;
                 }
                 Happens::Learned(ok, textures) => {
-                    let name = if ok { Ok(free_name(&table)) } else { Err(crate::wire::text("no")) };
+                    let name = if ok { Ok(free_name(&table)) } else { Err("no") };
                     probe.learned(name, textures);
                 }
-                Happens::Broken => probe.memory_failed(crate::wire::text("broken")),
+                Happens::Broken => probe.memory_failed("broken"),
             }
             match probe.job() {
                 Some(Job::Judge(slides)) => {

@@ -75,6 +75,10 @@ impl RigHandle for Bench {
         })
     }
 
+    async fn calibrate(&mut self) -> Result<RigCalibration, Failure> {
+        super::super::calibrate::by_motor(self).await
+    }
+
     async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), Self::Error> {
         self.state.calibration = calibration;
         Ok(())

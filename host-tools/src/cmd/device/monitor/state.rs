@@ -7,7 +7,7 @@ use tactus::eval::alike;
 use tactus::eval::show::count;
 use tactus_core::features::Movement;
 use tactus_core::table::{Action, Name, Table};
-use tactus_core::wire::{Event, Live, PROTOCOL, Phase, Report, SlideReport, Status};
+use tactus_core::wire::{Event, Live, PROTOCOL, Phase, Prompt, Report, SlideReport, Status};
 
 use crate::cmd::device::train::most_like;
 
@@ -72,6 +72,8 @@ pub(crate) struct Monitor {
     pub(crate) typed: Option<String>,
     /// it has learned a texture from the user since its table was read
     learned: Option<Name>,
+    /// what a person was asked to do last
+    prompt: Option<Prompt>,
 }
 
 impl Monitor {
@@ -96,6 +98,7 @@ impl Monitor {
             help: false,
             typed: None,
             learned: None,
+            prompt: None,
             status,
         }
     }
@@ -271,7 +274,14 @@ impl Monitor {
                 let over = self.pac.len().saturating_sub(SHOWN);
                 self.pac.drain(..over);
             }
+            Event::Prompt(prompt) => {
+                if self.prompt.replace(*prompt) != Some(*prompt) {
+                    self.note(Weight::Message, format!("the display says: {prompt}"));
+                }
+            }
             Event::Damaged(_)
+            | Event::Pdc(_)
+            | Event::Weighed { .. }
             | Event::Done(_)
             | Event::Refused { .. }
             | Event::TrainingSlide { .. }

@@ -1,10 +1,10 @@
 //! Slides of a real finger in the project's format, from the raw samples that the probe streams while it explores.
 //!
 //! The probe is asked for an exploration that takes one movement after the other and is never sure. P_AC and shear are the
-//! very samples that went into its features. P_DC is not streamed: it is computed back from the contact force, which the
-//! probe reports 20 times a second.
+//! very samples that went into its features, and so is P_DC of a handheld. A rig does not stream P_DC: it is computed back
+//! from the contact force, which the rig reports 20 times a second.
 
-use tactus::data::recording::{PAC_RATE_HZ, Recording};
+use crate::data::recording::{PAC_RATE_HZ, Recording};
 use tactus_core::features::{Block, Movement};
 use tactus_core::sensor::pressure::Calibration;
 use tactus_core::wire::{Event, Live, Phase, Report};
@@ -14,7 +14,8 @@ const LIVE_HZ: u32 = 20;
 
 /// Why a slide that counted is not recorded.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-pub(crate) enum RecordError {
+#[non_exhaustive]
+pub enum RecordError {
     /// A report was lost on the line.
     #[error("block {0} of its samples is missing")]
     MissingBlock(u16),
@@ -25,7 +26,7 @@ pub(crate) enum RecordError {
 
 /// Puts slides together from reports.
 #[derive(Debug)]
-pub(crate) struct Recorder {
+pub struct Recorder {
     calibration: Calibration,
     movement: Option<Movement>,
     numbers: u32,
@@ -40,11 +41,13 @@ struct Begun {
     began_ms: Option<u32>,
     sliding: bool,
     forces: Vec<(u32, i16)>,
+    /// P_DC from the slide's begin on, counts about that of the lifted finger, where the probe says it
+    pdc: Vec<i16>,
 }
 
 impl Recorder {
     /// A recorder of slides of one texture, with the probe's calibration.
-    pub(crate) fn new(calibration: Calibration) -> Self {
+    pub fn new(calibration: Calibration) -> Self {
         Self {
             calibration,
             movement: None,
@@ -54,7 +57,10 @@ impl Recorder {
     }
 
     /// Takes in a report; the slide that counts from now on, for the texture of this index.
-    pub(crate) fn hear(
+    ///
+    /// # Errors
+    /// See [`RecordError`].
+    pub fn hear(
         &mut self,
         texture: usize,
         report: &Report,
@@ -75,7 +81,15 @@ impl Recorder {
             }
             // a force reported while the finger is lifted is none of the slide's
             Event::Phase(_) if slide.began_ms.is_some() => slide.sliding = false,
-            Event::Block(block) => slide.blocks.push(block.clone()),
+            Event::Block(block) => {
+                if block.number == 0 {
+                    // a person has pressed anew
+                    slide.blocks.clear();
+                    slide.pdc.clear();
+                }
+                slide.blocks.push(block.clone());
+            }
+            Event::Pdc(counts) => slide.pdc.extend_from_slice(counts),
             Event::SlideReport { .. } => {
                 let slide = std::mem::take(slide);
                 return Some(self.finish(texture, slide));
@@ -90,22 +104,24 @@ impl Recorder {
         if let Some((missing, _)) = numbered.find(|(n, block)| usize::from(block.number) != *n) {
             return Err(RecordError::MissingBlock(missing as u16));
         }
-        let (Some(movement), Some(began_ms)) = (self.movement, slide.began_ms) else {
-            return Err(RecordError::NoSamples);
-        };
+        let movement = self.movement.ok_or(RecordError::NoSamples)?;
         let moving = slide.blocks.iter().filter(|block| !block.still);
         let pac: usize = moving.map(|block| block.pac.len()).sum();
         let samples = |rate_hz: usize| (pac * rate_hz).div_ceil(PAC_RATE_HZ as usize);
-        let pdc = (0..=samples(LIVE_HZ as usize)).map(|n| {
-            let at_ms = began_ms + n as u32 * 1000 / LIVE_HZ;
-            let forces = slide.forces.iter();
-            let (_, force_mn) = forces.min_by_key(|(told, _)| told.abs_diff(at_ms))?;
-            Some((f32::from(*force_mn) / self.calibration.force_mn_per_count).round() as i16)
-        });
-        let recording = pdc.collect::<Option<_>>().and_then(|pdc| {
-            Recording::from_blocks(movement, slide.blocks, pdc, LIVE_HZ, samples(1000))
-        });
-        let recording = recording.ok_or(RecordError::NoSamples)?;
+        let (pdc, rate_hz) = if slide.pdc.is_empty() {
+            let pdc = (0..=samples(LIVE_HZ as usize)).map(|n| {
+                let at_ms = slide.began_ms? + n as u32 * 1000 / LIVE_HZ;
+                let forces = slide.forces.iter();
+                let (_, force_mn) = forces.min_by_key(|(told, _)| told.abs_diff(at_ms))?;
+                Some((f32::from(*force_mn) / self.calibration.force_mn_per_count).round() as i16)
+            });
+            let pdc: Option<Vec<i16>> = pdc.collect();
+            (pdc.ok_or(RecordError::NoSamples)?, LIVE_HZ)
+        } else {
+            (slide.pdc, PAC_RATE_HZ)
+        };
+        let recording = Recording::from_blocks(movement, slide.blocks, pdc, rate_hz, samples(1000))
+            .ok_or(RecordError::NoSamples)?;
         self.numbers += 1;
         Ok(Recording {
             texture,

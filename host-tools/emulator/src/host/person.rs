@@ -1,0 +1,133 @@
+//! A person who holds the emulated handheld and does what its display says, while a host talks to it.
+
+use tactus::sim::person::{Hand, Manner};
+use tactus::sim::scenario::Step;
+use tactus_core::wire::{Event, Prompt, Report};
+
+use crate::board::{Display, Emulator};
+
+/// What the display shows when it wants a press, and a slide.
+const PRESS: &str = "slide ";
+const SLIDE: &str = "5 cm in 2 s";
+const LIFT: &str = "Lift";
+
+/// What the person is at, and until when, ns.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum At {
+    Idle,
+    Pressing,
+    Reacting(u64),
+    Sliding(u64),
+    Holding(u64),
+    Lifting(u64),
+    Weighing,
+}
+
+/// A person who looks at the display.
+#[derive(Debug)]
+pub struct Person {
+    at: At,
+    force_n: f64,
+    pace_mm_s: f64,
+    /// The weight that is asked for, mN.
+    weight: Option<u16>,
+    /// Slides made.
+    slides: u32,
+    /// When the display is looked at next, ns.
+    looks_ns: u64,
+}
+
+/// How often the person looks, ns.
+const LOOK_NS: u64 = 20_000_000;
+
+impl Person {
+    /// Puts the probe into a hand that means to slide so.
+    pub fn hold(board: &mut Emulator, seed: u64, manner: Manner) -> Self {
+        board.rig().world().hold(Hand::new(seed, manner));
+        Self {
+            at: At::Idle,
+            force_n: 0.5,
+            pace_mm_s: 25.0,
+            weight: None,
+            slides: 0,
+            looks_ns: 0,
+        }
+    }
+
+    /// Means to press this hard from now on.
+    pub fn press(&mut self, force_n: f64) {
+        self.force_n = force_n;
+    }
+
+    /// Whether the hand is free: it neither presses nor is on its way.
+    pub fn is_idle(&self) -> bool {
+        self.at == At::Idle
+    }
+
+    /// Slides made so far.
+    pub fn slides(&self) -> u32 {
+        self.slides
+    }
+
+    /// Hears what the probe tells its host: which weight to put on the finger, which a display of points cannot be asked.
+    pub fn hear(&mut self, report: &Report) {
+        if let Event::Prompt(prompt) = report.event {
+            self.weight = match prompt {
+                Prompt::Weigh(mn) => Some(mn),
+                _ => None,
+            };
+        }
+    }
+
+    /// Looks at the display and goes on: to be called every few ms, whatever the host does.
+    pub fn look(&mut self, board: &mut Emulator) {
+        let now = board.now_ns();
+        if now < self.looks_ns {
+            return;
+        }
+        self.looks_ns = now + LOOK_NS;
+        let after = |seconds: f64| now + (seconds * 1e9) as u64;
+        let shows = |text: &str| -> bool {
+            let rig = board.rig();
+            let display: &Display = rig.display();
+            display.shows(text)
+        };
+        let (at, intent) = match self.at {
+            At::Idle if self.weight.is_some() && shows("Weight") => {
+                let newton = f64::from(self.weight.unwrap_or(0)) * 1e-3;
+                (At::Weighing, Some((newton, 0.0)))
+            }
+            At::Idle if shows(PRESS) && !shows(LIFT) => (At::Pressing, Some((self.force_n, 0.0))),
+            At::Pressing if shows(SLIDE) => {
+                (At::Reacting(after(Step::REACTION_MS as f64 * 1e-3)), None)
+            }
+            At::Pressing if shows(LIFT) || !shows(PRESS) => {
+                (At::Lifting(after(Step::LIFTED_S)), Some((0.0, 0.0)))
+            }
+            At::Reacting(until) if now >= until => {
+                self.slides += 1;
+                (
+                    At::Sliding(after(Step::EXPLORED_S)),
+                    Some((self.force_n, self.pace_mm_s)),
+                )
+            }
+            At::Sliding(until) if now >= until => {
+                (At::Holding(after(Step::HELD_S)), Some((self.force_n, 0.0)))
+            }
+            At::Holding(until) if now >= until => {
+                (At::Lifting(after(Step::LIFTED_S)), Some((0.0, 0.0)))
+            }
+            At::Lifting(until) if now >= until => (At::Idle, None),
+            At::Weighing if !shows("Weight") => {
+                (At::Lifting(after(Step::LIFTED_S)), Some((0.0, 0.0)))
+            }
+            at => (at, None),
+        };
+        self.at = at;
+        if let Some((force_n, pace_mm_s)) = intent
+            && let Some(hand) = board.rig().world().hand()
+        {
+            hand.intend(force_n, pace_mm_s);
+        }
+    }
+}

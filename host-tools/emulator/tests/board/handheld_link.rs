@@ -1,0 +1,478 @@
+//! The real ELF of the handheld probe and a host at its serial link, while a person holds it: judged by what comes over the
+//! wire and by what the display shows.
+
+use std::path::PathBuf;
+
+use tactus::data::recording::{Recording, Texture};
+use tactus::data::recordings::{RecordingSet, RecordingWriter};
+use tactus::eval::learn::learn;
+use tactus::link::{PushTable, ReadTable, Recorder, Request};
+use tactus::sim::collection::Collection;
+use tactus::sim::person::Manner;
+use tactus::sim::world::Setup;
+use tactus_core::dsp::{Plain, Plan};
+use tactus_core::explorer::{Method, Strategy};
+use tactus_core::features::{FeatureSet, Measurement, Observation, Slide};
+use tactus_core::rig::calibration::{LineFit, RigCalibration};
+use tactus_core::table::{Name, Table};
+use tactus_core::wire::{
+    Command, Event, Forget, Identify, Phase, Prompt, Report, SlideReport, Status, Train,
+};
+use tactus_emulator::board::{Emulator, Options};
+use tactus_emulator::host::person::Person;
+use tactus_emulator::host::talk::{TIMEOUT_S, Talk, TalkError};
+
+use crate::common::elf_of;
+
+/// Longest exploration or training by hand, virtual seconds.
+const LONG_S: f64 = 120.0;
+const BURLAP: u8 = 101;
+
+/// A handheld probe over a texture of the world that its own table is learned from, and the person who holds it.
+struct Held {
+    talk: Talk,
+    person: Person,
+    /// What the person was asked to do, once each time that it changed.
+    prompts: Vec<Prompt>,
+    reports: Vec<Report>,
+}
+
+impl Held {
+    fn new(texture: &str, manner: Manner) -> Option<Self> {
+        Some(Self::with(
+            &elf_of("TACTUS_HANDHELD_ELF")?,
+            texture,
+            manner,
+            None,
+        ))
+    }
+
+    fn with(elf: &PathBuf, texture: &str, manner: Manner, store: Option<Vec<u8>>) -> Self {
+        let collection = Collection {
+            seed: 1,
+            textures: vec![BURLAP],
+            trials: 1,
+        };
+        let number = tactus::sim::scenario::texture(texture).unwrap();
+        let setup: Setup = collection.setup(number, 77);
+        let options = Options {
+            store,
+            ..Options::default()
+        };
+        let mut board = Emulator::start(elf, setup, options).unwrap();
+        let person = Person::hold(&mut board, 5, manner);
+        let mut held = Self {
+            talk: Talk::new(board),
+            person,
+            prompts: Vec::new(),
+            reports: Vec::new(),
+        };
+        held.until("ready", 2.0, |board| shows(board, "textures"));
+        held
+    }
+
+    /// Lets the person go on until the board shows what it should.
+    fn until(&mut self, what: &str, seconds: f64, seen: impl Fn(&mut Emulator) -> bool) {
+        let until_ns = self.talk.now_ns() + (seconds * 1e9) as u64;
+        while self.talk.now_ns() < until_ns {
+            self.talk.step().unwrap();
+            self.person.look(self.talk.board());
+            if seen(self.talk.board()) {
+                return;
+            }
+        }
+        panic!("{what} is not seen within {seconds} s");
+    }
+
+    /// Waits until the person's hand is free.
+    fn rest(&mut self) {
+        while !self.person.is_idle() {
+            self.until("some time", 1.0, |_| true);
+        }
+    }
+
+    /// Runs a request while the person does what the display says.
+    fn run<T>(&mut self, request: Request<T>, seconds: f64) -> Result<T, TalkError> {
+        let Self {
+            talk,
+            person,
+            prompts,
+            reports,
+        } = self;
+        reports.clear();
+        prompts.clear();
+        talk.run(request, seconds, |board, report| {
+            if let Some(report) = report {
+                person.hear(report);
+                reports.push(report.clone());
+                if let Event::Prompt(prompt) = report.event
+                    && prompts.last() != Some(&prompt)
+                {
+                    prompts.push(prompt);
+                }
+            }
+            person.look(board);
+        })
+    }
+
+    fn status(&mut self) -> Status {
+        self.run(Request::status(), TIMEOUT_S).unwrap()
+    }
+
+    fn table(&mut self) -> Vec<u8> {
+        self.talk
+            .run(ReadTable::default(), TIMEOUT_S, |_, _| ())
+            .unwrap()
+    }
+
+    /// What holds of every run: no slot late, no word lost, no reset, no frame damaged.
+    fn end(mut self) {
+        let counts = self.status().counts;
+        assert_eq!(
+            (counts.late_slots, counts.lost_samples, counts.lost_reports),
+            (0, 0, 0),
+            "{counts:?}"
+        );
+        assert_eq!(counts.damaged_frames, 0);
+        assert_eq!(self.talk.session().damaged(), 0);
+        assert_eq!(self.talk.session().missing(), 0);
+        let board = self.talk.board();
+        assert_eq!(board.resets().unwrap(), []);
+        assert_eq!(board.unmapped().unwrap(), [0u64; 0]);
+    }
+}
+
+fn shows(board: &mut Emulator, text: &str) -> bool {
+    board.rig().display().shows(text)
+}
+
+fn name(name: &str) -> Name {
+    name.try_into().unwrap()
+}
+
+#[test]
+fn it_says_how_it_is_and_gives_and_takes_tables() {
+    let Some(mut held) = Held::new("burlap", Manner::default()) else {
+        return;
+    };
+    let status = held.status();
+    assert_eq!(status.phase, Phase::Ready);
+    assert!(status.factory && status.fault.is_none(), "{status:?}");
+    assert_eq!(status.calibrated, 0);
+    let bytes = held.table();
+    let table = Table::read(&bytes).unwrap();
+    assert_eq!(
+        (table.crc(), table.textures()),
+        (status.table_crc, status.textures)
+    );
+    let (from, to) = (name(table.name(3).unwrap()), name("my paper"));
+    held.run(Request::rename(from, to), TIMEOUT_S).unwrap();
+    let gone = name(table.name(5).unwrap());
+    held.run(Request::forget(Forget::Texture(gone)), TIMEOUT_S)
+        .unwrap();
+    let changed = held.table();
+    let changed = Table::read(&changed).unwrap();
+    assert!(changed.find("my paper").is_some());
+    assert_eq!(changed.textures() + 1, table.textures());
+    held.until("one fewer", 1.0, |board| shows(board, "115 textures"));
+    // another table, by parts; then its own again
+    held.talk
+        .run(PushTable::new(&bytes).unwrap(), TIMEOUT_S, |_, _| ())
+        .unwrap();
+    assert_eq!(held.table(), bytes);
+    assert!(!held.status().factory);
+    held.until("all", 1.0, |board| shows(board, "116 textures"));
+    held.run(Request::command(Command::FactoryTable), TIMEOUT_S)
+        .unwrap();
+    assert!(held.status().factory);
+    held.end();
+}
+
+#[test]
+fn its_calibration_is_read_and_written_and_survives() {
+    let Some(elf) = elf_of("TACTUS_HANDHELD_ELF") else {
+        return;
+    };
+    let mut held = Held::with(&elf, "burlap", Manner::default(), None);
+    let mut calibration = held.run(Request::read_calibration(), TIMEOUT_S).unwrap();
+    calibration.pressure.force_mn_per_count = 12.5;
+    calibration.date = 20_261_123;
+    held.run(Request::write_calibration(&calibration).unwrap(), TIMEOUT_S)
+        .unwrap();
+    let store = held.talk.board().store().unwrap();
+    drop(held);
+    let mut held = Held::with(&elf, "burlap", Manner::default(), Some(store));
+    let kept: RigCalibration = held.run(Request::read_calibration(), TIMEOUT_S).unwrap();
+    assert_eq!(kept, calibration);
+    assert_eq!(held.status().calibrated, 20_261_123);
+    held.end();
+}
+
+#[test]
+fn it_identifies_what_a_person_slides_over_for_the_host() {
+    let Some(mut held) = Held::new("burlap", Manner::default()) else {
+        return;
+    };
+    let found = held
+        .run(Request::identify(Identify::default()), LONG_S)
+        .unwrap();
+    assert_eq!(found.verdict.name, "Burlap", "{found:?}");
+    assert!(found.verdict.sure);
+    assert_eq!(held.prompts[..2], [Prompt::Press, Prompt::Slide]);
+    // the person sees it, too
+    held.until("the verdict", 1.0, |board| shows(board, "Burlap"));
+    held.until("its end", 1.0, |board| shows(board, "next"));
+    held.end();
+}
+
+#[test]
+fn it_learns_a_texture_by_train_and_by_a_label() {
+    let Some(mut held) = Held::new("corkboard", Manner::default()) else {
+        return;
+    };
+    // the table has the very same
+    let known = Request::forget(Forget::Texture(name("Corkboard")));
+    held.run(known, TIMEOUT_S).unwrap();
+    let train = Train {
+        name: name("my cork"),
+        trials: 3,
+        pilot: false,
+        seed: 1,
+    };
+    let slides = held.run(Request::train(train), LONG_S).unwrap();
+    assert_eq!(slides, 3);
+    held.until("what was learned", 1.0, |board| shows(board, "my cork"));
+    let table = held.table();
+    let table = Table::read(&table).unwrap();
+    let texture = table.find("my cork").unwrap();
+    assert_eq!(table.trials(texture, 0), 3);
+    let found = held
+        .run(Request::identify(Identify::default()), LONG_S)
+        .unwrap();
+    assert_eq!(found.verdict.name, "my cork");
+    let learned = held
+        .run(Request::label(name("second cork")), TIMEOUT_S)
+        .unwrap();
+    assert_eq!(learned.name, "second cork");
+    held.end();
+}
+
+#[test]
+fn a_request_ends_when_the_host_stops_it_and_when_the_person_will_not() {
+    let Some(mut held) = Held::new("burlap", Manner::default()) else {
+        return;
+    };
+    // nobody touches: the person is not let look
+    let identify = Request::identify(Identify::default());
+    let Held { talk, .. } = &mut held;
+    let stop_ns = talk.now_ns() + 3_000_000_000;
+    let mut asked = 0;
+    let mut sent = false;
+    let stopped = talk.run(identify, LONG_S, |board, report| {
+        if let Some(Report {
+            event: Event::Prompt(Prompt::Press),
+            ..
+        }) = report
+        {
+            asked += 1;
+        }
+        if !sent && board.now_ns() > stop_ns {
+            sent = true;
+            board.press(true).unwrap();
+        }
+    });
+    held.talk.board().press(false).unwrap();
+    assert!(
+        matches!(&stopped, Err(TalkError::Refused(why)) if why.contains("stopped")),
+        "{stopped:?}"
+    );
+    // it was asked about every second, so that the host knows that the probe is there
+    assert!((3..=6).contains(&asked), "{asked}");
+    held.until("ready again", 1.0, |board| shows(board, "and hold"));
+    held.end();
+}
+
+/// The cable is pulled out in the middle of a slide: nobody hears or says anything any more.
+#[test]
+fn a_link_that_is_cut_leaves_a_probe_that_works() {
+    let Some(mut held) = Held::new("burlap", Manner::default()) else {
+        return;
+    };
+    let identify = Request::identify(Identify {
+        threshold: 1.0,
+        open: false,
+        ..Identify::default()
+    });
+    let cut = {
+        let Held { talk, person, .. } = &mut held;
+        let mut slides = 0;
+        talk.run(identify, 6.0, |board, report| {
+            person.look(board);
+            slides += u32::from(matches!(
+                report,
+                Some(Report {
+                    event: Event::SlideReport { .. },
+                    ..
+                })
+            ));
+        })
+    };
+    assert!(matches!(cut, Err(TalkError::Silent(_))), "{cut:?}");
+    // the person does not want to go on for a host that is not there
+    held.until("asked", 5.0, |board| shows(board, "slide "));
+    held.talk.board().press(true).unwrap();
+    held.talk.board().run_ms(700).unwrap();
+    held.talk.board().press(false).unwrap();
+    held.until("ready", 3.0, |board| shows(board, "and hold"));
+    held.rest();
+    // and uses the probe
+    held.talk
+        .board()
+        .rig()
+        .world()
+        .hand()
+        .unwrap()
+        .intend(0.5, 0.0);
+    held.until("its own episode", 3.0, |board| shows(board, "slide 1 of 5"));
+    held.until("verdict", 30.0, |board| shows(board, "next"));
+    held.until("verdict", 1.0, |board| shows(board, "Burlap"));
+    // the cable is back
+    assert_eq!(held.status().fault, None);
+    held.end();
+}
+
+/// The book's chapter "Learn with a handheld": recorded by hand, learned on the PC, pushed, and known from then on.
+#[test]
+fn slides_that_are_recorded_by_hand_are_learned_pushed_and_known() {
+    const SLIDES: u8 = 4;
+    let names = ["Burlap", "Cork", "Marble"];
+    let numbers =
+        ["burlap", "corkboard", "marble"].map(|n| tactus::sim::scenario::texture(n).unwrap());
+    let Some(mut held) = Held::new("burlap", Manner::default()) else {
+        return;
+    };
+    let folder = std::env::temp_dir().join(format!("tactus-by-hand-{}", std::process::id()));
+    let textures = names.iter().zip(1..).map(|(name, id)| Texture {
+        id,
+        name: (*name).to_owned(),
+    });
+    let mut writer = RecordingWriter::begin(&folder, textures.collect(), "a test").unwrap();
+    let calibration = held.run(Request::read_calibration(), TIMEOUT_S).unwrap();
+    held.run(Request::command(Command::Stream(true)), TIMEOUT_S)
+        .unwrap();
+    for (index, number) in numbers.into_iter().enumerate() {
+        held.talk.board().rig().world().place(number).unwrap();
+        let wanted = Identify {
+            threshold: 1.0,
+            max_slides: SLIDES,
+            strategy: Strategy::Cycling,
+            open: false,
+            ..Identify::default()
+        };
+        held.run(Request::identify(wanted), LONG_S).unwrap();
+        let mut recorder = Recorder::new(calibration.pressure);
+        let heard = held.reports.iter();
+        let slides = heard.filter_map(|report| recorder.hear(index, report));
+        let slides: Vec<_> = slides.collect::<Result<_, _>>().unwrap();
+        assert_eq!(slides.len(), usize::from(SLIDES));
+        // what is recorded is what was measured, to the bit
+        let reported = held
+            .reports
+            .iter()
+            .filter_map(|report| match &report.event {
+                Event::SlideReport { observed, .. } => Some(observed.clone()),
+                _ => None,
+            });
+        for (slide, reported) in slides.iter().zip(reported) {
+            assert_eq!(SlideReport::from(&measured(slide)), reported);
+            writer.write(slide).unwrap();
+        }
+    }
+    held.run(Request::command(Command::Stream(false)), TIMEOUT_S)
+        .unwrap();
+    writer.finish().unwrap();
+    let set = RecordingSet::open(&folder).unwrap();
+    let known: Vec<Vec<Vec<Observation>>> = (0..names.len())
+        .map(|index| {
+            let slides = set.load_texture(index).unwrap();
+            vec![slides.iter().map(|s| (&measured(s)).into()).collect()]
+        })
+        .collect();
+    std::fs::remove_dir_all(&folder).unwrap();
+    let names: Vec<String> = names.iter().map(|n| (*n).to_owned()).collect();
+    let features = Some(FeatureSet::Pressure);
+    let table = learn(Method::Fused, features, &names, &set.movements(), &known).unwrap();
+    held.talk
+        .run(PushTable::new(&table).unwrap(), TIMEOUT_S, |_, _| ())
+        .unwrap();
+    held.until("its textures", 1.0, |board| shows(board, "3 textures"));
+    for (name, number) in names.iter().zip(numbers) {
+        held.talk.board().rig().world().place(number).unwrap();
+        let found = held
+            .run(Request::identify(Identify::default()), LONG_S)
+            .unwrap();
+        assert_eq!(found.verdict.name.as_str(), name, "{found:?}");
+    }
+    held.end();
+}
+
+fn measured(slide: &Recording) -> Measurement {
+    let plan = Plan::new();
+    let mut samples = Slide::<Plain>::new(&plan, slide.movement);
+    slide.play(&mut samples);
+    samples.finish().unwrap()
+}
+
+/// A finger that gives way more than the paper's would be pressed too hard; weights say what its counts mean.
+#[test]
+fn known_weights_set_the_force_that_the_person_is_shown() {
+    let steady = Manner {
+        tremor: 0.0,
+        wander: 0.0,
+        uneven: 0.0,
+    };
+    let Some(mut held) = Held::new("burlap", steady) else {
+        return;
+    };
+    let mut calibration = held.run(Request::calibrate(), TIMEOUT_S).unwrap();
+    assert_eq!(held.prompts, [Prompt::Lift]);
+    let mut line = LineFit::default();
+    line.push(0.0, 0.0);
+    for mn in [490, 980, 1470] {
+        let counts = held.run(Request::weigh(mn), TIMEOUT_S).unwrap();
+        assert!(
+            held.prompts.contains(&Prompt::Weigh(mn)),
+            "{:?}",
+            held.prompts
+        );
+        eprintln!("{mn} mN: {counts} counts");
+        line.push(counts, mn.into());
+    }
+    let (_, mn_per_count) = line.line().unwrap();
+    // the simulated finger's, as the world has it
+    let truth = held.talk.board().rig().world().truth();
+    eprintln!("{mn_per_count} mN a count, {truth:?}");
+    calibration.pressure.force_mn_per_count = mn_per_count;
+    calibration.date = 20_261_123;
+    held.run(Request::write_calibration(&calibration).unwrap(), TIMEOUT_S)
+        .unwrap();
+    // it is shown
+    held.until("ready", 2.0, |board| shows(board, "and hold"));
+    held.talk.board().press(true).unwrap();
+    held.talk.board().run_ms(100).unwrap();
+    held.talk.board().press(false).unwrap();
+    held.until("its day", 1.0, |board| shows(board, "2026-11-23"));
+    held.rest();
+    // half a newton is half a newton
+    let found = held
+        .run(Request::identify(Identify::default()), LONG_S)
+        .unwrap();
+    assert_eq!(found.verdict.name, "Burlap");
+    let forces = held.reports.iter().filter_map(|report| match report.event {
+        Event::Live(live) => Some(live.force_mn),
+        _ => None,
+    });
+    let most = forces.max().unwrap();
+    assert!((450..600).contains(&most), "{most}");
+    held.end();
+}

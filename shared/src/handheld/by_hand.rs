@@ -1,0 +1,494 @@
+//! The probe in a hand as a [`Rig`]: a person makes its movements, asked on the display. So the core's [`Probe`] serves a
+//! host as a rig with motors does; between two requests the person uses it as if there were no host.
+
+use embedded_storage_async::nor_flash::NorFlash;
+
+use super::jobs::{Outcome, work};
+use super::judge::{Judgement, LEADING, MOVEMENT};
+use super::screen::{About, Screen};
+use super::states::{Answer, Asked, Handheld, TICKS_HZ};
+use crate::dsp;
+use crate::explorer::Kernels;
+use crate::features::{Property, PropertySet, Slide};
+use crate::probe::seams::{Events, RigHandle, StoredBytes, UnloadedRun};
+use crate::probe::{Probe, RigState, TableInUse, Watch};
+use crate::rig::calibration::RigCalibration;
+use crate::rig::skin::SkinCare;
+use crate::rig::{Fault, Refused, Rig, RigError};
+use crate::sensor::pressure::Pressure;
+use crate::store::Store;
+use crate::table::{Name, Table};
+use crate::wire::{Command, Event, Failure, Prompt, Request};
+use heapless::Vec;
+
+/// Ticks from one picture to the next: 20 a second.
+const PICTURE: u32 = TICKS_HZ / 20;
+/// Ticks from one word to the host about what the person is to do to the next: it takes a silent probe for gone.
+const REMIND: u32 = TICKS_HZ;
+/// The host waits this long for a finger to be lifted, or a weight to be put on, ticks.
+const PATIENCE: u32 = 60 * TICKS_HZ;
+/// Ticks in the air over which P_DC's zero is taken, which follows it within half a second.
+const AIR: u32 = 2 * TICKS_HZ;
+/// Ticks for which a weight has to lie still: its mean is of 1.5 s.
+const WEIGHED: u32 = 3 * TICKS_HZ / 2;
+/// Counts that a weight's P_DC may wander meanwhile, and the share of it.
+const WANDERS: (f32, f32) = (2.0, 0.04);
+/// A weight is there from this share of what it should give by the constants so far: a fingertip's are off by half at most.
+const THERE: f32 = 0.4;
+/// Ticks within which a sensor that works again is noticed.
+const CLEARED: u32 = TICKS_HZ;
+
+/// What a handheld probe is made of, on the chip or in a test.
+#[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
+pub trait Hand {
+    /// Waits for the next hundredth of a second.
+    async fn wait(&mut self);
+
+    /// The oldest word of the sensor that nobody has taken.
+    fn word(&mut self) -> Option<Option<Pressure>>;
+
+    /// Whether the button is pressed.
+    fn is_pressed(&mut self) -> bool;
+
+    /// Has the sensor's words come, or not. Time may have passed without ticks before they come again.
+    fn listen(&mut self, on: bool);
+
+    /// Sounds a tone, Hz, or none.
+    fn sound(&mut self, tone: Option<u16>);
+
+    /// Shows a screen.
+    fn show(&mut self, screen: &Screen<'_>);
+
+    /// What the page about the probe says, but for the calibration.
+    fn about(&self) -> About;
+
+    /// So the probe is now: answered at any time.
+    fn publish(&mut self, state: &RigState);
+
+    /// Whether the host stopped what it asked for.
+    fn is_stopped(&self) -> bool;
+
+    /// Whether the host wants raw samples.
+    fn streams(&self) -> bool;
+
+    /// Sends an event to the host.
+    fn tell(&mut self, event: Event);
+}
+
+/// A rig that is a person with a probe in the hand.
+pub struct ByHand<'p, H, K> {
+    /// Its parts.
+    pub hand: H,
+    /// What the person sees.
+    pub handheld: Handheld<'p, K>,
+    calibration: RigCalibration,
+    skin: SkinCare,
+    watch: Watch,
+    listens: bool,
+    tone: Option<u16>,
+    ticks: u32,
+    /// What the host was told last of what the person is to do, and when.
+    prompt: (Option<Prompt>, u32),
+    /// The slide that the host wants next.
+    asked: Asked,
+    /// Share of the memory for textures that is taken.
+    memory: f32,
+}
+
+impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
+    /// A probe that was just switched on, with a fingertip of these constants.
+    pub fn new(hand: H, handheld: Handheld<'p, K>, calibration: RigCalibration) -> Self {
+        let mut by_hand = Self {
+            hand,
+            handheld,
+            calibration,
+            skin: SkinCare::NEW,
+            watch: Watch::default(),
+            listens: false,
+            tone: None,
+            ticks: 0,
+            prompt: (None, 0),
+            asked: Asked::default(),
+            memory: 0.0,
+        };
+        by_hand.use_calibration(calibration);
+        by_hand
+    }
+
+    fn use_calibration(&mut self, calibration: RigCalibration) {
+        self.calibration = calibration;
+        let scale = calibration.pressure.force_mn_per_count;
+        self.handheld.calibrate(scale);
+    }
+
+    /// A hundredth of a second: words, button, buzzer, display, and what the host hears.
+    pub async fn tick(&mut self) {
+        self.hand.wait().await;
+        self.ticks = self.ticks.wrapping_add(1);
+        let streams = self.hand.streams() && self.handheld.prompt().is_some();
+        while let Some(word) = self.hand.word() {
+            self.handheld.word(word);
+            if streams && self.handheld.listens() {
+                let taken = self.handheld.taken();
+                for block in &taken.blocks {
+                    self.hand.tell(Event::Block(block.clone()));
+                }
+                if !taken.pdc.is_empty() {
+                    self.hand.tell(Event::Pdc(taken.pdc.clone()));
+                }
+            }
+        }
+        self.handheld.tick(self.hand.is_pressed());
+        if self.handheld.tone() != self.tone {
+            self.tone = self.handheld.tone();
+            self.hand.sound(self.tone);
+        }
+        self.heed();
+        let due = self.ticks.is_multiple_of(PICTURE);
+        if due && !self.handheld.names_textures() && self.handheld.is_new() {
+            self.draw(None);
+        }
+        let state = self.state();
+        let hand = &mut self.hand;
+        hand.publish(&state);
+        self.watch.look(&state, |event| hand.tell(event));
+        self.remind();
+    }
+
+    /// Has the sensor's words come while they are wanted.
+    fn heed(&mut self) {
+        if self.handheld.listens() != self.listens {
+            self.listens = self.handheld.listens();
+            self.hand.listen(self.listens);
+        }
+    }
+
+    /// The words do not come any more until the next tick that wants them: nobody takes them meanwhile.
+    fn pause(&mut self) {
+        self.hand.listen(false);
+        self.listens = false;
+        while let Some(word) = self.hand.word() {
+            self.handheld.word(word);
+        }
+        // what comes next does not follow what came
+        self.handheld.lose(1);
+    }
+
+    /// Tells the host what the person is to do.
+    fn remind(&mut self) {
+        let prompt = self.handheld.prompt();
+        let (told, at) = self.prompt;
+        if prompt != told || self.ticks.wrapping_sub(at) >= REMIND {
+            self.prompt = (prompt, self.ticks);
+            if let Some(prompt) = prompt {
+                self.hand.tell(Event::Prompt(prompt));
+            }
+        }
+    }
+
+    fn draw(&mut self, table: Option<&Table<'_>>) {
+        let about = About {
+            calibrated: self.calibration.date,
+            memory: self.memory,
+            ..self.hand.about()
+        };
+        let screen = self.handheld.screen(table, &about);
+        self.hand.show(&screen);
+    }
+
+    /// A tick of something that the host asked for, and whether it can go on.
+    async fn go_on(&mut self) -> Result<Option<Answer>, RigError> {
+        self.tick().await;
+        if self.hand.is_stopped() {
+            self.handheld.release();
+            return Err(RigError::Stopped);
+        }
+        match self.handheld.answer() {
+            Some(Answer::GivenUp) => Err(RigError::Stopped),
+            Some(Answer::Nobody) => Err(RigError::NobodyThere),
+            Some(Answer::Trouble) => {
+                let fault = self.handheld.fault().unwrap_or(Fault::SensorSilent);
+                Err(RigError::Fault(fault))
+            }
+            answer => Ok(answer),
+        }
+    }
+}
+
+impl<H: Hand, K: Kernels> Rig for ByHand<'_, H, K> {
+    type Error = RigError;
+
+    const ONLY_FUSED: bool = true;
+
+    fn measures(&self) -> PropertySet {
+        [Property::Roughness, Property::Fineness]
+            .into_iter()
+            .collect()
+    }
+
+    async fn perform<D: dsp::Kernels>(&mut self, slide: &mut Slide<'_, D>) -> Result<(), RigError> {
+        if slide.movement() != MOVEMENT {
+            return Err(RigError::NotByHand);
+        }
+        self.asked.slide = self.asked.slide.saturating_add(1);
+        self.handheld.ask_for_slide(self.asked);
+        self.heed();
+        while self.go_on().await? != Some(Answer::Slid) {}
+        slide.adopt(self.handheld.slide());
+        Ok(())
+    }
+
+    async fn lifted(&mut self) -> Result<(), RigError> {
+        self.heed();
+        for _ in 0..PATIENCE {
+            if !self.handheld.is_touched() {
+                break;
+            }
+            self.go_on().await?;
+        }
+        Ok(())
+    }
+}
+
+impl<H: Hand, K: Kernels> RigHandle for ByHand<'_, H, K> {
+    fn state(&self) -> RigState {
+        let view = self.handheld.view();
+        RigState {
+            phase: self.handheld.phase(),
+            at_rest: !self.handheld.is_touched(),
+            force_mn: view.force_mn,
+            air_counts: self.handheld.air_counts(),
+            skin: self.skin,
+            ..RigState::parked(self.calibration)
+        }
+    }
+
+    async fn begin(&mut self, _seed: u32) {
+        self.asked.slide = 0;
+    }
+
+    async fn home(&mut self) -> Result<(), RigError> {
+        self.handheld.clear();
+        self.heed();
+        for _ in 0..CLEARED {
+            self.tick().await;
+        }
+        self.handheld
+            .fault()
+            .map_or(Ok(()), |fault| Err(RigError::Fault(fault)))
+    }
+
+    async fn run_unloaded(&mut self, _speed_um_s: u32) -> Result<UnloadedRun, RigError> {
+        Err(RigError::NotByHand)
+    }
+
+    async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), RigError> {
+        let checked = calibration.check().map_err(Refused::Calibration);
+        checked.map_err(RigError::Refused)?;
+        self.use_calibration(calibration);
+        Ok(())
+    }
+
+    async fn set_skin(&mut self, skin: SkinCare) {
+        self.skin = skin;
+    }
+
+    /// P_DC in the air, once the finger has been there for [`AIR`].
+    async fn calibrate(&mut self) -> Result<RigCalibration, Failure> {
+        self.handheld.ask_for_air();
+        self.heed();
+        let mut in_the_air = 0;
+        for _ in 0..PATIENCE {
+            self.go_on().await.map_err(Failure::Rig)?;
+            in_the_air = match self.handheld.air_counts() {
+                Some(_) if !self.handheld.is_touched() => in_the_air + 1,
+                _ => 0,
+            };
+            if let Some(counts) = self.handheld.air_counts().filter(|_| in_the_air >= AIR) {
+                self.handheld.release();
+                let mut calibration = self.calibration;
+                calibration.pressure.pdc_no_contact = counts;
+                self.set_calibration(calibration)
+                    .await
+                    .map_err(Failure::Rig)?;
+                return Ok(calibration);
+            }
+        }
+        self.handheld.release();
+        Err(Failure::Rig(RigError::NobodyThere))
+    }
+
+    /// Mean P_DC under a weight that lies still, counts above that in the air.
+    async fn weigh(&mut self, mn: u16) -> Result<f32, Failure> {
+        // the weight before may still be there
+        self.handheld.ask_to_lift();
+        self.lifted().await.map_err(Failure::Rig)?;
+        self.handheld.ask_for_weight(mn);
+        self.heed();
+        let least = THERE * f32::from(mn) / self.calibration.pressure.force_mn_per_count;
+        let (mut mean, mut ticks) = (0.0, 0);
+        for _ in 0..PATIENCE {
+            self.go_on().await.map_err(Failure::Rig)?;
+            let Some(counts) = self.handheld.counts_above_air().filter(|c| *c > least) else {
+                ticks = 0;
+                continue;
+            };
+            let (most, share) = WANDERS;
+            if ticks == 0 || libm::fabsf(counts - mean) > most.max(share * mean) {
+                (mean, ticks) = (counts, 0);
+            }
+            ticks += 1;
+            mean += (counts - mean) / ticks as f32;
+            if ticks >= WEIGHED {
+                self.handheld.release();
+                return Ok(mean);
+            }
+        }
+        self.handheld.release();
+        Err(Failure::Rig(RigError::NobodyThere))
+    }
+}
+
+/// Who hears what the probe does, and what of it the display shows in the end.
+#[derive(Debug)]
+pub struct Shown<E> {
+    to: E,
+    /// The most probable textures after the last slide.
+    leading: Vec<(u16, f32), LEADING>,
+    /// Whether the verdict is sure, and whether the texture is unknown.
+    verdict: Option<(bool, bool)>,
+}
+
+impl<E: Events> Shown<E> {
+    /// Hands everything on to `to`.
+    pub const fn new(to: E) -> Self {
+        Self {
+            to,
+            leading: Vec::new(),
+            verdict: None,
+        }
+    }
+
+    /// The verdict that was told, once.
+    fn judgement(&mut self) -> Option<Judgement> {
+        let (sure, unknown) = self.verdict.take()?;
+        Some(Judgement {
+            leading: core::mem::take(&mut self.leading),
+            sure,
+            unknown,
+            open: false,
+        })
+    }
+}
+
+impl<E: Events> Events for Shown<E> {
+    fn tell(&mut self, event: Event) {
+        match &event {
+            Event::SlideReport { posterior, .. } => self.leading = super::judge::leading(posterior),
+            Event::Verdict(verdict) => self.verdict = Some((verdict.sure, verdict.unknown)),
+            _ => {}
+        }
+        self.to.tell(event);
+    }
+
+    fn table(&mut self, table: TableInUse) {
+        self.to.table(table);
+    }
+}
+
+/// The probe in the hand of a person.
+pub type HandProbe<'m, H, K, F, B, E> = Probe<'m, ByHand<'m, H, K>, F, B, Shown<E>>;
+
+/// A hundredth of a second of the person's own use, and what it has to be done with the table; `log` hears that.
+pub async fn step<H, K, F, B, E>(
+    probe: &mut HandProbe<'_, H, K, F, B, E>,
+    log: impl FnMut(Outcome<'_>),
+) where
+    H: Hand,
+    K: Kernels,
+    F: NorFlash,
+    B: StoredBytes<F>,
+    E: Events,
+{
+    let Probe {
+        rig,
+        memory,
+        events,
+        ..
+    } = probe;
+    rig.tick().await;
+    let job = rig.handheld.job();
+    let due = job.is_some() || rig.ticks.is_multiple_of(PICTURE);
+    if due && rig.handheld.is_new() {
+        rig.memory = memory.in_force().len() as f32 / Store::<F>::MAX_TABLE as f32;
+        // reading a table means checking it, which takes milliseconds
+        let table = if rig.handheld.names_textures() {
+            memory.table().ok()
+        } else {
+            None
+        };
+        rig.draw(table.as_ref());
+    }
+    if let Some(job) = job {
+        rig.pause();
+        // the picture goes out meanwhile
+        rig.hand.wait().await;
+        work(job, &mut rig.handheld, memory, events, log).await;
+        rig.heed();
+    }
+}
+
+/// What of a request the display names.
+fn asked(command: &Command) -> (Asked, Option<Name>) {
+    match command {
+        Command::Identify(wanted) => (
+            Asked {
+                slide: 0,
+                of: wanted.max_slides,
+            },
+            None,
+        ),
+        Command::Train(wanted) => (Asked::default(), Some(wanted.name.clone())),
+        _ => (Asked::default(), None),
+    }
+}
+
+/// Serves a request of the host, and shows what came of it.
+pub async fn serve<H, K, F, B, E>(probe: &mut HandProbe<'_, H, K, F, B, E>, request: &Request)
+where
+    H: Hand,
+    K: Kernels,
+    F: NorFlash,
+    B: StoredBytes<F>,
+    E: Events,
+{
+    let (slides, trains) = asked(&request.command);
+    probe.rig.asked = slides;
+    probe.rig.pause();
+    probe.events.verdict = None;
+    let before = probe.memory.table().ok().map(|table| table.crc());
+    let done = probe.perform::<K>(&request.command).await;
+    let table = probe.memory.table().ok();
+    let after = table.map(|table| (table.crc(), table.textures()));
+    let rig = &mut probe.rig;
+    rig.handheld.release();
+    if let Some((crc, textures)) = after
+        && before != Some(crc)
+    {
+        rig.handheld.table_changed(textures);
+    }
+    match (&done, trains, probe.events.judgement()) {
+        (Ok(()), Some(name), _) => rig.handheld.trained(name),
+        (Ok(()), None, Some(judgement)) => rig.handheld.told(judgement),
+        _ => {}
+    }
+    rig.heed();
+    let id = request.id;
+    probe.events.tell(match done {
+        Ok(()) => Event::Done(id),
+        Err(why) => Event::Refused { id, why },
+    });
+}
+
+#[cfg(test)]
+mod tests;

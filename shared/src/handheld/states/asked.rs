@@ -1,0 +1,194 @@
+//! What the host wants of the person who holds the probe: a slide, the finger in the air, or a weight on it. The pages are
+//! those of the person's own use; what was measured is the host's.
+
+use super::{Handheld, Page};
+use crate::explorer::Kernels;
+use crate::features::Slide;
+use crate::handheld::guidance::{Phase, View};
+use crate::handheld::judge::Judgement;
+use crate::handheld::screen::Trouble;
+use crate::handheld::touch::Taken;
+use crate::rig::{self, Fault};
+use crate::table::Name;
+use crate::wire::Prompt;
+
+/// Which slide the host wants.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Asked {
+    /// Its number, from 1.
+    pub slide: u8,
+    /// How many there can be; 0 is not known.
+    pub of: u8,
+}
+
+/// What came of it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Answer {
+    /// The slide was made, and is good.
+    Slid,
+    /// The person does not want to.
+    GivenUp,
+    /// Nobody has touched anything for a minute.
+    Nobody,
+    /// Sensor or memory fail.
+    Trouble,
+}
+
+impl<'p, K: Kernels> Handheld<'p, K> {
+    fn ask(&mut self, asked: Asked, page: Page) {
+        self.clear_episode();
+        self.job = None;
+        self.answer = None;
+        self.asked = Some(asked);
+        self.idle = 0;
+        self.show(page);
+    }
+
+    /// Asks the person for a slide, which [`Handheld::answer`] tells of.
+    pub fn ask_for_slide(&mut self, asked: Asked) {
+        self.ask(asked, Page::Touching);
+    }
+
+    /// Asks the person to hold the finger in the air; P_DC's zero is taken anew.
+    pub fn ask_for_air(&mut self) {
+        self.ask(Asked::default(), Page::Air);
+        self.touch.restart();
+    }
+
+    /// Asks the person to lift the finger.
+    pub fn ask_to_lift(&mut self) {
+        self.ask(Asked::default(), Page::Lift);
+    }
+
+    /// Asks the person to put a weight of so many mN on the finger.
+    pub fn ask_for_weight(&mut self, mn: u16) {
+        self.ask(Asked::default(), Page::Weigh(mn));
+    }
+
+    /// What came of the last request, once.
+    pub fn answer(&mut self) -> Option<Answer> {
+        self.answer.take()
+    }
+
+    pub(super) fn end(&mut self, answer: Answer) {
+        self.answer = Some(answer);
+        self.asked = None;
+        self.begin();
+    }
+
+    /// The host wants nothing any more; the page for its slides is left.
+    pub fn release(&mut self) {
+        let wanted = self.asked.take().is_some();
+        self.answer = None;
+        if wanted || matches!(self.page, Page::Lift | Page::Air | Page::Weigh(_)) {
+            self.begin();
+        }
+    }
+
+    /// Ends a fault, if it is over.
+    pub fn clear(&mut self) {
+        self.asked = None;
+        self.begin();
+    }
+
+    /// The host's slides said this: shown as after the person's own, and it can be taught.
+    pub fn told(&mut self, judgement: Judgement) {
+        self.clear_episode();
+        self.judgement = Some(judgement.clone());
+        self.sound(if judgement.unknown {
+            super::NOT_KNOWN
+        } else if judgement.sure {
+            super::SURE_IT_IS
+        } else {
+            super::GOOD
+        });
+        self.show(Page::Verdict(judgement));
+    }
+
+    /// The host's slides taught this texture.
+    pub fn trained(&mut self, name: Name) {
+        self.sound(super::SURE_IT_IS);
+        self.show(Page::Learned(Ok(name)));
+    }
+
+    /// Another table is in force, of so many textures: what is shown of the old one is over.
+    pub fn table_changed(&mut self, textures: u16) {
+        self.textures = textures;
+        if matches!(
+            self.page,
+            Page::Ready
+                | Page::Touching
+                | Page::Again(_)
+                | Page::Verdict(_)
+                | Page::Choose(_)
+                | Page::Spell(_)
+        ) {
+            self.begin();
+        }
+    }
+
+    /// From now on a count of P_DC means so many mN.
+    pub fn calibrate(&mut self, mn_per_count: f32) {
+        self.touch.calibrate(mn_per_count);
+    }
+
+    /// What the person is to do for the host now; `None`: nothing.
+    pub fn prompt(&self) -> Option<Prompt> {
+        self.asked?;
+        Some(match (&self.page, self.touch.view().phase) {
+            (Page::Again(why), _) => Prompt::Again(*why),
+            (Page::Weigh(mn), _) if self.touch.has_zero() => Prompt::Weigh(*mn),
+            (Page::Touching, Phase::Slide | Phase::Sliding) => Prompt::Slide,
+            (Page::Touching, Phase::Air | Phase::Press) if self.touch.has_zero() => Prompt::Press,
+            _ => Prompt::Lift,
+        })
+    }
+
+    /// The slide that was good last, until the finger is pressed again.
+    pub fn slide(&self) -> &Slide<'p, K> {
+        self.touch.slide()
+    }
+
+    /// The samples that came with the last word.
+    pub fn taken(&self) -> &Taken {
+        self.touch.taken()
+    }
+
+    /// P_DC in the air, counts; `None` before it is known.
+    pub fn air_counts(&self) -> Option<f32> {
+        self.touch.air_counts()
+    }
+
+    /// Mean P_DC of the last 100 ms, counts above that in the air.
+    pub fn counts_above_air(&self) -> Option<f32> {
+        self.touch.counts_above_air()
+    }
+
+    /// The touch as it is shown.
+    pub fn view(&self) -> View {
+        self.touch.view()
+    }
+
+    /// What keeps the probe from sliding.
+    pub fn fault(&self) -> Option<Fault> {
+        match &self.page {
+            Page::Fault(Trouble::Silent) => Some(Fault::SensorSilent),
+            Page::Fault(Trouble::Frozen) => Some(Fault::SensorFrozen),
+            _ => None,
+        }
+    }
+
+    /// What a rig would be doing.
+    pub fn phase(&self) -> rig::Phase {
+        if let Some(fault) = self.fault() {
+            return rig::Phase::Faulted(fault);
+        }
+        match self.touch.view().phase {
+            Phase::Air => rig::Phase::Ready,
+            Phase::Press => rig::Phase::Pressing,
+            Phase::Slide => rig::Phase::Background,
+            Phase::Sliding => rig::Phase::Sliding,
+            Phase::Lift => rig::Phase::Lifting,
+        }
+    }
+}
