@@ -38,9 +38,6 @@ pub trait Rig {
     /// Why a movement failed.
     type Error;
 
-    /// Whether every table of this rig has whitened features: the methods for others are left out of its image.
-    const ONLY_FUSED: bool = false;
-
     /// The properties that this rig can measure.
     fn measures(&self) -> PropertySet;
 

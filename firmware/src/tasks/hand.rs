@@ -12,10 +12,10 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_time::{Duration, Instant, Ticker, with_timeout};
 use heapless::spsc::Consumer;
 use static_cell::{ConstStaticCell, StaticCell};
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::handheld::by_hand::{self, ByHand, Hand, Shown};
 use tactus_core::handheld::jobs::{self, Outcome};
-use tactus_core::handheld::{About, Handheld, Picture, Screen, TICKS_HZ, draw};
+use tactus_core::handheld::{About, Handheld, Picture, Screen, Small, TICKS_HZ, draw};
 use tactus_core::probe::seams::Events;
 use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
 use tactus_core::rig::calibration::RigCalibration;
@@ -303,7 +303,7 @@ pub(crate) async fn hand(
     let mut memory = Memory::new(store, MappedTable, FACTORY, BUFFER.take());
     memory.reload(&mut events).await;
     let textures = memory.table().map_or(0, |table| table.textures());
-    let mut handheld = Handheld::<Plain>::new(plan, textures);
+    let mut handheld = Handheld::<Small>::new(plan, textures);
     if let Err(why) = memory.table() {
         handheld.memory_failed(jobs::words(&why));
     }

@@ -129,7 +129,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     /// Computed as eq. 10: 1 minus a sum that is close to 1 would lose the digits that decide late in an exploration.
     pub(super) fn uncertainty(&self, method: Method, action: Action) -> f32 {
         let movement = action.movement;
-        if method == Method::Fused {
+        if K::ONLY_FUSED || method == Method::Fused {
             return whitened::uncertainty::<K, N>(&self.table, movement, &self.posterior);
         }
         let mut live: Vec<LiveTexture, N> = Vec::new();

@@ -28,8 +28,11 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             .filter(|&at| at < self.made.len());
         let made = made.ok_or(ObserveError::Action(action))?;
         match action.property {
+            None if K::ONLY_FUSED || self.config.method == Method::Fused => {
+                self.observe_features(action, slide)?;
+            }
+            _ if K::ONLY_FUSED => return Err(ObserveError::Action(action)),
             Some(property) => self.observe_property(action, property, slide)?,
-            None if self.config.method == Method::Fused => self.observe_features(action, slide)?,
             None => self.observe_properties(action, slide)?,
         }
         if let Some(made) = self.made.get_mut(made) {

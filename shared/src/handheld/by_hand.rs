@@ -218,8 +218,6 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
 impl<H: Hand, K: Kernels> Rig for ByHand<'_, H, K> {
     type Error = RigError;
 
-    const ONLY_FUSED: bool = true;
-
     fn measures(&self) -> PropertySet {
         [Property::Roughness, Property::Fineness]
             .into_iter()

@@ -32,7 +32,7 @@ where
     let contents = table.contents();
     let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
     let config = wanted.config(contents);
-    if R::ONLY_FUSED {
+    if K::ONLY_FUSED {
         consider_fused(&mut explorer, rig.measures(), config, &wanted.among)
     } else {
         let candidates = candidates(&wanted.among, table.textures());
