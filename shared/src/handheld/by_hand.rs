@@ -244,17 +244,24 @@ impl<H: Hand, K: Kernels> Rig for ByHand<'_, H, K> {
             }
             self.go_on().await?;
         }
+        // what comes next may take long, and nobody takes words meanwhile
+        self.pause();
         Ok(())
     }
 }
 
 impl<H: Hand, K: Kernels> RigHandle for ByHand<'_, H, K> {
     fn state(&self) -> RigState {
-        let view = self.handheld.view();
+        // without words nobody knows what the finger does
+        let heard = self.handheld.listens();
         RigState {
             phase: self.handheld.phase(),
-            at_rest: !self.handheld.is_touched(),
-            force_mn: view.force_mn,
+            at_rest: !(heard && self.handheld.is_touched()),
+            force_mn: if heard {
+                self.handheld.view().force_mn
+            } else {
+                0.0
+            },
             air_counts: self.handheld.air_counts(),
             skin: self.skin,
             ..RigState::parked(self.calibration)

@@ -184,6 +184,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             return rig::Phase::Faulted(fault);
         }
         match self.touch.view().phase {
+            _ if !self.listens() => rig::Phase::Ready,
             Phase::Air => rig::Phase::Ready,
             Phase::Press => rig::Phase::Pressing,
             Phase::Slide => rig::Phase::Background,
