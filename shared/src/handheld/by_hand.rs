@@ -360,8 +360,8 @@ pub struct Shown<E> {
     to: E,
     /// The most probable textures after the last slide.
     leading: Vec<(u16, f32), LEADING>,
-    /// Whether the verdict is sure, and whether the texture is unknown.
-    verdict: Option<(bool, bool)>,
+    /// Whether the verdict is sure, and whether the texture is changed or unknown.
+    verdict: Option<(bool, bool, bool)>,
 }
 
 impl<E: Events> Shown<E> {
@@ -376,10 +376,11 @@ impl<E: Events> Shown<E> {
 
     /// The verdict that was told, once.
     fn judgement(&mut self) -> Option<Judgement> {
-        let (sure, unknown) = self.verdict.take()?;
+        let (sure, changed, unknown) = self.verdict.take()?;
         Some(Judgement {
             leading: core::mem::take(&mut self.leading),
             sure,
+            changed,
             unknown,
             open: false,
         })
@@ -390,7 +391,9 @@ impl<E: Events> Events for Shown<E> {
     fn tell(&mut self, event: Event) {
         match &event {
             Event::SlideReport { posterior, .. } => self.leading = super::judge::leading(posterior),
-            Event::Verdict(verdict) => self.verdict = Some((verdict.sure, verdict.unknown)),
+            Event::Verdict(verdict) => {
+                self.verdict = Some((verdict.sure, verdict.changed, verdict.unknown))
+            }
             _ => {}
         }
         self.to.tell(event);

@@ -108,7 +108,7 @@ pub fn words(why: &MemoryError) -> &'static str {
             "The textures do not allow that."
         }
         MemoryError::Store(StoreError::Worn) => "The memory is worn out and keeps nothing new.",
-        MemoryError::NoTable(_) | MemoryError::Table(_) => {
+        MemoryError::NoTable(_) | MemoryError::Table(_) | MemoryError::StoredTable(_) => {
             "The textures cannot be read. Load them with a computer."
         }
         MemoryError::Broken(_) | MemoryError::Store(_) => {

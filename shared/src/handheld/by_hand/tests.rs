@@ -313,6 +313,7 @@ fn what_the_host_found_out_is_shown() {
         probability: 0.6,
         sure: false,
         unknown: false,
+        changed: false,
         log_odds: None,
         slides: 1,
         wants_label: false,
