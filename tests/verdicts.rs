@@ -32,6 +32,7 @@ fn told(shown: &str) -> usize {
     let name = match shown.lines().rev().find(|line| line.contains(" after ")) {
         Some(line) if line.starts_with("It is not one of") => "new",
         Some(line) if line.starts_with("Not sure") => "undecided",
+        Some(line) if line.starts_with("It is like ") => "changed",
         Some(line) if line.starts_with("It is ") && shown.contains("\nRight.") => "right",
         Some(line) if line.starts_with("It is ") && shown.contains("\nWrong:") => "wrong",
         _ => panic!("{shown}"),
