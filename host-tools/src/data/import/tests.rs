@@ -295,7 +295,7 @@ fn missing_short_and_foreign_files_are_named() {
         "mat2_9_bio.csv",
         Some(&lines(&bio, 550)),
         &[
-            "mat2_9_bio.csv: P_AC has 12078 samples",
+            "mat2_9_bio.csv: P_AC (samples: 12078",
             "before the steady window does (5.5 s)",
             "fetch the file again",
         ],

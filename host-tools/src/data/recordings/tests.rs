@@ -202,7 +202,7 @@ fn own_manifest_errors_name_line_and_column() {
         (
             "0.02,0.1,",
             "0.02,0.2,",
-            ["manifest.csv: line 2", "P_AC has 220 samples"],
+            ["manifest.csv: line 2", "P_AC (samples: 220"],
         ),
         (
             ",2.2,",
@@ -297,7 +297,10 @@ fn damaged_npy_files_are_refused() {
         (with("False", "True "), "the order is not C"),
         (with("(3,", "(3,1,"), "the shape is not one number"),
         (with("(3,", "("), "the shape is not one number"),
-        (with("(3,", "(9,"), "says 9 samples, the file has 3"),
+        (
+            with("(3,", "(9,"),
+            "samples by the .npy header: 9; in the file: 3",
+        ),
         (
             good[..good.len() - 1].to_vec(),
             "5 bytes of samples are an odd number",
@@ -350,13 +353,13 @@ fn the_writer_refuses_what_the_reader_would() {
     );
     let third = message(writer.write(&slide(2, 1)).unwrap_err());
     assert!(
-        third.contains("has 2 textures, there is none with index 2"),
+        third.contains("there is no texture with index 2, but 2 in all"),
         "{third}"
     );
     let mut short = slide(0, 2);
     short.blocks.truncate(1);
     let short = message(writer.write(&short).unwrap_err());
-    assert!(short.contains("P_AC has 64 samples"), "{short}");
+    assert!(short.contains("P_AC (samples: 64"), "{short}");
     // a writer that ends here leaves no recordings
     let empty = message(writer.finish().unwrap_err());
     assert!(empty.contains("texture 2 (silk) has no slide"), "{empty}");
@@ -445,7 +448,7 @@ fn a_texture_that_is_not_there_is_an_error_not_a_panic() {
     assert!(set.slides(2).is_empty());
     let message = set.load_texture(2).unwrap_err().to_string();
     assert!(
-        message.contains("has 2 textures, there is none with index 2"),
+        message.contains("there is no texture with index 2, but 2 in all"),
         "{message}"
     );
 }

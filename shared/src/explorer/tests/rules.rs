@@ -397,7 +397,7 @@ fn the_errors_say_what_is_missing() {
                 textures: 117,
                 capacity: 20,
             },
-            "the table has 117 textures, and there is room for 20",
+            "the textures of the table are 117, and there is room for 20",
         ),
         (
             ExplorerError::Candidates,

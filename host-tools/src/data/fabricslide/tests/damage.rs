@@ -74,7 +74,7 @@ fn recordings_that_contradict_each_other_are_refused_where_they_are() {
     type Case = (&'static str, Value, &'static str);
     let cases: [Case; 8] = [
         ("rep", json!(2), "rep is 2; the two repetitions are 0 and 1"),
-        ("n", json!(0), "0 rows of 16 values"),
+        ("n", json!(0), "the rows, 0 of 16 values"),
         ("n", json!(u64::MAX), "correct the manifest"),
         ("n", json!(1 << 24), "a file no more than"),
         ("offset_values", json!(u64::MAX), "correct the manifest"),
@@ -112,7 +112,7 @@ fn recordings_that_contradict_each_other_are_refused_where_they_are() {
     );
     refuses(
         |json| json["files"][1]["slides"] = json!([]),
-        &["manifest.json: files, B.u16le.gz: 0 slides are listed"],
+        &["manifest.json: files, B.u16le.gz: the slides listed are 0"],
     );
     refuses(
         |json| json["files"][1]["fabric"] = json!("A"),

@@ -105,7 +105,10 @@ fn biotac_manifest_errors_name_the_entry() {
         (
             "[3,30,6]",
             "[3,30]",
-            ["manifest.json: files, m4.gz", "n_slides is 3, but 2 slides"],
+            [
+                "manifest.json: files, m4.gz",
+                "n_slides is 3, but \"slides\" lists 2",
+            ],
         ),
         (
             "[3,30,6]",
@@ -172,7 +175,7 @@ fn biotac_manifest_errors_name_the_entry() {
         (
             "[0.001,0.003]",
             "[0.001,0.005]",
-            ["manifest.json: slide 3 of m4.gz", "P_AC has 8 samples"],
+            ["manifest.json: slide 3 of m4.gz", "P_AC (samples: 8"],
         ),
         ("m9.gz", "m8.gz", ["m8.gz", "No such file"]),
     ] {
