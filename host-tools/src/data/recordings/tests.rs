@@ -312,7 +312,7 @@ fn damaged_npy_files_are_refused() {
         ),
         (
             header("{'descr': '<i2', 'fortran_order': False, 'shape': (18446744073709551615,), }"),
-            "says 18446744073709551615 samples",
+            "samples by the .npy header: 18446744073709551615;",
         ),
         (header(&"{[(".repeat(60)), "the type is not '<i2'"),
     ] {

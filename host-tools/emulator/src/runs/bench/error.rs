@@ -2,7 +2,6 @@
 
 use tactus::data::recordings::RecordingError;
 use tactus::eval::learn::TableError as LearnError;
-use tactus_core::explorer::Method;
 
 use crate::board;
 use crate::host::talk::TalkError;
@@ -18,10 +17,6 @@ pub(crate) enum BenchError {
     Recordings(#[from] RecordingError),
     #[error("the made-up table: {0}")]
     Learn(#[from] LearnError),
-    #[error(
-        "the made-up table of {method:?} is another one than the gates were set with (check sum {crc:#010x}); set them anew"
-    )]
-    OtherTable { method: Method, crc: u32 },
     #[error("{kernel}: {what}")]
     Unsuitable { kernel: String, what: &'static str },
     #[error("not what the plain kernels give: {}", .0.join("; "))]
