@@ -50,6 +50,28 @@ pub enum Job {
     Teach(Choice),
 }
 
+/// Which slide the host wants.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Asked {
+    /// Its number, from 1.
+    pub slide: u8,
+    /// How many there can be; 0 is not known.
+    pub of: u8,
+}
+
+/// What came of it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Answer {
+    /// The slide was made, and is good.
+    Slid,
+    /// The person does not want to.
+    GivenUp,
+    /// Nobody has touched anything for a minute.
+    Nobody,
+    /// Sensor or memory fail.
+    Trouble,
+}
+
 /// A page of what happens on the display.
 #[derive(Clone, PartialEq, Debug)]
 enum Page {
@@ -115,8 +137,6 @@ const BAD: &[Note] = &[(900, 12), (0, 6), (900, 12)];
 const SURE_IT_IS: &[Note] = &[(2000, 8), (2400, 8), (2700, 16)];
 const NOT_KNOWN: &[Note] = &[(1800, 10), (0, 4), (1400, 16)];
 const ALARM: &[Note] = &[(700, 30), (0, 10), (700, 30)];
-
-pub use asked::{Answer, Asked};
 
 impl<'p, K: Kernels> Handheld<'p, K> {
     /// A probe that was just switched on, with a table of so many textures.

@@ -1,7 +1,7 @@
 //! What the host wants of the person who holds the probe: a slide, the finger in the air, or a weight on it. The pages are
 //! those of the person's own use; what was measured is the host's.
 
-use super::{Handheld, Page};
+use super::{Answer, Asked, Handheld, Page};
 use crate::explorer::Kernels;
 use crate::features::Slide;
 use crate::handheld::guidance::{Phase, View};
@@ -11,28 +11,6 @@ use crate::handheld::touch::Taken;
 use crate::rig::{self, Fault};
 use crate::table::Name;
 use crate::wire::Prompt;
-
-/// Which slide the host wants.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Asked {
-    /// Its number, from 1.
-    pub slide: u8,
-    /// How many there can be; 0 is not known.
-    pub of: u8,
-}
-
-/// What came of it.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Answer {
-    /// The slide was made, and is good.
-    Slid,
-    /// The person does not want to.
-    GivenUp,
-    /// Nobody has touched anything for a minute.
-    Nobody,
-    /// Sensor or memory fail.
-    Trouble,
-}
 
 impl<'p, K: Kernels> Handheld<'p, K> {
     fn ask(&mut self, asked: Asked, page: Page) {
