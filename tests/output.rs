@@ -411,3 +411,49 @@ fn a_table_has_a_report_as_text_as_an_object_and_as_a_page() {
     let lost = said(&["report", table, "--recordings", "nowhere"], 1);
     assert!(lost.contains("nowhere: no such folder"), "{lost}");
 }
+
+#[test]
+fn slides_are_verified_against_a_texture_of_a_table_and_of_recordings() {
+    let temp = tempfile::tempdir().unwrap();
+    let table = temp.path().join("table");
+    let table = path(&table);
+    let learn = ["learn", "--recordings", SIMULATED, "--train-slides", "2"];
+    let learn = [&learn[..], &["--out", table]].concat();
+    assert!(tactus(&learn).status.success());
+    let of = |material: &'static str, code| {
+        let verify = [
+            "verify",
+            "--table",
+            table,
+            "--texture",
+            "burlap",
+            "--sample",
+        ];
+        let sample = [SIMULATED, "--material", material, "--format", "json"];
+        json(&[&verify[..], &sample].concat(), code)
+    };
+    let same = of("burlap", 0);
+    assert_eq!(
+        (&same["answer"], &same["few"]),
+        (&"same".into(), &true.into())
+    );
+    assert!(same["false_accept"].as_f64().unwrap() < 0.2);
+    let other = of("corduroy", 3);
+    assert_eq!(other["answer"], "different");
+    let slides = other["slides"].as_array().unwrap();
+    let last = slides.last().unwrap();
+    assert!(last["score"].as_f64() > last["limit"].as_f64(), "{last}");
+    assert_eq!(last["answer"], "different");
+
+    // the other textures of its own recordings give the scale
+    let reference = ["verify", "--reference", SIMULATED, "--texture", "burlap"];
+    let itself = [&reference[..], &["--sample", SIMULATED]].concat();
+    assert!(said(&itself, 1).contains("--sample is the reference itself"));
+    let other = [&itself[..], &["--material", "Denim twill"]].concat();
+    let text = String::from_utf8(tactus(&other).stdout).unwrap();
+    assert!(text.contains("Different from Burlap"), "{text}");
+    let lost = ["verify", "--table", table, "--sample", SIMULATED];
+    assert!(said(&lost, 2).contains("--texture NAME"));
+    let typo = [&lost[..], &["--texture", "burlab"]].concat();
+    assert!(said(&typo, 1).contains("did you mean Burlap?"));
+}

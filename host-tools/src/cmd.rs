@@ -20,6 +20,7 @@ mod study;
 mod table;
 mod table_file;
 mod textures;
+mod verify;
 
 use std::io::{self, Write as _};
 
@@ -51,6 +52,7 @@ enum Command {
     Report(report::Args),
     Identify(identify::Args),
     Evaluate(evaluate::Args),
+    Verify(verify::Args),
     Gauge(gauge::Args),
     Simulate(simulate::Args),
     LearnByHand(learn::ByHand),
@@ -91,6 +93,7 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         Some(Command::Report(args)) => report::run(&args, out)?,
         Some(Command::Identify(args)) => done = identify::run(&args, out)?,
         Some(Command::Evaluate(args)) => evaluate::run(&args, out)?,
+        Some(Command::Verify(args)) => done = verify::run(&args, out)?,
         Some(Command::Gauge(args)) => gauge::run(&args, out)?,
         Some(Command::Simulate(args)) => simulate::run(&args, out)?,
         Some(Command::LearnByHand(args)) => learn::by_hand(&args, out)?,

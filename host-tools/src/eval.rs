@@ -21,3 +21,4 @@ pub mod show;
 pub mod table_summary;
 pub mod transcript;
 pub mod verdicts;
+pub mod verify;

@@ -11,6 +11,7 @@ mod likelihoods;
 mod novelty;
 mod posterior;
 mod student;
+mod verify;
 mod whitened;
 
 pub use choice::{ExpectedOutcome, benefit, confusion};
@@ -19,6 +20,7 @@ pub use confusions::{Confusions, Degrees};
 pub use episode::EpisodeSummary;
 pub use kernels::Kernels;
 pub use posterior::{Explorer, Told, Verdict};
+pub use verify::{Answer, ENOUGH_TRIALS, Verification};
 
 #[cfg(test)]
 mod tests;

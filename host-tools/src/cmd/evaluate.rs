@@ -20,6 +20,7 @@ pub(crate) use experiment::Args;
 
 mod experiment;
 mod novelty;
+mod verify;
 
 /// What `evaluate` prints.
 #[derive(Serialize)]
@@ -58,8 +59,8 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     let is_fused = args.method.method() == explorer::Method::Fused;
     ensure!(
-        is_fused || !args.lifelong && args.novelty.is_none(),
-        "--novelty and --lifelong need --method fused: the other methods do not recognise new textures"
+        is_fused || !args.lifelong && !args.verify && args.novelty.is_none(),
+        "--novelty, --verify and --lifelong need --method fused: the other methods do not recognise new textures"
     );
     let canvas = args.plot.open()?;
     ensure!(
@@ -70,6 +71,9 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let config = args.stop.config(args.method);
     if args.lifelong {
         return novelty::lifelong(args, &experiment, config, out);
+    }
+    if args.verify {
+        return verify::run(args, &experiment, protocol, config, canvas, out);
     }
     if args.novelty.is_some() {
         return novelty::leave_one_out(args, &experiment, protocol, config, canvas, out);

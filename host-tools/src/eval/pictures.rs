@@ -7,3 +7,4 @@ pub mod map;
 pub mod novelty;
 mod spectrum;
 pub mod timeline;
+pub mod trade_off;

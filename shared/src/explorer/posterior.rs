@@ -218,7 +218,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         self.score(&episode, against)
     }
 
-    fn score(&self, episode: &Episode, against: Against) -> Option<f32> {
+    pub(super) fn score(&self, episode: &Episode, against: Against) -> Option<f32> {
         if !self.is_calibrated() {
             return None;
         }

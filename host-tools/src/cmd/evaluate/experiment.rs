@@ -36,7 +36,9 @@ the other.
 --novelty leaves one texture after the other out of the table and counts how often it is noticed, and how often a known one
 is taken for new. --lifelong plays a session in time order: the first slides are learned, and every later one is an
 episode of its own.
-Both need the method fused.
+--verify holds the slides of each texture against its own reference and against those of three others, as `tactus verify`
+does, and counts the errors: at the limits, and where both are equal.
+These need the method fused.
 
 With --novelty, --plot draws what is told of known and of new textures (known-by-slides, new-by-slides). Else it draws what is told of each texture (confusion), how often it was right when it said 99 % (reliability), and slides and
 errors by threshold (slides-by-threshold, errors-by-threshold).
@@ -46,6 +48,7 @@ Examples:
   tactus evaluate --recordings DIR --method paper
   tactus evaluate --recordings DIR --novelty leave-one-out
   tactus evaluate --recordings DIR --plot pictures
+  tactus evaluate --recordings DIR --verify --protocol blocked
   tactus evaluate --recordings DIR --lifelong")]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -74,6 +77,9 @@ pub(crate) struct Args {
     /// Play a session in time order, in which the probe goes on learning
     #[arg(long)]
     pub(crate) lifelong: bool,
+    /// Count how often slides are rightly called the same as a reference, and how often wrongly
+    #[arg(long, conflicts_with_all = ["lifelong", "novelty"])]
+    pub(crate) verify: bool,
     /// Slides to learn from, per texture and movement: 5 unless given, or all training rows of --properties
     #[arg(long, value_name = "N")]
     pub(crate) train_slides: Option<usize>,

@@ -1,0 +1,321 @@
+//! `tactus verify`: whether slides are of one texture, whatever else they may be of.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, ensure};
+use serde::Serialize;
+use tactus::data::recordings::RecordingSet;
+use tactus::data::replay::MeasuredSlide;
+use tactus::eval::evaluate::{Method, explorer};
+use tactus::eval::learn::Expected;
+use tactus::eval::show::count;
+use tactus::eval::verify::{false_accept, put};
+use tactus_core::explorer::{Answer, Config, ENOUGH_TRIALS, Strategy};
+use tactus_core::features::{Observation, PropertySet};
+use tactus_core::table::{Action, POPULATION, Table};
+
+use super::args::Stop;
+use super::learn::learn_first;
+use super::names::find;
+use super::output::{Done, Format, UsageError, percent, print_json};
+use super::table_file::read_table;
+use super::textures::{find_material, measure_folder};
+
+/// Say whether recorded slides are of the same texture as a reference
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus verify --reference DIR --texture cork --sample NEW                 the other textures of DIR give the scale
+  tactus verify --table TABLE --texture cork --sample NEW --material cork   a texture of a table
+  tactus verify --table TABLE --reference ROLL7 --sample ROLL8              one that the table does not have
+
+Slides are taken in the order of time until it is the same, different, or none is left. It is different if fewer than
+--false-alarm of the reference's own slides would look so, and the same if that is more probable than --threshold.
+Exit code: 0 the same, 3 different or not sure.")]
+pub(crate) struct Args {
+    /// Recordings of the reference
+    #[arg(long, value_name = "DIR", required_unless_present = "table")]
+    reference: Option<PathBuf>,
+    /// The reference's texture: of the recordings, or of the table
+    #[arg(long, value_name = "NAME")]
+    texture: Option<String>,
+    /// The table that gives the scale; without it, one is learned from all textures of the reference's recordings
+    #[arg(long, value_name = "TABLE")]
+    table: Option<PathBuf>,
+    /// Recordings of what is held against it
+    #[arg(long, value_name = "DIR")]
+    sample: PathBuf,
+    /// The texture of these recordings, where they have several
+    #[arg(long, value_name = "NAME")]
+    material: Option<String>,
+    #[command(flatten)]
+    stop: Stop,
+    /// How to print the answer
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What `verify --format json` prints.
+#[derive(Serialize)]
+struct Verified {
+    reference: String,
+    sample: String,
+    /// `same`, `different` or `unsure`.
+    answer: &'static str,
+    /// Fewest slides of the reference at a movement.
+    reference_slides: u8,
+    /// Whether these are too few to rely on.
+    few: bool,
+    false_alarm: f32,
+    threshold: f32,
+    /// Share of other textures' visits of as many slides that would be called the same; `null`: the table has no other.
+    false_accept: Option<f64>,
+    slides: Vec<Slide>,
+}
+
+/// What was known after a slide.
+#[derive(Serialize)]
+struct Slide {
+    number: u32,
+    force_n: f32,
+    speed_mm_s: f32,
+    score: f32,
+    limit: f32,
+    answer: &'static str,
+}
+
+fn name(answer: Answer) -> &'static str {
+    match answer {
+        Answer::Same => "same",
+        Answer::Different => "different",
+        Answer::Unsure => "unsure",
+    }
+}
+
+/// Holds the sample against the reference.
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
+    let (bytes, texture) = reference(args)?;
+    let table = Table::read(&bytes)?;
+    let limits = table.limits().context(
+        "the table has no limits, by which slides would be called different: learn it again, with --method fused",
+    )?;
+    let (set, measured) = measure_folder(&args.sample)?;
+    let sample = one(&set, args.material.as_deref(), &args.sample, "--material")?;
+    let sample_name = set.textures()[sample].name.clone();
+    let known: Vec<_> = (0..).zip(table.movements()).collect();
+    let usable = |slide: &&MeasuredSlide| {
+        let at = known
+            .iter()
+            .find(|(_, movement)| *movement == slide.movement);
+        at.is_some_and(|(at, _)| table.trials(texture, *at) > 0)
+    };
+    let slides: Vec<&MeasuredSlide> = measured[sample].iter().filter(usable).collect();
+    ensure!(
+        !slides.is_empty(),
+        "{}: {sample_name} has no slide at a movement of the reference",
+        args.sample.display()
+    );
+    let measures = slides.iter().fold(PropertySet::ALL, |all, slide| {
+        all.and(slide.measurement.properties.measured())
+    });
+    let config = Config {
+        strategy: Strategy::Cycling,
+        open: true,
+        ..args.stop.config(Method::Fused)
+    };
+    let mut explorer = explorer(&bytes, measures, config, Some(&[texture]))?;
+    let trials = known.iter().map(|(at, _)| table.trials(texture, *at));
+    let reference_slides = trials.filter(|n| *n > 0).min().unwrap_or(0);
+    let mut verified = Verified {
+        reference: table.name(texture).unwrap_or_default().to_owned(),
+        sample: sample_name,
+        answer: name(Answer::Unsure),
+        reference_slides,
+        few: reference_slides < ENOUGH_TRIALS,
+        false_alarm: config.false_alarm.unwrap_or(limits.false_alarm),
+        threshold: args.stop.threshold,
+        false_accept: None,
+        slides: Vec::new(),
+    };
+    for slide in slides.into_iter().take(args.stop.max_slides.into()) {
+        let at = known
+            .iter()
+            .find(|(_, movement)| *movement == slide.movement);
+        let Some((at, _)) = at else { continue };
+        let action = Action {
+            movement: *at,
+            property: None,
+        };
+        explorer.observe(action, &Observation::from(&slide.measurement))?;
+        let Some(now) = explorer.verification() else {
+            continue;
+        };
+        verified.answer = name(now.answer);
+        verified.slides.push(Slide {
+            number: slide.number,
+            force_n: slide.movement.force_n(),
+            speed_mm_s: slide.movement.speed_mm_s(),
+            score: now.score,
+            limit: now.limit,
+            answer: name(now.answer),
+        });
+        if now.answer != Answer::Unsure {
+            break;
+        }
+    }
+    verified.false_accept = false_accept(&explorer, texture);
+    match args.format {
+        Format::Json => print_json(&verified, out)?,
+        Format::Text => print(&verified, out)?,
+    }
+    Ok(if verified.answer == name(Answer::Same) {
+        Done::Fully
+    } else {
+        Done::NotIdentified
+    })
+}
+
+/// The table with the reference in it.
+fn reference(args: &Args) -> anyhow::Result<(Vec<u8>, u16)> {
+    let mut bytes = Vec::new();
+    let given = match &args.table {
+        Some(file) => Some((file, read_table(file, &mut bytes)?)),
+        None => None,
+    };
+    let Some(folder) = &args.reference else {
+        // clap has seen to it that there is a table
+        let (file, table) = given.context("give --reference DIR or --table TABLE")?;
+        let Some(wanted) = &args.texture else {
+            let say = "--table without --reference: say which of its textures, with --texture NAME";
+            return Err(UsageError(say.to_owned()).into());
+        };
+        let names: Vec<&str> = table.names().collect();
+        let name = find(wanted, &names).map_err(anyhow::Error::msg);
+        let name = name.with_context(|| file.display().to_string())?;
+        let texture = table
+            .find(name)
+            .context("a name of the table is in the table")?;
+        return Ok((table.as_bytes().to_vec(), texture));
+    };
+    let (set, measured) = measure_folder(folder)?;
+    let index = one(&set, args.texture.as_deref(), folder, "--texture")?;
+    let name = &set.textures()[index].name;
+    let is_same_folder = same_folder(folder, &args.sample);
+    let same_texture = args
+        .material
+        .as_deref()
+        .is_none_or(|m| find_material(&set, m).ok() == Some(index));
+    ensure!(
+        !(is_same_folder && same_texture),
+        "--sample is the reference itself: give other slides, or --material with another texture of the folder"
+    );
+    let bytes = match given {
+        Some((file, table)) => put(table, name, &measured[index])
+            .with_context(|| format!("{} with the reference", file.display()))?,
+        None => {
+            let textures = set.textures().len();
+            ensure!(
+                textures > POPULATION,
+                "{}: {} say little of how textures differ: give --table TABLE for the scale",
+                folder.display(),
+                count(textures as u64, "texture")
+            );
+            let all = measured.iter().map(Vec::len).max().unwrap_or(0);
+            learn_first(
+                &set,
+                &measured,
+                all,
+                Method::Fused,
+                None,
+                &Expected::default(),
+            )?
+        }
+    };
+    let texture = Table::read(&bytes)?.find(name);
+    let texture = texture.context("the reference was not learned; please report this")?;
+    Ok((bytes, texture))
+}
+
+fn same_folder(a: &Path, b: &Path) -> bool {
+    a.canonicalize()
+        .ok()
+        .zip(b.canonicalize().ok())
+        .is_some_and(|(a, b)| a == b)
+}
+
+/// The texture that is meant: the one that is named, or the only one.
+fn one(
+    set: &RecordingSet,
+    named: Option<&str>,
+    folder: &Path,
+    option: &str,
+) -> anyhow::Result<usize> {
+    match named {
+        Some(name) => find_material(set, name),
+        None => {
+            let textures = set.textures();
+            ensure!(
+                textures.len() == 1,
+                "{}: has {}; say which one with {option} NAME",
+                folder.display(),
+                count(textures.len() as u64, "texture")
+            );
+            Ok(0)
+        }
+    }
+}
+
+fn print(v: &Verified, out: &mut impl Write) -> anyhow::Result<()> {
+    writeln!(
+        out,
+        "Is it {}? ({} of {})",
+        v.reference,
+        count(v.slides.len() as u64, "slide"),
+        v.sample
+    )?;
+    for slide in &v.slides {
+        let says = match slide.answer {
+            "same" => "the same",
+            "different" => "different",
+            _ => "not sure yet",
+        };
+        writeln!(
+            out,
+            "  slide {}, {:.2} N at {:.1} mm/s: score {:.1}, different above {:.1}: {says}",
+            slide.number, slide.force_n, slide.speed_mm_s, slide.score, slide.limit
+        )?;
+    }
+    let answer = match v.answer {
+        "same" => format!("The same as {}.", v.reference),
+        "different" => format!(
+            "Different from {}, or {0} changed beyond what is expected.",
+            v.reference
+        ),
+        _ => format!(
+            "Not sure yet whether it is {}: more slides would tell.",
+            v.reference
+        ),
+    };
+    writeln!(out, "{answer}")?;
+    let accepted = match v.false_accept {
+        Some(share) => format!(
+            "; of the table's other textures {} would be called the same",
+            percent((share * 1000.0).round() / 1000.0)
+        ),
+        None => String::new(),
+    };
+    writeln!(
+        out,
+        "At this limit {} of its own slides would be called different{accepted}.",
+        percent(v.false_alarm.into())
+    )?;
+    if v.few {
+        writeln!(
+            out,
+            "The reference has only {} at a movement: record more of it, five make it much surer.",
+            count(v.reference_slides, "slide")
+        )?;
+    }
+    Ok(())
+}
