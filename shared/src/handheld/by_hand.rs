@@ -298,7 +298,7 @@ impl<H: Hand, K: Kernels> RigHandle for ByHand<'_, H, K> {
         self.skin = skin;
     }
 
-    /// P_DC in the air, once the finger has been there for [`AIR`].
+    /// P_DC in the air, once the finger has been there for two seconds.
     async fn calibrate(&mut self) -> Result<RigCalibration, Failure> {
         self.handheld.ask_for_air();
         self.heed();

@@ -58,6 +58,7 @@ fn identify(random: &mut ChaCha8Rng) -> Identify {
         open: random.random(),
         learn: random.random(),
         seed: random.random(),
+        false_alarm: random.random::<bool>().then(|| random.random()),
     }
 }
 

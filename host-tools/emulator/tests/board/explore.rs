@@ -41,6 +41,7 @@ fn identify(among: &[u16], threshold: f32) -> Identify {
         open: true,
         learn: false,
         seed: 11,
+        false_alarm: None,
     }
 }
 

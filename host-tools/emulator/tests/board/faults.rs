@@ -271,6 +271,7 @@ fn identify(slides: u8) -> Command {
         open: false,
         learn: false,
         seed: 5,
+        false_alarm: None,
     })
 }
 

@@ -176,8 +176,8 @@ fn reliability(courses: &[Course], threshold: f32) -> Result<Figure, DrawError> 
 /// The probabilities that are counted together, in %.
 fn range(bin: &Statements) -> String {
     match (percent(bin.from), percent(bin.to)) {
-        (low, high) if low == 0.0 => format!("<{high}"),
-        (low, high) if high == 100.0 => format!("\u{2265}{low}"),
+        (0.0, high) => format!("<{high}"),
+        (low, 100.0) => format!("\u{2265}{low}"),
         (low, high) => format!("{low}\u{2013}{high}"),
     }
 }
