@@ -6,6 +6,7 @@ pub mod fabricslide;
 pub mod import;
 pub mod program;
 pub mod properties;
+pub mod recorder;
 pub mod recording;
 pub mod recordings;
 pub mod replay;

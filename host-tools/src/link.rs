@@ -6,14 +6,12 @@
 
 pub mod follow;
 mod port;
-mod recorder;
 mod request;
 mod session;
 mod table;
 mod transaction;
 
 pub use port::{Port, PortError};
-pub use recorder::{RecordError, Recorder};
 pub use request::{Found, Request};
 pub use session::{LinkError, MAX_TRIES, Session};
 pub use table::{PushTable, ReadTable};

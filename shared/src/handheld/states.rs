@@ -201,6 +201,13 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         }
     }
 
+    /// Ends what the host asked for.
+    fn end(&mut self, answer: Answer) {
+        self.answer = Some(answer);
+        self.asked = None;
+        self.begin();
+    }
+
     /// Something to be done with the table; each is given once.
     pub fn job(&mut self) -> Option<Job> {
         self.job.take()

@@ -1,12 +1,13 @@
 //! The real ELF of the handheld probe and a host at its serial link, while a person holds it: judged by what comes over the
 //! wire and by what the display shows.
 
-use std::path::PathBuf;
+use std::path::Path;
 
+use tactus::data::recorder::Recorder;
 use tactus::data::recording::{Recording, Texture};
 use tactus::data::recordings::{RecordingSet, RecordingWriter};
 use tactus::eval::learn::learn;
-use tactus::link::{PushTable, ReadTable, Recorder, Request};
+use tactus::link::{PushTable, ReadTable, Request};
 use tactus::sim::collection::Collection;
 use tactus::sim::person::Manner;
 use tactus::sim::world::Setup;
@@ -47,7 +48,7 @@ impl Held {
         ))
     }
 
-    fn with(elf: &PathBuf, texture: &str, manner: Manner, store: Option<Vec<u8>>) -> Self {
+    fn with(elf: &Path, texture: &str, manner: Manner, store: Option<Vec<u8>>) -> Self {
         let collection = Collection {
             seed: 1,
             textures: vec![BURLAP],

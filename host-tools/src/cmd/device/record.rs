@@ -5,10 +5,11 @@ use std::path::PathBuf;
 
 use anyhow::ensure;
 use serde::Serialize;
+use tactus::data::recorder::Recorder;
 use tactus::data::recording::{Labels, Texture};
 use tactus::data::recordings::RecordingWriter;
 use tactus::eval::show::count;
-use tactus::link::{Recorder, Request};
+use tactus::link::Request;
 use tactus_core::explorer::Strategy;
 use tactus_core::wire::{Command, Identify};
 

@@ -48,12 +48,6 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         self.answer.take()
     }
 
-    pub(super) fn end(&mut self, answer: Answer) {
-        self.answer = Some(answer);
-        self.asked = None;
-        self.begin();
-    }
-
     /// The host wants nothing any more; the page for its slides is left.
     pub fn release(&mut self) {
         let wanted = self.asked.take().is_some();
