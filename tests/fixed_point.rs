@@ -9,6 +9,7 @@ use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::measure_all;
 use tactus::eval::evaluate::{Outcome, evaluate};
 use tactus::eval::experiment::{Experiment, Protocol, Run};
+use tactus::eval::learn::Expected;
 use tactus_core::explorer::{Config, Method, Told};
 use tactus_core::features::Property;
 use tactus_core::features::{FeatureSet, Observation};
@@ -223,7 +224,12 @@ fn decided_alike(name: &str, experiment: Experiment, method: Option<FeatureSet>,
         method: method.map_or(Method::Paper, |_| Method::Fused),
         ..Config::default()
     };
-    let experiment = experiment.with_features(method);
+    // drift and limits are held against an oracle of their own: fused_recipe.rs
+    let plain = Expected {
+        drift: None,
+        ..Expected::default()
+    };
+    let experiment = experiment.with_features(method).expecting(plain);
     let ours = evaluate(&experiment, config, runs, || ()).unwrap();
     let oracle = oracle(
         &experiment,

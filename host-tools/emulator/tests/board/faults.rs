@@ -308,7 +308,8 @@ fn run(case: &Case, talk: &mut Talk, random: &mut ChaCha8Rng) -> Outcome {
     let mut booted = None;
     let mut seen = None;
     let after_ms = case.deadline_ms.unwrap_or(1500) + 400;
-    let ended = talk.send(identify(10), 80.0, |board, report| {
+    // a fault that the rig gets over by itself ends an exploration after six slides, each with a homing
+    let ended = talk.send(identify(10), 200.0, |board, report| {
         if let Some(report) = report {
             match &report.event {
                 Event::Fault(fault) => seen = Some(*fault),
