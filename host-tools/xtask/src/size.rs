@@ -372,7 +372,7 @@ mod tests {
             "160000",
             "9000",
             "4086  session::work",
-            "1200  UART5, 9 runs",
+            "1200  UART5, runs: 9",
             "  start-up: clocks",
             "    embassy_stm32::rcc::init",
         ] {

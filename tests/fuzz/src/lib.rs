@@ -343,6 +343,7 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
                     open: true,
                     learn: true,
                     seed: 1,
+                    false_alarm: Some(0.02),
                 }),
                 Command::WriteCalibration(flash::calibration().to_bytes().into_iter().collect()),
                 Command::WriteTable {

@@ -357,8 +357,10 @@ fn run(case: &Case, talk: &mut Talk, random: &mut ChaCha8Rng) -> Outcome {
         "{}: its time never came: {ended:?}",
         case.name
     );
+    // what the rig gets over by itself leaves the exploration to its end
+    let got_over = ended.is_ok() && matches!(seen, Some(Seen::LeverSlips | Seen::Unsteady));
     assert!(
-        matches!(ended, Err(TalkError::Refused(_) | TalkError::Rebooted(_))),
+        got_over || matches!(ended, Err(TalkError::Refused(_) | TalkError::Rebooted(_))),
         "{}: {ended:?}",
         case.name
     );

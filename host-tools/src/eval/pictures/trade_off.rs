@@ -1,6 +1,7 @@
 //! What `tactus evaluate --verify` draws: false rejects against false accepts, limit by limit.
 
 use crate::eval::chart::{Chart, DrawError, Figure, MARKS, Mark, Series, WIDTH};
+use crate::eval::show::count;
 use crate::eval::verify::After;
 
 /// Height of the chart without its words, px.
@@ -16,10 +17,7 @@ pub fn figure(after: &[After]) -> Result<Figure, DrawError> {
     let end = (4.0 * worst.fold(0.5, f64::max)).ceil();
     let mut series = vec![Series::dashed("both alike", vec![(0.0, 0.0), (end, end)])];
     for (n, a) in after.iter().enumerate() {
-        let name = match a.slides {
-            1 => "1 slide".to_owned(),
-            slides => format!("{slides} slides"),
-        };
+        let name = count(a.slides as u64, "slide");
         let points = a
             .curve
             .iter()
