@@ -101,6 +101,8 @@ enum When {
     /// The finger presses, the stage stands.
     Pressing,
     Sliding,
+    /// At 25 mm/s or less: a slide of two seconds or more.
+    SlidingSlowly,
 }
 
 struct Case {
@@ -196,10 +198,11 @@ const CASES: [Case; 17] = [
         deadline_ms: None,
     },
     Case {
-        // on a soft sample the slide may end before the force is too high: then the steps up are lost
+        // on a soft sample the slide may end before the force is too high: then the steps up are lost. One of a second at 0.2 N
+        // ends before anything shows: docs/src/limits.md
         name: "the lever's driver runs down on its own while sliding",
         cause: Cause::Rig(Fault::LeverRunaway),
-        when: When::Sliding,
+        when: When::SlidingSlowly,
         seen: &[Seen::ForceHigh, Seen::LeverSlips],
         deadline_ms: None,
     },
@@ -282,6 +285,7 @@ fn is_time(when: When, board: &mut Emulator) -> bool {
         When::Approaching => truth.force_n == 0.0 && (-0.75..-0.4).contains(&truth.indentation_mm),
         When::Pressing => truth.force_n > 0.15 && truth.speed_mm_s.abs() < 1.0,
         When::Sliding => truth.force_n > 0.15 && truth.speed_mm_s > 5.0,
+        When::SlidingSlowly => truth.force_n > 0.15 && (5.0..40.0).contains(&truth.speed_mm_s),
     }
 }
 
@@ -357,10 +361,8 @@ fn run(case: &Case, talk: &mut Talk, random: &mut ChaCha8Rng) -> Outcome {
         "{}: its time never came: {ended:?}",
         case.name
     );
-    // what the rig gets over by itself leaves the exploration to its end
-    let got_over = ended.is_ok() && matches!(seen, Some(Seen::LeverSlips | Seen::Unsteady));
     assert!(
-        got_over || matches!(ended, Err(TalkError::Refused(_) | TalkError::Rebooted(_))),
+        matches!(ended, Err(TalkError::Refused(_) | TalkError::Rebooted(_))),
         "{}: {ended:?}",
         case.name
     );
