@@ -101,7 +101,7 @@ enum When {
     /// The finger presses, the stage stands.
     Pressing,
     Sliding,
-    /// At 25 mm/s or less: a slide of two seconds or more.
+    /// At 0.5 N or more: a slide of two seconds or longer.
     SlidingSlowly,
 }
 
@@ -285,7 +285,7 @@ fn is_time(when: When, board: &mut Emulator) -> bool {
         When::Approaching => truth.force_n == 0.0 && (-0.75..-0.4).contains(&truth.indentation_mm),
         When::Pressing => truth.force_n > 0.15 && truth.speed_mm_s.abs() < 1.0,
         When::Sliding => truth.force_n > 0.15 && truth.speed_mm_s > 5.0,
-        When::SlidingSlowly => truth.force_n > 0.15 && (5.0..40.0).contains(&truth.speed_mm_s),
+        When::SlidingSlowly => truth.force_n > 0.4 && truth.speed_mm_s > 5.0,
     }
 }
 
