@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use serde::Serialize;
 use tactus::data::recording::Labels;
-use tactus::eval::gauge::{Reading, Study, study};
+use tactus::eval::gauge::{Reading, Study, distinct, study};
 use tactus::eval::pictures::control;
 use tactus::eval::show::count;
 use tactus_core::features::{Movement, Property};
@@ -144,16 +144,6 @@ fn take(folder: &Path, slides: &mut Vec<Taken>) -> anyhow::Result<()> {
         }
     }
     Ok(())
-}
-
-fn distinct<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
-    let mut seen = Vec::new();
-    for one in all {
-        if !seen.contains(&one) {
-            seen.push(one);
-        }
-    }
-    seen
 }
 
 fn gauge(slides: &[Taken]) -> anyhow::Result<Gauged> {

@@ -73,12 +73,12 @@ const RANGE_IN_SD: f64 = std::f64::consts::FRAC_2_SQRT_PI;
 /// sqrt(2): half-widths of a class that holds 97 % of what one part reads.
 const CLASS: f64 = std::f64::consts::SQRT_2;
 
-/// The distinct names, in the order in which they come.
-fn distinct<'r>(names: impl Iterator<Item = &'r str>) -> Vec<&'r str> {
+/// Each of these once, in the order in which they come.
+pub fn distinct<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
     let mut seen = Vec::new();
-    for name in names {
-        if !seen.contains(&name) {
-            seen.push(name);
+    for one in all {
+        if !seen.contains(&one) {
+            seen.push(one);
         }
     }
     seen

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use serde::Serialize;
-use tactus_core::explorer::{self, Config};
+use tactus_core::explorer::{self, Config, ENOUGH_TRIALS};
 use tactus_core::features::{Observation, WHITE_STEPS};
 use tactus_core::table::{Contents, Table};
 
@@ -16,8 +16,6 @@ use crate::eval::verdicts::Verdicts;
 
 /// Explorations for each texture of recordings.
 pub const RUNS: u64 = 25;
-/// Fewest slides that a texture should be learned from.
-const ENOUGH: u8 = 3;
 /// A pair whose slides are taken for each other's less often is not worth a line.
 const WORTH_SAYING: f64 = 0.01;
 /// Most pairs that are listed.
@@ -328,7 +326,7 @@ fn advice(report: &Report) -> Vec<String> {
             Some(_) => {}
         }
     }
-    for few in 0..ENOUGH {
+    for few in 0..ENOUGH_TRIALS {
         let fewest = |t: &&TextureReport| t.trials.iter().min() == Some(&few);
         let names = report
             .textures

@@ -1,7 +1,7 @@
 //! A control chart: how far each reading is from the mean of its part and operator, in the order of time.
 
 use crate::eval::chart::{COLOURS, Chart, DrawError, Figure, MARKS, Mark, Series, WIDTH};
-use crate::eval::gauge::{Reading, Study};
+use crate::eval::gauge::{Reading, Study, distinct};
 
 /// Height of the chart without its words, px.
 const TALL: u32 = 320;
@@ -18,12 +18,7 @@ pub fn figure(
     study: &Study,
 ) -> Result<Figure, DrawError> {
     let places = || (1..).map(f64::from).zip(study.away.iter().copied());
-    let mut operators: Vec<&str> = Vec::new();
-    for reading in readings {
-        if !operators.contains(&reading.operator.as_str()) {
-            operators.push(&reading.operator);
-        }
-    }
+    let operators = distinct(readings.iter().map(|r| r.operator.as_str()));
     let end = readings.len() as f64 + 1.0;
     let level = |name: &str, y: f64| Series::dashed(name, vec![(0.0, y), (end, y)]);
     let limit = study.control_limit;
