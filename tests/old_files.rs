@@ -1,7 +1,7 @@
 //! What was written before names and places changed still opens: tables, stores, frames of the link, and logs of sessions.
 //!
-//! The files are those of commit c026dfc (`tests/golden/README.md` has the commands that made them) and are never made anew: a
-//! format that changes gets files of its own, beside these.
+//! `tests/golden/README.md` says which commit wrote which files, and how. They are never made anew: a format that changes gets
+//! files of its own, beside these.
 
 use std::convert::Infallible;
 use std::fmt::Debug;
@@ -16,14 +16,14 @@ use flate2::read::GzDecoder;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
-use tactus_core::explorer::{ExplorerError, ObserveError};
+use tactus_core::explorer::{Config, Explorer, ExplorerError, Method, ObserveError};
 use tactus_core::features::SlideError;
-use tactus_core::features::{FeatureSet, Movement, Property};
+use tactus_core::features::{FeatureSet, Movement, Observation, Properties, Property, PropertySet};
 use tactus_core::probe::teach::put_in_force;
 use tactus_core::rig::calibration::RigCalibrationError;
 use tactus_core::rig::{Fault, Refused, RigError};
 use tactus_core::store::{FlashFault, Store, StoreError};
-use tactus_core::table::{Action, Contents, EncodeError, Name, Table, TableError};
+use tactus_core::table::{Action, Against, Contents, EncodeError, Name, Table, TableError};
 use tactus_core::wire::{
     Command as Asked, Event, Failure, MAX_FRAME, MemoryError, Rejection, Report, Request, Text,
     TrainingError, decode, encode,
@@ -108,6 +108,14 @@ fn frames_of_every_report_are_what_they_were() {
         Event::Verdict(_) => true,
         _ => false,
     });
+}
+
+/// Version 5 of the messages: all of them, and every reason in every reason.
+#[test]
+fn frames_of_version_5_are_what_they_were() {
+    assert_frames::<Request>("requests-5.jsonl", 37, |_| false);
+    assert_frames::<Report>("reports-5.jsonl", 100, |_| false);
+    assert_frames::<Failure>("reasons-5.jsonl", 263, |_| false);
 }
 
 /// Version 4 of the messages: every kind of reason, alone in a frame.
@@ -288,6 +296,130 @@ fn tables_read_to_the_same_values() {
     }
 }
 
+/// Beside what [`values`] says, the sections of a table, and what is decided by them about slides that are as the mean of all
+/// textures, and a little off.
+fn sections(bytes: &[u8]) -> Value {
+    let table = Table::read(bytes).unwrap();
+    let limits = table.limits().map(|limits| {
+        let tails = [limits.drifted, limits.same];
+        let tails = tails.map(|tails| tails.map(|tail| [tail.begin, tail.excess]));
+        json!({"false_alarm": limits.false_alarm, "tails": tails})
+    });
+    let decided = match table.contents() {
+        Contents::Gaussians(_) => Vec::new(),
+        Contents::Fused(set, features) => [0, 200, -500]
+            .map(|off| decided(table, set, features.into(), off))
+            .to_vec(),
+    };
+    json!({"version": bytes[4], "drift": table.drift(), "limits": limits, "decided": decided})
+}
+
+fn decided(table: Table<'_>, set: FeatureSet, features: usize, off: i16) -> Value {
+    let config = Config {
+        method: Method::Fused,
+        ..Config::default()
+    };
+    let mut explorer = Explorer::<128>::new(table, PropertySet::ALL, config).unwrap();
+    let all = (0..table.movements().len() as u8).map(|movement| {
+        // a whitening begins with the means of its features
+        let whitening = table.whitening(movement).unwrap();
+        let (means, _) = whitening.as_bytes()[..2 * features].as_chunks();
+        let slide: Vec<i16> = means.iter().map(|m| i16::from_le_bytes(*m) + off).collect();
+        let (others, bands) = slide.split_at(set.others());
+        let properties = match set {
+            FeatureSet::Force | FeatureSet::Properties => others,
+            FeatureSet::Pressure | FeatureSet::Bands => &[],
+        };
+        let of = |n| properties.get(n).map(|p: &i16| f32::from(*p) / 1024.0);
+        let observation = Observation {
+            properties: Properties::new([of(0), of(1), of(2)]),
+            bands: bands.iter().copied().collect(),
+            pressure: match set {
+                FeatureSet::Pressure => Some([others[0], others[1]]),
+                _ => None,
+            },
+        };
+        let action = Action {
+            movement,
+            property: None,
+        };
+        explorer.observe(action, &observation).unwrap();
+        let visits: Vec<_> = explorer.observed().collect();
+        let score = |against| explorer.score_of(&visits, against);
+        json!({
+            "posterior": explorer.posterior().iter().take(13).collect::<Vec<_>>(),
+            "log_odds": explorer.log_odds(),
+            "changed": explorer.is_changed(),
+            "scores": [score(Against::Drifted), score(Against::Same)],
+        })
+    });
+    all.collect()
+}
+
+/// The same but for the last digits of numbers: what is computed may be computed in another order.
+fn assert_near(found: &Value, wanted: &Value, what: &str) {
+    match (found, wanted) {
+        (Value::Number(found), Value::Number(wanted)) => {
+            let (found, wanted) = (found.as_f64().unwrap(), wanted.as_f64().unwrap());
+            let near = (found - wanted).abs() <= 1e-3 * (1.0 + wanted.abs());
+            assert!(near, "{what}: {found}, {wanted}");
+        }
+        (Value::Array(found), Value::Array(wanted)) => {
+            assert_eq!(found.len(), wanted.len(), "{what}");
+            let each = found.iter().zip(wanted);
+            each.for_each(|(found, wanted)| assert_near(found, wanted, what));
+        }
+        (Value::Object(found), Value::Object(wanted)) => {
+            assert!(found.keys().eq(wanted.keys()), "{what}");
+            for (key, found) in found {
+                assert_near(found, &wanted[key], &format!("{what}, {key}"));
+            }
+        }
+        _ => assert_eq!(found, wanted, "{what}"),
+    }
+}
+
+#[test]
+fn tables_of_version_4_read_to_the_same_values_and_decide_the_same() {
+    for name in [
+        "factory",
+        "handheld",
+        "force",
+        "pressure",
+        "bands",
+        "properties",
+        "no-drift",
+        "two",
+        "paper",
+    ] {
+        let table = fs::read(golden(&format!("4-{name}.tact"))).unwrap();
+        let (mut found, sections) = (values(&table), sections(&table));
+        found["sections"] = sections;
+        let found = serde_json::to_string(&found).unwrap();
+        let wanted = golden(&format!("4-{name}.json"));
+        // a new file is written once, and never again
+        if !wanted.exists() && std::env::var("TACTUS_GOLDEN").is_ok_and(|set| set == "write") {
+            fs::write(
+                &wanted,
+                found.replace("{\"factory\"", "\n{\"factory\"") + "\n",
+            )
+            .unwrap();
+        }
+        let found: Value = serde_json::from_str(&found).unwrap();
+        let wanted = json_of(&format!("4-{name}.json"));
+        let exact = |value: &Value| {
+            let mut value = value.clone();
+            value["sections"]["decided"].take();
+            value
+        };
+        assert!(exact(&found) == exact(&wanted), "{name}: {found}");
+        assert_near(&found, &wanted, name);
+        // limits, and drift in front of them, are in all that can have them
+        let limits = &found["sections"]["limits"];
+        assert_eq!(limits.is_null(), matches!(name, "two" | "paper"), "{name}");
+    }
+}
+
 /// The store's sectors, which opening and reading leaves as they are.
 struct Sectors(Vec<u8>);
 
@@ -323,7 +455,7 @@ impl NorFlash for Sectors {
 
 #[test]
 fn stores_open_and_hold_the_same() {
-    for kind in ["fused", "gaussians"] {
+    for kind in ["fused", "gaussians", "before-4"] {
         let holds = json_of(&format!("store-{kind}.json"));
         let image = unpacked(&format!("store-{kind}.bin.gz"));
         let mut store = block_on(Store::open(Sectors(image))).unwrap();

@@ -304,8 +304,8 @@ pub(crate) async fn hand(
     memory.reload(&mut events).await;
     let textures = memory.table().map_or(0, |table| table.textures());
     let mut handheld = Handheld::<Small>::new(plan, textures);
-    if let Err(why) = memory.table() {
-        handheld.memory_failed(jobs::words(&why));
+    if let Some(why) = memory.trouble() {
+        handheld.memory_failed(jobs::words(why));
     }
     let mut awake = Awake::default();
     awake.was(None);

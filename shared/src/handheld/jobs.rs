@@ -108,9 +108,10 @@ pub fn words(why: &MemoryError) -> &'static str {
             "The textures do not allow that."
         }
         MemoryError::Store(StoreError::Worn) => "The memory is worn out and keeps nothing new.",
-        MemoryError::NoTable(_) | MemoryError::Table(_) | MemoryError::StoredTable(_) => {
-            "The textures cannot be read. Load them with a computer."
-        }
+        MemoryError::NoTable(_)
+        | MemoryError::Table(_)
+        | MemoryError::StoredTable(_)
+        | MemoryError::NewestTable(_) => "The textures cannot be read. Load them with a computer.",
         MemoryError::Broken(_) | MemoryError::Store(_) => {
             "The memory does not answer. Switch off and on."
         }

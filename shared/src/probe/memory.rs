@@ -28,6 +28,8 @@ pub struct Memory<'m, F, B> {
     length: Result<usize, MemoryError>,
     /// No texture was learned and no table was written.
     is_factory: bool,
+    /// Why another table is in force than the one that was stored last.
+    instead: Option<MemoryError>,
     /// Summary of the last exploration, until the rig moves again.
     pub episode: Option<EpisodeSummary>,
 }
@@ -65,6 +67,7 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
             buffer,
             length: Ok(0),
             is_factory: true,
+            instead: None,
             episode: None,
         }
     }
@@ -76,11 +79,18 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
 
     /// Puts the table in force, which `events` hears of.
     pub async fn reload(&mut self, events: &mut impl Events) {
+        let damaged = self.store.as_ref().ok().and_then(Store::damaged_table);
         let (base, why) = base(&mut self.store, &mut self.stored, self.factory);
-        if let Some(why) = why {
-            events.tell(Event::Trouble(MemoryError::StoredTable(why).into()));
-        }
         self.is_factory = core::ptr::eq(base, self.factory);
+        let instead = if self.is_factory {
+            MemoryError::StoredTable
+        } else {
+            MemoryError::NewestTable
+        };
+        self.instead = why.or(damaged).map(instead);
+        if let Some(why) = &self.instead {
+            events.tell(Event::Trouble(why.clone().into()));
+        }
         self.length = match Table::read(base) {
             Ok(base) => put_in_force(&base, self.store.as_mut().ok(), self.buffer)
                 .await
@@ -119,6 +129,11 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
             Ok(_) => Ok(Table::read(self.in_force())?),
             Err(why) => Err(why.clone()),
         }
+    }
+
+    /// Why there is no table in force, or another one than was stored last.
+    pub fn trouble(&self) -> Option<&MemoryError> {
+        self.length.as_ref().err().or(self.instead.as_ref())
     }
 
     /// The store.

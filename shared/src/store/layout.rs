@@ -3,6 +3,8 @@
 use crc::{CRC_32_ISO_HDLC, Crc};
 use embedded_storage_async::nor_flash::NorFlash;
 
+use crate::table::TableError;
+
 pub(super) const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// Bytes that the flash programs at once.
 pub(super) const WORD: usize = 4;
@@ -68,6 +70,8 @@ pub(super) struct Push {
 pub(super) struct Slots {
     /// The slot in use, and the table in it.
     pub(super) active: Option<(Slot, StoredTable)>,
+    /// Why the newest table that was committed is none any more: the one before it is in use, or none.
+    pub(super) damaged: Option<TableError>,
     /// Largest generation that either slot has had.
     pub(super) generation: u32,
     pub(super) push: Option<Push>,

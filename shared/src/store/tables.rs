@@ -7,7 +7,7 @@ use super::layout::{
     COMMIT, COMMIT_AT, CRC32, HEADER, Push, Slot, StoredTable, TABLE_AT, WORD, header,
 };
 use super::sectors::Store;
-use crate::table::Table;
+use crate::table::{Table, TableError};
 
 /// Bytes read at a time.
 const CHUNK: usize = 128;
@@ -26,6 +26,15 @@ impl<F: NorFlash> Store<F> {
     /// [`Store::begin_table`] is called again.
     pub fn table(&self) -> Option<StoredTable> {
         self.slots.active.map(|(_, table)| table)
+    }
+
+    /// What is wrong with the newest table that was committed, if [`Store::table`] had to fall back on the one before it, or on
+    /// none: its bytes have changed since. It ends with the next table, and with [`Store::factory_table`].
+    ///
+    /// Damage to the header of the newest table is not noticed while the one before it is whole: an erase that was interrupted
+    /// leaves the same.
+    pub fn damaged_table(&self) -> Option<TableError> {
+        self.slots.damaged
     }
 
     /// Reads the table to be used into the beginning of `buffer`; `None`: the factory's is.
@@ -168,6 +177,7 @@ impl<F: NorFlash> Store<F> {
             return Err(StoreError::Worn);
         }
         self.slots.active = Some((slot, stored));
+        self.slots.damaged = None;
         Ok((stored, table))
     }
 
@@ -194,9 +204,8 @@ impl<F: NorFlash> Store<F> {
     /// [`StoreError::Flash`].
     pub async fn factory_table(&mut self) -> Result<(), StoreError> {
         self.slots.push = None;
-        let Some((active, _)) = self.slots.active else {
-            return Ok(());
-        };
+        let active = self.slots.active.map(|(slot, _)| slot);
+        let active = active.unwrap_or_default();
         // the older one first: the active one hides it until it is given up itself
         for slot in [active.other(), active] {
             if self.commit_word(slot).await? == COMMIT {
@@ -205,28 +214,52 @@ impl<F: NorFlash> Store<F> {
             }
         }
         self.slots.active = None;
+        self.slots.damaged = None;
         Ok(())
     }
 
     /// Looks for the table to be used.
     pub(super) async fn find_tables(&mut self) -> Result<(), StoreError> {
+        // of the newest table that is damaged: its generation, where that can be read
+        let mut damaged: Option<(Option<u32>, TableError)> = None;
         for slot in [Slot::A, Slot::B] {
-            let Some(table) = self.slot_header(slot).await? else {
+            let header = self.slot_header(slot).await?;
+            if let Ok(table) = &header {
+                self.slots.generation = self.slots.generation.max(table.generation);
+            }
+            if self.commit_word(slot).await? != COMMIT {
                 continue;
+            }
+            let generation = header.as_ref().ok().map(|table| table.generation);
+            let whole = match header {
+                Ok(table) => self.whole(table).await?,
+                Err(why) => Err(why),
             };
-            self.slots.generation = self.slots.generation.max(table.generation);
-            let newer = self
-                .slots
-                .active
-                .is_none_or(|(_, other)| other.generation < table.generation);
-            if newer && self.commit_word(slot).await? == COMMIT && self.is_whole(&table).await? {
-                self.slots.active = Some((slot, table));
+            match whole {
+                Ok(table) => {
+                    let active = self.slots.active;
+                    if active.is_none_or(|(_, other)| other.generation < table.generation) {
+                        self.slots.active = Some((slot, table));
+                    }
+                }
+                Err(why) if damaged.is_none_or(|(other, _)| other < generation) => {
+                    damaged = Some((generation, why));
+                }
+                Err(_) => {}
             }
         }
+        let active = self.slots.active.map(|(_, table)| table.generation);
+        self.slots.damaged = damaged
+            .filter(|(generation, _)| active.is_none() || *generation > active)
+            .map(|(_, why)| why);
         Ok(())
     }
 
-    async fn slot_header(&mut self, slot: Slot) -> Result<Option<StoredTable>, StoreError> {
+    /// What the header of a slot says, if it is one.
+    async fn slot_header(
+        &mut self,
+        slot: Slot,
+    ) -> Result<Result<StoredTable, TableError>, StoreError> {
         let start = slot.start::<F>();
         let mut bytes = [0; HEADER];
         self.read(start, &mut bytes).await?;
@@ -237,13 +270,21 @@ impl<F: NorFlash> Store<F> {
             .map(|word| u32::from_le_bytes(*word));
         let mut word = || words.next().unwrap_or_default();
         let (_, _, generation, length, crc) = (word(), word(), word(), word(), word());
+        let stored = word();
         let table = StoredTable {
             offset: start + TABLE_AT,
             length: length as usize,
             crc,
             generation,
         };
-        Ok((bytes == header(&table) && table.length <= Self::MAX_TABLE).then_some(table))
+        let good = header(&table);
+        Ok(if bytes == good && table.length <= Self::MAX_TABLE {
+            Ok(table)
+        } else {
+            let [.., a, b, c, d] = good;
+            let computed = u32::from_le_bytes([a, b, c, d]);
+            Err(TableError::Crc { stored, computed })
+        })
     }
 
     async fn commit_word(&mut self, slot: Slot) -> Result<u32, StoreError> {
@@ -252,10 +293,13 @@ impl<F: NorFlash> Store<F> {
         Ok(u32::from_le_bytes(word))
     }
 
-    /// Whether the bytes of a table still have its checksum.
-    async fn is_whole(&mut self, table: &StoredTable) -> Result<bool, StoreError> {
+    /// The table, if its bytes still have its checksum.
+    async fn whole(
+        &mut self,
+        table: StoredTable,
+    ) -> Result<Result<StoredTable, TableError>, StoreError> {
         let Some(body) = table.length.checked_sub(WORD) else {
-            return Ok(false);
+            return Ok(Err(TableError::Header));
         };
         let mut digest = CRC32.digest();
         let mut chunk = [0; CHUNK];
@@ -270,7 +314,12 @@ impl<F: NorFlash> Store<F> {
                 stored = [a, b, c, *byte];
             }
         }
-        Ok(digest.finalize() == table.crc && u32::from_le_bytes(stored) == table.crc)
+        let (stored, computed) = (u32::from_le_bytes(stored), digest.finalize());
+        Ok(if computed == table.crc && stored == table.crc {
+            Ok(table)
+        } else {
+            Err(TableError::Crc { stored, computed })
+        })
     }
 
     async fn read_back<'r>(

@@ -216,10 +216,52 @@ fn a_damaged_table_is_never_used() {
         let mut ram = ram.clone().again();
         ram.bytes[bit / 8] ^= 1 << (bit % 8);
         // four bytes of the header are free
-        let free = (24..28).contains(&(bit / 8 - start));
+        let at = bit / 8 - start;
+        let free = (24..28).contains(&at);
         let expected = if free { &new } else { &old };
-        assert_eq!(used(&mut open(ram)).as_ref(), Some(expected), "bit {bit}");
+        let mut store = open(ram);
+        assert_eq!(used(&mut store).as_ref(), Some(expected), "bit {bit}");
+        // a header that is none may be what an erase left
+        let told = matches!(store.damaged_table(), Some(TableError::Crc { .. }));
+        assert_eq!(told, at >= 32, "bit {bit}");
     }
+}
+
+#[test]
+fn that_the_only_table_is_damaged_is_told_until_another_takes_its_place() {
+    let mut store = open(Ram::new());
+    block_on(push(&mut store, &table(2), 64)).unwrap();
+    let ram = store.close();
+    for at in 0..32 + table(2).len() {
+        let mut ram = ram.clone().again();
+        ram.bytes[at] ^= 1;
+        let mut store = open(ram);
+        // four bytes of the header are free, and without the commit word there was no table
+        let told = !(24..32).contains(&at);
+        assert_eq!(store.damaged_table().is_some(), told, "byte {at}");
+        assert_eq!(store.table().is_none(), !(24..28).contains(&at));
+        if !told {
+            continue;
+        }
+        store = open(store.close().again());
+        assert!(store.damaged_table().is_some());
+        let mut given_up = open(store.close().again());
+        block_on(given_up.factory_table()).unwrap();
+        assert_eq!(given_up.damaged_table(), None);
+        let mut store = open(given_up.close().again());
+        assert_eq!((store.damaged_table(), store.table()), (None, None));
+        block_on(push(&mut store, &table(4), 64)).unwrap();
+        assert_eq!(store.damaged_table(), None);
+    }
+    // and a new one takes its place
+    let mut ram = ram.again();
+    ram.bytes[40] ^= 1;
+    let mut store = open(ram);
+    block_on(push(&mut store, &table(4), 64)).unwrap();
+    assert_eq!(store.damaged_table(), None);
+    let mut store = open(store.close().again());
+    assert_eq!(store.damaged_table(), None);
+    assert_eq!(used(&mut store), Some(table(4)));
 }
 
 #[test]

@@ -136,6 +136,9 @@ pub enum MemoryError {
     /// The table that was stored cannot be read: the firmware's own is in force instead. New in version 5.
     #[error("the stored table cannot be read, and that of the firmware is in its place: {0}")]
     StoredTable(TableError),
+    /// The newest table that was stored is damaged: the one before it is in force instead. New in version 5.
+    #[error("the stored table cannot be read, and the one stored before it is in its place: {0}")]
+    NewestTable(TableError),
 }
 
 /// Why a slide does not count; `E` is why a rig failed.

@@ -187,6 +187,33 @@ fn a_stored_table_that_cannot_be_read_is_reported() {
     }
 }
 
+#[test]
+fn a_table_whose_bytes_have_changed_is_reported_whatever_is_in_its_place() {
+    let factory = fused_table();
+    // damage to the newest of so many tables
+    for tables in [1, 2] {
+        let mut store = block_on(Store::open(Ram::new())).unwrap();
+        for _ in 0..tables {
+            let mut buffer = vec![0; SECTOR];
+            buffer[..factory.len()].copy_from_slice(&factory);
+            block_on(store.replace_table(&mut buffer, factory.len())).unwrap();
+        }
+        let at = store.table().unwrap().offset as usize + 60;
+        let mut flash = store.close().again();
+        flash.bytes[at] ^= 4;
+        let store = block_on(Store::open(flash)).unwrap();
+        let probe = probe_with(factory.clone(), Some(store));
+        let [Event::Trouble(Failure::Memory(why))] = &probe.events.told[..] else {
+            panic!("{:?}", probe.events.told);
+        };
+        assert_eq!(probe.memory.trouble(), Some(why));
+        let why = why.to_string();
+        let instead = ["that of the firmware", "the one stored before it"][tables - 1];
+        assert!(why.contains(instead) && why.contains("damaged"), "{why}");
+        assert_eq!(probe.events.tables[0].factory, tables == 1);
+    }
+}
+
 fn command(probe: &mut Tested, command: Command) -> Result<(), String> {
     let done = block_on(probe.perform::<Plain>(&command));
     done.map_err(|why| why.to_string())

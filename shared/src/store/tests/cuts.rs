@@ -87,6 +87,7 @@ impl Model {
 
     fn of(store: &mut Store<Ram>) -> Self {
         assert_eq!(store.settings(), Ok(()));
+        assert_eq!(store.damaged_table(), None, "a cut is no damage");
         let table = used(store);
         block_on(async {
             let mut training_record = [[None; 2]; 2];
