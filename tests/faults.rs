@@ -279,11 +279,7 @@ fn judge(case: &Case, when: When, seed: u64, unguarded: Unguarded) -> Result<(),
         When::Arriving => 2,
         _ => draw(seed + 1, 3),
     };
-    let movement = [
-        Movement::FOR_TRACTION,
-        Movement::FOR_FINENESS,
-        Movement::FOR_ROUGHNESS,
-    ][choice as usize];
+    let movement = MOVEMENTS[choice as usize];
     // up to the cause nothing can be wrong: what goes wrong here is the test's
     if when == When::Homing {
         for _ in 0..100 {
@@ -888,4 +884,95 @@ fn a_rig_may_idle_for_an_hour() {
     rig.home().unwrap();
     wait(&mut rig, 3_600_000);
     rig.slide(Movement::FOR_ROUGHNESS, 0.5, |_, _| ()).unwrap();
+}
+
+/// One movement by the world's own reckoning: how it ended, and the mean force of the still finger and of the slide, N. A
+/// lever that runs down does so from this ms of the slide on.
+fn forces_of(
+    rig: &mut SimRig,
+    movement: Movement,
+    runs_down_at: Option<u64>,
+) -> (Result<(), Fault>, [f64; 2]) {
+    rig.control().start(movement, 0.3).unwrap();
+    let mut forces = [(0.0, 0u32); 2];
+    let mut slid = 0;
+    let ended = loop {
+        rig.tick();
+        let force_n = rig.world().truth().force_n;
+        let of = match rig.control().phase() {
+            Phase::Background => &mut forces[0],
+            Phase::Sliding => {
+                if runs_down_at == Some(slid) {
+                    rig.world().inject(Cause::LeverRunaway);
+                }
+                slid += 1;
+                &mut forces[1]
+            }
+            Phase::Faulted(fault) => break Err(fault),
+            Phase::Lifting => break Ok(()),
+            _ => continue,
+        };
+        *of = (of.0 + force_n, of.1 + 1);
+    };
+    (ended, forces.map(|(sum, n)| sum / f64::from(n.max(1))))
+}
+
+const MOVEMENTS: [Movement; 3] = [
+    Movement::FOR_TRACTION,
+    Movement::FOR_FINENESS,
+    Movement::FOR_ROUGHNESS,
+];
+
+/// The rig takes 3 counts and a quarter; a sound slide stays at half of that, of every texture that is tried.
+#[test]
+fn the_force_of_a_sound_slide_is_that_of_the_still_finger() {
+    let mut farthest = 0.0_f64;
+    for seed in 0..50 {
+        let mut rig = SimRig::new(Setup {
+            texture: 1 + draw(seed, 117) as u8,
+            trial_seed: seed,
+            finger_seed: 1 + seed % 5,
+            ..Setup::default()
+        });
+        rig.home().unwrap();
+        let movement = MOVEMENTS[seed as usize % 3];
+        let (ended, [still, slide]) = forces_of(&mut rig, movement, None);
+        assert_eq!(ended, Ok(()), "seed {seed}");
+        let allowed = 3.0 * 0.0115 + 0.25 * still;
+        farthest = farthest.max((slide - still).abs() / allowed);
+        assert!(farthest < 0.5, "seed {seed}: {still:.3} and {slide:.3} N");
+    }
+    println!("at most {:.0} % of what is allowed", 100.0 * farthest);
+}
+
+/// A driver that steps down by itself, even in a slide of one second: what counts was made with the force that was asked for.
+#[test]
+fn a_slide_during_which_the_lever_runs_down_does_not_count() {
+    let slides = |unguarded: Unguarded| {
+        let (mut counted, mut off) = (0, 0);
+        for seed in 0..60 {
+            let setup = Setup {
+                texture: 1 + draw(seed, 117) as u8,
+                trial_seed: seed,
+                finger_seed: 1 + seed % 5,
+                ..Setup::default()
+            };
+            let mut rig = SimRig::unguarded(setup, unguarded);
+            rig.home().unwrap();
+            let movement = MOVEMENTS[seed as usize % 3];
+            let (ended, [still, slide]) = forces_of(&mut rig, movement, Some(draw(seed, 900)));
+            let truth = rig.world().truth().force_max_n;
+            assert!(truth < 2.2, "seed {seed}: {truth} N");
+            // P_DC knows the force to 5 % and a count
+            let allowed = 4.0 * 0.0115 + 0.3 * still;
+            counted += u32::from(ended.is_ok());
+            off += u32::from(ended.is_ok() && (slide - still).abs() > allowed);
+        }
+        (counted, off)
+    };
+    let (counted, off) = slides(Unguarded::default());
+    println!("{counted} of 60 slides counted, {off} of them with another force");
+    assert_eq!(off, 0);
+    let (_, off) = slides(Unguarded::against(Fault::Unsteady));
+    assert!(off > 0, "without the check no slide has another force");
 }

@@ -35,6 +35,8 @@ const STANDS_MM_S: f32 = 0.5;
 const AIR_COUNTS: f32 = 40.0;
 /// A lifted finger shows no more than these counts above its zero.
 const LIFTED_COUNTS: f32 = 8.0;
+/// By so much may the mean force of a slide differ from that of the still finger before it: counts, and a share.
+const SLIDE_OFF: (f32, f32) = (3.0, 0.25);
 
 /// The whole rig.
 #[derive(Clone, Debug)]
@@ -62,6 +64,8 @@ pub struct Control {
     recovered: Option<f32>,
     /// P_DC in the air, mean of the last run without load.
     air: Option<f32>,
+    /// P_DC above no contact of the still finger, mean of the background.
+    still: f32,
     lever_top: Switch,
     stage_left: Switch,
     /// Duty of the last tick.
@@ -93,6 +97,7 @@ impl Control {
             compared: false,
             recovered: None,
             air: None,
+            still: 0.0,
             lever_top: Switch::default(),
             stage_left: Switch::default(),
             duty: 0.0,
@@ -520,6 +525,7 @@ impl Control {
                 }
                 if self.phase == Phase::Pressing && self.lever.state() == LeverState::Holding {
                     self.run.hold();
+                    self.meter.begin_long();
                     self.enter(Phase::Background);
                 }
             }
@@ -528,6 +534,8 @@ impl Control {
                 if self.ms >= BACKGROUND_MS {
                     let (_, to) = self.run.path_mm();
                     self.stage.go(to, self.run.movement().speed_mm_s());
+                    self.still = self.meter.long_counts().unwrap_or_default();
+                    self.meter.begin_long();
                     self.enter(Phase::Sliding);
                 }
             }
@@ -538,6 +546,13 @@ impl Control {
                 self.skin
                     .slid(shear_n, self.force_mn() * 1e-3, self.stage.velocity_mm_s());
                 if self.stage.state() == StageState::Standing {
+                    let felt = self.meter.long_counts().unwrap_or_default();
+                    let (counts, share) = SLIDE_OFF;
+                    if libm::fabsf(felt - self.still) > counts + share * self.still {
+                        self.check(Fault::Unsteady);
+                    }
+                }
+                if self.phase == Phase::Sliding && self.stage.state() == StageState::Standing {
                     let ended = self.run.ended(self.ms);
                     self.ended = Some(if self.guard.looks_for(Fault::SlideGap) {
                         ended

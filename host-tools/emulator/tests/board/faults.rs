@@ -101,8 +101,6 @@ enum When {
     /// The finger presses, the stage stands.
     Pressing,
     Sliding,
-    /// At 0.5 N or more: a slide of two seconds or longer.
-    SlidingSlowly,
 }
 
 struct Case {
@@ -198,12 +196,11 @@ const CASES: [Case; 17] = [
         deadline_ms: None,
     },
     Case {
-        // on a soft sample the slide may end before the force is too high: then the steps up are lost. One of a second at 0.2 N
-        // ends before anything shows: docs/src/limits.md
+        // the slide may end before the force is too high
         name: "the lever's driver runs down on its own while sliding",
         cause: Cause::Rig(Fault::LeverRunaway),
-        when: When::SlidingSlowly,
-        seen: &[Seen::ForceHigh, Seen::LeverSlips],
+        when: When::Sliding,
+        seen: &[Seen::ForceHigh, Seen::LeverSlips, Seen::Unsteady],
         deadline_ms: None,
     },
     Case {
@@ -285,7 +282,6 @@ fn is_time(when: When, board: &mut Emulator) -> bool {
         When::Approaching => truth.force_n == 0.0 && (-0.75..-0.4).contains(&truth.indentation_mm),
         When::Pressing => truth.force_n > 0.15 && truth.speed_mm_s.abs() < 1.0,
         When::Sliding => truth.force_n > 0.15 && truth.speed_mm_s > 5.0,
-        When::SlidingSlowly => truth.force_n > 0.4 && truth.speed_mm_s > 5.0,
     }
 }
 
