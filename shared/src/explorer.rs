@@ -15,7 +15,7 @@ mod verify;
 mod whitened;
 
 pub use choice::{ExpectedOutcome, benefit, confusion};
-pub use config::{Config, ExplorerError, Method, ObserveError, Strategy};
+pub use config::{Config, ExplorerError, Method, NEGLIGIBLE, ObserveError, Strategy};
 pub use confusions::{Confusions, Degrees};
 pub use episode::EpisodeSummary;
 pub use kernels::Kernels;

@@ -2,7 +2,7 @@
 //! same core, and compares.
 
 use tactus_core::dsp::Plan;
-use tactus_core::explorer::{Explorer, ExplorerError};
+use tactus_core::explorer::{Explorer, ExplorerError, NEGLIGIBLE};
 use tactus_core::features::{Block, FEATURE_STEPS, PropertySet, Slide, SlideError};
 use tactus_core::probe::explore::Random;
 use tactus_core::table::{Action, Contents, MAX_TEXTURES, Table};
@@ -313,6 +313,10 @@ impl<'t> Follower<'t> {
             agreement.posterior = f32::INFINITY;
         }
         for (&here, &there) in here.iter().zip(posterior) {
+            // too improbable to be reported
+            if there == 0.0 && here < NEGLIGIBLE {
+                continue;
+            }
             widen(&mut agreement.posterior, apart(Some(here), Some(there)));
         }
         compared

@@ -8,8 +8,8 @@ use crate::features::{FeatureSet, Property};
 use crate::table::{Action, Contents};
 
 /// Textures less probable than this are left out of the expected uncertainty: each changes it by at most about twice its
-/// probability, all of 117 by about 2e-4.
-pub(super) const NEGLIGIBLE: f32 = 1e-6;
+/// probability, all of 117 by about 2e-4. They are not reported either.
+pub const NEGLIGIBLE: f32 = 1e-6;
 
 /// How slides are compared with the table.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]

@@ -83,7 +83,8 @@ pub enum Event {
         /// What was measured.
         #[serde(alias = "felt")]
         observed: SlideReport,
-        /// Probability of every texture of the table. On the line only those that are not 0: most are soon.
+        /// Probability of every texture of the table. On the line only those of a millionth or more: the others are 0
+        /// there.
         #[serde(with = "sparse")]
         posterior: Vec<f32, MAX_TEXTURES>,
     },

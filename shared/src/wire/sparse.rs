@@ -1,10 +1,11 @@
-//! Numbers most of which are 0: how many there are, and the others with their places, ascending.
+//! Probabilities most of which are negligible: how many there are, and the others with their places, ascending.
 
 use heapless::Vec;
 use serde::de::Error as _;
 use serde::ser::Error as _;
 use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer};
 
+use crate::explorer::NEGLIGIBLE;
 use crate::table::MAX_TEXTURES;
 use crate::up_to;
 
@@ -17,7 +18,7 @@ pub(super) fn serialize<S: Serializer>(
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
     let others = numbers.iter().zip(0..);
-    let others = others.filter(|(number, _)| number.to_bits() != 0);
+    let others = others.filter(|(number, _)| **number >= NEGLIGIBLE);
     let others = up_to(others.map(|(number, place)| (place, *number)));
     let count = u16::try_from(numbers.len()).map_err(S::Error::custom)?;
     OnLine::from((count, others)).serialize(serializer)
