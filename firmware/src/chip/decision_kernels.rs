@@ -17,22 +17,25 @@ global_asm!(
     // the assembler is not told of the FPU otherwise
     ".fpu fpv4-sp-d16",
     // One texture: r4 to r10 are the mean that the others are compared with, two numbers each, r1 where the next texture's
-    // begins, r2 the next logarithm, r3 where they end.
+    // begins, r2 the next logarithm.
     ".macro tactus_likelihood last",
     "2:",
     // the odds to r11 and r12, Q32: pairs of squares, each with its weight
     "ldr r0, [r1]",
     "qsub16 r0, r4, r0",
     "smuad r0, r0, r0",
-    "ldr lr, [sp, #64]",
-    "umull r11, r12, r0, lr",
-    "tactus_square r5, 4",
-    "tactus_square r6, 8",
-    "tactus_square r7, 12",
-    "tactus_square r8, 16",
-    "tactus_square r9, 20",
-    "tactus_square r10, 24, \\last",
-    "ldr lr, [sp, #36]",
+    "ldrd r3, lr, [sp, #60]",
+    "umull r11, r12, r0, r3",
+    "tactus_square r5, lr, 4",
+    "ldrd r3, lr, [sp, #68]",
+    "tactus_square r6, r3, 8",
+    "tactus_square r7, lr, 12",
+    "ldrd r3, lr, [sp, #76]",
+    "tactus_square r8, r3, 16",
+    "tactus_square r9, lr, 20",
+    // the last weight, and how far it is to the next mean
+    "ldrd r3, lr, [sp, #84]",
+    "tactus_square r10, r3, 24, \\last",
     "add r1, r1, lr",
     // to r0, Q16, if they are below 2^30
     "cmp r12, #0x3f00",
@@ -45,7 +48,7 @@ global_asm!(
     "lsl r12, r0, r11",
     "rsb r11, r11, #15",
     "lsr r0, r12, #26",
-    "ldr lr, [sp, #40]",
+    "ldrd lr, r3, [sp, #36]",
     "add r0, lr, r0, lsl #3",
     "ldrd r0, lr, [r0]",
     "lsl r12, r12, #6",
@@ -68,29 +71,27 @@ global_asm!(
     "mov r0, r2",
     "pop {{r4-r11, pc}}",
     ".endm",
-    ".macro tactus_square a, at, load=ldr",
+    ".macro tactus_square a, weight, at, load=ldr",
     "\\load r0, [r1, #\\at]",
     "qsub16 r0, \\a, r0",
     // 2^31 at most
     "smuad r0, r0, r0",
-    "ldr lr, [sp, #64 + \\at]",
-    "umlal r11, r12, r0, lr",
+    "umlal r11, r12, r0, \\weight",
     ".endm",
     ".section .text.tactus_likelihoods,\"ax\",%progbits",
     ".global tactus_likelihoods",
     ".type tactus_likelihoods,%function",
     ".thumb_func",
-    // r0: the mean; r1: the first texture's; r2: logarithms; r3: where they end. On the stack how far one mean is from the
-    // next (36); [`LN`], as if it began 32 parts before (40); ln 2 in Q32 (44) and 2^15 (48); weight (52), twice the norm
-    // and 1 (56), whether there is a fourteenth number (60), and the narrowness of each pair of axes in Q16 (64).
+    // r0: the mean; r1: the first texture's; r2: logarithms; r3: whether there is a fourteenth number. On the stack [`LN`],
+    // as if it began 32 parts before (36); where the logarithms end (40); ln 2 in Q32 (44) and 2^15 (48); weight (52), twice
+    // the norm and 1 (56); the narrowness of each pair of axes in Q16 (60), and how far one mean is from the next (88).
     "tactus_likelihoods:",
     "push {{r4-r11, lr}}",
     // a word at a time, which need not be aligned
     ".irp pair, 4, 5, 6, 7, 8, 9",
     "ldr r\\pair, [r0, #(\\pair - 4) * 4]",
     ".endr",
-    "ldr r10, [sp, #60]",
-    "cmp r10, #0",
+    "cmp r3, #0",
     "beq 1f",
     "ldr r10, [r0, #24]",
     "tactus_likelihood ldr",
@@ -186,18 +187,19 @@ global_asm!(
     "add r10, r4, r10, lsl #3",
     "ldrd r10, r11, [r10]",
     "lsl r12, \\x, #16",
-    "umull lr, r12, r12, r11",
+    "umull r11, r12, r12, r11",
     "sub r10, r10, r12",
     "lsr \\x, \\x, #21",
     "lsr \\x, r10, \\x",
-    "adds r6, r6, \\x",
-    "adc r7, r7, #0",
+    // as it is, to 64 bits
+    "umlal r6, r7, \\x, lr",
     ".endm",
     "tactus_weigh:",
     "push {{r4-r11, lr}}",
     "ldrd r4, r5, [sp, #36]",
     "mov r6, #0",
     "mov r7, #0",
+    "mov lr, #1",
     // an odd one first
     "sub r8, r2, r1",
     "tst r8, #4",
@@ -322,15 +324,15 @@ unsafe extern "C" {
         from: *const i16,
         means: *const u8,
         logs: *mut i32,
-        end: *const i32,
-        stride: usize,
+        even: bool,
         ln: *const u32,
+        end: *const i32,
         ln_2: u32,
         half: u32,
         weight: i32,
         norm: i32,
-        even: bool,
         narrowness: Narrowness,
+        stride: usize,
     ) -> *mut i32;
     /// There are as many `cells`, 4 bytes, `stride` after each other, as logarithms up to `end`, one at least; `ln` is 256
     /// bytes before [`LN`].
@@ -415,15 +417,15 @@ impl Kernels for Chip {
                 from.as_ptr(),
                 means.as_ptr(),
                 logs,
-                logs.add(many),
-                stride,
+                even,
                 before_ln(),
+                logs.add(many),
                 LN_2,
                 1 << 15,
                 spread.weight,
                 2 * spread.norm + 1,
-                even,
                 Narrowness(spread.narrowness),
+                stride,
             );
             done.offset_from_unsigned(logs)
         }

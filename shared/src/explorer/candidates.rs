@@ -117,6 +117,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             let novelty_models = self.actions.iter();
             let novelty_models = novelty_models.map(|a| NoveltyModel::new(&table, a.movement));
             self.novelty_models.extend(novelty_models);
+            self.limits = table.limits();
         }
         // as many
         self.posterior = up_to(log.iter().map(|_| 0.0));

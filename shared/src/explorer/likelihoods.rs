@@ -165,8 +165,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             K::add_likelihoods,
         );
         let (top, sum) = self.normalize();
-        let limits = self.table.limits();
-        self.log_odds = elsewhere.and_then(|(elsewhere, can_tell)| match limits {
+        self.log_odds = elsewhere.and_then(|(elsewhere, can_tell)| match &self.limits {
             Some(limits) => {
                 let slides = self.slides.saturating_add(1);
                 let limit = limits.limit(Against::Drifted, slides, self.config.false_alarm);

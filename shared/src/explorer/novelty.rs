@@ -31,6 +31,10 @@ pub(super) struct NoveltyModel {
     mean: [f32; MAX_FEATURES],
     variance: [f32; MAX_FEATURES],
     pub(super) source: Source,
+    /// A squared distance from all textures that is greater counts as this one.
+    farthest: f32,
+    /// See [`student_norm`].
+    norm: f32,
     /// From how many slides all textures were learned, if it was as many.
     pub(super) slides: Option<u8>,
 }
@@ -45,12 +49,14 @@ impl NoveltyModel {
         let slides = table.trials(0, movement);
         let same = (0..table.textures()).all(|texture| table.trials(texture, movement) == slides);
         let slides = same.then_some(slides);
-        if table.limits().is_some() {
+        if let (Contents::Fused(_, features), Some(_)) = (table.contents(), table.limits()) {
             return Self {
                 movement,
                 mean: [0.0; MAX_FEATURES],
                 variance: [0.0; MAX_FEATURES],
                 source: Source::Table,
+                farthest: farthest(features),
+                norm: student_norm(features.into()),
                 slides,
             };
         }
@@ -77,6 +83,8 @@ impl NoveltyModel {
             } else {
                 Source::Nowhere
             },
+            farthest: f32::INFINITY,
+            norm: 0.0,
             slides,
         };
         if known {
@@ -97,7 +105,7 @@ impl NoveltyModel {
     /// As [`Spread::likelihood`], of the mean of `k` slides.
     pub(super) fn likelihood(&self, table: &Table<'_>, mean: &Vector, k: u8) -> f32 {
         if self.source == Source::Table {
-            return population_likelihood(table, self.movement, mean, k);
+            return self.population_likelihood(table, mean, k) - self.norm;
         }
         let v = 1.0 / f32::from(k);
         let (mut norm, mut distance) = (0.0, 0.0);
@@ -118,28 +126,46 @@ impl NoveltyModel {
         let tail = (freedom + mean.len() as f32) / 2.0;
         -0.5 * norm - tail * libm::log1pf(distance / freedom)
     }
+
+    /// ln of the likelihood of a texture that the table does not have, whose `k` slides have this mean: means of textures
+    /// are a Gaussian's, as a calibrated table says. 0 in another one.
+    pub(super) fn population_likelihood(&self, table: &Table<'_>, mean: &Vector, k: u8) -> f32 {
+        let Some(population) = table.population(self.movement) else {
+            return 0.0;
+        };
+        let v = 1.0 / f32::from(k);
+        let (mut products, mut distance) = ([1.0; 2], 0.0);
+        let along = population.axes.apply(mean);
+        for ((z, variance), at) in along.iter().zip(population.variances).zip(0..) {
+            let total = variance + v;
+            let apart = white(*z);
+            distance += apart * apart / total;
+            let [first, second] = &mut products;
+            *(if at < MAX_FEATURES / 2 { first } else { second }) *= total;
+        }
+        let norm: f32 = products.into_iter().map(libm::logf).sum();
+        -0.5 * (norm + distance.min(self.farthest))
+    }
 }
 
-/// ln of the likelihood of a texture that the table does not have, whose `k` slides have this mean: means of textures are
-/// a Gaussian's, as a calibrated table says. 0 in another one.
-pub(super) fn population_likelihood(table: &Table<'_>, movement: u8, mean: &Vector, k: u8) -> f32 {
-    let Some(population) = table.population(movement) else {
+/// The squared distance of a slide of any texture has about as many degrees of freedom as it has features.
+fn farthest(features: u8) -> f32 {
+    let d = f32::from(features);
+    d + FARTHEST * libm::sqrtf(2.0 * d)
+}
+
+/// ln of the constant of Student's t in so many dimensions in parts of that of a Gaussian: ln G((8+P)/2) - ln G(4)
+/// - P/2 ln 4 (Stirling's series, to 1e-5 from P = 1 on).
+pub(super) fn student_norm(dimensions: usize) -> f32 {
+    if dimensions == 0 {
         return 0.0;
-    };
-    let v = 1.0 / f32::from(k);
-    let (mut products, mut distance) = ([1.0; 2], 0.0);
-    let along = population.axes.apply(mean);
-    for ((z, variance), at) in along.iter().zip(population.variances).zip(0..) {
-        let total = variance + v;
-        let apart = white(*z);
-        distance += apart * apart / total;
-        let [first, second] = &mut products;
-        *(if at < MAX_FEATURES / 2 { first } else { second }) *= total;
     }
-    let norm: f32 = products.into_iter().map(libm::logf).sum();
-    let d = mean.len() as f32;
-    let farthest = d + FARTHEST * libm::sqrtf(2.0 * d);
-    -0.5 * (norm + distance.min(farthest))
+    let half = dimensions as f32 / 2.0;
+    let x = f32::from(DEGREES_OF_FREEDOM) / 2.0 + half;
+    let ln_gamma =
+        (x - 0.5) * libm::logf(x) - x + 0.918_938_5 + (1.0 - 1.0 / (30.0 * x * x)) / (12.0 * x);
+    // ln G(4) = ln 6
+    ln_gamma - 1.791_759_5 - half * 1.386_294_4
 }
 
 /// Draws the variances along the axes of a covariance of `n` towards their mean, by as much as so few deserve ([`oas`]):

@@ -15,7 +15,7 @@ use super::student::ShrinkagePrior;
 use super::whitened;
 use crate::dsp::Plain;
 use crate::features::{PropertySet, Vector};
-use crate::table::{Action, Against, Contents, MAX_ACTIONS, MAX_MOVEMENTS, Table};
+use crate::table::{Action, Against, Contents, Limits, MAX_ACTIONS, MAX_MOVEMENTS, Table};
 use crate::up_to;
 
 /// Logarithm of the posterior, Q16, of a texture that is no candidate. The slides of an exploration make it neither a
@@ -102,6 +102,8 @@ pub struct Explorer<'t, const N: usize, K = Plain> {
     pub(super) shrinkage: Vec<ShrinkagePrior, MAX_ACTIONS>,
     /// For the fused method: what a texture that is not in the table is like, at every movement.
     pub(super) novelty_models: Vec<NoveltyModel, MAX_MOVEMENTS>,
+    /// For the fused method: the table's, if it is calibrated.
+    pub(super) limits: Option<Limits>,
     pub(super) kernels: PhantomData<K>,
 }
 
@@ -124,6 +126,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             log_odds: None,
             shrinkage: Vec::new(),
             novelty_models: Vec::new(),
+            limits: None,
             kernels: PhantomData,
         }
     }
@@ -189,16 +192,14 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     }
 
     fn is_calibrated(&self) -> bool {
-        let models = &self.novelty_models;
-        !models.is_empty() && models.iter().all(NoveltyModel::is_calibrated)
+        self.limits.is_some()
     }
 
     /// Whether the texture, if it is one of the candidates, is not as it was learned: without the drift that the table
     /// expects it would be none of them. Never with a table that is not calibrated, or expects no drift.
     pub fn is_changed(&self) -> bool {
         let drifts = self.table.drift().is_some_and(|drift| !drift.is_none());
-        let limits = self.table.limits().filter(|_| drifts && self.slides > 0);
-        let Some(limits) = limits.filter(|_| self.is_calibrated()) else {
+        let Some(limits) = self.limits.filter(|_| drifts && self.slides > 0) else {
             return false;
         };
         let limit = limits.limit(Against::Same, self.slides, self.config.false_alarm);

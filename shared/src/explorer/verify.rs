@@ -53,7 +53,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     }
 
     fn answer(&self, score: f32, slides: u8) -> Option<Verification> {
-        let limits = self.table.limits()?;
+        let limits = self.limits?;
         if self.candidates != 1 {
             return None;
         }

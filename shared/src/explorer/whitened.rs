@@ -9,7 +9,7 @@ use heapless::{Vec, VecView};
 use super::config::NEGLIGIBLE;
 use super::episode::Episode;
 use super::kernels::{Candidate, DEGREES_OF_FREEDOM, Kernels, Spread, distance, mask, scales};
-use super::novelty::{NoveltyModel, Source, population_likelihood};
+use super::novelty::{NoveltyModel, Source, student_norm};
 use crate::dsp::fixed::{exp_neg_q30, ln_q16};
 use crate::table::{Contents, Table};
 
@@ -37,9 +37,12 @@ pub(super) fn add_likelihoods(
         return None;
     };
     let features = usize::from(features);
-    let calibrated = novelty_models.iter().all(NoveltyModel::is_calibrated);
+    // all of them are, or none
+    let calibrated = novelty_models
+        .first()
+        .is_some_and(NoveltyModel::is_calibrated);
     if calibrated && episode.len() > 1 {
-        return add_jointly(table, episode, features, drifting, logs, odds);
+        return add_jointly(table, episode, novelty_models, drifting, logs, odds);
     }
     let (mut elsewhere, mut can_tell) = (0.0, true);
     for sums in episode {
@@ -47,10 +50,7 @@ pub(super) fn add_likelihoods(
         let background = novelty_models
             .iter()
             .find(|b| b.movement == sums.movement)?;
-        let mut unknown = background.likelihood(table, &mean, sums.slides);
-        if calibrated {
-            unknown -= student_norm(features);
-        }
+        let unknown = background.likelihood(table, &mean, sums.slides);
         elsewhere += unknown;
         can_tell &= background.source != Source::Nowhere;
         // as little is known of a texture that was never measured here as of one that the table does not have
@@ -103,18 +103,25 @@ pub(super) fn add_likelihoods(
 fn add_jointly(
     table: &Table<'_>,
     episode: &Episode,
-    features: usize,
+    novelty_models: &[NoveltyModel],
     drifting: bool,
     logs: &mut [i32],
     odds: &mut [f32],
 ) -> Option<(f32, bool)> {
+    let Contents::Fused(_, features) = table.contents() else {
+        return None;
+    };
+    let features = usize::from(features);
     let odds = odds.get_mut(..logs.len())?;
     odds.fill(0.0);
     let of_all = student_norm(features * episode.len());
     let mut elsewhere = -of_all;
     for sums in episode {
         let mean = sums.mean(features);
-        let unknown = population_likelihood(table, sums.movement, &mean, sums.slides);
+        let background = novelty_models
+            .iter()
+            .find(|b| b.movement == sums.movement)?;
+        let unknown = background.population_likelihood(table, &mean, sums.slides);
         elsewhere += unknown;
         let column = table.column(sums.movement);
         let drifts = table.drifts(sums.movement).filter(|_| drifting);
@@ -152,20 +159,6 @@ fn add_jointly(
 /// A logarithm in Q16; none of an episode's is below -256, so that sums stay within 32 bits.
 fn q16(ln: f32) -> i32 {
     (ln.max(-256.0) * 65536.0) as i32
-}
-
-/// ln of the constant of Student's t in so many dimensions in parts of that of a Gaussian: ln G((8+P)/2) - ln G(4)
-/// - P/2 ln 4 (Stirling's series, to 1e-5 from P = 1 on).
-fn student_norm(dimensions: usize) -> f32 {
-    if dimensions == 0 {
-        return 0.0;
-    }
-    let half = dimensions as f32 / 2.0;
-    let x = f32::from(DEGREES_OF_FREEDOM) / 2.0 + half;
-    let ln_gamma =
-        (x - 0.5) * libm::logf(x) - x + 0.918_938_5 + (1.0 - 1.0 / (30.0 * x * x)) / (12.0 * x);
-    // ln G(4) = ln 6
-    ln_gamma - 1.791_759_5 - half * 1.386_294_4
 }
 
 /// e^(-x) is 0 from here on, Q16: [`exp_neg_q30`].

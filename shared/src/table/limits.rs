@@ -77,7 +77,14 @@ impl Limits {
         numbers.map(f32::to_le_bytes)
     }
 
-    /// `None` if these are not the bytes of any.
+    /// Whether these can be limits: finite, as scores are, for a share that people can be content with.
+    pub(super) fn are_possible(&self) -> bool {
+        // scores are below 1e4: logarithms of likelihoods of a few slides
+        let fits = |t: Tail| t.begin.abs() < 1e4 && t.excess > 0.0 && t.excess < 1e4;
+        is_false_alarm(self.false_alarm) && self.tails().all(fits)
+    }
+
+    /// `None` if these are not so many bytes as limits have.
     pub(super) fn read(bytes: &[u8]) -> Option<Self> {
         let (share, bytes) = bytes.split_first_chunk()?;
         let (pairs, rest) = bytes.as_chunks::<8>();
@@ -96,10 +103,7 @@ impl Limits {
                 excess: numbers.next()?,
             };
         }
-        // scores are below 1e4: logarithms of likelihoods of a few slides
-        let fits = |t: Tail| t.begin.abs() < 1e4 && t.excess > 0.0 && t.excess < 1e4;
-        let is_share = is_false_alarm(limits.false_alarm);
-        (is_share && limits.tails().all(fits)).then_some(limits)
+        Some(limits)
     }
 }
 

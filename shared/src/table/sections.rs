@@ -140,16 +140,15 @@ impl<'a> Table<'a> {
 
     /// Variances of the drift along each two axes of a movement, where there is any.
     pub(crate) fn drifts(&self, movement: u8) -> Option<Numbers<'a>> {
-        self.drift().filter(|drift| !drift.is_none())?;
         let bytes = of_drift(self.features());
-        let at = TWO + usize::from(movement) * bytes;
-        Some(Numbers::new(self.section(DRIFT)?.get(at..at + bytes)?))
+        let at = usize::from(movement) * bytes;
+        self.drifts.get(at..at + bytes).map(Numbers::new)
     }
 
     /// From which scores on a texture is new, or has changed; `None` for a table that is not calibrated: of an older
     /// version, or of fewer than three textures when it was made.
     pub fn limits(&self) -> Option<Limits> {
-        Limits::read(self.section(NOVELTY)?.get(..Limits::BYTES)?)
+        Limits::read(self.novelty.get(..Limits::BYTES)?)
     }
 
     /// What textures are like at a movement, in a table that is calibrated.
@@ -164,10 +163,7 @@ impl<'a> Table<'a> {
     fn population_bytes(&self, movement: u8) -> Option<(&'a [u8], &'a [u8])> {
         let features = self.features();
         let at = Limits::BYTES + usize::from(movement) * of_population(features);
-        let population = self
-            .section(NOVELTY)?
-            .get(at..)?
-            .get(..of_population(features))?;
+        let population = self.novelty.get(at..)?.get(..of_population(features))?;
         population.split_at_checked(Whitening::bytes(features))
     }
 
@@ -188,6 +184,14 @@ impl<'a> Table<'a> {
             .collect()
     }
 
+    /// Looks up what a slide asks for.
+    pub(super) fn find_sections(&mut self) {
+        let drifts = self.drift().is_some_and(|drift| !drift.is_none());
+        let section = self.section(DRIFT).filter(|_| drifts);
+        self.drifts = section.and_then(|s| s.get(TWO..)).unwrap_or_default();
+        self.novelty = self.section(NOVELTY).unwrap_or_default();
+    }
+
     /// That the sections are sections, and those that are known what they say.
     pub(super) fn check_sections(&self) -> Result<(), TableError> {
         let (features, movements) = (self.features(), usize::from(self.movements));
@@ -203,10 +207,13 @@ impl<'a> Table<'a> {
                         && variances.map(Numbers::new).all(|v| v.are_variances(0.0))
                 }
                 NOVELTY => {
-                    contents.len() == Limits::BYTES + movements * of_population(features)
-                        && self.limits().is_some()
-                        && (0..self.movements).all(|movement| {
-                            let found = self.population_bytes(movement);
+                    let (limits, populations) =
+                        contents.split_at_checked(Limits::BYTES).unwrap_or_default();
+                    let mut populations_of = populations.chunks(of_population(features).max(1));
+                    populations.len() == movements * of_population(features)
+                        && Limits::read(limits).is_some_and(|limits| limits.are_possible())
+                        && populations_of.all(|population| {
+                            let found = population.split_at_checked(Whitening::bytes(features));
                             found.is_some_and(|(axes, variances)| {
                                 View::new(axes, features).is_some()
                                     && Numbers::new(variances).are_variances(LEAST)

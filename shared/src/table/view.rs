@@ -18,6 +18,10 @@ pub struct Table<'a> {
     pub(super) contents: Contents,
     /// What is behind the names.
     pub(super) sections: &'a [u8],
+    /// Variances of the drift of every movement; none where there is no drift.
+    pub(super) drifts: &'a [u8],
+    /// The section of limits and population; nothing in a table that is not calibrated.
+    pub(super) novelty: &'a [u8],
 }
 
 impl<'a> Table<'a> {
@@ -78,6 +82,8 @@ impl<'a> Table<'a> {
             movements,
             contents,
             sections: &[],
+            drifts: &[],
+            novelty: &[],
         };
         let end = table.check()?;
         table.sections = body.get(end..).unwrap_or_default();
@@ -88,6 +94,7 @@ impl<'a> Table<'a> {
             });
         }
         table.check_sections()?;
+        table.find_sections();
         Ok(table)
     }
 
