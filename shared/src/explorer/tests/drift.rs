@@ -1,6 +1,7 @@
 //! Tables with drift and limits against the recipe in f64: posterior, choice, new and changed.
 
 use super::*;
+use crate::explorer::Answer;
 use crate::table::tests::whitening::Noise;
 use crate::table::tests::{fused_of, known, straight};
 use crate::table::{
@@ -304,4 +305,84 @@ fn known_changed_and_new_are_the_recipes() {
     std::println!("{same} of {all}, {news} new, {changes} changed");
     assert!(f64::from(same) > 0.995 * f64::from(all), "{same} of {all}");
     assert!(all > 4000 && news > 200 && changes > 200);
+}
+
+/// "The same as this one?" after each of three slides, of a texture's own and of another's: score, limit and answer.
+#[test]
+fn one_texture_is_verified_as_by_the_recipe() {
+    let mut noise = Noise(11);
+    let config = Config {
+        method: Method::Fused,
+        max_slides: 254,
+        ..Config::default()
+    };
+    // score below which it is the same
+    let sure = -(f64::from(config.threshold) / (1.0 - f64::from(config.threshold))).ln();
+    let (mut same, mut different, mut unsure) = ([0; 2], [0; 2], 0);
+    for _ in 0..60 {
+        let (recipe, bytes) = world(&mut noise, Drift::default(), true);
+        let table = Table::read(&bytes).unwrap();
+        let textures = recipe.known.len();
+        for reference in 0..textures {
+            let presented = if reference % 2 == 0 {
+                reference
+            } else {
+                (reference + 1) % textures
+            };
+            let one = [reference as u16];
+            let mut explorer = Explorer::<20>::among(table, PropertySet::ALL, config, one).unwrap();
+            assert_eq!(explorer.verification(), None, "nothing was felt");
+            let mut mean = vec![0.0; recipe.d];
+            for slides in 1..=3u8 {
+                let x: Vec<i16> = recipe.known[presented][0]
+                    .1
+                    .iter()
+                    .map(|m| ((m + noise.normal()) * 1024.0).round() as i16)
+                    .collect();
+                let slide = Observation {
+                    bands: x.iter().copied().collect(),
+                    ..Observation::default()
+                };
+                let action = Action {
+                    movement: 0,
+                    property: None,
+                };
+                explorer.observe(action, &slide).unwrap();
+                for (mean, z) in mean.iter_mut().zip(table.whiten(0, &x).unwrap()) {
+                    *mean += (f64::from(z) / 256.0 - *mean) / f64::from(slides);
+                }
+                let episode = BTreeMap::from([(0, (f64::from(slides), mean.clone()))]);
+                let (likelihoods, background) = recipe.decide(&episode, true);
+                let score = background - likelihoods[reference];
+                let limit = recipe.limits.limit(Against::Drifted, slides, None);
+                let found = explorer.verification().unwrap();
+                assert!((f64::from(found.score) - score).abs() < 0.03 + 2e-3 * score.abs());
+                assert_eq!(found.limit, limit);
+                let limit = f64::from(limit);
+                let is_own = usize::from(presented == reference);
+                match found.answer {
+                    Answer::Different => {
+                        assert!(score > limit - 0.1, "{score} {limit}");
+                        different[is_own] += 1;
+                    }
+                    Answer::Same => {
+                        assert!(score < sure.min(limit) + 0.1, "{score} {sure}");
+                        same[is_own] += 1;
+                    }
+                    Answer::Unsure => {
+                        assert!(score > sure - 0.1 && score < limit + 0.1, "{score}");
+                        unsure += 1;
+                    }
+                }
+            }
+        }
+        let two = Explorer::<20>::among(table, PropertySet::ALL, config, [0, 1]).unwrap();
+        let white = table.whiten(0, &[0; 12][..recipe.d]).unwrap();
+        assert_eq!(two.verify(&[(0, 1, white)]), None, "of which of the two?");
+    }
+    std::println!("same {same:?}, different {different:?}, not sure {unsure}");
+    assert!(
+        same[1] > 500 && different[0] > 500,
+        "{same:?} {different:?}"
+    );
 }
