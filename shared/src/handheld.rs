@@ -18,6 +18,7 @@ mod small;
 mod spelling;
 pub mod states;
 pub mod touch;
+pub mod weights;
 
 pub use draw::draw;
 pub use judge::{FEATURES, JudgeError, Judgement, LEADING, MAX_SLIDES, MOVEMENT, free_name, judge};

@@ -16,7 +16,7 @@ use crate::board::{Display, Emulator, Error, Options, Output};
 const LOOK_NS: u64 = 20_000_000;
 /// What the display says when it wants a slide, and when it wants none any more.
 const SLIDE: &str = "5 cm in 2 s";
-const OVER: &str = "next";
+const OVER: [&str; 2] = ["next", "yes"];
 
 /// Why a scenario did not come out as it says.
 #[derive(Debug, thiserror::Error)]
@@ -221,7 +221,9 @@ impl Played<'_> {
                     if let Err(unmet) = self.slide(*force_n, *pace_mm_s, Step::EXPLORED_S)? {
                         return Ok(Err(unmet));
                     }
-                    if self.until(Step::VERDICT_S, |display| display.shows(OVER))? {
+                    if self.until(Step::VERDICT_S, |display| {
+                        OVER.iter().any(|over| display.shows(over))
+                    })? {
                         return Ok(Ok(()));
                     }
                 }

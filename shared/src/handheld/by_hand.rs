@@ -6,7 +6,7 @@ use embedded_storage_async::nor_flash::NorFlash;
 use super::jobs::{Outcome, work};
 use super::judge::{Judgement, LEADING, MOVEMENT};
 use super::screen::{About, Screen};
-use super::states::{Answer, Asked, Handheld, TICKS_HZ};
+use super::states::{Answer, Asked, Handheld, Job, TICKS_HZ};
 use crate::dsp;
 use crate::explorer::Kernels;
 use crate::features::{Property, PropertySet, Slide};
@@ -93,6 +93,8 @@ pub struct ByHand<'p, H, K> {
     asked: Asked,
     /// Share of the memory for textures that is taken.
     memory: f32,
+    /// What is done is done for the host.
+    serves: bool,
 }
 
 impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
@@ -110,9 +112,15 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
             prompt: (None, 0),
             asked: Asked::default(),
             memory: 0.0,
+            serves: false,
         };
         by_hand.use_calibration(calibration);
         by_hand
+    }
+
+    /// The constants in use.
+    pub fn calibration(&self) -> RigCalibration {
+        self.calibration
     }
 
     fn use_calibration(&mut self, calibration: RigCalibration) {
@@ -196,10 +204,10 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
         self.hand.show(&screen);
     }
 
-    /// A tick of something that the host asked for, and whether it can go on.
+    /// A tick of something that a person is asked for, and whether it can go on.
     async fn go_on(&mut self) -> Result<Option<Answer>, RigError> {
         self.tick().await;
-        if self.hand.is_stopped() {
+        if self.serves && self.hand.is_stopped() {
             self.handheld.release();
             return Err(RigError::Stopped);
         }
@@ -441,7 +449,10 @@ pub async fn step<H, K, F, B, E>(
         rig.pause();
         // the picture goes out meanwhile
         rig.hand.wait().await;
-        work(job, &mut rig.handheld, memory, events, log).await;
+        match job {
+            Job::Calibrate => rig.set_force(memory).await,
+            job => work(job, &mut rig.handheld, memory, events, log).await,
+        }
         rig.heed();
     }
 }
@@ -473,12 +484,14 @@ where
     let (slides, trains) = asked(&request.command);
     probe.rig.asked = slides;
     probe.rig.pause();
+    probe.rig.serves = true;
     probe.events.verdict = None;
     let before = probe.memory.table().ok().map(|table| table.crc());
     let done = probe.perform::<K>(&request.command).await;
     let table = probe.memory.table().ok();
     let after = table.map(|table| (table.crc(), table.textures()));
     let rig = &mut probe.rig;
+    rig.serves = false;
     rig.handheld.release();
     if let Some((crc, textures)) = after
         && before != Some(crc)

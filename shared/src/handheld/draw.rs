@@ -268,12 +268,15 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
         }
         Screen::Weigh { mn, force_mn } => {
             brush.title("Calibrate", "keep still")?;
-            brush.centre("Weight", 13, &FONT_10X20)?;
-            let newton = say(format_args!("{}.{:02} N", mn / 1000, mn % 1000 / 10));
-            brush.centre(&newton, 32, &FONT_10X20)?;
+            brush.centre("Put on", 13, &FONT_10X20)?;
+            // what is written on weights
+            let grams = (u32::from(*mn) * 1000 + 4903) / 9807;
+            brush.centre(&say(format_args!("{grams} g")), 32, &FONT_10X20)?;
             let reads = *force_mn as u16;
             let reads = say(format_args!(
-                "reads {}.{:02} N",
+                "{}.{:02} N, reads {}.{:02}",
+                mn / 1000,
+                mn % 1000 / 10,
                 reads / 1000,
                 reads % 1000 / 10
             ));
@@ -314,15 +317,15 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
         Screen::Changed { rows } => {
             let name = rows.first().map_or("?", |row| row.name);
             brush.headline(&say(format_args!("{}?", cut(name, 20))), -1)?;
-            brush.left("feels like it, but it", 1, 19)?;
-            brush.left("is not as I learned.", 1, 30)?;
-            brush.left("Is it? Then teach it", 1, 41)?;
-            brush.button("next", "teach")
+            brush.left("Feels like it, but", 1, 19)?;
+            brush.left("not as I learned it.", 1, 30)?;
+            brush.left("Is it the same one?", 1, 41)?;
+            brush.button("no", "yes")
         }
         Screen::Unknown { like } => {
             brush.headline("Unknown", -1)?;
-            brush.left("none of those known,", 1, 19)?;
-            brush.left("most like", 1, 30)?;
+            brush.left("None of those I know.", 1, 19)?;
+            brush.left("The nearest one is", 1, 30)?;
             let name = like.first().map_or("?", |row| row.name);
             brush.left(&cut(name, 20), 7, 41)?;
             brush.button("next", "teach")
@@ -353,6 +356,20 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
         }
         Screen::Fault(trouble) => brush.fault(trouble),
         Screen::About(about) => brush.about_probe(about),
+        Screen::Calibrated(Ok(scale)) => {
+            brush.title("Calibrate", "")?;
+            brush.headline("Force is set", 16)?;
+            let hundredths = libm::roundf(100.0 * scale) as u16;
+            let (whole, rest) = (hundredths / 100, hundredths % 100);
+            let scale = say(format_args!("{whole}.{rest:02} mN a count"));
+            brush.centre(&scale, 40, &FONT_6X10)?;
+            brush.button("go on", "")
+        }
+        Screen::Calibrated(Err(why)) => {
+            brush.title("Force not set", "")?;
+            brush.paragraph(why, 14, 4)?;
+            brush.button("go on", "")
+        }
     }
 }
 
@@ -489,6 +506,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         let (year, month, day) = date(about.calibrated);
         let calibrated = match about.calibrated {
             0 => say(format_args!("never")),
+            1 => say(format_args!("day unknown")),
             _ => say(format_args!("{year}-{month:02}-{day:02}")),
         };
         self.row("Force set", &calibrated, 22)?;
@@ -500,7 +518,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.row("Awake", &both, 32)?;
         let slots = say(format_args!("late {}, lost {}", about.late, about.lost));
         self.row("Slots", &cut(&slots, 15), 42)?;
-        self.button("go on", "")
+        self.button("go on", "set force")
     }
 
     /// A name and its value.

@@ -70,6 +70,8 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
             let textures = memory.table().map_or(0, |table| table.textures());
             handheld.learned(learned, textures);
         }
+        // whoever has the finger does it
+        Job::Calibrate => {}
     }
 }
 
@@ -108,10 +110,13 @@ pub fn words(why: &MemoryError) -> &'static str {
             "The textures do not allow that."
         }
         MemoryError::Store(StoreError::Worn) => "The memory is worn out and keeps nothing new.",
-        MemoryError::NoTable(_)
-        | MemoryError::Table(_)
-        | MemoryError::StoredTable(_)
-        | MemoryError::NewestTable(_) => "The textures cannot be read. Load them with a computer.",
+        MemoryError::NoTable(_) | MemoryError::Table(_) => {
+            "The textures cannot be read. Load them with a computer."
+        }
+        MemoryError::StoredTable(_) => "Your textures are damaged. The built-in ones are in use.",
+        MemoryError::NewestTable(_) => {
+            "Your textures are damaged. Those before the last change are in use."
+        }
         MemoryError::Broken(_) | MemoryError::Store(_) => {
             "The memory does not answer. Switch off and on."
         }

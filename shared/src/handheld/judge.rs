@@ -33,6 +33,13 @@ pub struct Judgement {
     pub open: bool,
 }
 
+impl Judgement {
+    /// Whether the person is to be asked if it is the first one.
+    pub fn is_changed(&self) -> bool {
+        self.changed && !self.unknown
+    }
+}
+
 /// Why an episode cannot be judged.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 pub enum JudgeError {

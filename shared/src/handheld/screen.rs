@@ -56,7 +56,7 @@ pub struct About {
     pub late: u32,
     /// Words that were lost.
     pub lost: u32,
-    /// Day of the calibration, as 20261121; 0 for factory defaults.
+    /// Day of the calibration, as 20261121; 0 for factory defaults, 1 where it is not known.
     pub calibrated: u32,
     /// Share of the memory for textures that is taken, 0 to 1.
     pub memory: f32,
@@ -159,6 +159,8 @@ pub enum Screen<'a> {
     Fault(&'a Trouble),
     /// The probe.
     About(About),
+    /// The force was set by weights, mN a count of P_DC, or why not.
+    Calibrated(Result<f32, &'a str>),
     /// Nothing: the display is off.
     Dark,
 }

@@ -3,11 +3,15 @@
 use heapless::Vec;
 
 mod asked;
+mod naming;
+
+pub use self::naming::Choice;
+use self::naming::{Entry, Naming};
 
 use super::button::{Button, Press};
 use super::guidance::{Again, Event};
-use super::judge::{JudgeError, Judgement, MAX_SLIDES, free_name};
-use super::screen::{self, About, Row, Screen, Trouble};
+use super::judge::{JudgeError, Judgement, MAX_SLIDES};
+use super::screen::{About, Row, Screen, Trouble};
 use super::spelling::{Spelling, Taken};
 use super::touch::Touch;
 use crate::dsp::Plan;
@@ -29,17 +33,6 @@ const LEARNED: u32 = 3 * TICKS_HZ;
 /// No word for this long is a fault, ticks: the sensor needs 10 to start.
 const NO_WORDS: u32 = 50;
 
-/// The person's label for the texture.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub enum Choice {
-    /// The texture with this index.
-    Known(u16),
-    /// A new one, named by [`free_name`].
-    Numbered,
-    /// A new one, or a known one, of this name.
-    Spelled(Name),
-}
-
 /// Something to be done with the table, by whoever owns it.
 #[derive(Clone, PartialEq, Debug)]
 #[allow(clippy::large_enum_variant)] // no allocation here, and only one at a time
@@ -48,6 +41,8 @@ pub enum Job {
     Judge(Vec<Observation, MAX_SLIDES>),
     /// Learn the episode that was judged last as this texture, and call [`Handheld::learned`].
     Teach(Choice),
+    /// Set the force by weights, and call [`Handheld::calibrated`].
+    Calibrate,
 }
 
 /// Which slide the host wants.
@@ -90,13 +85,15 @@ enum Page {
     /// The job is being done.
     Thinking,
     Verdict(Judgement),
-    /// What is it? An entry of [`Handheld::entries`].
+    /// What is it? An entry of [`Naming`].
     Choose(u16),
     Spell(Spelling),
     Saving,
     Learned(Result<Name, &'static str>),
     Fault(Trouble),
     About,
+    /// The force was set, mN a count, or why not.
+    Calibrated(Result<f32, &'static str>),
     Dark,
 }
 
@@ -226,7 +223,6 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 ));
             }
         };
-        let (open, unknown, sure) = (judgement.open, judgement.unknown, judgement.sure);
         self.judgement = Some(judgement.clone());
         if self.training {
             if self.episode.len() < TRAINING_SLIDES {
@@ -236,19 +232,23 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 self.sound(SURE_IT_IS);
                 self.show(Page::Choose(0));
             }
-        } else if open {
+        } else if judgement.open {
             self.sound(GOOD);
             self.show(Page::Touching);
         } else {
-            self.sound(if unknown {
-                NOT_KNOWN
-            } else if sure {
-                SURE_IT_IS
-            } else {
-                GOOD
-            });
-            self.show(Page::Verdict(judgement));
+            self.show_verdict(judgement);
         }
+    }
+
+    fn show_verdict(&mut self, judgement: Judgement) {
+        self.sound(if judgement.unknown {
+            NOT_KNOWN
+        } else if judgement.sure {
+            SURE_IT_IS
+        } else {
+            GOOD
+        });
+        self.show(Page::Verdict(judgement));
     }
 
     /// The result of [`Job::Teach`]: the name that was learned, or why none was. The table now has `textures` textures.
@@ -284,6 +284,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             | Page::Saving
             | Page::Learned(_)
             | Page::About
+            | Page::Calibrated(_)
             | Page::Dark => false,
         }
     }
@@ -350,7 +351,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             Page::Verdict(judgement) if judgement.unknown => Screen::Unknown {
                 like: rows(judgement),
             },
-            Page::Verdict(judgement) if judgement.changed => Screen::Changed {
+            Page::Verdict(judgement) if judgement.is_changed() => Screen::Changed {
                 rows: rows(judgement),
             },
             Page::Verdict(judgement) => Screen::Verdict {
@@ -359,8 +360,8 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             },
             Page::Choose(at) => Screen::Choose {
                 at: *at,
-                count: self.entries(),
-                entries: self.around(*at, table),
+                count: self.naming().entries(),
+                entries: self.naming().around(*at, table),
             },
             Page::Spell(spelling) => Screen::Spell {
                 text: spelling.text(),
@@ -370,61 +371,16 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             Page::Learned(learned) => Screen::Learned(learned.as_ref().map_err(|why| *why)),
             Page::Fault(trouble) => Screen::Fault(trouble),
             Page::About => Screen::About(about.clone()),
+            Page::Calibrated(done) => Screen::Calibrated(*done),
             Page::Dark => Screen::Dark,
         }
     }
 
-    /// Entries of the page that asks for a name: the leading textures, a new one with a number, a new one that is spelled,
-    /// nothing, and all other textures.
-    fn entries(&self) -> u16 {
-        self.textures.saturating_add(3)
-    }
-
-    /// The leading textures of the last judgement.
-    fn leading(&self) -> impl Iterator<Item = u16> + Clone + '_ {
-        let leading = self.judgement.iter().flat_map(|j| j.leading.iter());
-        leading.map(|(texture, _)| *texture)
-    }
-
-    /// What an entry stands for; `None` is nothing.
-    fn entry(&self, at: u16) -> Entry {
-        let leading = self.leading().count() as u16;
-        if let Some(texture) = self.leading().nth(at.into()) {
-            return Entry::Known(texture);
+    fn naming(&self) -> Naming<'_> {
+        Naming {
+            judgement: self.judgement.as_ref(),
+            textures: self.textures,
         }
-        match at.saturating_sub(leading) {
-            0 => Entry::Numbered,
-            1 => Entry::Spell,
-            2 => Entry::Nothing,
-            other => {
-                let mut others =
-                    (0..self.textures).filter(|t| self.leading().all(|leading| leading != *t));
-                others
-                    .nth(usize::from(other) - 3)
-                    .map_or(Entry::Nothing, Entry::Known)
-            }
-        }
-    }
-
-    /// The entries about one of them, as they are shown.
-    fn around<'s>(
-        &self,
-        at: u16,
-        table: Option<&Table<'s>>,
-    ) -> Vec<screen::Entry<'s>, { screen::LINES }> {
-        let first = screen::first_line(at, self.entries());
-        let shown = (first..self.entries()).take(screen::LINES);
-        shown
-            .map(|at| match self.entry(at) {
-                Entry::Known(texture) => {
-                    let name = table.and_then(|table| table.name(texture));
-                    screen::Entry::Known(name.unwrap_or("?"))
-                }
-                Entry::Numbered => screen::Entry::Numbered(table.map_or(Name::new(), free_name)),
-                Entry::Spell => screen::Entry::Spell,
-                Entry::Nothing => screen::Entry::Nothing,
-            })
-            .collect()
     }
 
     fn show(&mut self, page: Page) {
@@ -550,21 +506,21 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             (Page::Touching | Page::Again(_), Press::Short) => {}
             (Page::Touching | Page::Again(_), Press::Long) => self.begin(),
             (Page::Lift | Page::Air | Page::Weigh(_), _) => self.begin(),
+            (Page::Verdict(judgement), press) if judgement.is_changed() => self.confirm(press),
             (Page::Verdict(_), Press::Short) => self.begin(),
             (Page::Verdict(_), Press::Long) => self.show(Page::Choose(0)),
             (Page::Choose(at), Press::Short) => {
                 let next = at.saturating_add(1);
-                let at = if next < self.entries() { next } else { 0 };
+                let at = if next < self.naming().entries() {
+                    next
+                } else {
+                    0
+                };
                 self.show(Page::Choose(at));
             }
             (Page::Choose(at), Press::Long) => {
                 let at = *at;
-                match self.entry(at) {
-                    Entry::Known(texture) => self.teach(Choice::Known(texture)),
-                    Entry::Numbered => self.teach(Choice::Numbered),
-                    Entry::Spell => self.show(Page::Spell(Spelling::default())),
-                    Entry::Nothing => self.begin(),
-                }
+                self.take(at);
             }
             (Page::Spell(spelling), Press::Short) => spelling.turn(),
             (Page::Spell(spelling), Press::Long) => match spelling.take() {
@@ -572,10 +528,34 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 Taken::Done(name) => self.teach(Choice::Spelled(name)),
                 Taken::Back => self.show(Page::Choose(0)),
             },
-            (Page::Fault(Trouble::Memory(_)) | Page::About | Page::Learned(_), _) => self.begin(),
+            (Page::About, Press::Long) => {
+                self.job = Some(Job::Calibrate);
+                self.show(Page::Air);
+            }
+            (Page::Fault(Trouble::Memory(_)) | Page::About, _)
+            | (Page::Learned(_) | Page::Calibrated(_), _) => self.begin(),
             (Page::Fault(_), _) => {}
         }
         self.sound(CLICK);
+    }
+
+    /// Does what an entry stands for.
+    fn take(&mut self, at: u16) {
+        match self.naming().entry(at) {
+            Entry::Known(texture) => self.teach(Choice::Known(texture)),
+            Entry::Numbered => self.teach(Choice::Numbered),
+            Entry::Spell => self.show(Page::Spell(Spelling::default())),
+            Entry::Nothing => self.begin(),
+        }
+    }
+
+    /// "Is it this one?", and the button says yes or no: it moves, or the list begins with a new one.
+    fn confirm(&mut self, press: Press) {
+        let first = self.naming().leading().next();
+        match (press, first) {
+            (Press::Long, Some(texture)) => self.teach(Choice::Known(texture)),
+            _ => self.show(Page::Choose(self.naming().leading().count() as u16)),
+        }
     }
 
     fn teach(&mut self, choice: Choice) {
@@ -586,14 +566,6 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         self.job = Some(Job::Teach(choice));
         self.show(Page::Saving);
     }
-}
-
-/// What can be chosen for an episode.
-enum Entry {
-    Known(u16),
-    Numbered,
-    Spell,
-    Nothing,
 }
 
 #[cfg(test)]

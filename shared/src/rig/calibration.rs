@@ -16,13 +16,17 @@ pub struct RigCalibration {
     pub unloaded_a: (f32, f32),
     /// Shear per motor current above that, N/A (the paper's inclined stage).
     pub newton_per_ampere: f32,
-    /// Day of the measurement, as 20261121; 0 for values that nobody measured.
+    /// Day of the measurement, as 20261121; 0 for values that nobody measured, [`RigCalibration::UNDATED`] where nobody knew
+    /// the day.
     pub date: u32,
     /// Serial number of the sensor, as the sensor says it.
     pub serial: [u8; 16],
 }
 
 impl RigCalibration {
+    /// The date of a calibration that a probe made without a computer: it has no clock.
+    pub const UNDATED: u32 = 1;
+
     /// Shear in N at a motor current and speed.
     pub fn shear_n(&self, current_a: f32, speed_mm_s: f32) -> f32 {
         let (standstill, per_mm_s) = self.unloaded_a;

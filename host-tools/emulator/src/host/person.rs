@@ -10,6 +10,15 @@ use crate::board::{Display, Emulator};
 const PRESS: &str = "slide ";
 const SLIDE: &str = "5 cm in 2 s";
 const LIFT: &str = "Lift";
+const WEIGH: &str = "Put on";
+/// Weights that a person has at hand, as the display names them, mN; one that ends as another comes before it.
+const WEIGHTS: [(&str, u16); 3] = [("150 g", 1471), ("100 g", 981), ("50 g", 490)];
+
+/// The weight that the display asks for, if the person has it.
+fn weight(shows: impl Fn(&str) -> bool) -> Option<u16> {
+    let mut weights = WEIGHTS.into_iter();
+    weights.find_map(|(grams, mn)| shows(grams).then_some(mn))
+}
 
 /// What the person is at, and until when, ns.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -69,7 +78,7 @@ impl Person {
         self.slides
     }
 
-    /// Hears what the probe tells its host: which weight to put on the finger, which a display of points cannot be asked.
+    /// Hears what the probe tells its host: which weight to put on the finger, where it is none that a person has at hand.
     pub fn hear(&mut self, report: &Report) {
         if let Event::Prompt(prompt) = report.event {
             self.weight = match prompt {
@@ -93,9 +102,9 @@ impl Person {
             display.shows(text)
         };
         let (at, intent) = match self.at {
-            At::Idle if self.weight.is_some() && shows("Weight") => {
-                let newton = f64::from(self.weight.unwrap_or(0)) * 1e-3;
-                (At::Weighing, Some((newton, 0.0)))
+            At::Idle if shows(WEIGH) && weight(&shows).or(self.weight).is_some() => {
+                let mn = weight(&shows).or(self.weight).unwrap_or(0);
+                (At::Weighing, Some((f64::from(mn) * 1e-3, 0.0)))
             }
             At::Idle if shows(PRESS) && !shows(LIFT) => (At::Pressing, Some((self.force_n, 0.0))),
             At::Pressing if shows(SLIDE) => {
@@ -118,9 +127,7 @@ impl Person {
                 (At::Lifting(after(Step::LIFTED_S)), Some((0.0, 0.0)))
             }
             At::Lifting(until) if now >= until => (At::Idle, None),
-            At::Weighing if !shows("Weight") => {
-                (At::Lifting(after(Step::LIFTED_S)), Some((0.0, 0.0)))
-            }
+            At::Weighing if !shows(WEIGH) => (At::Lifting(after(Step::LIFTED_S)), Some((0.0, 0.0))),
             at => (at, None),
         };
         self.at = at;

@@ -1,7 +1,10 @@
 //! What the tests of the firmware share: where it is, and boards that run it.
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use flate2::read::GzDecoder;
+use tactus_core::table::Table;
 use tactus_emulator::board::Options;
 use tactus_emulator::host::talk::Talk;
 use tactus_emulator::host::under_finger::Unknown;
@@ -39,4 +42,36 @@ pub(crate) fn boot(elf: &Path, unknown: &Unknown, store: Option<Vec<u8>>) -> Tal
 /// Waits until a board has homed, without a fault.
 pub(crate) fn ready(talk: &mut Talk) {
     assert_eq!(talk.ready(|_, _| ()).unwrap(), None);
+}
+
+/// CRC-32 (ISO-HDLC), bit by bit.
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
+            (crc >> 1) ^ (0xEDB8_8320 & 0u32.wrapping_sub(crc & 1))
+        })
+    })
+}
+
+/// The table with the limits of changed textures from here on, whatever they were; its checksum is right.
+pub(crate) fn with_limits_of_change(table: &[u8], begin: f32) -> Vec<u8> {
+    let limits = Table::read(table).unwrap().limits().unwrap();
+    let mut bytes = table.to_vec();
+    for tail in limits.same {
+        let there = [tail.begin, tail.excess].map(f32::to_le_bytes).concat();
+        let at = bytes.windows(8).position(|some| some == there).unwrap();
+        bytes[at..at + 4].copy_from_slice(&begin.to_le_bytes());
+    }
+    let end = bytes.len() - 4;
+    let crc = crc32(&bytes[..end]);
+    bytes[end..].copy_from_slice(&crc.to_le_bytes());
+    bytes
+}
+
+/// The bytes of a file that is packed.
+pub(crate) fn unpacked(path: &Path) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).unwrap();
+    GzDecoder::new(file).read_to_end(&mut bytes).unwrap();
+    bytes
 }

@@ -23,7 +23,7 @@ use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::person::Person;
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk, TalkError};
 
-use crate::common::elf_of;
+use crate::common::{elf_of, with_limits_of_change};
 
 /// Longest exploration or training by hand, virtual seconds.
 const LONG_S: f64 = 120.0;
@@ -83,6 +83,23 @@ impl Held {
             }
         }
         panic!("{what} is not seen within {seconds} s");
+    }
+
+    /// Presses the button for so many ms.
+    fn press_for(&mut self, ms: u64) {
+        self.talk.board().press(true).unwrap();
+        self.talk.board().run_ms(ms).unwrap();
+        self.talk.board().press(false).unwrap();
+    }
+
+    /// The person begins an episode, and slides until the display shows this.
+    fn slide_until(&mut self, text: &str) {
+        self.rest();
+        let hand = |board: &mut Emulator| board.rig().world().hand().unwrap().intend(0.5, 0.0);
+        hand(self.talk.board());
+        self.until("an episode", 3.0, |board| shows(board, "slide 1 of 5"));
+        self.until(text, 60.0, |board| shows(board, text));
+        self.rest();
     }
 
     /// Waits until the person's hand is free.
@@ -475,5 +492,118 @@ fn known_weights_set_the_force_that_the_person_is_shown() {
     });
     let most = forces.max().unwrap();
     assert!((450..600).contains(&most), "{most}");
+    held.end();
+}
+
+/// With a table by which every texture has changed, the button alone says whether it is that one.
+#[test]
+fn a_changed_texture_is_confirmed_or_denied_by_the_button() {
+    let Some(mut held) = Held::new("burlap", Manner::default()) else {
+        return;
+    };
+    let table = with_limits_of_change(&held.table(), -9000.0);
+    held.talk
+        .run(PushTable::new(&table).unwrap(), TIMEOUT_S, |_, _| ())
+        .unwrap();
+    let before = held.table();
+    assert_eq!(before, table);
+    let old = Table::read(&before).unwrap();
+    let burlap = old.find("Burlap").unwrap();
+    // yes: it moves, and nothing else does
+    held.slide_until("Is it the same one?");
+    assert!(shows(held.talk.board(), "Burlap?"));
+    held.press_for(700);
+    held.until("what was learned", 3.0, |board| shows(board, "Learned"));
+    held.until("ready", 5.0, |board| shows(board, "and hold"));
+    let moved = held.table();
+    let new = Table::read(&moved).unwrap();
+    assert_eq!(new.textures(), old.textures());
+    for texture in 0..old.textures() {
+        let same = new.whitened(texture, 0) == old.whitened(texture, 0);
+        assert_eq!(same, texture != burlap, "{texture}");
+    }
+    assert!(new.tally(burlap).user > old.tally(burlap).user);
+    assert_eq!(new.limits(), old.limits());
+    // no: a new one, and the old one stays
+    held.slide_until("Is it the same one?");
+    held.press_for(100);
+    held.until("the list", 2.0, |board| shows(board, "What is it?"));
+    held.until("a new one", 2.0, |board| shows(board, "new: sample 1"));
+    held.press_for(700);
+    held.until("its name", 3.0, |board| shows(board, "sample 1"));
+    held.until("ready", 5.0, |board| shows(board, "and hold"));
+    let added = held.table();
+    let added = Table::read(&added).unwrap();
+    assert_eq!(added.textures(), new.textures() + 1);
+    assert!(added.find("sample 1").is_some());
+    assert_eq!(added.whitened(burlap, 0), new.whitened(burlap, 0));
+    // the log is written with interrupts off while nobody touches anything: a slot may be late then, and none is lost
+    let counts = held.status().counts;
+    assert!(
+        counts.late_slots <= 2 && counts.lost_samples == 0,
+        "{counts:?}"
+    );
+    assert_eq!(counts.lost_reports, 0);
+}
+
+/// Nobody is at the other end of the cable: the display asks, a person lays weights on the finger.
+#[test]
+fn the_force_is_set_on_its_own_screen() {
+    let Some(elf) = elf_of("TACTUS_HANDHELD_ELF") else {
+        return;
+    };
+    let mut held = Held::with(&elf, "burlap", Manner::default(), None);
+    held.press_for(100);
+    held.until("its day", 1.0, |board| shows(board, "never"));
+    held.press_for(700);
+    held.until("the first weight", 10.0, |board| shows(board, "50 g"));
+    held.until("the end", 60.0, |board| shows(board, "Force is set"));
+    held.press_for(100);
+    held.until("ready", 5.0, |board| shows(board, "and hold"));
+    let store = held.talk.board().store().unwrap();
+    drop(held);
+    let mut held = Held::with(&elf, "burlap", Manner::default(), Some(store));
+    assert_eq!(held.status().calibrated, RigCalibration::UNDATED);
+    held.press_for(100);
+    held.until("its day", 1.0, |board| shows(board, "day unknown"));
+    held.press_for(100);
+    held.until("ready", 5.0, |board| shows(board, "and hold"));
+    // half a newton is half a newton
+    let found = held
+        .run(Request::identify(Identify::default()), LONG_S)
+        .unwrap();
+    assert_eq!(found.verdict.name, "Burlap");
+    let forces = held.reports.iter().filter_map(|report| match report.event {
+        Event::Live(live) => Some(live.force_mn),
+        _ => None,
+    });
+    let most = forces.max().unwrap();
+    assert!((450..600).contains(&most), "{most}");
+    held.end();
+}
+
+/// A bit of the taught table has changed in the flash: the display says so before anything else.
+#[test]
+fn a_damaged_table_is_told_on_the_display() {
+    let Some(elf) = elf_of("TACTUS_HANDHELD_ELF") else {
+        return;
+    };
+    let mut held = Held::with(&elf, "burlap", Manner::default(), None);
+    let bytes = held.table();
+    held.talk
+        .run(PushTable::new(&bytes).unwrap(), TIMEOUT_S, |_, _| ())
+        .unwrap();
+    let mut store = held.talk.board().store().unwrap();
+    drop(held);
+    let at = store
+        .windows(64)
+        .position(|some| some == &bytes[..64])
+        .unwrap();
+    store[at + 300] ^= 8;
+    let mut held = Held::with(&elf, "burlap", Manner::default(), Some(store));
+    held.until("the damage", 1.0, |board| shows(board, "Your textures are"));
+    held.press_for(100);
+    held.until("ready", 5.0, |board| shows(board, "and hold"));
+    assert!(held.status().factory);
     held.end();
 }

@@ -8,6 +8,7 @@ mod explore;
 mod faults;
 mod handheld;
 mod handheld_link;
+mod old_store;
 mod selftest;
 mod serve;
 mod settings;

@@ -53,7 +53,7 @@ pub(crate) struct Args {
 /// What `device calibrate --format json` prints, and a part of `device status`.
 #[derive(Serialize)]
 pub(crate) struct CalibrationSummary {
-    /// The day, as "2026-11-21"; `null` for factory defaults.
+    /// The day, as "2026-11-21"; "not known" where the probe was calibrated without a computer; `null` for factory defaults.
     date: Option<String>,
     sensor: Option<String>,
     pdc_in_the_air_counts: f32,
@@ -79,10 +79,14 @@ impl CalibrationSummary {
     }
 }
 
-/// "2026-11-21"; nothing for factory defaults.
+/// "2026-11-21", "not known" for a probe that was calibrated without a computer; nothing for factory defaults.
 fn date(c: &RigCalibration) -> Option<String> {
     let (year, month, day) = (c.date / 10_000, c.date / 100 % 100, c.date % 100);
-    (c.date != 0).then(|| format!("{year}-{month:02}-{day:02}"))
+    match c.date {
+        0 => None,
+        RigCalibration::UNDATED => Some("not known".to_owned()),
+        _ => Some(format!("{year}-{month:02}-{day:02}")),
+    }
 }
 
 /// The sensor's serial number.
@@ -180,7 +184,11 @@ pub(crate) fn calibration_rows(c: &RigCalibration) -> [(&'static str, String); 6
     [
         (
             "calibrated",
-            date(c).unwrap_or_else(|| "never: factory defaults".to_owned()),
+            match date(c) {
+                None => "never: factory defaults".to_owned(),
+                Some(day) if c.date == RigCalibration::UNDATED => format!("on a day {day}"),
+                Some(day) => day,
+            },
         ),
         (
             "sensor",

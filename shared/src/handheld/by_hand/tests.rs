@@ -2,8 +2,11 @@
 
 use super::*;
 use crate::dsp::{Plain, Plan};
+use crate::handheld::weights::WEIGHTS_MN;
+use crate::probe::Memory;
 use crate::probe::explore::Random;
 use crate::sensor::pressure::{Calibration, Channel, Counts};
+use crate::store::tests::ram::{Ram, SECTOR};
 use crate::wire::Again;
 use embassy_futures::block_on;
 use std::string::{String, ToString as _};
@@ -40,6 +43,8 @@ struct Obedient {
     stops: Option<u32>,
     ticks: u32,
     streams: bool,
+    /// Instead of this weight another one is put on, mN.
+    wrong: Option<u16>,
 }
 
 impl Obedient {
@@ -59,6 +64,7 @@ impl Obedient {
             stops: None,
             ticks: 0,
             streams: false,
+            wrong: None,
         }
     }
 
@@ -68,6 +74,7 @@ impl Obedient {
             Some(Prompt::Press) => (self.presses_mn, 0.0),
             Some(Prompt::Slide) if self.since < 30 => (self.presses_mn, 0.0),
             Some(Prompt::Slide) => (self.presses_mn, 40.0),
+            Some(Prompt::Weigh(mn)) if self.wrong == Some(mn) => (700.0, 0.0),
             Some(Prompt::Weigh(mn)) => (mn.into(), 0.0),
             Some(Prompt::Lift | Prompt::Again(_)) | None => (0.0, 0.0),
         }
@@ -142,7 +149,10 @@ impl Hand for Obedient {
 type Held<'p> = ByHand<'p, Obedient, Plain>;
 
 fn held(plan: &Plan) -> Held<'_> {
-    ByHand::new(Obedient::new(), Handheld::new(plan, 4), UNMEASURED)
+    ByHand {
+        serves: true,
+        ..ByHand::new(Obedient::new(), Handheld::new(plan, 4), UNMEASURED)
+    }
 }
 
 fn prompts(rig: &Held<'_>) -> List<Prompt> {
@@ -280,6 +290,65 @@ fn weights_and_the_air_give_the_calibration_that_forces_are_shown_by() {
     rig.hand.mn_per_count = 1e6;
     let why = block_on(rig.weigh(490)).unwrap_err();
     assert_eq!(why, Failure::Rig(RigError::Stopped));
+}
+
+/// No stored table.
+struct Nothing;
+
+impl<F: NorFlash> StoredBytes<F> for Nothing {
+    fn bytes(&mut self, _: &mut Store<F>) -> Option<&[u8]> {
+        None
+    }
+}
+
+#[test]
+fn a_person_sets_the_force_by_weights_without_a_host_and_it_is_kept() {
+    let plan = Plan::new();
+    let store = block_on(Store::open(Ram::<SECTOR>::new())).unwrap();
+    let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
+    let mut rig = held(&plan);
+    rig.serves = false;
+    // somebody stopped a host's request before
+    rig.hand.stops = Some(0);
+    rig.hand.mn_per_count = 14.0;
+    block_on(rig.set_force(&mut memory));
+    let set = rig.calibration();
+    let scale = set.pressure.force_mn_per_count;
+    assert!((scale - 14.0).abs() < 0.1, "{scale}");
+    assert!((set.pressure.pdc_no_contact - AIR).abs() < 0.2);
+    assert_eq!(set.date, RigCalibration::UNDATED);
+    let weights = prompts(&rig).into_iter().filter_map(|prompt| match prompt {
+        Prompt::Weigh(mn) => Some(mn),
+        _ => None,
+    });
+    assert_eq!(weights.collect::<List<_>>(), WEIGHTS_MN);
+    let about = About::default();
+    let shown = |rig: &Held<'_>| std::format!("{:?}", rig.handheld.screen(None, &about));
+    assert!(shown(&rig).starts_with("Calibrated(Ok("), "{}", shown(&rig));
+    // after a reset, too
+    let flash = memory.close().0.unwrap().close().again();
+    let mut store = block_on(Store::open(flash)).unwrap();
+    assert_eq!(block_on(store.calibration()), Ok(Some(set)));
+
+    // one weight is another than it should be: nothing is kept
+    let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
+    rig.hand.wrong = Some(981);
+    block_on(rig.set_force(&mut memory));
+    assert_eq!(rig.calibration(), set);
+    assert!(
+        shown(&rig).starts_with("Calibrated(Err("),
+        "{}",
+        shown(&rig)
+    );
+    let flash = memory.close().0.unwrap().close().again();
+    let mut store = block_on(Store::open(flash)).unwrap();
+    assert_eq!(block_on(store.calibration()), Ok(Some(set)));
+    // who gives up is back where they were
+    let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
+    rig.hand.gives_up = Some(rig.hand.ticks + 400);
+    block_on(rig.set_force(&mut memory));
+    assert_eq!(rig.calibration(), set);
+    assert!(!shown(&rig).starts_with("Calibrated"), "{}", shown(&rig));
 }
 
 #[test]

@@ -12,7 +12,7 @@ use crate::handheld::picture::{HEIGHT, Picture, WIDTH};
 use crate::handheld::screen::LINES;
 use crate::handheld::spelling::Spelling;
 use crate::store::StoreError;
-use crate::table::Name;
+use crate::table::{Name, TableError};
 use crate::wire::MemoryError;
 use heapless::Vec;
 
@@ -68,6 +68,15 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
     };
     each("weigh", &weigh);
     each("thinking", &Screen::Thinking { slide: 2 });
+    for (name, done) in [
+        ("force-set", Ok(11.37)),
+        (
+            "force-not-set",
+            Err("The weights do not agree. Weigh again."),
+        ),
+    ] {
+        each(name, &Screen::Calibrated(done));
+    }
     let sure = Screen::Verdict {
         rows: rows(&[
             row("bath towel", 0.9984),
@@ -99,6 +108,10 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
         like: rows(&[row("Cardboard", 0.98), row(LONG, 0.02)]),
     };
     each("unknown", &unknown);
+    let changed = Screen::Changed {
+        rows: rows(&[row("Cardboard", 0.98), row(LONG, 0.02)]),
+    };
+    each("changed", &changed);
     let entries: Vec<Entry<'_>, LINES> = Vec::from_slice(&[
         Entry::Known(LONG),
         Entry::Known("felt"),
@@ -146,6 +159,15 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
     );
     each("fault-silent", &Screen::Fault(&Trouble::Silent));
     each("fault-frozen", &Screen::Fault(&Trouble::Frozen));
+    for (name, why) in [
+        ("fault-table", MemoryError::StoredTable(TableError::Header)),
+        (
+            "fault-newest-table",
+            MemoryError::NewestTable(TableError::Header),
+        ),
+    ] {
+        each(name, &Screen::Fault(&Trouble::Memory(words(&why))));
+    }
     let memory = Trouble::Memory(words(&MemoryError::Store(StoreError::Worn)));
     each("fault-memory", &Screen::Fault(&memory));
     let about = About {

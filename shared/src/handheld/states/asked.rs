@@ -67,14 +67,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     pub fn told(&mut self, judgement: Judgement) {
         self.clear_episode();
         self.judgement = Some(judgement.clone());
-        self.sound(if judgement.unknown {
-            super::NOT_KNOWN
-        } else if judgement.sure {
-            super::SURE_IT_IS
-        } else {
-            super::GOOD
-        });
-        self.show(Page::Verdict(judgement));
+        self.show_verdict(judgement);
     }
 
     /// The host's slides taught this texture.
@@ -97,6 +90,22 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         ) {
             self.begin();
         }
+    }
+
+    /// What came of [`Job::Calibrate`](super::Job::Calibrate): mN a count, or why it is as it was, if there is more to say.
+    pub fn calibrated(&mut self, done: Result<f32, Option<&'static str>>) {
+        self.release();
+        let page = match done {
+            Ok(scale) => Page::Calibrated(Ok(scale)),
+            Err(Some(why)) => Page::Calibrated(Err(why)),
+            Err(None) => return,
+        };
+        self.sound(if done.is_ok() {
+            super::SURE_IT_IS
+        } else {
+            super::BAD
+        });
+        self.show(page);
     }
 
     /// From now on a count of P_DC means so many mN.

@@ -4,7 +4,7 @@ use super::*;
 use crate::dsp::Plain;
 use crate::explorer::EpisodeSummary;
 use crate::handheld::draw;
-use crate::handheld::judge::{FEATURES, judge};
+use crate::handheld::judge::{FEATURES, free_name, judge};
 use crate::handheld::picture::Picture;
 use crate::probe::explore::Random;
 use crate::sensor::pressure::{Channel, Counts};
@@ -46,6 +46,8 @@ struct Bench<'p> {
     table: List<u8>,
     learned: List<(Choice, u8)>,
     episode: Option<EpisodeSummary>,
+    /// Whatever is known has changed.
+    changed: bool,
 }
 
 impl<'p> Bench<'p> {
@@ -55,6 +57,7 @@ impl<'p> Bench<'p> {
             table: table(),
             learned: List::new(),
             episode: None,
+            changed: false,
         }
     }
 
@@ -63,12 +66,14 @@ impl<'p> Bench<'p> {
         match self.probe.job() {
             None => {}
             Some(Job::Judge(slides)) => match judge::<Plain>(table, &slides) {
-                Ok((judgement, episode)) => {
+                Ok((mut judgement, episode)) => {
                     self.episode = Some(episode);
+                    judgement.changed |= self.changed;
                     self.probe.judged(Ok(judgement));
                 }
                 Err(why) => self.probe.judged(Err(why)),
             },
+            Some(Job::Calibrate) => self.probe.calibrated(Ok(11.0)),
             Some(Job::Teach(choice)) => {
                 let slides = self.episode.take().unwrap().observed[0].1;
                 self.learned.push((choice, slides));
@@ -146,6 +151,44 @@ fn an_unknown_one_is_said_to_be_and_can_be_named() {
     assert_eq!(bench.shown(), "Learned");
     (0..LEARNED).for_each(|_| bench.tick(false));
     assert_eq!(bench.shown(), "Air");
+}
+
+#[test]
+fn a_changed_one_is_moved_by_yes_and_named_anew_after_no() {
+    let plan = Plan::new();
+    let mut bench = Bench::new(&plan);
+    bench.changed = true;
+    bench.slide(Some(2));
+    assert_eq!(bench.shown(), "Changed");
+    // yes
+    bench.press(70);
+    assert_eq!(bench.learned, [(Choice::Known(2), 1)]);
+    assert_eq!(bench.shown(), "Learned");
+    (0..LEARNED).for_each(|_| bench.tick(false));
+    bench.learned.clear();
+    bench.slide(Some(1));
+    // no: the list begins with a new one
+    bench.press(10);
+    assert_eq!(
+        (bench.shown(), &bench.learned[..]),
+        ("Choose".into(), &[][..])
+    );
+    bench.press(70);
+    assert_eq!(bench.learned, [(Choice::Numbered, 1)]);
+    (0..LEARNED).for_each(|_| bench.tick(false));
+    bench.learned.clear();
+    // neither: the next slide is of another sample
+    bench.slide(Some(1));
+    bench.slide(Some(3));
+    assert_eq!(bench.shown(), "Changed");
+    let Page::Verdict(judgement) = &bench.probe.page else {
+        panic!("no verdict");
+    };
+    assert_eq!(judgement.leading[0].0, 3);
+    assert_eq!(bench.learned, []);
+    // what is none of them is not asked about
+    (0..2).for_each(|_| bench.slide(None));
+    assert_eq!(bench.shown(), "Unknown");
 }
 
 #[test]
@@ -316,7 +359,7 @@ proptest! {
                 Happens::Judged(texture, sure, unknown, open) => {
                     let leading = (0..3).map(|n| (texture.wrapping_add(n), random.next_f32()));
                     let leading = leading.collect();
-                    probe.judged(Ok(Judgement { leading, sure, unknown, open, changed: false }));
+                    probe.judged(Ok(Judgement { leading, sure, unknown, open, changed: sure && !open }));
                     judged = true;
                 }
                 Happens::Learned(ok, textures) => {
@@ -332,6 +375,7 @@ proptest! {
                     judged = false;
                 }
                 Some(Job::Teach(_)) => prop_assert!(judged, "learned from what nobody judged"),
+                Some(Job::Calibrate) => probe.calibrated(Err(Some("no line"))),
                 None => {}
             }
             let screen = probe.screen(Some(&table), &About::default());
