@@ -238,3 +238,52 @@ fn numbers_of_trials_may_differ() {
         "{said}"
     );
 }
+
+/// Twenty worlds: a texture under the simulated finger against itself, and against another that the probe knows or does not.
+#[test]
+fn live_slides_are_verified_as_often_right_as_it_says() {
+    let textures: Vec<String> = (1..=117).map(|n: u8| n.to_string()).collect();
+    let (mut rejected, mut stated, mut unsure) = (0, 0.0, 0);
+    for seed in 1..=20 {
+        let reference = &textures[seed * 29 % 117];
+        let (world, other) = (
+            seed.to_string(),
+            &textures[(seed * 29 + 7 * seed + 3) % 117],
+        );
+        assert_ne!(reference, other);
+        for under in [reference, other] {
+            let command = ["verify", "--simulated", "--among", "5", "--format", "json"];
+            let more = [
+                "--texture",
+                reference,
+                "--material",
+                under,
+                "--seed",
+                &world,
+            ];
+            let told: serde_json::Value =
+                serde_json::from_str(&printed(&[&command[..], &more].concat())).unwrap();
+            let answer = told["answer"].as_str().unwrap();
+            println!(
+                "world {seed}: {} against {}: {answer} after {}",
+                told["sample"],
+                told["reference"],
+                told["slides"].as_array().unwrap().len()
+            );
+            if under == reference {
+                stated += told["false_alarm"].as_f64().unwrap();
+                rejected += i32::from(answer == "different");
+                unsure += i32::from(answer == "unsure");
+            } else {
+                assert_ne!(answer, "same", "{told}");
+            }
+        }
+    }
+    println!("{rejected} of 20 called different, {stated:.1} expected; {unsure} unsure");
+    // three standard deviations of a count
+    assert!(
+        f64::from(rejected) <= stated + 3.0 * stated.sqrt(),
+        "{rejected}"
+    );
+    assert!(unsure <= 2, "{unsure}");
+}
