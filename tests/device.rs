@@ -1039,6 +1039,7 @@ mod unix {
                     calibrated: 0,
                     counts: Counts::default(),
                     skin_mj: (0, 0),
+                    false_alarm: None,
                 })
             },
             || Event::Done(0),

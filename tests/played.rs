@@ -143,6 +143,7 @@ fn explore_all(set: &RecordingSet, method: Method, train: usize, seed: u64) -> T
                 }
                 ExplorationStep::Chosen(..)
                 | ExplorationStep::Decided { .. }
+                | ExplorationStep::Verified(..)
                 | ExplorationStep::CutShort(..) => {}
             },
         );

@@ -67,6 +67,11 @@ assign_resources! {
         blue: PB7,
         red: PB14,
     }
+    /// Follows `verify`.
+    go: Go {
+        /// High is "the same".
+        same: PC10,
+    }
     /// Of the handheld probe.
     display: Display {
         i2c: I2C1,

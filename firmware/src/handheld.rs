@@ -62,7 +62,7 @@ pub fn handheld() -> ! {
         }
     }
     match (
-        hand::hand(r.store, r.handle, words_out),
+        hand::hand(r.store, r.handle, r.go, words_out),
         display::show(r.display),
         hand::watch(),
     ) {

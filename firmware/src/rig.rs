@@ -68,7 +68,7 @@ pub async fn rig(thread: Spawner) {
         Err(_) => defmt::error!("no acquisition"),
     }
     spawn(&thread, watch::watch());
-    spawn(&thread, probe::probe(r.store, samples_out));
+    spawn(&thread, probe::probe(r.store, r.go, samples_out));
 }
 
 /// Spawns a task, of which there is only one.

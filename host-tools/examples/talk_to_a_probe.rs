@@ -61,6 +61,7 @@ fn pretend() -> SocketAddr {
                     calibrated: 0,
                     counts: Counts::default(),
                     skin_mj: (0, 0),
+                    false_alarm: None,
                 };
                 say(&mut line, Event::Status(status));
                 say(&mut line, Event::Done(request.id));

@@ -15,6 +15,7 @@ pub mod novelty;
 pub mod page;
 #[cfg(feature = "plots")]
 pub mod pictures;
+pub mod refresh;
 pub mod reliability;
 pub mod report;
 pub mod show;

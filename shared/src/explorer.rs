@@ -1,6 +1,7 @@
 //! Bayesian exploration: the posterior of every texture (eq. 1-4), and the next movement, which is the one that should
 //! leave the least confusion among the textures that are still likely (eq. 7, 11-13).
 
+mod answer;
 mod candidates;
 mod choice;
 mod config;
@@ -14,13 +15,14 @@ mod student;
 mod verify;
 mod whitened;
 
+pub use answer::{Answer, Verification};
 pub use choice::{ExpectedOutcome, benefit, confusion};
 pub use config::{Config, ExplorerError, Method, NEGLIGIBLE, ObserveError, Strategy};
 pub use confusions::{Confusions, Degrees};
 pub use episode::EpisodeSummary;
 pub use kernels::Kernels;
 pub use posterior::{Explorer, Told, Verdict};
-pub use verify::{Answer, ENOUGH_TRIALS, Verification};
+pub use verify::ENOUGH_TRIALS;
 
 #[cfg(test)]
 mod tests;

@@ -54,8 +54,8 @@ mod whitening;
 
 pub use drift::{Drift, Drifts, PAIRS};
 pub use encode::{
-    Change, EncodeError, Known, Texture, amend, encode, encode_fused, encoded_len, retell,
-    with_sections,
+    Change, EncodeError, Known, Texture, amend, encode, encode_fused, encoded_len, recentre,
+    retell, with_sections,
 };
 pub use format::{
     Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, Name, TableError, Tally, VERSION,
@@ -69,6 +69,7 @@ pub use scatter::{Scatter, WhitenError, whiten, whiten_drifting};
 pub use sections::Sections;
 pub use training_stats::{Experience, TrainingStats, Whitened};
 pub use view::Table;
+pub(crate) use whitening::fill;
 pub use whitening::{Whitening, white};
 
 #[cfg(test)]

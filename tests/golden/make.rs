@@ -257,6 +257,7 @@ fn reports() -> Vec<Report> {
                 damaged_frames: u32::MAX,
             },
             skin_mj: (1500, 250),
+            false_alarm: None,
         }));
     }
     tells.extend([

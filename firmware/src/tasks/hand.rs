@@ -3,7 +3,7 @@ use core::cell::Cell;
 use core::sync::atomic::Ordering::Relaxed;
 use core::sync::atomic::{AtomicBool, AtomicU32};
 
-use embassy_stm32::gpio::{Input, OutputType, Pull};
+use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::peripherals;
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::CountingMode;
@@ -266,8 +266,8 @@ fn tell(event: Event) {
     }
 }
 
-/// Tells the host, and who answers it meanwhile.
-struct Told;
+/// Tells the host, and who answers it meanwhile; has the go / no-go output.
+struct Told(Output<'static>);
 
 impl Events for Told {
     fn tell(&mut self, event: Event) {
@@ -277,12 +277,17 @@ impl Events for Told {
     fn table(&mut self, table: TableInUse) {
         TABLE.lock(|cell| cell.set(table));
     }
+
+    fn go(&mut self, on: bool) {
+        self.0.set_level(on.into());
+    }
 }
 
 #[embassy_executor::task]
 pub(crate) async fn hand(
     flash: board::Storage,
     handle: board::Handle,
+    go: board::Go,
     words: Consumer<'static, Word>,
 ) {
     static PLAN: StaticCell<Plan> = StaticCell::new();
@@ -299,7 +304,7 @@ pub(crate) async fn hand(
     );
     let store = with_timeout(OPENING, flash::open(flash)).await;
     let store = store.unwrap_or(Err(StoreError::Silent));
-    let mut events = Shown::new(Told);
+    let mut events = Shown::new(Told(Output::new(go.same, Level::Low, Speed::Low)));
     let mut memory = Memory::new(store, MappedTable, FACTORY, BUFFER.take());
     memory.reload(&mut events).await;
     let textures = memory.table().map_or(0, |table| table.textures());

@@ -1,6 +1,7 @@
 //! What the host asks for, one thing after the other. Owns the store.
 use core::sync::atomic::Ordering::Relaxed;
 
+use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_time::{Duration, Timer, with_timeout};
 use heapless::spsc::Consumer;
 use static_cell::{ConstStaticCell, StaticCell};
@@ -28,7 +29,11 @@ const OPENING: Duration = Duration::from_secs(10);
 const HEARD_MS: u64 = 150;
 
 #[embassy_executor::task]
-pub(crate) async fn probe(flash: board::Storage, samples: Consumer<'static, Samples>) {
+pub(crate) async fn probe(
+    flash: board::Storage,
+    go: board::Go,
+    samples: Consumer<'static, Samples>,
+) {
     static PLAN: StaticCell<Plan> = StaticCell::new();
     static BUFFER: ConstStaticCell<[u8; 16 * 1024]> = ConstStaticCell::new([0; 16 * 1024]);
     let mut rig = ServoRig::new(ServoHandle(samples));
@@ -45,7 +50,7 @@ pub(crate) async fn probe(flash: board::Storage, samples: Consumer<'static, Samp
     let mut probe = Probe {
         rig,
         memory: Memory::new(store, MappedTable, FACTORY, BUFFER.take()),
-        events: Told,
+        events: Told(Output::new(go.same, Level::Low, Speed::Low)),
         plan: PLAN.init_with(Plan::new),
     };
     probe.memory.reload(&mut probe.events).await;
@@ -79,8 +84,8 @@ fn trouble(why: Failure) {
     tell(Event::Trouble(why));
 }
 
-/// Tells the host, and the tasks that answer it meanwhile.
-struct Told;
+/// Tells the host, and the tasks that answer it meanwhile; has the go / no-go output.
+struct Told(Output<'static>);
 
 impl Events for Told {
     fn tell(&mut self, event: Event) {
@@ -89,5 +94,9 @@ impl Events for Told {
 
     fn table(&mut self, table: TableInUse) {
         TABLE.lock(|cell| cell.set(table));
+    }
+
+    fn go(&mut self, on: bool) {
+        self.0.set_level(on.into());
     }
 }

@@ -86,6 +86,7 @@ impl Stop {
             max_slides: self.max_slides,
             open: false,
             false_alarm: self.false_alarm,
+            verify: false,
         }
     }
 }

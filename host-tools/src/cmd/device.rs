@@ -10,11 +10,14 @@ mod loss;
 mod monitor;
 mod owner;
 mod record;
+mod refresh;
 mod rename;
 mod replay;
+mod settings;
 mod status;
 mod table;
 mod train;
+mod verify;
 
 use std::io::Write;
 
@@ -35,7 +38,7 @@ Try first:
   tactus device log replay session.jsonl       the same decisions, computed again on this PC
 
 Ctrl-C stops the rig and waits until the finger is lifted; the exit code is 130 then.
-Where `identify` ends without a name that is sure, it is 3.")]
+Where `identify` ends without a name that is sure, or `verify` not with \"the same\", it is 3.")]
 pub(crate) enum Command {
     /// List the serial ports, boards first
     #[command(after_help = "\
@@ -56,14 +59,17 @@ Examples:
   tactus device monitor --emulated --texture burlap    the emulated board, over simulated burlap")]
     Monitor(identify::Args),
     Identify(identify::Run),
+    Verify(verify::Args),
     Train(train::Train),
     Teach(train::Teach),
     Rename(rename::Rename),
     Forget(rename::Forget),
+    Refresh(refresh::Args),
     Record(record::Args),
     #[command(subcommand)]
     Table(table::Command),
     Calibrate(calibrate::Args),
+    Settings(settings::Args),
     /// End a fault and find the limit switches
     #[command(after_help = "\
 Examples:
@@ -86,13 +92,16 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<Don
         Command::Status(args) => status::run(args, out),
         Command::Monitor(args) => monitor::run(args),
         Command::Identify(args) => return identify::run(args, out),
+        Command::Verify(args) => return verify::run(args, out),
         Command::Train(args) => train::train(args, out),
         Command::Teach(args) => train::teach(args, out),
         Command::Rename(args) => rename::rename(args, out),
         Command::Forget(args) => rename::forget(args, out),
+        Command::Refresh(args) => refresh::run(args, out),
         Command::Record(args) => record::run(args, out),
         Command::Table(command) => table::run(command, out),
         Command::Calibrate(args) => calibrate::run(args, out),
+        Command::Settings(args) => settings::run(args, out),
         Command::Home(at) => calibrate::home(at, out),
         Command::Stop(at) => calibrate::stop(at, out),
         Command::Flash(args) => flash::run(args, out),

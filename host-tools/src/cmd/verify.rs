@@ -78,34 +78,47 @@ pub(crate) struct Args {
 
 /// What `verify --format json` prints.
 #[derive(Serialize)]
-struct Verified {
-    reference: String,
-    sample: String,
+pub(super) struct Verified {
+    pub(super) reference: String,
+    /// Where it is known what it is said to be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) sample: Option<String>,
     /// `same`, `different` or `unsure`.
-    answer: &'static str,
+    pub(super) answer: &'static str,
     /// Fewest slides of the reference at a movement.
-    reference_slides: u8,
+    pub(super) reference_slides: u8,
     /// Whether these are too few to rely on.
-    few: bool,
-    false_alarm: f32,
-    threshold: f32,
+    pub(super) few: bool,
+    pub(super) false_alarm: f32,
+    pub(super) threshold: f32,
     /// Share of other textures' visits of as many slides that would be called the same; `null`: the table has no other.
-    false_accept: Option<f64>,
-    slides: Vec<Slide>,
+    pub(super) false_accept: Option<f64>,
+    pub(super) slides: Vec<Slide>,
+}
+
+impl Verified {
+    /// How the command ends.
+    pub(super) fn done(&self) -> Done {
+        if self.answer == name(Answer::Same) {
+            Done::Fully
+        } else {
+            Done::NotIdentified
+        }
+    }
 }
 
 /// What was known after a slide.
 #[derive(Serialize)]
-struct Slide {
-    number: u32,
-    force_n: f32,
-    speed_mm_s: f32,
-    score: f32,
-    limit: f32,
-    answer: &'static str,
+pub(super) struct Slide {
+    pub(super) number: u32,
+    pub(super) force_n: f32,
+    pub(super) speed_mm_s: f32,
+    pub(super) score: f32,
+    pub(super) limit: f32,
+    pub(super) answer: &'static str,
 }
 
-fn name(answer: Answer) -> &'static str {
+pub(super) fn name(answer: Answer) -> &'static str {
     match answer {
         Answer::Same => "same",
         Answer::Different => "different",
@@ -231,7 +244,7 @@ fn hold(
     let reference_slides = trials.filter(|n| *n > 0).min().unwrap_or(0);
     let mut verified = Verified {
         reference: table.name(texture).unwrap_or_default().to_owned(),
-        sample,
+        sample: Some(sample),
         answer: name(Answer::Unsure),
         reference_slides,
         few: reference_slides < ENOUGH_TRIALS,
@@ -269,18 +282,14 @@ fn hold(
     ensure!(
         !verified.slides.is_empty(),
         "no slide on {} was good; another --seed makes another trial",
-        verified.sample
+        verified.sample.as_deref().unwrap_or("the sample")
     );
     verified.false_accept = false_accept(&explorer, texture);
     match args.format {
         Format::Json => print_json(&verified, out)?,
         Format::Text => print(&verified, out)?,
     }
-    Ok(if verified.answer == name(Answer::Same) {
-        Done::Fully
-    } else {
-        Done::NotIdentified
-    })
+    Ok(verified.done())
 }
 
 /// The table with the reference in it.
@@ -379,20 +388,28 @@ fn print(v: &Verified, out: &mut impl Write) -> anyhow::Result<()> {
         "Is it {}? ({} of {})",
         v.reference,
         count(v.slides.len() as u64, "slide"),
-        v.sample
+        v.sample.as_deref().unwrap_or("unknown")
     )?;
     for slide in &v.slides {
-        let says = match slide.answer {
-            "same" => "the same",
-            "different" => "different",
-            _ => "not sure yet",
-        };
-        writeln!(
-            out,
-            "  slide {}, {:.2} N at {:.1} mm/s: score {:.1}, different above {:.1}: {says}",
-            slide.number, slide.force_n, slide.speed_mm_s, slide.score, slide.limit
-        )?;
+        print_slide(slide, out)?;
     }
+    print_answer(v, out)
+}
+
+pub(super) fn print_slide(slide: &Slide, out: &mut impl Write) -> std::io::Result<()> {
+    let says = match slide.answer {
+        "same" => "the same",
+        "different" => "different",
+        _ => "not sure yet",
+    };
+    writeln!(
+        out,
+        "  slide {}, {:.2} N at {:.1} mm/s: score {:.1}, different above {:.1}: {says}",
+        slide.number, slide.force_n, slide.speed_mm_s, slide.score, slide.limit
+    )
+}
+
+pub(super) fn print_answer(v: &Verified, out: &mut impl Write) -> anyhow::Result<()> {
     let answer = match v.answer {
         "same" => format!("The same as {}.", v.reference),
         "different" => format!(

@@ -59,7 +59,7 @@ impl<'t, W: Write> Show<'t, W> {
             ),
             ExplorationStep::Rejected(_, why) => self.line(&format!("  rejected: {why}")),
             // shown with the truth: see `finish`
-            ExplorationStep::Decided { .. } => Ok(()),
+            ExplorationStep::Decided { .. } | ExplorationStep::Verified(..) => Ok(()),
             ExplorationStep::CutShort(known, slides) => self.answer(*known, slides),
         }
     }

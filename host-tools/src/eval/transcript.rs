@@ -99,7 +99,9 @@ impl Transcript {
             }
             ExplorationStep::Rejected(_, why) => self.rejected(why),
             // the answer is beside the slides: see [`Answer`]
-            ExplorationStep::Decided { .. } | ExplorationStep::CutShort(..) => {}
+            ExplorationStep::Decided { .. }
+            | ExplorationStep::Verified(..)
+            | ExplorationStep::CutShort(..) => {}
         }
     }
 

@@ -194,6 +194,7 @@ fn may_repeat(command: &Command) -> bool {
         | Command::BeginTable(_)
         | Command::WriteTable { .. }
         | Command::Forget(Forget::SelfLearned | Forget::Training(_))
+        | Command::SetFalseAlarm(_)
         | Command::FactoryTable => true,
         Command::Home
         | Command::Identify(_)
@@ -203,6 +204,7 @@ fn may_repeat(command: &Command) -> bool {
         | Command::Forget(Forget::Texture(_))
         | Command::Calibrate
         | Command::Weigh(_)
+        | Command::Verify(_)
         | Command::CommitTable => false,
     }
 }

@@ -251,8 +251,8 @@ mod tests {
                 continue;
             };
             all += 1;
-            let mut judged =
-                (1..=MAX_SLIDES).map(|n| (n, judge::<Plain>(table, &measured[..n]).unwrap().0));
+            let mut judged = (1..=MAX_SLIDES)
+                .map(|n| (n, judge::<Plain>(table, &measured[..n], None).unwrap().0));
             let (n, judged) = judged.find(|(_, judged)| !judged.open).unwrap();
             made += n;
             let is = judged.leading[0].0 == index;
@@ -334,7 +334,7 @@ mod tests {
                 continue;
             };
             let mut judged =
-                (1..=MAX_SLIDES).map(|n| judge::<Plain>(read, &measured[..n]).unwrap().0);
+                (1..=MAX_SLIDES).map(|n| judge::<Plain>(read, &measured[..n], None).unwrap().0);
             let judged = judged.find(|judged| !judged.open).unwrap();
             all += 1;
             new += usize::from(judged.unknown);

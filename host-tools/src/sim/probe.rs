@@ -24,6 +24,9 @@ pub trait Host {
     /// This table is in force now.
     fn table(&mut self, _table: TableInUse) {}
 
+    /// The go / no-go output is so from now on.
+    fn go(&mut self, _on: bool) {}
+
     /// It is `now` by the rig's clock, and this is its state: heard a thousand times a second.
     fn tick(&mut self, _now: Duration, _rig: &RigState) {}
 
@@ -152,6 +155,10 @@ impl<H: Host> Events for Told<'_, H> {
 
     fn table(&mut self, table: TableInUse) {
         self.0.borrow_mut().table(table);
+    }
+
+    fn go(&mut self, on: bool) {
+        self.0.borrow_mut().go(on);
     }
 }
 

@@ -85,6 +85,10 @@ pub struct Config {
     /// Share of the known textures that may be taken for new ones, if the answer may be that: with a table that is
     /// calibrated, whose own share it is unless given.
     pub false_alarm: Option<f32>,
+    /// Whether the question is whether it is the only candidate: slides are made until [`Explorer::verification`] answers.
+    ///
+    /// [`Explorer::verification`]: super::Explorer::verification
+    pub verify: bool,
 }
 
 impl Default for Config {
@@ -97,6 +101,7 @@ impl Default for Config {
             max_slides: 10,
             open: false,
             false_alarm: None,
+            verify: false,
         }
     }
 }

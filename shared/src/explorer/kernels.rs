@@ -5,7 +5,7 @@
 use crate::dsp::Plain;
 use crate::dsp::fixed::{exp_neg_q30, ln_q16};
 use crate::features::{MAX_FEATURES, Property};
-use crate::table::{Gaussian, Gaussians, Numbers, PAIRS};
+use crate::table::{Gaussian, Gaussians, Numbers, PAIRS, fill};
 
 /// A texture that is still likely, while a movement is weighed. The order of the fields is fixed, for kernels that are not
 /// written in Rust.
@@ -66,21 +66,18 @@ impl Candidate {
                 .sum::<i64>();
         };
         let pairs = mean.as_chunks_mut().0.iter_mut().zip(mask.iter().zip(by));
-        if let Some(known) = known.first_chunk::<{ 2 * MAX_FEATURES }>() {
-            // all of them, in steps that the compiler knows the number of
-            for ((pair, mask), word) in pairs.zip(known.as_chunks().0) {
-                take(pair, u32::from_le_bytes(*word), mask);
-            }
-        } else {
+        let filled;
+        let known = match known.first_chunk() {
+            Some(known) => known,
             // the last of a table
-            for ((pair, mask), bytes) in pairs.zip(known.chunks(4)) {
-                let bytes = bytes.iter().rev();
-                take(
-                    pair,
-                    bytes.fold(0, |word, byte| word << 8 | u32::from(*byte)),
-                    mask,
-                );
+            None => {
+                filled = fill(known);
+                &filled
             }
+        };
+        // in steps that the compiler knows the number of
+        for ((pair, mask), word) in pairs.zip(known.as_chunks().0) {
+            take(pair, u32::from_le_bytes(*word), mask);
         }
         Self {
             mean,

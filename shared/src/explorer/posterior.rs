@@ -12,6 +12,7 @@ use super::episode::{Episode, MovementSums};
 use super::kernels::Kernels;
 use super::novelty::NoveltyModel;
 use super::student::ShrinkagePrior;
+
 use super::whitened;
 use crate::dsp::Plain;
 use crate::features::{PropertySet, Vector};
@@ -148,6 +149,11 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     /// The table.
     pub fn table(&self) -> Table<'t> {
         self.table
+    }
+
+    /// How it explores.
+    pub fn config(&self) -> &Config {
+        &self.config
     }
 
     /// Slides made in this exploration.

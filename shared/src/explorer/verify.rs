@@ -4,38 +4,27 @@
 //! a texture that the table does not have. So it takes what is left of the other textures of the table: how much slides of one
 //! texture differ, how fingers drift, and how textures differ.
 
+use super::answer::{Answer, Verification};
 use super::kernels::Kernels;
-use super::posterior::Explorer;
+use super::posterior::{Explorer, Verdict};
 use crate::features::Vector;
 use crate::table::Against;
 
 /// Slides from which a reference is not one of few any more.
 pub const ENOUGH_TRIALS: u8 = 3;
 
-/// What an exploration says of its only candidate.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Verification {
-    /// ln of how much likelier the slides are of another texture, whichever, than of this one.
-    pub score: f32,
-    /// Score above which it is another one: as many of the slides of this one are above it as
-    /// [`Config::false_alarm`](super::Config::false_alarm) says.
-    pub limit: f32,
-    /// What to tell.
-    pub answer: Answer,
-}
-
-/// Whether it is the same.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Answer {
-    /// It is.
-    Same,
-    /// It is another one, or this one changed beyond what the table expects.
-    Different,
-    /// More slides would tell.
-    Unsure,
-}
-
 impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
+    /// As [`Explorer::verdict`]; where the question is whether it is the only candidate, once that is answered, or the last
+    /// slide was made.
+    pub fn end(&self) -> Option<Verdict> {
+        if !self.config.verify {
+            return self.verdict();
+        }
+        let now = self.verification().map(|now| now.answer);
+        let over = !matches!(now, None | Some(Answer::Unsure));
+        (over || self.slides >= self.config.max_slides).then(|| self.best())
+    }
+
     /// What the slides made so far say of the only candidate. `None` before the first slide, where there are other candidates,
     /// and with a table that has no limits.
     pub fn verification(&self) -> Option<Verification> {

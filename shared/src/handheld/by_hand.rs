@@ -410,6 +410,10 @@ impl<E: Events> Events for Shown<E> {
     fn table(&mut self, table: TableInUse) {
         self.to.table(table);
     }
+
+    fn go(&mut self, on: bool) {
+        self.to.go(on);
+    }
 }
 
 /// The probe in the hand of a person.
@@ -460,7 +464,7 @@ pub async fn step<H, K, F, B, E>(
 /// What of a request the display names.
 fn asked(command: &Command) -> (Asked, Option<Name>) {
     match command {
-        Command::Identify(wanted) => (
+        Command::Identify(wanted) | Command::Verify(wanted) => (
             Asked {
                 slide: 0,
                 of: wanted.max_slides,

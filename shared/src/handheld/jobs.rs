@@ -43,16 +43,17 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
                 Ok(table) => table,
                 Err(why) => return handheld.memory_failed(words(&why)),
             };
-            let judged = judge::<K>(table, &slides).map(|(judgement, episode)| {
-                if let Some((texture, p)) = judgement.leading.first() {
-                    log(Outcome::Judged {
-                        slides: slides.len(),
-                        leading: (table.name(*texture).unwrap_or_default(), *p),
-                        judgement: &judgement,
-                    });
-                }
-                (judgement, episode)
-            });
+            let judged =
+                judge::<K>(table, &slides, memory.false_alarm).map(|(judgement, episode)| {
+                    if let Some((texture, p)) = judgement.leading.first() {
+                        log(Outcome::Judged {
+                            slides: slides.len(),
+                            leading: (table.name(*texture).unwrap_or_default(), *p),
+                            judgement: &judgement,
+                        });
+                    }
+                    (judgement, episode)
+                });
             match judged {
                 Ok((judgement, episode)) => {
                     memory.episode = Some(episode);

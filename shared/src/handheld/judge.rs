@@ -55,18 +55,20 @@ pub enum JudgeError {
 }
 
 /// Compares the slides of an episode with every texture of the table. Returns the judgement to show and the summary that
-/// the probe can learn from.
+/// the probe can learn from. The share of false alarms is the table's own, unless given.
 ///
 /// # Errors
 /// The table is not one for a handheld probe, or a slide lacks a feature.
 pub fn judge<K: Kernels>(
     table: Table<'_>,
     slides: &[Observation],
+    false_alarm: Option<f32>,
 ) -> Result<(Judgement, EpisodeSummary), JudgeError> {
     let config = Config {
         method: Method::Fused,
         max_slides: MAX_SLIDES as u8,
         open: true,
+        false_alarm,
         ..Config::default()
     };
     let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);

@@ -10,9 +10,10 @@ use super::memory::Memory;
 use super::seams::{Events, Panel, RigHandle, StoredBytes};
 use super::{calibrate, identify, teach, train, transfer};
 use crate::dsp::Plan;
-use crate::explorer::Kernels;
+use crate::explorer::{Answer, Kernels};
 use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
+use crate::table::is_false_alarm;
 use crate::wire::{Command, Event, Failure, Request, Status};
 
 /// When a request is dealt with.
@@ -80,6 +81,7 @@ fn status(panel: &impl Panel) -> Status {
             (rig.skin.energy_j() * 1e3) as u32,
             (rig.skin.wear_j() * 1e3) as u32,
         ),
+        false_alarm: table.false_alarm,
     }
 }
 
@@ -133,19 +135,33 @@ where
                 memory.episode = None;
                 rig.home().await.map_err(Failure::Rig)
             }
-            Command::Identify(wanted) => {
+            Command::Identify(wanted) | Command::Verify(wanted) => {
+                let verify = matches!(command, Command::Verify(_));
+                if verify {
+                    events.go(false);
+                }
                 memory.episode = None;
                 rig.begin(wanted.seed).await;
                 let table = memory.table()?;
+                let mut config = wanted.config(table.contents());
+                config.verify = verify;
+                config.false_alarm = config.false_alarm.or(memory.false_alarm);
+                let mut same = false;
                 // awaited where it lies: moving it would take its size of the stack, twice
                 let done = {
-                    let tell = |event| events.tell(event);
-                    let exploration = pin!(identify::<_, K>(wanted, rig, table, plan, tell));
-                    exploration.await
+                    let tell = |event| {
+                        if let Event::Verified { now, .. } = &event {
+                            same = now.answer == Answer::Same;
+                        }
+                        events.tell(event);
+                    };
+                    pin!(identify::<_, K>(wanted, config, rig, table, plan, tell)).await
                 };
                 memory.keep_skin(&rig.state().skin).await;
                 let episode = done?;
-                if wanted.learn {
+                if verify {
+                    events.go(same);
+                } else if wanted.learn {
                     memory.learn_by_itself(&episode, events).await;
                 }
                 memory.episode = Some(episode);
@@ -216,6 +232,14 @@ where
                 memory.episode = None;
                 let counts = rig.weigh(*mn).await?;
                 events.tell(Event::Weighed { mn: *mn, counts });
+                Ok(())
+            }
+            Command::SetFalseAlarm(share) => {
+                if !share.is_none_or(is_false_alarm) {
+                    return Err(Failure::FalseAlarm);
+                }
+                memory.store()?.set_false_alarm(*share).await?;
+                memory.reload(events).await;
                 Ok(())
             }
             // answered when they came, see `receive`

@@ -1,7 +1,7 @@
 //! An exploration: slide by slide, the explorer chooses, the rig moves, and the explorer takes in what was measured.
 
 use crate::dsp::Plan;
-use crate::explorer::{ExpectedOutcome, Explorer, Kernels, Verdict};
+use crate::explorer::{ExpectedOutcome, Explorer, Kernels, Verdict, Verification};
 use crate::features::{Measurement, Observation, Slide};
 use crate::rig::{MAX_REJECTED, Rig, RigError};
 use crate::table::Action;
@@ -40,6 +40,8 @@ pub enum ExplorationStep<'a, E> {
     Chosen(Action, &'a [ExpectedOutcome]),
     /// The slide was made and taken in; the posterior of every texture.
     Measured(Action, &'a Measurement, &'a [f32]),
+    /// Where that was asked: whether it is the only candidate, after so many slides that counted.
+    Verified(Verification, u8),
     /// The slide came to nothing and does not count. The choice is made again: see [`Explorer::reject`].
     Rejected(Action, &'a Rejection<E>),
     /// The answer, while the finger is still being lifted.
@@ -124,7 +126,7 @@ async fn slides<R: Rig, const N: usize, K: Kernels>(
     explorer.restart();
     let mut rejected = 0;
     loop {
-        if let Some(verdict) = explorer.verdict() {
+        if let Some(verdict) = explorer.end() {
             tell(ExplorationStep::Decided {
                 verdict: &verdict,
                 slides: explorer.slides(),
@@ -157,6 +159,11 @@ async fn slides<R: Rig, const N: usize, K: Kernels>(
                         rejected = 0;
                         let posterior = explorer.posterior();
                         tell(ExplorationStep::Measured(action, &measurement, posterior));
+                        if explorer.config().verify
+                            && let Some(now) = explorer.verification()
+                        {
+                            tell(ExplorationStep::Verified(now, explorer.slides()));
+                        }
                         continue;
                     }
                 },

@@ -14,12 +14,15 @@ use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
 use crate::wire::{Event, Failure, Identify, MAX_EXPECTED_OUTCOMES, Verdict};
 
-/// Explores what lies under the finger until there is an answer, and reports it; the error is why there is none.
+/// Explores what lies under the finger until there is an answer, and reports it; the error is why there is none. `config` is
+/// that of the request, with what the probe adds to it; where it is to [verify](Config::verify), [`Event::Verified`] takes
+/// the verdict's place.
 ///
 /// # Errors
 /// The request makes no sense with this table, or the exploration failed: see [`crate::probe::explore::ExploreError`].
 pub async fn identify<R, K>(
     wanted: &Identify,
+    config: Config,
     rig: &mut R,
     table: Table<'_>,
     plan: &Plan,
@@ -30,8 +33,15 @@ where
     K: Kernels,
 {
     let contents = table.contents();
+    if config.verify {
+        if wanted.among.len() != 1 {
+            return Err(Failure::Explorer(ExplorerError::Candidates));
+        }
+        if table.limits().is_none() {
+            return Err(Failure::NoLimits);
+        }
+    }
     let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
-    let config = wanted.config(contents);
     if K::ONLY_FUSED {
         consider_fused(&mut explorer, rig.measures(), config, &wanted.among)
     } else {
@@ -66,6 +76,9 @@ where
                 });
                 slide = slide.saturating_add(1);
             }
+            ExplorationStep::Verified(now, slides) => tell(Event::Verified { slides, now }),
+            // whether it is the one asked for was told after the slide
+            ExplorationStep::Decided { .. } | ExplorationStep::CutShort(..) if config.verify => {}
             ExplorationStep::Rejected(_, why) => tell(Event::Rejected {
                 slide,
                 why: Failure::Slide(*why),

@@ -30,6 +30,8 @@ pub struct Memory<'m, F, B> {
     is_factory: bool,
     /// Why another table is in force than the one that was stored last.
     instead: Option<MemoryError>,
+    /// Share of false alarms that limits are for; the table's own, unless set.
+    pub false_alarm: Option<f32>,
     /// Summary of the last exploration, until the rig moves again.
     pub episode: Option<EpisodeSummary>,
 }
@@ -68,6 +70,7 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
             length: Ok(0),
             is_factory: true,
             instead: None,
+            false_alarm: None,
             episode: None,
         }
     }
@@ -77,9 +80,13 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         (self.store, self.factory, self.buffer)
     }
 
-    /// Puts the table in force, which `events` hears of.
+    /// Puts the table in force, with the limits that are set, which `events` hears of.
     pub async fn reload(&mut self, events: &mut impl Events) {
         let damaged = self.store.as_ref().ok().and_then(Store::damaged_table);
+        // settings that cannot be read are reported when the calibration is restored
+        if let Ok(store) = &mut self.store {
+            self.false_alarm = store.false_alarm().await.unwrap_or(None);
+        }
         let (base, why) = base(&mut self.store, &mut self.stored, self.factory);
         self.is_factory = core::ptr::eq(base, self.factory);
         let instead = if self.is_factory {
@@ -110,6 +117,7 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
                 bytes: self.in_force().len() as u32,
                 crc: table.crc(),
                 factory: self.is_factory,
+                false_alarm: self.false_alarm,
             });
         }
     }

@@ -80,6 +80,9 @@ pub trait Events {
 
     /// This table is in force now.
     fn table(&mut self, table: TableInUse);
+
+    /// The go / no-go output: on from a verification that said "the same" until the next one begins.
+    fn go(&mut self, _on: bool) {}
 }
 
 /// What is answered at any time, whatever the probe is busy with.

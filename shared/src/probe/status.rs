@@ -75,7 +75,7 @@ impl RigState {
 }
 
 /// The table in force.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub struct TableInUse {
     /// Its textures.
     pub textures: u16,
@@ -85,6 +85,8 @@ pub struct TableInUse {
     pub crc: u32,
     /// The table came with the firmware: the probe has learned no texture and the host has written no table.
     pub factory: bool,
+    /// Share of false alarms that its limits are for, if it was set; otherwise its own.
+    pub false_alarm: Option<f32>,
 }
 
 impl TableInUse {
@@ -94,6 +96,7 @@ impl TableInUse {
         bytes: 0,
         crc: 0,
         factory: true,
+        false_alarm: None,
     };
 }
 

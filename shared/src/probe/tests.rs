@@ -66,6 +66,7 @@ fn identified(slides: &[Option<i16>], wanted: &Identify) -> (Result<(), Text>, v
     let mut told = vec::Vec::new();
     let result = block_on(identify::<_, crate::dsp::Plain>(
         wanted,
+        wanted.config(Table::read(&bytes).unwrap().contents()),
         &mut Script(slides.iter().copied().collect()),
         Table::read(&bytes).unwrap(),
         &Plan::new(),
@@ -175,6 +176,7 @@ fn a_fused_exploration_says_whether_it_is_certain() {
         };
         let episode = block_on(identify::<_, crate::dsp::Plain>(
             &wanted,
+            wanted.config(Table::read(&bytes).unwrap().contents()),
             &mut Script(slides.iter().copied().collect()),
             Table::read(&bytes).unwrap(),
             &Plan::new(),

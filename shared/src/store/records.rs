@@ -26,6 +26,8 @@ pub(super) const KEY_SCHEMA: u8 = 0;
 pub(super) const KEY_CALIBRATION: u8 = 1;
 /// How far the finger has slid, and the work that the skin has seen.
 pub(super) const KEY_SKIN: u8 = 2;
+/// The share of false alarms that the probe's limits are for.
+pub(super) const KEY_FALSE_ALARM: u8 = 3;
 /// The first of the unfinished trainings: a texture at one movement each.
 pub(super) const KEY_TRAINED: u8 = 16;
 /// The first of the textures that the probe learned by itself, one each.

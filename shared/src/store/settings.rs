@@ -10,14 +10,14 @@ use super::error::{SettingsError, StoreError};
 use super::layout::SCHEMA;
 use super::pages::{Pages, page_size};
 use super::records::{
-    KEY_CALIBRATION, KEY_SCHEMA, KEY_SKIN, Map, RECORD, Record, Records, SelfLearnedRecord,
-    TrainingRecord, decode,
+    KEY_CALIBRATION, KEY_FALSE_ALARM, KEY_SCHEMA, KEY_SKIN, Map, RECORD, Record, Records,
+    SelfLearnedRecord, TrainingRecord, decode,
 };
 use super::sectors::Store;
 use crate::features::Movement;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
-use crate::table::{MAX_TEXTURES, TrainingStats};
+use crate::table::{MAX_TEXTURES, TrainingStats, is_false_alarm};
 
 /// How a place for a record is used, as a new record sees it.
 #[derive(Clone, Copy, PartialEq)]
@@ -39,7 +39,7 @@ impl<F: NorFlash> Store<F> {
         self.settings.map(|_| ())
     }
 
-    /// Erases all settings: calibration, skin care and unfinished training.
+    /// Erases all settings: calibration, skin care, false alarm and unfinished training.
     ///
     /// # Errors
     /// [`StoreError::Flash`].
@@ -100,6 +100,27 @@ impl<F: NorFlash> Store<F> {
     pub async fn set_skin(&mut self, skin: &SkinCare) -> Result<(), StoreError> {
         self.encode(KEY_SKIN, &(skin.energy_j(), skin.wear_j()))
             .await
+    }
+
+    /// Share of false alarms that limits are for; `None`: each table's own.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::Settings`].
+    pub async fn false_alarm(&mut self) -> Result<Option<f32>, StoreError> {
+        let mut buffer = [0; RECORD];
+        let Some(bytes) = self.fetch(KEY_FALSE_ALARM, &mut buffer).await? else {
+            return Ok(None);
+        };
+        let share: Option<f32> = decode(bytes)?;
+        Ok(share.filter(|share| is_false_alarm(*share)))
+    }
+
+    /// Stores the share of false alarms that limits are for.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
+    pub async fn set_false_alarm(&mut self, share: Option<f32>) -> Result<(), StoreError> {
+        self.encode(KEY_FALSE_ALARM, &share).await
     }
 
     /// What the training of a texture has learned so far at a movement, on top of the table with this checksum, or of its

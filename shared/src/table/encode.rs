@@ -346,6 +346,31 @@ pub fn retell(
     Ok(())
 }
 
+/// Puts other features in the place of those that are whitened to 0 at a movement: what was learned keeps its place among the
+/// whitened, and slides that differ from those of before by as much are whitened as those were.
+///
+/// # Errors
+/// The bytes are no fused table of so many features, or have no such movement.
+pub fn recentre(bytes: &mut [u8], movement: u8, centre: &[i16]) -> Result<(), EncodeError> {
+    let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
+    let Contents::Fused(_, features) = table.contents else {
+        return Err(EncodeError::Contents);
+    };
+    let features = usize::from(features);
+    if movement >= table.movements || centre.len() != features {
+        return Err(EncodeError::Contents);
+    }
+    let at = table.layout().whitenings + usize::from(movement) * Whitening::bytes(features);
+    let new = centre.iter().flat_map(|x| x.to_le_bytes());
+    for (to, from) in bytes.iter_mut().skip(at).zip(new) {
+        *to = from;
+    }
+    if let Some((body, crc)) = bytes.split_last_chunk_mut() {
+        *crc = CRC32.checksum(body).to_le_bytes();
+    }
+    Ok(())
+}
+
 /// Where the cells of a texture come from.
 #[derive(Clone, Copy)]
 enum Cells<'a> {

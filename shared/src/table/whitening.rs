@@ -124,28 +124,35 @@ impl<'b> View<'b> {
         let mut white = Vector::new();
         let mut rest = rows;
         for &places in places {
-            let sum = match rest.first_chunk::<{ 2 * MAX_FEATURES }>() {
-                // in steps that the compiler knows the number of; what follows the row is multiplied by 0
-                Some(row) => {
-                    let row = row.as_chunks().0.iter().map(|w| u32::from_le_bytes(*w));
-                    row.zip(apart).map(|(w, x)| dot(w, x)).sum()
-                }
+            let filled;
+            let row = match rest.first_chunk() {
+                Some(row) => row,
                 // the last of a table
                 None => {
-                    let row = rest.chunks(4).map(|w| match *w {
-                        [a, b, c, d] => u32::from_le_bytes([a, b, c, d]),
-                        [a, b, ..] => u16::from_le_bytes([a, b]).into(),
-                        _ => 0,
-                    });
-                    row.zip(apart).map(|(w, x)| dot(w, x)).sum()
+                    filled = fill(rest);
+                    &filled
                 }
             };
+            // in steps that the compiler knows the number of; what follows the row is multiplied by 0
+            let row = row.as_chunks().0.iter().map(|w| u32::from_le_bytes(*w));
+            let sum = row.zip(apart).map(|(w, x)| dot(w, x)).sum();
             // `white` has space for one value a row
             let _ = white.push(rounded(sum, places));
             rest = rest.get(2 * self.features..).unwrap_or_default();
         }
         white
     }
+}
+
+/// As many bytes as the most features take, 0 beyond those that there are.
+#[cold]
+#[inline(never)]
+pub(crate) fn fill(bytes: &[u8]) -> [u8; 2 * MAX_FEATURES] {
+    let mut filled = [0; 2 * MAX_FEATURES];
+    for (to, from) in filled.iter_mut().zip(bytes) {
+        *to = *from;
+    }
+    filled
 }
 
 /// Two numbers of 16 bits in a word, as the chip multiplies them.

@@ -72,6 +72,12 @@ pub enum Command {
     FactoryTable,
     /// Measures P_DC under a weight of so many mN that a person puts on the finger: [`super::Event::Weighed`].
     Weigh(u16),
+    /// Finds out whether what lies under the finger is the one texture it is among: [`super::Event::Verified`] after every
+    /// slide, and no verdict. New in version 6.
+    Verify(Identify),
+    /// Keeps the share of false alarms that limits are for, where a request does not say otherwise; `None`: each table's
+    /// own. New in version 6.
+    SetFalseAlarm(Option<f32>),
 }
 
 /// An exploration.
@@ -93,7 +99,8 @@ pub struct Identify {
     pub learn: bool,
     /// For random choices, and for where on the sample slides begin.
     pub seed: u32,
-    /// Share of the known textures that may be taken for new ones; the table's own, unless given. New in version 5.
+    /// Share of the known textures that may be taken for new ones; that of the probe's settings, or the
+    /// table's own, unless given. New in version 5.
     #[serde(default)]
     pub false_alarm: Option<f32>,
 }
@@ -125,6 +132,7 @@ impl Identify {
             max_slides: self.max_slides,
             open: self.open,
             false_alarm: self.false_alarm.filter(|share| is_false_alarm(*share)),
+            verify: false,
         }
     }
 }

@@ -8,7 +8,7 @@ use super::failure::{self, Failure};
 use super::prompt::Prompt;
 use super::sparse;
 use super::text::Text;
-use crate::explorer::{self, ExpectedOutcome};
+use crate::explorer::{self, ExpectedOutcome, Verification};
 use crate::features::{
     BLOCK, Block, FUSED_BANDS, Measurement, Movement, Observation, Properties, Property,
 };
@@ -144,6 +144,13 @@ pub enum Event {
         /// Counts above that of the lifted finger.
         counts: f32,
     },
+    /// Whether it is the texture asked for, after so many slides. New in version 6.
+    Verified {
+        /// Slides that counted.
+        slides: u8,
+        /// What they say.
+        now: Verification,
+    },
 }
 
 /// Why the chip started.
@@ -225,6 +232,9 @@ pub struct Status {
     pub counts: Counts,
     /// Work that the skin has seen, mJ, and that part of it that wears.
     pub skin_mj: (u32, u32),
+    /// Share of false alarms that limits are for, if it was set: see [`super::Command::SetFalseAlarm`]. New in version 6.
+    #[serde(default)]
+    pub false_alarm: Option<f32>,
 }
 
 /// What the acquisition and the link count, since boot.

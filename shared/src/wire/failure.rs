@@ -207,6 +207,14 @@ pub enum Failure {
     /// This kind of probe cannot do that.
     #[error("this kind of probe cannot do that")]
     OtherProbe,
+    /// The table has no limits by which slides would be called different. New in version 6.
+    #[error(
+        "the table has no limits, by which slides would be called different: learn it again, with --method fused"
+    )]
+    NoLimits,
+    /// A share of false alarms that is none, or that no limit can be for. New in version 6.
+    #[error("the share of false alarms must be from 0.0005 to 0.2")]
+    FalseAlarm,
 }
 
 /// What a rig gets over by itself asks nothing of a person.

@@ -132,6 +132,7 @@ fn longest() -> vec::Vec<Report> {
                 damaged_frames: u32::MAX,
             },
             skin_mj: (u32::MAX, u32::MAX),
+            false_alarm: Some(0.1),
         })),
     ]
 }

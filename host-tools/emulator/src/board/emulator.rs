@@ -272,6 +272,11 @@ impl Emulator {
         self.with(|standing| pins::LEDS.map(|led| standing.session.board_mut().level(led)))
     }
 
+    /// Whether the go / no-go output is high.
+    pub fn go(&mut self) -> Result<bool, Error> {
+        self.with(|standing| standing.session.board_mut().level(pins::GO))
+    }
+
     /// The debug probe's 8 MHz stop, for good. The chip's clock security system, where the firmware has turned it on, does
     /// all that it does but the NMI, which rigless cannot raise: write ICSR by code of your own.
     pub fn stop_clock(&mut self) -> Result<(), Error> {

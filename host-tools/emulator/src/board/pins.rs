@@ -70,8 +70,11 @@ pub const BUTTON: PinId = PinId(C, 13);
 /// LD1 green, LD2 blue, LD3 red.
 pub const LEDS: [PinId; 3] = [PinId(B, 0), PinId(B, 7), PinId(B, 14)];
 
+/// Go / no-go: high while the last verification said "the same".
+pub const GO: PinId = PinId(C, 10);
+
 /// Levels that resistors of the drivers give to pins that the chip leaves alone, so that nothing moves in a reset.
-pub(crate) const REST_LEVELS: [(PinId, bool); 8] = [
+pub(crate) const REST_LEVELS: [(PinId, bool); 9] = [
     (SENSOR_CS, true),
     (LEVER_STEP, false),
     (LEVER_DIR, false),
@@ -80,4 +83,5 @@ pub(crate) const REST_LEVELS: [(PinId, bool); 8] = [
     (STAGE_DIR, false),
     (STAGE_ENABLE, false),
     (BUTTON, false),
+    (GO, false),
 ];

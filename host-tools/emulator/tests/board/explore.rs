@@ -18,7 +18,7 @@ use tactus_emulator::runs::campaign;
 use crate::common::{boot, elf};
 
 /// A simulated world of six textures.
-fn world() -> &'static (Collection, Known) {
+pub(crate) fn world() -> &'static (Collection, Known) {
     static WORLD: OnceLock<(Collection, Known)> = OnceLock::new();
     WORLD.get_or_init(|| {
         let collection = Collection {

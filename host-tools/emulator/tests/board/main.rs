@@ -13,3 +13,4 @@ mod selftest;
 mod serve;
 mod settings;
 mod teach;
+mod verify;

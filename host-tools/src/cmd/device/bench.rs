@@ -401,6 +401,7 @@ fn moves(command: &Command) -> bool {
             | Command::Train(_)
             | Command::Calibrate
             | Command::Weigh(_)
+            | Command::Verify(_)
     )
 }
 

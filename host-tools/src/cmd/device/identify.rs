@@ -12,7 +12,7 @@ use tactus::eval::transcript::{Answer, Transcript};
 use tactus::link::Request;
 use tactus_core::explorer::Told;
 use tactus_core::table::Table;
-use tactus_core::wire::{Command, Identify};
+use tactus_core::wire::{Command, Identify, Status};
 
 use super::bench::Bench;
 use super::line::Where;
@@ -65,8 +65,8 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// The request, for a probe that knows these textures.
-    pub(crate) fn wanted(&self, names: &[String]) -> anyhow::Result<Identify> {
+    /// The request, for a probe that knows these textures and is so.
+    pub(crate) fn wanted(&self, names: &[String], status: &Status) -> anyhow::Result<Identify> {
         let index = |wanted: &String| {
             let wanted = wanted.trim();
             let known: Vec<&str> = names.iter().map(String::as_str).collect();
@@ -90,7 +90,8 @@ impl Args {
             open: !self.closed,
             learn: self.learn,
             seed: self.seed.unwrap_or_else(seed_of_now),
-            false_alarm: self.stop.false_alarm,
+            // told, so that a log says what was decided by
+            false_alarm: self.stop.false_alarm.or(status.false_alarm),
         })
     }
 }
@@ -120,12 +121,12 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
         Format::Text => &mut *stdout,
         Format::Json => &mut nowhere,
     };
-    let (mut bench, _) = Bench::open(&args.at)?;
+    let (mut bench, status) = Bench::open(&args.at)?;
     // it is in the log then, too
     let bytes = bench.table()?;
     let table = Table::read(&bytes)?;
     let names: Vec<String> = table.names().map(str::to_owned).collect();
-    let wanted = args.wanted(&names)?;
+    let wanted = args.wanted(&names, &status)?;
     let (among, seed) = (wanted.among.len(), wanted.seed);
     let among = if among == 0 { names.len() } else { among };
     writeln!(out, "An unknown texture, one of {among} (seed {seed}).")?;

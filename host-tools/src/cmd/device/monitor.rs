@@ -45,7 +45,7 @@ enum End {
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let (mut bench, status) = Bench::open(&args.at)?;
     let names = bench.names()?;
-    let wanted = args.wanted(&names)?;
+    let wanted = args.wanted(&names, &status)?;
     if !io::stdout().is_terminal() {
         return Err(io::Error::other(
             "the monitor needs a terminal; `tactus device identify` writes lines, `--log FILE` a record",

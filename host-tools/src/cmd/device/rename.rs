@@ -138,7 +138,7 @@ pub(crate) fn forget(args: &Forget, out: &mut impl Write) -> anyhow::Result<()> 
 }
 
 /// The texture that is meant, as a table has it.
-fn known(table: &[u8], typed: &str) -> anyhow::Result<Name> {
+pub(super) fn known(table: &[u8], typed: &str) -> anyhow::Result<Name> {
     let table = Table::read(table)?;
     let all: Vec<&str> = table.names().collect();
     name_of(names::find(typed, &all).map_err(anyhow::Error::msg)?)

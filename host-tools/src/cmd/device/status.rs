@@ -11,7 +11,7 @@ use tactus_core::wire::{Phase, Status};
 use super::bench::Bench;
 use super::calibrate::{CalibrationSummary, calibration_rows};
 use super::line::Where;
-use crate::cmd::output::{Format, print_json, print_rows};
+use crate::cmd::output::{Format, percent, print_json, print_rows};
 
 /// Show the state of the probe: rig, faults, table, counters
 #[derive(clap::Args)]
@@ -116,8 +116,20 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             format!("{joule:.1} J of sliding, {wear:.1} J of it wear"),
         ),
     ]);
+    rows.push(("limits", limits(status.false_alarm)));
     rows.extend(calibration_rows(&calibration));
     print_rows(&rows, out)
+}
+
+/// For which false alarms the probe's limits are.
+pub(crate) fn limits(false_alarm: Option<f32>) -> String {
+    match false_alarm {
+        Some(share) => format!(
+            "for {} false alarms, as set (tactus device settings)",
+            percent(share.into())
+        ),
+        None => "for the table's own false alarms".to_owned(),
+    }
 }
 
 /// What the rig does, in a word.

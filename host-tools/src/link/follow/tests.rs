@@ -122,6 +122,7 @@ fn exploration(method: Method) -> (Vec<u8>, Vec<Event>) {
         || 0,
         |event| {
             events.push(match event {
+                ExplorationStep::Verified(..) => return,
                 ExplorationStep::Chosen(action, expected) => {
                     let mut expected: Vec<ExpectedOutcome> = expected
                         .iter()

@@ -146,6 +146,7 @@ impl Recipe {
 
 const OPEN: Config = Config {
     false_alarm: None,
+    verify: false,
     method: Method::Fused,
     strategy: Strategy::Bayesian,
     threshold: 0.99,

@@ -65,7 +65,7 @@ impl<'p> Bench<'p> {
         let table = Table::read(&self.table).unwrap();
         match self.probe.job() {
             None => {}
-            Some(Job::Judge(slides)) => match judge::<Plain>(table, &slides) {
+            Some(Job::Judge(slides)) => match judge::<Plain>(table, &slides, None) {
                 Ok((mut judgement, episode)) => {
                     self.episode = Some(episode);
                     judgement.changed |= self.changed;

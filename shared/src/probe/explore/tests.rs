@@ -95,7 +95,7 @@ fn explored(stimuli: &[Stimulus], config: Config) -> (Outcome, Vec<String>, Vec<
         || random.next().unwrap(),
         |event| {
             told.push(match event {
-                ExplorationStep::Decided { .. } => return,
+                ExplorationStep::Decided { .. } | ExplorationStep::Verified(..) => return,
                 ExplorationStep::Chosen(action, expected) => {
                     assert!(expected.iter().any(|o| o.action == action));
                     format!("{} {}", action.what(), action.movement)
@@ -201,6 +201,7 @@ fn a_slide_is_judged_while_the_finger_is_lifted() {
                         "decided"
                     }
                     ExplorationStep::CutShort(..) => "cut short",
+                    ExplorationStep::Verified(..) => "verified",
                 });
             },
         );

@@ -317,6 +317,7 @@ impl Panel for Desk {
             bytes: 200,
             crc: 77,
             factory: false,
+            false_alarm: Some(0.1),
         }
     }
 
@@ -361,6 +362,7 @@ fn what_comes_while_the_probe_is_busy_is_answered_or_refused() {
             calibrated: 20_261_121,
             counts: desk.counts(),
             skin_mj: (1500, 250),
+            false_alarm: Some(0.1),
         }
     );
     desk.told.clear();

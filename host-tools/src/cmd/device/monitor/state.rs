@@ -285,6 +285,7 @@ impl Monitor {
             Event::Damaged(_)
             | Event::Pdc(_)
             | Event::Weighed { .. }
+            | Event::Verified { .. }
             | Event::Done(_)
             | Event::Refused { .. }
             | Event::TrainingSlide { .. }

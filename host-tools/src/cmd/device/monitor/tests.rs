@@ -26,6 +26,7 @@ fn status() -> Status {
         calibrated: 0,
         counts: Counts::default(),
         skin_mj: (1500, 250),
+        false_alarm: None,
     }
 }
 

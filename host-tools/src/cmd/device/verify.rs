@@ -1,0 +1,137 @@
+//! `tactus device verify`: whether what lies under the probe's finger is one of its textures.
+
+use std::io::{self, Write};
+
+use anyhow::Context as _;
+use tactus::eval::evaluate::{Method, explorer};
+use tactus::eval::verify::false_accept;
+use tactus::link::Request;
+use tactus_core::explorer::{Config, ENOUGH_TRIALS, Strategy};
+use tactus_core::features::{Movement, PropertySet};
+use tactus_core::table::Table;
+use tactus_core::wire::{Command, Event, Failure, Identify};
+
+use super::bench::{Bench, Prompts};
+use super::line::Where;
+use super::rename::known;
+use super::train::seed_of_now;
+use crate::cmd::args::Stop;
+use crate::cmd::output::{Done, Format, print_json};
+use crate::cmd::verify::{Slide, Verified, name, print_answer, print_slide};
+
+/// Have the probe say whether what lies under its finger is this texture
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus device verify cork                        the same, different, or not sure yet
+  tactus device verify cork --false-alarm 0.005    of its own slides, one in 200 may be called different
+  tactus device verify cork --emulated --texture cork
+
+The probe slides until it is sure, --max-slides at most. Its go / no-go output is high from the answer \"the same\" until the
+next `verify` begins. Exit code: 0 the same, 3 different or not sure.")]
+pub(crate) struct Args {
+    #[command(flatten)]
+    at: Where,
+    /// The texture of the probe's table that it may be
+    name: String,
+    #[command(flatten)]
+    stop: Stop,
+    /// Where on the sample slides begin; drawn anew unless given
+    #[arg(long)]
+    seed: Option<u32>,
+    /// How to print the answer
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// Has the probe find it out.
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
+    let (mut bench, status) = Bench::open(&args.at)?;
+    let bytes = bench.table()?;
+    let table = Table::read(&bytes)?;
+    let reference = known(&bytes, &args.name)?;
+    let texture = table
+        .find(&reference)
+        .context("a name of the table is in the table")?;
+    let limits = table.limits().context(Failure::NoLimits)?;
+    let config = Config {
+        strategy: Strategy::Cycling,
+        verify: true,
+        false_alarm: args.stop.false_alarm.or(status.false_alarm),
+        ..args.stop.config(Method::Fused)
+    };
+    // what the probe says of its slides, held against the other textures here
+    let mut here = explorer(&bytes, PropertySet::ALL, config, Some(&[texture]))?;
+    let trials = (0..).zip(table.movements());
+    let trials = trials.map(|(at, _)| table.trials(texture, at));
+    let reference_slides = trials.filter(|n| *n > 0).min().unwrap_or(0);
+    let mut verified = Verified {
+        reference: reference.to_string(),
+        sample: None,
+        answer: "unsure",
+        reference_slides,
+        few: reference_slides < ENOUGH_TRIALS,
+        false_alarm: config.false_alarm.unwrap_or(limits.false_alarm),
+        threshold: args.stop.threshold,
+        false_accept: None,
+        slides: Vec::new(),
+    };
+    let wanted = Identify {
+        among: std::iter::once(texture).collect(),
+        threshold: args.stop.threshold,
+        max_slides: args.stop.max_slides,
+        strategy: Strategy::Cycling,
+        seed: args.seed.unwrap_or_else(seed_of_now),
+        false_alarm: config.false_alarm,
+        ..Identify::default()
+    };
+    let text = args.format == Format::Text;
+    if text {
+        writeln!(out, "Is it {}?", verified.reference)?;
+        out.flush()?;
+    }
+    let mut prompts = Prompts::default();
+    let mut movement: Option<Movement> = None;
+    bench.run(Request::command(Command::Verify(wanted)), |report| {
+        match &report.event {
+            Event::Chosen { movement: next, .. } => movement = Some(*next),
+            Event::SlideReport {
+                action, observed, ..
+            } => {
+                // a slide that says nothing here is the probe's to judge
+                let _ = here.observe(*action, &observed.observation());
+            }
+            Event::Verified { slides, now, .. } => {
+                let slide = Slide {
+                    number: u32::from(*slides),
+                    force_n: movement.map_or(0.0, Movement::force_n),
+                    speed_mm_s: movement.map_or(0.0, Movement::speed_mm_s),
+                    score: now.score,
+                    limit: now.limit,
+                    answer: name(now.answer),
+                };
+                if text {
+                    print_slide(&slide, out)?;
+                }
+                verified.answer = slide.answer;
+                verified.slides.push(slide);
+            }
+            Event::Rejected { why, .. } if text => {
+                writeln!(out, "  rejected, and repeated: {why}")?;
+            }
+            _ if text => prompts.show(report, out)?,
+            _ => {}
+        }
+        if text {
+            out.flush()
+        } else {
+            io::Result::Ok(())
+        }
+    })?;
+    verified.false_accept = false_accept(&here, texture);
+    match args.format {
+        Format::Json => print_json(&verified, out)?,
+        Format::Text => print_answer(&verified, out)?,
+    }
+    Ok(verified.done())
+}
