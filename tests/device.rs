@@ -761,6 +761,96 @@ fn teaching_and_calibrating_do_what_was_meant() {
     assert_says(&complaint(&nonsense), &["above 0"]);
 }
 
+/// "The same as this one?" of what lies under the finger, the share of false alarms that the probe keeps, and a new skin.
+#[test]
+fn a_probe_verifies_keeps_its_setting_and_is_refreshed() {
+    let (at, asked) = probe(1000);
+    let temp = tempfile::tempdir().unwrap();
+    let backup = temp.path().join("before.tact");
+    let json = |arguments: &[&str], code: i32| {
+        let at = ["--port", &at, "--format", "json"];
+        object(&[arguments, &at].concat(), code)
+    };
+    let table = json(&["table", "show"], 0);
+    let name = |at: usize| table["textures"][at]["name"].as_str().unwrap().to_owned();
+    let [other, own, third] = [0, 1, 2].map(name);
+    // its slides are made in the simulated world, which has the second texture under the finger
+    let same = json(&["verify", &own, "--seed", "1"], 0);
+    assert_eq!(
+        (&same["answer"], &same["reference"]),
+        (&"same".into(), &own.as_str().into())
+    );
+    for name in [&other, &third] {
+        let different = json(&["verify", name, "--seed", "1"], 3);
+        assert_eq!(different["answer"], "different", "{different}");
+        let last = different["slides"]
+            .as_array()
+            .unwrap()
+            .last()
+            .unwrap()
+            .clone();
+        assert!(last["score"].as_f64() > last["limit"].as_f64());
+    }
+    assert_says(
+        &complaint(&["verify", "cheese", "--port", &at]),
+        &["no texture cheese; there are: "],
+    );
+
+    let set = |arguments: &[&str]| {
+        json(&[&["settings"][..], arguments].concat(), 0)["false_alarm"].clone()
+    };
+    assert!(set(&[]).is_null());
+    assert_eq!(
+        set(&["--false-alarm", "0.25e-1"]).as_f64().unwrap() as f32,
+        0.025
+    );
+    assert_eq!(set(&[]).as_f64().unwrap() as f32, 0.025);
+    assert_says(&printed(&["status", "--port", &at]), &["2.5 %"]);
+    assert!(set(&["--as-table"]).is_null());
+    assert_says(
+        &complaint(&["settings", "--false-alarm", "0.7", "--port", &at]),
+        &["0.7"],
+    );
+
+    // nobody to ask: said before anybody has laid a sample under the finger
+    for _ in asked.try_iter() {}
+    assert_says(
+        &complaint(&["refresh", "--port", &at]),
+        &["nothing was changed", "--yes"],
+    );
+    let slid = |command: wire::Command| matches!(command, wire::Command::Identify(_));
+    assert!(!asked.try_iter().any(slid));
+    let mut refresh = device(&[
+        "refresh", "--yes", "--seed", "3", "--format", "json", "--port", &at, "--backup",
+    ])
+    .arg(&backup)
+    .stdin(Stdio::piped())
+    .stdout(Stdio::piped())
+    .stderr(Stdio::null())
+    .spawn()
+    .unwrap();
+    refresh
+        .stdin
+        .take()
+        .unwrap()
+        .write_all(b"s\n\ns\n")
+        .unwrap();
+    let done = refresh.wait_with_output().unwrap();
+    assert!(done.status.success());
+    let done: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!(done["slides"], 3, "one at each movement");
+    assert_eq!(done["left_out"], serde_json::json!([other, third]));
+    assert_eq!(done["moved"].as_array().unwrap().len(), 1);
+    assert_ne!(done["checksum"], table["checksum"]);
+    let before = fs::read(&backup).unwrap();
+    assert_eq!(
+        format!("{:08x}", Table::read(&before).unwrap().crc()),
+        table["checksum"].as_str().unwrap()
+    );
+    assert_eq!(json(&["table", "show"], 0)["checksum"], done["checksum"]);
+    assert_eq!(json(&["verify", &own, "--seed", "5"], 0)["answer"], "same");
+}
+
 /// Frames of these reports, and a reader of what the host says, which is thrown away.
 fn says(events: &'static [fn() -> Event]) -> String {
     line(move |mut stream| {

@@ -102,8 +102,8 @@ impl Person {
             display.shows(text)
         };
         let (at, intent) = match self.at {
-            At::Idle if shows(WEIGH) && weight(&shows).or(self.weight).is_some() => {
-                let mn = weight(&shows).or(self.weight).unwrap_or(0);
+            At::Idle if shows(WEIGH) && weight(shows).or(self.weight).is_some() => {
+                let mn = weight(shows).or(self.weight).unwrap_or(0);
                 (At::Weighing, Some((f64::from(mn) * 1e-3, 0.0)))
             }
             At::Idle if shows(PRESS) && !shows(LIFT) => (At::Pressing, Some((self.force_n, 0.0))),

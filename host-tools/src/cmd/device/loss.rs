@@ -23,6 +23,17 @@ pub(crate) struct Consent {
 }
 
 impl Consent {
+    /// That there is somebody to ask, if that is needed: to be known before a person has worked for it.
+    ///
+    /// # Errors
+    /// There is nobody.
+    pub(crate) fn can_be_given(&self) -> anyhow::Result<()> {
+        if !self.yes && !std::io::stdin().is_terminal() {
+            bail!("nothing was changed: there is nobody to ask; add --yes to do it");
+        }
+        Ok(())
+    }
+
     /// Says what will be `lost`, keeps the table that the probe uses now, and asks. Nothing has happened to the probe yet.
     /// Where the output is for programs, that is said on standard error. The file that the table is kept in.
     ///
@@ -58,9 +69,7 @@ impl Consent {
         if self.yes {
             return Ok(file);
         }
-        if !std::io::stdin().is_terminal() {
-            bail!("nothing was changed: there is nobody to ask; add --yes to do it");
-        }
+        self.can_be_given()?;
         let answer = read_answer(bench.interrupt(), "Go on? [y/N] ")?;
         if !matches!(answer.trim().to_lowercase().as_str(), "y" | "yes") {
             bail!("nothing was changed");

@@ -69,6 +69,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         matches!(table.contents(), Contents::Fused(..)),
         "only tables with whitened features can be refreshed: learn this one again"
     );
+    args.consent.can_be_given()?;
     let text = args.format == Format::Text;
     let (mut slides, mut left_out) = (Vec::new(), Vec::new());
     for (texture, name) in (0..).zip(table.names()) {
