@@ -153,25 +153,28 @@ impl<'a> Table<'a> {
 
     /// What textures are like at a movement, in a table that is calibrated.
     pub(crate) fn population(&self, movement: u8) -> Option<PopulationView<'a>> {
-        let (axes, variances) = self.population_bytes(movement)?;
+        let population = self.population_bytes(movement)?;
+        let (_, variances) = population.split_at_checked(Whitening::bytes(self.features()))?;
         Some(PopulationView {
-            axes: View::checked(axes, self.features()),
+            axes: View::checked(population, self.features()),
             variances: Numbers::new(variances),
         })
     }
 
-    fn population_bytes(&self, movement: u8) -> Option<(&'a [u8], &'a [u8])> {
+    /// Axes and variances.
+    fn population_bytes(&self, movement: u8) -> Option<&'a [u8]> {
         let features = self.features();
         let at = Limits::BYTES + usize::from(movement) * of_population(features);
-        let population = self.novelty.get(at..)?.get(..of_population(features))?;
-        population.split_at_checked(Whitening::bytes(features))
+        self.novelty.get(at..)?.get(..of_population(features))
     }
 
     /// The populations of all movements, in a table that is calibrated.
     pub fn populations(&self) -> Option<Vec<Population, MAX_MOVEMENTS>> {
         (0..self.movements)
             .map(|movement| {
-                let (axes, numbers) = self.population_bytes(movement)?;
+                let (axes, numbers) = self
+                    .population_bytes(movement)?
+                    .split_at_checked(Whitening::bytes(self.features()))?;
                 let mut variances = [0.0; MAX_FEATURES];
                 for (to, from) in variances.iter_mut().zip(Numbers::new(numbers)) {
                     *to = from;

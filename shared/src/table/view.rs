@@ -377,12 +377,12 @@ impl<'a> Table<'a> {
 
     /// How features are whitened at a movement; `None` in a table of Gaussians and outside the table.
     pub fn whitening(&self, movement: u8) -> Option<Whitening> {
-        let (bytes, features) = self.whitening_bytes(movement)?;
-        Whitening::read(bytes, features)
+        let (bytes, features) = self.bytes_from_whitening(movement)?;
+        Whitening::read(bytes.get(..Whitening::bytes(features))?, features)
     }
 
-    /// The bytes of the whitening at a movement, and of how many features it is.
-    fn whitening_bytes(&self, movement: u8) -> Option<(&'a [u8], usize)> {
+    /// The bytes of the whitening at a movement and all behind it, and of how many features it is.
+    fn bytes_from_whitening(&self, movement: u8) -> Option<(&'a [u8], usize)> {
         let Contents::Fused(_, features) = self.contents else {
             return None;
         };
@@ -391,7 +391,7 @@ impl<'a> Table<'a> {
         }
         let length = Whitening::bytes(features.into());
         let at = self.layout().whitenings + usize::from(movement) * length;
-        Some((self.bytes.get(at..)?.get(..length)?, features.into()))
+        Some((self.bytes.get(at..)?, features.into()))
     }
 
     /// The whitened mean of a texture at a movement, in steps of 1/256 standard deviation; none in a table of Gaussians and
@@ -429,7 +429,7 @@ impl<'a> Table<'a> {
 
     /// Whitens features at a movement; `None` as [`Table::whitening`].
     pub fn whiten(&self, movement: u8, features: &[i16]) -> Option<Vector> {
-        let (bytes, known) = self.whitening_bytes(movement)?;
+        let (bytes, known) = self.bytes_from_whitening(movement)?;
         Some(View::checked(bytes, known).apply(features))
     }
 

@@ -96,7 +96,8 @@ impl<'b> View<'b> {
         places.iter().all(|&p| p <= 30).then_some(view)
     }
 
-    /// Of bytes that [`View::new`] has found to be one.
+    /// Of bytes that begin with what [`View::new`] has found to be one. Of those behind it two may be read: a row is taken as
+    /// long as the longest.
     pub(crate) fn checked(bytes: &'b [u8], features: usize) -> Self {
         Self { features, bytes }
     }

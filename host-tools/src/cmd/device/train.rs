@@ -216,3 +216,41 @@ fn show_slide(report: &Report, prompts: &mut Prompts, out: &mut impl Write) -> i
     }
     out.flush()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_texture_that_feels_like_another_is_warned_of() {
+        let said = |is_new, feels_the_same| {
+            let learned = Learned {
+                name: "velvet".into(),
+                is_new,
+                slides: 6,
+                nearest: Some(Alike {
+                    texture: "felt".into(),
+                    taken_for: 0.31,
+                    force_n: 0.5,
+                    speed_mm_s: 25.0,
+                    slides: None,
+                    feels_the_same,
+                }),
+            };
+            let mut out = Vec::new();
+            learned.print(Format::Text, &mut out).unwrap();
+            String::from_utf8(out).unwrap()
+        };
+        let one = said(true, true);
+        assert!(one.starts_with("Most like felt: 31 % of slides"), "{one}");
+        for part in [
+            "WARNING: velvet feels the same as felt",
+            "forget --name 'velvet'",
+            "consider more trials",
+        ] {
+            assert!(one.contains(part), "{one}");
+        }
+        assert!(said(false, true).ends_with("apart. Consider more trials.\n"));
+        assert!(!said(true, false).contains("WARNING"));
+    }
+}
