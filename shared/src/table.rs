@@ -69,8 +69,9 @@ pub use scatter::{Scatter, WhitenError, whiten, whiten_drifting};
 pub use sections::Sections;
 pub use training_stats::{Experience, TrainingStats, Whitened};
 pub use view::Table;
-pub(crate) use whitening::fill;
+pub use whitening::{Row, Words};
 pub use whitening::{Whitening, white};
+pub(crate) use whitening::{dot, fill, products, words};
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -8,7 +8,7 @@ use tactus_core::dsp::Plain;
 use tactus_core::dsp::fixed::{EXP2, LN, LN_2, LOG2_E, PARTS};
 use tactus_core::explorer::kernels::{Candidate, Kernels, LiveTexture, Spread};
 use tactus_core::features::MAX_FEATURES;
-use tactus_core::table::{Gaussians, PAIRS};
+use tactus_core::table::{Gaussians, PAIRS, Row, Words};
 
 use super::confusion_kernel::confuse;
 use super::dsp_kernels::Chip;
@@ -298,6 +298,24 @@ global_asm!(
     "pop {{r2, r3}}",
     "pop {{r4-r11, pc}}",
     ".size tactus_candidates, . - tactus_candidates",
+    ".section .text.tactus_products,\"ax\",%progbits",
+    ".global tactus_products",
+    ".type tactus_products,%function",
+    ".thumb_func",
+    // r0: the row, which need not be aligned; r1: the others. The sum in r0 and r1.
+    "tactus_products:",
+    "push {{r4-r11, lr}}",
+    "ldm r1, {{r4-r10}}",
+    "mov r2, #0",
+    "mov r3, #0",
+    ".irp other, 4, 5, 6, 7, 8, 9, 10",
+    "ldr r11, [r0, #(\\other - 4) * 4]",
+    "smlald r2, r3, r11, r\\other",
+    ".endr",
+    "mov r0, r2",
+    "mov r1, r3",
+    "pop {{r4-r11, pc}}",
+    ".size tactus_products, . - tactus_products",
     ".section .text.tactus_sqrt,\"ax\",%progbits",
     ".global tactus_sqrt",
     ".type tactus_sqrt,%function",
@@ -369,6 +387,7 @@ unsafe extern "C" {
         square: u64,
         behind: *const Candidate,
     );
+    safe fn tactus_products(row: &Row, others: &Words) -> i64;
     safe fn tactus_sqrt(x: f32) -> f32;
 }
 
@@ -482,6 +501,10 @@ impl Kernels for Chip {
             *p = p.to_bits() as f32 / total;
         }
         (top, total)
+    }
+
+    fn products(row: &Row, others: &Words) -> i64 {
+        tactus_products(row, others)
     }
 
     fn candidate_distances(from: &Candidate, others: &mut [Candidate]) {

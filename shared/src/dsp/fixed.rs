@@ -79,6 +79,7 @@ const fn ln(mantissa: u32, octaves: i64) -> i32 {
 }
 
 /// e^(-x) in Q30 of an `x` in Q16; relative error at most 7e-5, and 0 beyond 2^-30.
+#[inline(always)]
 pub const fn exp_neg_q30(x: u32) -> u32 {
     let octaves = x as u64 * LOG2_E as u64; // Q46
     let whole = (octaves >> 46) as u32;

@@ -5,7 +5,7 @@
 use crate::dsp::Plain;
 use crate::dsp::fixed::{exp_neg_q30, ln_q16};
 use crate::features::{MAX_FEATURES, Property};
-use crate::table::{Gaussian, Gaussians, Numbers, PAIRS, fill};
+use crate::table::{Gaussian, Gaussians, Numbers, PAIRS, Row, Words, dot, fill, products, words};
 
 /// A texture that is still likely, while a movement is weighed. The order of the fields is fixed, for kernels that are not
 /// written in Rust.
@@ -27,45 +27,17 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// One that is not compared yet. Its mean begins where `known` does, and `mask` is of its features; what lies behind
-    /// them does not count.
-    #[inline]
-    pub(crate) fn new(known: &[u8], mask: &Mask, probability: f32, slides: u8) -> Self {
-        Self::turned(known, mask, (|word, _| word, mask), probability, slides)
-    }
-
-    /// As [`Candidate::new`], each number [`shrunk`] by one of `by`.
-    #[inline]
-    pub(crate) fn scaled(
-        known: &[u8],
-        mask: &Mask,
-        by: &Mask,
-        probability: f32,
-        slides: u8,
-    ) -> Self {
-        Self::turned(known, mask, (shrunk, by), probability, slides)
-    }
-
+    /// One that is not compared yet. Its mean begins where `known` does, `mask` is of its features, and what lies behind them
+    /// does not count; each number is [`shrunk`] by one of `by`, if there are any.
     // words, not bytes: copying these would take longer than all else
     #[inline(always)]
-    fn turned(
+    pub(crate) fn new(
         known: &[u8],
         mask: &Mask,
-        (turn, by): (impl Fn(u32, u32) -> u32, &Mask),
+        by: Option<&Mask>,
         probability: f32,
         slides: u8,
     ) -> Self {
-        let mut mean = [0; MAX_FEATURES];
-        let mut square = 0;
-        let mut take = |pair: &mut [i16; 2], word: u32, (mask, by): (&u32, &u32)| {
-            let word = turn(word & mask, *by);
-            *pair = [word as i16, (word >> 16) as i16];
-            square += pair
-                .map(|m| i64::from(m) * i64::from(m))
-                .iter()
-                .sum::<i64>();
-        };
-        let pairs = mean.as_chunks_mut().0.iter_mut().zip(mask.iter().zip(by));
         let filled;
         let known = match known.first_chunk() {
             Some(known) => known,
@@ -75,10 +47,30 @@ impl Candidate {
                 &filled
             }
         };
-        // in steps that the compiler knows the number of
-        for ((pair, mask), word) in pairs.zip(known.as_chunks().0) {
-            take(pair, u32::from_le_bytes(*word), mask);
+        let ([a, b, c, d, e, f, g], [p, q, r, s, t, u, v]) = (words(known), *mask);
+        // no loops: see `words`
+        let mut words = [a & p, b & q, c & r, d & s, e & t, f & u, g & v];
+        if let Some(&[i, j, k, l, m, n, o]) = by {
+            let [a, b, c, d, e, f, g] = words;
+            words = [
+                shrunk(a, i),
+                shrunk(b, j),
+                shrunk(c, k),
+                shrunk(d, l),
+                shrunk(e, m),
+                shrunk(f, n),
+                shrunk(g, o),
+            ];
         }
+        let [a, b, c, d, e, f, g] = words;
+        let square = dot(dot(dot(dot(0, a, a), b, b), c, c), d, d);
+        let square = dot(dot(dot(square, e, e), f, f), g, g);
+        let (low, high) = (|word: u32| word as i16, |word: u32| (word >> 16) as i16);
+        #[rustfmt::skip]
+        let mean = [
+            low(a), high(a), low(b), high(b), low(c), high(c), low(d), high(d),
+            low(e), high(e), low(f), high(f), low(g), high(g),
+        ];
         Self {
             mean,
             probability,
@@ -150,7 +142,7 @@ pub(crate) fn confused(a: Gaussian, b: Gaussian, sqrt: fn(f32) -> f32) -> f32 {
 pub(crate) const DEGREES_OF_FREEDOM: u8 = 8;
 
 /// Shrinks two numbers in a word by two others, in 1/2^15.
-#[inline]
+#[inline(always)]
 pub(crate) fn shrunk(word: u32, by: u32) -> u32 {
     let low = (i32::from(word as i16) * i32::from(by as i16)) >> 15;
     let high = ((word as i32 >> 16) * (by as i32 >> 16)) >> 15;
@@ -216,7 +208,8 @@ impl Spread {
                 *second *= total;
             }
         }
-        let ln: f32 = products.into_iter().map(libm::logf).sum();
+        let [first, second] = products.map(libm::logf);
+        let ln = first + second;
         Self {
             slides: n,
             narrowness,
@@ -282,6 +275,11 @@ pub trait Kernels: crate::dsp::Kernels {
     /// The posterior (eq. 3) from its logarithms, Q16, of which there are as many, at least one. Returns the greatest of
     /// them, and the sum of the probabilities in parts of that one's, Q30. No two logarithms are 2^31 apart.
     fn posterior(logs: &[i32], posterior: &mut [f32]) -> (i32, f32);
+
+    /// The sum of the products of the numbers of a row, which need not be aligned, with others.
+    fn products(row: &Row, others: &Words) -> i64 {
+        products(row, others)
+    }
 
     /// Sets the squared distance of each of `others` from the mean of `from`.
     fn candidate_distances(from: &Candidate, others: &mut [Candidate]);

@@ -145,7 +145,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         let Some(vector) = slide.vector(set, features) else {
             return Err(ObserveError::Features(set));
         };
-        let Some(white) = self.table.whiten(action.movement, &vector) else {
+        let Some(white) = self.table.whiten_by(action.movement, &vector, K::products) else {
             return Err(ObserveError::Features(set));
         };
         if let Some(sums) = one_more(&mut self.episode, action.movement) {

@@ -136,15 +136,23 @@ impl NoveltyModel {
         let v = 1.0 / f32::from(k);
         let (mut products, mut distance) = ([1.0; 2], 0.0);
         let along = population.axes.apply(mean);
-        for ((z, variance), at) in along.iter().zip(population.variances).zip(0..) {
-            let total = variance + v;
-            let apart = white(*z);
-            distance += apart * apart / total;
-            let [first, second] = &mut products;
-            *(if at < MAX_FEATURES / 2 { first } else { second }) *= total;
+        let mut known = along.iter().zip(population.variances);
+        // two logarithms for all
+        for product in &mut products {
+            for (z, variance) in known.by_ref().take(MAX_FEATURES / 2) {
+                let total = variance + v;
+                let apart = white(*z);
+                distance += apart * apart / total;
+                *product *= total;
+            }
         }
-        let norm: f32 = products.into_iter().map(libm::logf).sum();
-        -0.5 * (norm + distance.min(self.farthest))
+        let [first, second] = products.map(libm::logf);
+        let distance = if distance < self.farthest {
+            distance
+        } else {
+            self.farthest
+        };
+        -0.5 * (first + second + distance)
     }
 }
 

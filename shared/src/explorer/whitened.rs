@@ -166,6 +166,7 @@ const FAR: u32 = 22 << 16;
 
 /// Degree of confusion of two textures (eq. 7, of the means of whitened slides) whose means are so far apart, Q16: 1 where
 /// one was never learned. `fewer` is the smaller number of slides of the two.
+#[inline(always)]
 fn confusion(apart: u32, fewer: u8) -> f32 {
     if fewer == 0 {
         return 1.0;
@@ -217,10 +218,7 @@ pub(super) fn gather(
     for (&probability, texture) in posterior.iter().zip(0..) {
         if probability >= NEGLIGIBLE {
             let (mean, slides) = (column.mean(texture), column.slides(texture));
-            let candidate = match &scales {
-                None => Candidate::new(mean, &mask, probability, slides),
-                Some(by) => Candidate::scaled(mean, &mask, by, probability, slides),
-            };
+            let candidate = Candidate::new(mean, &mask, scales.as_ref(), probability, slides);
             // `live` has space: it is as long as the posterior
             let _ = live.push(candidate);
         }

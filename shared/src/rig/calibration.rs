@@ -40,14 +40,14 @@ impl RigCalibration {
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
         let mut bytes = [0; Self::BYTES];
         let (body, end) = bytes.split_at_mut(Self::BYTES - 4);
-        let (numbers, serial) = body.split_at_mut(40);
-        let (floats, date) = numbers.split_at_mut(36);
-        for (slot, value) in floats.chunks_exact_mut(4).zip(self.numbers()) {
-            slot.copy_from_slice(&value.to_le_bytes());
+        let numbers = self.numbers().into_iter().flat_map(f32::to_le_bytes);
+        let fields = numbers.chain(self.date.to_le_bytes()).chain(self.serial);
+        for (slot, byte) in body.iter_mut().zip(fields) {
+            *slot = byte;
         }
-        date.copy_from_slice(&self.date.to_le_bytes());
-        serial.copy_from_slice(&self.serial);
-        end.copy_from_slice(&CRC32.checksum(body).to_le_bytes());
+        for (slot, byte) in end.iter_mut().zip(CRC32.checksum(body).to_le_bytes()) {
+            *slot = byte;
+        }
         bytes
     }
 

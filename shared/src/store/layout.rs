@@ -87,9 +87,12 @@ pub(super) fn header(table: &StoredTable) -> [u8; HEADER] {
         table.length as u32,
         table.crc,
     ];
-    for (word, field) in body.chunks_exact_mut(WORD).zip(fields) {
-        word.copy_from_slice(&field.to_le_bytes());
+    let fields = fields.into_iter().flat_map(u32::to_le_bytes);
+    for (slot, byte) in body.iter_mut().zip(fields) {
+        *slot = byte;
     }
-    end.copy_from_slice(&CRC32.checksum(body).to_le_bytes());
+    for (slot, byte) in end.iter_mut().zip(CRC32.checksum(body).to_le_bytes()) {
+        *slot = byte;
+    }
     bytes
 }

@@ -6,7 +6,7 @@ use super::format::{
 };
 use super::gaussian::{Gaussian, Gaussians, SD_STEP, mean_step};
 use super::training_stats::{Experience, Whitened};
-use super::whitening::{Column, View, Whitening};
+use super::whitening::{Column, Row, View, Whitening, Words};
 use crate::features::{MAX_FEATURES, Movement, Property, PropertySet, Vector};
 
 /// A checked texture table, borrowed from where it is stored.
@@ -431,6 +431,17 @@ impl<'a> Table<'a> {
     pub fn whiten(&self, movement: u8, features: &[i16]) -> Option<Vector> {
         let (bytes, known) = self.bytes_from_whitening(movement)?;
         Some(View::checked(bytes, known).apply(features))
+    }
+
+    /// As [`Table::whiten`], with other code for the products.
+    pub(crate) fn whiten_by(
+        &self,
+        movement: u8,
+        features: &[i16],
+        products: fn(&Row, &Words) -> i64,
+    ) -> Option<Vector> {
+        let (bytes, known) = self.bytes_from_whitening(movement)?;
+        Some(View::checked(bytes, known).apply_by(features, products))
     }
 
     fn label(&self, texture: u16) -> [u8; LABEL_BYTES] {

@@ -5,6 +5,7 @@
 
 use heapless::Vec;
 
+use super::PAIRS;
 use crate::features::{MAX_FEATURES, Vector, WHITE_STEPS};
 
 /// From features to whitened ones, z = W (x - g): canonical variates. W' W is the inverse of the covariance of slides within
@@ -114,6 +115,12 @@ impl<'b> View<'b> {
 
     /// As [`Whitening::apply`].
     pub(crate) fn apply(&self, features: &[i16]) -> Vector {
+        self.apply_by(features, products)
+    }
+
+    /// As [`Whitening::apply`], with other code for [`products`].
+    #[inline(never)]
+    pub(crate) fn apply_by(&self, features: &[i16], products: fn(&Row, &Words) -> i64) -> Vector {
         let [mean, places, rows] = self.parts();
         // beyond 32 units all features are alike; those that the table does not have are 0
         let mut apart = [[0; 2]; MAX_FEATURES / 2];
@@ -121,10 +128,14 @@ impl<'b> View<'b> {
         for (apart, (x, g)) in apart.as_flattened_mut().iter_mut().zip(known) {
             *apart = x.saturating_sub(i16::from_le_bytes(*g));
         }
-        let apart = apart.map(pair);
+        let [p, q, r, s, t, u, v] = apart;
+        let (p, q, r, s) = (pair(p), pair(q), pair(r), pair(s));
+        let apart = [p, q, r, s, pair(t), pair(u), pair(v)];
+        // one a row: pushed each for itself they would be counted each time
         let mut white = Vector::new();
+        let _ = white.resize(self.features, 0);
         let mut rest = rows;
-        for &places in places {
+        for (white, &places) in white.iter_mut().zip(places) {
             let filled;
             let row = match rest.first_chunk() {
                 Some(row) => row,
@@ -134,12 +145,12 @@ impl<'b> View<'b> {
                     &filled
                 }
             };
-            // in steps that the compiler knows the number of; what follows the row is multiplied by 0
-            let row = row.as_chunks().0.iter().map(|w| u32::from_le_bytes(*w));
-            let sum = row.zip(apart).map(|(w, x)| dot(w, x)).sum();
-            // `white` has space for one value a row
-            let _ = white.push(rounded(sum, places));
-            rest = rest.get(2 * self.features..).unwrap_or_default();
+            // what follows the row is multiplied by 0
+            *white = rounded(products(row, &apart), places);
+            match rest.get(2 * self.features..) {
+                Some(next) => rest = next,
+                None => break,
+            }
         }
         white
     }
@@ -148,7 +159,7 @@ impl<'b> View<'b> {
 /// As many bytes as the most features take, 0 beyond those that there are.
 #[cold]
 #[inline(never)]
-pub(crate) fn fill(bytes: &[u8]) -> [u8; 2 * MAX_FEATURES] {
+pub(crate) fn fill(bytes: &[u8]) -> Row {
     let mut filled = [0; 2 * MAX_FEATURES];
     for (to, from) in filled.iter_mut().zip(bytes) {
         *to = *from;
@@ -156,22 +167,52 @@ pub(crate) fn fill(bytes: &[u8]) -> [u8; 2 * MAX_FEATURES] {
     filled
 }
 
+/// A row of a whitening where its table lies, or what it is multiplied with: as many numbers as the most features, two to a word.
+pub type Row = [u8; 2 * MAX_FEATURES];
+/// Numbers of 16 bits, two to a word, the first in the low half.
+pub type Words = [u32; PAIRS];
+
+/// The sum of the products of the numbers of a row with others.
+#[inline(never)]
+pub(crate) fn products(row: &Row, others: &Words) -> i64 {
+    let ([a, b, c, d, e, f, g], [p, q, r, s, t, u, v]) = (words(row), *others);
+    let sum = dot(dot(dot(dot(0, a, p), b, q), c, r), d, s);
+    dot(dot(dot(sum, e, t), f, u), g, v)
+}
+
+/// Two numbers of 16 bits to a word. Not by a loop: a compiler that saves space would keep it, and take twice as long.
+#[inline(always)]
+pub(crate) fn words(bytes: &Row) -> Words {
+    let ([a, b, c, d, e, f, g], []) = bytes.as_chunks() else {
+        return [0; PAIRS];
+    };
+    [
+        u32::from_le_bytes(*a),
+        u32::from_le_bytes(*b),
+        u32::from_le_bytes(*c),
+        u32::from_le_bytes(*d),
+        u32::from_le_bytes(*e),
+        u32::from_le_bytes(*f),
+        u32::from_le_bytes(*g),
+    ]
+}
+
 /// Two numbers of 16 bits in a word, as the chip multiplies them.
-#[inline]
+#[inline(always)]
 fn pair([low, high]: [i16; 2]) -> u32 {
     u32::from(high as u16) << 16 | u32::from(low as u16)
 }
 
-/// Sum of the products of two pairs.
-#[inline]
-fn dot(a: u32, b: u32) -> i64 {
+/// Adds the products of two pairs to a sum; the chip has one instruction for it.
+#[inline(always)]
+pub(crate) fn dot(sum: i64, a: u32, b: u32) -> i64 {
     let low = i32::from(a as i16) * i32::from(b as i16);
     let high = ((a as i32) >> 16) * ((b as i32) >> 16);
-    i64::from(low) + i64::from(high)
+    sum + i64::from(low) + i64::from(high)
 }
 
 /// Products of features, in 1/1024 of a unit, and weights of so many binary places, 30 at most, to the nearest 1/256.
-#[inline]
+#[inline(always)]
 fn rounded(sum: i64, places: u8) -> i16 {
     // twice that, by shifts of 32 bits: those of 64 take the chip several
     let twice = u32::from(places & 31) + 1;
