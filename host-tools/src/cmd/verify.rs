@@ -17,6 +17,7 @@ use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Answer, Config, ENOUGH_TRIALS, Strategy};
 use tactus_core::features::{Movement, Observation, PropertySet};
 use tactus_core::table::{Action, POPULATION, Table};
+use tactus_core::wire::Failure;
 
 use super::args::Stop;
 use super::learn::learn_first;
@@ -97,6 +98,28 @@ pub(super) struct Verified {
 }
 
 impl Verified {
+    /// Before the first slide.
+    ///
+    /// # Errors
+    /// The table has no limits.
+    pub(super) fn new(table: Table<'_>, texture: u16, config: &Config) -> anyhow::Result<Self> {
+        let limits = table.limits().context(Failure::NoLimits)?;
+        let movements = 0..table.movements().len() as u8;
+        let trials = movements.map(|at| table.trials(texture, at));
+        let reference_slides = trials.filter(|n| *n > 0).min().unwrap_or(0);
+        Ok(Self {
+            reference: table.name(texture).unwrap_or_default().to_owned(),
+            sample: None,
+            answer: name(Answer::Unsure),
+            reference_slides,
+            few: reference_slides < ENOUGH_TRIALS,
+            false_alarm: config.false_alarm.unwrap_or(limits.false_alarm),
+            threshold: config.threshold,
+            false_accept: None,
+            slides: Vec::new(),
+        })
+    }
+
     /// How the command ends.
     pub(super) fn done(&self) -> Done {
         if self.answer == name(Answer::Same) {
@@ -230,29 +253,14 @@ fn hold(
     out: &mut impl Write,
 ) -> anyhow::Result<Done> {
     let table = Table::read(bytes)?;
-    let limits = table.limits().context(
-        "the table has no limits, by which slides would be called different: learn it again, with --method fused",
-    )?;
     let config = Config {
         strategy: Strategy::Cycling,
         open: true,
         ..args.stop.config(Method::Fused)
     };
+    let mut verified = Verified::new(table, texture, &config)?;
     let mut explorer = explorer(bytes, measures, config, Some(&[texture]))?;
-    let movements = 0..table.movements().len() as u8;
-    let trials = movements.map(|at| table.trials(texture, at));
-    let reference_slides = trials.filter(|n| *n > 0).min().unwrap_or(0);
-    let mut verified = Verified {
-        reference: table.name(texture).unwrap_or_default().to_owned(),
-        sample: Some(sample),
-        answer: name(Answer::Unsure),
-        reference_slides,
-        few: reference_slides < ENOUGH_TRIALS,
-        false_alarm: config.false_alarm.unwrap_or(limits.false_alarm),
-        threshold: args.stop.threshold,
-        false_accept: None,
-        slides: Vec::new(),
-    };
+    verified.sample = Some(sample);
     for slide in slides.take(args.stop.max_slides.into()) {
         let slide = slide?;
         let Some(movement) = index_of(table, slide.movement) else {

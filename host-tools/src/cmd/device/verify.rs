@@ -6,10 +6,10 @@ use anyhow::Context as _;
 use tactus::eval::evaluate::{Method, explorer};
 use tactus::eval::verify::false_accept;
 use tactus::link::Request;
-use tactus_core::explorer::{Config, ENOUGH_TRIALS, Strategy};
+use tactus_core::explorer::{Config, Strategy};
 use tactus_core::features::{Movement, PropertySet};
 use tactus_core::table::Table;
-use tactus_core::wire::{Command, Event, Failure, Identify};
+use tactus_core::wire::{Command, Event, Identify};
 
 use super::bench::{Bench, Prompts};
 use super::line::Where;
@@ -53,29 +53,15 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     let texture = table
         .find(&reference)
         .context("a name of the table is in the table")?;
-    let limits = table.limits().context(Failure::NoLimits)?;
     let config = Config {
         strategy: Strategy::Cycling,
         verify: true,
         false_alarm: args.stop.false_alarm.or(status.false_alarm),
         ..args.stop.config(Method::Fused)
     };
+    let mut verified = Verified::new(table, texture, &config)?;
     // what the probe says of its slides, held against the other textures here
     let mut here = explorer(&bytes, PropertySet::ALL, config, Some(&[texture]))?;
-    let trials = (0..).zip(table.movements());
-    let trials = trials.map(|(at, _)| table.trials(texture, at));
-    let reference_slides = trials.filter(|n| *n > 0).min().unwrap_or(0);
-    let mut verified = Verified {
-        reference: reference.to_string(),
-        sample: None,
-        answer: "unsure",
-        reference_slides,
-        few: reference_slides < ENOUGH_TRIALS,
-        false_alarm: config.false_alarm.unwrap_or(limits.false_alarm),
-        threshold: args.stop.threshold,
-        false_accept: None,
-        slides: Vec::new(),
-    };
     let wanted = Identify {
         among: std::iter::once(texture).collect(),
         threshold: args.stop.threshold,
