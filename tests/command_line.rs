@@ -523,6 +523,29 @@ fn evaluate_prints_one_json_object() {
 }
 
 #[test]
+fn evaluate_counts_the_right_name_among_those_told_changed() {
+    let Some(folder) = data("biotac") else { return };
+    let drift = ["evaluate", "--recordings", path(&folder), "--protocol"];
+    let drift = [&drift[..], &["drift", "--runs", "300", "--novelty"]].concat();
+    let drift = [&drift[..], &["leave-one-out"]].concat();
+    let e = json(&printed(&[&drift[..], &["--format", "json"]].concat()));
+    let after = &e["novelty"][2];
+    let right = after["known"]["changed_right"].as_f64().unwrap();
+    assert!((0.5..=1.0).contains(&right), "{after}");
+    // of what was left out no name is right
+    assert!(after["unknown"].get("changed_right").is_none());
+    assert!(e["verdicts_new"]["changed"].as_f64() > Some(0.0));
+    assert!(e["verdicts_new"]["changed_right"].is_null());
+    let said = printed(&drift);
+    let right = format!("(the right one in {:.1} %)", 100.0 * right);
+    let of_known = said.lines().find(|line| line.contains(&right)).unwrap();
+    assert!(of_known.contains("like one, but changed"), "{said}");
+    for line in said.lines().filter(|line| line.contains("new texture")) {
+        assert!(!line.contains("the right one"), "{said}");
+    }
+}
+
+#[test]
 fn evaluate_says_when_there_are_too_few_slides() {
     let Some(folder) = data("biotac") else { return };
     let all = slides(&folder).len();

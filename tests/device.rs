@@ -659,6 +659,198 @@ fn a_table_is_checked_pushed_and_pulled() {
     );
 }
 
+/// A table whose checksum is right, and whose limits are not.
+fn with_limits(table: &[u8], first: f32) -> Vec<u8> {
+    let limits = Table::read(table).unwrap().limits().unwrap();
+    let begin = limits.drifted[0].begin.to_le_bytes();
+    let mut places = (0..table.len()).filter(|&at| table[at..].starts_with(&begin));
+    let at = places.next_back().unwrap();
+    let mut bytes = table.to_vec();
+    bytes[at..at + 4].copy_from_slice(&first.to_le_bytes());
+    let body = bytes.len() - 4;
+    let mut crc = flate2::Crc::new();
+    crc.update(&bytes[..body]);
+    bytes[body..].copy_from_slice(&crc.sum().to_le_bytes());
+    bytes
+}
+
+#[test]
+fn a_table_with_damaged_limits_is_refused_and_nothing_is_lost() {
+    let (at, asked) = probe(1000);
+    let temp = tempfile::tempdir().unwrap();
+    let [before, after, file] = ["before", "after", "file"].map(|name| temp.path().join(name));
+    // something that would be lost
+    printed(&["rename", "--port", &at, "Burlap", "my own"]);
+    printed(&["table", "pull", "--port", &at, path(&before)]);
+    while asked.try_recv().is_ok() {}
+    let good = &known().1;
+    for damage in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        fs::write(&file, with_limits(good, damage)).unwrap();
+        for push in [&["--yes"][..], &[]] {
+            let command = ["table", "push", path(&file), "--port", &at];
+            let said = complaint(&[&command, push].concat());
+            assert_says(
+                &said,
+                &[
+                    path(&file),
+                    "its limits of new and changed textures are damaged",
+                ],
+            );
+        }
+        assert_eq!(asked.try_iter().count(), 0, "the probe was asked nothing");
+    }
+    printed(&["table", "pull", "--port", &at, path(&after)]);
+    let [before, after] = [before, after].map(|file| fs::read(file).unwrap());
+    assert_eq!(before, after);
+    assert!(Table::read(&after).unwrap().find("my own").is_some());
+    // it was the limits: the same table with other ones is taken
+    let limits = Table::read(good).unwrap().limits().unwrap();
+    let other = with_limits(good, limits.drifted[0].begin + 0.5);
+    assert_ne!(&other, good);
+    fs::write(&file, other).unwrap();
+    let command = ["table", "push", path(&file), "--port", &at, "--yes"];
+    assert_says(&printed(&command), &["the probe uses it now"]);
+}
+
+/// A terminal at which somebody answers each question with the next of these, as `tactus device` with these arguments asks
+/// them; what was printed, and what was asked.
+#[cfg(unix)]
+fn answered(arguments: &[&str], answers: &[&str]) -> (String, String) {
+    use serialport::{SerialPort as _, TTYPort};
+    let (mut terminal, slave) = TTYPort::pair().unwrap();
+    let stdin = fs::OpenOptions::new()
+        .read(true)
+        .write(true)
+        .open(slave.name().unwrap())
+        .unwrap();
+    let mut child = device(arguments)
+        .stdin(stdin)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stderr = child.stderr.take().unwrap();
+    let (mut said, mut answers) = (Vec::new(), answers.iter());
+    let mut byte = [0];
+    while stderr.read(&mut byte).unwrap() > 0 {
+        said.push(byte[0]);
+        if said.ends_with(b"(n: it stays): ") {
+            let answer = answers.next().expect("one question too many");
+            terminal.write_all(answer.as_bytes()).unwrap();
+        }
+    }
+    assert!(answers.next().is_none(), "a question too few");
+    let out = child.wait_with_output().unwrap();
+    let said = String::from_utf8(said).unwrap();
+    assert!(out.status.success(), "{arguments:?}: {said}");
+    (String::from_utf8(out.stdout).unwrap(), said)
+}
+
+#[cfg(unix)]
+#[test]
+fn a_training_asks_to_move_the_sample_and_the_table_says_what_came_of_it() {
+    let (at, asked) = probe(1000);
+    let temp = tempfile::tempdir().unwrap();
+    let [pulled, page] = ["pulled", "page.html"].map(|name| temp.path().join(name));
+    let train = |name: &str, options: &[&str], answers: &[&str]| {
+        let command = ["train", name, "--trials", "3", "--seed", "4", "--port", &at];
+        while asked.try_recv().is_ok() {}
+        let told = answered(&[&command, options].concat(), answers);
+        let trained = asked
+            .try_iter()
+            .filter(|c| matches!(c, wire::Command::Train(_)));
+        (told.0, trained.count())
+    };
+    let says = |name: &str| {
+        let show = ["table", "show", "--port", &at, "--format", "json"];
+        let table: serde_json::Value = serde_json::from_str(&printed(&show)).unwrap();
+        let textures = table["textures"].as_array().unwrap().clone();
+        let texture = textures.into_iter().find(|t| t["name"] == name).unwrap();
+        assert!(
+            texture["movements"][2]["trials"].as_u64() >= Some(3),
+            "{texture}"
+        );
+        texture["sample_moved"].clone()
+    };
+    // twice between three trials
+    let (out, parts) = train("moved", &[], &["\n", "\n"]);
+    assert_says(&out, &["9 slides made", "was moved between trials"]);
+    assert_eq!((parts, says("moved")), (3, true.into()));
+    let (out, _) = train("stayed", &[], &["n\n", "n\n"]);
+    assert_says(
+        &out,
+        &["9 slides made", "was not moved: slides on the same"],
+    );
+    assert_eq!(says("stayed"), false);
+    let (out, _) = train("both", &[], &["\n", "n\n"]);
+    assert_says(&out, &["does not know whether"]);
+    assert!(says("both").is_null());
+    // who says so beforehand is not asked; a script is not either
+    let (_, parts) = train("turned", &["--moved"], &[]);
+    assert_eq!((parts, says("turned")), (1, true.into()));
+    let (_, parts) = train("flat", &["--same-spot"], &[]);
+    assert_eq!((parts, says("flat")), (1, false.into()));
+    let script = ["train", "script", "--trials", "3", "--port", &at];
+    assert_says(
+        &printed(&script),
+        &["9 slides made", "does not know whether"],
+    );
+    assert!(says("script").is_null());
+    // more trials of a texture that was moved: not known any more, unless they were, too
+    let more = ["train", "turned", "--trials", "4", "--port", &at];
+    printed(&[&more[..], &["--moved"]].concat());
+    assert_eq!(says("turned"), true);
+    printed(&["train", "turned", "--trials", "5", "--port", &at]);
+    assert!(says("turned").is_null());
+    // what the probe learns and deletes otherwise leaves it as it is
+    printed(&["identify", "--port", &at, "--seed", "7"]);
+    printed(&["teach", "something else", "--port", &at]);
+    printed(&["forget", "--name", "script", "--yes", "--port", &at]);
+    printed(&["rename", "moved", "renamed", "--port", &at]);
+    assert_eq!(
+        (says("flat"), says("renamed")),
+        (false.into(), serde_json::Value::Null)
+    );
+    printed(&["table", "pull", path(&pulled), "--port", &at]);
+    let tactus = |arguments: &[&str]| {
+        let mut tactus = Command::new(env!("CARGO_BIN_EXE_tactus"));
+        let out = tactus.args(arguments).output().unwrap();
+        assert!(out.status.success(), "{out:?}");
+        String::from_utf8(out.stdout).unwrap()
+    };
+    for said in [
+        tactus(&["table", "show", path(&pulled)]),
+        tactus(&["report", path(&pulled), "--out", path(&page)]),
+    ] {
+        assert_says(
+            &said,
+            &[
+                "always at the same spot: stayed, flat;",
+                "Learned at one spot: stayed, flat.",
+            ],
+        );
+    }
+    let page = fs::read_to_string(page).unwrap();
+    assert_says(
+        &page,
+        &[
+            "sample moved",
+            "Learned at one spot: stayed, flat.",
+            "<td>not known</td>",
+        ],
+    );
+    let report = tactus(&["report", path(&pulled), "--format", "json"]);
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let moved = |name: &str| {
+        let textures = report["textures"].as_array().unwrap();
+        textures.iter().find(|t| t["name"] == name).unwrap()["sample_moved"].clone()
+    };
+    assert_eq!(
+        [moved("flat"), moved("both")],
+        [false.into(), serde_json::Value::Null]
+    );
+}
+
 #[test]
 fn teaching_and_calibrating_do_what_was_meant() {
     let (at, asked) = probe(1000);

@@ -120,6 +120,14 @@ fn frames_of_version_5_are_what_they_were() {
     assert_frames::<Failure>("reasons-5.jsonl", 263, |_| false);
 }
 
+/// Version 6 of the messages.
+#[test]
+fn frames_of_version_6_are_what_they_were() {
+    assert_frames::<Request>("requests-6.jsonl", 42, |_| false);
+    assert_frames::<Report>("reports-6.jsonl", 115, |_| false);
+    assert_frames::<Failure>("reasons-6.jsonl", 265, |_| false);
+}
+
 /// Version 4 of the messages: every kind of reason, alone in a frame.
 #[test]
 fn reasons_are_what_they_were_on_the_line() {

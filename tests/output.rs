@@ -281,8 +281,8 @@ fn a_gauge_study_is_one_object_and_compares_operators_of_several_folders() {
         let named: Vec<String> = text
             .lines()
             .map(|line| {
-                line.strip_suffix(",,")
-                    .map_or(line.to_owned(), |l| format!("{l},{name},"))
+                line.strip_suffix(",,,")
+                    .map_or(line.to_owned(), |l| format!("{l},{name},,"))
             })
             .collect();
         std::fs::write(&manifest, named.join("\n")).unwrap();
@@ -456,4 +456,103 @@ fn slides_are_verified_against_a_texture_of_a_table_and_of_recordings() {
     assert!(said(&lost, 2).contains("--texture NAME"));
     let typo = [&lost[..], &["--texture", "burlab"]].concat();
     assert!(said(&typo, 1).contains("did you mean Burlap?"));
+}
+
+#[test]
+fn a_table_says_whether_the_samples_of_its_slides_were_moved() {
+    let temp = tempfile::tempdir().unwrap();
+    let (folder, table) = (temp.path().join("slides"), temp.path().join("table"));
+    std::fs::create_dir(&folder).unwrap();
+    for entry in std::fs::read_dir(SIMULATED).unwrap() {
+        let from = entry.unwrap().path();
+        std::fs::copy(&from, folder.join(from.file_name().unwrap())).unwrap();
+    }
+    let manifest = folder.join("manifest.csv");
+    let rows = std::fs::read_to_string(&manifest).unwrap();
+    let learned = |labels: &dyn Fn(&str, u32) -> &'static str| {
+        let label = |line: &str| {
+            // nobody said so far
+            let (line, _) = line.rsplit_once(',').unwrap();
+            let fields: Vec<&str> = line.split(',').collect();
+            let moved = match fields[2].parse() {
+                Ok(slide) => labels(fields[1], slide),
+                Err(_) => "moved",
+            };
+            format!("{line},{moved}\n")
+        };
+        let labelled: String = rows.lines().map(label).collect();
+        std::fs::write(&manifest, labelled).unwrap();
+        let learn = [
+            "learn",
+            "--recordings",
+            path(&folder),
+            "--train-slides",
+            "2",
+        ];
+        json(
+            &[&learn[..], &["--out", path(&table), "--format", "json"]].concat(),
+            0,
+        );
+        let shown = json(&["table", "show", path(&table), "--format", "json"], 0);
+        let of = |t: &serde_json::Value| {
+            let name = t["name"].as_str().unwrap().to_owned();
+            (name, t["sample_moved"].as_bool())
+        };
+        let all: Vec<_> = shown["textures"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(of)
+            .collect();
+        (all, std::fs::read(&table).unwrap())
+    };
+    let (none, plain) = learned(&|_, _| "");
+    assert!(none.iter().all(|(_, moved)| moved.is_none()));
+    // the third slide of each movement, 3, 6 and 9, is not learned from
+    let (some, noted) = learned(&|name, slide| match name {
+        "Burlap" => "yes",
+        "Denim twill" => "no",
+        "Corduroy" if slide % 3 == 0 => "no",
+        "Corduroy" => "yes",
+        "Terry cloth" if slide == 1 => "",
+        "Terry cloth" => "yes",
+        _ => "",
+    });
+    for (name, moved) in some {
+        let wanted = match name.as_str() {
+            "Burlap" | "Corduroy" => Some(true),
+            "Denim twill" => Some(false),
+            _ => None,
+        };
+        assert_eq!(moved, wanted, "{name}");
+    }
+    // and nothing else: the same features, limits and explorations
+    assert_ne!(plain, noted);
+    let identify = |bytes: &[u8]| {
+        std::fs::write(&table, bytes).unwrap();
+        let identify = [
+            "identify",
+            "--recordings",
+            SIMULATED,
+            "--material",
+            "Burlap",
+            "--table",
+        ];
+        json(
+            &[&identify[..], &[path(&table), "--format", "json"]].concat(),
+            0,
+        )
+    };
+    assert_eq!(identify(&plain), identify(&noted));
+    // a part of the note that is cut off is told
+    let at = noted.windows(4).rposition(|w| w == [3, 0, 15, 0]).unwrap();
+    let mut damaged = noted.clone();
+    damaged[at + 4 + 4] = 7;
+    let body = damaged.len() - 4;
+    let mut crc = flate2::Crc::new();
+    crc.update(&damaged[..body]);
+    damaged[body..].copy_from_slice(&crc.sum().to_le_bytes());
+    std::fs::write(&table, damaged).unwrap();
+    let refused = said(&["table", "check", path(&table)], 1);
+    assert!(refused.contains("section 3 is damaged"), "{refused}");
 }

@@ -18,6 +18,7 @@ pub mod pictures;
 pub mod refresh;
 pub mod reliability;
 pub mod report;
+pub mod samples;
 pub mod show;
 pub mod table_summary;
 pub mod transcript;

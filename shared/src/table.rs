@@ -38,6 +38,9 @@
 //! | | 4 M d/2, rounded up | per movement: variance of the drift along each two of the whitened axes |
 //! | 2 | 52 | [`Limits`]: the share of false alarms; of scores with drift after 1, 2, 3 slides, then without: begin and mean excess of their upper tenth |
 //! | | M (7 d + 2 d d) | per movement the [`Population`] of textures: axes as a whitening of whitened features, in their steps; d variances |
+//!
+//! Section 3, of either kind of table, is for people: whether samples were moved between trials ([`Table::moved`]). Per texture
+//! of which that is known: its number (2), the lower half of the CRC-32 of its name (2), and 1 for no or 2 for yes (1).
 
 mod drift;
 mod encode;
@@ -46,6 +49,7 @@ mod gaussian;
 mod limits;
 mod matrix;
 mod population;
+mod samples;
 mod scatter;
 mod sections;
 mod training_stats;
@@ -64,6 +68,7 @@ pub use gaussian::{Gaussian, Gaussians, SD_LEAST, SD_STEP, mean_step};
 pub(crate) use limits::Numbers;
 pub use limits::{Against, EPISODES, FALSE_ALARM, Limits, Tail, is_false_alarm};
 pub use population::{POPULATION, Population};
+pub use samples::{samples_length, with_moved};
 pub(crate) use scatter::oas;
 pub use scatter::{Scatter, WhitenError, whiten, whiten_drifting};
 pub use sections::Sections;

@@ -13,6 +13,7 @@ mod record;
 mod refresh;
 mod rename;
 mod replay;
+mod samples;
 mod settings;
 mod status;
 mod table;

@@ -10,6 +10,7 @@ use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::MeasuredSlide;
 use tactus::eval::evaluate::Method;
 use tactus::eval::learn::Expected;
+use tactus::eval::samples::{note, of_all};
 use tactus::eval::show::count;
 use tactus::sim::collection::texture_name;
 use tactus_core::explorer;
@@ -279,12 +280,24 @@ pub(crate) fn learn_first(
         });
     let first: Vec<Vec<Vec<Observation>>> = first.collect::<anyhow::Result<_>>()?;
     let method = method.method();
-    Ok(tactus::eval::learn::learn_for(
+    let bytes = tactus::eval::learn::learn_for(
         expected,
         method,
         features,
         &names(set),
         &movements,
         &first,
-    )?)
+    )?;
+    // what the recordings say of the very slides that were learned from
+    let moved = |texture: usize| {
+        let keys = set.slides(texture);
+        let of = |movement: &Movement| {
+            let same = measured[texture].iter().filter(|s| s.movement == *movement);
+            let numbers: Vec<u32> = same.map(|s| s.number).take(slides).collect();
+            let used = keys.iter().filter(move |key| numbers.contains(&key.number));
+            used.map(|key| key.labels.moved)
+        };
+        of_all(movements.iter().flat_map(of))
+    };
+    Ok(note(&bytes, |texture| moved(texture.into()))?)
 }

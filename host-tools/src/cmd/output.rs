@@ -48,14 +48,17 @@ pub(crate) fn percent(share: f64) -> String {
     format!("{} %", percent.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// Verdicts by name, as people read them.
-pub(crate) fn verdict_rows(v: &Verdicts) -> [(&'static str, f64); 5] {
+/// Verdicts by name, as people read them, with a remark behind the share.
+pub(crate) fn verdict_rows(v: &Verdicts) -> [(&'static str, f64, String); 5] {
+    let named = v.changed_right.map_or(String::new(), |share| {
+        format!(" (the right one in {:.1} %)", 100.0 * share)
+    });
     [
-        ("right", v.right),
-        ("like one, but changed", v.changed),
-        ("none of those known", v.new),
-        ("wrong", v.wrong),
-        ("undecided", v.undecided),
+        ("right", v.right, String::new()),
+        ("like one, but changed", v.changed, named),
+        ("none of those known", v.new, String::new()),
+        ("wrong", v.wrong, String::new()),
+        ("undecided", v.undecided, String::new()),
     ]
 }
 

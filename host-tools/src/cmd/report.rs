@@ -9,6 +9,7 @@ use tactus::data::whole::write_whole;
 use tactus::eval::page::render;
 use tactus::eval::pictures::map;
 use tactus::eval::report::{RUNS, Report, Slides};
+use tactus::eval::samples;
 use tactus::eval::show::count;
 use tactus_core::table::Table;
 
@@ -81,7 +82,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     match args.format {
         Format::Json => print_json(&report, out)?,
-        Format::Text => print(&report, out)?,
+        Format::Text => print(&report, &samples::in_words(table), out)?,
     }
     out.flush()?;
     if let Some(path) = &args.out {
@@ -114,7 +115,7 @@ fn unseen(folder: &Path, table: Table<'_>) -> anyhow::Result<Vec<Slides>> {
         .collect())
 }
 
-fn print(report: &Report, out: &mut impl Write) -> anyhow::Result<()> {
+fn print(report: &Report, samples: &str, out: &mut impl Write) -> anyhow::Result<()> {
     let wide = report.textures.iter().map(|t| t.name.chars().count()).max();
     let wide = wide.unwrap_or(0).max(7);
     writeln!(
@@ -144,6 +145,7 @@ fn print(report: &Report, out: &mut impl Write) -> anyhow::Result<()> {
             "{name:<wide$}  {learned:>6}  {nearest:<wide$} {taken:>12} {slides:>14}"
         )?;
     }
+    writeln!(out, "{samples}")?;
     if let Some(recorded) = &report.recorded {
         let explorations = count(recorded.explorations as u64, "exploration");
         writeln!(
@@ -157,8 +159,9 @@ fn print(report: &Report, out: &mut impl Write) -> anyhow::Result<()> {
             ("others", unknown),
         ];
         for (kind, verdicts) in of.into_iter().filter_map(|(k, v)| Some((k, v?))) {
-            let told = verdict_rows(verdicts).map(|(name, share)| {
-                format!("{name} {}", percent((1000.0 * share).round() / 1000.0))
+            let told = verdict_rows(verdicts).map(|(name, share, remark)| {
+                let share = percent((1000.0 * share).round() / 1000.0);
+                format!("{name} {share}{remark}")
             });
             writeln!(out, "  {kind}: {}", told.join(", "))?;
         }

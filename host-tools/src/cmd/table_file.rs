@@ -46,6 +46,7 @@ pub(crate) fn read_table<'b>(file: &Path, bytes: &'b mut Vec<u8>) -> anyhow::Res
         .and_then(|file| file.take(MAX_BYTES).read_to_end(bytes))
         .with_context(|| format!("{name}: no table here, `tactus learn --out FILE` writes one"))?;
     let table = Table::read(bytes).with_context(|| name.to_string())?;
+    table.check_samples().with_context(|| name.to_string())?;
     let behind = bytes.len() - table.as_bytes().len();
     ensure!(
         behind == 0,

@@ -75,9 +75,10 @@ fn copy(set: &RecordingSet, to: &Path, progress: &mut dyn FnMut(usize, usize)) -
     let total = (0..done.textures).map(|t| set.slides(t).len()).sum();
     let mut writer = begin(set.folder(), to, set.textures().to_vec())?;
     for texture in 0..done.textures {
-        for slide in set.load_texture(texture)? {
+        for (slide, key) in set.load_texture(texture)?.iter().zip(set.slides(texture)) {
             if !writer.has(texture, slide.number) {
-                writer.write(&slide)?;
+                writer.label(key.labels.clone());
+                writer.write(slide)?;
             }
             done.slides += 1;
             progress(done.slides, total);

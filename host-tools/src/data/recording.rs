@@ -69,6 +69,8 @@ pub struct Labels {
     pub operator: String,
     /// Anything else.
     pub note: String,
+    /// Whether the sample was moved or turned since the slide before.
+    pub moved: Option<bool>,
 }
 
 impl Recording {

@@ -546,15 +546,15 @@ impl<'e> Run<'e> {
         )
     }
 
-    /// As [`Run::learn`], without one of the textures.
+    /// As [`Run::learn`], without some of the textures.
     ///
     /// # Errors
     /// See [`TableError`].
-    pub fn learn_without(&self, method: Method, texture: usize) -> Result<Vec<u8>, TableError> {
+    pub fn learn_without(&self, method: Method, out: &[usize]) -> Result<Vec<u8>, TableError> {
         let of = self.experiment;
-        let (mut names, mut training) = (of.names.clone(), self.training());
-        names.remove(texture);
-        training.remove(texture);
+        let all = (0..).zip(of.names.iter().cloned().zip(self.training()));
+        let kept = all.filter(|(texture, _)| !out.contains(texture));
+        let (names, training): (Vec<_>, Vec<_>) = kept.map(|(_, of)| of).unzip();
         let expected = &of.expected;
         learn_for(
             expected,

@@ -1,6 +1,11 @@
 //! Textures that the table does not have: how many are noticed, and how often one that it has is taken for one.
 
-use rand::RngExt as _;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use rand::seq::SliceRandom as _;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::{Config, Told};
@@ -56,6 +61,8 @@ impl After {
             right: 0.0,
             new,
             changed,
+            // no name is right
+            changed_right: None,
             wrong,
             undecided,
         }
@@ -95,6 +102,69 @@ pub fn leave_one_out(
     runs: u64,
     done: impl Fn() + Sync,
 ) -> Result<Novelty, EvaluateError> {
+    leave_out(experiment, config, 1, runs, done)
+}
+
+/// Which textures are left out of a table together.
+struct Groups(Vec<Vec<usize>>);
+
+impl Groups {
+    /// Of so many of all textures, drawn by lot; the last group is filled up with the first ones.
+    fn new(textures: usize, together: usize) -> Self {
+        let mut order: Vec<usize> = (0..textures).collect();
+        if together > 1 {
+            order.shuffle(&mut ChaCha8Rng::seed_from_u64(0));
+        }
+        let group = |first: usize| {
+            let mut group: Vec<usize> = order
+                .iter()
+                .cycle()
+                .skip(first)
+                .take(together)
+                .copied()
+                .collect();
+            group.sort_unstable();
+            group
+        };
+        Self((0..textures).step_by(together).map(group).collect())
+    }
+
+    /// The first group that a texture is in.
+    fn of(&self, texture: usize) -> &[usize] {
+        let group = self.0.iter().find(|group| group.contains(&texture));
+        group.map_or(&[], Vec::as_slice)
+    }
+}
+
+/// As [`leave_one_out`], with so many textures left out of each table together.
+///
+/// # Errors
+/// See [`EvaluateError`].
+pub fn leave_out(
+    experiment: &Experiment,
+    config: Config,
+    together: usize,
+    runs: u64,
+    done: impl Fn() + Sync,
+) -> Result<Novelty, EvaluateError> {
+    let groups = Groups::new(experiment.names().len(), together);
+    // where every run learns from the same slides, there is one table for each group
+    let tables: Mutex<HashMap<Vec<usize>, Arc<Vec<u8>>>> = Mutex::default();
+    let table = |run: &Run<'_>, out: &[usize]| {
+        let is_there = |tables: &Mutex<HashMap<_, Arc<Vec<u8>>>>| {
+            let tables = tables.lock().unwrap_or_else(PoisonError::into_inner);
+            tables.get(out).cloned()
+        };
+        if let Some(table) = is_there(&tables) {
+            return Ok(table);
+        }
+        let learned = Arc::new(run.learn_without(config.method, out)?);
+        if experiment.is_fixed() {
+            let mut tables = tables.lock().unwrap_or_else(PoisonError::into_inner);
+            tables.insert(out.to_vec(), Arc::clone(&learned));
+        }
+        Ok::<_, EvaluateError>(learned)
+    };
     let as_told = experiment.clone().each_slide_once();
     let open = Config {
         open: true,
@@ -106,20 +176,24 @@ pub fn leave_one_out(
             let mut run = experiment.run(index);
             let presented = run.unknown;
             let textures = experiment.names().len();
-            let other = (presented + 1 + run.random.random_range(0..textures - 1)) % textures;
-            let new = episode(experiment, open, &mut run, presented)?;
-            let known = episode(experiment, open, &mut run, other)?;
-            let told = |left_out| {
+            let first = presented + 1 + run.random.random_range(0..textures - 1);
+            // the next one that is left out while this one is not
+            let other = (first..first + textures)
+                .map(|other| groups.of(other % textures))
+                .find(|group| !group.contains(&presented))
+                .unwrap_or_default();
+            let outs = [groups.of(presented), other];
+            let tables = [table(&run, outs[0])?, table(&run, outs[1])?];
+            let new = episode(experiment, open, &mut run, outs[0], &tables[0])?;
+            let known = episode(experiment, open, &mut run, outs[1], &tables[1])?;
+            let told = |out: &[usize], bytes: &[u8]| {
                 let run = as_told.run(index);
-                let bytes = run.learn_without(open.method, left_out)?;
-                let mut explorer = explorer(&bytes, as_told.measured(), open, None)?;
+                let mut explorer = explorer(bytes, as_told.measured(), open, None)?;
                 let outcome = play(&mut explorer, None, open.strategy, run);
-                // in this table the textures after the missing one are one place further to the front
-                let place = presented.checked_sub(usize::from(presented > left_out));
-                let is_right = presented != left_out && Some(outcome.identified) == place;
+                let is_right = place(presented, out) == Some(outcome.identified);
                 Ok::<_, EvaluateError>((outcome.told, is_right))
             };
-            let told = [told(presented)?, told(other)?];
+            let told = [told(outs[0], &tables[0])?, told(outs[1], &tables[1])?];
             done();
             Ok(([new, known], told))
         })
@@ -134,23 +208,28 @@ pub fn leave_one_out(
     };
     Ok(Novelty {
         novelty: (0..SLIDES).map(after).collect(),
-        verdicts_new: Verdicts::of(presented.iter().map(|(_, told)| told[0])),
+        verdicts_new: Verdicts::of_unknown(presented.iter().map(|(_, told)| told[0].0)),
         verdicts_known: Verdicts::of(presented.iter().map(|(_, told)| told[1])),
     })
 }
 
-/// Slides over the run's texture with a table that lacks `left_out`: what is told after each, and whether the most probable
-/// texture is the right one.
+/// Where a texture is in a table without those that are left out; `None`: it is one of them.
+fn place(texture: usize, out: &[usize]) -> Option<usize> {
+    let before = out.iter().filter(|other| **other < texture).count();
+    (!out.contains(&texture)).then(|| texture - before)
+}
+
+/// Slides over the run's texture with a table without those that are left out: what is told after each, and whether the most
+/// probable texture is the right one.
 fn episode(
     experiment: &Experiment,
     config: Config,
     run: &mut Run<'_>,
-    left_out: usize,
+    out: &[usize],
+    bytes: &[u8],
 ) -> Result<[(Told, bool); SLIDES], EvaluateError> {
-    let bytes = run.learn_without(config.method, left_out)?;
-    let mut explorer = explorer(&bytes, experiment.measured(), config, None)?;
-    // in this table the textures after the missing one are one place further to the front
-    let place = run.unknown.checked_sub(usize::from(run.unknown > left_out));
+    let mut explorer = explorer(bytes, experiment.measured(), config, None)?;
+    let place = place(run.unknown, out);
     let mut told = [(Told::Undecided, false); SLIDES];
     for told in &mut told {
         let expected = explorer.expected_outcomes();
@@ -162,8 +241,31 @@ fn episode(
             .observe(action, slide)
             .expect("every slide has the features that the table was learned from");
         let best = explorer.best();
-        let is_right = run.unknown != left_out && Some(best.texture.into()) == place;
+        let is_right = place == Some(best.texture.into());
         *told = (best.told(), is_right);
     }
     Ok(told)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_texture_is_left_out_and_a_group_has_as_many_as_were_asked_for() {
+        for (textures, together) in [(20, 1), (117, 17), (10, 3), (4, 2)] {
+            let groups = Groups::new(textures, together);
+            for texture in 0..textures {
+                let out = groups.of(texture);
+                assert!(out.contains(&texture) && out.is_sorted());
+                assert_eq!(out.len(), together);
+                assert_eq!(place(texture, out), None);
+                // the places of the others are those of the table that is learned without them
+                let kept: Vec<usize> = (0..textures).filter(|t| !out.contains(t)).collect();
+                for (at, other) in kept.iter().enumerate() {
+                    assert_eq!(place(*other, out), Some(at));
+                }
+            }
+        }
+    }
 }

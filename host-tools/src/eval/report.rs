@@ -10,6 +10,7 @@ use crate::data::replay::MeasuredSlide;
 use crate::eval::alike::{Alike, alike, nearest};
 use crate::eval::evaluate::{EvaluateError, Method, Shared, explorer, play};
 use crate::eval::experiment::Experiment;
+use crate::eval::samples;
 use crate::eval::show::count;
 use crate::eval::table_summary::TableSummary;
 use crate::eval::verdicts::Verdicts;
@@ -47,6 +48,8 @@ pub struct TextureReport {
     pub name: String,
     /// Slides it was learned from at each movement, in the order of the movements.
     pub trials: Vec<u8>,
+    /// Whether its sample was moved or turned between them; `None`: nobody said.
+    pub sample_moved: Option<bool>,
     /// The texture that it is most like.
     pub nearest: Option<Alike>,
     /// What recordings make of it.
@@ -131,6 +134,7 @@ impl Report {
                 .zip(table.movements())
                 .map(|(m, _)| table.trials(texture, m))
                 .collect(),
+            sample_moved: table.moved(texture),
             nearest: nearest(table, texture),
             recorded: None,
         });
@@ -236,7 +240,10 @@ impl Report {
         self.recorded = Some(Recorded {
             explorations,
             known: verdicts,
-            unknown: (others > 0).then_some(unknown),
+            unknown: (others > 0).then_some(Verdicts {
+                changed_right: None,
+                ..unknown
+            }),
             mean_slides,
             not_in_table: (0..whole.len())
                 .filter(missing)
@@ -342,6 +349,10 @@ fn advice(report: &Report) -> Vec<String> {
             ));
         }
     }
+    let at_one_spot = |t: &&TextureReport| t.sample_moved == Some(false);
+    let stayed = report.textures.iter().filter(at_one_spot);
+    let stayed: Vec<&str> = stayed.map(|t| t.name.as_str()).collect();
+    advice.extend(samples::advice(&stayed));
     for texture in &report.textures {
         let name = &texture.name;
         let Some(recorded) = texture.recorded else {

@@ -9,6 +9,8 @@ use tactus_core::probe::explore::ExplorationStep;
 use tactus_core::table::{Action, Contents, Table, white};
 use tactus_core::wire::{Event, Prompt};
 
+use crate::eval::samples;
+
 const BAR: usize = 24;
 /// Most candidates listed after a slide.
 const LISTED: usize = 5;
@@ -351,8 +353,10 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
             (None, Some(_)) => writeln!(out, "no limits: it had fewer than three textures")?,
             (None, None) => {}
         }
+        show_samples(table, out)?;
         return show_whitened(table, out);
     }
+    show_samples(table, out)?;
     for (movement, index) in table.movements().zip(0..) {
         writeln!(out, "\nmovement {}: {movement}", index + 1)?;
         write!(out, "{:>4} {:<24} {:>6}", "no.", "texture", "trials")?;
@@ -383,6 +387,17 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
         }
     }
     Ok(())
+}
+
+/// Prints whether samples were moved between trials, and what would help where they never were.
+fn show_samples(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
+    writeln!(out, "{}", samples::in_words(table))?;
+    let stayed = (0..table.textures()).filter(|&texture| table.moved(texture) == Some(false));
+    let stayed: Vec<&str> = stayed.filter_map(|texture| table.name(texture)).collect();
+    match samples::advice(&stayed) {
+        Some(advice) => writeln!(out, "{advice}"),
+        None => Ok(()),
+    }
 }
 
 /// Prints what a fused table holds: whitened means say nothing to people, how far they are apart does.

@@ -45,6 +45,8 @@ pub struct TextureSummary {
     pub slides_user: u32,
     /// See [`Self::slides_factory`].
     pub slides_itself: u32,
+    /// Whether its sample was moved or turned between trials; `null` where nobody said.
+    pub sample_moved: Option<bool>,
     /// What is known of it at each movement, in the order of the movements.
     pub movements: Vec<KnownSummary>,
 }
@@ -101,6 +103,7 @@ impl TextureSummary {
             slides_factory: tally.factory.into(),
             slides_user: tally.user.into(),
             slides_itself: tally.itself.into(),
+            sample_moved: table.moved(texture),
             movements: movements
                 .map(|(movement, _)| KnownSummary::new(table, texture, movement))
                 .collect(),

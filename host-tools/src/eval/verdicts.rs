@@ -10,6 +10,9 @@ pub struct Verdicts {
     pub right: f64,
     /// Told the name of a texture that is not as it was learned. Only calibrated tables give this verdict.
     pub changed: f64,
+    /// Of those that were told so, the share that was told the right name; `None` where nobody was. No part of the sum.
+    #[serde(default)]
+    pub changed_right: Option<f64>,
     /// Told that it is none of the textures known.
     pub new: f64,
     /// Told a wrong name as sure.
@@ -22,9 +25,12 @@ impl Verdicts {
     /// Counts what was told at the end of each exploration, and whether the most probable texture was the right one.
     pub fn of(told: impl IntoIterator<Item = (Told, bool)>) -> Self {
         let mut counts = Self::default();
-        let mut all = 0.0_f64;
+        let (mut all, mut named) = (0.0_f64, 0.0_f64);
         for (told, is_right) in told {
             all += 1.0;
+            if told == Told::Changed && is_right {
+                named += 1.0;
+            }
             *match told {
                 Told::Sure if is_right => &mut counts.right,
                 Told::Sure => &mut counts.wrong,
@@ -37,9 +43,18 @@ impl Verdicts {
         Self {
             right: share(counts.right),
             changed: share(counts.changed),
+            changed_right: (counts.changed > 0.0).then(|| named / counts.changed),
             new: share(counts.new),
             wrong: share(counts.wrong),
             undecided: share(counts.undecided),
+        }
+    }
+
+    /// The same of textures that the table does not have: no name is right.
+    pub fn of_unknown(told: impl IntoIterator<Item = Told>) -> Self {
+        Self {
+            changed_right: None,
+            ..Self::of(told.into_iter().map(|told| (told, false)))
         }
     }
 }
@@ -63,11 +78,27 @@ mod tests {
         let expected = Verdicts {
             right: 0.25,
             changed: 0.0,
+            changed_right: None,
             new: 0.25,
             wrong: 0.125,
             undecided: 0.375,
         };
         assert_eq!(Verdicts::of(told), expected);
         assert_eq!(Verdicts::of([]), Verdicts::default());
+    }
+
+    #[test]
+    fn the_right_name_is_counted_among_those_that_were_told_changed() {
+        let told = [
+            (Told::Changed, true),
+            (Told::Changed, true),
+            (Told::Changed, false),
+            (Told::Sure, true),
+            (Told::Sure, true),
+            (Told::New, true),
+        ];
+        let verdicts = Verdicts::of(told);
+        assert_eq!(verdicts.changed_right, Some(2.0 / 3.0));
+        assert_eq!(verdicts.changed, 0.5);
     }
 }

@@ -393,7 +393,10 @@ mod tests {
         let set = RecordingSet::open(folder.as_ref()).unwrap();
         let measured = measure_all(&set, |_| ()).unwrap();
         let experiment = recorded();
-        let bytes = experiment.run(0).learn_without(Method::Fused, 5).unwrap();
+        let bytes = experiment
+            .run(0)
+            .learn_without(Method::Fused, &[5])
+            .unwrap();
         let table = Table::read(&bytes).unwrap();
         // two of each movement, and a third one of each to hold against it
         let third = |texture: usize| -> Vec<MeasuredSlide> {

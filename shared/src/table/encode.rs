@@ -213,17 +213,22 @@ pub fn with_sections<'o>(
         return Err(EncodeError::Contents);
     };
     let features = usize::from(features);
-    rewrite(
-        out,
-        old,
-        0,
-        old.names()
-            .zip(0..)
-            .map(|(name, texture)| Row::old(old, texture, name)),
-        (sections.length(features), |writer: &mut Writer<'_>| {
-            sections.write(features, |bytes| writer.put(bytes));
-        }),
-    )
+    let length = sections.length(features);
+    rewrite_with(out, old, 0, length, |put| sections.write(features, put))
+}
+
+/// Writes `old` with other sections, which take so many bytes.
+pub(super) fn rewrite_with<'o>(
+    out: &'o mut [u8],
+    old: &Table<'_>,
+    lineage: u32,
+    of_sections: usize,
+    sections: impl FnOnce(&mut dyn FnMut(&[u8])),
+) -> Result<Table<'o>, EncodeError> {
+    let rows = old.names().zip(0..);
+    let rows = rows.map(|(name, texture)| Row::old(old, texture, name));
+    let write = |writer: &mut Writer<'_>| sections(&mut |bytes| writer.put(bytes));
+    rewrite(out, old, lineage, rows, (of_sections, write))
 }
 
 /// Writes these rows with all else as `old` has it.
@@ -578,7 +583,10 @@ struct Writer<'o> {
 impl Writer<'_> {
     fn put(&mut self, bytes: &[u8]) {
         if let Some(buffer) = self.buffer.get_mut(self.at..self.at + bytes.len()) {
-            buffer.copy_from_slice(bytes);
+            // as long as these; `copy_from_slice` would ask again
+            for (to, from) in buffer.iter_mut().zip(bytes) {
+                *to = *from;
+            }
         }
         self.at += bytes.len();
     }

@@ -8,7 +8,7 @@
 //!
 //! Numbers are f32. Kind 1, how it drifts: [`Drift::bands`], [`Drift::traction`]; per movement variances along each two axes
 //! of its whitening. Kind 2, what textures are like, and the limits of scores: [`Limits`], begin and excess of six tails; per
-//! movement the axes of the population as a whitening, and d variances along them.
+//! movement the axes of the population as a whitening, and d variances along them. Kind 3 is for people: [`super::samples`].
 
 use heapless::Vec;
 
@@ -24,6 +24,7 @@ use crate::features::MAX_FEATURES;
 const HEAD: usize = 4;
 const DRIFT: u16 = 1;
 const NOVELTY: u16 = 2;
+pub(super) const SAMPLES: u16 = 3;
 /// Bytes of the drift's two numbers.
 const TWO: usize = 8;
 
@@ -116,9 +117,24 @@ fn each(bytes: &[u8]) -> impl Iterator<Item = Option<(u16, &[u8])>> {
 }
 
 impl<'a> Table<'a> {
-    fn section(&self, wanted: u16) -> Option<&'a [u8]> {
+    pub(super) fn section(&self, wanted: u16) -> Option<&'a [u8]> {
         let mut each = each(self.sections).flatten();
         each.find_map(|(kind, contents)| (kind == wanted).then_some(contents))
+    }
+
+    /// Heads and contents of all sections but those of this kind.
+    pub(super) fn other_sections(
+        &self,
+        left_out: u16,
+    ) -> impl Iterator<Item = ([u8; HEAD], &'a [u8])> {
+        let others = each(self.sections).flatten();
+        let others = others.filter(move |(kind, _)| *kind != left_out);
+        others.map(|(kind, contents)| {
+            let [k0, k1] = kind.to_le_bytes();
+            // it was read from as many bytes
+            let [l0, l1] = (contents.len() as u16).to_le_bytes();
+            ([k0, k1, l0, l1], contents)
+        })
     }
 
     /// Number of features of a fused table.

@@ -1,6 +1,7 @@
 //! A probe that somebody works with: its line, the log of what is said, and Ctrl-C, which leaves the rig lifted and stopped.
 
 use std::io::{self, Write};
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
@@ -228,16 +229,39 @@ impl Bench {
         transaction: E,
         mut each: impl FnMut(&Report) -> io::Result<()>,
     ) -> Result<E::Outcome, BenchError> {
+        let each = |report: &Report| each(report).map(|()| ControlFlow::Continue(()));
+        let outcome = self.run_until(transaction, each)?;
+        // nothing but the user stops it
+        outcome.ok_or(BenchError::Stopped)
+    }
+
+    /// As [`run`](Self::run), and `each` may break it off: `None` then, and the rig is stopped and lifted.
+    pub(crate) fn run_until<E: Transaction>(
+        &mut self,
+        transaction: E,
+        mut each: impl FnMut(&Report) -> io::Result<ControlFlow<()>>,
+    ) -> Result<Option<E::Outcome>, BenchError> {
         let mut job = self.begin(transaction)?;
+        let mut goes_on = ControlFlow::Continue(());
         loop {
             let mut shown = Ok(());
             let polled = self.step(&mut job, |report| {
                 if shown.is_ok() {
-                    shown = each(report);
+                    match each(report) {
+                        Ok(ControlFlow::Continue(())) => {}
+                        Ok(enough) => goes_on = enough,
+                        Err(why) => shown = Err(why),
+                    }
                 }
             });
             match (polled, shown) {
-                (Ok(Poll::Ready(outcome)), Ok(())) => return Ok(outcome),
+                (Ok(Poll::Ready(outcome)), Ok(())) => return Ok(Some(outcome)),
+                (Ok(Poll::Pending), Ok(())) if goes_on.is_break() => {
+                    return match self.lift() {
+                        BenchError::Stopped => Ok(None),
+                        why => Err(why),
+                    };
+                }
                 (Ok(Poll::Pending), Ok(())) if !self.interrupt.take() => {}
                 (Ok(Poll::Pending), Ok(())) => {
                     eprintln!("\nStopping and lifting the finger (Ctrl-C again: do not wait) ...");

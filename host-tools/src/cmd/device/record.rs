@@ -15,6 +15,7 @@ use tactus_core::wire::{Command, Identify};
 
 use super::bench::{Bench, Prompts, wait_for_enter};
 use super::line::Where;
+use super::samples::Sample;
 use super::train::seed_of_now;
 use crate::cmd::output::{Format, print_json};
 
@@ -25,6 +26,7 @@ Examples:
   tactus device record burlap silk --out recordings     asks for the next texture when it is due
   tactus evaluate --recordings recordings
   tactus device record burlap silk --out anna --operator Anna --lot 7     what tactus gauge asks for
+  tactus device record burlap silk --out turned --moved     on a turntable; the table learned from it says so
 The same command goes on with the texture at which an interrupted one stopped.")]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -60,6 +62,8 @@ pub(crate) struct Args {
         hide_default_value = true
     )]
     note: String,
+    #[command(flatten)]
+    sample: Sample,
     /// How to print what was recorded
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
@@ -101,6 +105,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         lot: args.lot.trim().to_owned(),
         operator: args.operator.trim().to_owned(),
         note: args.note.trim().to_owned(),
+        moved: args.sample.said(),
     });
     let (mut bench, _) = Bench::open(&args.at)?;
     let calibration = bench.get(Request::read_calibration())?;

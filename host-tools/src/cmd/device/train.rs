@@ -1,6 +1,7 @@
 //! `tactus device train` and `teach`: what the probe learns, and what that feels most like.
 
 use std::io::{self, Write};
+use std::ops::ControlFlow;
 
 use anyhow::ensure;
 use serde::Serialize;
@@ -8,11 +9,13 @@ use tactus::eval::alike::{self, Alike};
 use tactus::eval::show::count;
 use tactus::link::Request;
 use tactus_core::features::Property;
+use tactus_core::probe::training::pilot_movements;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire::{self, Event, Report};
 
 use super::bench::{Bench, Prompts};
 use super::line::Where;
+use super::samples::{Sample, Trials, ask_to_move, note_in_table};
 use crate::cmd::names;
 use crate::cmd::output::{Format, print_json};
 
@@ -21,7 +24,12 @@ use crate::cmd::output::{Format, print_json};
 #[command(after_help = "\
 Examples:
   tactus device train burlap                five trials of each movement of the probe's table
-  tactus device train burlap --pilot        every movement, to find out which ones tell textures apart")]
+  tactus device train burlap --pilot        every movement, to find out which ones tell textures apart
+  tactus device train burlap --same-spot    without asking to move the sample
+
+A slide on the same track again says little about a texture. So at a terminal the rig stops after each trial of all
+movements, its finger lifted, and you are asked to move or turn the sample. What came of that stands in the probe's table,
+for `tactus table show` and `tactus report`.")]
 pub(crate) struct Train {
     #[command(flatten)]
     at: Where,
@@ -36,6 +44,8 @@ pub(crate) struct Train {
     /// Where on the sample slides begin; drawn anew unless given
     #[arg(long)]
     seed: Option<u32>,
+    #[command(flatten)]
+    sample: Sample,
     /// How to print what came of it
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
@@ -64,6 +74,8 @@ struct Learned {
     is_new: bool,
     /// Slides that were made for it, or that it was taught from.
     slides: u32,
+    /// Whether its sample was moved or turned between trials, as the table says it.
+    sample_moved: Option<bool>,
     /// What it feels most like; `null` where the probe knows no other, and after a pilot.
     nearest: Option<Alike>,
 }
@@ -72,25 +84,92 @@ struct Learned {
 pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
     let typed = name_of(&args.name)?;
     let (mut bench, _) = Bench::open(&args.at)?;
-    let before = bench.names()?;
+    let bytes = bench.table()?;
+    let table = Table::read(&bytes)?;
+    let before: Vec<String> = table.names().map(str::to_owned).collect();
     let name = known_as(typed, &before)?;
-    let wanted = wire::Train {
-        name: name.clone(),
-        trials: args.trials,
-        pilot: args.pilot,
-        seed: args.seed.unwrap_or_else(seed_of_now),
+    let movements = match args.pilot {
+        true => pilot_movements().count(),
+        false => table.movements().len(),
     };
+    let noted = table.find(&name).map(|texture| table.moved(texture));
+    let seed = args.seed.unwrap_or_else(seed_of_now);
     let text = args.format == Format::Text;
-    let mut prompts = Prompts::default();
-    let slides = bench.run(Request::train(wanted), |report| match text {
-        true => show_slide(report, &mut prompts, out),
-        false => Ok(()),
-    })?;
+    let (mut prompts, mut slides) = (Prompts::default(), 0);
+    let mut trials = Trials::default();
+    let fewest = |texture| {
+        (0..)
+            .zip(table.movements())
+            .map(move |(m, _)| table.trials(texture, m))
+            .min()
+    };
+    let fewest = table.find(&name).and_then(fewest);
+    // trials of before, and somebody who knows whether the sample lies as it did
+    if args.sample.asks() && !args.pilot && fewest.is_some_and(|there| there < args.trials) {
+        trials.said(Some(ask_to_move(&bench, &name)?));
+    }
+    for part in 0.. {
+        let wanted = wire::Train {
+            name: name.clone(),
+            trials: args.trials,
+            pilot: args.pilot,
+            // slides of the next part begin elsewhere, too
+            seed: seed.wrapping_add(part),
+        };
+        let done = bench.run_until(Request::train(wanted), |report| {
+            if text {
+                show_slide(report, &mut prompts, out)?;
+            }
+            let Event::TrainingSlide { left, .. } = report.event else {
+                return Ok(ControlFlow::Continue(()));
+            };
+            let left = usize::from(left);
+            if slides == 0 && left + 1 < usize::from(args.trials) * movements {
+                trials.before(noted.flatten());
+            }
+            slides += 1;
+            let ends_trial = left > 0 && left.is_multiple_of(movements);
+            Ok(match ends_trial && args.sample.asks() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            })
+        })?;
+        if done.is_some() {
+            break;
+        }
+        trials.said(Some(ask_to_move(&bench, &name)?));
+    }
     if text {
         writeln!(out, "{name}: {} made.", count(slides, "slide"))?;
     }
+    if slides > 0 {
+        if !args.sample.asks() {
+            trials.said(args.sample.said());
+        }
+        // one trial is moved from nowhere
+        let moved = trials.moved().filter(|_| args.trials > 1);
+        if let Some(why) = note_in_table(&mut bench, &name, moved)? {
+            eprintln!("Whether the sample was moved is not noted in the table: {why}");
+        }
+    }
     let learned = Learned::new(&mut bench, &name, slides, &before)?;
+    if text && slides > 0 && !args.pilot {
+        writeln!(out, "{}", of_sample(learned.sample_moved))?;
+    }
     learned.print(args.format, out)
+}
+
+/// What the table says of the sample of a texture.
+fn of_sample(moved: Option<bool>) -> &'static str {
+    match moved {
+        Some(true) => "Its sample was moved between trials.",
+        Some(false) => {
+            "Its sample was not moved: slides on the same track say little about a texture. More trials elsewhere on it would help."
+        }
+        None => {
+            "The table does not know whether its sample was moved between all trials (--moved and --same-spot say so)."
+        }
+    }
 }
 
 /// Names the texture of the last exploration.
@@ -121,6 +200,7 @@ impl Learned {
             name: name.to_owned(),
             is_new: !before.iter().any(|known| known == name),
             slides,
+            sample_moved: texture.and_then(|texture| table.moved(texture)),
             nearest: texture.and_then(|texture| alike::nearest(table, texture)),
         })
     }
@@ -228,6 +308,7 @@ mod tests {
                 name: "velvet".into(),
                 is_new,
                 slides: 6,
+                sample_moved: None,
                 nearest: Some(Alike {
                     texture: "felt".into(),
                     taken_for: 0.31,

@@ -47,6 +47,7 @@ Examples:
   tactus evaluate --recordings DIR --protocol drift
   tactus evaluate --recordings DIR --method paper
   tactus evaluate --recordings DIR --novelty leave-one-out
+  tactus evaluate --recordings DIR --novelty leave-one-out --left-out 5     tables of all but five
   tactus evaluate --recordings DIR --plot pictures
   tactus evaluate --recordings DIR --verify --protocol blocked
   tactus evaluate --recordings DIR --lifelong")]
@@ -74,6 +75,9 @@ pub(crate) struct Args {
     /// Count how textures that were not learned are noticed
     #[arg(long, value_enum, conflicts_with = "lifelong")]
     pub(crate) novelty: Option<Novelty>,
+    /// With --novelty: textures that are left out of a table together
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "novelty", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) left_out: u16,
     /// Play a session in time order, in which the probe goes on learning
     #[arg(long)]
     pub(crate) lifelong: bool,
@@ -113,7 +117,7 @@ impl Args {
 /// How novelty is tried.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Novelty {
-    /// One texture after the other is left out of the table
+    /// One texture after the other is left out of the table, or one group after the other with --left-out
     LeaveOneOut,
 }
 

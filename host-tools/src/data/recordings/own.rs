@@ -14,6 +14,7 @@
 //! | `pdc_file`, `pdc_rate_hz`, `pdc_sha256` | P_DC in counts about the still baseline |
 //! | `shear_file`, `shear_rate_hz`, `shear_sha256` | tangential force in mN, positive against the motion; file and hash are empty where it was not measured |
 //! | `lot`, `operator`, `note` | batch or piece of the sample, who made the slide, anything else; may be empty or missing |
+//! | `moved` | whether the sample was moved or turned since the slide before: `yes`, `no`, or empty where nobody said; may be missing |
 //!
 //! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it; each is a
 //! one-dimensional array of `<i2` (numpy.int16). The hash is the SHA-256 of the whole file in hexadecimal. The rows may come
@@ -55,7 +56,7 @@ pub const COLUMNS: [&str; 19] = [
 ];
 
 /// Columns that follow them, which older manifests do not have.
-pub const LABELS: [&str; 3] = ["lot", "operator", "note"];
+pub const LABELS: [&str; 4] = ["lot", "operator", "note", "moved"];
 
 /// What the manifest says, checked.
 #[derive(Debug)]
@@ -177,7 +178,17 @@ impl Entry {
             Stream::of(row, file, sha256)?
                 .ok_or_else(|| row.error(Some(file), ContentError::NoFile))
         };
-        let [lot, operator, note] = LABELS.map(|column| row.text(column).to_owned());
+        let [lot, operator, note, moved] = LABELS.map(|column| row.text(column).to_owned());
+        let moved = match moved.as_str() {
+            "" => None,
+            "yes" => Some(true),
+            "no" => Some(false),
+            other => {
+                let other = other.chars().take(40).collect();
+                let cause = ContentError::NotA(other, "yes, no or nothing");
+                return Err(row.error(Some("moved"), cause));
+            }
+        };
         Ok(Self {
             line: row.line(),
             number: row.parse("slide", "the number of a slide")?,
@@ -186,6 +197,7 @@ impl Entry {
                 lot,
                 operator,
                 note,
+                moved,
             },
             window: (row.number("window_start_s")?, row.number("window_end_s")?),
             background,

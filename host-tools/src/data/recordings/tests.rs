@@ -479,6 +479,7 @@ fn labels_come_back_and_older_manifests_have_none() {
         lot: "7, front".to_owned(),
         operator: "Ánna \"A\"".to_owned(),
         note: String::new(),
+        moved: Some(false),
     };
     let texture = |id: u32| Texture {
         id,
@@ -496,14 +497,30 @@ fn labels_come_back_and_older_manifests_have_none() {
         set.slides(texture)[0].labels.clone()
     };
     assert_eq!([labels(0), labels(1)], [given, Labels::default()]);
+    // what is neither yes nor no is none
+    let manifest = folder.path().join("manifest.csv");
+    let text = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, text.replace(",,no\n", ",,maybe\n")).unwrap();
+    let why = RecordingSet::open(folder.path()).unwrap_err().to_string();
+    assert!(
+        why.contains("moved") && why.contains("\"maybe\" is not yes, no or nothing"),
+        "{why}"
+    );
+    fs::write(&manifest, &text).unwrap();
+    // and an import keeps them
+    let copy = tempfile::tempdir().unwrap();
+    let to = copy.path().join("to");
+    crate::data::import::import(folder.path(), &to, &mut |_, _| ()).unwrap();
+    let copied = RecordingSet::open(&to).unwrap();
+    assert_eq!(copied.slides(0)[0].labels, labels(0));
     // as they were written before there were labels
     let manifest = folder.path().join("manifest.csv");
     let text = fs::read_to_string(&manifest).unwrap();
-    let older = text.replace(",lot,operator,note", "");
-    let older = older.replace(",\"7, front\",\"Ánna \"\"A\"\"\",", "");
+    let older = text.replace(",lot,operator,note,moved", "");
+    let older = older.replace(",\"7, front\",\"Ánna \"\"A\"\"\",,no", "");
     let older: String = older
         .lines()
-        .map(|line| format!("{}\n", line.strip_suffix(",,,").unwrap_or(line)))
+        .map(|line| format!("{}\n", line.strip_suffix(",,,,").unwrap_or(line)))
         .collect();
     fs::write(&manifest, older).unwrap();
     assert_eq!(

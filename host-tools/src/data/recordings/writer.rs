@@ -82,8 +82,13 @@ impl RecordingWriter {
     /// The slides that are written from now on have these labels.
     #[must_use]
     pub fn labelled(mut self, labels: Labels) -> Self {
-        self.labels = labels;
+        self.label(labels);
         self
+    }
+
+    /// As [`labelled`](Self::labelled).
+    pub fn label(&mut self, labels: Labels) {
+        self.labels = labels;
     }
 
     fn check(folder: &Path, textures: &[Texture]) -> Result<()> {
@@ -188,6 +193,8 @@ impl RecordingWriter {
         }
         let labels = &self.labels;
         row.extend([&labels.lot, &labels.operator, &labels.note].map(Clone::clone));
+        let moved = labels.moved.map(|moved| if moved { "yes" } else { "no" });
+        row.push(moved.unwrap_or_default().to_owned());
         let written = csv(std::iter::once(&row)).and_then(|row| self.journal.write_all(&row));
         written.map_err(|e| io_error(&self.folder.join(ROWS), e))?;
         self.rows.push(row);

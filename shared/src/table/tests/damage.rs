@@ -36,6 +36,7 @@ pub(super) fn read_all(bytes: &[u8]) {
     assert_eq!(table.names().count(), usize::from(table.textures()));
     assert!(table.movements().len() <= MAX_MOVEMENTS);
     for texture in 0..table.textures() {
+        let _ = (table.moved(texture), table.check_samples());
         for movement in 0..table.movements().len() as u8 {
             let mut whitened = table.whitened(texture, movement);
             whitened.teach(&[5; 14]);

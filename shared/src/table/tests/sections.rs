@@ -21,7 +21,7 @@ fn limits() -> Limits {
 }
 
 /// Four textures, two movements and two features, with drift and limits.
-fn full() -> Vec<u8> {
+pub(super) fn full() -> Vec<u8> {
     let known = |n: i16| {
         let mean = [f64::from(n), f64::from(n * n)];
         vec![super::known(5, &mean), super::known(4, &mean)]
@@ -50,7 +50,7 @@ fn begin(bytes: &[u8]) -> usize {
     bytes.len() - CRC_BYTES - (4 + 8 + 8 + 4 + 52 + 2 * (14 + 8))
 }
 
-fn changed(change: impl FnOnce(&mut Vec<u8>, usize)) -> Vec<u8> {
+pub(super) fn changed(change: impl FnOnce(&mut Vec<u8>, usize)) -> Vec<u8> {
     let mut bytes = full();
     let at = begin(&bytes);
     bytes.truncate(bytes.len() - CRC_BYTES);

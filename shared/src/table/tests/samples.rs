@@ -1,0 +1,124 @@
+//! What a table says of samples: read back, carried over by a probe that learns, renames and deletes, and no part of what is
+//! decided.
+
+use super::damage::read_all;
+use super::sections::{changed, full};
+use super::*;
+
+const NOTES: [Option<bool>; 4] = [Some(true), Some(false), None, Some(true)];
+
+fn noted() -> Vec<u8> {
+    let bytes = full();
+    let mut out = vec![0; bytes.len() + samples_length(4)];
+    let table = Table::read(&bytes).unwrap();
+    let noted = with_moved(&mut out, &table, |texture| NOTES[usize::from(texture)]);
+    noted.unwrap().as_bytes().to_vec()
+}
+
+fn said(table: &Table<'_>) -> Vec<Option<bool>> {
+    (0..table.textures()).map(|t| table.moved(t)).collect()
+}
+
+#[test]
+fn it_is_read_back_and_the_rest_stays_to_the_bit() {
+    let (plain, noted) = (full(), noted());
+    let table = Table::read(&noted).unwrap();
+    assert_eq!(said(&table), NOTES);
+    assert_eq!(table.check_samples(), Ok(()));
+    // three of 5 bytes, and kind and length
+    assert_eq!(noted.len(), plain.len() + 4 + 15);
+    let without = Table::read(&plain).unwrap();
+    assert_eq!(
+        (without.check_samples(), said(&without)),
+        (Ok(()), vec![None; 4])
+    );
+    assert_eq!(
+        (table.drift(), table.limits()),
+        (without.drift(), without.limits())
+    );
+    assert_eq!(table.drifts, without.drifts);
+    assert_eq!(table.novelty, without.novelty);
+    let cells = table.layout().cells..table.layout().lineage;
+    assert_eq!(noted[cells.clone()], plain[cells]);
+    // nothing known: nothing written
+    let mut out = vec![0; noted.len()];
+    let none = with_moved(&mut out, &table, |_| None).unwrap();
+    assert_eq!(none.as_bytes().len(), plain.len());
+    assert_eq!(none.lineage(), without.crc());
+    // a table of Gaussians can have it, too
+    let small = small();
+    let table = Table::read(&small).unwrap();
+    let mut out = vec![0; small.len() + samples_length(table.textures().into())];
+    let noted = with_moved(&mut out, &table, |_| Some(false)).unwrap();
+    assert!(said(&noted).iter().all(|moved| *moved == Some(false)));
+    assert_eq!(noted.experience(0, 0), table.experience(0, 0));
+}
+
+#[test]
+fn a_probe_that_learns_and_deletes_carries_it_over() {
+    let bytes = noted();
+    let table = Table::read(&bytes).unwrap();
+    let mut out = vec![0; 4000];
+    let new = [known(3, &[9.0, 9.0]), known(3, &[9.0, 9.0])];
+    let put = |name| Change::Put {
+        name,
+        known: Known::Fused(&new),
+        tally: Tally::default(),
+    };
+    let name = |texture| table.name(texture).unwrap();
+    let learned = amend(&mut out, &table, put("new")).unwrap();
+    assert_eq!(said(&learned)[..4], NOTES);
+    assert_eq!(learned.moved(4), None, "nobody said");
+    let again = amend(&mut out, &table, put(name(1))).unwrap();
+    assert_eq!(said(&again), NOTES);
+    let fewer = amend(&mut out, &table, Change::Forget(0)).unwrap();
+    assert_eq!(said(&fewer), NOTES[1..]);
+    // another name: nothing is claimed of it, and the others keep theirs
+    let change = Change::Rename {
+        texture: 1,
+        name: "x",
+    };
+    let renamed = amend(&mut out, &table, change).unwrap();
+    assert_eq!(said(&renamed), [Some(true), None, None, Some(true)]);
+    let mut told = bytes.clone();
+    retell(&mut told, 1, 0, &new[0], Tally::default()).unwrap();
+    assert_eq!(said(&Table::read(&told).unwrap()), NOTES);
+    recentre(&mut told, 0, &[5, 6]).unwrap();
+    assert_eq!(said(&Table::read(&told).unwrap()), NOTES);
+}
+
+#[test]
+fn a_texture_with_the_number_of_a_deleted_one_does_not_get_its_note() {
+    let bytes = noted();
+    let table = Table::read(&bytes).unwrap();
+    let (mut fewer, mut more) = (vec![0; 4000], vec![0; 4000]);
+    let fewer = amend(&mut fewer, &table, Change::Forget(3)).unwrap();
+    assert_eq!(fewer.next_number(), table.number(3));
+    let new = [known(3, &[9.0, 9.0]), known(3, &[9.0, 9.0])];
+    let put = Change::Put {
+        name: "new",
+        known: Known::Fused(&new),
+        tally: Tally::default(),
+    };
+    let more = amend(&mut more, &fewer, put).unwrap();
+    assert_eq!(more.number(3), table.number(3));
+    assert_eq!(more.moved(3), None);
+}
+
+#[test]
+fn what_is_damaged_says_nothing_and_is_reported_to_who_looks() {
+    let section = |contents: &[u8]| {
+        changed(|bytes, _| {
+            bytes.extend([3, 0]);
+            bytes.extend((contents.len() as u16).to_le_bytes());
+            bytes.extend(contents);
+        })
+    };
+    for contents in [&[1, 2, 3][..], &[0, 0, 1, 2, 3], &[0, 0, 1, 2, 2, 9]] {
+        let bytes = section(contents);
+        let table = Table::read(&bytes).unwrap();
+        assert_eq!(table.check_samples(), Err(TableError::Section(3)));
+        assert_eq!(said(&table), [None; 4]);
+        read_all(&bytes);
+    }
+}
