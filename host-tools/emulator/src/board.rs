@@ -15,6 +15,7 @@ mod options;
 mod peers;
 pub mod pins;
 mod record;
+pub mod referee;
 mod registers;
 mod rig;
 mod stack;

@@ -15,6 +15,7 @@ use super::flash::{self, FlashWrite};
 use super::handler_profile::HandlerProfiler;
 use super::log::Log;
 use super::pins::{self, PinId};
+use super::referee::Referee;
 use super::rig::{SharedRig, lock};
 use super::stack::Stack;
 
@@ -64,11 +65,14 @@ pub(crate) struct Driver {
     pub(crate) clock: bool,
     /// what the firmware did to the store's sectors
     pub(crate) stored: Vec<FlashWrite>,
+    /// judges what the firmware does to the chip, from the first instruction on
+    pub(crate) referee: Option<Referee>,
 }
 
 impl Driver {
     /// Before the first instruction.
     pub(crate) fn power_up(&mut self, session: &mut Session<Board>) {
+        self.referee = Some(Referee::new(session.board_mut().part.bus()));
         self.restarted(session.board_mut(), VirtualNanos(0));
         self.switch(session.board_mut(), VirtualNanos(0));
     }
@@ -173,11 +177,14 @@ impl Driver {
             registers.get(FlashRegister::Sr),
         );
         if flash::ARRAY.contains(&access.address) {
+            let there = host.read(access.address, access.width)?;
+            if let Some(referee) = &mut self.referee {
+                referee.programs(access, cr, there);
+            }
             match flash::refusal(cr, access.width) {
                 // programming only clears bits
                 0 => {
-                    let old = host.read(access.address, access.width)?;
-                    let new = old & access.value & access.width.mask();
+                    let new = there & access.value & access.width.mask();
                     host.program(access.address, access.width, new)?;
                     let stored = FlashWrite::program(access.address, access.width, new);
                     self.stored.extend(stored);
@@ -274,12 +281,21 @@ impl emulator::Driver<Board> for Driver {
                 let at = reset.at;
                 self.restarted(session.board_mut(), at);
             }
+            if let Some(referee) = &mut self.referee {
+                referee.reset();
+            }
+        }
+        if let (Settled::Access { access, .. }, Some(referee)) = (&settled, &mut self.referee) {
+            referee.access(access);
         }
         match settled {
             Settled::Access { access, .. } if access.kind == AccessKind::Write => {
                 self.write(session, host, &access);
             }
             Settled::Hit(hit) => {
+                if let Some(referee) = &mut self.referee {
+                    referee.arrived(&hit, host);
+                }
                 if let Some(stack) = &mut self.stack {
                     stack.hit(&hit, host);
                 }

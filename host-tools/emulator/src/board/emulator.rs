@@ -22,6 +22,7 @@ use super::handler_profile::{HandlerProfile, HandlerProfiler};
 use super::log::Log;
 use super::options::Options;
 use super::pins;
+use super::referee::{Referee, Violation};
 use super::registers::register;
 use super::rig::{Rig, SharedRig, lock};
 use super::stack::{Stack, StackLayout, StackUse};
@@ -84,6 +85,7 @@ impl Emulator {
             switches: [None; 4],
             clock: options.clock,
             stored: Vec::new(),
+            referee: None,
         };
         let shared = rig.clone();
         let thread = std::thread::spawn(move || {
@@ -105,6 +107,11 @@ impl Emulator {
             symbols,
         };
         emulator.wait()?;
+        emulator.with(|standing| {
+            if let Some(referee) = &mut standing.driver.referee {
+                referee.watch(standing.host);
+            }
+        })?;
         Ok(emulator)
     }
 
@@ -236,8 +243,8 @@ impl Emulator {
         })
     }
 
-    /// Registers that the firmware used and no model implements, "SYSCFG.EXTICR4" and so on. Only SYSCFG's should be here.
-    pub fn unimplemented(&mut self) -> Result<Vec<String>, Error> {
+    /// Registers that the firmware used and no model implements, "SYSCFG.EXTICR4" and so on.
+    fn unimplemented(&mut self) -> Result<Vec<String>, Error> {
         self.with(|standing| {
             let registers = standing.session.unimplemented().values();
             registers
@@ -247,7 +254,7 @@ impl Emulator {
     }
 
     /// Addresses that the firmware used and nothing is at.
-    pub fn unmapped(&mut self) -> Result<Vec<u64>, Error> {
+    fn unmapped(&mut self) -> Result<Vec<u64>, Error> {
         self.with(|standing| {
             let unmapped = standing.session.unmapped().into_iter();
             // stores to the array are listed, since the driver does what they do
@@ -256,6 +263,34 @@ impl Emulator {
                 .filter(|address| !flash::ARRAY.contains(address))
                 .collect()
         })
+    }
+
+    /// What the firmware did so far that the chip's vendor does not allow, and what the models report themselves. None should be
+    /// here.
+    pub fn violations(&mut self) -> Result<Vec<Violation>, Error> {
+        let mut found = self.with(|standing| {
+            let referee = standing.driver.referee.as_ref();
+            let mut found = referee.map(Referee::found).unwrap_or_default();
+            let session = &standing.session;
+            let refused = session.refused().iter();
+            found.extend(refused.map(|(address, why)| {
+                Violation::of_models(format!("{address:#x} is refused: {why}"))
+            }));
+            let told = session.told();
+            found.extend(told.map(|told| {
+                let (instance, register) = (told.instance, told.register);
+                Violation::of_models(format!("{instance}.{register}: {}", told.reason))
+            }));
+            found
+        })?;
+        let unmapped = self.unmapped()?.into_iter();
+        found.extend(unmapped.map(|at| Violation::of_models(format!("nothing is at {at:#x}"))));
+        // which pin gives an edge: the board does what SYSCFG does
+        let unimplemented = self.unimplemented()?.into_iter();
+        let unimplemented = unimplemented.filter(|name| !name.starts_with("SYSCFG"));
+        found
+            .extend(unimplemented.map(|name| Violation::of_models(format!("no model has {name}"))));
+        Ok(found)
     }
 
     /// Presses the board's button or lets it go.

@@ -13,6 +13,7 @@ use tactus_core::table::{Action, Contents, Table, TableError, white};
 use tactus_core::wire::{Command, Counts, Event, Identify, Report, SlideReport, Verdict};
 
 use super::talk::{TIMEOUT_S, Talk, TalkError};
+use crate::board::referee::Violation;
 use crate::board::{self, Emulator, Slide};
 
 /// A whole exploration, virtual seconds.
@@ -108,6 +109,8 @@ pub struct Exploration {
     pub lost_reports: u64,
     /// What was played of recordings, all 0 without any.
     pub played: PlayCounts,
+    /// What the firmware did since power-up that the chip's vendor does not allow.
+    pub violations: Vec<Violation>,
 }
 
 /// Has the firmware find out what lies under its finger, and follows it. It must know `table` and be ready; `each` sees all
@@ -177,6 +180,7 @@ pub fn explore(
         not_followed,
         lost_reports,
         played,
+        violations: board.violations()?,
     })
 }
 
@@ -336,6 +340,9 @@ impl Exploration {
         let jitter = self.jitter_us();
         check(jitter <= JITTER_US, format!("slots off by {jitter:.2} us"));
         check(self.resets == 0, format!("{} resets", self.resets));
+        for violation in &self.violations {
+            check(false, format!("not allowed by the chip: {violation}"));
+        }
         let counts = self.counts;
         check(
             counts.lost_samples == 0,
@@ -426,6 +433,8 @@ impl Exploration {
             "parity_errors": self.counts.parity_errors,
             "missed_slots_true": self.missed_slots(),
             "resets": self.resets,
+            "silicon_violations": self.violations.len(),
+            "violations": self.violations.iter().map(ToString::to_string).collect::<Vec<_>>(),
             "force_error_max": force_share,
             "force_error_max_n": force_n,
             "speed_error_max": self.speed_error(),

@@ -9,6 +9,7 @@ mod faults;
 mod handheld;
 mod handheld_link;
 mod old_store;
+mod referee;
 mod selftest;
 mod serve;
 mod settings;

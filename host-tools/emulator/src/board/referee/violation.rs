@@ -1,0 +1,94 @@
+//! What a firmware may not do, and what it did.
+
+use std::fmt;
+
+/// What a firmware may not do.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub enum Rule {
+    /// Use a peripheral whose clock is off.
+    Clock,
+    /// Use a peripheral that is held in reset.
+    HeldInReset,
+    /// Use an address of a peripheral where it has no register.
+    NoRegister,
+    /// Write a byte where the register takes half-words or words, or past its end.
+    Width,
+    /// Write a register that can only be read.
+    ReadOnly,
+    /// Read a register that can only be written.
+    WriteOnly,
+    /// Change a reserved bit from its reset value.
+    ReservedBits,
+    /// Give a pin an alternate function that it does not have.
+    AlternateFunction,
+    /// Start a peripheral none of whose pins is led to it.
+    NoPin,
+    /// Lead two pins to one input of a peripheral.
+    TwoPins,
+    /// Convert a channel whose pin is not analog.
+    NotAnalog,
+    /// Start a DMA stream for a request that is not wired to it.
+    DmaRequest,
+    /// Have DMA use memory that it does not reach.
+    DmaMemory,
+    /// Change a DMA stream that runs.
+    DmaRunning,
+    /// Take an interrupt that has no handler.
+    NoHandler,
+    /// Program flash by a width other than the one that is set, or while it is locked or busy.
+    FlashProgram,
+    /// Program a bit of flash back to 1.
+    FlashBits,
+    /// Run faster than the wait states of the flash allow.
+    WaitStates,
+    /// Run a bus faster than it may.
+    BusClock,
+    /// Set the watchdog without its key.
+    WatchdogKey,
+    /// Unmask an edge of a pin that is no input.
+    EdgeOfNoInput,
+    /// What the models report themselves: an address that nothing is at, an access that is refused, a wrong use.
+    Model,
+}
+
+/// Something that the firmware may not do.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Violation {
+    /// What was broken.
+    pub rule: Rule,
+    /// Where and how.
+    pub what: String,
+    /// When first, ns.
+    pub at_ns: u64,
+    /// The instruction that did it first.
+    pub instruction: Option<u64>,
+    /// How often.
+    pub times: u64,
+}
+
+impl Violation {
+    /// What rigless' models report.
+    pub(in super::super) fn of_models(what: String) -> Self {
+        Self {
+            rule: Rule::Model,
+            what,
+            at_ns: 0,
+            instruction: None,
+            times: 1,
+        }
+    }
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?}: {}", self.rule, self.what)?;
+        if let Some(instruction) = self.instruction {
+            write!(f, ", by the instruction at {instruction:#x}")?;
+        }
+        write!(f, ", first at {:.6} s", self.at_ns as f64 * 1e-9)?;
+        if self.times > 1 {
+            write!(f, ", {} times", self.times)?;
+        }
+        Ok(())
+    }
+}
