@@ -2,9 +2,11 @@
 //!
 //! Each fault is injected at seeded instants of several phases. With its guard switched off the same judge must object.
 
+use std::time::Duration;
+
 use rayon::prelude::*;
 use tactus::sim::encoder::Cut;
-use tactus::sim::faults::Fault as Cause;
+use tactus::sim::faults::{BOUNCES_NS, Fault as Cause};
 use tactus::sim::rig::{SimError, SimRig};
 use tactus::sim::world::Setup;
 use tactus_core::features::Movement;
@@ -43,6 +45,8 @@ enum When {
 enum Since {
     /// The cause itself.
     Cause,
+    /// Its contact no longer bounces.
+    Settled,
     /// The stage is to move.
     Motion,
     /// The real force is over 2.1 N.
@@ -86,7 +90,7 @@ const CASES: &[Case] = &[
         fault: Fault::EStop,
         cause: Cause::EStop,
         when: ALL,
-        since: Since::Cause,
+        since: Since::Settled,
     },
     Case {
         fault: Fault::LeverLimit,
@@ -341,10 +345,13 @@ fn judge(case: &Case, when: When, seed: u64, unguarded: Unguarded) -> Result<(),
 
     // to the end, and how long it took from the moment it could be seen
     let mut detectable_ms = 0;
+    let pressed_n = rig.world().truth().force_n;
+    let settled = rig.now() + Duration::from_nanos(BOUNCES_NS);
     let faulted =
         |rig: &mut SimRig| matches!(rig.control().phase(), Phase::Faulted(_) | Phase::Ready);
     let detectable = |rig: &mut SimRig| match case.since {
         Since::Cause => true,
+        Since::Settled => rig.now() > settled,
         Since::Own => false,
         Since::Force => rig.world().truth().force_n > 2.1,
         Since::LeverDown => rig.world().truth().tip_mm < 14.4,
@@ -384,6 +391,7 @@ fn judge(case: &Case, when: When, seed: u64, unguarded: Unguarded) -> Result<(),
     }
     let ended = rig.rest(|_| ());
     // a lever that makes no steps cannot lift either, and that is then the fault
+    let without_power = case.cause == Cause::EStop;
     let stuck = matches!(case.cause, Cause::LeverLosesSteps { .. });
     if ended != Err(SimError::Fault(case.fault))
         && !(stuck && ended == Err(SimError::Fault(Fault::LeverNotHome)))
@@ -398,7 +406,11 @@ fn judge(case: &Case, when: When, seed: u64, unguarded: Unguarded) -> Result<(),
     if truth.force_max_n > 2.2 {
         return Err(format!("pressed with {:.3} N", truth.force_max_n));
     }
-    if case.fault != Fault::LeverNotHome && (truth.force_n != 0.0 || truth.indentation_mm > -0.5) {
+    if without_power && truth.force_max_n > pressed_n + 0.01 {
+        return Err(format!("pressed on without power: {truth:?}"));
+    }
+    let must_be_lifted = case.fault != Fault::LeverNotHome && !without_power;
+    if must_be_lifted && (truth.force_n != 0.0 || truth.indentation_mm > -0.5) {
         return Err(format!("the finger is not lifted: {truth:?}"));
     }
     if truth.speed_mm_s.abs() > 0.1 {
@@ -535,7 +547,7 @@ fn a_finger_that_was_not_lifted_is_not_dragged_along() {
 #[test]
 fn a_runaway_after_a_fault_finds_the_driver_off() {
     let mut rig = pressed(Unguarded::default());
-    rig.world().inject(Cause::EStop);
+    rig.world().inject(Cause::StageJammed);
     assert!(rig.rest(|_| ()).is_err());
     rig.world().inject(Cause::LeverRunaway);
     rig.world().reset_extremes();
@@ -551,8 +563,8 @@ fn a_runaway_after_a_fault_finds_the_driver_off() {
 #[test]
 fn a_reset_or_a_stop_does_not_leave_the_finger_down() {
     let mut rig = pressed(Unguarded::default());
-    rig.world().inject(Cause::EStop);
-    wait(&mut rig, 10);
+    rig.world().inject(Cause::StageJammed);
+    wait(&mut rig, 100);
     assert_eq!(rig.control().reset(), Err(Refused::Busy), "still lifting");
     assert!(rig.rest(|_| ()).is_err());
     assert!(rig.world().truth().indentation_mm < -0.5);

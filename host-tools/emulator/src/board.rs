@@ -8,6 +8,7 @@ mod emulator;
 mod error;
 mod exti;
 mod flash;
+mod halt;
 mod handler_profile;
 mod handlers;
 mod log;

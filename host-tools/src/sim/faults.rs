@@ -64,14 +64,21 @@ pub enum Fault {
     /// The lever's driver steps down on its own with 800 steps/s, until its enable is taken away or STEP asked for more
     /// steps up than it made by itself.
     LeverRunaway,
-    /// Somebody presses the emergency stop. It is a contact that the firmware sees; it cuts no power, since a finger that
-    /// presses must still be lifted.
+    /// The wire of the lever's DIR comes in inverted: up is down.
+    LeverDirInverted,
+    /// Somebody presses the emergency stop. One contact is for the firmware to see, and bounces; the other one takes the
+    /// supply of both motors.
     EStop,
+    /// A disturbance on the wire of the stop's first contact.
+    EStopGlitch {
+        /// How long it reads as pressed, us.
+        us: u64,
+    },
 }
 
 impl Fault {
     /// One of each kind, for campaigns.
-    pub const EXAMPLES: [Self; 21] = [
+    pub const EXAMPLES: [Self; 23] = [
         Self::SensorUnplugged,
         Self::BitFlips { share: 0.05 },
         Self::MisoStuck { high: false },
@@ -103,14 +110,16 @@ impl Fault {
         Self::LeverTopStuck { closed: false },
         Self::LeverLosesSteps { share: 0.1 },
         Self::LeverRunaway,
+        Self::LeverDirInverted,
         Self::EStop,
+        Self::EStopGlitch { us: 1_000 },
     ];
 }
 
 /// The faults that are there now, as far as they are not the finger's, the lever's, the stage's or the encoder's own.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Faults {
-    pub(super) e_stop: bool,
+    pub(super) e_stop: Stop,
     pub(super) top_stuck: Option<bool>,
     pub(super) limit_stuck: (Option<bool>, Option<bool>),
     pub(super) flip_share: f64,
@@ -119,6 +128,47 @@ pub(super) struct Faults {
     pub(super) pdc_stuck: bool,
     /// counts per second, and since when
     pub(super) drift: Option<(f64, u64)>,
+}
+
+/// How long the emergency stop's contact bounces, ns, and how long it stays as it is meanwhile (chosen: usual for a
+/// mushroom button).
+pub const BOUNCES_NS: u64 = 4_000_000;
+const BOUNCE_NS: u64 = 350_000;
+
+/// The emergency stop.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Stop {
+    pressed_ns: Option<u64>,
+    /// from when to when its wire is disturbed
+    glitch_ns: (u64, u64),
+}
+
+impl Stop {
+    pub(super) fn press(&mut self, now_ns: u64) {
+        self.pressed_ns.get_or_insert(now_ns);
+    }
+
+    pub(super) fn disturb(&mut self, now_ns: u64, us: u64) {
+        self.glitch_ns = (now_ns, now_ns + 1000 * us);
+    }
+
+    /// Whether the supply of the motors is off.
+    pub(super) fn cuts_power(self) -> bool {
+        self.pressed_ns.is_some()
+    }
+
+    /// Whether the contact that the firmware sees is open.
+    pub(super) fn is_open(self, now_ns: u64) -> bool {
+        let (from_ns, to_ns) = self.glitch_ns;
+        let pressed = self.pressed_ns.is_some_and(|since_ns| {
+            let after_ns = now_ns.saturating_sub(since_ns);
+            // it opens first; then every other time, seen from any instant of power-up
+            let bounce = after_ns / BOUNCE_NS;
+            after_ns >= BOUNCES_NS
+                || (bounce * 7 + since_ns / BOUNCE_NS * u64::from(bounce > 0)) % 3 != 1
+        });
+        pressed || (from_ns..to_ns).contains(&now_ns)
+    }
 }
 
 /// Command that samples the static pressure (SPM table 7).

@@ -7,6 +7,9 @@
 //! The driver's currents point to a microstep, the *field*; the rotor follows it to the nearest place where they agree,
 //! which repeats every 64 microsteps. That is all there is to losing steps: a rotor that is left behind by more than half
 //! of that snaps into another period, always a whole number of them away.
+//!
+//! The screw locks itself: its thread (Tr8x2) rises by 5.2 degrees, and steel on brass holds up to 8.5. Without current the
+//! lever stays where it is, whatever pushes; only its knob moves it.
 
 use std::f64::consts::TAU;
 
@@ -32,10 +35,6 @@ pub const RAMP_PER_S2: f64 = 320_000.0;
 const RATE_SLACK: f64 = 1.02;
 /// Load that the standing motor holds, N (chosen); falls linearly to nothing at [`TOP_PER_S`].
 pub const HOLD_N: f64 = 12.0;
-/// Load that the screw's friction holds without current, N (chosen: a 2 mm lead is nearly self-locking).
-pub const FRICTION_N: f64 = 0.5;
-/// How fast a finger pushes the unpowered lever up, per newton over [`FRICTION_N`], mm/s (chosen).
-pub const CREEP_MM_S_PER_N: f64 = 0.5;
 /// Play between screw and nut, um (chosen). A pressed finger keeps it closed: it shows only with the finger in the air.
 pub const BACKLASH_UM: f64 = 15.0;
 /// Finger force that overcomes the lever's own friction and closes the play, N (chosen).
@@ -67,6 +66,8 @@ pub struct Lever {
     step: Pin,
     dir: Pin,
     enabled: bool,
+    /// DIR's wire comes in inverted (fault)
+    inverted: bool,
     /// whether the last rising edge was a step: a short pulse takes it back
     last_edge_stepped: bool,
     last_step_ns: Option<u64>,
@@ -77,7 +78,7 @@ pub struct Lever {
     standing: bool,
     /// microsteps down from the upper hard stop, unwrapped
     field: i64,
-    /// the same for the rotor; between microsteps only without current
+    /// the same for the rotor; between microsteps only after its knob was turned
     rotor: f64,
     /// way of the nut at this place of the rotor: its sines take longer than the rest of a step
     screw: (f64, f64),
@@ -129,6 +130,7 @@ impl Lever {
             step: Pin::default(),
             dir: Pin::default(),
             enabled: false,
+            inverted: false,
             last_edge_stepped: false,
             last_step_ns: None,
             rate: 0.0,
@@ -165,7 +167,11 @@ impl Lever {
             since_ns: Some(at_ns),
         };
         if high {
-            let sign = if self.dir.high { 1 } else { -1 };
+            let sign = if self.dir.high != self.inverted {
+                1
+            } else {
+                -1
+            };
             self.asked += sign;
             if sign < 0
                 && let Some(runaway) = &mut self.runaway
@@ -200,7 +206,7 @@ impl Lever {
     }
 
     /// The level of EN: high gives current. Without it the driver still counts steps, as an A4988 does, but the rotor stays
-    /// where friction holds it, and snaps to the nearest fitting place when the current returns.
+    /// where it is, and snaps to the nearest fitting place when the current returns.
     pub fn enable(&mut self, high: bool, load_n: f64) {
         if high == self.enabled {
             return;
@@ -220,11 +226,6 @@ impl Lever {
     /// Lets one tick pass that ends at `now_ns`, with the finger pushing up with `load_n`.
     pub fn tick(&mut self, now_ns: u64, load_n: f64) {
         if !self.enabled {
-            if load_n > FRICTION_N {
-                let up_um = (load_n - FRICTION_N) * CREEP_MM_S_PER_N * TICK_S * 1e3;
-                self.rotor = (self.rotor - up_um / STEP_UM).max(0.0);
-                self.place_tip();
-            }
             return;
         }
         self.run_away(load_n);
@@ -267,6 +268,19 @@ impl Lever {
     /// Pulses that broke [`STEP_LEVEL_NS`] or [`DIR_SETUP_NS`].
     pub fn bad_pulses(&self) -> u64 {
         self.bad_pulses
+    }
+
+    /// From now on DIR says the opposite; `false` ends it.
+    pub fn invert_dir(&mut self, on: bool) {
+        self.inverted = on;
+    }
+
+    /// Turns the screw by its knob while there is no current: so far up, mm. Whether it could be turned.
+    pub fn turn_by_hand(&mut self, up_mm: f64, load_n: f64) -> bool {
+        if !self.enabled {
+            self.turn(-up_mm * 1e3 / STEP_UM, load_n);
+        }
+        !self.enabled
     }
 
     /// From now on the motor misses this share of the steps.

@@ -112,6 +112,8 @@ pub struct World {
     lever: Lever,
     mount: Mount,
     stage: Stage,
+    /// the enables of lever and stage
+    wanted: (bool, bool),
     encoder: Encoder,
     surface: Surface,
     finger: Finger,
@@ -159,6 +161,7 @@ impl World {
             lever: Lever::new(tip_mm, setup.world_seed, setup.trial_seed),
             mount: Mount::STIFF,
             stage: Stage::new(stage_mm, setup.world_seed, setup.trial_seed),
+            wanted: (false, false),
             encoder: Encoder::new(stage_mm, setup.keep_edges),
             surface: sample(setup.texture, setup.world_seed, conditions.variation),
             finger: Finger::under([setup.finger_seed, finger_noise], conditions),
@@ -206,7 +209,8 @@ impl World {
     /// power-up.
     pub fn lever_enable(&mut self, now_ns: u64, high: bool) {
         self.advance_to(now_ns);
-        self.lever.enable(high, self.finger.force_n());
+        self.wanted.0 = high;
+        self.supply_motors();
     }
 
     /// Duty of the stage's H-bridge, -1 to 1; positive drives to higher positions and counts. 0 shorts the motor: it
@@ -219,7 +223,16 @@ impl World {
     /// Enable of the stage's H-bridge: low, the motor has no current and the stage coasts. Low at power-up.
     pub fn stage_enable(&mut self, now_ns: u64, high: bool) {
         self.advance_to(now_ns);
-        self.stage.enable(high);
+        self.wanted.1 = high;
+        self.supply_motors();
+    }
+
+    /// Gives both motors current as their enables say, unless the emergency stop has taken their supply.
+    fn supply_motors(&mut self) {
+        let on = !self.faults.e_stop.cuts_power();
+        let (lever, stage) = self.wanted;
+        self.lever.enable(lever && on, self.finger.force_n());
+        self.stage.enable(stage && on);
     }
 
     /// One transfer with the sensor, chip select low from `now_ns` for `duration_ns`; fills `miso`.
@@ -293,9 +306,9 @@ impl World {
         (stuck.0.unwrap_or(lower), stuck.1.unwrap_or(upper))
     }
 
-    /// The emergency stop; `true` is pressed.
+    /// The emergency stop's contact for the firmware; `true` is open, as when it is pressed.
     pub fn e_stop(&self) -> bool {
-        self.faults.e_stop
+        self.faults.e_stop.is_open(self.now_ns)
     }
 
     /// Mounts another sample.
@@ -317,14 +330,25 @@ impl World {
         self.pull_n = -pull_n;
     }
 
+    /// Somebody turns the lever's screw by its knob, so far up, mm; whether it could be turned, which takes a motor without
+    /// current.
+    pub fn turn_knob(&mut self, up_mm: f64) -> bool {
+        self.lever.turn_by_hand(up_mm, self.finger.force_n())
+    }
+
     /// Fixes the finger to the lever by another mount; it is stiff unless this is called.
     pub fn mount(&mut self, mount: Mount) {
         self.mount = mount;
     }
 
-    /// Has a hand hold the finger from now on, in place of lever and stage: they stand still.
+    /// Has a hand hold the finger from now on, in place of lever and stage, which move without it.
     pub fn hold(&mut self, hand: Hand) {
         self.hand = Some(hand);
+    }
+
+    /// The finger is on the lever again, wherever that is.
+    pub fn put_back(&mut self) {
+        self.hand = None;
     }
 
     /// The hand that holds the finger.
@@ -388,7 +412,12 @@ impl World {
             Fault::LeverTopStuck { closed } => faults.top_stuck = Some(closed),
             Fault::LeverLosesSteps { share } => self.lever.lose_steps(share),
             Fault::LeverRunaway => self.lever.run_away_down(true),
-            Fault::EStop => faults.e_stop = true,
+            Fault::LeverDirInverted => self.lever.invert_dir(true),
+            Fault::EStop => {
+                faults.e_stop.press(at_ns);
+                self.supply_motors();
+            }
+            Fault::EStopGlitch { us } => faults.e_stop.disturb(at_ns, us),
         }
     }
 
@@ -411,6 +440,8 @@ impl World {
         self.encoder.set_cut(None, position_mm, self.now_ns);
         self.lever.lose_steps(0.0);
         self.lever.run_away_down(false);
+        self.lever.invert_dir(false);
+        self.supply_motors();
     }
 
     /// What is really so.
@@ -465,17 +496,12 @@ impl World {
                 lever_vibration: 0.0,
             });
             self.force_max_n = self.force_max_n.max(self.finger.force_n());
+            self.move_motors(0.0, 0.0);
             return;
         }
-        self.lever.tick(self.tick_ends_ns, self.finger.force_n());
-        self.mount.tick(self.finger.force_n());
-        let from_mm = self.stage.position_mm();
-        self.stage.tick(shear_n + self.pull_n);
-        let to_mm = self.stage.position_mm();
-        if from_mm != to_mm {
-            self.encoder
-                .pass([from_mm, to_mm], [self.tick_began_ns, self.tick_ends_ns]);
-        }
+        let force_n = self.finger.force_n();
+        self.mount.tick(force_n);
+        let [from_mm, to_mm] = self.move_motors(force_n, shear_n);
         self.finger.tick(&Contact {
             indentation_mm: self.indentation_mm(),
             surface: Some(&self.surface),
@@ -488,6 +514,19 @@ impl World {
         self.stage_reach_mm.0 = self.stage_reach_mm.0.min(to_mm);
         self.stage_reach_mm.1 = self.stage_reach_mm.1.max(to_mm);
         self.sliding_j -= shear_n * (to_mm - from_mm) * 1e-3;
+    }
+
+    /// A tick of lever and stage with this force of the finger and this shear on them, N: from where to where the stage goes.
+    fn move_motors(&mut self, force_n: f64, shear_n: f64) -> [f64; 2] {
+        self.lever.tick(self.tick_ends_ns, force_n);
+        let from_mm = self.stage.position_mm();
+        self.stage.tick(shear_n + self.pull_n);
+        let to_mm = self.stage.position_mm();
+        if from_mm != to_mm {
+            self.encoder
+                .pass([from_mm, to_mm], [self.tick_began_ns, self.tick_ends_ns]);
+        }
+        [from_mm, to_mm]
     }
 
     /// How far the time reached is into its tick, 0 to 1.

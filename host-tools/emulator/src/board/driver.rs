@@ -12,6 +12,7 @@ use rigless::time::VirtualNanos;
 
 use super::chip::Board;
 use super::flash::{self, FlashWrite};
+use super::halt::Halt;
 use super::handler_profile::HandlerProfiler;
 use super::log::Log;
 use super::pins::{self, PinId};
@@ -67,6 +68,8 @@ pub(crate) struct Driver {
     pub(crate) stored: Vec<FlashWrite>,
     /// judges what the firmware does to the chip, from the first instruction on
     pub(crate) referee: Option<Referee>,
+    /// a debugger has halted the core
+    pub(super) halt: Option<Halt>,
 }
 
 impl Driver {
@@ -325,6 +328,9 @@ impl emulator::Driver<Board> for Driver {
                 rig.buzzer(now.0, tone);
             }
             self.switch(session.board_mut(), now);
+            if let Some(halt) = &self.halt {
+                halt.last(&mut session.board_mut().part, now);
+            }
             if let Some(log) = &mut self.log {
                 log.drain(now.0, host);
             }

@@ -18,6 +18,7 @@ use super::chip::Board;
 use super::driver::{Command, Driver, Standing};
 use super::error::Error;
 use super::flash::{self, FlashWrite};
+use super::halt::Halt;
 use super::handler_profile::{HandlerProfile, HandlerProfiler};
 use super::log::Log;
 use super::options::Options;
@@ -86,6 +87,7 @@ impl Emulator {
             clock: options.clock,
             stored: Vec::new(),
             referee: None,
+            halt: None,
         };
         let shared = rig.clone();
         let thread = std::thread::spawn(move || {
@@ -348,6 +350,28 @@ impl Emulator {
         let whole = self.read(address, needed)?;
         self.write(address, &bytes)?;
         Ok((address, whole))
+    }
+
+    /// A debugger halts the core, until [`Emulator::go_on`]: time passes, and what DBGMCU does not stop goes on. With
+    /// `watchdog_stands` its tool has told DBGMCU to stop the watchdog.
+    pub fn halt(&mut self, watchdog_stands: bool) -> Result<(), Error> {
+        let at = VirtualNanos(self.now_ns);
+        self.with(move |standing| {
+            standing.host.hold(true);
+            let part = &mut standing.session.board_mut().part;
+            standing.driver.halt = Some(Halt::begin(part, at, watchdog_stands));
+        })
+    }
+
+    /// The debugger lets the core go on.
+    pub fn go_on(&mut self) -> Result<(), Error> {
+        let at = VirtualNanos(self.now_ns);
+        self.with(move |standing| {
+            if let Some(halt) = standing.driver.halt.take() {
+                halt.end(&mut standing.session.board_mut().part, at);
+            }
+            standing.host.hold(false);
+        })
     }
 
     /// Resets the chip by its pin.

@@ -6,6 +6,7 @@ mod commands;
 mod common;
 mod explore;
 mod faults;
+mod halt;
 mod handheld;
 mod handheld_link;
 mod old_store;

@@ -249,26 +249,43 @@ fn the_switch_at_the_top_has_a_hysteresis_and_the_hard_stop_takes_the_steps() {
 }
 
 #[test]
-fn without_current_a_finger_pushes_it_up_slowly_until_friction_holds_it() {
+fn without_current_it_stays_where_it_is_whatever_pushes() {
     let mut bench = Bench::at(2.0);
     bench.turn_to(true);
     bench.steps(160, 800.0);
-    bench.load_n = 1.5;
-    bench.wait_ms(100);
     let held = bench.lever.height_mm();
-    bench.lever.enable(false, 1.5);
-    bench.wait_ms(100);
+    assert!(!bench.lever.turn_by_hand(0.1, 0.0), "the motor holds");
+    for load_n in [0.5, 2.1, 12.0, 50.0] {
+        bench.load_n = load_n;
+        bench.lever.enable(false, load_n);
+        bench.wait_ms(1_000);
+        assert_eq!(bench.lever.height_mm(), held, "{load_n} N");
+    }
+    // but for its knob
+    assert!(bench.lever.turn_by_hand(0.05, 2.1));
     let up_mm = bench.lever.height_mm() - held;
-    assert!((up_mm - 0.05).abs() < 2e-3, "0.5 mm/s for 0.1 s: {up_mm}");
-    bench.load_n = FRICTION_N;
-    let held = bench.lever.height_mm();
-    bench.wait_ms(100);
-    assert_eq!(bench.lever.height_mm(), held);
+    assert!((up_mm - 0.05).abs() < 2e-3, "{up_mm}");
     // with the current, the rotor snaps to the nearest place that fits
-    bench.lever.enable(true, FRICTION_N);
+    let held = bench.lever.height_mm();
+    bench.lever.enable(true, 2.1);
     let snapped = bench.lever.height_mm();
     assert!((snapped - held).abs() <= 0.5 * PERIOD as f64 * STEP_UM * 1e-3 + STEP_ERROR_MM);
     assert_eq!((bench.lever.missing_steps()) % 64.0, 0.0);
+}
+
+#[test]
+fn an_inverted_dir_turns_every_step_round() {
+    let mut bench = Bench::at(8.0);
+    bench.turn_to(true);
+    bench.lever.invert_dir(true);
+    bench.steps(100, 800.0);
+    let from = bench.lever.height_mm();
+    bench.steps(800, 800.0);
+    let up_mm = bench.lever.height_mm() - from;
+    assert!((up_mm - 0.5).abs() < 2e-3, "{up_mm}");
+    bench.lever.invert_dir(false);
+    bench.steps(1_600, 800.0);
+    assert!(bench.lever.height_mm() < from);
 }
 
 #[test]

@@ -55,7 +55,11 @@ impl Bench {
     }
 
     fn wait_ms(&mut self, ms: u64) {
-        self.now_ns += ms * MS_NS;
+        self.wait_ns(ms * MS_NS);
+    }
+
+    fn wait_ns(&mut self, ns: u64) {
+        self.now_ns += ns;
         self.world.advance_to(self.now_ns);
     }
 

@@ -170,6 +170,7 @@ fn contacts_stick() {
     let pins = |world: &World| (world.e_stop(), world.lever_top(), world.stage_limits());
     assert_eq!(pins(&bench.world), (false, false, (false, false)));
     bench.world.inject(Fault::EStop);
+    bench.wait_ms(5);
     bench.world.inject(Fault::LeverTopStuck { closed: true });
     bench.world.inject(Fault::StageLimitStuck {
         upper: true,
@@ -197,6 +198,54 @@ fn contacts_stick() {
     assert_eq!(pins(&bench.world), (false, false, (false, false)));
     bench.world.clear();
     assert_eq!(pins(&bench.world), (false, true, (false, true)));
+}
+
+#[test]
+fn the_stop_bounces_and_takes_the_motors_supply_at_once() {
+    let mut bounced = 0;
+    for seed in 0..20 {
+        let mut bench = Bench::pressed(setup(46, seed), 0.2);
+        bench.world.stage_enable(bench.now_ns, true);
+        bench.world.stage_pwm(bench.now_ns, 0.2);
+        bench.wait_ms(100);
+        bench.wait_ns(seed * 117_000);
+        let before = bench.world.truth();
+        assert!(before.speed_mm_s > 10.0);
+        bench.world.inject(Fault::EStop);
+        assert!(bench.world.e_stop(), "it opens at once");
+        let open = (0..100).map(|_| {
+            bench.wait_ns(50_000);
+            bench.world.e_stop()
+        });
+        let open: Vec<bool> = open.collect();
+        bounced += u32::from(open.contains(&false));
+        assert_eq!(open[80..], [true; 20], "4 ms");
+        assert_eq!(bench.world.truth().current_a, 0.0);
+        bench.steps(400, 1_600);
+        let after = bench.world.truth();
+        assert_eq!(after.tip_mm, before.tip_mm, "no current, no step");
+        assert!(after.speed_mm_s == 0.0, "{after:?}");
+        bench.world.clear();
+        bench.wait_ms(100);
+        // at the end of its travel by now, in some trials
+        assert!(bench.world.truth().current_a > 0.02);
+    }
+    assert!(bounced > 15, "{bounced} of 20");
+}
+
+#[test]
+fn a_disturbed_wire_of_the_stop_takes_no_supply() {
+    let mut bench = Bench::new(Setup::default());
+    bench.world.inject(Fault::EStopGlitch { us: 1_000 });
+    assert!(bench.world.e_stop());
+    bench.wait_ns(990_000);
+    assert!(bench.world.e_stop());
+    bench.wait_ns(20_000);
+    assert!(!bench.world.e_stop());
+    bench.world.stage_pwm(bench.now_ns, 0.2);
+    bench.world.inject(Fault::EStopGlitch { us: 1_000 });
+    bench.wait_ms(100);
+    assert!(bench.world.truth().speed_mm_s > 10.0);
 }
 
 #[test]

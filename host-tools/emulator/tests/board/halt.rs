@@ -1,0 +1,98 @@
+//! A debugger halts the core in the middle of a movement: judged by the lever's pins and by the world.
+
+use tactus_core::wire::Command;
+use tactus_emulator::board::{Emulator, Output};
+use tactus_tests::expected_to_fail;
+
+use crate::common::elf;
+use crate::faults::{When, board, identify, is_time};
+
+/// How long the core is halted.
+const HALTED_MS: u64 = 700;
+
+/// When the lever made steps, ns.
+fn steps(board: &Emulator) -> Vec<u64> {
+    let rig = board.rig();
+    let rises = rig
+        .trace()
+        .filter(|(_, output)| *output == Output::LeverStep(true));
+    rises.map(|(at_ns, _)| *at_ns).collect()
+}
+
+/// A moment before the lever's next pulse, if it makes steps: its timer has been told to make it, and would make it again
+/// and again.
+fn before_a_pulse(board: &Emulator) -> Option<u64> {
+    let steps = steps(board);
+    let [.., before, last] = steps[..] else {
+        return None;
+    };
+    let every_ns = last - before;
+    let next_ns = last + every_ns - 100_000;
+    (every_ns < 10_000_000 && next_ns > board.now_ns()).then_some(next_ns)
+}
+
+/// Halts the core once in each of two movements: the steps made in halts, and the greatest force.
+fn steps_in_halts(elf: &std::path::Path, when: When, watchdog_stands: bool) -> (usize, f64) {
+    let mut talk = board(elf, 61, 30);
+    talk.board().rig().world().reset_extremes();
+    let mut made = 0;
+    for _ in 0..2 {
+        let mut halted = false;
+        // a halt costs the movement: slots are missed
+        let ended = talk.send(identify(1), 120.0, |board, report| {
+            if report.is_some() || halted || !is_time(when, board) {
+                return;
+            }
+            // while it slides the lever makes none
+            let at_ns = match when {
+                When::Sliding => board.now_ns() + 1,
+                _ => before_a_pulse(board).unwrap_or_default(),
+            };
+            if at_ns == 0 {
+                return;
+            }
+            halted = true;
+            board.run_until(at_ns).unwrap();
+            board.halt(watchdog_stands).unwrap();
+            board.run_ms(HALTED_MS).unwrap();
+            made += steps(board)
+                .iter()
+                .filter(|&&step_ns| step_ns > at_ns)
+                .count();
+            board.go_on().unwrap();
+        });
+        eprintln!("{when:?}: {made} steps, {ended:?}");
+        assert!(halted, "its time never came: {ended:?}");
+        // whatever was reported meanwhile
+        let rested_ns = talk.board().now_ns() + 12_000_000_000;
+        while talk.board().now_ns() < rested_ns {
+            talk.step().unwrap();
+        }
+        let force_n = talk.board().rig().world().truth().force_n;
+        assert_eq!(force_n, 0.0, "the finger is not lifted");
+        talk.send(Command::Home, 40.0, |_, _| ()).unwrap();
+    }
+    let force_max_n = talk.board().rig().world().truth().force_max_n;
+    (made, force_max_n)
+}
+
+/// With a tool that stops the watchdog nothing but the timer's own halt ends the pulses.
+#[test]
+fn no_step_is_made_in_a_halt() {
+    expected_to_fail("steps in a halt", || {
+        let Some(elf) = elf() else { return };
+        for when in [When::Approaching, When::Pressing] {
+            let (steps, force_max_n) = steps_in_halts(&elf, when, true);
+            assert_eq!(steps, 0, "steps in a halt: {force_max_n:.2} N");
+            assert!(force_max_n < 1.4, "{force_max_n} N");
+        }
+    });
+}
+
+/// Without such a tool the chip starts again, 100 ms into the halt.
+#[test]
+fn a_halt_that_the_watchdog_ends_presses_no_further() {
+    let Some(elf) = elf() else { return };
+    let (_, force_max_n) = steps_in_halts(&elf, When::Sliding, false);
+    assert!(force_max_n < 2.2, "{force_max_n} N");
+}
