@@ -7,7 +7,6 @@ use tactus::sim::world::Setup;
 use tactus_core::features::Movement;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Ended, Fault, Phase};
-use tactus_tests::expected_to_fail;
 
 /// A rig that nobody has calibrated, its DIR inverted from power-up on, over one of the samples.
 fn inverted(seed: u64) -> SimRig {
@@ -33,96 +32,88 @@ fn homed_again_and_again(rig: &mut SimRig, times: u32) -> f64 {
 /// Up is down. The first homing presses until the guard sees it; the zero that it began with must not be forgotten then.
 #[test]
 fn a_homing_that_goes_down_adds_no_force_to_the_last_one() {
-    expected_to_fail(" N after eight homings", || {
-        let objections: Vec<String> = (0..24)
-            .into_par_iter()
-            .filter_map(|seed| {
-                let mut rig = inverted(seed);
-                let once_n = homed_again_and_again(&mut rig, 1);
-                let often_n = homed_again_and_again(&mut rig, 7);
-                let fails = once_n > 2.2 || often_n > once_n + 1e-3;
-                fails.then(|| format!("{seed}: {once_n:.2} N, {often_n:.2} N after eight homings"))
-            })
-            .collect();
-        assert!(objections.is_empty(), "{}", objections.join("\n"));
-    });
+    let objections: Vec<String> = (0..24)
+        .into_par_iter()
+        .filter_map(|seed| {
+            let mut rig = inverted(seed);
+            let once_n = homed_again_and_again(&mut rig, 1);
+            let often_n = homed_again_and_again(&mut rig, 7);
+            let fails = once_n > 2.2 || often_n > once_n + 1e-3;
+            fails.then(|| format!("{seed}: {once_n:.2} N, {often_n:.2} N after eight homings"))
+        })
+        .collect();
+    assert!(objections.is_empty(), "{}", objections.join("\n"));
 }
 
 /// DIR turns round while the finger presses, and then it is to be lifted.
 #[test]
 fn a_lift_that_goes_down_is_given_up_in_time() {
-    expected_to_fail(" N by lifting", || {
-        let objections: Vec<String> = (0..24)
-            .into_par_iter()
-            .filter_map(|seed| {
-                let mut rig = SimRig::new(Setup {
-                    texture: 1 + (seed * 37 % 117) as u8,
-                    trial_seed: seed,
-                    ..Setup::default()
-                });
-                rig.home().unwrap();
-                rig.control().start(Movement::FOR_TRACTION, 0.3).unwrap();
-                while rig.control().phase() != Phase::Sliding {
-                    rig.tick();
-                }
-                rig.world().inject(Cause::LeverDirInverted);
-                rig.control().stop();
-                let _ = rig.rest(|_| ());
-                let lifted_n = rig.world().truth().force_max_n;
-                let often_n = homed_again_and_again(&mut rig, 7);
-                (often_n > 2.2)
-                    .then(|| format!("{seed}: {lifted_n:.2} N, then {often_n:.2} N by lifting"))
-            })
-            .collect();
-        assert!(objections.is_empty(), "{}", objections.join("\n"));
-    });
+    let objections: Vec<String> = (0..24)
+        .into_par_iter()
+        .filter_map(|seed| {
+            let mut rig = SimRig::new(Setup {
+                texture: 1 + (seed * 37 % 117) as u8,
+                trial_seed: seed,
+                ..Setup::default()
+            });
+            rig.home().unwrap();
+            rig.control().start(Movement::FOR_TRACTION, 0.3).unwrap();
+            while rig.control().phase() != Phase::Sliding {
+                rig.tick();
+            }
+            rig.world().inject(Cause::LeverDirInverted);
+            rig.control().stop();
+            let _ = rig.rest(|_| ());
+            let lifted_n = rig.world().truth().force_max_n;
+            let often_n = homed_again_and_again(&mut rig, 7);
+            (often_n > 2.2)
+                .then(|| format!("{seed}: {lifted_n:.2} N, then {often_n:.2} N by lifting"))
+        })
+        .collect();
+    assert!(objections.is_empty(), "{}", objections.join("\n"));
 }
 
 /// The screw locks itself: a finger that is still pressed when nothing moves any more is freed by the knob alone, and
 /// whoever reads of the fault is told so.
 #[test]
 fn who_has_to_turn_the_knob_is_told_of_it() {
-    expected_to_fail("no word of the knob", || {
-        let mut rig = inverted(3);
-        homed_again_and_again(&mut rig, 1);
-        let Phase::Faulted(fault) = rig.control().phase() else {
-            panic!("{:?}", rig.control().phase());
-        };
-        for _ in 0..60_000 {
-            rig.tick();
-        }
-        let pressed_n = rig.world().truth().force_n;
-        assert!(pressed_n > 0.05, "nobody has lifted it: {pressed_n} N");
-        for fault in [fault, Fault::ForceHigh, Fault::LeverNotHome] {
-            let told = fault.recovery();
-            assert!(told.contains("knob"), "no word of the knob: {told}");
-        }
-        // and then it works
-        assert!(rig.world().turn_knob(3.0));
-        assert_eq!(rig.world().truth().indentation_mm.max(0.0), 0.0);
-        rig.world().clear();
-        rig.control().reset().unwrap();
-        rig.home().unwrap();
-        rig.slide(Movement::FOR_ROUGHNESS, 0.5, |_, _| ()).unwrap();
-    });
+    let mut rig = inverted(3);
+    homed_again_and_again(&mut rig, 1);
+    let Phase::Faulted(fault) = rig.control().phase() else {
+        panic!("{:?}", rig.control().phase());
+    };
+    for _ in 0..60_000 {
+        rig.tick();
+    }
+    let pressed_n = rig.world().truth().force_n;
+    assert!(pressed_n > 0.05, "nobody has lifted it: {pressed_n} N");
+    for fault in [fault, Fault::ForceHigh, Fault::LeverNotHome] {
+        let told = fault.recovery();
+        assert!(told.contains("knob"), "no word of the knob: {told}");
+    }
+    // and then it works
+    assert!(rig.world().turn_knob(3.0));
+    assert_eq!(rig.world().truth().indentation_mm.max(0.0), 0.0);
+    rig.world().clear();
+    rig.control().reset().unwrap();
+    rig.home().unwrap();
+    rig.slide(Movement::FOR_ROUGHNESS, 0.5, |_, _| ()).unwrap();
 }
 
 /// A spark nearby is no emergency stop: what is shorter than the contact's own bouncing says nothing.
 #[test]
 fn a_disturbance_of_the_stops_wire_ends_no_slide() {
-    expected_to_fail("EStop", || {
-        for us in [100, 1_000, 2_000] {
-            let mut rig = SimRig::new(Setup::default());
-            rig.home().unwrap();
-            let now_ns = rig.now().as_nanos() as u64;
-            for n in 0..400 {
-                let at_ns = now_ns + n * 23_700_000;
-                rig.world().schedule(at_ns, Cause::EStopGlitch { us });
-            }
-            let slid = rig.slide(Movement::FOR_ROUGHNESS, 0.5, |_, _| ());
-            assert_eq!(slid, Ok(Ended::Whole), "{us} us: {}", slid.unwrap_err());
+    for us in [100, 1_000, 2_000] {
+        let mut rig = SimRig::new(Setup::default());
+        rig.home().unwrap();
+        let now_ns = rig.now().as_nanos() as u64;
+        for n in 0..400 {
+            let at_ns = now_ns + n * 23_700_000;
+            rig.world().schedule(at_ns, Cause::EStopGlitch { us });
         }
-    });
+        let slid = rig.slide(Movement::FOR_ROUGHNESS, 0.5, |_, _| ());
+        assert_eq!(slid, Ok(Ended::Whole), "{us} us: {}", slid.unwrap_err());
+    }
 }
 
 /// The stop's second contact takes the motors' supply: no program has to do anything for that.

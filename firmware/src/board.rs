@@ -3,8 +3,8 @@
 use assign_resources::assign_resources;
 use embassy_stm32::gpio::{Level, OutputOpenDrain, Pull, Speed};
 use embassy_stm32::interrupt::{self, InterruptExt as _, Priority};
-use embassy_stm32::pac::RCC;
 use embassy_stm32::pac::rcc::vals::Pllsrc;
+use embassy_stm32::pac::{DBGMCU, RCC};
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllQDiv, PllSource,
     Sysclk,
@@ -103,6 +103,9 @@ pub(crate) const RESET_HZ: u32 = 16_000_000;
 
 /// Starts the clocks, sets the priorities and hands out the pins. To be called once, first of all.
 pub(crate) fn start() -> AssignedResources {
+    // A debugger that halts the core halts the lever's pulses with it; the stage's PWM goes on, which would stop at either
+    // level.
+    DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
     let external = find_clock();
     let p = embassy_stm32::init(clocks(external));
     if external {

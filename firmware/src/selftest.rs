@@ -1,7 +1,7 @@
 //! The self-test of a board and its rig: each part in turn, with what was measured and what to do about it, over defmt.
 //!
-//! Motors move only after all switches were seen closed, and no further than a bound; nothing here needs the finger, which
-//! must be off. The watchdog comes last: it starts the chip again, and the next start says whether it did.
+//! Motors move only after all switches were seen closed and somebody squeezed the finger in the hand, and no further than a
+//! bound: the finger must be off its mount, its cable on. P_DC is watched while the lever moves. The watchdog comes last: it starts the chip again, and the next start says whether it did.
 use cortex_m::peripheral::DWT;
 use embassy_stm32::flash::Flash;
 use embassy_stm32::gpio::{Level, Output, Speed};
@@ -65,8 +65,17 @@ pub async fn selftest() {
             ),
         };
         chip(&mut account);
-        sensor(r.acquire, &mut account).await;
-        rig(r.lever, r.stage, r.switches, well, &mut blue, &mut account).await;
+        let touch = sensor(r.acquire, &mut account).await;
+        rig(
+            r.lever,
+            r.stage,
+            r.switches,
+            touch,
+            well,
+            &mut blue,
+            &mut account,
+        )
+        .await;
         store(r.store, &mut account).await;
         watchdog(r.watchdog, &mut account).await;
     }

@@ -5,6 +5,7 @@
 //! What is done every millisecond is `#[inline]` here: so it is compiled with the firmware, which is optimised for size,
 //! and not with the kernels of this crate.
 
+mod ascent;
 pub mod calibration;
 pub mod control;
 pub mod fault;

@@ -1,5 +1,5 @@
-//! Current amplifier, switches, lever and stage. Motors move only after all switches were seen closed, and no further than a
-//! bound.
+//! Current amplifier, switches, lever and stage. Motors move only after all switches were seen closed and the finger was off,
+//! no further than a bound, and the lever no further than P_DC stays as it is.
 use core::sync::atomic::Ordering::Relaxed;
 
 use embassy_stm32::Peri;
@@ -13,7 +13,7 @@ use tactus_core::rig::lever::{APPROACH_STEPS_S, MAX_STEPS, RETRACT_STEPS_S};
 use tactus_core::rig::stage::StageConstants;
 
 use super::account::{Account, wait_us};
-use super::sensor::Spread;
+use super::sensor::{Spread, Touch};
 use crate::board;
 use crate::chip::lever::Lever;
 use crate::chip::rescue;
@@ -24,6 +24,8 @@ const ZERO_COUNTS: f32 = 60.0;
 const CURRENT_NOISE_COUNTS: f32 = 16.0;
 /// 2 mm of the lever.
 const LEVER_STEPS: i32 = 3200;
+/// P_DC has risen by so much when the lever presses the finger, counts: 0.09 N.
+const PRESSED_COUNTS: f32 = 8.0;
 /// 0.1 mm: how far from where it opened the lever's switch may close.
 const LEVER_PLAY: i32 = 160;
 /// About 36 mm/s: enough to overcome friction, slow enough to stop by hand.
@@ -44,6 +46,7 @@ pub(super) async fn rig(
     lever: board::Lever,
     stage: board::Stage,
     switches: board::Switches,
+    mut touch: Touch,
     well: bool,
     blue: &mut Output<'static>,
     account: &mut Account,
@@ -119,7 +122,22 @@ pub(super) async fn rig(
         account.leave_out("stage", why);
         return;
     }
-    defmt::warn!("THE MOTORS MOVE IN 3 s: the finger must be off, hands away");
+    defmt::warn!(
+        "TAKE THE FINGER OFF ITS MOUNT, squeeze it once between two fingers and lay it down, within 30 s"
+    );
+    let off = touch.squeezed().await;
+    let seen = off.err().unwrap_or("squeezed, and left alone");
+    if !account.check(
+        off.is_ok(),
+        "finger off",
+        seen,
+        "Without it the motors stay off: they would move before anybody knows which way is up",
+    ) {
+        account.leave_out("lever", "since the finger may be on");
+        account.leave_out("stage", "since the finger may be on");
+        return;
+    }
+    defmt::warn!("THE MOTORS MOVE IN 3 s: hands away");
     for _ in 0..15 {
         blue.set_high();
         Timer::after_millis(100).await;
@@ -130,7 +148,7 @@ pub(super) async fn rig(
     // should the firmware give up now, the rescue can drive both
     rescue::ARMED.store(true, Relaxed);
 
-    let lifted = match test_lever(&mut lever, &switches).await {
+    let lifted = match test_lever(&mut lever, &switches, &mut touch).await {
         Ok((up, play)) => account.check(
             true,
             "lever",
@@ -197,6 +215,7 @@ fn level(input: &Input<'_>) -> &'static str {
 async fn drive_lever(
     lever: &mut Lever,
     switches: &Switches,
+    touch: &mut Touch,
     rate: i32,
     most: i32,
     until_open: Option<bool>,
@@ -213,6 +232,15 @@ async fn drive_lever(
         };
         if switches.e_stop.is_high() {
             break Err("emergency stop");
+        }
+        match touch.rise() {
+            Ok(rise) if rise < PRESSED_COUNTS => {}
+            Ok(_) => {
+                break Err(
+                    "P_DC rises: the finger is on its mount, or somebody holds it. If the lever went down, DIR is inverted",
+                );
+            }
+            Err(why) => break Err(why),
         }
         if seen >= 3 {
             break Ok(made);
@@ -234,21 +262,25 @@ async fn drive_lever(
 }
 
 /// Up to the switch, 2 mm down and up again: steps to the switch, and the difference between the ways.
-async fn test_lever(lever: &mut Lever, switches: &Switches) -> Result<(i32, i32), &'static str> {
+async fn test_lever(
+    lever: &mut Lever,
+    switches: &Switches,
+    touch: &mut Touch,
+) -> Result<(i32, i32), &'static str> {
     // the drivers want a while with current before they step
     lever.drive(true, 0);
     Timer::after_millis(10).await;
     let most = MAX_STEPS * 5 / 4;
-    let up = drive_lever(lever, switches, RETRACT_STEPS_S, most, Some(true)).await?;
+    let up = drive_lever(lever, switches, touch, RETRACT_STEPS_S, most, Some(true)).await?;
     let down = 2 * APPROACH_STEPS_S;
-    drive_lever(lever, switches, down, LEVER_STEPS, None).await?;
+    drive_lever(lever, switches, touch, down, LEVER_STEPS, None).await?;
     if switches.lever_top.is_high() {
         return Err(
             "the switch at its top stays open 2 mm below: its wire is broken, or the lever does not move",
         );
     }
     let most = LEVER_STEPS + LEVER_PLAY;
-    let back = drive_lever(lever, switches, -down, most, Some(true)).await?;
+    let back = drive_lever(lever, switches, touch, -down, most, Some(true)).await?;
     let play = (back - LEVER_STEPS).abs();
     if play > LEVER_PLAY {
         return Err("it came back to its switch too early: it loses steps on the way down");

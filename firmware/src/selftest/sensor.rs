@@ -20,8 +20,17 @@ const PAC_NOISE_COUNTS: core::ops::RangeInclusive<f32> = 1.0..=8.0;
 /// P_DC of a finger filled as it should be, in air.
 const PDC_COUNTS: core::ops::RangeInclusive<f32> = 2000.0..=3200.0;
 
+/// A squeeze, and that it is over, counts of P_DC: 0.23 and 0.06 N.
+const SQUEEZED_COUNTS: f32 = 20.0;
+const LEFT_COUNTS: f32 = 5.0;
+/// The finger lies still for so long, ms, and so long the squeeze is waited for.
+const LEFT_MS: u32 = 500;
+const ASKED_MS: u32 = 30_000;
+/// P_DC says nothing any more after so many damaged words in a row.
+const MOST_DAMAGED: u32 = 10;
+
 /// The bus of the sensor, used directly.
-struct Sensor {
+pub(super) struct Sensor {
     spi: Spi<'static, Blocking, Master>,
     select: Output<'static>,
 }
@@ -75,7 +84,54 @@ impl Spread {
     }
 }
 
-pub(super) async fn sensor(pins: board::Acquire, account: &mut Account) {
+/// P_DC against that of the finger that nobody touches, asked for every millisecond while a motor may press it.
+pub(super) struct Touch {
+    sensor: Sensor,
+    rest: f32,
+    /// Mean over some 8 ms.
+    counts: f32,
+    damaged: u32,
+}
+
+impl Touch {
+    /// Another word; how far P_DC is above its rest, counts.
+    pub(super) fn rise(&mut self) -> Result<f32, &'static str> {
+        let read = self.sensor.exchange(BioTac::exchange(Channel::Pdc));
+        match BioTac::decode(Channel::Pdc, read) {
+            Ok(word) => {
+                self.damaged = 0;
+                self.counts += (f32::from(word.counts.get()) - self.counts) / 8.0;
+            }
+            Err(_) => self.damaged += 1,
+        }
+        if self.damaged >= MOST_DAMAGED {
+            return Err("P_DC says nothing, so nobody would see the finger pressed");
+        }
+        Ok(self.counts - self.rest)
+    }
+
+    /// Waits for somebody who squeezes the finger and lays it down: then P_DC lives, and its rest is known.
+    pub(super) async fn squeezed(&mut self) -> Result<(), &'static str> {
+        let (mut squeezed, mut left_ms) = (false, 0);
+        for _ in 0..ASKED_MS {
+            Timer::after_millis(1).await;
+            let rise = self.rise()?;
+            squeezed |= rise > SQUEEZED_COUNTS;
+            left_ms = if squeezed && rise.abs() < LEFT_COUNTS {
+                left_ms + 1
+            } else {
+                0
+            };
+            if left_ms >= LEFT_MS {
+                self.rest = self.counts;
+                return Ok(());
+            }
+        }
+        Err("nobody squeezed it and laid it down")
+    }
+}
+
+pub(super) async fn sensor(pins: board::Acquire, account: &mut Account) -> Touch {
     let mut config = spi::Config::default();
     config.frequency = Hertz(5_250_000);
     config.miso_pull = Pull::Up;
@@ -152,4 +208,10 @@ pub(super) async fn sensor(pins: board::Acquire, account: &mut Account) {
         format_args!("{:.0} counts", pdc.mean()),
         "2000 to 3200 are right without contact. Refill the finger as its manual says; keep off anything that presses it",
     );
+    Touch {
+        sensor,
+        rest: pdc.mean(),
+        counts: pdc.mean(),
+        damaged: 0,
+    }
 }

@@ -40,7 +40,7 @@ pub(crate) async fn probe(
     // Whatever was before the reset, the finger is lifted first, and waits for nothing but the sensor. The stage does not
     // move before the calibration is there, which says whether the finger is in the air.
     Timer::after_millis(HEARD_MS).await;
-    let _ = rig.lift().await;
+    let lifted = rig.lift().await.is_ok();
     let store = with_timeout(OPENING, open(flash, &mut rig))
         .await
         .unwrap_or(Err(StoreError::Silent));
@@ -54,7 +54,10 @@ pub(crate) async fn probe(
         plan: PLAN.init_with(Plan::new),
     };
     probe.memory.reload(&mut probe.events).await;
-    let _ = probe.rig.home().await;
+    // a lever that does not go up must not be asked again before somebody has looked at it
+    if lifted {
+        let _ = probe.rig.home().await;
+    }
     loop {
         servo::forget_stop();
         BUSY.store(false, Relaxed);

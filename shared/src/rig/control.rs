@@ -4,12 +4,12 @@
 //! It has no input or output of its own: [`Control::tick`] takes the state of the inputs and returns that of the outputs,
 //! so that board and simulator run the same code.
 
+use super::ascent::{Ascent, RELEASE_MS, is_far};
 use super::calibration::RigCalibration;
 use super::fault::Fault;
 use super::force::ForceMeter;
 use super::guard::{FORCE_LIMIT_MN, Guard, Seen, Switch, Unguarded};
 use super::lever::{Lever, LeverState};
-use super::phase::HIGH_FORCE_MN;
 use super::pins::{Inputs, Outputs};
 use super::skin::SkinCare;
 use super::slide::Run;
@@ -17,22 +17,14 @@ use super::stage::{MARGIN_MM, Stage, StageConstants, StageState};
 use crate::features::Movement;
 use crate::sensor::pressure::{Calibration, Channel};
 
-use super::phase::{Ended, Phase, Refused};
+use super::phase::{Ended, HIGH_FORCE_MN, Phase, Refused};
 
 /// How long the still finger is measured.
 pub const BACKGROUND_MS: u32 = 1000;
 /// Speed of the stage while the finger is lifted.
 const RETURN_MM_S: f32 = 50.0;
-/// With the lever driver off the finger pushes it back; only then it is lifted.
-const RELEASE_MS: u32 = 20;
-/// Force that has risen by so many counts since the lever's driver was off rises because of the lifting.
-const WORSE_COUNTS: f32 = 8.0;
 /// Slower than this the stage stands, mm/s.
 const STANDS_MM_S: f32 = 0.5;
-/// P_DC of a finger in the air is no further than this from what its calibration says, counts: between the drift with the
-/// finger's temperature and the 110 of a contact that is pressed (chosen). What it lets pass, 0.46 N, and 1.26 N on top
-/// are below the guard's limit.
-const AIR_COUNTS: f32 = 40.0;
 /// A lifted finger shows no more than these counts above its zero.
 const LIFTED_COUNTS: f32 = 8.0;
 /// By so much may the mean force of a slide differ from that of the still finger before it: counts, and a share.
@@ -52,10 +44,6 @@ pub struct Control {
     ended: Option<Ended>,
     run: Run,
     allow_high_force: bool,
-    /// The finger cannot be lifted: the lever's driver stays off.
-    gave_up: bool,
-    /// P_DC above no contact when the driver had been off for [`RELEASE_MS`].
-    released: f32,
     /// P_DC without contact was measured: before that only its rise says anything of a finger that nobody calibrated.
     zeroed: bool,
     /// The first zero since homing was compared with the calibration's.
@@ -64,6 +52,8 @@ pub struct Control {
     recovered: Option<f32>,
     /// P_DC in the air, mean of the last run without load.
     air: Option<f32>,
+    /// The way up, by P_DC.
+    ascent: Ascent,
     /// P_DC above no contact of the still finger, mean of the background.
     still: f32,
     lever_top: Switch,
@@ -91,12 +81,11 @@ impl Control {
             ended: None,
             run: Run::NONE,
             allow_high_force: false,
-            gave_up: false,
-            released: 0.0,
             zeroed: false,
             compared: false,
             recovered: None,
             air: None,
+            ascent: Ascent::default(),
             still: 0.0,
             lever_top: Switch::default(),
             stage_left: Switch::default(),
@@ -151,6 +140,7 @@ impl Control {
         self.calibration = calibration;
         self.meter = ForceMeter::new(calibration.pressure.pdc_no_contact);
         self.zeroed = false;
+        self.ascent.forget();
         self.forget_default();
         Ok(())
     }
@@ -178,7 +168,9 @@ impl Control {
                 self.stage.forget();
                 self.compared = false;
                 self.recovered = None;
-                self.forget_default();
+                if self.ascent.begin() {
+                    self.forget_default();
+                }
                 self.enter(Phase::Homing);
                 Ok(())
             }
@@ -213,11 +205,13 @@ impl Control {
     }
 
     /// Whether P_DC at `counts` cannot be that of this finger in the air.
+    #[inline(never)]
     fn is_pressed(&self, counts: Option<f32>) -> bool {
         let calibrated = self.calibration.pressure.pdc_no_contact;
         let calibrated = (self.calibration.date != 0).then_some(calibrated);
-        let far = |air: f32| counts.is_some_and(|counts| libm::fabsf(counts - air) > AIR_COUNTS);
-        calibrated.is_some_and(far) || self.recovered.is_some_and(far)
+        // of a finger that nobody has calibrated, what it said on its way up
+        let known = [calibrated.or(self.ascent.lowest()), self.recovered];
+        known.into_iter().flatten().any(|air| is_far(counts, air))
     }
 
     /// Makes one movement, beginning at `start`: 0 to 1 of the room that the sample leaves.
@@ -331,18 +325,18 @@ impl Control {
             } else {
                 self.lever.reset();
             }
-            self.gave_up = false;
+            self.ascent.gave_up = false;
             self.enter(Phase::Parked);
         }
         Ok(())
     }
 
     /// Whether nothing moves and nothing will without a command: ready, parked, or at the end of a fault. The finger is
-    /// lifted then, unless the fault is [`Fault::LeverNotHome`].
+    /// lifted then, unless the fault is [`Fault::LeverNotHome`], or [`Fault::EStop`] and the motors had no supply.
     pub fn is_at_rest(&self) -> bool {
         match self.phase {
             Phase::Parked | Phase::Ready => true,
-            Phase::Faulted(_) => self.lever.is_lifted() || self.gave_up,
+            Phase::Faulted(_) => self.lever.is_lifted() || self.ascent.gave_up,
             _ => false,
         }
     }
@@ -375,15 +369,13 @@ impl Control {
         }
         let at_top = self.lever_top.tick(inputs.lever_top);
         let at_left = self.stage_left.tick(inputs.stage_limits.0);
+        let lost = self.stage.state() == StageState::Unknown;
+        let rise = self.ascent.tick(self.phase, lost, self.ms, &self.meter);
+        if let Some(fault) = rise.filter(|_| !self.lever.is_lifted()) {
+            self.check(fault);
+        }
         match self.watch(inputs) {
-            Some(Fault::ForceHigh) if self.phase == Phase::Faulted(Fault::ForceHigh) => {
-                let counts = self.meter.counts();
-                if self.ms <= RELEASE_MS {
-                    self.released = counts;
-                }
-                // lifting makes it worse: a driver or a wire that does not do what it is told
-                self.gave_up |= self.ms > 2 * RELEASE_MS && counts > self.released + WORSE_COUNTS;
-            }
+            Some(Fault::ForceHigh) if self.phase == Phase::Faulted(Fault::ForceHigh) => {}
             Some(fault) => self.fail(fault),
             None => {}
         }
@@ -405,8 +397,7 @@ impl Control {
             Phase::Faulted(fault) => {
                 // with its bridge on and no duty the motor is shorted, and brakes
                 outputs.stage_duty = 0.0;
-                // a driver that steps on its own must lose its current; then the finger has pushed it back. Once lifted,
-                // nothing is to happen any more.
+                // a driver that steps on its own must lose its current. Once lifted, nothing is to happen any more.
                 let released = fault != Fault::ForceHigh || self.ms > RELEASE_MS;
                 outputs.lever_enabled = released && !self.is_at_rest();
                 if !outputs.lever_enabled {
@@ -433,8 +424,11 @@ impl Control {
             return;
         }
         if fault == Fault::LeverNotHome {
-            self.gave_up = true;
-            self.fail(fault);
+            self.ascent.gave_up = true;
+            // the emergency stop itself has taken the lever's supply
+            if self.phase != Phase::Faulted(Fault::EStop) {
+                self.fail(fault);
+            }
         } else if !matches!(self.phase, Phase::Faulted(_)) {
             self.fail(fault);
         }
@@ -522,6 +516,7 @@ impl Control {
                     if first && self.is_pressed(zero) {
                         self.check(Fault::LeverNotHome);
                     }
+                    self.ascent.zero(self.meter.no_contact());
                 }
                 if self.phase == Phase::Pressing && self.lever.state() == LeverState::Holding {
                     self.run.hold();

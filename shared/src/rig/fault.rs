@@ -53,10 +53,11 @@ macro_rules! faults {
 // the fault, its name, how it is detected, the deadline in ms, what stops, what is refused, what the user does
 faults! {
     /// The finger is pressed too hard.
-    ForceHigh, "force too high", "P_DC means more than 2.05 N, mean of 10 ms made up for its lag; it bends: that is 2.1 N", 12,
-        "lever driver off at once, then finger lifted; stage motor braked", ALL, "look at the lever and the sample, then reset";
+    ForceHigh, "force too high", "P_DC means more than 2.05 N, mean of 10 ms made up for its lag; it bends: that is 2.1 N. Or it rises by 8 counts while the lever looks for its switch", 12,
+        "lever driver off at once, then finger lifted; stage motor braked", ALL, "look at the lever and the sample; if the finger still presses, turn the lever's knob until it is free; then reset";
     /// The emergency stop is pressed.
-    EStop, "emergency stop", "its input", 2, BOTH, ALL, "release it, then reset";
+    EStop, "emergency stop", "its input, open for 3 ms", 5, "both motors by its second contact; finger lifted as soon as there is supply, freed only by the lever's knob before", ALL,
+        "release it, then reset";
     /// The limit switch of the lever is pressed while the finger presses.
     LeverLimit, "lever at its limit", "upper limit switch closed more than 1 mm below it, 3 ms", 5, BOTH, ALL,
         "check the switch and its wire, then reset";
@@ -97,8 +98,8 @@ faults! {
     TasksHung, "tasks hung", "the firmware's tasks have not checked in for 2 s, or what was asked for makes no progress for 30 s", 2, BOTH, ALL,
         "none: the watchdog restarts the probe once the finger is lifted";
     /// The lever did not find its limit switch.
-    LeverNotHome, "lever not home", "limit switch not reached in 1.25 times the travel, or P_DC there or at the first zero more than 40 counts off the calibration's", 2,
-        "lever motor off, stage motor braked", ALL, "lift the finger by hand and check the switch; calibrate a finger that has drifted, then reset";
+    LeverNotHome, "lever not home", "limit switch not reached in 1.25 times the travel, P_DC still as high as it had risen on the last way up, or P_DC there or at the first zero more than 40 counts off the calibration's", 2,
+        "lever motor off, stage motor braked", ALL, "turn the lever's knob until the finger is free, check the switch and that DIR is not inverted; calibrate a finger that has drifted, then reset";
     /// The stage did not find its limit switch.
     StageNotHome, "stage not home", "limit switch not reached: the stage falls behind, or has gone 1.25 times the travel", 2, BOTH, ALL,
         "clear the stage's way and check the switch, then reset";

@@ -62,7 +62,8 @@ pub struct Seen<'a> {
     pub emf_mm_s: f32,
 }
 
-/// A limit switch. It is believed when it has been closed for 3 ms: less is its bouncing.
+/// A limit switch, or the emergency stop. It is believed when it has been pressed for 3 ms: less is its bouncing, or a
+/// disturbance of its wire.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Switch {
     closed_ms: u32,
@@ -91,6 +92,7 @@ pub struct Guard {
     frozen_ms: [u32; 2],
     damaged: [u32; SLICES],
     slice_ms: u32,
+    e_stop: Switch,
     lever_top: Switch,
     stage_limit: Switch,
     /// How far the stage should have come, has come by its encoder and has come by its motor's back-EMF, in mm since it
@@ -130,6 +132,8 @@ impl Guard {
     ) -> Option<Fault> {
         let sensor = self.sensor(seen.words);
         let stage = self.stage(seen);
+        // its second contact has taken the motors' supply by then
+        let e_stop = self.e_stop.tick(seen.e_stop);
         let lever_top = self.lever_top.tick(seen.lever_top);
         let stage_limit = self.stage_limit.tick(seen.stage_limit);
         // a calibration that says less than the paper's does not allow more
@@ -138,7 +142,7 @@ impl Guard {
             meter.counts().max(meter.counts_now()) * mn_per_count > limit_mn.min(FORCE_LIMIT_MN);
         [
             force.then_some(Fault::ForceHigh),
-            seen.e_stop.then_some(Fault::EStop),
+            e_stop.then_some(Fault::EStop),
             seen.hung.then_some(Fault::TasksHung),
             lever_top.then_some(Fault::LeverLimit),
             stage_limit.then_some(Fault::StageLimit),

@@ -4,6 +4,7 @@
 
 use tactus::sim::encoder::Cut;
 use tactus::sim::faults::Fault;
+use tactus::sim::person::{Hand, Manner};
 use tactus::sim::world::Setup;
 use tactus_emulator::board::{Emulator, Options, Output, ResetCause};
 
@@ -18,6 +19,9 @@ struct Run {
     resets: Vec<ResetCause>,
     /// What the motors were told, with the times, ns.
     outputs: Vec<(u64, Output)>,
+    force_max_n: f64,
+    /// When it said that the motors move.
+    warned_ns: u64,
 }
 
 impl Run {
@@ -27,25 +31,72 @@ impl Run {
     }
 }
 
-/// Runs the self-test with these faults from these times on, ns.
+/// What the person does who is asked to take the finger off and to squeeze it.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Person {
+    /// That.
+    Obeys,
+    /// Squeezes it, and puts it back.
+    PutsItBack,
+    /// Nothing: it is on the lever.
+    IsAway,
+}
+
+/// Runs the self-test, the finger in somebody's hand, with these faults: from power-up on, or so long after it has said that
+/// the motors move, ns.
 fn run(faults: &[(u64, Fault)]) -> Option<Run> {
+    run_with(Person::Obeys, faults)
+}
+
+fn run_with(person: Person, faults: &[(u64, Fault)]) -> Option<Run> {
     let elf = elf_of("TACTUS_SELFTEST_ELF")?;
     let options = Options {
         trace_s: 60,
         ..Options::default()
     };
     let mut emulator = Emulator::start(&elf, Setup::default(), options).unwrap();
-    for (at_ns, fault) in faults {
-        emulator.schedule(*at_ns, *fault);
+    for (_, fault) in faults.iter().filter(|(after_ns, _)| *after_ns == 0) {
+        emulator.inject(*fault);
     }
+    if person != Person::IsAway {
+        let hand = Hand::new(1, Manner::default());
+        emulator.rig().world().hold(hand);
+    }
+    // a hand takes a second and a half to get to it
+    let squeeze = |emulator: &mut Emulator, force_n, ms| {
+        if let Some(hand) = emulator.rig().world().hand() {
+            hand.intend(force_n, 0.0);
+        }
+        emulator.run_ms(ms).unwrap();
+    };
     let mut log = Vec::new();
+    let (mut asked, mut warned_ns) = (false, 0);
     while !log.iter().any(|line: &String| line.contains("SELF-TEST")) {
         assert!(emulator.now_ns() < 60_000_000_000, "no end: {log:#?}");
         emulator.run_ms(100).unwrap();
         log.extend(emulator.log().unwrap().into_iter().map(|(_, line)| line));
+        if warned_ns == 0
+            && let Some(line) = log.iter().find(|line| line.contains("THE MOTORS MOVE"))
+        {
+            let stamp = line.split_whitespace().next().unwrap();
+            warned_ns = (stamp.parse::<f64>().unwrap() * 1e9) as u64;
+            for (after_ns, fault) in faults.iter().filter(|(after_ns, _)| *after_ns > 0) {
+                emulator.schedule(warned_ns + after_ns, *fault);
+            }
+        }
+        if !asked && log.iter().any(|line| line.contains("TAKE THE FINGER OFF")) {
+            asked = true;
+            squeeze(&mut emulator, 0.5, 3000);
+            squeeze(&mut emulator, 0.0, 200);
+            if person == Person::PutsItBack {
+                emulator.rig().world().put_back();
+                emulator.rig().world().reset_extremes();
+            }
+        }
     }
     eprintln!("{}", log.join("\n"));
     assert_eq!(emulator.violations().unwrap(), []);
+    let force_max_n = emulator.rig().world().truth().force_max_n;
     let checks = log.iter().filter_map(|line| {
         let (verdict, name) = [("PASS ", true), ("FAIL ", false)]
             .into_iter()
@@ -62,11 +113,13 @@ fn run(faults: &[(u64, Fault)]) -> Option<Run> {
             .map(|reset| reset.cause)
             .collect(),
         outputs: emulator.rig().trace().copied().collect(),
+        force_max_n,
+        warned_ns,
         log,
     })
 }
 
-const CHECKS: [&str; 16] = [
+const CHECKS: [&str; 17] = [
     "reset",
     "clock",
     "PA12",
@@ -79,6 +132,7 @@ const CHECKS: [&str; 16] = [
     "right switch PF15",
     "emergency stop PF13",
     "lever switch PF12",
+    "finger off",
     "lever",
     "stage",
     "store",
@@ -95,19 +149,21 @@ fn an_intact_board_passes_every_check() {
         run.log
             .last()
             .unwrap()
-            .contains("SELF-TEST PASSED: 16 checks")
+            .contains("SELF-TEST PASSED: 17 checks")
     );
     assert_eq!(run.leds, [true, false, false]);
     assert_eq!(run.resets.len(), 1, "only the watchdog's: {:?}", run.resets);
 }
 
 #[test]
-fn an_unplugged_sensor_fails_the_sensors_checks_only() {
+fn an_unplugged_sensor_fails_its_checks_and_no_motor_moves_without_it() {
     let Some(run) = run(&[(0, Fault::SensorUnplugged)]) else {
         return;
     };
     let sensors = ["sensor identity", "sensor words", "P_AC noise", "P_DC"];
-    assert_eq!(run.failed(), sensors);
+    let motors = ["finger off", "lever", "stage"];
+    assert_eq!(run.failed(), [&sensors[..], &motors].concat());
+    assert!(!run.outputs.iter().any(|(_, output)| moves(output)));
     assert_eq!(run.leds, [false, false, true]);
 }
 
@@ -153,20 +209,40 @@ fn the_stage_stays_where_it_is_if_the_levers_switch_never_closes_or_opens() {
 #[test]
 fn the_emergency_stop_stops_lever_and_stage_at_once() {
     // while the lever goes up, and while the stage goes to the right
-    for (at_ns, failed) in [
-        (5_000_000_000, &["lever", "stage"][..]),
-        (9_880_000_000, &["stage"][..]),
+    for (after_ns, failed) in [
+        (3_839_000_000, &["lever", "stage"][..]),
+        (8_719_000_000, &["stage"][..]),
     ] {
-        let Some(run) = run(&[(at_ns, Fault::EStop)]) else {
+        let Some(run) = run(&[(after_ns, Fault::EStop)]) else {
             return;
         };
         assert_eq!(run.failed(), failed);
+        let at_ns = run.warned_ns + after_ns;
         let moving = run.outputs.iter().filter(|(_, output)| moves(output));
         let last_ns = moving.map(|(at_ns, _)| *at_ns).max().unwrap();
         let ends = run.outputs.iter().filter(|(at, _)| *at > last_ns);
         let end_ns = ends.map(|(at_ns, _)| *at_ns).min().unwrap();
         assert!(last_ns > at_ns - 100_000_000, "it did not move before");
-        assert!(end_ns < at_ns + 3_000_000, "moves until {end_ns}");
+        // its contact bounces for 4 ms
+        assert!(end_ns < at_ns + 7_000_000, "moves until {end_ns}");
+    }
+}
+
+/// The finger is on its mount all the same, and up is down.
+#[test]
+fn a_finger_that_was_left_on_is_not_crushed_by_a_lever_that_goes_down() {
+    for (person, failed) in [
+        (Person::PutsItBack, &["lever", "stage"][..]),
+        (Person::IsAway, &["finger off", "lever", "stage"][..]),
+    ] {
+        let Some(run) = run_with(person, &[(0, Fault::LeverDirInverted)]) else {
+            return;
+        };
+        assert_eq!(run.failed(), failed, "{person:?}");
+        let force_n = run.force_max_n;
+        assert!(force_n < 0.5, "{person:?}: {force_n:.2} N on the finger");
+        let moved = run.outputs.iter().any(|(_, output)| moves(output));
+        assert_eq!(moved, person == Person::PutsItBack);
     }
 }
 

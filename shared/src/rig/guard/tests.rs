@@ -62,7 +62,12 @@ fn a_rig_at_rest_has_no_fault() {
 fn faults_are_seen_when_the_table_says() {
     assert_eq!(
         run(|ms, _, s| s.e_stop = ms >= 500),
-        Some((500, Fault::EStop))
+        Some((502, Fault::EStop))
+    );
+    assert_eq!(
+        run(|ms, _, s| s.e_stop = ms % 3 != 0),
+        None,
+        "two ms of the emergency stop are a disturbance of its wire"
     );
     assert_eq!(
         run(|ms, _, s| s.lever_top = ms >= 500),
