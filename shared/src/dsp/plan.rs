@@ -61,36 +61,9 @@ pub struct Taps {
 }
 
 impl Taps {
-    /// Designs the band-pass: the ideal response, cut by a Hamming window and scaled to gain 1 in the middle of the band.
-    #[inline]
+    /// The band-pass.
     pub fn band_pass() -> Self {
-        let (low, high) = (
-            PASS_BAND_HZ.0 / f64::from(RATE_HZ),
-            PASS_BAND_HZ.1 / f64::from(RATE_HZ),
-        );
-        let middle = low + high;
-        // both of one tap at `m` samples from the centre; frequencies in cycles per sample
-        let windowed = |n: usize| {
-            let m = n as f64 - HISTORY as f64 / 2.0;
-            let ideal = |f: f64| {
-                if m == 0.0 {
-                    2.0 * f
-                } else {
-                    // a sine is a cosine a quarter of a turn later
-                    cos_of_turns(f * m - 0.25) / (PI * m)
-                }
-            };
-            let hamming = 0.54 - 0.46 * cos_of_turns(n as f64 / HISTORY as f64);
-            ((ideal(high) - ideal(low)) * hamming, m)
-        };
-        let gain: f64 = (0..TAPS)
-            .map(windowed)
-            .map(|(h, m)| h * cos_of_turns(middle * m / 2.0))
-            .sum();
-        let mut taps = [0; TAPS];
-        for (n, tap) in taps.iter_mut().enumerate() {
-            *tap = libm::round(windowed(n).0 / gain * 32768.0) as i16;
-        }
+        let taps = BAND_PASS;
         let mut pairs = [[0; 2]; PAIRS];
         let at = |n: Option<usize>| n.and_then(|n| taps.iter().rev().nth(n)).copied();
         let word = |low: Option<i16>, high: Option<i16>| {
@@ -124,12 +97,58 @@ impl Taps {
     }
 }
 
+/// The band-pass, designed by the compiler: the chip would take 1 KB of code for it.
+const BAND_PASS: [i16; TAPS] = design();
+
+/// Designs the band-pass: the ideal response, cut by a Hamming window and scaled to gain 1 in the middle of the band.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "the compiler runs it, and has no iterators"
+)]
+const fn design() -> [i16; TAPS] {
+    // frequencies in cycles per sample
+    let (low, high) = (
+        PASS_BAND_HZ.0 / RATE_HZ as f64,
+        PASS_BAND_HZ.1 / RATE_HZ as f64,
+    );
+    let mut response = [0.0; TAPS];
+    let mut gain = 0.0;
+    let mut n = 0;
+    while n < TAPS {
+        // samples from the centre
+        let m = n as f64 - HISTORY as f64 / 2.0;
+        let hamming = 0.54 - 0.46 * cos_of_turns(n as f64 / HISTORY as f64);
+        response[n] = (ideal(high, m) - ideal(low, m)) * hamming;
+        gain += response[n] * cos_of_turns((low + high) * m / 2.0);
+        n += 1;
+    }
+    let mut taps = [0; TAPS];
+    let mut n = 0;
+    while n < TAPS {
+        let tap = response[n] / gain * 32768.0;
+        // to the nearest: what is converted is cut towards 0
+        taps[n] = (tap + if tap < 0.0 { -0.5 } else { 0.5 }) as i16;
+        n += 1;
+    }
+    taps
+}
+
+/// The ideal low-pass, `m` samples from its centre.
+const fn ideal(edge: f64, m: f64) -> f64 {
+    if m == 0.0 {
+        2.0 * edge
+    } else {
+        // a sine is a cosine a quarter of a turn later
+        cos_of_turns(edge * m - 0.25) / (PI * m)
+    }
+}
+
 /// Cosine of an angle in turns, fewer than 2^31 of them. That of `libm` takes angles of any size in radians, and 5 KB of
 /// flash to tell how many turns they are.
 #[inline]
-pub(crate) fn cos_of_turns(turns: f64) -> f64 {
+pub(crate) const fn cos_of_turns(turns: f64) -> f64 {
     let turns = if turns < 0.0 { -turns } else { turns };
-    let part = turns - f64::from(turns as u32);
+    let part = turns - turns as u32 as f64;
     // to an eighth of a turn, where the series below are as good as f64 is
     let half = if part > 0.5 { 1.0 - part } else { part };
     let (quarter, sign) = if half > 0.25 {
@@ -137,19 +156,24 @@ pub(crate) fn cos_of_turns(turns: f64) -> f64 {
     } else {
         (half, 1.0)
     };
-    let series = |x: f64, first: u32| {
-        // 1 - x^2 / ((first + 1) (first + 2)) (1 - x^2 / ((first + 3) (first + 4)) (1 - ...
-        (0..9).rev().fold(1.0, |sum, term| {
-            let n = f64::from(first + 2 * term);
-            1.0 - x * x / ((n + 1.0) * (n + 2.0)) * sum
-        })
-    };
     if quarter <= 0.125 {
         sign * series(TAU * quarter, 0)
     } else {
         let x = TAU * (0.25 - quarter);
         sign * x * series(x, 1)
     }
+}
+
+/// 1 - x^2 / ((first + 1) (first + 2)) (1 - x^2 / ((first + 3) (first + 4)) (1 - ...
+const fn series(x: f64, first: u32) -> f64 {
+    let mut sum = 1.0;
+    let mut term = 9;
+    while term > 0 {
+        term -= 1;
+        let n = (first + 2 * term) as f64;
+        sum = 1.0 - x * x / ((n + 1.0) * (n + 2.0)) * sum;
+    }
+    sum
 }
 
 /// Cosine and sine of every 512th part of a turn in its first quarter: what the window and folding take.
