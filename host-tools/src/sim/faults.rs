@@ -42,6 +42,8 @@ pub enum Fault {
     },
     /// The stage is held by something; its motor can still push.
     StageJammed,
+    /// The stage's bridge is off while its PWM is low, and lets the motor coast.
+    FastDecay,
     /// A wire of the encoder is cut.
     EncoderCut(Cut),
     /// A limit switch of the stage sticks.
@@ -78,7 +80,7 @@ pub enum Fault {
 
 impl Fault {
     /// One of each kind, for campaigns.
-    pub const EXAMPLES: [Self; 23] = [
+    pub const EXAMPLES: [Self; 24] = [
         Self::SensorUnplugged,
         Self::BitFlips { share: 0.05 },
         Self::MisoStuck { high: false },
@@ -91,6 +93,7 @@ impl Fault {
         Self::PdcFades { seconds: 0.0 },
         Self::SkinLeaks { seconds: 0.3 },
         Self::StageJammed,
+        Self::FastDecay,
         Self::EncoderCut(Cut::A),
         Self::EncoderCut(Cut::B),
         Self::EncoderCut(Cut::Both),

@@ -9,12 +9,14 @@
 //! mass dv/dt = K i + shear - friction(x, v)      K = 2 pi Kt / lead, in N/A and in V s/m
 //! R i        = duty x supply - K v               (L/R is 35 us, less than a tick)
 //! ```
-//! The two are solved together for the speed at the end of the tick, so that a steady speed is exact.
+//! The two are solved together for the speed at the end of the tick, so that a steady speed is exact. That is a bridge which
+//! shorts the motor while its PWM is low (*slow decay*), as the parts list wants it. One that is off meanwhile (*fast decay*)
+//! lets the current run back into the supply and then stop: [`Stage::decay_fast`].
 
 use std::f64::consts::TAU;
 
 use super::conditions::TICK_S;
-use super::maths::{exp, sin};
+use super::maths::{exp, ln, sin};
 use super::noise::Noise;
 
 /// Supply of the H-bridge, V (chosen).
@@ -24,6 +26,10 @@ pub const SUPPLY_V: f64 = 12.0;
 pub const RESISTANCE_OHM: f64 = 7.5;
 /// Torque per current, Nm/A (chosen, see above).
 pub const TORQUE_NM_PER_A: f64 = 0.0261;
+/// Inductance over resistance of the motor, s (facts of the motor chosen above).
+pub const TIME_CONSTANT_S: f64 = 35e-6;
+/// Period of the bridge's PWM, s.
+pub const PWM_S: f64 = 50e-6;
 /// Way of the stage per revolution of the screw, mm (chosen).
 pub const LEAD_MM: f64 = 10.0;
 /// Force per current, N/A, and back-EMF per speed, V s/m: 16.4.
@@ -77,6 +83,7 @@ pub struct Stage {
     duty: f64,
     enabled: bool,
     jammed: bool,
+    decays_fast: bool,
     /// at the end of the last tick, and at its begin
     position_mm: f64,
     position_before_mm: f64,
@@ -111,6 +118,7 @@ impl Stage {
             duty: 0.0,
             enabled: false,
             jammed: false,
+            decays_fast: false,
             position_mm,
             position_before_mm: position_mm,
             speed_mm_s: 0.0,
@@ -148,14 +156,43 @@ impl Stage {
         self.jammed = jammed;
     }
 
+    /// From now on the bridge is off while its PWM is low (a bridge, or a setting of it, that the parts list warns of).
+    pub fn decay_fast(&mut self, fast: bool) {
+        self.decays_fast = fast;
+    }
+
+    /// Mean current over a period of the PWM, A: driven by the supply, then against it through the diodes until there is none.
+    fn fast_current_a(&self) -> f64 {
+        let emf_v = self.along.force_n_per_a * self.speed_mm_s * 1e-3 * self.duty.signum();
+        let on_s = self.duty.abs() * PWM_S;
+        // where the current goes to, on and off
+        let to_a = (SUPPLY_V - emf_v) / RESISTANCE_OHM;
+        let back_a = (-SUPPLY_V - emf_v) / RESISTANCE_OHM;
+        let peak_a = to_a * (1.0 - exp(-on_s / TIME_CONSTANT_S));
+        if peak_a <= 0.0 {
+            return 0.0;
+        }
+        let off_s = TIME_CONSTANT_S * ln((peak_a - back_a) / -back_a);
+        let mean_a = if off_s < PWM_S - on_s {
+            // its charge: what flows to the end values, less what the inductance keeps, which is nothing at both ends
+            (to_a * on_s + back_a * off_s) / PWM_S
+        } else {
+            (SUPPLY_V * (2.0 * self.duty.abs() - 1.0) - emf_v) / RESISTANCE_OHM
+        };
+        mean_a * self.duty.signum()
+    }
+
     /// Lets one tick pass, the finger pushing the stage with `shear_n` (positive to higher positions).
     pub fn tick(&mut self, shear_n: f64) {
         let force_n_per_a = self.along.force_n_per_a;
-        let (drive_v, conductance) = if self.enabled {
-            (self.duty * SUPPLY_V, 1.0 / RESISTANCE_OHM)
-        } else {
-            (0.0, 0.0)
+        let (drive_v, conductance) = match (self.enabled, self.decays_fast) {
+            (false, _) => (0.0, 0.0),
+            (true, false) => (self.duty * SUPPLY_V, 1.0 / RESISTANCE_OHM),
+            // as much at the speed of now, which a tick changes little
+            (true, true) => (self.fast_current_a() * RESISTANCE_OHM, 1.0 / RESISTANCE_OHM),
         };
+        // what a faster motor lacks of its current, per V of back-EMF
+        let braking = if self.decays_fast { 0.0 } else { conductance };
         let v = self.speed_mm_s * 1e-3;
         // as if there were no dry friction ...
         let push_n = force_n_per_a * drive_v * conductance + shear_n;
@@ -164,7 +201,7 @@ impl Stage {
             self.current_a = drive_v * conductance;
             return;
         }
-        let drag = force_n_per_a * force_n_per_a * conductance + VISCOUS_N_S_PER_M;
+        let drag = force_n_per_a * force_n_per_a * braking + VISCOUS_N_S_PER_M;
         let inertia = MASS_KG / TICK_S + drag;
         let free = (MASS_KG / TICK_S * v + push_n) / inertia;
         // ... which then takes what it can, but turns nothing round
@@ -174,7 +211,7 @@ impl Stage {
         } else {
             free - dry * free.signum()
         };
-        self.current_a = (drive_v - force_n_per_a * after) * conductance;
+        self.current_a = drive_v * conductance - force_n_per_a * after * braking;
         self.position_mm += after * 1e3 * TICK_S;
         self.speed_mm_s = after * 1e3;
         if !(0.0..=TRAVEL_MM).contains(&self.position_mm) {

@@ -400,6 +400,7 @@ impl World {
             Fault::PdcFades { seconds } => self.finger.fade_pdc(seconds),
             Fault::SkinLeaks { seconds } => self.finger.leak(seconds),
             Fault::StageJammed => self.stage.jam(true),
+            Fault::FastDecay => self.stage.decay_fast(true),
             Fault::EncoderCut(cut) => self.encoder.set_cut(Some(cut), position_mm, at_ns),
             Fault::StageLimitStuck {
                 upper: false,
@@ -436,6 +437,7 @@ impl World {
         self.sensor.plug(self.now_ns);
         self.finger.mend();
         self.stage.jam(false);
+        self.stage.decay_fast(false);
         let position_mm = self.stage.position_at_mm(self.fraction());
         self.encoder.set_cut(None, position_mm, self.now_ns);
         self.lever.lose_steps(0.0);

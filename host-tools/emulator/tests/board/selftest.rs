@@ -7,6 +7,7 @@ use tactus::sim::faults::Fault;
 use tactus::sim::person::{Hand, Manner};
 use tactus::sim::world::Setup;
 use tactus_emulator::board::{Emulator, Options, Output, ResetCause};
+use tactus_tests::expected_to_fail;
 
 use crate::common::elf_of;
 
@@ -226,6 +227,18 @@ fn the_emergency_stop_stops_lever_and_stage_at_once() {
         // its contact bounces for 4 ms
         assert!(end_ns < at_ns + 7_000_000, "moves until {end_ns}");
     }
+}
+
+/// Without duty such a bridge lets the stage coast, and the duty that should move it does not.
+#[test]
+fn a_bridge_of_fast_decay_is_named() {
+    expected_to_fail("[\"stage\"]", || {
+        let Some(run) = run(&[(0, Fault::FastDecay)]) else {
+            return;
+        };
+        assert_eq!(run.failed(), ["bridge brakes"]);
+        assert!(run.log.iter().any(|line| line.contains("fast decay")));
+    });
 }
 
 /// The finger is on its mount all the same, and up is down.

@@ -272,3 +272,71 @@ fn noise_of_the_reading_is_what_it_says() {
     assert!(white.abs() < 0.04, "{white}");
     assert_eq!(stage.adc(5), stage.adc(5));
 }
+
+/// A bridge that is off while its PWM is low: the current is the integral of V = R i + L di/dt, a diode's way back included.
+#[test]
+fn fast_decay_gives_the_current_of_its_equation() {
+    for (duty, speed_mm_s) in [
+        (0.08, 0.0),
+        (0.1, 20.0),
+        (-0.3, -100.0),
+        (0.3, -30.0),
+        (0.7, 50.0),
+    ] {
+        let mut stage = stage_at(40.0);
+        stage.decay_fast(true);
+        stage.set_duty(duty);
+        stage.speed_mm_s = speed_mm_s;
+        let emf_v = stage.along.force_n_per_a * speed_mm_s * 1e-3;
+        let supply_v = SUPPLY_V * duty.signum();
+        let inductance_h = TIME_CONSTANT_S * RESISTANCE_OHM;
+        let (steps, mut current_a, mut mean_a) = (20_000, 0.0, 0.0);
+        // until it repeats
+        for _ in 0..8 {
+            mean_a = 0.0;
+            for step in 0..steps {
+                let on = f64::from(step) < duty.abs() * f64::from(steps);
+                let bridge_v = if on { supply_v } else { -supply_v };
+                let change = (bridge_v - emf_v - RESISTANCE_OHM * current_a) / inductance_h;
+                let before: f64 = current_a;
+                current_a += change * PWM_S / f64::from(steps);
+                if !on && current_a * duty.signum() < 0.0 {
+                    current_a = 0.0;
+                }
+                mean_a += (before + current_a) / 2.0 / f64::from(steps);
+            }
+        }
+        let found_a = stage.fast_current_a();
+        assert!(
+            (found_a - mean_a).abs() < 2e-4,
+            "{duty} at {speed_mm_s}: {found_a} A, not {mean_a}"
+        );
+    }
+}
+
+/// Without duty a motor with slow decay is shorted and brakes; with fast decay it coasts, and no current flows.
+#[test]
+fn fast_decay_coasts_where_slow_decay_brakes() {
+    let [slow, fast] = [false, true].map(|fast| {
+        let mut stage = stage_at(40.0);
+        stage.set_duty(0.08);
+        run(&mut stage, 0.2, 0.0);
+        assert!(stage.speed_mm_s() > 30.0);
+        let from_mm = stage.position_mm();
+        stage.decay_fast(fast);
+        stage.set_duty(0.0);
+        run(&mut stage, 0.002, 0.0);
+        let current_a = stage.current_a();
+        run(&mut stage, 0.3, 0.0);
+        assert_eq!(stage.speed_mm_s(), 0.0);
+        (current_a, stage.position_mm() - from_mm)
+    });
+    assert!(slow.0 < -0.05 && fast.0 == 0.0, "{slow:?} {fast:?}");
+    assert!(slow.1 < 0.8 && fast.1 > 1.0, "{slow:?} {fast:?}");
+    // and at the duty that moves the one, the other stays where it is
+    let mut stage = stage_at(40.0);
+    stage.decay_fast(true);
+    stage.set_duty(0.08);
+    run(&mut stage, 0.5, 0.0);
+    assert_eq!(stage.position_mm(), 40.0);
+}
