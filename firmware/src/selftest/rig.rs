@@ -33,6 +33,14 @@ const STAGE_DUTY: f32 = 0.08;
 const STAGE_MM: f32 = 1.0;
 /// At that duty no more than 10 mm, should the encoder be silent.
 const STAGE_MS: u32 = 250;
+/// A motor that stands and draws less than this is hardly driven, A: friction alone takes more. Then the duty rises by steps, as far as
+/// [`MOST_DUTY`].
+const WEAK_A: f32 = 0.025;
+const STEP_MS: u32 = 30;
+const STEP_DUTY: f32 = 0.02;
+const MOST_DUTY: f32 = 0.3;
+/// A shorted motor that is turned by the stage draws more than this the other way, A.
+const BRAKING_A: f32 = 0.02;
 
 struct Switches {
     lever_top: Input<'static>,
@@ -174,6 +182,16 @@ pub(super) async fn rig(
         right.set_level((duty > 0.0).into());
         pwm.set_duty_cycle((libm::fabsf(duty) * full as f32) as u32);
     };
+    // once in each of the 50 us of the PWM's period
+    let zero = current.mean();
+    let mut current_a = || {
+        let mut current = Spread::default();
+        for _ in 0..50 {
+            current.add(adc.blocking_read(&mut current_pin, SampleTime::CYCLES56));
+            wait_us(33);
+        }
+        (current.mean() - zero) * (3.3 / 4096.0)
+    };
     bridge.set_high();
     let mut count: i32 = 0;
     let mut position_mm = || {
@@ -181,28 +199,50 @@ pub(super) async fn rig(
         count as f32 * StageConstants::REFERENCE.mm_per_count
     };
     position_mm();
-    let there = move_stage(STAGE_DUTY, &mut drive, &mut position_mm, &switches).await;
-    let moved = match there {
-        Ok(right_mm) => move_stage(-STAGE_DUTY, &mut drive, &mut position_mm, &switches)
-            .await
-            .map(|left_mm| (right_mm, left_mm)),
+    let mut go = async |duty| {
+        move_stage(
+            duty,
+            &mut drive,
+            &mut position_mm,
+            &mut current_a,
+            &switches,
+        )
+        .await
+    };
+    let moved = match go(STAGE_DUTY).await {
+        Ok(there) => go(-STAGE_DUTY).await.map(|back| (there, back)),
         Err(why) => Err(why),
     };
     bridge.set_low();
     match moved {
-        Ok((right_mm, left_mm)) => account.check(
-            true,
-            "stage",
-            format_args!("{right_mm:.2} mm to the right, {:.2} mm back", -left_mm),
-            "",
-        ),
-        Err(why) => account.check(
-            false,
-            "stage",
-            why,
-            "PWM PC6, DIR PC7 (high is right), EN PC8, encoder PD12 and PD13, the bridge's supply",
-        ),
-    };
+        Ok((there, back)) => {
+            account.check(
+                true,
+                "stage",
+                format_args!("{:.2} mm to the right, {:.2} mm back", there.mm, -back.mm),
+                "",
+            );
+            account.check(
+                there.braking_a < -BRAKING_A && back.braking_a > BRAKING_A,
+                "bridge brakes",
+                format_args!(
+                    "{:.0} and {:.0} mA without duty",
+                    1e3 * there.braking_a,
+                    1e3 * back.braking_a
+                ),
+                "The bridge is off while its PWM is low (fast decay), and the stage coasts: it must short the motor then (slow decay). \
+                 Look for that input of the bridge, or take another one. Or the amplifier's inputs are swapped",
+            );
+        }
+        Err(why) => {
+            account.check(
+                false,
+                "stage",
+                why,
+                "PWM PC6, DIR PC7 (high is right), EN PC8, encoder PD12 and PD13, the bridge's supply",
+            );
+        }
+    }
     rescue::ARMED.store(false, Relaxed);
     blue.set_low();
 }
@@ -288,17 +328,25 @@ async fn test_lever(
     Ok((up, play))
 }
 
-/// Moves the stage by at least [`STAGE_MM`] and brakes it; how far it went, mm, to the right positive.
+/// A move of the stage, to the right positive.
+struct Moved {
+    mm: f32,
+    /// The motor's current while it braked.
+    braking_a: f32,
+}
+
+/// Moves the stage by at least [`STAGE_MM`] and brakes it.
 async fn move_stage(
-    duty: f32,
+    mut duty: f32,
     drive: &mut impl FnMut(f32),
     position_mm: &mut impl FnMut() -> f32,
+    current_a: &mut impl FnMut() -> f32,
     switches: &Switches,
-) -> Result<f32, &'static str> {
+) -> Result<Moved, &'static str> {
     let from_mm = position_mm();
     let direction = duty.signum();
     drive(duty);
-    let mut ms = 0;
+    let (mut ms, mut weak) = (0, false);
     let done = loop {
         Timer::after_millis(1).await;
         ms += 1;
@@ -322,7 +370,17 @@ async fn move_stage(
                 "the encoder counts backwards: swap its lines A and B, or the motor's wires",
             );
         }
-        if ms >= STAGE_MS {
+        if ms == STEP_MS {
+            weak = moved_mm <= 0.0 && current_a() * direction < WEAK_A;
+        }
+        if weak && ms % STEP_MS == 0 && moved_mm <= 0.0 {
+            duty += STEP_DUTY * direction;
+            if duty.abs() > MOST_DUTY {
+                break Err("hardly any current: the motor, the bridge's enable or its supply");
+            }
+            drive(duty);
+        }
+        if !weak && ms >= STAGE_MS || ms >= 2 * STAGE_MS {
             break Err(
                 "the encoder does not count: a line of it is cut, or the stage does not move",
             );
@@ -330,7 +388,8 @@ async fn move_stage(
     };
     // without duty the bridge shorts the motor
     drive(0.0);
+    let braking_a = current_a();
     Timer::after_millis(200).await;
-    let moved_mm = position_mm() - from_mm;
-    done.map(|()| moved_mm)
+    let mm = position_mm() - from_mm;
+    done.map(|()| Moved { mm, braking_a })
 }
