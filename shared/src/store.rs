@@ -10,6 +10,14 @@
 //! A cut at any moment, in the middle of a word or of an erase as well, leaves the state before an operation or the one
 //! after it. So does a future that is dropped before its end; the store must then be opened anew.
 //!
+//! # Bits that change
+//!
+//! Everything has a checksum, and [`Store::mend`] looks at everything. It puts up to three wrong bits of a table's header right,
+//! and two of a record. A damaged table gives way to the one before it, and so does a damaged record:
+//! [`Store::damaged_table`] and [`Store::damaged_record`] tell. A record that the flash does not take is stored again behind
+//! the words that were in its way. The handheld, whose image has no room for it, does not mend its store: it tells of a damaged
+//! table, not of a damaged header or record.
+//!
 //! # A table slot, little-endian
 //!
 //! | bytes | what |
@@ -21,7 +29,7 @@
 //! | 4 | checksum of the table, its own last four bytes |
 //! | 4 | CRC-32 (ISO-HDLC) of these five |
 //! | 4 | free |
-//! | 4 | commit word `COMM`, written when all else has been read back; anything else: no table, or one given up |
+//! | 4 | commit word `COMM`, of which up to three bits may be wrong, written when all else has been read back; anything else: no table, or one given up |
 //! | | the table |
 //!
 //! # Words that are programmed again
@@ -29,8 +37,10 @@
 //! Only to clear further bits: a commit word becomes 0 when its table is given up, and a marker that a cut tore is
 //! written again. The flash of an STM32F4 has no ECC and permits it.
 
+mod correct;
 mod error;
 mod layout;
+mod mend;
 mod open;
 mod pages;
 mod records;
@@ -38,7 +48,7 @@ mod sectors;
 mod settings;
 mod tables;
 
-pub use error::{FlashFault, SettingsError, StoreError};
+pub use error::{FlashFault, Setting, SettingsError, StoreError};
 pub use layout::{SCHEMA, SECTORS, StoredTable};
 pub use records::{MAX_RECORDS, SELF_MOVEMENTS, SelfLearnedRecord, TrainingRecord};
 pub use sectors::Store;

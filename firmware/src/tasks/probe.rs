@@ -75,6 +75,9 @@ async fn open(
     rig: &mut ServoRig<ServoHandle>,
 ) -> Result<Storage, StoreError> {
     let mut store = flash::open(flash).await?;
+    if let Err(why) = store.mend().await {
+        trouble(why.into());
+    }
     if let Err(why) = probe::restore(&mut store, rig).await {
         trouble(why.into());
     }

@@ -169,7 +169,7 @@ pub type SimProbe<'p, H> = Probe<'p, ServoRig<SimServo<'p, H>>, RamFlash, TableC
 /// comes with the firmware. `buffer` takes the longest table.
 ///
 /// # Errors
-/// The flash has no room for a store, or its settings cannot be read.
+/// The flash has no room for a store. Of what else is wrong with it the host is told, as by the firmware.
 pub fn switch_on<'p, H: Host>(
     rig: SimRig,
     flash: RamFlash,
@@ -180,7 +180,14 @@ pub fn switch_on<'p, H: Host>(
 ) -> Result<SimProbe<'p, H>, StoreError> {
     let mut rig = ServoRig::new(SimServo::new(rig, host));
     let mut store = block_on(Store::open(flash))?;
-    block_on(probe::restore(&mut store, &mut rig))?;
+    for done in [
+        block_on(store.mend()),
+        block_on(probe::restore(&mut store, &mut rig)),
+    ] {
+        if let Err(why) = done {
+            host.borrow_mut().tell(Event::Trouble(why.into()));
+        }
+    }
     let mut probe = Probe {
         rig,
         memory: Memory::new(Ok(store), TableCopy::default(), factory, buffer),

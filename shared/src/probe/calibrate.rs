@@ -49,7 +49,7 @@ pub(super) async fn keep<F: NorFlash>(
 /// Gives the rig its skin and its calibration as they are stored; each whatever becomes of the other.
 ///
 /// # Errors
-/// One of them cannot be read.
+/// One of them cannot be read, or another record of the settings is damaged.
 pub async fn restore<F: NorFlash, R: RigHandle>(
     store: &mut Store<F>,
     rig: &mut R,
@@ -61,6 +61,9 @@ pub async fn restore<F: NorFlash, R: RigHandle>(
     if let Some(calibration) = store.calibration().await? {
         // one that was stored is not refused
         let _ = rig.set_calibration(calibration).await;
+    }
+    if let Some(why) = store.damaged_record() {
+        return Err(why.into());
     }
     skin.map(|_| ())
 }

@@ -125,4 +125,27 @@ pub enum SettingsError {
     /// No space for more progress of training: delete a texture.
     #[error("no room for more unfinished training: finish or forget a texture")]
     Full,
+    /// A record of this kind is damaged, the one before it is in force. New in version 6.
+    #[error("a stored record is damaged, and the one before it is in its place: {0}")]
+    Record(Setting),
+}
+
+/// What a record is about. Its words say what to do without it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
+pub enum Setting {
+    /// The calibration.
+    #[error("the calibration; calibrate again")]
+    Calibration,
+    /// The wear of the skin.
+    #[error("the wear of the skin")]
+    Skin,
+    /// What was set by `tactus device settings`.
+    #[error("what was set; set it again")]
+    Limits,
+    /// An unfinished training.
+    #[error("the training of a texture; train it again")]
+    Training,
+    /// What the probe learned by itself.
+    #[error("what was learned by itself of a texture")]
+    SelfLearned,
 }

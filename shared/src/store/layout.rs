@@ -3,6 +3,7 @@
 use crc::{CRC_32_ISO_HDLC, Crc};
 use embedded_storage_async::nor_flash::NorFlash;
 
+use super::correct::Checksum;
 use crate::table::TableError;
 
 pub(super) const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
@@ -76,6 +77,35 @@ pub(super) struct Slots {
     pub(super) generation: u32,
     pub(super) push: Option<Push>,
 }
+
+/// Of a slot's header.
+const HEADER_SUM: Checksum = Checksum {
+    polynomial: 0xEDB8_8320,
+    highest: 1 << 31,
+};
+/// Bits of a header and of a commit word that may be wrong: less than half of the distance of the header's code, which is 7.
+const WRONG: u8 = 3;
+
+/// Whether a slot was committed.
+pub(super) fn is_committed(word: u32) -> bool {
+    (word ^ COMMIT).count_ones() <= WRONG.into()
+}
+
+/// Puts a header right, if it is one with no more than three wrong bits.
+pub(super) fn correct_header(bytes: &mut [u8; HEADER]) {
+    let (body, stored) = bytes.split_at(HEADER - WORD);
+    let stored = stored
+        .iter()
+        .rev()
+        .fold(0, |sum, byte| sum << 8 | u32::from(*byte));
+    let syndrome = CRC32.checksum(body) ^ stored;
+    if syndrome != 0 {
+        HEADER_SUM.correct(bytes, syndrome, WRONG);
+    }
+}
+
+/// What is done to the header of a committed slot before it is read.
+pub(super) type Correct = fn(&mut [u8; HEADER]);
 
 pub(super) fn header(table: &StoredTable) -> [u8; HEADER] {
     let mut bytes = [0; HEADER];

@@ -7,7 +7,7 @@ use super::layout::{SECTORS, Slots};
 use super::sectors::Store;
 
 impl<F: NorFlash> Store<F> {
-    /// Opens the store, and finishes what a power cut has interrupted. Blank flash is an empty store.
+    /// Opens the store, and finishes what a power cut has interrupted. Blank flash is an empty store. [`Store::mend`] is due.
     ///
     /// Settings that cannot be read are no error here, see [`Store::settings`]: tables can be used without them.
     ///
@@ -19,11 +19,12 @@ impl<F: NorFlash> Store<F> {
             flash,
             slots: Slots::default(),
             settings: Err(SettingsError::Corrupt),
+            lost: None,
         };
         if store.flash.capacity() < SECTORS * F::ERASE_SIZE {
             return Err(StoreError::NoSpace(store.flash.capacity()));
         }
-        store.find_tables().await?;
+        store.find_tables(|_| ()).await?;
         store.open_settings().await?;
         Ok(store)
     }

@@ -140,7 +140,7 @@ impl<'m, 'f, F: NorFlash, T: Record> Records<'m, 'f, F, T> {
 }
 
 /// The next record with one of these keys, whatever its type is: `decode` says whether the bytes are a record.
-async fn next<F: NorFlash>(
+pub(super) async fn next<F: NorFlash>(
     items: &mut Items<'_, '_, F>,
     keys: Range<u8>,
     decode: &mut dyn FnMut(&[u8]) -> bool,

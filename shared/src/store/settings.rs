@@ -1,23 +1,28 @@
 //! The settings: one record per key in a `sequential-storage` map.
 
+use core::ops::Range;
+
 use embedded_storage_async::nor_flash::NorFlash;
 use sequential_storage::cache::key_pointers::ArrayKeyPointers;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 use serde::Serialize;
 
-use super::error::{SettingsError, StoreError};
+use super::error::{Setting, SettingsError, StoreError};
 use super::layout::SCHEMA;
 use super::pages::{Pages, page_size};
 use super::records::{
-    KEY_CALIBRATION, KEY_FALSE_ALARM, KEY_SCHEMA, KEY_SKIN, Map, RECORD, Record, Records,
-    SelfLearnedRecord, TrainingRecord, decode,
+    KEY_CALIBRATION, KEY_FALSE_ALARM, KEY_SCHEMA, KEY_SELF, KEY_SKIN, KEY_TRAINED, Map, RECORD,
+    Record, Records, SelfLearnedRecord, TrainingRecord, decode, next,
 };
 use super::sectors::Store;
 use crate::features::Movement;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::table::{MAX_TEXTURES, TrainingStats, is_false_alarm};
+
+/// A record is stored so often at most: three wrong bits can be in the way of three.
+const TRIES: u8 = 4;
 
 /// How a place for a record is used, as a new record sees it.
 #[derive(Clone, Copy, PartialEq)]
@@ -30,6 +35,18 @@ enum Use {
     Same,
 }
 
+/// How the place of a record with these bytes is used; `None`: they are no record.
+type Seen<'s> = &'s dyn Fn(&[u8]) -> Option<Use>;
+
+fn seen<T: Record>(bytes: &[u8], of: &dyn Fn(&T) -> Use) -> Option<Use> {
+    let record: Option<T> = postcard::from_bytes(bytes).ok()?;
+    Some(record.as_ref().map_or(Use::Free, of))
+}
+
+const fn keys<T: Record>() -> Range<u8> {
+    T::FIRST..T::FIRST + T::PLACES
+}
+
 impl<F: NorFlash> Store<F> {
     /// Whether the settings can be used. If not, [`Store::erase_settings`] makes them so; the tables are not concerned.
     ///
@@ -39,12 +56,27 @@ impl<F: NorFlash> Store<F> {
         self.settings.map(|_| ())
     }
 
+    /// What of the settings [`Store::mend`] could not put right, and is as it was before; it ends with the next record of its
+    /// kind.
+    pub fn damaged_record(&self) -> Option<SettingsError> {
+        self.lost.map(|key| {
+            SettingsError::Record(match key {
+                KEY_CALIBRATION => Setting::Calibration,
+                KEY_SKIN => Setting::Skin,
+                KEY_TRAINED..KEY_SELF => Setting::Training,
+                KEY_SELF.. => Setting::SelfLearned,
+                _ => Setting::Limits,
+            })
+        })
+    }
+
     /// Erases all settings: calibration, skin care, false alarm and unfinished training.
     ///
     /// # Errors
     /// [`StoreError::Flash`].
     pub async fn erase_settings(&mut self) -> Result<(), StoreError> {
         self.settings = Err(SettingsError::Corrupt);
+        self.lost = None;
         Pages(&mut self.flash)
             .wipe()
             .await
@@ -231,7 +263,7 @@ impl<F: NorFlash> Store<F> {
     /// Stores a record in the place of the one that it replaces; otherwise in a free place, or in that of one that it
     /// outlives.
     async fn put<T: Record>(&mut self, new: &T) -> Result<(), StoreError> {
-        let seen = |old: &T| {
+        let old = |old: &T| {
             if new.replaces(old) {
                 Use::Same
             } else if new.outlives(old) {
@@ -240,7 +272,7 @@ impl<F: NorFlash> Store<F> {
                 Use::Taken
             }
         };
-        let uses = self.uses(&seen).await?;
+        let uses = self.uses(keys::<T>(), &|bytes| seen(bytes, &old)).await?;
         let uses = uses.iter().take(T::PLACES.into());
         let place = [Use::Same, Use::Free, Use::Stale]
             .into_iter()
@@ -259,31 +291,41 @@ impl<F: NorFlash> Store<F> {
                 Use::Taken
             }
         };
-        let uses = self.uses(&such).await?;
-        for (key, now) in (T::FIRST..).zip(uses) {
+        self.clear_keys(keys::<T>(), &|bytes| seen(bytes, &such))
+            .await
+    }
+
+    async fn clear_keys(&mut self, keys: Range<u8>, of: Seen<'_>) -> Result<(), StoreError> {
+        let uses = self.uses(keys.clone(), of).await?;
+        for (key, now) in keys.zip(uses) {
             if now == Use::Same {
-                self.encode(key, &None::<T>).await?;
+                self.encode(key, &None::<()>).await?;
             }
         }
         Ok(())
     }
 
-    /// How every place of a kind of record is used.
-    async fn uses<T: Record>(
+    /// How every place of records with these keys is used.
+    async fn uses(
         &mut self,
-        of: &dyn Fn(&T) -> Use,
+        keys: Range<u8>,
+        of: Seen<'_>,
     ) -> Result<[Use; MAX_TEXTURES], StoreError> {
         self.settings?;
         let mut uses = [Use::Free; MAX_TEXTURES];
         let mut buffer = [0; RECORD];
         let mut map = self.map();
-        let mut records = Records::<F, T>::new(map.fetch_all_items(&mut buffer).await?);
-        while let Some((place, record)) = records.next().await? {
-            if let Some(now) = uses.get_mut(usize::from(place)) {
-                *now = record.as_ref().map_or(Use::Free, of);
+        let mut items = map.fetch_all_items(&mut buffer).await?;
+        loop {
+            let mut now = Use::Free;
+            let mut decode = |bytes: &[u8]| of(bytes).map(|used| now = used).is_some();
+            let Some(key) = next(&mut items, keys.clone(), &mut decode).await? else {
+                return Ok(uses);
+            };
+            if let Some(slot) = uses.get_mut(usize::from(key - keys.start)) {
+                *slot = now;
             }
         }
-        Ok(uses)
     }
 
     /// Brings the pages into order, and looks whether they can be read.
@@ -292,6 +334,11 @@ impl<F: NorFlash> Store<F> {
             .recover()
             .await
             .map_err(StoreError::flash)?;
+        self.look_at_settings().await
+    }
+
+    /// Looks whether the settings can be read.
+    pub(super) async fn look_at_settings(&mut self) -> Result<(), StoreError> {
         self.settings = match self.read_all().await {
             Ok(schema_written) => Ok(schema_written),
             Err(StoreError::Settings(why)) => Err(why),
@@ -352,20 +399,28 @@ impl<F: NorFlash> Store<F> {
         self.store(key, bytes).await
     }
 
-    /// Stores a record and reads it back.
+    /// Stores a record, the first one behind one of the schema.
     async fn store(&mut self, key: u8, bytes: &[u8]) -> Result<(), StoreError> {
-        let schema_written = self.settings?;
-        let mut buffer = [0; RECORD];
-        let mut map = self.map();
-        if !schema_written {
+        if !self.settings? {
             let mut record = [0; RECORD];
-            let schema: &[u8] =
+            let schema =
                 postcard::to_slice(&SCHEMA, &mut record).map_err(|_| SettingsError::Corrupt)?;
-            map.store_item(&mut buffer, &KEY_SCHEMA, &schema).await?;
+            self.store_checked(KEY_SCHEMA, schema).await?;
+            self.settings = Ok(true);
         }
-        map.store_item(&mut buffer, &key, &bytes).await?;
-        let kept = map.fetch_item::<&[u8]>(&mut buffer, &key).await? == Some(bytes);
-        self.settings = Ok(true);
-        if kept { Ok(()) } else { Err(StoreError::Worn) }
+        self.store_checked(key, bytes).await
+    }
+
+    /// Stores a record and reads it back. Where bits of the flash no longer change, it is stored behind them.
+    pub(super) async fn store_checked(&mut self, key: u8, bytes: &[u8]) -> Result<(), StoreError> {
+        let mut buffer = [0; RECORD];
+        for _ in 0..TRIES {
+            let mut map = self.map();
+            map.store_item(&mut buffer, &key, &bytes).await?;
+            if map.fetch_item::<&[u8]>(&mut buffer, &key).await? == Some(bytes) {
+                return Ok(());
+            }
+        }
+        Err(StoreError::Worn)
     }
 }

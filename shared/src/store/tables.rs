@@ -4,7 +4,8 @@ use embedded_storage_async::nor_flash::NorFlash;
 
 use super::error::StoreError;
 use super::layout::{
-    COMMIT, COMMIT_AT, CRC32, HEADER, Push, Slot, StoredTable, TABLE_AT, WORD, header,
+    COMMIT, COMMIT_AT, CRC32, Correct, HEADER, Push, Slot, StoredTable, TABLE_AT, WORD, header,
+    is_committed,
 };
 use super::sectors::Store;
 use crate::table::{Table, TableError};
@@ -31,8 +32,8 @@ impl<F: NorFlash> Store<F> {
     /// What is wrong with the newest table that was committed, if [`Store::table`] had to fall back on the one before it, or on
     /// none: its bytes have changed since. It ends with the next table, and with [`Store::factory_table`].
     ///
-    /// Damage to the header of the newest table is not noticed while the one before it is whole: an erase that was interrupted
-    /// leaves the same.
+    /// More damage to the header of the newest table than is put right is not noticed while the one before it is whole: an
+    /// erase that was interrupted leaves the same.
     pub fn damaged_table(&self) -> Option<TableError> {
         self.slots.damaged
     }
@@ -208,7 +209,7 @@ impl<F: NorFlash> Store<F> {
         let active = active.unwrap_or_default();
         // the older one first: the active one hides it until it is given up itself
         for slot in [active.other(), active] {
-            if self.commit_word(slot).await? == COMMIT {
+            if is_committed(self.commit_word(slot).await?) {
                 self.program(slot.start::<F>() + COMMIT_AT, &[0; WORD])
                     .await?;
             }
@@ -219,15 +220,21 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Looks for the table to be used.
-    pub(super) async fn find_tables(&mut self) -> Result<(), StoreError> {
+    pub(super) async fn find_tables(&mut self, correct: Correct) -> Result<(), StoreError> {
         // of the newest table that is damaged: its generation, where that can be read
         let mut damaged: Option<(Option<u32>, TableError)> = None;
         for slot in [Slot::A, Slot::B] {
-            let header = self.slot_header(slot).await?;
+            let is_committed = is_committed(self.commit_word(slot).await?);
+            let correct = if is_committed {
+                correct
+            } else {
+                |_: &mut _| ()
+            };
+            let header = self.slot_header(slot, correct).await?;
             if let Ok(table) = &header {
                 self.slots.generation = self.slots.generation.max(table.generation);
             }
-            if self.commit_word(slot).await? != COMMIT {
+            if !is_committed {
                 continue;
             }
             let generation = header.as_ref().ok().map(|table| table.generation);
@@ -259,10 +266,12 @@ impl<F: NorFlash> Store<F> {
     async fn slot_header(
         &mut self,
         slot: Slot,
+        correct: Correct,
     ) -> Result<Result<StoredTable, TableError>, StoreError> {
         let start = slot.start::<F>();
         let mut bytes = [0; HEADER];
         self.read(start, &mut bytes).await?;
+        correct(&mut bytes);
         let mut words = bytes
             .as_chunks::<WORD>()
             .0

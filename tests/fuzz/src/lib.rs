@@ -224,6 +224,8 @@ pub fn store(data: &[u8]) {
     let Ok(mut store) = block_on(Store::open(flash)) else {
         return;
     };
+    // whatever has changed, the store goes on
+    let _ = block_on(store.mend());
     let mut buffer = vec![0; flash::SECTOR];
     // a table that is damaged gives way to the factory's
     #[cfg(feature = "planted")]

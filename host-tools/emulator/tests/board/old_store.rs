@@ -143,6 +143,28 @@ fn everything_that_was_taught_before_version_4_is_kept() {
 }
 
 #[test]
+fn changed_bits_of_a_header_and_of_a_record_are_put_right() {
+    let Some(elf) = elf() else { return };
+    let holds = holds();
+    let mut changed = store();
+    let newest_at = holds["offset"].as_u64().unwrap() as usize;
+    changed[newest_at - 32 + 9] ^= 0x10;
+    // the newest calibration, a byte behind its head
+    let calibration = holds["calibration"].as_str().unwrap();
+    let place = changed.windows(RigCalibration::BYTES);
+    let at = place
+        .enumerate()
+        .filter(|(_, bytes)| hex(bytes) == calibration);
+    let (at, _) = at.last().unwrap();
+    changed[at + 20] ^= 0x81;
+    let (mut talk, told) = troubles(&elf, changed);
+    assert_eq!(told, []);
+    assert_eq!(holds["in_force"], hex(&table(&mut talk)));
+    let kept = talk.run(Request::read_calibration(), TIMEOUT_S, |_, _| ());
+    assert_eq!(calibration, hex(&RigCalibration::to_bytes(&kept.unwrap())));
+}
+
+#[test]
 fn a_damaged_table_is_reported_and_not_replaced_in_silence() {
     let Some(elf) = elf() else { return };
     let whole = store();

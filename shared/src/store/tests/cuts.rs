@@ -26,13 +26,13 @@ enum Operation {
 
 /// What the store is to hold.
 #[derive(Clone, PartialEq, Debug, Default)]
-struct Model {
-    table: Option<Vec<u8>>,
-    calibration: Option<RigCalibration>,
-    skin: SkinCare,
+pub(super) struct Model {
+    pub(super) table: Option<Vec<u8>>,
+    pub(super) calibration: Option<RigCalibration>,
+    pub(super) skin: SkinCare,
     /// By texture and table.
-    training_record: [[Option<TrainingStats>; 2]; 2],
-    self_learned: [Option<SelfLearnedRecord>; 2],
+    pub(super) training_record: [[Option<TrainingStats>; 2]; 2],
+    pub(super) self_learned: [Option<SelfLearnedRecord>; 2],
 }
 
 const NAMES: [&str; 2] = ["felt", "sandpaper of 100 grit"];
@@ -41,7 +41,7 @@ const TABLES: [Option<u32>; 2] = [None, Some(0x1234_5678)];
 /// Of both textures that are learned: lineage and number.
 const SELVES: [(u32, u16); 2] = [(0x89AB_CDEF, 0), (0x89AB_CDEF, 300)];
 
-fn self_learned(texture: u8, n: u8) -> SelfLearnedRecord {
+pub(super) fn self_learned(texture: u8, n: u8) -> SelfLearnedRecord {
     let (lineage, number) = SELVES[usize::from(texture)];
     let whitened = Whitened {
         slides: n,
@@ -85,10 +85,33 @@ impl Model {
         next
     }
 
-    fn of(store: &mut Store<Ram>) -> Self {
+    pub(super) fn of(store: &mut Store<Ram>) -> Self {
         assert_eq!(store.settings(), Ok(()));
         assert_eq!(store.damaged_table(), None, "a cut is no damage");
+        Self::damaged(store)
+    }
+
+    /// How many of the settings are not as in `other`.
+    pub(super) fn differences(&self, other: &Self) -> usize {
+        let records = self.training_record.iter().flatten();
+        let theirs = other.training_record.iter().flatten();
+        let selves = self.self_learned.iter().zip(&other.self_learned);
+        usize::from(self.table != other.table)
+            + usize::from(self.calibration != other.calibration)
+            + usize::from(self.skin != other.skin)
+            + records.zip(theirs).filter(|(a, b)| a != b).count()
+            + selves.filter(|(a, b)| a != b).count()
+    }
+
+    /// Of a store that may be damaged; nothing where the settings cannot be used.
+    pub(super) fn damaged(store: &mut Store<Ram>) -> Self {
         let table = used(store);
+        if store.settings().is_err() {
+            return Self {
+                table,
+                ..Self::default()
+            };
+        }
         block_on(async {
             let mut training_record = [[None; 2]; 2];
             for (name, of_name) in NAMES.into_iter().zip(&mut training_record) {

@@ -46,6 +46,8 @@ pub(crate) struct Ram<const S: usize = SECTOR> {
     pub(crate) worn: [u32; 4],
     /// The operation that the power is cut in.
     pub(crate) cut: Option<(usize, Torn)>,
+    /// Bits have changed by themselves: writing to them is no mistake, and clears what it can.
+    pub(crate) rotten: bool,
     dead: bool,
 }
 
@@ -57,6 +59,7 @@ impl<const S: usize> Ram<S> {
             erases: 0,
             worn: [0; 4],
             cut: None,
+            rotten: false,
             dead: false,
         }
     }
@@ -156,7 +159,7 @@ impl<const S: usize> NorFlash for Ram<S> {
             let torn = self.operate()?;
             let buffer: &mut [u8; 4] = self.bytes[at..].first_chunk_mut().unwrap();
             let (old, new) = (u32::from_le_bytes(*buffer), u32::from_le_bytes(*word));
-            if torn.is_none() && old & new != new {
+            if torn.is_none() && old & new != new && !self.rotten {
                 return Err(RamError::Rules);
             }
             let cleared = match torn {

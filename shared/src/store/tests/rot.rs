@@ -1,0 +1,153 @@
+//! Bits of the flash that change by themselves: to ones and to zeros in what was written, to zeros where nothing was. Flash
+//! without ECC says nothing of it, and a word that is written afterwards keeps the zeros.
+
+use super::cuts::Model;
+use super::ram::SECTOR;
+use super::*;
+use crate::table::tests::fixed;
+use proptest::prelude::*;
+
+/// Stores of different pasts: how many rounds of settings they have seen, and how many tables.
+const PASTS: [(u8, u8); 6] = [(0, 0), (1, 1), (6, 2), (11, 3), (14, 2), (40, 5)];
+
+/// Where bits change.
+const REGIONS: usize = 8;
+
+fn stored(rounds: u8, tables: u8) -> Ram {
+    let mut store = open(Ram::new());
+    block_on(async {
+        for n in 0..tables {
+            push(&mut store, &table(n), 64).await.unwrap();
+        }
+        for n in 0..rounds {
+            if n % 5 == 0 {
+                let share = f32::from(n + 1) * 1e-3;
+                store.set_calibration(&calibration(n)).await.unwrap();
+                store.set_false_alarm(Some(share)).await.unwrap();
+                let felt = training_record("felt", Movement::FOR_FINENESS, None, n + 1);
+                store.set_training_record(&felt).await.unwrap();
+                let learned = super::cuts::self_learned(n % 2, n);
+                store.set_self_learned(&learned).await.unwrap();
+            }
+            let skin = SkinCare::after(n.into(), n.into());
+            store.set_skin(&skin).await.unwrap();
+        }
+    });
+    store.close().again()
+}
+
+/// Where the settings end that were written: the last word of each page that is not blank, in front of its end mark.
+fn written(ram: &Ram, sector: usize) -> usize {
+    let page = &ram.bytes[sector * SECTOR..][..SECTOR - 20];
+    let last = page.iter().rposition(|byte| *byte != 0xFF);
+    last.map_or(0, |last| (last + 4) / 4 * 4)
+}
+
+/// A bit of a region, as `any` chooses it.
+fn bit(ram: &Ram, region: usize, any: u32) -> usize {
+    let any = any as usize;
+    let settings = if written(ram, 2) > written(ram, 3) {
+        2
+    } else {
+        3
+    };
+    let end = written(ram, settings);
+    let (from, length) = match region {
+        // a slot's header and commit word, and its table
+        0 => (any / 7 % 2 * SECTOR, 32),
+        1 => (any / 7 % 2 * SECTOR + 32, table(1).len()),
+        // records, the first ones, what follows on them, the blank rest of the page
+        2 => (settings * SECTOR + 4, end.saturating_sub(4).max(4)),
+        3 => (settings * SECTOR + 4, 12),
+        4 => (settings * SECTOR + end, 40.min(SECTOR - end)),
+        5 => (settings * SECTOR + end, SECTOR - end),
+        // the marks of the pages
+        6 => match any / 7 % 4 {
+            page @ 0..2 => ((2 + page) * SECTOR, 4),
+            page => ((1 + page) * SECTOR - 20, 20),
+        },
+        _ => (0, 4 * SECTOR),
+    };
+    8 * from + (any >> 8) % (8 * length)
+}
+
+/// What the store says of itself.
+fn said(store: &Store<Ram>) -> (bool, Option<SettingsError>, Result<(), SettingsError>) {
+    let table = store.damaged_table().is_some();
+    (table, store.damaged_record(), store.settings())
+}
+
+proptest! {
+    #![proptest_config(fixed(6000))]
+    #[test]
+    fn changed_bits_are_put_right_or_told_and_nothing_else_is_lost(
+        past in 0..PASTS.len(),
+        region in 0..REGIONS,
+        bits in prop::collection::vec(any::<u32>(), 1..=3)
+    ) {
+        let (rounds, tables) = PASTS[past];
+        let ram = stored(rounds, tables);
+        let mut whole = open(ram.clone());
+        let (before, share) = (Model::of(&mut whole), block_on(whole.false_alarm()).unwrap());
+        let mut changed: Vec<usize> = bits.iter().map(|any| bit(&ram, region, *any)).collect();
+        changed.sort_unstable();
+        changed.dedup();
+        let mut ram = ram;
+        ram.rotten = true;
+        for bit in &changed {
+            ram.bytes[bit / 8] ^= 1 << (bit % 8);
+        }
+        let mut store = open(ram);
+        let told = said(&store);
+        let (is_table_damaged, lost, settings) = told;
+        // two bits of a record are put right, and three of a header
+        if changed.len() < 3 {
+            prop_assert_eq!((lost, settings), (None, Ok(())));
+        }
+        let is_of_table = |bit: &usize| bit / 8 % SECTOR >= 32 && bit / 8 < 2 * SECTOR;
+        prop_assert!(!is_table_damaged || changed.iter().any(is_of_table));
+        let mut found = Model::damaged(&mut store);
+        if is_table_damaged {
+            let former = (tables >= 2).then(|| table(tables - 2));
+            prop_assert!(found.table.is_none() || found.table == former);
+            found.table.clone_from(&before.table);
+        }
+        if settings.is_ok() {
+            let same_share = block_on(store.false_alarm()).unwrap() == share;
+            let losses = found.differences(&before) + usize::from(!same_share);
+            prop_assert!(losses <= usize::from(lost.is_some()), "{} lost, told {:?}: {:?}, {:?}", losses, lost, changed, [&before, &found]);
+        }
+        // the next boot finds the same and says the same
+        let mut ram = store.close().again();
+        ram.rotten = true;
+        let mut store = open(ram);
+        prop_assert_eq!(said(&store), told);
+        let mut again = Model::damaged(&mut store);
+        if is_table_damaged {
+            again.table.clone_from(&before.table);
+        }
+        prop_assert_eq!(&again, &found);
+        // it goes on from there
+        block_on(async {
+            if store.settings().is_err() {
+                store.erase_settings().await.unwrap();
+            }
+            for n in 50..60 {
+                push(&mut store, &table(n), 64).await.unwrap();
+                store.set_calibration(&calibration(n)).await.unwrap();
+                store.set_skin(&SkinCare::after(n.into(), 1.0)).await.unwrap();
+            }
+        });
+        let mut ram = store.close().again();
+        ram.rotten = true;
+        let mut store = open(ram);
+        let mut after = Model::of(&mut store);
+        prop_assert_eq!(after.table.take(), Some(table(59)));
+        prop_assert_eq!(after.calibration.take(), Some(calibration(59)));
+        prop_assert_eq!(after.skin, SkinCare::after(59.0, 1.0));
+        if settings.is_ok() {
+            let rest = Model { table: None, calibration: None, skin: after.skin, ..found };
+            prop_assert_eq!(after, rest);
+        }
+    }
+}
