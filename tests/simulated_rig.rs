@@ -6,6 +6,7 @@ use proptest::test_runner::RngSeed;
 use rayon::prelude::*;
 use tactus::data::replay::measure;
 use tactus::sim::collection::{Collection, calibrated, record_texture, texture_name};
+use tactus::sim::faults::Fault;
 use tactus::sim::rig::{Performed, SimRig};
 use tactus::sim::stage::{FORCE_N_PER_A, SAMPLE_AT_MM, SAMPLE_MM};
 use tactus::sim::world::Setup;
@@ -152,6 +153,83 @@ fn a_recorded_slide_has_the_properties_measured_live() {
     let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
     block_on(rig.perform(&mut slide)).unwrap();
     assert_eq!(slide.finish().unwrap(), recorded);
+}
+
+/// How far the properties of a texture move on a stage that vibrates, in standard deviations of its trials: the median over
+/// textures, and the most.
+///
+/// The still finger's power is measured while the stage stands, so a stage's own vibration is taken for texture.
+#[test]
+fn a_stage_that_vibrates_is_taken_for_texture() {
+    let properties = |texture: u8, trial: u64, movement, um| -> [f64; 3] {
+        let mut rig = SimRig::new(Setup {
+            texture,
+            trial_seed: trial,
+            ..Setup::default()
+        });
+        rig.world().inject(Fault::StageVibrates { um });
+        rig.home().unwrap();
+        let recorded = rig.record(movement).unwrap();
+        let observed = measure(&Plan::new(), &recorded).unwrap().properties;
+        Property::ALL.map(|property| f64::from(observed.get(property).unwrap()))
+    };
+    const TRIALS: u64 = 4;
+    const UM: [f64; 4] = [0.0, 1.0, 3.0, 10.0];
+    let movements = [
+        Movement::FOR_TRACTION,
+        Movement::FOR_ROUGHNESS,
+        Movement::FOR_FINENESS,
+    ];
+    let mean =
+        |all: &[[f64; 3]], at: usize| all.iter().map(|p| p[at]).sum::<f64>() / all.len() as f64;
+    // per texture and movement, and per amplitude, the shifts of the three properties
+    let textures: Vec<u8> = (1..=117).step_by(13).collect();
+    let shifts: Vec<[[f64; 3]; UM.len()]> = textures
+        .par_iter()
+        .flat_map_iter(|&texture| movements.map(|movement| (texture, movement)))
+        .map(|(texture, movement)| {
+            let trials = UM.map(|um| -> Vec<_> {
+                let of = |trial| properties(texture, trial, movement, um);
+                (0..TRIALS).map(of).collect()
+            });
+            let [still, ..] = &trials;
+            std::array::from_fn(|um| {
+                std::array::from_fn(|at| {
+                    let squares = still.iter().map(|p| (p[at] - mean(still, at)).powi(2));
+                    let sd = (squares.sum::<f64>() / (TRIALS - 1) as f64).sqrt();
+                    (mean(&trials[um], at) - mean(still, at)).abs() / sd
+                })
+            })
+        })
+        .collect();
+    let sorted = |um: usize, at: usize| -> Vec<f64> {
+        let mut all: Vec<f64> = shifts.iter().map(|s| s[um][at]).collect();
+        all.sort_by(f64::total_cmp);
+        all
+    };
+    let [_, roughness, fineness] = Property::ALL.map(|property| {
+        UM.iter()
+            .zip(0..)
+            .map(|(amplitude_um, um)| {
+                let all = sorted(um, property.index());
+                let (median, most) = (all[all.len() / 2], all[all.len() - 1]);
+                println!(
+                    "{amplitude_um} um, {}: {median:.2} sd, at most {most:.2}",
+                    property.name()
+                );
+                (median, most)
+            })
+            .collect::<Vec<_>>()
+    });
+    for moved in [roughness, fineness] {
+        assert_eq!(moved[0], (0.0, 0.0));
+        assert!(
+            moved.is_sorted_by(|a, b| a.0 <= b.0 && a.1 <= b.1),
+            "{moved:?}"
+        );
+        // what rests on one texture is not told: some texture moves by as much as its trials differ
+        assert!(moved[UM.len() - 1].1 > 1.0, "{moved:?}");
+    }
 }
 
 #[test]

@@ -44,6 +44,11 @@ pub enum Fault {
     StageJammed,
     /// The stage's bridge is off while its PWM is low, and lets the motor coast.
     FastDecay,
+    /// The stage vibrates while it moves, and the sample with it.
+    StageVibrates {
+        /// Amplitude at 100 mm/s, um.
+        um: f64,
+    },
     /// A wire of the encoder is cut.
     EncoderCut(Cut),
     /// A limit switch of the stage sticks.
@@ -80,7 +85,7 @@ pub enum Fault {
 
 impl Fault {
     /// One of each kind, for campaigns.
-    pub const EXAMPLES: [Self; 24] = [
+    pub const EXAMPLES: [Self; 25] = [
         Self::SensorUnplugged,
         Self::BitFlips { share: 0.05 },
         Self::MisoStuck { high: false },
@@ -94,6 +99,7 @@ impl Fault {
         Self::SkinLeaks { seconds: 0.3 },
         Self::StageJammed,
         Self::FastDecay,
+        Self::StageVibrates { um: 0.5 },
         Self::EncoderCut(Cut::A),
         Self::EncoderCut(Cut::B),
         Self::EncoderCut(Cut::Both),

@@ -54,6 +54,12 @@ pub const RIPPLE: f64 = 0.02;
 /// ... this often per revolution, by commutation (5 segments).
 pub const RIPPLES_PER_TURN: f64 = 10.0;
 
+/// A stage that vibrates lifts and lowers the sample so often per revolution of the screw, with these shares of the amplitude
+/// (chosen): the screw's runout, the commutation (100 Hz at 100 mm/s), the nut's thread.
+pub const VIBRATIONS: [(f64, f64); 3] = [(1.0, 1.0), (RIPPLES_PER_TURN, 0.3), (32.0, 0.1)];
+/// Speed at which [`Stage::vibrate`] gives the amplitude, mm/s; at others it is in proportion.
+pub const VIBRATION_MM_S: f64 = 100.0;
+
 /// Way between the hard stops, mm (chosen). Positions count from the lower one.
 pub const TRAVEL_MM: f64 = 85.0;
 /// Where the sample of [`SAMPLE_MM`] begins: in the middle of the travel.
@@ -84,6 +90,8 @@ pub struct Stage {
     enabled: bool,
     jammed: bool,
     decays_fast: bool,
+    /// amplitude of its vibration, um
+    vibration_um: f64,
     /// at the end of the last tick, and at its begin
     position_mm: f64,
     position_before_mm: f64,
@@ -119,6 +127,7 @@ impl Stage {
             enabled: false,
             jammed: false,
             decays_fast: false,
+            vibration_um: 0.0,
             position_mm,
             position_before_mm: position_mm,
             speed_mm_s: 0.0,
@@ -222,6 +231,25 @@ impl Stage {
             self.along = self.along();
         }
         self.switch_limits();
+    }
+
+    /// From now on it vibrates while it moves: amplitude of the sample's way up and down at [`VIBRATION_MM_S`], um. The paper's
+    /// stage does not.
+    pub fn vibrate(&mut self, um: f64) {
+        self.vibration_um = um;
+    }
+
+    /// How much higher the sample is than on a stage that does not vibrate, mm.
+    pub fn heave_mm(&self) -> f64 {
+        let amplitude_um = self.vibration_um * self.speed_mm_s.abs() / VIBRATION_MM_S;
+        if amplitude_um == 0.0 {
+            return 0.0;
+        }
+        let turns = self.position_mm / LEAD_MM;
+        let waves = VIBRATIONS.map(|(per_turn, share)| {
+            share * sin(turns * per_turn * TAU + per_turn * self.ripple_phase)
+        });
+        amplitude_um * 1e-3 * waves.iter().sum::<f64>()
     }
 
     /// Position at the end of the last tick, mm from the lower hard stop.

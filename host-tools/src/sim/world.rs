@@ -401,6 +401,7 @@ impl World {
             Fault::SkinLeaks { seconds } => self.finger.leak(seconds),
             Fault::StageJammed => self.stage.jam(true),
             Fault::FastDecay => self.stage.decay_fast(true),
+            Fault::StageVibrates { um } => self.stage.vibrate(um),
             Fault::EncoderCut(cut) => self.encoder.set_cut(Some(cut), position_mm, at_ns),
             Fault::StageLimitStuck {
                 upper: false,
@@ -438,6 +439,7 @@ impl World {
         self.finger.mend();
         self.stage.jam(false);
         self.stage.decay_fast(false);
+        self.stage.vibrate(0.0);
         let position_mm = self.stage.position_at_mm(self.fraction());
         self.encoder.set_cut(None, position_mm, self.now_ns);
         self.lever.lose_steps(0.0);
@@ -540,7 +542,7 @@ impl World {
         if let Some(hand) = &self.hand {
             return hand.indentation_mm();
         }
-        self.over_tip_mm(&self.surface)
+        self.over_tip_mm(&self.surface) + self.stage.heave_mm()
     }
 
     /// How far a sample reaches over the undeformed tip, mm.

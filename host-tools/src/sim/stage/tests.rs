@@ -340,3 +340,31 @@ fn fast_decay_coasts_where_slow_decay_brakes() {
     run(&mut stage, 0.5, 0.0);
     assert_eq!(stage.position_mm(), 40.0);
 }
+
+/// As often as the screw's turns and the commutation come past, as far as was said, and not at all at rest.
+#[test]
+fn a_vibration_has_its_amplitude_and_its_frequencies() {
+    let mut stage = plain();
+    stage.vibrate(2.0);
+    assert_eq!(stage.heave_mm(), 0.0);
+    stage.speed_mm_s = 50.0;
+    let heave: Vec<f64> = (0..1000)
+        .map(|n| {
+            stage.position_mm = f64::from(n) * 1e-3 * LEAD_MM;
+            stage.heave_mm() * 1e3
+        })
+        .collect();
+    // amplitudes of a Fourier series over one turn
+    for (per_turn, share) in VIBRATIONS {
+        let angle = |n: usize| n as f64 * 1e-3 * per_turn * TAU;
+        let part = |f: fn(f64) -> f64| -> f64 {
+            let products = heave.iter().enumerate().map(|(n, y)| y * f(angle(n)));
+            products.sum::<f64>() / 500.0
+        };
+        let amplitude_um = part(f64::sin).hypot(part(f64::cos));
+        assert!(
+            (amplitude_um - share).abs() < 1e-6,
+            "{per_turn} a turn: {amplitude_um} um"
+        );
+    }
+}
