@@ -20,6 +20,7 @@ pub(crate) const EXAMPLES: &str = "Examples:
   cargo xtask seeds identify --seeds 200-330  every method
   cargo xtask seeds rig --jobs 1              on the emulated board
   cargo xtask seeds handheld                  the handheld, in a hand that differs from seed to seed
+  cargo xtask seeds verify                    the same texture, and another one, held against what was learned
   cargo xtask seeds press --seeds 63          all presses of a world, with P_DC sound, dead, dying and leaking";
 
 #[derive(Args)]
@@ -52,6 +53,8 @@ enum What {
     Simulate,
     /// `tactus learn-by-hand`
     LearnByHand,
+    /// `tactus verify --simulated`: a texture against itself, and the next one against it
+    Verify,
     /// An exploration on the emulated board
     Rig,
     /// An exploration by the handheld on the emulated board
@@ -78,6 +81,8 @@ struct Run {
     arguments: Vec<String>,
     /// A variable of its environment.
     variable: Option<(&'static str, String)>,
+    /// How the line begins that is right, where the program does not know that itself.
+    right: Option<&'static str>,
 }
 
 impl What {
@@ -89,7 +94,7 @@ impl What {
     fn seeds(self) -> RangeInclusive<u64> {
         match self {
             Self::Study | Self::Press => 1..=100,
-            Self::Identify | Self::Simulate | Self::LearnByHand => 1..=50,
+            Self::Identify | Self::Simulate | Self::LearnByHand | Self::Verify => 1..=50,
             Self::Rig | Self::Handheld => 1..=20,
         }
     }
@@ -101,6 +106,7 @@ impl What {
             name,
             arguments: command.iter().map(|a| (*a).to_owned()).collect(),
             variable: None,
+            right: None,
         };
         let (number, out) = (seed.to_string(), out.to_string_lossy());
         let seeded = |command: &[&str]| {
@@ -133,6 +139,24 @@ impl What {
                 .collect(),
             Self::Simulate => vec![seeded(&["simulate", "--trials", "2", "--out", &out])],
             Self::LearnByHand => vec![seeded(&["learn-by-hand", "--out", &out])],
+            Self::Verify => {
+                // in steps that reach all 117
+                let texture = |n: u64| format!("T{}", 1 + n * 37 % 117);
+                let (reference, other) = (texture(seed), texture(seed + 1));
+                [
+                    ("itself", &reference, "The same as"),
+                    ("another", &other, "Different from"),
+                ]
+                .map(|(name, material, right)| {
+                    let under = ["--texture", &reference, "--material", material];
+                    let arguments = [&["verify", "--simulated", "--seed", &number], &under[..]];
+                    Run {
+                        right: Some(right),
+                        ..run(format!("seed {seed}, {name}"), &arguments.concat())
+                    }
+                })
+                .into()
+            }
             Self::Rig => vec![seeded(&["identify"])],
             Self::Handheld => vec![seeded(&["handheld"])],
             Self::Press => {
@@ -166,12 +190,18 @@ enum Ending {
     Failed,
 }
 
-/// What a run's output says of its end. An exit code of 3 is "not identified": no failure.
-fn ending(code: Option<i32>, stdout: &str) -> Ending {
+/// What a run's output says of its end, or what is right by the caller. An exit code of 3 is "not identified": no failure.
+fn ending(code: Option<i32>, stdout: &str, right: Option<&str>) -> Ending {
     if !matches!(code, Some(0 | 3)) {
         return Ending::Failed;
     }
     let says = |word: &str| stdout.lines().any(|line| line.starts_with(word));
+    match right {
+        Some(right) if says(right) => return Ending::Right,
+        Some(_) if says("Not sure") => return Ending::Undecided,
+        Some(_) => return Ending::Wrong,
+        None => {}
+    }
     match () {
         () if says("Wrong") => Ending::Wrong,
         () if says("Undecided") => Ending::Undecided,
@@ -305,7 +335,7 @@ fn perform(program: &Program, run: &Run, further: &[String], scratch: &Path) -> 
                 String::from_utf8_lossy(&stdout),
                 String::from_utf8_lossy(&stderr),
             );
-            let ending = ending(status.code(), &stdout);
+            let ending = ending(status.code(), &stdout, run.right);
             let told = if ending == Ending::Failed {
                 stderr
             } else {
@@ -320,9 +350,16 @@ fn perform(program: &Program, run: &Run, further: &[String], scratch: &Path) -> 
                 .map(str::trim)
                 .filter(|line| !line.is_empty());
             let says = |line: &&str| {
-                ["error", "Wrong", "Undecided"]
-                    .iter()
-                    .any(|word| line.starts_with(word))
+                [
+                    "error",
+                    "Wrong",
+                    "Undecided",
+                    "The same",
+                    "Different",
+                    "Not sure",
+                ]
+                .iter()
+                .any(|word| line.starts_with(word))
             };
             let said = panicked
                 .or_else(|| lines.clone().find(says))
@@ -436,15 +473,28 @@ mod tests {
 
     #[test]
     fn an_ending_is_what_the_run_says() {
-        assert_eq!(ending(Some(0), "Slide 1\nRight.\n3 s\n"), Ending::Right);
         assert_eq!(
-            ending(Some(3), "Undecided: it was felt.\n"),
+            ending(Some(0), "Slide 1\nRight.\n3 s\n", None),
+            Ending::Right
+        );
+        assert_eq!(
+            ending(Some(3), "Undecided: it was felt.\n", None),
             Ending::Undecided
         );
-        assert_eq!(ending(Some(0), "Wrong: it was felt.\n"), Ending::Wrong);
-        assert_eq!(ending(Some(0), "117 textures\n"), Ending::Done);
-        assert_eq!(ending(Some(1), "Right.\n"), Ending::Failed);
-        assert_eq!(ending(None, ""), Ending::Failed);
+        assert_eq!(
+            ending(Some(0), "Wrong: it was felt.\n", None),
+            Ending::Wrong
+        );
+        assert_eq!(ending(Some(0), "117 textures\n", None), Ending::Done);
+        assert_eq!(ending(Some(1), "Right.\n", None), Ending::Failed);
+        assert_eq!(ending(None, "", None), Ending::Failed);
+        let other = |stdout| ending(Some(3), stdout, Some("Different from"));
+        assert_eq!(other("Slide 1\nDifferent from Silk.\n"), Ending::Right);
+        assert_eq!(other("The same as Silk.\n"), Ending::Wrong);
+        assert_eq!(
+            other("Not sure yet whether it is Silk.\n"),
+            Ending::Undecided
+        );
     }
 
     /// A program that ends so for some seeds, in the place of the real one.
@@ -465,6 +515,7 @@ mod tests {
             name: "seed 7".into(),
             arguments: arguments.map(ToOwned::to_owned).to_vec(),
             variable: None,
+            right: None,
         };
         let ended = perform(&program, &run, &[], scratch.path());
         let line = ended.line().unwrap();
