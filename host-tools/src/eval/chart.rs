@@ -2,6 +2,8 @@
 
 pub(crate) mod grid;
 mod labels;
+#[cfg(feature = "study")]
+pub(crate) mod matrix;
 mod svg;
 
 use plotters::prelude::*;

@@ -4,7 +4,7 @@ use serde_json::json;
 use tactus_core::features::{Movement, Property};
 
 use super::model::{Report, Rows, axis, cells, movement_name, owned};
-use crate::eval::chart::grid::{SHADES, matrix};
+use crate::eval::chart::matrix::{SHADES, matrix};
 use crate::eval::chart::{Chart, DrawError, Figure, MARKS, Mark, Series, buffer};
 use crate::study::published::{MOST_USEFUL, TRIALS};
 use crate::study::training::Training;

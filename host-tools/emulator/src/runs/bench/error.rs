@@ -29,6 +29,7 @@ pub(crate) enum BenchError {
     Draw(#[from] tactus::eval::chart::DrawError),
     #[error(transparent)]
     Write(#[from] crate::host::args::WriteError),
+    #[cfg(not(feature = "plot"))]
     #[error(
         "built without the feature `plot`: `cargo xtask bench --growth --plot FILE` builds with it"
     )]
