@@ -12,6 +12,7 @@
 pub mod collection;
 mod conditions;
 pub mod encoder;
+pub mod fault_case;
 pub mod faults;
 pub mod finger;
 pub mod flash;

@@ -4,6 +4,7 @@ pub mod bench;
 pub mod campaign;
 mod cuts;
 mod error;
+mod faults;
 mod handheld;
 mod identify;
 mod serve;
@@ -44,6 +45,8 @@ enum Cli {
     Serve(serve::Args),
     /// Have it identify many textures, and cut its power, against the bars
     Campaign(campaign::Args),
+    /// Break the simulated rig of the PC in many ways, at any moment of whatever its probe does
+    Faults(faults::Args),
     /// Have it work for a day on the simulated rig and for an hour on the board, with random faults
     Soak(soak::Args),
     /// Count the instructions of the core's kernels
@@ -66,6 +69,7 @@ fn run(cli: &Cli) -> Result<ExitCode, RunError> {
         Cli::Handheld(args) => handheld::run(args).map(|()| ExitCode::SUCCESS),
         Cli::Serve(args) => serve::run(args).map(|()| ExitCode::SUCCESS),
         Cli::Campaign(args) => campaign::run(args).map(met),
+        Cli::Faults(args) => faults::run(args).map(met),
         Cli::Soak(args) => soak::run(args).map(met),
         Cli::Bench(args) => bench::run(args),
         Cli::Stack(args) => stack_depth::run(args).map(|()| ExitCode::SUCCESS),

@@ -33,6 +33,8 @@ pub struct Edge {
 pub struct Encoder {
     origin: f64,
     cut: Option<Cut>,
+    /// lines A and B are exchanged: without edges only
+    swapped: bool,
     /// count - what [`Encoder::followed`] says
     offset: i64,
     /// counts, when they were reached and how the lines were then, if somebody wants edges
@@ -46,6 +48,7 @@ impl Encoder {
         Self {
             origin: (position_mm * COUNTS_PER_MM).floor(),
             cut: None,
+            swapped: false,
             offset: 0,
             passed: edges.then(VecDeque::new),
             shown: lines(0, None),
@@ -73,7 +76,15 @@ impl Encoder {
 
     /// What the counter says with the stage at a position.
     pub fn count(&self, position_mm: f64) -> i32 {
-        (self.offset + followed(self.counts(position_mm), self.cut)) as i32
+        let followed = followed(self.counts(position_mm), self.cut);
+        (self.offset + if self.swapped { -followed } else { followed }) as i32
+    }
+
+    /// Exchanges lines A and B, or puts them right, with the stage at a position. The edges that are kept stay as they were.
+    pub fn swap(&mut self, swapped: bool, position_mm: f64) {
+        let before = i64::from(self.count(position_mm));
+        self.swapped = swapped;
+        self.offset += before - i64::from(self.count(position_mm));
     }
 
     /// Cuts wires, or joins them again, at a time with the stage at a position. Edges of that tick that are yet to come are
@@ -83,10 +94,11 @@ impl Encoder {
             return;
         }
         let count = self.counts(position_mm);
-        let before = self.offset + followed(count, self.cut);
-        let jump = step(lines(count, self.cut), lines(count, cut));
+        let sign = if self.swapped { -1 } else { 1 };
+        let before = self.offset + sign * followed(count, self.cut);
+        let jump = sign * step(lines(count, self.cut), lines(count, cut));
         self.cut = cut;
-        self.offset = before + jump - followed(count, cut);
+        self.offset = before + jump - sign * followed(count, cut);
         if let Some(passed) = &mut self.passed {
             let now = passed.partition_point(|(_, edge)| edge.at_ns <= now_ns);
             for (count, to_come) in passed.range_mut(now..) {

@@ -1,6 +1,7 @@
 //! What can go wrong with the rig, and what it does to the words on the way from the sensor.
 
 use super::encoder::Cut;
+use super::maths::pow;
 use super::noise::Noise;
 
 /// Stream of the trial's seed that faults draw from.
@@ -35,6 +36,11 @@ pub enum Fault {
         /// Time in which the gain falls to 1/e, s; 0: it is gone at once.
         seconds: f64,
     },
+    /// The amplifier of the static pressure has this gain of a sound one's: P_DC says less than there is, while P_AC lives.
+    PdcWeak {
+        /// 0 to 1.
+        gain: f64,
+    },
     /// The skin is torn: the fluid runs out while it is pressed, and its pressure goes with it, for both signals.
     SkinLeaks {
         /// Time in which the pressure of a still finger falls to 1/e, s.
@@ -51,6 +57,20 @@ pub enum Fault {
     },
     /// A wire of the encoder is cut.
     EncoderCut(Cut),
+    /// The wires of the encoder are exchanged: it counts backwards.
+    EncoderSwapped,
+    /// The amplifier of the motor current says so much more than there is.
+    CurrentOffset {
+        /// A, of either sign.
+        amperes: f64,
+    },
+    /// The amplifier of the motor current is at its end.
+    CurrentSaturated,
+    /// The supply of both motors is gone for so long.
+    SupplyDip {
+        /// How long, ms.
+        ms: u64,
+    },
     /// A limit switch of the stage sticks.
     StageLimitStuck {
         /// The upper or the lower one.
@@ -85,7 +105,7 @@ pub enum Fault {
 
 impl Fault {
     /// One of each kind, for campaigns.
-    pub const EXAMPLES: [Self; 25] = [
+    pub const EXAMPLES: [Self; 30] = [
         Self::SensorUnplugged,
         Self::BitFlips { share: 0.05 },
         Self::MisoStuck { high: false },
@@ -96,8 +116,13 @@ impl Fault {
         },
         Self::PdcStuck,
         Self::PdcFades { seconds: 0.0 },
+        Self::PdcWeak { gain: 0.5 },
         Self::SkinLeaks { seconds: 0.3 },
         Self::StageJammed,
+        Self::EncoderSwapped,
+        Self::CurrentOffset { amperes: 0.1 },
+        Self::CurrentSaturated,
+        Self::SupplyDip { ms: 200 },
         Self::FastDecay,
         Self::StageVibrates { um: 0.5 },
         Self::EncoderCut(Cut::A),
@@ -123,6 +148,41 @@ impl Fault {
         Self::EStop,
         Self::EStopGlitch { us: 1_000 },
     ];
+
+    /// The same kind of fault to another degree, `share` of the way from the smallest to the largest that is to be expected;
+    /// itself where there is but one.
+    #[must_use]
+    pub fn varied(self, share: f64) -> Self {
+        let between = |low: f64, high: f64| low * pow(high / low, share);
+        match self {
+            Self::BitFlips { .. } => Self::BitFlips {
+                share: between(1e-4, 0.3),
+            },
+            Self::PdcDrift { .. } => Self::PdcDrift {
+                counts_per_s: if share < 0.5 { -1.0 } else { 1.0 } * between(1.0, 50.0),
+            },
+            Self::PdcFades { .. } => Self::PdcFades {
+                seconds: between(0.05, 5.0),
+            },
+            Self::PdcWeak { .. } => Self::PdcWeak { gain: 0.9 * share },
+            Self::SkinLeaks { .. } => Self::SkinLeaks {
+                seconds: between(0.1, 20.0),
+            },
+            Self::CurrentOffset { .. } => Self::CurrentOffset {
+                amperes: 2.0 * share - 1.0,
+            },
+            Self::SupplyDip { .. } => Self::SupplyDip {
+                ms: between(1.0, 1_000.0) as u64,
+            },
+            Self::LeverLosesSteps { .. } => Self::LeverLosesSteps {
+                share: between(0.01, 1.0),
+            },
+            Self::EStopGlitch { .. } => Self::EStopGlitch {
+                us: between(10.0, 20_000.0) as u64,
+            },
+            other => other,
+        }
+    }
 }
 
 /// The faults that are there now, as far as they are not the finger's, the lever's, the stage's or the encoder's own.
@@ -135,6 +195,10 @@ pub(super) struct Faults {
     pub(super) miso_stuck: Option<bool>,
     pub(super) frozen: bool,
     pub(super) pdc_stuck: bool,
+    /// A, or the amplifier's end
+    pub(super) current: Option<f64>,
+    /// until when the motors have no supply
+    pub(super) dip_ends_ns: u64,
     /// counts per second, and since when
     pub(super) drift: Option<(f64, u64)>,
 }

@@ -325,6 +325,11 @@ impl Finger {
         self.amplifiers.fade_pdc(seconds);
     }
 
+    /// From now on P_DC has this gain: see `Fault::PdcWeak`.
+    pub fn weaken_pdc(&mut self, gain: f64) {
+        self.amplifiers.weaken_pdc(gain);
+    }
+
     /// Fills a torn skin, and mends the amplifier.
     pub fn mend(&mut self) {
         (self.leak_s, self.leaked_n) = (None, 0.0);

@@ -203,11 +203,27 @@ pub fn switch_on<'p, H: Host>(
 /// # Errors
 /// See [`switch_on`].
 pub fn switch_off_and_on<H: Host>(probe: SimProbe<'_, H>) -> Result<SimProbe<'_, H>, StoreError> {
+    switch_off_changed_and_on(probe, &[])
+}
+
+/// The same, and these bits of its flash change meanwhile.
+///
+/// # Errors
+/// See [`switch_on`].
+pub fn switch_off_changed_and_on<'p, H: Host>(
+    probe: SimProbe<'p, H>,
+    bits: &[usize],
+) -> Result<SimProbe<'p, H>, StoreError> {
     let Probe {
         rig, memory, plan, ..
     } = probe;
     let (store, factory, buffer) = memory.close();
-    let flash = store.map_or_else(|_| RamFlash::blank(), Store::close);
+    let mut flash = store.map_or_else(|_| RamFlash::blank(), Store::close);
+    for bit in bits {
+        if let Some(byte) = flash.bytes.get_mut(bit / 8) {
+            *byte ^= 1 << (bit % 8);
+        }
+    }
     let SimServo { rig, host, .. } = rig.servo;
     switch_on(rig, flash, factory, buffer, plan, host)
 }

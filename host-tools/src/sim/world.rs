@@ -19,7 +19,7 @@ use super::mount::Mount;
 use super::person::Hand;
 use super::played::{PlayCounts, Played};
 use super::sensor::SensorPeer;
-use super::stage::Stage;
+use super::stage::{ADC_REFERENCE_V, ADC_V_PER_A, Stage};
 use super::surface::Surface;
 use super::{noise::Noise, textures};
 
@@ -229,7 +229,8 @@ impl World {
 
     /// Gives both motors current as their enables say, unless the emergency stop has taken their supply.
     fn supply_motors(&mut self) {
-        let on = !self.faults.e_stop.cuts_power();
+        let dips = self.now_ns < self.faults.dip_ends_ns;
+        let on = !self.faults.e_stop.cuts_power() && !dips;
         let (lever, stage) = self.wanted;
         self.lever.enable(lever && on, self.finger.force_n());
         self.stage.enable(stage && on);
@@ -291,7 +292,10 @@ impl World {
 
     /// The converter's reading of the stage's motor current: 12 bits over 3.3 V, about 2048 without current, 1 V/A.
     pub fn motor_adc(&self) -> u16 {
-        self.stage.adc(self.now_ns)
+        let reading = self.stage.adc(self.now_ns);
+        let off = self.faults.current.unwrap_or_default() * ADC_V_PER_A * 4096.0 / ADC_REFERENCE_V;
+        // the addition saturates at both ends, as the amplifier does
+        (f64::from(reading) + off).round().clamp(0.0, 4095.0) as u16
     }
 
     /// The limit switch at the top of the lever's travel; `true` is closed.
@@ -399,7 +403,15 @@ impl World {
             Fault::PdcStuck => faults.pdc_stuck = true,
             Fault::PdcFades { seconds } => self.finger.fade_pdc(seconds),
             Fault::SkinLeaks { seconds } => self.finger.leak(seconds),
+            Fault::PdcWeak { gain } => self.finger.weaken_pdc(gain),
             Fault::StageJammed => self.stage.jam(true),
+            Fault::EncoderSwapped => self.encoder.swap(true, position_mm),
+            Fault::CurrentOffset { amperes } => faults.current = Some(amperes),
+            Fault::CurrentSaturated => faults.current = Some(f64::INFINITY),
+            Fault::SupplyDip { ms } => {
+                faults.dip_ends_ns = at_ns + ms * 1_000_000;
+                self.supply_motors();
+            }
             Fault::FastDecay => self.stage.decay_fast(true),
             Fault::StageVibrates { um } => self.stage.vibrate(um),
             Fault::EncoderCut(cut) => self.encoder.set_cut(Some(cut), position_mm, at_ns),
@@ -442,6 +454,7 @@ impl World {
         self.stage.vibrate(0.0);
         let position_mm = self.stage.position_at_mm(self.fraction());
         self.encoder.set_cut(None, position_mm, self.now_ns);
+        self.encoder.swap(false, position_mm);
         self.lever.lose_steps(0.0);
         self.lever.run_away_down(false);
         self.lever.invert_dir(false);
@@ -483,6 +496,10 @@ impl World {
         let began_ns = self.tick_began_ns;
         while let Some((_, fault)) = self.scheduled.pop_if(|(at_ns, _)| *at_ns <= began_ns) {
             self.inject_at(fault, began_ns, self.stage.position_mm());
+        }
+        if (1..=began_ns).contains(&self.faults.dip_ends_ns) {
+            self.faults.dip_ends_ns = 0;
+            self.supply_motors();
         }
         self.ticks += 1;
         // 1 s / 13 200 is 2 500 000 / 33 ns: exact, and no overflow

@@ -54,6 +54,27 @@ pub(crate) fn start(run: &str, options: &[OsString]) -> Result<()> {
     shell::run(emulator.args(options))
 }
 
+/// The campaign on emulated boards, or of faults on the PC's rig where so many of them are asked for.
+pub(crate) fn campaign(options: &[OsString]) -> Result<()> {
+    let given = |name: &str| {
+        options.iter().any(|option| {
+            let option = option.to_string_lossy();
+            option
+                .strip_prefix(name)
+                .is_some_and(|rest| rest.is_empty() || rest.starts_with('='))
+        })
+    };
+    if !given("--faults") {
+        return start("campaign", options);
+    }
+    shell::run(&mut build())?;
+    let mut faults = program("faults");
+    if !given("--out") {
+        faults.arg("--out").arg(target().join("faults/cases.jsonl"));
+    }
+    shell::run(faults.args(options))
+}
+
 /// A run of the emulator, which is built.
 pub(crate) fn program(run: &str) -> Command {
     let mut emulator = Command::new(folder().join("release/tactus-emulator"));

@@ -99,12 +99,15 @@ enum Cli {
     /// Run many explorations and power cuts on emulated boards and hold them against the bars
     ///
     /// In a simulated world and on recordings of a real finger, side by side on all cores; then the power is cut at every word
-    /// of what the firmware stores. Exit code 1 if a bar is missed.
+    /// of what the firmware stores. With --faults the PC's simulated rig breaks instead, at any moment of whatever its probe does.
+    /// Exit code 1 if a bar is missed.
     #[command(after_help = "Examples:
   cargo xtask campaign                                  20 of each, and cuts; some twenty minutes on two cores
   cargo xtask campaign --simulated 4 --recordings 0 --cuts 0     fewer
   cargo xtask campaign --simulated 0 --recordings 0     power cuts only
-  cargo xtask campaign --format json --out result.json  for programs")]
+  cargo xtask campaign --format json --out result.json  for programs
+  cargo xtask campaign --faults 2000                    seeds 1 to 2000 of the PC's rig with one to three faults
+  cargo xtask campaign --faults 1 --seed 17 --again     one of them once more")]
     #[command(disable_help_flag = true)]
     Campaign {
         /// Options for the campaign
@@ -168,7 +171,7 @@ fn main() -> ExitCode {
     let done = match Cli::parse() {
         Cli::Build => firmware::build().map(|_| ()),
         Cli::Emulate { options } => emulate::emulate(&options),
-        Cli::Campaign { options } => emulate::start("campaign", &options),
+        Cli::Campaign { options } => emulate::campaign(&options),
         Cli::Soak { options } => emulate::start("soak", &options),
         Cli::Check => return ended(test::check()),
         Cli::Test { step: None, quick } => return ended(test::test(quick)),

@@ -90,6 +90,11 @@ impl Amplifiers {
         self.pdc_kept = exp(-TICK_S / seconds);
     }
 
+    /// From now on P_DC has this gain.
+    pub(super) fn weaken_pdc(&mut self, gain: f64) {
+        self.pdc_gain = gain;
+    }
+
     /// P_DC has its gain again.
     pub(super) fn mend(&mut self) {
         (self.pdc_gain, self.pdc_kept) = (1.0, 1.0);

@@ -10,7 +10,7 @@ use rand::seq::IndexedRandom as _;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 use tactus::eval::show::count;
-use tactus::sim::collection::Collection;
+pub(super) use tactus::sim::fault_case::{HOMINGS, world};
 use tactus::sim::faults::Fault;
 use tactus_core::wire::Identify;
 
@@ -20,17 +20,6 @@ pub(crate) const MOST_N: f64 = 2.2;
 const FAULTS_IN: u32 = 4;
 /// Latest time of a fault, ns after the episode began: an episode takes some 15 s.
 const LATEST_NS: u64 = 15_000_000_000;
-/// A rig is asked to home so often once its fault is gone.
-pub(super) const HOMINGS: usize = 3;
-
-/// The world that the firmware's own table is learned from.
-pub(super) fn world() -> Collection {
-    Collection {
-        seed: 1,
-        textures: (1..=117).collect(),
-        trials: 5,
-    }
-}
 
 /// The table that comes with the firmware.
 pub(super) const FACTORY: &[u8] = include_bytes!("../../../../../firmware/factory.tact");

@@ -1,0 +1,212 @@
+//! The campaign of faults on the simulated rig of the PC: many cases, each by its seed, side by side on all cores.
+
+use std::collections::BTreeMap;
+use std::fs::{self, OpenOptions};
+use std::io::Write as _;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use clap::Args as Arguments;
+use serde_json::{Value, json};
+use tactus::eval::show::count;
+use tactus::sim::fault_case::{Bench, Case};
+
+use super::error::RunError;
+use super::soak::day::DayError;
+use crate::host::progress;
+
+/// The table that comes with the firmware.
+const FACTORY: &[u8] = include_bytes!("../../../../firmware/factory.tact");
+
+/// Breaks one to three things of the simulated rig at any moment of whatever the probe does, case by case.
+///
+/// The probe homes, identifies, learns, calibrates or rests meanwhile. Then bits of its flash change while its power is off,
+/// everything is repaired, and it works again. Bars: never more than 2.2 N on the finger, a rig at rest with its motors off and
+/// its finger lifted, nothing of the store lost without a word, and a repaired rig that homes and identifies. The exit code is
+/// 1 if a case misses one.
+///
+/// Each case is written as it ends; those that are written already are not run again.
+#[derive(Arguments)]
+#[command(after_help = "Examples:
+  cargo xtask campaign --faults 2000                      seeds 1 to 2000, or what is left of them
+  cargo xtask campaign --faults 1 --seed 17 --again       one of them once more")]
+pub(crate) struct Args {
+    /// How many cases
+    #[arg(long, value_name = "N")]
+    faults: u64,
+    /// The seed of the first one; those of the others follow
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Run cases that are written already, too
+    #[arg(long)]
+    again: bool,
+    /// Where the cases are written, as JSON Lines
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+/// Whether all cases are as they must be.
+pub(crate) fn run(args: &Args) -> Result<bool, RunError> {
+    let seeds = args.seed..args.seed.saturating_add(args.faults);
+    let mut cases = written(&args.out);
+    cases.retain(|seed, _| seeds.contains(seed));
+    let left: Vec<u64> = seeds
+        .clone()
+        .filter(|seed| args.again || !cases.contains_key(seed))
+        .collect();
+    if let Some(folder) = args.out.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    let file = OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(&args.out)?;
+    let bar = progress::bar("cases", args.faults, ", {eta} left");
+    bar.set_position(args.faults - left.len() as u64);
+    bar.reset_eta();
+    let ended = Mutex::new((file, cases));
+    let next = AtomicUsize::new(0);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let bench = Bench::new(FACTORY).map_err(DayError::from)?;
+    std::thread::scope(|scope| {
+        for _ in 0..cores.min(left.len()) {
+            scope.spawn(|| {
+                while let Some(&seed) = left.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let line = perform(&bench, seed);
+                    let mut ended = ended.lock().unwrap_or_else(|e| e.into_inner());
+                    if let Some(said) = failed(&line) {
+                        bar.suspend(|| println!("{said}"));
+                    }
+                    // a line at a time: what is written is whole, or is run again
+                    if let Err(why) = writeln!(ended.0, "{line}") {
+                        bar.suspend(|| eprintln!("{}: {why}", args.out.display()));
+                    }
+                    ended.1.insert(seed, line);
+                    bar.inc(1);
+                }
+            });
+        }
+    });
+    bar.finish_and_clear();
+    let (_, cases) = ended.into_inner().unwrap_or_else(|e| e.into_inner());
+    print!("{}", summary(&cases));
+    println!("{}", args.out.display());
+    Ok(cases.values().all(|line| failed(line).is_none()))
+}
+
+/// The cases that a file holds; a line that is not whole is none.
+fn written(file: &Path) -> BTreeMap<u64, Value> {
+    let text = fs::read_to_string(file).unwrap_or_default();
+    text.lines()
+        .filter_map(|line| serde_json::from_str(line).ok())
+        .filter_map(|line: Value| Some((line["seed"].as_u64()?, line)))
+        .collect()
+}
+
+/// Runs the case of a seed; its line.
+fn perform(bench: &Bench<'_>, seed: u64) -> Value {
+    let case = Case::draw(seed);
+    let ended = catch_unwind(AssertUnwindSafe(|| bench.run(&case)));
+    let mut line = json!({
+        "seed": seed,
+        "activity": format!("{:?}", case.activity),
+        "texture": case.texture,
+        "faults": case.faults.iter().map(|(ms, fault)| format!("{ms} ms {fault:?}")).collect::<Vec<_>>(),
+        "bits": case.bits,
+    });
+    match ended {
+        Ok(Ok(outcome)) => {
+            line["force_max_n"] = outcome.force_max_n.into();
+            line["named"] = json!(
+                outcome
+                    .named
+                    .iter()
+                    .map(|f| format!("{f:?}"))
+                    .collect::<Vec<_>>()
+            );
+            line["refused"] = json!(outcome.refused);
+            line["virtual_s"] = outcome.took.as_secs_f64().into();
+            line["wrong"] = json!(outcome.wrong);
+        }
+        Ok(Err(why)) => line["wrong"] = json!([why.to_string()]),
+        Err(_) => line["wrong"] = json!(["it panicked"]),
+    }
+    line
+}
+
+/// What is wrong with a case, and how it is run again.
+fn failed(line: &Value) -> Option<String> {
+    let wrong = line["wrong"].as_array()?;
+    let wrong: Vec<&str> = wrong.iter().filter_map(Value::as_str).collect();
+    (!wrong.is_empty()).then(|| {
+        format!(
+            "seed {seed}: {}, {}: FAILED: {}\n    again: cargo xtask campaign --faults 1 --seed {seed} --again",
+            line["activity"].as_str().unwrap_or_default(),
+            line["faults"],
+            wrong.join("; "),
+            seed = line["seed"],
+        )
+    })
+}
+
+/// How many cases there were, what they were asked for, and what they named.
+fn summary(cases: &BTreeMap<u64, Value>) -> String {
+    let mut by: BTreeMap<&str, (u32, u32, u32)> = BTreeMap::new();
+    for line in cases.values() {
+        let (all, named, wrong) = by
+            .entry(line["activity"].as_str().unwrap_or_default())
+            .or_default();
+        *all += 1;
+        *named += u32::from(
+            line["named"]
+                .as_array()
+                .is_some_and(|named| !named.is_empty()),
+        );
+        *wrong += u32::from(failed(line).is_some());
+    }
+    let forces = cases
+        .values()
+        .filter_map(|line| line["force_max_n"].as_f64());
+    let most = forces.fold(0.0, f64::max);
+    let wrong: u32 = by.values().map(|(.., wrong)| wrong).sum();
+    let mut text = format!(
+        "{}, {wrong} failed; at most {most:.3} N on the finger\n",
+        count(cases.len() as u64, "case")
+    );
+    for (activity, (all, named, wrong)) in by {
+        text += &format!("  {activity}: {all}, of which {named} named a fault, {wrong} failed\n");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cases_that_are_written_are_not_run_again() {
+        let name = format!("tactus-faults-{}", std::process::id());
+        let out = std::env::temp_dir().join(name).join("cases.jsonl");
+        fs::create_dir_all(out.parent().unwrap()).unwrap();
+        // of the first one half a line was written
+        fs::write(
+            &out,
+            "{\"seed\": 1, \"wro\n{\"seed\": 2, \"activity\": \"Idle\", \"wrong\": [\"x\"]}\n",
+        )
+        .unwrap();
+        assert_eq!(written(&out).into_keys().collect::<Vec<_>>(), [2]);
+        let args = |again| Args {
+            faults: 2,
+            seed: 1,
+            again,
+            out: out.clone(),
+        };
+        assert!(!run(&args(false)).unwrap(), "seed 2 has failed");
+        assert_eq!(fs::read_to_string(&out).unwrap().lines().count(), 3);
+        assert!(run(&args(true)).unwrap());
+        assert_eq!(fs::read_to_string(&out).unwrap().lines().count(), 5);
+        fs::remove_dir_all(out.parent().unwrap()).unwrap();
+    }
+}

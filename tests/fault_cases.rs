@@ -1,0 +1,158 @@
+//! The campaign of faults on the simulated rig: some of its cases, and those by name that have failed.
+
+use rayon::prelude::*;
+use tactus::sim::encoder::Cut;
+use tactus::sim::fault_case::{Activity, Bench, Case, Outcome};
+use tactus::sim::faults::Fault;
+use tactus_core::rig;
+use tactus_tests::expected_to_fail;
+
+/// The table that comes with the firmware.
+const FACTORY: &[u8] = include_bytes!("../firmware/factory.tact");
+
+fn outcome(case: &Case) -> Outcome {
+    Bench::new(FACTORY).unwrap().run(case).unwrap()
+}
+
+fn case(seed: u64, activity: Activity, texture: u8, faults: &[(u64, Fault)]) -> Case {
+    Case {
+        seed,
+        texture,
+        activity,
+        faults: faults.to_vec(),
+        bits: Vec::new(),
+    }
+}
+
+/// Has a case happen, which must end well.
+fn ends_well(seed: u64, activity: Activity, texture: u8, faults: &[(u64, Fault)]) {
+    let outcome = outcome(&case(seed, activity, texture, faults));
+    assert!(outcome.wrong.is_empty(), "{outcome}");
+}
+
+/// Whether a fault is one of those that are known to end badly: see the tests below.
+fn may_end_badly((_, fault): &(u64, Fault)) -> bool {
+    matches!(
+        fault,
+        Fault::PdcWeak { .. }
+            | Fault::SkinLeaks { .. }
+            | Fault::LeverDirInverted
+            | Fault::LeverRunaway
+    )
+}
+
+#[test]
+fn the_first_cases_end_well() {
+    let bench = Bench::new(FACTORY).unwrap();
+    let cases: Vec<Case> = (1..=60).map(Case::draw).collect();
+    let outcomes: Vec<Outcome> = cases
+        .par_iter()
+        .filter(|case| !case.faults.iter().any(may_end_badly))
+        .map(|case| bench.run(case).unwrap())
+        .collect();
+    let wrong: Vec<String> = outcomes
+        .iter()
+        .filter(|outcome| !outcome.wrong.is_empty())
+        .map(ToString::to_string)
+        .collect();
+    assert_eq!(wrong, [""; 0]);
+    // else this would show nothing
+    assert!(outcomes.iter().filter(|o| !o.named.is_empty()).count() > 8);
+    assert!(outcomes.iter().any(|o| o.force_max_n > 0.3));
+}
+
+/// The judge must object to a rig whose finger is pressed too hard, and to a store that is another one without a word.
+#[test]
+fn a_case_says_what_broke() {
+    let stop = [(3_000, Fault::EStop)];
+    let stopped = outcome(&case(7, Activity::Identify, 10, &stop));
+    assert_eq!(stopped.named, [rig::Fault::EStop]);
+    assert!(
+        stopped.refused.is_some() && stopped.wrong.is_empty(),
+        "{stopped}"
+    );
+    let nothing = outcome(&case(7, Activity::Identify, 10, &[]));
+    assert_eq!((nothing.refused, nothing.named), (None, Vec::new()));
+    assert!(nothing.wrong.is_empty(), "{:?}", nothing.wrong);
+}
+
+/// P_DC that says a quarter of what there is: the lever presses until it says what is wanted.
+#[test]
+fn a_weak_pressure_presses_too_hard() {
+    expected_to_fail("N on the finger", || {
+        let weak = Fault::PdcWeak {
+            gain: 0.238_497_425_065_986_06,
+        };
+        ends_well(48, Activity::Train, 72, &[(31_781, weak)]);
+    });
+}
+
+/// A skin that leaks within nine seconds, from between two movements on.
+#[test]
+fn a_leak_that_begins_between_movements_presses_too_hard() {
+    expected_to_fail("N on the finger", || {
+        let leak = Fault::SkinLeaks {
+            seconds: 9.432_495_918_938_178,
+        };
+        ends_well(267, Activity::Train, 104, &[(20_981, leak)]);
+    });
+}
+
+/// A skin that tears quickly while the finger is down.
+#[test]
+fn a_quick_leak_presses_too_hard() {
+    expected_to_fail("N on the finger", || {
+        let leak = Fault::SkinLeaks {
+            seconds: 0.173_351_269_437_774,
+        };
+        ends_well(965, Activity::Label, 45, &[(7_125, leak)]);
+    });
+}
+
+/// The wire of DIR goes wrong while the finger is down, and the sensor is silent before it is lifted: what lifts, presses, and
+/// nothing says so.
+#[test]
+fn an_inverted_lever_without_a_sensor_presses_too_hard() {
+    expected_to_fail("N on the finger", || {
+        let faults = [
+            (9_574, Fault::LeverDirInverted),
+            (11_598, Fault::MisoStuck { high: false }),
+        ];
+        ends_well(213, Activity::Label, 54, &faults);
+    });
+}
+
+/// The wire of DIR goes wrong while the finger is down: the rig says that the force is high, not that it is not lifted.
+#[test]
+fn an_inverted_lever_is_not_named_as_one_that_is_not_home() {
+    expected_to_fail("the finger is down", || {
+        ends_well(
+            130,
+            Activity::Label,
+            68,
+            &[(6_722, Fault::LeverDirInverted)],
+        );
+    });
+}
+
+/// A driver that steps down by itself, and then words of the sensor are damaged: the lever never comes to rest.
+#[test]
+fn a_runaway_lever_with_damaged_words_goes_on() {
+    expected_to_fail("no rest", || {
+        let flips = Fault::BitFlips {
+            share: 0.005_811_423_298_212_308,
+        };
+        let faults = [(37_654, Fault::LeverRunaway), (39_538, flips)];
+        ends_well(283, Activity::Calibrate, 69, &faults);
+    });
+}
+
+/// Encoder lines that are exchanged, or cut, are noticed before the stage is in a hard stop.
+#[test]
+fn a_stage_that_counts_backwards_ends_well() {
+    for fault in [Fault::EncoderSwapped, Fault::EncoderCut(Cut::Both)] {
+        for at_ms in [500, 4_000, 9_000, 12_000] {
+            ends_well(at_ms, Activity::Identify, 10, &[(at_ms, fault)]);
+        }
+    }
+}
