@@ -22,6 +22,7 @@ mod rig;
 mod stack;
 mod symbols;
 mod taps;
+mod upset;
 
 pub use display::Display;
 pub use emulator::{Emulator, Reset};
@@ -33,3 +34,4 @@ pub use record::Slide;
 pub use rig::{Output, Rig};
 pub use rigless::device::ResetCause;
 pub use stack::{StackLayout, StackLevel, StackUse};
+pub use upset::Switch;

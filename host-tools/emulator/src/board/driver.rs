@@ -19,6 +19,7 @@ use super::pins::{self, PinId};
 use super::referee::Referee;
 use super::rig::{SharedRig, lock};
 use super::stack::Stack;
+use super::upset::Switch;
 
 const SPI1_CR1: u64 = 0x4001_3000;
 const TIM5_SR: u64 = 0x4000_0C10;
@@ -66,6 +67,12 @@ pub(crate) struct Driver {
     pub(crate) clock: bool,
     /// what the firmware did to the store's sectors
     pub(crate) stored: Vec<FlashWrite>,
+    /// an erase was under way when CR of the flash was written last
+    pub(crate) flash_busy: bool,
+    /// an erase never ends
+    pub(crate) flash_stuck: bool,
+    /// a switch that cannot be turned on
+    pub(crate) held_off: Option<Switch>,
     /// judges what the firmware does to the chip, from the first instruction on
     pub(crate) referee: Option<Referee>,
     /// a debugger has halted the core
@@ -194,7 +201,14 @@ impl Driver {
                 }
                 flags => registers.set(FlashRegister::Sr, sr | flags),
             }
-        } else if access.value >> 16 & 1 == 1
+            return Ok(());
+        }
+        let is_busy = sr & flash::BSY != 0;
+        if let Some(referee) = &mut self.referee {
+            referee.controls(access, sr, self.flash_busy && is_busy);
+        }
+        self.flash_busy = is_busy;
+        if access.value >> 16 & 1 == 1
             && let Some(addresses) = flash::erased(cr, sr)
         {
             self.stored.extend(FlashWrite::erase(&addresses));
@@ -205,8 +219,21 @@ impl Driver {
         Ok(())
     }
 
+    /// The erase that began last is not over.
+    fn keep_busy(&self, board: &mut Board) {
+        let bus = board.part.bus_mut();
+        if let Some(slot) = bus.slot_of("FLASH") {
+            let registers = bus.slot_mut(slot).registers_mut();
+            let sr = registers.get(FlashRegister::Sr);
+            registers.set(FlashRegister::Sr, sr | flash::BSY);
+        }
+    }
+
     fn write(&mut self, session: &mut Session<Board>, host: &mut dyn Host, access: &Access) {
         let now = access.virtual_time;
+        if let Some(switch) = self.held_off {
+            switch.hold(&mut session.board_mut().part, now, access.address);
+        }
         match access.address {
             address if PORTS.contains(&address) => {
                 let port = ((address - PORTS.start) >> 10) as usize;
@@ -287,6 +314,8 @@ impl emulator::Driver<Board> for Driver {
             if let Some(referee) = &mut self.referee {
                 referee.reset();
             }
+            self.flash_busy = false;
+            self.held_off = None;
         }
         if let (Settled::Access { access, .. }, Some(referee)) = (&settled, &mut self.referee) {
             referee.access(access);
@@ -328,6 +357,9 @@ impl emulator::Driver<Board> for Driver {
                 rig.buzzer(now.0, tone);
             }
             self.switch(session.board_mut(), now);
+            if self.flash_stuck && self.flash_busy {
+                self.keep_busy(session.board_mut());
+            }
             if let Some(halt) = &self.halt {
                 halt.last(&mut session.board_mut().part, now);
             }

@@ -8,6 +8,7 @@ use std::thread::JoinHandle;
 use rigless::device::ResetCause;
 use rigless::emulator::{Start, run};
 use rigless::image::Image;
+use rigless::mcu::Operate as _;
 use rigless::session::Session;
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
@@ -28,6 +29,7 @@ use super::registers::register;
 use super::rig::{Rig, SharedRig, lock};
 use super::stack::{Stack, StackLayout, StackUse};
 use super::symbols::symbols;
+use super::upset::Switch;
 
 /// A reset of the chip.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -86,6 +88,9 @@ impl Emulator {
             switches: [None; 4],
             clock: options.clock,
             stored: Vec::new(),
+            flash_busy: false,
+            flash_stuck: false,
+            held_off: None,
             referee: None,
             halt: None,
         };
@@ -350,6 +355,31 @@ impl Emulator {
         let whole = self.read(address, needed)?;
         self.write(address, &bytes)?;
         Ok((address, whole))
+    }
+
+    /// A switch goes off; with `lasting` nothing but a reset of the chip turns it on again.
+    pub fn upset(&mut self, switch: Switch, lasting: bool) -> Result<(), Error> {
+        let at = VirtualNanos(self.now_ns());
+        self.with(move |standing| {
+            switch.off(&mut standing.session.board_mut().part, at);
+            standing.driver.held_off = lasting.then_some(switch);
+        })
+    }
+
+    /// From now on an erase is never over: the flash says that it is busy.
+    pub fn stick_flash(&mut self) -> Result<(), Error> {
+        self.with(|standing| standing.driver.flash_stuck = true)
+    }
+
+    /// A register as the core would read it, a word.
+    pub fn register(&mut self, address: u64) -> Result<u32, Error> {
+        let at = VirtualNanos(self.now_ns());
+        let read = self.with(move |standing| {
+            let part = &mut standing.session.board_mut().part;
+            part.read(at, address, Width::W32).ok()
+        })?;
+        read.map(|word| word as u32)
+            .ok_or(Error::Memory { address })
     }
 
     /// A debugger halts the core, until [`Emulator::go_on`]: time passes, and what DBGMCU does not stop goes on. With

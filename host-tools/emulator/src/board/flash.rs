@@ -20,7 +20,7 @@ const LOCK: u64 = 1 << 31;
 /// SR: operations in the wrong sequence, of the wrong width, busy.
 const PGSERR: u64 = 1 << 7;
 const PGPERR: u64 = 1 << 6;
-const BSY: u64 = 1 << 16;
+pub(super) const BSY: u64 = 1 << 16;
 
 /// What the firmware did to its store.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -11,7 +11,7 @@ use rigless::emulator::{Access, AccessKind, Hit, Host, Watch};
 use rigless::soc::Bus;
 use stm32_metapac::metadata::{METADATA, MemoryRegionKind, Peripheral};
 
-use super::flash::{self, FLASH};
+use super::flash::{self, BSY, FLASH};
 use super::registers::{IPSR, register, word};
 pub use violation::{Rule, Violation};
 
@@ -95,6 +95,16 @@ pub(crate) struct Referee {
 struct Now {
     at_ns: u64,
     instruction: Option<u64>,
+}
+
+impl Now {
+    /// `None`: a debugger may do all.
+    fn of(access: &Access) -> Option<Self> {
+        Some(Self {
+            at_ns: access.virtual_time.0,
+            instruction: Some(access.program_counter?),
+        })
+    }
 }
 
 impl Referee {
@@ -191,14 +201,7 @@ impl Referee {
 
     /// An access of the core, once it is made.
     pub(crate) fn access(&mut self, access: &Access) {
-        let now = Now {
-            at_ns: access.virtual_time.0,
-            instruction: access.program_counter,
-        };
-        // a debugger may do all
-        if now.instruction.is_none() {
-            return;
-        }
+        let Some(now) = Now::of(access) else { return };
         let word = match self.vendor.at(access.address) {
             None => return,
             Some(Ok(word)) => word,
@@ -527,25 +530,37 @@ impl Referee {
         }
     }
 
+    /// Read while write spoils the data cache (ES0206 2.2.12).
+    fn data_cache(&mut self, now: Now, what: &str) {
+        if self.field("FLASH", "ACR", "DCEN") == Some(1) {
+            self.tell(now, Rule::DataCache, what.to_owned());
+        }
+    }
+
     /// A store to the flash array, with CR and SR of the flash, before it is made; `old` is what is there.
     pub(crate) fn programs(&mut self, access: &Access, cr: u64, old: u64) {
-        let now = Now {
-            at_ns: access.virtual_time.0,
-            instruction: access.program_counter,
-        };
-        if now.instruction.is_none() {
-            return;
-        }
+        let Some(now) = Now::of(access) else { return };
         let (mask, sector) = (access.width.mask(), access.address & !0x3FFF);
         if flash::refusal(cr, access.width) != 0 {
             let what = format!("{} bits, CR {cr:#x}", access.width.bits());
             self.tell(now, Rule::FlashProgram, what);
-        } else if access.value & mask & !old != 0 {
-            self.tell(
-                now,
-                Rule::FlashBits,
-                format!("in the 16 KB from {sector:#x}"),
-            );
+            return;
+        }
+        self.data_cache(now, "a store");
+        if access.value & mask & !old != 0 {
+            let what = format!("in the 16 KB from {sector:#x}");
+            self.tell(now, Rule::FlashBits, what);
+        }
+    }
+
+    /// A store to CR of the flash, with SR afterwards, and whether the flash was busy before (RM0090 3.6.1).
+    pub(crate) fn controls(&mut self, access: &Access, sr: u64, was_busy: bool) {
+        let Some(now) = Now::of(access) else { return };
+        if was_busy {
+            let what = format!("CR {:#x}", access.value);
+            self.tell(now, Rule::FlashBusy, what);
+        } else if sr & BSY != 0 {
+            self.data_cache(now, "an erase");
         }
     }
 }

@@ -14,5 +14,6 @@ mod referee;
 mod selftest;
 mod serve;
 mod settings;
+mod silicon;
 mod teach;
 mod verify;

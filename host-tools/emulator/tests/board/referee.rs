@@ -164,6 +164,11 @@ fn cases() -> Vec<(Rule, Vec<Do>, Vec<Do>)> {
     ];
     let by_words = W(FLASH_IF + 0x10, 2 << 8 | 1);
     let by_bytes = W(FLASH_IF + 0x10, 1);
+    // sector 16, by words, and its start
+    let erase = [
+        W(FLASH_IF + 0x10, 16 << 3 | 2 << 8 | 2),
+        W(FLASH_IF + 0x10, 1 << 16 | 16 << 3 | 2 << 8 | 2),
+    ];
     let to_pll = |cfgr: u32| [W(CFGR, cfgr | 2)];
     // APB1 / 4, APB2 / 2
     let divided = 5 << 10 | 4 << 13;
@@ -279,6 +284,16 @@ fn cases() -> Vec<(Rule, Vec<Do>, Vec<Do>)> {
             Rule::FlashBits,
             all(&[&unlock, &[by_words, W(STORE, 7), W(STORE, 3)]]),
             all(&[&unlock, &[by_words, W(STORE, 7), W(STORE, 8)]]),
+        ),
+        (
+            Rule::DataCache,
+            all(&[&unlock, &[by_words, W(STORE, 7)]]),
+            all(&[&unlock, &[W(FLASH_IF, 1 << 10), by_words, W(STORE, 7)]]),
+        ),
+        (
+            Rule::FlashBusy,
+            all(&[&unlock, &erase]),
+            all(&[&unlock, &erase, &[by_words]]),
         ),
         (
             Rule::WaitStates,

@@ -39,6 +39,10 @@ pub enum Rule {
     FlashProgram,
     /// Program a bit of flash back to 1.
     FlashBits,
+    /// Program or erase flash with its data cache on.
+    DataCache,
+    /// Write the control register of the flash while it is busy: the core stands until it no longer is.
+    FlashBusy,
     /// Run faster than the wait states of the flash allow.
     WaitStates,
     /// Run a bus faster than it may.
