@@ -1,16 +1,18 @@
 //! The NUCLEO-F429ZI: its clocks, and who gets which pin and timer (UM1974). Pins are named by their Arduino and Zio
 //! connectors in docs/src/rig.md.
+use core::mem::ManuallyDrop;
+
 use assign_resources::assign_resources;
-use embassy_stm32::gpio::{Level, OutputOpenDrain, Pull, Speed};
+use embassy_stm32::gpio::{Flex, Level, OutputOpenDrain, Pin, Pull, Speed};
 use embassy_stm32::interrupt::{self, InterruptExt as _, Priority};
 use embassy_stm32::pac::rcc::vals::Pllsrc;
-use embassy_stm32::pac::{DBGMCU, RCC};
+use embassy_stm32::pac::{DBGMCU, FLASH as FLASH_INTERFACE, RCC};
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllQDiv, PllSource,
     Sysclk,
 };
 use embassy_stm32::time::Hertz;
-use embassy_stm32::{Peri, bind_interrupts, flash, peripherals, usart};
+use embassy_stm32::{Peri, PeripheralType, bind_interrupts, flash, peripherals, usart};
 
 assign_resources! {
     acquire: Acquire {
@@ -26,9 +28,9 @@ assign_resources! {
         timer: TIM1,
         step: PE9,
         /// High is down.
-        direction: PE11,
+        direction: PE11 = LeverDirection,
         /// High gives current.
-        enable: PE13,
+        enable: PE13 = LeverEnable,
     }
     stage: Stage {
         timer: TIM3,
@@ -36,7 +38,7 @@ assign_resources! {
         /// High drives to higher positions.
         direction: PC7,
         /// High turns the bridge on.
-        enable: PC8,
+        enable: PC8 = StageEnable,
         encoder: TIM4,
         encoder_a: PD12,
         encoder_b: PD13,
@@ -46,7 +48,7 @@ assign_resources! {
     }
     /// Normally closed to ground: high is pressed, or a broken wire.
     switches: Switches {
-        lever_top: PF12,
+        lever_top: PF12 = LeverTop,
         stage_left: PF14,
         stage_right: PF15,
         e_stop: PF13,
@@ -65,7 +67,7 @@ assign_resources! {
     leds: Leds {
         green: PB0,
         blue: PB7,
-        red: PB14,
+        red: PB14 = RedLed,
     }
     /// Follows `verify`.
     go: Go {
@@ -91,6 +93,24 @@ assign_resources! {
     }
 }
 
+/// The peripheral of a name that the table above gives: for who uses pins that others have, when
+/// nothing else works any more.
+pub(crate) type Named<P> = <P as Named_>::Peripheral;
+
+/// See [`Named`].
+pub(crate) trait Named_ {
+    type Peripheral;
+}
+
+impl<T: PeripheralType> Named_ for Peri<'static, T> {
+    type Peripheral = T;
+}
+
+/// A pin as its driver has set it up.
+pub(crate) fn held(pin: Peri<'static, impl Pin>) -> ManuallyDrop<Flex<'static>> {
+    ManuallyDrop::new(Flex::new(pin))
+}
+
 bind_interrupts!(pub(crate) struct Irqs {
     USART3 => usart::BufferedInterruptHandler<peripherals::USART3>;
     FLASH => flash::InterruptHandler;
@@ -108,6 +128,15 @@ pub(crate) fn start() -> AssignedResources {
     DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
     let external = find_clock();
     let p = embassy_stm32::init(clocks(external));
+    // embassy sets the wait states alone, five at 168 MHz: prefetch and the instruction cache make up for them (RM0090 3.5.2).
+    // No line of that cache goes stale: bank 2 alone is ever erased, and no code is in it. The data cache stays off. It must
+    // be off while one bank is written and the other one read (ES0206 2.2.12), and would keep what was there before;
+    // embassy's driver means to see to both, but takes this part for one with a single bank, since the list of its
+    // regions ends with the OTP area.
+    FLASH_INTERFACE.acr().modify(|w| {
+        w.set_prften(true);
+        w.set_icen(true);
+    });
     if external {
         // should it stop later: an NMI, see `rescue`
         RCC.cr().modify(|w| w.set_csson(true));
@@ -146,7 +175,8 @@ fn find_clock() -> bool {
     RCC.cr().modify(|w| w.set_hsebyp(true));
     RCC.cr().modify(|w| w.set_hseon(true));
     let found = (0..LOOKS).any(|_| {
-        cortex_m::asm::delay(RESET_HZ / 10_000);
+        // a turn of its loop takes three cycles
+        cortex_m::asm::delay(RESET_HZ / 10_000 / 3);
         RCC.cr().read().hserdy()
     });
     if !found {

@@ -7,3 +7,9 @@ pub(crate) mod lever;
 pub(crate) mod rescue;
 
 pub(crate) use dsp_kernels::Chip;
+
+/// Waits for at least so many cycles of the core. cortex-m's delay counts turns of its loop, which takes three on an M4: one, and
+/// two of a branch that is taken at the least.
+pub(crate) fn wait_cycles(cycles: u32) {
+    cortex_m::asm::delay(cycles / 3);
+}

@@ -17,7 +17,7 @@ use static_cell::ConstStaticCell;
 use crate::board;
 use crate::chip::rescue;
 use crate::tasks::acquire::{self, ACQUIRE, WORDS, Word};
-use crate::tasks::{display, hand, link};
+use crate::tasks::{display, hand, link, only};
 
 static HAND: InterruptExecutor = InterruptExecutor::new();
 
@@ -32,6 +32,7 @@ pub fn handheld() -> ! {
     static WORD_QUEUE: ConstStaticCell<Queue<Word, WORDS>> = ConstStaticCell::new(Queue::new());
     let (reset, last_words) = rescue::reset_cause();
     rescue::watch_start();
+    rescue::guard_stack();
     let r = board::start();
     defmt::info!("tactus-handheld {=str}", env!("CARGO_PKG_VERSION"));
     if let Some(words) = &last_words {
@@ -48,30 +49,14 @@ pub fn handheld() -> ! {
     // until `hand` can take them
     acquire::listen(false);
     let slots = ACQUIRE.start(interrupt::UART4);
-    match acquire::acquire(r.acquire, words_in) {
-        Ok(task) => slots.spawn(task),
-        Err(_) => defmt::error!("no acquisition"),
-    }
-    if let Some((tx, rx)) = link::open(r.link) {
-        match (link::send(tx), link::receive(rx, &hand::BODY)) {
-            (Ok(send), Ok(receive)) => {
-                hands.spawn(send);
-                hands.spawn(receive);
-            }
-            _ => defmt::error!("no link"),
-        }
-    }
-    match (
-        hand::hand(r.store, r.handle, r.go, words_out),
-        display::show(r.display),
-        hand::watch(),
-    ) {
-        (Ok(hand), Ok(show), Ok(watch)) => {
-            hands.spawn(hand);
-            hands.spawn(show);
-            hands.spawn(watch);
-        }
-        _ => defmt::error!("a task was spawned twice"),
-    }
+    slots.spawn(only(acquire::acquire(r.acquire, words_in)));
+    let Some((tx, rx)) = link::open(r.link) else {
+        rescue::refuse("the link's rate cannot be had");
+    };
+    hands.spawn(only(link::send(tx)));
+    hands.spawn(only(link::receive(rx, &hand::BODY)));
+    hands.spawn(only(hand::hand(r.store, r.handle, r.go, words_out)));
+    hands.spawn(only(display::show(r.display)));
+    hands.spawn(only(hand::watch()));
     hand::sleep()
 }

@@ -22,7 +22,7 @@ use crate::board;
 use crate::chip::rescue;
 use crate::tasks::acquire::{self, ACQUIRE, WORDS, Word};
 use crate::tasks::servo::{self, SAMPLES};
-use crate::tasks::{link, outbox, probe, watch};
+use crate::tasks::{link, only, outbox, probe, watch};
 
 static SERVO: InterruptExecutor = InterruptExecutor::new();
 
@@ -39,45 +39,30 @@ pub async fn rig(thread: Spawner) {
         ConstStaticCell::new(Queue::new());
     let (reset, last_words) = rescue::reset_cause();
     rescue::watch_start();
+    rescue::guard_stack();
     let r = board::start();
     let no_clock = (!board::has_clock()).then_some(board::NO_CLOCK);
     defmt::info!("tactus-rig {=str}", env!("CARGO_PKG_VERSION"));
     let (words_in, words_out) = WORD_QUEUE.take().split();
     let (samples_in, samples_out) = SAMPLE_QUEUE.take().split();
 
-    let servo = SERVO.start(interrupt::UART5);
-    let acquire = ACQUIRE.start(interrupt::UART4);
-    if let Some((tx, rx)) = link::open(r.link) {
-        spawn(&thread, link::send(tx));
-        spawn(&thread, link::receive(rx, &servo::BODY));
-    }
+    let Some((tx, rx)) = link::open(r.link) else {
+        rescue::refuse("the link's rate cannot be had");
+    };
     outbox::tell(Event::Booted {
         protocol: PROTOCOL,
         version: env!("CARGO_PKG_VERSION").try_into().unwrap_or_default(),
         reset,
         last_words: last_words.or_else(|| no_clock?.try_into().ok()),
     });
-    match servo::servo(
+    // those of thread mode run when all are there, `servo`, which has the motors, at once: it is the last one
+    thread.spawn(only(link::send(tx)));
+    thread.spawn(only(link::receive(rx, &servo::BODY)));
+    thread.spawn(only(watch::watch()));
+    thread.spawn(only(probe::probe(r.store, r.go, samples_out)));
+    let slots = ACQUIRE.start(interrupt::UART4);
+    slots.spawn(only(acquire::acquire(r.acquire, words_in)));
+    SERVO.start(interrupt::UART5).spawn(only(servo::servo(
         r.lever, r.stage, r.switches, r.watchdog, words_out, samples_in,
-    ) {
-        Ok(task) => servo.spawn(task),
-        Err(_) => defmt::error!("no servo"),
-    }
-    match acquire::acquire(r.acquire, words_in) {
-        Ok(task) => acquire.spawn(task),
-        Err(_) => defmt::error!("no acquisition"),
-    }
-    spawn(&thread, watch::watch());
-    spawn(&thread, probe::probe(r.store, r.go, samples_out));
-}
-
-/// Spawns a task, of which there is only one.
-fn spawn<S>(
-    thread: &Spawner,
-    task: Result<embassy_executor::SpawnToken<S>, embassy_executor::SpawnError>,
-) {
-    match task {
-        Ok(task) => thread.spawn(task),
-        Err(_) => defmt::error!("a task was spawned twice"),
-    }
+    )));
 }

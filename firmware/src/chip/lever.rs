@@ -4,25 +4,27 @@ use core::sync::atomic::{AtomicI32, AtomicU32, Ordering::Relaxed};
 
 use embassy_stm32::gpio::{Level, Output, OutputType, Speed};
 use embassy_stm32::interrupt;
-use embassy_stm32::pac::{GPIOE, TIM1 as REGISTERS, timer::vals::Ocm};
+use embassy_stm32::pac::{TIM1 as REGISTERS, timer::vals::Ocm};
 use embassy_stm32::peripherals::TIM1;
 use embassy_stm32::timer::Ch1;
 use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::timer::simple_pwm::PwmPin;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_time::{Duration, Instant};
 use tactus_core::rig::steps::{BASE_HZ, Steps};
 
-use crate::board;
+use crate::board::{Named, held};
+use crate::{board, chip};
 
 /// The timer counts at 2 MHz.
 const PRESCALER: u16 = 83;
 const PERIOD: u16 = (2_000_000 / BASE_HZ) as u16;
 static CORE_HZ: AtomicU32 = AtomicU32::new(168_000_000);
+/// From current to the first step: the driver wants a while.
+const ENABLE: Duration = Duration::from_millis(10);
 /// STEP is high for 5 us.
 const HIGH: u16 = 10;
-const DIRECTION_PIN: usize = 11;
-const ENABLE_PIN: usize = 13;
 
 /// Steps per second that are wanted, downwards positive, and steps made.
 static RATE: AtomicI32 = AtomicI32::new(0);
@@ -32,6 +34,7 @@ static STEPS: Mutex<CriticalSectionRawMutex, Cell<Steps>> = Mutex::new(Cell::new
 /// The lever's driver.
 pub(crate) struct Lever {
     enable: Output<'static>,
+    enabled: Instant,
     _direction: Output<'static>,
     _step: PwmPin<'static, TIM1, Ch1>,
     _timer: Timer<'static, TIM1>,
@@ -59,6 +62,7 @@ impl Lever {
         unsafe { interrupt::InterruptExt::enable(interrupt::TIM1_UP_TIM10) };
         Self {
             enable: Output::new(pins.enable, Level::Low, Speed::Low),
+            enabled: Instant::now(),
             _direction: Output::new(pins.direction, Level::Low, Speed::Low),
             _step: step,
             _timer: timer,
@@ -70,9 +74,18 @@ impl Lever {
         MADE.load(Relaxed)
     }
 
-    /// Gives the motor current, or takes it away, and steps at this rate from the next period on.
+    /// Gives the motor current, or takes it away, and steps at this rate from the next period on; 10 ms after it got current
+    /// at the earliest, for which this is to be called again.
     pub(crate) fn drive(&mut self, enabled: bool, rate: i32) {
+        if enabled && self.enable.is_set_low() {
+            self.enabled = Instant::now();
+        }
         self.enable.set_level(enabled.into());
+        let rate = if self.enabled.elapsed() < ENABLE {
+            0
+        } else {
+            rate
+        };
         if RATE.swap(rate, Relaxed) == rate {
             return;
         }
@@ -103,10 +116,8 @@ fn TIM1_UP_TIM10() {
 }
 
 fn set_direction(down: bool) {
-    GPIOE.bsrr().write(|w| match down {
-        true => w.set_bs(DIRECTION_PIN, true),
-        false => w.set_br(DIRECTION_PIN, true),
-    });
+    // SAFETY: its driver does nothing but hold it.
+    held(unsafe { <Named<board::LeverDirection>>::steal() }).set_level(down.into());
 }
 
 /// Core and timer run at 16 MHz from now on: for [`lift_by_hand`].
@@ -125,18 +136,33 @@ pub(crate) fn lift_by_hand(mut done: impl FnMut(u32) -> bool) {
     REGISTERS.dier().write(|w| w.set_uie(false));
     REGISTERS.ccr(0).write(|w| w.set_ccr(0));
     REGISTERS.cr1().modify(|w| w.set_cen(true));
-    let core_hz = CORE_HZ.load(Relaxed);
+    let cycles = CORE_HZ.load(Relaxed) / BASE_HZ;
     let period = || {
         REGISTERS.sr().write(|w| w.0 = 0);
         // most of the period, so that the register is not asked all the time
-        cortex_m::asm::delay(core_hz / BASE_HZ * 9 / 10);
-        while !REGISTERS.sr().read().uif() {}
+        chip::wait_cycles(cycles * 9 / 10);
+        // a timer that does not run ends this, too
+        for _ in 0..cycles {
+            if REGISTERS.sr().read().uif() {
+                break;
+            }
+        }
     };
     // the pulse that may be under way
     period();
     set_direction(false);
-    GPIOE.bsrr().write(|w| w.set_bs(ENABLE_PIN, true));
-    period();
+    // SAFETY: nothing else runs any more.
+    let mut enable = held(unsafe { <Named<board::LeverEnable>>::steal() });
+    let mut wait = if enable.is_set_high() {
+        1
+    } else {
+        BASE_HZ * ENABLE.as_millis() as u32 / 1000
+    };
+    enable.set_high();
+    while wait > 0 {
+        wait -= 1;
+        period();
+    }
     let mut steps = 0;
     while !done(steps) {
         REGISTERS.ccr(0).write(|w| w.set_ccr(HIGH));

@@ -5,25 +5,28 @@ use core::panic::PanicInfo;
 use core::ptr::{addr_of, addr_of_mut};
 use core::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use cortex_m::peripheral::SCB;
+use cortex_m::peripheral::{MPU, SCB};
 use cortex_m_rt::{ExceptionFrame, exception};
-use embassy_stm32::pac::{GPIOC, GPIOF, IWDG, RCC, TIM3};
+use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::pac::{IWDG, RCC, TIM3};
 use heapless::String;
 use tactus_core::rig::lever::MAX_STEPS;
 use tactus_core::wire::{Reset, Text};
 
 use super::lever;
+use crate::board::{self, Named, held};
 
 const MAGIC: u32 = 0x7ac7_1a57;
-const LEVER_TOP: usize = 12;
+/// Bytes of the last words.
+const WORDS: usize = 120;
 /// Callers that the last words can hold.
 const CALLERS: usize = 10;
 
-/// Last words that survive a reset; RAM that the start-up code leaves alone.
+/// Last words that survive a reset; RAM that the start-up code leaves alone. Every bit pattern is a value.
 struct LastWords {
     magic: u32,
     length: usize,
-    bytes: [u8; 120],
+    bytes: [u8; WORDS],
 }
 
 #[unsafe(link_section = ".uninit.LAST_WORDS")]
@@ -47,14 +50,17 @@ pub(crate) fn reset_cause() -> (Reset, Option<Text>) {
     } else {
         Reset::Other
     };
-    // SAFETY: no other code uses it before interrupts are on or after they are off; every bit pattern is a value.
-    let words = unsafe { &mut *addr_of_mut!(LAST_WORDS).cast::<LastWords>() };
-    let said = (words.magic == MAGIC)
-        .then(|| words.bytes.get(..words.length))
-        .flatten()
-        .and_then(|bytes| core::str::from_utf8(bytes).ok())
-        .and_then(|text| Text::try_from(text).ok());
-    words.magic = 0;
+    // SAFETY: no other code uses it before interrupts are on or after they are off. Until the magic number says that it was
+    // written there is no reference to what is in it.
+    let said = unsafe {
+        let at = addr_of_mut!(LAST_WORDS).cast::<LastWords>();
+        let magic = addr_of_mut!((*at).magic);
+        let said = (magic.read_volatile() == MAGIC).then(|| &*at);
+        said.and_then(|words| words.bytes.get(..words.length))
+            .and_then(|bytes| core::str::from_utf8(bytes).ok())
+            .and_then(|text| Text::try_from(text).ok())
+            .inspect(|_| magic.write_volatile(0))
+    };
     (reset, said)
 }
 
@@ -62,16 +68,17 @@ pub(crate) fn reset_cause() -> (Reset, Option<Text>) {
 pub(crate) fn remember(text: &str) {
     critical_section::with(|_| {
         // SAFETY: interrupts are off.
-        let words = unsafe { &mut *addr_of_mut!(LAST_WORDS).cast::<LastWords>() };
-        let mut length = text.len().min(words.bytes.len());
-        while !text.is_char_boundary(length) {
-            length -= 1;
+        let words = unsafe { &mut *addr_of_mut!(LAST_WORDS) }.write(LastWords {
+            magic: MAGIC,
+            length: text.len().min(WORDS),
+            bytes: [0; WORDS],
+        });
+        while !text.is_char_boundary(words.length) {
+            words.length -= 1;
         }
         for (to, from) in words.bytes.iter_mut().zip(text.as_bytes()) {
             *to = *from;
         }
-        words.length = length;
-        words.magic = MAGIC;
     });
 }
 
@@ -107,28 +114,72 @@ fn give_up(why: &str) -> ! {
     if ARMED.load(Relaxed) {
         // the bridge stays on: without duty it shorts the motor
         TIM3.ccr(0).write(|w| w.0 = 0);
-        GPIOC.bsrr().write(|w| w.set_bs(8, true));
+        // SAFETY: nothing else runs any more.
+        let (mut bridge, top) = unsafe {
+            (
+                held(<Named<board::StageEnable>>::steal()),
+                held(<Named<board::LeverTop>>::steal()),
+            )
+        };
+        bridge.set_high();
         let mut closed = 0;
         lever::lift_by_hand(|steps| {
             pet();
             // pressed, or its wire is broken: three times, for it bounces
-            closed =
-                if GPIOF.idr().read().idr(LEVER_TOP) == embassy_stm32::pac::gpio::vals::Idr::HIGH {
-                    closed + 1
-                } else {
-                    0
-                };
+            closed = if top.is_high() { closed + 1 } else { 0 };
             closed >= 3 || steps > MAX_STEPS as u32 * 5 / 4
         });
     }
     SCB::sys_reset()
 }
 
+/// Stops a start that cannot be completed: no motor gets current, the red LED is on. To be called before a motor could move.
+pub(crate) fn refuse(why: &str) -> ! {
+    cortex_m::interrupt::disable();
+    defmt::error!("not started: {=str}", why);
+    // SAFETY: nothing else runs any more.
+    let _pins = unsafe {
+        (
+            Output::new(<Named<board::LeverEnable>>::steal(), Level::Low, Speed::Low),
+            Output::new(<Named<board::StageEnable>>::steal(), Level::Low, Speed::Low),
+            Output::new(<Named<board::RedLed>>::steal(), Level::High, Speed::Low),
+        )
+    };
+    loop {
+        pet();
+        // 18 ms by 168 MHz
+        cortex_m::asm::delay(1_000_000);
+    }
+}
+
+/// Guards the end of the stack: nobody may use the memory between it and the variables. Who does so gets a hard fault, and has
+/// all of the guard as stack for what comes then, as the MPU is not for hard faults.
+pub(crate) fn guard_stack() {
+    unsafe extern "C" {
+        static __stack_guard: u32;
+    }
+    // a region of 16 KB (2^(13 + 1)), on; without access, and no code (ARMv7-M B3.5.9)
+    const SIZE: u32 = 13 << 1 | 1;
+    const NO_CODE: u32 = 1 << 28;
+    // the rest is as without the MPU; on
+    const PRIVDEFENA: u32 = 1 << 2;
+    // SAFETY: nobody else uses the MPU, and the linker has left the guard free: memory.x.
+    unsafe {
+        let mpu = &*MPU::PTR;
+        mpu.rnr.write(0);
+        mpu.rbar.write(addr_of!(__stack_guard) as u32);
+        mpu.rasr.write(NO_CODE | SIZE);
+        mpu.ctrl.write(PRIVDEFENA | 1);
+    }
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+}
+
 /// Says where from, and not what: the sentences and places of all panics would take 10 KB of flash. `addr2line` and the ELF
 /// know the lines.
 #[panic_handler]
 fn panic(_: &PanicInfo<'_>) -> ! {
-    let mut text: String<120> = String::new();
+    let mut text: String<WORDS> = String::new();
     let _ = text.push_str("panic, called from");
     callers(|at| {
         let _ = write!(text, " {at:#x}");
@@ -174,7 +225,15 @@ unsafe fn NonMaskableInt() -> ! {
 
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    let mut text: String<120> = String::new();
+    // accesses to data, of exception frames and of those of the FPU that the MPU refused
+    const REFUSED: u32 = 1 << 1 | 1 << 4 | 1 << 5;
+    // SAFETY: it is only read.
+    let status = unsafe { (*SCB::PTR).cfsr.read() };
+    if status & REFUSED != 0 {
+        // the frame may be missing
+        give_up("the stack overflowed");
+    }
+    let mut text: String<WORDS> = String::new();
     let _ = write!(text, "hard fault at {:#010x}", frame.pc());
     give_up(&text)
 }

@@ -3,6 +3,7 @@ use core::fmt::Display;
 use core::mem::MaybeUninit;
 use core::ptr::addr_of_mut;
 
+use cortex_m::peripheral::DWT;
 use defmt::Display2Format;
 
 pub(super) const CORE_HZ: u32 = 168_000_000;
@@ -70,7 +71,8 @@ pub(super) fn ready(is: bool) -> &'static str {
     if is { "ready" } else { "not ready" }
 }
 
-/// At least so long.
+/// So long, by the core's cycle counter, which is to run.
 pub(super) fn wait_us(us: u32) {
-    cortex_m::asm::delay(us * (CORE_HZ / 1_000_000));
+    let began = DWT::cycle_count();
+    while DWT::cycle_count().wrapping_sub(began) < us * (CORE_HZ / 1_000_000) {}
 }

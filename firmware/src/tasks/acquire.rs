@@ -8,7 +8,8 @@ use core::task::Poll;
 use embassy_executor::InterruptExecutor;
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::interrupt;
-use embassy_stm32::pac::{SPI1, TIM2};
+use embassy_stm32::pac::spi::regs::Cr1;
+use embassy_stm32::pac::{RCC, SPI1, TIM2};
 use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::Timer as SlotTimer;
@@ -16,10 +17,10 @@ use embassy_sync::waitqueue::AtomicWaker;
 use embassy_time::Timer;
 use heapless::spsc::Producer;
 use tactus_core::sensor::PressureSensor as _;
-use tactus_core::sensor::biotac::{BioTac, WordStats};
+use tactus_core::sensor::biotac::{BioTac, WordError, WordStats};
 use tactus_core::sensor::pressure::{Channel, Pressure};
 
-use crate::board;
+use crate::{board, chip};
 
 /// A sensor word; `None` is a damaged or missing one.
 pub(crate) type Word = Option<Pressure>;
@@ -30,6 +31,9 @@ pub(crate) const WORDS: usize = 128;
 const SPI_HZ: u32 = 5_250_000;
 /// Cycles of the core, 168 MHz, in a frame of 16 bits.
 const FRAME_CYCLES: u32 = 16 * (168_000_000 / SPI_HZ);
+
+/// Looks at a frame in its time.
+const LOOKS: u32 = 32;
 
 /// 84 MHz / 19 091: 4399.98 slots a second.
 const SLOT_TICKS: u32 = 19_091;
@@ -83,19 +87,29 @@ async fn due(what: u8) {
     .await;
 }
 
-/// Sends two bytes as one frame, while select is low, and gives what came in meanwhile.
+/// Sends two bytes as one frame, while select is low, and gives what came in meanwhile; `None` if the frame is not over in
+/// three times its time.
 ///
 /// embassy's transfers look at the status register all the time, 104 times a slot; here it is first looked at when the frame
 /// may be over. To the chip that is the same; of the emulator's accesses to registers it was more than half.
-fn transfer(bytes: [u8; 2]) -> [u8; 2] {
+fn transfer(bytes: [u8; 2]) -> Option<[u8; 2]> {
     // the last frame has been read, so the data register is free and the next word received belongs to this frame
     SPI1.dr().write(|w| w.set_dr(u16::from_be_bytes(bytes)));
-    // a turn of its loop takes three cycles
-    cortex_m::asm::delay(FRAME_CYCLES / 3);
-    while !SPI1.sr().read().rxne() {
-        cortex_m::asm::delay(FRAME_CYCLES / 32 / 3);
+    chip::wait_cycles(FRAME_CYCLES);
+    for _ in 0..2 * LOOKS {
+        if SPI1.sr().read().rxne() {
+            return Some(SPI1.dr().read().dr().to_be_bytes());
+        }
+        chip::wait_cycles(FRAME_CYCLES / LOOKS);
     }
-    SPI1.dr().read().dr().to_be_bytes()
+    None
+}
+
+/// Sets the bus up anew: a disturbance may have switched it off, and what is left in its buffers belongs to no word.
+fn restart(control: Cr1) {
+    RCC.apb2rstr().modify(|w| w.set_spi1rst(true));
+    RCC.apb2rstr().modify(|w| w.set_spi1rst(false));
+    SPI1.cr1().write_value(control);
 }
 
 /// Whether words are wanted, and whether the timer is set up.
@@ -128,6 +142,7 @@ pub(crate) async fn acquire(pins: board::Acquire, mut words: Producer<'static, W
     let mut spi = Spi::new_blocking(pins.spi, pins.sck, pins.mosi, pins.miso, config);
     // nothing, in frames of 16 bits: from here on they are what the bus sends
     let _ = spi.blocking_write::<u16>(&[]);
+    let control = SPI1.cr1().read();
     let mut select = Output::new(pins.select, Level::High, Speed::VeryHigh);
     Timer::after_millis(BioTac::POWER_UP_MS.into()).await;
 
@@ -171,13 +186,17 @@ pub(crate) async fn acquire(pins: board::Acquire, mut words: Producer<'static, W
         slot = slot.wrapping_add(1);
         SLOTS.store(slot, Relaxed);
         let exchange = BioTac::exchange(channel);
+        let mut sent = true;
         if let Some(command) = exchange.command {
             select.set_low();
-            // the bus itself cannot fail: no mode fault with software select, no overrun as each frame is read
-            transfer(command);
+            // no mode fault with software select, no overrun as each frame is read
+            sent = transfer(command).is_some();
             select.set_high();
         }
-        let late = TIM2.cnt().read() > LATE_TICKS;
+        if !sent {
+            restart(control);
+        }
+        let late = !sent || TIM2.cnt().read() > LATE_TICKS;
         if !late {
             // this slot's is yet to come: one that is there belongs to a slot that was not served
             DUE.fetch_and(!READ, Relaxed);
@@ -191,7 +210,11 @@ pub(crate) async fn acquire(pins: board::Acquire, mut words: Producer<'static, W
         select.set_low();
         let reply = transfer(exchange.read);
         select.set_high();
-        let word = BioTac::decode(channel, reply);
+        if reply.is_none() {
+            restart(control);
+        }
+        let word = reply.ok_or(WordError::NoSensor);
+        let word = word.and_then(|reply| BioTac::decode(channel, reply));
         stats.count(&word);
         PARITY.store(stats.parity.saturating_add(stats.padding), Relaxed);
         ERROR_FRAMES.store(stats.error_frames.saturating_add(stats.no_sensor), Relaxed);

@@ -9,7 +9,7 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
 use embassy_sync::blocking_mutex::Mutex;
-use embassy_time::{Duration, Instant, Ticker, with_timeout};
+use embassy_time::{Duration, Instant, Ticker};
 use heapless::spsc::Consumer;
 use static_cell::{ConstStaticCell, StaticCell};
 use tactus_core::dsp::Plan;
@@ -20,7 +20,6 @@ use tactus_core::probe::seams::Events;
 use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::pressure::Calibration;
-use tactus_core::store::StoreError;
 use tactus_core::wire::{Event, PROTOCOL, Reset, Text};
 
 use super::acquire::{self, Word};
@@ -35,8 +34,6 @@ use crate::chip::rescue;
 /// The table that comes with the handheld: textures of a simulated world under a simulated hand. Its
 /// whitening says how slides of one texture by hand differ; the user trains a real probe.
 static FACTORY: &[u8] = include_bytes!("../../handheld.tact");
-/// The store is open by now, or will never be.
-const OPENING: Duration = Duration::from_secs(10);
 /// Ticks from one word in the log about sleep to the next.
 const SAY: u32 = 5 * TICKS_HZ;
 /// `hand` gets on at least this often; the longest that it does is to erase two sectors, ms.
@@ -60,6 +57,11 @@ pub(crate) fn sleep() -> ! {
         // SAFETY: they were on before, and nothing here is in their way.
         unsafe { cortex_m::interrupt::enable() };
     }
+}
+
+/// `hand` gets on.
+fn progress() {
+    PROGRESS_MS.store(Instant::now().as_millis() as u32, Relaxed);
 }
 
 /// Feeds the watchdog as long as `hand` gets on.
@@ -179,7 +181,7 @@ struct Parts {
 impl Hand for Parts {
     async fn wait(&mut self) {
         self.ticker.next().await;
-        PROGRESS_MS.store(Instant::now().as_millis() as u32, Relaxed);
+        progress();
         self.ticks = self.ticks.wrapping_add(1);
         if self.ticks.is_multiple_of(TICKS_HZ) {
             self.awake.was(self.same.then_some(self.listens));
@@ -302,8 +304,7 @@ pub(crate) async fn hand(
         Hertz(2000),
         CountingMode::EdgeAlignedUp,
     );
-    let store = with_timeout(OPENING, flash::open(flash)).await;
-    let store = store.unwrap_or(Err(StoreError::Silent));
+    let store = flash::wait(flash::open(flash), progress).await;
     let mut events = Shown::new(Told(Output::new(go.same, Level::Low, Speed::Low)));
     let mut memory = Memory::new(store, MappedTable, FACTORY, BUFFER.take());
     memory.reload(&mut events).await;

@@ -2,14 +2,13 @@
 use core::sync::atomic::Ordering::Relaxed;
 
 use embassy_stm32::gpio::{Level, Output, Speed};
-use embassy_time::{Duration, Timer, with_timeout};
+use embassy_time::Timer;
 use heapless::spsc::Consumer;
 use static_cell::{ConstStaticCell, StaticCell};
 use tactus_core::dsp::Plan;
 use tactus_core::probe::seams::{Events, RigHandle as _};
 use tactus_core::probe::servo_rig::{Samples, ServoRig};
 use tactus_core::probe::{self, Memory, Probe, TableInUse};
-use tactus_core::store::StoreError;
 use tactus_core::wire::{Event, Failure};
 
 use super::link::{BUSY, JOBS, TABLE};
@@ -18,13 +17,11 @@ use super::rig_handle::ServoHandle;
 use super::servo;
 use crate::board;
 use crate::chip::Chip;
-use crate::chip::flash::{self, MappedTable, Storage};
+use crate::chip::flash::{self, MappedTable};
 
 /// The table that comes with the firmware: textures of a simulated world, which suit the emulated board. A real rig
 /// is trained by its user, or receives a table from the host.
 static FACTORY: &[u8] = include_bytes!("../../factory.tact");
-/// The store is open by now, or will never be: two of its sectors erased take less than 2 s.
-const OPENING: Duration = Duration::from_secs(10);
 /// The sensor's first words are there by now.
 const HEARD_MS: u64 = 150;
 
@@ -41,11 +38,20 @@ pub(crate) async fn probe(
     // move before the calibration is there, which says whether the finger is in the air.
     Timer::after_millis(HEARD_MS).await;
     let lifted = rig.lift().await.is_ok();
-    let store = with_timeout(OPENING, open(flash, &mut rig))
-        .await
-        .unwrap_or(Err(StoreError::Silent));
-    if let Err(why) = &store {
-        trouble((*why).into());
+    let opening = async {
+        let mut store = flash::open(flash).await?;
+        if let Err(why) = store.mend().await {
+            trouble(why.into());
+        }
+        Ok(store)
+    };
+    let mut store = flash::wait(opening, servo::progress).await;
+    let restored = match &mut store {
+        Ok(store) => probe::restore(store, &mut rig).await,
+        Err(why) => Err(*why),
+    };
+    if let Err(why) = restored {
+        trouble(why.into());
     }
     let mut probe = Probe {
         rig,
@@ -67,21 +73,6 @@ pub(crate) async fn probe(
         BUSY.store(true, Relaxed);
         probe.serve::<Chip>(&request).await;
     }
-}
-
-/// The store, its settings in use.
-async fn open(
-    flash: board::Storage,
-    rig: &mut ServoRig<ServoHandle>,
-) -> Result<Storage, StoreError> {
-    let mut store = flash::open(flash).await?;
-    if let Err(why) = store.mend().await {
-        trouble(why.into());
-    }
-    if let Err(why) = probe::restore(&mut store, rig).await {
-        trouble(why.into());
-    }
-    Ok(store)
 }
 
 /// The words for it are the host's.

@@ -29,8 +29,8 @@ use tactus_core::sensor::pressure::Calibration;
 
 use super::acquire::Word;
 use super::link::Body;
-use crate::board;
 use crate::chip::{lever, rescue};
+use crate::{board, chip};
 
 /// Samples on their way to the features: a quarter of a second.
 pub(crate) const SAMPLES: usize = 256;
@@ -45,7 +45,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 static STOPPED: AtomicBool = AtomicBool::new(false);
 static STATE: Mutex<CriticalSectionRawMutex, Cell<RigState>> =
     Mutex::new(Cell::new(RigState::parked(UNMEASURED)));
-/// Samples dropped because the queue to the probe was full.
+/// Samples dropped because the queue to the probe was full, or without a current of their own.
 pub(crate) static LOST: AtomicU32 = AtomicU32::new(0);
 /// Milliseconds since the tasks in thread mode have checked in.
 static SILENT_MS: AtomicU32 = AtomicU32::new(0);
@@ -69,6 +69,11 @@ const HUNG_MS: u32 = 2000;
 /// A session without progress for longer waits for something that does not come, such as an interrupt of the flash. All
 /// that it does without the rig, the four sectors of the store erased and written, takes less than 5 s.
 const STUCK_LIMIT_MS: u32 = 30_000;
+/// Without a conversion of the motor's current for so many ms the motor is not driven on.
+const NO_CURRENT_MS: u32 = 10;
+/// Looks at a conversion that began 3.2 us ago, and cycles between two: 9 us.
+const LOOKS: u32 = 50;
+const LOOK_CYCLES: u32 = 30;
 /// Without the servo for this long the chip starts again.
 const WATCHDOG_US: u32 = 100_000;
 
@@ -133,6 +138,28 @@ pub(crate) static BODY: Body = Body {
     lost: || LOST.load(Relaxed),
 };
 
+/// Begins a conversion of the motor's current.
+fn convert() {
+    ADC1.cr2().modify(|w| {
+        // it is on, unless a disturbance has switched it off
+        w.set_adon(true);
+        w.set_swstart(true);
+    });
+}
+
+/// What came of the conversion, A; `None` if it is not over in time.
+fn converted() -> Option<f32> {
+    for _ in 0..LOOKS {
+        if ADC1.sr().read().eoc() {
+            // which clears EOC
+            return Some(amperes(ADC1.dr().read().data()));
+        }
+        // a look costs the emulator more than these few instructions
+        chip::wait_cycles(LOOK_CYCLES);
+    }
+    None
+}
+
 /// Amperes of the stage's motor by the amplifier's 12 bits over 3.3 V: 1 V/A about 2048.
 fn amperes(adc: u16) -> f32 {
     (f32::from(adc) - 2048.0) * (3.3 / 4096.0)
@@ -193,11 +220,12 @@ pub(crate) async fn servo(
     let mut ended = None;
     let mut count: i32 = 0;
     let mut hung = None;
+    let (mut current_a, mut no_current_ms) = (0.0, 0);
     let mut ticker = Ticker::every(Duration::from_millis(1));
     loop {
         ticker.next().await;
         // read below, some 3.2 us later
-        ADC1.cr2().modify(|w| w.set_swstart(true));
+        convert();
         if STOP.swap(false, Relaxed) {
             control.stop();
         }
@@ -234,13 +262,18 @@ pub(crate) async fn servo(
             switches.stage_right.is_high(),
         );
         inputs.e_stop = switches.e_stop.is_high();
-        inputs.hung = hung.is_some();
-        while !ADC1.sr().read().eoc() {
-            // a look costs the emulator more than these few instructions
-            cortex_m::asm::delay(10);
+        if let Some(now_a) = converted() {
+            (current_a, no_current_ms) = (now_a, 0);
+        } else {
+            // the last one stands for it, and the slide does not count
+            LOST.fetch_add(1, Relaxed);
+            no_current_ms += 1;
         }
-        // which clears EOC
-        inputs.current_a = amperes(ADC1.dr().read().data());
+        inputs.current_a = current_a;
+        if no_current_ms > NO_CURRENT_MS {
+            hung.get_or_insert("the motor's current was not converted for 10 ms");
+        }
+        inputs.hung = hung.is_some();
 
         let outputs = control.tick(&inputs);
         lever.drive(outputs.lever_enabled, outputs.lever_steps_s);

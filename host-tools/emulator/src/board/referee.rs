@@ -2,6 +2,7 @@
 //! believe: stm32-metapac's metadata (clocks, alternate functions, DMA requests, registers and their fields) and ST's SVD
 //! (reset values). Limits that neither has are quoted from RM0090 and the data sheet.
 
+mod accelerator;
 mod vendor;
 mod violation;
 
@@ -15,6 +16,7 @@ use super::flash::{self, BSY, FLASH};
 use super::registers::{IPSR, register, word};
 pub use violation::{Rule, Violation};
 
+use accelerator::Accelerator;
 use vendor::{Vendor, Word};
 
 /// Status registers that are cleared by zeros (rc_w0). The vendor's own library writes ones to all else in them, reserved bits too.
@@ -88,6 +90,7 @@ pub(crate) struct Referee {
     found: BTreeMap<(Rule, String), Violation>,
     /// The handler of interrupts that have none.
     no_handler: Option<u64>,
+    accelerator: Accelerator,
 }
 
 /// The access that is judged.
@@ -114,6 +117,7 @@ impl Referee {
             written: HashMap::new(),
             found: BTreeMap::new(),
             no_handler: None,
+            accelerator: Accelerator::default(),
         };
         referee.reset();
         referee
@@ -123,6 +127,7 @@ impl Referee {
     pub(crate) fn reset(&mut self) {
         let words = self.vendor.words();
         self.written = words.map(|(address, word)| (address, word.reset)).collect();
+        self.accelerator = Accelerator::default();
     }
 
     /// Watches where interrupts end that have no handler: the most frequent of the vectors.
@@ -202,6 +207,10 @@ impl Referee {
     /// An access of the core, once it is made.
     pub(crate) fn access(&mut self, access: &Access) {
         let Some(now) = Now::of(access) else { return };
+        if self.accelerator.is_missed(now.at_ns) {
+            let acr = self.word("FLASH", "ACR");
+            self.tell(now, Rule::Accelerator, format!("ACR {acr:#x}"));
+        }
         let word = match self.vendor.at(access.address) {
             None => return,
             Some(Ok(word)) => word,
@@ -517,6 +526,9 @@ impl Referee {
             let what = format!("{core} MHz with {wait_states}");
             self.tell(now, Rule::WaitStates, what);
         }
+        let on = |name| self.field("FLASH", "ACR", name) == Some(1);
+        let quick = on("PRFTEN") && on("ICEN");
+        self.accelerator.changed(now.at_ns, core, quick);
         // the data sheet's limits, without and with over-drive
         let over = self.field("PWR", "CR1", "ODEN").unwrap_or(0) == 1;
         let limits = match over {

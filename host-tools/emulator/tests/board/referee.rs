@@ -117,6 +117,7 @@ const SPI1: u32 = 0x4001_3000;
 const SYSCFG: u32 = 0x4001_3800;
 const EXTI: u32 = 0x4001_3C00;
 const ADC1: u32 = 0x4001_2000;
+const TIM2: u32 = 0x4000_0000;
 const TIM4: u32 = 0x4000_0800;
 const DMA2_S0: u32 = 0x4002_6410;
 const IWDG: u32 = 0x4000_3000;
@@ -173,6 +174,13 @@ fn cases() -> Vec<(Rule, Vec<Do>, Vec<Do>)> {
     // APB1 / 4, APB2 / 2
     let divided = 5 << 10 | 4 << 13;
     let wait_states = [W(FLASH_IF, 5)];
+    // TIM2 counts 84 MHz for 1.6 ms
+    let later = [
+        W(APB1ENR, 1),
+        W(TIM2, 1),
+        Until(TIM2 + 0x24, 1 << 17),
+        R(RCC),
+    ];
     let encoder = [W(AHB1ENR, CCM | 8), W(APB1ENR, 1 << 2)];
     let encoder_pins = [W(0x4002_0C24, 0x0022_0000), W(0x4002_0C00, 0x0A00_0000)];
     let nvic = [W(0xE000_E104, 1 << 6)];
@@ -299,6 +307,11 @@ fn cases() -> Vec<(Rule, Vec<Do>, Vec<Do>)> {
             Rule::WaitStates,
             all(&[&wait_states, &PLL, &to_pll(divided)]),
             all(&[&PLL, &to_pll(divided)]),
+        ),
+        (
+            Rule::Accelerator,
+            all(&[&[W(FLASH_IF, 0x305)], &PLL, &to_pll(divided), &later]),
+            all(&[&[W(FLASH_IF, 0x205)], &PLL, &to_pll(divided), &later]),
         ),
         (
             Rule::BusClock,

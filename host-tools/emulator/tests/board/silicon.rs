@@ -9,7 +9,6 @@ use tactus_core::wire::{Event, Reset};
 use tactus_emulator::board::referee::Rule;
 use tactus_emulator::board::{Emulator, Options, Output, Switch};
 use tactus_emulator::host::talk::{Talk, TalkError};
-use tactus_tests::expected_to_fail;
 
 use crate::common::{elf, elf_of, ready};
 use crate::faults::{When, board, identify, is_time};
@@ -31,16 +30,14 @@ fn images() -> impl Iterator<Item = std::path::PathBuf> {
 
 #[test]
 fn prefetch_and_cache_make_up_for_the_flashs_wait_states() {
-    expected_to_fail("waits for its flash", || {
-        for elf in images() {
-            let mut board = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
-            board.run_ms(800).unwrap();
-            let acr = board.register(FLASH_ACR).unwrap();
-            assert_eq!(acr & 0xF, 5, "wait states at 168 MHz");
-            let on = acr & CACHES;
-            assert_eq!(on, ACCELERATOR, "the core waits for its flash");
-        }
-    });
+    for elf in images() {
+        let mut board = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
+        board.run_ms(800).unwrap();
+        let acr = board.register(FLASH_ACR).unwrap();
+        assert_eq!(acr & 0xF, 5, "wait states at 168 MHz");
+        let on = acr & CACHES;
+        assert_eq!(on, ACCELERATOR, "the core waits for its flash");
+    }
 }
 
 /// A driver of a stepper that has just got current wants a while before its first step.
@@ -51,31 +48,29 @@ fn the_lever_waits_between_current_and_its_first_step() {
         trace_s: 60,
         ..Options::default()
     };
-    expected_to_fail("after its current", || {
-        let board = Emulator::start(&elf, Setup::default(), options.clone()).unwrap();
-        let mut talk = Talk::new(board);
-        ready(&mut talk);
-        talk.send(identify(1), 120.0, |_, _| ()).unwrap();
-        let mut rig = talk.board().rig();
-        let (mut enabled_ns, mut steps) = (None, 0);
-        for &(at_ns, output) in rig.trace() {
-            match output {
-                Output::LeverEnable(on) => enabled_ns = on.then_some(at_ns),
-                Output::LeverStep(true) => {
-                    // without current it is the end of a pulse that was under way
-                    let Some(enabled_ns) = enabled_ns else {
-                        continue;
-                    };
-                    let after_ms = (at_ns - enabled_ns) as f64 * 1e-6;
-                    assert!(after_ms >= 10.0, "a step {after_ms} ms after its current");
-                    steps += 1;
-                }
-                _ => {}
+    let board = Emulator::start(&elf, Setup::default(), options.clone()).unwrap();
+    let mut talk = Talk::new(board);
+    ready(&mut talk);
+    talk.send(identify(1), 120.0, |_, _| ()).unwrap();
+    let mut rig = talk.board().rig();
+    let (mut enabled_ns, mut steps) = (None, 0);
+    for &(at_ns, output) in rig.trace() {
+        match output {
+            Output::LeverEnable(on) => enabled_ns = on.then_some(at_ns),
+            Output::LeverStep(true) => {
+                // without current it is the end of a pulse that was under way
+                let Some(enabled_ns) = enabled_ns else {
+                    continue;
+                };
+                let after_ms = (at_ns - enabled_ns) as f64 * 1e-6;
+                assert!(after_ms >= 10.0, "a step {after_ms} ms after its current");
+                steps += 1;
             }
+            _ => {}
         }
-        assert!(steps > 100, "{steps}");
-        rig.world().clear();
-    });
+    }
+    assert!(steps > 100, "{steps}");
+    rig.world().clear();
 }
 
 /// What came of an exploration in which a switch went off while the finger slid.
@@ -154,44 +149,36 @@ fn upset(elf: &Path, switch: Switch, lasting: bool) -> Outcome {
 #[test]
 fn a_bus_that_goes_off_costs_a_word_and_not_the_watchdogs_patience() {
     let Some(elf) = elf() else { return };
-    expected_to_fail("it hung", || {
-        let once = upset(&elf, Switch::Spi1, false);
-        assert_eq!(once.rebooted, None, "it hung");
-        assert!(once.ended.is_ok(), "{:?}", once.ended);
-        once.assert_lifted();
-    });
-    expected_to_fail("it hung", || {
-        let lasting = upset(&elf, Switch::Spi1, true);
-        assert_eq!(lasting.rebooted, None, "it hung");
-        assert_eq!(lasting.seen, Some(Seen::SensorSilent));
-        assert!(lasting.braked_ms.is_some_and(|ms| ms < 14.0));
-        lasting.assert_lifted();
-    });
+    let once = upset(&elf, Switch::Spi1, false);
+    assert_eq!(once.rebooted, None, "it hung");
+    assert!(once.ended.is_ok(), "{:?}", once.ended);
+    once.assert_lifted();
+    let lasting = upset(&elf, Switch::Spi1, true);
+    assert_eq!(lasting.rebooted, None, "it hung");
+    assert_eq!(lasting.seen, Some(Seen::SensorSilent));
+    assert!(lasting.braked_ms.is_some_and(|ms| ms < 14.0));
+    lasting.assert_lifted();
 }
 
 /// One conversion that does not come is a lost sample; without any the motor is not driven on.
 #[test]
 fn a_converter_that_goes_off_costs_a_sample_and_not_the_watchdogs_patience() {
     let Some(elf) = elf() else { return };
-    expected_to_fail("it hung", || {
-        let once = upset(&elf, Switch::Adc1, false);
-        assert_eq!(once.rebooted, None, "it hung");
-        assert!(once.ended.is_ok(), "{:?}", once.ended);
-        once.assert_lifted();
-    });
-    expected_to_fail("it hung", || {
-        let lasting = upset(&elf, Switch::Adc1, true);
-        let words = lasting
-            .rebooted
-            .as_ref()
-            .and_then(|(_, words)| words.as_ref());
-        assert!(
-            words.is_some_and(|words| words.contains("current")),
-            "it hung"
-        );
-        assert!(lasting.braked_ms.is_some_and(|ms| ms < 14.0));
-        lasting.assert_lifted();
-    });
+    let once = upset(&elf, Switch::Adc1, false);
+    assert_eq!(once.rebooted, None, "it hung");
+    assert!(once.ended.is_ok(), "{:?}", once.ended);
+    once.assert_lifted();
+    let lasting = upset(&elf, Switch::Adc1, true);
+    let words = lasting
+        .rebooted
+        .as_ref()
+        .and_then(|(_, words)| words.as_ref());
+    assert!(
+        words.is_some_and(|words| words.contains("current")),
+        "it hung"
+    );
+    assert!(lasting.braked_ms.is_some_and(|ms| ms < 14.0));
+    lasting.assert_lifted();
 }
 
 /// The store is opened while the finger is lifted and homed, and waits for an erase that is never over. A write to the flash's
@@ -206,20 +193,18 @@ fn an_erase_that_never_ends_is_left_to_itself() {
         ..Options::default()
     };
     for elf in images() {
-        expected_to_fail("the core stands", || {
-            let mut board = Emulator::start(&elf, Setup::default(), options.clone()).unwrap();
-            board.lose_flash_interrupts().unwrap();
-            board.stick_flash().unwrap();
-            board.run_ms(12_000).unwrap();
-            assert_eq!(
-                board.resets().unwrap(),
-                [],
-                "the core stands or starts anew"
-            );
-            let found = board.violations().unwrap();
-            let stands = found.iter().any(|found| found.rule == Rule::FlashBusy);
-            assert!(!stands, "the core stands: {found:?}");
-        });
+        let mut board = Emulator::start(&elf, Setup::default(), options.clone()).unwrap();
+        board.lose_flash_interrupts().unwrap();
+        board.stick_flash().unwrap();
+        board.run_ms(12_000).unwrap();
+        assert_eq!(
+            board.resets().unwrap(),
+            [],
+            "the core stands or starts anew"
+        );
+        let found = board.violations().unwrap();
+        let stands = found.iter().any(|found| found.rule == Rule::FlashBusy);
+        assert!(!stands, "the core stands: {found:?}");
     }
 }
 
@@ -227,44 +212,42 @@ fn an_erase_that_never_ends_is_left_to_itself() {
 #[test]
 fn a_stack_that_overflows_is_stopped_at_its_guard() {
     let Some(elf) = elf() else { return };
-    expected_to_fail("no word of it", || {
-        for when in [When::Pressing, When::Sliding] {
-            let mut talk = board(&elf, 82, 30);
-            let mut words = None;
-            let mut planted = false;
-            let ended = talk.send(identify(1), 120.0, |board, report| {
-                if let Some(Event::Booted { last_words, .. }) = report.map(|report| &report.event) {
-                    words = last_words.as_ref().map(|words| words.as_str().to_owned());
+    for when in [When::Pressing, When::Sliding] {
+        let mut talk = board(&elf, 82, 30);
+        let mut words = None;
+        let mut planted = false;
+        let ended = talk.send(identify(1), 120.0, |board, report| {
+            if let Some(Event::Booted { last_words, .. }) = report.map(|report| &report.event) {
+                words = last_words.as_ref().map(|words| words.as_str().to_owned());
+            }
+            if !planted && is_time(when, board) {
+                planted = true;
+                // push {r0-r7}, and again
+                board.write(NOWHERE, &[0xFF, 0xB4, 0xFD, 0xE7]).unwrap();
+                let (task, _) = board.symbol("___watch_task_inner_function0E4poll").unwrap();
+                let task = task & !1;
+                let whole = board.read(task, 8).unwrap();
+                // ldr.w pc, [pc], and the address behind; nop first, where it would not be a multiple of 4
+                let mut code = vec![0xDF, 0xF8, 0x00, 0xF0];
+                if !task.is_multiple_of(4) {
+                    code.splice(0..0, [0x00, 0xBF]);
                 }
-                if !planted && is_time(when, board) {
-                    planted = true;
-                    // push {r0-r7}, and again
-                    board.write(NOWHERE, &[0xFF, 0xB4, 0xFD, 0xE7]).unwrap();
-                    let (task, _) = board.symbol("___watch_task_inner_function0E4poll").unwrap();
-                    let task = task & !1;
-                    let whole = board.read(task, 8).unwrap();
-                    // ldr.w pc, [pc], and the address behind; nop first, where it would not be a multiple of 4
-                    let mut code = vec![0xDF, 0xF8, 0x00, 0xF0];
-                    if !task.is_multiple_of(4) {
-                        code.splice(0..0, [0x00, 0xBF]);
-                    }
-                    code.extend((NOWHERE as u32 | 1).to_le_bytes());
-                    board.write(task, &code).unwrap();
-                    board.run_ms(10).unwrap();
-                    board.write(task, &whole).unwrap();
-                }
-            });
-            eprintln!("{when:?}: {ended:?}: {words:?}");
-            assert!(planted);
-            assert!(
-                words.is_some_and(|words| words.contains("stack")),
-                "no word of it"
-            );
-            ready(&mut talk);
-            let force_max_n = talk.board().rig().world().truth().force_max_n;
-            assert!(force_max_n < 2.2, "{force_max_n} N");
-        }
-    });
+                code.extend((NOWHERE as u32 | 1).to_le_bytes());
+                board.write(task, &code).unwrap();
+                board.run_ms(10).unwrap();
+                board.write(task, &whole).unwrap();
+            }
+        });
+        eprintln!("{when:?}: {ended:?}: {words:?}");
+        assert!(planted);
+        assert!(
+            words.is_some_and(|words| words.contains("stack")),
+            "no word of it"
+        );
+        ready(&mut talk);
+        let force_max_n = talk.board().rig().world().truth().force_max_n;
+        assert!(force_max_n < 2.2, "{force_max_n} N");
+    }
 }
 
 /// Where a task's memory says that it runs, from its beginning on: found on a board where it does.
@@ -289,38 +272,36 @@ fn a_task_that_does_not_start_stops_the_boot() {
         ("TACTUS_HANDHELD_ELF", "4hand4hand4POOL"),
     ] {
         let Some(elf) = elf_of(variable) else { return };
-        expected_to_fail("the red LED is off", || {
-            let mut board = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
-            // the variables are zeroed, the clocks not yet set
-            while board.register(RCC_CR).unwrap() & HSEON == 0 {
-                board.run_until(board.now_ns() + 10_000).unwrap();
-            }
-            let (pool, _) = board.symbol(task).unwrap();
-            let state = pool + runs_at(&elf, task);
-            assert_eq!(board.read(state, 4).unwrap(), [0; 4], "{task}");
-            // it runs already
-            board.write(state, &[1]).unwrap();
-            board.run_ms(1500).unwrap();
-            assert_eq!(
-                board.leds().unwrap(),
-                [false, false, true],
-                "the red LED is off: {task}"
-            );
-            assert_eq!(board.resets().unwrap(), [], "{task}");
-            let log = board.log().unwrap();
-            assert!(
-                log.iter().any(|(_, line)| line.contains("not started")),
-                "{log:?}"
-            );
-            let mut rig = board.rig();
-            let moved = rig.trace().any(|(_, output)| {
-                matches!(
-                    output,
-                    Output::LeverEnable(true) | Output::StageEnable(true)
-                )
-            });
-            assert!(!moved, "{task}");
-            assert_eq!(rig.world().truth().force_max_n, 0.0);
+        let mut board = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
+        // the variables are zeroed, the clocks not yet set
+        while board.register(RCC_CR).unwrap() & HSEON == 0 {
+            board.run_until(board.now_ns() + 10_000).unwrap();
+        }
+        let (pool, _) = board.symbol(task).unwrap();
+        let state = pool + runs_at(&elf, task);
+        assert_eq!(board.read(state, 4).unwrap(), [0; 4], "{task}");
+        // it runs already
+        board.write(state, &[1]).unwrap();
+        board.run_ms(1500).unwrap();
+        assert_eq!(
+            board.leds().unwrap(),
+            [false, false, true],
+            "the red LED is off: {task}"
+        );
+        assert_eq!(board.resets().unwrap(), [], "{task}");
+        let log = board.log().unwrap();
+        assert!(
+            log.iter().any(|(_, line)| line.contains("not started")),
+            "{log:?}"
+        );
+        let mut rig = board.rig();
+        let moved = rig.trace().any(|(_, output)| {
+            matches!(
+                output,
+                Output::LeverEnable(true) | Output::StageEnable(true)
+            )
         });
+        assert!(!moved, "{task}");
+        assert_eq!(rig.world().truth().force_max_n, 0.0);
     }
 }

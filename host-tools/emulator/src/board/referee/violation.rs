@@ -45,6 +45,8 @@ pub enum Rule {
     FlashBusy,
     /// Run faster than the wait states of the flash allow.
     WaitStates,
+    /// Run with wait states for a millisecond, and without the prefetch and the instruction cache that make up for them.
+    Accelerator,
     /// Run a bus faster than it may.
     BusClock,
     /// Set the watchdog without its key.
