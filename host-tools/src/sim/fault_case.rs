@@ -24,6 +24,7 @@ use tactus_core::wire::{Command, Event, Failure, Identify, Train};
 use super::collection::Collection;
 use super::faults::Fault;
 use super::flash::{RamFlash, SECTOR};
+use super::mount::Mount;
 use super::press::FORCE_LIMIT_N;
 use super::probe::{Host, SimProbe, switch_on};
 use super::rig::{SimError, SimRig};
@@ -99,6 +100,8 @@ pub struct Case {
     pub faults: Vec<(u64, Fault)>,
     /// Bits of the flash that change while the power is off.
     pub bits: Vec<usize>,
+    /// The finger's mount has no spring, against the list of parts.
+    pub stiff: bool,
 }
 
 impl Case {
@@ -121,6 +124,7 @@ impl Case {
             bits: (0..random.random_range(0..=3))
                 .map(|_| random.random_range(0..8 * 4 * SECTOR))
                 .collect(),
+            stiff: false,
         }
     }
 }
@@ -150,10 +154,12 @@ impl fmt::Display for Outcome {
             activity,
             faults,
             bits,
+            stiff,
         } = &self.case;
+        let mount = if *stiff { " on a stiff mount" } else { "" };
         write!(
             f,
-            "seed {seed}: {activity:?} of T{texture}, {faults:?}, {} bits; {:.3} N, named {:?}: {}",
+            "seed {seed}: {activity:?} of T{texture}{mount}, {faults:?}, {} bits; {:.3} N, named {:?}: {}",
             bits.len(),
             self.force_max_n,
             self.named,
@@ -229,6 +235,9 @@ impl<'t> Bench<'t> {
     /// See [`CaseError`].
     pub fn run(&self, case: &Case) -> Result<Outcome, CaseError> {
         let mut rig = SimRig::new(world().setup(case.texture, case.seed));
+        if !case.stiff {
+            rig.world().mount(Mount::SPRUNG);
+        }
         rig.control()
             .calibrate(self.calibration)
             .map_err(SimError::from)?;
@@ -402,8 +411,8 @@ fn rest(probe: &mut SimProbe<'_, Heard>, host: &RefCell<Heard>, wrong: &mut Vec<
     if truth.speed_mm_s.abs() > STANDS_MM_S {
         wrong.push(format!("the stage moves, {:.1} mm/s", truth.speed_mm_s));
     }
-    // a lever that cannot be lifted, or has no supply, is named as that
-    let says_so = |named: &Named| matches!(named, Named::LeverNotHome | Named::EStop);
+    // where a finger may still be pressed, the fault's remedy is the lever's knob; the stop has taken the supply
+    let says_so = |named: &Named| *named == Named::EStop || named.recovery().contains("knob");
     if truth.force_n > LIFTED_N && !host.borrow().named.iter().any(says_so) {
         wrong.push(format!("the finger is down, {:.3} N", truth.force_n));
     }

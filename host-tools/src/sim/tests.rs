@@ -17,8 +17,9 @@ use super::finger::{Contact, Finger};
 use super::sensor::{POWER_UP_NS, SensorPeer};
 
 /// What drives the world with the core's control, and learns from it: these files know both, and the world none of them.
-const DRIVERS: [&str; 7] = [
+const DRIVERS: [&str; 8] = [
     "collection",
+    "fault_case",
     "handheld",
     "press",
     "probe",

@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 use tactus::sim::collection::{calibrated, texture_name};
 use tactus::sim::flash::{RamFlash, SECTOR};
+use tactus::sim::mount::Mount;
 use tactus::sim::probe::{Host, SimProbe, switch_off_and_on, switch_on};
 use tactus::sim::rig::{SimError, SimRig};
 use tactus_core::dsp::{self, Plain};
@@ -122,6 +123,8 @@ pub(crate) fn day(virtual_s: f64, seed: u64, mut each: impl FnMut(f64)) -> Resul
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let setup = world().setup(1, 1 + seed);
     let mut rig = SimRig::new(setup);
+    // as the list of parts has it
+    rig.world().mount(Mount::SPRUNG);
     let calibration = calibrated(setup)?;
     rig.control()
         .calibrate(calibration)

@@ -7,6 +7,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus::link::{ReadTable, Request};
 use tactus::sim::collection::{calibrated, texture_name};
+use tactus::sim::mount::Mount;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire::{Command, Counts, Event, Forget, Report, Reset, Status};
 
@@ -123,6 +124,7 @@ pub(super) fn hour(
     let calibration = calibrated(world().setup(1, 0))?;
     let unknown = under_finger::mounted(&world(), texture, 1 + seed);
     let mut emulator = unknown.start(elf, Options::default())?;
+    emulator.rig().world().mount(Mount::SPRUNG);
     // only how deep it gets in all, which costs nothing
     emulator.measure_stack(StackLayout {
         levels: Vec::new(),
