@@ -184,6 +184,7 @@ pub(crate) struct Board {
     pub(crate) part: Part,
     view: MemoryView,
     instructions_per_second: NonZeroU64,
+    mpu: armv7m::MpuRegions,
     /// what drives pins from outside, in the order it began
     driven: Vec<(PinId, Option<bool>)>,
 }
@@ -219,7 +220,7 @@ impl Machine for Board {
         .spec_with_parts(
             &rigless::cpu::armv7m::windows(Mcu::bus(&self.part)),
             armv7m::Fpu::FpV4Sp,
-            armv7m::MpuRegions::Eight,
+            self.mpu,
         );
         vec![Target::new("mcu", &mut self.view, core)]
     }
@@ -233,11 +234,16 @@ impl Board {
     pub(crate) fn new(
         rig: &SharedRig,
         instructions_per_second: NonZeroU64,
+        mpu: bool,
     ) -> Result<Self, rigless::soc::Error> {
         let view = Bus::builder(CPU, &MEMORY_MAP, [generated::FLASH]).build()?;
         let mut board = Self {
             part: Part::new(rig)?,
             view: MemoryView(view),
+            mpu: match mpu {
+                true => armv7m::MpuRegions::Eight,
+                false => armv7m::MpuRegions::None,
+            },
             instructions_per_second,
             driven: Vec::new(),
         };

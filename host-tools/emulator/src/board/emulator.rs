@@ -96,7 +96,7 @@ impl Emulator {
         };
         let shared = rig.clone();
         let thread = std::thread::spawn(move || {
-            let board = Board::new(&shared, options.instructions_per_second)?;
+            let board = Board::new(&shared, options.instructions_per_second, options.mpu)?;
             let mut session = Session::new(Box::new(board), 0, VirtualNanos(0))?;
             driver.power_up(&mut session);
             let mut start = Start::new(&images);

@@ -15,6 +15,9 @@ pub struct Options {
     pub clock: bool,
     /// What the firmware's store holds at power-up, from [`Emulator::store`](super::Emulator::store); blank otherwise.
     pub store: Option<Vec<u8>>,
+    /// Whether the core has its MPU, with which the firmware guards its stack. Each access is checked then, which takes twice the
+    /// time; without, what the firmware writes to the MPU does nothing, as on a part that has none.
+    pub mpu: bool,
 }
 
 impl Default for Options {
@@ -25,6 +28,7 @@ impl Default for Options {
             trace_s: 2,
             clock: true,
             store: None,
+            mpu: false,
         }
     }
 }

@@ -248,6 +248,11 @@ const CASES: [Case; 17] = [
 ];
 
 pub(crate) fn board(elf: &std::path::Path, seed: u64, texture: u8) -> Talk {
+    board_with(elf, seed, texture, Options::default())
+}
+
+/// The same with other options, but for the trace's length.
+pub(crate) fn board_with(elf: &std::path::Path, seed: u64, texture: u8, options: Options) -> Talk {
     let setup = Setup {
         texture,
         trial_seed: seed,
@@ -255,7 +260,7 @@ pub(crate) fn board(elf: &std::path::Path, seed: u64, texture: u8) -> Talk {
     };
     let options = Options {
         trace_s: 4,
-        ..Options::default()
+        ..options
     };
     let mut talk = Talk::new(Emulator::start(elf, setup, options).unwrap());
     ready(&mut talk);

@@ -11,7 +11,7 @@ use tactus_emulator::board::{Emulator, Options, Output, Switch};
 use tactus_emulator::host::talk::{Talk, TalkError};
 
 use crate::common::{elf, elf_of, ready};
-use crate::faults::{When, board, identify, is_time};
+use crate::faults::{When, board, board_with, identify, is_time};
 
 const FLASH_ACR: u64 = 0x4002_3C00;
 const RCC_CR: u64 = 0x4002_3800;
@@ -31,8 +31,13 @@ fn images() -> impl Iterator<Item = std::path::PathBuf> {
 #[test]
 fn prefetch_and_cache_make_up_for_the_flashs_wait_states() {
     for elf in images() {
-        let mut board = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
+        let options = Options {
+            mpu: true,
+            ..Options::default()
+        };
+        let mut board = Emulator::start(&elf, Setup::default(), options).unwrap();
         board.run_ms(800).unwrap();
+        assert_eq!(board.resets().unwrap(), []);
         let acr = board.register(FLASH_ACR).unwrap();
         assert_eq!(acr & 0xF, 5, "wait states at 168 MHz");
         let on = acr & CACHES;
@@ -46,6 +51,8 @@ fn the_lever_waits_between_current_and_its_first_step() {
     let Some(elf) = elf() else { return };
     let options = Options {
         trace_s: 60,
+        // a whole exploration under the guard of the stack
+        mpu: true,
         ..Options::default()
     };
     let board = Emulator::start(&elf, Setup::default(), options.clone()).unwrap();
@@ -213,7 +220,11 @@ fn an_erase_that_never_ends_is_left_to_itself() {
 fn a_stack_that_overflows_is_stopped_at_its_guard() {
     let Some(elf) = elf() else { return };
     for when in [When::Pressing, When::Sliding] {
-        let mut talk = board(&elf, 82, 30);
+        let options = Options {
+            mpu: true,
+            ..Options::default()
+        };
+        let mut talk = board_with(&elf, 82, 30, options);
         let mut words = None;
         let mut planted = false;
         let ended = talk.send(identify(1), 120.0, |board, report| {

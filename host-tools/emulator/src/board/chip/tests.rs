@@ -45,7 +45,7 @@ const SETUP: Setup = Setup {
 impl Bench {
     fn new() -> Self {
         let rig = Arc::new(Mutex::new(Rig::new(SETUP, 1_000 * MS)));
-        let board = Board::new(&rig, NonZeroU64::new(168_000_000).unwrap()).unwrap();
+        let board = Board::new(&rig, NonZeroU64::new(168_000_000).unwrap(), true).unwrap();
         let mut bench = Self { board, rig, now: 0 };
         // every peripheral's clock, from the internal oscillator: 16 MHz
         for enable in [0x4002_3830, 0x4002_3840, 0x4002_3844] {
