@@ -37,6 +37,9 @@ const SHARE: f32 = 0.03;
 const LIFTED_N: f64 = 0.02;
 /// A stage that stands is no faster, mm/s.
 const STANDS_MM_S: f64 = 0.5;
+/// A lever that stands goes no farther, mm, in so many ms.
+const STILL_MM: f64 = 0.01;
+const STILL_MS: u32 = 500;
 /// A rig is at rest at the latest after this, s.
 const REST_S: u64 = 120;
 
@@ -393,11 +396,16 @@ fn ask(probe: &mut SimProbe<'_, Heard>, case: &Case) -> Result<(), String> {
 fn rest(probe: &mut SimProbe<'_, Heard>, host: &RefCell<Heard>, wrong: &mut Vec<String>) -> f64 {
     let servo = &mut probe.rig.servo;
     let ends = servo.rig().now() + Duration::from_secs(REST_S);
-    while !servo.rig().control().is_at_rest() && servo.rig().now() < ends {
-        servo.tick();
-    }
-    for _ in 0..500 {
-        servo.tick();
+    // a lever that nothing drives is at rest, too, while it runs down
+    let mut tip_mm = f64::NAN;
+    while servo.rig().now() < ends {
+        for _ in 0..STILL_MS {
+            servo.tick();
+        }
+        let before = std::mem::replace(&mut tip_mm, servo.rig().world().truth().tip_mm);
+        if servo.rig().control().is_at_rest() && (tip_mm - before).abs() < STILL_MM {
+            break;
+        }
     }
     let rig = servo.rig();
     if !rig.control().is_at_rest() {
