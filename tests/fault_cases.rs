@@ -5,7 +5,6 @@ use tactus::sim::encoder::Cut;
 use tactus::sim::fault_case::{Activity, Bench, Case, Outcome};
 use tactus::sim::faults::Fault;
 use tactus_core::rig;
-use tactus_tests::expected_to_fail;
 
 /// The table that comes with the firmware.
 const FACTORY: &[u8] = include_bytes!("../firmware/factory.tact");
@@ -141,7 +140,7 @@ fn a_lever_that_runs_down_by_itself_is_seen() {
         .filter(|outcome| !outcome.wrong.is_empty())
         .map(|outcome| outcome.to_string())
         .collect();
-    expected_to_fail("the finger is down", || assert_eq!(wrong, [""; 0]));
+    assert_eq!(wrong, [""; 0]);
 }
 
 /// A driver that steps down by itself, and then words of the sensor are damaged.

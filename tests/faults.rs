@@ -773,7 +773,7 @@ fn the_first_zero_is_that_of_the_calibration() {
         (30.0, Unguarded::default(), false),
         (-30.0, Unguarded::default(), false),
         (3.0, Unguarded::default(), true),
-        (30.0, unwatched, true),
+        (-30.0, unwatched, true),
     ] {
         let mut rig = SimRig::new(Setup::default());
         rig.home().unwrap();
@@ -784,8 +784,12 @@ fn the_first_zero_is_that_of_the_calibration() {
         wait(&mut rig, 1500);
         rig.world().reset_extremes();
         let slid = rig.slide(Movement::FOR_ROUGHNESS, 0.5, |_, _| ());
-        let fault = Err(SimError::Fault(Fault::LeverNotHome));
-        assert_eq!(slid != fault, slides, "{counts_per_s} counts/s: {slid:?}");
+        let faults = [Fault::LeverNotHome, Fault::ForceHigh];
+        let seen =
+            |fault: Fault| slid == Err(fault.into()) || slid == Err(Refused::Fault(fault).into());
+        // one that rises is seen before, while the rig waits
+        let fault = faults.into_iter().find(|fault| seen(*fault));
+        assert_eq!(fault.is_none(), slides, "{counts_per_s} counts/s: {slid:?}");
         if !slides {
             assert_eq!(rig.world().truth().force_max_n, 0.0);
         }
@@ -859,7 +863,8 @@ fn a_finger_that_nobody_calibrated_is_guarded_before_its_first_zero() {
     };
     for down_at_boot in [false, true] {
         let (force_max_n, phase) = pressed_by_a_runaway(down_at_boot, Unguarded::default());
-        assert!((1.5..2.2).contains(&force_max_n), "{force_max_n} N");
+        // 40 counts are 0.46 N
+        assert!((0.4..0.8).contains(&force_max_n), "{force_max_n} N");
         assert_eq!(phase, Phase::Faulted(Fault::ForceHigh));
         let unguarded = Unguarded::against(Fault::ForceHigh);
         let (force_max_n, _) = pressed_by_a_runaway(down_at_boot, unguarded);

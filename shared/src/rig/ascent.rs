@@ -1,4 +1,4 @@
-//! Whether a lever that is to go up does: P_DC may fall on the way, and not rise.
+//! Whether a lever that is to go up does, and one that is up stays there: P_DC may fall meanwhile, and not rise.
 
 use super::fault::Fault;
 use super::force::ForceMeter;
@@ -12,6 +12,9 @@ const AIR_COUNTS: f32 = 40.0;
 pub(super) const RELEASE_MS: u32 = 20;
 /// P_DC that has risen by so many counts on the way up, 0.09 N, says that something presses: the lever, if it goes down.
 const RISEN_COUNTS: f32 = 8.0;
+/// A finger that waits in the air may warm up: what it says there follows so many counts a millisecond, 30 a minute (chosen).
+/// Somebody may touch it, too: only [`AIR_COUNTS`] more say that the lever has come down.
+const WARMING_COUNTS: f32 = 0.0005;
 /// The same of a finger that was pressed too hard, since its driver was off: there every tenth of a newton counts.
 const WORSE_COUNTS: f32 = 4.0;
 
@@ -49,8 +52,13 @@ impl Ascent {
         true
     }
 
+    /// A lifted finger sets out with the stage, at P_DC of `mean`.
+    pub(super) fn set_out(&mut self, mean: Option<f32>) {
+        self.lowest = mean.or(self.lowest);
+    }
+
     /// A millisecond of `phase`, its `ms`-th, with a stage that may have `lost` its place: the fault, if P_DC has risen on the
-    /// way to the switch.
+    /// way to the switch, or of a finger that is lifted.
     #[inline(never)]
     pub(super) fn tick(
         &mut self,
@@ -60,27 +68,30 @@ impl Ascent {
         meter: &ForceMeter,
     ) -> Option<Fault> {
         match phase {
-            Phase::Homing => self.rises(meter.mean()),
-            Phase::Lifting if lost => self.rises(meter.mean()),
+            Phase::Homing | Phase::Positioning | Phase::Unloaded => {
+                self.rises(meter.mean(), RISEN_COUNTS)
+            }
+            Phase::Lifting if lost => self.rises(meter.mean(), RISEN_COUNTS),
             Phase::Faulted(Fault::ForceHigh) => {
                 self.lift(ms, meter);
                 None
             }
             Phase::Ready => {
                 self.pressed = false;
-                None
+                self.lowest = self.lowest.map(|lowest| lowest + WARMING_COUNTS);
+                self.rises(meter.mean(), AIR_COUNTS)
             }
             _ => None,
         }
     }
 
-    /// P_DC on the way, mean of 10 ms: the fault, if it has risen. The first time somebody may lean on the finger, and it is
+    /// P_DC on the way, mean of 10 ms: the fault, if it has risen by more than `counts`. The first time somebody may lean on the finger, and it is
     /// lifted; then no further try makes a step before P_DC has fallen again.
-    fn rises(&mut self, mean: Option<f32>) -> Option<Fault> {
+    fn rises(&mut self, mean: Option<f32>, counts: f32) -> Option<Fault> {
         let mean = mean?;
         let lowest = self.lowest.map_or(mean, |lowest| lowest.min(mean));
         self.lowest = Some(lowest);
-        if mean <= lowest + RISEN_COUNTS {
+        if mean <= lowest + counts {
             return None;
         }
         let before = core::mem::replace(&mut self.pressed, true);
@@ -116,26 +127,33 @@ impl Ascent {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sensor::pressure::Counts;
 
     #[test]
     fn what_rose_once_must_fall_before_the_next_try() {
         let mut ascent = Ascent::default();
         assert!(ascent.begin());
         for mean in [None, Some(2700.0), Some(2650.0), Some(2658.0)] {
-            assert_eq!(ascent.rises(mean), None);
+            assert_eq!(ascent.rises(mean, RISEN_COUNTS), None);
         }
-        assert_eq!(ascent.rises(Some(2659.0)), Some(Fault::ForceHigh));
+        assert_eq!(
+            ascent.rises(Some(2659.0), RISEN_COUNTS),
+            Some(Fault::ForceHigh)
+        );
         for _ in 0..3 {
             assert!(!ascent.begin(), "the zero is kept");
-            assert_eq!(ascent.rises(Some(2659.0)), Some(Fault::LeverNotHome));
+            assert_eq!(
+                ascent.rises(Some(2659.0), RISEN_COUNTS),
+                Some(Fault::LeverNotHome)
+            );
         }
         // somebody has freed it
         assert!(!ascent.begin());
-        assert_eq!(ascent.rises(Some(2651.0)), None);
+        assert_eq!(ascent.rises(Some(2651.0), RISEN_COUNTS), None);
         ascent.pressed = false;
         assert!(ascent.begin());
         assert_eq!(ascent.lowest(), None);
-        assert_eq!(ascent.rises(Some(2800.0)), None);
+        assert_eq!(ascent.rises(Some(2800.0), RISEN_COUNTS), None);
     }
 
     #[test]
@@ -144,6 +162,30 @@ mod tests {
         ascent.zero(2600.0);
         ascent.pressed = true;
         assert!(!ascent.begin());
-        assert_eq!(ascent.rises(Some(2700.0)), Some(Fault::LeverNotHome));
+        assert_eq!(
+            ascent.rises(Some(2700.0), RISEN_COUNTS),
+            Some(Fault::LeverNotHome)
+        );
+    }
+
+    #[test]
+    fn a_finger_that_waits_may_warm_up_but_not_be_pressed() {
+        let mut meter = ForceMeter::new(2600.0);
+        let mut ascent = Ascent::default();
+        let mut wait = |ascent: &mut Ascent, ms: u32, counts_per_ms: f32, from: f32| {
+            let mut seen = None;
+            for ms in 0..ms {
+                let counts = Counts::new((from + counts_per_ms * ms as f32) as u16);
+                meter.push(counts.unwrap());
+                seen = seen.or(ascent.tick(Phase::Ready, false, ms, &meter));
+            }
+            seen
+        };
+        // 24 counts a minute, for ten minutes; then somebody touches it
+        assert_eq!(wait(&mut ascent, 600_000, 0.0004, 2600.0), None);
+        assert_eq!(wait(&mut ascent, 1_000, 0.0, 2860.0), None);
+        // a lever comes down: 45 counts a second
+        let fault = wait(&mut ascent, 2_000, 0.045, 2840.0);
+        assert_eq!(fault, Some(Fault::ForceHigh));
     }
 }

@@ -233,6 +233,7 @@ impl Control {
         self.ended = None;
         let (from, _) = self.run.path_mm();
         self.stage.go(from, RETURN_MM_S);
+        self.ascent.set_out(self.meter.mean());
         self.enter(Phase::Positioning);
         Ok(())
     }
@@ -260,6 +261,7 @@ impl Control {
         self.ended = None;
         self.air = None;
         self.meter.begin_long();
+        self.ascent.set_out(self.meter.mean());
         self.enter(Phase::Unloaded);
         Ok(())
     }
@@ -371,7 +373,8 @@ impl Control {
         let at_left = self.stage_left.tick(inputs.stage_limits.0);
         let lost = self.stage.state() == StageState::Unknown;
         let rise = self.ascent.tick(self.phase, lost, self.ms, &self.meter);
-        if let Some(fault) = rise.filter(|_| !self.lever.is_lifted()) {
+        let goes_up = matches!(self.phase, Phase::Homing | Phase::Lifting);
+        if let Some(fault) = rise.filter(|_| !(goes_up && self.lever.is_lifted())) {
             self.check(fault);
         }
         match self.watch(inputs) {
