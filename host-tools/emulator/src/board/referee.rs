@@ -6,10 +6,11 @@ mod accelerator;
 mod vendor;
 mod violation;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 use rigless::emulator::{Access, AccessKind, Hit, Host, Watch};
 use rigless::soc::Bus;
+use rustc_hash::FxHashMap;
 use stm32_metapac::metadata::{METADATA, MemoryRegionKind, Peripheral};
 
 use super::flash::{self, BSY, FLASH};
@@ -86,7 +87,9 @@ pub(crate) struct Referee {
     vendor: &'static Vendor,
     /// What was last written to each word, or its reset value. Only of words that the firmware alone changes it means
     /// anything.
-    written: HashMap<u64, u32>,
+    written: FxHashMap<u64, u32>,
+    /// Encoders whose pins were looked at since a pin or a timer's mode changed.
+    encoders: BTreeSet<&'static str>,
     found: BTreeMap<(Rule, String), Violation>,
     /// The handler of interrupts that have none.
     no_handler: Option<u64>,
@@ -114,7 +117,8 @@ impl Referee {
     pub(crate) fn new(bus: &Bus) -> Self {
         let mut referee = Self {
             vendor: Vendor::of(bus),
-            written: HashMap::new(),
+            written: FxHashMap::default(),
+            encoders: BTreeSet::new(),
             found: BTreeMap::new(),
             no_handler: None,
             accelerator: Accelerator::default(),
@@ -128,6 +132,7 @@ impl Referee {
         let words = self.vendor.words();
         self.written = words.map(|(address, word)| (address, word.reset)).collect();
         self.accelerator = Accelerator::default();
+        self.encoders.clear();
     }
 
     /// Watches where interrupts end that have no handler: the most frequent of the vectors.
@@ -136,7 +141,7 @@ impl Referee {
             let vector = 4 * (FIRST_INTERRUPT + interrupt.number);
             word(FLASH as u32 + vector, host)
         });
-        let mut times: HashMap<u32, usize> = HashMap::new();
+        let mut times: BTreeMap<u32, usize> = BTreeMap::new();
         for vector in vectors.filter(|vector| *vector != 0) {
             *times.entry(vector & !1).or_default() += 1;
         }
@@ -291,6 +296,9 @@ impl Referee {
         let before = self.written.get(&address).copied().unwrap_or_default();
         let after = before & !part | value & part;
         self.written.insert(address, after);
+        if kind == "gpio" || register == "SMCR" {
+            self.encoders.clear();
+        }
         match (kind, register) {
             ("gpio", "MODER" | "AFR0" | "AFR1") => self.pins(now, of),
             ("dma", _) => self.dma(now, of, register, before, after),
@@ -377,7 +385,8 @@ impl Referee {
 
     /// The count of an encoder, of which the timer should have both lines.
     fn encoder(&mut self, now: Now, of: &'static Peripheral) {
-        if matches!(self.field(of.name, "SMCR", "SMS"), Some(1..=3)) {
+        // it is read every millisecond
+        if self.encoders.insert(of.name) && matches!(self.field(of.name, "SMCR", "SMS"), Some(1..=3)) {
             for signal in ["CH1", "CH2"] {
                 self.wants(now, of, signal, Wants::OnePin);
             }

@@ -1,9 +1,9 @@
 //! What the vendor says of the chip's registers: stm32-metapac's metadata and, of reset values and fields, ST's SVD.
 
-use std::collections::HashMap;
 use std::sync::OnceLock;
 
 use rigless::soc::{Bus, RegisterSpec};
+use rustc_hash::FxHashMap;
 use stm32_metapac::metadata::ir::{
     Access, Array, BitOffset, Block, BlockItem, BlockItemInner, Field, FieldSet, IR, Register,
 };
@@ -40,13 +40,13 @@ pub(crate) type Place = (u64, u32);
 /// All registers, by address.
 #[derive(Debug)]
 pub(crate) struct Vendor {
-    words: HashMap<u64, Word>,
+    words: FxHashMap<u64, Word>,
     /// Pages of peripherals, with the first of them.
-    pages: HashMap<u64, usize>,
+    pages: FxHashMap<u64, usize>,
     /// By the names of [`Word`].
-    addresses: HashMap<String, u64>,
+    addresses: FxHashMap<String, u64>,
     /// By names as "SPI1.CR1.SPE".
-    fields: HashMap<String, Place>,
+    fields: FxHashMap<String, Place>,
     /// What enables each of [`METADATA`]'s peripherals, and what holds it in reset.
     switches: Vec<[Option<Place>; 2]>,
 }
@@ -138,9 +138,9 @@ impl Vendor {
     }
 
     fn new(bus: &Bus) -> Self {
-        let (mut words, mut pages) = (HashMap::<u64, Word>::new(), HashMap::new());
-        let (mut addresses, mut places) = (HashMap::new(), HashMap::new());
-        let mut specified: HashMap<u64, &RegisterSpec> = HashMap::new();
+        let (mut words, mut pages) = (FxHashMap::<u64, Word>::default(), FxHashMap::default());
+        let (mut addresses, mut places) = (FxHashMap::default(), FxHashMap::default());
+        let mut specified: FxHashMap<u64, &RegisterSpec> = FxHashMap::default();
         for instance in bus.peripherals() {
             let all = instance.registers.iter();
             specified.extend(all.map(|spec| (instance.base + u64::from(spec.offset), spec)));
