@@ -386,7 +386,9 @@ impl Referee {
     /// The count of an encoder, of which the timer should have both lines.
     fn encoder(&mut self, now: Now, of: &'static Peripheral) {
         // it is read every millisecond
-        if self.encoders.insert(of.name) && matches!(self.field(of.name, "SMCR", "SMS"), Some(1..=3)) {
+        if self.encoders.insert(of.name)
+            && matches!(self.field(of.name, "SMCR", "SMS"), Some(1..=3))
+        {
             for signal in ["CH1", "CH2"] {
                 self.wants(now, of, signal, Wants::OnePin);
             }

@@ -126,6 +126,19 @@ fn the_share_of_time_awake_is_true() {
     let (is, said) = awake(&mut board, "awake listening:");
     eprintln!("listening: awake {is:.4}, said {said:.4}");
     assert!((is - said).abs() < 0.003 && is > 0.02, "{is} {said}");
+    // the book's table of power goes by it
+    let book = include_str!("../../../../docs/src/handheld.md");
+    let row = book
+        .lines()
+        .find(|line| line.starts_with("| waiting for a press"));
+    let cell = row
+        .and_then(|row| row.split('|').nth(2))
+        .unwrap_or_default();
+    let written: f64 = cell.trim_matches([' ', '%']).parse().unwrap();
+    assert!(
+        (100.0 * is - written).abs() < 1.5,
+        "{is}, in the book {written} %"
+    );
     board.press(true).unwrap();
     board.run_ms(100).unwrap();
     board.press(false).unwrap();
