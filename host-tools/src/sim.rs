@@ -28,6 +28,7 @@ pub mod press;
 pub mod probe;
 pub mod recorded;
 pub mod rig;
+pub mod ripple;
 pub mod scenario;
 pub mod sensor;
 pub mod stage;

@@ -23,6 +23,7 @@ mod stack;
 mod symbols;
 mod taps;
 mod upset;
+mod wave;
 
 pub use display::Display;
 pub use emulator::{Emulator, Reset};

@@ -3,6 +3,7 @@
 use super::encoder::Cut;
 use super::maths::pow;
 use super::noise::Noise;
+use super::stage::{ADC_REFERENCE_V, ADC_V_PER_A};
 
 /// Stream of the trial's seed that faults draw from.
 const STREAM: u64 = 0xfa01;
@@ -201,6 +202,15 @@ pub(super) struct Faults {
     pub(super) dip_ends_ns: u64,
     /// counts per second, and since when
     pub(super) drift: Option<(f64, u64)>,
+}
+
+impl Faults {
+    /// What the amplifier of the motor current makes of a reading.
+    pub(super) fn amplified(&self, reading: u16) -> u16 {
+        let off = self.current.unwrap_or_default() * ADC_V_PER_A * 4096.0 / ADC_REFERENCE_V;
+        // the addition saturates at both ends, as the amplifier does
+        (f64::from(reading) + off).round().clamp(0.0, 4095.0) as u16
+    }
 }
 
 /// How long the emergency stop's contact bounces, ns, and how long it stays as it is meanwhile (chosen: usual for a

@@ -18,6 +18,7 @@ use std::f64::consts::TAU;
 use super::conditions::TICK_S;
 use super::maths::{exp, ln, sin};
 use super::noise::Noise;
+use super::ripple::{self, PwmPhase};
 
 /// Supply of the H-bridge, V (chosen).
 pub const SUPPLY_V: f64 = 12.0;
@@ -283,11 +284,37 @@ impl Stage {
         self.limits
     }
 
-    /// What the converter reads of the current at a time: two readings at the same time are the same.
+    /// What the converter reads of the mean current at a time: two readings at the same time are the same.
     pub fn adc(&self, now_ns: u64) -> u16 {
+        self.reading(self.current_a, now_ns)
+    }
+
+    /// What it reads of the current at this place in a period of the bridge's PWM.
+    pub fn adc_within(&self, now_ns: u64, phase: PwmPhase) -> u16 {
+        self.reading(self.current_a + self.ripple_a(phase), now_ns)
+    }
+
+    /// By how much the current at a place in a period of the bridge's PWM is above its mean, A.
+    fn ripple_a(&self, phase: PwmPhase) -> f64 {
+        if !self.enabled {
+            return 0.0;
+        }
+        let direction = self.duty.signum();
+        let emf_v = self.along.force_n_per_a * self.speed_mm_s * 1e-3 * direction;
+        let low_v = if self.decays_fast { -SUPPLY_V } else { 0.0 };
+        let ends = ripple::Ends {
+            high_a: (SUPPLY_V - emf_v) / RESISTANCE_OHM,
+            low_a: (low_v - emf_v) / RESISTANCE_OHM,
+            stops: self.decays_fast,
+            time_constant_s: TIME_CONSTANT_S,
+        };
+        direction * ripple::above_mean_a(ends, self.duty.abs(), phase)
+    }
+
+    fn reading(&self, current_a: f64, now_ns: u64) -> u16 {
         let counts_per_v = 4096.0 / ADC_REFERENCE_V;
         let reading = 2048.0
-            + self.current_a * ADC_V_PER_A * self.adc_gain * counts_per_v
+            + current_a * ADC_V_PER_A * self.adc_gain * counts_per_v
             + self.adc_offset
             + ADC_NOISE_COUNTS * gauss(self.noise_seed ^ now_ns);
         reading.round().clamp(0.0, 4095.0) as u16

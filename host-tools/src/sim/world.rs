@@ -18,8 +18,9 @@ use super::lever::Lever;
 use super::mount::Mount;
 use super::person::Hand;
 use super::played::{PlayCounts, Played};
+use super::ripple::PwmPhase;
 use super::sensor::SensorPeer;
-use super::stage::{ADC_REFERENCE_V, ADC_V_PER_A, Stage};
+use super::stage::Stage;
 use super::surface::Surface;
 use super::{noise::Noise, textures};
 
@@ -290,12 +291,15 @@ impl World {
         self.encoder.next_edge(self.now_ns)
     }
 
-    /// The converter's reading of the stage's motor current: 12 bits over 3.3 V, about 2048 without current, 1 V/A.
+    /// The converter's reading of the stage's mean motor current: 12 bits over 3.3 V, about 2048 without current, 1 V/A.
     pub fn motor_adc(&self) -> u16 {
-        let reading = self.stage.adc(self.now_ns);
-        let off = self.faults.current.unwrap_or_default() * ADC_V_PER_A * 4096.0 / ADC_REFERENCE_V;
-        // the addition saturates at both ends, as the amplifier does
-        (f64::from(reading) + off).round().clamp(0.0, 4095.0) as u16
+        self.faults.amplified(self.stage.adc(self.now_ns))
+    }
+
+    /// Its reading at this place in a period of the bridge's PWM.
+    pub fn motor_adc_within(&self, phase: PwmPhase) -> u16 {
+        let reading = self.stage.adc_within(self.now_ns, phase);
+        self.faults.amplified(reading)
     }
 
     /// The limit switch at the top of the lever's travel; `true` is closed.

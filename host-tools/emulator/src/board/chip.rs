@@ -84,7 +84,7 @@ impl Part {
             },
             pwm: Tapped {
                 model: narrow(),
-                tap: Pwm::new(rig.clone()),
+                tap: Pwm::new(rig.clone(), RESET_HZ),
             },
             encoder: Tapped {
                 model: narrow(),
@@ -119,7 +119,7 @@ impl Mcu for Part {
         self.exti = Exti::default();
         self.step.model = advanced();
         self.pwm.model = narrow();
-        self.pwm.tap.restart();
+        self.pwm.tap.restart(RESET_HZ);
         self.encoder.model = narrow();
         self.current.model = converter();
         // the fresh timer believes both lines low, until somebody looks

@@ -3,6 +3,7 @@
 //! (reset values). Limits that neither has are quoted from RM0090 and the data sheet.
 
 mod accelerator;
+mod converter;
 mod vendor;
 mod violation;
 
@@ -18,6 +19,7 @@ use super::registers::{IPSR, register, word};
 pub use violation::{Rule, Violation};
 
 use accelerator::Accelerator;
+use converter::Converters;
 use vendor::{Vendor, Word};
 
 /// Status registers that are cleared by zeros (rc_w0). The vendor's own library writes ones to all else in them, reserved bits too.
@@ -94,6 +96,7 @@ pub(crate) struct Referee {
     /// The handler of interrupts that have none.
     no_handler: Option<u64>,
     accelerator: Accelerator,
+    converters: Converters,
 }
 
 /// The access that is judged.
@@ -122,6 +125,7 @@ impl Referee {
             found: BTreeMap::new(),
             no_handler: None,
             accelerator: Accelerator::default(),
+            converters: Converters::default(),
         };
         referee.reset();
         referee
@@ -133,6 +137,7 @@ impl Referee {
         self.written = words.map(|(address, word)| (address, word.reset)).collect();
         self.accelerator = Accelerator::default();
         self.encoders.clear();
+        self.converters = Converters::default();
     }
 
     /// Watches where interrupts end that have no handler: the most frequent of the vectors.
@@ -407,10 +412,15 @@ impl Referee {
         }
     }
 
-    /// Pins of a converter that software starts.
+    /// A store to CR2 of a converter, which may start it.
     fn conversion(&mut self, now: Now, of: &'static Peripheral, before: u32, after: u32) {
-        if after & !before & self.bits(of, "CR2", "SWSTART") == 0 {
-            return;
+        let mut converters = std::mem::take(&mut self.converters);
+        let word = |of: &str, register: &str| self.word(of, register);
+        let wrong = converters.store(of, now.at_ns, [before, after], self.buses()[2], word);
+        self.converters = converters;
+        let Some(wrong) = wrong else { return };
+        for (rule, what) in wrong {
+            self.tell(now, rule, what);
         }
         let length = self.field(of.name, "SQR1", "L").unwrap_or(0);
         // one after the other, six to a word, from the third one on
@@ -419,8 +429,7 @@ impl Referee {
             let channel = self.word(of.name, register) >> (5 * (at % 6)) & 31;
             let signal = format!("IN{channel}");
             // those within the chip have no pin
-            let has_pin = of.pins.iter().any(|pin| pin.signal == signal);
-            if has_pin && self.led(of, &signal) == 0 {
+            if of.pins.iter().any(|pin| pin.signal == signal) && self.led(of, &signal) == 0 {
                 self.tell(now, Rule::NotAnalog, format!("{} {signal}", of.name));
             }
         }
@@ -496,8 +505,8 @@ impl Referee {
         }
     }
 
-    /// Wait states and buses, when the core runs by the PLL.
-    fn clocks(&mut self, now: Now) {
+    /// Clocks of the core, APB1 and APB2, MHz.
+    fn buses(&self) -> [u32; 3] {
         // the board's crystal, and the internal oscillator
         const HSE_MHZ: u32 = 8;
         const HSI_MHZ: u32 = 16;
@@ -526,11 +535,13 @@ impl Referee {
             prescaler @ 4.. => core >> (prescaler - 3),
             _ => core,
         };
-        let buses = [
-            ("core", core),
-            ("APB1", bus("PPRE1")),
-            ("APB2", bus("PPRE2")),
-        ];
+        [core, bus("PPRE1"), bus("PPRE2")]
+    }
+
+    /// Wait states and buses, when the core runs by the PLL.
+    fn clocks(&mut self, now: Now) {
+        let [core, apb1, apb2] = self.buses();
+        let buses = [("core", core), ("APB1", apb1), ("APB2", apb2)];
         // RM0090, table 11, 2.7 to 3.6 V: 30 MHz for each
         let wait_states = self.field("FLASH", "ACR", "LATENCY").unwrap_or(0);
         if core > 30 * (wait_states + 1) {

@@ -7,6 +7,7 @@ use tactus::sim::world::{Setup, World};
 
 use super::display::Display;
 use super::record::{Recorder, Slide};
+use super::wave::Wave;
 
 /// Shortest byte of a 10 MHz clock, the sensor's fastest, ns.
 const FASTEST_BYTE_NS: u64 = 800;
@@ -48,6 +49,8 @@ pub struct Rig {
     step: bool,
     duty_timer: f64,
     duty_port: Option<bool>,
+    wave: Option<Wave>,
+    ripples: bool,
     stage_up: bool,
     lever_down: bool,
     lever_enabled: bool,
@@ -98,6 +101,8 @@ impl Rig {
             step: false,
             duty_timer: 0.0,
             duty_port: Some(false),
+            wave: None,
+            ripples: false,
             stage_up: false,
             lever_down: false,
             lever_enabled: false,
@@ -222,6 +227,29 @@ impl Rig {
     pub(crate) fn stage_duty(&mut self, now_ns: u64, duty: f64) {
         self.duty_timer = duty;
         self.update_duty(now_ns);
+    }
+
+    /// Where the timer's PWM is in its period, if it makes one.
+    pub(super) fn stage_wave(&mut self, wave: Option<Wave>) {
+        self.wave = wave;
+    }
+
+    /// From now on the converter sees how the motor's current swings with the PWM, as it does on a bench.
+    pub fn ripple(&mut self) {
+        self.ripples = true;
+    }
+
+    /// What the converter reads of the motor's current.
+    pub(super) fn motor_adc(&mut self, now_ns: u64) -> u16 {
+        self.advance_to(now_ns);
+        // a port's level does not swing
+        let by_timer = self
+            .wave
+            .filter(|_| self.ripples && self.duty_port.is_none());
+        match by_timer.and_then(|wave| wave.phase(now_ns)) {
+            Some(phase) => self.world.motor_adc_within(phase),
+            None => self.world.motor_adc(),
+        }
     }
 
     /// PWM as an output of its port; `None` leaves it to the timer.

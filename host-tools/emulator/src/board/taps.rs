@@ -1,13 +1,14 @@
 //! What the rig does round models whose pins it needs to the nanosecond: TIM1, TIM3, TIM4 and ADC1.
 
-use rigless::device::{DeviceContext, ErasedDevice, Level, RegisterFile, RequestChange};
+use rigless::device::{Device, DeviceContext, ErasedDevice, Level, RegisterFile, RequestChange};
 use rigless::soc::RegisterSpec;
-use rigless::soc::stm32f427::generated::tim3::Register as TimRegister;
+use rigless::soc::stm32f427::generated::{tim2, tim3::Register as TimRegister};
 use rigless::soc::stm32f427::peripherals::adc::{self, Adc};
 use rigless::soc::stm32f427::peripherals::tim::{Advanced, Channel, General, Tim};
 use rigless::time::{EventId, VirtualNanos};
 
 use super::rig::{SharedRig, lock};
+use super::wave::Wave;
 
 /// What the rig does round a model.
 pub(super) trait Tap<M> {
@@ -15,6 +16,8 @@ pub(super) trait Tap<M> {
     fn before(&mut self, _: &mut M, _: &mut RegisterFile, _: &mut DeviceContext<'_>) {}
     /// Something was written, or its clock has changed: before [`Tap::after`].
     fn touched(&mut self, _: VirtualNanos) {}
+    /// Its clock is so fast from now on, Hz: before [`Tap::touched`].
+    fn clocked(&mut self, _: u64) {}
     /// Whether it has to act on its own event now: a timer that does not catches up when it is looked at next.
     fn heeds(&mut self, _: &RegisterFile, _: VirtualNanos) -> bool {
         true
@@ -105,6 +108,8 @@ impl<M: ErasedDevice, T: Tap<M>> ErasedDevice for Tapped<M, T> {
         context: &mut DeviceContext<'_>,
     ) {
         self.model.on_clock_input(input, hz, registers, context);
+        // timers have one input, and by it rigless drives them
+        self.tap.clocked(hz);
         self.touched(registers, context.now());
     }
 
@@ -164,27 +169,35 @@ pub(super) struct Pwm {
     period: u64,
     /// What was written has come into force by then, ns.
     settled: u64,
+    /// Of the timer, Hz.
+    clock: u64,
 }
 
 impl Pwm {
-    pub(super) fn new(rig: SharedRig) -> Self {
+    /// Of a timer as after a reset, which runs by such a clock, Hz.
+    pub(super) fn new(rig: SharedRig, clock: u64) -> Self {
         Self {
             rig,
             touched: None,
             period: 0,
             settled: u64::MAX,
+            clock,
         }
     }
 
-    /// A timer as after a reset.
-    pub(super) fn restart(&mut self) {
-        *self = Self::new(self.rig.clone());
+    /// The timer was reset.
+    pub(super) fn restart(&mut self, clock: u64) {
+        *self = Self::new(self.rig.clone(), clock);
     }
 }
 
 impl Tap<Tim<General>> for Pwm {
     fn touched(&mut self, now: VirtualNanos) {
         self.touched = Some(now);
+    }
+
+    fn clocked(&mut self, hz: u64) {
+        self.clock = hz;
     }
 
     /// Its edges would stop the core 40 000 times a second. Nobody waits for them but by DIER, and the duty changes only where
@@ -203,12 +216,21 @@ impl Tap<Tim<General>> for Pwm {
         };
         if let Some(at) = self.touched.take() {
             // the period under way and the next, by the longer of the old and the new; without a pulse every event counts
-            let period = pulse.map_or(u64::MAX, |pulse| pulse.period.0);
+            let period = pulse.as_ref().map_or(u64::MAX, |pulse| pulse.period.0);
             let longest = period.max(self.period);
             self.settled = at.0.saturating_add(longest.saturating_mul(2));
             self.period = period;
         }
-        lock(&self.rig).stage_duty(now.0, duty);
+        let wave = pulse.filter(|pulse| pulse.period.0 > 0).map(|_| Wave {
+            at_ns: now.0,
+            // the model is up to date here: the count is within its period
+            count: Device::peek(tim, tim2::Register::Cnt, registers, now).unwrap_or_default(),
+            counts: registers.get(TimRegister::Arr) + 1,
+            hz: self.clock / (registers.get(TimRegister::Psc) + 1),
+        });
+        let mut rig = lock(&self.rig);
+        rig.stage_duty(now.0, duty);
+        rig.stage_wave(wave);
     }
 }
 
@@ -265,9 +287,8 @@ impl Current {
 
 impl Tap<Adc> for Current {
     fn before(&mut self, adc: &mut Adc, _: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        let mut rig = lock(&self.0);
-        rig.advance_to(context.now().0);
+        let code = lock(&self.0).motor_adc(context.now().0);
         let pa3 = adc::Channel::new(3).expect("the converter has channels 0 to 15");
-        adc.set_input(pa3, rig.world().motor_adc().into());
+        adc.set_input(pa3, code.into());
     }
 }

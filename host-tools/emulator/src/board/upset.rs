@@ -13,14 +13,17 @@ pub enum Switch {
     Spi1,
     /// ADC1's: without it no conversion is ever over.
     Adc1,
+    /// Of the stream of DMA2 that carries ADC1: without it no conversion arrives, and the converter stops.
+    Dma2,
 }
 
 impl Switch {
     fn place(self) -> (u64, u64) {
         match self {
-            // SPE of CR1, ADON of CR2
+            // SPE of CR1, ADON of CR2, EN of S0CR
             Self::Spi1 => (0x4001_3000, 1 << 6),
             Self::Adc1 => (0x4001_2008, 1),
+            Self::Dma2 => (0x4002_6410, 1),
         }
     }
 

@@ -4,6 +4,7 @@
 mod boot;
 mod commands;
 mod common;
+mod current;
 mod explore;
 mod faults;
 mod halt;

@@ -148,7 +148,23 @@ fn cases() -> Vec<(Rule, Vec<Do>, Vec<Do>)> {
     let ports = W(AHB1ENR, CCM | 3);
     let syscfg = W(APB2ENR, 1 << 14);
     let adc = [ports, W(APB2ENR, 1 << 8), W(ADC1 + 0x34, 3)];
-    let convert = [W(ADC1 + 0x08, 1), W(ADC1 + 0x08, 1 << 30 | 1)];
+    // TIM2 counts 84 MHz for 6 us, or 16 for longer
+    let waits = [W(APB1ENR, 1), W(TIM2, 1), Until(TIM2 + 0x24, 1 << 9)];
+    let start = |setting: u32| W(ADC1 + 0x08, 1 << 30 | setting);
+    let convert = all(&[&[W(ADC1 + 0x08, 1)], &waits, &[start(1)]]);
+    let analog = all(&[&adc, &[W(GPIOA, 0xA800_00C0)]]);
+    // from ADC1 to a ring of four
+    let ring = [
+        W(AHB1ENR, CCM | 3 | 1 << 22),
+        W(DMA2_S0 + 0x08, ADC1 + 0x4C),
+        W(DMA2_S0 + 0x0C, 0x2000_0000),
+        W(DMA2_S0 + 0x04, 4),
+        W(DMA2_S0, 0x2D01),
+    ];
+    let without_end = |setting: u32| {
+        let on = [W(ADC1 + 0x08, setting)];
+        all(&[&analog, &ring, &on, &waits, &[start(setting)]])
+    };
     let dma = |request: u32, memory: u32| {
         [
             W(AHB1ENR, CCM | 3 | 1 << 22),
@@ -262,6 +278,31 @@ fn cases() -> Vec<(Rule, Vec<Do>, Vec<Do>)> {
             Rule::NotAnalog,
             all(&[&adc, &[W(GPIOA, 0xA800_00C0)], &convert]),
             all(&[&adc, &convert]),
+        ),
+        (
+            Rule::Unsteady,
+            all(&[&analog, &convert]),
+            all(&[&analog, &[W(ADC1 + 0x08, 1), start(1)]]),
+        ),
+        (Rule::Unsteady, analog.clone(), all(&[&analog, &[start(0)]])),
+        (
+            Rule::RequestsEnd,
+            // on and on, by DMA
+            without_end(0x303),
+            without_end(0x103),
+        ),
+        (
+            Rule::ConverterClock,
+            // 84 MHz / 4, and / 2
+            all(&[
+                &wait_states,
+                &PLL,
+                &to_pll(divided),
+                &analog,
+                &[W(ADC1 + 0x304, 1 << 16)],
+                &convert,
+            ]),
+            all(&[&wait_states, &PLL, &to_pll(divided), &analog, &convert]),
         ),
         (
             Rule::DmaRequest,

@@ -14,22 +14,30 @@ use crate::board::rig::{Output, Rig, lock};
 
 const MS: u64 = 1_000_000;
 
-/// No model under test reaches memory.
-struct NoMemory;
+/// RAM for DMA to write to, by its half-words.
+#[derive(Default)]
+struct Ram(std::collections::BTreeMap<u64, u16>);
 
-impl Memory for NoMemory {
+const RAM: u64 = 0x2000_0000;
+
+impl Memory for Ram {
     fn read(&mut self, address: u64, width: Width) -> Result<u64, Error> {
         Err(Error::Memory { address, width })
     }
 
-    fn write(&mut self, address: u64, width: Width, _: u64) -> Result<(), Error> {
-        Err(Error::Memory { address, width })
+    fn write(&mut self, address: u64, width: Width, value: u64) -> Result<(), Error> {
+        if width != Width::W16 || address < RAM {
+            return Err(Error::Memory { address, width });
+        }
+        self.0.insert(address, value as u16);
+        Ok(())
     }
 }
 
 struct Bench {
     board: Board,
     rig: SharedRig,
+    ram: Ram,
     now: u64,
 }
 
@@ -46,7 +54,12 @@ impl Bench {
     fn new() -> Self {
         let rig = Arc::new(Mutex::new(Rig::new(SETUP, 1_000 * MS)));
         let board = Board::new(&rig, NonZeroU64::new(168_000_000).unwrap(), true).unwrap();
-        let mut bench = Self { board, rig, now: 0 };
+        let mut bench = Self {
+            board,
+            rig,
+            ram: Ram::default(),
+            now: 0,
+        };
         // every peripheral's clock, from the internal oscillator: 16 MHz
         for enable in [0x4002_3830, 0x4002_3840, 0x4002_3844] {
             bench.write(enable, 0xFFFF_FFFF);
@@ -59,7 +72,7 @@ impl Bench {
         let part = &mut self.board.part;
         part.write(VirtualNanos(self.now), address, Width::W32, value)
             .unwrap_or_else(|fault| panic!("{address:#x}: {fault}"));
-        part.settle(&mut NoMemory).unwrap();
+        part.settle(&mut self.ram).unwrap();
     }
 
     fn read(&mut self, address: u64) -> u64 {
@@ -75,7 +88,7 @@ impl Bench {
             let next = part.next_event().map_or(until, |at| at.0.min(until));
             self.now = self.now.max(next);
             part.advance_to(VirtualNanos(self.now));
-            part.settle(&mut NoMemory).unwrap();
+            part.settle(&mut self.ram).unwrap();
             if self.now >= until {
                 break;
             }
@@ -185,6 +198,83 @@ fn conversions_give_the_code_that_the_world_has_when_they_end() {
         codes.insert(code);
     }
     assert!(codes.len() > 50, "{} codes", codes.len());
+}
+
+/// PWM of 4100 ticks and a conversion of 3936 of them: 25 conversions in 24 periods, of all places in a period.
+#[test]
+fn the_converter_sees_the_ripple_of_the_current_and_its_mean_over_whole_periods() {
+    const TIM3: u64 = 0x4000_0400;
+    const ADC: u64 = 0x4001_2000;
+    const DMA: u64 = 0x4002_6400;
+    const CONVERSIONS: usize = 25;
+    let mut bench = Bench::new();
+    lock(&bench.rig).ripple();
+    lock(&bench.rig).world().inject(Fault::StageJammed);
+    lock(&bench.rig).stage_port(0, None);
+    lock(&bench.rig).stage_dir(0, true);
+    lock(&bench.rig).stage_enable(0, true);
+    // 168 MHz by the crystal: APB1 at 42 and its timers at 84, APB2 at 84
+    bench.write(0x4002_3C00, 5);
+    bench.write(0x4002_3800, 1 << 16 | 0x83);
+    bench.pass_until(10 * MS);
+    bench.write(0x4002_3804, 0x2740_2A04);
+    bench.write(0x4002_3800, 1 << 24 | 1 << 16 | 0x83);
+    bench.pass_until(20 * MS);
+    bench.write(0x4002_3808, 5 << 10 | 4 << 13 | 2);
+    // PWM mode 1 on channel 1: a tenth
+    for (register, value) in [
+        (0x2C, 4099),
+        (0x34, 410),
+        (0x18, 0b1101 << 3),
+        (0x20, 1),
+        (0x14, 1),
+        (0x00, 0x81),
+    ] {
+        bench.write(TIM3 + register, value);
+    }
+    // the converters at 84 MHz / 8; 480 cycles of channel 3, on and on, to a ring
+    for (register, value) in [
+        (DMA + 0x18, ADC + 0x4C),
+        (DMA + 0x1C, RAM),
+        (DMA + 0x14, CONVERSIONS as u64),
+        (DMA + 0x10, 0x2D01),
+        (ADC + 0x304, 3 << 16),
+        (ADC + 0x10, 7 << 9),
+        (ADC + 0x34, 3),
+        (ADC + 0x08, 0x303),
+        (ADC + 0x08, 1 << 30 | 0x303),
+    ] {
+        bench.write(register, value);
+    }
+    let mut rings = Vec::new();
+    for _ in 0..40 {
+        bench.pass_until(bench.now + 24 * 4100 * 1000 / 84);
+        rings.push(bench.ram.0.values().copied().collect::<Vec<_>>());
+    }
+    assert_eq!(bench.ram.0.len(), CONVERSIONS);
+    let mean = |codes: &mut dyn Iterator<Item = u16>| {
+        let codes: Vec<u16> = codes.collect();
+        codes.iter().map(|code| f64::from(*code)).sum::<f64>() / codes.len() as f64
+    };
+    let rings = &rings[2..];
+    let truth = {
+        let mut rig = lock(&bench.rig);
+        let from = bench.now;
+        mean(&mut (0..1000).map(|reading| {
+            rig.world().advance_to(from + reading * 1000);
+            rig.world().motor_adc()
+        }))
+    };
+    let of_ring = mean(&mut rings.iter().flatten().copied());
+    // 25 places leave up to 0.45 mA, which are 0.55 counts; the rest is noise
+    assert!((of_ring - truth).abs() < 0.8, "{of_ring} of {truth}");
+    // and each place of it is the current of one place in the period: 203 mA from the least to the most
+    let places = (0..CONVERSIONS).map(|at| mean(&mut rings.iter().map(|ring| ring[at])));
+    let (least, most) = places.fold((f64::MAX, 0.0), |(least, most), code| {
+        (f64::min(least, code), f64::max(most, code))
+    });
+    let swing_a = (most - least) * 3.3 / 4096.0;
+    assert!((swing_a - 0.203).abs() < 0.02, "{swing_a} A");
 }
 
 /// A transfer over SPI1 with chip select; the answer, and from when to when chip select was low.

@@ -27,6 +27,12 @@ pub enum Rule {
     TwoPins,
     /// Convert a channel whose pin is not analog.
     NotAnalog,
+    /// Start a converter that was switched on less than 3 us ago, or is off.
+    Unsteady,
+    /// Have a converter ask for DMA only up to the last place of a ring.
+    RequestsEnd,
+    /// Run a converter faster than it may.
+    ConverterClock,
     /// Start a DMA stream for a request that is not wired to it.
     DmaRequest,
     /// Have DMA use memory that it does not reach.
