@@ -42,9 +42,13 @@ assign_resources! {
         encoder: TIM4,
         encoder_a: PD12,
         encoder_b: PD13,
+    }
+    /// Of the stage's motor.
+    current: Current {
         adc: ADC1,
+        stream: DMA2_CH0,
         /// 1 V/A about half of 3.3 V.
-        current: PA3,
+        pin: PA3,
     }
     /// Normally closed to ground: high is pressed, or a broken wire.
     switches: Switches {

@@ -1,5 +1,6 @@
-//! What only this chip can do: its flash, its timers' lever, its last acts, and the core's kernels in its assembly.
+//! What only this chip can do: its flash, its timers' lever, its converter's motor current, its last acts, and the core's kernels in its assembly.
 mod confusion_kernel;
+pub(crate) mod current;
 mod decision_kernels;
 mod dsp_kernels;
 pub(crate) mod flash;

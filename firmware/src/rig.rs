@@ -63,6 +63,6 @@ pub async fn rig(thread: Spawner) {
     let slots = ACQUIRE.start(interrupt::UART4);
     slots.spawn(only(acquire::acquire(r.acquire, words_in)));
     SERVO.start(interrupt::UART5).spawn(only(servo::servo(
-        r.lever, r.stage, r.switches, r.watchdog, words_out, samples_in,
+        r.lever, r.stage, r.current, r.switches, r.watchdog, words_out, samples_in,
     )));
 }

@@ -70,6 +70,7 @@ pub async fn selftest() {
         rig(
             r.lever,
             r.stage,
+            r.current,
             r.switches,
             touch,
             well,

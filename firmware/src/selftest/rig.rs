@@ -3,9 +3,7 @@
 use core::sync::atomic::Ordering::Relaxed;
 
 use embassy_stm32::Peri;
-use embassy_stm32::adc::{Adc, SampleTime};
 use embassy_stm32::gpio::{AnyPin, Input, Level, Output, OutputType, Pull, Speed};
-use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::qei::Qei;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
 use embassy_time::Timer;
@@ -15,11 +13,14 @@ use tactus_core::rig::stage::StageConstants;
 use super::account::{Account, wait_us};
 use super::sensor::{Spread, Touch};
 use crate::board;
+use crate::chip::current::{self, Current};
 use crate::chip::lever::Lever;
 use crate::chip::rescue;
 
 /// The current amplifier's zero is half of the reference, 2048; this is far beyond what its resistors can do.
 const ZERO_COUNTS: f32 = 60.0;
+/// Rings of conversions at rest: a thousand of them.
+const AT_REST: u32 = 40;
 /// 13 mA; the slowest slide draws 40.
 const CURRENT_NOISE_COUNTS: f32 = 16.0;
 /// 2 mm of the lever.
@@ -53,6 +54,7 @@ struct Switches {
 pub(super) async fn rig(
     lever: board::Lever,
     stage: board::Stage,
+    converter: board::Current,
     switches: board::Switches,
     mut touch: Touch,
     well: bool,
@@ -73,7 +75,7 @@ pub(super) async fn rig(
         None,
         None,
         None,
-        Hertz::khz(20),
+        current::PWM,
         Default::default(),
     );
     let mut pwm = pwm.ch1();
@@ -88,20 +90,30 @@ pub(super) async fn rig(
         stage.encoder_b,
         Default::default(),
     );
-    let mut adc = Adc::new(stage.adc);
-    let mut current_pin = stage.current;
-
-    let mut current = Spread::default();
-    for _ in 0..1000 {
-        current.add(adc.blocking_read(&mut current_pin, SampleTime::CYCLES56));
-        wait_us(20);
-    }
-    account.check(
-        (current.mean() - 2048.0).abs() <= ZERO_COUNTS && current.rms() <= CURRENT_NOISE_COUNTS,
-        "motor current at rest",
-        format_args!("{:.0} counts, noise {:.1} rms", current.mean(), current.rms()),
-        "2048 +- 60 and below 16 rms are right. The amplifier's output belongs to PA3, its reference to half of 3.3 V",
-    );
+    let mut converter = Current::new(converter);
+    let zero = match conversions(&mut converter, AT_REST) {
+        Ok(current) => {
+            let (mean, rms) = (current.mean(), current.rms());
+            account.check(
+                (mean - 2048.0).abs() <= ZERO_COUNTS && rms <= CURRENT_NOISE_COUNTS,
+                "motor current at rest",
+                format_args!("{mean:.0} counts, noise {rms:.1} rms"),
+                "2048 +- 60 and below 16 rms are right. The amplifier's output belongs to PA3, its reference to half of 3.3 V",
+            );
+            mean
+        }
+        Err(why) => {
+            account.check(
+                false,
+                "motor current at rest",
+                why,
+                "The chip's converter stands: start it again; if it stays so replace the board",
+            );
+            account.leave_out("lever", why);
+            account.leave_out("stage", why);
+            return;
+        }
+    };
 
     let mut closed = true;
     for (name, input) in [
@@ -182,15 +194,9 @@ pub(super) async fn rig(
         right.set_level((duty > 0.0).into());
         pwm.set_duty_cycle((libm::fabsf(duty) * full as f32) as u32);
     };
-    // once in each of the 50 us of the PWM's period
-    let zero = current.mean();
     let mut current_a = || {
-        let mut current = Spread::default();
-        for _ in 0..50 {
-            current.add(adc.blocking_read(&mut current_pin, SampleTime::CYCLES56));
-            wait_us(33);
-        }
-        (current.mean() - zero) * (3.3 / 4096.0)
+        let current = conversions(&mut converter, 1)?;
+        Ok(current::amperes(current.mean()) - current::amperes(zero))
     };
     bridge.set_high();
     let mut count: i32 = 0;
@@ -245,6 +251,19 @@ pub(super) async fn rig(
     }
     rescue::ARMED.store(false, Relaxed);
     blue.set_low();
+}
+
+/// Conversions of so many rings, one after the other: each begins after the call.
+fn conversions(converter: &mut Current, rings: u32) -> Result<Spread, &'static str> {
+    let mut found = Spread::default();
+    for _ in 0..rings {
+        wait_us(1000 * current::RING_MS as u32);
+        let ring = converter.ring();
+        for code in ring.ok_or("the motor's current is not converted")? {
+            found.add(code);
+        }
+    }
+    Ok(found)
 }
 
 fn level(input: &Input<'_>) -> &'static str {
@@ -340,7 +359,7 @@ async fn move_stage(
     mut duty: f32,
     drive: &mut impl FnMut(f32),
     position_mm: &mut impl FnMut() -> f32,
-    current_a: &mut impl FnMut() -> f32,
+    current_a: &mut impl FnMut() -> Result<f32, &'static str>,
     switches: &Switches,
 ) -> Result<Moved, &'static str> {
     let from_mm = position_mm();
@@ -371,7 +390,10 @@ async fn move_stage(
             );
         }
         if ms == STEP_MS {
-            weak = moved_mm <= 0.0 && current_a() * direction < WEAK_A;
+            weak = match current_a() {
+                Ok(now_a) => moved_mm <= 0.0 && now_a * direction < WEAK_A,
+                Err(why) => break Err(why),
+            };
         }
         if weak && ms % STEP_MS == 0 && moved_mm <= 0.0 {
             duty += STEP_DUTY * direction;
@@ -391,5 +413,9 @@ async fn move_stage(
     let braking_a = current_a();
     Timer::after_millis(200).await;
     let mm = position_mm() - from_mm;
-    done.map(|()| Moved { mm, braking_a })
+    done?;
+    Ok(Moved {
+        mm,
+        braking_a: braking_a?,
+    })
 }

@@ -5,17 +5,14 @@ use core::sync::atomic::Ordering::Relaxed;
 use core::sync::atomic::{AtomicBool, AtomicU32};
 
 use embassy_stm32::Peri;
-use embassy_stm32::adc::{Adc, SampleTime};
 use embassy_stm32::gpio::{AnyPin, Input, Level, Output, OutputType, Pull, Speed};
-use embassy_stm32::pac::ADC1;
-use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::qei::Qei;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use embassy_time::{Duration, Ticker};
+use embassy_time::{Duration, Ticker, Timer};
 use heapless::spsc::{Consumer, Producer};
 use tactus_core::probe::RigState;
 use tactus_core::probe::servo_rig::{RigCommand, Samples};
@@ -29,8 +26,9 @@ use tactus_core::sensor::pressure::Calibration;
 
 use super::acquire::Word;
 use super::link::Body;
+use crate::board;
+use crate::chip::current::{self, Current};
 use crate::chip::{lever, rescue};
-use crate::{board, chip};
 
 /// Samples on their way to the features: a quarter of a second.
 pub(crate) const SAMPLES: usize = 256;
@@ -71,9 +69,6 @@ const HUNG_MS: u32 = 2000;
 const STUCK_LIMIT_MS: u32 = 30_000;
 /// Without a conversion of the motor's current for so many ms the motor is not driven on.
 const NO_CURRENT_MS: u32 = 10;
-/// Looks at a conversion that began 3.2 us ago, and cycles between two: 9 us.
-const LOOKS: u32 = 50;
-const LOOK_CYCLES: u32 = 30;
 /// Without the servo for this long the chip starts again.
 const WATCHDOG_US: u32 = 100_000;
 
@@ -138,33 +133,6 @@ pub(crate) static BODY: Body = Body {
     lost: || LOST.load(Relaxed),
 };
 
-/// Begins a conversion of the motor's current.
-fn convert() {
-    ADC1.cr2().modify(|w| {
-        // it is on, unless a disturbance has switched it off
-        w.set_adon(true);
-        w.set_swstart(true);
-    });
-}
-
-/// What came of the conversion, A; `None` if it is not over in time.
-fn converted() -> Option<f32> {
-    for _ in 0..LOOKS {
-        if ADC1.sr().read().eoc() {
-            // which clears EOC
-            return Some(amperes(ADC1.dr().read().data()));
-        }
-        // a look costs the emulator more than these few instructions
-        chip::wait_cycles(LOOK_CYCLES);
-    }
-    None
-}
-
-/// Amperes of the stage's motor by the amplifier's 12 bits over 3.3 V: 1 V/A about 2048.
-fn amperes(adc: u16) -> f32 {
-    (f32::from(adc) - 2048.0) * (3.3 / 4096.0)
-}
-
 struct Switches {
     lever_top: Input<'static>,
     stage_left: Input<'static>,
@@ -176,11 +144,13 @@ struct Switches {
 pub(crate) async fn servo(
     lever: board::Lever,
     stage: board::Stage,
+    current: board::Current,
     switches: board::Switches,
     watchdog: board::Watchdog,
     mut words: Consumer<'static, Word>,
     mut samples: Producer<'static, Samples>,
 ) {
+    let mut current = Current::new(current);
     let mut lever = lever::Lever::new(lever);
     let mut pwm = SimplePwm::new(
         stage.timer,
@@ -188,7 +158,7 @@ pub(crate) async fn servo(
         None,
         None,
         None,
-        Hertz::khz(20),
+        current::PWM,
         Default::default(),
     );
     let mut pwm = pwm.ch1();
@@ -202,9 +172,6 @@ pub(crate) async fn servo(
         stage.encoder_b,
         Default::default(),
     );
-    let mut adc = Adc::new(stage.adc);
-    // Chooses the channel and how long it is sampled; the driver would wait for every conversion where it is started.
-    adc.blocking_read(&mut { stage.current }, SampleTime::CYCLES56);
     let switch = |pin: Peri<'static, AnyPin>| Input::new(pin, Pull::Up);
     let switches = Switches {
         lever_top: switch(switches.lever_top.into()),
@@ -221,11 +188,10 @@ pub(crate) async fn servo(
     let mut count: i32 = 0;
     let mut hung = None;
     let (mut current_a, mut no_current_ms) = (0.0, 0);
+    Timer::after_millis(current::RING_MS).await;
     let mut ticker = Ticker::every(Duration::from_millis(1));
     loop {
         ticker.next().await;
-        // read below, some 3.2 us later
-        convert();
         if STOP.swap(false, Relaxed) {
             control.stop();
         }
@@ -262,7 +228,7 @@ pub(crate) async fn servo(
             switches.stage_right.is_high(),
         );
         inputs.e_stop = switches.e_stop.is_high();
-        if let Some(now_a) = converted() {
+        if let Some(now_a) = current.amperes() {
             (current_a, no_current_ms) = (now_a, 0);
         } else {
             // the last one stands for it, and the slide does not count

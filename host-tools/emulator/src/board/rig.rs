@@ -50,7 +50,6 @@ pub struct Rig {
     duty_timer: f64,
     duty_port: Option<bool>,
     wave: Option<Wave>,
-    ripples: bool,
     stage_up: bool,
     lever_down: bool,
     lever_enabled: bool,
@@ -102,7 +101,6 @@ impl Rig {
             duty_timer: 0.0,
             duty_port: Some(false),
             wave: None,
-            ripples: false,
             stage_up: false,
             lever_down: false,
             lever_enabled: false,
@@ -234,18 +232,11 @@ impl Rig {
         self.wave = wave;
     }
 
-    /// From now on the converter sees how the motor's current swings with the PWM, as it does on a bench.
-    pub fn ripple(&mut self) {
-        self.ripples = true;
-    }
-
     /// What the converter reads of the motor's current.
     pub(super) fn motor_adc(&mut self, now_ns: u64) -> u16 {
         self.advance_to(now_ns);
         // a port's level does not swing
-        let by_timer = self
-            .wave
-            .filter(|_| self.ripples && self.duty_port.is_none());
+        let by_timer = self.wave.filter(|_| self.duty_port.is_none());
         match by_timer.and_then(|wave| wave.phase(now_ns)) {
             Some(phase) => self.world.motor_adc_within(phase),
             None => self.world.motor_adc(),

@@ -167,25 +167,27 @@ fn a_bus_that_goes_off_costs_a_word_and_not_the_watchdogs_patience() {
     lasting.assert_lifted();
 }
 
-/// One conversion that does not come is a lost sample; without any the motor is not driven on.
+/// A converter that stops, or its DMA, is started anew and costs samples; where that does not help the motor is not driven on.
 #[test]
 fn a_converter_that_goes_off_costs_a_sample_and_not_the_watchdogs_patience() {
     let Some(elf) = elf() else { return };
-    let once = upset(&elf, Switch::Adc1, false);
-    assert_eq!(once.rebooted, None, "it hung");
-    assert!(once.ended.is_ok(), "{:?}", once.ended);
-    once.assert_lifted();
-    let lasting = upset(&elf, Switch::Adc1, true);
-    let words = lasting
-        .rebooted
-        .as_ref()
-        .and_then(|(_, words)| words.as_ref());
-    assert!(
-        words.is_some_and(|words| words.contains("current")),
-        "it hung"
-    );
-    assert!(lasting.braked_ms.is_some_and(|ms| ms < 14.0));
-    lasting.assert_lifted();
+    for switch in [Switch::Adc1, Switch::Dma2] {
+        let once = upset(&elf, switch, false);
+        assert_eq!(once.rebooted, None, "it hung");
+        assert!(once.ended.is_ok(), "{:?}", once.ended);
+        once.assert_lifted();
+        let lasting = upset(&elf, switch, true);
+        let words = lasting
+            .rebooted
+            .as_ref()
+            .and_then(|(_, words)| words.as_ref());
+        assert!(
+            words.is_some_and(|words| words.contains("current")),
+            "it hung"
+        );
+        assert!(lasting.braked_ms.is_some_and(|ms| ms < 14.0));
+        lasting.assert_lifted();
+    }
 }
 
 /// The store is opened while the finger is lifted and homed, and waits for an erase that is never over. A write to the flash's

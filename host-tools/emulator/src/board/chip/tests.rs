@@ -208,7 +208,6 @@ fn the_converter_sees_the_ripple_of_the_current_and_its_mean_over_whole_periods(
     const DMA: u64 = 0x4002_6400;
     const CONVERSIONS: usize = 25;
     let mut bench = Bench::new();
-    lock(&bench.rig).ripple();
     lock(&bench.rig).world().inject(Fault::StageJammed);
     lock(&bench.rig).stage_port(0, None);
     lock(&bench.rig).stage_dir(0, true);
