@@ -251,8 +251,12 @@ mod tests {
                 continue;
             };
             all += 1;
-            let mut judged = (1..=MAX_SLIDES)
-                .map(|n| (n, judge::<Plain>(table, &measured[..n], None).unwrap().0));
+            let mut judged = (1..=MAX_SLIDES).map(|n| {
+                (
+                    n,
+                    judge::<Plain>(table, &measured[..n], None, None).unwrap().0,
+                )
+            });
             let (n, judged) = judged.find(|(_, judged)| !judged.open).unwrap();
             made += n;
             let is = judged.leading[0].0 == index;
@@ -333,8 +337,8 @@ mod tests {
             let Ok((measured, _)) = slides(other.setup(texture, 1), Manner::default(), 5) else {
                 continue;
             };
-            let mut judged =
-                (1..=MAX_SLIDES).map(|n| judge::<Plain>(read, &measured[..n], None).unwrap().0);
+            let mut judged = (1..=MAX_SLIDES)
+                .map(|n| judge::<Plain>(read, &measured[..n], None, None).unwrap().0);
             let judged = judged.find(|judged| !judged.open).unwrap();
             all += 1;
             new += usize::from(judged.unknown);

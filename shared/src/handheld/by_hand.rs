@@ -4,7 +4,7 @@
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::jobs::{Outcome, work};
-use super::judge::{Judgement, LEADING, MOVEMENT};
+use super::judge::{Judgement, MOVEMENT};
 use super::screen::{About, Screen};
 use super::states::{Answer, Asked, Handheld, Job, TICKS_HZ};
 use crate::dsp;
@@ -19,7 +19,6 @@ use crate::sensor::pressure::Pressure;
 use crate::store::Store;
 use crate::table::{Name, Table};
 use crate::wire::{Command, Event, Failure, Prompt, Request};
-use heapless::Vec;
 
 /// Ticks from one picture to the next: 20 a second.
 const PICTURE: u32 = TICKS_HZ / 20;
@@ -366,41 +365,43 @@ impl<H: Hand, K: Kernels> RigHandle for ByHand<'_, H, K> {
 #[derive(Debug)]
 pub struct Shown<E> {
     to: E,
-    /// The most probable textures after the last slide.
-    leading: Vec<(u16, f32), LEADING>,
-    /// Whether the verdict is sure, and whether the texture is changed or unknown.
-    verdict: Option<(bool, bool, bool)>,
+    judgement: Judgement,
+    /// There was a verdict.
+    told: bool,
 }
 
 impl<E: Events> Shown<E> {
     /// Hands everything on to `to`.
-    pub const fn new(to: E) -> Self {
+    pub fn new(to: E) -> Self {
         Self {
             to,
-            leading: Vec::new(),
-            verdict: None,
+            judgement: Judgement::default(),
+            told: false,
         }
     }
 
     /// The verdict that was told, once.
     fn judgement(&mut self) -> Option<Judgement> {
-        let (sure, changed, unknown) = self.verdict.take()?;
-        Some(Judgement {
-            leading: core::mem::take(&mut self.leading),
-            sure,
-            changed,
-            unknown,
-            open: false,
-        })
+        core::mem::take(&mut self.told).then(|| core::mem::take(&mut self.judgement))
     }
 }
 
 impl<E: Events> Events for Shown<E> {
     fn tell(&mut self, event: Event) {
+        let judgement = &mut self.judgement;
         match &event {
-            Event::SlideReport { posterior, .. } => self.leading = super::judge::leading(posterior),
+            Event::SlideReport { posterior, .. } => {
+                judgement.leading = super::judge::leading(posterior);
+            }
             Event::Verdict(verdict) => {
-                self.verdict = Some((verdict.sure, verdict.changed, verdict.unknown))
+                judgement.sure = verdict.sure;
+                judgement.changed = verdict.changed;
+                judgement.unknown = verdict.unknown;
+                self.told = true;
+            }
+            Event::Verified { now, .. } => {
+                judgement.answered(now.answer);
+                self.told = true;
             }
             _ => {}
         }
@@ -437,6 +438,9 @@ pub async fn step<H, K, F, B, E>(
         ..
     } = probe;
     rig.tick().await;
+    if let Some(same) = rig.handheld.go() {
+        events.go(same);
+    }
     let job = rig.handheld.job();
     let due = job.is_some() || rig.ticks.is_multiple_of(PICTURE);
     if due && rig.handheld.is_new() {
@@ -489,7 +493,7 @@ where
     probe.rig.asked = slides;
     probe.rig.pause();
     probe.rig.serves = true;
-    probe.events.verdict = None;
+    probe.events.told = false;
     let before = probe.memory.table().ok().map(|table| table.crc());
     let done = probe.perform::<K>(&request.command).await;
     let table = probe.memory.table().ok();
@@ -504,7 +508,10 @@ where
     }
     match (&done, trains, probe.events.judgement()) {
         (Ok(()), Some(name), _) => rig.handheld.trained(name),
-        (Ok(()), None, Some(judgement)) => rig.handheld.told(judgement),
+        (Ok(()), None, Some(judgement)) => {
+            let compared = matches!(request.command, Command::Verify(_));
+            rig.handheld.told(judgement, compared);
+        }
         _ => {}
     }
     rig.heed();

@@ -5,16 +5,15 @@
 
 use core::fmt::Write as _;
 
-use embedded_graphics::Drawable;
 use embedded_graphics::draw_target::DrawTarget;
 use embedded_graphics::geometry::{Point, Size};
-use embedded_graphics::mono_font::ascii::{FONT_6X10, FONT_7X13_BOLD, FONT_10X20};
-use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
 use embedded_graphics::pixelcolor::BinaryColor;
 use embedded_graphics::primitives::Rectangle;
-use embedded_graphics::text::{Alignment, Baseline, Text as Writing, TextStyleBuilder};
 use heapless::String;
 
+mod letters;
+
+use self::letters::{Anchor, BOLD, Font, LARGE, SMALL};
 use super::guidance::{Again, ZONE_MN};
 use super::screen::{About, Entry, Row, Screen, Trouble, first_line};
 use super::spelling::{Place, WHEEL};
@@ -58,39 +57,33 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
     fn write(
         &mut self,
         text: &str,
-        at: Point,
-        font: &MonoFont<'_>,
-        alignment: Alignment,
+        x: i32,
+        y: i32,
+        font: &Font,
+        anchor: Anchor,
         inverted: bool,
     ) -> Done<D> {
-        let style = TextStyleBuilder::new()
-            .alignment(alignment)
-            .baseline(Baseline::Top)
-            .build();
-        let character = MonoTextStyle::new(font, ink(inverted));
-        Writing::with_text_style(text, at, character, style).draw(self.0)?;
-        Ok(())
+        letters::write(self.0, text, (x, y), font, anchor, ink(inverted))
     }
 
     fn left(&mut self, text: &str, x: i32, y: i32) -> Done<D> {
-        self.write(text, Point::new(x, y), &FONT_6X10, Alignment::Left, false)
+        self.write(text, x, y, &SMALL, Anchor::Left, false)
     }
 
     fn right(&mut self, text: &str, y: i32) -> Done<D> {
-        let at = Point::new(WIDTH, y);
-        self.write(text, at, &FONT_6X10, Alignment::Right, false)
+        self.write(text, WIDTH, y, &SMALL, Anchor::Right, false)
     }
 
-    fn centre(&mut self, text: &str, y: i32, font: &MonoFont<'_>) -> Done<D> {
-        self.write(text, Point::new(MIDDLE, y), font, Alignment::Center, false)
+    fn centre(&mut self, text: &str, y: i32, font: &Font) -> Done<D> {
+        self.write(text, MIDDLE, y, font, Anchor::Middle, false)
     }
 
     /// In the middle, in the largest of three fonts that it fits.
     fn headline(&mut self, text: &str, y: i32) -> Done<D> {
         match text.chars().count() {
-            0..=12 => self.centre(text, y, &FONT_10X20),
-            13..=18 => self.centre(text, y + 3, &FONT_7X13_BOLD),
-            _ => self.centre(&cut(text, 21), y + 5, &FONT_6X10),
+            0..=12 => self.centre(text, y, &LARGE),
+            13..=18 => self.centre(text, y + 3, &BOLD),
+            _ => self.centre(&cut(text, 21), y + 5, &SMALL),
         }
     }
 
@@ -134,9 +127,8 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
     /// Where one is.
     fn title(&mut self, title: &str, right: &str) -> Done<D> {
         self.fill(0, 0, WIDTH, 12, false)?;
-        self.write(title, Point::new(3, 1), &FONT_6X10, Alignment::Left, true)?;
-        let at = Point::new(WIDTH - 3, 1);
-        self.write(right, at, &FONT_6X10, Alignment::Right, true)
+        self.write(title, 3, 1, &SMALL, Anchor::Left, true)?;
+        self.write(right, WIDTH - 3, 1, &SMALL, Anchor::Right, true)
     }
 
     /// What the button does: pressed, and held.
@@ -210,6 +202,17 @@ fn count(slide: u8, of: u8) -> String<40> {
     }
 }
 
+/// The leading texture, if it is that.
+fn perhaps(rows: &[Row<'_>]) -> String<40> {
+    let name = rows.first().map_or("?", |row| row.name);
+    say(format_args!("{}?", cut(name, 20)))
+}
+
+/// A name in a line of its own.
+fn below(name: &str) -> String<40> {
+    say(format_args!(" {}", cut(name, 20)))
+}
+
 /// Writes a short text.
 fn say(text: core::fmt::Arguments<'_>) -> String<40> {
     let mut said = String::new();
@@ -228,8 +231,8 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
         Screen::Dark => Ok(()),
         Screen::Air => {
             brush.title("Tactus", "")?;
-            brush.centre("Hold it", 18, &FONT_10X20)?;
-            brush.centre("in the air", 38, &FONT_10X20)
+            brush.centre("Hold it", 18, &LARGE)?;
+            brush.centre("in the air", 38, &LARGE)
         }
         Screen::Ready { textures } => brush.ready(*textures),
         Screen::Press {
@@ -245,7 +248,7 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
                 mn if mn > *ZONE_MN.end() => "Lighter",
                 _ => "Hold still",
             };
-            brush.centre(order, 15, &FONT_10X20)?;
+            brush.centre(order, 15, &LARGE)?;
             brush.force(*force_mn, 42)
         }
         Screen::Slide {
@@ -263,15 +266,15 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
                 0 => brush.title("Tactus", "")?,
                 _ => brush.title("Good", &say(format_args!("slide {slide}")))?,
             }
-            brush.centre("Lift", 18, &FONT_10X20)?;
-            brush.centre("the finger", 38, &FONT_10X20)
+            brush.centre("Lift", 18, &LARGE)?;
+            brush.centre("the finger", 38, &LARGE)
         }
         Screen::Weigh { mn, force_mn } => {
             brush.title("Calibrate", "keep still")?;
-            brush.centre("Put on", 13, &FONT_10X20)?;
+            brush.centre("Put on", 13, &LARGE)?;
             // what is written on weights
             let grams = (u32::from(*mn) * 1000 + 4903) / 9807;
-            brush.centre(&say(format_args!("{grams} g")), 32, &FONT_10X20)?;
+            brush.centre(&say(format_args!("{grams} g")), 32, &LARGE)?;
             let reads = *force_mn as u16;
             let reads = say(format_args!(
                 "{}.{:02} N, reads {}.{:02}",
@@ -280,7 +283,7 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
                 reads / 1000,
                 reads % 1000 / 10
             ));
-            brush.centre(&reads, 54, &FONT_6X10)
+            brush.centre(&reads, 54, &SMALL)
         }
         Screen::Again { why, lift } => {
             brush.title("Again", "")?;
@@ -292,10 +295,10 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
                 Again::Disturbed => ("A sample was lost", ""),
             };
             if *lift {
-                return brush.centre("Lift the finger", 46, &FONT_7X13_BOLD);
+                return brush.centre("Lift the finger", 46, &BOLD);
             }
-            brush.centre(first, 40, &FONT_6X10)?;
-            brush.centre(second, 51, &FONT_6X10)
+            brush.centre(first, 40, &SMALL)?;
+            brush.centre(second, 51, &SMALL)
         }
         Screen::Thinking { slide } => {
             brush.title("Thinking", &say(format_args!("slide {slide}")))?;
@@ -305,37 +308,60 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             Ok(())
         }
         Screen::Verdict { rows, sure } => {
-            let name = rows.first().map_or("?", |row| row.name);
             if *sure {
-                brush.headline(name, -1)?;
+                brush.headline(rows.first().map_or("?", |row| row.name), -1)?;
             } else {
-                brush.headline(&say(format_args!("{}?", cut(name, 20))), -1)?;
+                brush.headline(&perhaps(rows), -1)?;
             }
             brush.rows(rows, 20)?;
             brush.button("next", "teach")
         }
         Screen::Changed { rows } => {
-            let name = rows.first().map_or("?", |row| row.name);
-            brush.headline(&say(format_args!("{}?", cut(name, 20))), -1)?;
-            brush.left("Feels like it, but", 1, 19)?;
-            brush.left("not as I learned it.", 1, 30)?;
-            brush.left("Is it the same one?", 1, 41)?;
+            brush.headline(&perhaps(rows), -1)?;
+            let like = "Feels like it, but";
+            brush.lines([like, "not as I learned it.", "Is it the same one?"])?;
             brush.button("no", "yes")
         }
         Screen::Unknown { like } => {
             brush.headline("Unknown", -1)?;
-            brush.left("None of those I know.", 1, 19)?;
-            brush.left("The nearest one is", 1, 30)?;
-            let name = like.first().map_or("?", |row| row.name);
-            brush.left(&cut(name, 20), 7, 41)?;
+            let nearest = below(like.first().map_or("?", |row| row.name));
+            brush.lines(["None of those I know.", "The nearest one is", &nearest])?;
             brush.button("next", "teach")
         }
-        Screen::Choose { at, count, entries } => brush.choose(*at, *count, entries),
+        Screen::Compared {
+            name,
+            same,
+            open,
+            trials,
+        } => {
+            // fewer than `ENOUGH_TRIALS` are told
+            let next = match trials {
+                1 => "learned from 1 slide",
+                2 => "learned from 2 slides",
+                _ => "Touch the next one.",
+            };
+            let may = "It may or may not be";
+            let (is, how, hint) = match (same, open) {
+                (Some(true), _) => ("Same", "It feels like", next),
+                (Some(false), _) => ("Different", "It does not feel like", next),
+                (None, true) => ("Not sure yet", may, "Slide again."),
+                (None, false) => ("Not sure", may, "The slides cannot say"),
+            };
+            brush.headline(is, -1)?;
+            brush.lines([how, &below(name), hint])?;
+            brush.button("end", "other")
+        }
+        Screen::Choose {
+            title,
+            at,
+            count,
+            entries,
+        } => brush.choose(title, *at, *count, entries),
         Screen::Spell { text, wheel } => brush.spell(text, wheel),
         Screen::Saving => {
             brush.title("Teach", "")?;
             brush.headline("Learning", 18)?;
-            brush.centre("Leave it on", 42, &FONT_6X10)
+            brush.centre("Leave it on", 42, &SMALL)
         }
         Screen::Learned(Ok(name)) => {
             brush.title("Learned", "")?;
@@ -349,11 +375,7 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             }
             Ok(())
         }
-        Screen::Learned(Err(why)) => {
-            brush.title("Not learned", "")?;
-            brush.paragraph(why, 14, 4)?;
-            brush.button("go on", "")
-        }
+        Screen::Learned(Err(why)) => brush.sentence("Not learned", why),
         Screen::Fault(trouble) => brush.fault(trouble),
         Screen::About(about) => brush.about_probe(about),
         Screen::Calibrated(Ok(scale)) => {
@@ -362,14 +384,10 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             let hundredths = libm::roundf(100.0 * scale) as u16;
             let (whole, rest) = (hundredths / 100, hundredths % 100);
             let scale = say(format_args!("{whole}.{rest:02} mN a count"));
-            brush.centre(&scale, 40, &FONT_6X10)?;
+            brush.centre(&scale, 40, &SMALL)?;
             brush.button("go on", "")
         }
-        Screen::Calibrated(Err(why)) => {
-            brush.title("Force not set", "")?;
-            brush.paragraph(why, 14, 4)?;
-            brush.button("go on", "")
-        }
+        Screen::Calibrated(Err(why)) => brush.sentence("Force not set", why),
     }
 }
 
@@ -390,17 +408,16 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         {
             self.fill(x + step, 49 - step, 1, 1, false)?;
         }
-        let at = |y| Point::new(44, y);
-        self.write("Press", at(13), &FONT_10X20, Alignment::Left, false)?;
-        self.write("and hold", at(31), &FONT_10X20, Alignment::Left, false)?;
-        self.button("about", "teach")
+        self.write("Press", 44, 13, &LARGE, Anchor::Left, false)?;
+        self.write("and hold", 44, 31, &LARGE, Anchor::Left, false)?;
+        self.button("menu", "teach")
     }
 
     /// How far the slide is, and how far it ought to be: 5 cm while the bar fills.
     fn pace(&mut self, progress: Option<f32>, force_mn: f32) -> Done<D> {
         let Some(progress) = progress else {
-            self.centre("Slide", 12, &FONT_10X20)?;
-            return self.centre("5 cm in 2 s", 31, &FONT_6X10);
+            self.centre("Slide", 12, &LARGE)?;
+            return self.centre("5 cm in 2 s", 31, &SMALL);
         };
         let end = 10 + (107.0 * progress.clamp(0.0, 1.0)) as i32;
         self.fill(0, 26, WIDTH, 3, false)?;
@@ -415,12 +432,12 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
             mn if mn > *ZONE_MN.end() => "press lighter",
             _ => "keep going",
         };
-        self.centre(order, 34, &FONT_6X10)
+        self.centre(order, 34, &SMALL)
     }
 
-    fn choose(&mut self, at: u16, count: u16, entries: &[Entry<'_>]) -> Done<D> {
+    fn choose(&mut self, title: &str, at: u16, count: u16, entries: &[Entry<'_>]) -> Done<D> {
         let place = say(format_args!("{} of {count}", at.saturating_add(1)));
-        self.title("What is it?", &place)?;
+        self.title(title, &place)?;
         let first = first_line(at, count);
         for ((entry, number), y) in entries.iter().zip(first..).zip((13..).step_by(10)) {
             let chosen = number == at;
@@ -428,26 +445,17 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
                 self.fill(0, y - 1, WIDTH, 10, false)?;
             }
             let text = match entry {
-                Entry::Known(name) => cut(name, 21),
+                Entry::Text(text) => cut(text, 21),
                 Entry::Numbered(name) => say(format_args!("new: {name}")),
-                Entry::Spell => say(format_args!("new: spell it")),
-                Entry::Nothing => say(format_args!("nothing, go back")),
             };
-            let place = Point::new(1, y - 1);
-            self.write(&text, place, &FONT_6X10, Alignment::Left, chosen)?;
+            self.write(&text, 1, y - 1, &SMALL, Anchor::Left, chosen)?;
         }
         self.button("next", "take")
     }
 
     fn spell(&mut self, text: &str, wheel: &[Place; WHEEL]) -> Done<D> {
         self.title("Spell it", "")?;
-        self.write(
-            text,
-            Point::new(1, 15),
-            &FONT_7X13_BOLD,
-            Alignment::Left,
-            false,
-        )?;
+        self.write(text, 1, 15, &BOLD, Anchor::Left, false)?;
         let cursor = 1 + 7 * text.chars().count() as i32;
         self.fill(cursor, 29, 6.min(WIDTH - cursor), 2, false)?;
         for (place, n) in wheel.iter().zip(0..) {
@@ -458,37 +466,35 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
             }
             let mut letter: String<4> = String::new();
             let (text, font, y) = match place {
-                Place::Done => ("OK", &FONT_7X13_BOLD, 36),
-                Place::Rub => ("<-", &FONT_7X13_BOLD, 36),
-                Place::Letter(' ') => ("_", &FONT_10X20, 32),
+                Place::Done => ("OK", &BOLD, 36),
+                Place::Rub => ("<-", &BOLD, 36),
+                Place::Letter(' ') => ("_", &LARGE, 32),
                 Place::Letter(c) => {
                     // a letter fits
                     let _ = letter.push(*c);
-                    (letter.as_str(), &FONT_10X20, 33)
+                    (letter.as_str(), &LARGE, 33)
                 }
             };
-            self.write(text, Point::new(x, y), font, Alignment::Center, chosen)?;
+            self.write(text, x, y, font, Anchor::Middle, chosen)?;
         }
         self.button("next", "take")
     }
 
     fn fault(&mut self, trouble: &Trouble) -> Done<D> {
-        self.title("Fault", "")?;
         let (what, first, second) = match trouble {
             Trouble::Silent => ("No sensor", "Check its cable", "and its power"),
             Trouble::Frozen => ("Sensor hangs", "Switch it off", "and on again"),
             Trouble::Memory(why) => {
-                self.paragraph(why, 14, 4)?;
-                return self.button("go on", "");
+                return self.sentence("Fault", why);
             }
         };
+        self.title("Fault", "")?;
         self.triangle(12, 16, 13, true)?;
         self.fill(11, 19, 3, 5, true)?;
         self.fill(11, 26, 3, 2, true)?;
-        let at = Point::new(28, 19);
-        self.write(what, at, &FONT_7X13_BOLD, Alignment::Left, false)?;
-        self.centre(first, 41, &FONT_6X10)?;
-        self.centre(second, 52, &FONT_6X10)
+        self.write(what, 28, 19, &BOLD, Anchor::Left, false)?;
+        self.centre(first, 41, &SMALL)?;
+        self.centre(second, 52, &SMALL)
     }
 
     fn about_probe(&mut self, about: &About) -> Done<D> {
@@ -518,7 +524,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.row("Awake", &both, 32)?;
         let slots = say(format_args!("late {}, lost {}", about.late, about.lost));
         self.row("Slots", &cut(&slots, 15), 42)?;
-        self.button("go on", "set force")
+        self.button("go on", "")
     }
 
     /// A name and its value.
@@ -527,11 +533,26 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.right(value, y)
     }
 
-    /// A sentence over so many lines, broken at blanks.
-    fn paragraph(&mut self, text: &str, y: i32, lines: usize) -> Done<D> {
+    /// Three lines below a headline.
+    fn lines(&mut self, lines: [&str; 3]) -> Done<D> {
+        for (line, y) in lines.iter().zip((19..).step_by(11)) {
+            self.left(line, 1, y)?;
+        }
+        Ok(())
+    }
+
+    /// A sentence, and the button goes on.
+    fn sentence(&mut self, title: &str, text: &str) -> Done<D> {
+        self.title(title, "")?;
+        self.paragraph(text)?;
+        self.button("go on", "")
+    }
+
+    /// A sentence over four lines, broken at blanks.
+    fn paragraph(&mut self, text: &str) -> Done<D> {
         const LETTERS: usize = 21;
         let mut line: String<LETTERS> = String::new();
-        let mut at = (y..).step_by(10).take(lines);
+        let mut at = (14..).step_by(10).take(4);
         for word in text.split(' ') {
             let blank = usize::from(!line.is_empty());
             if line.len() + blank + word.len() > LETTERS && !line.is_empty() {

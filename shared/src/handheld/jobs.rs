@@ -38,13 +38,13 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
     mut log: impl FnMut(Outcome<'_>),
 ) {
     match job {
-        Job::Judge(slides) => {
+        Job::Judge { slides, reference } => {
             let table = match memory.table() {
                 Ok(table) => table,
                 Err(why) => return handheld.memory_failed(words(&why)),
             };
-            let judged =
-                judge::<K>(table, &slides, memory.false_alarm).map(|(judgement, episode)| {
+            let judged = judge::<K>(table, &slides, reference, memory.false_alarm).map(
+                |(judgement, episode)| {
                     if let Some((texture, p)) = judgement.leading.first() {
                         log(Outcome::Judged {
                             slides: slides.len(),
@@ -53,7 +53,8 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
                         });
                     }
                     (judgement, episode)
-                });
+                },
+            );
             match judged {
                 Ok((judgement, episode)) => {
                     memory.episode = Some(episode);

@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 use crate::explorer::{
-    Config, EpisodeSummary, Explorer, ExplorerError, Kernels, Method, ObserveError,
+    Answer, Config, EpisodeSummary, Explorer, ExplorerError, Kernels, Method, ObserveError,
 };
 use crate::features::{FeatureSet, Movement, Observation, PropertySet};
 use crate::probe::consider_fused;
@@ -18,8 +18,9 @@ pub const MAX_SLIDES: usize = 5;
 /// Textures that a verdict shows.
 pub const LEADING: usize = 3;
 
-/// What the probe makes of an episode.
-#[derive(Clone, PartialEq, Debug)]
+/// What the probe makes of an episode. Where the question is whether it is one texture, that is the leading one: it is `sure`
+/// where it is the same, and `unknown` where it is different.
+#[derive(Clone, PartialEq, Debug, Default)]
 pub struct Judgement {
     /// The most probable textures and their probabilities, the first one leading.
     pub leading: Vec<(u16, f32), LEADING>,
@@ -34,6 +35,13 @@ pub struct Judgement {
 }
 
 impl Judgement {
+    /// The question was whether it is the first one, and this is the answer.
+    pub(super) fn answered(&mut self, answer: Answer) {
+        self.sure = answer == Answer::Same;
+        self.unknown = answer == Answer::Different;
+        self.changed = false;
+    }
+
     /// Whether the person is to be asked if it is the first one.
     pub fn is_changed(&self) -> bool {
         self.changed && !self.unknown
@@ -52,16 +60,20 @@ pub enum JudgeError {
     /// The table has no movement.
     #[error("the table has no movement")]
     Movement,
+    /// The table has no limits, by which slides are the same as a texture's or different.
+    #[error("the table has no limits to tell same from different by")]
+    NoLimits,
 }
 
-/// Compares the slides of an episode with every texture of the table. Returns the judgement to show and the summary that
-/// the probe can learn from. The share of false alarms is the table's own, unless given.
+/// Compares the slides of an episode with every texture of the table, or with `reference` alone: is it that one? Returns the
+/// judgement to show and the summary that the probe can learn from. The share of false alarms is the table's own, unless given.
 ///
 /// # Errors
 /// The table is not one for a handheld probe, or a slide lacks a feature.
 pub fn judge<K: Kernels>(
     table: Table<'_>,
     slides: &[Observation],
+    reference: Option<u16>,
     false_alarm: Option<f32>,
 ) -> Result<(Judgement, EpisodeSummary), JudgeError> {
     let config = Config {
@@ -69,10 +81,12 @@ pub fn judge<K: Kernels>(
         max_slides: MAX_SLIDES as u8,
         open: true,
         false_alarm,
+        verify: reference.is_some(),
         ..Config::default()
     };
     let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
-    consider_fused(&mut explorer, PropertySet::default(), config, &[])
+    let among = reference.as_slice();
+    consider_fused(&mut explorer, PropertySet::default(), config, among)
         .map_err(JudgeError::Table)?;
     let action = Action {
         movement: movement(&table).ok_or(JudgeError::Movement)?,
@@ -82,14 +96,18 @@ pub fn judge<K: Kernels>(
         explorer.observe(action, slide).map_err(JudgeError::Slide)?;
     }
     let best = explorer.best();
-    let verdict = explorer.verdict();
-    let judgement = Judgement {
+    let verdict = explorer.end();
+    let mut judgement = Judgement {
         leading: leading(explorer.posterior()),
         sure: verdict.is_some_and(|verdict| verdict.sure),
         unknown: verdict.is_some_and(|verdict| verdict.unknown),
         changed: verdict.is_some_and(|verdict| verdict.changed),
         open: verdict.is_none(),
     };
+    if reference.is_some() {
+        let now = explorer.verification().ok_or(JudgeError::NoLimits)?;
+        judgement.answered(now.answer);
+    }
     let episode = EpisodeSummary {
         table: table.crc(),
         texture: best.texture,
@@ -124,6 +142,11 @@ fn movement(table: &Table<'_>) -> Option<u8> {
         .find(|(movement, _)| *movement == MOVEMENT)
         .or(first)
         .map(|(_, index)| index)
+}
+
+/// From how many slides a texture was learned.
+pub(super) fn trials(table: &Table<'_>, texture: u16) -> u8 {
+    movement(table).map_or(0, |movement| table.trials(texture, movement))
 }
 
 /// A name for a texture that the person does not want to spell: the first of "sample 1", "sample 2" that is free.

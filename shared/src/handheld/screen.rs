@@ -30,17 +30,13 @@ pub struct Row<'a> {
     pub probability: f32,
 }
 
-/// A line of the list of names.
+/// A line of a list.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Entry<'a> {
-    /// A texture of the table.
-    Known(&'a str),
-    /// A new one, with this name.
+    /// A texture of the table, or what can be done.
+    Text(&'a str),
+    /// A new texture, with this name.
     Numbered(Name),
-    /// A new one, to be spelled.
-    Spell,
-    /// None.
-    Nothing,
 }
 
 /// What the page about the probe says.
@@ -135,8 +131,21 @@ pub enum Screen<'a> {
         /// What it is most like.
         like: Vec<Row<'a>, LEADING>,
     },
-    /// What is it?
+    /// Whether it is the texture that it was compared with.
+    Compared {
+        /// That texture.
+        name: &'a str,
+        /// Whether it is; `None`: not sure.
+        same: Option<bool>,
+        /// Another slide may tell.
+        open: bool,
+        /// From how many slides that texture was learned.
+        trials: u8,
+    },
+    /// What is it? And other lists.
     Choose {
+        /// What is chosen.
+        title: &'a str,
         /// Which is chosen.
         at: u16,
         /// How many there are.

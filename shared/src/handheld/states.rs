@@ -3,16 +3,17 @@
 use heapless::Vec;
 
 mod asked;
-mod naming;
+mod lists;
+mod pressed;
 
-pub use self::naming::Choice;
-use self::naming::{Entry, Naming};
+pub use self::lists::Choice;
+use self::lists::{Entries, List};
 
-use super::button::{Button, Press};
+use super::button::Button;
 use super::guidance::{Again, Event};
-use super::judge::{JudgeError, Judgement, MAX_SLIDES};
+use super::judge::{JudgeError, Judgement, MAX_SLIDES, trials};
 use super::screen::{About, Row, Screen, Trouble};
-use super::spelling::{Spelling, Taken};
+use super::spelling::Spelling;
 use super::touch::Touch;
 use crate::dsp::Plan;
 use crate::explorer::Kernels;
@@ -38,7 +39,12 @@ const NO_WORDS: u32 = 50;
 #[allow(clippy::large_enum_variant)] // no allocation here, and only one at a time
 pub enum Job {
     /// Compare these slides with the table ([`judge`](super::judge())), and call [`Handheld::judged`].
-    Judge(Vec<Observation, MAX_SLIDES>),
+    Judge {
+        /// The slides of this episode.
+        slides: Vec<Observation, MAX_SLIDES>,
+        /// The only texture to compare them with.
+        reference: Option<u16>,
+    },
     /// Learn the episode that was judged last as this texture, and call [`Handheld::learned`].
     Teach(Choice),
     /// Set the force by weights, and call [`Handheld::calibrated`].
@@ -84,9 +90,10 @@ enum Page {
     Again(Again),
     /// The job is being done.
     Thinking,
-    Verdict(Judgement),
-    /// What is it? An entry of [`Naming`].
-    Choose(u16),
+    /// What was made of the slides: `judgement`.
+    Verdict,
+    /// An entry of a list.
+    Choose(List, u16),
     Spell(Spelling),
     Saving,
     Learned(Result<Name, &'static str>),
@@ -115,6 +122,10 @@ pub struct Handheld<'p, K> {
     judgement: Option<Judgement>,
     /// The slides are for learning, not for identifying.
     training: bool,
+    /// They are compared with this texture only: is it that one?
+    reference: Option<u16>,
+    /// The go / no-go output is to be set.
+    go: Option<bool>,
     /// Textures of the table.
     textures: u16,
     job: Option<Job>,
@@ -148,6 +159,8 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             episode: Vec::new(),
             judgement: None,
             training: false,
+            reference: None,
+            go: None,
             textures,
             job: None,
             melody: &[],
@@ -174,30 +187,6 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         self.touch.lose(words);
     }
 
-    /// A hundredth of a second, and whether the button is pressed.
-    pub fn tick(&mut self, pressed: bool) {
-        self.shown = self.shown.saturating_add(1);
-        self.idle = self.idle.saturating_add(1);
-        self.play();
-        if self.listens() {
-            self.silent = self.silent.saturating_add(1);
-            if self.silent >= NO_WORDS && !matches!(self.page, Page::Fault(_)) {
-                self.fail(Trouble::Silent);
-            }
-        }
-        if let Some(press) = self.button.tick(pressed) {
-            self.idle = 0;
-            self.pressed(press);
-        }
-        match &self.page {
-            Page::Learned(_) if self.shown >= LEARNED => self.begin(),
-            Page::Thinking | Page::Saving | Page::Fault(_) | Page::Dark => {}
-            _ if self.idle >= DARK_AFTER && self.asked.is_some() => self.end(Answer::Nobody),
-            _ if self.idle >= DARK_AFTER => self.show(Page::Dark),
-            _ => {}
-        }
-    }
-
     /// Ends what the host asked for.
     fn end(&mut self, answer: Answer) {
         self.answer = Some(answer);
@@ -217,24 +206,26 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         }
         let judgement = match judged {
             Ok(judgement) => judgement,
-            Err(_) => {
-                return self.fail(Trouble::Memory(
-                    "These textures are not for a handheld. Load others.",
-                ));
+            Err(why) => {
+                return self.fail(Trouble::Memory(match why {
+                    JudgeError::NoLimits => "These textures cannot be compared. Learn them anew.",
+                    _ => "These textures are not for a handheld. Load others.",
+                }));
             }
         };
-        self.judgement = Some(judgement.clone());
-        if self.training {
-            if self.episode.len() < TRAINING_SLIDES {
-                self.sound(GOOD);
-                self.show(Page::Touching);
-            } else {
-                self.sound(SURE_IT_IS);
-                self.show(Page::Choose(0));
-            }
-        } else if judgement.open {
+        let go_on = if self.training {
+            self.episode.len() < TRAINING_SLIDES
+        } else {
+            judgement.open && self.reference.is_none()
+        };
+        if go_on {
+            self.judgement = Some(judgement);
             self.sound(GOOD);
             self.show(Page::Touching);
+        } else if self.training {
+            self.judgement = Some(judgement);
+            self.sound(SURE_IT_IS);
+            self.show(Page::Choose(List::Name, 0));
         } else {
             self.show_verdict(judgement);
         }
@@ -248,7 +239,24 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         } else {
             GOOD
         });
-        self.show(Page::Verdict(judgement));
+        if self.reference.is_some() {
+            self.go = Some(judgement.sure);
+        }
+        self.judgement = Some(judgement);
+        self.show(Page::Verdict);
+    }
+
+    /// The next slides are compared with this texture.
+    fn compare(&mut self, reference: u16) {
+        self.clear_episode();
+        self.reference = Some(reference);
+        self.go = Some(false);
+        self.show(Page::Touching);
+    }
+
+    /// How the go / no-go output is to be set, once: on where it is the same, and off when the next comparison begins.
+    pub fn go(&mut self) -> Option<bool> {
+        self.go.take()
     }
 
     /// The result of [`Job::Teach`]: the name that was learned, or why none was. The table now has `textures` textures.
@@ -276,10 +284,10 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             | Page::Weigh(_)
             | Page::Again(_)
             | Page::Thinking
-            | Page::Verdict(_) => true,
+            | Page::Verdict => true,
             // it may come back
             Page::Fault(trouble) => !matches!(trouble, Trouble::Memory(_)),
-            Page::Choose(_)
+            Page::Choose(..)
             | Page::Spell(_)
             | Page::Saving
             | Page::Learned(_)
@@ -311,7 +319,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
 
     /// Whether the display names textures, so that [`Handheld::screen`] needs the table.
     pub fn names_textures(&self) -> bool {
-        matches!(self.page, Page::Verdict(_) | Page::Choose(_))
+        matches!(self.page, Page::Verdict | Page::Choose(..))
     }
 
     /// What the display shows.
@@ -348,21 +356,35 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 lift: self.touch.is_down(),
             },
             Page::Thinking => Screen::Thinking { slide: slide - 1 },
-            Page::Verdict(judgement) if judgement.unknown => Screen::Unknown {
-                like: rows(judgement),
+            Page::Verdict => match (&self.judgement, self.reference) {
+                // there is one
+                (None, _) => Screen::Dark,
+                (Some(judgement), Some(reference)) => Screen::Compared {
+                    name: name(reference),
+                    same: (judgement.sure || judgement.unknown).then_some(judgement.sure),
+                    open: judgement.open,
+                    trials: table.map_or(0, |table| trials(table, reference)),
+                },
+                (Some(judgement), None) if judgement.unknown => Screen::Unknown {
+                    like: rows(judgement),
+                },
+                (Some(judgement), None) if judgement.changed => Screen::Changed {
+                    rows: rows(judgement),
+                },
+                (Some(judgement), None) => Screen::Verdict {
+                    rows: rows(judgement),
+                    sure: judgement.sure,
+                },
             },
-            Page::Verdict(judgement) if judgement.is_changed() => Screen::Changed {
-                rows: rows(judgement),
-            },
-            Page::Verdict(judgement) => Screen::Verdict {
-                rows: rows(judgement),
-                sure: judgement.sure,
-            },
-            Page::Choose(at) => Screen::Choose {
-                at: *at,
-                count: self.naming().entries(),
-                entries: self.naming().around(*at, table),
-            },
+            Page::Choose(list, at) => {
+                let entries = self.entries(*list);
+                Screen::Choose {
+                    title: list.title(),
+                    at: *at,
+                    count: entries.count(),
+                    entries: entries.around(*at, table),
+                }
+            }
             Page::Spell(spelling) => Screen::Spell {
                 text: spelling.text(),
                 wheel: spelling.wheel(),
@@ -376,8 +398,9 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         }
     }
 
-    fn naming(&self) -> Naming<'_> {
-        Naming {
+    fn entries(&self, list: List) -> Entries<'_> {
+        Entries {
+            list,
             judgement: self.judgement.as_ref(),
             textures: self.textures,
         }
@@ -416,6 +439,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     /// A new episode may begin.
     fn begin(&mut self) {
         self.clear_episode();
+        self.reference = None;
         self.show(Page::Ready);
     }
 
@@ -452,17 +476,28 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             Event::Zeroed | Event::Silent | Event::Frozen => {}
             Event::Down => match self.page {
                 Page::Ready | Page::Touching | Page::Again(_) => self.show(Page::Touching),
-                Page::Verdict(_) => {
-                    self.clear_episode();
+                Page::Verdict if self.judgement.as_ref().is_some_and(|j| j.open) => {
                     self.show(Page::Touching);
                 }
+                Page::Verdict => match self.reference {
+                    // another sample, and the same question
+                    Some(reference) => self.compare(reference),
+                    None => {
+                        self.clear_episode();
+                        self.show(Page::Touching);
+                    }
+                },
                 _ => {}
             },
             Event::Still if matches!(self.page, Page::Touching) => self.sound(SLIDE),
             Event::Still => {}
             Event::Up => match self.page {
                 Page::Touching if self.asked.is_some() => {}
-                Page::Touching if self.episode.is_empty() && !self.training => self.begin(),
+                Page::Touching
+                    if self.episode.is_empty() && !self.training && self.reference.is_none() =>
+                {
+                    self.begin();
+                }
                 Page::Again(_) if self.shown >= AGAIN => self.show(Page::Touching),
                 _ => {}
             },
@@ -482,89 +517,14 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             Event::Slid(observation) => {
                 // the episode has space: it ends with its last slide
                 if matches!(self.page, Page::Touching) && self.episode.push(observation).is_ok() {
-                    self.job = Some(Job::Judge(self.episode.clone()));
+                    self.job = Some(Job::Judge {
+                        slides: self.episode.clone(),
+                        reference: self.reference,
+                    });
                     self.show(Page::Thinking);
                 }
             }
         }
-    }
-
-    fn pressed(&mut self, press: Press) {
-        self.fresh = true;
-        match (&mut self.page, press) {
-            // nothing to be said while the table is at work
-            (Page::Thinking | Page::Saving, _) => return,
-            (Page::Dark, _) => self.begin(),
-            (Page::Ready, Press::Short) => self.show(Page::About),
-            (Page::Ready, Press::Long) => {
-                self.clear_episode();
-                self.training = true;
-                self.show(Page::Touching);
-            }
-            (_, Press::Short) if self.asked.is_some() => {}
-            (_, Press::Long) if self.asked.is_some() => self.end(Answer::GivenUp),
-            (Page::Touching | Page::Again(_), Press::Short) => {}
-            (Page::Touching | Page::Again(_), Press::Long) => self.begin(),
-            (Page::Lift | Page::Air | Page::Weigh(_), _) => self.begin(),
-            (Page::Verdict(judgement), press) if judgement.is_changed() => self.confirm(press),
-            (Page::Verdict(_), Press::Short) => self.begin(),
-            (Page::Verdict(_), Press::Long) => self.show(Page::Choose(0)),
-            (Page::Choose(at), Press::Short) => {
-                let next = at.saturating_add(1);
-                let at = if next < self.naming().entries() {
-                    next
-                } else {
-                    0
-                };
-                self.show(Page::Choose(at));
-            }
-            (Page::Choose(at), Press::Long) => {
-                let at = *at;
-                self.take(at);
-            }
-            (Page::Spell(spelling), Press::Short) => spelling.turn(),
-            (Page::Spell(spelling), Press::Long) => match spelling.take() {
-                Taken::Letter => {}
-                Taken::Done(name) => self.teach(Choice::Spelled(name)),
-                Taken::Back => self.show(Page::Choose(0)),
-            },
-            (Page::About, Press::Long) => {
-                self.job = Some(Job::Calibrate);
-                self.show(Page::Air);
-            }
-            (Page::Fault(Trouble::Memory(_)) | Page::About, _)
-            | (Page::Learned(_) | Page::Calibrated(_), _) => self.begin(),
-            (Page::Fault(_), _) => {}
-        }
-        self.sound(CLICK);
-    }
-
-    /// Does what an entry stands for.
-    fn take(&mut self, at: u16) {
-        match self.naming().entry(at) {
-            Entry::Known(texture) => self.teach(Choice::Known(texture)),
-            Entry::Numbered => self.teach(Choice::Numbered),
-            Entry::Spell => self.show(Page::Spell(Spelling::default())),
-            Entry::Nothing => self.begin(),
-        }
-    }
-
-    /// "Is it this one?", and the button says yes or no: it moves, or the list begins with a new one.
-    fn confirm(&mut self, press: Press) {
-        let first = self.naming().leading().next();
-        match (press, first) {
-            (Press::Long, Some(texture)) => self.teach(Choice::Known(texture)),
-            _ => self.show(Page::Choose(self.naming().leading().count() as u16)),
-        }
-    }
-
-    fn teach(&mut self, choice: Choice) {
-        if self.judgement.is_none() {
-            // no slide was measured
-            return self.begin();
-        }
-        self.job = Some(Job::Teach(choice));
-        self.show(Page::Saving);
     }
 }
 

@@ -30,8 +30,8 @@ const LONG_S: f64 = 120.0;
 const BURLAP: u8 = 101;
 
 /// A handheld probe over a texture of the world that its own table is learned from, and the person who holds it.
-struct Held {
-    talk: Talk,
+pub(crate) struct Held {
+    pub(crate) talk: Talk,
     person: Person,
     /// What the person was asked to do, once each time that it changed.
     prompts: Vec<Prompt>,
@@ -39,7 +39,7 @@ struct Held {
 }
 
 impl Held {
-    fn new(texture: &str, manner: Manner) -> Option<Self> {
+    pub(crate) fn new(texture: &str, manner: Manner) -> Option<Self> {
         Some(Self::with(
             &elf_of("TACTUS_HANDHELD_ELF")?,
             texture,
@@ -48,7 +48,7 @@ impl Held {
         ))
     }
 
-    fn with(elf: &Path, texture: &str, manner: Manner, store: Option<Vec<u8>>) -> Self {
+    pub(crate) fn with(elf: &Path, texture: &str, manner: Manner, store: Option<Vec<u8>>) -> Self {
         let collection = Collection {
             seed: 1,
             textures: vec![BURLAP],
@@ -73,7 +73,7 @@ impl Held {
     }
 
     /// Lets the person go on until the board shows what it should.
-    fn until(&mut self, what: &str, seconds: f64, seen: impl Fn(&mut Emulator) -> bool) {
+    pub(crate) fn until(&mut self, what: &str, seconds: f64, seen: impl Fn(&mut Emulator) -> bool) {
         let until_ns = self.talk.now_ns() + (seconds * 1e9) as u64;
         while self.talk.now_ns() < until_ns {
             self.talk.step().unwrap();
@@ -86,31 +86,55 @@ impl Held {
     }
 
     /// Presses the button for so many ms.
-    fn press_for(&mut self, ms: u64) {
+    pub(crate) fn press_for(&mut self, ms: u64) {
         self.talk.board().press(true).unwrap();
         self.talk.board().run_ms(ms).unwrap();
         self.talk.board().press(false).unwrap();
+        // a button that bounces is looked at for 30 ms
+        self.talk.board().run_ms(60).unwrap();
     }
 
-    /// The person begins an episode, and slides until the display shows this.
-    fn slide_until(&mut self, text: &str) {
+    /// Presses the button on and off again.
+    pub(crate) fn click(&mut self) {
+        self.press_for(100);
+    }
+
+    /// Takes an entry of the menu, so many behind the first.
+    pub(crate) fn take(&mut self, entry: &str, number: u32) {
+        self.click();
+        self.until("the menu", 1.0, |board| shows(board, "Menu"));
+        (0..number).for_each(|_| self.click());
+        let place = format!("{} of 4", number + 1);
+        self.until(entry, 1.0, |board| {
+            shows(board, entry) && shows(board, &place)
+        });
+        self.press_for(700);
+    }
+
+    /// The person begins an episode.
+    pub(crate) fn touch(&mut self) {
         self.rest();
         let hand = |board: &mut Emulator| board.rig().world().hand().unwrap().intend(0.5, 0.0);
         hand(self.talk.board());
         self.until("an episode", 3.0, |board| shows(board, "slide 1 of 5"));
+    }
+
+    /// The person begins an episode, and slides until the display shows this.
+    pub(crate) fn slide_until(&mut self, text: &str) {
+        self.touch();
         self.until(text, 60.0, |board| shows(board, text));
         self.rest();
     }
 
     /// Waits until the person's hand is free.
-    fn rest(&mut self) {
+    pub(crate) fn rest(&mut self) {
         while !self.person.is_idle() {
             self.until("some time", 1.0, |_| true);
         }
     }
 
     /// Runs a request while the person does what the display says.
-    fn run<T>(&mut self, request: Request<T>, seconds: f64) -> Result<T, TalkError> {
+    pub(crate) fn run<T>(&mut self, request: Request<T>, seconds: f64) -> Result<T, TalkError> {
         let Self {
             talk,
             person,
@@ -133,18 +157,24 @@ impl Held {
         })
     }
 
-    fn status(&mut self) -> Status {
+    pub(crate) fn status(&mut self) -> Status {
         self.run(Request::status(), TIMEOUT_S).unwrap()
     }
 
-    fn table(&mut self) -> Vec<u8> {
+    pub(crate) fn table(&mut self) -> Vec<u8> {
         self.talk
             .run(ReadTable::default(), TIMEOUT_S, |_, _| ())
             .unwrap()
     }
 
+    pub(crate) fn push(&mut self, table: &[u8]) {
+        self.talk
+            .run(PushTable::new(table).unwrap(), TIMEOUT_S, |_, _| ())
+            .unwrap();
+    }
+
     /// What holds of every run: no slot late, no word lost, no reset, no frame damaged.
-    fn end(mut self) {
+    pub(crate) fn end(mut self) {
         let counts = self.status().counts;
         assert_eq!(
             (counts.late_slots, counts.lost_samples, counts.lost_reports),
@@ -160,7 +190,7 @@ impl Held {
     }
 }
 
-fn shows(board: &mut Emulator, text: &str) -> bool {
+pub(crate) fn shows(board: &mut Emulator, text: &str) -> bool {
     board.rig().display().shows(text)
 }
 
@@ -194,9 +224,7 @@ fn it_says_how_it_is_and_gives_and_takes_tables() {
     assert_eq!(changed.textures() + 1, table.textures());
     held.until("one fewer", 1.0, |board| shows(board, "115 textures"));
     // another table, by parts; then its own again
-    held.talk
-        .run(PushTable::new(&bytes).unwrap(), TIMEOUT_S, |_, _| ())
-        .unwrap();
+    held.push(&bytes);
     assert_eq!(held.table(), bytes);
     assert!(!held.status().factory);
     held.until("all", 1.0, |board| shows(board, "116 textures"));
@@ -420,9 +448,7 @@ fn slides_that_are_recorded_by_hand_are_learned_pushed_and_known() {
     let names: Vec<String> = names.iter().map(|n| (*n).to_owned()).collect();
     let features = Some(FeatureSet::Pressure);
     let table = learn(Method::Fused, features, &names, &set.movements(), &known).unwrap();
-    held.talk
-        .run(PushTable::new(&table).unwrap(), TIMEOUT_S, |_, _| ())
-        .unwrap();
+    held.push(&table);
     held.until("its textures", 1.0, |board| shows(board, "3 textures"));
     for (name, number) in names.iter().zip(numbers) {
         held.talk.board().rig().world().place(number).unwrap();
@@ -476,9 +502,7 @@ fn known_weights_set_the_force_that_the_person_is_shown() {
         .unwrap();
     // it is shown
     held.until("ready", 2.0, |board| shows(board, "and hold"));
-    held.talk.board().press(true).unwrap();
-    held.talk.board().run_ms(100).unwrap();
-    held.talk.board().press(false).unwrap();
+    held.take("about this probe", 1);
     held.until("its day", 1.0, |board| shows(board, "2026-11-23"));
     held.rest();
     half_a_newton_is_half_a_newton(&mut held);
@@ -506,9 +530,7 @@ fn a_changed_texture_is_confirmed_or_denied_by_the_button() {
         return;
     };
     let table = with_limits_of_change(&held.table(), -9000.0);
-    held.talk
-        .run(PushTable::new(&table).unwrap(), TIMEOUT_S, |_, _| ())
-        .unwrap();
+    held.push(&table);
     let before = held.table();
     assert_eq!(before, table);
     let old = Table::read(&before).unwrap();
@@ -557,9 +579,11 @@ fn the_force_is_set_on_its_own_screen() {
         return;
     };
     let mut held = Held::with(&elf, "burlap", Manner::default(), None);
-    held.press_for(100);
+    held.take("about this probe", 1);
     held.until("its day", 1.0, |board| shows(board, "never"));
-    held.press_for(700);
+    held.press_for(100);
+    held.until("ready", 5.0, |board| shows(board, "and hold"));
+    held.take("set the force", 2);
     held.until("the first weight", 10.0, |board| shows(board, "50 g"));
     held.until("the end", 60.0, |board| shows(board, "Force is set"));
     held.press_for(100);
@@ -568,7 +592,7 @@ fn the_force_is_set_on_its_own_screen() {
     drop(held);
     let mut held = Held::with(&elf, "burlap", Manner::default(), Some(store));
     assert_eq!(held.status().calibrated, RigCalibration::UNDATED);
-    held.press_for(100);
+    held.take("about this probe", 1);
     held.until("its day", 1.0, |board| shows(board, "day unknown"));
     held.press_for(100);
     held.until("ready", 5.0, |board| shows(board, "and hold"));
@@ -584,9 +608,7 @@ fn a_damaged_table_is_told_on_the_display() {
     };
     let mut held = Held::with(&elf, "burlap", Manner::default(), None);
     let bytes = held.table();
-    held.talk
-        .run(PushTable::new(&bytes).unwrap(), TIMEOUT_S, |_, _| ())
-        .unwrap();
+    held.push(&bytes);
     let mut store = held.talk.board().store().unwrap();
     drop(held);
     let at = store

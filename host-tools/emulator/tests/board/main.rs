@@ -9,6 +9,7 @@ mod explore;
 mod faults;
 mod halt;
 mod handheld;
+mod handheld_compare;
 mod handheld_link;
 mod old_store;
 mod referee;

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::dsp::{Plain, Plan};
+use crate::explorer::{Answer, Verification};
 use crate::handheld::weights::WEIGHTS_MN;
 use crate::probe::Memory;
 use crate::probe::explore::Random;
@@ -9,6 +10,7 @@ use crate::sensor::pressure::{Calibration, Channel, Counts};
 use crate::store::tests::ram::{Ram, SECTOR};
 use crate::wire::Again;
 use embassy_futures::block_on;
+use heapless::Vec;
 use std::string::{String, ToString as _};
 use std::vec::Vec as List;
 
@@ -392,4 +394,20 @@ fn what_the_host_found_out_is_shown() {
     assert_eq!(leading, [(1, 0.6), (3, 0.25), (0, 0.1)]);
     assert!(!judgement.sure && !judgement.open);
     assert!(shown.judgement().is_none());
+    // whether it is one texture
+    for (answer, sure, unknown) in [
+        (Answer::Same, true, false),
+        (Answer::Different, false, true),
+        (Answer::Unsure, false, false),
+    ] {
+        let now = Verification {
+            score: 0.0,
+            limit: 0.0,
+            answer,
+        };
+        shown.tell(Event::Verified { slides: 1, now });
+        let judgement = shown.judgement().unwrap();
+        assert_eq!((judgement.sure, judgement.unknown), (sure, unknown));
+        assert!(!judgement.changed && !judgement.open);
+    }
 }

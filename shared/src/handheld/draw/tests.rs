@@ -113,15 +113,16 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
     };
     each("changed", &changed);
     let entries: Vec<Entry<'_>, LINES> = Vec::from_slice(&[
-        Entry::Known(LONG),
-        Entry::Known("felt"),
+        Entry::Text(LONG),
+        Entry::Text("felt"),
         Entry::Numbered(Name::try_from("sample 1").unwrap()),
-        Entry::Spell,
+        Entry::Text("new: spell it"),
     ])
     .unwrap();
     each(
         "choose",
         &Screen::Choose {
+            title: "What is it?",
             at: 0,
             count: 120,
             entries: entries.clone(),
@@ -131,6 +132,7 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
     each(
         "choose-later",
         &Screen::Choose {
+            title: "What is it?",
             at: 70,
             count: 120,
             entries,
@@ -150,6 +152,35 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
             wheel: wheel(37),
         },
     );
+    let list = |title, at, count, texts: [&'static str; 4]| Screen::Choose {
+        title,
+        at,
+        count,
+        entries: texts.into_iter().map(Entry::Text).collect(),
+    };
+    let todo = [
+        "is it the same as ..?",
+        "about this probe",
+        "set the force",
+        "nothing, go back",
+    ];
+    each("menu", &list("Menu", 0, 4, todo));
+    let references = ["Burlap", "Cardboard", "Cork", "Felt"];
+    each("reference", &list("Same as", 102, 116, references));
+    for (name, same, open, trials, other) in [
+        ("compared-same", Some(true), false, 15, "Cork"),
+        ("compared-different", Some(false), false, 2, LONG),
+        ("compared-again", None, true, 15, "Cork"),
+        ("compared-unsure", None, false, 15, "Cork"),
+    ] {
+        let compared = Screen::Compared {
+            name: other,
+            same,
+            open,
+            trials,
+        };
+        each(name, &compared);
+    }
     each("saving", &Screen::Saving);
     let name = Name::try_from("velvet").unwrap();
     each("taught", &Screen::Learned(Ok(&name)));

@@ -63,10 +63,12 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         self.begin();
     }
 
-    /// The host's slides said this: shown as after the person's own, and it can be taught.
-    pub fn told(&mut self, judgement: Judgement) {
+    /// The host's slides said this: shown as after the person's own, and it can be taught. `compared`: the question was whether
+    /// it is the first one.
+    pub fn told(&mut self, judgement: Judgement, compared: bool) {
         self.clear_episode();
-        self.judgement = Some(judgement.clone());
+        let first = judgement.leading.first().filter(|_| compared);
+        self.reference = first.map(|(texture, _)| *texture);
         self.show_verdict(judgement);
     }
 
@@ -84,8 +86,8 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             Page::Ready
                 | Page::Touching
                 | Page::Again(_)
-                | Page::Verdict(_)
-                | Page::Choose(_)
+                | Page::Verdict
+                | Page::Choose(..)
                 | Page::Spell(_)
         ) {
             self.begin();

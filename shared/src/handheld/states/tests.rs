@@ -9,21 +9,51 @@ use crate::handheld::picture::Picture;
 use crate::probe::explore::Random;
 use crate::sensor::pressure::{Channel, Counts};
 use crate::table::tests::{fused_of, known, straight};
+use crate::table::{
+    Drift, Drifts, EPISODES, Limits, Population, Sections, Tail, Whitened, with_sections,
+};
 use proptest::prelude::*;
 use proptest::strategy::Strategy;
 use std::vec;
 use std::vec::Vec as List;
 
 /// Four textures far apart, of all the features that a handheld has.
+fn textures() -> List<List<Whitened>> {
+    let far = |texture| {
+        let mut mean = [0.0; 14];
+        mean[texture] = 12.0;
+        vec![known(5, &mean)]
+    };
+    (0..4).map(far).collect()
+}
+
 fn table() -> List<u8> {
-    let textures: List<_> = (0..4)
-        .map(|texture| {
-            let mut mean = [0.0; 14];
-            mean[texture] = 12.0;
-            vec![known(5, &mean)]
-        })
-        .collect();
-    fused_of(FEATURES, &[straight(14)], &textures)
+    fused_of(FEATURES, &[straight(14)], &textures())
+}
+
+/// The same with limits.
+fn with_limits() -> List<u8> {
+    let plain = table();
+    let textures = textures();
+    let means = textures.iter().map(|row| (row[0].slides, &row[0].mean[..]));
+    let population = Population::new(14, means).unwrap();
+    let tail = Tail {
+        begin: 2.0,
+        excess: 1.0,
+    };
+    let limits = Limits {
+        false_alarm: 0.02,
+        drifted: [tail; EPISODES],
+        same: [tail; EPISODES],
+    };
+    let sections = Sections {
+        drift: (Drift::default(), &[Drifts::default()]),
+        novelty: Some((limits, &[population])),
+    };
+    let mut out = vec![0; 8000];
+    let table = Table::read(&plain).unwrap();
+    let table = with_sections(&mut out, &table, &sections).unwrap();
+    table.as_bytes().to_vec()
 }
 
 /// A slide that feels like one of them; `None`: like none, as far from each as they are from each other.
@@ -61,11 +91,20 @@ impl<'p> Bench<'p> {
         }
     }
 
+    fn judge(
+        &self,
+        slides: &[Observation],
+        reference: Option<u16>,
+    ) -> Result<(Judgement, EpisodeSummary), JudgeError> {
+        let table = Table::read(&self.table).unwrap();
+        judge::<Plain>(table, slides, reference, None)
+    }
+
     fn work(&mut self) {
         let table = Table::read(&self.table).unwrap();
         match self.probe.job() {
             None => {}
-            Some(Job::Judge(slides)) => match judge::<Plain>(table, &slides, None) {
+            Some(Job::Judge { slides, reference }) => match self.judge(&slides, reference) {
                 Ok((mut judgement, episode)) => {
                     self.episode = Some(episode);
                     judgement.changed |= self.changed;
@@ -104,6 +143,11 @@ impl<'p> Bench<'p> {
         self.touch(Event::Slid(slide(texture)));
     }
 
+    fn verdict(&self) -> &Judgement {
+        assert_eq!(self.probe.page, Page::Verdict);
+        self.probe.judgement.as_ref().unwrap()
+    }
+
     /// The first words of what is shown.
     fn shown(&self) -> std::string::String {
         let table = Table::read(&self.table).unwrap();
@@ -123,9 +167,7 @@ fn a_known_texture_is_recognised_and_the_next_episode_begins_anew() {
     for texture in [2, 0] {
         bench.slide(Some(texture));
         assert_eq!(bench.shown(), "Verdict");
-        let Page::Verdict(judgement) = &bench.probe.page else {
-            panic!("no verdict");
-        };
+        let judgement = bench.verdict();
         assert!(judgement.sure && !judgement.unknown);
         assert_eq!(usize::from(judgement.leading[0].0), texture);
         assert_eq!(bench.probe.episode.len(), 1);
@@ -181,10 +223,7 @@ fn a_changed_one_is_moved_by_yes_and_named_anew_after_no() {
     bench.slide(Some(1));
     bench.slide(Some(3));
     assert_eq!(bench.shown(), "Changed");
-    let Page::Verdict(judgement) = &bench.probe.page else {
-        panic!("no verdict");
-    };
-    assert_eq!(judgement.leading[0].0, 3);
+    assert_eq!(bench.verdict().leading[0].0, 3);
     assert_eq!(bench.learned, []);
     // what is none of them is not asked about
     (0..2).for_each(|_| bench.slide(None));
@@ -245,6 +284,139 @@ fn a_rejected_slide_is_no_part_of_the_episode() {
     assert_eq!(bench.episode.as_ref().unwrap().observed[0].1, 1);
 }
 
+/// From the ready page to the touch that is compared with a texture.
+fn choose_reference(bench: &mut Bench<'_>, texture: u16) {
+    bench.press(10);
+    bench.press(70);
+    (0..texture).for_each(|_| bench.press(10));
+    bench.press(70);
+}
+
+#[test]
+fn the_menu_leads_to_everything() {
+    let plan = Plan::new();
+    let mut bench = Bench::new(&plan);
+    for (entry, page) in [(1, "About"), (2, "Calibrated"), (3, "Air")] {
+        bench.press(10);
+        assert_eq!(bench.shown(), "Choose");
+        (0..entry).for_each(|_| bench.press(10));
+        bench.press(70);
+        assert_eq!(bench.shown(), page, "{entry}");
+        bench.press(10);
+        if page != "Air" {
+            assert_eq!(bench.shown(), "Air", "{entry}");
+        } else {
+            // the last press was on the ready page
+            bench.press(10);
+        }
+        while bench.probe.page != Page::Ready {
+            bench.press(70);
+        }
+    }
+}
+
+#[test]
+fn a_texture_is_compared_with_one_that_was_chosen() {
+    let plan = Plan::new();
+    let mut bench = Bench::new(&plan);
+    bench.table = with_limits();
+    choose_reference(&mut bench, 2);
+    assert_eq!(
+        (bench.shown().as_str(), bench.probe.go()),
+        ("Press", Some(false))
+    );
+    // a touch that comes to nothing ends nothing
+    for event in [Event::Down, Event::Up] {
+        bench.probe.on_touch(event);
+    }
+    bench.touch(Event::Again(Again::TooHard));
+    (0..AGAIN).for_each(|_| bench.tick(false));
+    bench.slide(Some(2));
+    let same = |bench: &Bench<'_>| {
+        let table = Table::read(&bench.table).unwrap();
+        match bench.probe.screen(Some(&table), &About::default()) {
+            Screen::Compared { same, open, .. } => Some((same, open)),
+            _ => None,
+        }
+    };
+    assert_eq!(same(&bench), Some((Some(true), false)));
+    assert_eq!((bench.probe.go(), bench.probe.go()), (Some(true), None));
+    // the next sample: the output is off before its slide
+    bench.probe.on_touch(Event::Down);
+    assert_eq!(
+        (bench.shown().as_str(), bench.probe.go()),
+        ("Press", Some(false))
+    );
+    bench.slide(Some(1));
+    assert_eq!(same(&bench), Some((Some(false), false)));
+    assert_eq!(bench.probe.go(), Some(false));
+    assert_eq!(bench.probe.episode.len(), 1);
+    // another reference: the list begins with the last one
+    bench.press(70);
+    assert_eq!(bench.probe.page, Page::Choose(super::List::Reference, 2));
+    (0..4).for_each(|_| bench.press(10));
+    bench.press(70);
+    bench.slide(Some(1));
+    assert_eq!(same(&bench), Some((Some(true), false)));
+    // and the end of it: nothing was learned
+    bench.press(10);
+    assert_eq!(bench.probe.page, Page::Ready);
+    bench.slide(Some(3));
+    assert_eq!(bench.shown(), "Verdict");
+    assert_eq!(bench.learned, []);
+}
+
+#[test]
+fn who_is_not_sure_is_asked_to_slide_again_and_five_slides_are_the_end() {
+    let plan = Plan::new();
+    let mut bench = Bench::new(&plan);
+    bench.table = with_limits();
+    choose_reference(&mut bench, 0);
+    // whatever the slides are like
+    let unsure = |open| Judgement {
+        leading: [(0, 1.0)].into_iter().collect(),
+        open,
+        ..Judgement::default()
+    };
+    for slides in 1..=MAX_SLIDES {
+        for event in [Event::Down, Event::Still, Event::Slid(slide(Some(0)))] {
+            bench.probe.on_touch(event);
+        }
+        let Some(Job::Judge {
+            slides: all,
+            reference: Some(0),
+        }) = bench.probe.job()
+        else {
+            panic!("nothing to judge");
+        };
+        assert_eq!(all.len(), slides);
+        bench.probe.judged(Ok(unsure(slides < MAX_SLIDES)));
+        bench.probe.on_touch(Event::Up);
+        assert_eq!(
+            (bench.shown().as_str(), bench.probe.go().is_some()),
+            ("Compared", true)
+        );
+    }
+    // what comes next is another sample
+    bench.probe.on_touch(Event::Down);
+    assert!(bench.probe.episode.is_empty());
+}
+
+#[test]
+fn a_table_without_limits_cannot_tell_same_from_different() {
+    let plan = Plan::new();
+    let mut bench = Bench::new(&plan);
+    choose_reference(&mut bench, 1);
+    for event in [Event::Down, Event::Still, Event::Slid(slide(Some(1)))] {
+        bench.probe.on_touch(event);
+    }
+    bench.work();
+    assert_eq!(bench.shown(), "Fault");
+    assert!(!bench.probe.listens());
+    bench.press(10);
+    assert_eq!(bench.probe.page, Page::Ready);
+}
+
 #[test]
 fn faults_show_and_go() {
     let plan = Plan::new();
@@ -274,7 +446,7 @@ fn it_goes_dark_and_wakes_by_the_button() {
     assert_eq!(bench.shown(), "Air");
     assert!(bench.probe.listens());
     bench.press(10);
-    assert_eq!(bench.shown(), "About");
+    assert_eq!(bench.shown(), "Choose");
     assert!(!bench.probe.listens());
 }
 
@@ -369,7 +541,7 @@ proptest! {
                 Happens::Broken => probe.memory_failed("broken"),
             }
             match probe.job() {
-                Some(Job::Judge(slides)) => {
+                Some(Job::Judge { slides, .. }) => {
                     prop_assert!(!slides.is_empty());
                     prop_assert!(slides.iter().all(|slide| good.contains(slide)));
                     judged = false;
