@@ -11,11 +11,12 @@ use tactus::data::recordings::RecordingWriter;
 use tactus::eval::show::count;
 use tactus::link::Request;
 use tactus_core::explorer::Strategy;
+use tactus_core::table::Table;
 use tactus_core::wire::{Command, Identify};
 
 use super::bench::{Bench, Prompts, wait_for_enter};
 use super::line::Where;
-use super::samples::Sample;
+use super::samples::{Sample, Trials, ask_to_move};
 use super::train::seed_of_now;
 use crate::cmd::output::{Format, print_json};
 
@@ -27,6 +28,9 @@ Examples:
   tactus evaluate --recordings recordings
   tactus device record burlap silk --out anna --operator Anna --lot 7     what tactus gauge asks for
   tactus device record burlap silk --out turned --moved     on a turntable; the table learned from it says so
+  tactus device record burlap silk --out there --same-spot  without asking to move the sample
+A slide on the same track again says little about a texture. So at a terminal the rig stops after each slide of all movements of
+the probe's table, its finger lifted, and you are asked to move or turn the sample. What came of that stands beside each slide.
 The same command goes on with the texture at which an interrupted one stopped.")]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -110,6 +114,11 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (mut bench, _) = Bench::open(&args.at)?;
     let calibration = bench.get(Request::read_calibration())?;
     bench.get(Request::command(Command::Stream(true)))?;
+    // a slide of each movement, then the sample is moved
+    let part = match args.sample.asks() {
+        true => Table::read(&bench.table()?)?.movements().len() as u8,
+        false => *slides,
+    };
     let (mut written, mut all_lost) = (0, Vec::new());
     let text = args.format == Format::Text;
     for (index, name) in textures.iter().enumerate() {
@@ -127,34 +136,44 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             let prompt = format!("Lay {name} under the finger and press Enter: ");
             wait_for_enter(bench.interrupt(), &prompt)?;
         }
-        // never sure: all slides are made
-        let wanted = Identify {
-            threshold: 1.0,
-            max_slides: *slides,
-            strategy: Strategy::Cycling,
-            open: false,
-            seed: args.seed.unwrap_or_else(seed_of_now),
-            ..Identify::default()
-        };
+        let seed = args.seed.unwrap_or_else(seed_of_now);
         let mut recorder = Recorder::new(calibration.pressure);
         let (mut lost, mut kept) = (Vec::new(), Vec::new());
-        let mut prompts = Prompts::default();
-        bench.run(Request::identify(wanted), |report| {
-            match recorder.hear(index, report) {
-                Some(Ok(slide)) => {
-                    let (number, movement) = (slide.number, slide.movement);
-                    if text {
-                        writeln!(out, "{name}, slide {number} of {slides}: {movement}")?;
-                    }
-                    kept.push(slide);
-                }
-                Some(Err(why)) => lost.push(why),
-                None if text => prompts.show(report, out)?,
-                None => {}
+        let (mut prompts, mut trials) = (Prompts::default(), Trials::default());
+        for (trial, begin) in (0..*slides).step_by(part.max(1).into()).enumerate() {
+            if trial > 0 {
+                trials.said(Some(ask_to_move(&bench, name)?));
             }
-            out.flush()
-        })?;
-        for slide in &kept {
+            // never sure: all slides are made
+            let wanted = Identify {
+                threshold: 1.0,
+                max_slides: part.min(slides - begin),
+                strategy: Strategy::Cycling,
+                open: false,
+                // slides of the next part begin elsewhere, too
+                seed: seed.wrapping_add(trial as u32),
+                ..Identify::default()
+            };
+            bench.run(Request::identify(wanted), |report| {
+                match recorder.hear(index, report) {
+                    Some(Ok(slide)) => {
+                        let (number, movement) = (slide.number, slide.movement);
+                        if text {
+                            writeln!(out, "{name}, slide {number} of {slides}: {movement}")?;
+                        }
+                        kept.push((trial, slide));
+                    }
+                    Some(Err(why)) => lost.push(why),
+                    None if text => prompts.show(report, out)?,
+                    None => {}
+                }
+                out.flush()
+            })?;
+        }
+        for (trial, slide) in &kept {
+            if args.sample.asks() {
+                writer.moved(trials.before_trial(*trial));
+            }
             writer.write(slide)?;
         }
         written += kept.len();

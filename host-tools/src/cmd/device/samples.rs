@@ -1,5 +1,5 @@
-//! Whether the sample was moved or turned between the trials of a training: asked of whoever stands beside it, and noted in
-//! the probe's table.
+//! Whether the sample was moved or turned between the trials of a training or a recording: asked of whoever stands beside it,
+//! and noted in the probe's table, or beside the slides.
 
 use std::io::IsTerminal as _;
 
@@ -59,6 +59,14 @@ impl Trials {
     /// This was said of the next ones; `None`: nothing.
     pub(crate) fn said(&mut self, moved: Option<bool>) {
         self.answers.push(moved);
+    }
+
+    /// What was said before a trial, from 0. Of the first one nobody is asked: it is as all others are.
+    pub(crate) fn before_trial(&self, trial: usize) -> Option<bool> {
+        match trial.checked_sub(1) {
+            Some(asked) => *self.answers.get(asked)?,
+            None => self.moved(),
+        }
     }
 
     /// What is to be noted: what is true of all of them.
@@ -121,5 +129,20 @@ mod tests {
         assert_eq!(of(Some(Some(true)), &[true]), Some(true));
         assert_eq!(of(Some(Some(false)), &[true]), None);
         assert_eq!(of(Some(Some(true)), &[]), Some(true));
+    }
+
+    #[test]
+    fn a_trial_is_noted_as_it_was_said_and_the_first_one_as_all_others() {
+        let of = |said: &[bool]| -> Vec<Option<bool>> {
+            let mut trials = Trials::default();
+            said.iter().for_each(|moved| trials.said(Some(*moved)));
+            (0..=said.len())
+                .map(|trial| trials.before_trial(trial))
+                .collect()
+        };
+        assert_eq!(of(&[true, true]), [Some(true); 3]);
+        assert_eq!(of(&[false]), [Some(false); 2]);
+        assert_eq!(of(&[true, false]), [None, Some(true), Some(false)]);
+        assert_eq!(of(&[]), [None]);
     }
 }

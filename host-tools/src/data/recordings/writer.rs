@@ -128,6 +128,11 @@ impl RecordingWriter {
         Ok(())
     }
 
+    /// Of the slides from here on: whether the sample was moved or turned before.
+    pub fn moved(&mut self, moved: Option<bool>) {
+        self.labels.moved = moved;
+    }
+
     /// Writes the samples of one slide.
     ///
     /// # Errors
