@@ -4,6 +4,7 @@ pub mod args;
 pub mod exploration;
 pub mod learned;
 pub mod person;
+pub mod power_cut;
 pub mod progress;
 pub mod talk;
 pub mod under_finger;

@@ -4,8 +4,8 @@
 //! cut, the flash is made as it is after a part of them, with the last one torn, and the firmware boots on it: it must hold
 //! the state from before or the one from after, and say so before it has found its switches.
 
+pub(crate) mod held;
 mod outcome;
-pub(crate) mod tear;
 
 use std::path::Path;
 
@@ -20,10 +20,12 @@ use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::Name;
 use tactus_core::wire::{Event, Identify, Reset};
 
+use self::held::{CutError, Held, Left, Operation, judge};
 pub(crate) use self::outcome::{Cuts, Outcome};
-use self::tear::{Cut, CutError, Held, Left, Operation, Torn, judge, left_by};
+
 use crate::board::{FlashWrite, Options};
 use crate::host::exploration::{Exploration, explore};
+use crate::host::power_cut::{Cut, Torn, left_by};
 use crate::host::talk::{TIMEOUT_S, Talk, TalkError};
 use crate::host::under_finger::{self, Known, Unknown};
 

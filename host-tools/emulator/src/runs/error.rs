@@ -8,7 +8,7 @@ use crate::host::under_finger::KnownError;
 use crate::scenario::PlayError;
 
 use super::bench::error::BenchError;
-use super::cuts::tear::CutError;
+use super::cuts::held::CutError;
 use super::soak::day::DayError;
 use super::soak::hour_report::HourError;
 
