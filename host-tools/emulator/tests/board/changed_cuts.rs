@@ -128,9 +128,10 @@ fn reboot(elf: &Path, unknown: &Unknown, store: Vec<u8>) -> (Talk, Vec<u8>) {
         ..Options::default()
     };
     let mut talk = Talk::new(unknown.start(elf, options).unwrap());
-    let hear = |_: &mut Emulator, report: Option<&Report>| match report.map(|r| &r.event) {
-        Some(Event::Trouble(why)) => panic!("trouble: {why}"),
-        _ => {}
+    let hear = |_: &mut Emulator, report: Option<&Report>| {
+        if let Some(Event::Trouble(why)) = report.map(|r| &r.event) {
+            panic!("trouble: {why}");
+        }
     };
     let booted = |event: &Event| match event {
         Event::Booted { reset, .. } => Some(Ok(*reset)),
