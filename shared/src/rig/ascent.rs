@@ -58,7 +58,7 @@ impl Ascent {
     }
 
     /// A millisecond of `phase`, its `ms`-th, with a stage that may have `lost` its place: the fault, if P_DC has risen on the
-    /// way to the switch, or of a finger that is lifted.
+    /// way to the switch, or while the finger is to stay lifted.
     #[inline(never)]
     pub(super) fn tick(
         &mut self,
@@ -85,8 +85,8 @@ impl Ascent {
         }
     }
 
-    /// P_DC on the way, mean of 10 ms: the fault, if it has risen by more than `counts`. The first time somebody may lean on the finger, and it is
-    /// lifted; then no further try makes a step before P_DC has fallen again.
+    /// P_DC on the way, mean of 10 ms: the fault, if it has risen by more than `counts`. The first time somebody may lean on
+    /// the finger, and it is lifted; then no further try makes a step before P_DC has fallen again.
     fn rises(&mut self, mean: Option<f32>, counts: f32) -> Option<Fault> {
         let mean = mean?;
         let lowest = self.lowest.map_or(mean, |lowest| lowest.min(mean));
