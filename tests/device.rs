@@ -28,6 +28,7 @@ use tactus_core::wire::{
     self, Counts, Event, Forget, MAX_FRAME, PROTOCOL, Phase, Receiver, Report, Request, Reset,
     Status,
 };
+use tactus_tests::expected_to_fail;
 
 const UNKNOWN: u8 = 47;
 
@@ -949,6 +950,18 @@ fn teaching_and_calibrating_do_what_was_meant() {
     assert_says(&shown, &["counts in the air"]);
     let nonsense = ["calibrate", "--newton-per-ampere", "NaN", "--port", &at];
     assert_says(&complaint(&nonsense), &["above 0"]);
+}
+
+/// Without a scale or weights nobody has measured what a count of P_DC is worth: a date would say that somebody has.
+#[test]
+fn a_force_scale_that_nobody_measured_has_no_date() {
+    let (at, _) = probe(1000);
+    let json = ["--format", "json", "--port", &at];
+    let found = object(&[&["calibrate"][..], &json].concat(), 0);
+    assert_eq!(found["force_mn_per_count"], 11.5);
+    expected_to_fail("is dated", || {
+        assert!(found["date"].is_null(), "the paper's scale is dated: {found}");
+    });
 }
 
 /// "The same as this one?" of what lies under the finger, the share of false alarms that the probe keeps, and a new skin.
