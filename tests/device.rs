@@ -28,7 +28,6 @@ use tactus_core::wire::{
     self, Counts, Event, Forget, MAX_FRAME, PROTOCOL, Phase, Receiver, Report, Request, Reset,
     Status,
 };
-use tactus_tests::expected_to_fail;
 
 const UNKNOWN: u8 = 47;
 
@@ -937,10 +936,15 @@ fn teaching_and_calibrating_do_what_was_meant() {
             "20261121",
             "--newton-per-ampere",
             "16.25",
+            "--force-mn-per-count",
+            "11.4",
         ],
         wire::Command::Calibrate,
     );
-    assert_says(&measured, &["2026-11-21", "16.25 N/A"]);
+    assert_says(
+        &measured,
+        &["11.40 mN a count, measured on 2026-11-21", "16.25 N/A"],
+    );
     let shown = printed(&["calibrate", "--show", "--port", &at]);
     assert!(
         !asked
@@ -956,12 +960,42 @@ fn teaching_and_calibrating_do_what_was_meant() {
 #[test]
 fn a_force_scale_that_nobody_measured_has_no_date() {
     let (at, _) = probe(1000);
-    let json = ["--format", "json", "--port", &at];
-    let found = object(&[&["calibrate"][..], &json].concat(), 0);
-    assert_eq!(found["force_mn_per_count"], 11.5);
-    expected_to_fail("is dated", || {
-        assert!(found["date"].is_null(), "the paper's scale is dated: {found}");
-    });
+    let json = |arguments: &[&str]| {
+        object(
+            &[arguments, &["--format", "json", "--port", &at]].concat(),
+            0,
+        )
+    };
+    let before = json(&["calibrate", "--show"]);
+    assert_eq!(before["air_known"], false, "{before}");
+    for arguments in [&["calibrate"][..], &["calibrate", "--drifted"]] {
+        let found = json(arguments);
+        assert_eq!(found["force_mn_per_count"], 11.5);
+        assert!(
+            found["force_scale_date"].is_null(),
+            "the paper's scale is dated: {found}"
+        );
+        assert_eq!(found["air_known"], true, "{found}");
+        let status = json(&["status"]);
+        assert_eq!(status["calibrated"], 0);
+        assert_eq!(status["calibration"], found);
+    }
+    assert_says(
+        &printed(&["status", "--port", &at]),
+        &["not measured (the paper's 11.5 mN a count)"],
+    );
+    // a day of nothing
+    let usage = device(&["calibrate", "--date", "20261121", "--port", &at]).output();
+    assert_eq!(usage.unwrap().status.code(), Some(2));
+    // measured on a scale once, it stays so when the motor and the air are measured again
+    let scale = ["--force-mn-per-count", "11.4", "--date", "20261121"];
+    json(&[&["calibrate"][..], &scale].concat());
+    for arguments in [&["calibrate"][..], &["calibrate", "--drifted"]] {
+        let found = json(arguments);
+        assert_eq!(found["force_scale_date"], "2026-11-21", "{found}");
+        assert_eq!(found["air_known"], true, "{found}");
+        assert_eq!(json(&["status"])["calibrated"], 20_261_121);
+    }
 }
 
 /// "The same as this one?" of what lies under the finger, the share of false alarms that the probe keeps, and a new skin.

@@ -706,7 +706,7 @@ fn a_finger_that_is_not_in_the_air_is_neither_dragged_nor_pressed_further() {
             // it lifts the finger, then reads its calibration
             let unmeasured = RigCalibration {
                 pressure: Calibration::PAPER,
-                date: 0,
+                air_known: false,
                 ..calibration
             };
             reboot(&mut rig, unmeasured, unguarded);
@@ -799,7 +799,7 @@ fn the_first_zero_is_that_of_the_calibration() {
 /// What nobody has calibrated yet, of a finger that says 240 counts more in the air than the default.
 fn far_off_default(rig: &mut SimRig) -> RigCalibration {
     let unmeasured = *rig.control().calibration();
-    assert_eq!(unmeasured.date, 0);
+    assert!(!unmeasured.air_known);
     RigCalibration {
         pressure: Calibration {
             pdc_no_contact: 2400.0,

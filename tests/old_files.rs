@@ -472,6 +472,9 @@ fn stores_open_and_hold_the_same() {
         assert_eq!(store.settings(), Ok(()));
         let calibration = block_on(store.calibration()).unwrap().unwrap();
         assert_eq!(holds["calibration"], hex(&calibration.to_bytes()));
+        // its date said that P_DC in the air was measured; its scale is the paper's all the same
+        assert!(calibration.air_known && calibration.date != 0, "{kind}");
+        assert_eq!(calibration.scale_day(), None, "{kind}");
         let skin = block_on(store.skin()).unwrap();
         assert_eq!(holds["skin"], json!([skin.energy_j(), skin.wear_j()]));
         let stored = store.table().unwrap();

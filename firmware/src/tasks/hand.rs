@@ -162,6 +162,7 @@ const UNMEASURED: RigCalibration = RigCalibration {
     unloaded_a: (0.0, 0.0),
     newton_per_ampere: 1.0,
     date: 0,
+    air_known: false,
     serial: [0; 16],
 };
 

@@ -58,6 +58,7 @@ pub(crate) const UNMEASURED: RigCalibration = RigCalibration {
     unloaded_a: (0.037, 0.0),
     newton_per_ampere: 16.4,
     date: 0,
+    air_known: false,
     serial: [0; 16],
 };
 

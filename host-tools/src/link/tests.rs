@@ -35,6 +35,7 @@ fn calibration() -> RigCalibration {
         unloaded_a: (0.037, 0.001),
         newton_per_ampere: 16.4,
         date: 20_261_121,
+        air_known: true,
         serial: *b"BT-0000000000001",
     }
 }

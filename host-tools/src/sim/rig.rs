@@ -121,6 +121,7 @@ impl SimRig {
             unloaded_a: (0.037, 0.0),
             newton_per_ampere: 16.4,
             date: 0,
+            air_known: false,
             serial: [0; 16],
         };
         Self {
@@ -427,10 +428,6 @@ impl SimRig {
         let calibration = RigCalibration {
             pressure: Calibration {
                 force_mn_per_count,
-                pdc_no_contact: self
-                    .control
-                    .air_counts()
-                    .unwrap_or(unloaded.pressure.pdc_no_contact),
                 ..unloaded.pressure
             },
             newton_per_ampere: 1.0 / ampere_per_newton,
@@ -438,6 +435,8 @@ impl SimRig {
             serial,
             ..unloaded
         };
+        let air = self.control.air_counts();
+        let calibration = air.map_or(calibration, |counts| calibration.with_air(counts));
         self.control.calibrate(calibration)?;
         Ok(calibration)
     }

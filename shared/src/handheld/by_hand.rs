@@ -195,7 +195,7 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
 
     fn draw(&mut self, table: Option<&Table<'_>>) {
         let about = About {
-            calibrated: self.calibration.date,
+            calibrated: self.calibration.scale_day().unwrap_or(0),
             memory: self.memory,
             ..self.hand.about()
         };
@@ -318,8 +318,7 @@ impl<H: Hand, K: Kernels> RigHandle for ByHand<'_, H, K> {
             };
             if let Some(counts) = self.handheld.air_counts().filter(|_| in_the_air >= AIR) {
                 self.handheld.release();
-                let mut calibration = self.calibration;
-                calibration.pressure.pdc_no_contact = counts;
+                let calibration = self.calibration.with_air(counts);
                 self.set_calibration(calibration)
                     .await
                     .map_err(Failure::Rig)?;

@@ -52,7 +52,7 @@ pub struct About {
     pub late: u32,
     /// Words that were lost.
     pub lost: u32,
-    /// Day of the calibration, as 20261121; 0 for factory defaults, 1 where it is not known.
+    /// Day on which the force was set by weights, as 20261121; 0 if it was not, 1 where the day is not known.
     pub calibrated: u32,
     /// Share of the memory for textures that is taken, 0 to 1.
     pub memory: f32,

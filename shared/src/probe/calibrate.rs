@@ -26,7 +26,7 @@ pub(super) async fn by_motor<R: RigHandle>(rig: &mut R) -> Result<RigCalibration
     let state = rig.state();
     let mut calibration = runs.finish(&state.calibration)?;
     if let Some(air_counts) = state.air_counts {
-        calibration.pressure.pdc_no_contact = air_counts;
+        calibration = calibration.with_air(air_counts);
     }
     calibration.check()?;
     rig.set_calibration(calibration)

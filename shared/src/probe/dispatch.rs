@@ -75,7 +75,7 @@ fn status(panel: &impl Panel) -> Status {
         table_bytes: table.bytes,
         table_crc: table.crc,
         factory: table.factory,
-        calibrated: rig.calibration.date,
+        calibrated: rig.calibration.scale_day().unwrap_or(0),
         counts: panel.counts(),
         skin_mj: (
             (rig.skin.energy_j() * 1e3) as u32,

@@ -16,9 +16,11 @@ pub struct RigCalibration {
     pub unloaded_a: (f32, f32),
     /// Shear per motor current above that, N/A (the paper's inclined stage).
     pub newton_per_ampere: f32,
-    /// Day of the measurement, as 20261121; 0 for values that nobody measured, [`RigCalibration::UNDATED`] where nobody knew
-    /// the day.
+    /// Day on which the force per count was measured, as 20261121, [`RigCalibration::UNDATED`] where nobody knew the day, 0 if
+    /// it was not. Programs before version 7 of the messages dated every calibration: see [`RigCalibration::scale_day`].
     pub date: u32,
+    /// Whether P_DC in the air is this finger's, and no default.
+    pub air_known: bool,
     /// Serial number of the sensor, as the sensor says it.
     pub serial: [u8; 16],
 }
@@ -26,6 +28,26 @@ pub struct RigCalibration {
 impl RigCalibration {
     /// The date of a calibration that a probe made without a computer: it has no clock.
     pub const UNDATED: u32 = 1;
+
+    /// Marks the stored date where it does not say whether P_DC in the air is known: of a date that programs before version 7
+    /// wrote, it is; of 0, it is not.
+    const OTHER_AIR: u32 = 1 << 31;
+
+    /// Day on which the force per count was measured, see [`RigCalibration::date`]. The paper's own value was not, whatever the
+    /// date says.
+    pub fn scale_day(&self) -> Option<u32> {
+        let is_papers =
+            self.pressure.force_mn_per_count == Calibration::PAPER.force_mn_per_count;
+        (self.date != 0 && !is_papers).then_some(self.date)
+    }
+
+    /// This, with P_DC in the air as it was measured, counts.
+    #[must_use]
+    pub fn with_air(mut self, counts: f32) -> Self {
+        self.pressure.pdc_no_contact = counts;
+        self.air_known = true;
+        self
+    }
 
     /// Shear in N at a motor current and speed.
     pub fn shear_n(&self, current_a: f32, speed_mm_s: f32) -> f32 {
@@ -36,12 +58,15 @@ impl RigCalibration {
     /// Length of a stored record.
     pub const BYTES: usize = 60;
 
-    /// The record as it is stored: nine f32, the date, the serial number, and a CRC-32 of these; little-endian.
+    /// The record as it is stored: nine f32, the date, the serial number, and a CRC-32 of these; little-endian. The highest bit
+    /// of the date says whether P_DC in the air is known: set, if it is without a date, or is not with one.
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
         let mut bytes = [0; Self::BYTES];
         let (body, end) = bytes.split_at_mut(Self::BYTES - 4);
         let numbers = self.numbers().into_iter().flat_map(f32::to_le_bytes);
-        let fields = numbers.chain(self.date.to_le_bytes()).chain(self.serial);
+        let other_air = self.air_known != (self.date != 0);
+        let date = self.date | if other_air { Self::OTHER_AIR } else { 0 };
+        let fields = numbers.chain(date.to_le_bytes()).chain(self.serial);
         for (slot, byte) in body.iter_mut().zip(fields) {
             *slot = byte;
         }
@@ -72,7 +97,7 @@ impl RigCalibration {
                 .next()
                 .map_or(f32::NAN, |word| f32::from_le_bytes(*word))
         };
-        let record = Self {
+        let mut record = Self {
             pressure: Calibration {
                 pac_pa_per_count: number(),
                 pac_rest: number(),
@@ -84,8 +109,12 @@ impl RigCalibration {
             unloaded_a: (number(), number()),
             newton_per_ampere: number(),
             date: words.next().map_or(0, |word| u32::from_le_bytes(*word)),
+            air_known: false,
             serial: *serial,
         };
+        let other_air = record.date & Self::OTHER_AIR != 0;
+        record.date &= !Self::OTHER_AIR;
+        record.air_known = other_air != (record.date != 0);
         record.check()?;
         Ok(record)
     }
@@ -250,6 +279,7 @@ mod tests {
             unloaded_a: (0.1, 0.002),
             newton_per_ampere: 8.0,
             date: 20_261_121,
+            air_known: true,
             serial: *b"BT-0000000000001",
         };
         assert!((rig.shear_n(0.25, 25.0) - 0.8).abs() < 1e-5);
@@ -279,6 +309,14 @@ mod tests {
                 Err(RigCalibrationError::Damaged)
             );
         }
+        for (date, air_known) in [(0, false), (0, true), (1, false), (1, true)] {
+            let rig = RigCalibration {
+                date,
+                air_known,
+                ..rig
+            };
+            assert_eq!(RigCalibration::from_bytes(&rig.to_bytes()), Ok(rig));
+        }
         let nonsense = RigCalibration {
             newton_per_ampere: f32::NAN,
             ..rig
@@ -288,6 +326,18 @@ mod tests {
             RigCalibration::from_bytes(&nonsense),
             Err(RigCalibrationError::Current)
         );
+        // dated by a program that did not ask for a scale
+        assert_eq!(rig.scale_day(), None);
+        let weighed = Calibration {
+            force_mn_per_count: 11.4,
+            ..Calibration::PAPER
+        };
+        let weighed = RigCalibration {
+            pressure: weighed,
+            ..rig
+        };
+        assert_eq!(weighed.scale_day(), Some(20_261_121));
+        assert_eq!(RigCalibration { date: 0, ..weighed }.scale_day(), None);
         let pressure = Calibration {
             force_mn_per_count: -1.0,
             ..Calibration::PAPER

@@ -195,7 +195,7 @@ impl Control {
 
     /// Whether nobody has measured this finger's P_DC without contact: the default says nothing of it.
     fn knows_only_default(&self) -> bool {
-        !self.zeroed && self.calibration.date == 0
+        !self.zeroed && !self.calibration.air_known
     }
 
     fn forget_default(&mut self) {
@@ -208,7 +208,7 @@ impl Control {
     #[inline(never)]
     fn is_pressed(&self, counts: Option<f32>) -> bool {
         let calibrated = self.calibration.pressure.pdc_no_contact;
-        let calibrated = (self.calibration.date != 0).then_some(calibrated);
+        let calibrated = self.calibration.air_known.then_some(calibrated);
         // of a finger that nobody has calibrated, what it said on its way up
         let known = [calibrated.or(self.ascent.lowest()), self.recovered];
         known.into_iter().flatten().any(|air| is_far(counts, air))
@@ -485,7 +485,7 @@ impl Control {
                                 self.check(Fault::LeverNotHome);
                             }
                             // before there are 10 ms of P_DC nothing is known; that they come is the guard's to see
-                            let known = mean.is_some() || self.calibration.date == 0;
+                            let known = mean.is_some() || !self.calibration.air_known;
                             if known && self.phase == Phase::Homing {
                                 self.stage.home();
                             }

@@ -68,6 +68,7 @@ mod tests {
         unloaded_a: (0.0, 0.0),
         newton_per_ampere: 8.0,
         date: 20_261_121,
+        air_known: true,
         serial: [b'0'; 16],
     };
 

@@ -80,6 +80,7 @@ fn calibration(n: u8) -> RigCalibration {
         unloaded_a: (0.1, f32::from(n) * 1e-3),
         newton_per_ampere: 8.0,
         date: 20_261_121,
+        air_known: true,
         serial: [b'0'; 16],
     }
 }

@@ -226,7 +226,7 @@ pub struct Status {
     pub table_crc: u32,
     /// Whether it came with the firmware.
     pub factory: bool,
-    /// Day of the calibration, as 20261121; 0 for constants that nobody measured.
+    /// Day on which the force per count was measured, as 20261121, 1 where nobody knew the day; 0 if it is the paper's.
     pub calibrated: u32,
     /// What was counted since boot.
     pub counts: Counts,

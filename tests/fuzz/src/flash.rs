@@ -23,6 +23,7 @@ pub(crate) fn calibration() -> RigCalibration {
         unloaded_a: (0.037, 0.001),
         newton_per_ampere: 16.4,
         date: 1,
+        air_known: true,
         serial: *b"BT000000FUZZFUZZ",
     }
 }

@@ -3,9 +3,11 @@
 use std::io::Write;
 
 use anyhow::ensure;
+use clap::ArgGroup;
 use serde::Serialize;
 use tactus::link::Request;
 use tactus_core::rig::calibration::{LineFit, RigCalibration};
+use tactus_core::sensor::pressure::Calibration;
 use tactus_core::wire::Command;
 
 use super::bench::{Bench, BenchError};
@@ -14,15 +16,18 @@ use crate::cmd::output::{Format, print_json, print_rows};
 
 /// Measure what differs from rig to rig, or show and set it
 #[derive(clap::Args)]
-#[command(after_help = "\
+#[command(group(ArgGroup::new("scale").args(["force_mn_per_count", "weights"])), after_help = "\
 Examples:
-  tactus device calibrate                   measures the motor's current without load; the date is today's
+  tactus device calibrate                   measures the motor's current without load, and P_DC in the air
   tactus device calibrate --show            what is in use
   tactus device calibrate --drifted         if a finger in the air seems to touch something: takes its P_DC anew
   tactus device calibrate --weights 0.49,0.98,1.47
                                             a handheld: asks for these weights on its finger, N
   tactus device calibrate --newton-per-ampere 16.2 --force-mn-per-count 11.4
-                                            also takes what was measured on an incline and on a scale")]
+                                            also takes what was measured on an incline and on a scale
+
+What a count of P_DC is worth in mN has a day only once it was measured: with --weights, or with --force-mn-per-count.
+Until then it is the paper's, of another finger.")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,
@@ -32,18 +37,18 @@ pub(crate) struct Args {
     /// The finger has drifted further than the probe allows: discard the P_DC that it had in the air, and measure it anew
     #[arg(long)]
     drifted: bool,
-    /// The day of the calibration, as 20261121; today unless given
-    #[arg(long, value_name = "YYYYMMDD", value_parser = clap::value_parser!(u32).range(20_000_101..=29_991_231))]
+    /// The day on which the force per count was measured, as 20261121; today unless given
+    #[arg(long, value_name = "YYYYMMDD", requires = "scale", value_parser = clap::value_parser!(u32).range(20_000_101..=29_991_231))]
     date: Option<u32>,
     /// Shear per motor current, N/A, from pulls on an inclined stage
     #[arg(long, value_name = "X")]
     newton_per_ampere: Option<f32>,
-    /// Contact force per count of P_DC, mN, from presses on a scale
+    /// Contact force per count of P_DC, mN, measured by presses on a scale
     #[arg(long, value_name = "X")]
     force_mn_per_count: Option<f32>,
     /// A handheld's finger: three known weights or more, N, which it asks for one after the other; with its tip up, each is
     /// laid on it
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',', conflicts_with = "force_mn_per_count", value_parser = newton)]
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = newton)]
     weights: Vec<u16>,
     /// How to print what is in use
     #[arg(long, value_enum, default_value_t = Format::Text)]
@@ -53,10 +58,13 @@ pub(crate) struct Args {
 /// What `device calibrate --format json` prints, and a part of `device status`.
 #[derive(Serialize)]
 pub(crate) struct CalibrationSummary {
-    /// The day, as "2026-11-21"; "not known" where the probe was calibrated without a computer; `null` for factory defaults.
-    date: Option<String>,
+    /// The day on which the force per count was measured, as "2026-11-21"; "not known" where that was done without a computer;
+    /// `null`: it was not, and is the paper's.
+    force_scale_date: Option<String>,
     sensor: Option<String>,
     pdc_in_the_air_counts: f32,
+    /// Whether that was measured.
+    air_known: bool,
     force_mn_per_count: f32,
     /// Motor current without load at standstill, and more of it for each mm/s.
     unloaded_ma: f32,
@@ -68,9 +76,10 @@ impl CalibrationSummary {
     pub(crate) fn new(c: &RigCalibration) -> Self {
         let (unloaded_a, a_per_mm_s) = c.unloaded_a;
         Self {
-            date: date(c),
+            force_scale_date: date(c),
             sensor: sensor(c),
             pdc_in_the_air_counts: c.pressure.pdc_no_contact,
+            air_known: c.air_known,
             force_mn_per_count: c.pressure.force_mn_per_count,
             unloaded_ma: unloaded_a * 1e3,
             unloaded_ma_per_mm_s: a_per_mm_s * 1e3,
@@ -79,14 +88,15 @@ impl CalibrationSummary {
     }
 }
 
-/// "2026-11-21", "not known" for a probe that was calibrated without a computer; nothing for factory defaults.
+/// The day of the force scale: "2026-11-21", "not known" for a probe that was calibrated without a computer; nothing for a
+/// scale that was not measured.
 fn date(c: &RigCalibration) -> Option<String> {
-    let (year, month, day) = (c.date / 10_000, c.date / 100 % 100, c.date % 100);
-    match c.date {
-        0 => None,
-        RigCalibration::UNDATED => Some("not known".to_owned()),
-        _ => Some(format!("{year}-{month:02}-{day:02}")),
-    }
+    let date = c.scale_day()?;
+    let (year, month, day) = (date / 10_000, date / 100 % 100, date % 100);
+    Some(match date {
+        RigCalibration::UNDATED => "not known".to_owned(),
+        _ => format!("{year}-{month:02}-{day:02}"),
+    })
 }
 
 /// The sensor's serial number.
@@ -111,17 +121,16 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     };
     let mut told = told;
     if how.drifted {
-        calibration.date = 0;
+        calibration.air_known = false;
         bench.get(Request::write_calibration(&calibration)?)?;
         bench.perform(Request::command(Command::Home), &mut told)?;
     }
     writeln!(
         told,
-        "Measuring the motor's current without load; of a handheld P_DC in the air ..."
+        "Measuring P_DC in the air and, of a rig, the motor's current without load ..."
     )?;
     told.flush()?;
     calibration = bench.perform(Request::calibrate(), &mut told)?;
-    calibration.date = how.date.unwrap_or_else(today);
     if let Some(newton_per_ampere) = how.newton_per_ampere {
         calibration.newton_per_ampere = newton_per_ampere;
     }
@@ -130,6 +139,9 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     if !how.weights.is_empty() {
         calibration.pressure.force_mn_per_count = weigh(&mut bench, &how.weights, &mut told)?;
+    }
+    if how.force_mn_per_count.is_some() || !how.weights.is_empty() {
+        calibration.date = how.date.unwrap_or_else(today);
     }
     bench.get(Request::write_calibration(&calibration)?)?;
     let kept = bench.get(Request::read_calibration())?;
@@ -178,16 +190,29 @@ fn today() -> u32 {
 }
 
 /// The constants in words.
-pub(crate) fn calibration_rows(c: &RigCalibration) -> [(&'static str, String); 6] {
+pub(crate) fn calibration_rows(c: &RigCalibration) -> [(&'static str, String); 5] {
     let (offset_ma, slope_ma) = (c.unloaded_a.0 * 1e3, c.unloaded_a.1 * 1e3);
     let motor = format!("{offset_ma:.1} mA + {slope_ma:.3} mA per mm/s without load");
+    let mn = c.pressure.force_mn_per_count;
+    let whose = if mn == Calibration::PAPER.force_mn_per_count {
+        "the paper's "
+    } else {
+        ""
+    };
+    let air = if c.air_known {
+        ""
+    } else {
+        ", which nobody measured"
+    };
     [
         (
-            "calibrated",
+            "force scale",
             match date(c) {
-                None => "never: factory defaults".to_owned(),
-                Some(day) if c.date == RigCalibration::UNDATED => format!("on a day {day}"),
-                Some(day) => day,
+                None => format!("not measured ({whose}{mn:.1} mN a count)"),
+                Some(day) if c.date == RigCalibration::UNDATED => {
+                    format!("{mn:.2} mN a count, measured on a day {day}")
+                }
+                Some(day) => format!("{mn:.2} mN a count, measured on {day}"),
             },
         ),
         (
@@ -196,11 +221,7 @@ pub(crate) fn calibration_rows(c: &RigCalibration) -> [(&'static str, String); 6
         ),
         (
             "P_DC",
-            format!("{:.1} counts in the air", c.pressure.pdc_no_contact),
-        ),
-        (
-            "force",
-            format!("{:.2} mN per count", c.pressure.force_mn_per_count),
+            format!("{:.1} counts in the air{air}", c.pressure.pdc_no_contact),
         ),
         ("motor current", motor),
         (

@@ -22,6 +22,7 @@ const UNMEASURED: RigCalibration = RigCalibration {
     unloaded_a: (0.0, 0.0),
     newton_per_ampere: 1.0,
     date: 0,
+    air_known: false,
     serial: [0; 16],
 };
 
@@ -318,7 +319,8 @@ fn a_person_sets_the_force_by_weights_without_a_host_and_it_is_kept() {
     let scale = set.pressure.force_mn_per_count;
     assert!((scale - 14.0).abs() < 0.1, "{scale}");
     assert!((set.pressure.pdc_no_contact - AIR).abs() < 0.2);
-    assert_eq!(set.date, RigCalibration::UNDATED);
+    assert_eq!(set.scale_day(), Some(RigCalibration::UNDATED));
+    assert!(set.air_known);
     let weights = prompts(&rig).into_iter().filter_map(|prompt| match prompt {
         Prompt::Weigh(mn) => Some(mn),
         _ => None,

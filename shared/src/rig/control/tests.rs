@@ -7,6 +7,7 @@ fn a_lever_that_cannot_press_is_a_fault_and_lifts() {
         unloaded_a: (0.0, 0.0),
         newton_per_ampere: 8.0,
         date: 0,
+        air_known: false,
         serial: [0; 16],
     };
     let mut control = Control::new(
