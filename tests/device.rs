@@ -1044,6 +1044,22 @@ fn a_probe_verifies_keeps_its_setting_and_is_refreshed() {
     assert_eq!(set(&[]).as_f64().unwrap() as f32, 0.025);
     assert_says(&printed(&["status", "--port", &at]), &["2.5 %"]);
     assert!(set(&["--as-table"]).is_null());
+    // 2 N take somebody who says that the finger is safe
+    let high_force = |arguments: &[&str]| json(&[&["settings"][..], arguments].concat(), 0);
+    assert_eq!(high_force(&[])["high_force"], false);
+    for _ in asked.try_iter() {}
+    assert_says(
+        &complaint(&["settings", "--high-force", "on", "--port", &at]),
+        &["nothing was changed", "--yes"],
+    );
+    let sets = |command: wire::Command| matches!(command, wire::Command::SetHighForce(_));
+    assert!(!asked.try_iter().any(sets));
+    let said = printed(&["settings", "--high-force", "on", "--yes", "--port", &at]);
+    assert_says(&said, &["2.05 N, 0.009 N/mm", "hard stop", "up to 2.00 N"]);
+    assert_eq!(high_force(&[])["high_force"], true);
+    assert_eq!(json(&["status"], 0)["high_force"], true);
+    assert_says(&printed(&["status", "--port", &at]), &["up to 2.00 N"]);
+    assert_eq!(high_force(&["--high-force", "off"])["high_force"], false);
     let usage = device(&["settings", "--false-alarm", "0.7", "--port", &at]).output();
     assert_eq!(usage.unwrap().status.code(), Some(2));
 
@@ -1365,6 +1381,7 @@ mod unix {
                     counts: Counts::default(),
                     skin_mj: (0, 0),
                     false_alarm: None,
+                    high_force: false,
                 })
             },
             || Event::Done(0),

@@ -91,6 +91,7 @@ fn without_the_guard_a_dead_pressure_crushes_the_finger() {
             texture: 45,
             trouble: Trouble::Dead,
             unguarded,
+            mount: Mount::STIFF,
         };
         bench.run()
     };
@@ -112,6 +113,7 @@ fn the_softest_foam_is_pressed_with_two_newtons() {
             texture: 30,
             trouble: Trouble::Sound,
             unguarded: Unguarded::against(Fault::ForceHigh),
+            mount: Mount::STIFF,
         };
         for press in bench.run() {
             let wanted_n = f64::from(press.movement.force_n());

@@ -11,8 +11,8 @@ use tactus_core::features::Observation;
 use tactus_core::features::{PropertySet, Slide};
 use tactus_core::probe::explore::explore;
 use tactus_core::probe::training::{Training, Wanted};
-use tactus_core::rig::Rig as _;
 use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::{HIGH_FORCE_MN, Rig as _};
 use tactus_core::store::TrainingRecord;
 use tactus_core::table::Table;
 
@@ -33,6 +33,7 @@ fn wanted(name: &str) -> Wanted<'_> {
         trials: 5,
         pilot: false,
         measures: PropertySet::ALL,
+        most_mn: HIGH_FORCE_MN,
     }
 }
 

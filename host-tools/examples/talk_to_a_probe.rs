@@ -62,6 +62,7 @@ fn pretend() -> SocketAddr {
                     counts: Counts::default(),
                     skin_mj: (0, 0),
                     false_alarm: None,
+                    high_force: false,
                 };
                 say(&mut line, Event::Status(status));
                 say(&mut line, Event::Done(request.id));

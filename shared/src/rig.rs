@@ -27,7 +27,7 @@ use crate::dsp::Kernels;
 use crate::features::{PropertySet, Slide};
 
 pub use fault::{FAULTS, Fault};
-pub use phase::{Ended, Phase, Refused, RigError};
+pub use phase::{Ended, HIGH_FORCE_MN, Phase, Refused, RigError, most_mn};
 
 /// Slides in a row that came to nothing, after which an exploration ends: each movement is tried twice, so these are three
 /// movements.
@@ -41,6 +41,11 @@ pub trait Rig {
 
     /// The properties that this rig can measure.
     fn measures(&self) -> PropertySet;
+
+    /// The largest contact force that this rig makes a movement with, mN.
+    fn most_mn(&self) -> u16 {
+        HIGH_FORCE_MN
+    }
 
     /// Makes the movement of `slide`: presses, measures the still finger, slides, and gives it all samples in blocks.
     /// The finger may still be on its way up: see [`Rig::lifted`].

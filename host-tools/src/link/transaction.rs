@@ -195,6 +195,7 @@ fn may_repeat(command: &Command) -> bool {
         | Command::WriteTable { .. }
         | Command::Forget(Forget::SelfLearned | Forget::Training(_))
         | Command::SetFalseAlarm(_)
+        | Command::SetHighForce(_)
         | Command::FactoryTable => true,
         Command::Home
         | Command::Identify(_)

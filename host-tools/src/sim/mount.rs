@@ -27,6 +27,13 @@ impl Mount {
         pushed_mm: 0.0,
     };
 
+    /// The one of a rig that is to press 2 N: it lies still at that, and the lever's whole travel makes no more of it than 2.2 N.
+    pub const FOR_2_N: Self = Self {
+        preload_n: 2.05,
+        n_per_mm: 0.009,
+        pushed_mm: 0.0,
+    };
+
     /// A tick with this force on the finger, N.
     pub(super) fn tick(&mut self, force_n: f64) {
         let over_n = force_n - self.preload_n - self.n_per_mm * self.pushed_mm;
@@ -47,12 +54,15 @@ mod tests {
     fn a_spring_lies_at_its_stop_until_its_preload_and_comes_back() {
         let mut mount = Mount::SPRUNG;
         let after = |mount: &mut Mount, force_n: f64| {
-            (0..2000).for_each(|_| mount.tick(force_n));
+            (0..20_000).for_each(|_| mount.tick(force_n));
             mount.pushed_mm()
         };
         assert_eq!(after(&mut mount, 1.44), 0.0);
         assert!((after(&mut mount, 1.65) - 5.0).abs() < 0.1);
         assert_eq!(after(&mut mount, 1.4), 0.0);
+        let mut stronger = Mount::FOR_2_N;
+        assert_eq!(after(&mut stronger, 2.04), 0.0);
+        assert!((after(&mut stronger, 2.2) - 16.7).abs() < 0.1);
         let mut stiff = Mount::STIFF;
         assert_eq!(after(&mut stiff, 12.0), 0.0);
     }

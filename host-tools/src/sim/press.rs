@@ -13,6 +13,7 @@ use super::collection::{Collection, texture_name};
 use super::conditions::Conditions;
 use super::faults::Fault as Cause;
 use super::maths::pow;
+use super::mount::Mount;
 use super::noise::Noise;
 use super::rig::{SimError, SimRig};
 use super::textures;
@@ -69,7 +70,7 @@ impl Trouble {
 }
 
 /// A rig of the campaign: it makes every movement of the grid on one texture. All of it can be made again from this.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Bench {
     /// The world's seed.
     pub world: u64,
@@ -79,6 +80,8 @@ pub struct Bench {
     pub trouble: Trouble,
     /// Guards that are switched off.
     pub unguarded: Unguarded,
+    /// What the finger is fixed to.
+    pub mount: Mount,
 }
 
 /// One press and its slide.
@@ -153,6 +156,7 @@ impl Campaign {
                         texture,
                         trouble,
                         unguarded: self.unguarded,
+                        mount: Mount::STIFF,
                     });
                 }
             }
@@ -191,6 +195,11 @@ fn textures_of(world: u64) -> Vec<u8> {
 impl Bench {
     /// Makes every movement of the grid.
     pub fn run(&self) -> Vec<Press> {
+        self.make(Movement::grid())
+    }
+
+    /// Makes these movements; high forces are allowed.
+    pub fn make(&self, movements: impl IntoIterator<Item = Movement>) -> Vec<Press> {
         let number = Trouble::ALL.iter().position(|t| *t == self.trouble);
         let collection = Collection {
             seed: self.world,
@@ -202,6 +211,7 @@ impl Bench {
             ..collection.setup(self.texture, 900 + number.unwrap_or(0) as u64)
         };
         let mut rig = SimRig::under(setup, Conditions::default(), self.unguarded);
+        rig.world().mount(self.mount);
         rig.control().allow_high_force(true);
         let mut noise = Noise::new(setup.trial_seed, STREAM);
         let press = |movement| {
@@ -216,7 +226,7 @@ impl Bench {
                 ended,
             }
         };
-        Movement::grid().map(press).collect()
+        movements.into_iter().map(press).collect()
     }
 }
 

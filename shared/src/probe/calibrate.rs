@@ -46,7 +46,7 @@ pub(super) async fn keep<F: NorFlash>(
     store.set_calibration(calibration).await
 }
 
-/// Gives the rig its skin and its calibration as they are stored; each whatever becomes of the other.
+/// Gives the rig its skin, its largest force and its calibration as they are stored; each whatever becomes of the others.
 ///
 /// # Errors
 /// One of them cannot be read, or another record of the settings is damaged.
@@ -57,6 +57,10 @@ pub async fn restore<F: NorFlash, R: RigHandle>(
     let skin = store.skin().await;
     if let Ok(skin) = &skin {
         rig.set_skin(*skin).await;
+    }
+    if store.high_force().await.unwrap_or(false) {
+        // a hand refuses it, and a rig does not
+        let _ = rig.allow_high_force(true).await;
     }
     if let Some(calibration) = store.calibration().await? {
         // one that was stored is not refused

@@ -82,6 +82,7 @@ fn status(panel: &impl Panel) -> Status {
             (rig.skin.wear_j() * 1e3) as u32,
         ),
         false_alarm: table.false_alarm,
+        high_force: rig.high_force,
     }
 }
 
@@ -241,6 +242,18 @@ where
                 memory.store()?.set_false_alarm(*share).await?;
                 memory.reload(events).await;
                 Ok(())
+            }
+            Command::SetHighForce(allow) => {
+                rig.allow_high_force(*allow).await?;
+                let kept = match memory.store() {
+                    Ok(store) => store.set_high_force(*allow).await.map_err(Failure::from),
+                    Err(why) => Err(why.into()),
+                };
+                if kept.is_err() {
+                    // what is not kept does not hold
+                    rig.allow_high_force(false).await?;
+                }
+                kept
             }
             // answered when they came, see `receive`
             Command::Status | Command::Stop | Command::Stream(_) | Command::ReadCalibration => {

@@ -47,6 +47,14 @@ pub trait RigHandle: Rig<Error = RigError> {
     /// The rig refuses it.
     async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), RigError>;
 
+    /// Allows movements of up to 2 N, or forbids them.
+    ///
+    /// # Errors
+    /// [`Failure::OtherProbe`]: a hand makes no such movement.
+    async fn allow_high_force(&mut self, _allow: bool) -> Result<(), Failure> {
+        Err(Failure::OtherProbe)
+    }
+
     /// Goes on from this wear of the skin.
     async fn set_skin(&mut self, skin: SkinCare);
 

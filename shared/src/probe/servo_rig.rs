@@ -14,7 +14,7 @@ use crate::rig::control::Control;
 use crate::rig::pins::Outputs;
 use crate::rig::skin::SkinCare;
 use crate::rig::timeout::{MovementTimeout, Wait};
-use crate::rig::{Ended, Phase, Refused, Rig, RigError};
+use crate::rig::{Ended, Phase, Refused, Rig, RigError, most_mn};
 use crate::wire::{Event, Failure};
 
 /// How often the samples are looked after, ms.
@@ -35,6 +35,8 @@ pub enum RigCommand {
     StartUnloaded(u32),
     /// Uses this calibration.
     Calibrate(RigCalibration),
+    /// Whether movements may press with up to 2 N.
+    AllowHighForce(bool),
     /// Another sample may lie under the finger.
     SampleChanged,
     /// Goes on from this wear of the skin.
@@ -61,6 +63,10 @@ impl RigCommand {
             Self::Start(movement, start) => control.start(movement, start),
             Self::StartUnloaded(speed_um_s) => control.start_unloaded(speed_um_s),
             Self::Calibrate(calibration) => control.calibrate(calibration),
+            Self::AllowHighForce(allow) => {
+                control.allow_high_force(allow);
+                Ok(())
+            }
             Self::SampleChanged => {
                 control.sample_changed();
                 Ok(())
@@ -260,6 +266,12 @@ impl<S: Servo> RigHandle for ServoRig<S> {
         self.servo.command(command).await.map_err(RigError::Refused)
     }
 
+    async fn allow_high_force(&mut self, allow: bool) -> Result<(), Failure> {
+        let command = RigCommand::AllowHighForce(allow);
+        let done = self.servo.command(command).await;
+        done.map_err(|why| Failure::Rig(RigError::Refused(why)))
+    }
+
     async fn set_skin(&mut self, skin: SkinCare) {
         // never refused
         let _ = self.servo.command(RigCommand::Skin(skin)).await;
@@ -271,6 +283,10 @@ impl<S: Servo> Rig for ServoRig<S> {
 
     fn measures(&self) -> PropertySet {
         PropertySet::ALL
+    }
+
+    fn most_mn(&self) -> u16 {
+        most_mn(self.servo.state().high_force)
     }
 
     async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), RigError> {

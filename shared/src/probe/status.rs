@@ -31,6 +31,8 @@ pub struct RigState {
     pub air_counts: Option<f32>,
     /// The constants in use.
     pub calibration: RigCalibration,
+    /// Whether movements may press with up to 2 N.
+    pub high_force: bool,
     /// What the skin has been through.
     pub skin: SkinCare,
 }
@@ -50,6 +52,7 @@ impl RigState {
             mean_current_a: None,
             air_counts: None,
             calibration,
+            high_force: false,
             skin: SkinCare::NEW,
         }
     }
@@ -69,6 +72,7 @@ impl RigState {
             mean_current_a: control.mean_current_a(),
             air_counts: control.air_counts(),
             calibration: *control.calibration(),
+            high_force: control.high_force(),
             skin: *control.skin(),
         }
     }

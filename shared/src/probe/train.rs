@@ -8,7 +8,7 @@ use super::training::{Training, Wanted};
 use crate::dsp::Plan;
 use crate::explorer::Kernels;
 use crate::features::{Movement, Observation, Slide};
-use crate::rig::{MAX_REJECTED, Rig, RigError};
+use crate::rig::{MAX_REJECTED, Refused, Rig, RigError};
 use crate::store::Store;
 use crate::table::{MAX_MOVEMENTS, Table};
 use crate::up_to;
@@ -18,7 +18,8 @@ use crate::wire::{Event, Failure, Rejection, Train};
 /// is stored at once. In the end the store has a new table, which is to be used from then on. `buffer` holds a whole table.
 ///
 /// # Errors
-/// The texture cannot be learned, see [`crate::wire::TrainingError`]; the rig or the store failed;
+/// The texture cannot be learned, see [`crate::wire::TrainingError`]; the rig does not press as hard as one of the movements;
+/// the rig or the store failed;
 /// [`MAX_REJECTED`] slides in a row were no good.
 pub async fn train<R, F, K>(
     wanted: &Train,
@@ -41,11 +42,16 @@ where
             trials: wanted.trials,
             pilot: wanted.pilot,
             measures: rig.measures(),
+            most_mn: rig.most_mn(),
         },
         Some(&table),
         Store::<F>::MAX_TABLE.min(buffer.len()),
     )?;
     let movements: Vec<Movement, MAX_MOVEMENTS> = up_to(training.learned().iter().map(|(m, _)| *m));
+    let mut forces = movements.iter().map(|movement| movement.force_mn());
+    if let Some(force_mn) = forces.find(|mn| *mn > rig.most_mn()) {
+        return Err(Failure::Rig(Refused::Force(force_mn).into()));
+    }
     for &movement in &movements {
         let before = store
             .training_record(name, movement, training.table())

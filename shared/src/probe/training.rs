@@ -30,9 +30,9 @@ pub const FIRST_MOVEMENTS: [Movement; 3] = [
     Movement::FOR_ROUGHNESS,
 ];
 
-/// Movements of a pilot: the grid up to 1.26 N; with more force the skin touches the core (fig. 3).
-pub fn pilot_movements() -> impl Iterator<Item = Movement> {
-    Movement::grid().filter(|m| m.force_mn() <= Movement::FOR_TRACTION.force_mn())
+/// Movements of a pilot: of the grid those that a rig presses, up to `most_mn`.
+pub fn pilot_movements(most_mn: u16) -> impl Iterator<Item = Movement> {
+    Movement::grid().filter(move |m| m.force_mn() <= most_mn)
 }
 
 /// A texture to learn.
@@ -46,6 +46,8 @@ pub struct Wanted<'n> {
     pub pilot: bool,
     /// The properties that the rig measures.
     pub measures: PropertySet,
+    /// The largest force that it presses, mN.
+    pub most_mn: u16,
 }
 
 /// A texture that is being learned.
@@ -83,7 +85,7 @@ impl Training {
             return Err(TrainingError::Name(0));
         }
         let makes_table = match table {
-            Some(table) => !wanted.pilot || table.movements().eq(pilot_movements()),
+            Some(table) => !wanted.pilot || table.movements().eq(pilot_movements(wanted.most_mn)),
             None => true,
         };
         let contents = match table {
@@ -135,7 +137,9 @@ impl Training {
                     (movement, known.unwrap_or(untouched(movement).1))
                 }),
             ),
-            None if wanted.pilot => fill(&mut learned, pilot_movements().map(untouched)),
+            None if wanted.pilot => {
+                fill(&mut learned, pilot_movements(wanted.most_mn).map(untouched))
+            }
             None => fill(&mut learned, FIRST_MOVEMENTS.into_iter().map(untouched)),
         }
         if makes_table && known.is_none() {

@@ -36,8 +36,7 @@ impl RigCalibration {
     /// Day on which the force per count was measured, see [`RigCalibration::date`]. The paper's own value was not, whatever the
     /// date says.
     pub fn scale_day(&self) -> Option<u32> {
-        let is_papers =
-            self.pressure.force_mn_per_count == Calibration::PAPER.force_mn_per_count;
+        let is_papers = self.pressure.force_mn_per_count == Calibration::PAPER.force_mn_per_count;
         (self.date != 0 && !is_papers).then_some(self.date)
     }
 

@@ -8,14 +8,14 @@ use super::ascent::{Ascent, RELEASE_MS, is_far};
 use super::calibration::RigCalibration;
 use super::fault::Fault;
 use super::force::ForceMeter;
-use super::guard::{FORCE_LIMIT_MN, Guard, Seen, Switch, Unguarded};
+use super::guard::{Guard, Seen, Switch, Unguarded, force_limit_mn, may_press};
 use super::lever::{Lever, LeverState};
 use super::pins::{Inputs, Outputs};
 use super::skin::SkinCare;
 use super::slide::Run;
 use super::stage::{MARGIN_MM, Stage, StageConstants, StageState};
 use crate::features::Movement;
-use crate::sensor::pressure::{Calibration, Channel};
+use crate::sensor::pressure::Channel;
 
 use super::phase::{Ended, HIGH_FORCE_MN, Phase, Refused};
 
@@ -43,7 +43,7 @@ pub struct Control {
     ms: u32,
     ended: Option<Ended>,
     run: Run,
-    allow_high_force: bool,
+    high_force: bool,
     /// P_DC without contact was measured: before that only its rise says anything of a finger that nobody calibrated.
     zeroed: bool,
     /// The first zero since homing was compared with the calibration's.
@@ -80,7 +80,7 @@ impl Control {
             ms: 0,
             ended: None,
             run: Run::NONE,
-            allow_high_force: false,
+            high_force: false,
             zeroed: false,
             compared: false,
             recovered: None,
@@ -145,9 +145,15 @@ impl Control {
         Ok(())
     }
 
-    /// Allows forces up to 2 N: the last row of the grid of eq. 21.
+    /// Allows forces up to 2 N, the last two rows of the grid of eq. 21, or forbids them. Where P_DC says too little the lever
+    /// presses on: for a rig whose finger yields before 2.2 N, or whose lever is stopped.
     pub fn allow_high_force(&mut self, allow: bool) {
-        self.allow_high_force = allow;
+        self.high_force = allow;
+    }
+
+    /// Whether forces up to 2 N are allowed.
+    pub fn high_force(&self) -> bool {
+        self.high_force
     }
 
     /// Another sample lies under the finger and may be thicker: the place of the last contact is forgotten.
@@ -221,13 +227,9 @@ impl Control {
     #[inline]
     pub fn start(&mut self, movement: Movement, start: f32) -> Result<(), Refused> {
         self.may_start()?;
-        let pressable = self
-            .calibration
-            .pressure
-            .force_counts(movement.force_mn())
-            .is_ok();
-        if !pressable || (movement.force_mn() > HIGH_FORCE_MN && !self.allow_high_force) {
-            return Err(Refused::Force(movement.force_mn()));
+        let force_mn = movement.force_mn();
+        if !may_press(&self.calibration.pressure, force_mn, self.high_force) {
+            return Err(Refused::Force(force_mn));
         }
         self.run = Run::slide(movement, start, self.stage.constants()).ok_or(Refused::Length)?;
         self.ended = None;
@@ -459,8 +461,8 @@ impl Control {
                 .emf_speed_mm_s(self.duty, inputs.current_a),
         };
         let pressure = &self.calibration.pressure;
-        // the tolerance of the paper's 2 N also for a finger whose line ends earlier
-        let limit_mn = pressure.linear_mn * (FORCE_LIMIT_MN / Calibration::PAPER.linear_mn);
+        let high = self.high_force && self.run.movement().force_mn() > HIGH_FORCE_MN;
+        let limit_mn = force_limit_mn(pressure, high);
         let fault = self
             .guard
             .tick(&seen, &self.meter, pressure.force_mn_per_count, limit_mn)?;

@@ -53,7 +53,7 @@ macro_rules! faults {
 // the fault, its name, how it is detected, the deadline in ms, what stops, what is refused, what the user does
 faults! {
     /// The finger is pressed too hard.
-    ForceHigh, "force too high", "P_DC means more than 2.05 N, mean of 10 ms made up for its lag; it bends: that is 2.1 N. Or it rises by 8 counts while the lever looks for its switch, or while the stage moves under a lifted finger; or by 40 while the rig waits with its finger lifted", 12,
+    ForceHigh, "force too high", "P_DC means more than 2.05 N, mean of 10 ms made up for its lag; it bends: that is 2.1 N. While a rig that was set to it presses more than 1.26 N, 2.1 N: that is 2.18 N. Or it rises by 8 counts while the lever looks for its switch, or while the stage moves under a lifted finger; or by 40 while the rig waits with its finger lifted", 12,
         "lever driver off at once, then finger lifted; stage motor braked", ALL, "look at the lever and the sample; if the finger still presses, turn the lever's knob until it is free; then reset";
     /// The emergency stop is pressed.
     EStop, "emergency stop", "its input, open for 3 ms", 5, "both motors by its second contact; finger lifted as soon as there is supply, freed only by the lever's knob before", ALL,

@@ -4,12 +4,16 @@ use super::force::ForceMeter;
 use crate::sensor::pressure::{Calibration, Pressure};
 
 use super::fault::Fault;
+use super::phase::{HIGH_FORCE_MN, most_mn};
 
 /// Force by P_DC at which the finger is lifted, mN, so that it never feels more than 2.2 N.
 ///
 /// P_DC bends above 2 N, where the skin touches the core, and says less than there is (fig. 3); what silicone adds to a
 /// fast press it does not say at all. 2.05 N by P_DC are 2.07 to 2.13 N.
 pub const FORCE_LIMIT_MN: f32 = 2050.0;
+/// The same while a rig that was allowed to presses more than 1.26 N. Friction adds to P_DC, 3 % of the shear in the model:
+/// 2.1 N by P_DC are at most 2.18 N.
+pub const HIGH_FORCE_LIMIT_MN: f32 = 2100.0;
 const SILENT_MS: u32 = 10;
 const FROZEN_MS: u32 = 100;
 const MOTION_MS: usize = 30;
@@ -18,6 +22,26 @@ const MAX_DAMAGED: u32 = 22;
 /// Slices of that second.
 const SLICES: usize = 10;
 const SLICE_MS: u32 = 100;
+
+/// Force by P_DC at which the finger is lifted, mN: while a `high` force is pressed, or otherwise. A finger whose line ends
+/// before 2 N has the tolerance of the paper's.
+pub(super) fn force_limit_mn(finger: &Calibration, high: bool) -> f32 {
+    let most_mn = if high {
+        HIGH_FORCE_LIMIT_MN
+    } else {
+        FORCE_LIMIT_MN
+    };
+    (finger.linear_mn * (most_mn / Calibration::PAPER.linear_mn)).min(most_mn)
+}
+
+/// Whether a rig that was allowed high forces, or was not, may press this finger with so many mN.
+pub(super) fn may_press(finger: &Calibration, force_mn: u16, high_force: bool) -> bool {
+    // the guard takes a count for no less than the paper's
+    let most_counts = HIGH_FORCE_LIMIT_MN / Calibration::PAPER.force_mn_per_count;
+    let counts = finger.force_counts(force_mn);
+    force_mn <= most_mn(high_force)
+        && counts.is_ok_and(|counts| force_mn <= HIGH_FORCE_MN || counts < most_counts)
+}
 
 /// Faults whose detection is switched off. For tests, which must see that a missing guard is noticed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -120,7 +144,7 @@ impl Guard {
         !self.unguarded.ignores(fault)
     }
 
-    /// One millisecond. `limit_mn` is the force at which the finger is lifted, at most [`FORCE_LIMIT_MN`]. The first of
+    /// One millisecond. `limit_mn` is the force at which the finger is lifted, at most [`HIGH_FORCE_LIMIT_MN`]. The first of
     /// several faults is the one that can hurt most.
     #[inline]
     pub fn tick(
@@ -138,8 +162,8 @@ impl Guard {
         let stage_limit = self.stage_limit.tick(seen.stage_limit);
         // a calibration that says less than the paper's does not allow more
         let mn_per_count = mn_per_count.max(Calibration::PAPER.force_mn_per_count);
-        let force =
-            meter.counts().max(meter.counts_now()) * mn_per_count > limit_mn.min(FORCE_LIMIT_MN);
+        let force = meter.counts().max(meter.counts_now()) * mn_per_count
+            > limit_mn.min(HIGH_FORCE_LIMIT_MN);
         [
             force.then_some(Fault::ForceHigh),
             e_stop.then_some(Fault::EStop),

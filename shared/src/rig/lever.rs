@@ -53,8 +53,10 @@ const MAX_TRIMS: u8 = 6;
 /// and a P_DC that drifts must not be followed until the finger is crushed.
 const MAX_CREEP_SHARE: f32 = 0.15;
 const MAX_CREEP_COUNTS: f32 = 3.0;
-/// P_DC counts at the force guard's limit, 2.05 N: trims never press on beyond.
+/// P_DC counts at 2.05 N, where the force guard acts as a rule: trims never press on beyond.
 const LIMIT_COUNTS: f32 = 178.0;
+/// P_DC counts of the guard's highest limit, 2.1 N: they must be below full scale.
+const GUARD_COUNTS: f32 = 183.0;
 /// The zero of one press and of the next differ by less, in counts: drift, and nothing that presses.
 const ZERO_COUNTS: f32 = 8.0;
 /// 1 N/mm, the softest that a finger is, in counts per step.
@@ -270,7 +272,7 @@ impl Lever {
                     let moved = self
                         .zero
                         .is_some_and(|last| libm::fabsf(zero - last) > ZERO_COUNTS);
-                    if moved || zero + LIMIT_COUNTS > f32::from(Counts::MAX.get()) {
+                    if moved || zero + GUARD_COUNTS > f32::from(Counts::MAX.get()) {
                         return Err(Fault::Unsteady);
                     }
                     self.zero = Some(zero);

@@ -6,8 +6,17 @@ use super::calibration::RigCalibrationError;
 use super::fault::Fault;
 use crate::features::{Movement, MovementError};
 
-/// Forces over this are pressed only by a rig that was allowed to.
-pub(super) const HIGH_FORCE_MN: u16 = Movement::FOR_TRACTION.force_mn();
+/// Forces over this, 1.26 N, are pressed only by a rig that was allowed to.
+pub const HIGH_FORCE_MN: u16 = Movement::FOR_TRACTION.force_mn();
+
+/// Largest force of a movement, mN, of a rig that was allowed high forces, or was not.
+pub const fn most_mn(high_force: bool) -> u16 {
+    if high_force {
+        *Movement::FORCE_MN.end()
+    } else {
+        HIGH_FORCE_MN
+    }
+}
 
 /// What the rig is doing.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -60,7 +69,8 @@ pub enum Refused {
     Fault(Fault),
     /// The force is over what this rig may press.
     #[error(
-        "{0} mN is more than this rig may press; {HIGH_FORCE_MN} mN unless high forces are allowed"
+        "{0} mN is more than this rig may press: {HIGH_FORCE_MN} mN, or {most} mN with tactus device settings --high-force on, and no more than its calibration can tell",
+        most = most_mn(true)
     )]
     Force(u16),
     /// No speed of this stage, um/s.

@@ -14,7 +14,7 @@ use super::pages::Pages;
 use crate::features::Movement;
 use crate::table::{MAX_TEXTURES, Name, TrainingStats, Whitened};
 
-/// Most records of training: a pilot of 30 movements and three textures of three. With all of them in use, 108 bytes each,
+/// Most records of training: a pilot of 36 movements and a texture of three. With all of them in use, 108 bytes each,
 /// and everything self-learned besides, 84 bytes a texture, a page of 16 KB is not full.
 pub const MAX_RECORDS: u8 = 40;
 /// Movements of a texture that a probe learns by itself: an exploration rarely makes more.
@@ -28,6 +28,8 @@ pub(super) const KEY_CALIBRATION: u8 = 1;
 pub(super) const KEY_SKIN: u8 = 2;
 /// The share of false alarms that the probe's limits are for.
 pub(super) const KEY_FALSE_ALARM: u8 = 3;
+/// Whether movements may press with up to 2 N.
+pub(super) const KEY_HIGH_FORCE: u8 = 4;
 /// The first of the unfinished trainings: a texture at one movement each.
 pub(super) const KEY_TRAINED: u8 = 16;
 /// The first of the textures that the probe learned by itself, one each.

@@ -12,8 +12,8 @@ use super::error::{Setting, SettingsError, StoreError};
 use super::layout::SCHEMA;
 use super::pages::{Pages, page_size};
 use super::records::{
-    KEY_CALIBRATION, KEY_FALSE_ALARM, KEY_SCHEMA, KEY_SELF, KEY_SKIN, KEY_TRAINED, Map, RECORD,
-    Record, Records, SelfLearnedRecord, TrainingRecord, decode, next,
+    KEY_CALIBRATION, KEY_FALSE_ALARM, KEY_HIGH_FORCE, KEY_SCHEMA, KEY_SELF, KEY_SKIN, KEY_TRAINED,
+    Map, RECORD, Record, Records, SelfLearnedRecord, TrainingRecord, decode, next,
 };
 use super::sectors::Store;
 use crate::features::Movement;
@@ -153,6 +153,27 @@ impl<F: NorFlash> Store<F> {
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
     pub async fn set_false_alarm(&mut self, share: Option<f32>) -> Result<(), StoreError> {
         self.encode(KEY_FALSE_ALARM, &share).await
+    }
+
+    /// Whether movements may press with up to 2 N; never while a record is lost, see [`Store::damaged_record`]: the one before it
+    /// may have allowed what it forbade.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::Settings`].
+    pub async fn high_force(&mut self) -> Result<bool, StoreError> {
+        let mut buffer = [0; RECORD];
+        match self.fetch(KEY_HIGH_FORCE, &mut buffer).await? {
+            Some(bytes) if self.lost.is_none() => decode(bytes),
+            _ => Ok(false),
+        }
+    }
+
+    /// Stores whether movements may press with up to 2 N.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
+    pub async fn set_high_force(&mut self, allow: bool) -> Result<(), StoreError> {
+        self.encode(KEY_HIGH_FORCE, &allow).await
     }
 
     /// What the training of a texture has learned so far at a movement, on top of the table with this checksum, or of its

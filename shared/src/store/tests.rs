@@ -307,6 +307,12 @@ fn settings_are_kept_over_many_rounds_of_the_pages() {
             store.training_record("felt", movement, table).await,
             Ok(None)
         );
+        assert_eq!(store.high_force().await, Ok(false));
+        for allow in [true, false, true] {
+            store.set_high_force(allow).await.unwrap();
+            store = Store::open(store.close().again()).await.unwrap();
+            assert_eq!(store.high_force().await, Ok(allow));
+        }
         let unusable = RigCalibration {
             newton_per_ampere: 0.0,
             ..calibration(1)

@@ -78,6 +78,9 @@ pub enum Command {
     /// Keeps the share of false alarms that limits are for, where a request does not say otherwise; `None`: each table's
     /// own. New in version 6.
     SetFalseAlarm(Option<f32>),
+    /// Keeps whether movements may press with up to 2 N: only for a finger whose mount yields, or whose lever is stopped, before
+    /// 2.2 N. New in version 7.
+    SetHighForce(bool),
 }
 
 /// An exploration.
@@ -156,7 +159,7 @@ pub struct Train {
     pub name: Name,
     /// How often each movement is to have been made in the end.
     pub trials: u8,
-    /// All movements of the grid up to 1.26 N, instead of those of the table.
+    /// All movements of the grid up to 1.26 N, or 2 N where [`Command::SetHighForce`] allows it, instead of those of the table.
     pub pilot: bool,
     /// For where on the sample slides begin.
     pub seed: u32,

@@ -235,6 +235,9 @@ pub struct Status {
     /// Share of false alarms that limits are for, if it was set: see [`super::Command::SetFalseAlarm`]. New in version 6.
     #[serde(default)]
     pub false_alarm: Option<f32>,
+    /// Whether movements may press with up to 2 N: see [`super::Command::SetHighForce`]. New in version 7.
+    #[serde(default)]
+    pub high_force: bool,
 }
 
 /// What the acquisition and the link count, since boot.

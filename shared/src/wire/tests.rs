@@ -133,6 +133,7 @@ fn longest() -> vec::Vec<Report> {
             },
             skin_mj: (u32::MAX, u32::MAX),
             false_alarm: Some(0.1),
+            high_force: true,
         })),
     ]
 }

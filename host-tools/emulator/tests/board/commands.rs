@@ -64,7 +64,7 @@ fn identify(random: &mut ChaCha8Rng) -> Identify {
 
 /// What moves comes most often.
 fn command(random: &mut ChaCha8Rng) -> Command {
-    match random.random_range(0..32) {
+    match random.random_range(0..33) {
         0..=6 => Command::Identify(identify(random)),
         7..=10 => Command::Train(Train {
             name: name(random),
@@ -94,6 +94,7 @@ fn command(random: &mut ChaCha8Rng) -> Command {
         28 => Command::FactoryTable,
         29 => Command::Verify(identify(random)),
         30 => Command::SetFalseAlarm(random.random::<bool>().then(|| random.random())),
+        31 => Command::SetHighForce(random.random()),
         _ => Command::WriteCalibration(bytes(random, 64).into_iter().collect()),
     }
 }

@@ -207,6 +207,10 @@ fn it_says_how_it_is_and_gives_and_takes_tables() {
     assert_eq!(status.phase, Phase::Ready);
     assert!(status.factory && status.fault.is_none(), "{status:?}");
     assert_eq!(status.calibrated, 0);
+    // a person presses it, and no lever
+    let hard = held.run(Request::command(Command::SetHighForce(true)), TIMEOUT_S);
+    assert!(matches!(hard, Err(TalkError::Refused(_))), "{hard:?}");
+    assert!(!held.status().high_force);
     let bytes = held.table();
     let table = Table::read(&bytes).unwrap();
     assert_eq!(

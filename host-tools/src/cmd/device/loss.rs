@@ -28,10 +28,7 @@ impl Consent {
     /// # Errors
     /// There is nobody.
     pub(crate) fn can_be_given(&self) -> anyhow::Result<()> {
-        if !self.yes && !std::io::stdin().is_terminal() {
-            bail!("nothing was changed: there is nobody to ask; add --yes to do it");
-        }
-        Ok(())
+        can_be_asked(self.yes)
     }
 
     /// Says what will be `lost`, keeps the table that the probe uses now, and asks. Nothing has happened to the probe yet.
@@ -61,21 +58,44 @@ impl Consent {
         let said = format!(
             "{lost}\nThe probe's table is kept: `tactus device table push {file}` brings it back."
         );
-        match format {
-            Format::Text => writeln!(out, "{said}")?,
-            Format::Json => eprintln!("{said}"),
-        }
-        out.flush()?;
-        if self.yes {
-            return Ok(file);
-        }
-        self.can_be_given()?;
-        let answer = read_answer(bench.interrupt(), "Go on? [y/N] ")?;
-        if !matches!(answer.trim().to_lowercase().as_str(), "y" | "yes") {
-            bail!("nothing was changed");
-        }
+        confirm(&said, "Go on?", self.yes, bench, format, out)?;
         Ok(file)
     }
+}
+
+fn can_be_asked(yes: bool) -> anyhow::Result<()> {
+    if !yes && !std::io::stdin().is_terminal() {
+        bail!("nothing was changed: there is nobody to ask; add --yes to do it");
+    }
+    Ok(())
+}
+
+/// Says something, on standard error where the output is for programs, and asks, unless that was answered by `yes`.
+///
+/// # Errors
+/// There is nobody to ask, or the answer is no.
+pub(crate) fn confirm(
+    said: &str,
+    question: &str,
+    yes: bool,
+    bench: &Bench,
+    format: Format,
+    out: &mut impl Write,
+) -> anyhow::Result<()> {
+    match format {
+        Format::Text => writeln!(out, "{said}")?,
+        Format::Json => eprintln!("{said}"),
+    }
+    out.flush()?;
+    if yes {
+        return Ok(());
+    }
+    can_be_asked(yes)?;
+    let answer = read_answer(bench.interrupt(), &format!("{question} [y/N] "))?;
+    if !matches!(answer.trim().to_lowercase().as_str(), "y" | "yes") {
+        bail!("nothing was changed");
+    }
+    Ok(())
 }
 
 /// Where tables are kept.

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use clap::ArgGroup;
+use clap::{ArgGroup, ValueEnum};
 use serde::Serialize;
 use tactus::link::Request;
 use tactus_core::table::Table;
@@ -10,20 +10,23 @@ use tactus_core::wire::Command;
 
 use super::bench::Bench;
 use super::line::Where;
-use super::status::limits;
+use super::loss::confirm;
+use super::status::{limits, movements};
 use crate::cmd::args::false_alarm;
 use crate::cmd::output::{Format, percent, print_json};
 
-/// Show or set for which share of false alarms the probe's limits are
+/// Show or set for which share of false alarms the probe's limits are, and whether a rig may press with up to 2 N
 #[derive(clap::Args)]
 #[command(group(ArgGroup::new("wanted").args(["false_alarm", "as_table"])), after_help = "\
 Examples:
   tactus device settings                        what is set
   tactus device settings --false-alarm 0.005    of known textures, one in 200 may be called new
   tactus device settings --as-table             what the table was learned for, 2 % unless `learn` was told otherwise
+  tactus device settings --high-force on        a rig may press with 2 N, if its finger yields or its lever is stopped before 2.2 N
+  tactus device settings --high-force off       1.26 N again
 
-The probe keeps it without power. It holds for the person at a handheld and for `identify`, `monitor` and `verify`, where these
-are not given a --false-alarm of their own.")]
+The probe keeps both without power. The share of false alarms holds for the person at a handheld and for `identify`, `monitor` and
+`verify`, where these are not given a --false-alarm of their own. A handheld refuses --high-force: a person presses it.")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,
@@ -33,10 +36,29 @@ pub(crate) struct Args {
     /// The share that each table was learned for
     #[arg(long)]
     as_table: bool,
+    /// Whether movements may press with up to 2 N, as the paper's do; on only with a mount that yields, or a hard stop
+    #[arg(long, value_enum, value_name = "ON|OFF")]
+    high_force: Option<Switch>,
+    /// Turn high forces on without asking for mount or stop
+    #[arg(long, short, requires = "high_force")]
+    yes: bool,
     /// How to print what is set
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
 }
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Switch {
+    On,
+    Off,
+}
+
+/// What a person must know who turns high forces on.
+const HIGH_FORCE: &str = "\
+With high forces on, movements may press with up to 2 N, and the guard acts at 2.1 N by P_DC. Above 2 N the skin lies on the
+finger's core, and P_DC no longer tells the force; where P_DC says too little, or the skin is torn, the lever presses on. What
+keeps the finger whole then is no program: a mount whose spring yields (preloaded to 2.05 N, 0.009 N/mm), or a hard stop that
+the lever cannot push beyond 2.2 N. The usual mount, of 1.45 N, yields before 2 N are reached.";
 
 /// What `device settings --format json` prints.
 #[derive(Serialize)]
@@ -45,6 +67,8 @@ struct Settings {
     false_alarm: Option<f32>,
     /// What the table in use was learned for; `null`: it has no limits.
     table_false_alarm: Option<f32>,
+    /// Whether movements may press with up to 2 N.
+    high_force: bool,
 }
 
 /// Shows the settings, and changes them first where that is asked for.
@@ -55,11 +79,21 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         bench.get(Request::command(set))?;
         status = bench.get(Request::status())?;
     }
+    if let Some(switch) = args.high_force {
+        let on = switch == Switch::On;
+        if on && !status.high_force {
+            let question = "Does the finger's mount yield, or does a stop hold the lever?";
+            confirm(HIGH_FORCE, question, args.yes, &bench, args.format, out)?;
+        }
+        bench.get(Request::command(Command::SetHighForce(on)))?;
+        status = bench.get(Request::status())?;
+    }
     let bytes = bench.table()?;
     let of_table = Table::read(&bytes)?.limits();
     let settings = Settings {
         false_alarm: status.false_alarm,
         table_false_alarm: of_table.map(|limits| limits.false_alarm),
+        high_force: status.high_force,
     };
     if args.format == Format::Json {
         return print_json(&settings, out);
@@ -76,5 +110,10 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             "Its table has no limits: learn it again, with --method fused."
         )?,
     }
+    writeln!(
+        out,
+        "A rig's movements press with {}.",
+        movements(status.high_force)
+    )?;
     Ok(())
 }

@@ -5,7 +5,7 @@ use std::io::Write;
 use serde::Serialize;
 use tactus::eval::show::count;
 use tactus::link::Request;
-use tactus_core::rig::Fault;
+use tactus_core::rig::{Fault, most_mn};
 use tactus_core::wire::{Phase, Status};
 
 use super::bench::Bench;
@@ -117,6 +117,9 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         ),
     ]);
     rows.push(("limits", limits(status.false_alarm)));
+    if status.high_force {
+        rows.push(("HIGH FORCE", movements(true)));
+    }
     rows.extend(calibration_rows(&calibration));
     print_rows(&rows, out)
 }
@@ -130,6 +133,17 @@ pub(crate) fn limits(false_alarm: Option<f32>) -> String {
         ),
         None => "for the table's own false alarms".to_owned(),
     }
+}
+
+/// How hard movements may press.
+pub(crate) fn movements(high_force: bool) -> String {
+    let most_n = f32::from(most_mn(high_force)) * 1e-3;
+    let set = if high_force {
+        ", as set: keep the mount that yields, or the stop (tactus device settings)"
+    } else {
+        ""
+    };
+    format!("up to {most_n:.2} N{set}")
 }
 
 /// What the rig does, in a word.

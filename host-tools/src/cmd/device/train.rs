@@ -10,6 +10,7 @@ use tactus::eval::show::count;
 use tactus::link::Request;
 use tactus_core::features::Property;
 use tactus_core::probe::training::pilot_movements;
+use tactus_core::rig::most_mn;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire::{self, Event, Report};
 
@@ -38,7 +39,7 @@ pub(crate) struct Train {
     /// Trials of each movement, those of an unfinished training included
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u8).range(1..))]
     trials: u8,
-    /// Make all movements of the grid up to 1.26 N instead of the table's, to find out which tell textures apart
+    /// Make all movements of the grid up to 1.26 N, or 2 N where that is set, instead of the table's, to find out which tell textures apart
     #[arg(long)]
     pilot: bool,
     /// Where on the sample slides begin; drawn anew unless given
@@ -83,13 +84,13 @@ struct Learned {
 /// Has the probe make slides of a texture and learn it.
 pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
     let typed = name_of(&args.name)?;
-    let (mut bench, _) = Bench::open(&args.at)?;
+    let (mut bench, status) = Bench::open(&args.at)?;
     let bytes = bench.table()?;
     let table = Table::read(&bytes)?;
     let before: Vec<String> = table.names().map(str::to_owned).collect();
     let name = known_as(typed, &before)?;
     let movements = match args.pilot {
-        true => pilot_movements().count(),
+        true => pilot_movements(most_mn(status.high_force)).count(),
         false => table.movements().len(),
     };
     let noted = table.find(&name).map(|texture| table.moved(texture));

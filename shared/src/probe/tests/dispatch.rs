@@ -85,6 +85,11 @@ impl RigHandle for Bench {
         Ok(())
     }
 
+    async fn allow_high_force(&mut self, allow: bool) -> Result<(), Failure> {
+        self.state.high_force = allow;
+        Ok(())
+    }
+
     async fn set_skin(&mut self, skin: SkinCare) {
         self.state.skin = skin;
     }
@@ -365,6 +370,7 @@ fn what_comes_while_the_probe_is_busy_is_answered_or_refused() {
             counts: desk.counts(),
             skin_mj: (1500, 250),
             false_alarm: Some(0.1),
+            high_force: false,
         }
     );
     desk.told.clear();
@@ -534,6 +540,28 @@ fn a_calibration_is_measured_reported_used_and_kept() {
         (fresh.rig.state.calibration, fresh.rig.state.skin),
         (CALIBRATION, skin)
     );
+}
+
+#[test]
+fn a_high_force_holds_only_where_it_is_kept() {
+    let mut probe = probe();
+    for allow in [true, false, true] {
+        command(&mut probe, Command::SetHighForce(allow)).unwrap();
+        assert_eq!(probe.rig.state.high_force, allow);
+    }
+    // after a reset
+    let mut fresh = self::probe();
+    let store = probe.memory.store().unwrap();
+    block_on(restore(store, &mut fresh.rig)).unwrap();
+    assert!(fresh.rig.state.high_force);
+    // erased with the other settings
+    block_on(store.erase_settings()).unwrap();
+    let mut fresh = self::probe();
+    block_on(restore(store, &mut fresh.rig)).unwrap();
+    assert!(!fresh.rig.state.high_force);
+    let mut broken = probe_with(fused_table(), None);
+    assert!(command(&mut broken, Command::SetHighForce(true)).is_err());
+    assert!(!broken.rig.state.high_force);
 }
 
 /// Sends a table in parts, each twice.

@@ -5,6 +5,7 @@ mod fused;
 use super::*;
 use crate::features::Properties;
 use crate::features::Property;
+use crate::rig::HIGH_FORCE_MN;
 use crate::table::tests::{around, table_of};
 use std::vec;
 use std::vec::Vec as List;
@@ -19,6 +20,7 @@ fn wanted(name: &str) -> Wanted<'_> {
         trials: 3,
         pilot: false,
         measures: PropertySet::ALL,
+        most_mn: HIGH_FORCE_MN,
     }
 }
 
@@ -185,14 +187,19 @@ fn a_slide_that_lacks_a_property_does_not_count() {
 
 #[test]
 fn without_a_table_the_first_texture_makes_one() {
-    for pilot in [false, true] {
+    for (pilot, most_mn, movements) in [
+        (false, HIGH_FORCE_MN, 3),
+        (true, HIGH_FORCE_MN, 30),
+        (true, 2000, 36),
+    ] {
         let wanted = Wanted {
             pilot,
+            most_mn,
             ..wanted("felt")
         };
         let mut training = Training::new(wanted, None, 4096).unwrap();
         let made = train(&mut training);
-        assert_eq!(made.len(), if pilot { 90 } else { 9 });
+        assert_eq!(made.len(), 3 * movements);
         let mut buffer = vec![0; 4096];
         let first = training.encode(None, &mut buffer).unwrap();
         assert_eq!(first.names().collect::<List<_>>(), ["felt"]);
@@ -200,7 +207,7 @@ fn without_a_table_the_first_texture_makes_one() {
             assert!(first.movements().eq(FIRST_MOVEMENTS));
             continue;
         }
-        assert!(first.movements().eq(pilot_movements()));
+        assert!(first.movements().eq(pilot_movements(most_mn)));
         // where the table has the pilot's movements a second pilot goes into it
         let second = Wanted {
             name: "wool",
@@ -211,7 +218,7 @@ fn without_a_table_the_first_texture_makes_one() {
         train(&mut training);
         let mut buffer = vec![0; 4096];
         let both = training.encode(Some(&first), &mut buffer).unwrap();
-        assert_eq!((both.textures(), both.movements().len()), (2, 30));
+        assert_eq!((both.textures(), both.movements().len()), (2, movements));
     }
 }
 

@@ -1,4 +1,5 @@
 use super::*;
+use crate::sensor::pressure::Calibration;
 
 #[test]
 fn a_lever_that_cannot_press_is_a_fault_and_lifts() {

@@ -207,3 +207,39 @@ fn the_table_has_every_fault_once_and_a_fault_can_be_ignored() {
         "the others are still looked for"
     );
 }
+
+#[test]
+fn a_high_force_is_allowed_and_guarded_by_limits_of_its_own() {
+    let finger = |force_mn_per_count, linear_mn| Calibration {
+        force_mn_per_count,
+        linear_mn,
+        ..Calibration::PAPER
+    };
+    for (linear_mn, usual_mn, high_mn) in [
+        (2000.0, 2050.0, 2100.0),
+        (1000.0, 1025.0, 1050.0),
+        (3000.0, 2050.0, 2100.0),
+    ] {
+        let finger = finger(11.5, linear_mn);
+        let limits = [false, true].map(|high| force_limit_mn(&finger, high));
+        assert_eq!(limits, [usual_mn, high_mn]);
+    }
+    for (force_mn, mn_per_count, [usual, allowed]) in [
+        (1262, 11.5, [true, true]),
+        (1262, 6.0, [true, true]),
+        (1263, 11.5, [false, true]),
+        (2000, 11.5, [false, true]),
+        (2000, 20.0, [false, true]),
+        // the guard would act before
+        (2000, 10.9, [false, false]),
+        (1995, 11.0, [false, true]),
+    ] {
+        let finger = finger(mn_per_count, 2000.0);
+        let may = [false, true].map(|high| may_press(&finger, force_mn, high));
+        assert_eq!(may, [usual, allowed], "{force_mn} mN, {mn_per_count}");
+    }
+    assert!(
+        !may_press(&finger(11.5, 1200.0), 1262, true),
+        "beyond its line"
+    );
+}

@@ -24,6 +24,7 @@ fn stored(rounds: u8, tables: u8) -> Ram {
                 let share = f32::from(n + 1) * 1e-3;
                 store.set_calibration(&calibration(n)).await.unwrap();
                 store.set_false_alarm(Some(share)).await.unwrap();
+                store.set_high_force(n % 10 == 0).await.unwrap();
                 let felt = training_record("felt", Movement::FOR_FINENESS, None, n + 1);
                 store.set_training_record(&felt).await.unwrap();
                 let learned = super::cuts::self_learned(n % 2, n);
@@ -89,6 +90,7 @@ proptest! {
         let ram = stored(rounds, tables);
         let mut whole = open(ram.clone());
         let (before, share) = (Model::of(&mut whole), block_on(whole.false_alarm()).unwrap());
+        let high_force = block_on(whole.high_force()).unwrap();
         let mut changed: Vec<usize> = bits.iter().map(|any| bit(&ram, region, *any)).collect();
         changed.sort_unstable();
         changed.dedup();
@@ -115,6 +117,9 @@ proptest! {
         if settings.is_ok() {
             let same_share = block_on(store.false_alarm()).unwrap() == share;
             let losses = found.differences(&before) + usize::from(!same_share);
+            // whatever is lost, nobody is pressed harder than was set
+            let now = block_on(store.high_force()).unwrap();
+            prop_assert_eq!(now, high_force && lost.is_none(), "{:?}, told {:?}", changed, lost);
             prop_assert!(losses <= usize::from(lost.is_some()), "{} lost, told {:?}: {:?}, {:?}", losses, lost, changed, [&before, &found]);
         }
         // the next boot finds the same and says the same

@@ -27,6 +27,7 @@ fn status() -> Status {
         counts: Counts::default(),
         skin_mj: (1500, 250),
         false_alarm: None,
+        high_force: false,
     }
 }
 
