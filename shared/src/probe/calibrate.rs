@@ -58,10 +58,8 @@ pub async fn restore<F: NorFlash, R: RigHandle>(
     if let Ok(skin) = &skin {
         rig.set_skin(*skin).await;
     }
-    if store.high_force().await.unwrap_or(false) {
-        // a hand refuses it, and a rig does not
-        let _ = rig.allow_high_force(true).await;
-    }
+    // a hand has none; what cannot be read is not allowed
+    let _ = rig.high_force(None, store).await;
     if let Some(calibration) = store.calibration().await? {
         // one that was stored is not refused
         let _ = rig.set_calibration(calibration).await;

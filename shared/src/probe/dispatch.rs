@@ -243,18 +243,7 @@ where
                 memory.reload(events).await;
                 Ok(())
             }
-            Command::SetHighForce(allow) => {
-                rig.allow_high_force(*allow).await?;
-                let kept = match memory.store() {
-                    Ok(store) => store.set_high_force(*allow).await.map_err(Failure::from),
-                    Err(why) => Err(why.into()),
-                };
-                if kept.is_err() {
-                    // what is not kept does not hold
-                    rig.allow_high_force(false).await?;
-                }
-                kept
-            }
+            Command::SetHighForce(allow) => rig.high_force(Some(*allow), memory.store()?).await,
             // answered when they came, see `receive`
             Command::Status | Command::Stop | Command::Stream(_) | Command::ReadCalibration => {
                 Ok(())

@@ -47,11 +47,16 @@ pub trait RigHandle: Rig<Error = RigError> {
     /// The rig refuses it.
     async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), RigError>;
 
-    /// Allows movements of up to 2 N, or forbids them.
+    /// Allows movements of up to 2 N, or forbids them, as is `wanted` and then kept in `store`, or as is kept there. What
+    /// cannot be kept, or read, is not allowed.
     ///
     /// # Errors
-    /// [`Failure::OtherProbe`]: a hand makes no such movement.
-    async fn allow_high_force(&mut self, _allow: bool) -> Result<(), Failure> {
+    /// [`Failure::OtherProbe`]: a hand makes no such movement. The store failed.
+    async fn high_force<F: NorFlash>(
+        &mut self,
+        _wanted: Option<bool>,
+        _store: &mut Store<F>,
+    ) -> Result<(), Failure> {
         Err(Failure::OtherProbe)
     }
 

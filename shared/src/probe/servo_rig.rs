@@ -1,6 +1,7 @@
 //! The rig that a servo moves, a thousand times a second, as a probe sees it: one movement after the other, its samples
 //! into the features.
 
+use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
 use super::calibrate;
@@ -15,6 +16,7 @@ use crate::rig::pins::Outputs;
 use crate::rig::skin::SkinCare;
 use crate::rig::timeout::{MovementTimeout, Wait};
 use crate::rig::{Ended, Phase, Refused, Rig, RigError, most_mn};
+use crate::store::Store;
 use crate::wire::{Event, Failure};
 
 /// How often the samples are looked after, ms.
@@ -266,10 +268,16 @@ impl<S: Servo> RigHandle for ServoRig<S> {
         self.servo.command(command).await.map_err(RigError::Refused)
     }
 
-    async fn allow_high_force(&mut self, allow: bool) -> Result<(), Failure> {
-        let command = RigCommand::AllowHighForce(allow);
-        let done = self.servo.command(command).await;
-        done.map_err(|why| Failure::Rig(RigError::Refused(why)))
+    async fn high_force<F: NorFlash>(
+        &mut self,
+        wanted: Option<bool>,
+        store: &mut Store<F>,
+    ) -> Result<(), Failure> {
+        let kept = store.keep_high_force(wanted).await;
+        let allow = RigCommand::AllowHighForce(kept.unwrap_or(false));
+        let done = self.servo.command(allow).await;
+        done.map_err(|why| Failure::Rig(RigError::Refused(why)))?;
+        kept.map(drop).map_err(Failure::from)
     }
 
     async fn set_skin(&mut self, skin: SkinCare) {

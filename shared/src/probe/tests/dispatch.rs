@@ -6,8 +6,9 @@ use crate::probe::seams::{Events, Panel, RigHandle, StoredBytes, UnloadedRun};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::rig::{Fault, Phase};
-use crate::store::StoreError;
+use crate::store::{Store, StoreError};
 use crate::wire::{Command, Counts, Failure, Forget, PART, Request, Status, TextureLearned};
+use embedded_storage_async::nor_flash::NorFlash;
 use std::boxed::Box;
 use std::string::ToString;
 
@@ -85,9 +86,14 @@ impl RigHandle for Bench {
         Ok(())
     }
 
-    async fn allow_high_force(&mut self, allow: bool) -> Result<(), Failure> {
-        self.state.high_force = allow;
-        Ok(())
+    async fn high_force<F: NorFlash>(
+        &mut self,
+        wanted: Option<bool>,
+        store: &mut Store<F>,
+    ) -> Result<(), Failure> {
+        let kept = store.keep_high_force(wanted).await;
+        self.state.high_force = kept.unwrap_or(false);
+        kept.map(drop).map_err(Failure::from)
     }
 
     async fn set_skin(&mut self, skin: SkinCare) {
