@@ -40,7 +40,7 @@ pub struct Port<S> {
     timeout: Duration,
     /// to be sent with the next step
     send: Vec<u8>,
-    /// when something came last, or was waited for from then on
+    /// when a report came last, or was waited for from then on
     heard: Instant,
     /// bytes that came, and reports
     bytes: u64,
@@ -109,18 +109,21 @@ impl<S: Read + Write> Port<S> {
         let mut bytes = [0; 4096];
         let received = self.exchange(&mut bytes)?;
         if !received.is_empty() {
+            let before = self.reports;
             let reports = &mut self.reports;
             let polled = job.poll(&mut self.session, received, &mut self.send, |report| {
                 *reports += 1;
                 each(report);
             });
-            return match polled {
+            match polled {
                 Poll::Ready(Err(LinkError::Disturbed)) if self.reports == 0 => {
-                    Err(PortError::Garbage(self.bytes))
+                    return Err(PortError::Garbage(self.bytes));
                 }
-                Poll::Ready(outcome) => Ok(Poll::Ready(outcome?)),
-                Poll::Pending => Ok(Poll::Pending),
-            };
+                Poll::Ready(outcome) => return Ok(Poll::Ready(outcome?)),
+                // bytes without end that are no report are as good as silence
+                Poll::Pending if self.reports > before => self.heard = Instant::now(),
+                Poll::Pending => {}
+            }
         }
         if self.heard.elapsed() >= self.timeout {
             match job.repeat(&mut self.session, &mut self.send) {
@@ -172,7 +175,6 @@ impl<S: Read + Write> Port<S> {
         match self.stream.read(bytes) {
             Ok(0) => Err(PortError::Closed),
             Ok(n) => {
-                self.heard = Instant::now();
                 self.bytes += n as u64;
                 Ok(bytes.get(..n).unwrap_or_default())
             }

@@ -1,7 +1,7 @@
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::task::Poll;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
 use tactus_core::explorer::{Method, Strategy as Choice};
@@ -501,7 +501,7 @@ fn a_port_runs_transactions() {
         answer: VecDeque::new(),
         silent: false,
     };
-    let mut port = Port::new(line, Duration::from_millis(1));
+    let mut port = Port::new(line, Duration::from_millis(50));
     port.run(PushTable::new(&bytes).unwrap(), |_| ()).unwrap();
     assert_eq!(port.run(ReadTable::default(), |_| ()).unwrap(), bytes);
     assert_eq!(port.session().damaged(), 0);
@@ -511,6 +511,42 @@ fn a_port_runs_transactions() {
 }
 
 /// What a line may do to a stretch of bytes.
+/// Sends without end, and nothing of it is a report.
+struct Noise;
+
+impl Read for Noise {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        buffer.fill(0x55);
+        Ok(buffer.len())
+    }
+}
+
+impl Write for Noise {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn bytes_without_end_are_no_answer() {
+    for request in [Command::Stop, Command::Home].map(Request::command) {
+        let mut port = Port::new(Noise, Duration::from_millis(1));
+        let mut job = port.begin(request).unwrap();
+        let began = Instant::now();
+        let why = loop {
+            assert!(began.elapsed() < Duration::from_secs(10));
+            if let Err(why) = port.step(&mut job, |_| {}) {
+                break why;
+            }
+        };
+        assert!(matches!(why, PortError::Garbage(1..)), "{why}");
+    }
+}
+
 fn damage() -> impl Strategy<Value = Vec<(usize, u8)>> {
     proptest::collection::vec((0usize..20_000, 1u8..), 0..6)
 }
