@@ -219,6 +219,22 @@ fn the_moving_picture_is_small_and_moves() {
     assert!(svg.contains("@keyframes") && svg.contains(&EXPLORATION.join(" ")));
 }
 
+/// The monitor in the book: a session of the simulated rig, filmed.
+#[test]
+fn the_film_is_what_its_command_makes() {
+    let temp = tempfile::tempdir().unwrap();
+    let [log, film] = ["session.jsonl", "film.svg"].map(|name| temp.path().join(name));
+    let packed = fs::File::open(root().join("tests/golden/identify.jsonl.gz")).unwrap();
+    let mut unpacked = fs::File::create(&log).unwrap();
+    std::io::copy(&mut flate2::read::GzDecoder::new(packed), &mut unpacked).unwrap();
+    let [log, film] = [&log, &film].map(|path| path.to_str().unwrap());
+    tactus(&["device", "log", "film", log, "--out", film]);
+    let svg = fs::read(film).unwrap();
+    assert!(svg.len() <= MAX_PICTURE, "{} bytes", svg.len());
+    assert!(read("docs/src/bench.md").contains("](monitor.svg)"));
+    compare("docs/src/monitor.svg", &svg).unwrap();
+}
+
 /// The pictures of the page about pictures, the command of each, and what comes before it.
 const PLOTS: [(&str, &[&str]); 4] = [
     (

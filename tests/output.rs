@@ -1,5 +1,6 @@
 //! What commands print for programs, how they end, and what they make of names, folders and ports.
 
+use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -555,4 +556,66 @@ fn a_table_says_whether_the_samples_of_its_slides_were_moved() {
     std::fs::write(&table, damaged).unwrap();
     let refused = said(&["table", "check", path(&table)], 1);
     assert!(refused.contains("section 3 is damaged"), "{refused}");
+}
+
+#[test]
+fn a_log_is_shown_as_objects_and_filmed() {
+    let temp = tempfile::tempdir().unwrap();
+    let [log, film] = ["session.jsonl", "film.svg"].map(|name| temp.path().join(name));
+    let packed = "../tests/golden/identify.jsonl.gz";
+    let packed = fs::File::open(Path::new(env!("CARGO_MANIFEST_DIR")).join(packed)).unwrap();
+    let mut unpacked = fs::File::create(&log).unwrap();
+    std::io::copy(&mut flate2::read::GzDecoder::new(packed), &mut unpacked).unwrap();
+    let all = json(
+        &["device", "log", "show", path(&log), "--format", "json"],
+        0,
+    );
+    let [exploration] = all.as_array().unwrap().as_slice() else {
+        panic!("{all}");
+    };
+    assert_eq!(
+        (&exploration["among"], &exploration["seed"]),
+        (&3.into(), &5.into())
+    );
+    assert_eq!(exploration["verdict"]["told"], "sure");
+    assert_eq!(exploration["verdict"]["texture"], "Polyurethane rubber");
+    let slide = &exploration["slides"][0];
+    assert!(
+        (slide["traction_n"].as_f64().unwrap() - 1.565_463).abs() < 1e-5,
+        "{slide}"
+    );
+    // a film of another size, and what is no size or no picture
+    let film_of = |size: &'static str, out: &Path| {
+        command(&[
+            "device",
+            "log",
+            "film",
+            path(&log),
+            "--size",
+            size,
+            "--out",
+            path(out),
+        ])
+        .output()
+        .unwrap()
+    };
+    assert!(film_of("100x30", &film).status.success());
+    let svg = fs::read_to_string(&film).unwrap();
+    assert!(svg.contains("Polyurethane rubber") && svg.contains("width=\"856\""));
+    for (size, out) in [("59x30", "a.svg"), ("60", "a.svg"), ("60x24", "a.png")] {
+        let done = film_of(size, &temp.path().join(out));
+        assert_eq!(done.status.code(), Some(2), "{size} {out}");
+    }
+    // a log in which nobody was talked to
+    fs::write(
+        &log,
+        "{\"session\":{\"tactus\":\"0.1.0\",\"protocol\":6,\"port\":\"x\"}}\n",
+    )
+    .unwrap();
+    let said = String::from_utf8(film_of("60x24", &film).stderr).unwrap();
+    assert!(
+        said.contains("session.jsonl: the probe does not say"),
+        "{said}"
+    );
+    assert_eq!(fs::read_to_string(&film).unwrap(), svg);
 }

@@ -10,7 +10,7 @@ use plotters::prelude::*;
 
 use labels::{Area, lines, place, width};
 pub(crate) use svg::{COLOURS, EM, GREY, WIDTH};
-pub use svg::{DrawError, Figure};
+pub use svg::{DrawError, Figure, escaped};
 use svg::{FONT, Failed, From, INK, Root, TEXT, Tip, caption, figure, write};
 
 /// What stands at a point.

@@ -1,12 +1,13 @@
 //! The log of a session: a line of JSON for every command and every report.
 //!
-//! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":2,"port":"/dev/ttyACM0"}}`. Each other one is
+//! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":7,"port":"/dev/ttyACM0"}}`. Each other one is
 //! `{"command":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log itself:
 //! the table in use (the parts that were read), the raw samples (blocks), what was measured, chosen and answered.
 
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::{self, BufWriter, Write as _};
+use std::io::{self, BufRead as _, BufReader, BufWriter, Read as _, Write as _};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -82,4 +83,67 @@ impl Log {
 
 fn named(path: &Path, why: &io::Error) -> io::Error {
     io::Error::new(why.kind(), format!("{}: {why}", path.display()))
+}
+
+/// Versions of the messages whose logs are read: since the first of them only reasons have become more than sentences.
+const LOGGED: RangeInclusive<u8> = 3..=PROTOCOL;
+
+/// Why a log cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum LogError {
+    /// A line is none of a log.
+    #[error(
+        "line {line} is no line of a session's log ({why}); `tactus device identify --log FILE` writes one"
+    )]
+    Line { line: usize, why: serde_json::Error },
+    /// Messages of another version.
+    #[error(
+        "written with version {0} of the messages, this program reads {oldest} to {PROTOCOL}: replay it with the tactus \
+         that wrote it",
+        oldest = LOGGED.start()
+    )]
+    Protocol(u8),
+    /// The file cannot be read.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}
+
+/// Most bytes of a line: the longest reports, many times over.
+const MAX_LINE: u64 = 1 << 20;
+
+/// Reads a log line by line.
+pub(crate) fn read(path: &Path, mut each: impl FnMut(Line<'static>)) -> Result<(), LogError> {
+    let file = File::open(path)?;
+    let (mut lines, mut line) = (BufReader::new(file), Vec::new());
+    for number in 1.. {
+        line.clear();
+        if lines.by_ref().take(MAX_LINE).read_until(b'\n', &mut line)? == 0 {
+            break;
+        }
+        let read = serde_json::from_slice(&line);
+        match read.map_err(|why| LogError::Line { line: number, why })? {
+            Line::Session { protocol, .. } if !LOGGED.contains(&protocol) => {
+                return Err(LogError::Protocol(protocol));
+            }
+            line => each(line),
+        }
+    }
+    Ok(())
+}
+
+/// A table, as its parts come.
+#[derive(Default)]
+pub(crate) struct TableParts(Vec<u8>);
+
+impl TableParts {
+    /// Takes a part; the table, when it is whole.
+    pub(crate) fn take(&mut self, offset: u32, length: u32, bytes: &[u8]) -> Option<Vec<u8>> {
+        if offset == 0 {
+            self.0.clear();
+        }
+        if offset as usize == self.0.len() {
+            self.0.extend_from_slice(bytes);
+        }
+        (self.0.len() == length as usize).then(|| std::mem::take(&mut self.0))
+    }
 }

@@ -3,6 +3,7 @@
 //! [`Monitor`] is all that is known, from the reports alone; [`view`] draws it; [`run`] brings keys, reports and time
 //! together.
 
+mod film;
 mod keys;
 mod state;
 mod view;
@@ -18,6 +19,7 @@ use tactus::link::{Job, LinkError, PortError, ReadTable, Request};
 use tactus_core::table::Table;
 use tactus_core::wire::{Command, Identify, Report};
 
+pub(super) use self::film::film;
 use self::keys::Act;
 use self::state::{Monitor, Weight};
 use super::bench::{Bench, BenchError};
@@ -164,24 +166,26 @@ fn watch(
                 Some(Act::Stop) => {
                     to_do.clear();
                     bench.send(Command::Stop)?;
-                    monitor.stop();
+                    monitor.asked(&Command::Stop);
                 }
                 Some(Act::Identify) => {
                     if monitor.table_crc != monitor.status.table_crc {
                         to_do.push_back(Command::ReadTable(0));
                     }
-                    to_do.push_back(Command::Identify(wanted.clone()));
+                    let identify = Command::Identify(wanted.clone());
+                    monitor.asked(&identify);
+                    to_do.push_back(identify);
                     // the next one begins elsewhere on the sample
                     wanted.seed = wanted.seed.wrapping_add(1);
-                    monitor.identify();
                 }
                 Some(Act::Home) => {
+                    monitor.asked(&Command::Home);
                     to_do.push_back(Command::Home);
-                    monitor.note(Weight::Message, "home");
                 }
                 Some(Act::Teach(name)) => {
-                    monitor.note(Weight::Message, format!("teach {name}"));
-                    to_do.push_back(Command::Label(name));
+                    let teach = Command::Label(name);
+                    monitor.asked(&teach);
+                    to_do.push_back(teach);
                     // what it feels most like now
                     to_do.push_back(Command::ReadTable(0));
                 }

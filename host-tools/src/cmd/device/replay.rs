@@ -1,9 +1,7 @@
 //! `tactus device log`: the log of a session shown again, and replayed: every decision of the session computed again from
 //! its events, by the same core.
 
-use std::fs::File;
-use std::io::{self, BufRead as _, BufReader, Read as _, Write};
-use std::ops::RangeInclusive;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, ensure};
@@ -13,15 +11,17 @@ use tactus::eval::chart::{DrawError, Figure};
 use tactus::eval::pictures::exploration::Exploration;
 use tactus::eval::pictures::timeline::{Timeline, Watch};
 use tactus::eval::show::{Show, count};
+use tactus::eval::transcript::{Answer, Transcript};
 use tactus::link::follow::{ALLOWED, Agreement, Follower};
 use tactus_core::dsp::Plan;
 use tactus_core::features::PropertySet;
 use tactus_core::table::Table;
-use tactus_core::wire::{self, Event, Forget, Identify, PROTOCOL, Verdict};
+use tactus_core::wire::{self, Event, Forget, Identify, Report, Verdict};
 
-use super::log::Line;
-use crate::cmd::output::{Format, percent};
-use crate::cmd::plot::Plot;
+use super::log::{Line, LogError, TableParts, read};
+use super::monitor;
+use crate::cmd::output::{Format, percent, print_json};
+use crate::cmd::plot::{Plot, svg_file};
 
 /// Show the log of a session (--log), or compute its decisions again
 #[derive(Subcommand)]
@@ -29,6 +29,7 @@ use crate::cmd::plot::Plot;
 Examples:
   tactus device log show session.jsonl
   tactus device log show session.jsonl --plot pictures     as `tactus identify` draws them
+  tactus device log film session.jsonl --out film.svg      the monitor, as it would have shown the session
   tactus device log replay session.jsonl    computes every decision again; exit code 1 if one differs")]
 pub(crate) enum Command {
     /// Compute every decision of the session again, and compare
@@ -47,16 +48,43 @@ pub(crate) enum Command {
         file: PathBuf,
         #[command(flatten)]
         plot: Plot,
+        /// How to print them
+        #[arg(long, value_enum, default_value_t = Format::Text)]
+        format: Format,
     },
+    /// Draw what the monitor shows of the session, as a moving picture (SVG)
+    Film {
+        /// The log
+        file: PathBuf,
+        /// The picture; what is there of this name is replaced
+        #[arg(long, value_name = "FILE.svg", value_parser = svg_file)]
+        out: PathBuf,
+        /// Columns and lines of the terminal, from 60x21 to 200x60; a phone can show 60 columns
+        #[arg(long, value_name = "CxL", default_value = "60x24", value_parser = size)]
+        size: (u16, u16),
+    },
+}
+
+fn size(text: &str) -> Result<(u16, u16), String> {
+    let size = text.split_once('x');
+    let size = size.and_then(|(columns, lines)| Some((columns.parse().ok()?, lines.parse().ok()?)));
+    size.filter(|(columns, lines)| (60..=200).contains(columns) && (21..=60).contains(lines))
+        .ok_or_else(|| "columns and lines from 60x21 to 200x60, such as 80x24".to_owned())
 }
 
 /// Shows or replays a log.
 pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()> {
-    let (Command::Replay { plot, .. } | Command::Show { plot, .. }) = command;
+    let (file, plot) = match command {
+        Command::Replay { file, plot, .. } | Command::Show { file, plot, .. } => (file, plot),
+        Command::Film { file, out, size } => {
+            return monitor::film(file, out, *size).with_context(|| file.display().to_string());
+        }
+    };
     let canvas = plot.open()?;
-    let (file, done) = match command {
-        Command::Replay { file, format, .. } => (file, replay(file, *format, out)),
-        Command::Show { file, .. } => (file, show(file, out)),
+    let done = match command {
+        Command::Replay { format, .. } => replay(file, *format, out).map_err(Into::into),
+        Command::Show { format, .. } if *format == Format::Json => show_json(file, out),
+        _ => show(file, out).map_err(Into::into),
     };
     done.with_context(|| file.display().to_string())?;
     if let Some(canvas) = canvas {
@@ -89,31 +117,19 @@ fn pictures(explorations: &[Logged]) -> Result<Vec<Figure>, DrawError> {
     Ok(all)
 }
 
-/// Versions of the messages whose logs are read: since the first of them only reasons have become more than sentences.
-const LOGGED: RangeInclusive<u8> = 3..=PROTOCOL;
-
 /// Why a log cannot be replayed.
 #[derive(Debug, thiserror::Error)]
 enum ReplayError {
-    /// A line is none of a log.
-    #[error(
-        "line {line} is no line of a session's log ({why}); `tactus device identify --log FILE` writes one"
-    )]
-    Line { line: usize, why: serde_json::Error },
-    /// Messages of another version.
-    #[error(
-        "written with version {0} of the messages, this program reads {oldest} to {PROTOCOL}: replay it with the tactus \
-         that wrote it",
-        oldest = LOGGED.start()
-    )]
-    Protocol(u8),
+    /// See [`LogError`].
+    #[error(transparent)]
+    Log(#[from] LogError),
     /// Nothing to replay.
     #[error("no exploration in this log; `tactus device identify --log FILE` writes one")]
     Nothing,
     /// The decisions are others here.
     #[error("not every decision is the same here")]
     Differs,
-    /// The log cannot be read, or what is shown cannot be written.
+    /// What is shown cannot be written.
     #[error(transparent)]
     Io(#[from] io::Error),
 }
@@ -137,81 +153,102 @@ impl Logged {
 const NOT_READ: &str = "the log does not have the table that the probe used";
 const CHANGED: &str = "the probe's table was changed after the log read it";
 
-/// Most bytes of a line: the longest reports, many times over.
-const MAX_LINE: u64 = 1 << 20;
-
 /// The explorations of a log.
 fn explorations(path: &Path) -> Result<Vec<Logged>, ReplayError> {
-    let file = File::open(path)?;
     let mut explorations: Vec<Logged> = Vec::new();
     let mut running = false;
-    let mut parts = Vec::new();
+    let mut parts = TableParts::default();
     let mut table = Err(NOT_READ);
-    let (mut lines, mut line) = (BufReader::new(file), Vec::new());
-    for number in 1.. {
-        line.clear();
-        if lines.by_ref().take(MAX_LINE).read_until(b'\n', &mut line)? == 0 {
-            break;
-        }
-        let read = serde_json::from_slice(&line);
-        match read.map_err(|why| ReplayError::Line { line: number, why })? {
-            Line::Session { protocol, .. } if !LOGGED.contains(&protocol) => {
-                return Err(ReplayError::Protocol(protocol));
+    read(path, |line| match line {
+        Line::Session { .. } => {}
+        Line::Command(command) => match command.into_owned() {
+            wire::Command::Identify(asked) => {
+                running = true;
+                explorations.push(Logged {
+                    asked,
+                    table: table.clone(),
+                    events: Vec::new(),
+                    at_ms: Vec::new(),
+                });
             }
-            Line::Session { .. } => {}
-            Line::Command(command) => match command.into_owned() {
-                wire::Command::Identify(asked) => {
-                    running = true;
-                    explorations.push(Logged {
-                        asked,
-                        table: table.clone(),
-                        events: Vec::new(),
-                        at_ms: Vec::new(),
-                    });
+            wire::Command::Label(_)
+            | wire::Command::Train(_)
+            | wire::Command::Rename { .. }
+            | wire::Command::Forget(Forget::Texture(_) | Forget::SelfLearned)
+            | wire::Command::BeginTable(_)
+            | wire::Command::CommitTable
+            | wire::Command::FactoryTable => table = Err(CHANGED),
+            _ => {}
+        },
+        Line::Report(report) => {
+            let Report { at_ms, event, .. } = report.into_owned();
+            if let Event::TablePart {
+                offset,
+                length,
+                bytes,
+            } = &event
+            {
+                if let Some(whole) = parts.take(*offset, *length, bytes) {
+                    table = Ok(whole);
                 }
-                wire::Command::Label(_)
-                | wire::Command::Train(_)
-                | wire::Command::Rename { .. }
-                | wire::Command::Forget(Forget::Texture(_) | Forget::SelfLearned)
-                | wire::Command::BeginTable(_)
-                | wire::Command::CommitTable
-                | wire::Command::FactoryTable => table = Err(CHANGED),
-                _ => {}
-            },
-            Line::Report(ref report) => match report.event.clone() {
-                Event::TablePart {
-                    offset,
-                    length,
-                    bytes,
-                } => {
-                    if offset == 0 {
-                        parts.clear();
-                    }
-                    if offset as usize == parts.len() {
-                        parts.extend_from_slice(&bytes);
-                    }
-                    if parts.len() == length as usize {
-                        table = Ok(std::mem::take(&mut parts));
-                    }
-                }
-                event => {
-                    if matches!(event, Event::TextureLearned(_)) {
-                        table = Err(CHANGED);
-                    }
-                    let over = matches!(event, Event::Verdict(_) | Event::Refused { .. });
-                    if running && let Some(last) = explorations.last_mut() {
-                        last.events.push(event);
-                        last.at_ms.push(report.at_ms);
-                        running = !over;
-                    }
-                }
-            },
+                return;
+            }
+            if matches!(event, Event::TextureLearned(_)) {
+                table = Err(CHANGED);
+            }
+            let over = matches!(event, Event::Verdict(_) | Event::Refused { .. });
+            if running && let Some(last) = explorations.last_mut() {
+                last.events.push(event);
+                last.at_ms.push(at_ms);
+                running = !over;
+            }
         }
-    }
+    })?;
     if explorations.is_empty() {
         return Err(ReplayError::Nothing);
     }
     Ok(explorations)
+}
+
+/// An exploration in `device log show --format json`.
+#[derive(Serialize)]
+struct Shown {
+    /// Textures that it might be.
+    among: usize,
+    threshold: f32,
+    max_slides: u8,
+    seed: u32,
+    slides: Transcript,
+    verdict: Option<Answer>,
+}
+
+/// The explorations of a log as objects; those whose table the log does not have are an error.
+fn show_json(path: &Path, out: &mut impl Write) -> anyhow::Result<()> {
+    let mut all = Vec::new();
+    for logged in &explorations(path)? {
+        let table = logged.table().context(NOT_READ)?;
+        let mut show = Show::new(table, io::sink());
+        let mut slides = Transcript::default();
+        for event in &logged.events {
+            slides.event(event, table);
+            show.event(event)?;
+        }
+        let asked = &logged.asked;
+        all.push(Shown {
+            among: match asked.among.len() {
+                0 => table.textures().into(),
+                some => some,
+            },
+            threshold: asked.threshold,
+            max_slides: asked.max_slides,
+            seed: asked.seed,
+            slides,
+            verdict: show
+                .answered()
+                .map(|(verdict, slides)| Answer::new(verdict, slides, table)),
+        });
+    }
+    print_json(&all, out)
 }
 
 /// Shows the explorations of a log as they were shown live.

@@ -7,7 +7,9 @@ use tactus::eval::alike;
 use tactus::eval::show::count;
 use tactus_core::features::Movement;
 use tactus_core::table::{Action, Name, Table};
-use tactus_core::wire::{Event, Live, PROTOCOL, Phase, Prompt, Report, SlideReport, Status};
+use tactus_core::wire::{
+    Command, Event, Live, PROTOCOL, Phase, Prompt, Report, SlideReport, Status,
+};
 
 use crate::cmd::device::train::most_like;
 
@@ -115,18 +117,26 @@ impl Monitor {
         }
     }
 
-    /// The user has had the rig stopped: what it was at says nothing any more.
-    pub(crate) fn stop(&mut self) {
-        self.forget_exploration();
-        self.stopped = true;
-        self.note(Weight::Message, "stopping");
-    }
-
-    /// The user has begun an exploration.
-    pub(crate) fn identify(&mut self) {
-        self.forget_exploration();
-        self.stopped = false;
-        self.note(Weight::Message, "identify");
+    /// The user has asked the probe for something.
+    pub(crate) fn asked(&mut self, command: &Command) {
+        let note = match command {
+            // what it was at says nothing any more
+            Command::Stop => {
+                self.forget_exploration();
+                self.stopped = true;
+                "stopping".to_owned()
+            }
+            Command::Identify(_) => {
+                self.forget_exploration();
+                self.stopped = false;
+                "identify".to_owned()
+            }
+            Command::Home => "home".to_owned(),
+            Command::Label(name) => format!("teach {name}"),
+            Command::Train(train) => format!("train {}", train.name),
+            _ => return,
+        };
+        self.note(Weight::Message, note);
     }
 
     fn forget_exploration(&mut self) {

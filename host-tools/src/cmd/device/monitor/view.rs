@@ -19,10 +19,10 @@ use super::state::{Monitor, SHOWN, Weight};
 use crate::cmd::device::status::phase_name;
 
 // of the 256 colours that every terminal has, the nearest to Okabe's and Ito's
-const BLUE: Color = Color::Indexed(39);
-const ORANGE: Color = Color::Indexed(214);
-const VERMILLION: Color = Color::Indexed(202);
-const DIM: Color = Color::Indexed(245);
+pub(super) const BLUE: Color = Color::Indexed(39);
+pub(super) const ORANGE: Color = Color::Indexed(214);
+pub(super) const VERMILLION: Color = Color::Indexed(202);
+pub(super) const DIM: Color = Color::Indexed(245);
 
 /// The force guard trips here, N.
 const MOST_N: f32 = 2.1;
