@@ -9,7 +9,7 @@ use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::measure_all;
 use tactus::eval::evaluate::{Method, Summary, evaluate};
 use tactus::eval::experiment::{Experiment, Protocol};
-use tactus::eval::lifelong::lifelong;
+use tactus::eval::lifelong::{Lifelong, Moment, lifelong};
 use tactus::eval::novelty::leave_one_out;
 use tactus_core::explorer::Config;
 use tactus_tests::{data, skipped};
@@ -299,4 +299,24 @@ fn new_materials_are_noticed_and_a_session_is_followed() {
     assert!(none.accuracy < alone.accuracy);
     assert!(alone.accuracy >= 0.97 && alone.worst.0 >= 0.80);
     assert!(asking.accuracy >= 0.98 && asking.uncertain <= 0.10);
+    // slides move away from what was learned, and whoever learns follows them
+    let [still, moved] = [none, alone].map(|life| {
+        let all = &life.over_time;
+        assert_eq!(all.iter().map(|m| m.episodes).sum::<usize>(), life.episodes);
+        let mean = |of: &[Moment]| of.iter().map(|m| m.distance_sd).sum::<f64>() / of.len() as f64;
+        let third = all.len() / 3;
+        [mean(&all[..third]), mean(&all[all.len() - third..])]
+    });
+    println!("{still:?} {moved:?}");
+    assert!(still[1] > 1.1 * still[0] && moved[1] < 0.8 * still[1]);
+    let square = |life: &Lifelong| {
+        let of = life.over_time.iter();
+        of.map(|m| m.distance_sd.powi(2) * m.episodes as f64)
+            .sum::<f64>()
+            / life.episodes as f64
+    };
+    let by_texture = none.by_texture.iter().flat_map(|of| &of.distance_sd);
+    let by_texture: Vec<f64> = by_texture.map(|sd| sd.powi(2)).collect();
+    let mean = by_texture.iter().sum::<f64>() / by_texture.len() as f64;
+    assert!((mean / square(none) - 1.0).abs() < 1e-9, "{mean}");
 }

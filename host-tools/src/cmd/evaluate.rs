@@ -63,14 +63,10 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         "--novelty, --verify and --lifelong need --method fused: the other methods do not recognise new textures"
     );
     let canvas = args.plot.open()?;
-    ensure!(
-        canvas.is_none() || !args.lifelong,
-        "--plot draws no sessions: leave out --lifelong"
-    );
     let (experiment, protocol) = experiment::open(args)?;
     let config = args.stop.config(args.method);
     if args.lifelong {
-        return novelty::lifelong(args, &experiment, config, out);
+        return novelty::lifelong(args, &experiment, config, canvas, out);
     }
     if args.verify {
         return verify::run(args, &experiment, protocol, config, canvas, out);

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::{Config, Told};
-use tactus_core::features::Observation;
+use tactus_core::features::{Observation, Vector, WHITE_STEPS};
 use tactus_core::table::{Action, Contents, EncodeError, Table, retell};
 
 use crate::eval::evaluate::{EvaluateError, explorer};
@@ -24,6 +24,17 @@ pub enum Learning {
     Itself,
     /// From these, and from the user where it is not certain.
     Asking,
+}
+
+impl Learning {
+    /// What the probe does, for people.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::None => "learning nothing",
+            Self::Itself => "learning by itself",
+            Self::Asking => "asking where uncertain",
+        }
+    }
 }
 
 /// What a session comes to.
@@ -43,14 +54,45 @@ pub struct Lifelong {
     pub wrong_updates: f64,
     /// What the user would have been told after each episode's slide.
     pub verdicts: Verdicts,
+    /// The session, slide by slide.
+    pub over_time: Vec<Moment>,
+    /// The same for each texture.
+    pub by_texture: Vec<TextureCourse>,
+}
+
+/// A moment of a session: of each texture the slide of this number.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Moment {
+    /// Counts the slides of a texture and movement after those that were learned from, from 1.
+    pub slide: usize,
+    /// Episodes of it.
+    pub episodes: usize,
+    /// How far the slides are from what the table says of their textures then: root mean square over features and episodes,
+    /// in standard deviations between slides of one texture.
+    pub distance_sd: f64,
+    /// What the user would have been told.
+    pub verdicts: Verdicts,
+}
+
+/// How far the slides of a texture are from what the table says of it, slide by slide.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct TextureCourse {
+    /// Its name.
+    pub texture: String,
+    /// As [`Moment::distance_sd`].
+    pub distance_sd: Vec<f64>,
 }
 
 /// One episode: what was presented, and what became of it.
 struct Episode {
+    /// Place of the slide in its texture's session, from 0.
+    time: usize,
     texture: usize,
     right: bool,
     certain: bool,
     told: Told,
+    /// Mean square distance from what the table says of the texture, over features.
+    square: f64,
 }
 
 /// Plays so many sessions with every kind of learning; they differ in the order of the textures.
@@ -104,6 +146,7 @@ fn play(
                     continue;
                 };
                 let (best, certain, told) = look(experiment, config, &bytes, movement, slide)?;
+                let square = square(&bytes, texture, movement, slide)?;
                 let label = match learning {
                     Learning::None => None,
                     Learning::Itself => certain.then_some(best),
@@ -113,6 +156,8 @@ fn play(
                     learn(&mut bytes, label, movement, slide)?;
                 }
                 episodes.push(Episode {
+                    time,
+                    square,
                     texture,
                     right: best == texture,
                     certain,
@@ -148,6 +193,33 @@ fn look(
     Ok((best.texture.into(), explorer.is_certain(), best.told()))
 }
 
+/// A slide as the table whitens it.
+fn whitened(table: &Table<'_>, movement: u8, slide: &Observation) -> Result<Vector, EvaluateError> {
+    let Contents::Fused(set, features) = table.contents() else {
+        return Err(crate::eval::learn::TableError::Encode(EncodeError::Contents).into());
+    };
+    let vector = slide.vector(set, features.into()).unwrap_or_default();
+    Ok(table.whiten(movement, &vector).unwrap_or_default())
+}
+
+/// Mean square distance of a slide from what the table says of its texture, over features.
+fn square(
+    bytes: &[u8],
+    texture: usize,
+    movement: u8,
+    slide: &Observation,
+) -> Result<f64, EvaluateError> {
+    let table = Table::read(bytes)?;
+    let white = whitened(&table, movement, slide)?;
+    let known = table.whitened(texture as u16, movement);
+    let apart = white.iter().zip(known.mean);
+    let apart = apart.map(|(z, mean)| f64::from(*z) - f64::from(mean));
+    let sum: f64 = apart
+        .map(|steps| (steps / f64::from(WHITE_STEPS)).powi(2))
+        .sum();
+    Ok(sum / white.len().max(1) as f64)
+}
+
 /// Learns a slide of a texture, as the probe does.
 fn learn(
     bytes: &mut [u8],
@@ -157,11 +229,7 @@ fn learn(
 ) -> Result<(), EvaluateError> {
     let table = Table::read(bytes)?;
     let texture = texture as u16;
-    let Contents::Fused(set, features) = table.contents() else {
-        return Err(crate::eval::learn::TableError::Encode(EncodeError::Contents).into());
-    };
-    let vector = slide.vector(set, features.into()).unwrap_or_default();
-    let white = table.whiten(movement, &vector).unwrap_or_default();
+    let white = whitened(&table, movement, slide)?;
     let mut known = table.whitened(texture, movement);
     known.adapt(&white);
     let tally = table.tally(texture);
@@ -180,7 +248,37 @@ fn sum_up(learning: Learning, episodes: &[Episode], names: &[String]) -> Lifelon
     let worst = of_each.min_by(|a, b| a.0.total_cmp(&b.0));
     let certain = episodes.iter().filter(|v| v.certain);
     let wrong = certain.clone().filter(|v| !v.right).count();
+    let times = episodes.iter().map(|v| v.time + 1).max().unwrap_or(0);
+    let distance_sd = |of: &dyn Fn(&Episode) -> bool| {
+        let squares: Vec<f64> = episodes
+            .iter()
+            .filter(|v| of(v))
+            .map(|v| v.square)
+            .collect();
+        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+    };
+    let moment = |time: usize| {
+        let of: Vec<&Episode> = episodes.iter().filter(|v| v.time == time).collect();
+        Moment {
+            slide: time + 1,
+            episodes: of.len(),
+            distance_sd: distance_sd(&|v| v.time == time),
+            verdicts: Verdicts::of(of.iter().map(|v| (v.told, v.right))),
+        }
+    };
+    let course = |(at, name): (usize, &String)| {
+        let own = |v: &&Episode| v.texture == at;
+        let times = episodes.iter().filter(own).map(|v| v.time + 1).max();
+        TextureCourse {
+            texture: name.clone(),
+            distance_sd: (0..times.unwrap_or(0))
+                .map(|time| distance_sd(&|v| v.texture == at && v.time == time))
+                .collect(),
+        }
+    };
     Lifelong {
+        over_time: (0..times).map(moment).collect(),
+        by_texture: names.iter().enumerate().map(course).collect(),
         learning,
         episodes: episodes.len(),
         accuracy: right(&|_| true),

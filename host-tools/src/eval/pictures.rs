@@ -5,6 +5,7 @@ pub mod evaluation;
 pub mod exploration;
 pub mod map;
 pub mod novelty;
+pub mod session;
 mod spectrum;
 pub mod timeline;
 pub mod trade_off;

@@ -40,8 +40,11 @@ episode of its own.
 does, and counts the errors: at the limits, and where both are equal.
 These need the method fused.
 
-With --novelty, --plot draws what is told of known and of new textures (known-by-slides, new-by-slides). Else it draws what is told of each texture (confusion), how often it was right when it said 99 % (reliability), and slides and
-errors by threshold (slides-by-threshold, errors-by-threshold).
+--plot draws what is told of each texture (confusion), how often it was right when it said 99 %
+(reliability), and slides and errors by threshold (slides-by-threshold, errors-by-threshold). With
+--novelty it draws what is told of known and of new textures (known-by-slides, new-by-slides), with
+--verify one error against the other (trade-off), with --lifelong how far slides move away from
+what was learned (drift, drift-by-texture) and what is told of them (told-...), slide by slide.
 
 Examples:
   tactus evaluate --recordings DIR --protocol drift
@@ -50,7 +53,8 @@ Examples:
   tactus evaluate --recordings DIR --novelty leave-one-out --left-out 5     tables of all but five
   tactus evaluate --recordings DIR --plot pictures
   tactus evaluate --recordings DIR --verify --protocol blocked
-  tactus evaluate --recordings DIR --lifelong")]
+  tactus evaluate --recordings DIR --lifelong
+  tactus evaluate --recordings DIR --lifelong --plot drift.svg")]
 pub(crate) struct Args {
     #[command(flatten)]
     pub(crate) from: Recordings,

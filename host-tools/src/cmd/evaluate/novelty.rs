@@ -8,7 +8,7 @@ use tactus::eval::evaluate::Method;
 use tactus::eval::experiment::Experiment;
 use tactus::eval::lifelong::{self, Learning, Lifelong};
 use tactus::eval::novelty::{self, Novelty};
-use tactus::eval::pictures::novelty::figures;
+use tactus::eval::pictures::{novelty as of_novelty, session};
 use tactus::eval::show::count;
 use tactus::eval::verdicts::Verdicts;
 use tactus_core::explorer::Config;
@@ -63,7 +63,7 @@ pub(crate) fn leave_one_out(
         novelty::leave_out(experiment, config, together, args.runs(), done)
     })?;
     if let Some(canvas) = canvas {
-        canvas.write("tactus evaluate", &figures(&novelty)?, out)?;
+        canvas.write("tactus evaluate", &of_novelty::figures(&novelty)?, out)?;
     }
     let (train_slides, runs, seed) = (experiment.train_slides(), args.runs(), args.seed);
     if args.format == Format::Json {
@@ -118,6 +118,7 @@ pub(crate) fn lifelong(
     args: &Args,
     experiment: &Experiment,
     config: Config,
+    canvas: Option<Canvas>,
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
     // they differ in the order of the textures only
@@ -126,6 +127,23 @@ pub(crate) fn lifelong(
     let lifelong = with_progress(3 * sessions, "living through sessions", |done| {
         lifelong::lifelong(experiment, config, sessions, seed, done)
     })?;
+    let figures = canvas.as_ref();
+    let figures = figures.map(|_| session::figures(&lifelong, train_slides));
+    let figures = figures.transpose()?.unwrap_or_default();
+    print_lives(args, train_slides, lifelong, out)?;
+    match canvas {
+        Some(canvas) => canvas.write("tactus evaluate --lifelong", &figures, out),
+        None => Ok(()),
+    }
+}
+
+fn print_lives(
+    args: &Args,
+    train_slides: usize,
+    lifelong: Vec<Lifelong>,
+    out: &mut impl Write,
+) -> anyhow::Result<()> {
+    let (sessions, seed) = (args.runs(), args.seed);
     if args.format == Format::Json {
         let figures = LifelongFigures {
             method: args.method,
@@ -143,10 +161,10 @@ pub(crate) fn lifelong(
         count(sessions, "order")
     )?;
     for life in lifelong {
-        let (who, uncertain) = match life.learning {
-            Learning::None => ("learning nothing", "uncertain"),
-            Learning::Itself => ("learning by itself", "uncertain"),
-            Learning::Asking => ("asking where uncertain", "asked"),
+        let who = life.learning.words();
+        let uncertain = match life.learning {
+            Learning::None | Learning::Itself => "uncertain",
+            Learning::Asking => "asked",
         };
         let shares = [
             life.accuracy,
