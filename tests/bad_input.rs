@@ -3,11 +3,20 @@
 //!
 //! `TACTUS_BOOK=write` (`cargo xtask docs --write`) writes the page again.
 
+#[path = "bad_input/arguments.rs"]
+mod arguments;
+#[path = "bad_input/ports.rs"]
+mod ports;
+#[path = "bad_input/settings.rs"]
+mod settings;
+
 use std::collections::BTreeMap;
+use std::error::Error as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use tactus::sim::scenario::Scenario;
 use tactus_tests::properties_csv;
 use tempfile::TempDir;
 
@@ -16,8 +25,8 @@ const PAGE: &str = "docs/src/bad-input.md";
 const HEAD: &str = "\
 # Bad input
 
-Each file that the command line reads, damaged in eight ways, and the first line of what it answers. The exit code is 1; nothing is written, and the file is as it was.
-`tests/bad_input.rs` damages them and writes this page; a test fails when an answer is another one.
+Everything that is read, damaged in eight ways, and the first line of the answer. For files and ports the exit code is 1, for arguments 2; nothing is written, and what was read is as it was.
+`tests/bad_input.rs` damages them and writes this page; a test fails when an answer is another one. Where a cell has no answer it says why.
 
 *A flipped bit*: one in each of 64 bytes all over the file, one at a time. Where a file has no check sum, a flipped bit can make another valid file, and the table says how many did.
 *Huge*: 6 GB. *No permission*: not readable by the user; the user root may read it nevertheless.
@@ -48,17 +57,24 @@ const DAMAGES: [(Damage, &str); 8] = [
     (Damage::NoPermission, "no permission"),
 ];
 
-/// Something that a command reads.
+/// A file that something reads.
 struct Input {
     name: &'static str,
     /// Puts a good one into a folder; the file that is damaged.
     make: fn(&Path) -> PathBuf,
-    /// The command; `DIR` is that folder, `OUT` what it may write.
-    command: &'static [&'static str],
+    reader: Reader,
     /// A file of another version, made of a good one.
     another_version: fn(Vec<u8>) -> Vec<u8>,
     /// Whether the format says where a file ends.
     has_end: bool,
+}
+
+/// Who reads a file.
+enum Reader {
+    /// A command; `DIR` is the folder, `OUT` what it may write.
+    Command(&'static [&'static str]),
+    /// The tests of the emulated handheld.
+    Scenario,
 }
 
 fn root() -> &'static Path {
@@ -95,14 +111,14 @@ const LEARN: &[&str] = &[
     "OUT",
 ];
 
-const INPUTS: [Input; 5] = [
+const INPUTS: [Input; 6] = [
     Input {
         name: "A recording folder's manifest",
         make: |folder| {
             recordings(folder);
             folder.join("manifest.csv")
         },
-        command: LEARN,
+        reader: Reader::Command(LEARN),
         another_version: (|bytes| replaced(bytes, "pac_rate_hz", "pac_rate_khz")),
         has_end: true,
     },
@@ -112,7 +128,7 @@ const INPUTS: [Input; 5] = [
             recordings(folder);
             folder.join("t001_s001_pac.npy")
         },
-        command: LEARN,
+        reader: Reader::Command(LEARN),
         another_version: (|mut bytes| {
             // behind \x93NUMPY
             bytes[6] = 9;
@@ -127,7 +143,7 @@ const INPUTS: [Input; 5] = [
             fs::write(&file, properties_csv(3, 3, |_, _, _| 5)).unwrap();
             file
         },
-        command: &[
+        reader: Reader::Command(&[
             "evaluate",
             "--properties",
             "DIR/properties.csv",
@@ -135,14 +151,14 @@ const INPUTS: [Input; 5] = [
             "paper",
             "--runs",
             "20",
-        ],
+        ]),
         another_version: (|bytes| replaced(bytes, "fineness", "sharpness")),
         has_end: false,
     },
     Input {
         name: "A texture table",
         make: |folder| copied("tests/golden/fused-bands.tact", folder),
-        command: &["table", "show", "DIR/fused-bands.tact"],
+        reader: Reader::Command(&["table", "show", "DIR/fused-bands.tact"]),
         another_version: (|mut bytes| {
             // behind TACT
             bytes[4] = 2;
@@ -159,8 +175,15 @@ const INPUTS: [Input; 5] = [
             std::io::copy(&mut flate2::read::GzDecoder::new(packed), &mut log).unwrap();
             file
         },
-        command: &["device", "log", "replay", "DIR/session.jsonl"],
+        reader: Reader::Command(&["device", "log", "replay", "DIR/session.jsonl"]),
         another_version: (|bytes| replaced(bytes, "\"protocol\":3", "\"protocol\":99")),
+        has_end: true,
+    },
+    Input {
+        name: "A scenario of the emulated handheld",
+        make: |folder| copied("host-tools/emulator/scenarios/known.json", folder),
+        reader: Reader::Scenario,
+        another_version: (|bytes| replaced(bytes, "\"step\"", "\"steps\"")),
         has_end: true,
     },
 ];
@@ -172,8 +195,19 @@ struct Answer {
 }
 
 fn answer(input: &Input, folder: &Path, out: &Path) -> Answer {
+    let Reader::Command(command) = input.reader else {
+        let file = folder.join("known.json");
+        let said = Scenario::read(&file).err().map(|why| {
+            let source = why.source().map(|source| format!(": {source}"));
+            format!("error: {why}{}", source.unwrap_or_default())
+        });
+        return Answer {
+            code: Some(said.is_some().into()),
+            said: said.unwrap_or_default(),
+        };
+    };
     let folder = folder.to_str().unwrap();
-    let arguments = input.command.iter().map(|argument| match *argument {
+    let arguments = command.iter().map(|argument| match *argument {
         "OUT" => out.to_str().unwrap().to_owned(),
         other => other.replace("DIR", folder),
     });
@@ -215,10 +249,12 @@ fn error(input: &Input, damage: Damage, folder: &Path, out: &Path) -> Result<Str
         line.contains(name),
         "{here}: the error names no file: {line}"
     );
-    Ok(line
-        .replace(name, "DIR")
-        .replace('|', "\\|")
-        .replace('<', "\\<"))
+    Ok(of_table(&line.replace(name, "DIR")))
+}
+
+/// Text that a cell of a table in Markdown shows as it is.
+fn of_table(text: &str) -> String {
+    text.replace('|', "\\|").replace('<', "\\<")
 }
 
 /// A cell of the table.
@@ -288,9 +324,12 @@ fn cell(input: &Input, damage: Damage) -> String {
 fn bad_input_is_refused_as_the_book_says() {
     let mut page = HEAD.to_owned();
     for input in &INPUTS {
-        let command = input.command.join(" ");
+        let reader = match input.reader {
+            Reader::Command(command) => format!("`tactus {}`", command.join(" ")),
+            Reader::Scenario => "No command reads one: tests play them.".to_owned(),
+        };
         page += &format!(
-            "## {}\n\n`tactus {command}`\n\n| damage | answer |\n|---|---|\n",
+            "## {}\n\n{reader}\n\n| damage | answer |\n|---|---|\n",
             input.name
         );
         for (damage, name) in DAMAGES {
@@ -298,6 +337,9 @@ fn bad_input_is_refused_as_the_book_says() {
         }
         page += "\n";
     }
+    page += &ports::section();
+    page += &settings::section();
+    page += &arguments::section();
     let page = page.trim_end().to_owned() + "\n";
     let path = root().join(PAGE);
     if std::env::var("TACTUS_BOOK").as_deref() == Ok("write") {
