@@ -550,7 +550,7 @@ fn evaluate_says_when_there_are_too_few_slides() {
     let Some(folder) = data("biotac") else { return };
     let all = slides(&folder).len();
     let (number, more) = (all.to_string(), (all + 1).to_string());
-    // the first 19 of 34 are the early ones (facts/protocols.md)
+    // the first 19 of 34 are the early ones (`Protocol`)
     let early = (all * 19 + 17) / 34;
     let too_many = (early + 1).to_string();
     for (more, cause) in [

@@ -21,7 +21,7 @@ use super::noise::Noise;
 pub const STEP_UM: f64 = 0.625;
 /// Microsteps in which the driver's currents repeat: four full steps.
 const PERIOD: i64 = 64;
-/// STEP must stay at each level this long (facts/hardware.md: suits every common driver). A shorter pulse is no step.
+/// STEP must stay at each level this long (chosen: it suits every common driver). A shorter pulse is no step.
 pub const STEP_LEVEL_NS: u64 = 4_000;
 /// DIR must be stable this long before STEP rises. Else the step is lost.
 pub const DIR_SETUP_NS: u64 = 1_000;

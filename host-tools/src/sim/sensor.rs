@@ -1,7 +1,7 @@
 //! The BioTac's protocol as the sensor plays it: what it answers at each chip select.
 //!
-//! Its words are made here, apart from the core's, which are what is tested with them. Facts of SPM and HDR by
-//! shared/facts/biotac.md; what no document says is chosen and marked.
+//! Its words are made here, apart from the core's, which are what is tested with them. [`sim`](super) names the documents;
+//! what none of them says is chosen and marked.
 
 use super::finger::Finger;
 use super::noise::Noise;
@@ -10,7 +10,7 @@ use super::noise::Noise;
 pub const GAP_NS: u64 = 50_000;
 /// Time from power-up to the first command that is understood, ns (LIB).
 pub const POWER_UP_NS: u64 = 100_000_000;
-/// Time without clock that ends the streaming mode, ns (facts/biotac.md: 5 s).
+/// Time without clock that ends the streaming mode, ns (SPM: 5 s).
 const STREAMING_NS: u64 = 5_000_000_000;
 
 /// First byte of an error frame.

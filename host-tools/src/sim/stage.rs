@@ -1,8 +1,8 @@
 //! The stage that slides the sample under the fingertip: a brushed DC motor on a screw, behind an H-bridge, with a
 //! quadrature encoder, two limit switches and a current amplifier.
 //!
-//! The paper's stage (ANT130, Aerotech) is a linear motor whose controller tells its current; ours is the reference stage of
-//! facts/hardware.md. Its current is that of the unloaded stage plus the shear force over [`FORCE_N_PER_A`], as the paper
+//! The paper's stage (ANT130, Aerotech) is a linear motor whose controller tells its current; ours is the one of the
+//! list of parts (docs/src/rig.md). Its current is that of the unloaded stage plus the shear force over [`FORCE_N_PER_A`], as the paper
 //! found by weights on the inclined stage.
 //!
 //! ```text

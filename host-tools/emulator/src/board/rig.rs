@@ -324,7 +324,7 @@ impl Rig {
         if self.spi_control & CR1_MODE == 0 {
             return miso;
         }
-        // read a bit late; the sensor itself is taken to understand (chosen), as facts/biotac.md counts
+        // read a bit late; the sensor itself is taken to understand (chosen): three of four words fail parity
         let late = self.bit << 7 | miso >> 1;
         self.bit = miso & 1;
         late

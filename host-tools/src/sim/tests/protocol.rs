@@ -1,4 +1,4 @@
-//! The sensor's side of the bus: worked words of shared/facts/biotac.md and the rules of its timing.
+//! The sensor's side of the bus: words that were worked out by hand from SPM, and the rules of its timing.
 
 use crate::sim::finger::{Contact, Finger};
 use crate::sim::sensor::{GAP_NS, POWER_UP_NS, SensorPeer};

@@ -154,7 +154,7 @@ fn a_fingertip_rests_alike_in_all_trials_and_each_otherwise() {
         );
         fingers.push(trials[0]);
     }
-    // facts/biotac.md: those of three real ones were 112 apart
+    // those of three real ones were 112 apart (OUT)
     fingers.sort_by(f64::total_cmp);
     assert!(fingers[49] - fingers[0] > 80.0, "{fingers:.0?}");
 }
@@ -168,7 +168,7 @@ fn the_sensor_answers_through_its_pins() {
     assert_eq!(miso, [0xFF, 0xFF], "it starts up for 100 ms");
 
     let mut bench = Bench::new(Setup::default());
-    // facts/biotac.md: at rest P_AC is 2040 to 2045, P_DC 2583 to 2695, whose first bytes are these
+    // at rest P_AC is 2040 to 2045, P_DC 2583 to 2695 (OUT), whose first bytes are these
     let [byte0, _] = bench.sample(PAC);
     assert!([0x7F, 0x80].contains(&byte0), "{byte0:02X}");
     assert!((2_030.0..2_055.0).contains(&bench.counts(PAC)));

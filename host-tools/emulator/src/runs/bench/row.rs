@@ -9,7 +9,7 @@ pub(super) struct Row {
     pub(super) instructions: f64,
     pub(super) cycles: Option<f64>,
     pub(super) gate: Option<f64>,
-    /// CMSIS-DSP in an expert's hands, and the floor of the instruction set (facts/performance.md).
+    /// CMSIS-DSP in an expert's hands (gcc 12, -O3, counted by QEMU), and the floor of the instruction set (estimated).
     pub(super) cmsis: Option<f64>,
     pub(super) floor: Option<f64>,
     /// The chip's result is the plain kernels' to the bit.
