@@ -70,7 +70,8 @@ impl<F: NorFlash> Store<F> {
     async fn mend_records(&mut self) -> Result<(), StoreError> {
         self.lost = None;
         let mut word = [0; RECORD + WORD];
-        let mut damaged: Vec<(u8, u32), KEPT> = Vec::new();
+        // the key of a record, and what it says where that is known again
+        let mut damaged: Vec<(u8, Option<Vec<u8, RECORD>>), KEPT> = Vec::new();
         let size = page_size::<F>() as u32;
         // a page that is closed comes before the other one, which its records are copied to
         let mut last = [0; WORD];
@@ -83,20 +84,22 @@ impl<F: NorFlash> Store<F> {
                 if item.state != State::Torn {
                     damaged.retain(|(key, _)| *key != item.key);
                 }
-                if matches!(item.state, State::Corrected | State::Lost) {
-                    // of more than are looked for, the first ones are told
-                    let _ = damaged.push((item.key, at));
-                }
+                let record = word.get(1..item.bytes).unwrap_or_default();
+                let record = match item.state {
+                    State::Corrected => Some(Vec::from_slice(record).ok()),
+                    State::Lost => Some(None),
+                    State::Whole | State::Torn => None,
+                };
+                // of more than are looked for, the first ones are told
+                let _ = record.map(|record| damaged.push((item.key, record)));
                 at += item.next as u32;
             }
         }
-        for &(key, at) in &damaged {
-            match self.item(at, 2 * size, &mut word).await? {
-                Some(item) if item.state == State::Corrected => {
-                    let record = word.get(1..item.bytes).unwrap_or_default();
-                    self.store_checked(key, record).await?;
-                }
-                _ => self.lost = Some(key),
+        // only now: storing may turn the page, which leaves out what is damaged
+        for (key, record) in &damaged {
+            match record {
+                Some(record) => self.store_checked(*key, record).await?,
+                None => self.lost = Some(*key),
             }
         }
         Ok(())

@@ -156,3 +156,33 @@ proptest! {
         }
     }
 }
+
+/// A bit in each of two records: the page turns while the first one is stored again, and leaves out what is damaged.
+#[test]
+fn two_records_are_put_right_at_once_wherever_the_page_ends() {
+    let mut turns = 0;
+    for rounds in 0..100 {
+        let ram = stored(rounds, 5);
+        if written(&ram, 2).max(written(&ram, 3)) < SECTOR - 150 {
+            continue;
+        }
+        let worn = ram.erases;
+        let before = Model::of(&mut open(ram.clone()));
+        for any in 0..100 {
+            let mut ram = ram.clone();
+            ram.rotten = true;
+            for any in [any * 71 << 8, (any * 71 + 900) << 8] {
+                let bit = bit(&ram, 2, any);
+                ram.bytes[bit / 8] ^= 1 << (bit % 8);
+            }
+            let mut store = open(ram);
+            turns += store.flash.erases - worn;
+            for _ in 0..2 {
+                assert_eq!(said(&store), (false, None, Ok(())), "{rounds} {any}");
+                assert_eq!(Model::damaged(&mut store), before, "{rounds} {any}");
+                store = open(store.close().again());
+            }
+        }
+    }
+    assert!(turns > 100, "{turns}");
+}
