@@ -130,6 +130,7 @@ fn frames_of_version_6_are_what_they_were() {
     // version 7 has one more field
     assert_frames::<Report>("reports-6.jsonl", 115, is_status);
     assert_frames::<Failure>("reasons-6.jsonl", 265, |_| false);
+    assert_frames::<Failure>("reasons-6-records.jsonl", 15, |_| false);
 }
 
 /// Version 4 of the messages: every kind of reason, alone in a frame.
