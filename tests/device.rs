@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use std::{fs, thread};
 
 use tactus::sim::collection::{Collection, calibrated, plain_name, texture_name};
-use tactus::sim::flash::{RamFlash, SECTOR};
+use tactus::sim::flash::{RamFlash, SECTOR, TABLE};
 use tactus::sim::probe::{self, Host};
 use tactus::sim::rig::SimRig;
 use tactus_core::dsp::{Plain, Plan};
@@ -194,7 +194,7 @@ fn serve(lines: impl IntoIterator<Item = Box<dyn Line>>, hurry: u64, asked: Send
         asked,
         gone: false,
     });
-    let (mut buffer, plan) = (vec![0; SECTOR], Plan::new());
+    let (mut buffer, plan) = (vec![0; TABLE], Plan::new());
     let flash = RamFlash::blank();
     let probe = probe::switch_on(rig, flash, factory, &mut buffer, &plan, &wire);
     let mut probe = probe.unwrap();
@@ -659,6 +659,83 @@ fn a_table_is_checked_pushed_and_pulled() {
     );
 }
 
+/// A table of 24 movements does not fit into the sectors of the shorter ones, and works as they do.
+#[test]
+fn a_table_that_is_longer_than_a_small_sector_is_used_and_added_to() {
+    let (at, asked) = probe(1000);
+    let temp = tempfile::tempdir().unwrap();
+    let [long, pulled, slides] = ["long", "pulled", "slides"].map(|name| temp.path().join(name));
+    let movements: Vec<Movement> = Movement::grid().take(24).collect();
+    let table = world().learn_at(&movements, Method::Fused, known().0, || ());
+    let table = table.unwrap();
+    assert!(
+        table.len() > SECTOR && table.len() < TABLE,
+        "{}",
+        table.len()
+    );
+    fs::write(&long, &table).unwrap();
+    let done = |arguments: &[&str]| {
+        let at = ["--port", &at, "--format", "json"];
+        object(&[arguments, &at].concat(), 0)
+    };
+    done(&["table", "push", path(&long)]);
+    done(&["table", "pull", path(&pulled)]);
+    assert_eq!(fs::read(&pulled).unwrap(), table);
+    let found = done(&["identify", "--seed", "7"]);
+    assert_eq!(
+        found["verdict"]["texture"],
+        texture_name(UNKNOWN),
+        "{found}"
+    );
+    done(&["teach", "my own"]);
+    done(&["table", "pull", path(&pulled)]);
+    let taught = fs::read(&pulled).unwrap();
+    assert!(taught.len() > table.len());
+    let taught = Table::read(&taught).unwrap();
+    assert_eq!((taught.textures(), taught.movements().len()), (4, 24));
+    assert!(taught.find("my own").is_some());
+    // one that fits nowhere is refused by the probe, and what it has is kept
+    while asked.try_recv().is_ok() {}
+    let too_long = longer_than(&table, TABLE);
+    fs::write(&slides, &too_long).unwrap();
+    let said = complaint(&["table", "push", "--yes", path(&slides), "--port", &at]);
+    assert_says(
+        &said,
+        &[&format!(
+            "the table takes {} bytes, and there is room for {TABLE}",
+            too_long.len()
+        )],
+    );
+    let commits = |command| command == wire::Command::CommitTable;
+    assert!(!asked.try_iter().any(commits));
+    let kept = done(&["table", "show"]);
+    assert_eq!(kept["textures"].as_array().unwrap().len(), 4);
+}
+
+/// A good table of more than `length` bytes: with a section that nobody knows.
+fn longer_than(table: &[u8], length: usize) -> Vec<u8> {
+    let mut bytes = table[..table.len() - 4].to_vec();
+    for kind in 900u16.. {
+        if bytes.len() + 4 > length {
+            break;
+        }
+        bytes.extend(kind.to_le_bytes());
+        bytes.extend(16_000u16.to_le_bytes());
+        bytes.resize(bytes.len() + 16_000, 0);
+    }
+    with_checksum(bytes)
+}
+
+/// The length in the header and the checksum at the end of a table of these bytes.
+fn with_checksum(mut bytes: Vec<u8>) -> Vec<u8> {
+    let length = bytes.len() as u32 + 4;
+    bytes[8..12].copy_from_slice(&length.to_le_bytes());
+    let mut crc = flate2::Crc::new();
+    crc.update(&bytes);
+    bytes.extend(crc.sum().to_le_bytes());
+    bytes
+}
+
 /// A table whose checksum is right, and whose limits are not.
 fn with_limits(table: &[u8], first: f32) -> Vec<u8> {
     let limits = Table::read(table).unwrap().limits().unwrap();
@@ -667,11 +744,8 @@ fn with_limits(table: &[u8], first: f32) -> Vec<u8> {
     let at = places.next_back().unwrap();
     let mut bytes = table.to_vec();
     bytes[at..at + 4].copy_from_slice(&first.to_le_bytes());
-    let body = bytes.len() - 4;
-    let mut crc = flate2::Crc::new();
-    crc.update(&bytes[..body]);
-    bytes[body..].copy_from_slice(&crc.sum().to_le_bytes());
-    bytes
+    bytes.truncate(bytes.len() - 4);
+    with_checksum(bytes)
 }
 
 #[test]

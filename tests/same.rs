@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use embassy_futures::block_on;
 use tactus::sim::collection::{Collection, calibrated};
-use tactus::sim::flash::{RamFlash, SECTOR};
+use tactus::sim::flash::{RamFlash, TABLE};
 use tactus::sim::probe::{Host, switch_off_and_on, switch_on};
 use tactus::sim::rig::SimRig;
 use tactus_core::dsp::{Plain, Plan};
@@ -64,7 +64,7 @@ fn ask(
     rig.control().calibrate(known.0).unwrap();
     rig.home().unwrap();
     let heard = RefCell::new(Heard::default());
-    let (mut buffer, plan) = (vec![0; SECTOR], Plan::new());
+    let (mut buffer, plan) = (vec![0; TABLE], Plan::new());
     let flash = RamFlash::blank();
     let probe = switch_on(rig, flash, &known.1, &mut buffer, &plan, &heard);
     let mut probe = probe.unwrap();
@@ -200,7 +200,7 @@ fn a_probe_set_to_more_false_alarms_calls_more_textures_new() {
     // kept without power
     let rig = SimRig::new(world().setup(47, 1));
     let heard = RefCell::new(Heard::default());
-    let (mut buffer, plan) = (vec![0; SECTOR], Plan::new());
+    let (mut buffer, plan) = (vec![0; TABLE], Plan::new());
     let flash = RamFlash::blank();
     let mut probe = switch_on(rig, flash, &known.1, &mut buffer, &plan, &heard).unwrap();
     for set in [None, Some(0.005), Some(0.1), None] {

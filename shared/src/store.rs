@@ -1,11 +1,15 @@
 //! What survives a power cut: the texture table, and the settings of this rig.
 //!
-//! A [`Store`] owns four erase sectors (64 KB of the chip, `STORE` in `memory.x`):
+//! A [`Store`] owns six erase sectors (256 KB of the chip, `STORE` in `memory.x`):
 //!
-//! | sector | what |
-//! |---|---|
-//! | 0, 1 | one texture table each, see [`Store::begin_table`] |
-//! | 2, 3 | settings: calibration, skin care, progress of the training, what the probe has learned by itself |
+//! | sector | KB | what |
+//! |---|---|---|
+//! | 0, 1 | 16 | one texture table each, see [`Store::begin_table`] |
+//! | 2, 3 | 16 | settings: calibration, skin care, progress of the training, what the probe has learned by itself |
+//! | 4, 5 | 64, 128 | one texture table each that is longer than fits into 0 and 1, of 64 KB at most |
+//!
+//! Of all tables that are committed and whole the newest is in use. Among the two slots that a new one fits into it takes the
+//! place of the older one, so that the newest is never erased.
 //!
 //! A cut at any moment, in the middle of a word or of an erase as well, leaves the state before an operation or the one
 //! after it. So does a future that is dropped before its end; the store must then be opened anew.
@@ -24,7 +28,7 @@
 //! |---|---|
 //! | 4 | magic `SLOT` |
 //! | 4 | version of this layout, 1 |
-//! | 4 | generation: the newer of two tables has the larger one |
+//! | 4 | generation: the newer of two tables has the larger one, whatever their sectors are |
 //! | 4 | length of the table |
 //! | 4 | checksum of the table, its own last four bytes |
 //! | 4 | CRC-32 (ISO-HDLC) of these five |

@@ -11,7 +11,7 @@ use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_time::{Duration, Instant, Ticker};
 use heapless::spsc::Consumer;
-use static_cell::{ConstStaticCell, StaticCell};
+use static_cell::StaticCell;
 use tactus_core::dsp::Plan;
 use tactus_core::handheld::by_hand::{self, ByHand, Hand, Shown};
 use tactus_core::handheld::jobs::{self, Outcome};
@@ -36,8 +36,9 @@ use crate::chip::rescue;
 static FACTORY: &[u8] = include_bytes!("../../handheld.tact");
 /// Ticks from one word in the log about sleep to the next.
 const SAY: u32 = 5 * TICKS_HZ;
-/// `hand` gets on at least this often; the longest that it does is to erase two sectors, ms.
-const PATIENCE_MS: u32 = 5000;
+/// `hand` gets on at least this often, ms. The longest that it does is to turn a page of settings, to erase the largest sector,
+/// 2 s, and to write 64 KB, 1.6 s.
+const PATIENCE_MS: u32 = 10_000;
 
 /// How long the core has slept, us.
 static ASLEEP_US: AtomicU32 = AtomicU32::new(0);
@@ -294,7 +295,6 @@ pub(crate) async fn hand(
     words: Consumer<'static, Word>,
 ) {
     static PLAN: StaticCell<Plan> = StaticCell::new();
-    static BUFFER: ConstStaticCell<[u8; 16 * 1024]> = ConstStaticCell::new([0; 16 * 1024]);
     let plan: &'static Plan = PLAN.init_with(Plan::new);
     let buzzer = SimplePwm::new(
         handle.tones,
@@ -307,7 +307,7 @@ pub(crate) async fn hand(
     );
     let store = flash::wait(flash::open(flash), progress).await;
     let mut events = Shown::new(Told(Output::new(go.same, Level::Low, Speed::Low)));
-    let mut memory = Memory::new(store, MappedTable, FACTORY, BUFFER.take());
+    let mut memory = Memory::new(store, MappedTable, FACTORY, flash::buffer());
     memory.reload(&mut events).await;
     let textures = memory.table().map_or(0, |table| table.textures());
     let mut handheld = Handheld::<Small>::new(plan, textures);

@@ -4,7 +4,7 @@ use core::sync::atomic::Ordering::Relaxed;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_time::Timer;
 use heapless::spsc::Consumer;
-use static_cell::{ConstStaticCell, StaticCell};
+use static_cell::StaticCell;
 use tactus_core::dsp::Plan;
 use tactus_core::probe::seams::{Events, RigHandle as _};
 use tactus_core::probe::servo_rig::{Samples, ServoRig};
@@ -32,7 +32,6 @@ pub(crate) async fn probe(
     samples: Consumer<'static, Samples>,
 ) {
     static PLAN: StaticCell<Plan> = StaticCell::new();
-    static BUFFER: ConstStaticCell<[u8; 16 * 1024]> = ConstStaticCell::new([0; 16 * 1024]);
     let mut rig = ServoRig::new(ServoHandle(samples));
     // Whatever was before the reset, the finger is lifted first, and waits for nothing but the sensor. The stage does not
     // move before the calibration is there, which says whether the finger is in the air.
@@ -55,7 +54,7 @@ pub(crate) async fn probe(
     }
     let mut probe = Probe {
         rig,
-        memory: Memory::new(store, MappedTable, FACTORY, BUFFER.take()),
+        memory: Memory::new(store, MappedTable, FACTORY, flash::buffer()),
         events: Told(Output::new(go.same, Level::Low, Speed::Low)),
         plan: PLAN.init_with(Plan::new),
     };

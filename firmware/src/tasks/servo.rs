@@ -66,7 +66,7 @@ pub(crate) const UNMEASURED: RigCalibration = RigCalibration {
 /// half of it.
 const HUNG_MS: u32 = 2000;
 /// A session without progress for longer waits for something that does not come, such as an interrupt of the flash. All
-/// that it does without the rig, the four sectors of the store erased and written, takes less than 5 s.
+/// that it does without the rig, the sectors of the store erased and written, takes less than 15 s.
 const STUCK_LIMIT_MS: u32 = 30_000;
 /// Without a conversion of the motor's current for so many ms the motor is not driven on.
 const NO_CURRENT_MS: u32 = 10;

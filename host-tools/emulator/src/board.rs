@@ -28,7 +28,7 @@ mod wave;
 pub use display::Display;
 pub use emulator::{Emulator, Reset};
 pub use error::Error;
-pub use flash::{FLASH, FlashWrite, SECTOR, STORE};
+pub use flash::{FLASH, FlashWrite, STORE, places};
 pub use handler_profile::HandlerProfile;
 pub use options::Options;
 pub use record::Slide;

@@ -80,16 +80,21 @@ impl Collection {
         calibration: RigCalibration,
         done: impl Fn() + Sync,
     ) -> Result<Vec<Vec<Recording>>, TrialError> {
+        self.record_at(&Self::MOVEMENTS, calibration, done)
+    }
+
+    fn record_at(
+        &self,
+        movements: &[Movement],
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<Vec<Recording>>, TrialError> {
         self.textures
             .par_iter()
             .enumerate()
             .map(|(index, &texture)| {
-                let mut slides = record_texture(
-                    self.setup(texture, 0),
-                    calibration,
-                    &Self::MOVEMENTS,
-                    self.trials,
-                )?;
+                let mut slides =
+                    record_texture(self.setup(texture, 0), calibration, movements, self.trials)?;
                 for slide in &mut slides {
                     slide.texture = index;
                 }
@@ -109,12 +114,26 @@ impl Collection {
         calibration: RigCalibration,
         done: impl Fn() + Sync,
     ) -> Result<Vec<u8>, LearnError> {
+        self.learn_at(&Self::MOVEMENTS, method, calibration, done)
+    }
+
+    /// As [`Collection::learn`], of these movements.
+    ///
+    /// # Errors
+    /// The first fault of a rig, or slide without properties.
+    pub fn learn_at(
+        &self,
+        movements: &[Movement],
+        method: Method,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<u8>, LearnError> {
         let plan = Plan::new();
         let measured = self
-            .record(calibration, done)?
+            .record_at(movements, calibration, done)?
             .iter()
             .map(|slides| {
-                Self::MOVEMENTS
+                movements
                     .iter()
                     .map(|movement| {
                         let trials = slides.iter().filter(|s| s.movement == *movement);
@@ -132,13 +151,7 @@ impl Collection {
             })
             .collect::<Result<Vec<_>, TrialError>>()?;
         let names = self.names();
-        Ok(learn::learn(
-            method,
-            None,
-            &names,
-            &Self::MOVEMENTS,
-            &measured,
-        )?)
+        Ok(learn::learn(method, None, &names, movements, &measured)?)
     }
 }
 

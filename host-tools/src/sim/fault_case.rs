@@ -23,7 +23,7 @@ use tactus_core::wire::{Command, Event, Failure, Identify, Train};
 
 use super::collection::Collection;
 use super::faults::Fault;
-use super::flash::{RamFlash, SECTOR};
+use super::flash::{RamFlash, SECTOR, TABLE};
 use super::mount::Mount;
 use super::press::FORCE_LIMIT_N;
 use super::probe::{Host, SimProbe, switch_on};
@@ -246,7 +246,7 @@ impl<'t> Bench<'t> {
             .map_err(SimError::from)?;
         rig.home()?;
         let (host, plan) = (RefCell::new(Heard::default()), dsp::Plan::new());
-        let mut buffer = vec![0; SECTOR];
+        let mut buffer = vec![0; TABLE];
         let blank = RamFlash::blank();
         let mut probe = switch_on(rig, blank, self.factory, &mut buffer, &plan, &host)?;
         if let Ok(store) = probe.memory.store() {

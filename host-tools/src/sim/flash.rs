@@ -3,13 +3,15 @@
 use std::convert::Infallible;
 
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
-use tactus_core::store::SECTORS;
+use tactus_core::store::{SECTORS, Store};
 
-/// Bytes of a sector of the chip's store.
+/// Bytes of the smallest sector of the chip's store.
 pub const SECTOR: usize = 16 * 1024;
+/// Bytes of the longest table: for buffers.
+pub const TABLE: usize = Store::<RamFlash>::MAX_TABLE;
 
-/// The sectors of a store, of `S` bytes each. They obey the rules: words are read and written whole, sectors are erased
-/// whole, and writing only clears bits.
+/// The sectors of a store, the smallest of `S` bytes. They obey the rules: words are read and written whole, sectors are
+/// erased whole, and writing only clears bits.
 #[derive(Clone, Debug)]
 pub struct RamFlash<const S: usize = SECTOR> {
     /// What they hold.
@@ -21,11 +23,13 @@ pub struct RamFlash<const S: usize = SECTOR> {
 impl<const S: usize> RamFlash<S> {
     /// Erased.
     pub fn blank() -> Self {
-        Self::of(vec![0xFF; SECTORS * S])
+        Self::of(Vec::new())
     }
 
-    /// Flash that holds these bytes.
-    pub fn of(bytes: Vec<u8>) -> Self {
+    /// Flash that begins with these bytes, and is blank behind them.
+    pub fn of(mut bytes: Vec<u8>) -> Self {
+        let end = SECTORS.iter().map(|&(_, end)| end as usize * S).max();
+        bytes.resize(bytes.len().max(end.unwrap_or_default()), 0xFF);
         Self { bytes, erases: 0 }
     }
 
@@ -61,13 +65,14 @@ impl<const S: usize> NorFlash for RamFlash<S> {
     const ERASE_SIZE: usize = S;
 
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), Infallible> {
-        let (from, to) = (from as usize, to as usize);
+        let unit = S as u32;
+        let is_it = |&(begin, end): &(u32, u32)| (begin * unit, end * unit) == (from, to);
         assert!(
-            from.is_multiple_of(S) && to.is_multiple_of(S),
-            "flash is erased in sectors of {S} bytes: {from} to {to}"
+            SECTORS.iter().any(is_it),
+            "flash is erased sector by sector: {from} to {to}"
         );
-        self.bytes[from..to].fill(0xFF);
-        self.erases += ((to - from) / S) as u32;
+        self.bytes[from as usize..to as usize].fill(0xFF);
+        self.erases += 1;
         Ok(())
     }
 

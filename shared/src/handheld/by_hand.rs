@@ -17,7 +17,7 @@ use crate::rig::skin::SkinCare;
 use crate::rig::{Fault, Refused, Rig, RigError};
 use crate::sensor::pressure::Pressure;
 use crate::store::Store;
-use crate::table::{Name, Table};
+use crate::table::{MAX_TEXTURES, Name, Table};
 use crate::wire::{Command, Event, Failure, Prompt, Request};
 
 /// Ticks from one picture to the next: 20 a second.
@@ -443,7 +443,9 @@ pub async fn step<H, K, F, B, E>(
     let job = rig.handheld.job();
     let due = job.is_some() || rig.ticks.is_multiple_of(PICTURE);
     if due && rig.handheld.is_new() {
-        rig.memory = memory.in_force().len() as f32 / Store::<F>::MAX_TABLE as f32;
+        let bytes = memory.in_force().len() as f32 / Store::<F>::MAX_TABLE as f32;
+        let textures = f32::from(rig.handheld.textures()) / MAX_TEXTURES as f32;
+        rig.memory = bytes.max(textures);
         // reading a table means checking it, which takes milliseconds
         let table = if rig.handheld.names_textures() {
             memory.table().ok()

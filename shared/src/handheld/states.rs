@@ -317,6 +317,11 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         core::mem::take(&mut self.fresh) || moves
     }
 
+    /// How many textures the table has.
+    pub fn textures(&self) -> u16 {
+        self.textures
+    }
+
     /// Whether the display names textures, so that [`Handheld::screen`] needs the table.
     pub fn names_textures(&self) -> bool {
         matches!(self.page, Page::Verdict | Page::Choose(..))

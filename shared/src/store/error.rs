@@ -4,7 +4,7 @@ use embedded_storage_async::nor_flash::{NorFlashError, NorFlashErrorKind};
 use sequential_storage::Error;
 use serde::{Deserialize, Serialize};
 
-use super::layout::{SCHEMA, SECTORS};
+use super::layout::{SCHEMA, UNITS};
 use crate::rig::calibration::RigCalibrationError;
 use crate::table::TableError;
 
@@ -38,10 +38,10 @@ pub enum StoreError {
     /// The flash itself failed.
     #[error("the flash failed: {0}")]
     Flash(FlashFault),
-    /// The flash has fewer than four sectors.
-    #[error("{0} bytes of flash, and the store takes {SECTORS} sectors")]
+    /// The flash has fewer sectors than the store takes.
+    #[error("{0} bytes of flash, and the store takes {UNITS} of its smallest sectors")]
     NoSpace(usize),
-    /// The table does not fit into its sector.
+    /// The table does not fit into the largest sector for one.
     #[error("the table takes {length} bytes, and there is room for {capacity}")]
     TooLong {
         /// Bytes of the table.

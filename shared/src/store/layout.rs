@@ -9,8 +9,18 @@ use crate::table::TableError;
 pub(super) const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// Bytes that the flash programs at once.
 pub(super) const WORD: usize = 4;
-/// Sectors of a store.
-pub const SECTORS: usize = 4;
+/// Where the sectors of a store begin and end, in the smallest of them: two for small tables, two of the settings, two for
+/// larger tables. So bank 2 of an STM32F42x begins; a flash of equal sectors erases several for one.
+pub const SECTORS: [(u32, u32); 6] = [
+    Slot::A.place(),
+    Slot::B.place(),
+    (2, 3),
+    (3, 4),
+    Slot::C.place(),
+    Slot::D.place(),
+];
+/// All of them.
+pub(super) const UNITS: usize = 16;
 /// Version of the records and of the map they are in (`sequential-storage` 8).
 pub const SCHEMA: u16 = 2;
 pub(super) const MAGIC: u32 = u32::from_le_bytes(*b"SLOT");
@@ -35,26 +45,58 @@ pub struct StoredTable {
     pub generation: u32,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+/// A place for a table.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Slot {
     A,
-    #[default]
     B,
+    C,
+    D,
 }
 
 impl Slot {
-    pub(super) fn other(self) -> Self {
+    pub(super) const ALL: [Self; 4] = [Self::A, Self::B, Self::C, Self::D];
+    /// The two that take turns with tables which fit into the smallest sectors: those are erased the soonest.
+    pub(super) const SMALL: [Self; 2] = [Self::A, Self::B];
+    /// The two for longer ones.
+    pub(super) const LARGE: [Self; 2] = [Self::C, Self::D];
+
+    /// All of them in turn.
+    pub(super) fn next(self) -> Self {
         match self {
             Self::A => Self::B,
-            Self::B => Self::A,
+            Self::B => Self::C,
+            Self::C => Self::D,
+            Self::D => Self::A,
         }
     }
 
-    pub(super) fn start<F: NorFlash>(self) -> u32 {
+    /// Where its sector begins and ends, in the smallest sectors.
+    const fn place(self) -> (u32, u32) {
         match self {
-            Self::A => 0,
-            Self::B => F::ERASE_SIZE as u32,
+            Self::A => (0, 1),
+            Self::B => (1, 2),
+            Self::C => (4, 8),
+            Self::D => (8, 16),
         }
+    }
+
+    /// Bytes that a table in it may have. A pair takes what fits into the smaller one of it.
+    pub(super) const fn capacity<F: NorFlash>(self) -> usize {
+        let units = match self {
+            Self::A | Self::B => 1,
+            Self::C | Self::D => 4,
+        };
+        units * F::ERASE_SIZE - TABLE_AT as usize
+    }
+
+    pub(super) const fn start<F: NorFlash>(self) -> u32 {
+        self.place().0 * F::ERASE_SIZE as u32
+    }
+
+    /// Where its sector ends.
+    pub(super) const fn end<F: NorFlash>(self) -> u32 {
+        self.place().1 * F::ERASE_SIZE as u32
     }
 }
 
@@ -69,13 +111,37 @@ pub(super) struct Push {
 
 #[derive(Default)]
 pub(super) struct Slots {
-    /// The slot in use, and the table in it.
+    /// Of [`Slot::ALL`], the generations of the tables that can be used; 0 where there is none.
+    pub(super) usable: [u32; 4],
+    /// The slot in use, and the table in it: the newest of them.
     pub(super) active: Option<(Slot, StoredTable)>,
     /// Why the newest table that was committed is none any more: the one before it is in use, or none.
     pub(super) damaged: Option<TableError>,
-    /// Largest generation that either slot has had.
+    /// Largest generation that any slot has had.
     pub(super) generation: u32,
     pub(super) push: Option<Push>,
+}
+
+impl Slots {
+    /// Generation of the table in a slot that can be used.
+    pub(super) fn usable(&mut self, slot: Slot) -> &mut u32 {
+        let [a, b, c, d] = &mut self.usable;
+        match slot {
+            Slot::A => a,
+            Slot::B => b,
+            Slot::C => c,
+            Slot::D => d,
+        }
+    }
+
+    /// The slot for a table of this pair: of the two, the one whose loss matters less. The newest table is never lost.
+    pub(super) fn next(&mut self, [one, other]: [Slot; 2]) -> Slot {
+        if *self.usable(one) <= *self.usable(other) {
+            one
+        } else {
+            other
+        }
+    }
 }
 
 /// Of a slot's header.

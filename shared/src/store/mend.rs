@@ -91,7 +91,9 @@ impl<F: NorFlash> Store<F> {
                     State::Whole | State::Torn => None,
                 };
                 // of more than are looked for, the first ones are told
-                let _ = record.map(|record| damaged.push((item.key, record)));
+                if let Some(record) = record {
+                    let _ = damaged.push((item.key, record));
+                }
                 at += item.next as u32;
             }
         }

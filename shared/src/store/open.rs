@@ -3,7 +3,7 @@
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::error::{SettingsError, StoreError};
-use super::layout::{SECTORS, Slots};
+use super::layout::{Slots, UNITS};
 use super::sectors::Store;
 
 impl<F: NorFlash> Store<F> {
@@ -21,7 +21,7 @@ impl<F: NorFlash> Store<F> {
             settings: Err(SettingsError::Corrupt),
             lost: None,
         };
-        if store.flash.capacity() < SECTORS * F::ERASE_SIZE {
+        if store.flash.capacity() < UNITS * F::ERASE_SIZE {
             return Err(StoreError::NoSpace(store.flash.capacity()));
         }
         store.find_tables(|_| ()).await?;

@@ -5,7 +5,8 @@ use embedded_storage_async::nor_flash::NorFlash;
 use super::error::{SettingsError, StoreError};
 use super::layout::{Slots, WORD};
 
-/// Tables and settings in the first four sectors of a flash.
+/// Tables and settings in the first sectors of a flash. [`super::SECTORS`] are erased, each as a whole; `F::ERASE_SIZE` is the
+/// size of the smallest.
 ///
 /// The flash programs words of one, two or four bytes and reads as many or fewer.
 pub struct Store<F> {

@@ -1,4 +1,4 @@
-//! The two slots of the texture table.
+//! The slots of the texture table.
 
 use embedded_storage_async::nor_flash::NorFlash;
 
@@ -15,7 +15,7 @@ const CHUNK: usize = 128;
 
 impl<F: NorFlash> Store<F> {
     /// Bytes that a table may have at most.
-    pub const MAX_TABLE: usize = F::ERASE_SIZE - TABLE_AT as usize;
+    pub const MAX_TABLE: usize = Slot::C.capacity::<F>();
 
     /// The table to be used: the newest one that was committed and is whole; `None`: the factory's.
     ///
@@ -55,8 +55,8 @@ impl<F: NorFlash> Store<F> {
         }
     }
 
-    /// Begins a table of `length` bytes: erases the slot that is not in use. The table in use stays until the new one is
-    /// committed. One that was begun before and not committed is given up.
+    /// Begins a table of `length` bytes: of the two slots for such tables, erases the one that is not in use, or has the older
+    /// table. The table in use stays until the new one is committed. One that was begun before and not committed is given up.
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::TooLong`].
@@ -68,15 +68,15 @@ impl<F: NorFlash> Store<F> {
                 capacity: Self::MAX_TABLE,
             });
         }
-        let slot = self
-            .slots
-            .active
-            .map(|(slot, _)| slot)
-            .unwrap_or_default()
-            .other();
-        let start = slot.start::<F>();
+        let pair = if length <= Slot::A.capacity::<F>() {
+            Slot::SMALL
+        } else {
+            Slot::LARGE
+        };
+        let slot = self.slots.next(pair);
+        *self.slots.usable(slot) = 0;
         self.flash
-            .erase(start, start + F::ERASE_SIZE as u32)
+            .erase(slot.start::<F>(), slot.end::<F>())
             .await
             .map_err(StoreError::flash)?;
         self.slots.push = Some(Push {
@@ -177,6 +177,7 @@ impl<F: NorFlash> Store<F> {
         if self.commit_word(slot).await? != COMMIT {
             return Err(StoreError::Worn);
         }
+        *self.slots.usable(slot) = stored.generation;
         self.slots.active = Some((slot, stored));
         self.slots.damaged = None;
         Ok((stored, table))
@@ -205,15 +206,16 @@ impl<F: NorFlash> Store<F> {
     /// [`StoreError::Flash`].
     pub async fn factory_table(&mut self) -> Result<(), StoreError> {
         self.slots.push = None;
-        let active = self.slots.active.map(|(slot, _)| slot);
-        let active = active.unwrap_or_default();
-        // the older one first: the active one hides it until it is given up itself
-        for slot in [active.other(), active] {
+        let mut slot = self.slots.active.map_or(Slot::A, |(slot, _)| slot);
+        // the older ones first: the active one hides them until it is given up itself
+        for _ in Slot::ALL {
+            slot = slot.next();
             if is_committed(self.commit_word(slot).await?) {
                 self.program(slot.start::<F>() + COMMIT_AT, &[0; WORD])
                     .await?;
             }
         }
+        self.slots.usable = [0; 4];
         self.slots.active = None;
         self.slots.damaged = None;
         Ok(())
@@ -223,7 +225,7 @@ impl<F: NorFlash> Store<F> {
     pub(super) async fn find_tables(&mut self, correct: Correct) -> Result<(), StoreError> {
         // of the newest table that is damaged: its generation, where that can be read
         let mut damaged: Option<(Option<u32>, TableError)> = None;
-        for slot in [Slot::A, Slot::B] {
+        for slot in Slot::ALL {
             let is_committed = is_committed(self.commit_word(slot).await?);
             let correct = if is_committed {
                 correct
@@ -244,6 +246,7 @@ impl<F: NorFlash> Store<F> {
             };
             match whole {
                 Ok(table) => {
+                    *self.slots.usable(slot) = table.generation;
                     let active = self.slots.active;
                     if active.is_none_or(|(_, other)| other.generation < table.generation) {
                         self.slots.active = Some((slot, table));
@@ -287,7 +290,7 @@ impl<F: NorFlash> Store<F> {
             generation,
         };
         let good = header(&table);
-        Ok(if bytes == good && table.length <= Self::MAX_TABLE {
+        Ok(if bytes == good && table.length <= slot.capacity::<F>() {
             Ok(table)
         } else {
             let [.., a, b, c, d] = good;

@@ -43,6 +43,22 @@ fn table(n: u8) -> Vec<u8> {
     bytes
 }
 
+/// A table that fits only into the larger slots, unlike that of every other `n`.
+fn large(n: u8) -> Vec<u8> {
+    let cells = [(f32::from(n) * 0.01, 0.1); 3];
+    let bytes = table_of(
+        crate::features::PropertySet::ALL,
+        &vec![vec![around(cells); 3]; 21 + usize::from(n) % 3],
+    );
+    assert!(bytes.len() > SECTOR - 32 && Table::read(&bytes).is_ok());
+    bytes
+}
+
+/// Small ones and large ones, two by two.
+fn any_table(n: u8) -> Vec<u8> {
+    if n % 4 < 2 { table(n) } else { large(n) }
+}
+
 fn open(ram: Ram) -> Store<Ram> {
     block_on(async {
         let mut store = Store::open(ram).await.unwrap();
@@ -56,7 +72,7 @@ async fn push(store: &mut Store<Ram>, bytes: &[u8], part: usize) -> Outcome<()> 
     for (index, some) in bytes.chunks(part).enumerate() {
         store.write_table(index * part, some).await?;
     }
-    let mut buffer = [0; SECTOR];
+    let mut buffer = [0; 4 * SECTOR];
     let (stored, table) = store.commit_table(&mut buffer).await?;
     assert_eq!((table.as_bytes(), table.crc()), (bytes, stored.crc));
     Ok(())
@@ -64,7 +80,7 @@ async fn push(store: &mut Store<Ram>, bytes: &[u8], part: usize) -> Outcome<()> 
 
 /// The table in use.
 fn used(store: &mut Store<Ram>) -> Option<Vec<u8>> {
-    let mut buffer = [0; SECTOR];
+    let mut buffer = [0; 4 * SECTOR];
     let table = block_on(store.read_table(&mut buffer)).unwrap()?;
     let bytes = table.as_bytes().to_vec();
     let stored = store.table().unwrap();
@@ -124,10 +140,10 @@ fn a_blank_flash_is_an_empty_store() {
     assert_eq!(none, Ok(None));
     assert_eq!(store.close().operations, 0, "looking writes nothing");
     let mut short = Ram::<SECTOR>::new();
-    short.bytes.truncate(3 * SECTOR);
+    short.bytes.truncate(15 * SECTOR);
     assert_eq!(
         block_on(Store::open(short)).err(),
-        Some(StoreError::NoSpace(3 * SECTOR))
+        Some(StoreError::NoSpace(15 * SECTOR))
     );
 }
 
@@ -135,10 +151,10 @@ fn a_blank_flash_is_an_empty_store() {
 fn tables_come_in_parts_of_any_size_and_the_newest_counts() {
     let mut store = open(Ram::new());
     for n in 0..20 {
-        block_on(push(&mut store, &table(n), 1 + usize::from(n))).unwrap();
-        assert_eq!(used(&mut store), Some(table(n)));
+        block_on(push(&mut store, &any_table(n), 1 + usize::from(n))).unwrap();
+        assert_eq!(used(&mut store), Some(any_table(n)));
         store = open(store.close().again());
-        assert_eq!(used(&mut store), Some(table(n)));
+        assert_eq!(used(&mut store), Some(any_table(n)));
         assert_eq!(store.table().unwrap().generation, u32::from(n) + 1);
     }
     block_on(store.factory_table()).unwrap();
@@ -155,7 +171,7 @@ fn a_table_that_is_not_whole_is_refused_and_the_former_one_stays() {
     let mut store = open(Ram::new());
     let (old, new) = (table(1), table(2));
     block_on(push(&mut store, &old, 16)).unwrap();
-    let mut buffer = [0; SECTOR];
+    let mut buffer = [0; 4 * SECTOR];
     let part = |offset, wanted| Err(StoreError::Part { offset, wanted });
     block_on(async {
         assert_eq!(store.write_table(0, &new).await, Err(StoreError::NoTable));
@@ -164,10 +180,10 @@ fn a_table_that_is_not_whole_is_refused_and_the_former_one_stays() {
             Some(StoreError::NoTable)
         );
         let too_long = StoreError::TooLong {
-            length: SECTOR - 31,
-            capacity: SECTOR - 32,
+            length: 4 * SECTOR - 31,
+            capacity: 4 * SECTOR - 32,
         };
-        assert_eq!(store.begin_table(SECTOR - 31).await, Err(too_long));
+        assert_eq!(store.begin_table(4 * SECTOR - 31).await, Err(too_long));
         store.begin_table(new.len()).await.unwrap();
         assert_eq!(store.write_table(4, &new).await, part(4, 0));
         store.write_table(0, &new[..7]).await.unwrap();
@@ -207,6 +223,59 @@ fn a_table_that_is_not_whole_is_refused_and_the_former_one_stays() {
     assert_eq!(used(&mut store), Some(new.clone()));
     let mut store = open(store.close().again());
     assert_eq!(used(&mut store), Some(new));
+}
+
+#[test]
+fn a_table_goes_to_the_smallest_sector_that_it_fits_into() {
+    let mut store = open(Ram::new());
+    for (length, worn) in [
+        (SECTOR - 32, [1, 0, 0, 0, 0, 0]),
+        (SECTOR - 31, [1, 0, 0, 0, 1, 0]),
+        (4 * SECTOR - 32, [1, 0, 0, 0, 2, 0]),
+    ] {
+        block_on(store.begin_table(length)).unwrap();
+        assert_eq!(store.flash.worn, worn, "{length}");
+    }
+    // in turn, once they are committed
+    for n in [2, 3, 6, 0, 1, 4] {
+        block_on(push(&mut store, &any_table(n), 64)).unwrap();
+    }
+    assert_eq!(store.flash.worn, [3, 1, 0, 0, 4, 1]);
+}
+
+/// Whatever sectors they are in: the one before the newest is in use where that is damaged, and so on to the first.
+#[test]
+fn the_tables_before_the_newest_one_stay_until_their_slot_is_wanted() {
+    // in which order tables are pushed; which are left, newest first
+    for (pushed, left) in [
+        (&[0, 2][..], &[2, 0][..]),
+        (&[2, 0], &[0, 2]),
+        (&[0, 1, 2, 3], &[3, 2, 1, 0]),
+        (&[2, 0, 3, 1], &[1, 3, 0, 2]),
+        // the older one of its pair gives way, never the newest
+        (&[0, 1, 2, 4], &[4, 2, 1]),
+        (&[0, 2, 3, 6], &[6, 3, 0]),
+        (&[0, 2, 3, 1, 4], &[4, 1, 3, 2]),
+    ] {
+        let mut store = open(Ram::new());
+        for &n in pushed {
+            block_on(push(&mut store, &any_table(n), 64)).unwrap();
+        }
+        for (at, &n) in left.iter().enumerate() {
+            store = open(store.close().again());
+            assert_eq!(used(&mut store), Some(any_table(n)), "{pushed:?}");
+            assert_eq!(store.damaged_table().is_some(), at > 0, "{pushed:?} {at}");
+            let offset = store.table().unwrap().offset as usize;
+            store.flash.bytes[offset + 40] ^= 1;
+        }
+        store = open(store.close().again());
+        assert_eq!(store.table(), None, "{pushed:?}");
+        assert!(store.damaged_table().is_some());
+        // all of them are given up together
+        block_on(store.factory_table()).unwrap();
+        store = open(store.close().again());
+        assert_eq!((store.damaged_table(), store.table()), (None, None));
+    }
 }
 
 #[test]

@@ -11,10 +11,10 @@ use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::pressure::Calibration;
 use tactus_core::store::Store;
 
-/// Bytes of a sector: a sixteenth of the chip's, so that they fill up.
+/// Bytes of the smallest sector: a sixteenth of the chip's, so that they fill up.
 pub(crate) const SECTOR: usize = 1024;
 
-/// Four such sectors.
+/// The sectors of a store.
 pub type Flash = RamFlash<SECTOR>;
 
 pub(crate) fn calibration() -> RigCalibration {
@@ -64,7 +64,7 @@ pub fn images() -> &'static [Vec<u8>] {
     IMAGES.get_or_init(|| {
         (0..tables().len() as u8 + 1)
             .map(|fill| {
-                let mut buffer = vec![0; SECTOR];
+                let mut buffer = vec![0; Store::<Flash>::MAX_TABLE];
                 block_on(async {
                     let mut store = Store::open(Flash::blank()).await.expect("blank flash");
                     if let Some(table) = tables().get(usize::from(fill)) {

@@ -226,7 +226,7 @@ pub fn store(data: &[u8]) {
     };
     // whatever has changed, the store goes on
     let _ = block_on(store.mend());
-    let mut buffer = vec![0; flash::SECTOR];
+    let mut buffer = vec![0; Store::<Flash>::MAX_TABLE];
     // a table that is damaged gives way to the factory's
     #[cfg(feature = "planted")]
     assert!(

@@ -71,6 +71,8 @@ pub(crate) struct Driver {
     pub(crate) flash_busy: bool,
     /// an erase never ends
     pub(crate) flash_stuck: bool,
+    /// an erase takes twice its typical time
+    pub(crate) flash_slow: bool,
     /// a switch that cannot be turned on
     pub(crate) held_off: Option<Switch>,
     /// judges what the firmware does to the chip, from the first instruction on
@@ -208,7 +210,7 @@ impl Driver {
             referee.controls(access, sr, self.flash_busy && is_busy);
         }
         self.flash_busy = is_busy;
-        if access.value >> 16 & 1 == 1
+        if access.value & flash::STRT != 0
             && let Some(addresses) = flash::erased(cr, sr)
         {
             self.stored.extend(FlashWrite::erase(&addresses));
@@ -260,6 +262,12 @@ impl Driver {
             address if address == FLASH_CR || flash::ARRAY.contains(&address) => {
                 // the array is there as a whole
                 let _ = self.flash(session, host, access);
+                let slower = flash::slower(access.value).filter(|_| self.flash_slow);
+                if let Some(cr) = slower.filter(|_| address == FLASH_CR) {
+                    let part = &mut session.board_mut().part;
+                    // the register is there
+                    let _ = part.write(now, FLASH_CR, Width::W32, cr);
+                }
             }
             _ => {}
         }

@@ -90,6 +90,7 @@ impl Emulator {
             stored: Vec::new(),
             flash_busy: false,
             flash_stuck: false,
+            flash_slow: false,
             held_off: None,
             referee: None,
             halt: None,
@@ -369,6 +370,12 @@ impl Emulator {
     /// From now on an erase is never over: the flash says that it is busy.
     pub fn stick_flash(&mut self) -> Result<(), Error> {
         self.with(|standing| standing.driver.flash_stuck = true)
+    }
+
+    /// From now on an erase takes as long as with words of 8 bits: twice the typical time, which is the longest that the data
+    /// sheet allows.
+    pub fn slow_erases(&mut self) -> Result<(), Error> {
+        self.with(|standing| standing.driver.flash_slow = true)
     }
 
     /// A register as the core would read it, a word.

@@ -6,8 +6,8 @@ use rigless::soc::Width;
 
 /// Where the array begins.
 pub const FLASH: u64 = 0x0800_0000;
-/// The firmware's store: bank 2's four sectors of 16 KB.
-pub const STORE: Range<u64> = 0x0810_0000..0x0811_0000;
+/// The firmware's store: bank 2's four sectors of 16 KB, the one of 64 KB and the first of 128 KB.
+pub const STORE: Range<u64> = 0x0810_0000..0x0814_0000;
 /// The array, both banks.
 pub(crate) const ARRAY: Range<u64> = FLASH..FLASH + (2 << 20);
 
@@ -16,6 +16,7 @@ const PG: u64 = 1;
 const SER: u64 = 1 << 1;
 const SNB_SHIFT: u32 = 3;
 const PSIZE_SHIFT: u32 = 8;
+pub(super) const STRT: u64 = 1 << 16;
 const LOCK: u64 = 1 << 31;
 /// SR: operations in the wrong sequence, of the wrong width, busy.
 const PGSERR: u64 = 1 << 7;
@@ -39,8 +40,16 @@ pub enum FlashWrite {
     },
 }
 
-/// Bytes of a sector of the store.
-pub const SECTOR: usize = 16 * 1024;
+/// SNB of the store's first sector.
+const FIRST: u64 = 16;
+
+/// The places of a sector of the store, from its first byte on; none where there is no such sector.
+pub fn places(number: usize) -> Range<usize> {
+    let addresses = sector(FIRST + number as u64).filter(|at| at.end <= STORE.end);
+    addresses.map_or(0..0, |at| {
+        (at.start - STORE.start) as usize..(at.end - STORE.start) as usize
+    })
+}
 
 impl FlashWrite {
     /// A store to the array that left this there; `None` outside of the store's sectors, which are programmed by words.
@@ -54,8 +63,11 @@ impl FlashWrite {
 
     /// The erase of these addresses.
     pub(crate) fn erase(addresses: &Range<u64>) -> Option<Self> {
-        STORE.contains(&addresses.start).then(|| Self::Erase {
-            sector: (addresses.start - STORE.start) as usize / SECTOR,
+        let all = FIRST..FIRST + 12;
+        let snb = all.filter(|_| STORE.contains(&addresses.start));
+        let mut snb = snb.filter(|snb| sector(*snb).as_ref() == Some(addresses));
+        snb.next().map(|snb| Self::Erase {
+            sector: (snb - FIRST) as usize,
         })
     }
 }
@@ -81,6 +93,11 @@ pub(crate) fn refusal(cr: u64, width: Width) -> u64 {
 pub(crate) fn erased(cr: u64, sr: u64) -> Option<Range<u64>> {
     let begun = sr & BSY != 0 && cr & SER != 0;
     begun.then(|| sector(cr >> SNB_SHIFT & 0x1F)).flatten()
+}
+
+/// What is stored to CR to prepare an erase, with words of 8 bits; `None` for any other store.
+pub(crate) fn slower(cr: u64) -> Option<u64> {
+    (cr & (PG | STRT | LOCK) == 0).then_some(cr & !(3 << PSIZE_SHIFT))
 }
 
 /// The addresses of a sector by SNB: 0 to 11, and 16 to 27 for bank 2 (RM0090 tables 6 and 16).
@@ -130,7 +147,7 @@ mod tests {
         assert_eq!(
             FlashWrite::program(0x0810_4008, Width::W32, 7),
             Some(FlashWrite::Program {
-                at: SECTOR + 8,
+                at: 0x4008,
                 word: 7
             })
         );
@@ -139,7 +156,26 @@ mod tests {
             FlashWrite::erase(&(0x0810_C000..0x0811_0000)),
             Some(FlashWrite::Erase { sector: 3 })
         );
+        assert_eq!(
+            FlashWrite::erase(&(0x0812_0000..0x0814_0000)),
+            Some(FlashWrite::Erase { sector: 5 })
+        );
+        assert_eq!(FlashWrite::erase(&(0x0814_0000..0x0816_0000)), None);
         assert_eq!(FlashWrite::erase(&(0x0800_0000..0x0800_4000)), None);
+        assert_eq!(places(0), 0..0x4000);
+        assert_eq!(places(3), 0xC000..0x1_0000);
+        assert_eq!(places(4), 0x1_0000..0x2_0000);
+        assert_eq!(places(5), 0x2_0000..0x4_0000);
+        assert_eq!(places(6), 0..0);
+    }
+
+    #[test]
+    fn only_what_prepares_an_erase_is_made_slower() {
+        let by_words = SER | 2 << PSIZE_SHIFT;
+        assert_eq!(slower(by_words), Some(SER));
+        for other in [PG, STRT, LOCK] {
+            assert_eq!(slower(by_words | other), None);
+        }
     }
 
     #[test]

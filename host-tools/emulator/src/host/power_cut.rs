@@ -6,7 +6,7 @@
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use crate::board::{FlashWrite, SECTOR};
+use crate::board::{FlashWrite, places};
 
 /// How a write is torn.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -47,7 +47,7 @@ fn apply(store: &mut [u8], write: FlashWrite) {
     match write {
         FlashWrite::Program { at, word: new } => word(store, at, |_| new),
         FlashWrite::Erase { sector } => {
-            if let Some(sector) = store.chunks_mut(SECTOR).nth(sector) {
+            if let Some(sector) = store.get_mut(places(sector)) {
                 sector.fill(0xFF);
             }
         }
@@ -68,16 +68,17 @@ fn tear(store: &mut [u8], write: FlashWrite, cut: Cut) {
             word(store, at, |old| old & (new | kept));
         }
         FlashWrite::Erase { sector } => {
-            let Some(sector) = store.chunks_mut(SECTOR).nth(sector) else {
+            let Some(sector) = store.get_mut(places(sector)) else {
                 return;
             };
-            let part = random.random_range(0..SECTOR / 4) * 4;
+            let length = sector.len();
+            let part = random.random_range(0..length / 4) * 4;
             match cut.torn {
                 Torn::Nothing => {}
                 Torn::Begin => sector[..part].fill(0xFF),
                 Torn::End => sector[part..].fill(0xFF),
                 Torn::Bits => {
-                    for at in (0..SECTOR).step_by(4) {
+                    for at in (0..length).step_by(4) {
                         let erased: u32 = match random.random_range(0..3) {
                             0 => 0,
                             1 => u32::MAX,
@@ -115,7 +116,7 @@ mod tests {
 
     #[test]
     fn a_torn_word_only_loses_bits_and_a_torn_erase_only_gains_them() {
-        let before = vec![0xF0; 4 * SECTOR];
+        let before = vec![0xF0; 0x4_0000];
         let writes = [
             FlashWrite::Program {
                 at: 4,
@@ -126,6 +127,8 @@ mod tests {
                 word: 0x0000_0000,
             },
             FlashWrite::Erase { sector: 2 },
+            FlashWrite::Erase { sector: 4 },
+            FlashWrite::Erase { sector: 5 },
         ];
         for torn in Torn::ALL {
             let left = left_by(&before, &writes, Cut { torn, ..CUT });
@@ -133,14 +136,28 @@ mod tests {
             assert_eq!(left[8..12] == [0xF0; 4], torn == Torn::Nothing);
             assert!(left[8..12].iter().all(|byte| byte & !0xF0 == 0));
             assert_eq!(left[12..], before[12..]);
-            let left = left_by(&before, &writes, Cut { at: 2, torn, ..CUT });
-            assert_eq!(left[8..12], [0; 4]);
-            let sector = &left[2 * SECTOR..3 * SECTOR];
-            assert!(sector.iter().all(|byte| byte & 0xF0 == 0xF0));
-            assert_eq!(sector == [0xF0; SECTOR], torn == Torn::Nothing);
-            assert!(sector.contains(&0xF0), "not all of it");
+            for erased in 2..5 {
+                let at = Cut {
+                    at: erased,
+                    torn,
+                    ..CUT
+                };
+                let left = left_by(&before, &writes, at);
+                assert_eq!(left[8..12], [0; 4]);
+                let FlashWrite::Erase { sector } = writes[erased] else {
+                    panic!("an erase")
+                };
+                let sector = &left[places(sector)];
+                assert!(sector.iter().all(|byte| byte & 0xF0 == 0xF0));
+                let is_as_before = sector.iter().all(|byte| *byte == 0xF0);
+                assert_eq!(is_as_before, torn == Torn::Nothing);
+                assert!(sector.contains(&0xF0), "not all of it");
+            }
         }
-        let whole = left_by(&before, &writes, Cut { at: 3, ..CUT });
-        assert_eq!(whole[2 * SECTOR..3 * SECTOR], [0xFF; SECTOR]);
+        let whole = left_by(&before, &writes, Cut { at: 5, ..CUT });
+        let (rest, erased) = whole.split_at(places(4).start);
+        assert!(erased.iter().all(|byte| *byte == 0xFF));
+        assert_eq!(rest[places(1)], before[places(1)]);
+        assert!(rest[places(2)].iter().all(|byte| *byte == 0xFF));
     }
 }

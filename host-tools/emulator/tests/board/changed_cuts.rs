@@ -122,7 +122,7 @@ fn explore(talk: &mut Talk, seed: u32, truth: &str) {
 }
 
 /// The table that a rig holds which boots on this store; nothing is to be complained about.
-fn reboot(elf: &Path, unknown: &Unknown, store: Vec<u8>) -> (Talk, Vec<u8>) {
+pub(crate) fn reboot(elf: &Path, unknown: &Unknown, store: Vec<u8>) -> (Talk, Vec<u8>) {
     let options = Options {
         store: Some(store),
         ..Options::default()

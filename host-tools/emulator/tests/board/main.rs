@@ -12,6 +12,7 @@ mod halt;
 mod handheld;
 mod handheld_compare;
 mod handheld_link;
+mod long_table;
 mod old_store;
 mod referee;
 mod selftest;

@@ -58,7 +58,7 @@ fn table(talk: &mut Talk) -> Vec<u8> {
 }
 
 /// A board on this store, and what it says until it has homed.
-fn troubles(elf: &Path, store: Vec<u8>) -> (Talk, Vec<Failure>) {
+pub(crate) fn troubles(elf: &Path, store: Vec<u8>) -> (Talk, Vec<Failure>) {
     let options = Options {
         store: Some(store),
         ..Options::default()

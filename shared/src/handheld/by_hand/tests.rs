@@ -7,6 +7,7 @@ use crate::handheld::weights::WEIGHTS_MN;
 use crate::probe::Memory;
 use crate::probe::explore::Random;
 use crate::sensor::pressure::{Calibration, Channel, Counts};
+use crate::store::Store;
 use crate::store::tests::ram::{Ram, SECTOR};
 use crate::wire::Again;
 use embassy_futures::block_on;

@@ -60,7 +60,7 @@ impl Model {
     fn after(&self, operation: &Operation) -> Self {
         let mut next = self.clone();
         match *operation {
-            Operation::Push(n, _) => next.table = Some(table(n)),
+            Operation::Push(n, _) => next.table = Some(any_table(n)),
             Operation::Half(_) => {}
             Operation::Factory => next.table = None,
             Operation::Calibrate(n) => next.calibration = Some(calibration(n)),
@@ -163,9 +163,9 @@ impl Model {
 
 async fn perform(store: &mut Store<Ram>, operation: &Operation) -> Outcome<()> {
     match *operation {
-        Operation::Push(n, part) => push(store, &table(n), part).await,
+        Operation::Push(n, part) => push(store, &any_table(n), part).await,
         Operation::Half(n) => {
-            let bytes = table(n);
+            let bytes = any_table(n);
             store.begin_table(bytes.len()).await?;
             store.write_table(0, &bytes).await
         }
@@ -261,6 +261,9 @@ fn a_cut_anywhere_leaves_the_old_or_the_new_state() {
         Operation::Train(1, TABLES[0], 3),
         Operation::Train(0, TABLES[1], 2),
         Operation::Push(5, 64),
+        Operation::Push(6, 200),
+        Operation::Half(7),
+        Operation::Push(8, 64),
         Operation::Factory,
     ];
     // round and round the pages

@@ -6,6 +6,8 @@ use embedded_storage_async::nor_flash::{
 use std::vec;
 use std::vec::Vec;
 
+use crate::store::SECTORS;
+
 /// Sectors of a sixteenth of the chip's, unless others are wanted, so that every word of every operation can be cut.
 pub(crate) const SECTOR: usize = 1024;
 
@@ -43,7 +45,7 @@ pub(crate) struct Ram<const S: usize = SECTOR> {
     pub(crate) operations: usize,
     pub(crate) erases: usize,
     /// Erases of each sector.
-    pub(crate) worn: [u32; 4],
+    pub(crate) worn: [u32; SECTORS.len()],
     /// The operation that the power is cut in.
     pub(crate) cut: Option<(usize, Torn)>,
     /// Bits have changed by themselves: writing to them is no mistake, and clears what it can.
@@ -54,10 +56,10 @@ pub(crate) struct Ram<const S: usize = SECTOR> {
 impl<const S: usize> Ram<S> {
     pub(crate) fn new() -> Self {
         Self {
-            bytes: vec![0xFF; 4 * S],
+            bytes: vec![0xFF; 16 * S],
             operations: 0,
             erases: 0,
-            worn: [0; 4],
+            worn: [0; SECTORS.len()],
             cut: None,
             rotten: false,
             dead: false,
@@ -124,16 +126,19 @@ impl<const S: usize> NorFlash for Ram<S> {
 
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), RamError> {
         let (from, to) = (from as usize, to as usize);
-        assert!(from.is_multiple_of(S) && to == from + S, "sectors");
+        let is_it =
+            |&(begin, end): &(u32, u32)| [begin, end].map(|at| at as usize * S) == [from, to];
+        let number = SECTORS.iter().position(is_it).expect("a sector");
         let torn = self.operate()?;
         self.erases += 1;
-        self.worn[from / S] += 1;
+        self.worn[number] += 1;
         let sector = &mut self.bytes[from..to];
+        let length = sector.len();
         match torn {
             None | Some(Torn::All) => sector.fill(0xFF),
             Some(Torn::Nothing) => {}
-            Some(Torn::Begin(part)) => sector[..S * part / 100].fill(0xFF),
-            Some(Torn::End(part)) => sector[S * part / 100..].fill(0xFF),
+            Some(Torn::Begin(part)) => sector[..length * part / 100].fill(0xFF),
+            Some(Torn::End(part)) => sector[length * part / 100..].fill(0xFF),
             Some(Torn::Bits(mut seed)) => {
                 for word in sector.as_chunks_mut::<4>().0 {
                     let erased = match next(&mut seed) % 3 {

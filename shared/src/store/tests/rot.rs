@@ -5,19 +5,36 @@ use super::cuts::Model;
 use super::ram::SECTOR;
 use super::*;
 use crate::table::tests::fixed;
+use core::ops::Range;
 use proptest::prelude::*;
 
 /// Stores of different pasts: how many rounds of settings they have seen, and how many tables.
-const PASTS: [(u8, u8); 6] = [(0, 0), (1, 1), (6, 2), (11, 3), (14, 2), (40, 5)];
+const PASTS: [(u8, u8); 8] = [
+    (0, 0),
+    (1, 1),
+    (6, 2),
+    (11, 3),
+    (14, 2),
+    (3, 4),
+    (40, 5),
+    (5, 7),
+];
 
 /// Where bits change.
 const REGIONS: usize = 8;
+/// Where the slots of tables begin.
+const SLOTS: [usize; 4] = [0, SECTOR, 4 * SECTOR, 8 * SECTOR];
 
-fn stored(rounds: u8, tables: u8) -> Ram {
+/// The flash, and where its tables lie, the last one last.
+fn stored(rounds: u8, tables: u8) -> (Ram, Vec<Range<usize>>) {
     let mut store = open(Ram::new());
+    let mut places = Vec::new();
     block_on(async {
         for n in 0..tables {
-            push(&mut store, &table(n), 64).await.unwrap();
+            push(&mut store, &any_table(n), 64).await.unwrap();
+            let table = store.table().unwrap();
+            let at = table.offset as usize;
+            places.push(at..at + table.length);
         }
         for n in 0..rounds {
             if n % 5 == 0 {
@@ -34,7 +51,22 @@ fn stored(rounds: u8, tables: u8) -> Ram {
             store.set_skin(&skin).await.unwrap();
         }
     });
-    store.close().again()
+    (store.close().again(), places)
+}
+
+/// The newest table that no bit of has changed, and whether it is the last one.
+fn newest_whole(places: &[Range<usize>], changed: &[usize]) -> (Option<Vec<u8>>, bool) {
+    let is_left = |n: usize| {
+        let newer = &places[n + 1..];
+        newer.iter().all(|newer| newer.start != places[n].start)
+    };
+    let is_whole = |n: usize| !changed.iter().any(|bit| places[n].contains(&(bit / 8)));
+    let newest = (0..places.len()).rev().find(|&n| is_left(n) && is_whole(n));
+    let is_last = newest.is_none_or(|n| n + 1 == places.len());
+    (
+        newest.map(|n| any_table(n as u8)),
+        is_last && (newest.is_some() || places.is_empty()),
+    )
 }
 
 /// Where the settings end that were written: the last word of each page that is not blank, in front of its end mark.
@@ -55,8 +87,11 @@ fn bit(ram: &Ram, region: usize, any: u32) -> usize {
     let end = written(ram, settings);
     let (from, length) = match region {
         // a slot's header and commit word, and its table
-        0 => (any / 7 % 2 * SECTOR, 32),
-        1 => (any / 7 % 2 * SECTOR + 32, table(1).len()),
+        0 => (SLOTS[any / 7 % 4], 32),
+        1 => match any / 7 % 4 {
+            small @ 0..2 => (SLOTS[small] + 32, table(1).len()),
+            slot => (SLOTS[slot] + 32, large(2).len()),
+        },
         // records, the first ones, what follows on them, the blank rest of the page
         2 => (settings * SECTOR + 4, end.saturating_sub(4).max(4)),
         3 => (settings * SECTOR + 4, 12),
@@ -87,7 +122,7 @@ proptest! {
         bits in prop::collection::vec(any::<u32>(), 1..=3)
     ) {
         let (rounds, tables) = PASTS[past];
-        let ram = stored(rounds, tables);
+        let (ram, places) = stored(rounds, tables);
         let mut whole = open(ram.clone());
         let (before, share) = (Model::of(&mut whole), block_on(whole.false_alarm()).unwrap());
         let high_force = block_on(whole.high_force()).unwrap();
@@ -106,12 +141,11 @@ proptest! {
         if changed.len() < 3 {
             prop_assert_eq!((lost, settings), (None, Ok(())));
         }
-        let is_of_table = |bit: &usize| bit / 8 % SECTOR >= 32 && bit / 8 < 2 * SECTOR;
-        prop_assert!(!is_table_damaged || changed.iter().any(is_of_table));
+        let (wanted, is_last) = newest_whole(&places, &changed);
+        prop_assert_eq!(is_table_damaged, !is_last);
         let mut found = Model::damaged(&mut store);
         if is_table_damaged {
-            let former = (tables >= 2).then(|| table(tables - 2));
-            prop_assert!(found.table.is_none() || found.table == former);
+            prop_assert_eq!(&found.table, &wanted);
             found.table.clone_from(&before.table);
         }
         if settings.is_ok() {
@@ -138,7 +172,7 @@ proptest! {
                 store.erase_settings().await.unwrap();
             }
             for n in 50..60 {
-                push(&mut store, &table(n), 64).await.unwrap();
+                push(&mut store, &any_table(n), 64).await.unwrap();
                 store.set_calibration(&calibration(n)).await.unwrap();
                 store.set_skin(&SkinCare::after(n.into(), 1.0)).await.unwrap();
             }
@@ -147,7 +181,7 @@ proptest! {
         ram.rotten = true;
         let mut store = open(ram);
         let mut after = Model::of(&mut store);
-        prop_assert_eq!(after.table.take(), Some(table(59)));
+        prop_assert_eq!(after.table.take(), Some(any_table(59)));
         prop_assert_eq!(after.calibration.take(), Some(calibration(59)));
         prop_assert_eq!(after.skin, SkinCare::after(59.0, 1.0));
         if settings.is_ok() {
@@ -162,7 +196,7 @@ proptest! {
 fn two_records_are_put_right_at_once_wherever_the_page_ends() {
     let mut turns = 0;
     for rounds in 0..100 {
-        let ram = stored(rounds, 5);
+        let (ram, _) = stored(rounds, 5);
         if written(&ram, 2).max(written(&ram, 3)) < SECTOR - 150 {
             continue;
         }
@@ -171,7 +205,7 @@ fn two_records_are_put_right_at_once_wherever_the_page_ends() {
         for any in 0..100 {
             let mut ram = ram.clone();
             ram.rotten = true;
-            for any in [any * 71 << 8, (any * 71 + 900) << 8] {
+            for any in [(any * 71) << 8, (any * 71 + 900) << 8] {
                 let bit = bit(&ram, 2, any);
                 ram.bytes[bit / 8] ^= 1 << (bit % 8);
             }

@@ -99,5 +99,5 @@ fn a_training_erases_one_of_the_two_sectors_of_the_table() {
         let words = store.flash.operations - before - 1;
         assert_eq!(words, bytes.len().div_ceil(4) + 7);
     }
-    assert_eq!(store.flash.worn, [10, 10, 0, 0]);
+    assert_eq!(store.flash.worn, [10, 10, 0, 0, 0, 0]);
 }

@@ -7,7 +7,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 use tactus::sim::collection::{calibrated, texture_name};
-use tactus::sim::flash::{RamFlash, SECTOR};
+use tactus::sim::flash::{RamFlash, TABLE};
 use tactus::sim::mount::Mount;
 use tactus::sim::probe::{Host, SimProbe, switch_off_and_on, switch_on};
 use tactus::sim::rig::{SimError, SimRig};
@@ -131,7 +131,7 @@ pub(crate) fn day(virtual_s: f64, seed: u64, mut each: impl FnMut(f64)) -> Resul
         .map_err(SimError::from)?;
     rig.home()?;
     let (host, plan) = (RefCell::default(), dsp::Plan::new());
-    let mut buffer = vec![0; SECTOR];
+    let mut buffer = vec![0; TABLE];
     let flash = RamFlash::blank();
     let mut probe = switch_on(rig, flash, FACTORY, &mut buffer, &plan, &host)?;
     block_on(store(&mut probe).set_calibration(&calibration))?;
@@ -324,7 +324,7 @@ mod tests {
         let mut rig = SimRig::new(world().setup(1, 1));
         rig.home().unwrap();
         let (host, plan) = (RefCell::default(), dsp::Plan::new());
-        let mut buffer = vec![0; SECTOR];
+        let mut buffer = vec![0; TABLE];
         let flash = RamFlash::blank();
         let probe = switch_on(rig, flash, FACTORY, &mut buffer, &plan, &host);
         let mut probe = probe.unwrap();
@@ -334,7 +334,7 @@ mod tests {
         assert_eq!(day.missed, [""; 0]);
         // the store has a table that the probe has not put in force
         let store = store(&mut probe);
-        let mut renamed = vec![0; SECTOR];
+        let mut renamed = vec![0; TABLE];
         let table = Table::read(FACTORY).unwrap();
         let change = Change::Forget(0);
         let length = amend(&mut renamed, &table, change)

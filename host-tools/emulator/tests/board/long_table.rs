@@ -1,0 +1,316 @@
+//! A table that does not fit into the 16 KB sectors: read in place from a larger one, added to, and given up when it is
+//! damaged for the one before it, whatever sector that is in.
+
+use std::path::Path;
+
+use tactus::link::{PushTable, ReadTable, Request};
+use tactus::sim::collection::{Collection, calibrated};
+use tactus::sim::person::Manner;
+use tactus_core::explorer::Method;
+use tactus_core::features::Movement;
+use tactus_core::table::{Change, Name, Table, TableError, amend};
+use tactus_core::wire::{Command, Failure, Forget, Identify, MemoryError, Train};
+use tactus_emulator::board::{FlashWrite, places};
+use tactus_emulator::host::power_cut::{Cut, Torn, left_by};
+use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
+use tactus_emulator::host::under_finger::{self, Known, Unknown};
+
+use crate::changed_cuts::reboot;
+use crate::common::{boot, elf, elf_of};
+use crate::handheld_link::Held;
+use crate::old_store::troubles;
+
+/// The texture under the finger, which the tables have.
+const TEXTURE: u8 = 47;
+/// Bytes of the longest table in a sector of 16 KB, and in the larger ones.
+const SHORT: usize = (16 << 10) - 32;
+const LONG: usize = (64 << 10) - 32;
+/// Longest exploration or training, virtual seconds.
+const LONG_S: f64 = 300.0;
+
+fn world() -> Collection {
+    Collection {
+        seed: 3,
+        textures: Collection::spread(TEXTURE, 4),
+        trials: 5,
+    }
+}
+
+fn under_finger() -> Unknown {
+    under_finger::mounted(&world(), TEXTURE, 9)
+}
+
+/// Tables of 24 movements, and of the usual three.
+fn tables() -> (Known, Vec<u8>) {
+    let short = under_finger::simulated(&world(), Method::Fused, || ()).unwrap();
+    let movements: Vec<Movement> = Movement::grid().take(24).collect();
+    let calibration = calibrated(world().setup(world().textures[0], 0)).unwrap();
+    let long = world().learn_at(&movements, Method::Fused, calibration, || ());
+    let long = long.unwrap();
+    assert!(short.table.len() <= SHORT && long.len() > SHORT && long.len() < LONG);
+    (short, long)
+}
+
+fn table(talk: &mut Talk) -> Vec<u8> {
+    talk.run(ReadTable::default(), TIMEOUT_S, |_, _| ())
+        .unwrap()
+}
+
+/// Does something, and gives the sectors of tables that were erased for it.
+fn erased(talk: &mut Talk, what: impl FnOnce(&mut Talk)) -> Vec<usize> {
+    talk.board().store_writes().unwrap();
+    what(talk);
+    let writes = talk.board().store_writes().unwrap();
+    let erases = writes.iter().filter_map(|write| match write {
+        FlashWrite::Erase { sector } if !matches!(sector, 2 | 3) => Some(*sector),
+        _ => None,
+    });
+    erases.collect()
+}
+
+fn push(talk: &mut Talk, table: &[u8]) {
+    talk.run(PushTable::new(table).unwrap(), TIMEOUT_S, |_, _| ())
+        .unwrap();
+}
+
+fn name(name: &str) -> Name {
+    Name::try_from(name).unwrap()
+}
+
+/// Boots on what a board has stored.
+fn again(elf: &Path, mut talk: Talk) -> Talk {
+    let store = talk.board().store().unwrap();
+    drop(talk);
+    boot(elf, &under_finger(), Some(store))
+}
+
+fn identify(seed: u32, learn: bool) -> Identify {
+    Identify {
+        seed,
+        learn,
+        ..Identify::default()
+    }
+}
+
+#[test]
+fn a_long_table_is_used_and_learned_on() {
+    let Some(elf) = elf() else { return };
+    let (short, long) = tables();
+    let unknown = under_finger();
+    let mut talk = boot(&elf, &unknown, None);
+    talk.teach(&short.calibration, &short.table, |_, _| ())
+        .unwrap();
+    assert_eq!(erased(&mut talk, |talk| push(talk, &long)), [4]);
+    assert_eq!(table(&mut talk), long);
+    let mut talk = again(&elf, talk);
+    assert_eq!(table(&mut talk), long);
+    // it is told what lies under the finger, learns of it by itself, and keeps that
+    let found = talk.run(Request::identify(identify(5, true)), LONG_S, |_, _| ());
+    let verdict = found.unwrap().verdict;
+    assert!(
+        verdict.sure && verdict.name.as_str() == unknown.name,
+        "{verdict:?}"
+    );
+    let learned = table(&mut talk);
+    assert_ne!(learned, long);
+    let mut talk = again(&elf, talk);
+    assert_eq!(table(&mut talk), learned);
+    talk.run(Request::forget(Forget::SelfLearned), TIMEOUT_S, |_, _| ())
+        .unwrap();
+    assert_eq!(table(&mut talk), long);
+    // from a label, by training, and another name; each writes the table into the other large sector
+    talk.run(Request::identify(identify(6, false)), LONG_S, |_, _| ())
+        .unwrap();
+    let label = |talk: &mut Talk| {
+        talk.run(Request::label(name("my own")), TIMEOUT_S, |_, _| ())
+            .unwrap();
+    };
+    assert_eq!(erased(&mut talk, label), [5]);
+    let rename = |talk: &mut Talk| {
+        let rename = Request::rename(name("my own"), name("mine"));
+        talk.run(rename, TIMEOUT_S, |_, _| ()).unwrap();
+    };
+    assert_eq!(erased(&mut talk, rename), [4]);
+    let train = |talk: &mut Talk| {
+        let train = Train {
+            name: name("mine"),
+            trials: 2,
+            pilot: false,
+            seed: 2,
+        };
+        talk.run(Request::train(train), 4.0 * LONG_S, |_, _| ())
+            .unwrap();
+    };
+    assert_eq!(erased(&mut talk, train), [5]);
+    let taught = table(&mut talk);
+    let mut talk = again(&elf, talk);
+    assert_eq!(table(&mut talk), taught);
+    let read = Table::read(&taught).unwrap();
+    assert_eq!((read.textures(), read.movements().len()), (5, 24));
+    let mine = read.find("mine").unwrap();
+    assert!((0..24).all(|movement| read.trials(mine, movement) >= 2));
+    // what fits into the small sectors goes there again, and the firmware's own table gives all up
+    let back = |talk: &mut Talk| push(talk, &short.table);
+    assert_eq!(erased(&mut talk, back), [1]);
+    let mut talk = again(&elf, talk);
+    assert_eq!(table(&mut talk), short.table);
+    talk.send(Command::FactoryTable, TIMEOUT_S, |_, _| ())
+        .unwrap();
+    let mut talk = again(&elf, talk);
+    let status = talk.run(Request::status(), TIMEOUT_S, |_, _| ()).unwrap();
+    assert!(status.factory);
+}
+
+/// What is longer than there is room for is refused before anything is erased, pushed or learned.
+#[test]
+fn a_table_that_fits_nowhere_is_refused() {
+    let Some(elf) = elf() else { return };
+    let mut talk = boot(&elf, &under_finger(), None);
+    let before = table(&mut talk);
+    let refused = |talk: &mut Talk| {
+        let begin = Command::BeginTable(LONG as u32 + 1);
+        let why = talk.send(begin, TIMEOUT_S, |_, _| ()).unwrap_err();
+        let why = why.to_string();
+        let room = format!("{} bytes, and there is room for {LONG}", LONG + 1);
+        assert!(why.contains(&room), "{why}");
+    };
+    assert_eq!(erased(&mut talk, refused), [0; 0]);
+    assert_eq!(table(&mut talk), before);
+    let mut talk = again(&elf, talk);
+    assert_eq!(table(&mut talk), before);
+}
+
+/// The erase of each of the larger sectors, and the words behind it: one table or the other is in force, nothing is complained
+/// about, and the push can be made again.
+#[test]
+fn a_push_of_a_long_table_is_cut() {
+    let Some(elf) = elf() else { return };
+    let (short, first) = tables();
+    let mut second = vec![0; LONG];
+    let read = Table::read(&first).unwrap();
+    let rename = Change::Rename {
+        texture: 0,
+        name: "another name",
+    };
+    let second = amend(&mut second, &read, rename).unwrap().as_bytes();
+    let mut talk = boot(&elf, &under_finger(), None);
+    talk.teach(&short.calibration, &short.table, |_, _| ())
+        .unwrap();
+    // into sector 4 and 5, and over what is in 4
+    let pushed = [&short.table[..], &first, second, &first];
+    for tables in pushed.windows(2) {
+        let [old, new] = tables else { return };
+        talk.board().store_writes().unwrap();
+        let before = talk.board().store().unwrap();
+        push(&mut talk, new);
+        let writes = talk.board().store_writes().unwrap();
+        let last = writes.len() - 1;
+        assert!(matches!(writes[0], FlashWrite::Erase { sector: 4 | 5 }));
+        let cuts = [0, 1, last / 2, last - 1, last, last + 1];
+        for (n, at) in cuts.into_iter().enumerate() {
+            for (torn, seed) in Torn::ALL.into_iter().zip(n as u64..) {
+                // what is torn of a word is known from the other tests
+                if ![0, last].contains(&at) && torn != Torn::Bits {
+                    continue;
+                }
+                let cut = Cut { at, torn, seed };
+                let store = left_by(&before, &writes, cut);
+                let (mut talk, found) = reboot(&elf, &under_finger(), store);
+                assert!(found == *new || found == *old && at <= last, "{cut:?}");
+                if torn == Torn::Bits {
+                    push(&mut talk, new);
+                    assert!(table(&mut talk) == *new, "{cut:?}");
+                }
+            }
+        }
+    }
+}
+
+/// The watchdog waits for 2 s, and the longest erase of the 128 KB takes as long: the tasks go on meanwhile, and the probe
+/// says what it is doing.
+#[test]
+fn no_erase_costs_the_watchdogs_patience() {
+    let Some(elf) = elf() else { return };
+    let (_, long) = tables();
+    let mut talk = boot(&elf, &under_finger(), None);
+    talk.board().slow_erases().unwrap();
+    for sector in [4, 5] {
+        let from_ns = talk.now_ns();
+        let begin = Command::BeginTable(long.len() as u32);
+        talk.send(begin, TIMEOUT_S, |_, _| ()).unwrap();
+        let took_ms = (talk.now_ns() - from_ns) / 1_000_000;
+        let wanted_ms = if sector == 4 { 1200 } else { 2000 };
+        assert!((wanted_ms..wanted_ms + 300).contains(&took_ms), "{took_ms}");
+        assert_eq!(erased(&mut talk, |talk| push(talk, &long)), [sector]);
+        assert!(table(&mut talk) == long);
+    }
+    assert_eq!(talk.board().resets().unwrap(), []);
+}
+
+#[test]
+fn of_small_and_large_sectors_the_newest_table_counts_and_the_one_before_it_is_kept() {
+    let Some(elf) = elf() else { return };
+    let (short, long) = tables();
+    let mut talk = boot(&elf, &under_finger(), None);
+    talk.teach(&short.calibration, &short.table, |_, _| ())
+        .unwrap();
+    let mut tables = vec![short.table.clone(), long.clone()];
+    // of each table one with another name
+    for table in [&long, &short.table] {
+        let mut other = vec![0; LONG];
+        let read = Table::read(table).unwrap();
+        let rename = Change::Rename {
+            texture: 0,
+            name: "another name",
+        };
+        let other = amend(&mut other, &read, rename).unwrap();
+        tables.push(other.as_bytes().to_vec());
+    }
+    let sectors = [0, 4, 5, 1];
+    for (table, sector) in tables.iter().zip(sectors).skip(1) {
+        assert_eq!(erased(&mut talk, |talk| push(talk, table)), [sector]);
+    }
+    let mut store = talk.board().store().unwrap();
+    drop(talk);
+    for (at, (wanted, sector)) in tables.iter().zip(sectors).rev().enumerate() {
+        let (mut talk, said) = troubles(&elf, store.clone());
+        assert!(table(&mut talk) == *wanted, "{at}");
+        let newest = matches!(
+            said[..],
+            [Failure::Memory(MemoryError::NewestTable(
+                TableError::Crc { .. }
+            ))]
+        );
+        assert!(if at == 0 { said.is_empty() } else { newest }, "{said:?}");
+        drop(talk);
+        store[places(sector).start + 100] ^= 0x10;
+    }
+    let (mut talk, said) = troubles(&elf, store);
+    let stored = matches!(said[..], [Failure::Memory(MemoryError::StoredTable(_))]);
+    assert!(stored, "{said:?}");
+    let status = talk.run(Request::status(), TIMEOUT_S, |_, _| ()).unwrap();
+    assert!(status.factory);
+}
+
+/// The handheld explores with the first movement of a table alone; it keeps all of it, and adds to it.
+#[test]
+fn the_handheld_keeps_a_long_table() {
+    let Some(elf) = elf_of("TACTUS_HANDHELD_ELF") else {
+        return;
+    };
+    let (_, long) = tables();
+    let mut held = Held::with(&elf, "burlap", Manner::default(), None);
+    held.push(&long);
+    assert!(held.table() == long);
+    let named = Table::read(&long).unwrap();
+    let first = named.names().next().unwrap();
+    let rename = Request::rename(name(first), name("another name"));
+    held.run(rename, TIMEOUT_S).unwrap();
+    let renamed = held.table();
+    assert!(Table::read(&renamed).unwrap().find("another name") == Some(0));
+    let store = held.talk.board().store().unwrap();
+    drop(held);
+    let mut held = Held::with(&elf, "burlap", Manner::default(), Some(store));
+    assert!(held.table() == renamed);
+    held.end();
+}
