@@ -15,14 +15,16 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::{Peri, PeripheralType, bind_interrupts, flash, peripherals, usart};
 
 assign_resources! {
-    acquire: Acquire {
+    sensor: Sensor {
         spi: SPI1,
         sck: PA5,
         miso: PA6,
         // not PA7, which is the Ethernet PHY's CRS_DV
         mosi: PB5,
         select: PD14,
-        slots: TIM2,
+    }
+    slots: Slots {
+        timer: TIM2,
     }
     lever: Lever {
         timer: TIM1,
@@ -34,7 +36,7 @@ assign_resources! {
     }
     stage: Stage {
         timer: TIM3,
-        pwm: PC6,
+        pwm: PC6 = StagePwm,
         /// High drives to higher positions.
         direction: PC7,
         /// High turns the bridge on.
@@ -161,7 +163,7 @@ pub(crate) fn start() -> AssignedResources {
     // The slots of the sensor before all; a byte of the link waits at most 10.8 us, then it is lost; the lever's steps, the
     // clock and the servo have more time.
     interrupt::TIM2.set_priority(Priority::P0);
-    interrupt::UART4.set_priority(Priority::P1);
+    interrupt::SPI1.set_priority(Priority::P0);
     interrupt::USART3.set_priority(Priority::P2);
     interrupt::TIM1_UP_TIM10.set_priority(Priority::P3);
     interrupt::TIM5.set_priority(Priority::P4);

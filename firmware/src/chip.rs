@@ -1,4 +1,5 @@
-//! What only this chip can do: its flash, its timers' lever, its converter's motor current, its last acts, and the core's kernels in its assembly.
+//! What only this chip can do: its flash, the sensor's slots by its interrupts, its timers' lever, its converter's motor current, its
+//! last acts, and the core's kernels in its assembly.
 mod confusion_kernel;
 pub(crate) mod current;
 mod decision_kernels;
@@ -6,6 +7,8 @@ mod dsp_kernels;
 pub(crate) mod flash;
 pub(crate) mod lever;
 pub(crate) mod rescue;
+pub(crate) mod slots;
+pub(crate) mod watchdog;
 
 pub(crate) use dsp_kernels::Chip;
 

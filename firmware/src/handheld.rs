@@ -2,10 +2,11 @@
 //!
 //! | executor | task | does | tells |
 //! |---|---|---|---|
-//! | UART4's interrupt, woken by TIM2's | `acquire` | a sensor word every 227 us, while they are wanted | words to `hand` |
+//! | interrupts of TIM2 and SPI1 | `chip::slots` | a sensor word every 227 us, while they are wanted | words to `hand` |
 //! | UART7's interrupt, woken by the clock's | `hand` | states, button, buzzer, table, requests; owns the store | pictures to `show`, reports to `send` |
 //! | UART7's interrupt | `receive`, `send` | frames of USART3 | requests to `hand` |
 //! | UART7's interrupt | `show` | the display, by I2C1 and its DMA | |
+//! | UART7's interrupt | `acquire` | starts the slots when the sensor is ready | |
 //! | UART7's interrupt | `watch` | the watchdog, as long as `hand` gets on | |
 //! | thread mode | | sleeps, and counts for how long | `hand` |
 use embassy_executor::InterruptExecutor;
@@ -15,9 +16,9 @@ use heapless::spsc::Queue;
 use static_cell::ConstStaticCell;
 
 use crate::board;
-use crate::chip::rescue;
-use crate::tasks::acquire::{self, ACQUIRE, WORDS, Word};
-use crate::tasks::{display, hand, link, only};
+use crate::chip::slots::{self, WORDS, Word};
+use crate::chip::{rescue, watchdog};
+use crate::tasks::{acquire, display, hand, link, only};
 
 static HAND: InterruptExecutor = InterruptExecutor::new();
 
@@ -31,7 +32,7 @@ fn UART7() {
 pub fn handheld() -> ! {
     static WORD_QUEUE: ConstStaticCell<Queue<Word, WORDS>> = ConstStaticCell::new(Queue::new());
     let (reset, last_words) = rescue::reset_cause();
-    rescue::watch_start();
+    watchdog::start();
     rescue::guard_stack();
     let r = board::start();
     defmt::info!("tactus-handheld {=str}", env!("CARGO_PKG_VERSION"));
@@ -47,9 +48,8 @@ pub fn handheld() -> ! {
     let hands = HAND.start(interrupt::UART7);
     hand::booted(reset, last_words);
     // until `hand` can take them
-    acquire::listen(false);
-    let slots = ACQUIRE.start(interrupt::UART4);
-    slots.spawn(only(acquire::acquire(r.acquire, words_in)));
+    slots::listen(false);
+    hands.spawn(only(acquire::acquire(r.sensor, r.slots, words_in)));
     let Some((tx, rx)) = link::open(r.link) else {
         rescue::refuse("the link's rate cannot be had");
     };

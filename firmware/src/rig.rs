@@ -2,13 +2,14 @@
 //!
 //! | executor | task | does | tells |
 //! |---|---|---|---|
-//! | UART4's interrupt, woken by TIM2's | `acquire` | a sensor word every 227 us | words to `servo` |
+//! | interrupts of TIM2 and SPI1 | `chip::slots` | a sensor word every 227 us | words to `servo` |
 //! | UART5's interrupt, woken by the clock's | `servo` | control, guard and watchdog, 1 kHz | samples to `probe`, a snapshot to all |
 //! | thread mode | `probe` | explorations, training, tables; owns the store | commands to `servo`, reports to `send` |
+//! | thread mode | `acquire` | starts the slots when the sensor is ready | |
 //! | thread mode | `watch` | phases, faults and places as they change | reports to `send` |
 //! | thread mode | `receive`, `send` | frames of USART3 | requests to `probe` |
 //!
-//! Their priorities, and between the two executors those of the link's bytes and of the lever's steps (TIM1), are in
+//! Their priorities, and between slots and servo those of the link's bytes and of the lever's steps (TIM1), are in
 //! `board`.
 
 use embassy_executor::{InterruptExecutor, Spawner};
@@ -19,10 +20,10 @@ use tactus_core::probe::servo_rig::Samples;
 use tactus_core::wire::{Event, PROTOCOL};
 
 use crate::board;
-use crate::chip::rescue;
-use crate::tasks::acquire::{self, ACQUIRE, WORDS, Word};
+use crate::chip::slots::{WORDS, Word};
+use crate::chip::{rescue, watchdog};
 use crate::tasks::servo::{self, SAMPLES};
-use crate::tasks::{link, only, outbox, probe, watch};
+use crate::tasks::{acquire, link, only, outbox, probe, watch};
 
 static SERVO: InterruptExecutor = InterruptExecutor::new();
 
@@ -38,7 +39,7 @@ pub async fn rig(thread: Spawner) {
     static SAMPLE_QUEUE: ConstStaticCell<Queue<Samples, SAMPLES>> =
         ConstStaticCell::new(Queue::new());
     let (reset, last_words) = rescue::reset_cause();
-    rescue::watch_start();
+    watchdog::start();
     rescue::guard_stack();
     let r = board::start();
     let no_clock = (!board::has_clock()).then_some(board::NO_CLOCK);
@@ -60,8 +61,7 @@ pub async fn rig(thread: Spawner) {
     thread.spawn(only(link::receive(rx, &servo::BODY)));
     thread.spawn(only(watch::watch()));
     thread.spawn(only(probe::probe(r.store, r.go, samples_out)));
-    let slots = ACQUIRE.start(interrupt::UART4);
-    slots.spawn(only(acquire::acquire(r.acquire, words_in)));
+    thread.spawn(only(acquire::acquire(r.sensor, r.slots, words_in)));
     SERVO.start(interrupt::UART5).spawn(only(servo::servo(
         r.lever, r.stage, r.current, r.switches, r.watchdog, words_out, samples_in,
     )));

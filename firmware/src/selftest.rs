@@ -6,7 +6,6 @@ use cortex_m::peripheral::DWT;
 use embassy_stm32::flash::Flash;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::pac::{FLASH, GPIOA, RCC, gpio::vals::Idr, rcc::vals::Sw};
-use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_time::{Duration, Timer, block_for};
 use tactus_core::store::Store;
 use tactus_core::wire::Reset;
@@ -15,7 +14,7 @@ use self::account::{Account, CORE_HZ, Kept, keep, ready};
 use self::rig::rig;
 use self::sensor::sensor;
 use crate::board;
-use crate::chip::rescue;
+use crate::chip::{rescue, watchdog};
 
 mod account;
 mod rig;
@@ -66,7 +65,7 @@ pub async fn selftest() {
         };
         chip(&mut account);
         brown_out();
-        let touch = sensor(r.acquire, &mut account).await;
+        let touch = sensor(r.sensor, &mut account).await;
         rig(
             r.lever,
             r.stage,
@@ -79,7 +78,7 @@ pub async fn selftest() {
         )
         .await;
         store(r.store, &mut account).await;
-        watchdog(r.watchdog, &mut account).await;
+        watch(r.watchdog, &mut account).await;
     }
     if account.failed == 0 {
         green.set_high();
@@ -178,7 +177,7 @@ async fn store(flash: board::Storage, account: &mut Account) {
 }
 
 /// Hangs until the watchdog starts the chip again; comes back only if it does not.
-async fn watchdog(watchdog: board::Watchdog, account: &mut Account) {
+async fn watch(watchdog: board::Watchdog, account: &mut Account) {
     defmt::info!(
         "the watchdog now: {=u32} passed, {=u32} failed so far. If no line follows within a second, look at the LEDs",
         account.passed,
@@ -191,8 +190,7 @@ async fn watchdog(watchdog: board::Watchdog, account: &mut Account) {
         passed: account.passed,
         failed: account.failed,
     });
-    let mut watchdog = IndependentWatchdog::new(watchdog.iwdg, WATCHDOG_US);
-    watchdog.unleash();
+    watchdog::tighten(watchdog);
     // 0.5 s at the least, 1.5 s on a chip: no clock is asked, which could stand
     critical_section::with(|_| cortex_m::asm::delay(5 * WATCHDOG_US * (CORE_HZ / 1_000_000)));
     keep(Kept {

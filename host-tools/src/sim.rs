@@ -33,6 +33,7 @@ pub mod rig;
 pub mod ripple;
 pub mod scenario;
 pub mod sensor;
+pub(crate) mod slot;
 pub mod stage;
 pub mod surface;
 pub mod textures;

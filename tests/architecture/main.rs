@@ -12,6 +12,7 @@
 mod house;
 mod names;
 mod planted;
+mod registers;
 mod rules;
 mod source;
 mod uses;

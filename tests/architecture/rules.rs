@@ -61,7 +61,7 @@ pub(crate) fn faults(top: &Path, packages: &[Package]) -> Vec<String> {
     faults
 }
 
-fn name(top: &Path, file: &Path) -> String {
+pub(crate) fn name(top: &Path, file: &Path) -> String {
     let file = file.strip_prefix(top).unwrap_or(file);
     file.to_string_lossy().replace('\\', "/")
 }
@@ -84,7 +84,7 @@ fn roots(source: &Path) -> Vec<PathBuf> {
 }
 
 /// All files of Rust below a folder.
-fn files(folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut entries: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
     entries.sort();

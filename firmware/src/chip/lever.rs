@@ -1,4 +1,4 @@
-//! The lever's STEP and DIR, from TIM1: which of its periods have a pulse is [`Steps`]' to say.
+//! The lever's STEP and DIR, from TIM1: which of its periods have a pulse is [`Steps`]' to say. This module owns the timer.
 use core::cell::Cell;
 use core::sync::atomic::{AtomicI32, AtomicU32, Ordering::Relaxed};
 
@@ -7,8 +7,8 @@ use embassy_stm32::interrupt;
 use embassy_stm32::pac::{TIM1 as REGISTERS, timer::vals::Ocm};
 use embassy_stm32::peripherals::TIM1;
 use embassy_stm32::timer::Ch1;
-use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::timer::simple_pwm::PwmPin;
+use embassy_stm32::{Peri, rcc};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_time::{Duration, Instant};
@@ -37,14 +37,14 @@ pub(crate) struct Lever {
     enabled: Instant,
     _direction: Output<'static>,
     _step: PwmPin<'static, TIM1, Ch1>,
-    _timer: Timer<'static, TIM1>,
+    _timer: Peri<'static, TIM1>,
 }
 
 impl Lever {
     /// Takes the pins: no current, no steps.
     pub(crate) fn new(pins: board::Lever) -> Self {
         let step = PwmPin::new(pins.step, OutputType::PushPull);
-        let timer = Timer::new(pins.timer);
+        rcc::enable_and_reset::<TIM1>();
         REGISTERS.psc().write_value(PRESCALER);
         REGISTERS.arr().write(|w| w.set_arr(PERIOD - 1));
         REGISTERS.ccmr_output(0).modify(|w| {
@@ -65,7 +65,7 @@ impl Lever {
             enabled: Instant::now(),
             _direction: Output::new(pins.direction, Level::Low, Speed::Low),
             _step: step,
-            _timer: timer,
+            _timer: pins.timer,
         }
     }
 

@@ -8,12 +8,12 @@ use core::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use cortex_m::peripheral::{MPU, SCB};
 use cortex_m_rt::{ExceptionFrame, exception};
 use embassy_stm32::gpio::{Level, Output, Speed};
-use embassy_stm32::pac::{IWDG, RCC, TIM3};
+use embassy_stm32::pac::RCC;
 use heapless::String;
 use tactus_core::rig::lever::MAX_STEPS;
 use tactus_core::wire::{Reset, Text};
 
-use super::lever;
+use super::{lever, watchdog};
 use crate::board::{self, Named, held};
 
 const MAGIC: u32 = 0x7ac7_1a57;
@@ -82,49 +82,27 @@ pub(crate) fn remember(text: &str) {
     });
 }
 
-/// Starts the watchdog for the start-up, which takes milliseconds: half a second and more, by its oscillator of 17 to
-/// 47 kHz. The servo takes it over.
-pub(crate) fn watch_start() {
-    use embassy_stm32::pac::iwdg::vals::{Key, Pr};
-    IWDG.kr().write(|w| w.set_key(Key::START));
-    IWDG.kr().write(|w| w.set_key(Key::ENABLE));
-    IWDG.pr().write(|w| w.set_pr(Pr::DIVIDE_BY32));
-    IWDG.rlr().write(|w| w.set_rl(800));
-    // They take five of its cycles to arrive, 0.3 ms at most, and its oscillator has to start. Before that a reload would
-    // load 4 s, and what the servo sets would be ignored. The core runs at 16 MHz: at most some 10 ms.
-    for _ in 0..20_000 {
-        if IWDG.sr().read().0 == 0 {
-            break;
-        }
-    }
-    pet();
-}
-
-/// Pets the watchdog; does no harm where it is not running.
-pub(crate) fn pet() {
-    IWDG.kr()
-        .write(|w| w.set_key(embassy_stm32::pac::iwdg::vals::Key::RESET));
-}
-
 /// Brakes the stage, lifts the finger up to the limit switch and starts the chip again. Whatever went wrong: nothing here
 /// needs an interrupt, memory or another task.
 fn give_up(why: &str) -> ! {
     cortex_m::interrupt::disable();
     remember(why);
     if ARMED.load(Relaxed) {
-        // the bridge stays on: without duty it shorts the motor
-        TIM3.ccr(0).write(|w| w.0 = 0);
         // SAFETY: nothing else runs any more.
-        let (mut bridge, top) = unsafe {
+        let (mut pwm, mut bridge, top) = unsafe {
             (
+                held(<Named<board::StagePwm>>::steal()),
                 held(<Named<board::StageEnable>>::steal()),
                 held(<Named<board::LeverTop>>::steal()),
             )
         };
+        // taken from its timer; the bridge stays on: without duty it shorts the motor
+        pwm.set_low();
+        pwm.set_as_output(Speed::Low);
         bridge.set_high();
         let mut closed = 0;
         lever::lift_by_hand(|steps| {
-            pet();
+            watchdog::pet();
             // pressed, or its wire is broken: three times, for it bounces
             closed = if top.is_high() { closed + 1 } else { 0 };
             closed >= 3 || steps > MAX_STEPS as u32 * 5 / 4
@@ -146,7 +124,7 @@ pub(crate) fn refuse(why: &str) -> ! {
         )
     };
     loop {
-        pet();
+        watchdog::pet();
         // 18 ms by 168 MHz
         cortex_m::asm::delay(1_000_000);
     }

@@ -71,8 +71,8 @@ pub(super) fn ready(is: bool) -> &'static str {
     if is { "ready" } else { "not ready" }
 }
 
-/// So long, by the core's cycle counter, which is to run.
+/// So long, by the core's cycle counter; a look at it takes a cycle and more, which is the bound if it does not run.
 pub(super) fn wait_us(us: u32) {
-    let began = DWT::cycle_count();
-    while DWT::cycle_count().wrapping_sub(began) < us * (CORE_HZ / 1_000_000) {}
+    let (began, cycles) = (DWT::cycle_count(), us * (CORE_HZ / 1_000_000));
+    let _ = (0..cycles).find(|_| DWT::cycle_count().wrapping_sub(began) >= cycles);
 }

@@ -1,18 +1,16 @@
 //! The sensor on its bus: who it is, whether its words come whole and in time, and what it measures when nobody touches it.
-use embassy_stm32::gpio::{Level, Output, Pull, Speed};
-use embassy_stm32::mode::Blocking;
-use embassy_stm32::spi::mode::Master;
-use embassy_stm32::spi::{self, Spi};
-use embassy_stm32::time::Hertz;
 use embassy_time::{Duration, Instant, Timer};
-use tactus_core::sensor::biotac::{BioTac, Diagnosis, IdentityBytes, WordStats};
-use tactus_core::sensor::pressure::Channel;
-use tactus_core::sensor::{Exchange, PressureSensor as _};
+use tactus_core::sensor::biotac::{BioTac, Diagnosis, IdentityBytes, WordError, WordStats, keep};
+use tactus_core::sensor::pressure::{Channel, Pressure, SLOTS_HZ};
+use tactus_core::sensor::slot::{self, Answer, Transaction};
+use tactus_core::sensor::{PressureSensor as _, slot_of};
 
 use super::account::{Account, wait_us};
 use crate::board;
+use crate::chip::slots::Bus;
 
-const SLOTS_PER_S: u64 = 4400;
+/// The slot that gives P_DC.
+const PDC: u32 = 1;
 /// A slot that begins later than this leaves the sensor less than its 50 us before the next one.
 const LATE_US: u64 = 100;
 /// P_AC of a BioTac that nobody touches. Less is a dead converter, more is a bad ground.
@@ -30,25 +28,21 @@ const ASKED_MS: u32 = 30_000;
 const MOST_DAMAGED: u32 = 10;
 
 /// The bus of the sensor, used directly.
-pub(super) struct Sensor {
-    spi: Spi<'static, Blocking, Master>,
-    select: Output<'static>,
-}
+pub(super) struct Sensor(Bus);
 
 impl Sensor {
-    fn exchange<R: AsMut<[u8]>>(&mut self, mut exchange: Exchange<R>) -> R {
-        // the bus itself cannot fail: no mode fault with software select, no overrun with blocking transfers
-        if let Some(command) = &exchange.command {
-            self.select.set_low();
-            let _ = self.spi.blocking_write(command);
-            self.select.set_high();
-            wait_us(exchange.gap_us);
-        }
-        self.select.set_low();
-        let _ = self.spi.blocking_transfer_in_place(exchange.read.as_mut());
-        self.select.set_high();
-        wait_us(exchange.rest_us);
-        exchange.read
+    /// The answer to transactions; nothing if the bus is off.
+    fn perform(&mut self, transactions: &[Transaction]) -> Answer {
+        let answer = slot::perform(transactions, |transaction, bytes| {
+            let done = self.0.transact(transaction, bytes);
+            wait_us(transaction.gap_us);
+            done
+        });
+        answer.unwrap_or_default()
+    }
+
+    fn word(&mut self, slot: u32) -> Result<Pressure, WordError> {
+        BioTac.decode(slot, &self.perform(slot_of::<BioTac>(slot)))
     }
 }
 
@@ -96,8 +90,7 @@ pub(super) struct Touch {
 impl Touch {
     /// Another word; how far P_DC is above its rest, counts.
     pub(super) fn rise(&mut self) -> Result<f32, &'static str> {
-        let read = self.sensor.exchange(BioTac::exchange(Channel::Pdc));
-        match BioTac::decode(Channel::Pdc, read) {
+        match self.sensor.word(PDC) {
             Ok(word) => {
                 self.damaged = 0;
                 self.counts += (f32::from(word.counts.get()) - self.counts) / 8.0;
@@ -131,18 +124,12 @@ impl Touch {
     }
 }
 
-pub(super) async fn sensor(pins: board::Acquire, account: &mut Account) -> Touch {
-    let mut config = spi::Config::default();
-    config.frequency = Hertz(5_250_000);
-    config.miso_pull = Pull::Up;
-    let mut sensor = Sensor {
-        spi: Spi::new_blocking(pins.spi, pins.sck, pins.mosi, pins.miso, config),
-        select: Output::new(pins.select, Level::High, Speed::VeryHigh),
-    };
+pub(super) async fn sensor(pins: board::Sensor, account: &mut Account) -> Touch {
+    let mut sensor = Sensor(Bus::new(pins));
     Timer::after_millis(BioTac::POWER_UP_MS.into()).await;
     let mut bytes = IdentityBytes::default();
-    for exchange in bytes.exchanges() {
-        sensor.exchange(exchange);
+    for (transactions, place) in bytes.reads() {
+        keep(place, &sensor.perform(&transactions));
     }
     match bytes.decode() {
         Ok(id) => account.check(
@@ -163,21 +150,17 @@ pub(super) async fn sensor(pins: board::Acquire, account: &mut Account) -> Touch
     let (mut pac, mut pdc) = (Spread::default(), Spread::default());
     let mut late: u32 = 0;
     let began = Instant::now();
-    for slot in 0..SLOTS_PER_S {
-        let due = began + Duration::from_micros(slot * 1_000_000 / SLOTS_PER_S);
+    for slot in 0..SLOTS_HZ {
+        let due_us = u64::from(slot) * 1_000_000 / u64::from(SLOTS_HZ);
+        let due = began + Duration::from_micros(due_us);
         Timer::at(due).await;
         if Instant::now().saturating_duration_since(due).as_micros() > LATE_US {
             late += 1;
         }
-        let channel = if slot % 2 == 0 {
-            Channel::Pac
-        } else {
-            Channel::Pdc
-        };
-        let word = BioTac::decode(channel, sensor.exchange(BioTac::exchange(channel)));
+        let word = sensor.word(slot);
         stats.count(&word);
         if let Ok(pressure) = word {
-            match channel {
+            match pressure.channel {
                 Channel::Pac => pac.add(pressure.counts.get()),
                 Channel::Pdc => pdc.add(pressure.counts.get()),
             }

@@ -22,14 +22,14 @@ use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::pressure::Calibration;
 use tactus_core::wire::{Event, PROTOCOL, Reset, Text};
 
-use super::acquire::{self, Word};
 use super::display;
 use super::level::OneLevel;
 use super::link::{BUSY, Body, HEARD, JOBS, TABLE};
 use super::outbox::{self, STREAM};
 use crate::board;
 use crate::chip::flash::{self, MappedTable};
-use crate::chip::rescue;
+use crate::chip::slots::{self, Word};
+use crate::chip::watchdog;
 
 /// The table that comes with the handheld: textures of a simulated world under a simulated hand. Its
 /// whitening says how slides of one texture by hand differ; the user trains a real probe.
@@ -73,7 +73,7 @@ pub(crate) async fn watch() {
         ticker.next().await;
         let now = Instant::now().as_millis() as u32;
         if now.wrapping_sub(PROGRESS_MS.load(Relaxed)) < PATIENCE_MS {
-            rescue::pet();
+            watchdog::pet();
         }
     }
 }
@@ -124,8 +124,8 @@ impl Awake {
         }
         defmt::info!(
             "sensor slots: {=u32} late, {=u32} lost",
-            acquire::LATE.load(Relaxed),
-            acquire::LOST.load(Relaxed)
+            slots::LATE.load(Relaxed),
+            slots::LOST.load(Relaxed)
         );
     }
 }
@@ -205,7 +205,7 @@ impl Hand for Parts {
             self.ticker.reset();
         }
         (self.listens, self.same) = (on, false);
-        acquire::listen(on);
+        slots::listen(on);
     }
 
     fn sound(&mut self, tone: Option<u16>) {
@@ -226,8 +226,8 @@ impl Hand for Parts {
             version: env!("CARGO_PKG_VERSION"),
             awake: self.awake.listening.get(),
             awake_at_rest: self.awake.resting.get(),
-            late: acquire::LATE.load(Relaxed),
-            lost: acquire::LOST.load(Relaxed),
+            late: slots::LATE.load(Relaxed),
+            lost: slots::LOST.load(Relaxed),
             ..About::default()
         }
     }

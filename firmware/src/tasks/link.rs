@@ -11,10 +11,10 @@ use tactus_core::probe::seams::Panel;
 use tactus_core::probe::{RigState, TableInUse, Turn, receive as receive_request};
 use tactus_core::wire::{Counts, Event, Receiver, Request};
 
-use super::acquire;
 use super::level::OneLevel;
 use super::outbox::{self, OUTBOX, STREAM, tell};
 use crate::board::{self, Irqs};
+use crate::chip::slots;
 
 /// embassy's buffer for the line, and the longest write: a longer one would fail, and the flush after it never end.
 const CHUNK: usize = 256;
@@ -125,11 +125,11 @@ impl Panel for AtAnyTime {
 
     fn counts(&self) -> Counts {
         Counts {
-            slots: acquire::SLOTS.load(Relaxed),
-            late_slots: acquire::LATE.load(Relaxed),
-            parity_errors: acquire::PARITY.load(Relaxed),
-            error_frames: acquire::ERROR_FRAMES.load(Relaxed),
-            lost_samples: acquire::LOST.load(Relaxed) + (self.0.lost)(),
+            slots: slots::SLOTS.load(Relaxed),
+            late_slots: slots::LATE.load(Relaxed),
+            parity_errors: slots::PARITY.load(Relaxed),
+            error_frames: slots::ERROR_FRAMES.load(Relaxed),
+            lost_samples: slots::LOST.load(Relaxed) + (self.0.lost)(),
             lost_reports: outbox::LOST_REPORTS.load(Relaxed),
             damaged_frames: DAMAGED_FRAMES.load(Relaxed),
         }

@@ -9,7 +9,8 @@ use tactus_core::rig::Refused;
 use tactus_core::wire::Event;
 
 use super::outbox::{STREAM, tell};
-use super::{acquire, servo};
+use super::servo;
+use crate::chip::slots;
 
 /// The probe's end of the servo.
 pub(crate) struct ServoHandle(pub(crate) Consumer<'static, Samples>);
@@ -33,7 +34,7 @@ impl Servo for ServoHandle {
     }
 
     fn lost(&self) -> u32 {
-        let acquired = acquire::LOST.load(Relaxed);
+        let acquired = slots::LOST.load(Relaxed);
         acquired.wrapping_add(servo::LOST.load(Relaxed))
     }
 

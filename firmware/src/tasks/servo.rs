@@ -8,7 +8,6 @@ use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AnyPin, Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::timer::qei::Qei;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
-use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
@@ -24,11 +23,11 @@ use tactus_core::rig::pins::{Inputs, MAX_WORDS};
 use tactus_core::rig::stage::StageConstants;
 use tactus_core::sensor::pressure::Calibration;
 
-use super::acquire::Word;
 use super::link::Body;
 use crate::board;
 use crate::chip::current::{self, Current};
-use crate::chip::{lever, rescue};
+use crate::chip::slots::Word;
+use crate::chip::{lever, rescue, watchdog};
 
 /// Samples on their way to the features: a quarter of a second.
 pub(crate) const SAMPLES: usize = 256;
@@ -70,8 +69,6 @@ const HUNG_MS: u32 = 2000;
 const STUCK_LIMIT_MS: u32 = 30_000;
 /// Without a conversion of the motor's current for so many ms the motor is not driven on.
 const NO_CURRENT_MS: u32 = 10;
-/// Without the servo for this long the chip starts again.
-const WATCHDOG_US: u32 = 100_000;
 
 /// Gives a command and waits for the answer. For one task at a time.
 pub(crate) async fn command(command: RigCommand) -> Result<(), Refused> {
@@ -181,8 +178,7 @@ pub(crate) async fn servo(
         e_stop: switch(switches.e_stop.into()),
     };
     rescue::ARMED.store(true, Relaxed);
-    let mut watchdog = IndependentWatchdog::new(watchdog.iwdg, WATCHDOG_US);
-    watchdog.unleash();
+    watchdog::tighten(watchdog);
 
     let mut control = Control::new(StageConstants::REFERENCE, UNMEASURED, Unguarded::default());
     let mut ended = None;
@@ -265,7 +261,7 @@ pub(crate) async fn servo(
         });
         match hung {
             Some(why) if control.is_at_rest() => rescue::remember(why),
-            _ => watchdog.pet(),
+            _ => watchdog::pet(),
         }
     }
 }

@@ -9,19 +9,15 @@ use tactus_core::features::Observation;
 use tactus_core::handheld::guidance::{Again, Event};
 use tactus_core::handheld::touch::Touch;
 use tactus_core::handheld::{FEATURES, MOVEMENT};
-use tactus_core::sensor::PressureSensor as _;
-use tactus_core::sensor::biotac::BioTac;
-use tactus_core::sensor::pressure::{Channel, Pressure, SLOTS_HZ};
+use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
 
 use crate::eval::learn::{self, TableError};
 use crate::sim::collection::{Collection, texture_name};
 use crate::sim::maths::exp;
 use crate::sim::person::{Hand, Manner};
+use crate::sim::slot::{TRANSFER_NS, word_of_slot};
 use crate::sim::world::{Setup, Truth, World};
 
-/// Two bytes at 5.25 MHz, and the sensor's gap.
-const TRANSFER_NS: u64 = 3_048;
-const GAP_NS: u64 = 55_000;
 /// Deviations of ln(force) and of ln(pace) from slide to slide of a person who looks at the display (chosen).
 const FORCE_SPREAD: f64 = 0.10;
 const PACE_SPREAD: f64 = 0.12;
@@ -74,16 +70,11 @@ impl Person {
         let at = u128::from(self.slot) * 1_000_000_000 / u128::from(SLOTS_HZ);
         // the sensor needs 100 ms to start
         let at_ns = 150_000_000 + at as u64;
-        let channel = Channel::PATTERN[(self.slot % 2) as usize];
+        let slot = self.slot;
         self.slot += 1;
-        let mut exchange = BioTac::exchange(channel);
-        let command = exchange.command?;
-        self.world.spi(at_ns, TRANSFER_NS, &command, &mut [0; 2]);
-        let read_ns = at_ns + TRANSFER_NS + GAP_NS;
-        let mosi = exchange.read;
-        self.world
-            .spi(read_ns, TRANSFER_NS, &mosi, &mut exchange.read);
-        BioTac::decode(channel, exchange.read).ok()
+        word_of_slot(slot, at_ns, |begins_ns, mosi, miso| {
+            self.world.spi(begins_ns, TRANSFER_NS, mosi, miso);
+        })
     }
 
     /// What the hand means to do from now on.

@@ -1,6 +1,7 @@
 //! The simulated rig: the world of [`crate::sim`] at one end of the pins, the core's [`Control`] at the other, and what the
 //! board's timers do in between, in virtual time.
 
+use std::convert::Infallible;
 use std::time::Duration;
 
 use rand::{RngExt as _, SeedableRng as _};
@@ -17,18 +18,15 @@ use tactus_core::rig::timeout::{MovementTimeout, Wait};
 use tactus_core::rig::unloaded::UnloadedRuns;
 use tactus_core::rig::{Ended, Fault, MAX_REJECTED, Phase, Refused, Rig, RigError};
 use tactus_core::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ, SLOTS_HZ};
-use tactus_core::sensor::{PressureSensor as _, biotac};
+use tactus_core::sensor::{PressureSensor as _, biotac, slot};
 use tactus_core::wire::Event;
 
 use crate::data::recording::Recording;
 use crate::sim::conditions::Conditions;
+use crate::sim::slot::{TRANSFER_NS, word_of_slot};
 use crate::sim::world::{Setup, World};
 
 const TICK_NS: u64 = 1_000_000;
-/// Two bytes at 5.25 MHz.
-const TRANSFER_NS: u64 = 3_048;
-/// The answer is read this long after the command ended: the sensor's 50 us and some.
-const GAP_NS: u64 = 55_000;
 /// STEP stays high this long.
 const PULSE_NS: u64 = 5_000;
 /// DIR is set this long before STEP rises.
@@ -253,24 +251,18 @@ impl SimRig {
         seconds * 1_000_000_000 + slot * 1_000_000_000 / hz
     }
 
-    /// A slot: the command, and its answer after the gap.
+    /// A slot.
     fn sample(&mut self, at_ns: u64) {
-        let channel = Channel::PATTERN[(self.slot % 2) as usize];
+        let slot = self.slot;
         self.slot += 1;
-        let mut exchange = biotac::BioTac::exchange(channel);
-        if let Some(command) = exchange.command {
-            self.world.spi(at_ns, TRANSFER_NS, &command, &mut [0; 2]);
-        }
-        let read_ns = at_ns + TRANSFER_NS + GAP_NS;
-        // steps that fall due in the gap are made in it
-        while self.rate != 0 && self.next_step_ns < read_ns {
-            self.step(self.next_step_ns);
-        }
-        let mosi = exchange.read;
-        self.world
-            .spi(read_ns, TRANSFER_NS, &mosi, &mut exchange.read);
-        self.words
-            .push(biotac::BioTac::decode(channel, exchange.read).ok());
+        let word = word_of_slot(slot, at_ns, |begins_ns, mosi, miso| {
+            // steps that fall due in the gap are made in it
+            while self.rate != 0 && self.next_step_ns < begins_ns {
+                self.step(self.next_step_ns);
+            }
+            self.world.spi(begins_ns, TRANSFER_NS, mosi, miso);
+        });
+        self.words.push(word);
     }
 
     fn step(&mut self, at_ns: u64) {
@@ -360,18 +352,16 @@ impl SimRig {
     /// It is not that of a BioTac.
     pub fn serial(&mut self) -> Result<[u8; 16], SimError> {
         let mut bytes = biotac::IdentityBytes::default();
-        for exchange in bytes.exchanges() {
-            if let Some(command) = exchange.command {
+        for (transactions, place) in bytes.reads() {
+            let Ok(answer) = slot::perform(&transactions, |transaction, miso| {
+                let duration_ns = TRANSFER_NS / 2 * miso.len() as u64;
                 self.world
-                    .spi(self.now_ns, TRANSFER_NS, &command, &mut [0; 2]);
-            }
-            // the timer of the slots stands meanwhile
-            self.now_ns += TICK_NS / 4;
-            let mosi = exchange.read.to_vec();
-            let duration_ns = TRANSFER_NS / 2 * mosi.len() as u64;
-            self.world
-                .spi(self.now_ns, duration_ns, &mosi, exchange.read.as_mut());
-            self.now_ns += TICK_NS / 4;
+                    .spi(self.now_ns, duration_ns, transaction.out, miso);
+                // the timer of the slots stands meanwhile
+                self.now_ns += TICK_NS / 4;
+                Ok::<(), Infallible>(())
+            });
+            biotac::keep(place, &answer);
         }
         let identity = bytes.decode()?;
         let mut serial = [0; 16];

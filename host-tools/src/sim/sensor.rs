@@ -3,6 +3,8 @@
 //! Its words are made here, apart from the core's, which are what is tested with them. [`sim`](super) names the documents;
 //! what none of them says is chosen and marked.
 
+use std::collections::BTreeMap;
+
 use super::finger::Finger;
 use super::noise::Noise;
 
@@ -67,6 +69,7 @@ pub struct SensorPeer {
     bytes: usize,
     line: [u8; PROPERTY_LEN],
     asked_property: bool,
+    complaints: BTreeMap<u8, u64>,
 }
 
 impl SensorPeer {
@@ -92,7 +95,13 @@ impl SensorPeer {
             bytes: 0,
             line: [FLOATING; PROPERTY_LEN],
             asked_property: false,
+            complaints: BTreeMap::new(),
         }
+    }
+
+    /// The error frames that it has answered with so far: their second bytes, and how often.
+    pub fn complaints(&self) -> &BTreeMap<u8, u64> {
+        &self.complaints
     }
 
     /// Pulls the plug.
@@ -204,6 +213,9 @@ impl SensorPeer {
     fn answer(&mut self, reply: Reply) {
         match &reply {
             Reply::Word(word) => {
+                if let [ERROR, why] = *word {
+                    *self.complaints.entry(why).or_default() += 1;
+                }
                 let flipped = (u16::from_be_bytes(*word) ^ self.flip).to_be_bytes();
                 self.flip = 0;
                 self.line

@@ -246,6 +246,11 @@ impl World {
         self.spi_deselect(now_ns + duration_ns);
     }
 
+    /// The sensor's end of the bus.
+    pub fn sensor(&self) -> &SensorPeer {
+        &self.sensor
+    }
+
     /// The sensor's chip select falls.
     pub fn spi_select(&mut self, now_ns: u64) {
         self.advance_to(now_ns);
@@ -266,11 +271,8 @@ impl World {
             self.miso.pass(self.now_ns, mosi, line, &self.faults);
         }
         self.selected = Some(count + 1);
-        self.sensor
-            .line()
-            .get(count)
-            .copied()
-            .unwrap_or(Miso::idle(&self.faults))
+        let line = self.sensor.line().get(count).copied();
+        line.unwrap_or(Miso::idle(&self.faults))
     }
 
     /// The sensor's chip select rises; time does not pass by it.

@@ -5,9 +5,7 @@ use serde::{Deserialize, Serialize};
 use tactus_core::dsp::{BIN_HZ, Plan, TAPS, Taps};
 use tactus_core::features::Movement;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::sensor::PressureSensor as _;
-use tactus_core::sensor::biotac::BioTac;
-use tactus_core::sensor::pressure::{Calibration, Channel, RATE_HZ};
+use tactus_core::sensor::pressure::{Calibration, RATE_HZ};
 
 use super::error::StudyError;
 use super::slides::{Named, StudyWorld, properties};
@@ -16,6 +14,7 @@ use crate::data::replay::measure;
 use crate::sim::collection::{Trial, TrialError};
 use crate::sim::finger::PAC_PA_PER_COUNT;
 use crate::sim::rig::SimError;
+use crate::sim::slot::{TRANSFER_NS, word_of_slot};
 
 /// Numbers of the sessions: see [`super::slides::Session::number`].
 const PRESS: u64 = 5;
@@ -28,6 +27,8 @@ const LINEAR_N: f64 = 2.0;
 const TURN_N: f64 = 2.6;
 /// Speed of the press, microsteps a second: the paper's 0.5 mm/s.
 const STEPS_PER_S: u64 = 800;
+/// The slot that gives P_DC.
+const PDC: u64 = 1;
 /// P_DC is averaged over so many words for a point of the figure.
 const WORDS: usize = 22;
 /// Words in the air before contact, for P_DC without force.
@@ -126,20 +127,10 @@ fn press(world: StudyWorld) -> Press {
         now_ns += step_ns;
         world.lever_step(now_ns, true);
         world.lever_step(now_ns + step_ns / 2, false);
-        let mut exchange = BioTac::exchange(Channel::Pdc);
-        if let Some(command) = exchange.command {
-            world.spi(now_ns + step_ns / 2 + 5_000, 3_048, &command, &mut [0; 2]);
-        }
-        let mosi = exchange.read;
-        world.spi(
-            now_ns + step_ns / 2 + 65_000,
-            3_048,
-            &mosi,
-            &mut exchange.read,
-        );
-        let Ok(word) = BioTac::decode(Channel::Pdc, exchange.read) else {
-            continue;
-        };
+        let word = word_of_slot(PDC, now_ns + step_ns / 2 + 5_000, |at_ns, mosi, miso| {
+            world.spi(at_ns, TRANSFER_NS, mosi, miso);
+        });
+        let Some(word) = word else { continue };
         let (counts, force_n) = (f64::from(word.counts.get()), world.truth().force_n);
         if force_n == 0.0 {
             if !down {

@@ -103,13 +103,8 @@ const REASONS: &[Reason] = &[
         "moves the end of its block to its beginning: the block is never longer than its room",
     ),
     never(
-        &["acquire_task"],
-        "start-up: the bus's frequency is a constant",
-    ),
-    never(
         &["servo_task"],
-        "start-up: frequencies of timer and watchdog are constants; later its ticker, whose microseconds have room for 584 000 \
-         years",
+        "start-up: its timer's frequency is a constant; later its ticker, whose microseconds have room for 584 000 years",
     ),
     never(
         &[

@@ -19,5 +19,5 @@ mod word;
 pub use command::{Channel, FULL_FRAME, GAP_US, PRESSURE_SLOTS, READ_MOSI, REST_US};
 pub use finger::BioTac;
 pub use link::{Diagnosis, WordStats};
-pub use property::{Ascii, Identity, IdentityBytes, Property, PropertyError};
+pub use property::{Ascii, Identity, IdentityBytes, Property, PropertyError, keep};
 pub use word::{BadParity, ErrorCode, WordError, decode, encode, encode_error};

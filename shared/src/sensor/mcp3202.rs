@@ -8,47 +8,44 @@
 //! The converter samples while it is read (data sheet DS21034, 5.1), the BioTac when it is asked: in split use the two
 //! differ by the gap, which shifts both channels alike.
 
-use core::ops::RangeInclusive;
+use embedded_hal::spi::MODE_0;
 
-use crate::sensor::driver::{Exchange, PressureSensor};
+use crate::sensor::driver::PressureSensor;
 use crate::sensor::pressure::{Channel, Counts, Pressure};
+use crate::sensor::slot::{Port, Transaction};
 
 /// An MCP3202 as a [`PressureSensor`].
 #[derive(Clone, Copy, Debug)]
 pub struct Mcp3202;
 
+/// Start bit at the end of byte 0, then single-ended, the channel, and most significant bit first (DS21034, fig. 6-1 and
+/// table 5-1). Chip select has to go high between conversions (DS21034, 3.2).
+const SLOTS: [[Transaction; 1]; 2] = [
+    [Transaction::first_port(&[0x01, 0b1010_0000, 0x00], 2, 1)],
+    [Transaction::first_port(&[0x01, 0b1110_0000, 0x00], 2, 1)],
+];
+
 impl PressureSensor for Mcp3202 {
-    type Reply = [u8; 3];
     type Error = NullBit;
-    /// Upper end: 50000 samples a second at 2.7 V, 18 clocks each (DS21034); one read of 24 clocks takes 27 us. Lower end:
-    /// the held charge leaks away within 1.2 ms (DS21034, 6.2).
-    const CLOCK_HZ: RangeInclusive<u32> = 10_000..=900_000;
+    const PORTS: &'static [Port] = &[Port {
+        mode: MODE_0,
+        // Upper end: 50000 samples a second at 2.7 V, 18 clocks each (DS21034); one read of 24 clocks takes 27 us. Lower end:
+        // the held charge leaks away within 1.2 ms (DS21034, 6.2).
+        clock_hz: 10_000..=900_000,
+    }];
     const POWER_UP_MS: u32 = 0;
+    const SLOTS: &'static [&'static [Transaction]] = &[&SLOTS[0], &SLOTS[1]];
 
-    /// Start bit at the end of byte 0, then single-ended, the channel, and most significant bit first (DS21034, fig. 6-1
-    /// and table 5-1).
-    fn exchange(channel: Channel) -> Exchange<[u8; 3]> {
-        let select = match channel {
-            Channel::Pac => 0b1010_0000,
-            Channel::Pdc => 0b1110_0000,
-        };
-        Exchange {
-            command: None,
-            gap_us: 0,
-            read: [0x01, select, 0x00],
-            // chip select has to go high between conversions (DS21034, 3.2)
-            rest_us: 1,
+    /// Three bits are not driven; then a null bit and 12 bits, the most significant first.
+    fn decode(&mut self, n: u32, answer: &[u8]) -> Result<Pressure, NullBit> {
+        match *answer {
+            [upper, lower] if upper & 0b1_0000 == 0 => Ok(Pressure {
+                channel: Channel::of_slot(n),
+                counts: Counts::from_low_bits(u16::from_be_bytes([upper, lower])),
+            }),
+            // an answer that did not come is none, either
+            _ => Err(NullBit),
         }
-    }
-
-    /// Byte 0 and three bits of byte 1 are not driven; then a null bit and 12 bits, the most significant first.
-    fn decode(channel: Channel, reply: [u8; 3]) -> Result<Pressure, NullBit> {
-        let [_, upper, lower] = reply;
-        if upper & 0b1_0000 != 0 {
-            return Err(NullBit);
-        }
-        let counts = Counts::from_low_bits(u16::from_be_bytes([upper, lower]));
-        Ok(Pressure { channel, counts })
     }
 }
 
@@ -100,10 +97,9 @@ mod tests {
             Delay::blocking_delay_us(1),
             Delay::blocking_delay_us(1),
         ];
-        let mut driver =
-            Driver::<Mcp3202, _, _>::new(Mock::new(&bus()), CheckedDelay::new(&delays));
+        let mut driver = Driver::new(Mcp3202, Mock::new(&bus()), CheckedDelay::new(&delays));
         driver.power_up();
-        let [pac, pdc] = Channel::PATTERN.map(|channel| driver.sample(channel).unwrap());
+        let [pac, pdc] = [0, 1].map(|slot| driver.sample(slot).unwrap());
         check(pac, pdc);
         let (mut spi, mut delay) = driver.release();
         spi.done();
@@ -113,12 +109,11 @@ mod tests {
     #[test]
     fn the_async_driver_reads_both_pressures() {
         let delays = [Delay::async_delay_us(1), Delay::async_delay_us(1)];
-        let mut driver =
-            Driver::<Mcp3202, _, _>::new(Mock::new(&bus()), CheckedDelay::new(&delays));
+        let mut driver = Driver::new(Mcp3202, Mock::new(&bus()), CheckedDelay::new(&delays));
         let (pac, pdc) = embassy_futures::block_on(async {
             (
-                driver.sample_async(Channel::Pac).await.unwrap(),
-                driver.sample_async(Channel::Pdc).await.unwrap(),
+                driver.sample_async(0).await.unwrap(),
+                driver.sample_async(1).await.unwrap(),
             )
         });
         check(pac, pdc);
@@ -131,8 +126,8 @@ mod tests {
     fn a_line_that_nothing_drives_is_an_error() {
         let bus = conversion([0x01, 0xA0, 0x00], [0xFF; 3]);
         let delay = CheckedDelay::new(&vec![Delay::blocking_delay_us(1)]);
-        let mut driver = Driver::<Mcp3202, _, _>::new(Mock::new(&bus), delay);
-        let error = driver.sample(Channel::Pac).unwrap_err();
+        let mut driver = Driver::new(Mcp3202, Mock::new(&bus), delay);
+        let error = driver.sample(0).unwrap_err();
         assert_eq!(error, Error::Sensor(NullBit));
         assert!(error.to_string().contains("chip select"));
         let (mut spi, mut delay) = driver.release();
@@ -145,25 +140,13 @@ mod tests {
         for value in 0..=4095u16 {
             let [upper, lower] = value.to_be_bytes();
             for undriven in 0..8 {
-                let reply = [0x5A, undriven << 5 | upper, lower];
-                let sample = Mcp3202::decode(Channel::Pdc, reply).unwrap();
+                let upper = undriven << 5 | upper;
+                let sample = Mcp3202.decode(1, &[upper, lower]).unwrap();
                 assert_eq!(sample.counts.get(), value);
                 assert_eq!(sample.channel, Channel::Pdc);
-                let [b0, b1, b2] = reply;
-                assert_eq!(
-                    Mcp3202::decode(Channel::Pac, [b0, b1 | 0x10, b2]),
-                    Err(NullBit)
-                );
+                assert_eq!(Mcp3202.decode(0, &[upper | 0x10, lower]), Err(NullBit));
             }
         }
-    }
-
-    #[test]
-    fn needs_no_command_and_fits_a_slot() {
-        let exchange = Mcp3202::exchange(Channel::Pac);
-        assert_eq!(exchange.command, None);
-        let read_us = 24 * 1_000_000 / Mcp3202::CLOCK_HZ.end();
-        let slot_us = 1_000_000 / crate::sensor::pressure::SLOTS_HZ;
-        assert!(read_us + exchange.rest_us < slot_us);
+        assert_eq!(Mcp3202.decode(0, &[]), Err(NullBit), "it did not come");
     }
 }

@@ -23,6 +23,15 @@ pub enum Channel {
 impl Channel {
     /// The channels in the order of the slots: both at 2200 Hz out of 4400 slots a second.
     pub const PATTERN: [Self; 2] = [Self::Pac, Self::Pdc];
+
+    /// The channel whose sample slot `n` gives.
+    pub const fn of_slot(n: u32) -> Self {
+        if n.is_multiple_of(2) {
+            Self::Pac
+        } else {
+            Self::Pdc
+        }
+    }
 }
 
 /// A 12-bit reading of a converter over 0..3.3 V: 0..=4095.

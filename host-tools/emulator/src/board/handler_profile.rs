@@ -14,6 +14,8 @@ pub struct HandlerProfile {
     pub runs: u64,
     /// Instructions of all runs.
     pub instructions: u64,
+    /// Of every other one, from the first and from the second on: an interrupt comes for two things by turns.
+    pub by_turns: [u64; 2],
 }
 
 /// Instructions until a handler began, and those of handlers that interrupted it.
@@ -34,6 +36,7 @@ impl HandlerProfiler {
             address,
             runs: 0,
             instructions: 0,
+            by_turns: [0; 2],
         });
         Self {
             handlers: handlers.collect(),
@@ -49,8 +52,10 @@ impl HandlerProfiler {
         while let Some(ended) = self.watched.ended(hit, sp, host) {
             let all = now - ended.kept.at;
             let handler = &mut self.handlers[ended.handler];
+            let own = all - ended.kept.nested;
+            handler.by_turns[(handler.runs % 2) as usize] += own;
             handler.runs += 1;
-            handler.instructions += all - ended.kept.nested;
+            handler.instructions += own;
             if let Some(below) = self.watched.latest() {
                 below.kept.nested += all;
             }

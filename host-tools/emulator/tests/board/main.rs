@@ -19,5 +19,6 @@ mod selftest;
 mod serve;
 mod settings;
 mod silicon;
+mod slots;
 mod teach;
 mod verify;

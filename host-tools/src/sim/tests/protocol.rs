@@ -1,5 +1,11 @@
 //! The sensor's side of the bus: words that were worked out by hand from SPM, and the rules of its timing.
 
+use std::convert::Infallible;
+
+use tactus_core::sensor::biotac::BioTac;
+use tactus_core::sensor::slot::{Transaction, perform};
+use tactus_core::sensor::{PressureSensor as _, slot_of};
+
 use crate::sim::finger::{Contact, Finger};
 use crate::sim::sensor::{GAP_NS, POWER_UP_NS, SensorPeer};
 
@@ -147,4 +153,40 @@ fn a_flipped_bit_is_in_one_word_only() {
     let bad = bus.ask([0x83, 0], GAP_NS, 2);
     assert_eq!(bad[0].count_ones() % 2, 0);
     bus.value(0x83);
+}
+
+/// The core's slots as data on the sensor's wire; how many of `slots` gave a word, and what the sensor complained of.
+fn on_the_wire(slots: u32, change: impl Fn(&mut [Transaction; 2])) -> (usize, Vec<(u8, u64)>) {
+    let mut bus = Bus::new();
+    let mut sensor = BioTac;
+    let words = (0..slots).filter(|n| {
+        let mut slot: [Transaction; 2] = slot_of::<BioTac>(*n).try_into().unwrap();
+        change(&mut slot);
+        let Ok(answer) = perform(&slot, |transaction, bytes| {
+            bytes.copy_from_slice(&bus.select(transaction.out));
+            bus.now_ns += 1000 * u64::from(transaction.gap_us);
+            Ok::<(), Infallible>(())
+        });
+        sensor.decode(*n, &answer).is_ok()
+    });
+    let words = words.count();
+    let complaints = bus.sensor.complaints().iter();
+    (words, complaints.map(|(why, many)| (*why, *many)).collect())
+}
+
+#[test]
+fn the_sensor_has_nothing_to_complain_of_the_cores_slots() {
+    assert_eq!(on_the_wire(1000, |_| ()), (1000, vec![]));
+}
+
+#[test]
+fn the_sensor_complains_of_a_slot_with_a_short_gap_or_another_order() {
+    let short = on_the_wire(100, |[command, _]| command.gap_us -= 1);
+    assert_eq!(short, (0, vec![(0x2D, 100)]), "too early");
+    // the first read finds nothing, each other one the answer to the slot before, too early
+    let swapped = on_the_wire(100, |[first, second]| {
+        std::mem::swap(&mut first.out, &mut second.out);
+    });
+    assert_eq!(swapped.0, 0);
+    assert_eq!(swapped.1, [(0x2D, 99), (0x5F, 1)]);
 }

@@ -1,8 +1,8 @@
 //! Sampling commands, their timing, and the order in which channels are sampled.
 
 use super::word::with_parity;
-use crate::sensor::driver::Exchange;
 use crate::sensor::pressure;
+use crate::sensor::slot::Transaction;
 
 /// Shortest time between a command and the read of its answer, us (SPM 8.3.1.1). Earlier, the answer is an error frame.
 pub const GAP_US: u32 = 50;
@@ -10,6 +10,22 @@ pub const GAP_US: u32 = 50;
 pub const REST_US: u32 = 10;
 /// What MOSI says while a sample is read (SPM).
 pub const READ_MOSI: [u8; 2] = [0x00, 0x01];
+
+/// The bytes of the commands, by channel number. The second byte is ignored (SPM); 0 as in LIB.
+const COMMANDS: &[[u8; 2]; Channel::E19 as usize + 1] = &{
+    let mut all = [[0x00; 2]; Channel::E19 as usize + 1];
+    let mut number = 0;
+    while number < all.len() {
+        all[number] = [command(number as u8), 0x00];
+        number += 1;
+    }
+    all
+};
+
+/// 0x80, the channel number, and odd parity in the lowest bit.
+const fn command(number: u8) -> u8 {
+    with_parity(0x40 | number, 1)
+}
 
 /// A channel of the sensor. The discriminant is the channel number of SPM table 7 and HDR.
 ///
@@ -62,7 +78,7 @@ impl Channel {
 
     /// The command that samples this channel: 0x80, the channel number, and odd parity in the lowest bit.
     pub const fn command(self) -> u8 {
-        with_parity(0x40 | self as u8, 1)
+        command(self as u8)
     }
 
     /// The channel that a command samples, for a simulated sensor; `None` if it is no sampling command.
@@ -70,15 +86,12 @@ impl Channel {
         Self::ALL.into_iter().find(|c| c.command() == command)
     }
 
-    /// What to send to get a sample of this channel.
-    pub const fn exchange(self) -> Exchange<[u8; 2]> {
-        Exchange {
-            // the second byte is ignored (SPM); 0 as in LIB
-            command: Some([self.command(), 0x00]),
-            gap_us: GAP_US,
-            read: READ_MOSI,
-            rest_us: REST_US,
-        }
+    /// What to do to get a sample of this channel: the command and, 50 us later, the read.
+    pub const fn transactions(self) -> [Transaction; 2] {
+        [
+            Transaction::first_port(&COMMANDS[self as usize], 0, GAP_US),
+            Transaction::first_port(&READ_MOSI, READ_MOSI.len() as u8, REST_US),
+        ]
     }
 }
 
@@ -144,6 +157,9 @@ mod tests {
         assert_eq!(slots, [0x80, 0x83]);
         let shared = pressure::Channel::PATTERN.map(Channel::from);
         assert_eq!(shared, PRESSURE_SLOTS);
+        let by_slot = [0, 1, 2, u32::MAX].map(pressure::Channel::of_slot);
+        let [pac, pdc] = pressure::Channel::PATTERN;
+        assert_eq!(by_slot, [pac, pdc, pac, pdc]);
         assert_eq!(
             pressure::SLOTS_HZ / PRESSURE_SLOTS.len() as u32,
             pressure::RATE_HZ
@@ -173,15 +189,16 @@ mod tests {
     #[test]
     fn a_sample_is_a_command_a_gap_of_50_us_a_read_of_0001_and_a_rest() {
         for (channel, command) in Channel::ALL.into_iter().zip(COMMANDS) {
+            let [sent, read] = channel.transactions();
             assert_eq!(
-                channel.exchange(),
-                Exchange {
-                    command: Some([command, 0x00]),
-                    gap_us: 50,
-                    read: [0x00, 0x01],
-                    rest_us: 10,
-                }
+                (sent.out, sent.answer, sent.gap_us),
+                (&[command, 0x00][..], 0, 50)
             );
+            assert_eq!(
+                (read.out, read.answer, read.gap_us),
+                (&[0x00, 0x01][..], 2, 10)
+            );
+            assert_eq!((sent.port, read.port), (0, 0));
         }
     }
 }

@@ -1,30 +1,40 @@
 //! The BioTac as one of the sensors of the two pressures.
 
-use core::ops::RangeInclusive;
+use embedded_hal::spi::MODE_0;
 
-use super::command::Channel;
+use super::command::PRESSURE_SLOTS;
 use super::word::{WordError, decode};
-use crate::sensor::driver::{Exchange, PressureSensor};
-use crate::sensor::pressure::{self, Pressure};
+use crate::sensor::driver::PressureSensor;
+use crate::sensor::pressure::{Channel, Pressure};
+use crate::sensor::slot::{Port, Transaction};
 
-/// A BioTac as a [`PressureSensor`]. Its other channels are read with [`Channel::exchange`] and [`decode`].
+/// A BioTac as a [`PressureSensor`]. Its other channels are read with [`Channel::transactions`](super::Channel::transactions) and
+/// [`decode`].
 #[derive(Clone, Copy, Debug)]
 pub struct BioTac;
 
+const SLOTS: [[Transaction; 2]; 2] = {
+    let [pac, pdc] = PRESSURE_SLOTS;
+    [pac.transactions(), pdc.transactions()]
+};
+
 impl PressureSensor for BioTac {
-    type Reply = [u8; 2];
     type Error = WordError;
-    /// SPM 8.2 and HDR; 1, 3 and 4.4 MHz are used in the field.
-    const CLOCK_HZ: RangeInclusive<u32> = 500_000..=10_000_000;
+    const PORTS: &'static [Port] = &[Port {
+        mode: MODE_0,
+        // SPM 8.2 and HDR; 1, 3 and 4.4 MHz are used in the field
+        clock_hz: 500_000..=10_000_000,
+    }];
     /// The maker's library waits this long (LIB).
     const POWER_UP_MS: u32 = 100;
+    const SLOTS: &'static [&'static [Transaction]] = &[&SLOTS[0], &SLOTS[1]];
 
-    fn exchange(channel: pressure::Channel) -> Exchange<[u8; 2]> {
-        Channel::from(channel).exchange()
-    }
-
-    fn decode(channel: pressure::Channel, reply: [u8; 2]) -> Result<Pressure, WordError> {
-        let counts = decode(reply)?;
-        Ok(Pressure { channel, counts })
+    fn decode(&mut self, n: u32, answer: &[u8]) -> Result<Pressure, WordError> {
+        // an answer that did not come
+        let word = answer.try_into().map_err(|_| WordError::NoSensor)?;
+        Ok(Pressure {
+            channel: Channel::of_slot(n),
+            counts: decode(word)?,
+        })
     }
 }

@@ -12,7 +12,11 @@ use embedded_hal_async::spi::SpiDevice as AsyncSpiDevice;
 use super::command::{GAP_US, REST_US};
 use super::finger::BioTac;
 use super::word::{ErrorCode, WordError, decode};
-use crate::sensor::driver::{Driver, Error, Exchange};
+use crate::sensor::driver::{Driver, Error};
+use crate::sensor::slot::{MAX_BYTES, Transaction};
+
+/// Asks for a property.
+const READ: u8 = 0x61;
 
 /// A property that can be read (HDR). The discriminant is its code.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -31,18 +35,24 @@ pub enum Property {
 }
 
 impl Property {
-    /// Asks for a property.
-    const READ: u8 = 0x61;
-
-    /// What to send to read this property into `reply`, whose length says how many bytes are read. `reply` is sent
-    /// meanwhile: give zeros, as LIB does.
-    pub const fn exchange(self, reply: &mut [u8]) -> Exchange<&mut [u8]> {
-        Exchange {
-            command: Some([Self::READ, self as u8]),
-            gap_us: GAP_US,
-            read: reply,
-            rest_us: REST_US,
+    /// The bytes that ask for it.
+    const fn command(self) -> &'static [u8; 2] {
+        match self {
+            Self::Flex => &[READ, Self::Flex as u8],
+            Self::Firmware => &[READ, Self::Firmware as u8],
+            Self::Serial => &[READ, Self::Serial as u8],
+            Self::CpuSpeed => &[READ, Self::CpuSpeed as u8],
+            Self::SamplingRate => &[READ, Self::SamplingRate as u8],
         }
+    }
+
+    /// What to do to read `N` bytes of this property. Zeros are sent meanwhile, as LIB does.
+    const fn read<const N: usize>(self) -> [Transaction; 2] {
+        const { assert!(N <= MAX_BYTES) };
+        [
+            Transaction::first_port(self.command(), 0, GAP_US),
+            Transaction::first_port(const { &[0; N] }, N as u8, REST_US),
+        ]
     }
 }
 
@@ -132,8 +142,8 @@ pub struct Identity {
 
 /// The bytes of the properties, before and after they are read.
 ///
-/// [`IdentityBytes::exchanges`] says what to do, [`IdentityBytes::decode`] what came of it: the drivers do no more than
-/// perform the exchanges in between.
+/// [`IdentityBytes::reads`] says what to do, [`IdentityBytes::decode`] what came of it: the drivers do no more than
+/// perform the reads in between.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct IdentityBytes {
     serial: [u8; 16],
@@ -143,15 +153,21 @@ pub struct IdentityBytes {
     sampling_rate: [u8; 2],
 }
 
+/// Puts an answer where it belongs; one that did not come leaves what was there.
+pub fn keep(place: &mut [u8], answer: &[u8]) {
+    let bytes = place.iter_mut().zip(answer);
+    bytes.for_each(|(to, from)| *to = *from);
+}
+
 impl IdentityBytes {
-    /// The reads that fill in the properties.
-    pub fn exchanges(&mut self) -> [Exchange<&mut [u8]>; 5] {
+    /// The reads of the properties, and where the answer of each belongs: [`keep`] puts it there.
+    pub fn reads(&mut self) -> [([Transaction; 2], &mut [u8]); 5] {
         [
-            Property::Serial.exchange(&mut self.serial),
-            Property::Firmware.exchange(&mut self.firmware),
-            Property::Flex.exchange(&mut self.flex),
-            Property::CpuSpeed.exchange(&mut self.cpu_speed),
-            Property::SamplingRate.exchange(&mut self.sampling_rate),
+            (Property::Serial.read::<16>(), &mut self.serial),
+            (Property::Firmware.read::<4>(), &mut self.firmware),
+            (Property::Flex.read::<2>(), &mut self.flex),
+            (Property::CpuSpeed.read::<2>(), &mut self.cpu_speed),
+            (Property::SamplingRate.read::<2>(), &mut self.sampling_rate),
         ]
     }
 
@@ -186,8 +202,8 @@ impl<SPI: SpiDevice, D: DelayNs> Driver<BioTac, SPI, D> {
     /// [`Error::Bus`], or [`Error::Sensor`] if the answers are not those of a BioTac.
     pub fn identity(&mut self) -> Result<Identity, Error<SPI::Error, PropertyError>> {
         let mut bytes = IdentityBytes::default();
-        for exchange in bytes.exchanges() {
-            self.exchange(exchange).map_err(Error::Bus)?;
+        for (transactions, place) in bytes.reads() {
+            keep(place, &self.perform(&transactions).map_err(Error::Bus)?);
         }
         bytes.decode().map_err(Error::Sensor)
     }
@@ -200,8 +216,9 @@ impl<SPI: AsyncSpiDevice, D: AsyncDelayNs> Driver<BioTac, SPI, D> {
     /// [`Error::Bus`], or [`Error::Sensor`] if the answers are not those of a BioTac.
     pub async fn identity_async(&mut self) -> Result<Identity, Error<SPI::Error, PropertyError>> {
         let mut bytes = IdentityBytes::default();
-        for exchange in bytes.exchanges() {
-            self.exchange_async(exchange).await.map_err(Error::Bus)?;
+        for (transactions, place) in bytes.reads() {
+            let answer = self.perform_async(&transactions).await;
+            keep(place, &answer.map_err(Error::Bus)?);
         }
         bytes.decode().map_err(Error::Sensor)
     }
@@ -258,15 +275,20 @@ mod tests {
 
     #[test]
     fn each_property_is_asked_for_by_its_code_and_read_to_its_length() {
-        let asked = |e: Exchange<&mut [u8]>| (e.command, e.gap_us, e.read.len(), e.rest_us);
+        let mut bytes = IdentityBytes::default();
+        let asked = bytes.reads().map(|([command, read], place)| {
+            assert!(read.out.iter().all(|byte| *byte == 0));
+            assert_eq!((read.out.len(), command.answer), (place.len(), 0));
+            (command.out, command.gap_us, read.answer, read.gap_us)
+        });
         assert_eq!(
-            IdentityBytes::default().exchanges().map(asked),
+            asked,
             [
-                (Some([0x61, 0x15]), 50, 16, 10),
-                (Some([0x61, 0x13]), 50, 4, 10),
-                (Some([0x61, 0x10]), 50, 2, 10),
-                (Some([0x61, 0x61]), 50, 2, 10),
-                (Some([0x61, 0x70]), 50, 2, 10),
+                (&[0x61, 0x15][..], 50, 16, 10),
+                (&[0x61, 0x13], 50, 4, 10),
+                (&[0x61, 0x10], 50, 2, 10),
+                (&[0x61, 0x61], 50, 2, 10),
+                (&[0x61, 0x70], 50, 2, 10),
             ]
         );
     }

@@ -18,8 +18,8 @@ pub(crate) const GATES: &[(&str, &str, f64)] = &[
     // (1.2 times 37,274, since means are compared in spite of drift)
     ("choice among 20 live textures, fused", "choice", 44_700.0),
     ("last sample to decision, fused", "decision", 233_000.0),
-    ("acquisition, bus waiting included", "slot", 2500.0),
-    ("core busy during a slide", "% at 168 MHz", 10.0),
+    ("slot, not waiting", "slot", 500.0),
+    ("core busy during a slide", "% at 168 MHz", 6.0),
     ("last sample to the verdict on the link", "ms", 5.0),
 ];
 

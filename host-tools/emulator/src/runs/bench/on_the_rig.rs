@@ -9,7 +9,7 @@ use tactus_core::wire::{Command, Event, Identify, Phase};
 use super::error::BenchError;
 use super::gates::gate;
 use super::row::Row;
-use crate::board::{Emulator, Options, Output};
+use crate::board::{Emulator, HandlerProfile, Options, Output};
 use crate::host::talk::Talk;
 
 /// Longest that the rig takes for anything, virtual seconds.
@@ -35,7 +35,8 @@ pub(super) fn on_the_rig(elf: &Path) -> Result<Vec<Row>, BenchError> {
         ..Options::default()
     };
     let emulator = Emulator::start(elf, Setup::default(), options)?;
-    let handlers = ["TIM2", "UART4"].map(|name| emulator.symbol(name).map(|(address, _)| address));
+    // what does the slots: nothing in it waits for the wire
+    let handlers = ["TIM2", "SPI1"].map(|name| emulator.symbol(name).map(|(address, _)| address));
     let handlers = handlers.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut talk = Talk::new(emulator);
     talk.ready(|_, _| ())?;
@@ -74,7 +75,7 @@ pub(super) fn on_the_rig(elf: &Path) -> Result<Vec<Row>, BenchError> {
         return Err(why.into());
     }
     let profiles = talk.board().handlers()?;
-    let [timer, executor] = profiles[..] else {
+    let [timer, bus] = profiles[..] else {
         return Err(BenchError::Rig("its handlers were not counted"));
     };
     let begun = begun.ok_or(BenchError::Rig("it says nothing of a slide"))?;
@@ -97,10 +98,20 @@ pub(super) fn on_the_rig(elf: &Path) -> Result<Vec<Row>, BenchError> {
         floor: None,
         equal: true,
     };
-    let slot = (timer.instructions + executor.instructions) as f64 / slots;
+    let slot = (timer.instructions + bus.instructions) as f64 / slots;
+    // each comes twice a slot; what begins or ends a slot is the longer turn
+    let turns = |profile: &HandlerProfile| {
+        let [one, other] = profile.by_turns;
+        [one.max(other), one.min(other)].map(|instructions| instructions as f64 / slots)
+    };
+    let ([begins, asks], [answered, sent]) = (turns(&timer), turns(&bus));
     let late_ms = (told_ns + BEFORE_STEP_NS - lifts_ns) as f64 * 1e-6;
     Ok(vec![
-        row("acquisition, bus waiting included", "slot", slot),
+        row("slot, not waiting", "slot", slot),
+        row("- begins, command goes out", "slot", begins),
+        row("- command is over", "slot", sent),
+        row("- answer is asked for", "slot", asks),
+        row("- answer is over, decoded, queued", "slot", answered),
         row("core busy during a slide", "% at 168 MHz", 100.0 * busy),
         row("last sample to the verdict on the link", "ms", late_ms),
     ])

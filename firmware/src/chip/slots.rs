@@ -1,0 +1,444 @@
+//! The sensor's slots: SPI1 with its pins, the chip selects, and the timer TIM2, which this module owns wholly.
+//!
+//! The timer begins a slot every 227 us. What is done in it is the finger's data ([`PressureSensor::SLOTS`]): the timer's interrupts
+//! begin a transaction, the bus's interrupt ends each of its frames, and nobody waits for either. What does not end in its time
+//! is given up when the timer comes next. embassy's driver of the bus has no transfers by its interrupt: it spins for each
+//! byte, or takes two DMA streams with an interrupt each for the two bytes of a word.
+use core::cell::UnsafeCell;
+use core::mem::ManuallyDrop;
+use core::sync::atomic::Ordering::Relaxed;
+use core::sync::atomic::{AtomicBool, AtomicU32};
+
+use embassy_stm32::gpio::{AfType, Flex, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::interrupt;
+use embassy_stm32::pac::spi::regs::Cr1;
+use embassy_stm32::pac::spi::vals::{Br, Cpha, Cpol, Dff, Mstr};
+use embassy_stm32::pac::{SPI1, TIM2};
+use embassy_stm32::{Peri, peripherals, rcc};
+use embedded_hal::spi::{Phase, Polarity};
+use heapless::spsc::Producer;
+use tactus_core::sensor::biotac::{BioTac, WordStats};
+use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
+use tactus_core::sensor::slot::{Answer, Transaction, length_us};
+use tactus_core::sensor::{PressureSensor, slot_of};
+
+use crate::board::{self, held};
+use crate::chip;
+
+/// The finger.
+pub(crate) type Finger = BioTac;
+const FINGER: Finger = BioTac;
+
+/// A sensor word; `None` is a damaged or missing one.
+pub(crate) type Word = Option<Pressure>;
+/// Words on their way to the servo: 29 ms.
+pub(crate) const WORDS: usize = 128;
+
+/// The timer's clock, and that of the bus before it is divided: both 84 MHz.
+const TIMER_HZ: u32 = 84_000_000;
+/// The bus: 84 MHz / 16.
+const SPI_HZ: u32 = 5_250_000;
+const DIVIDER: Br = Br::DIV16;
+/// Cycles of the core, 168 MHz, in a byte.
+const BYTE_CYCLES: u32 = 8 * (2 * TIMER_HZ / SPI_HZ);
+/// Ticks of the timer in a byte.
+const BYTE_TICKS: u32 = BYTE_CYCLES / 2;
+const US_TICKS: u32 = TIMER_HZ / 1_000_000;
+/// 84 MHz / 19 091: 4399.98 slots a second.
+const SLOT_TICKS: u32 = (TIMER_HZ + SLOTS_HZ / 2) / SLOTS_HZ;
+/// A transaction may end so much later than its bytes take, us: by other interrupts, and while they are off. Later, it would
+/// leave less than the gap before the next one, or its sample would not be where it should be in time.
+const SLACK_US: u32 = 7;
+
+/// Alternate function of SPI1's pins (data sheet, table 12).
+const SPI1_FUNCTION: u8 = 5;
+/// Parts of the finger that the board has chip selects for.
+const SELECTS: usize = 1;
+
+/// Whether all transactions have an even number of bytes, so that frames can be of two. One interrupt is then enough for two bytes.
+const WIDE: bool = {
+    let (mut even, mut slots) = (true, Finger::SLOTS);
+    while let [slot, others @ ..] = slots {
+        let mut rest = *slot;
+        while let [transaction, others @ ..] = rest {
+            even &= transaction.out.len().is_multiple_of(2) && !transaction.out.is_empty();
+            assert!(
+                (transaction.port as usize) < SELECTS,
+                "there is no such chip select"
+            );
+            rest = others;
+        }
+        let byte_ns = 8 * 1_000_000_000_u64.div_ceil(SPI_HZ as u64) as u32;
+        let slot_us = 1_000_000 / SLOTS_HZ;
+        assert!(
+            length_us(slot, byte_ns, SLACK_US) <= slot_us,
+            "a slot is too long"
+        );
+        slots = others;
+    }
+    even
+};
+const FRAME_BYTES: usize = if WIDE { 2 } else { 1 };
+const _: () = {
+    let [port] = Finger::PORTS else {
+        panic!("the board has chip selects for another number of parts")
+    };
+    assert!(*port.clock_hz.start() <= SPI_HZ && SPI_HZ <= *port.clock_hz.end());
+};
+
+/// Slots since boot, those that came too late, and words by what was wrong with them.
+pub(crate) static SLOTS: AtomicU32 = AtomicU32::new(0);
+pub(crate) static LATE: AtomicU32 = AtomicU32::new(0);
+pub(crate) static PARITY: AtomicU32 = AtomicU32::new(0);
+pub(crate) static ERROR_FRAMES: AtomicU32 = AtomicU32::new(0);
+pub(crate) static LOST: AtomicU32 = AtomicU32::new(0);
+
+/// A frame did not end in three times its time; the bus was set up anew.
+pub(crate) struct NoFrame;
+
+/// The bus and its selects.
+pub(crate) struct Bus {
+    _spi: Peri<'static, peripherals::SPI1>,
+    _pins: [ManuallyDrop<Flex<'static>>; 3],
+    selects: [Output<'static>; SELECTS],
+    control: Cr1,
+    /// It was told to say when a frame is over.
+    interrupts: bool,
+}
+
+/// Looks at a frame in its time.
+const LOOKS: u32 = 32;
+
+impl Bus {
+    /// Takes the bus; no select is low.
+    pub(crate) fn new(pins: board::Sensor) -> Self {
+        let selects = [Output::new(pins.select, Level::High, Speed::VeryHigh)];
+        let out = AfType::output(OutputType::PushPull, Speed::VeryHigh);
+        // nobody there then reads as FF FF
+        let input = AfType::input(Pull::Up);
+        let mut led = [held(pins.sck), held(pins.mosi), held(pins.miso)];
+        for (pin, how) in led.iter_mut().zip([out, out, input]) {
+            pin.set_as_af_unchecked(SPI1_FUNCTION, how);
+        }
+        let mut control = Cr1::default();
+        if let [port, ..] = Finger::PORTS {
+            control.set_cpol(match port.mode.polarity {
+                Polarity::IdleLow => Cpol::IDLE_LOW,
+                Polarity::IdleHigh => Cpol::IDLE_HIGH,
+            });
+            control.set_cpha(match port.mode.phase {
+                Phase::CaptureOnFirstTransition => Cpha::FIRST_EDGE,
+                Phase::CaptureOnSecondTransition => Cpha::SECOND_EDGE,
+            });
+        }
+        control.set_dff(if WIDE { Dff::BITS16 } else { Dff::BITS8 });
+        control.set_br(DIVIDER);
+        control.set_mstr(Mstr::MASTER);
+        // selects are by software: no mode fault
+        control.set_ssm(true);
+        control.set_ssi(true);
+        control.set_spe(true);
+        let mut bus = Self {
+            _spi: pins.spi,
+            _pins: led,
+            selects,
+            control,
+            interrupts: false,
+        };
+        bus.restart();
+        bus
+    }
+
+    /// Sets the bus up anew: a disturbance may have switched it off, and what is left in its buffers belongs to no word.
+    fn restart(&mut self) {
+        for select in &mut self.selects {
+            select.set_high();
+        }
+        rcc::enable_and_reset::<peripherals::SPI1>();
+        SPI1.cr2().write(|w| w.set_rxneie(self.interrupts));
+        SPI1.cr1().write_value(self.control);
+    }
+
+    fn select(&mut self, transaction: &Transaction, low: bool) {
+        if let Some(select) = self.selects.get_mut(usize::from(transaction.port)) {
+            select.set_level((!low).into());
+        }
+    }
+
+    /// Sends the frame from byte `at` on. The one before has been read, so the data register is free, and the next that is received
+    /// belongs to this one.
+    fn send(&mut self, bytes: &[u8], at: usize) {
+        let byte = |index| u16::from(bytes.get(index).copied().unwrap_or_default());
+        let frame = match WIDE {
+            true => byte(at) << 8 | byte(at + 1),
+            false => byte(at),
+        };
+        SPI1.dr().write(|w| w.set_dr(frame));
+    }
+
+    /// The bytes of a frame that is over, in the last places.
+    fn received(&mut self) -> [u8; 2] {
+        SPI1.dr().read().dr().to_be_bytes()
+    }
+
+    /// Does a transaction and waits for it: for who has nothing else to do. What comes in takes the place of `bytes`.
+    pub(crate) fn transact(
+        &mut self,
+        transaction: &Transaction,
+        bytes: &mut [u8],
+    ) -> Result<(), NoFrame> {
+        self.select(transaction, true);
+        let done = (0..bytes.len())
+            .step_by(FRAME_BYTES)
+            .all(|at| self.wait_for_frame(bytes, at));
+        self.select(transaction, false);
+        if done {
+            return Ok(());
+        }
+        self.restart();
+        Err(NoFrame)
+    }
+
+    fn wait_for_frame(&mut self, bytes: &mut [u8], at: usize) -> bool {
+        self.send(bytes, at);
+        let cycles = FRAME_BYTES as u32 * BYTE_CYCLES;
+        chip::wait_cycles(cycles);
+        for _ in 0..2 * LOOKS {
+            if SPI1.sr().read().rxne() {
+                let came_in = self.received();
+                let places = bytes.iter_mut().skip(at);
+                let came_in = came_in.into_iter().skip(2 - FRAME_BYTES);
+                places.zip(came_in).for_each(|(to, from)| *to = from);
+                return true;
+            }
+            chip::wait_cycles(cycles / LOOKS);
+        }
+        false
+    }
+}
+
+/// What the two interrupts do.
+struct Slots {
+    bus: Bus,
+    _timer: Peri<'static, peripherals::TIM2>,
+    finger: Finger,
+    words: Producer<'static, Word>,
+    stats: WordStats,
+    /// Words were lost: who takes them sees where, as the next one is no good.
+    gap: bool,
+    /// Slots that have begun.
+    begun: u32,
+    /// What is left to do of the slot, the transaction under way first.
+    left: &'static [Transaction],
+    /// The bytes of that one which have been sent, or none: it has not begun.
+    sent: usize,
+    /// When it should begin, and have ended, ticks since the slot began.
+    begins: u32,
+    ends: u32,
+    answer: Answer,
+}
+
+/// Where the two interrupts find it.
+struct Shared(UnsafeCell<Option<Slots>>);
+
+// SAFETY: written once, before either interrupt is enabled. Afterwards the handlers of the two alone use it, which have one
+// priority: neither interrupts the other.
+unsafe impl Sync for Shared {}
+
+static SHARED: Shared = Shared(UnsafeCell::new(None));
+/// Whether words are wanted, and whether the timer is set up.
+static WANTED: AtomicBool = AtomicBool::new(true);
+static SET_UP: AtomicBool = AtomicBool::new(false);
+
+/// Stops the slots, or lets them go on where they stopped. Before they have begun it is heard, too.
+pub(crate) fn listen(on: bool) {
+    WANTED.store(on, Relaxed);
+    if SET_UP.load(Relaxed) {
+        TIM2.cr1().modify(|w| w.set_cen(on));
+    }
+}
+
+/// Begins the slots; to be called once, when the sensor has started. `interrupt`s of SPI1 and TIM2 have one priority.
+pub(crate) fn begin(mut bus: Bus, timer: board::Slots, words: Producer<'static, Word>) {
+    bus.interrupts = true;
+    bus.restart();
+    rcc::enable_and_reset::<peripherals::TIM2>();
+    let slots = Slots {
+        bus,
+        _timer: timer.timer,
+        finger: FINGER,
+        words,
+        stats: WordStats::default(),
+        gap: false,
+        begun: 0,
+        left: &[],
+        sent: 0,
+        begins: 0,
+        ends: 0,
+        answer: Answer::new(),
+    };
+    // SAFETY: the interrupts are off, and this is called once: `bus` exists once.
+    unsafe { *SHARED.0.get() = Some(slots) };
+    TIM2.arr().write_value(SLOT_TICKS - 1);
+    TIM2.dier().write(|w| {
+        w.set_uie(true);
+        w.set_ccie(0, true);
+    });
+    // SAFETY: the handlers are below, their state is ready.
+    unsafe {
+        interrupt::InterruptExt::enable(interrupt::SPI1);
+        interrupt::InterruptExt::enable(interrupt::TIM2);
+    }
+    // nobody who listens runs before this does
+    SET_UP.store(true, Relaxed);
+    listen(WANTED.load(Relaxed));
+}
+
+#[interrupt]
+fn TIM2() {
+    let flags = TIM2.sr().read();
+    // a flag is cleared by writing 0; 1 leaves it
+    TIM2.sr().write(|w| w.0 = !flags.0);
+    // SAFETY: see `Shared`.
+    let Some(slots) = (unsafe { &mut *SHARED.0.get() }) else {
+        return;
+    };
+    if flags.uif() {
+        slots.begin();
+    }
+    // one that is there of the slot before is not for this one, and a slot may have a single transaction
+    if flags.ccif(0) && slots.begins > 0 && TIM2.cnt().read() >= slots.begins {
+        slots.next();
+    }
+}
+
+#[interrupt]
+fn SPI1() {
+    // SAFETY: see `Shared`.
+    let Some(slots) = (unsafe { &mut *SHARED.0.get() }) else {
+        return;
+    };
+    if SPI1.sr().read().rxne() {
+        slots.frame();
+    }
+}
+
+impl Slots {
+    /// A slot begins.
+    fn begin(&mut self) {
+        self.give_up();
+        self.left = slot_of::<Finger>(self.begun);
+        self.begun = self.begun.wrapping_add(1);
+        SLOTS.store(self.begun, Relaxed);
+        self.answer.clear();
+        self.begins = 0;
+        self.transact();
+    }
+
+    /// The time of the next transaction has come.
+    fn next(&mut self) {
+        if self.sent == 0 {
+            self.transact();
+        } else {
+            self.give_up();
+        }
+    }
+
+    /// What is under way has not ended in its time.
+    fn give_up(&mut self) {
+        let Some(transaction) = self.left.first() else {
+            return;
+        };
+        if self.sent > 0 {
+            self.bus.restart();
+        }
+        if transaction.answer > 0 && self.sent > 0 {
+            // an answer that does not come
+            self.answer.clear();
+            self.word();
+        } else {
+            self.late();
+        }
+    }
+
+    fn transact(&mut self) {
+        let Some(transaction) = self.left.first() else {
+            return;
+        };
+        self.bus.select(transaction, true);
+        self.bus.send(transaction.out, 0);
+        self.sent = FRAME_BYTES;
+        let bytes_ticks = transaction.out.len() as u32 * BYTE_TICKS;
+        self.ends = self.begins + bytes_ticks + SLACK_US * US_TICKS;
+        let gap_ticks = transaction.gap_us * US_TICKS;
+        if self.left.len() > 1 {
+            self.begins = self.ends + gap_ticks;
+            TIM2.ccr(0).write_value(self.begins);
+        } else if self.begins > 0 {
+            // the sample was taken before: there is time until the next slot
+            self.ends = SLOT_TICKS - gap_ticks;
+        }
+    }
+
+    /// A frame is over.
+    fn frame(&mut self) {
+        let came_in = self.bus.received();
+        let [transaction, left @ ..] = self.left else {
+            return;
+        };
+        let first = self.sent.saturating_sub(FRAME_BYTES);
+        let came_in = came_in.iter().skip(2 - FRAME_BYTES);
+        for (byte, index) in came_in.zip(first..) {
+            if transaction.answers_at(index) {
+                // there is room for the answers of a slot
+                let _ = self.answer.push(*byte);
+            }
+        }
+        if self.sent < transaction.out.len() {
+            self.bus.send(transaction.out, self.sent);
+            self.sent += FRAME_BYTES;
+            return;
+        }
+        self.bus.select(transaction, false);
+        self.sent = 0;
+        self.left = left;
+        if TIM2.cnt().read() > self.ends {
+            self.late();
+        } else if left.is_empty() {
+            self.word();
+        }
+    }
+
+    /// The slot's sample is not where it should be in time: the rest of the slot is left out.
+    fn late(&mut self) {
+        self.left = &[];
+        self.sent = 0;
+        LATE.fetch_add(1, Relaxed);
+        self.put(None);
+    }
+
+    /// The slot is over, and has its answer.
+    fn word(&mut self) {
+        self.left = &[];
+        self.sent = 0;
+        let word = self.finger.decode(self.begun.wrapping_sub(1), &self.answer);
+        if word.is_err() {
+            let stats = &mut self.stats;
+            stats.count(&word);
+            PARITY.store(stats.parity.saturating_add(stats.padding), Relaxed);
+            let silent = stats.no_sensor;
+            ERROR_FRAMES.store(stats.error_frames.saturating_add(silent), Relaxed);
+        }
+        self.put(word.ok());
+    }
+
+    fn put(&mut self, word: Word) {
+        self.gap = self
+            .words
+            .enqueue(if self.gap { None } else { word })
+            .is_err();
+        if self.gap {
+            LOST.fetch_add(1, Relaxed);
+        }
+    }
+}

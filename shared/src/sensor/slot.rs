@@ -1,0 +1,102 @@
+//! What is done on the bus in a slot, as plain data: chip selects, bytes and gaps. Who does it has the bus: a driver over
+//! embedded-hal ([`Driver`](crate::sensor::Driver)), the firmware's interrupts, a simulated finger.
+
+use core::ops::RangeInclusive;
+
+use embedded_hal::spi::Mode;
+
+/// A part of a finger as the bus sees it: what has a chip select of its own.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Port {
+    /// Polarity and phase of the clock.
+    pub mode: Mode,
+    /// Clocks that the part works with, Hz.
+    pub clock_hz: RangeInclusive<u32>,
+}
+
+/// One period of chip select, and the pause after it. Most significant bit first.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Transaction {
+    /// Whose chip select: an index into [`PressureSensor::PORTS`](crate::sensor::PressureSensor::PORTS).
+    pub port: u8,
+    /// Bytes to send, at most [`MAX_BYTES`]; as many come in meanwhile.
+    pub out: &'static [u8],
+    /// So many of those that come in are the answer: the last ones.
+    pub answer: u8,
+    /// Shortest time from here, with chip select high, to the next transaction of this slot or of the next one, us.
+    pub gap_us: u32,
+}
+
+/// Most bytes of a transaction, and of the answers of a slot.
+pub const MAX_BYTES: usize = 16;
+
+/// The answers of a slot's transactions, one after the other.
+pub type Answer = heapless::Vec<u8, MAX_BYTES>;
+
+impl Transaction {
+    /// A transaction with the first part of a finger.
+    pub const fn first_port(out: &'static [u8], answer: u8, gap_us: u32) -> Self {
+        Self {
+            port: 0,
+            out,
+            answer,
+            gap_us,
+        }
+    }
+
+    /// Whether the byte at an index belongs to the answer.
+    pub const fn answers_at(&self, index: usize) -> bool {
+        index + self.answer as usize >= self.out.len()
+    }
+
+    /// Puts the bytes to send into a buffer: they are what a transfer in place needs.
+    pub(super) fn bytes<'a>(&self, buffer: &'a mut [u8; MAX_BYTES]) -> &'a mut [u8] {
+        let bytes = buffer.get_mut(..self.out.len()).unwrap_or_default();
+        bytes
+            .iter_mut()
+            .zip(self.out)
+            .for_each(|(to, from)| *to = *from);
+        bytes
+    }
+
+    /// Adds what belongs to the answer of the bytes that came in.
+    pub(super) fn add_to(&self, answer: &mut Answer, came_in: &[u8]) {
+        let first = came_in.len().saturating_sub(self.answer.into());
+        // there is room for all answers of a slot
+        let _ = answer.extend_from_slice(came_in.get(first..).unwrap_or_default());
+    }
+}
+
+/// Does transactions one after the other, and gives their answers. `transact` gets the bytes to send and puts in their place
+/// what came in; the gap after a transaction is its business, too.
+///
+/// # Errors
+/// The first of `transact`; nothing is done after it.
+pub fn perform<E>(
+    transactions: &[Transaction],
+    mut transact: impl FnMut(&Transaction, &mut [u8]) -> Result<(), E>,
+) -> Result<Answer, E> {
+    let mut answer = Answer::new();
+    for transaction in transactions {
+        let mut buffer = [0; MAX_BYTES];
+        let bytes = transaction.bytes(&mut buffer);
+        transact(transaction, bytes)?;
+        transaction.add_to(&mut answer, bytes);
+    }
+    Ok(answer)
+}
+
+/// How long transactions and the gaps after them take, us, if a byte takes `byte_ns` and each transaction may end
+/// `slack_us` late: a slot of them has to be as long.
+pub const fn length_us(transactions: &[Transaction], byte_ns: u32, slack_us: u32) -> u32 {
+    let (mut us, mut rest) = (0, transactions);
+    while let [transaction, others @ ..] = rest {
+        let bytes_ns = transaction.out.len() as u32 * byte_ns;
+        us += bytes_ns.div_ceil(1000) + slack_us + transaction.gap_us;
+        rest = others;
+    }
+    us
+}
+
+#[cfg(test)]
+mod tests;
