@@ -58,8 +58,7 @@ pub async fn restore<F: NorFlash, R: RigHandle>(
     if let Ok(skin) = &skin {
         rig.set_skin(*skin).await;
     }
-    // a hand has none; what cannot be read is not allowed
-    let _ = rig.high_force(None, store).await;
+    rig.restore_high_force(store).await;
     if let Some(calibration) = store.calibration().await? {
         // one that was stored is not refused
         let _ = rig.set_calibration(calibration).await;

@@ -2,6 +2,7 @@
 
 use embedded_storage_async::nor_flash::NorFlash;
 
+use super::memory::Memory;
 use super::status::{RigState, TableInUse};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
@@ -47,18 +48,20 @@ pub trait RigHandle: Rig<Error = RigError> {
     /// The rig refuses it.
     async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), RigError>;
 
-    /// Allows movements of up to 2 N, or forbids them, as is `wanted` and then kept in `store`, or as is kept there. What
-    /// cannot be kept, or read, is not allowed.
+    /// Allows movements of up to 2 N, or forbids them. What the memory cannot keep is not allowed.
     ///
     /// # Errors
-    /// [`Failure::OtherProbe`]: a hand makes no such movement. The store failed.
-    async fn high_force<F: NorFlash>(
+    /// [`Failure::OtherProbe`]: a hand makes no such movement. The memory failed.
+    async fn set_high_force<F: NorFlash, B: StoredBytes<F>>(
         &mut self,
-        _wanted: Option<bool>,
-        _store: &mut Store<F>,
+        _allow: bool,
+        _memory: &mut Memory<'_, F, B>,
     ) -> Result<(), Failure> {
         Err(Failure::OtherProbe)
     }
+
+    /// Allows movements of up to 2 N if that is kept in the store.
+    async fn restore_high_force<F: NorFlash>(&mut self, _store: &mut Store<F>) {}
 
     /// Goes on from this wear of the skin.
     async fn set_skin(&mut self, skin: SkinCare);

@@ -6,7 +6,8 @@ use heapless::Vec;
 
 use super::calibrate;
 use super::explore::Random;
-use super::seams::{RigHandle, UnloadedRun};
+use super::memory::Memory;
+use super::seams::{RigHandle, StoredBytes, UnloadedRun};
 use super::status::RigState;
 use crate::dsp::Kernels;
 use crate::features::{Block, Blocks, Movement, PropertySet, SamplePhase, Slide};
@@ -268,16 +269,22 @@ impl<S: Servo> RigHandle for ServoRig<S> {
         self.servo.command(command).await.map_err(RigError::Refused)
     }
 
-    async fn high_force<F: NorFlash>(
+    async fn set_high_force<F: NorFlash, B: StoredBytes<F>>(
         &mut self,
-        wanted: Option<bool>,
-        store: &mut Store<F>,
+        allow: bool,
+        memory: &mut Memory<'_, F, B>,
     ) -> Result<(), Failure> {
-        let kept = store.keep_high_force(wanted).await;
-        let allow = RigCommand::AllowHighForce(kept.unwrap_or(false));
-        let done = self.servo.command(allow).await;
+        let kept = memory.store()?.set_high_force(allow).await;
+        let command = RigCommand::AllowHighForce(allow && kept.is_ok());
+        let done = self.servo.command(command).await;
         done.map_err(|why| Failure::Rig(RigError::Refused(why)))?;
-        kept.map(drop).map_err(Failure::from)
+        kept.map_err(Failure::from)
+    }
+
+    async fn restore_high_force<F: NorFlash>(&mut self, store: &mut Store<F>) {
+        let allow = store.high_force().await.unwrap_or(false);
+        // never refused
+        let _ = self.servo.command(RigCommand::AllowHighForce(allow)).await;
     }
 
     async fn set_skin(&mut self, skin: SkinCare) {

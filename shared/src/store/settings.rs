@@ -168,15 +168,12 @@ impl<F: NorFlash> Store<F> {
         }
     }
 
-    /// Stores whether movements may press with up to 2 N, if that is `wanted`, and says whether they may.
+    /// Stores whether movements may press with up to 2 N.
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
-    pub async fn keep_high_force(&mut self, wanted: Option<bool>) -> Result<bool, StoreError> {
-        match wanted {
-            Some(allow) => self.encode(KEY_HIGH_FORCE, &allow).await.map(|()| allow),
-            None => self.high_force().await,
-        }
+    pub async fn set_high_force(&mut self, allow: bool) -> Result<(), StoreError> {
+        self.encode(KEY_HIGH_FORCE, &allow).await
     }
 
     /// What the training of a texture has learned so far at a movement, on top of the table with this checksum, or of its

@@ -378,7 +378,7 @@ fn settings_are_kept_over_many_rounds_of_the_pages() {
         );
         assert_eq!(store.high_force().await, Ok(false));
         for allow in [true, false, true] {
-            store.keep_high_force(Some(allow)).await.unwrap();
+            store.set_high_force(allow).await.unwrap();
             store = Store::open(store.close().again()).await.unwrap();
             assert_eq!(store.high_force().await, Ok(allow));
         }

@@ -86,14 +86,18 @@ impl RigHandle for Bench {
         Ok(())
     }
 
-    async fn high_force<F: NorFlash>(
+    async fn set_high_force<F: NorFlash, B: StoredBytes<F>>(
         &mut self,
-        wanted: Option<bool>,
-        store: &mut Store<F>,
+        allow: bool,
+        memory: &mut Memory<'_, F, B>,
     ) -> Result<(), Failure> {
-        let kept = store.keep_high_force(wanted).await;
-        self.state.high_force = kept.unwrap_or(false);
-        kept.map(drop).map_err(Failure::from)
+        let kept = memory.store()?.set_high_force(allow).await;
+        self.state.high_force = allow && kept.is_ok();
+        kept.map_err(Failure::from)
+    }
+
+    async fn restore_high_force<F: NorFlash>(&mut self, store: &mut Store<F>) {
+        self.state.high_force = store.high_force().await.unwrap_or(false);
     }
 
     async fn set_skin(&mut self, skin: SkinCare) {

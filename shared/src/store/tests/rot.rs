@@ -41,7 +41,7 @@ fn stored(rounds: u8, tables: u8) -> (Ram, Vec<Range<usize>>) {
                 let share = f32::from(n + 1) * 1e-3;
                 store.set_calibration(&calibration(n)).await.unwrap();
                 store.set_false_alarm(Some(share)).await.unwrap();
-                store.keep_high_force(Some(n % 10 == 0)).await.unwrap();
+                store.set_high_force(n % 10 == 0).await.unwrap();
                 let felt = training_record("felt", Movement::FOR_FINENESS, None, n + 1);
                 store.set_training_record(&felt).await.unwrap();
                 let learned = super::cuts::self_learned(n % 2, n);
