@@ -22,6 +22,7 @@ mod rig;
 mod stack;
 mod symbols;
 mod taps;
+mod timing;
 mod upset;
 mod wave;
 
@@ -35,4 +36,5 @@ pub use record::Slide;
 pub use rig::{Output, Rig};
 pub use rigless::device::ResetCause;
 pub use stack::{StackLayout, StackLevel, StackUse};
+pub use timing::Timing;
 pub use upset::Switch;

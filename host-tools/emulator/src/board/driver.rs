@@ -11,6 +11,7 @@ use rigless::soc::stm32f427::generated::flash::Register as FlashRegister;
 use rigless::time::VirtualNanos;
 
 use super::chip::Board;
+use super::cycles::Tracer;
 use super::flash::{self, FlashWrite};
 use super::halt::Halt;
 use super::handler_profile::HandlerProfiler;
@@ -19,6 +20,7 @@ use super::pins::{self, PinId};
 use super::referee::Referee;
 use super::rig::{SharedRig, lock};
 use super::stack::Stack;
+use super::timing::{SLOT_COUNT, Timing};
 use super::upset::Switch;
 
 const SPI1_CR1: u64 = 0x4001_3000;
@@ -55,6 +57,8 @@ pub(crate) struct Driver {
     pub(crate) log: Option<Log>,
     pub(crate) stack: Option<Stack>,
     pub(crate) profiler: Option<HandlerProfiler>,
+    pub(crate) tracer: Option<Tracer>,
+    pub(crate) timing: Timing,
     /// instructions since power-up, without the time that the core slept
     pub(crate) instructions: u64,
     pub(crate) tick_ns: u64,
@@ -91,11 +95,13 @@ impl Driver {
 
     /// Brings the levels of a port's outputs to the rig.
     fn port(&mut self, board: &mut Board, now_ns: u64, port: usize) {
+        let mut command_ends = false;
         let rig = self.rig.clone();
         let mut rig = lock(&rig);
         let mut at = |pin: PinId| (pin.port() == port).then(|| board.level(pin));
-        if let Some(high) = at(pins::SENSOR_CS) {
-            rig.select_sensor(now_ns, !high);
+        let select = at(pins::SENSOR_CS);
+        if select.is_some_and(|high| rig.select_sensor(now_ns, !high)) {
+            command_ends = true;
         }
         // DIR before EN and STEP, as it is set before them
         if let Some(high) = at(pins::LEVER_DIR) {
@@ -117,6 +123,10 @@ impl Driver {
         if pins::STAGE_PWM.port() == port {
             let level = by_port(board, pins::STAGE_PWM, pins::TIM3_4_FUNCTION);
             rig.stage_port(now_ns, level);
+        }
+        let now = VirtualNanos(now_ns);
+        if command_ends && let Ok(count) = board.part.read(now, SLOT_COUNT, Width::W32) {
+            self.timing.command(count);
         }
     }
 
@@ -328,6 +338,12 @@ impl emulator::Driver<Board> for Driver {
         if let (Settled::Access { access, .. }, Some(referee)) = (&settled, &mut self.referee) {
             referee.access(access);
         }
+        if let Settled::Access { access, .. } = &settled {
+            self.timing.access(access);
+            if let Some(tracer) = &mut self.tracer {
+                tracer.access(access);
+            }
+        }
         match settled {
             Settled::Access { access, .. } if access.kind == AccessKind::Write => {
                 self.write(session, host, &access);
@@ -341,6 +357,9 @@ impl emulator::Driver<Board> for Driver {
                 }
                 if let Some(profiler) = &mut self.profiler {
                     profiler.hit(&hit, host);
+                }
+                if let Some(tracer) = &mut self.tracer {
+                    tracer.hit(&hit, host);
                 }
             }
             _ => {}

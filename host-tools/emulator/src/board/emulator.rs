@@ -1,5 +1,6 @@
 //! The emulator for those who use it.
 
+use std::ops::Range;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -16,6 +17,7 @@ use tactus::sim::faults::Fault;
 use tactus::sim::world::Setup;
 
 use super::chip::Board;
+use super::cycles::{CycleProfile, Tracer};
 use super::driver::{Command, Driver, Standing};
 use super::error::Error;
 use super::flash::{self, FlashWrite};
@@ -28,7 +30,8 @@ use super::referee::{Referee, Violation};
 use super::registers::register;
 use super::rig::{Rig, SharedRig, lock};
 use super::stack::{Stack, StackLayout, StackUse};
-use super::symbols::symbols;
+use super::symbols::{code, symbols};
+use super::timing::Timing;
 use super::upset::Switch;
 
 /// A reset of the chip.
@@ -50,6 +53,8 @@ pub struct Emulator {
     now_ns: u64,
     /// name, address without the Thumb bit, size in bytes
     symbols: Vec<(String, u64, u64)>,
+    /// where the image has its code
+    code: Vec<Range<u64>>,
 }
 
 impl Emulator {
@@ -59,10 +64,12 @@ impl Emulator {
             path: path.into(),
             source,
         })?;
-        let symbols = symbols(&elf).map_err(|source| Error::Elf {
+        let bad = |source| Error::Elf {
             path: path.into(),
             source,
-        })?;
+        };
+        let symbols = symbols(&elf).map_err(bad)?;
+        let code = code(&elf).map_err(bad)?;
         let block = symbols.iter().find(|(name, ..)| name == "_SEGGER_RTT");
         let log = block.and_then(|(_, address, _)| Log::new(&elf, *address));
         let mut images = vec![Image::new(path, elf, None)?];
@@ -80,6 +87,8 @@ impl Emulator {
             log,
             stack: None,
             profiler: None,
+            tracer: None,
+            timing: Timing::default(),
             instructions: 0,
             tick_ns: options.tick_ns.max(1),
             next_tick_ns: 0,
@@ -113,6 +122,7 @@ impl Emulator {
             thread: Some(thread),
             now_ns: 0,
             symbols,
+            code,
         };
         emulator.wait()?;
         emulator.with(|standing| {
@@ -450,6 +460,49 @@ impl Emulator {
             let profiler = standing.driver.profiler.as_ref();
             profiler.map_or_else(Vec::new, |profiler| profiler.handlers.clone())
         })
+    }
+
+    /// Follows every instruction from now on with the model of the core's [cycles](super::cycles), by groups of handlers at these
+    /// addresses. With a switch, those that are executed while the word at that address is not 0. Costs most of the speed.
+    pub fn trace_cycles(
+        &mut self,
+        groups: Vec<Vec<u64>>,
+        switch: Option<u64>,
+    ) -> Result<(), Error> {
+        let acr = self.register(flash::ACR)?;
+        let code = self.code.clone();
+        self.with(move |standing| {
+            let tracer = Tracer::new(
+                code,
+                &groups,
+                acr,
+                switch.map(|at| at as u32),
+                standing.host,
+            );
+            standing.driver.tracer = Some(tracer);
+        })
+    }
+
+    /// What was spent since [`Emulator::trace_cycles`] or the last call.
+    pub fn cycle_profile(&mut self) -> Result<CycleProfile, Error> {
+        self.with(|standing| {
+            let tracer = standing.driver.tracer.as_mut();
+            tracer.map(Tracer::take).unwrap_or_default()
+        })
+    }
+
+    /// What was spent since then, and an end of [`Emulator::trace_cycles`].
+    pub fn untrace_cycles(&mut self) -> Result<CycleProfile, Error> {
+        self.with(|standing| {
+            let tracer = standing.driver.tracer.take();
+            let profile = tracer.map(|tracer| tracer.stop(standing.host));
+            profile.unwrap_or_default()
+        })
+    }
+
+    /// How slots and servo kept their time since the last call.
+    pub fn timing(&mut self) -> Result<Timing, Error> {
+        self.with(|standing| std::mem::take(&mut standing.driver.timing))
     }
 
     /// Measures from now on how deep the stack gets. To be called at time 0: it paints the whole stack. Costs most of the

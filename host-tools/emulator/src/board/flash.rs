@@ -11,6 +11,9 @@ pub const STORE: Range<u64> = 0x0810_0000..0x0814_0000;
 /// The array, both banks.
 pub(crate) const ARRAY: Range<u64> = FLASH..FLASH + (2 << 20);
 
+/// The register of the wait states and the caches.
+pub(super) const ACR: u64 = 0x4002_3C00;
+
 /// CR: program, sector erase, mass erase, sector number, parallelism, start, lock.
 const PG: u64 = 1;
 const SER: u64 = 1 << 1;

@@ -23,6 +23,8 @@ pub(super) struct Running<T> {
 pub(super) struct Handlers<T> {
     addresses: Vec<u64>,
     running: Vec<Running<T>>,
+    /// Somebody else watches all code.
+    is_watched: bool,
 }
 
 impl<T> Handlers<T> {
@@ -34,9 +36,29 @@ impl<T> Handlers<T> {
             );
         }
         Self {
+            is_watched: false,
+            ..Self::among_watched(addresses)
+        }
+    }
+
+    /// Handlers in code of which every instruction is watched already.
+    pub(super) fn among_watched(addresses: Vec<u64>) -> Self {
+        Self {
             addresses,
             running: Vec::new(),
+            is_watched: true,
         }
+    }
+
+    /// Whether a handler may begin or be over at a hit.
+    pub(super) fn concerns(&self, hit: &Hit) -> bool {
+        let mut returns = self.running.iter().map(|running| running.returns_to);
+        returns.any(|at| at == hit.address) || self.addresses.contains(&hit.address)
+    }
+
+    /// The index of the handler that runs.
+    pub(super) fn running(&self) -> Option<usize> {
+        self.running.last().map(|running| running.handler)
     }
 
     /// The handler that begins at a hit.
@@ -46,7 +68,9 @@ impl<T> Handlers<T> {
 
     pub(super) fn begin(&mut self, handler: usize, sp: u32, kept: T, host: &mut dyn Host) {
         let returns_to = u64::from(word(sp + RETURN, host));
-        host.watch(Watch::Instruction(returns_to));
+        if !self.is_watched {
+            host.watch(Watch::Instruction(returns_to));
+        }
         self.running.push(Running {
             handler,
             sp,
@@ -67,7 +91,8 @@ impl<T> Handlers<T> {
         })?;
         let returns_to = ended.returns_to;
         let mut others = self.running.iter().map(|running| running.returns_to);
-        if !others.any(|at| at == returns_to) && !self.addresses.contains(&returns_to) {
+        let is_wanted = self.is_watched || others.any(|at| at == returns_to);
+        if !is_wanted && !self.addresses.contains(&returns_to) {
             host.unwatch(Watch::Instruction(returns_to));
         }
         Some(ended)

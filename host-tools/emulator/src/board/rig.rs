@@ -59,6 +59,8 @@ pub struct Rig {
     pub(super) selected_ns: u64,
     /// bytes of this select so far, and the time of the last one
     bytes: u32,
+    /// the first of them was a sample command
+    commanded: bool,
     pub(super) byte_ns: u64,
     /// last bit of MISO, for a wrong clock phase
     bit: u8,
@@ -109,6 +111,7 @@ impl Rig {
             selected: false,
             selected_ns: 0,
             bytes: 0,
+            commanded: false,
             byte_ns: 0,
             bit: 1,
             sensor_wired: false,
@@ -274,11 +277,13 @@ impl Rig {
         }
     }
 
-    pub(crate) fn select_sensor(&mut self, now_ns: u64, selected: bool) {
+    /// Whether a sample command ends with it.
+    pub(crate) fn select_sensor(&mut self, now_ns: u64, selected: bool) -> bool {
         if selected == self.selected {
-            return;
+            return false;
         }
         self.selected = selected;
+        let commanded = std::mem::take(&mut self.commanded);
         if selected {
             self.selected_ns = now_ns;
             self.bytes = 0;
@@ -286,6 +291,7 @@ impl Rig {
         } else {
             self.world.spi_deselect(now_ns);
         }
+        commanded
     }
 
     /// Whether the pins carry SPI1, and TIM4.
@@ -314,6 +320,7 @@ impl Rig {
         self.byte_ns = now_ns;
         if first && mosi & 0x80 != 0 {
             self.commands += 1;
+            self.commanded = true;
             self.recorder.command(self.selected_ns);
         }
         if too_fast || self.spi_control & CR1_LSB_FIRST != 0 {

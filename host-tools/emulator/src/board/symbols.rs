@@ -1,6 +1,18 @@
-//! Functions and variables of an ELF.
+//! Functions and variables of an ELF, and where its code is.
 
-use object::{Object as _, ObjectSymbol as _};
+use std::ops::Range;
+
+use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SectionKind};
+
+/// Addresses of code.
+pub(super) fn code(elf: &[u8]) -> object::Result<Vec<Range<u64>>> {
+    let file = object::File::parse(elf)?;
+    let code = file
+        .sections()
+        .filter(|section| section.kind() == SectionKind::Text);
+    let ranges = code.map(|section| section.address()..section.address() + section.size());
+    Ok(ranges.collect())
+}
 
 /// Functions and variables.
 pub(super) fn symbols(elf: &[u8]) -> object::Result<Vec<(String, u64, u64)>> {

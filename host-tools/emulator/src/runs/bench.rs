@@ -2,6 +2,7 @@
 //! that it counted are read, and the plain kernels do the same on this PC.
 
 mod counter;
+pub mod cycles;
 pub(crate) mod error;
 mod gates;
 mod inputs;
@@ -63,17 +64,25 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode, RunError> {
 }
 
 fn count(args: &Args) -> Result<bool, BenchError> {
-    let mut bench = Bench::start(&args.firmware.elf)?;
+    let text = args.format == Format::Text;
+    let mut bench = Bench::start(&args.firmware.elf, false)?;
     if args.growth {
         return growth(&mut bench, args.plot.as_deref());
     }
     corners(&mut bench)?;
-    let text = args.format == Format::Text;
-    bench.model = text;
+    if text {
+        bench = Bench::start(&args.firmware.elf, true)?;
+    }
     let (samples, source) = slide()?;
     let mut rows = kernels(&mut bench, &samples)?;
+    let mut slow = None;
     if let Some(rig) = &args.rig {
-        rows.extend(on_the_rig(rig)?);
+        let cycles = text.then(|| cycles::trace(rig, u64::MAX)).transpose()?;
+        rows.extend(on_the_rig(rig, cycles.as_ref())?);
+        if let Some(cycles) = cycles {
+            let by = cycles::RESERVE * cycles.worst_ratio();
+            slow = Some((cycles, cycles::slowed(rig, by)));
+        }
         let is_counted = |name: &str| rows.iter().any(|row| row.kernel == name);
         if let Some((name, ..)) = GATES.iter().find(|(name, ..)| !is_counted(name)) {
             let (kernel, what) = ((*name).to_owned(), "it has a gate and was not counted");
@@ -82,6 +91,9 @@ fn count(args: &Args) -> Result<bool, BenchError> {
     }
     if text {
         print(&rows, source);
+        if let Some((cycles, slowed)) = &slow {
+            cycles::print(cycles, slowed);
+        }
     } else {
         println!("{}", Value::from_iter(rows.iter().map(Row::json)));
     }

@@ -6,6 +6,7 @@ mod changed_cuts;
 mod commands;
 mod common;
 mod current;
+mod cycles;
 mod explore;
 mod faults;
 mod halt;

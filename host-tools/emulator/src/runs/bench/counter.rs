@@ -2,14 +2,13 @@
 
 use std::path::Path;
 
-use rand::{RngExt as _, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
 use tactus::sim::world::Setup;
 use tactus_core::dsp::{Plain, Plan};
 
 use super::error::BenchError;
 use super::workload::{self, Counter, Workload};
-use crate::board::{Emulator, Options, cycles};
+use crate::board::cycles::Spent;
+use crate::board::{Emulator, Options};
 
 /// What the chip found.
 pub(super) struct Counted {
@@ -21,12 +20,10 @@ pub(super) struct Counted {
 pub(super) struct Bench {
     emulator: Emulator,
     desk: u64,
-    /// Where the chip says that it counts.
-    counts: u64,
     plan: Plan,
     overhead: u64,
-    /// Whether cycles are estimated.
-    pub(super) model: bool,
+    /// Whether each instruction goes through the model of the cycles.
+    traces: bool,
 }
 
 /// Offsets in the bench image's `Desk`.
@@ -38,8 +35,6 @@ const INPUT_BYTES: u64 = 2 * 8192;
 const TABLE_AT: u64 = 0x0812_0000;
 const CHIPS_TURN: u32 = 1;
 const DONE: u32 = 2;
-/// Samples of what is running, of which the cycles are estimated: their error is 1 to 2 %.
-const SAMPLES: usize = 2000;
 /// Longest that a workload takes, virtual ns.
 const PATIENCE_NS: u64 = 60_000_000_000;
 
@@ -60,31 +55,30 @@ fn unsuitable(workload: Workload, what: &'static str) -> BenchError {
 }
 
 impl Bench {
-    /// Boots the bench image. Cycles are estimated once `model` is set.
-    pub(super) fn start(elf: &Path) -> Result<Self, BenchError> {
+    /// Boots the bench image, to count cycles, too, where it `traces`.
+    pub(super) fn start(elf: &Path, traces: bool) -> Result<Self, BenchError> {
         let mut emulator = Emulator::start(elf, Setup::default(), Options::default())?;
         let (desk, _) = emulator.symbol("BENCH_DESK")?;
+        // where the chip says that it counts
         let (counts, _) = emulator.symbol("BENCH_COUNTS")?;
         // the clocks are up by then
         emulator.run_ms(20)?;
+        if traces {
+            emulator.trace_cycles(Vec::new(), Some(counts))?;
+        }
         let mut bench = Self {
             emulator,
             desk,
-            counts,
             plan: Plan::new(),
             overhead: 0,
-            model: false,
+            traces,
         };
         bench.overhead = bench.send(Workload::Nothing, &[], &[])?.0;
         Ok(bench)
     }
 
     fn word(&mut self, offset: u64) -> Result<u32, BenchError> {
-        self.word_at(self.desk + offset)
-    }
-
-    fn word_at(&mut self, address: u64) -> Result<u32, BenchError> {
-        let bytes = self.emulator.read(address, 4)?;
+        let bytes = self.emulator.read(self.desk + offset, 4)?;
         Ok(u32::from_le_bytes(bytes.try_into().unwrap_or_default()))
     }
 
@@ -139,43 +133,6 @@ impl Bench {
         Ok((instructions.into(), results))
     }
 
-    /// Cycles that an instruction of a workload takes in the mean, by samples of what is running.
-    fn cycles_per_instruction(
-        &mut self,
-        workload: Workload,
-        table: &[u8],
-        words: &[i16],
-        instructions: u64,
-    ) -> Result<f64, BenchError> {
-        let mut random = ChaCha8Rng::seed_from_u64(3);
-        // 6 ns an instruction
-        let lasts_ns = 6 * instructions;
-        let (mut samples, mut cycles) = (0, 0);
-        while samples < SAMPLES {
-            self.begin(workload, table, words)?;
-            loop {
-                let counts = self.word_at(self.counts)? != 0;
-                let step = if counts {
-                    if let Some(address) = self.emulator.program_counter()? {
-                        let code = self.emulator.read(address.into(), 4)?;
-                        let half = |at| u16::from_le_bytes([code[at], code[at + 1]]);
-                        cycles += cycles::cycles(half(0), half(2));
-                        samples += 1;
-                    }
-                    let mean = (lasts_ns / SAMPLES as u64).clamp(60, 20_000);
-                    random.random_range(mean / 2..mean * 3 / 2)
-                } else {
-                    // not over it
-                    (lasts_ns / 4).clamp(1000, 100_000)
-                };
-                if self.step(workload, step)? {
-                    break;
-                }
-            }
-        }
-        Ok(f64::from(cycles) / samples as f64)
-    }
-
     /// Counts a workload, and holds its results against the plain kernels'.
     pub(super) fn count(
         &mut self,
@@ -183,18 +140,17 @@ impl Bench {
         table: &[u8],
         words: &[i16],
     ) -> Result<Counted, BenchError> {
+        // what the one before has left
+        self.emulator.cycle_profile()?;
         let (instructions, results) = self.send(workload, table, words)?;
+        let spent: Spent = self.emulator.cycle_profile()?.total(0..1);
         let mut expected = Vec::new();
         let mut put = |bytes: &[u8]| expected.extend_from_slice(bytes);
         workload::run::<Plain>(workload, &self.plan, table, words, &mut Uncounted, &mut put)
             .ok_or_else(|| unsuitable(workload, "its words make no sense"))?;
         let instructions = instructions.saturating_sub(self.overhead);
-        let cycles = if self.model {
-            let each = self.cycles_per_instruction(workload, table, words, instructions)?;
-            Some(each * instructions as f64)
-        } else {
-            None
-        };
+        // the few instructions round them are told apart by what they take on the average
+        let cycles = self.traces.then(|| spent.ratio() * instructions as f64);
         Ok(Counted {
             instructions,
             cycles,

@@ -6,6 +6,7 @@ use tactus::sim::world::Setup;
 use tactus_core::rig::lever::RETRACT_STEPS_S;
 use tactus_core::wire::{Command, Event, Identify, Phase};
 
+use super::cycles::{CORE_HZ, Cycles};
 use super::error::BenchError;
 use super::gates::gate;
 use super::row::Row;
@@ -14,7 +15,6 @@ use crate::host::talk::Talk;
 
 /// Longest that the rig takes for anything, virtual seconds.
 const TIMEOUT_S: f64 = 120.0;
-const CORE_HZ: f64 = 168e6;
 
 /// The last sample is up to a tick of 1 ms old when the servo has the lever step up, and the first step comes a period of
 /// its rate later.
@@ -28,8 +28,8 @@ fn first_step_up(board: &mut Emulator, since_ns: u64) -> Option<u64> {
     })
 }
 
-/// Load and latency of the rig's image while it makes a slide.
-pub(super) fn on_the_rig(elf: &Path) -> Result<Vec<Row>, BenchError> {
+/// Load and latency of the rig's image while it makes a slide; the cycles are of another run.
+pub(super) fn on_the_rig(elf: &Path, cycles: Option<&Cycles>) -> Result<Vec<Row>, BenchError> {
     let options = Options {
         trace_s: 2,
         ..Options::default()
@@ -88,11 +88,11 @@ pub(super) fn on_the_rig(elf: &Path) -> Result<Vec<Row>, BenchError> {
     let slots = timer.runs as f64 / 2.0;
     let seconds = (over.0 - begun.0) as f64 * 1e-9;
     let busy = (over.1 - begun.1) as f64 / (seconds * CORE_HZ);
-    let row = |kernel: &str, unit, measured| Row {
+    let row = |kernel: &str, unit, measured, cycles| Row {
         kernel: kernel.into(),
         unit,
         instructions: measured,
-        cycles: None,
+        cycles,
         gate: gate(kernel),
         cmsis: None,
         floor: None,
@@ -107,12 +107,22 @@ pub(super) fn on_the_rig(elf: &Path) -> Result<Vec<Row>, BenchError> {
     let ([begins, asks], [answered, sent]) = (turns(&timer), turns(&bus));
     let late_ms = (told_ns + BEFORE_STEP_NS - lifts_ns) as f64 * 1e-6;
     Ok(vec![
-        row("slot, not waiting", "slot", slot),
-        row("- begins, command goes out", "slot", begins),
-        row("- command is over", "slot", sent),
-        row("- answer is asked for", "slot", asks),
-        row("- answer is over, decoded, queued", "slot", answered),
-        row("core busy during a slide", "% at 168 MHz", 100.0 * busy),
-        row("last sample to the verdict on the link", "ms", late_ms),
+        row("slot, not waiting", "slot", slot, cycles.map(Cycles::of_slot)),
+        row("- begins, command goes out", "slot", begins, None),
+        row("- command is over", "slot", sent, None),
+        row("- answer is asked for", "slot", asks, None),
+        row("- answer is over, decoded, queued", "slot", answered, None),
+        row(
+            "core busy during a slide",
+            "% at 168 MHz",
+            100.0 * busy,
+            cycles.map(|cycles| 100.0 * cycles.busy()),
+        ),
+        row(
+            "last sample to the verdict on the link",
+            "ms",
+            late_ms,
+            None,
+        ),
     ])
 }

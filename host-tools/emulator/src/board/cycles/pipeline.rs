@@ -1,0 +1,203 @@
+//! The core's pipeline: what one instruction after the other takes.
+
+use super::accelerator::Accelerator;
+use super::instruction::{Access, Address, Branch, Instruction};
+
+/// Cycles in which the pipeline is filled anew, of the manual's 1 to 3: the target is fetched early if the instruction has it, and
+/// takes a cycle more if it is of 32 bits across two words.
+const REFILL_DIRECT: u64 = 1;
+const REFILL_INDIRECT: u64 = 2;
+/// Into an exception's handler, back from it, and from one to the next.
+const ENTRY: u64 = 12;
+const RETURN: u64 = 10;
+const TAIL_CHAIN: u64 = 6;
+/// S0 to S15 and FPSCR, put aside at the first instruction of a handler for the FPU, and brought back at its end.
+const FLOATS: u64 = 17;
+
+/// The flash, and where it is seen after a boot from it.
+const FLASH: std::ops::Range<u32> = 0x0800_0000..0x0820_0000;
+const ALIAS: std::ops::Range<u32> = 0..0x0020_0000;
+/// The buses of peripherals at 42 and at 84 MHz, and those at the core's clock.
+const APB1: std::ops::Range<u32> = 0x4000_0000..0x4001_0000;
+const APB2: std::ops::Range<u32> = 0x4001_0000..0x4002_0000;
+const AHB: std::ops::Range<u32> = 0x4002_0000..0x6000_0000;
+/// Waits for an access there: two cycles of the bus, and up to one until it begins. On the core's own clock, one.
+const APB1_WAIT: u64 = 3 * 4;
+const APB2_WAIT: u64 = 3 * 2;
+const AHB_WAIT: u64 = 1;
+
+fn is_flash(address: u32) -> bool {
+    FLASH.contains(&address) || ALIAS.contains(&address)
+}
+
+/// An instruction that was executed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Executed {
+    /// Its address.
+    pub at: u32,
+    /// Its halves; of a short one, and what follows it.
+    pub code: [u16; 2],
+    /// The address of the next one.
+    pub next: u32,
+    /// Where it read or wrote, if it did and it is known. The address of a literal need not be told.
+    pub data: Option<u32>,
+}
+
+/// What the last instruction leaves for the next one.
+#[derive(Clone, Copy, Default, Debug)]
+struct Before {
+    /// It loaded this register of the core.
+    loads: Option<u8>,
+    /// It computed this one of the FPU.
+    float: Option<u8>,
+    /// It branched.
+    branched: bool,
+}
+
+/// A core that has executed instructions so far.
+#[derive(Clone, Debug)]
+pub struct Core {
+    flash: Accelerator,
+    cycles: u64,
+    before: Before,
+    /// For each handler that runs, whether it has used the FPU.
+    handlers: Vec<bool>,
+}
+
+impl Core {
+    /// In thread mode, with such a flash.
+    pub fn new(flash: Accelerator) -> Self {
+        Self {
+            flash,
+            cycles: 0,
+            before: Before::default(),
+            handlers: Vec::new(),
+        }
+    }
+
+    /// Cycles of all that it executed.
+    pub fn cycles(&self) -> u64 {
+        self.cycles
+    }
+
+    fn fetch(&mut self, address: u32) {
+        if is_flash(address) {
+            self.cycles += self.flash.fetch(address, self.cycles);
+        }
+    }
+
+    /// Executes an instruction; its cycles.
+    pub fn execute(&mut self, executed: &Executed) -> u64 {
+        self.run(executed, Instruction::decode(executed.code))
+    }
+
+    /// Executes an instruction that is decoded already.
+    pub(super) fn run(&mut self, executed: &Executed, instruction: Instruction) -> u64 {
+        let began = self.cycles;
+        self.fetch(executed.at);
+        self.fetch(executed.at + instruction.length - 2);
+        if self.before.branched && instruction.length == 4 && !executed.at.is_multiple_of(4) {
+            self.cycles += 1;
+        }
+        if let Some(float) = instruction.float {
+            let is_awaited = |source: &Option<u8>| source.is_some() && *source == self.before.float;
+            if float.sources.iter().any(is_awaited) {
+                self.cycles += 1;
+            }
+            if let Some(used @ false) = self.handlers.last_mut() {
+                *used = true;
+                self.cycles += FLOATS;
+            }
+        }
+        let access = instruction.access.as_ref();
+        let follows_load = access.is_some_and(|access| self.is_pipelined(access, &instruction));
+        // the address goes out in the first cycle, the data come in the next
+        let issued = self.cycles + 1;
+        self.cycles += u64::from(instruction.cycles) - u64::from(follows_load);
+        if let Some(access) = access {
+            self.cycles += self.wait(executed, access, issued);
+        }
+        let branched = executed.next != executed.at + instruction.length;
+        if branched {
+            self.cycles += match instruction.branch {
+                Branch::Direct => REFILL_DIRECT,
+                Branch::Indirect => REFILL_INDIRECT,
+                Branch::No => 0,
+            };
+        }
+        self.before = Before {
+            branched,
+            loads: instruction.loads,
+            float: instruction.float.and_then(|float| float.result),
+        };
+        self.cycles - began
+    }
+
+    /// Whether it shares a cycle with the load before it: its address does not depend on what that loads.
+    fn is_pipelined(&self, access: &Access, instruction: &Instruction) -> bool {
+        let Some(loaded) = self.before.loads else {
+            return false;
+        };
+        let depends = match access.address {
+            Address::Literal(_) => false,
+            Address::Based { base, .. } => base == loaded,
+            Address::Indexed { base, index, .. } => base == loaded || index == loaded,
+        };
+        let is_single = access.words == 1 && instruction.branch == Branch::No;
+        is_single && instruction.cycles > 1 && !depends
+    }
+
+    /// Cycles that a load or store waits for memory.
+    fn wait(&mut self, executed: &Executed, access: &Access, issued: u64) -> u64 {
+        let address = match access.address {
+            Address::Literal(offset) => Some(literal(executed.at, offset)),
+            _ => executed.data,
+        };
+        let Some(address) = address else { return 0 };
+        let one = |wait| wait * u64::from(access.words);
+        if APB1.contains(&address) {
+            one(APB1_WAIT)
+        } else if APB2.contains(&address) {
+            one(APB2_WAIT)
+        } else if AHB.contains(&address) {
+            one(AHB_WAIT)
+        } else if is_flash(address) && access.is_load {
+            let words = (0..access.words).map(|word| address.wrapping_add(4 * word));
+            let mut waited = 0;
+            for (address, word) in words.zip(0u64..) {
+                waited += self.flash.load(address, issued + word + waited);
+            }
+            waited
+        } else {
+            0
+        }
+    }
+
+    /// A handler begins, by the vector at an address; after the return from another one it is `chained`. Its cycles.
+    pub fn enter(&mut self, vector: u32, chained: bool) -> u64 {
+        let began = self.cycles;
+        self.fetch(vector);
+        self.cycles += if chained { TAIL_CHAIN } else { ENTRY };
+        self.handlers.push(false);
+        self.before = Before::default();
+        self.cycles - began
+    }
+
+    /// A handler is over; cycles until what it interrupted goes on, none if another handler is next.
+    pub fn leave(&mut self, chained: bool) -> u64 {
+        let began = self.cycles;
+        let used = self.handlers.pop() == Some(true);
+        self.cycles += if chained { 0 } else { RETURN };
+        self.cycles += if used { FLOATS } else { 0 };
+        self.before = Before::default();
+        self.cycles - began
+    }
+}
+
+/// Where a literal is, from an instruction and its offset.
+fn literal(at: u32, offset: i32) -> u32 {
+    ((at + 4) & !3).wrapping_add_signed(offset)
+}
+
+#[cfg(test)]
+mod tests;
