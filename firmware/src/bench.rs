@@ -14,7 +14,10 @@ use crate::board;
 use crate::chip::Chip;
 use crate::chip::rescue;
 
+mod silicon;
 pub mod workload;
+
+pub use silicon::silicon;
 
 const WORDS: usize = 8192;
 const RESULTS: usize = 9000;

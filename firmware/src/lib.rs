@@ -12,7 +12,7 @@ mod rig;
 mod selftest;
 mod tasks;
 
-pub use bench::{bench, workload};
+pub use bench::{bench, silicon, workload};
 pub use handheld::handheld;
 pub use rig::rig;
 pub use selftest::selftest;

@@ -82,11 +82,7 @@ impl Current {
         let left = stream.ndtr().read().ndt();
         // a stream that was switched off says so of itself, too
         let runs = stream.cr().read().en();
-        let filled = runs && DMA2.isr(STREAM / 4).read().tcif(STREAM);
-        if filled {
-            DMA2.ifcr(STREAM / 4).write(|w| w.set_tcif(STREAM, true));
-            self.whole = true;
-        }
+        let filled = runs && self.turns();
         // as many conversions as there is room for leave the count as it was
         if !runs || left == self.left && !filled {
             self.start();
@@ -95,6 +91,16 @@ impl Current {
         self.left = left;
         self.whole
             .then(|| core::array::from_fn(|at| RING.get(at).map_or(0, |code| code.load(Relaxed))))
+    }
+
+    /// Whether the ring was filled since the last look.
+    pub(crate) fn turns(&mut self) -> bool {
+        let filled = DMA2.isr(STREAM / 4).read().tcif(STREAM);
+        if filled {
+            DMA2.ifcr(STREAM / 4).write(|w| w.set_tcif(STREAM, true));
+            self.whole = true;
+        }
+        filled
     }
 
     /// The mean current, A; see [`Current::ring`].

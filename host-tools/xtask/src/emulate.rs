@@ -120,6 +120,7 @@ pub(crate) fn with_images<'t>(
     let images = [
         ("TACTUS_ELF", RIG),
         ("TACTUS_SELFTEST_ELF", "tactus-selftest"),
+        ("TACTUS_SILICON_ELF", "tactus-silicon"),
         ("TACTUS_HANDHELD_ELF", HANDHELD),
     ];
     for (variable, name) in images {

@@ -13,12 +13,22 @@ use crate::toolchain;
 const PROFILES: [(&str, &[&str]); 2] = [
     (
         "firmware",
-        &["tactus-rig", "tactus-selftest", "tactus-bench"],
+        &[
+            "tactus-rig",
+            "tactus-selftest",
+            "tactus-silicon",
+            "tactus-bench",
+        ],
     ),
     ("handheld", &["tactus-handheld"]),
 ];
 /// The images that are flashed. The bench image is for the emulated board only.
-const FLASHED: [&str; 3] = ["tactus-rig", "tactus-selftest", "tactus-handheld"];
+const FLASHED: [&str; 4] = [
+    "tactus-rig",
+    "tactus-selftest",
+    "tactus-silicon",
+    "tactus-handheld",
+];
 
 /// Builds every image of the firmware that is flashed and says what came out; the ELFs.
 pub(crate) fn build() -> Result<Vec<PathBuf>> {

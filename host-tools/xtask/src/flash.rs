@@ -13,6 +13,7 @@ pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask flash                            the rig's firmware
   cargo xtask flash --self-test                test board and rig instead, with a report; take the finger off before
+  cargo xtask flash --test                     what only the chip can answer: kernels, cycles, flash, DMA; needs no rig
   cargo xtask flash -- --probe 0483:374b:SER   if there are several probes: `probe-rs list` names them";
 
 /// The chip's name in probe-rs; .cargo/config.toml has it too.
@@ -23,6 +24,9 @@ pub(crate) struct Options {
     /// Flash the self-test and show its report until it is stopped with Ctrl-C
     #[arg(long)]
     self_test: bool,
+    /// Flash the tests of the chip alone, show their results, and fail if one of them does
+    #[arg(long, conflicts_with = "self_test")]
+    test: bool,
     /// Build, and print what would be run
     #[arg(long)]
     dry_run: bool,
@@ -32,15 +36,17 @@ pub(crate) struct Options {
 }
 
 pub(crate) fn flash(options: &Options) -> Result<()> {
-    let wanted = if options.self_test {
-        "tactus-selftest"
-    } else {
-        "tactus-rig"
+    let wanted = match options {
+        Options {
+            self_test: true, ..
+        } => "tactus-selftest",
+        Options { test: true, .. } => "tactus-silicon",
+        _ => "tactus-rig",
     };
     let elves = firmware::elves()?;
     let elf = firmware::image(&elves, wanted)?;
     run(&mut command(options, elf))?;
-    if !options.self_test && !options.dry_run {
+    if !options.is_watched() && !options.dry_run {
         println!(
             "The firmware runs. Its log: probe-rs attach --chip {CHIP} {}",
             firmware::shown(elf)
@@ -49,13 +55,20 @@ pub(crate) fn flash(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// `tactus device flash` does it: the self-test stays attached for its report, the rig is left alone.
+impl Options {
+    /// Whether the image has a report.
+    fn is_watched(&self) -> bool {
+        self.self_test || self.test
+    }
+}
+
+/// `tactus device flash` does it: it stays attached for a report, and ends as the image ends; the rig is left alone.
 fn command(options: &Options, elf: &Path) -> Command {
     let mut tactus = cargo();
     tactus.args(["run", "--quiet", "--release", "--package", "tactus", "--"]);
     tactus.args(["device", "flash"]).arg(elf);
     for (flag, wanted) in [
-        ("--attach", options.self_test),
+        ("--attach", options.is_watched()),
         ("--dry-run", options.dry_run),
     ] {
         if wanted {
@@ -73,10 +86,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_rig_is_left_alone_and_the_self_test_is_watched() {
-        let line = |self_test, options: &[&str]| {
+    fn the_rig_is_left_alone_and_what_reports_is_watched() {
+        let line = |watched, options: &[&str]| {
+            let [self_test, test] = watched;
             let options = Options {
                 self_test,
+                test,
                 dry_run: false,
                 options: options.iter().map(OsString::from).collect(),
             };
@@ -85,11 +100,12 @@ mod tests {
             words.join(" ")
         };
         let run = "run --quiet --release --package tactus -- device flash t/elf";
-        assert_eq!(line(false, &[]), run);
+        assert_eq!(line([false, false], &[]), run);
         assert_eq!(
-            line(true, &["--probe", "0483:374b"]),
+            line([true, false], &["--probe", "0483:374b"]),
             format!("{run} --attach -- --probe 0483:374b")
         );
+        assert_eq!(line([false, true], &[]), format!("{run} --attach"));
     }
 
     #[test]

@@ -21,5 +21,6 @@ mod serve;
 mod settings;
 mod silicon;
 mod slots;
+mod silicon_image;
 mod teach;
 mod verify;

@@ -1,0 +1,107 @@
+//! The image with what only silicon can answer, as far as the emulated board answers it: its kernels are compared to the bit, its
+//! timers and its flash are models'.
+
+use tactus::sim::world::Setup;
+use tactus_emulator::board::cycles::Spent;
+use tactus_emulator::board::{Emulator, FLASH, Options};
+
+use crate::common::elf_of;
+
+/// How far a kernel's cycles by the image may be off the model's: a compiler's next version changes them.
+const OFF: f64 = 0.05;
+
+/// More than the image takes, bytes.
+const IMAGE: u64 = 256 * 1024;
+
+/// Runs the image to its end; `each` sees its lines.
+fn run(board: &mut Emulator, mut each: impl FnMut(&mut Emulator, &str)) -> Vec<String> {
+    let mut log: Vec<String> = Vec::new();
+    while !log.iter().any(|line| line.contains("SILICON")) {
+        assert!(board.now_ns() < 60_000_000_000, "no end: {log:#?}");
+        board.run_ms(1).unwrap();
+        for (_, line) in board.log().unwrap() {
+            each(board, &line);
+            log.push(line);
+        }
+    }
+    eprintln!("{}", log.join("\n"));
+    log
+}
+
+fn start() -> Option<Emulator> {
+    let elf = elf_of("TACTUS_SILICON_ELF")?;
+    let board = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
+    Some(board)
+}
+
+fn failed(log: &[String]) -> Vec<&str> {
+    let failed = log.iter().filter_map(|line| line.split_once("FAIL "));
+    failed
+        .map(|(_, line)| line.split(": ").next().unwrap())
+        .collect()
+}
+
+#[test]
+fn an_intact_chip_passes_and_its_kernels_take_what_the_image_says() {
+    let Some(mut board) = start() else { return };
+    let (counts, _) = board.symbol("BENCH_COUNTS").unwrap();
+    // its clocks are up, and it waits for a probe
+    board.run_ms(15).unwrap();
+    board.trace_cycles(Vec::new(), Some(counts)).unwrap();
+    let mut kernels = Vec::new();
+    let log = run(&mut board, |board, line| {
+        // "PASS cycles: 123 of NAME, 456 by the model"
+        let Some((_, said)) = line.split_once("cycles: ") else {
+            return;
+        };
+        let Some((_, said)) = said.split_once(" of ") else {
+            return;
+        };
+        let (name, rest) = said.rsplit_once(", ").unwrap();
+        let modelled: f64 = rest.split(' ').next().unwrap().parse().unwrap();
+        let spent: Spent = board.cycle_profile().unwrap().total(0..1);
+        kernels.push((name.to_owned(), modelled, spent));
+    });
+    assert_eq!(failed(&log), [""; 0]);
+    assert_eq!(board.violations().unwrap(), []);
+    assert_eq!(kernels.len(), 13);
+    for (name, modelled, spent) in &kernels {
+        eprintln!("{name}: {spent:?}");
+        let off = spent.cycles as f64 / modelled - 1.0;
+        assert!(
+            off.abs() < OFF,
+            "{name}: {} cycles, the image says {modelled}",
+            spent.cycles
+        );
+    }
+}
+
+/// Half-words of code in the chip's flash.
+fn code(board: &mut Emulator) -> Vec<u16> {
+    let bytes = board.read(FLASH, IMAGE).unwrap();
+    let pairs = bytes.as_chunks().0.iter();
+    pairs.map(|pair| u16::from_le_bytes(*pair)).collect()
+}
+
+/// SMLAD with its halves crossed, SMLADX, in all places: nobody but the kernels in assembly has it.
+#[test]
+fn a_wrong_kernel_fails() {
+    let Some(mut board) = start() else { return };
+    let code = code(&mut board);
+    let mut crossed = 0;
+    for (at, pair) in code.windows(2).enumerate() {
+        let is_smlad = pair[0] & 0xFFF0 == 0xFB20 && pair[1] & 0x00F0 == 0 && pair[1] < 0xF000;
+        if is_smlad {
+            let second = (pair[1] | 0x10).to_le_bytes();
+            board.write(FLASH + 2 * at as u64 + 2, &second).unwrap();
+            crossed += 1;
+        }
+    }
+    assert!(crossed > 10, "{crossed} SMLAD");
+    let log = run(&mut board, |_, _| ());
+    let failed = failed(&log);
+    for name in ["band power", "slide"] {
+        assert!(failed.contains(&name), "{name}: {failed:?}");
+    }
+    assert!(log.last().unwrap().contains("SILICON FAILED"));
+}
