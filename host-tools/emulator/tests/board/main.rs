@@ -20,7 +20,7 @@ mod selftest;
 mod serve;
 mod settings;
 mod silicon;
-mod slots;
 mod silicon_image;
+mod slots;
 mod teach;
 mod verify;

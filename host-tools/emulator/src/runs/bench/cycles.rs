@@ -22,8 +22,8 @@ pub const COMMAND_US: f64 = 10.0;
 /// Longest that the rig takes for a slide, virtual seconds.
 const TIMEOUT_S: f64 = 120.0;
 
-/// Acquisition: the slots' timer and their executor; the servo's executor.
-const ACQUISITION: [&str; 2] = ["TIM2", "UART4"];
+/// Acquisition: the slots' timer and their bus; the servo's executor.
+const ACQUISITION: [&str; 2] = ["TIM2", "SPI1"];
 const SERVO: [&str; 1] = ["UART5"];
 
 /// What one of the tasks takes.

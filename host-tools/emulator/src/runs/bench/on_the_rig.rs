@@ -107,7 +107,12 @@ pub(super) fn on_the_rig(elf: &Path, cycles: Option<&Cycles>) -> Result<Vec<Row>
     let ([begins, asks], [answered, sent]) = (turns(&timer), turns(&bus));
     let late_ms = (told_ns + BEFORE_STEP_NS - lifts_ns) as f64 * 1e-6;
     Ok(vec![
-        row("slot, not waiting", "slot", slot, cycles.map(Cycles::of_slot)),
+        row(
+            "slot, not waiting",
+            "slot",
+            slot,
+            cycles.map(Cycles::of_slot),
+        ),
         row("- begins, command goes out", "slot", begins, None),
         row("- command is over", "slot", sent, None),
         row("- answer is asked for", "slot", asks, None),
