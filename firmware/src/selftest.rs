@@ -3,18 +3,16 @@
 //! Motors move only after all switches were seen closed and somebody squeezed the finger in the hand, and no further than a
 //! bound: the finger must be off its mount, its cable on. P_DC is watched while the lever moves. The watchdog comes last: it starts the chip again, and the next start says whether it did.
 use cortex_m::peripheral::DWT;
-use embassy_stm32::flash::Flash;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::pac::{FLASH, GPIOA, RCC, gpio::vals::Idr, rcc::vals::Sw};
 use embassy_time::{Duration, Timer, block_for};
-use tactus_core::store::Store;
 use tactus_core::wire::Reset;
 
 use self::account::{Account, CORE_HZ, Kept, keep, ready};
 use self::rig::rig;
 use self::sensor::sensor;
 use crate::board;
-use crate::chip::{rescue, watchdog};
+use crate::chip::{flash, rescue, watchdog};
 
 mod account;
 mod rig;
@@ -140,12 +138,9 @@ fn brown_out() {
 }
 
 /// Writes the skin's record as it is and reads it again: nothing else is changed, and nothing at all where it is not read.
-async fn store(flash: board::Storage, account: &mut Account) {
-    let flash = Flash::new(flash.flash, board::Irqs)
-        .into_regions()
-        .bank2_region1;
+async fn store(pins: board::Storage, account: &mut Account) {
     const REMEDY: &str = "Nothing was erased. Report this line; the rig works without a store but forgets at power-off";
-    let mut store = match Store::open(flash).await {
+    let mut store = match flash::open(pins).await {
         Ok(store) => store,
         Err(why) => {
             account.check(false, "store", why, REMEDY);

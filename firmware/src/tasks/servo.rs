@@ -1,6 +1,7 @@
 //! A thousand times a second: the pins into [`Control`], what it says to the pins, and the samples of the slide on their
 //! way to the features. Lever, stage and guard live in the core; here is only where their pins are.
 use core::cell::Cell;
+use core::mem;
 use core::sync::atomic::Ordering::Relaxed;
 use core::sync::atomic::{AtomicBool, AtomicU32};
 
@@ -181,7 +182,7 @@ pub(crate) async fn servo(
     watchdog::tighten(watchdog);
 
     let mut control = Control::new(StageConstants::REFERENCE, UNMEASURED, Unguarded::default());
-    let mut ended = None;
+    let (mut ended, mut remembered) = (None, false);
     let mut count: i32 = 0;
     let mut hung = None;
     let (mut current_a, mut no_current_ms) = (0.0, 0);
@@ -260,7 +261,12 @@ pub(crate) async fn servo(
             cell.set(RigState::of(&mut control, steps, current_a, ended));
         });
         match hung {
-            Some(why) if control.is_at_rest() => rescue::remember(why),
+            Some(why) if control.is_at_rest() => {
+                // once: the reset may come while it is written
+                if !mem::replace(&mut remembered, true) {
+                    rescue::remember(why);
+                }
+            }
             _ => watchdog::pet(),
         }
     }

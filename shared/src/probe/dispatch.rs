@@ -243,7 +243,7 @@ where
                 memory.reload(events).await;
                 Ok(())
             }
-            Command::SetHighForce(allow) => rig.set_high_force(*allow, memory).await,
+            Command::SetHighForce(allow) => rig.set_high_force(*allow, memory.store()).await,
             // answered when they came, see `receive`
             Command::Status | Command::Stop | Command::Stream(_) | Command::ReadCalibration => {
                 Ok(())

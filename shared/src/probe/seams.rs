@@ -2,13 +2,12 @@
 
 use embedded_storage_async::nor_flash::NorFlash;
 
-use super::memory::Memory;
 use super::status::{RigState, TableInUse};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::rig::{Rig, RigError};
 use crate::store::Store;
-use crate::wire::{Counts, Event, Failure};
+use crate::wire::{Counts, Event, Failure, MemoryError};
 
 /// A run of the stage without load.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -48,14 +47,14 @@ pub trait RigHandle: Rig<Error = RigError> {
     /// The rig refuses it.
     async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), RigError>;
 
-    /// Allows movements of up to 2 N, or forbids them. What the memory cannot keep is not allowed.
+    /// Allows movements of up to 2 N, or forbids them. What the store cannot keep is not allowed.
     ///
     /// # Errors
-    /// [`Failure::OtherProbe`]: a hand makes no such movement. The memory failed.
-    async fn set_high_force<F: NorFlash, B: StoredBytes<F>>(
+    /// [`Failure::OtherProbe`]: a hand makes no such movement. The store failed.
+    async fn set_high_force<F: NorFlash>(
         &mut self,
         _allow: bool,
-        _memory: &mut Memory<'_, F, B>,
+        _store: Result<&mut Store<F>, MemoryError>,
     ) -> Result<(), Failure> {
         Err(Failure::OtherProbe)
     }

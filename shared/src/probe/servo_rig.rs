@@ -6,8 +6,7 @@ use heapless::Vec;
 
 use super::calibrate;
 use super::explore::Random;
-use super::memory::Memory;
-use super::seams::{RigHandle, StoredBytes, UnloadedRun};
+use super::seams::{RigHandle, UnloadedRun};
 use super::status::RigState;
 use crate::dsp::Kernels;
 use crate::features::{Block, Blocks, Movement, PropertySet, SamplePhase, Slide};
@@ -18,7 +17,7 @@ use crate::rig::skin::SkinCare;
 use crate::rig::timeout::{MovementTimeout, Wait};
 use crate::rig::{Ended, Phase, Refused, Rig, RigError, most_mn};
 use crate::store::Store;
-use crate::wire::{Event, Failure};
+use crate::wire::{Event, Failure, MemoryError};
 
 /// How often the samples are looked after, ms.
 pub const LOOK_MS: u32 = 10;
@@ -269,12 +268,12 @@ impl<S: Servo> RigHandle for ServoRig<S> {
         self.servo.command(command).await.map_err(RigError::Refused)
     }
 
-    async fn set_high_force<F: NorFlash, B: StoredBytes<F>>(
+    async fn set_high_force<F: NorFlash>(
         &mut self,
         allow: bool,
-        memory: &mut Memory<'_, F, B>,
+        store: Result<&mut Store<F>, MemoryError>,
     ) -> Result<(), Failure> {
-        let kept = memory.store()?.set_high_force(allow).await;
+        let kept = store?.set_high_force(allow).await;
         let command = RigCommand::AllowHighForce(allow && kept.is_ok());
         let done = self.servo.command(command).await;
         done.map_err(|why| Failure::Rig(RigError::Refused(why)))?;

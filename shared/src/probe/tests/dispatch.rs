@@ -7,7 +7,9 @@ use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::rig::{Fault, Phase};
 use crate::store::{Store, StoreError};
-use crate::wire::{Command, Counts, Failure, Forget, PART, Request, Status, TextureLearned};
+use crate::wire::{
+    Command, Counts, Failure, Forget, MemoryError, PART, Request, Status, TextureLearned,
+};
 use embedded_storage_async::nor_flash::NorFlash;
 use std::boxed::Box;
 use std::string::ToString;
@@ -86,12 +88,12 @@ impl RigHandle for Bench {
         Ok(())
     }
 
-    async fn set_high_force<F: NorFlash, B: StoredBytes<F>>(
+    async fn set_high_force<F: NorFlash>(
         &mut self,
         allow: bool,
-        memory: &mut Memory<'_, F, B>,
+        store: Result<&mut Store<F>, MemoryError>,
     ) -> Result<(), Failure> {
-        let kept = memory.store()?.set_high_force(allow).await;
+        let kept = store?.set_high_force(allow).await;
         self.state.high_force = allow && kept.is_ok();
         kept.map_err(Failure::from)
     }
