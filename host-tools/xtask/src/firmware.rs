@@ -20,8 +20,12 @@ const PROFILES: [(&str, &[&str]); 2] = [
             "tactus-bench",
         ],
     ),
-    ("handheld", &["tactus-handheld"]),
+    (HANDHELD, &["tactus-handheld"]),
 ];
+const HANDHELD: &str = "handheld";
+/// At `opt-level = "z"` LLVM inlines what is worth 5 of its instructions. At 12 what is inlined is still smaller than its call
+/// more often than not: the image is 1.1 KB smaller (it grows again from 18 on).
+const HANDHELD_FLAGS: [&str; 1] = ["-Cllvm-args=--inline-threshold=12"];
 /// The images that are flashed. The bench image is for the emulated board only.
 const FLASHED: [&str; 4] = [
     "tactus-rig",
@@ -60,7 +64,12 @@ pub(crate) fn compile(images: &[&str]) -> Result<Vec<PathBuf>> {
         if wanted().count() == 0 {
             continue;
         }
-        let mut cargo = toolchain.cargo_build();
+        let flags: &[&str] = if profile == HANDHELD {
+            &HANDHELD_FLAGS
+        } else {
+            &[]
+        };
+        let mut cargo = toolchain.cargo_build(flags);
         cargo.args(["--package", "tactus-firmware", "--profile", profile]);
         cargo.args(wanted().flat_map(|image| ["--bin", image]));
         // progress and diagnostics go to stderr; stdout says where the ELFs are

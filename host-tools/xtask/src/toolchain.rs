@@ -82,7 +82,7 @@ impl Toolchain {
     /// The ELF is not to depend on who builds it and where, so RUSTFLAGS from outside do not count and folders are left out
     /// of it. Warnings are denied in the workspace only: cargo caps the lints of dependencies. The toolchains have a target
     /// folder each, so that neither builds the other's work anew.
-    pub(crate) fn cargo_build(self) -> Command {
+    pub(crate) fn cargo_build(self, flags: &[&str]) -> Command {
         let mut cargo = match self {
             Self::Active => cargo(),
             Self::Debian => debian_cargo(),
@@ -92,7 +92,7 @@ impl Toolchain {
             Self::Debian => "debian",
         };
         cargo
-            .env("CARGO_ENCODED_RUSTFLAGS", rustflags())
+            .env("CARGO_ENCODED_RUSTFLAGS", rustflags(flags))
             .args(["build", "--target", TARGET, "--target-dir"])
             .arg(target().join(folder));
         if self == Self::Debian {
@@ -112,8 +112,13 @@ impl Toolchain {
     }
 }
 
-fn rustflags() -> OsString {
+/// What every build of the firmware gets, then these.
+fn rustflags(more: &[&str]) -> OsString {
     let mut flags = OsString::from("-Dwarnings");
+    for flag in more {
+        flags.push("\x1f");
+        flags.push(flag);
+    }
     let mut leave_out = |folder: &Path, name: &str| {
         // cargo's separator: folders may have spaces
         flags.push("\x1f--remap-path-prefix=");
