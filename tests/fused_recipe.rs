@@ -441,6 +441,7 @@ fn a_learned_table_is_calibrated_as_the_recipe_says() {
         properties: Properties::new([Some(x[0] as f32), None, None]),
         bands: x[1..].iter().map(|x| (x * 1024.0) as i16).collect(),
         pressure: None,
+        pace: None,
     };
     let training: Session = (0..textures)
         .map(|texture| (0..5).map(|_| slide(texture, 0.0)).collect())

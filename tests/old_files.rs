@@ -353,6 +353,7 @@ fn decided(table: Table<'_>, set: FeatureSet, features: usize, off: i16) -> Valu
                 FeatureSet::Pressure => Some([others[0], others[1]]),
                 _ => None,
             },
+            pace: None,
         };
         let action = Action {
             movement,

@@ -54,6 +54,7 @@ fn invented(textures: &[u8], movements: usize, trials: usize, seed: u64) -> Vec<
                     ),
                     bands: bands.iter().map(|b| (1024.0 * b) as i16).collect(),
                     pressure: None,
+                    pace: None,
                 }
             };
             (0..trials).map(slide).collect()

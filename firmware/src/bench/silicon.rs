@@ -365,6 +365,7 @@ fn observed(table: &[u8], method: Method, words: &mut Words) -> Option<()> {
             properties,
             bands,
             pressure: None,
+            pace: None,
         };
         (None, slide)
     };

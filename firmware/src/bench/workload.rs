@@ -123,6 +123,7 @@ impl ObservedSlide {
                 properties: Properties::new(properties),
                 bands: Vec::from_slice(bands).ok()?,
                 pressure: (has_pressure != 0).then_some([mean, sd]),
+                pace: None,
             },
         };
         Some((observed, rest))

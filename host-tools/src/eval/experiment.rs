@@ -378,6 +378,7 @@ impl Experiment {
                 .filter_map(tactus_core::features::fixed)
                 .collect(),
             pressure: None,
+            pace: None,
         };
         let of = |learned: bool| -> Vec<Vec<Vec<Observation>>> {
             let mut slides = vec![vec![Vec::new(); set.movements.len()]; set.fabrics.len()];

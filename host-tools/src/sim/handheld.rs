@@ -1,11 +1,13 @@
 //! The handheld probe in the simulated world: a hand that does what the display says, and the table that is learned from it.
 
+use std::collections::VecDeque;
+
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tactus_core::dsp::{Plain, Plan};
 use tactus_core::explorer::Method;
-use tactus_core::features::Observation;
+use tactus_core::features::{FEATURE_STEPS, Observation};
 use tactus_core::handheld::guidance::{Again, Event};
 use tactus_core::handheld::touch::Touch;
 use tactus_core::handheld::{FEATURES, MOVEMENT};
@@ -13,14 +15,18 @@ use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
 
 use crate::eval::learn::{self, TableError};
 use crate::sim::collection::{Collection, texture_name};
-use crate::sim::maths::exp;
+use crate::sim::maths::{exp, ln};
 use crate::sim::person::{Hand, Manner};
 use crate::sim::slot::{TRANSFER_NS, word_of_slot};
 use crate::sim::world::{Setup, Truth, World};
 
-/// Deviations of ln(force) and of ln(pace) from slide to slide of a person who looks at the display (chosen).
-const FORCE_SPREAD: f64 = 0.10;
-const PACE_SPREAD: f64 = 0.12;
+/// The steady part of a slide is its last 1.2 s: over it the speed is measured.
+const STEADY_S: f64 = 1.2;
+const STEADY_SLOTS: usize = (STEADY_S * SLOTS_HZ as f64) as usize;
+/// Parts of a unit that a step of [`Observation::pace`] is.
+const PACE_STEPS: f64 = FEATURE_STEPS as f64;
+/// Speeds that a person can have, in ln of what is asked for.
+const PACES: f64 = 1.5;
 /// From the sound to the slide, s (chosen).
 const REACTION_S: (f64, f64) = (0.2, 0.5);
 /// How long a person slides, s: until the bar is full, and a little more.
@@ -49,6 +55,9 @@ pub struct Person {
     world: World,
     slot: u64,
     random: ChaCha8Rng,
+    manner: Manner,
+    /// Where the finger was on the sample at the latest slots, mm.
+    places_mm: VecDeque<f64>,
 }
 
 impl Person {
@@ -62,6 +71,8 @@ impl Person {
             world,
             slot: 0,
             random,
+            manner,
+            places_mm: VecDeque::new(),
         }
     }
 
@@ -103,6 +114,12 @@ impl Person {
     ) -> Option<Event> {
         for _ in 0..(seconds * f64::from(SLOTS_HZ)) as u32 {
             let word = self.word();
+            if let Some(hand) = self.world.hand() {
+                self.places_mm.push_back(hand.x_mm());
+                if self.places_mm.len() > STEADY_SLOTS {
+                    self.places_mm.pop_front();
+                }
+            }
             if let Some(event) = touch.word(word)
                 && until(&event)
             {
@@ -116,8 +133,8 @@ impl Person {
     pub fn slide(&mut self, touch: &mut Touch<'_, Plain>) -> Option<Result<Observation, Again>> {
         let target_n = f64::from(<(u16, u32)>::from(MOVEMENT).0) * 1e-3;
         let pace_mm_s = f64::from(<(u16, u32)>::from(MOVEMENT).1) * 1e-3;
-        let force_n = target_n * exp(FORCE_SPREAD * self.normal());
-        let pace_mm_s = pace_mm_s * exp(PACE_SPREAD * self.normal());
+        let force_n = target_n * exp(self.manner.force_spread * self.normal());
+        let pace_mm_s = pace_mm_s * exp(self.manner.pace_spread * self.normal());
         self.intend(force_n, 0.0);
         self.run_until(touch, 5.0, |event| *event == Event::Still);
         let reaction_s = self.random.random_range(REACTION_S.0..REACTION_S.1);
@@ -125,16 +142,29 @@ impl Person {
         self.intend(force_n, pace_mm_s);
         let over = |event: &Event| matches!(event, Event::Slid(_) | Event::Again(_));
         let measured = self.run_until(touch, SLIDE_S, over);
+        let pace = self.measured_pace();
         self.intend(force_n, 0.0);
         self.run_until(touch, 0.1, |_| false);
         self.intend(0.0, 0.0);
         let pause_s = self.random.random_range(0.3..0.5);
         self.run_until(touch, pause_s, |_| false);
         match measured? {
-            Event::Slid(observation) => Some(Ok(observation)),
+            Event::Slid(observation) => Some(Ok(Observation {
+                pace,
+                ..observation
+            })),
             Event::Again(why) => Some(Err(why)),
             _ => None,
         }
+    }
+
+    /// What a sensor of speed says of the steady part of the slide that is over now.
+    fn measured_pace(&mut self) -> Option<i16> {
+        let error = self.manner.speed_error? * self.normal();
+        let (first, last) = (self.places_mm.front()?, self.places_mm.back()?);
+        let wanted_mm_s = f64::from(<(u16, u32)>::from(MOVEMENT).1) * 1e-3;
+        let pace = ln(((last - first) / STEADY_S).max(1e-3) / wanted_mm_s) + error;
+        Some((pace.clamp(-PACES, PACES) * PACE_STEPS).round() as i16)
     }
 }
 

@@ -45,6 +45,12 @@ pub struct Manner {
     pub wander: f64,
     /// Deviations of the pace within a slide, relative to it: rms.
     pub uneven: f64,
+    /// Deviations of ln(force) from slide to slide: rms.
+    pub force_spread: f64,
+    /// Deviations of ln(pace) from slide to slide: rms.
+    pub pace_spread: f64,
+    /// The probe measures its speed, and ln(speed) of a slide is off by this: rms. `None` without a sensor of speed.
+    pub speed_error: Option<f64>,
 }
 
 impl Default for Manner {
@@ -54,6 +60,10 @@ impl Default for Manner {
             tremor: 0.005,
             wander: 0.04,
             uneven: 0.08,
+            // a person who looks at the display (chosen)
+            force_spread: 0.10,
+            pace_spread: 0.12,
+            speed_error: None,
         }
     }
 }
@@ -188,6 +198,7 @@ mod tests {
             tremor: 0.0,
             wander: 0.0,
             uneven: 0.0,
+            ..Manner::default()
         };
         let (forces, speeds) = held(none, 1);
         let (force, speed) = (statistics(&forces), statistics(&speeds));

@@ -268,8 +268,18 @@ impl Scenario {
             tremor,
             wander,
             uneven,
+            force_spread,
+            pace_spread,
+            speed_error,
         } = self.hand;
-        for (what, is) in [("tremor", tremor), ("wander", wander), ("uneven", uneven)] {
+        for (what, is) in [
+            ("tremor", tremor),
+            ("wander", wander),
+            ("uneven", uneven),
+            ("force_spread", force_spread),
+            ("pace_spread", pace_spread),
+            ("speed_error", speed_error.unwrap_or(0.0)),
+        ] {
             within("the hand", what, is, 0.0, MAX_DEVIATION)?;
         }
         for (step, number) in self.step.iter().zip(1..) {

@@ -84,6 +84,9 @@ pub struct Observation {
     pub bands: Vec<i16, FUSED_BANDS>,
     /// Mean and standard deviation of P_DC, in steps of 1/1024 of 100 counts.
     pub pressure: Option<[i16; 2]>,
+    /// Natural logarithm of the mean speed in parts of the movement's, in steps of 1/1024; `None` where it was not measured.
+    #[serde(default)]
+    pub pace: Option<i16>,
 }
 
 impl Observation {
@@ -132,6 +135,7 @@ impl From<&Measurement> for Observation {
             properties: slide.properties,
             bands: up_to(slide.fused_bands().into_iter().filter_map(fixed)),
             pressure,
+            pace: None,
         }
     }
 }

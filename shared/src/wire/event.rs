@@ -286,6 +286,7 @@ impl SlideReport {
             properties: self.properties(),
             bands: self.bands.clone(),
             pressure: self.pressure,
+            pace: None,
         }
     }
 }
@@ -296,6 +297,7 @@ impl From<&Measurement> for SlideReport {
             properties,
             bands,
             pressure,
+            pace: _,
         } = slide.into();
         Self {
             properties: Property::ALL.map(|p| properties.get(p)),

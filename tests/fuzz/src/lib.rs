@@ -193,6 +193,7 @@ fn explore(table: &Table<'_>, method: Method, bytes: &[u8], mode: u8) {
             properties: Properties::new([value(), value(), value()]),
             bands: (0..FUSED_BANDS).map(|_| number()).collect(),
             pressure: Some([number(), number()]),
+            pace: None,
         };
         if explorer.observe(action, &slide).is_err() {
             return;

@@ -148,6 +148,7 @@ fn said_and_seen(learn: Learn, features: usize, apart: [f64; 3], trials: [u8; 2]
                 properties: properties(&slide),
                 bands: slide.iter().map(|x| (x * 1024.0).round() as i16).collect(),
                 pressure: None,
+                pace: None,
             };
             taken += u32::from(is_taken(table, movement, &observed));
         }

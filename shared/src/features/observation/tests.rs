@@ -13,6 +13,7 @@ fn observation() -> Observation {
         properties: Properties::new([Some(0.5), Some(-2.0), Some(5.25)]),
         bands: Vec::from_slice(&bands).unwrap(),
         pressure: Some([7, 8]),
+        pace: None,
     }
 }
 

@@ -312,6 +312,7 @@ fn by_bands(
             properties: Properties::new(properties),
             bands: bands.iter().copied().collect(),
             pressure: None,
+            pace: None,
         },
     })
 }
