@@ -11,6 +11,7 @@ pub mod gauge;
 pub mod learn;
 pub mod lifelong;
 pub mod novelty;
+mod pace;
 #[cfg(feature = "study")]
 pub mod page;
 #[cfg(feature = "plots")]

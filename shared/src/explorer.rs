@@ -10,6 +10,7 @@ mod episode;
 pub mod kernels;
 mod likelihoods;
 mod novelty;
+mod paced;
 mod posterior;
 mod student;
 mod verify;

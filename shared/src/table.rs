@@ -7,12 +7,13 @@
 //!
 //! # Binary form, version 4, little-endian
 //!
-//! A table without sections is written as version 3, which is the same otherwise. Both are read.
+//! A table without sections is written as version 3, one that knows speeds (section 4) as version 5; they are the same
+//! otherwise. All are read, version 5 by a build that knows speeds.
 //!
 //! | bytes | what |
 //! |---|---|
 //! | 4 | magic `TACT` |
-//! | 2 | version, 4, or 3 |
+//! | 2 | version, 4, or 3, or 5 |
 //! | 1 | contents, 0: Gaussians, 1: fused |
 //! | 1 | Gaussians: properties measured, a bit each: 1 traction, 2 roughness, 4 fineness; fused: place in `features::FeatureSet::ALL` |
 //! | 4 | length of the whole table in bytes |
@@ -27,7 +28,7 @@
 //! | 4 | CRC-32 of the table that this one was made from by learning, the first of all; 0 for none |
 //! | 5 T | per texture: a number that stays its own (2); slides that were learned from the factory, the user and itself (1 each, 255 for more) |
 //! | | per texture: length of its name (1), the name in UTF-8 |
-//! | | version 4: sections, each its kind (2), the length of its contents (2), and these; an unknown kind is skipped |
+//! | | from version 4 on: sections, each its kind (2), the length of its contents (2), and these; an unknown kind is skipped |
 //! | 4 | CRC-32 (ISO-HDLC) of all before |
 //!
 //! Sections of a fused table; numbers are f32:
@@ -38,6 +39,8 @@
 //! | | 4 M d/2, rounded up | per movement: variance of the drift along each two of the whitened axes |
 //! | 2 | 52 | [`Limits`]: the share of false alarms; of scores with drift after 1, 2, 3 slides, then without: begin and mean excess of their upper tenth |
 //! | | M (7 d + 2 d d) | per movement the [`Population`] of textures: axes as a whitening of whitened features, in their steps; d variances |
+//! | 4 | M (6 + 2 d) | version 5, per movement the [`Pace`] of slides: mean (i16, 1/1024) and variance of ln(speed), slope of all textures (d i16, 1/256) |
+//! | | 2 d T M | per texture and movement: its [`Slope`] |
 //!
 //! Section 3, of either kind of table, is for people: whether samples were moved between trials ([`Table::moved`]). Per texture
 //! of which that is known: its number (2), the lower half of the CRC-32 of its name (2), and 1 for no or 2 for yes (1).
@@ -48,34 +51,39 @@ mod format;
 mod gaussian;
 mod limits;
 mod matrix;
+mod patch;
 mod population;
 mod samples;
 mod scatter;
 mod sections;
+mod slopes;
 mod training_stats;
 mod view;
 mod whitening;
 
 pub use drift::{Drift, Drifts, PAIRS};
 pub use encode::{
-    Change, EncodeError, Known, Texture, amend, encode, encode_fused, encoded_len, recentre,
-    retell, with_sections,
+    Change, EncodeError, Known, Texture, amend, encode, encode_fused, encoded_len, with_sections,
 };
 pub use format::{
-    Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, Name, TableError, Tally, VERSION,
+    Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, Name, PACED, TableError, Tally,
+    VERSION,
 };
 pub use gaussian::{Gaussian, Gaussians, SD_LEAST, SD_STEP, mean_step};
 pub(crate) use limits::Numbers;
 pub use limits::{Against, EPISODES, FALSE_ALARM, Limits, Tail, is_false_alarm};
+pub use patch::{recentre, retell};
 pub use population::{POPULATION, Population};
 pub use samples::{samples_length, with_moved};
 pub(crate) use scatter::oas;
 pub use scatter::{Scatter, WhitenError, whiten, whiten_drifting};
 pub use sections::Sections;
+pub use slopes::{Pace, Slopes};
+pub(crate) use slopes::{SlopesView, moved};
 pub use training_stats::{Experience, TrainingStats, Whitened};
 pub use view::Table;
 pub use whitening::{Row, Words};
-pub use whitening::{Whitening, white};
+pub use whitening::{Slope, Whitening, white};
 pub(crate) use whitening::{dot, fill, products, words};
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use tactus_core::table::{
 };
 
 use super::calibrate::limits;
+use super::pace;
 
 /// Why slides do not make a table.
 #[derive(Debug, thiserror::Error)]
@@ -196,6 +197,14 @@ fn learn_fused(
                 })
         })
         .collect::<Result<Vec<_>, _>>()?;
+    // a table without sections has no space for slopes
+    let lines = expected
+        .drift
+        .and_then(|_| pace::lines(slides, &vectors, features));
+    let vectors = match &lines {
+        Some(lines) => lines.at_movement_speed(&vectors),
+        None => vectors,
+    };
     let mut scatters = vec![Scatter::new(features); movements.len()];
     for row in &vectors {
         for (scatter, slides) in scatters.iter_mut().zip(row) {
@@ -216,6 +225,7 @@ fn learn_fused(
         .iter()
         .map(|row| row.iter().map(|slides| mean(slides, features)).collect())
         .collect();
+    let whitened = lines.map(|lines| lines.whitened(&whitenings));
     let movements: Vec<_> = movements.iter().copied().zip(whitenings).collect();
     let contents = Contents::Fused(set, features as u8);
     let mut plain = buffer(contents, names, movements.len());
@@ -235,6 +245,7 @@ fn learn_fused(
         let sections = Sections {
             drift: (drift, &drifts),
             novelty,
+            slopes: whitened.as_ref().map(pace::Whitened::slopes),
         };
         let mut bytes = vec![0; plain.as_bytes().len() + sections.length(features)];
         with_sections(&mut bytes, &plain, &sections)?;

@@ -13,6 +13,9 @@ pub(super) struct MovementSums {
     pub(super) slides: u8,
     /// Sum of the whitened slides, 1/256.
     pub(super) white: [i32; MAX_FEATURES],
+    /// Sum of ln(speed) of the slides of which it is known, 1/1024, and how many these are.
+    pub(super) pace: i32,
+    pub(super) paces: u8,
     /// Sum of the properties.
     pub(super) properties: [f32; 3],
 }
@@ -39,11 +42,12 @@ pub(super) fn one_more(episode: &mut Episode, movement: u8) -> Option<&mut Movem
 }
 
 impl MovementSums {
-    /// So many slides of this whitened mean.
+    /// So many slides of this whitened mean, at the movement's speed.
     pub(super) fn of(movement: u8, slides: u8, mean: &[i16]) -> Self {
         let mut sums = Self {
             movement,
             slides,
+            paces: slides,
             ..Self::default()
         };
         for (sum, z) in sums.white.iter_mut().zip(mean) {
@@ -78,4 +82,7 @@ pub struct EpisodeSummary {
     pub certain: bool,
     /// The movements made, with the number of slides and their whitened mean; none with a table of Gaussians.
     pub observed: Vec<(u8, u8, Vector), MAX_MOVEMENTS>,
+    /// At each of these the mean of ln(speed) in parts of the movement's, 1/1024; where it is not known that of a usual one. 0 with
+    /// a table that knows no speeds.
+    pub paces: Vec<i16, MAX_MOVEMENTS>,
 }

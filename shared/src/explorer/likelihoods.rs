@@ -3,11 +3,12 @@
 use super::config::{Method, ObserveError};
 use super::episode::one_more;
 use super::kernels::Kernels;
+use super::paced;
 use super::posterior::{Explorer, rebase};
 use super::student::{ShrinkagePrior, Student};
 use super::whitened;
 use crate::features::{Observation, Property};
-use crate::table::{Action, Against, Contents, Gaussian, mean_step};
+use crate::table::{Action, Against, Contents, Gaussian, PACED, mean_step};
 
 /// Most that the likelihood of a slide takes from a logarithm.
 const MOST: i32 = 1 << 26;
@@ -152,18 +153,33 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             for (sum, z) in sums.white.iter_mut().zip(&white) {
                 *sum += i32::from(*z);
             }
+            if let Some(pace) = slide.pace.filter(|_| PACED) {
+                sums.pace += i32::from(pace);
+                sums.paces = sums.paces.saturating_add(1);
+            }
         }
         self.reset_to_prior();
-        let elsewhere = whitened::add_likelihoods(
-            &self.table,
-            &self.episode,
-            &self.novelty_models,
-            true,
-            &mut self.log,
-            // overwritten below
-            &mut self.posterior,
-            K::add_likelihoods,
-        );
+        // the posterior is overwritten below
+        let elsewhere = if self.table.is_paced() {
+            paced::add_likelihoods(
+                &self.table,
+                &self.episode,
+                &self.novelty_models,
+                true,
+                &mut self.log,
+                &mut self.posterior,
+            )
+        } else {
+            whitened::add_likelihoods(
+                &self.table,
+                &self.episode,
+                &self.novelty_models,
+                true,
+                &mut self.log,
+                &mut self.posterior,
+                K::add_likelihoods,
+            )
+        };
         let (top, sum) = self.normalize();
         self.log_odds = elsewhere.and_then(|(elsewhere, can_tell)| match &self.limits {
             Some(limits) => {

@@ -11,8 +11,8 @@ use super::config::Config;
 use super::episode::{Episode, MovementSums};
 use super::kernels::Kernels;
 use super::novelty::NoveltyModel;
+use super::paced;
 use super::student::ShrinkagePrior;
-
 use super::whitened;
 use crate::dsp::Plain;
 use crate::features::{PropertySet, Vector};
@@ -231,15 +231,14 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         }
         let mut log: Vec<i32, N> = up_to(self.log.iter().map(|l| if *l < LEAST { OUT } else { 0 }));
         let mut odds: Vec<f32, N> = up_to(log.iter().map(|_| 0.0));
-        let (elsewhere, _) = whitened::add_likelihoods(
-            &self.table,
-            episode,
-            &self.novelty_models,
-            against == Against::Drifted,
-            &mut log,
-            &mut odds,
-            K::add_likelihoods,
-        )?;
+        let (table, models) = (&self.table, &self.novelty_models);
+        let drifting = against == Against::Drifted;
+        let (elsewhere, _) = if table.is_paced() {
+            paced::add_likelihoods(table, episode, models, drifting, &mut log, &mut odds)?
+        } else {
+            let add = K::add_likelihoods;
+            whitened::add_likelihoods(table, episode, models, drifting, &mut log, &mut odds, add)?
+        };
         let top = log.iter().copied().max().unwrap_or(0);
         Some(elsewhere - top as f32 / 65536.0)
     }
@@ -264,6 +263,13 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         };
         let episode = self.episode.iter().filter(move |_| features > 0);
         episode.map(move |v| (v.movement, v.slides, v.mean(features)))
+    }
+
+    /// At each of [`Explorer::observed`] the mean of ln(speed): see [`super::EpisodeSummary::paces`].
+    pub fn paces(&self) -> impl Iterator<Item = i16> + '_ {
+        let slopes = |movement| self.table.slopes_at(movement);
+        let pace = move |v: &MovementSums| slopes(v.movement).map_or(0, |s| v.pace(&s).0);
+        self.episode.iter().map(pace)
     }
 
     /// The most probable texture as things stand, the first of equals: the answer also where no further slide can be made.

@@ -157,7 +157,7 @@ fn add_jointly(
 }
 
 /// A logarithm in Q16; none of an episode's is below -256, so that sums stay within 32 bits.
-fn q16(ln: f32) -> i32 {
+pub(super) fn q16(ln: f32) -> i32 {
     (ln.max(-256.0) * 65536.0) as i32
 }
 

@@ -113,6 +113,7 @@ pub fn judge<K: Kernels>(
         texture: best.texture,
         certain: explorer.is_certain(),
         observed: explorer.observed().collect(),
+        paces: explorer.paces().collect(),
     };
     Ok((judgement, episode))
 }

@@ -103,6 +103,7 @@ where
         texture: verdict.texture,
         certain: explorer.is_certain(),
         observed: up_to(explorer.observed()),
+        paces: up_to(explorer.paces()),
     })
 }
 

@@ -86,12 +86,12 @@ pub async fn learn_by_itself<F: NorFlash>(
     };
     store.self_learned(lineage, &mut each).await?;
     let mut learned = 0u8;
-    for (movement, slides, mean) in &episode.observed {
-        let known = table.whitened(texture, *movement);
-        if let Some(at) = place(&mut record, *movement, known) {
-            adapt(&mut at.2, *slides, mean);
-            at.1 = at.1.saturating_add(*slides);
-            learned = learned.saturating_add(*slides);
+    for (movement, slides, mean) in observed(episode, &table, Some(texture)) {
+        let known = table.whitened(texture, movement);
+        if let Some(at) = place(&mut record, movement, known) {
+            adapt(&mut at.2, slides, &mean);
+            at.1 = at.1.saturating_add(slides);
+            learned = learned.saturating_add(slides);
         }
     }
     if learned == 0 {
@@ -112,6 +112,21 @@ pub async fn learn_by_itself<F: NorFlash>(
         slides: learned,
         itself: true,
     })))
+}
+
+/// What was observed in an episode, as it is learned if the texture is this one of the table, or a new one: at the movement's
+/// speed.
+fn observed<'a>(
+    episode: &'a EpisodeSummary,
+    table: &'a Table<'_>,
+    texture: Option<u16>,
+) -> impl Iterator<Item = (u8, u8, Vector)> + 'a {
+    let paces = episode.paces.iter().copied().chain(core::iter::repeat(0));
+    let observed = episode.observed.iter().zip(paces);
+    observed.map(move |((movement, slides, mean), pace)| {
+        let mean = table.at_movement_speed(texture, *movement, mean, pace);
+        (*movement, *slides, mean)
+    })
 }
 
 /// The record's entry of a movement; `None` where it has as many as it may have.
@@ -166,15 +181,15 @@ pub async fn label<F: NorFlash>(
             .map(|movement| known.map_or(Whitened::default(), |t| base.whitened(t, movement))),
     );
     let mut slides = 0u8;
-    for (movement, count, mean) in &episode.observed {
-        let Some(at) = whitened.get_mut(usize::from(*movement)) else {
+    for (movement, count, mean) in observed(episode, base, known) {
+        let Some(at) = whitened.get_mut(usize::from(movement)) else {
             continue;
         };
-        slides = slides.saturating_add(*count);
+        slides = slides.saturating_add(count);
         if known.is_some() {
-            adapt(at, *count, mean);
+            adapt(at, count, &mean);
         } else {
-            (0..*count).for_each(|_| at.teach(mean));
+            (0..count).for_each(|_| at.teach(&mean));
         }
     }
     let before = known.map_or(Tally::default(), |texture| base.tally(texture));
@@ -203,10 +218,10 @@ pub async fn label<F: NorFlash>(
         };
         store.self_learned(lineage, &mut each).await?;
         if let Some(mut record) = record {
-            for (movement, count, mean) in &episode.observed {
-                let of_movement = record.movements.iter_mut().find(|m| m.0 == *movement);
+            for (movement, count, mean) in observed(episode, base, known) {
+                let of_movement = record.movements.iter_mut().find(|m| m.0 == movement);
                 if let Some((.., whitened)) = of_movement {
-                    adapt(whitened, *count, mean);
+                    adapt(whitened, count, &mean);
                 }
             }
             store.set_self_learned(&record).await?;

@@ -239,6 +239,7 @@ impl Training {
         slide: &Observation,
     ) -> Result<TrainingRecord, TrainingError> {
         let contents = self.contents;
+        let known = table.and_then(|table| table.find(&self.name));
         let stats = self.at(movement)?;
         match (&mut *stats, contents) {
             (TrainingStats::Gaussians(experience), Contents::Gaussians(measured)) => experience
@@ -247,8 +248,10 @@ impl Training {
             (TrainingStats::Fused(whitened), Contents::Fused(set, features)) => {
                 let white = slide.vector(set, features.into()).and_then(|vector| {
                     let table = table?;
-                    let index = table.movements().position(|m| m == movement)?;
-                    table.whiten(index as u8, &vector)
+                    let index = table.movements().position(|m| m == movement)? as u8;
+                    let white = table.whiten(index, &vector)?;
+                    let pace = table.pace_of(index, slide);
+                    Some(table.at_movement_speed(known, index, &white, pace))
                 });
                 whitened.teach(&white.ok_or(TrainingError::Features(set))?);
             }

@@ -5,11 +5,12 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, CRC32, Contents, LABEL_BYTES, MAGIC, MAX_MOVEMENTS,
-    PLAIN_VERSION, TableError, Tally, VERSION,
+    Action, CELL_BYTES, CRC_BYTES, CRC32, Contents, MAGIC, MAX_MOVEMENTS, PACED, PACED_VERSION,
+    PLAIN_VERSION, SLOPES, TableError, Tally, VERSION,
 };
 use super::gaussian::{SD_LEAST, SD_STEP, mean_step};
-use super::sections::Sections;
+use super::sections::{Sections, each};
+use super::slopes::{self, put_slope};
 use super::training_stats::{Experience, Whitened};
 use super::view::Table;
 use super::whitening::Whitening;
@@ -277,6 +278,7 @@ pub fn amend<'o>(
             number: old.next_number(),
             tally,
             cells: Cells::New(known),
+            slope_of: None,
         }),
         _ => None,
     };
@@ -293,87 +295,53 @@ pub fn amend<'o>(
             _ => Some(row),
         }
     });
+    let rows = kept.chain(added);
+    if old.is_paced() {
+        return rewrite_paced(out, old, rows);
+    }
     let sections = old.sections;
     rewrite(
         out,
         old,
         old.lineage(),
-        kept.chain(added),
+        rows,
         (sections.len(), |writer: &mut Writer<'_>| {
             writer.put(sections)
         }),
     )
 }
 
-/// Puts what a fused table has learned on the go of a texture at a movement in its place, and marks the table as made from
-/// the one that it was.
-///
-/// # Errors
-/// The bytes are no fused table, or have no such texture or movement.
-#[inline]
-pub fn retell(
-    bytes: &mut [u8],
-    texture: u16,
-    movement: u8,
-    whitened: &Whitened,
-    tally: Tally,
-) -> Result<(), EncodeError> {
-    let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
-    let Contents::Fused(_, features) = table.contents else {
-        return Err(EncodeError::Contents);
+/// As [`rewrite`], of a table that knows speeds: every row with its slopes, those of all textures for a new one.
+fn rewrite_paced<'o, 'a>(
+    out: &'o mut [u8],
+    old: &Table<'_>,
+    rows: impl Iterator<Item = Row<'a>> + Clone,
+) -> Result<Table<'o>, EncodeError> {
+    let (features, movements) = (old.features(), old.movements);
+    let length = slopes::length(features, rows.clone().count(), movements.into());
+    let Ok(length_field) = u16::try_from(length) else {
+        return Err(EncodeError::NoSpace(length));
     };
-    if texture >= table.textures || movement >= table.movements {
-        return Err(EncodeError::Texture(texture));
-    }
-    let (layout, lineage) = (table.layout(), table.lineage());
-    let length = table.bytes.len();
-    let features = usize::from(features);
-    let cell = usize::from(texture) * usize::from(table.movements) + usize::from(movement);
-    let mut put = |at: usize, new: &[u8]| {
-        // byte by byte: `copy_from_slice` has a panic that the compiler does not always see through
-        for (to, from) in bytes.iter_mut().skip(at).zip(new) {
-            *to = *from;
+    let others = || old.other_sections(SLOPES);
+    let of_others = others().map(|(head, contents)| head.len() + contents.len());
+    let of_sections = of_others.sum::<usize>() + 4 + length;
+    let of_rows = rows.clone();
+    let write = |writer: &mut Writer<'_>| {
+        for (head, contents) in others() {
+            writer.put(&head);
+            writer.put(contents);
+        }
+        writer.put(&SLOPES.to_le_bytes());
+        writer.put(&length_field.to_le_bytes());
+        writer.put(old.paces_bytes());
+        for row in of_rows {
+            for movement in 0..movements {
+                let slope = old.slope(row.slope_of, movement);
+                put_slope(&slope, features, |bytes| writer.put(bytes));
+            }
         }
     };
-    for (mean, at) in whitened.mean.iter().take(features).zip((0..).step_by(2)) {
-        put(layout.cells + cell * 2 * features + at, &mean.to_le_bytes());
-    }
-    put(layout.trials + cell, &[whitened.slides]);
-    put(layout.lineage, &lineage.to_le_bytes());
-    let label = layout.labels + usize::from(texture) * LABEL_BYTES;
-    put(label + 2, &[tally.factory, tally.user, tally.itself]);
-    if let Some((body, crc)) = bytes
-        .get_mut(..length)
-        .and_then(<[u8]>::split_last_chunk_mut)
-    {
-        *crc = CRC32.checksum(body).to_le_bytes();
-    }
-    Ok(())
-}
-
-/// Puts other features in the place of those that are whitened to 0 at a movement: what was learned keeps its place among the
-/// whitened, and slides that differ from those of before by as much are whitened as those were.
-///
-/// # Errors
-/// The bytes are no fused table of so many features, or have no such movement.
-pub fn recentre(bytes: &mut [u8], movement: u8, centre: &[i16]) -> Result<(), EncodeError> {
-    let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
-    let Contents::Fused(_, features) = table.contents else {
-        return Err(EncodeError::Contents);
-    };
-    let features = usize::from(features);
-    if movement >= table.movements || centre.len() != features {
-        return Err(EncodeError::Contents);
-    }
-    let at = table.layout().whitenings + usize::from(movement) * Whitening::bytes(features);
-    let new = centre.iter().flat_map(|x| x.to_le_bytes());
-    for (to, from) in bytes.iter_mut().skip(at).zip(new) {
-        *to = from;
-    }
-    if let Some((body, crc)) = bytes.split_last_chunk_mut() {
-        *crc = CRC32.checksum(body).to_le_bytes();
-    }
-    Ok(())
+    rewrite(out, old, old.lineage(), rows, (of_sections, write))
 }
 
 /// Where the cells of a texture come from.
@@ -390,6 +358,8 @@ struct Row<'a> {
     number: u16,
     tally: Tally,
     cells: Cells<'a>,
+    /// The texture of the old table whose slopes it has.
+    slope_of: Option<u16>,
 }
 
 impl<'a> Row<'a> {
@@ -400,6 +370,7 @@ impl<'a> Row<'a> {
             number: table.number(texture),
             tally: table.tally(texture),
             cells: Cells::Old(*table, texture),
+            slope_of: Some(texture),
         }
     }
 
@@ -413,6 +384,7 @@ impl<'a> Row<'a> {
                 ..Tally::default()
             },
             cells: Cells::New(known),
+            slope_of: None,
         }
     }
 
@@ -568,7 +540,14 @@ fn write<'o, 'a>(
         writer.put(&[u8::try_from(row.name.len()).map_err(|_| EncodeError::Name(index))?]);
         writer.put(row.name.as_bytes());
     }
+    let names_end = writer.at;
     sections(&mut writer);
+    let written = writer.buffer.get(names_end..writer.at).unwrap_or_default();
+    if PACED && each(written).flatten().any(|(kind, _)| kind == SLOPES) {
+        writer.at = MAGIC.len();
+        writer.put(&PACED_VERSION.to_le_bytes());
+        writer.at = names_end + of_sections;
+    }
     let crc = CRC32.checksum(writer.written());
     writer.put(&crc.to_le_bytes());
     Table::read(writer.buffer).map_err(EncodeError::Invalid)

@@ -12,8 +12,14 @@ use crate::features::{FeatureSet, MovementError, Property, PropertySet};
 pub(super) const MAGIC: [u8; 4] = *b"TACT";
 /// Version of the binary form of tables with sections.
 pub const VERSION: u16 = 4;
-/// Version of those without, which is the same otherwise.
+/// Version of those that know speeds, which is the same otherwise.
+pub(super) const PACED_VERSION: u16 = 5;
+/// Version of those without sections, which is the same otherwise.
 pub(super) const PLAIN_VERSION: u16 = 3;
+/// Whether this build knows speeds. A probe without a sensor of speed saves the space, and refuses such tables.
+pub const PACED: bool = cfg!(any(test, feature = "pace"));
+/// The kind of the section that has them.
+pub(super) const SLOPES: u16 = 4;
 pub(super) const GAUSSIANS: u8 = 0;
 pub(super) const FUSED: u8 = 1;
 pub(super) const HEADER: usize = 16;
@@ -147,9 +153,10 @@ impl fmt::Display for TableError {
                 "not a texture table: it begins with [{a:02x}, {b:02x}, {c:02x}, {d:02x}], not `TACT`"
             ),
             Self::Version(found) => {
+                let newest = if PACED { PACED_VERSION } else { VERSION };
                 write!(
                     f,
-                    "version {found}, and this program reads versions {PLAIN_VERSION} and {VERSION}: learn the table anew"
+                    "version {found}, and this program reads versions {PLAIN_VERSION} to {newest}: learn the table anew"
                 )
             }
             Self::Method(found) => write!(f, "method {found} is unknown to this program"),
@@ -183,6 +190,7 @@ impl fmt::Display for TableError {
             Self::Sections => f.write_str("what follows the names is damaged"),
             Self::Section(1) => f.write_str("the drift that it expects is damaged"),
             Self::Section(2) => f.write_str("its limits of new and changed textures are damaged"),
+            Self::Section(4) if PACED => f.write_str("its slopes over speed are damaged"),
             Self::Section(kind) => write!(f, "section {kind} is damaged"),
             Self::Number(texture) => {
                 write!(f, "texture {} has another's number", texture + 1)

@@ -9,13 +9,15 @@
 //! Numbers are f32. Kind 1, how it drifts: [`Drift::bands`], [`Drift::traction`]; per movement variances along each two axes
 //! of its whitening. Kind 2, what textures are like, and the limits of scores: [`Limits`], begin and excess of six tails; per
 //! movement the axes of the population as a whitening, and d variances along them. Kind 3 is for people: [`super::samples`].
+//! Kind 4, how means go with the speed: [`super::slopes`].
 
 use heapless::Vec;
 
 use super::drift::{Drift, Drifts};
-use super::format::{Contents, MAX_MOVEMENTS, TableError, array};
+use super::format::{MAX_MOVEMENTS, PACED, SLOPES, TableError, array};
 use super::limits::{Limits, Numbers};
 use super::population::{LEAST, Population};
+use super::slopes::{self, Slopes};
 use super::view::Table;
 use super::whitening::{View, Whitening};
 use crate::features::MAX_FEATURES;
@@ -35,6 +37,8 @@ pub struct Sections<'a> {
     pub drift: (Drift, &'a [Drifts]),
     /// The limits, and the population of every movement; `None` for a table of too few textures.
     pub novelty: Option<(Limits, &'a [Population])>,
+    /// How means go with the speed; `None` for a table that knows no speeds.
+    pub slopes: Option<Slopes<'a>>,
 }
 
 impl Sections<'_> {
@@ -44,7 +48,9 @@ impl Sections<'_> {
         let novelty = self.novelty.map_or(0, |(_, populations)| {
             HEAD + Limits::BYTES + populations.len() * of_population(features)
         });
-        HEAD + TWO + drifts.len() * of_drift(features) + novelty
+        let slopes = self.slopes;
+        let slopes = slopes.map_or(0, |slopes| HEAD + of_slopes(&slopes, features));
+        HEAD + TWO + drifts.len() * of_drift(features) + novelty + slopes
     }
 
     /// Gives the bytes, piece by piece, of so many features.
@@ -64,17 +70,20 @@ impl Sections<'_> {
         {
             put(&variance.to_le_bytes());
         }
-        let Some((limits, populations)) = self.novelty else {
-            return;
-        };
-        let length = Limits::BYTES + populations.len() * of_population(features);
-        head(&mut put, NOVELTY, length);
-        limits.bytes().for_each(|number| put(&number));
-        for population in populations {
-            put(population.axes.as_bytes());
-            for variance in population.variances.iter().take(features) {
-                put(&variance.to_le_bytes());
+        if let Some((limits, populations)) = self.novelty {
+            let length = Limits::BYTES + populations.len() * of_population(features);
+            head(&mut put, NOVELTY, length);
+            limits.bytes().for_each(|number| put(&number));
+            for population in populations {
+                put(population.axes.as_bytes());
+                for variance in population.variances.iter().take(features) {
+                    put(&variance.to_le_bytes());
+                }
             }
+        }
+        if let Some(slopes) = self.slopes {
+            head(&mut put, SLOPES, of_slopes(&slopes, features));
+            slopes.write(features, put);
         }
     }
 }
@@ -82,6 +91,12 @@ impl Sections<'_> {
 /// Bytes of a movement's variances of the drift.
 const fn of_drift(features: usize) -> usize {
     4 * features.div_ceil(2)
+}
+
+/// Bytes of all slopes.
+fn of_slopes(slopes: &Slopes<'_>, features: usize) -> usize {
+    let movements = slopes.paces.len();
+    slopes::length(features, slopes.slopes.len() / movements.max(1), movements)
 }
 
 /// Bytes of a movement's population.
@@ -97,7 +112,7 @@ pub(crate) struct PopulationView<'t> {
 }
 
 /// Kinds and contents of sections; `None` for the rest where it is no section.
-fn each(bytes: &[u8]) -> impl Iterator<Item = Option<(u16, &[u8])>> {
+pub(super) fn each(bytes: &[u8]) -> impl Iterator<Item = Option<(u16, &[u8])>> {
     let mut rest = bytes;
     core::iter::from_fn(move || {
         if rest.is_empty() {
@@ -135,14 +150,6 @@ impl<'a> Table<'a> {
             let [l0, l1] = (contents.len() as u16).to_le_bytes();
             ([k0, k1, l0, l1], contents)
         })
-    }
-
-    /// Number of features of a fused table.
-    fn features(&self) -> usize {
-        match self.contents {
-            Contents::Fused(_, features) => features.into(),
-            Contents::Gaussians(_) => 0,
-        }
     }
 
     /// How much drift the table was made for; `None` for one that does not say, of an older version.
@@ -209,12 +216,15 @@ impl<'a> Table<'a> {
         let section = self.section(DRIFT).filter(|_| drifts);
         self.drifts = section.and_then(|s| s.get(TWO..)).unwrap_or_default();
         self.novelty = self.section(NOVELTY).unwrap_or_default();
+        if PACED {
+            self.slopes = self.section(SLOPES).unwrap_or_default();
+        }
     }
 
     /// That the sections are sections, and those that are known what they say.
     pub(super) fn check_sections(&self) -> Result<(), TableError> {
         let (features, movements) = (self.features(), usize::from(self.movements));
-        let mut seen = [false; 2];
+        let mut seen = [false; 3];
         for section in each(self.sections) {
             let (kind, contents) = section.ok_or(TableError::Sections)?;
             let fits = match kind {
@@ -239,9 +249,16 @@ impl<'a> Table<'a> {
                             })
                         })
                 }
+                SLOPES if PACED => {
+                    slopes::are_slopes(contents, features, self.textures.into(), movements)
+                }
                 _ => continue,
             };
-            let first = seen.get_mut(usize::from(kind == NOVELTY));
+            let first = seen.get_mut(match kind {
+                DRIFT => 0,
+                NOVELTY => 1,
+                _ => 2,
+            });
             let again = first.is_none_or(|seen| core::mem::replace(seen, true));
             if features == 0 || again || !fits {
                 return Err(TableError::Section(kind));

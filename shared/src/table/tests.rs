@@ -5,6 +5,7 @@ mod fused;
 mod learning;
 mod samples;
 mod sections;
+pub(crate) mod slopes;
 pub(crate) mod whitening;
 
 use super::format::*;

@@ -2,7 +2,8 @@
 
 use super::format::{
     Action, CELL_BYTES, CRC_BYTES, CRC32, Contents, HEADER, LABEL_BYTES, Layout, MAGIC,
-    MAX_MOVEMENTS, MOVEMENT_BYTES, PLAIN_VERSION, TableError, Tally, VERSION, array,
+    MAX_MOVEMENTS, MOVEMENT_BYTES, PACED, PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally,
+    VERSION, array,
 };
 use super::gaussian::{Gaussian, Gaussians, SD_STEP, mean_step};
 use super::training_stats::{Experience, Whitened};
@@ -22,6 +23,8 @@ pub struct Table<'a> {
     pub(super) drifts: &'a [u8],
     /// The section of limits and population; nothing in a table that is not calibrated.
     pub(super) novelty: &'a [u8],
+    /// The section of slopes; nothing in a table that knows no speeds.
+    pub(super) slopes: &'a [u8],
 }
 
 impl<'a> Table<'a> {
@@ -58,7 +61,8 @@ impl<'a> Table<'a> {
             return Err(TableError::Magic([m0, m1, m2, m3]));
         }
         let version = u16::from_le_bytes([v0, v1]);
-        if version != VERSION && version != PLAIN_VERSION {
+        let paced = PACED && version == PACED_VERSION;
+        if version != VERSION && version != PLAIN_VERSION && !paced {
             return Err(TableError::Version(version));
         }
         let length = u32::from_le_bytes([l0, l1, l2, l3]) as usize;
@@ -84,6 +88,7 @@ impl<'a> Table<'a> {
             sections: &[],
             drifts: &[],
             novelty: &[],
+            slopes: &[],
         };
         let end = table.check()?;
         table.sections = body.get(end..).unwrap_or_default();
@@ -95,6 +100,9 @@ impl<'a> Table<'a> {
         }
         table.check_sections()?;
         table.find_sections();
+        if PACED && paced == table.slopes.is_empty() {
+            return Err(TableError::Section(SLOPES));
+        }
         Ok(table)
     }
 
@@ -321,6 +329,14 @@ impl<'a> Table<'a> {
             movements,
             stride: cell * movements,
             step: measured.map_or(0.0, mean_step),
+        }
+    }
+
+    /// Number of features of a fused table.
+    pub(super) fn features(&self) -> usize {
+        match self.contents {
+            Contents::Fused(_, features) => features.into(),
+            Contents::Gaussians(_) => 0,
         }
     }
 

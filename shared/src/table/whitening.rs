@@ -6,7 +6,7 @@
 use heapless::Vec;
 
 use super::PAIRS;
-use crate::features::{MAX_FEATURES, Vector, WHITE_STEPS};
+use crate::features::{FEATURE_STEPS, MAX_FEATURES, Vector, WHITE_STEPS};
 
 /// From features to whitened ones, z = W (x - g): canonical variates. W' W is the inverse of the covariance of slides within
 /// a texture, and the means of different textures are uncorrelated in z, those that scatter most first.
@@ -69,6 +69,27 @@ impl Whitening {
         self.features
     }
 
+    /// What a change of the features by so many steps is in whitened ones, to the nearest 1/256.
+    pub fn change(&self, steps: &[f64; MAX_FEATURES]) -> Slope {
+        let view = View {
+            features: self.features,
+            bytes: &self.bytes,
+        };
+        let [_, places, rows] = view.parts();
+        // steps of whitened features are coarser
+        let coarser = f64::from(FEATURE_STEPS / WHITE_STEPS);
+        let mut change = Slope::default();
+        let rows = rows.chunks_exact((2 * self.features).max(1)).zip(places);
+        for (change, (row, places)) in change.iter_mut().zip(rows) {
+            let weights = row.as_chunks().0.iter().zip(steps);
+            let sum = weights.map(|(w, x)| f64::from(i16::from_le_bytes(*w)) * x);
+            let scale = coarser * f64::from(1u32 << (places & 31));
+            // `as` saturates
+            *change = libm::round(sum.sum::<f64>() / scale) as i16;
+        }
+        change
+    }
+
     /// Whitens the features of a slide; those that are missing count as the mean, those beyond the table's not at all.
     pub fn apply(&self, features: &[i16]) -> Vector {
         let view = View {
@@ -78,6 +99,9 @@ impl Whitening {
         view.apply(features)
     }
 }
+
+/// Change of a whitened mean per unit of ln(speed), in steps of 1/256 standard deviation; 0 beyond the features.
+pub type Slope = [i16; MAX_FEATURES];
 
 /// A [`Whitening`] where its table lies: copying it takes as long as applying it.
 #[derive(Clone, Copy, Debug)]

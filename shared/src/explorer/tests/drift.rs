@@ -9,19 +9,19 @@ use crate::table::{
 };
 
 /// The recipe on what a table was made from: whitening is straight.
-struct Recipe {
-    d: usize,
+pub(super) struct Recipe {
+    pub(super) d: usize,
     /// Slides and mean of every texture at every movement.
-    known: Vec<Vec<(f64, Vec<f64>)>>,
+    pub(super) known: Vec<Vec<(f64, Vec<f64>)>>,
     /// Variances of the drift at every movement.
-    drifts: Vec<Vec<f64>>,
-    limits: Limits,
+    pub(super) drifts: Vec<Vec<f64>>,
+    pub(super) limits: Limits,
 }
 
-const NU: f64 = 8.0;
+pub(super) const NU: f64 = 8.0;
 
 /// ln of the gamma function for 1, 1.5, 2...
-fn ln_gamma(x: f64) -> f64 {
+pub(super) fn ln_gamma(x: f64) -> f64 {
     match x {
         0.5 => std::f64::consts::PI.sqrt().ln(),
         1.0 => 0.0,
@@ -30,7 +30,7 @@ fn ln_gamma(x: f64) -> f64 {
 }
 
 /// Inverse and ln |V| of a positive matrix, by Gauss and Jordan.
-fn inverse(matrix: &[Vec<f64>]) -> (Vec<Vec<f64>>, f64) {
+pub(super) fn inverse(matrix: &[Vec<f64>]) -> (Vec<Vec<f64>>, f64) {
     let d = matrix.len();
     let unit = |i: usize| (0..d).map(move |j| f64::from(u8::from(i == j)));
     let mut rows: Vec<Vec<f64>> = (0..d)
@@ -53,7 +53,7 @@ fn inverse(matrix: &[Vec<f64>]) -> (Vec<Vec<f64>>, f64) {
 impl Recipe {
     /// ln of the likelihood of a texture that nobody knows: the covariance of the means, shrunk (OAS), less what their own
     /// slides scatter.
-    fn background(&self, movement: usize, k: f64, z: &[f64]) -> f64 {
+    pub(super) fn background(&self, movement: usize, k: f64, z: &[f64]) -> f64 {
         let cells = self.known.iter().map(|row| &row[movement]);
         let means: Vec<&(f64, Vec<f64>)> = cells.filter(|(n, _)| *n > 0.0).collect();
         let (count, d) = (means.len() as f64, self.d as f64);
@@ -146,7 +146,7 @@ impl Recipe {
 }
 
 /// A world with its table: whitened means of textures, movements by movements.
-fn world(noise: &mut Noise, drift: Drift, evenly: bool) -> (Recipe, Vec<u8>) {
+pub(super) fn world(noise: &mut Noise, drift: Drift, evenly: bool) -> (Recipe, Vec<u8>) {
     let mut whole = |least: usize, below: usize| least + noise.below(below - least);
     let (d, textures, movements) = (whole(2, 13), whole(8, 20), whole(1, 4));
     let slides = whole(2, 9) as u8;
@@ -188,6 +188,7 @@ fn world(noise: &mut Noise, drift: Drift, evenly: bool) -> (Recipe, Vec<u8>) {
     let sections = Sections {
         drift: (drift, &drifts),
         novelty: Some((limits, &populations)),
+        slopes: None,
     };
     let table = with_sections(&mut out, &Table::read(&plain).unwrap(), &sections).unwrap();
     let row = |row: &Vec<Whitened>| {

@@ -49,6 +49,7 @@ fn with_limits() -> List<u8> {
     let sections = Sections {
         drift: (Drift::default(), &[Drifts::default()]),
         novelty: Some((limits, &[population])),
+        slopes: None,
     };
     let mut out = vec![0; 8000];
     let table = Table::read(&plain).unwrap();

@@ -47,6 +47,7 @@ fn calibrated() -> List<u8> {
             limits,
             &[population.clone(), population.clone(), population],
         )),
+        slopes: None,
     };
     let mut out = vec![0; 2000];
     let table = with_sections(&mut out, &table, &sections).unwrap();
@@ -97,6 +98,7 @@ fn summary(table: &[u8], texture: u16, observed: &[(u8, u8, [i16; 3])]) -> Episo
             .iter()
             .map(|(movement, slides, mean)| (*movement, *slides, Vector::from_slice(mean).unwrap()))
             .collect(),
+        paces: heapless::Vec::new(),
     }
 }
 

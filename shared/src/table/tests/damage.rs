@@ -218,7 +218,7 @@ fn every_error_says_what_is_wrong() {
         ),
         (
             TableError::Version(1),
-            "version 1, and this program reads versions 3 and 4: learn the table anew",
+            "version 1, and this program reads versions 3 to 5: learn the table anew",
         ),
         (TableError::Method(7), "method 7 is unknown"),
         (
@@ -262,6 +262,7 @@ fn every_error_says_what_is_wrong() {
             TableError::Section(2),
             "its limits of new and changed textures are damaged",
         ),
+        (TableError::Section(4), "its slopes over speed are damaged"),
         (TableError::Section(9), "section 9 is damaged"),
         (
             TableError::Name(0),

@@ -35,6 +35,7 @@ pub(super) fn full() -> Vec<u8> {
     let sections = Sections {
         drift: (Drift::default(), &[drifts, drifts]),
         novelty: Some((limits(), &[population.clone(), population])),
+        slopes: None,
     };
     let mut out = vec![0; 4000];
     let table = with_sections(&mut out, &Table::read(&plain).unwrap(), &sections).unwrap();
@@ -55,6 +56,11 @@ pub(super) fn changed(change: impl FnOnce(&mut Vec<u8>, usize)) -> Vec<u8> {
     let at = begin(&bytes);
     bytes.truncate(bytes.len() - CRC_BYTES);
     change(&mut bytes, at);
+    sealed(bytes)
+}
+
+/// With its length and checksum.
+pub(super) fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     let length = (bytes.len() + CRC_BYTES) as u32;
     bytes[8..12].copy_from_slice(&length.to_le_bytes());
     seal(bytes)
