@@ -519,8 +519,8 @@ fn commands() -> String {
     for (path, _) in &known {
         let names: Vec<&str> = path.iter().map(String::as_str).collect();
         let help = help(&names);
-        // a group of commands is in the list above
-        if !help.contains("\nCommands:\n") {
+        // a group of commands is in the list above, unless it does something itself
+        if !help.contains("\nCommands:\n") || help.contains("\nArguments:\n") {
             text += &format!(
                 "\n## tactus {}\n\n```text\n{}\n```\n",
                 path.join(" "),

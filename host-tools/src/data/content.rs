@@ -211,6 +211,23 @@ pub enum ContentError {
     /// The two files of a slide are of different times.
     #[error("no force at the time of the slide; fetch it and its _bio again")]
     NoForce,
+    /// The name of a file of the Cluster dataset.
+    #[error(
+        "the name is not SURFACE_DIRECTION_SPEED_FORCE_REPETITION.csv of the Cluster Haptic Texture Dataset (0_135_40_500_0.csv: \
+         multiples of 45 degrees, 20 to 60 mm/s, 500 or 1000 mN, 0 or 1); correct it or move the file away"
+    )]
+    ClusterName,
+    /// A surface that is not in the dataset, and the last one that is.
+    #[error("there is no surface {0}: they are 0 to {1}; correct the name or move the file away")]
+    Surface(u32, u32),
+    /// Speed along the way, and that of the file's name, mm/s.
+    #[error(
+        "the finger moves at {0:.1} mm/s where the file's name says {1}: it was cut off or has a wrong name; fetch it again"
+    )]
+    Speed(f64, u32),
+    /// The force ends too early.
+    #[error("ends before the finger has come to the end of its way; fetch it again")]
+    NoForceThen,
     /// A slide that came of a publisher's file is not usable.
     #[error("{0}; fetch the file again, or move it and its _cw away")]
     Imported(Box<Self>),

@@ -32,6 +32,8 @@ use crate::data::recordings::biotac::{BACKGROUND_POWER, NOMINAL_FORCE_MN};
 use crate::data::recordings::{RecordingError, RecordingSet, RecordingWriter, Result};
 use crate::data::rows::Rows;
 
+#[cfg(feature = "cluster")]
+pub mod cluster;
 pub mod signs;
 
 /// Sliding speed of the publisher's arm.
@@ -52,6 +54,8 @@ pub struct Imported {
     pub slides: usize,
     /// Rows of 10 ms that the publisher's files lack, by their timestamps: the samples before and after are joined.
     pub lost_rows: usize,
+    /// Slides in which the sensor paused: they are not imported.
+    pub left_out: usize,
 }
 
 /// Converts the recordings in the folder `from` to the project's own format in the folder `to`, where an import that was
@@ -73,7 +77,7 @@ fn copy(set: &RecordingSet, to: &Path, progress: &mut dyn FnMut(usize, usize)) -
         ..Imported::default()
     };
     let total = (0..done.textures).map(|t| set.slides(t).len()).sum();
-    let mut writer = begin(set.folder(), to, set.textures().to_vec())?;
+    let mut writer = begin("import", set.folder(), to, set.textures().to_vec())?;
     for texture in 0..done.textures {
         for (slide, key) in set.load_texture(texture)?.iter().zip(set.slides(texture)) {
             if !writer.has(texture, slide.number) {
@@ -104,7 +108,7 @@ fn import_csv(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) ->
         id,
         name: format!("mat{id}"),
     });
-    let mut writer = begin(from, to, textures.collect())?;
+    let mut writer = begin("import", from, to, textures.collect())?;
     for (texture, (&material, numbers)) in materials.iter().enumerate() {
         let folder = raw.join(format!("mat{material}"));
         // a few slides at a time: rebuilding the signs takes most of a second each
@@ -177,9 +181,9 @@ fn names(folder: &Path) -> Result<Vec<String>> {
 }
 
 /// A writer that goes on with an import of this folder.
-fn begin(from: &Path, to: &Path, textures: Vec<Texture>) -> Result<RecordingWriter> {
+fn begin(command: &str, from: &Path, to: &Path, textures: Vec<Texture>) -> Result<RecordingWriter> {
     let from = fs::canonicalize(from).unwrap_or_else(|_| from.to_owned());
-    let command = format!("tactus import {} ...", from.display());
+    let command = format!("tactus {command} {} ...", from.display());
     RecordingWriter::begin(to, textures, &command)
 }
 
@@ -309,19 +313,24 @@ fn interpolate(force: &[(f64, f64)], times: &[f64]) -> std::result::Result<Vec<i
         (Some(m), Some(w)) if m.0 <= w.1 && w.0 <= m.1 => {}
         _ => return Err(ContentError::NoForce),
     }
-    let at = |&time: &f64| {
-        let after = force.partition_point(|(t, _)| *t <= time);
-        let (before, after) = (after.saturating_sub(1), after.min(force.len() - 1));
-        let ((t0, f0), (t1, f1)) = (force[before], force[after]);
+    // at most 32 N: fits
+    let mn = on_line(force, times).map(|newton| (newton * 1e3).round() as i16);
+    Ok(mn.collect())
+}
+
+/// The values at `times`, as [`interpolate`] has them; there is one value at least.
+fn on_line<'a>(values: &'a [(f64, f64)], times: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+    times.iter().map(|&time| {
+        let after = values.partition_point(|(t, _)| *t <= time);
+        let (before, after) = (after.saturating_sub(1), after.min(values.len() - 1));
+        let ((t0, v0), (t1, v1)) = (values[before], values[after]);
         let part = if t1 > t0 {
             ((time - t0) / (t1 - t0)).clamp(0.0, 1.0)
         } else {
             0.0
         };
-        // at most 32 N: fits
-        ((f0 + part * (f1 - f0)) * 1e3).round() as i16
-    };
-    Ok(times.iter().map(at).collect())
+        v0 + part * (v1 - v0)
+    })
 }
 
 #[cfg(test)]

@@ -44,6 +44,12 @@ pub enum RecordingError {
          https://github.com/dexrob/BioTac_slide_20_50; give the folder that holds raw_data or mat1, mat2, ...", .0.display()
     )]
     NothingToImport(PathBuf),
+    /// The folder does not have the Cluster dataset's layout.
+    #[error(
+        "{}: no slide of the Cluster Haptic Texture Dataset here, such as sensor_data/accel/0/0_135_40_500_0.csv; give the folder \
+         that holds sensor_data. The CSV files of https://doi.org/10.6084/m9.figshare.29438288 are read, .parquet is not", .0.display()
+    )]
+    NoCluster(PathBuf),
     /// The system could not read or write.
     #[error("{}: {cause}", path.display())]
     Io {
