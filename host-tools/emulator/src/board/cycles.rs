@@ -7,8 +7,10 @@
 //! |---|---|
 //! | divisions, 2 to 12 cycles | 12 |
 //! | instructions of an IT block that are not executed | as if they were |
-//! | an exception's vector and its first instructions, which may be read while registers are stacked | read afterwards |
-//! | a peripheral's bus, which stores do not wait for if nothing follows | waited for |
+//! | an exception's first instructions, which may be read while registers are stacked | read afterwards |
+//! | an exception that arrives while another one's registers are stacked | stacked again |
+//! | a store in the write buffer, which a load from the flash may overtake | every load and store waits for it |
+//! | a bridge to a peripheral's bus, whose cycles no manual gives | begins up to a cycle of that bus late, and takes two |
 //! | code that was prefetched, though not in time | a miss: it goes to the cache |
 //!
 //! Not modelled: the bus that DMA takes now and then (a half-word of the motor's current every 3 us).

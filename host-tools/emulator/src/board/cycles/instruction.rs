@@ -53,6 +53,8 @@ pub(super) struct Instruction {
     pub(super) cycles: u32,
     pub(super) branch: Branch,
     pub(super) access: Option<Access>,
+    /// It begins when the write buffer is empty: loads, stores and barriers.
+    pub(super) drains: bool,
     /// A load of one register of the core: this one. Loads behind it may be a cycle shorter.
     pub(super) loads: Option<u8>,
     /// What it has to do with the FPU.
@@ -66,6 +68,7 @@ impl Instruction {
             cycles,
             branch: Branch::No,
             access: None,
+            drains: false,
             loads: None,
             float: None,
         }
@@ -81,7 +84,14 @@ impl Instruction {
             words,
             is_load,
         });
-        Self { access, ..self }
+        Self { access, ..self }.drains()
+    }
+
+    fn drains(self) -> Self {
+        Self {
+            drains: true,
+            ..self
+        }
     }
 
     fn loads(self, register: u16) -> Self {
@@ -154,11 +164,13 @@ fn short(code: u16) -> Instruction {
         }
         0b1011 => match code >> 8 {
             // PUSH and POP: the stack is in RAM
-            0b1011_0100 | 0b1011_0101 => Instruction::of(2, 1 + (code & 0x1ff).count_ones()),
-            0b1011_1100 => Instruction::of(2, 1 + registers.count_ones()),
+            0b1011_0100 | 0b1011_0101 => {
+                Instruction::of(2, 1 + (code & 0x1ff).count_ones()).drains()
+            }
+            0b1011_1100 => Instruction::of(2, 1 + registers.count_ones()).drains(),
             0b1011_1101 => {
                 let pop = Instruction::of(2, 2 + registers.count_ones());
-                pop.branches(Branch::Indirect)
+                pop.drains().branches(Branch::Indirect)
             }
             // CBZ, CBNZ
             0b1011_0001 | 0b1011_0011 | 0b1011_1001 | 0b1011_1011 => plain.branches(Branch::Direct),
@@ -235,7 +247,7 @@ fn long(first: u16, second: u16) -> Instruction {
                 let is_special = first >> 7 & 0b111 == 0b111;
                 if is_special {
                     // MSR, MRS, barriers, hints
-                    Instruction::of(4, BARRIER)
+                    Instruction::of(4, BARRIER).drains()
                 } else {
                     plain.branches(Branch::Direct)
                 }

@@ -11,6 +11,9 @@ const REFILL_INDIRECT: u64 = 2;
 const ENTRY: u64 = 12;
 const RETURN: u64 = 10;
 const TAIL_CHAIN: u64 = 6;
+/// Of the entry, nine cycles put registers on the stack; meanwhile the vector is read and the handler's first instruction fetched, which
+/// take six and what they wait (ARM's article 103489845 on interrupt latency).
+const ENTRY_HIDES: u64 = 9 - 6;
 /// S0 to S15 and FPSCR, put aside at the first instruction of a handler for the FPU, and brought back at its end.
 const FLOATS: u64 = 17;
 
@@ -60,6 +63,8 @@ pub struct Core {
     flash: Accelerator,
     cycles: u64,
     before: Before,
+    /// The first cycle in which the store under way lets another access of the data buses begin.
+    drained: u64,
     /// For each handler that runs, whether it has used the FPU.
     handlers: Vec<bool>,
 }
@@ -71,6 +76,7 @@ impl Core {
             flash,
             cycles: 0,
             before: Before::default(),
+            drained: 0,
             handlers: Vec::new(),
         }
     }
@@ -109,13 +115,24 @@ impl Core {
                 self.cycles += FLOATS;
             }
         }
+        if instruction.drains {
+            self.drain();
+        }
         let access = instruction.access.as_ref();
         let follows_load = access.is_some_and(|access| self.is_pipelined(access, &instruction));
         // the address goes out in the first cycle, the data come in the next
         let issued = self.cycles + 1;
         self.cycles += u64::from(instruction.cycles) - u64::from(follows_load);
         if let Some(access) = access {
-            self.cycles += self.wait(executed, access, issued);
+            let waits = self.wait(executed, access, issued);
+            if access.is_load {
+                self.cycles += waits;
+            } else {
+                // the last word waits in the write buffer
+                let last = waits / u64::from(access.words.max(1));
+                self.cycles += waits - last;
+                self.drained = self.cycles + last;
+            }
         }
         let branched = executed.next != executed.at + instruction.length;
         if branched {
@@ -133,6 +150,11 @@ impl Core {
         self.cycles - began
     }
 
+    /// Waits until the write buffer is empty.
+    fn drain(&mut self) {
+        self.cycles = self.cycles.max(self.drained);
+    }
+
     /// Whether it shares a cycle with the load before it: its address does not depend on what that loads.
     fn is_pipelined(&self, access: &Access, instruction: &Instruction) -> bool {
         let Some(loaded) = self.before.loads else {
@@ -147,7 +169,8 @@ impl Core {
         is_single && instruction.cycles > 1 && !depends
     }
 
-    /// Cycles that a load or store waits for memory.
+    /// Cycles that a load or store waits for memory. A store's last word does so in the write buffer (one entry, for the data buses of
+    /// code and system, ARM DDI 0337 3.5 and 100166 3.3.2): peripherals are device memory, which is buffered (ARM DDI 0403 B3.1).
     fn wait(&mut self, executed: &Executed, access: &Access, issued: u64) -> u64 {
         let address = match access.address {
             Address::Literal(offset) => Some(literal(executed.at, offset)),
@@ -176,8 +199,16 @@ impl Core {
     /// A handler begins, by the vector at an address; after the return from another one it is `chained`. Its cycles.
     pub fn enter(&mut self, vector: u32, chained: bool) -> u64 {
         let began = self.cycles;
-        self.fetch(vector);
-        self.cycles += if chained { TAIL_CHAIN } else { ENTRY };
+        if chained {
+            self.fetch(vector);
+            self.cycles += TAIL_CHAIN;
+        } else {
+            // registers go to the stack
+            self.drain();
+            let before = self.cycles;
+            self.fetch(vector);
+            self.cycles = before + ENTRY + (self.cycles - before).saturating_sub(ENTRY_HIDES);
+        }
         self.handlers.push(false);
         self.before = Before::default();
         self.cycles - began
@@ -187,6 +218,9 @@ impl Core {
     pub fn leave(&mut self, chained: bool) -> u64 {
         let began = self.cycles;
         let used = self.handlers.pop() == Some(true);
+        if used || !chained {
+            self.drain();
+        }
         self.cycles += if chained { 0 } else { RETURN };
         self.cycles += if used { FLOATS } else { 0 };
         self.before = Before::default();
