@@ -9,18 +9,19 @@ use core::mem::ManuallyDrop;
 use core::sync::atomic::Ordering::Relaxed;
 use core::sync::atomic::{AtomicBool, AtomicU32};
 
-use embassy_stm32::gpio::{AfType, Flex, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::gpio::{AfType, AnyPin, Flex, OutputType, Pin as _, Pull, Speed};
 use embassy_stm32::interrupt;
+use embassy_stm32::pac::gpio::{Gpio, regs::Bsrr};
 use embassy_stm32::pac::spi::regs::Cr1;
 use embassy_stm32::pac::spi::vals::{Br, Cpha, Cpol, Dff, Mstr};
 use embassy_stm32::pac::{SPI1, TIM2};
 use embassy_stm32::{Peri, peripherals, rcc};
 use embedded_hal::spi::{Phase, Polarity};
 use heapless::spsc::Producer;
+use tactus_core::sensor::PressureSensor;
 use tactus_core::sensor::biotac::{BioTac, WordStats};
 use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
 use tactus_core::sensor::slot::{Answer, Transaction, length_us};
-use tactus_core::sensor::{PressureSensor, slot_of};
 
 use crate::board::{self, held};
 use crate::chip;
@@ -86,6 +87,82 @@ const _: () = {
     assert!(*port.clock_hz.start() <= SPI_HZ && SPI_HZ <= *port.clock_hz.end());
 };
 
+/// A transaction as the interrupts do it. The board test `slots` plants mistakes in it, by this layout.
+#[derive(Clone, Copy)]
+#[repr(C)]
+struct Step {
+    /// Time for the bytes, with the slack, and for the gap behind them.
+    ticks: u32,
+    gap_ticks: u32,
+    /// What goes out, in frames.
+    out: [u16; FRAMES],
+    port: u8,
+    /// Bytes, and the index of the first one that comes in as the answer.
+    bytes: u8,
+    answer: u8,
+}
+
+impl Step {
+    const fn of(transaction: &Transaction) -> Self {
+        let (mut out, mut index, mut rest) = ([0; FRAMES], 0, transaction.out);
+        while let [byte, others @ ..] = rest {
+            out[index / FRAME_BYTES] = out[index / FRAME_BYTES] << 8 | *byte as u16;
+            (index, rest) = (index + 1, others);
+        }
+        Self {
+            ticks: index as u32 * BYTE_TICKS + SLACK_US * US_TICKS,
+            gap_ticks: transaction.gap_us * US_TICKS,
+            out,
+            port: transaction.port,
+            bytes: index as u8,
+            answer: index as u8 - transaction.answer,
+        }
+    }
+}
+
+/// Slots, the transactions of the longest one, and the frames of the longest of these.
+const COUNT: usize = Finger::SLOTS.len();
+const STEPS: usize = most().0;
+const FRAMES: usize = most().1;
+
+const fn most() -> (usize, usize) {
+    let (mut steps, mut frames, mut slots) = (0, 0, Finger::SLOTS);
+    while let [slot, others @ ..] = slots {
+        steps = if slot.len() > steps {
+            slot.len()
+        } else {
+            steps
+        };
+        let mut rest = *slot;
+        while let [transaction, others @ ..] = rest {
+            let these = transaction.out.len().div_ceil(FRAME_BYTES);
+            frames = if these > frames { these } else { frames };
+            rest = others;
+        }
+        slots = others;
+    }
+    (steps, frames)
+}
+
+/// What is done in each slot, in RAM: without the data cache (see `board`) each constant that is read from flash takes six cycles
+/// more, and a slot reads twenty of them.
+#[unsafe(link_section = ".data.SLOT_PLAN")]
+static SLOT_PLAN: [(usize, [Step; STEPS]); COUNT] = {
+    let nothing = Step::of(&Transaction::first_port(&[], 0, 0));
+    let (mut plan, mut at) = ([(0, [nothing; STEPS]); COUNT], 0);
+    while at < COUNT {
+        let slot = Finger::SLOTS[at];
+        let mut step = 0;
+        while step < slot.len() {
+            plan[at].1[step] = Step::of(&slot[step]);
+            step += 1;
+        }
+        plan[at].0 = step;
+        at += 1;
+    }
+    plan
+};
+
 /// Slots since boot, those that came too late, and words by what was wrong with them.
 pub(crate) static SLOTS: AtomicU32 = AtomicU32::new(0);
 pub(crate) static LATE: AtomicU32 = AtomicU32::new(0);
@@ -100,10 +177,38 @@ pub(crate) struct NoFrame;
 pub(crate) struct Bus {
     _spi: Peri<'static, peripherals::SPI1>,
     _pins: [ManuallyDrop<Flex<'static>>; 3],
-    selects: [Output<'static>; SELECTS],
+    selects: [Select; SELECTS],
     control: Cr1,
     /// It was told to say when a frame is over.
     interrupts: bool,
+}
+
+/// A chip select. embassy's output computes port and bit from the pin's number each time, four times in a slot.
+struct Select {
+    _pin: ManuallyDrop<Flex<'static>>,
+    port: Gpio,
+    mask: u32,
+}
+
+impl Select {
+    /// It is high.
+    fn new(pin: Peri<'static, AnyPin>) -> Self {
+        let (port, mask) = (pin.block(), 1 << pin.pin());
+        let mut pin = held(pin);
+        pin.set_high();
+        pin.set_as_output(Speed::VeryHigh);
+        Self {
+            _pin: pin,
+            port,
+            mask,
+        }
+    }
+
+    /// By the register that leaves the port's other pins alone.
+    fn set(&self, low: bool) {
+        let mask = if low { self.mask << 16 } else { self.mask };
+        self.port.bsrr().write_value(Bsrr(mask));
+    }
 }
 
 /// Looks at a frame in its time.
@@ -112,7 +217,7 @@ const LOOKS: u32 = 32;
 impl Bus {
     /// Takes the bus; no select is low.
     pub(crate) fn new(pins: board::Sensor) -> Self {
-        let selects = [Output::new(pins.select, Level::High, Speed::VeryHigh)];
+        let selects = [Select::new(pins.select.into())];
         let out = AfType::output(OutputType::PushPull, Speed::VeryHigh);
         // nobody there then reads as FF FF
         let input = AfType::input(Pull::Up);
@@ -151,28 +256,23 @@ impl Bus {
 
     /// Sets the bus up anew: a disturbance may have switched it off, and what is left in its buffers belongs to no word.
     fn restart(&mut self) {
-        for select in &mut self.selects {
-            select.set_high();
+        for select in &self.selects {
+            select.set(false);
         }
         rcc::enable_and_reset::<peripherals::SPI1>();
         SPI1.cr2().write(|w| w.set_rxneie(self.interrupts));
         SPI1.cr1().write_value(self.control);
     }
 
-    fn select(&mut self, transaction: &Transaction, low: bool) {
-        if let Some(select) = self.selects.get_mut(usize::from(transaction.port)) {
-            select.set_level((!low).into());
+    #[inline(always)]
+    fn select(&mut self, port: u8, low: bool) {
+        if let Some(select) = self.selects.get(usize::from(port)) {
+            select.set(low);
         }
     }
 
-    /// Sends the frame from byte `at` on. The one before has been read, so the data register is free, and the next that is received
-    /// belongs to this one.
-    fn send(&mut self, bytes: &[u8], at: usize) {
-        let byte = |index| u16::from(bytes.get(index).copied().unwrap_or_default());
-        let frame = match WIDE {
-            true => byte(at) << 8 | byte(at + 1),
-            false => byte(at),
-        };
+    /// Sends a frame. The one before has been read, so the data register is free, and the next that is received belongs to this one.
+    fn send(&mut self, frame: u16) {
         SPI1.dr().write(|w| w.set_dr(frame));
     }
 
@@ -187,11 +287,11 @@ impl Bus {
         transaction: &Transaction,
         bytes: &mut [u8],
     ) -> Result<(), NoFrame> {
-        self.select(transaction, true);
-        let done = (0..bytes.len())
-            .step_by(FRAME_BYTES)
-            .all(|at| self.wait_for_frame(bytes, at));
-        self.select(transaction, false);
+        self.select(transaction.port, true);
+        let done = bytes
+            .chunks_mut(FRAME_BYTES)
+            .all(|frame| self.wait_for_frame(frame));
+        self.select(transaction.port, false);
         if done {
             return Ok(());
         }
@@ -199,16 +299,21 @@ impl Bus {
         Err(NoFrame)
     }
 
-    fn wait_for_frame(&mut self, bytes: &mut [u8], at: usize) -> bool {
-        self.send(bytes, at);
+    fn wait_for_frame(&mut self, bytes: &mut [u8]) -> bool {
+        self.send(
+            bytes
+                .iter()
+                .fold(0, |frame, byte| frame << 8 | u16::from(*byte)),
+        );
         let cycles = FRAME_BYTES as u32 * BYTE_CYCLES;
         chip::wait_cycles(cycles);
         for _ in 0..2 * LOOKS {
             if SPI1.sr().read().rxne() {
-                let came_in = self.received();
-                let places = bytes.iter_mut().skip(at);
-                let came_in = came_in.into_iter().skip(2 - FRAME_BYTES);
-                places.zip(came_in).for_each(|(to, from)| *to = from);
+                let came_in = self.received().into_iter().skip(2 - FRAME_BYTES);
+                bytes
+                    .iter_mut()
+                    .zip(came_in)
+                    .for_each(|(to, from)| *to = from);
                 return true;
             }
             chip::wait_cycles(cycles / LOOKS);
@@ -229,7 +334,7 @@ struct Slots {
     /// Slots that have begun.
     begun: u32,
     /// What is left to do of the slot, the transaction under way first.
-    left: &'static [Transaction],
+    left: &'static [Step],
     /// The bytes of that one which have been sent, or none: it has not begun.
     sent: usize,
     /// When it should begin, and have ended, ticks since the slot began.
@@ -303,12 +408,15 @@ fn TIM2() {
     let Some(slots) = (unsafe { &mut *SHARED.0.get() }) else {
         return;
     };
-    if flags.uif() {
+    let due = if flags.uif() {
         slots.begin();
-    }
-    // one that is there of the slot before is not for this one, and a slot may have a single transaction
-    if flags.ccif(0) && slots.begins > 0 && TIM2.cnt().read() >= slots.begins {
-        slots.next();
+        true
+    } else {
+        // a slot may have a single transaction
+        flags.ccif(0) && slots.begins > 0 && TIM2.cnt().read() >= slots.begins && slots.next()
+    };
+    if due {
+        slots.transact();
     }
 }
 
@@ -325,81 +433,85 @@ fn SPI1() {
 
 impl Slots {
     /// A slot begins.
+    #[inline(always)]
     fn begin(&mut self) {
-        self.give_up();
-        self.left = slot_of::<Finger>(self.begun);
+        if let [step, ..] = self.left {
+            self.give_up(step);
+        }
+        if let Some((steps, all)) = SLOT_PLAN.get(self.begun as usize % COUNT) {
+            self.left = all.get(..*steps).unwrap_or_default();
+        }
         self.begun = self.begun.wrapping_add(1);
         SLOTS.store(self.begun, Relaxed);
         self.answer.clear();
         self.begins = 0;
-        self.transact();
     }
 
-    /// The time of the next transaction has come.
-    fn next(&mut self) {
-        if self.sent == 0 {
-            self.transact();
-        } else {
-            self.give_up();
+    /// The time of the next transaction has come; whether it can begin.
+    #[inline(always)]
+    fn next(&mut self) -> bool {
+        match self.left {
+            [step, ..] if self.sent > 0 => {
+                self.give_up(step);
+                false
+            }
+            _ => true,
         }
     }
 
     /// What is under way has not ended in its time.
-    fn give_up(&mut self) {
-        let Some(transaction) = self.left.first() else {
-            return;
-        };
+    #[cold]
+    fn give_up(&mut self, step: &Step) {
         if self.sent > 0 {
             self.bus.restart();
         }
-        if transaction.answer > 0 && self.sent > 0 {
+        if step.answer < step.bytes && self.sent > 0 {
             // an answer that does not come
-            self.answer.clear();
-            self.word();
+            let word = self.finger.decode(self.begun.wrapping_sub(1), &[]);
+            self.damaged(&word);
         } else {
             self.late();
         }
     }
 
+    #[inline(always)]
     fn transact(&mut self) {
-        let Some(transaction) = self.left.first() else {
+        let [step, left @ ..] = self.left else {
             return;
         };
-        self.bus.select(transaction, true);
-        self.bus.send(transaction.out, 0);
+        self.bus.select(step.port, true);
+        self.bus.send(step.out.first().copied().unwrap_or_default());
         self.sent = FRAME_BYTES;
-        let bytes_ticks = transaction.out.len() as u32 * BYTE_TICKS;
-        self.ends = self.begins + bytes_ticks + SLACK_US * US_TICKS;
-        let gap_ticks = transaction.gap_us * US_TICKS;
-        if self.left.len() > 1 {
-            self.begins = self.ends + gap_ticks;
+        self.ends = self.begins + step.ticks;
+        if !left.is_empty() {
+            self.begins = self.ends + step.gap_ticks;
             TIM2.ccr(0).write_value(self.begins);
         } else if self.begins > 0 {
             // the sample was taken before: there is time until the next slot
-            self.ends = SLOT_TICKS - gap_ticks;
+            self.ends = SLOT_TICKS - step.gap_ticks;
         }
     }
 
     /// A frame is over.
+    #[inline(always)]
     fn frame(&mut self) {
         let came_in = self.bus.received();
-        let [transaction, left @ ..] = self.left else {
+        let [step, left @ ..] = self.left else {
             return;
         };
-        let first = self.sent.saturating_sub(FRAME_BYTES);
-        let came_in = came_in.iter().skip(2 - FRAME_BYTES);
-        for (byte, index) in came_in.zip(first..) {
-            if transaction.answers_at(index) {
-                // there is room for the answers of a slot
-                let _ = self.answer.push(*byte);
-            }
+        // the answer begins with a frame, or in the middle of one
+        let before = (usize::from(step.answer) + FRAME_BYTES).saturating_sub(self.sent);
+        for byte in came_in.iter().skip(2 - FRAME_BYTES + before) {
+            // there is room for the answers of a slot
+            let _ = self.answer.push(*byte);
         }
-        if self.sent < transaction.out.len() {
-            self.bus.send(transaction.out, self.sent);
+        if self.sent < step.bytes.into() {
+            let frame = step.out.get(self.sent / FRAME_BYTES);
+            self.bus.send(frame.copied().unwrap_or_default());
             self.sent += FRAME_BYTES;
             return;
         }
-        self.bus.select(transaction, false);
+        self.bus.select(step.port, false);
         self.sent = 0;
         self.left = left;
         if TIM2.cnt().read() > self.ends {
@@ -410,28 +522,40 @@ impl Slots {
     }
 
     /// The slot's sample is not where it should be in time: the rest of the slot is left out.
+    #[cold]
     fn late(&mut self) {
-        self.left = &[];
-        self.sent = 0;
         LATE.fetch_add(1, Relaxed);
-        self.put(None);
+        self.lose();
     }
 
     /// The slot is over, and has its answer.
+    #[inline(always)]
     fn word(&mut self) {
-        self.left = &[];
-        self.sent = 0;
         let word = self.finger.decode(self.begun.wrapping_sub(1), &self.answer);
-        if word.is_err() {
-            let stats = &mut self.stats;
-            stats.count(&word);
-            PARITY.store(stats.parity.saturating_add(stats.padding), Relaxed);
-            let silent = stats.no_sensor;
-            ERROR_FRAMES.store(stats.error_frames.saturating_add(silent), Relaxed);
+        match word {
+            Ok(word) => self.put(Some(word)),
+            Err(_) => self.damaged(&word),
         }
-        self.put(word.ok());
     }
 
+    #[cold]
+    fn damaged(&mut self, word: &Result<Pressure, <Finger as PressureSensor>::Error>) {
+        let stats = &mut self.stats;
+        stats.count(word);
+        PARITY.store(stats.parity.saturating_add(stats.padding), Relaxed);
+        let silent = stats.no_sensor;
+        ERROR_FRAMES.store(stats.error_frames.saturating_add(silent), Relaxed);
+        self.lose();
+    }
+
+    /// The slot is over, without a word.
+    fn lose(&mut self) {
+        self.left = &[];
+        self.sent = 0;
+        self.put(None);
+    }
+
+    #[inline(always)]
     fn put(&mut self, word: Word) {
         self.gap = self
             .words

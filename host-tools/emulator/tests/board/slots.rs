@@ -11,15 +11,17 @@ use tactus_emulator::host::talk::Talk;
 use crate::common::{elf, elf_of, ready};
 use crate::faults::identify;
 
-const FLASH: u64 = 0x0800_0000;
-/// Where images end at the latest: flash bank 1.
-const FLASH_BYTES: u64 = 1 << 20;
-/// A transaction in the order of the compiler: where the bytes are, how many there are, the gap, select and answer.
-const GAP_AT: u64 = 8;
-const SELECT_AT: u64 = 12;
+/// A transaction as the firmware keeps it in RAM: its time, the gap behind it, the frame, the select, how many bytes.
+const GAP_AT: u64 = 4;
+const FRAME_AT: u64 = 8;
+const SELECT_AT: u64 = 10;
+const BYTES_AT: u64 = 11;
 const TRANSACTION_BYTES: u64 = 16;
-/// The gap behind a command, us.
+/// Ticks of the slots' timer in a us, and the gap behind a command, us.
+const TICKS: u32 = 84;
 const GAP_US: u32 = 50;
+/// By now RAM has its initial values, and no slot has begun: the sensor starts for 100 ms.
+const BEFORE_SLOTS_MS: u64 = 50;
 
 /// Complaints: an answer that was read too early, a read without a command.
 const TOO_EARLY: u8 = 0x2D;
@@ -54,27 +56,22 @@ fn the_sensor_has_nothing_to_complain_of() {
     }
 }
 
-/// The places in flash of the transactions that send these bytes.
-fn transactions(board: &mut Emulator, sends: [u8; 2]) -> Vec<u64> {
-    let flash = board.read(FLASH, FLASH_BYTES).unwrap();
-    let word = |at: usize| -> Option<u32> {
-        let bytes = flash.get(at..at + 4)?.try_into().ok()?;
-        Some(u32::from_le_bytes(bytes))
-    };
-    let sends_at = |at: usize| {
-        let from = word(at)?.checked_sub(FLASH as u32)? as usize;
-        (flash.get(from..from + 2)? == sends && word(at + 4)? == 2).then_some(())
-    };
-    (0..flash.len())
-        .step_by(4)
-        .filter(|at| sends_at(*at).is_some())
-        .map(|at| FLASH + at as u64)
+/// The places in RAM of the transactions that send this frame of two bytes.
+fn transactions(board: &mut Emulator, frame: u16) -> Vec<u64> {
+    let (begin, bytes) = board.symbol("SLOT_PLAN").unwrap();
+    let places = (begin..=begin + bytes - TRANSACTION_BYTES).step_by(4);
+    places
+        .filter(|place| {
+            board.read(place + FRAME_AT, 2).unwrap() == frame.to_le_bytes()
+                && board.read(place + BYTES_AT, 1).unwrap() == [2]
+        })
         .collect()
 }
 
 /// Runs an image whose slots are not what they should be, and says what the sensor heard and the rig saw.
 fn planted(elf: &Path, plant: impl FnOnce(&mut Emulator)) -> (Vec<(u8, u64)>, u64, Option<Seen>) {
     let mut board = Emulator::start(elf, Setup::default(), Options::default()).unwrap();
+    board.run_ms(BEFORE_SLOTS_MS).unwrap();
     plant(&mut board);
     let mut talk = Talk::new(board);
     let mut seen = None;
@@ -101,12 +98,12 @@ fn the_sensor_complains_of_a_slot_with_a_short_gap() {
     for variable in ["TACTUS_ELF", "TACTUS_HANDHELD_ELF"] {
         let Some(elf) = elf_of(variable) else { return };
         let (complaints, commands, seen) = planted(&elf, |board| {
-            for sends in [[0x80, 0x00], [0x83, 0x00]] {
+            for sends in [0x8000, 0x8300] {
                 let places = transactions(board, sends);
                 let [place] = places[..] else {
                     panic!("{places:x?} for {sends:x?}")
                 };
-                let [gap, short] = [GAP_US, 30].map(u32::to_le_bytes);
+                let [gap, short] = [GAP_US, 30].map(|us| (us * TICKS).to_le_bytes());
                 write(board, place + GAP_AT, &gap, &short);
             }
         });
@@ -127,19 +124,20 @@ fn the_sensor_complains_of_a_slot_with_a_short_gap() {
 fn a_slot_that_reads_before_it_asks_has_no_sample() {
     let Some(elf) = elf() else { return };
     let (complaints, _, seen) = planted(&elf, |board| {
-        for command in [[0x80, 0x00], [0x83, 0x00]] {
+        for command in [0x8000, 0x8300] {
             let [place] = transactions(board, command)[..] else {
                 panic!("{command:x?}")
             };
             // that of the read is the other half of the slot
-            let reads = transactions(board, [0x00, 0x01]);
+            let reads = transactions(board, 0x0001);
             let near = reads
                 .into_iter()
                 .find(|read| read.abs_diff(place) == TRANSACTION_BYTES);
             let near = near.expect("no read beside the command");
-            let [asks, read] = [place, near].map(|at| board.read(at, 4).unwrap());
-            board.write(place, &read).unwrap();
-            board.write(near, &asks).unwrap();
+            let frames = [place, near].map(|at| at + FRAME_AT);
+            let [asks, read] = frames.map(|at| board.read(at, 2).unwrap());
+            board.write(frames[0], &read).unwrap();
+            board.write(frames[1], &asks).unwrap();
         }
     });
     // each later read comes 160 us after the command of the slot before
@@ -151,12 +149,12 @@ fn a_slot_that_reads_before_it_asks_has_no_sample() {
 fn a_slot_without_its_select_is_heard_by_nobody() {
     let Some(elf) = elf() else { return };
     let (complaints, commands, seen) = planted(&elf, |board| {
-        for command in [[0x80, 0x00], [0x83, 0x00]] {
+        for command in [0x8000, 0x8300] {
             let [place] = transactions(board, command)[..] else {
                 panic!("{command:x?}")
             };
-            // the second select, which the board has not; no answer
-            write(board, place + SELECT_AT, &[0, 0], &[1, 0]);
+            // the second select, which the board has not
+            write(board, place + SELECT_AT, &[0], &[1]);
         }
     });
     assert_eq!(commands, 0);
