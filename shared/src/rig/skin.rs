@@ -16,26 +16,45 @@ pub fn wearing(power_mw: f32) -> f32 {
     1.0 + power_mw / Movement::WEAR_LIMIT_MW
 }
 
+/// A sum of millions of small parts: what a part loses to the sum's rounding is added with the next one (Kahan's), since the chip adds
+/// f64 in a hundred instructions.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+struct Sum {
+    sum: f32,
+    /// So much too large is the sum.
+    excess: f32,
+}
+
+impl Sum {
+    const fn of(sum: f32) -> Self {
+        Self { sum, excess: 0.0 }
+    }
+
+    fn add(&mut self, part: f32) {
+        let part = part - self.excess;
+        let sum = self.sum + part;
+        self.excess = (sum - self.sum) - part;
+        self.sum = sum;
+    }
+}
+
 /// Sliding since the skin was replaced.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct SkinCare {
-    /// Energy in mJ, plain and weighted; f64, for they are sums of millions of small parts.
-    energy_mj: f64,
-    wear_mj: f64,
+    /// Energy in J, plain and weighted.
+    energy_j: Sum,
+    wear_j: Sum,
 }
 
 impl SkinCare {
     /// A new skin.
-    pub const NEW: Self = Self {
-        energy_mj: 0.0,
-        wear_mj: 0.0,
-    };
+    pub const NEW: Self = Self::after(0.0, 0.0);
 
     /// A skin that has done `energy_j` joules, which wore it like `wear_j`.
-    pub fn after(energy_j: f32, wear_j: f32) -> Self {
+    pub const fn after(energy_j: f32, wear_j: f32) -> Self {
         Self {
-            energy_mj: f64::from(energy_j) * 1e3,
-            wear_mj: f64::from(wear_j) * 1e3,
+            energy_j: Sum::of(energy_j),
+            wear_j: Sum::of(wear_j),
         }
     }
 
@@ -48,19 +67,19 @@ impl SkinCare {
             force_n.max(0.0)
         };
         let power_mw = friction * libm::fabsf(speed_mm_s);
-        let energy_mj = f64::from(power_mw) * 1e-3;
-        self.energy_mj += energy_mj;
-        self.wear_mj += energy_mj * f64::from(wearing(power_mw));
+        let energy_j = power_mw * 1e-6;
+        self.energy_j.add(energy_j);
+        self.wear_j.add(energy_j * wearing(power_mw));
     }
 
     /// Sliding energy since the last replacement, J.
     pub fn energy_j(&self) -> f32 {
-        (self.energy_mj * 1e-3) as f32
+        self.energy_j.sum
     }
 
     /// The same, weighted by how much it wears, J.
     pub fn wear_j(&self) -> f32 {
-        (self.wear_mj * 1e-3) as f32
+        self.wear_j.sum
     }
 
     /// Whether the skin should be looked at before the next training.
@@ -93,6 +112,24 @@ mod tests {
         assert!((fast.wear_j() / fast.energy_j() - (1.0 + 50.0 / 15.887)).abs() < 1e-3);
         // without a shear the force counts
         assert!((slide(0.0, 10.0, 3000).energy_j() - 0.03).abs() < 1e-6);
+    }
+
+    /// The parts of a worn skin are 1e-6 of its sum: f32 alone would be off by some of them each.
+    #[test]
+    fn hours_of_sliding_are_summed_as_in_f64() {
+        let mut skin = SkinCare::after(3.0, 7.0);
+        let (mut energy_j, mut wear_j) = (3.0, 7.0);
+        for ms in 0..2_000_000 {
+            let shear_n = 0.1 + (ms % 977) as f32 * 1e-3;
+            skin.slid(shear_n, 1.0, 3.0);
+            let power_mw = f64::from(shear_n) * 3.0;
+            energy_j += power_mw * 1e-6;
+            wear_j += power_mw * 1e-6 * (1.0 + power_mw / f64::from(Movement::WEAR_LIMIT_MW));
+        }
+        for (sum, exact) in [(skin.energy_j(), energy_j), (skin.wear_j(), wear_j)] {
+            let off = (f64::from(sum) / exact - 1.0).abs();
+            assert!(off < 3e-7, "{sum} for {exact}: {off}");
+        }
     }
 
     #[test]

@@ -9,7 +9,6 @@ use super::slide_path::SlidePath;
 use super::stage::{MARGIN_MM, StageConstants};
 use crate::features::{Movement, SamplePhase};
 use crate::sensor::pressure::{Channel, RATE_HZ};
-use crate::up_to;
 
 /// Longest slide at constant speed, s.
 const STEADY_S: f32 = 3.0;
@@ -161,12 +160,21 @@ impl Run {
         }
     }
 
-    /// P_AC of this tick about the baseline.
+    /// P_AC of this tick about the baseline. The servo does this each millisecond: once over the words, in place.
     fn feel(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
-        self.damaged += inputs.words.iter().filter(|w| w.is_none()).count() as u32;
-        self.words = self.words.saturating_add(pac(inputs).count() as u32);
-        let baseline = self.baseline;
-        outputs.pac = up_to(pac(inputs).map(|counts| (i32::from(counts) - baseline) as i16));
+        outputs.pac.clear();
+        for word in &inputs.words {
+            match word {
+                None => self.damaged += 1,
+                Some(word) if word.channel == Channel::Pac => {
+                    self.words = self.words.saturating_add(1);
+                    let about = i32::from(word.counts.get()) - self.baseline;
+                    // there is room for as many as there are words
+                    let _ = outputs.pac.push(about as i16);
+                }
+                Some(_) => {}
+            }
+        }
     }
 }
 
