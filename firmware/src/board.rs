@@ -14,6 +14,8 @@ use embassy_stm32::rcc::{
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Peri, PeripheralType, bind_interrupts, flash, peripherals, usart};
 
+use crate::chip::critical_section::MASKED;
+
 assign_resources! {
     sensor: Sensor {
         spi: SPI1,
@@ -122,6 +124,9 @@ bind_interrupts!(pub(crate) struct Irqs {
     FLASH => flash::InterruptHandler;
 });
 
+/// Of the chip (RM0090, table 62).
+const INTERRUPTS: usize = 91;
+
 /// How often the 8 MHz are looked for, 100 us apart: 0.1 s, in which the probe has started too.
 const LOOKS: u32 = 1000;
 /// The core after its reset.
@@ -160,6 +165,13 @@ pub(crate) fn start() -> AssignedResources {
         Speed::Low,
         Pull::Down,
     ));
+    // Critical sections mask all but the slots' priority, so nobody else may have it, as whoever is not set below would.
+    // SAFETY: nobody else sets priorities.
+    let nvic = unsafe { cortex_m::Peripherals::steal() }.NVIC;
+    for priority in nvic.ipr.iter().take(INTERRUPTS) {
+        // SAFETY: no critical section is open.
+        unsafe { priority.write(MASKED as u8) };
+    }
     // The slots of the sensor before all; a byte of the link waits at most 10.8 us, then it is lost; the lever's steps, the
     // clock and the servo have more time.
     interrupt::TIM2.set_priority(Priority::P0);

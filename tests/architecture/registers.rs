@@ -125,6 +125,31 @@ fn a_peripheral_has_one_owner() {
     }
 }
 
+/// Critical sections do not mask the highest priority: who has it must not share data by them, as all drivers do.
+#[test]
+fn the_slots_alone_have_the_highest_priority() {
+    let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware/src");
+    let texts = files(&firmware)
+        .into_iter()
+        .map(|file| fs::read_to_string(file).unwrap());
+    let set = texts.flat_map(|text| {
+        let lines = text.lines().filter(|line| line.contains("Priority::P0"));
+        lines.map(|line| line.trim().to_owned()).collect::<Vec<_>>()
+    });
+    let slots =
+        ["TIM2", "SPI1"].map(|name| format!("interrupt::{name}.set_priority(Priority::P0);"));
+    assert_eq!(set.collect::<Vec<_>>(), slots);
+    let slots = fs::read_to_string(firmware.join("chip/slots.rs")).unwrap();
+    for shares in [
+        "critical_section",
+        "CriticalSection",
+        "defmt",
+        "interrupt::free",
+    ] {
+        assert!(!slots.contains(shares), "{shares}");
+    }
+}
+
 #[test]
 fn who_touches_what_another_file_or_a_driver_has_is_named() {
     let found = |file: &str, text: &str| {

@@ -67,10 +67,12 @@ pub struct Cycles {
 }
 
 impl Cycles {
-    /// Cycles per instruction in the worst millisecond of acquisition or servo.
+    /// Cycles per instruction in the worst millisecond: of all that is executed in it, and, which is more, of acquisition and servo
+    /// alone.
     pub fn worst_ratio(&self) -> f64 {
-        let ratios = [self.acquisition, self.servo].map(|share| share.slowest.spent.ratio());
-        ratios[0].max(ratios[1])
+        let shares = [self.all, self.acquisition, self.servo];
+        let ratios = shares.map(|share| share.slowest.spent.ratio());
+        ratios.into_iter().fold(0.0, f64::max)
     }
 
     /// Share of the core's time that a slide takes, waits included.
