@@ -33,7 +33,7 @@ pub struct Edge {
 pub struct Encoder {
     origin: f64,
     cut: Option<Cut>,
-    /// lines A and B are exchanged: without edges only
+    /// lines A and B are exchanged
     swapped: bool,
     /// count - what [`Encoder::followed`] says
     offset: i64,
@@ -61,11 +61,12 @@ impl Encoder {
         let Some(passed) = &mut self.passed else {
             return;
         };
+        let wires = (self.cut, self.swapped);
         let mut pass = |count: i64, boundary: i64| {
             let at_mm = (boundary as f64 + self.origin) / COUNTS_PER_MM;
             let share = ((at_mm - from_mm) / (to_mm - from_mm)).clamp(0.0, 1.0);
             let at_ns = began_ns + (share * (ended_ns - began_ns) as f64) as u64;
-            passed.push_back((count, edge(at_ns, count, self.cut)));
+            passed.push_back((count, edge(at_ns, count, wires)));
         };
         if to > from {
             (from + 1..=to).for_each(|count| pass(count, count));
@@ -80,11 +81,17 @@ impl Encoder {
         (self.offset + if self.swapped { -followed } else { followed }) as i32
     }
 
-    /// Exchanges lines A and B, or puts them right, with the stage at a position. The edges that are kept stay as they were.
-    pub fn swap(&mut self, swapped: bool, position_mm: f64) {
+    /// Exchanges lines A and B, or puts them right, at a time with the stage at a position. Edges of that tick that are yet to
+    /// come are changed.
+    pub fn swap(&mut self, swapped: bool, position_mm: f64, now_ns: u64) {
+        if swapped == self.swapped {
+            return;
+        }
+        // two lines at once are nothing to a counter
         let before = i64::from(self.count(position_mm));
         self.swapped = swapped;
         self.offset += before - i64::from(self.count(position_mm));
+        self.rewire(self.counts(position_mm), now_ns);
     }
 
     /// Cuts wires, or joins them again, at a time with the stage at a position. Edges of that tick that are yet to come are
@@ -99,12 +106,18 @@ impl Encoder {
         let jump = sign * step(lines(count, self.cut), lines(count, cut));
         self.cut = cut;
         self.offset = before + jump - sign * followed(count, cut);
+        self.rewire(count, now_ns);
+    }
+
+    /// The lines are what the wires of now make of the count, and of the edges to come.
+    fn rewire(&mut self, count: i64, now_ns: u64) {
+        let wires = (self.cut, self.swapped);
         if let Some(passed) = &mut self.passed {
             let now = passed.partition_point(|(_, edge)| edge.at_ns <= now_ns);
             for (count, to_come) in passed.range_mut(now..) {
-                *to_come = edge(to_come.at_ns, *count, cut);
+                *to_come = edge(to_come.at_ns, *count, wires);
             }
-            passed.insert(now, (count, edge(now_ns, count, cut)));
+            passed.insert(now, (count, edge(now_ns, count, wires)));
         }
     }
 
@@ -125,8 +138,9 @@ impl Encoder {
     }
 }
 
-fn edge(at_ns: u64, count: i64, cut: Option<Cut>) -> Edge {
+fn edge(at_ns: u64, count: i64, (cut, swapped): (Option<Cut>, bool)) -> Edge {
     let (a, b) = lines(count, cut);
+    let (a, b) = if swapped { (b, a) } else { (a, b) };
     Edge { at_ns, a, b }
 }
 
@@ -170,16 +184,17 @@ fn followed(count: i64, cut: Option<Cut>) -> i64 {
 mod tests {
     use super::*;
 
-    /// Goes to and fro with wires cut and joined, and counts edges as a timer does.
+    /// Goes to and fro with wires cut, joined and exchanged, and counts edges as a timer does.
     #[test]
     fn the_count_is_what_a_counter_makes_of_the_edges() {
         let mut encoder = Encoder::new(10.0003, true);
         let cuts = [None, Some(Cut::A), Some(Cut::B), Some(Cut::Both), None];
-        let way = [10.0003, 10.0121, 10.0049, 10.0301, 9.9907, 10.0307];
+        let way = [10.0003, 10.0121, 10.0049, 10.0301, 9.9907, 10.0003];
         let (mut counted, mut shown) = (0, (false, false));
         let mut now = 0;
-        for (cut, leg) in cuts.into_iter().zip(way.windows(2)) {
+        for (cut, leg) in cuts.into_iter().chain(cuts).zip(way.windows(2).cycle()) {
             encoder.set_cut(cut, leg[0], now);
+            encoder.swap(now > 2_000 && now < 8_000, leg[0], now);
             encoder.pass([leg[0], leg[1]], [now, now + 1_000]);
             now += 1_000;
             while let Some(edge) = encoder.next_edge(now) {

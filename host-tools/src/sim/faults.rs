@@ -18,6 +18,11 @@ pub enum Fault {
         /// 0 to 1.
         share: f64,
     },
+    /// This share of the words is noise: all 16 bits by chance, so that every fourth one has good parity.
+    WordNoise {
+        /// 0 to 1.
+        share: f64,
+    },
     /// MISO is shorted to a level.
     MisoStuck {
         /// Which level.
@@ -49,6 +54,8 @@ pub enum Fault {
     },
     /// The stage is held by something; its motor can still push.
     StageJammed,
+    /// The stage's bridge is off, whatever its enable says.
+    BridgeOff,
     /// The stage's bridge is off while its PWM is low, and lets the motor coast.
     FastDecay,
     /// The stage vibrates while it moves, and the sample with it.
@@ -84,6 +91,11 @@ pub enum Fault {
         /// Closed or open.
         closed: bool,
     },
+    /// The limit switches' contacts bounce: each goes to and fro for so long whenever it opens or closes.
+    SwitchesBounce {
+        /// How long, ms.
+        ms: u64,
+    },
     /// The lever misses this share of its steps.
     LeverLosesSteps {
         /// 0 to 1.
@@ -106,9 +118,10 @@ pub enum Fault {
 
 impl Fault {
     /// One of each kind, for campaigns.
-    pub const EXAMPLES: [Self; 30] = [
+    pub const EXAMPLES: [Self; 34] = [
         Self::SensorUnplugged,
         Self::BitFlips { share: 0.05 },
+        Self::WordNoise { share: 0.005 },
         Self::MisoStuck { high: false },
         Self::MisoStuck { high: true },
         Self::SensorFrozen,
@@ -124,6 +137,7 @@ impl Fault {
         Self::CurrentOffset { amperes: 0.1 },
         Self::CurrentSaturated,
         Self::SupplyDip { ms: 200 },
+        Self::BridgeOff,
         Self::FastDecay,
         Self::StageVibrates { um: 0.5 },
         Self::EncoderCut(Cut::A),
@@ -132,6 +146,10 @@ impl Fault {
         Self::StageLimitStuck {
             upper: false,
             closed: true,
+        },
+        Self::StageLimitStuck {
+            upper: false,
+            closed: false,
         },
         Self::StageLimitStuck {
             upper: true,
@@ -143,6 +161,7 @@ impl Fault {
         },
         Self::LeverTopStuck { closed: true },
         Self::LeverTopStuck { closed: false },
+        Self::SwitchesBounce { ms: 5 },
         Self::LeverLosesSteps { share: 0.1 },
         Self::LeverRunaway,
         Self::LeverDirInverted,
@@ -158,6 +177,12 @@ impl Fault {
         match self {
             Self::BitFlips { .. } => Self::BitFlips {
                 share: between(1e-4, 0.3),
+            },
+            Self::WordNoise { .. } => Self::WordNoise {
+                share: between(1e-4, 0.3),
+            },
+            Self::SwitchesBounce { .. } => Self::SwitchesBounce {
+                ms: between(1.0, 50.0) as u64,
             },
             Self::PdcDrift { .. } => Self::PdcDrift {
                 counts_per_s: if share < 0.5 { -1.0 } else { 1.0 } * between(1.0, 50.0),
@@ -190,9 +215,10 @@ impl Fault {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Faults {
     pub(super) e_stop: Stop,
-    pub(super) top_stuck: Option<bool>,
-    pub(super) limit_stuck: (Option<bool>, Option<bool>),
+    pub(super) switches: Switches,
+    pub(super) bridge_off: bool,
     pub(super) flip_share: f64,
+    pub(super) noise_share: f64,
     pub(super) miso_stuck: Option<bool>,
     pub(super) frozen: bool,
     pub(super) pdc_stuck: bool,
@@ -243,14 +269,55 @@ impl Stop {
     /// Whether the contact that the firmware sees is open.
     pub(super) fn is_open(self, now_ns: u64) -> bool {
         let (from_ns, to_ns) = self.glitch_ns;
-        let pressed = self.pressed_ns.is_some_and(|since_ns| {
-            let after_ns = now_ns.saturating_sub(since_ns);
-            // it opens first; then every other time, seen from any instant of power-up
-            let bounce = after_ns / BOUNCE_NS;
-            after_ns >= BOUNCES_NS
-                || (bounce * 7 + since_ns / BOUNCE_NS * u64::from(bounce > 0)) % 3 != 1
-        });
+        // it opens first, and bounces
+        let pressed = self
+            .pressed_ns
+            .is_some_and(|since_ns| !is_back(since_ns, now_ns, BOUNCES_NS));
         pressed || (from_ns..to_ns).contains(&now_ns)
+    }
+}
+
+/// Whether a contact that has changed at `since_ns`, and bounces for `lasts_ns`, is as it was before: every third time, seen
+/// from any instant of power-up.
+fn is_back(since_ns: u64, now_ns: u64, lasts_ns: u64) -> bool {
+    let after_ns = now_ns.saturating_sub(since_ns);
+    let bounce = after_ns / BOUNCE_NS;
+    after_ns < lasts_ns && (bounce * 7 + since_ns / BOUNCE_NS * u64::from(bounce > 0)) % 3 == 1
+}
+
+/// The contacts of the limit switches: the lever's, the stage's lower and upper one. `true` is closed.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Switches {
+    pub(super) stuck: [Option<bool>; 3],
+    bounce_ns: u64,
+    /// how they were, and since when
+    were: [(bool, u64); 3],
+}
+
+impl Switches {
+    /// From now on they bounce for so long.
+    pub(super) fn bounce(&mut self, now: [bool; 3], ms: u64) {
+        self.bounce_ns = ms * 1_000_000;
+        self.were = now.map(|closed| (closed, 0));
+    }
+
+    /// The switches are so at this time.
+    pub(super) fn watch(&mut self, now: [bool; 3], at_ns: u64) {
+        if self.bounce_ns == 0 {
+            return;
+        }
+        for (were, closed) in self.were.iter_mut().zip(now) {
+            if were.0 != closed {
+                *were = (closed, at_ns);
+            }
+        }
+    }
+
+    /// What their contacts say.
+    pub(super) fn read(&self, now: [bool; 3], at_ns: u64) -> [bool; 3] {
+        std::array::from_fn(|n| {
+            self.stuck[n].unwrap_or(now[n] ^ is_back(self.were[n].1, at_ns, self.bounce_ns))
+        })
     }
 }
 
@@ -297,6 +364,9 @@ impl Miso {
             {
                 let drift = counts_per_s * now_ns.saturating_sub(since_ns) as f64 * 1e-9;
                 [*byte0, *byte1] = shifted([*byte0, *byte1], drift);
+            }
+            if faults.noise_share > 0.0 && self.noise.uniform() < faults.noise_share {
+                [*byte0, *byte1] = [(); 2].map(|()| (self.noise.uniform() * 256.0) as u8);
             }
             if faults.flip_share > 0.0 && self.noise.uniform() < faults.flip_share {
                 let bit = (self.noise.uniform() * 16.0) as usize;

@@ -234,7 +234,7 @@ impl World {
         let on = !self.faults.e_stop.cuts_power() && !dips;
         let (lever, stage) = self.wanted;
         self.lever.enable(lever && on, self.finger.force_n());
-        self.stage.enable(stage && on);
+        self.stage.enable(stage && on && !self.faults.bridge_off);
     }
 
     /// One transfer with the sensor, chip select low from `now_ns` for `duration_ns`; fills `miso`.
@@ -306,14 +306,19 @@ impl World {
 
     /// The limit switch at the top of the lever's travel; `true` is closed.
     pub fn lever_top(&self) -> bool {
-        self.faults.top_stuck.unwrap_or(self.lever.at_top())
+        self.faults.switches.read(self.switches(), self.now_ns)[0]
     }
 
     /// The limit switches at the lower and the upper end of the stage; `true` is closed.
     pub fn stage_limits(&self) -> (bool, bool) {
+        let [_, lower, upper] = self.faults.switches.read(self.switches(), self.now_ns);
+        (lower, upper)
+    }
+
+    /// The limit switches as they are: the lever's, then the stage's.
+    fn switches(&self) -> [bool; 3] {
         let (lower, upper) = self.stage.limits();
-        let stuck = self.faults.limit_stuck;
-        (stuck.0.unwrap_or(lower), stuck.1.unwrap_or(upper))
+        [self.lever.at_top(), lower, upper]
     }
 
     /// The emergency stop's contact for the firmware; `true` is open, as when it is pressed.
@@ -390,81 +395,6 @@ impl World {
         self.must_be_over(&self.surface)?;
         self.finger.replace_skin();
         Ok(())
-    }
-
-    /// Breaks something now, or presses the stop. Faults add up.
-    pub fn inject(&mut self, fault: Fault) {
-        let position_mm = self.stage.position_at_mm(self.fraction());
-        self.inject_at(fault, self.now_ns, position_mm);
-    }
-
-    fn inject_at(&mut self, fault: Fault, at_ns: u64, position_mm: f64) {
-        let faults = &mut self.faults;
-        match fault {
-            Fault::SensorUnplugged => self.sensor.unplug(),
-            Fault::BitFlips { share } => faults.flip_share = share,
-            Fault::MisoStuck { high } => faults.miso_stuck = Some(high),
-            Fault::SensorFrozen => faults.frozen = true,
-            Fault::PdcDrift { counts_per_s } => faults.drift = Some((counts_per_s, at_ns)),
-            Fault::PdcStuck => faults.pdc_stuck = true,
-            Fault::PdcFades { seconds } => self.finger.fade_pdc(seconds),
-            Fault::SkinLeaks { seconds } => self.finger.leak(seconds),
-            Fault::PdcWeak { gain } => self.finger.weaken_pdc(gain),
-            Fault::StageJammed => self.stage.jam(true),
-            Fault::EncoderSwapped => self.encoder.swap(true, position_mm),
-            Fault::CurrentOffset { amperes } => faults.current = Some(amperes),
-            Fault::CurrentSaturated => faults.current = Some(f64::INFINITY),
-            Fault::SupplyDip { ms } => {
-                faults.dip_ends_ns = at_ns + ms * 1_000_000;
-                self.supply_motors();
-            }
-            Fault::FastDecay => self.stage.decay_fast(true),
-            Fault::StageVibrates { um } => self.stage.vibrate(um),
-            Fault::EncoderCut(cut) => self.encoder.set_cut(Some(cut), position_mm, at_ns),
-            Fault::StageLimitStuck {
-                upper: false,
-                closed,
-            } => faults.limit_stuck.0 = Some(closed),
-            Fault::StageLimitStuck {
-                upper: true,
-                closed,
-            } => faults.limit_stuck.1 = Some(closed),
-            Fault::LeverTopStuck { closed } => faults.top_stuck = Some(closed),
-            Fault::LeverLosesSteps { share } => self.lever.lose_steps(share),
-            Fault::LeverRunaway => self.lever.run_away_down(true),
-            Fault::LeverDirInverted => self.lever.invert_dir(true),
-            Fault::EStop => {
-                faults.e_stop.press(at_ns);
-                self.supply_motors();
-            }
-            Fault::EStopGlitch { us } => faults.e_stop.disturb(at_ns, us),
-        }
-    }
-
-    /// Lets something break at a time, to the tick: up to 76 us late.
-    pub fn schedule(&mut self, at_ns: u64, fault: Fault) {
-        self.scheduled.push((at_ns, fault));
-        self.scheduled
-            .sort_by_key(|(at_ns, _)| std::cmp::Reverse(*at_ns));
-    }
-
-    /// Repairs everything, and forgets what was scheduled; a sensor that is plugged in again starts up. What a fault has
-    /// done stays: lost steps, lost counts, a lever that ran down.
-    pub fn clear(&mut self) {
-        self.faults = Faults::default();
-        self.scheduled.clear();
-        self.sensor.plug(self.now_ns);
-        self.finger.mend();
-        self.stage.jam(false);
-        self.stage.decay_fast(false);
-        self.stage.vibrate(0.0);
-        let position_mm = self.stage.position_at_mm(self.fraction());
-        self.encoder.set_cut(None, position_mm, self.now_ns);
-        self.encoder.swap(false, position_mm);
-        self.lever.lose_steps(0.0);
-        self.lever.run_away_down(false);
-        self.lever.invert_dir(false);
-        self.supply_motors();
     }
 
     /// What is really so.
@@ -553,6 +483,8 @@ impl World {
             self.encoder
                 .pass([from_mm, to_mm], [self.tick_began_ns, self.tick_ends_ns]);
         }
+        let switches = self.switches();
+        self.faults.switches.watch(switches, self.tick_ends_ns);
         [from_mm, to_mm]
     }
 
@@ -594,5 +526,6 @@ fn sample(texture: u8, world_seed: u64, variation: f64) -> Surface {
     Surface::new(&textures::draw(texture, world_seed), world_seed, variation)
 }
 
+mod breaking;
 #[cfg(test)]
 mod tests;
