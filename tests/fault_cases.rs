@@ -2,9 +2,11 @@
 
 use rayon::prelude::*;
 use tactus::sim::encoder::Cut;
+use tactus::sim::fault_case::naming::Naming;
 use tactus::sim::fault_case::{Activity, Bench, Case, Outcome};
 use tactus::sim::faults::Fault;
 use tactus_core::rig;
+use tactus_core::rig::guard::Unguarded;
 
 /// The table that comes with the firmware.
 const FACTORY: &[u8] = include_bytes!("../firmware/factory.tact");
@@ -65,6 +67,7 @@ fn a_case_says_what_broke() {
     let stop = [(3_000, Fault::EStop)];
     let stopped = outcome(&case(7, Activity::Identify, 10, &stop));
     assert_eq!(stopped.named, [rig::Fault::EStop]);
+    assert_eq!(stopped.naming, Naming::Right);
     assert!(
         stopped.refused.is_some() && stopped.wrong.is_empty(),
         "{stopped}"
@@ -72,6 +75,31 @@ fn a_case_says_what_broke() {
     let nothing = outcome(&case(7, Activity::Identify, 10, &[]));
     assert_eq!((nothing.refused, nothing.named), (None, Vec::new()));
     assert!(nothing.wrong.is_empty(), "{:?}", nothing.wrong);
+}
+
+/// The judge goes by the world: a driver that steps down by itself while the finger slides, and a rig that does not look at the
+/// force.
+#[test]
+fn a_rig_without_a_guard_fails() {
+    let case = Case {
+        stiff: true,
+        ..case(7, Activity::Identify, 10, &[(9_000, Fault::LeverRunaway)])
+    };
+    let guarded = outcome(&case);
+    assert!(guarded.wrong.is_empty(), "{guarded}");
+    assert_eq!(guarded.naming, Naming::Right);
+    let off = [
+        rig::Fault::ForceHigh,
+        rig::Fault::LeverSlips,
+        rig::Fault::Unsteady,
+    ];
+    let bench = Bench {
+        unguarded: off.into_iter().fold(Unguarded::default(), Unguarded::and),
+        ..Bench::new(FACTORY).unwrap()
+    };
+    let unguarded = bench.run(&case).unwrap();
+    let pressed = |wrong: &String| wrong.ends_with("N on the finger");
+    assert!(unguarded.wrong.iter().any(pressed), "{unguarded}");
 }
 
 /// P_DC that says a quarter of what there is: the lever presses until it says what is wanted.

@@ -4,6 +4,8 @@
 //! Judged is the world: the force on the finger, what moves in the end, what is still stored, and whether a repaired rig
 //! works.
 
+pub mod naming;
+
 use std::cell::RefCell;
 use std::fmt;
 use std::time::Duration;
@@ -15,12 +17,14 @@ use rand_chacha::ChaCha8Rng;
 use tactus_core::dsp::{self, Plain};
 use tactus_core::probe::RigState;
 use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Fault as Named, Phase};
 use tactus_core::sensor::PressureSensor as _;
 use tactus_core::sensor::biotac::BioTac;
 use tactus_core::store::StoreError;
 use tactus_core::wire::{Command, Event, Failure, Identify, Train};
 
+use self::naming::Naming;
 use super::collection::Collection;
 use super::faults::Fault;
 use super::flash::{RamFlash, SECTOR, TABLE};
@@ -32,16 +36,17 @@ use super::rig::{SimError, SimRig};
 /// A rig that is repaired is asked to home so often.
 pub const HOMINGS: usize = 3;
 /// The share of false alarms that the probe is set to.
-const SHARE: f32 = 0.03;
+pub const SHARE: f32 = 0.03;
 /// A finger that is lifted feels no more than this, N.
-const LIFTED_N: f64 = 0.02;
+pub const LIFTED_N: f64 = 0.02;
 /// A stage that stands is no faster, mm/s.
-const STANDS_MM_S: f64 = 0.5;
-/// A lever that stands goes no farther, mm, in so many ms.
-const STILL_MM: f64 = 0.01;
-const STILL_MS: u32 = 500;
+pub const STANDS_MM_S: f64 = 0.5;
+/// A lever that stands goes no farther, mm, in [`STILL_MS`].
+pub const STILL_MM: f64 = 0.01;
+/// See [`STILL_MM`].
+pub const STILL_MS: u32 = 500;
 /// A rig is at rest at the latest after this, s.
-const REST_S: u64 = 120;
+pub const REST_S: u64 = 120;
 
 /// The world that the table of the firmware is learned from.
 pub fn world() -> Collection {
@@ -80,7 +85,7 @@ impl Activity {
     ];
 
     /// How long it takes, about, ms.
-    fn takes_ms(self) -> u64 {
+    pub fn takes_ms(self) -> u64 {
         match self {
             Self::Homing => 6_000,
             Self::Identify | Self::Label => 15_000,
@@ -107,6 +112,12 @@ pub struct Case {
     pub stiff: bool,
 }
 
+/// Whether what the fault says that the user does frees a finger that still presses: where the rig cannot lift it, by the lever's
+/// knob or because the stop has taken the supply.
+pub fn frees_the_finger(named: Named) -> bool {
+    named == Named::EStop || named.recovery().contains("knob")
+}
+
 impl Case {
     /// The case of a seed.
     pub fn draw(seed: u64) -> Self {
@@ -130,6 +141,32 @@ impl Case {
             stiff: false,
         }
     }
+
+    /// An exploration of what lies under the finger.
+    pub fn identify(&self) -> Identify {
+        Identify {
+            seed: self.seed as u32,
+            ..Identify::default()
+        }
+    }
+
+    /// What the probe is sent, one after the other.
+    pub fn commands(&self) -> Vec<Command> {
+        let name = || "a new one".try_into().unwrap_or_default();
+        match self.activity {
+            Activity::Homing => vec![Command::Home],
+            Activity::Identify => vec![Command::Identify(self.identify())],
+            Activity::Train => vec![Command::Train(Train {
+                name: name(),
+                trials: 1,
+                pilot: false,
+                seed: self.seed as u32,
+            })],
+            Activity::Label => vec![Command::Identify(self.identify()), Command::Label(name())],
+            Activity::Calibrate => vec![Command::Calibrate],
+            Activity::Idle => Vec::new(),
+        }
+    }
 }
 
 /// What became of a case.
@@ -143,6 +180,8 @@ pub struct Outcome {
     pub refused: Option<String>,
     /// The faults that the rig named.
     pub named: Vec<Named>,
+    /// How well they fit what broke.
+    pub naming: Naming,
     /// What is not as it must be.
     pub wrong: Vec<String>,
     /// Virtual time.
@@ -162,10 +201,11 @@ impl fmt::Display for Outcome {
         let mount = if *stiff { " on a stiff mount" } else { "" };
         write!(
             f,
-            "seed {seed}: {activity:?} of T{texture}{mount}, {faults:?}, {} bits; {:.3} N, named {:?}: {}",
+            "seed {seed}: {activity:?} of T{texture}{mount}, {faults:?}, {} bits; {:.3} N, named {:?} ({}): {}",
             bits.len(),
             self.force_max_n,
             self.named,
+            self.naming,
             self.wrong.join("; ")
         )
     }
@@ -175,6 +215,8 @@ impl fmt::Display for Outcome {
 #[derive(Default)]
 struct Heard {
     named: Vec<Named>,
+    /// When the first one was.
+    first_ns: Option<u64>,
     learned: bool,
     troubles: Vec<Failure>,
 }
@@ -188,10 +230,11 @@ impl Host for Heard {
         }
     }
 
-    fn tick(&mut self, _now: Duration, rig: &RigState) {
+    fn tick(&mut self, now: Duration, rig: &RigState) {
         if let Phase::Faulted(fault) = rig.phase
             && self.named.last() != Some(&fault)
         {
+            self.first_ns.get_or_insert(now.as_nanos() as u64);
             self.named.push(fault);
         }
     }
@@ -215,6 +258,8 @@ pub struct Bench<'t> {
     pub factory: &'t [u8],
     /// The calibration of the rig of [`world`].
     pub calibration: RigCalibration,
+    /// Guards that are off: a campaign must notice that.
+    pub unguarded: Unguarded,
 }
 
 impl<'t> Bench<'t> {
@@ -229,6 +274,7 @@ impl<'t> Bench<'t> {
         Ok(Self {
             factory,
             calibration,
+            unguarded: Unguarded::default(),
         })
     }
 
@@ -237,7 +283,8 @@ impl<'t> Bench<'t> {
     /// # Errors
     /// See [`CaseError`].
     pub fn run(&self, case: &Case) -> Result<Outcome, CaseError> {
-        let mut rig = SimRig::new(world().setup(case.texture, case.seed));
+        let setup = world().setup(case.texture, case.seed);
+        let mut rig = SimRig::unguarded(setup, self.unguarded);
         if !case.stiff {
             rig.world().mount(Mount::SPRUNG);
         }
@@ -275,6 +322,14 @@ impl<'t> Bench<'t> {
         );
         wrong.extend(after.lost(&before, may));
         let named = host.borrow().named.clone();
+        let breaks_ns = case.faults.iter().map(|(ms, _)| began_ns + ms * 1_000_000);
+        if let (Some(first_ns), breaks_ns) = (host.borrow().first_ns, breaks_ns.min())
+            && breaks_ns.is_none_or(|breaks_ns| first_ns < breaks_ns)
+        {
+            wrong.push(format!("{named:?} before anything broke"));
+        }
+        let broke = case.faults.iter().map(|(_, fault)| fault);
+        let naming = naming::judge(broke, &named, asked.is_err());
         let mut probe = self.restarted(probe, case, &host, &after, &mut wrong)?;
         repaired(&mut probe, case, may.1, &mut wrong);
         Ok(Outcome {
@@ -282,6 +337,7 @@ impl<'t> Bench<'t> {
             force_max_n,
             refused: asked.err(),
             named,
+            naming,
             wrong,
             took: probe.rig.servo.rig().now(),
         })
@@ -366,30 +422,9 @@ fn send(probe: &mut SimProbe<'_, Heard>, command: Command) -> Result<(), String>
 }
 
 fn ask(probe: &mut SimProbe<'_, Heard>, case: &Case) -> Result<(), String> {
-    let identify = Command::Identify(Identify {
-        seed: case.seed as u32,
-        ..Identify::default()
-    });
-    let name = || "a new one".try_into().unwrap_or_default();
-    match case.activity {
-        Activity::Homing => send(probe, Command::Home),
-        Activity::Identify => send(probe, identify),
-        Activity::Train => {
-            let train = Train {
-                name: name(),
-                trials: 1,
-                pilot: false,
-                seed: case.seed as u32,
-            };
-            send(probe, Command::Train(train))
-        }
-        Activity::Label => {
-            send(probe, identify)?;
-            send(probe, Command::Label(name()))
-        }
-        Activity::Calibrate => send(probe, Command::Calibrate),
-        Activity::Idle => Ok(()),
-    }
+    case.commands()
+        .into_iter()
+        .try_for_each(|command| send(probe, command))
 }
 
 /// The rig comes to rest, with its motors off and its finger lifted; the largest force until then, N.
@@ -419,9 +454,8 @@ fn rest(probe: &mut SimProbe<'_, Heard>, host: &RefCell<Heard>, wrong: &mut Vec<
     if truth.speed_mm_s.abs() > STANDS_MM_S {
         wrong.push(format!("the stage moves, {:.1} mm/s", truth.speed_mm_s));
     }
-    // where a finger may still be pressed, the fault's remedy is the lever's knob; the stop has taken the supply
-    let says_so = |named: &Named| *named == Named::EStop || named.recovery().contains("knob");
-    if truth.force_n > LIFTED_N && !host.borrow().named.iter().any(says_so) {
+    let named = &host.borrow().named;
+    if truth.force_n > LIFTED_N && !named.iter().any(|named| frees_the_finger(*named)) {
         wrong.push(format!("the finger is down, {:.3} N", truth.force_n));
     }
     if truth.force_max_n > FORCE_LIMIT_N {
@@ -457,11 +491,7 @@ fn repaired(
     if calibrated && let Err(why) = send(probe, Command::Calibrate) {
         wrong.push(format!("repaired, it does not calibrate: {why}"));
     }
-    let identify = Identify {
-        seed: case.seed as u32,
-        ..Identify::default()
-    };
-    if let Err(why) = send(probe, Command::Identify(identify)) {
+    if let Err(why) = send(probe, Command::Identify(case.identify())) {
         wrong.push(format!("repaired, it does not identify: {why}"));
     }
     let rig = probe.rig.servo.rig();
