@@ -102,6 +102,23 @@ fn a_rig_without_a_guard_fails() {
     assert!(unguarded.wrong.iter().any(pressed), "{unguarded}");
 }
 
+/// P_DC that drifts while it is measured in the air: with those constants a finger that drifts no more would be one that is
+/// pressed.
+#[test]
+fn a_calibration_with_a_drifting_pressure_is_refused() {
+    let cases = [
+        (100_432, 41, 1_197, -1.885_477_276_745_623_4),
+        (100_013, 64, 11_259, -2.797_370_443_493_259_4),
+        (100_353, 58, 16_319, -4.279_273_699_133_493),
+    ];
+    tactus_tests::expected_to_fail("it does not home", || {
+        for (seed, texture, at_ms, counts_per_s) in cases {
+            let drift = [(at_ms, Fault::PdcDrift { counts_per_s })];
+            ends_well(seed, Activity::Calibrate, texture, &drift);
+        }
+    });
+}
+
 /// P_DC that says a quarter of what there is: the lever presses until it says what is wanted.
 #[test]
 fn the_spring_holds_a_finger_whose_pressure_is_weak() {
@@ -179,6 +196,34 @@ fn a_runaway_lever_with_damaged_words_ends_well() {
     };
     let faults = [(37_654, Fault::LeverRunaway), (39_538, flips)];
     ends_well(283, Activity::Calibrate, 69, &faults);
+}
+
+/// A driver that steps down by itself while P_DC is dead or says too little: the two together show in nothing that the rig looks
+/// at while its finger is lifted. The spring holds it.
+#[test]
+fn a_runaway_lever_without_a_pressure_is_not_seen() {
+    let weak = Fault::PdcWeak {
+        gain: 0.109_074_820_751_001_21,
+    };
+    let cases = [
+        (
+            100_628,
+            Activity::Homing,
+            [(3_815, weak), (3_938, Fault::LeverRunaway)],
+        ),
+        (
+            200_195,
+            Activity::Idle,
+            [(2_225, Fault::PdcStuck), (4_816, Fault::LeverRunaway)],
+        ),
+    ];
+    for (seed, activity, faults) in cases {
+        let outcome = outcome(&case(seed, activity, 10, &faults));
+        assert!(outcome.force_max_n < 2.2, "{outcome}");
+        tactus_tests::expected_to_fail("the finger is down", || {
+            assert_eq!(outcome.wrong, [""; 0], "{outcome}");
+        });
+    }
 }
 
 /// Encoder lines that are exchanged, or cut, are noticed before the stage is in a hard stop.
