@@ -3,11 +3,15 @@
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::seams::{RigHandle, UnloadedRun};
-use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::unloaded::UnloadedRuns;
+use crate::rig::{Fault, Phase, RigError};
 use crate::store::{Store, StoreError};
 use crate::wire::Failure;
+
+/// P_DC in the air may move so far while it is measured, counts: what a rig that waits allows in that time, 30 a minute. One that has
+/// moved farther, and moves back, would be that of a finger that is pressed.
+const DRIFT_COUNTS: f32 = 20.0;
 
 /// Measures the motor's current without load and P_DC in the air, and uses them from now on.
 pub(super) async fn by_motor<R: RigHandle>(rig: &mut R) -> Result<RigCalibration, Failure> {
@@ -15,6 +19,7 @@ pub(super) async fn by_motor<R: RigHandle>(rig: &mut R) -> Result<RigCalibration
         rig.home().await.map_err(Failure::Rig)?;
     }
     let mut runs = UnloadedRuns::default();
+    let mut first_air = None;
     while let Some(speed_um_s) = runs.next_speed() {
         let UnloadedRun {
             from_mm,
@@ -22,6 +27,12 @@ pub(super) async fn by_motor<R: RigHandle>(rig: &mut R) -> Result<RigCalibration
             mean_current_a,
         } = rig.run_unloaded(speed_um_s).await.map_err(Failure::Rig)?;
         runs.took(from_mm, to_mm, mean_current_a);
+        if let Some(air_counts) = rig.state().air_counts {
+            let first = *first_air.get_or_insert(air_counts);
+            if (air_counts - first).abs() > DRIFT_COUNTS {
+                return Err(Failure::Rig(RigError::Fault(Fault::Unsteady)));
+            }
+        }
     }
     let state = rig.state();
     let mut calibration = runs.finish(&state.calibration)?;
