@@ -11,6 +11,7 @@ mod flash;
 mod halt;
 mod handler_profile;
 mod handlers;
+mod line;
 mod log;
 mod options;
 mod peers;

@@ -4,7 +4,7 @@ pub mod bench;
 pub mod campaign;
 mod cuts;
 mod error;
-mod faults;
+pub mod faults;
 mod handheld;
 mod identify;
 mod serve;

@@ -54,7 +54,7 @@ pub(crate) fn start(run: &str, options: &[OsString]) -> Result<()> {
     shell::run(emulator.args(options))
 }
 
-/// The campaign on emulated boards, or of faults on the PC's rig where so many of them are asked for.
+/// The campaign on emulated boards, or of faults where so many of them are asked for.
 pub(crate) fn campaign(options: &[OsString]) -> Result<()> {
     let given = |name: &str| {
         options.iter().any(|option| {
@@ -67,12 +67,17 @@ pub(crate) fn campaign(options: &[OsString]) -> Result<()> {
     if !given("--faults") {
         return start("campaign", options);
     }
-    shell::run(&mut build())?;
-    let mut faults = program("faults");
+    let board = given("--board");
+    let mut options = options.to_vec();
     if !given("--out") {
-        faults.arg("--out").arg(target().join("faults/cases.jsonl"));
+        let file = if board { "board.jsonl" } else { "cases.jsonl" };
+        options.extend(["--out".into(), target().join("faults").join(file).into()]);
     }
-    shell::run(faults.args(options))
+    if board {
+        return start("faults", &options);
+    }
+    shell::run(&mut build())?;
+    shell::run(program("faults").args(options))
 }
 
 /// A run of the emulator, which is built.

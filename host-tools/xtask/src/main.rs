@@ -107,7 +107,8 @@ enum Cli {
   cargo xtask campaign --simulated 0 --recordings 0     power cuts only
   cargo xtask campaign --format json --out result.json  for programs
   cargo xtask campaign --faults 2000                    seeds 1 to 2000 of the PC's rig with one to three faults
-  cargo xtask campaign --faults 1 --seed 17 --again     one of them once more")]
+  cargo xtask campaign --faults 1 --seed 17 --again     one of them once more
+  cargo xtask campaign --faults 300 --board             the same on emulated boards, with the firmware")]
     #[command(disable_help_flag = true)]
     Campaign {
         /// Options for the campaign

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tactus::sim::world::{Setup, World};
 
 use super::display::Display;
+use super::line::LineNoise;
 use super::record::{Recorder, Slide};
 use super::wave::Wave;
 
@@ -78,6 +79,8 @@ pub struct Rig {
     pub(crate) heard: Vec<(u64, u8)>,
     /// To the firmware.
     pub(crate) to_say: VecDeque<u8>,
+    /// On the line between the two.
+    line: Option<LineNoise>,
 }
 
 impl std::fmt::Debug for Rig {
@@ -126,6 +129,7 @@ impl Rig {
             tone: None,
             heard: Vec::new(),
             to_say: VecDeque::new(),
+            line: None,
         }
     }
 
@@ -335,6 +339,31 @@ impl Rig {
         let late = self.bit << 7 | miso >> 1;
         self.bit = miso & 1;
         late
+    }
+
+    /// Disturbs the line to the host until a time: this share of the bytes, either way, has a wrong bit or is lost.
+    pub fn disturb_line(&mut self, share: f64, until_ns: u64, seed: u64) {
+        self.line = Some(LineNoise::new(share, until_ns, seed));
+    }
+
+    fn on_the_line(&mut self, now_ns: u64, byte: u8) -> Option<u8> {
+        match &mut self.line {
+            Some(noise) => noise.pass(now_ns, byte),
+            None => Some(byte),
+        }
+    }
+
+    /// A byte from the firmware.
+    pub(crate) fn hear(&mut self, now_ns: u64, byte: u8) {
+        if let Some(byte) = self.on_the_line(now_ns, byte) {
+            self.heard.push((now_ns, byte));
+        }
+    }
+
+    /// The next byte to the firmware.
+    pub(crate) fn say(&mut self, now_ns: u64) -> Option<u8> {
+        let byte = self.to_say.pop_front()?;
+        self.on_the_line(now_ns, byte)
     }
 
     /// The encoder's lines after its next edge up to the time reached.

@@ -1,4 +1,6 @@
-//! The campaign of faults on the simulated rig of the PC: many cases, each by its seed, side by side on all cores.
+//! The campaign of faults: many cases, each by its seed, side by side, on the simulated rig of the PC or on emulated boards.
+
+pub mod board;
 
 use std::collections::BTreeMap;
 use std::fs::{self, OpenOptions};
@@ -12,7 +14,9 @@ use clap::Args as Arguments;
 use serde_json::{Value, json};
 use tactus::eval::show::count;
 use tactus::sim::fault_case::{Bench, Case};
+use tactus_core::rig::Fault as Named;
 
+use self::board::{BoardBench, BoardCase};
 use super::error::RunError;
 use super::soak::day::DayError;
 use crate::host::progress;
@@ -20,12 +24,13 @@ use crate::host::progress;
 /// The table that comes with the firmware.
 const FACTORY: &[u8] = include_bytes!("../../../../firmware/factory.tact");
 
-/// Breaks one to three things of the simulated rig at any moment of whatever the probe does, case by case.
+/// Breaks one to three things at any moment of whatever the probe does, case by case: on the simulated rig of the PC, or with
+/// --board on emulated boards, whose link, supply and debugger break, too.
 ///
 /// The probe homes, identifies, learns, calibrates or rests meanwhile. Then bits of its flash change while its power is off,
 /// everything is repaired, and it works again. Bars: never more than 2.2 N on the finger, a rig at rest with its motors off and
 /// its finger lifted, nothing of the store lost without a word, and a repaired rig that homes and identifies. The exit code is
-/// 1 if a case misses one.
+/// 1 if a case misses one. How well the fault that is named fits what broke is counted.
 ///
 /// Each case is written as it ends; those that are written already are not run again.
 #[derive(Arguments)]
@@ -45,6 +50,15 @@ pub(crate) struct Args {
     /// Without the spring of the finger's mount, which the list of parts asks for; write these cases into another file
     #[arg(long)]
     stiff: bool,
+    /// On emulated boards, with the real firmware; write these cases into another file
+    #[arg(long, requires = "elf")]
+    board: bool,
+    /// The firmware of the boards: what `cargo xtask build` names
+    #[arg(long, value_name = "PATH")]
+    elf: Option<PathBuf>,
+    /// How many cases at once; as many as there are cores unless given
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
     /// Where the cases are written, as JSON Lines
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -72,12 +86,19 @@ pub(crate) fn run(args: &Args) -> Result<bool, RunError> {
     let ended = Mutex::new((file, cases));
     let next = AtomicUsize::new(0);
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let cores = args.jobs.unwrap_or(cores).max(1);
     let bench = Bench::new(FACTORY).map_err(DayError::from)?;
+    let elf = args.elf.as_ref().filter(|_| args.board);
+    let board = elf.map(|elf| BoardBench::new(elf, &bench.calibration));
+    let board = board.transpose()?;
     std::thread::scope(|scope| {
         for _ in 0..cores.min(left.len()) {
             scope.spawn(|| {
                 while let Some(&seed) = left.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let line = perform(&bench, seed, args.stiff);
+                    let line = match &board {
+                        Some(board) => perform_on_board(board, seed, args.stiff),
+                        None => perform(&bench, seed, args.stiff),
+                    };
                     let mut ended = ended.lock().unwrap_or_else(|e| e.into_inner());
                     if let Some(said) = failed(&line) {
                         bar.suspend(|| println!("{said}"));
@@ -108,6 +129,28 @@ fn written(file: &Path) -> BTreeMap<u64, Value> {
         .collect()
 }
 
+/// The line of a case, of which the outcome is not known yet.
+fn line(case: &Case, broke: Vec<String>, board: bool) -> Value {
+    json!({
+        "seed": case.seed,
+        "activity": format!("{:?}", case.activity),
+        "texture": case.texture,
+        "faults": broke,
+        "bits": case.bits,
+        "stiff": case.stiff,
+        "board": board,
+    })
+}
+
+/// What breaks, and when.
+fn broken<T: std::fmt::Debug>(what: &[(u64, T)]) -> impl Iterator<Item = String> {
+    what.iter().map(|(ms, what)| format!("{ms} ms {what:?}"))
+}
+
+fn names(named: &[Named]) -> Value {
+    json!(named.iter().map(|f| format!("{f:?}")).collect::<Vec<_>>())
+}
+
 /// Runs the case of a seed; its line.
 fn perform(bench: &Bench<'_>, seed: u64, stiff: bool) -> Value {
     let case = Case {
@@ -115,24 +158,12 @@ fn perform(bench: &Bench<'_>, seed: u64, stiff: bool) -> Value {
         ..Case::draw(seed)
     };
     let ended = catch_unwind(AssertUnwindSafe(|| bench.run(&case)));
-    let mut line = json!({
-        "seed": seed,
-        "activity": format!("{:?}", case.activity),
-        "texture": case.texture,
-        "faults": case.faults.iter().map(|(ms, fault)| format!("{ms} ms {fault:?}")).collect::<Vec<_>>(),
-        "bits": case.bits,
-        "stiff": case.stiff,
-    });
+    let mut line = line(&case, broken(&case.faults).collect(), false);
     match ended {
         Ok(Ok(outcome)) => {
             line["force_max_n"] = outcome.force_max_n.into();
-            line["named"] = json!(
-                outcome
-                    .named
-                    .iter()
-                    .map(|f| format!("{f:?}"))
-                    .collect::<Vec<_>>()
-            );
+            line["named"] = names(&outcome.named);
+            line["naming"] = outcome.naming.to_string().into();
             line["refused"] = json!(outcome.refused);
             line["virtual_s"] = outcome.took.as_secs_f64().into();
             line["wrong"] = json!(outcome.wrong);
@@ -143,21 +174,54 @@ fn perform(bench: &Bench<'_>, seed: u64, stiff: bool) -> Value {
     line
 }
 
+/// The same on a board.
+fn perform_on_board(bench: &BoardBench<'_>, seed: u64, stiff: bool) -> Value {
+    let mut drawn = BoardCase::draw(seed);
+    drawn.case.stiff = stiff;
+    let broke = broken(&drawn.case.faults).chain(broken(&drawn.upsets));
+    let mut line = line(&drawn.case, broke.collect(), true);
+    match bench.run(&drawn) {
+        Ok(outcome) => {
+            line["force_max_n"] = outcome.force_max_n.into();
+            line["named"] = names(&outcome.named);
+            line["naming"] = outcome.naming.to_string().into();
+            line["refused"] = json!(outcome.refused);
+            line["resets"] = outcome.resets.into();
+            line["virtual_s"] = outcome.virtual_s.into();
+            line["wrong"] = json!(outcome.wrong);
+        }
+        Err(why) => line["wrong"] = json!([why.to_string()]),
+    }
+    line
+}
+
 /// What is wrong with a case, and how it is run again.
 fn failed(line: &Value) -> Option<String> {
     let wrong = line["wrong"].as_array()?;
     let wrong: Vec<&str> = wrong.iter().filter_map(Value::as_str).collect();
     (!wrong.is_empty()).then(|| {
         format!(
-            "seed {seed}: {}, {}: FAILED: {}\n    again: cargo xtask campaign --faults 1 --seed {seed} --again{}",
+            "seed {seed}: {}, {}: FAILED: {}\n    again: cargo xtask campaign --faults 1 --seed {seed} --again{}{}",
             line["activity"].as_str().unwrap_or_default(),
             line["faults"],
             wrong.join("; "),
             if line["stiff"] == true { " --stiff" } else { "" },
+            if line["board"] == true { " --board" } else { "" },
             seed = line["seed"],
         )
     })
 }
+
+/// What the namings of cases mean.
+const NAMINGS: [(&str, &str); 4] = [
+    ("right", "named faults that fit what broke"),
+    ("other", "stopped with a name that leads elsewhere"),
+    (
+        "refused",
+        "refused what was asked for, with a reason of its own",
+    ),
+    ("unnoticed", "named nothing, and did what was asked for"),
+];
 
 /// How many cases there were, what they were asked for, and what they named.
 fn summary(cases: &BTreeMap<u64, Value>) -> String {
@@ -183,6 +247,10 @@ fn summary(cases: &BTreeMap<u64, Value>) -> String {
         "{}, {wrong} failed; at most {most:.3} N on the finger\n",
         count(cases.len() as u64, "case")
     );
+    for (naming, what) in NAMINGS {
+        let all = cases.values().filter(|line| line["naming"] == naming);
+        text += &format!("  {} {what}\n", all.count());
+    }
     for (activity, (all, named, wrong)) in by {
         text += &format!("  {activity}: {all}, of which {named} named a fault, {wrong} failed\n");
     }
@@ -210,6 +278,9 @@ mod tests {
             seed: 1,
             again,
             stiff: false,
+            board: false,
+            elf: None,
+            jobs: None,
             out: out.clone(),
         };
         assert!(!run(&args(false)).unwrap(), "seed 2 has failed");

@@ -8,6 +8,7 @@ mod common;
 mod current;
 mod cycles;
 mod explore;
+mod fault_cases;
 mod faults;
 mod halt;
 mod handheld;
