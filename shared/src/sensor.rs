@@ -1,12 +1,18 @@
 //! From the sensor's words to pressures.
 //!
-//! [`PressureSensor`] is the seam: a sensor is a file that implements it. [`biotac`] and [`mcp3202`] are the two there are.
-//! What they do on the bus is data: [`slot`]. All later rooms see [`pressure`] only.
+//! [`PressureSensor`] is the seam: a finger is a file that implements it. [`biotac`], [`analog`] and [`mems`] are the three there are.
+//! What they do on the bus is data: [`slot`]. All later rooms see [`pressure`] and what a kind of finger is like: [`FingerModel`].
 
+pub mod ads1220;
+pub mod analog;
 pub mod biotac;
 mod driver;
+mod finger;
+pub mod iis3dwb;
 pub mod mcp3202;
+pub mod mems;
 pub mod pressure;
 pub mod slot;
 
-pub use driver::{Driver, Error, PressureSensor, slot_of};
+pub use driver::{Driver, Error, PressureSensor, StartError, slot_of};
+pub use finger::{AtRest, FingerModel, FingerName, UnknownFinger};

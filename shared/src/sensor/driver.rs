@@ -1,7 +1,7 @@
 //! The seam between sensor words and pressures.
 //!
 //! A sensor is a file that implements [`PressureSensor`]: which parts it has, what is done with them in each slot, and what
-//! their answers mean. [`crate::sensor::biotac`] and [`crate::sensor::mcp3202`] are the two there are. Everything after this
+//! their answers mean. [`crate::sensor::biotac`], [`crate::sensor::analog`] and [`crate::sensor::mems`] are the three there are. Everything after this
 //! module sees [`Pressure`]s only.
 //!
 //! A slot is plain data ([`Transaction`]s) and does no input or output itself, so there is one logic with several ways to run it:
@@ -15,17 +15,22 @@ use embedded_hal::spi::SpiDevice;
 use embedded_hal_async::delay::DelayNs as AsyncDelayNs;
 use embedded_hal_async::spi::SpiDevice as AsyncSpiDevice;
 
+use crate::sensor::finger::FingerModel;
 use crate::sensor::pressure::Pressure;
-use crate::sensor::slot::{self, Answer, MAX_BYTES, Port, Transaction};
+use crate::sensor::slot::{self, Answer, MAX_BYTES, Port, StartStep, Transaction, Unexpected};
 
 /// A sensor of the two pressures: a finger, of one part or of several.
 pub trait PressureSensor {
     /// What can be wrong with an answer.
     type Error: core::error::Error;
+    /// What kind of finger it is.
+    const MODEL: FingerModel;
     /// Its parts, each with a chip select of its own.
     const PORTS: &'static [Port];
     /// Shortest time from power-up to the first slot, ms.
     const POWER_UP_MS: u32;
+    /// What is done after that, before the first slot. A part that has lost its power needs it again.
+    const START: &'static [StartStep];
     /// What is done in a slot, for as many slots as it takes until all begins again. Slot `n` does
     /// `SLOTS[n % SLOTS.len()]`, and gives the sample of [`Channel::of_slot`](crate::sensor::pressure::Channel::of_slot).
     const SLOTS: &'static [&'static [Transaction]];
@@ -75,6 +80,19 @@ impl<S: PressureSensor, SPI: SpiDevice, D: DelayNs> Driver<S, SPI, D> {
     /// Waits for as long as the sensor needs after its power came on.
     pub fn power_up(&mut self) {
         self.delay.delay_ms(S::POWER_UP_MS);
+    }
+
+    /// Does the start-up list.
+    ///
+    /// # Errors
+    /// That of the bus, or of the first step whose answer is not as it must be. What comes after it is not done.
+    pub fn start(&mut self) -> Result<(), StartError<SPI::Error>> {
+        for step in S::START {
+            let answer = self.perform(&[step.transaction]).map_err(StartError::Bus)?;
+            step.check(S::PORTS, &answer).map_err(StartError::Part)?;
+            self.delay.delay_us(step.wait_us);
+        }
+        Ok(())
     }
 
     /// The sample of slot `n`.
@@ -141,6 +159,17 @@ impl<S: PressureSensor, SPI: AsyncSpiDevice, D: AsyncDelayNs> Driver<S, SPI, D> 
         }
         Ok(answer)
     }
+}
+
+/// Why a sensor does not start: the bus failed, or a part of it did.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum StartError<B> {
+    /// The bus or the chip select failed.
+    #[error("SPI bus failed: {0:?}")]
+    Bus(B),
+    /// The bus worked; a part does not answer as it should.
+    #[error(transparent)]
+    Part(Unexpected),
 }
 
 /// Why there is no sample: the bus failed, or the sensor did.

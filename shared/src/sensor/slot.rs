@@ -8,6 +8,8 @@ use embedded_hal::spi::Mode;
 /// A part of a finger as the bus sees it: what has a chip select of its own.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Port {
+    /// What it is called in messages.
+    pub name: &'static str,
     /// Polarity and phase of the clock.
     pub mode: Mode,
     /// Clocks that the part works with, Hz.
@@ -65,6 +67,55 @@ impl Transaction {
         // there is room for all answers of a slot
         let _ = answer.extend_from_slice(came_in.get(first..).unwrap_or_default());
     }
+}
+
+/// A step of a finger's start-up list: something to send, what has to come back, and the time until the next step.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct StartStep {
+    /// What is sent.
+    pub transaction: Transaction,
+    /// For each byte of its answer: the bits that matter, and what they have to be.
+    pub expect: &'static [(u8, u8)],
+    /// Shortest time to the next step, or to the first slot, beyond the transaction's own gap, us.
+    pub wait_us: u32,
+}
+
+impl StartStep {
+    /// Whether the answer is as it must be.
+    ///
+    /// # Errors
+    /// The first byte that is not, or that did not come.
+    pub fn check(&self, ports: &[Port], answer: &[u8]) -> Result<(), Unexpected> {
+        for (at, (mask, want)) in self.expect.iter().enumerate() {
+            let got = answer.get(at).copied().unwrap_or(0xFF);
+            if got & mask != want & mask || answer.len() <= at {
+                let port = ports.get(usize::from(self.transaction.port));
+                return Err(Unexpected {
+                    part: port.map_or("", |port| port.name),
+                    sent: self.transaction.out.first().copied().unwrap_or(0),
+                    got,
+                    want: want & mask,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A part of a finger does not answer as it must before it is used.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error(
+    "the {part} answers {got:02X} to {sent:02X} and not {want:02X}: check its power, its wires, its chip select and the SPI mode"
+)]
+pub struct Unexpected {
+    /// Which one.
+    pub part: &'static str,
+    /// The first byte that was sent to it.
+    pub sent: u8,
+    /// The byte that came.
+    pub got: u8,
+    /// The byte that should have come, in the bits that matter.
+    pub want: u8,
 }
 
 /// Does transactions one after the other, and gives their answers. `transact` gets the bytes to send and puts in their place

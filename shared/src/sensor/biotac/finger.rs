@@ -5,8 +5,9 @@ use embedded_hal::spi::MODE_0;
 use super::command::PRESSURE_SLOTS;
 use super::word::{WordError, decode};
 use crate::sensor::driver::PressureSensor;
-use crate::sensor::pressure::{Channel, Pressure};
-use crate::sensor::slot::{Port, Transaction};
+use crate::sensor::finger::{AtRest, FingerModel, FingerName};
+use crate::sensor::pressure::{Calibration, Channel, Pressure};
+use crate::sensor::slot::{Port, StartStep, Transaction};
 
 /// A BioTac as a [`PressureSensor`]. Its other channels are read with [`Channel::transactions`](super::Channel::transactions) and
 /// [`decode`].
@@ -20,13 +21,24 @@ const SLOTS: [[Transaction; 2]; 2] = {
 
 impl PressureSensor for BioTac {
     type Error = WordError;
+    const MODEL: FingerModel = FingerModel {
+        name: FingerName::Biotac,
+        calibration: Calibration::PAPER,
+        pac_shows_force: true,
+        at_rest: AtRest {
+            pac_noise_counts: (1.0, 8.0),
+            pdc_counts: (2000.0, 3200.0),
+        },
+    };
     const PORTS: &'static [Port] = &[Port {
+        name: "BioTac",
         mode: MODE_0,
         // SPM 8.2 and HDR; 1, 3 and 4.4 MHz are used in the field
         clock_hz: 500_000..=10_000_000,
     }];
     /// The maker's library waits this long (LIB).
     const POWER_UP_MS: u32 = 100;
+    const START: &'static [StartStep] = &[];
     const SLOTS: &'static [&'static [Transaction]] = &[&SLOTS[0], &SLOTS[1]];
 
     fn decode(&mut self, n: u32, answer: &[u8]) -> Result<Pressure, WordError> {

@@ -1,4 +1,4 @@
-//! Slots of three fingers on a wire: the BioTac, the MCP3202, and one of two parts that no file has yet.
+//! Slots of the three fingers on a wire, and start-up lists.
 
 use std::vec;
 use std::vec::Vec;
@@ -6,76 +6,11 @@ use std::vec::Vec;
 use embedded_hal::spi::{MODE_0, MODE_1, MODE_3};
 
 use super::*;
+use crate::sensor::analog::Analog;
 use crate::sensor::biotac::BioTac;
-use crate::sensor::mcp3202::Mcp3202;
-use crate::sensor::pressure::{Channel, Counts, Pressure, SLOTS_HZ};
-use crate::sensor::{PressureSensor, slot_of};
-
-/// An accelerometer of 16 bits and a load cell behind a converter of 24, which share the bus: each has its own select, mode
-/// and clock. The accelerometer is read in every slot and averaged over two, the cell in every fourth.
-#[derive(Default)]
-struct TwoParts {
-    /// Of the two slots before.
-    last: i16,
-    cell: Option<u16>,
-}
-
-const ACCELEROMETER: Transaction = Transaction {
-    port: 0,
-    out: &[0xAC, 0, 0],
-    answer: 2,
-    gap_us: 1,
-};
-const CELL: Transaction = Transaction {
-    port: 1,
-    out: &[0x10, 0, 0, 0],
-    answer: 3,
-    gap_us: 1,
-};
-
-#[derive(Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no sample")]
-struct NoSample;
-
-impl PressureSensor for TwoParts {
-    type Error = NoSample;
-    const PORTS: &'static [Port] = &[
-        Port {
-            mode: MODE_3,
-            clock_hz: 100_000..=10_000_000,
-        },
-        Port {
-            mode: MODE_1,
-            clock_hz: 100_000..=4_000_000,
-        },
-    ];
-    const POWER_UP_MS: u32 = 10;
-    const SLOTS: &'static [&'static [Transaction]] = &[
-        &[ACCELEROMETER, CELL],
-        &[ACCELEROMETER],
-        &[ACCELEROMETER],
-        &[ACCELEROMETER],
-    ];
-
-    fn decode(&mut self, n: u32, answer: &[u8]) -> Result<Pressure, NoSample> {
-        let [low, high, cell @ ..] = answer else {
-            return Err(NoSample);
-        };
-        let z = i16::from_le_bytes([*low, *high]);
-        let mean = (i32::from(self.last) + i32::from(z)) / 2;
-        self.last = z;
-        if let [upper, middle, _] = *cell {
-            self.cell = Some(u16::from_be_bytes([upper, middle]) >> 4);
-        }
-        let channel = Channel::of_slot(n);
-        let counts = match channel {
-            Channel::Pac => (2048 + (mean >> 4)) as u16,
-            Channel::Pdc => self.cell.ok_or(NoSample)?,
-        };
-        let counts = Counts::new(counts).ok_or(NoSample)?;
-        Ok(Pressure { channel, counts })
-    }
-}
+use crate::sensor::mems::Mems;
+use crate::sensor::pressure::{Channel, SLOTS_HZ};
+use crate::sensor::{PressureSensor, ads1220, iis3dwb, slot_of};
 
 /// What a part of the wire saw: select, mode, bytes, and the pause behind them, us.
 type Seen = (u8, Mode, Vec<u8>, u32);
@@ -84,7 +19,7 @@ type Seen = (u8, Mode, Vec<u8>, u32);
 fn run<S: PressureSensor>(
     sensor: &mut S,
     slots: u32,
-    says: impl Fn(u8, &[u8]) -> Vec<u8>,
+    mut says: impl FnMut(u8, &[u8]) -> Vec<u8>,
 ) -> (Vec<Seen>, Vec<Option<u16>>) {
     let mut wire = Vec::new();
     let counts = (0..slots).map(|n| {
@@ -129,7 +64,7 @@ fn a_biotac_is_asked_and_read_after_its_gap() {
 
 #[test]
 fn a_converter_answers_while_it_is_asked() {
-    let (wire, counts) = run(&mut Mcp3202, 2, |_, mosi| match mosi[1] {
+    let (wire, counts) = run(&mut Analog, 2, |_, mosi| match mosi[1] {
         0xA0 => vec![0xFF, 0xE7, 0xE5],
         _ => vec![0x00, 0x0A, 0x8F],
     });
@@ -140,19 +75,89 @@ fn a_converter_answers_while_it_is_asked() {
 
 #[test]
 fn a_finger_of_two_parts_has_two_selects_and_two_modes() {
-    let (wire, counts) = run(&mut TwoParts::default(), 6, |port, mosi| match port {
-        0 => vec![0xFF, 0x20, 0x03],
-        _ => [&[0xFF, 0x95, 0x10], &mosi[3..]].concat(),
+    let mut conversions = 0;
+    let (wire, counts) = run(&mut Mems::new(), 24, |port, mosi| match (port, mosi[0]) {
+        (0, 0xAC) => vec![0xFF, 0x20, 0x03, 0xFF],
+        (0, _) => vec![0xFF, 0xA2],
+        _ => {
+            conversions += 1;
+            vec![0xFF, 0x00, 0x95, 0x10 + conversions]
+        }
     });
-    let accelerometer = (0, MODE_3, vec![0xAC, 0, 0], 1);
-    let mut expected = vec![accelerometer; 6];
+    let accelerometer = (0, MODE_3, vec![0xAC, 0, 0, 0], 1);
     let cell = (1, MODE_1, vec![0x10, 0, 0, 0], 1);
-    expected.insert(5, cell.clone());
-    expected.insert(1, cell);
+    let on = (0, MODE_3, vec![0x90, 0], 1);
+    let round = [
+        &accelerometer,
+        &accelerometer,
+        &cell,
+        &accelerometer,
+        &accelerometer,
+        &on,
+    ];
+    let expected: Vec<_> = round.into_iter().cycle().take(36).cloned().collect();
     assert_eq!(wire, expected);
-    // the mean of the slot and the one before, 0x0320 / 16 / 2 and 0x0320 / 16 above the middle; the cell's upper 12 bits
-    let (first, vibration, force) = (Some(2048 + 25), Some(2048 + 50), Some(0x951));
-    assert_eq!(counts, [first, force, vibration, force, vibration, force]);
+    // the filter takes 15 slots; what does not change is no vibration
+    let (vibration, force) = (Some(2048), Some(1000 + 37));
+    assert_eq!(counts[15..18], [force, vibration, force]);
+}
+
+/// What a part answers to each step of a start-up list.
+fn start<S: PressureSensor>(
+    mut says: impl FnMut(usize, &[u8]) -> Vec<u8>,
+) -> Result<(), Unexpected> {
+    S::START.iter().enumerate().try_for_each(|(at, step)| {
+        assert!(usize::from(step.transaction.port) < S::PORTS.len());
+        assert!(usize::from(step.transaction.answer) >= step.expect.len());
+        let answer = perform(&[step.transaction], |_, bytes| {
+            let came_in = says(at, bytes);
+            bytes.copy_from_slice(&came_in);
+            Ok::<(), ()>(())
+        });
+        step.check(S::PORTS, &answer.unwrap())
+    })
+}
+
+#[test]
+fn a_start_up_list_names_the_part_that_does_not_answer() {
+    let mut written = std::collections::BTreeMap::from([(0x0F, 0x7B)]);
+    let mut cell = [0; 4];
+    let mut good = |_: usize, mosi: &[u8]| -> Vec<u8> {
+        match mosi {
+            [read @ 0x80..=0xFF, _] => vec![0xFF, *written.get(&(read & 0x7F)).unwrap_or(&0)],
+            [0x23, ..] => [&[0xFF], &cell[..]].concat(),
+            [0x43, registers @ ..] => {
+                cell.copy_from_slice(registers);
+                vec![0xFF; 5]
+            }
+            // a software reset is over by the time it is looked at
+            [0x12, 0x01] => vec![0xFF; 2],
+            [write, value] => {
+                written.insert(*write, *value);
+                vec![0xFF; 2]
+            }
+            _ => vec![0xFF; mosi.len()],
+        }
+    };
+    assert_eq!(start::<Mems>(&mut good), Ok(()));
+    let why = start::<Mems>(|_, mosi| vec![0xFF; mosi.len()]).unwrap_err();
+    assert_eq!(
+        (why.part, why.sent, why.got, why.want),
+        ("IIS3DWB accelerometer", 0x8F, 0xFF, 0x7B)
+    );
+    let cell_at = iis3dwb::START.len();
+    let why = start::<Mems>(|at, mosi| {
+        let mut came_in = good(at, mosi);
+        if at > cell_at {
+            came_in.fill(0);
+        }
+        came_in
+    });
+    let why = why.unwrap_err();
+    assert_eq!((why.part, why.want), (ads1220::PORT.name, 0x0E));
+    assert!(std::format!("{why}").contains("SPI mode"));
+    assert_eq!(start::<BioTac>(|_, _| vec![]), Ok(()));
+    assert_eq!(start::<Analog>(|_, _| vec![]), Ok(()));
 }
 
 /// At the clocks that a chip may have, and with 7 us of lateness of each transaction.
@@ -172,8 +177,9 @@ fn all_slots_are_over_before_the_next_one() {
     }
     let slot_us = 1_000_000 / SLOTS_HZ;
     assert_eq!(longest::<BioTac>(5_250_000), 4 + 7 + 50 + 4 + 7 + 10);
-    assert_eq!(longest::<Mcp3202>(656_250), 37 + 7 + 1);
-    assert_eq!(longest::<TwoParts>(2_625_000), 10 + 7 + 1 + 13 + 7 + 1);
+    assert_eq!(longest::<Analog>(656_250), 37 + 7 + 1);
+    assert_eq!(longest::<Mems>(5_250_000), 7 + 7 + 1 + 7 + 7 + 1);
+    assert!(longest::<Mems>(656_250) < slot_us);
     assert!(longest::<BioTac>(500_000) < slot_us);
 }
 
@@ -193,11 +199,12 @@ fn a_bus_that_fails_ends_a_slot() {
 /// Bytes of an answer are the last ones that came in, and go where [`Transaction::answers_at`] says.
 #[test]
 fn answers_are_the_last_bytes() {
-    let expected: Vec<u8> = (0..CELL.out.len())
-        .filter(|index| CELL.answers_at(*index))
+    let cell = ads1220::READ;
+    let expected: Vec<u8> = (0..cell.out.len())
+        .filter(|index| cell.answers_at(*index))
         .map(|index| index as u8)
         .collect();
-    let answer = perform(&[CELL], |_, bytes| {
+    let answer = perform(&[cell], |_, bytes| {
         bytes
             .iter_mut()
             .zip(0..)
