@@ -17,6 +17,8 @@ use tactus_core::rig::pins::Inputs;
 use tactus_core::rig::stage::StageConstants;
 use tactus_core::rig::{Ended, Phase, Refused};
 use tactus_core::rig::{FAULTS, Fault};
+use tactus_core::sensor::PressureSensor as _;
+use tactus_core::sensor::biotac::BioTac;
 use tactus_core::sensor::pressure::{Calibration, Channel, Counts, Pressure};
 
 /// When the cause comes.
@@ -682,7 +684,12 @@ fn a_force_that_lasts_does_not_end_the_lifting() {
 
 /// The chip starts again, wherever lever and stage are.
 fn reboot(rig: &mut SimRig, calibration: RigCalibration, unguarded: Unguarded) {
-    *rig.control() = Control::new(StageConstants::REFERENCE, calibration, unguarded);
+    *rig.control() = Control::new(
+        &BioTac::MODEL,
+        StageConstants::REFERENCE,
+        calibration,
+        unguarded,
+    );
 }
 
 /// The wire of the lever's switch breaks, and the chip starts again while the finger presses: to the firmware it is at the

@@ -13,10 +13,6 @@ use crate::chip::slots::Bus;
 const PDC: u32 = 1;
 /// A slot that begins later than this leaves the sensor less than its 50 us before the next one.
 const LATE_US: u64 = 100;
-/// P_AC of a BioTac that nobody touches. Less is a dead converter, more is a bad ground.
-const PAC_NOISE_COUNTS: core::ops::RangeInclusive<f32> = 1.0..=8.0;
-/// P_DC of a finger filled as it should be, in air.
-const PDC_COUNTS: core::ops::RangeInclusive<f32> = 2000.0..=3200.0;
 
 /// A squeeze, and that it is over, counts of P_DC: 0.23 and 0.06 N.
 const SQUEEZED_COUNTS: f32 = 20.0;
@@ -179,14 +175,16 @@ pub(super) async fn sensor(pins: board::Sensor, account: &mut Account) -> Touch 
         ),
         "Shorten the cable and check the pins named above",
     );
+    let within = |(least, most): (f32, f32), counts: f32| (least..=most).contains(&counts);
+    let at_rest = BioTac::MODEL.at_rest;
     account.check(
-        PAC_NOISE_COUNTS.contains(&pac.rms()),
+        within(at_rest.pac_noise_counts, pac.rms()),
         "P_AC noise",
         format_args!("{:.2} counts rms", pac.rms()),
         "1 to 8 are right. Less: the sensor does not convert. More: is the finger touched? Check its ground",
     );
     account.check(
-        PDC_COUNTS.contains(&pdc.mean()),
+        within(at_rest.pdc_counts, pdc.mean()),
         "P_DC",
         format_args!("{:.0} counts", pdc.mean()),
         "2000 to 3200 are right without contact. Refill the finger as its manual says; keep off anything that presses it",

@@ -19,7 +19,7 @@ use tactus_core::handheld::{About, Handheld, Picture, Screen, Small, TICKS_HZ, d
 use tactus_core::probe::seams::Events;
 use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::sensor::pressure::Calibration;
+use tactus_core::sensor::PressureSensor as _;
 use tactus_core::wire::{Event, PROTOCOL, Reset, Text};
 
 use super::display;
@@ -28,7 +28,7 @@ use super::link::{BUSY, Body, HEARD, JOBS, TABLE};
 use super::outbox::{self, STREAM};
 use crate::board;
 use crate::chip::flash::{self, MappedTable};
-use crate::chip::slots::{self, Word};
+use crate::chip::slots::{self, Finger, Word};
 use crate::chip::watchdog;
 
 /// The table that comes with the handheld: textures of a simulated world under a simulated hand. Its
@@ -159,7 +159,7 @@ pub(crate) static BODY: Body = Body {
 
 /// A fingertip that nobody has measured; what belongs to motors is not used.
 const UNMEASURED: RigCalibration = RigCalibration {
-    pressure: Calibration::PAPER,
+    pressure: Finger::MODEL.calibration,
     unloaded_a: (0.0, 0.0),
     newton_per_ampere: 1.0,
     date: 0,

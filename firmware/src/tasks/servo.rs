@@ -22,12 +22,12 @@ use tactus_core::rig::control::Control;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::pins::{Inputs, MAX_WORDS};
 use tactus_core::rig::stage::StageConstants;
-use tactus_core::sensor::pressure::Calibration;
+use tactus_core::sensor::PressureSensor as _;
 
 use super::link::Body;
 use crate::board;
 use crate::chip::current::{self, Current};
-use crate::chip::slots::Word;
+use crate::chip::slots::{Finger, Word};
 use crate::chip::{lever, rescue, watchdog};
 
 /// Samples on their way to the features: a quarter of a second.
@@ -54,7 +54,7 @@ const WAITS: u32 = u32::MAX;
 
 /// The reference rig's constants, until measured ones are read from the store.
 pub(crate) const UNMEASURED: RigCalibration = RigCalibration {
-    pressure: Calibration::PAPER,
+    pressure: Finger::MODEL.calibration,
     unloaded_a: (0.037, 0.0),
     newton_per_ampere: 16.4,
     date: 0,
@@ -181,7 +181,12 @@ pub(crate) async fn servo(
     rescue::ARMED.store(true, Relaxed);
     watchdog::tighten(watchdog);
 
-    let mut control = Control::new(StageConstants::REFERENCE, UNMEASURED, Unguarded::default());
+    let mut control = Control::new(
+        &Finger::MODEL,
+        StageConstants::REFERENCE,
+        UNMEASURED,
+        Unguarded::default(),
+    );
     let (mut ended, mut remembered) = (None, false);
     let mut count: i32 = 0;
     let mut hung = None;

@@ -115,7 +115,7 @@ impl SimRig {
 
     fn of(world: World, seed: u64, unguarded: Unguarded) -> Self {
         let calibration = RigCalibration {
-            pressure: Calibration::PAPER,
+            pressure: biotac::BioTac::MODEL.calibration,
             unloaded_a: (0.037, 0.0),
             newton_per_ampere: 16.4,
             date: 0,
@@ -124,7 +124,12 @@ impl SimRig {
         };
         Self {
             world,
-            control: Control::new(StageConstants::REFERENCE, calibration, unguarded),
+            control: Control::new(
+                &biotac::BioTac::MODEL,
+                StageConstants::REFERENCE,
+                calibration,
+                unguarded,
+            ),
             random: ChaCha8Rng::seed_from_u64(seed),
             now_ns: 0,
             slot: 0,

@@ -3,29 +3,31 @@
 use super::fault::Fault;
 use super::force::ForceMeter;
 use super::phase::Phase;
+use crate::sensor::FingerModel;
 
-/// P_DC of a finger in the air is no further than this from what its calibration says, counts: between the drift with the
-/// finger's temperature and the 110 of a contact that is pressed (chosen). What it lets pass, 0.46 N, and 1.26 N on top
-/// are below the guard's limit.
-const AIR_COUNTS: f32 = 40.0;
+/// P_DC of a finger in the air is no further than this from what its calibration says, mN: 40 counts of a BioTac, between its
+/// drift with temperature and the 110 of a contact that is pressed (chosen). What it lets pass, and 1.26 N on top, are below
+/// the guard's limit.
+const AIR_MN: f32 = 460.0;
 /// A driver that steps on its own stops without current; only then the finger is lifted.
 pub(super) const RELEASE_MS: u32 = 20;
-/// P_DC that has risen by so many counts on the way up, 0.09 N, says that something presses: the lever, if it goes down.
-const RISEN_COUNTS: f32 = 8.0;
-/// A finger that waits in the air may warm up: what it says there follows so many counts a millisecond, 30 a minute (chosen).
-/// Somebody may touch it, too: only [`AIR_COUNTS`] more say that the lever has come down.
-const WARMING_COUNTS: f32 = 0.0005;
+/// P_DC that has risen by so much on the way up, mN, says that something presses: the lever, if it goes down.
+const RISEN_MN: f32 = 92.0;
+/// A finger that waits in the air may warm up: what it says there follows so many mN a millisecond, 30 counts of a BioTac a
+/// minute (chosen). Somebody may touch it, too: only [`AIR_MN`] more say that the lever has come down.
+const WARMING_MN: f32 = 0.00575;
 /// The same of a finger that was pressed too hard, since its driver was off: there every tenth of a newton counts.
-const WORSE_COUNTS: f32 = 4.0;
+const WORSE_MN: f32 = 46.0;
 
-/// Whether P_DC at `counts` is none of a finger that says `air` in the air.
-pub(super) fn is_far(counts: Option<f32>, air: f32) -> bool {
-    counts.is_some_and(|counts| libm::fabsf(counts - air) > AIR_COUNTS)
+/// Whether P_DC at `counts` is none of such a finger that says `air` in the air.
+pub(super) fn is_far(finger: &FingerModel, counts: Option<f32>, air: f32) -> bool {
+    counts.is_some_and(|counts| libm::fabsf(counts - air) > finger.counts(AIR_MN))
 }
 
 /// P_DC on the way to the limit switch.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Ascent {
+    finger: &'static FingerModel,
     /// The least mean since the lever began to look for its switch, or without contact at the last press, counts.
     lowest: Option<f32>,
     /// That is kept: the finger was pressed too hard since lever and stage were home, and may be so still.
@@ -37,6 +39,17 @@ pub(super) struct Ascent {
 }
 
 impl Ascent {
+    /// Of such a finger, of whose P_DC nothing is known.
+    pub(super) fn new(finger: &'static FingerModel) -> Self {
+        Self {
+            finger,
+            lowest: None,
+            pressed: false,
+            gave_up: false,
+            released: 0.0,
+        }
+    }
+
     /// Another finger, or another calibration: nothing is known of P_DC.
     pub(super) fn forget(&mut self) {
         (self.lowest, self.pressed) = (None, false);
@@ -69,29 +82,31 @@ impl Ascent {
     ) -> Option<Fault> {
         match phase {
             Phase::Homing | Phase::Positioning | Phase::Unloaded => {
-                self.rises(meter.mean(), RISEN_COUNTS)
+                self.rises(meter.mean(), RISEN_MN)
             }
-            Phase::Lifting if lost => self.rises(meter.mean(), RISEN_COUNTS),
+            Phase::Lifting if lost => self.rises(meter.mean(), RISEN_MN),
             Phase::Faulted(Fault::ForceHigh) => {
                 self.lift(ms, meter);
                 None
             }
             Phase::Ready => {
                 self.pressed = false;
-                self.lowest = self.lowest.map(|lowest| lowest + WARMING_COUNTS);
-                self.rises(meter.mean(), AIR_COUNTS)
+                self.lowest = self
+                    .lowest
+                    .map(|lowest| lowest + self.finger.counts(WARMING_MN));
+                self.rises(meter.mean(), AIR_MN)
             }
             _ => None,
         }
     }
 
-    /// P_DC on the way, mean of 10 ms: the fault, if it has risen by more than `counts`. The first time somebody may lean on
+    /// P_DC on the way, mean of 10 ms: the fault, if it has risen by more than `mn`. The first time somebody may lean on
     /// the finger, and it is lifted; then no further try makes a step before P_DC has fallen again.
-    fn rises(&mut self, mean: Option<f32>, counts: f32) -> Option<Fault> {
+    fn rises(&mut self, mean: Option<f32>, mn: f32) -> Option<Fault> {
         let mean = mean?;
         let lowest = self.lowest.map_or(mean, |lowest| lowest.min(mean));
         self.lowest = Some(lowest);
-        if mean <= lowest + counts {
+        if mean <= lowest + self.finger.counts(mn) {
             return None;
         }
         let before = core::mem::replace(&mut self.pressed, true);
@@ -109,7 +124,7 @@ impl Ascent {
         if ms <= RELEASE_MS {
             self.released = meter.counts();
         } else {
-            self.gave_up |= meter.counts_now() > self.released + WORSE_COUNTS;
+            self.gave_up |= meter.counts_now() > self.released + self.finger.counts(WORSE_MN);
         }
     }
 
@@ -127,43 +142,42 @@ impl Ascent {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sensor::PressureSensor as _;
+    use crate::sensor::biotac::BioTac;
     use crate::sensor::pressure::Counts;
 
     #[test]
     fn what_rose_once_must_fall_before_the_next_try() {
-        let mut ascent = Ascent::default();
+        let mut ascent = Ascent::new(&BioTac::MODEL);
         assert!(ascent.begin());
         for mean in [None, Some(2700.0), Some(2650.0), Some(2658.0)] {
-            assert_eq!(ascent.rises(mean, RISEN_COUNTS), None);
+            assert_eq!(ascent.rises(mean, RISEN_MN), None);
         }
-        assert_eq!(
-            ascent.rises(Some(2659.0), RISEN_COUNTS),
-            Some(Fault::ForceHigh)
-        );
+        assert_eq!(ascent.rises(Some(2659.0), RISEN_MN), Some(Fault::ForceHigh));
         for _ in 0..3 {
             assert!(!ascent.begin(), "the zero is kept");
             assert_eq!(
-                ascent.rises(Some(2659.0), RISEN_COUNTS),
+                ascent.rises(Some(2659.0), RISEN_MN),
                 Some(Fault::LeverNotHome)
             );
         }
         // somebody has freed it
         assert!(!ascent.begin());
-        assert_eq!(ascent.rises(Some(2651.0), RISEN_COUNTS), None);
+        assert_eq!(ascent.rises(Some(2651.0), RISEN_MN), None);
         ascent.pressed = false;
         assert!(ascent.begin());
         assert_eq!(ascent.lowest(), None);
-        assert_eq!(ascent.rises(Some(2800.0), RISEN_COUNTS), None);
+        assert_eq!(ascent.rises(Some(2800.0), RISEN_MN), None);
     }
 
     #[test]
     fn a_press_keeps_the_last_zero() {
-        let mut ascent = Ascent::default();
+        let mut ascent = Ascent::new(&BioTac::MODEL);
         ascent.zero(2600.0);
         ascent.pressed = true;
         assert!(!ascent.begin());
         assert_eq!(
-            ascent.rises(Some(2700.0), RISEN_COUNTS),
+            ascent.rises(Some(2700.0), RISEN_MN),
             Some(Fault::LeverNotHome)
         );
     }
@@ -171,7 +185,7 @@ mod tests {
     #[test]
     fn a_finger_that_waits_may_warm_up_but_not_be_pressed() {
         let mut meter = ForceMeter::new(2600.0);
-        let mut ascent = Ascent::default();
+        let mut ascent = Ascent::new(&BioTac::MODEL);
         let mut wait = |ascent: &mut Ascent, ms: u32, counts_per_ms: f32, from: f32| {
             let mut seen = None;
             for ms in 0..ms {

@@ -15,6 +15,7 @@ use super::skin::SkinCare;
 use super::slide::Run;
 use super::stage::{MARGIN_MM, Stage, StageConstants, StageState};
 use crate::features::Movement;
+use crate::sensor::FingerModel;
 use crate::sensor::pressure::Channel;
 
 use super::phase::{Ended, HIGH_FORCE_MN, Phase, Refused};
@@ -25,14 +26,15 @@ pub const BACKGROUND_MS: u32 = 1000;
 const RETURN_MM_S: f32 = 50.0;
 /// Slower than this the stage stands, mm/s.
 const STANDS_MM_S: f32 = 0.5;
-/// A lifted finger shows no more than these counts above its zero.
-const LIFTED_COUNTS: f32 = 8.0;
-/// By so much may the mean force of a slide differ from that of the still finger before it: counts, and a share.
-const SLIDE_OFF: (f32, f32) = (3.0, 0.25);
+/// A lifted finger shows no more than this above its zero, mN.
+const LIFTED_MN: f32 = 92.0;
+/// By so much may the mean force of a slide differ from that of the still finger before it: mN, and a share.
+const SLIDE_OFF: (f32, f32) = (34.5, 0.25);
 
 /// The whole rig.
 #[derive(Clone, Debug)]
 pub struct Control {
+    finger: &'static FingerModel,
     lever: Lever,
     stage: Stage,
     guard: Guard,
@@ -63,14 +65,16 @@ pub struct Control {
 }
 
 impl Control {
-    /// A rig that does not know where it is, with all guards but `unguarded`.
+    /// A rig with such a finger that does not know where it is, with all guards but `unguarded`.
     pub fn new(
+        finger: &'static FingerModel,
         constants: StageConstants,
         calibration: RigCalibration,
         unguarded: Unguarded,
     ) -> Self {
         Self {
-            lever: Lever::new(unguarded),
+            finger,
+            lever: Lever::new(finger, unguarded),
             stage: Stage::new(constants),
             guard: Guard::new(unguarded),
             meter: ForceMeter::new(calibration.pressure.pdc_no_contact),
@@ -85,7 +89,7 @@ impl Control {
             compared: false,
             recovered: None,
             air: None,
-            ascent: Ascent::default(),
+            ascent: Ascent::new(finger),
             still: 0.0,
             lever_top: Switch::default(),
             stage_left: Switch::default(),
@@ -217,7 +221,8 @@ impl Control {
         let calibrated = self.calibration.air_known.then_some(calibrated);
         // of a finger that nobody has calibrated, what it said on its way up
         let known = [calibrated.or(self.ascent.lowest()), self.recovered];
-        known.into_iter().flatten().any(|air| is_far(counts, air))
+        let mut known = known.into_iter().flatten();
+        known.any(|air| is_far(self.finger, counts, air))
     }
 
     /// Makes one movement, beginning at `start`: 0 to 1 of the room that the sample leaves.
@@ -228,7 +233,8 @@ impl Control {
     pub fn start(&mut self, movement: Movement, start: f32) -> Result<(), Refused> {
         self.may_start()?;
         let force_mn = movement.force_mn();
-        if !may_press(&self.calibration.pressure, force_mn, self.high_force) {
+        let pressure = &self.calibration.pressure;
+        if !may_press(self.finger, pressure, force_mn, self.high_force) {
             return Err(Refused::Force(force_mn));
         }
         self.run = Run::slide(movement, start, self.stage.constants()).ok_or(Refused::Length)?;
@@ -463,9 +469,10 @@ impl Control {
         let pressure = &self.calibration.pressure;
         let high = self.high_force && self.run.movement().force_mn() > HIGH_FORCE_MN;
         let limit_mn = force_limit_mn(pressure, high);
+        let mn_per_count = pressure.force_mn_per_count;
         let fault = self
             .guard
-            .tick(&seen, &self.meter, pressure.force_mn_per_count, limit_mn)?;
+            .tick(&seen, &self.meter, self.finger, mn_per_count, limit_mn)?;
         // a sensor that is switched off is no fault of a rig that does nothing; too much force always is
         let idle = matches!(self.phase, Phase::Parked | Phase::Faulted(_));
         (!idle || (fault == Fault::ForceHigh && self.phase != Phase::Parked)).then_some(fault)
@@ -547,8 +554,9 @@ impl Control {
                     .slid(shear_n, self.force_mn() * 1e-3, self.stage.velocity_mm_s());
                 if self.stage.state() == StageState::Standing {
                     let felt = self.meter.long_counts().unwrap_or_default();
-                    let (counts, share) = SLIDE_OFF;
-                    if libm::fabsf(felt - self.still) > counts + share * self.still {
+                    let (mn, share) = SLIDE_OFF;
+                    let most = self.finger.counts(mn) + share * self.still;
+                    if libm::fabsf(felt - self.still) > most {
                         self.check(Fault::Unsteady);
                     }
                 }
@@ -574,7 +582,7 @@ impl Control {
             Phase::Lifting => {
                 if self.lever.is_lifted() && libm::fabsf(self.stage.velocity_mm_s()) < STANDS_MM_S {
                     // steps that were asked for and not made leave the finger down
-                    if self.meter.counts() > LIFTED_COUNTS {
+                    if self.meter.counts() > self.finger.counts(LIFTED_MN) {
                         self.check(Fault::LeverSlips);
                     } else if self.stage.state() == StageState::Unknown {
                         self.lever.reset();

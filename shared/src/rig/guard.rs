@@ -1,6 +1,7 @@
 //! Notices every fault that can be seen from outside the lever and the stage: sensor, switches, stage and force.
 
 use super::force::ForceMeter;
+use crate::sensor::FingerModel;
 use crate::sensor::pressure::{Calibration, Pressure};
 
 use super::fault::Fault;
@@ -34,10 +35,15 @@ pub(super) fn force_limit_mn(finger: &Calibration, high: bool) -> f32 {
     (finger.linear_mn * (most_mn / Calibration::PAPER.linear_mn)).min(most_mn)
 }
 
-/// Whether a rig that was allowed high forces, or was not, may press this finger with so many mN.
-pub(super) fn may_press(finger: &Calibration, force_mn: u16, high_force: bool) -> bool {
-    // the guard takes a count for no less than the paper's
-    let most_counts = HIGH_FORCE_LIMIT_MN / Calibration::PAPER.force_mn_per_count;
+/// Whether a rig that was allowed high forces, or was not, may press this finger of this model with so many mN.
+pub(super) fn may_press(
+    model: &FingerModel,
+    finger: &Calibration,
+    force_mn: u16,
+    high_force: bool,
+) -> bool {
+    // the guard takes a count for no less than the model's
+    let most_counts = model.counts(HIGH_FORCE_LIMIT_MN);
     let counts = finger.force_counts(force_mn);
     force_mn <= most_mn(high_force)
         && counts.is_ok_and(|counts| force_mn <= HIGH_FORCE_MN || counts < most_counts)
@@ -151,6 +157,7 @@ impl Guard {
         &mut self,
         seen: &Seen<'_>,
         meter: &ForceMeter,
+        model: &FingerModel,
         mn_per_count: f32,
         limit_mn: f32,
     ) -> Option<Fault> {
@@ -160,8 +167,8 @@ impl Guard {
         let e_stop = self.e_stop.tick(seen.e_stop);
         let lever_top = self.lever_top.tick(seen.lever_top);
         let stage_limit = self.stage_limit.tick(seen.stage_limit);
-        // a calibration that says less than the paper's does not allow more
-        let mn_per_count = mn_per_count.max(Calibration::PAPER.force_mn_per_count);
+        // a calibration that says less than the model's does not allow more
+        let mn_per_count = mn_per_count.max(model.calibration.force_mn_per_count);
         let force = meter.counts().max(meter.counts_now()) * mn_per_count
             > limit_mn.min(HIGH_FORCE_LIMIT_MN);
         [

@@ -7,6 +7,7 @@ use super::fault::Fault;
 use super::force::ForceMeter;
 use super::guard::Unguarded;
 use super::progress::Progress;
+use crate::sensor::FingerModel;
 use crate::sensor::pressure::{Calibration, Counts};
 
 /// Travel of the reference lever per step, um: lead 2 mm, 200 steps, 1/16.
@@ -25,10 +26,10 @@ const CLEARANCE_STEPS: i32 = 1600;
 pub const MAX_STEPS: i32 = 25_600;
 /// A finger that presses on something thin goes on to the lower end itself: 17 mm below the limit switch.
 const END_STEPS: i32 = 27_200;
-/// Contact is seen when the mean of P_DC has risen by this many counts: thirty times its noise.
-const CONTACT_COUNTS: f32 = 3.0;
+/// Contact is seen when the mean of P_DC has risen by this, mN: 3 counts of a BioTac, thirty times its noise.
+const CONTACT_MN: f32 = 34.5;
 /// The zero was taken in the air if P_DC does not rise by a third of that in the first 0.1 mm of the way down, 200 ms: the
-/// softest sample would show 1.6 counts.
+/// softest sample would show 18 mN.
 const CLEAR_MS: u32 = 200;
 /// Nearer to the top than this the limit switch may be closed, further down it must be open: 1 mm, the switch's
 /// own way and the half millimetre from it to the hard stop.
@@ -41,42 +42,42 @@ const TRIM_STEPS: f32 = 1200.0;
 const SETTLE_MS: u32 = 250;
 /// Mean of P_DC from which the force is trimmed: 100 ms, 220 samples.
 const WEIGH_MS: u32 = 100;
-/// The approach stops short by this many counts, so that trimming mostly presses on and never meets the backlash.
-const SHORT_COUNTS: f32 = 0.6;
-/// The force is good when it is this near, in counts, or ...
-const GOOD_COUNTS: f32 = 0.25;
+/// The approach stops short by this, mN, so that trimming mostly presses on and never meets the backlash.
+const SHORT_MN: f32 = 6.9;
+/// The force is good when it is this near, mN, or ...
+const GOOD_MN: f32 = 2.875;
 /// ... this near, as a share of the target.
 const GOOD_SHARE: f32 = 0.01;
 /// After this many trims the force has to be within tolerance.
 const MAX_TRIMS: u8 = 6;
-/// All trims together press on by no more than this share of the target and this many counts: the skin creeps by less,
+/// All trims together press on by no more than this share of the target and this force, mN: the skin creeps by less,
 /// and a P_DC that drifts must not be followed until the finger is crushed.
 const MAX_CREEP_SHARE: f32 = 0.15;
-const MAX_CREEP_COUNTS: f32 = 3.0;
-/// P_DC counts at 2.05 N, where the force guard acts as a rule: trims never press on beyond.
-const LIMIT_COUNTS: f32 = 178.0;
-/// P_DC counts of the guard's highest limit, 2.1 N: they must be below full scale.
-const GUARD_COUNTS: f32 = 183.0;
-/// The zero of one press and of the next differ by less, in counts: drift, and nothing that presses.
-const ZERO_COUNTS: f32 = 8.0;
-/// 1 N/mm, the softest that a finger is, in counts per step.
-const SOFTEST: f32 = STEP_UM / 11.5;
+const MAX_CREEP_MN: f32 = 34.5;
+/// A whole count of a BioTac below 2.05 N, where the force guard acts as a rule, mN: trims never press on beyond.
+const LIMIT_MN: f32 = 2047.0;
+/// A whole count of a BioTac above the guard's highest limit, 2.1 N, mN: it must be below full scale.
+const GUARD_MN: f32 = 2104.5;
+/// The zero of one press and of the next differ by less, mN: drift, and nothing that presses.
+const ZERO_MN: f32 = 92.0;
+/// 1 N/mm, the softest that a finger is, mN per step.
+const SOFTEST_MN: f32 = STEP_UM;
 /// Longest times of a trim, of lifting and of an approach, ms: a motor that makes no steps must not go unnoticed.
 const TRIM_MS: u32 = 20_000;
 const LIFT_MS: u32 = 10_000;
 const APPROACH_MS: u32 = 60_000;
-/// A press beyond this, 1.38 N, stands still twice on its way, at these shares of its target: a skin that leaks over seconds
+/// A press beyond this, mN, stands still twice on its way, at these shares of its target: a skin that leaks over seconds
 /// looks like a sample that gives way for as long as the lever steps. Lighter presses are over before it matters.
-const STANDS_FROM_COUNTS: f32 = 120.0;
+const STANDS_FROM_MN: f32 = 1380.0;
 const STANDS_AT: [f32; 2] = [0.5, 0.75];
 /// While it stands P_DC is weighed twice: from 50 to 150 ms and from [`SETTLE_MS`] on, 200 ms later.
 const FIRST_WEIGH_MS: u32 = 50;
 const BETWEEN_WEIGHINGS_S: f32 = 0.2;
-/// What leaks away until the target is reached is at most this, in counts, if it leaks on as it does while the lever stands:
-/// 0.09 N more on the finger than P_DC says (chosen: with the guard's limit and the trims, less than 2.2 N).
-const LEAK_COUNTS: f32 = 8.0;
-/// Tolerance of a pressed finger: 1 count or 5 %, whichever is more.
-const TOLERANCE_COUNTS: f32 = 1.0;
+/// What leaks away until the target is reached is at most this, mN, if it leaks on as it does while the lever stands:
+/// so much more on the finger than P_DC says (chosen: with the guard's limit and the trims, less than 2.2 N).
+const LEAK_MN: f32 = 92.0;
+/// Tolerance of a pressed finger: this, mN (a BioTac's count), or 5 %, whichever is more.
+const TOLERANCE_MN: f32 = 11.5;
 const TOLERANCE_SHARE: f32 = 0.05;
 /// The value of no contact is a mean over this time.
 const ZERO_MS: u32 = 200;
@@ -107,9 +108,10 @@ pub enum LeverState {
     Retracting(i32),
 }
 
-/// The state machine of the lever; by default of one that does not know where it is.
-#[derive(Clone, Debug, Default)]
+/// The state machine of the lever.
+#[derive(Clone, Debug)]
 pub struct Lever {
+    finger: &'static FingerModel,
     state: LeverState,
     /// Force asked for, in counts above no contact.
     target: f32,
@@ -136,21 +138,35 @@ pub struct Lever {
 }
 
 impl Lever {
-    /// A lever that does not know where it is, with all guards but `unguarded`.
-    pub fn new(unguarded: Unguarded) -> Self {
+    /// A lever that does not know where it is and presses such a finger, with all guards but `unguarded`.
+    pub fn new(finger: &'static FingerModel, unguarded: Unguarded) -> Self {
+        Self::with(finger, Progress::new(finger, unguarded))
+    }
+
+    fn with(finger: &'static FingerModel, progress: Progress) -> Self {
         Self {
-            progress: Progress::new(unguarded),
-            ..Self::default()
+            finger,
+            state: LeverState::Unknown,
+            target: 0.0,
+            trims: 0,
+            stood: 0,
+            first: 0.0,
+            pressed: 0.0,
+            crept: 0.0,
+            counts_per_step: 0.0,
+            before: None,
+            zero: None,
+            top: 0,
+            known: false,
+            contact: None,
+            progress,
+            ms: 0,
         }
     }
 
     /// Forgets where it is: it may be moved by hand now.
     pub fn lose(&mut self) {
-        let progress = core::mem::take(&mut self.progress);
-        *self = Self {
-            progress,
-            ..Self::default()
-        };
+        *self = Self::with(self.finger, self.progress.clone());
     }
 
     /// Takes a sample of P_AC.
@@ -271,12 +287,12 @@ impl Lever {
                     // something presses already, or full scale comes before the guard's limit
                     let moved = self
                         .zero
-                        .is_some_and(|last| libm::fabsf(zero - last) > ZERO_COUNTS);
-                    if moved || zero + GUARD_COUNTS > f32::from(Counts::MAX.get()) {
+                        .is_some_and(|last| libm::fabsf(zero - last) > self.finger.counts(ZERO_MN));
+                    if moved || zero + self.finger.counts(GUARD_MN) > f32::from(Counts::MAX.get()) {
                         return Err(Fault::Unsteady);
                     }
                     self.zero = Some(zero);
-                    self.counts_per_step = SOFTEST;
+                    self.counts_per_step = self.finger.counts(SOFTEST_MN);
                     self.before = None;
                     self.trims = 0;
                     self.stood = 0;
@@ -334,7 +350,8 @@ impl Lever {
         contact: Option<i32>,
     ) -> Result<i32, Fault> {
         let (counts, mean) = (meter.counts_now(), meter.counts());
-        let contact = contact.or_else(|| (mean > CONTACT_COUNTS).then_some(steps));
+        let contact_counts = self.finger.counts(CONTACT_MN);
+        let contact = contact.or_else(|| (mean > contact_counts).then_some(steps));
         self.state = LeverState::Approaching(contact);
         self.progress.judge(steps, mean, contact.is_some())?;
         let lowest = contact.map_or(MAX_STEPS, |_| END_STEPS);
@@ -342,8 +359,8 @@ impl Lever {
         match contact {
             // less than no contact: the zero has drifted, and with it the force that would be pressed. More at once: something
             // pressed when it was taken
-            None if mean < -CONTACT_COUNTS
-                || (self.ms < CLEAR_MS && mean > CONTACT_COUNTS / 3.0) =>
+            None if mean < -contact_counts
+                || (self.ms < CLEAR_MS && mean > contact_counts / 3.0) =>
             {
                 return Err(Fault::Unsteady);
             }
@@ -361,17 +378,18 @@ impl Lever {
             self.before = Some((steps, counts));
         }
         self.pressed += mean * 1e-3;
-        if counts < self.next_stand() - SHORT_COUNTS {
+        if counts < self.next_stand() - self.finger.counts(SHORT_MN) {
             return Ok(APPROACH_STEPS_S);
         }
         if let Some((from, before)) = self.before {
             let made = (steps - from) as f32;
             let rise = (counts - before) / made;
             // a light target is reached before the mean has filled: 1 N/mm then, the softest that a finger is
-            self.counts_per_step = if made > 0.0 && rise > SOFTEST {
+            let softest = self.finger.counts(SOFTEST_MN);
+            self.counts_per_step = if made > 0.0 && rise > softest {
                 rise
             } else {
-                SOFTEST
+                softest
             };
         }
         self.enter(LeverState::Settling);
@@ -381,7 +399,7 @@ impl Lever {
     /// P_DC at which the lever stands next, counts: on its way, or at its target.
     fn next_stand(&self) -> f32 {
         let share = STANDS_AT.get(self.stood);
-        let share = share.filter(|_| self.target > STANDS_FROM_COUNTS);
+        let share = share.filter(|_| self.target > self.finger.counts(STANDS_FROM_MN));
         share.copied().unwrap_or(1.0) * self.target
     }
 
@@ -390,7 +408,7 @@ impl Lever {
         let share_per_s = (self.first - counts) / counts / BETWEEN_WEIGHINGS_S;
         // what was pressed until now is to the whole as the square of the force, or less
         let still = self.target / counts;
-        if share_per_s * self.pressed * still * still > LEAK_COUNTS {
+        if share_per_s * self.pressed * still * still > self.finger.counts(LEAK_MN) {
             return Err(Fault::PressureDead);
         }
         self.stood += 1;
@@ -409,9 +427,11 @@ impl Lever {
             return self.look_for_leak(counts);
         }
         let off = self.target - counts;
-        let near = |counts: f32, share: f32| libm::fabsf(off) <= counts.max(share * self.target);
-        if near(GOOD_COUNTS, GOOD_SHARE)
-            || (self.trims >= MAX_TRIMS && near(TOLERANCE_COUNTS, TOLERANCE_SHARE))
+        let near = |mn: f32, share: f32| {
+            libm::fabsf(off) <= self.finger.counts(mn).max(share * self.target)
+        };
+        if near(GOOD_MN, GOOD_SHARE)
+            || (self.trims >= MAX_TRIMS && near(TOLERANCE_MN, TOLERANCE_SHARE))
         {
             self.enter(LeverState::Holding);
             return Ok(0);
@@ -421,8 +441,8 @@ impl Lever {
         }
         self.trims += 1;
         self.crept += off;
-        let most =
-            (MAX_CREEP_COUNTS + MAX_CREEP_SHARE * self.target).min(LIMIT_COUNTS - self.target);
+        let [creep, limit] = [MAX_CREEP_MN, LIMIT_MN].map(|mn| self.finger.counts(mn));
+        let most = (creep + MAX_CREEP_SHARE * self.target).min(limit - self.target);
         if self.crept > most.max(0.0) {
             return Err(Fault::Unsteady);
         }

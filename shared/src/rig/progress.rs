@@ -9,6 +9,7 @@
 
 use super::fault::Fault;
 use super::guard::Unguarded;
+use crate::sensor::FingerModel;
 use crate::sensor::pressure::{Calibration, RATE_HZ};
 
 /// Time constant of P_AC's high-pass, s: 10 Hz (Methods, "BioTac").
@@ -17,6 +18,8 @@ const HIGH_PASS_S: f32 = 1.0 / (core::f32::consts::TAU * 10.0);
 const MEMORY_S: f32 = 2.0;
 /// The rest is a mean over the last 10 to 20 s.
 const REST_SAMPLES: u32 = 20 * RATE_HZ;
+/// What is meant here by a count, mN: that of a BioTac, whose figures these are. Counts of another finger are converted.
+const COUNT_MN: f32 = Calibration::PAPER.force_mn_per_count;
 /// P_AC shows contact from this rise of the pressure on, in counts of P_DC: six times what a rest that was measured for
 /// 0.7 s may be off by, with the noise of 4.8 counts that real devices have. The motor's hum adds 0.1.
 const TOUCH_COUNTS: f32 = 1.0;
@@ -55,8 +58,11 @@ struct Mark {
 }
 
 /// How a press gets on.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Progress {
+    finger: &'static FingerModel,
+    /// What is meant by a count here, in counts of this finger.
+    counts: f32,
     unguarded: Unguarded,
     /// Sum and number of P_AC samples since the finger was lifted.
     rest: (u32, u32),
@@ -78,17 +84,28 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Judges by all guards but `unguarded`.
-    pub(super) fn new(unguarded: Unguarded) -> Self {
+    /// Judges such a finger by all guards but `unguarded`.
+    pub(super) fn new(finger: &'static FingerModel, unguarded: Unguarded) -> Self {
         Self {
+            finger,
+            counts: finger.counts(COUNT_MN),
             unguarded,
-            ..Self::default()
+            rest: (0, 0),
+            last: 0,
+            same: 0,
+            lately: 0.0,
+            of_piece: 0.0,
+            touched: None,
+            contact: 0,
+            piece: None,
+            early: (0.0, 0.0),
+            compliance: None,
         }
     }
 
     /// The finger was lifted: its P_AC at rest is measured anew.
     pub(super) fn lifted(&mut self) {
-        *self = Self::new(self.unguarded);
+        *self = Self::new(self.finger, self.unguarded);
     }
 
     /// P_AC of the lifted finger while the lever stands, counts.
@@ -111,12 +128,12 @@ impl Progress {
         };
         self.last = pac;
         let (sum, samples) = self.rest;
-        if samples == 0 {
+        if samples == 0 || !self.finger.pac_shows_force {
             return;
         }
         let above = f32::from(pac) - sum as f32 / samples as f32;
         let ratio = calibration.pac_pa_per_count / calibration.pdc_pa_per_count;
-        let rise = above * ratio / (HIGH_PASS_S * RATE_HZ as f32);
+        let rise = above * ratio / (HIGH_PASS_S * RATE_HZ as f32) / self.counts;
         self.lately += rise - self.lately / (MEMORY_S * RATE_HZ as f32);
         self.of_piece += rise;
     }
@@ -130,6 +147,7 @@ impl Progress {
         if self.same >= FROZEN_SAMPLES {
             return Ok(());
         }
+        let counts = counts / self.counts;
         let now = Mark { steps, counts };
         let fault = if contact {
             self.judge_piece(now)

@@ -1,4 +1,6 @@
 use super::*;
+use crate::sensor::PressureSensor as _;
+use crate::sensor::biotac::BioTac;
 use crate::sensor::pressure::Calibration;
 
 #[test]
@@ -12,6 +14,7 @@ fn a_lever_that_cannot_press_is_a_fault_and_lifts() {
         serial: [0; 16],
     };
     let mut control = Control::new(
+        &BioTac::MODEL,
         StageConstants::REFERENCE,
         calibration,
         Unguarded::against(Fault::SensorSilent),

@@ -1,5 +1,7 @@
 use super::super::fault::FAULTS;
 use super::*;
+use crate::sensor::PressureSensor as _;
+use crate::sensor::biotac::BioTac;
 use crate::sensor::pressure::{Channel, Counts};
 
 fn word(channel: Channel, counts: u16) -> Option<Pressure> {
@@ -46,6 +48,7 @@ fn run(change: impl Fn(u32, &mut [Option<Pressure>; 4], &mut Seen<'_>)) -> Optio
                     ..seen
                 },
                 &meter,
+                &BioTac::MODEL,
                 11.5,
                 2050.0,
             )?,
@@ -158,11 +161,32 @@ fn no_calibration_allows_more_than_the_papers() {
                 ..seen
             },
             &meter,
+            &BioTac::MODEL,
             mn_per_count,
             2050.0,
         );
         assert_eq!(fault, Some(Fault::ForceHigh));
     }
+    // a model of half as much a count: 4.1 N of the paper's are 2.05 N
+    let half = FingerModel {
+        calibration: Calibration {
+            force_mn_per_count: 5.75,
+            ..Calibration::PAPER
+        },
+        ..BioTac::MODEL
+    };
+    let trips = |counts: u16, mn_per_count: f32| {
+        let mut meter = ForceMeter::new(2000.0);
+        (0..44).for_each(|_| meter.push(Counts::new(2000 + counts).unwrap()));
+        let seen = Seen {
+            words: &words,
+            ..seen
+        };
+        let fault = Guard::default().tick(&seen, &meter, &half, mn_per_count, 2050.0);
+        fault == Some(Fault::ForceHigh)
+    };
+    assert!(!trips(356, 5.75) && trips(357, 5.75));
+    assert!(trips(357, 2.0) && trips(179, 11.5));
     meter.zero();
     assert_eq!(
         Guard::default().tick(
@@ -171,6 +195,7 @@ fn no_calibration_allows_more_than_the_papers() {
                 ..seen
             },
             &ForceMeter::new(2000.0),
+            &BioTac::MODEL,
             11.5,
             2050.0
         ),
@@ -197,12 +222,15 @@ fn the_table_has_every_fault_once_and_a_fault_can_be_ignored() {
         ..seen
     };
     let meter = ForceMeter::new(2593.0);
-    assert_eq!(guard.tick(&seen, &meter, 11.5, 2050.0), None);
-    guard.reset();
-    guard.tick(&seen, &meter, 11.5, 2050.0);
-    guard.tick(&seen, &meter, 11.5, 2050.0);
     assert_eq!(
-        guard.tick(&seen, &meter, 11.5, 2050.0),
+        guard.tick(&seen, &meter, &BioTac::MODEL, 11.5, 2050.0),
+        None
+    );
+    guard.reset();
+    guard.tick(&seen, &meter, &BioTac::MODEL, 11.5, 2050.0);
+    guard.tick(&seen, &meter, &BioTac::MODEL, 11.5, 2050.0);
+    assert_eq!(
+        guard.tick(&seen, &meter, &BioTac::MODEL, 11.5, 2050.0),
         Some(Fault::LeverLimit),
         "the others are still looked for"
     );
@@ -235,11 +263,11 @@ fn a_high_force_is_allowed_and_guarded_by_limits_of_its_own() {
         (1995, 11.0, [false, true]),
     ] {
         let finger = finger(mn_per_count, 2000.0);
-        let may = [false, true].map(|high| may_press(&finger, force_mn, high));
+        let may = [false, true].map(|high| may_press(&BioTac::MODEL, &finger, force_mn, high));
         assert_eq!(may, [usual, allowed], "{force_mn} mN, {mn_per_count}");
     }
     assert!(
-        !may_press(&finger(11.5, 1200.0), 1262, true),
+        !may_press(&BioTac::MODEL, &finger(11.5, 1200.0), 1262, true),
         "beyond its line"
     );
 }

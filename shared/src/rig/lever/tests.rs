@@ -1,4 +1,6 @@
 use super::*;
+use crate::sensor::PressureSensor as _;
+use crate::sensor::biotac::BioTac;
 
 /// P_DC of a finger in the air, counts.
 const REST: f32 = 2640.0;
@@ -19,7 +21,7 @@ struct Bench {
 
 impl Bench {
     fn new(clear_mm: f32, compliance: f32) -> Self {
-        let mut lever = Lever::default();
+        let mut lever = Lever::new(&BioTac::MODEL, Unguarded::default());
         lever.home();
         Self {
             lever,
