@@ -478,6 +478,9 @@ fn known_weights_set_the_force_that_the_person_is_shown() {
         tremor: 0.0,
         wander: 0.0,
         uneven: 0.0,
+        force_spread: 0.0,
+        pace_spread: 0.0,
+        speed_error: None,
     };
     let Some(mut held) = Held::new("burlap", steady) else {
         return;

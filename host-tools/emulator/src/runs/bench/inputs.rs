@@ -198,6 +198,7 @@ fn corner(
                     properties: Properties::new(properties),
                     pressure: (set == FeatureSet::Pressure)
                         .then(|| [fixed(&observed[3]), fixed(&observed[4])]),
+                    pace: None,
                     bands: observed[5..].iter().map(fixed).collect(),
                 }
             };
