@@ -785,7 +785,18 @@ fn a_table_is_learned_from_the_cluster_dataset() {
     ];
     printed(&[&learn[..], &["--train-slides", "3"]].concat());
     let said = printed(&["table", "show", path(&table)]);
-    assert!(said.contains("surface 117"), "{said}");
+    assert!(
+        said.contains("surface 117") && said.contains("finger: mems"),
+        "{said}"
+    );
+    // slides of a BioTac say nothing about it
+    let simulated = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+    let said = complaint(&["report", path(&table), "--recordings", simulated]);
+    let why = "learned with the finger mems, but the finger here is biotac";
+    assert!(
+        said.contains(why) && said.contains("Use a table that was learned with biotac"),
+        "{said}"
+    );
     let evaluate = [
         "evaluate",
         "--recordings",

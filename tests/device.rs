@@ -23,6 +23,7 @@ use tactus_core::probe::seams::{Panel, RigHandle as _};
 use tactus_core::probe::{RigState, TableInUse, Turn, Watch, receive};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::skin::SkinCare;
+use tactus_core::sensor::FingerCode;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire::{
     self, Counts, Event, Forget, MAX_FRAME, PROTOCOL, Phase, Receiver, Report, Request, Reset,
@@ -101,6 +102,10 @@ impl Wire {
 }
 
 impl Panel for Wire {
+    fn finger(&self) -> FingerCode {
+        FingerCode::BIOTAC
+    }
+
     fn rig(&self) -> RigState {
         self.rig
     }
@@ -606,13 +611,23 @@ fn a_table_is_checked_pushed_and_pulled() {
             .try_iter()
             .any(|command| command == wire::Command::CommitTable)
     );
-    // what is damaged is never begun
-    let mut bytes = fs::read(&other).unwrap();
+    // what is damaged, or of another finger, is never begun
+    let good = fs::read(&other).unwrap();
+    let mut bytes = good.clone();
     bytes[40] ^= 1;
     fs::write(&bad, bytes).unwrap();
     assert_says(
         &complaint(&["table", "push", "--port", &at, path(&bad)]),
         &["checksum"],
+    );
+    let mems = tactus::eval::learn::name_finger(&good, FingerCode::MEMS, 20_261_124);
+    fs::write(&bad, mems.unwrap()).unwrap();
+    assert_says(
+        &complaint(&["table", "push", "--port", &at, path(&bad)]),
+        &[
+            "learned with the finger mems, but the finger here is biotac",
+            "Use a table that was learned with biotac",
+        ],
     );
     assert!(
         asked
@@ -1235,6 +1250,7 @@ fn a_port_without_a_probe_is_an_error_that_says_what_to_do() {
         version: Default::default(),
         reset: Reset::Power,
         last_words: None,
+        finger: FingerCode::BIOTAC,
     }]);
     assert_says(
         &complaint(&["status", "--port", &booted]),
@@ -1456,6 +1472,7 @@ mod unix {
                     skin_mj: (0, 0),
                     false_alarm: None,
                     high_force: false,
+                    finger: FingerCode::BIOTAC,
                 })
             },
             || Event::Done(0),

@@ -22,6 +22,7 @@ use tactus_core::features::{FeatureSet, Movement, Observation, Properties, Prope
 use tactus_core::probe::teach::put_in_force;
 use tactus_core::rig::calibration::RigCalibrationError;
 use tactus_core::rig::{Fault, Refused, RigError};
+use tactus_core::sensor::FingerCode;
 use tactus_core::store::{FlashFault, SECTORS, Store, StoreError};
 use tactus_core::table::{Action, Against, Contents, EncodeError, Name, Table, TableError};
 use tactus_core::wire::{
@@ -104,22 +105,22 @@ fn frames_of_every_report_are_what_they_were() {
         Event::Rejected { why, .. } => {
             *why == Failure::Said(Text::try_from("the slide is too short").unwrap())
         }
-        // version 5 has one more field, and versions 6 and 7
-        Event::Verdict(_) | Event::Status(_) => true,
+        // version 5 has one more field, and versions 6, 7 and 8
+        Event::Verdict(_) | Event::Status(_) | Event::Booted { .. } => true,
         _ => false,
     });
 }
 
-fn is_status(report: &Report) -> bool {
-    matches!(report.event, Event::Status(_))
+fn has_more(report: &Report) -> bool {
+    matches!(report.event, Event::Status(_) | Event::Booted { .. })
 }
 
 /// Version 5 of the messages: all of them, and every reason in every reason.
 #[test]
 fn frames_of_version_5_are_what_they_were() {
     assert_frames::<Request>("requests-5.jsonl", 37, |_| false);
-    // version 6 has one more field, and version 7
-    assert_frames::<Report>("reports-5.jsonl", 100, is_status);
+    // version 6 has one more field, and versions 7 and 8
+    assert_frames::<Report>("reports-5.jsonl", 100, has_more);
     assert_frames::<Failure>("reasons-5.jsonl", 263, |_| false);
 }
 
@@ -127,10 +128,30 @@ fn frames_of_version_5_are_what_they_were() {
 #[test]
 fn frames_of_version_6_are_what_they_were() {
     assert_frames::<Request>("requests-6.jsonl", 42, |_| false);
-    // version 7 has one more field
-    assert_frames::<Report>("reports-6.jsonl", 115, is_status);
+    // versions 7 and 8 have one more field
+    assert_frames::<Report>("reports-6.jsonl", 115, has_more);
     assert_frames::<Failure>("reasons-6.jsonl", 265, |_| false);
     assert_frames::<Failure>("reasons-6-records.jsonl", 15, |_| false);
+}
+
+/// Version 7 of the messages.
+#[test]
+fn frames_of_version_7_are_what_they_were() {
+    assert_frames::<Request>("requests-7.jsonl", 44, |_| false);
+    // version 8 has one more field
+    assert_frames::<Report>("reports-7.jsonl", 135, has_more);
+    assert_frames::<Failure>("reasons-7.jsonl", 280, |_| false);
+    // without it they are a BioTac's
+    for line in text("reports-7.jsonl").lines() {
+        let line: Value = serde_json::from_str(line).unwrap();
+        let report: Report = serde_json::from_value(line["message"].clone()).unwrap();
+        let finger = match report.event {
+            Event::Booted { finger, .. } => finger,
+            Event::Status(status) => status.finger,
+            _ => continue,
+        };
+        assert_eq!(finger, FingerCode::BIOTAC);
+    }
 }
 
 /// Version 4 of the messages: every kind of reason, alone in a frame.

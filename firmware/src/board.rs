@@ -13,6 +13,10 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Peri, PeripheralType, bind_interrupts, flash, peripherals, usart};
+use tactus_core::sensor::FingerCode;
+
+/// The finger that this image is for.
+pub(crate) const FINGER: FingerCode = FingerCode::BIOTAC;
 
 use crate::chip::critical_section::MASKED;
 

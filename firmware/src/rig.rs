@@ -55,6 +55,7 @@ pub async fn rig(thread: Spawner) {
         version: env!("CARGO_PKG_VERSION").try_into().unwrap_or_default(),
         reset,
         last_words: last_words.or_else(|| no_clock?.try_into().ok()),
+        finger: board::FINGER,
     });
     // those of thread mode run when all are there, `servo`, which has the motors, at once: it is the last one
     thread.spawn(only(link::send(tx)));

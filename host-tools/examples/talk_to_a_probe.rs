@@ -8,6 +8,7 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 
 use tactus::link::{Port, Request};
+use tactus_core::sensor::FingerCode;
 use tactus_core::wire::{self, Counts, Event, Phase, Receiver, Report, Status};
 
 pub(crate) fn main() {
@@ -63,6 +64,7 @@ fn pretend() -> SocketAddr {
                     skin_mj: (0, 0),
                     false_alarm: None,
                     high_force: false,
+                    finger: FingerCode::BIOTAC,
                 };
                 say(&mut line, Event::Status(status));
                 say(&mut line, Event::Done(request.id));

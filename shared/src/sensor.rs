@@ -8,6 +8,7 @@ pub mod analog;
 pub mod biotac;
 mod driver;
 mod finger;
+mod finger_code;
 pub mod iis3dwb;
 pub mod mcp3202;
 pub mod mems;
@@ -16,3 +17,4 @@ pub mod slot;
 
 pub use driver::{Driver, Error, PressureSensor, StartError, slot_of};
 pub use finger::{AtRest, FingerModel, FingerName, UnknownFinger};
+pub use finger_code::{FingerCode, NoFinger};

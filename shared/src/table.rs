@@ -44,13 +44,18 @@
 //!
 //! Section 3, of either kind of table, is for people: whether samples were moved between trials ([`Table::moved`]). Per texture
 //! of which that is known: its number (2), the lower half of the CRC-32 of its name (2), and 1 for no or 2 for yes (1).
+//!
+//! Section 5, of either kind of table: the finger that it was learned with (1: 0 `biotac`, 1 `analog`, 2 `mems`), and the day on which
+//! that finger's force per count was measured (4, as 20261121). Without it a table is a BioTac's. A probe of another finger refuses it.
 
 mod drift;
 mod encode;
+mod finger;
 mod format;
 mod gaussian;
 mod limits;
 mod matrix;
+mod one_section;
 mod patch;
 mod population;
 mod samples;
@@ -65,6 +70,7 @@ pub use drift::{Drift, Drifts, PAIRS};
 pub use encode::{
     Change, EncodeError, Known, Texture, amend, encode, encode_fused, encoded_len, with_sections,
 };
+pub use finger::{FINGER_LENGTH, with_finger};
 pub use format::{
     Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, Name, PACED, TableError, Tally,
     VERSION,

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread;
 
+use tactus_core::sensor::FingerCode;
 use tactus_core::wire::{self, Counts, Event, MAX_FRAME, Phase, Report, Reset, Status};
 use tempfile::TempDir;
 
@@ -37,6 +38,7 @@ fn status() -> Vec<u8> {
         skin_mj: (1500, 250),
         false_alarm: None,
         high_force: false,
+        finger: FingerCode::BIOTAC,
     }))
 }
 
@@ -108,6 +110,7 @@ pub(super) fn section() -> String {
         version: Default::default(),
         reset: Reset::Power,
         last_words: None,
+        finger: FingerCode::BIOTAC,
     };
     // a good answer is none of these errors
     let at = says(send([status(), frame(Event::Done(0))].concat()));

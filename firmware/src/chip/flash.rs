@@ -10,6 +10,7 @@ use embassy_time::{Duration, with_timeout};
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use static_cell::ConstStaticCell;
 use tactus_core::probe::seams::StoredBytes;
+use tactus_core::sensor::FingerCode;
 use tactus_core::store::{Store, StoreError};
 
 use crate::board;
@@ -129,6 +130,10 @@ pub(crate) async fn wait(
 pub(crate) struct MappedTable;
 
 impl StoredBytes<Bank2> for MappedTable {
+    fn finger(&self) -> FingerCode {
+        board::FINGER
+    }
+
     fn bytes(&mut self, store: &mut Storage) -> Option<&[u8]> {
         let table = store.table()?;
         let at = table.offset as usize;

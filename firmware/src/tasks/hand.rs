@@ -256,6 +256,7 @@ pub(crate) fn booted(reset: Reset, last_words: Option<Text>) {
         version: env!("CARGO_PKG_VERSION").try_into().unwrap_or_default(),
         reset,
         last_words,
+        finger: board::FINGER,
     });
 }
 

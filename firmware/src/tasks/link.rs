@@ -9,6 +9,7 @@ use embedded_io_async::{Read as _, Write as _};
 use static_cell::ConstStaticCell;
 use tactus_core::probe::seams::Panel;
 use tactus_core::probe::{RigState, TableInUse, Turn, receive as receive_request};
+use tactus_core::sensor::FingerCode;
 use tactus_core::wire::{Counts, Event, Receiver, Request};
 
 use super::level::OneLevel;
@@ -115,6 +116,10 @@ fn received(request: Request, body: &'static Body) {
 struct AtAnyTime(&'static Body);
 
 impl Panel for AtAnyTime {
+    fn finger(&self) -> FingerCode {
+        board::FINGER
+    }
+
     fn rig(&self) -> RigState {
         (self.0.state)()
     }

@@ -34,7 +34,7 @@ use super::output::{Done, Format, print_json};
 use super::plot::{Canvas, Plot};
 use super::progress::with_progress;
 use super::table_file::read_table;
-use super::textures::{find_material, find_textures, measure_folder, names};
+use super::textures::{find_material, find_textures, measure_folder, names, of_one_finger};
 
 pub(crate) const FIRST_STEPS: &str = "\
 Try first:
@@ -160,6 +160,7 @@ fn identify_recorded(
     let (_, measured) = measure_folder(folder)?;
     let mut shown = set.load_texture(index)?;
     let table = if let Some((file, table)) = given {
+        of_one_finger(&set, table)?;
         let mut first = learned_here(&set, &measured, table);
         shown.retain(|slide| !first.is_one(name, slide.movement));
         ensure!(

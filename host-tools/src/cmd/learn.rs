@@ -9,7 +9,7 @@ use serde::Serialize;
 use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::MeasuredSlide;
 use tactus::eval::evaluate::Method;
-use tactus::eval::learn::Expected;
+use tactus::eval::learn::{Expected, name_finger};
 use tactus::eval::samples::{note, of_all};
 use tactus::eval::show::count;
 use tactus::sim::collection::texture_name;
@@ -21,7 +21,7 @@ use super::args::{Expecting, Features, Recordings, false_alarm};
 use super::output::{Format, print_json};
 use super::progress::with_progress;
 use super::table_file::{TableFile, write_table};
-use super::textures::{collection, measure_folder, names};
+use super::textures::{collection, finger_of, measure_folder, names};
 
 /// Learn a texture table from the first slides of every texture
 #[derive(clap::Args)]
@@ -299,5 +299,7 @@ pub(crate) fn learn_first(
         };
         of_all(movements.iter().flat_map(of))
     };
-    Ok(note(&bytes, |texture| moved(texture.into()))?)
+    let noted = note(&bytes, |texture| moved(texture.into()))?;
+    let (finger, calibrated) = finger_of(set)?;
+    Ok(name_finger(&noted, finger, calibrated)?)
 }

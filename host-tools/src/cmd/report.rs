@@ -17,7 +17,7 @@ use super::learn::learned_here;
 use super::output::{Format, percent, print_json, verdict_rows};
 use super::progress::{notice, progress};
 use super::table_file::read_table;
-use super::textures::measure_folder;
+use super::textures::{measure_folder, of_one_finger};
 
 /// Say what a table is good for: which textures are told apart, how soon, and what would help
 #[derive(clap::Args)]
@@ -102,6 +102,7 @@ fn command(args: &Args) -> String {
 /// The slides of a folder that the table has not seen.
 fn unseen(folder: &Path, table: Table<'_>) -> anyhow::Result<Vec<Slides>> {
     let (set, measured) = measure_folder(folder)?;
+    of_one_finger(&set, table)?;
     let mut first = learned_here(&set, &measured, table);
     let textures = set.textures().iter().zip(measured);
     Ok(textures

@@ -25,7 +25,7 @@ use super::names::find;
 use super::output::{Done, Format, UsageError, percent, print_json};
 use super::progress::with_progress;
 use super::table_file::read_table;
-use super::textures::{find_material, find_textures, measure_folder};
+use super::textures::{find_material, find_textures, measure_folder, of_one_finger};
 
 /// Trials that a simulated probe has learned each texture from, and slides that it tries at most.
 const LEARNED: u32 = 5;
@@ -164,6 +164,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     let (bytes, texture) = reference(args, folder)?;
     let table = Table::read(&bytes)?;
     let (set, measured) = measure_folder(folder)?;
+    of_one_finger(&set, table)?;
     let sample = one(&set, args.material.as_deref(), folder, "--material")?;
     let sample_name = set.textures()[sample].name.clone();
     let usable = |slide: &&MeasuredSlide| {
@@ -335,7 +336,8 @@ fn reference(args: &Args, sample: &Path) -> anyhow::Result<(Vec<u8>, u16)> {
         "--sample is the reference itself: give other slides, or --material with another texture of the folder"
     );
     let bytes = match given {
-        Some((file, table)) => put(table, name, &measured[index])
+        Some((file, table)) => of_one_finger(&set, table)
+            .and_then(|()| Ok(put(table, name, &measured[index])?))
             .with_context(|| format!("{} with the reference", file.display()))?,
         None => {
             let textures = set.textures().len();

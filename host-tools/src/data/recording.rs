@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use tactus_core::dsp::Kernels;
 use tactus_core::features::{Block, Movement, Slide};
+use tactus_core::sensor::FingerCode;
 use tactus_core::sensor::pressure::RATE_HZ;
 
 use crate::data::content::ContentError;
@@ -71,6 +72,11 @@ pub struct Labels {
     pub note: String,
     /// Whether the sample was moved or turned since the slide before.
     pub moved: Option<bool>,
+    /// The finger; a BioTac where nobody said.
+    pub finger: FingerCode,
+    /// Day on which that finger's force per count was measured, as 20261121; 1 where nobody knew the day, 0 if it was not, or is
+    /// not known.
+    pub calibrated: u32,
 }
 
 impl Recording {

@@ -3,10 +3,11 @@
 use tactus_core::explorer::ExplorerError;
 use tactus_core::explorer::Method;
 use tactus_core::features::{FeatureSet, Movement, Observation, PropertySet, Vector};
+use tactus_core::sensor::FingerCode;
 use tactus_core::table::{
-    self, Contents, Drift, Drifts, EncodeError, Experience, FALSE_ALARM, Limits, Population,
-    Scatter, Sections, Table, Tail, WhitenError, Whitened, Whitening, whiten_drifting,
-    with_sections,
+    self, Contents, Drift, Drifts, EncodeError, Experience, FALSE_ALARM, FINGER_LENGTH, Limits,
+    Population, Scatter, Sections, Table, Tail, WhitenError, Whitened, Whitening, whiten_drifting,
+    with_finger, with_sections,
 };
 
 use super::calibrate::limits;
@@ -105,6 +106,27 @@ impl Default for Expected {
             false_alarm: FALSE_ALARM,
         }
     }
+}
+
+/// A table with the finger that its slides were made with, and the day of that finger's calibration.
+///
+/// # Errors
+/// These bytes are no table.
+pub fn name_finger(
+    bytes: &[u8],
+    finger: FingerCode,
+    calibrated: u32,
+) -> Result<Vec<u8>, EncodeError> {
+    let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
+    if (table.finger(), table.calibrated()) == (finger, calibrated) {
+        return Ok(bytes.to_vec());
+    }
+    let mut named = vec![0; bytes.len() + FINGER_LENGTH];
+    let length = with_finger(&mut named, &table, finger, calibrated)?
+        .as_bytes()
+        .len();
+    named.truncate(length);
+    Ok(named)
 }
 
 /// As [`learn`], for what else is expected.

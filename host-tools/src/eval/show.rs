@@ -6,6 +6,7 @@ use std::io::{self, Write};
 use tactus_core::explorer::{ExpectedOutcome, Told, Verdict};
 use tactus_core::features::{Properties, Property};
 use tactus_core::probe::explore::ExplorationStep;
+use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::{Action, Contents, Table, white};
 use tactus_core::wire::{Event, Prompt};
 
@@ -308,6 +309,18 @@ pub fn count(number: impl Into<u64>, thing: &str) -> String {
     }
 }
 
+/// A day as messages, tables and recordings have it, in words; nothing for 0.
+pub fn day(date: u32) -> Option<String> {
+    match date {
+        0 => None,
+        RigCalibration::UNDATED => Some("not known".to_owned()),
+        _ => {
+            let (year, month, day) = (date / 10_000, date / 100 % 100, date % 100);
+            Some(format!("{year}-{month:02}-{day:02}"))
+        }
+    }
+}
+
 /// Whether a verdict is right about the texture of this name; `None` where it is undecided.
 pub fn is_right(verdict: Verdict, truth: &str, table: Table<'_>) -> Option<bool> {
     match verdict.told() {
@@ -331,6 +344,12 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
         count(table.movements().len() as u64, "movement"),
         table.as_bytes().len(),
         table.crc()
+    )?;
+    let calibrated = day(table.calibrated()).unwrap_or_else(|| "not said".to_owned());
+    writeln!(
+        out,
+        "finger: {}; day of its force calibration: {calibrated}",
+        table.finger()
     )?;
     if let Contents::Fused(set, features) = table.contents() {
         let features = count(features, "feature");

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 use tactus_core::features::Property;
+use tactus_core::sensor::FingerCode;
 use tactus_core::table::{Action, Contents, Drift, Table};
 
 use crate::eval::show::apart;
@@ -15,6 +16,10 @@ pub struct TableSummary {
     pub checksum: String,
     /// What slides are compared by: the three properties, or a set of whitened features.
     pub features: &'static str,
+    /// The finger that it was learned with.
+    pub finger: FingerCode,
+    /// Day on which that finger's force per count was measured, as 20261121; 1 where nobody knew the day, 0 if it was not, or is not known.
+    pub finger_calibrated: u32,
     /// The drift that it expects; `null` in a table of properties or of an older version.
     pub drift: Option<Drift>,
     /// The share of false alarms that its limits are for; `null` where it has none.
@@ -78,6 +83,8 @@ impl TableSummary {
                 Contents::Gaussians(_) => "properties",
                 Contents::Fused(set, _) => set.name(),
             },
+            finger: table.finger(),
+            finger_calibrated: table.calibrated(),
             drift: table.drift(),
             false_alarm: table.limits().map(|limits| limits.false_alarm),
             movements: table

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use proptest::prelude::*;
 use tactus_core::explorer::{Method, Strategy as Choice};
 use tactus_core::features::{BLOCK, Block, Movement, Observation, Properties};
+use tactus_core::sensor::FingerCode;
 use tactus_core::sensor::pressure::Calibration;
 use tactus_core::wire::{Phase, Text};
 
@@ -403,6 +404,7 @@ fn a_restart_is_noticed() {
         version: Default::default(),
         reset: Reset::Watchdog,
         last_words: Some(Text::try_from("stack").unwrap()),
+        finger: FingerCode::BIOTAC,
     };
     for (protocol, expected) in [
         (

@@ -10,6 +10,7 @@ use tactus_core::probe::seams::{Events, StoredBytes};
 use tactus_core::probe::servo_rig::{LOOK_MS, RigCommand, Samples, Servo, ServoRig};
 use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
 use tactus_core::rig::{Ended, Refused};
+use tactus_core::sensor::FingerCode;
 use tactus_core::store::{Store, StoreError};
 use tactus_core::wire::Event;
 
@@ -138,6 +139,10 @@ impl<H: Host> Servo for SimServo<'_, H> {
 pub struct TableCopy(Vec<u8>);
 
 impl<const S: usize> StoredBytes<RamFlash<S>> for TableCopy {
+    fn finger(&self) -> FingerCode {
+        FingerCode::BIOTAC
+    }
+
     fn bytes(&mut self, store: &mut Store<RamFlash<S>>) -> Option<&[u8]> {
         self.0.resize(Store::<RamFlash<S>>::MAX_TABLE, 0);
         let table = block_on(store.read_table(&mut self.0)).ok()??;

@@ -83,6 +83,7 @@ fn status(panel: &impl Panel) -> Status {
         ),
         false_alarm: table.false_alarm,
         high_force: rig.high_force,
+        finger: panel.finger(),
     }
 }
 

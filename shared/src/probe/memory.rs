@@ -44,10 +44,11 @@ fn base<'b, F: NorFlash, B: StoredBytes<F>>(
     factory: &'b [u8],
 ) -> (&'b [u8], Option<TableError>) {
     let store = store.as_mut().ok();
+    let finger = stored.finger();
     match store.and_then(|store| stored.bytes(store)) {
         None => (factory, None),
-        // one that another version of this firmware wrote is not understood
-        Some(bytes) => match Table::read(bytes) {
+        // one that another version of this firmware wrote is not understood, or is another finger's
+        Some(bytes) => match Table::read(bytes).and_then(|table| table.of_finger(finger)) {
             Ok(_) => (bytes, None),
             Err(why) => (factory, Some(why)),
         },
@@ -87,6 +88,7 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         if let Ok(store) = &mut self.store {
             self.false_alarm = store.false_alarm().await.unwrap_or(None);
         }
+        let finger = self.stored.finger();
         let (base, why) = base(&mut self.store, &mut self.stored, self.factory);
         self.is_factory = core::ptr::eq(base, self.factory);
         let instead = if self.is_factory {
@@ -98,7 +100,7 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         if let Some(why) = &self.instead {
             events.tell(Event::Trouble(why.clone().into()));
         }
-        self.length = match Table::read(base) {
+        self.length = match Table::read(base).and_then(|table| table.of_finger(finger)) {
             Ok(base) => put_in_force(&base, self.store.as_mut().ok(), self.buffer)
                 .await
                 .map_err(MemoryError::from),
@@ -170,7 +172,8 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
             .store
             .as_mut()
             .map_err(|why| MemoryError::Broken(*why))?;
-        store.commit_table(self.buffer).await?;
+        let finger = self.stored.finger();
+        store.commit_table_of(Some(finger), self.buffer).await?;
         Ok(())
     }
 

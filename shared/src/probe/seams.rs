@@ -6,6 +6,7 @@ use super::status::{RigState, TableInUse};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::rig::{Rig, RigError};
+use crate::sensor::FingerCode;
 use crate::store::Store;
 use crate::wire::{Counts, Event, Failure, MemoryError};
 
@@ -86,6 +87,9 @@ pub trait RigHandle: Rig<Error = RigError> {
 pub trait StoredBytes<F: NorFlash> {
     /// The bytes of [`Store::table`]; `None` if no table is stored, or if it cannot be read.
     fn bytes(&mut self, store: &mut Store<F>) -> Option<&[u8]>;
+
+    /// The finger of the probe: no table of another one comes into force.
+    fn finger(&self) -> FingerCode;
 }
 
 /// Who hears what a probe does.
@@ -110,6 +114,9 @@ pub trait Panel {
 
     /// What acquisition and link have counted since boot.
     fn counts(&self) -> Counts;
+
+    /// The finger of the probe.
+    fn finger(&self) -> FingerCode;
 
     /// Stops what is being done now. `all`: also what would come after it, until the request is over.
     fn stop(&mut self, all: bool);

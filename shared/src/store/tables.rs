@@ -8,6 +8,7 @@ use super::layout::{
     is_committed,
 };
 use super::sectors::Store;
+use crate::sensor::FingerCode;
 use crate::table::{Table, TableError};
 
 /// Bytes read at a time.
@@ -138,6 +139,18 @@ impl<F: NorFlash> Store<F> {
         &mut self,
         buffer: &'r mut [u8],
     ) -> Result<(StoredTable, Table<'r>), StoreError> {
+        self.commit_table_of(None, buffer).await
+    }
+
+    /// As [`Store::commit_table`], but only a table that was learned with this finger, where one is given.
+    ///
+    /// # Errors
+    /// Also [`TableError::Finger`].
+    pub async fn commit_table_of<'r>(
+        &mut self,
+        finger: Option<FingerCode>,
+        buffer: &'r mut [u8],
+    ) -> Result<(StoredTable, Table<'r>), StoreError> {
         let push = self.slots.push.as_ref().ok_or(StoreError::NoTable)?;
         let (slot, length, got) = (push.slot, push.length, push.at);
         if got != length {
@@ -158,6 +171,8 @@ impl<F: NorFlash> Store<F> {
                 wanted: table.as_bytes().len(),
             });
         }
+        let finger = finger.unwrap_or(table.finger());
+        let table = table.of_finger(finger).map_err(StoreError::Table)?;
         let stored = StoredTable {
             offset: start + TABLE_AT,
             length,

@@ -10,10 +10,11 @@ use super::*;
 use crate::features::Movement;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
+use crate::sensor::FingerCode;
 use crate::sensor::pressure::Calibration;
 use crate::table::Name;
 use crate::table::tests::{around, table_of};
-use crate::table::{Experience, Table, TableError, TrainingStats};
+use crate::table::{Experience, FINGER_LENGTH, Table, TableError, TrainingStats, with_finger};
 use embassy_futures::block_on;
 use ram::{Ram, SECTOR};
 use std::vec;
@@ -223,6 +224,36 @@ fn a_table_that_is_not_whole_is_refused_and_the_former_one_stays() {
     assert_eq!(used(&mut store), Some(new.clone()));
     let mut store = open(store.close().again());
     assert_eq!(used(&mut store), Some(new));
+}
+
+#[test]
+fn a_table_of_another_finger_is_refused_and_the_former_one_stays() {
+    let mut store = open(Ram::new());
+    let old = table(1);
+    block_on(push(&mut store, &old, 16)).unwrap();
+    let [mems, biotac] = [FingerCode::MEMS, FingerCode::BIOTAC];
+    let mut other = vec![0; old.len() + FINGER_LENGTH];
+    let named = with_finger(&mut other, &Table::read(&old).unwrap(), mems, 20_261_124).unwrap();
+    assert_eq!((named.finger(), named.calibrated()), (mems, 20_261_124));
+    let commit = |store: &mut Store<Ram<SECTOR>>, finger| {
+        let mut buffer = [0; SECTOR];
+        block_on(async {
+            store.begin_table(other.len()).await.unwrap();
+            store.write_table(0, &other).await.unwrap();
+            let committed = store.commit_table_of(Some(finger), &mut buffer).await;
+            committed.map(|(_, table)| table.finger())
+        })
+    };
+    let refused = StoreError::Table(TableError::Finger {
+        table: mems,
+        probe: biotac,
+    });
+    assert_eq!(commit(&mut store, biotac), Err(refused));
+    assert_eq!(used(&mut store), Some(old.clone()));
+    let mut store = open(store.close().again());
+    assert_eq!(used(&mut store), Some(old));
+    assert_eq!(commit(&mut store, mems), Ok(mems));
+    assert_eq!(used(&mut store), Some(other));
 }
 
 #[test]

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::whitening::Whitening;
 use crate::features::{FeatureSet, MovementError, Property, PropertySet};
+use crate::sensor::FingerCode;
 
 pub(super) const MAGIC: [u8; 4] = *b"TACT";
 /// Version of the binary form of tables with sections.
@@ -140,6 +141,13 @@ pub enum TableError {
     Sections,
     /// A section of this kind is damaged, there twice, or not for such a table.
     Section(u16),
+    /// It was learned with another finger than the probe has. New in version 8 of the messages.
+    Finger {
+        /// The table's.
+        table: FingerCode,
+        /// The probe's.
+        probe: FingerCode,
+    },
 }
 
 impl fmt::Display for TableError {
@@ -188,6 +196,10 @@ impl fmt::Display for TableError {
                 write!(f, "the whitening of movement {} is damaged", index + 1)
             }
             Self::Sections => f.write_str("what follows the names is damaged"),
+            Self::Finger { table, probe } => write!(
+                f,
+                "learned with the finger {table}, but the finger here is {probe}: their slides cannot be compared. Use a table that was learned with {probe}"
+            ),
             Self::Section(1) => f.write_str("the drift that it expects is damaged"),
             Self::Section(2) => f.write_str("its limits of new and changed textures are damaged"),
             Self::Section(4) if PACED => f.write_str("its slopes over speed are damaged"),

@@ -11,8 +11,9 @@
 //! | 2 | the lower half of its name's CRC-32: a texture that got the number of a deleted one has another |
 //! | 1 | 1: always at the same spot; 2: moved or turned between trials |
 
-use super::encode::{EncodeError, rewrite_with};
+use super::encode::EncodeError;
 use super::format::{CRC32, TableError};
+use super::one_section::rewrite_section;
 use super::sections::SAMPLES;
 use super::view::Table;
 
@@ -89,20 +90,7 @@ pub fn with_moved<'o>(
     let length = u16::try_from(known * ENTRY).unwrap_or(u16::MAX);
     // as many as fit: no table has so many textures
     let known = usize::from(length) / ENTRY;
-    let others = || old.other_sections(SAMPLES);
-    let of_others: usize = others()
-        .map(|(head, contents)| head.len() + contents.len())
-        .sum();
-    let own = if known > 0 { 4 + known * ENTRY } else { 0 };
-    rewrite_with(out, old, old.lineage(), of_others + own, |put| {
-        for (head, contents) in others() {
-            put(&head);
-            put(contents);
-        }
-        if known > 0 {
-            put(&SAMPLES.to_le_bytes());
-            put(&length.to_le_bytes());
-            entries().take(known).for_each(|entry| put(&entry));
-        }
+    rewrite_section(out, old, SAMPLES, (known * ENTRY) as u16, |put| {
+        entries().take(known).for_each(|entry| put(&entry));
     })
 }

@@ -10,6 +10,7 @@
 //! of its whitening. Kind 2, what textures are like, and the limits of scores: [`Limits`], begin and excess of six tails; per
 //! movement the axes of the population as a whitening, and d variances along them. Kind 3 is for people: [`super::samples`].
 //! Kind 4, how means go with the speed: [`super::slopes`].
+//! Kind 5, the finger that it was learned with: [`super::finger`].
 
 use heapless::Vec;
 
@@ -27,6 +28,7 @@ const HEAD: usize = 4;
 const DRIFT: u16 = 1;
 const NOVELTY: u16 = 2;
 pub(super) const SAMPLES: u16 = 3;
+pub(super) const FINGER: u16 = 5;
 /// Bytes of the drift's two numbers.
 const TWO: usize = 8;
 

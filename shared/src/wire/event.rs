@@ -13,6 +13,7 @@ use crate::features::{
     BLOCK, Block, FUSED_BANDS, Measurement, Movement, Observation, Properties, Property,
 };
 use crate::rig::Fault;
+use crate::sensor::FingerCode;
 use crate::table::{Action, MAX_TEXTURES, Name};
 
 /// How many expected outcomes are sent at most: those of the best actions.
@@ -44,6 +45,9 @@ pub enum Event {
         reset: Reset,
         /// Why the firmware gave up before the reset, if it did.
         last_words: Option<Text>,
+        /// Its finger. New in version 8.
+        #[serde(default)]
+        finger: FingerCode,
     },
     /// Answer to [`super::Command::Status`].
     Status(Status),
@@ -238,6 +242,9 @@ pub struct Status {
     /// Whether movements may press with up to 2 N: see [`super::Command::SetHighForce`]. New in version 7.
     #[serde(default)]
     pub high_force: bool,
+    /// The finger that the firmware is for. New in version 8.
+    #[serde(default)]
+    pub finger: FingerCode,
 }
 
 /// What the acquisition and the link count, since boot.

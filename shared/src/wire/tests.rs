@@ -4,6 +4,7 @@ use crate::features::{
     BLOCK, Block, FUSED_BANDS, Movement, Properties, Property, PropertySet, SlideError,
 };
 use crate::rig::{Fault, RigError};
+use crate::sensor::FingerCode;
 use crate::table::{Action, MAX_TEXTURES, Name};
 use heapless::{String, Vec};
 use proptest::prelude::*;
@@ -86,6 +87,7 @@ fn longest() -> vec::Vec<Report> {
             version: String::try_from("0.1.0").unwrap(),
             reset: Reset::Watchdog,
             last_words: Some(text()),
+            finger: FingerCode(u8::MAX),
         }),
         report(Event::Verdict(Verdict {
             texture: u16::MAX,
@@ -134,6 +136,7 @@ fn longest() -> vec::Vec<Report> {
             skin_mj: (u32::MAX, u32::MAX),
             false_alarm: Some(0.1),
             high_force: true,
+            finger: FingerCode(u8::MAX),
         })),
     ]
 }

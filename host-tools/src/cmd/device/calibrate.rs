@@ -5,6 +5,7 @@ use std::io::Write;
 use anyhow::ensure;
 use clap::ArgGroup;
 use serde::Serialize;
+use tactus::eval::show::day;
 use tactus::link::Request;
 use tactus_core::rig::calibration::{LineFit, RigCalibration};
 use tactus_core::sensor::pressure::Calibration;
@@ -91,12 +92,7 @@ impl CalibrationSummary {
 /// The day of the force scale: "2026-11-21", "not known" for a probe that was calibrated without a computer; nothing for a
 /// scale that was not measured.
 fn date(c: &RigCalibration) -> Option<String> {
-    let date = c.scale_day()?;
-    let (year, month, day) = (date / 10_000, date / 100 % 100, date % 100);
-    Some(match date {
-        RigCalibration::UNDATED => "not known".to_owned(),
-        _ => format!("{year}-{month:02}-{day:02}"),
-    })
+    day(c.scale_day()?)
 }
 
 /// The sensor's serial number.

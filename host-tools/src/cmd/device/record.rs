@@ -104,14 +104,16 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         "tactus device record {} --slides {slides}",
         textures.join(" ")
     );
-    let writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
-    let mut writer = writer.labelled(Labels {
+    let mut writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
+    let (mut bench, status) = Bench::open(&args.at)?;
+    writer.label(Labels {
         lot: args.lot.trim().to_owned(),
         operator: args.operator.trim().to_owned(),
         note: args.note.trim().to_owned(),
         moved: args.sample.said(),
+        finger: status.finger,
+        calibrated: status.calibrated,
     });
-    let (mut bench, _) = Bench::open(&args.at)?;
     let calibration = bench.get(Request::read_calibration())?;
     bench.get(Request::command(Command::Stream(true)))?;
     // a slide of each movement, then the sample is moved

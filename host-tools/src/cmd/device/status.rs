@@ -68,6 +68,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     let mut rows = vec![
         ("probe", format!("at {}", bench.name)),
+        ("finger", status.finger.to_string()),
         ("rig", phase_name(status.phase).to_owned()),
     ];
     if let Some(fault) = &status.fault {

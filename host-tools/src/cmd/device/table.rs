@@ -159,6 +159,9 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
             let file = file.display().to_string();
             let push = PushTable::new(table.as_bytes()).with_context(|| file.clone())?;
             let (mut bench, status) = Bench::open(at)?;
+            table
+                .of_finger(status.finger)
+                .with_context(|| file.clone())?;
             // the firmware's own table is never lost
             let loses = !status.factory && status.table_crc != table.crc();
             let lost = |old: &Table<'_>| replaced(old, Some(&table));

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use clap::ValueEnum;
 use tactus::data::fabricslide::FabricSet;
 use tactus::data::properties::PropertyTable;
@@ -13,7 +13,7 @@ use tactus::eval::learn::Expected;
 use crate::cmd::args::{Expecting, Features, Recordings, Stop};
 use crate::cmd::output::Format;
 use crate::cmd::plot::Plot;
-use crate::cmd::textures::{measure_folder, names};
+use crate::cmd::textures::{finger_of, measure_folder, names};
 
 /// Play thousands of virtual explorations and count the right answers
 #[derive(clap::Args, Clone)]
@@ -139,6 +139,13 @@ pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
     } else {
         let (set, measured) = measure_folder(&args.from.folder()?)?;
         let test = args.test.as_deref().map(measure_folder).transpose()?;
+        if let Some((test, _)) = &test {
+            let [here, there] = [finger_of(&set)?.0, finger_of(test)?.0];
+            ensure!(
+                here == there,
+                "--test has slides of the finger {there}, and the others are of {here}: they cannot be compared"
+            );
+        }
         let test = test.map(|(set, measured)| (names(&set), measured));
         let test = test
             .as_ref()

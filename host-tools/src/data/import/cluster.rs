@@ -25,6 +25,7 @@ use rubato::audioadapter::Adapter as _;
 use rubato::audioadapter_buffers::direct::InterleavedSlice;
 use rubato::{Async, FixedAsync, Resampler as _, SincInterpolationParameters, WindowFunction};
 use tactus_core::features::Movement;
+use tactus_core::sensor::FingerCode;
 
 use super::{Imported, begin, names, number};
 use crate::data::content::ContentError;
@@ -93,6 +94,7 @@ pub fn import(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) ->
                 Some(Some(slide)) => {
                     writer.label(Labels {
                         note: format!("direction {} degrees", name.degrees),
+                        finger: FingerCode::MEMS,
                         ..Labels::default()
                     });
                     writer.write(&slide)?;

@@ -15,6 +15,8 @@
 //! | `shear_file`, `shear_rate_hz`, `shear_sha256` | tangential force in mN, positive against the motion; file and hash are empty where it was not measured |
 //! | `lot`, `operator`, `note` | batch or piece of the sample, who made the slide, anything else; may be empty or missing |
 //! | `moved` | whether the sample was moved or turned since the slide before: `yes`, `no`, or empty where nobody said; may be missing |
+//! | `finger` | the finger: `biotac`, `analog` or `mems`; empty or missing for a BioTac |
+//! | `calibrated` | day on which that finger's force per count was measured, as 20261121; 1 where nobody knew the day; empty, 0 or missing if it was not, or is not known |
 //!
 //! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it; each is a
 //! one-dimensional array of `<i2` (numpy.int16). The hash is the SHA-256 of the whole file in hexadecimal. The rows may come
@@ -22,6 +24,7 @@
 use std::path::Path;
 
 use tactus_core::features::Movement;
+use tactus_core::sensor::FingerCode;
 
 use super::files::{
     OWN_MANIFEST as MANIFEST, RecordingError, Result, check_hash, distinct_textures,
@@ -56,7 +59,7 @@ pub const COLUMNS: [&str; 19] = [
 ];
 
 /// Columns that follow them, which older manifests do not have.
-pub const LABELS: [&str; 4] = ["lot", "operator", "note", "moved"];
+pub const LABELS: [&str; 6] = ["lot", "operator", "note", "moved", "finger", "calibrated"];
 
 /// What the manifest says, checked.
 #[derive(Debug)]
@@ -178,7 +181,8 @@ impl Entry {
             Stream::of(row, file, sha256)?
                 .ok_or_else(|| row.error(Some(file), ContentError::NoFile))
         };
-        let [lot, operator, note, moved] = LABELS.map(|column| row.text(column).to_owned());
+        let [lot, operator, note, moved, finger, calibrated] =
+            LABELS.map(|column| row.text(column).to_owned());
         let moved = match moved.as_str() {
             "" => None,
             "yes" => Some(true),
@@ -198,6 +202,14 @@ impl Entry {
                 operator,
                 note,
                 moved,
+                finger: match finger.as_str() {
+                    "" => FingerCode::BIOTAC,
+                    _ => row.parse("finger", "a finger: biotac, analog or mems")?,
+                },
+                calibrated: match calibrated.as_str() {
+                    "" => 0,
+                    _ => row.parse("calibrated", "a day as 20261121")?,
+                },
             },
             window: (row.number("window_start_s")?, row.number("window_end_s")?),
             background,

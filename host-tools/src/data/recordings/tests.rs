@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use tactus_core::features::Movement;
+use tactus_core::sensor::FingerCode;
 use tempfile::TempDir;
 
 use super::files::*;
@@ -480,6 +481,8 @@ fn labels_come_back_and_older_manifests_have_none() {
         operator: "Ánna \"A\"".to_owned(),
         note: String::new(),
         moved: Some(false),
+        finger: FingerCode(200),
+        calibrated: 20_261_121,
     };
     let texture = |id: u32| Texture {
         id,
@@ -500,7 +503,7 @@ fn labels_come_back_and_older_manifests_have_none() {
     // what is neither yes nor no is none
     let manifest = folder.path().join("manifest.csv");
     let text = fs::read_to_string(&manifest).unwrap();
-    fs::write(&manifest, text.replace(",,no\n", ",,maybe\n")).unwrap();
+    fs::write(&manifest, text.replace(",,no,", ",,maybe,")).unwrap();
     let why = RecordingSet::open(folder.path()).unwrap_err().to_string();
     assert!(
         why.contains("moved") && why.contains("\"maybe\" is not yes, no or nothing"),
@@ -516,11 +519,14 @@ fn labels_come_back_and_older_manifests_have_none() {
     // as they were written before there were labels
     let manifest = folder.path().join("manifest.csv");
     let text = fs::read_to_string(&manifest).unwrap();
-    let older = text.replace(",lot,operator,note,moved", "");
-    let older = older.replace(",\"7, front\",\"Ánna \"\"A\"\"\",,no", "");
+    let older = text.replace(",lot,operator,note,moved,finger,calibrated", "");
+    let older = older.replace(
+        ",\"7, front\",\"Ánna \"\"A\"\"\",,no,finger-200,20261121",
+        "",
+    );
     let older: String = older
         .lines()
-        .map(|line| format!("{}\n", line.strip_suffix(",,,,").unwrap_or(line)))
+        .map(|line| format!("{}\n", line.strip_suffix(",,,,,biotac,").unwrap_or(line)))
         .collect();
     fs::write(&manifest, older).unwrap();
     assert_eq!(

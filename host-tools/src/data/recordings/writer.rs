@@ -200,6 +200,9 @@ impl RecordingWriter {
         row.extend([&labels.lot, &labels.operator, &labels.note].map(Clone::clone));
         let moved = labels.moved.map(|moved| if moved { "yes" } else { "no" });
         row.push(moved.unwrap_or_default().to_owned());
+        row.push(labels.finger.to_string());
+        let day = (labels.calibrated != 0).then(|| labels.calibrated.to_string());
+        row.push(day.unwrap_or_default());
         let written = csv(std::iter::once(&row)).and_then(|row| self.journal.write_all(&row));
         written.map_err(|e| io_error(&self.folder.join(ROWS), e))?;
         self.rows.push(row);

@@ -6,6 +6,7 @@ use crate::explorer::{Answer, Verification};
 use crate::handheld::weights::WEIGHTS_MN;
 use crate::probe::Memory;
 use crate::probe::explore::Random;
+use crate::sensor::FingerCode;
 use crate::sensor::pressure::{Calibration, Channel, Counts};
 use crate::store::Store;
 use crate::store::tests::ram::{Ram, SECTOR};
@@ -300,6 +301,10 @@ fn weights_and_the_air_give_the_calibration_that_forces_are_shown_by() {
 struct Nothing;
 
 impl<F: NorFlash> StoredBytes<F> for Nothing {
+    fn finger(&self) -> FingerCode {
+        FingerCode::BIOTAC
+    }
+
     fn bytes(&mut self, _: &mut Store<F>) -> Option<&[u8]> {
         None
     }

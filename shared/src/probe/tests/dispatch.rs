@@ -6,6 +6,7 @@ use crate::probe::seams::{Events, Panel, RigHandle, StoredBytes, UnloadedRun};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::rig::{Fault, Phase};
+use crate::sensor::FingerCode;
 use crate::store::{Store, StoreError};
 use crate::wire::{
     Command, Counts, Failure, Forget, MemoryError, PART, Request, Status, TextureLearned,
@@ -112,6 +113,10 @@ impl RigHandle for Bench {
 struct Copied(vec::Vec<u8>);
 
 impl StoredBytes<Flash> for Copied {
+    fn finger(&self) -> FingerCode {
+        FingerCode::BIOTAC
+    }
+
     fn bytes(&mut self, store: &mut Store<Flash>) -> Option<&[u8]> {
         self.0.resize(SECTOR, 0);
         let table = block_on(store.read_table(&mut self.0)).ok()??;
@@ -172,6 +177,10 @@ fn probe() -> Tested {
 struct Mapped(vec::Vec<u8>);
 
 impl StoredBytes<Flash> for Mapped {
+    fn finger(&self) -> FingerCode {
+        FingerCode::BIOTAC
+    }
+
     fn bytes(&mut self, _: &mut Store<Flash>) -> Option<&[u8]> {
         Some(&self.0)
     }
@@ -182,7 +191,11 @@ fn a_stored_table_that_cannot_be_read_is_reported() {
     let factory = fused_table();
     let mut damaged = factory.clone();
     damaged[60] ^= 4;
-    for (stored, told) in [(factory.clone(), 0), (damaged, 1)] {
+    // nor is one of another finger put in force
+    let mut other = vec![0; factory.len() + crate::table::FINGER_LENGTH];
+    let table = crate::table::Table::read(&factory).unwrap();
+    crate::table::with_finger(&mut other, &table, FingerCode::ANALOG, 0).unwrap();
+    for (stored, told) in [(factory.clone(), 0), (damaged, 1), (other, 1)] {
         let store = block_on(Store::open(Ram::new())).unwrap();
         let mut buffer = vec![0; SECTOR];
         let mut memory = Memory::new(Ok(store), Mapped(stored), &factory, &mut buffer);
@@ -321,6 +334,10 @@ struct Desk {
 }
 
 impl Panel for Desk {
+    fn finger(&self) -> FingerCode {
+        FingerCode::BIOTAC
+    }
+
     fn rig(&self) -> RigState {
         RigState {
             phase: Phase::Faulted(crate::rig::Fault::EStop),
@@ -383,6 +400,7 @@ fn what_comes_while_the_probe_is_busy_is_answered_or_refused() {
             skin_mj: (1500, 250),
             false_alarm: Some(0.1),
             high_force: false,
+            finger: FingerCode::BIOTAC,
         }
     );
     desk.told.clear();

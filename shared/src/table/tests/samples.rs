@@ -4,6 +4,7 @@
 use super::damage::read_all;
 use super::sections::{changed, full};
 use super::*;
+use crate::sensor::FingerCode;
 
 const NOTES: [Option<bool>; 4] = [Some(true), Some(false), None, Some(true)];
 
@@ -120,5 +121,48 @@ fn what_is_damaged_says_nothing_and_is_reported_to_who_looks() {
         assert_eq!(table.check_samples(), Err(TableError::Section(3)));
         assert_eq!(said(&table), [None; 4]);
         read_all(&bytes);
+    }
+}
+
+#[test]
+fn the_finger_stays_when_a_table_learns_and_a_table_without_one_is_a_biotacs() {
+    let plain = table_of(
+        PropertySet::ALL,
+        &[vec![around([(1.0, 0.1); 3])], vec![around([(2.0, 0.1); 3])]],
+    );
+    let old = Table::read(&plain).unwrap();
+    assert_eq!((old.finger(), old.calibrated()), (FingerCode::BIOTAC, 0));
+    // one of a later day, too
+    for finger in [FingerCode::MEMS, FingerCode(200)] {
+        let mut buffers = [[0; 400]; 4];
+        let [named, moved, amended, back] = &mut buffers;
+        let named = with_finger(named, &old, finger, 20_261_124).unwrap();
+        let moved = with_moved(moved, &named, |_| Some(true)).unwrap();
+        let amended = amend(amended, &moved, Change::Forget(0)).unwrap();
+        for table in [named, moved, amended] {
+            assert_eq!((table.finger(), table.calibrated()), (finger, 20_261_124));
+            assert_eq!(
+                table.of_finger(finger).map(|table| table.crc()),
+                Ok(table.crc())
+            );
+            let probe = FingerCode::ANALOG;
+            let refused = table.of_finger(probe).map(|table| table.crc());
+            let why = TableError::Finger {
+                table: finger,
+                probe,
+            };
+            assert_eq!(refused, Err(why));
+            let why = why.to_string();
+            assert!(
+                why.contains(&finger.to_string())
+                    && why.contains("Use a table that was learned with analog"),
+                "{why}"
+            );
+        }
+        let back = with_finger(back, &moved, FingerCode::BIOTAC, 0).unwrap();
+        assert_eq!(
+            (back.finger(), back.moved(1)),
+            (FingerCode::BIOTAC, Some(true))
+        );
     }
 }

@@ -180,6 +180,7 @@ impl Monitor {
                 version,
                 reset,
                 last_words,
+                ..
             } => {
                 if *protocol != PROTOCOL {
                     self.protocol = Some(*protocol);

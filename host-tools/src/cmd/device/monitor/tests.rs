@@ -5,6 +5,7 @@ use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use tactus_core::features::{Block, Movement, Property};
 use tactus_core::rig::Fault;
+use tactus_core::sensor::FingerCode;
 use tactus_core::table::Action;
 use tactus_core::wire::{
     Command, Counts, Event, ExpectedOutcome, Failure, Live, Phase, Report, SlideReport, Status,
@@ -29,6 +30,7 @@ fn status() -> Status {
         skin_mj: (1500, 250),
         false_alarm: None,
         high_force: false,
+        finger: FingerCode::BIOTAC,
     }
 }
 

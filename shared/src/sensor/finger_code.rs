@@ -1,0 +1,114 @@
+//! Kinds of fingers as tables and messages name them: one byte, so that the name of a later day is read and passed on.
+
+use core::fmt;
+use core::str::FromStr;
+
+use serde::de::{Error, Unexpected, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// A kind of finger: on the line and in tables its number, in text its name.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub struct FingerCode(pub u8);
+
+/// The names, by number: new ones go to the end.
+const NAMES: [&str; 3] = ["biotac", "analog", "mems"];
+/// What a number without a name is called, before the number.
+const NAMELESS: &str = "finger-";
+
+impl FingerCode {
+    /// SynTouch's BioTac; also the finger of all tables, recordings and messages that do not say.
+    pub const BIOTAC: Self = Self(0);
+    /// A piezo disc and a load cell on an MCP3202.
+    pub const ANALOG: Self = Self(1);
+    /// An accelerometer IIS3DWB, and a load cell on an ADS1220.
+    pub const MEMS: Self = Self(2);
+}
+
+impl fmt::Display for FingerCode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match NAMES.get(usize::from(self.0)) {
+            Some(name) => f.write_str(name),
+            None => write!(f, "{NAMELESS}{}", self.0),
+        }
+    }
+}
+
+/// It names no finger.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("no finger has this name: there are biotac, analog and mems")]
+pub struct NoFinger;
+
+impl FromStr for FingerCode {
+    type Err = NoFinger;
+
+    fn from_str(name: &str) -> Result<Self, NoFinger> {
+        let known = (0..).zip(NAMES).find(|(_, known)| *known == name);
+        let number = || name.strip_prefix(NAMELESS)?.parse().ok();
+        let code = known.map(|(code, _)| code).or_else(number);
+        code.map(Self).ok_or(NoFinger)
+    }
+}
+
+impl Serialize for FingerCode {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        if to.is_human_readable() {
+            to.collect_str(self)
+        } else {
+            to.serialize_u8(self.0)
+        }
+    }
+}
+
+impl<'d> Deserialize<'d> for FingerCode {
+    fn deserialize<D: Deserializer<'d>>(from: D) -> Result<Self, D::Error> {
+        if from.is_human_readable() {
+            from.deserialize_str(ByName)
+        } else {
+            u8::deserialize(from).map(Self)
+        }
+    }
+}
+
+struct ByName;
+
+impl Visitor<'_> for ByName {
+    type Value = FingerCode;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the name of a finger")
+    }
+
+    fn visit_str<E: Error>(self, name: &str) -> Result<FingerCode, E> {
+        let unknown = |_| E::invalid_value(Unexpected::Str(name), &self);
+        name.parse().map_err(unknown)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::string::ToString as _;
+
+    use super::*;
+
+    #[test]
+    fn every_number_has_a_name_that_is_found_again() {
+        for code in 0..=u8::MAX {
+            let code = FingerCode(code);
+            assert_eq!(code.to_string().parse(), Ok(code));
+        }
+        for name in ["", "BioTac", "finger-", "finger-256", "mems "] {
+            assert_eq!(name.parse::<FingerCode>(), Err(NoFinger));
+        }
+        assert_eq!(FingerCode::MEMS.to_string(), "mems");
+        assert_eq!(FingerCode(77).to_string(), "finger-77");
+    }
+
+    #[test]
+    fn on_the_line_it_is_a_byte() {
+        let bytes = postcard::to_slice(&FingerCode(200), &mut [0; 4]).map(|bytes| bytes.to_vec());
+        assert_eq!(bytes, Ok(std::vec![200]));
+        assert_eq!(postcard::from_bytes(&[200]), Ok(FingerCode(200)));
+    }
+}

@@ -1,0 +1,66 @@
+//! The finger that a table was learned with: bands and pressures of two kinds of fingers cannot be compared.
+//!
+//! Section of kind 5; a table without it was learned with a BioTac, as all were before there was another finger.
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 1 | the finger: 0 `biotac`, 1 `analog`, 2 `mems` |
+//! | 4 | day on which its force per count was measured, as 20261121; 1 where nobody knew the day, 0 if it was not, or is not known |
+
+use super::encode::EncodeError;
+use super::format::{TableError, array};
+use super::one_section::rewrite_section;
+use super::sections::FINGER;
+use super::view::Table;
+use crate::sensor::FingerCode;
+
+/// Bytes that the section takes.
+pub const FINGER_LENGTH: usize = 4 + 5;
+
+impl Table<'_> {
+    /// The finger that it was learned with.
+    pub fn finger(&self) -> FingerCode {
+        let section = self.section(FINGER).unwrap_or_default();
+        section
+            .first()
+            .copied()
+            .map_or_else(FingerCode::default, FingerCode)
+    }
+
+    /// Day on which that finger's force per count was measured: see [`crate::wire::Status::calibrated`].
+    pub fn calibrated(&self) -> u32 {
+        let date = self.section(FINGER).and_then(|section| array(section, 1));
+        date.map_or(0, u32::from_le_bytes)
+    }
+
+    /// This table, if it was learned with this finger.
+    ///
+    /// # Errors
+    /// [`TableError::Finger`].
+    pub fn of_finger(self, probe: FingerCode) -> Result<Self, TableError> {
+        let table = self.finger();
+        if table == probe {
+            Ok(self)
+        } else {
+            Err(TableError::Finger { table, probe })
+        }
+    }
+}
+
+/// Writes `old` into `out`, with this finger and the day of its calibration in place of what it says of that.
+///
+/// # Errors
+/// As [`super::encode`].
+pub fn with_finger<'o>(
+    out: &'o mut [u8],
+    old: &Table<'_>,
+    finger: FingerCode,
+    calibrated: u32,
+) -> Result<Table<'o>, EncodeError> {
+    let silent = finger == FingerCode::BIOTAC && calibrated == 0;
+    let length = if silent { 0 } else { 5 };
+    rewrite_section(out, old, FINGER, length, |put| {
+        put(&[finger.0]);
+        put(&calibrated.to_le_bytes());
+    })
+}
