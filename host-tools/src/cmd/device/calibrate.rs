@@ -22,8 +22,8 @@ Examples:
   tactus device calibrate                   measures the motor's current without load, and P_DC in the air
   tactus device calibrate --show            what is in use
   tactus device calibrate --drifted         if a finger in the air seems to touch something: takes its P_DC anew
-  tactus device calibrate --weights 0.49,0.98,1.47
-                                            a handheld: asks for these weights on its finger, N
+  tactus device calibrate --weights 30g,60g,90g,120g,150g
+                                            a handheld: asks for these weights on its finger
   tactus device calibrate --newton-per-ampere 16.2 --force-mn-per-count 11.4
                                             also takes what was measured on an incline and on a scale
 
@@ -148,25 +148,49 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     print(how.format, &kept, out)
 }
 
-/// Contact force per count, mN: the line through known weights. It goes through 0, where the finger is in the air.
+/// Contact force per count, mN, from known weights, which are asked for.
 fn weigh(bench: &mut Bench, weights: &[u16], told: &mut impl Write) -> anyhow::Result<f32> {
-    let mut line = LineFit::default();
-    line.push(0.0, 0.0);
+    let mut points = Vec::new();
     for &mn in weights {
         let counts = bench.perform(Request::weigh(mn), told)?;
         writeln!(told, "{mn} mN: {counts:.1} counts")?;
-        line.push(counts, f32::from(mn));
+        points.push((counts, f32::from(mn)));
     }
-    let (_, mn_per_count) = line.line()?;
+    let (mn_per_count, residuals) = fit(&points)?;
+    for ((_, mn), residual) in points.iter().zip(residuals) {
+        let share = 100.0 * residual / mn;
+        writeln!(
+            told,
+            "{mn:.0} mN: {residual:+.0} mN off the line ({share:+.1} %)"
+        )?;
+    }
     Ok(mn_per_count)
 }
 
-/// A weight in N as mN: what a fingertip's line holds for.
+/// The line through counts and weights in mN, and through 0 and 0, where the finger is in the air: mN a count, and how far each
+/// weight is off it, mN.
+fn fit(points: &[(f32, f32)]) -> anyhow::Result<(f32, Vec<f32>)> {
+    let mut line = LineFit::default();
+    line.push(0.0, 0.0);
+    points
+        .iter()
+        .for_each(|&(counts, mn)| line.push(counts, mn));
+    let (at_0, mn_per_count) = line.line()?;
+    ensure!(
+        mn_per_count > 0.0,
+        "P_DC falls under a weight: the load cell is wired the wrong way round. Swap its two signal wires"
+    );
+    let off = |&(counts, mn): &(f32, f32)| mn - (at_0 + mn_per_count * counts);
+    Ok((mn_per_count, points.iter().map(off).collect()))
+}
+
+/// A weight in N, or in g with a g behind it, as mN: what a fingertip's line holds for.
 fn newton(text: &str) -> Result<u16, String> {
-    let newton: f32 = text
-        .trim()
-        .parse()
-        .map_err(|_| "a weight is a number of N".to_owned())?;
+    let text = text.trim();
+    let grams = text.strip_suffix('g').map(str::trim_end);
+    let number: Result<f32, _> = grams.unwrap_or(text).parse();
+    let number = number.map_err(|_| "a weight is a number of N, or of g as in 50g".to_owned())?;
+    let newton = grams.map_or(number, |_| number * 9.806_65e-3);
     match newton {
         0.2..=2.0 => Ok((newton * 1e3).round() as u16),
         _ => Err("a weight has 0.2 to 2 N (100 g are 0.98 N)".to_owned()),
@@ -247,5 +271,45 @@ pub(crate) fn stop(at: &Where, out: &mut impl Write) -> anyhow::Result<()> {
             Ok(())
         }
         why => Err(why.into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_are_newtons_or_grams() {
+        assert_eq!(newton("0.49"), Ok(490));
+        let kitchen = ["30g", "60 g", " 90g", "120g", "150g"].map(newton);
+        assert_eq!(kitchen, [294, 588, 883, 1177, 1471].map(Ok));
+        for wrong in ["", "g", "50", "10g", "250g", "NaN", "1kg", "30gg"] {
+            assert!(newton(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_line_has_residuals_and_a_reversed_cell_is_found() {
+        // 10 mN a count, and the third weight 20 mN too light
+        let points = [(29.4, 294.0), (58.8, 588.0), (90.3, 883.0), (117.7, 1177.0)];
+        let (scale, residuals) = fit(&points).unwrap();
+        assert!((scale - 10.0).abs() < 0.1, "{scale}");
+        let worst = residuals
+            .iter()
+            .copied()
+            .fold(0.0, |a: f32, b| if b.abs() > a.abs() { b } else { a });
+        assert!(
+            (-20.0..-10.0).contains(&worst) && worst == residuals[2],
+            "{residuals:?}"
+        );
+        let reversed = points.map(|(counts, mn)| (-counts, mn));
+        assert!(
+            fit(&reversed)
+                .unwrap_err()
+                .to_string()
+                .contains("Swap its two signal wires")
+        );
+        // one weight laid on twice is no line
+        assert!(fit(&[(29.4, 294.0), (58.8, 588.0), (58.8, 1200.0)]).is_err());
     }
 }
