@@ -8,6 +8,7 @@ use tactus::data::recording::{Recording, Texture};
 use tactus::data::recordings::RecordingWriter;
 use tactus::eval::show::count;
 use tactus::sim::collection::{Collection, calibrated, texture_name};
+use tactus_core::sensor::FingerName;
 
 use super::output::{Format, print_json};
 use super::progress::progress;
@@ -19,6 +20,7 @@ use super::textures::collection;
 Examples:
   tactus simulate --out DIR --textures burlap,47 --trials 10
   tactus simulate --out DIR --seed 2                       all 117 textures of another world
+  tactus simulate --out DIR --finger mems                  with another finger
 The same command goes on where an interrupted one stopped.")]
 pub(crate) struct Args {
     /// The folder to write; it must not hold recordings yet
@@ -33,6 +35,9 @@ pub(crate) struct Args {
     /// Another seed is another world: other textures of the same names
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// The finger that slides: biotac, analog (piezo disc and load cell) or mems (accelerometer and load cell)
+    #[arg(long, value_name = "NAME", default_value_t = FingerName::Biotac)]
+    finger: FingerName,
     /// How to print what was written
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
@@ -56,14 +61,18 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     });
     let textures = collection.textures.len();
     let numbers: Vec<String> = collection.textures.iter().map(u8::to_string).collect();
+    let finger = match args.finger {
+        FingerName::Biotac => String::new(),
+        other => format!(" --finger {other}"),
+    };
     let command = format!(
-        "tactus simulate --seed {} --trials {} --textures {}",
+        "tactus simulate --seed {} --trials {} --textures {}{finger}",
         args.seed,
         args.trials,
         numbers.join(",")
     );
     let mut writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
-    let calibration = calibrated(collection.setup(collection.textures[0], 0))?;
+    let calibration = calibrated(collection.setup_with(args.finger, collection.textures[0], 0))?;
     let each = Collection::MOVEMENTS.len() * args.trials as usize;
     // those that an interrupted command has not come to
     let todo: Vec<(usize, u8)> = (0..)
@@ -78,7 +87,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             textures: some.iter().map(|(_, number)| *number).collect(),
             ..collection.clone()
         };
-        let recorded = part.record(calibration, || bar.inc(1))?;
+        let recorded = part.record_with(args.finger, calibration, || bar.inc(1))?;
         for (slides, &(texture, _)) in recorded.into_iter().zip(some) {
             for slide in slides {
                 if !writer.has(texture, slide.number) {

@@ -7,6 +7,7 @@ use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
 use tactus_core::features::{Movement, Observation, SlideError};
 use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::sensor::FingerName;
 
 use crate::data::recording::Recording;
 use crate::data::replay::measure;
@@ -62,6 +63,14 @@ impl Collection {
         }
     }
 
+    /// The same with another finger than a BioTac.
+    pub fn setup_with(&self, finger: FingerName, texture: u8, trial: u64) -> Setup {
+        Setup {
+            finger,
+            ..self.setup(texture, trial)
+        }
+    }
+
     /// Names of the textures.
     pub fn names(&self) -> Vec<String> {
         self.textures
@@ -80,11 +89,25 @@ impl Collection {
         calibration: RigCalibration,
         done: impl Fn() + Sync,
     ) -> Result<Vec<Vec<Recording>>, TrialError> {
-        self.record_at(&Self::MOVEMENTS, calibration, done)
+        self.record_with(FingerName::Biotac, calibration, done)
+    }
+
+    /// The same with another finger than a BioTac.
+    ///
+    /// # Errors
+    /// The first fault of a rig.
+    pub fn record_with(
+        &self,
+        finger: FingerName,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<Vec<Recording>>, TrialError> {
+        self.record_at(finger, &Self::MOVEMENTS, calibration, done)
     }
 
     fn record_at(
         &self,
+        finger: FingerName,
         movements: &[Movement],
         calibration: RigCalibration,
         done: impl Fn() + Sync,
@@ -93,8 +116,8 @@ impl Collection {
             .par_iter()
             .enumerate()
             .map(|(index, &texture)| {
-                let mut slides =
-                    record_texture(self.setup(texture, 0), calibration, movements, self.trials)?;
+                let setup = self.setup_with(finger, texture, 0);
+                let mut slides = record_texture(setup, calibration, movements, self.trials)?;
                 for slide in &mut slides {
                     slide.texture = index;
                 }
@@ -128,9 +151,24 @@ impl Collection {
         calibration: RigCalibration,
         done: impl Fn() + Sync,
     ) -> Result<Vec<u8>, LearnError> {
+        self.learn_with(FingerName::Biotac, movements, method, calibration, done)
+    }
+
+    /// The same with another finger than a BioTac.
+    ///
+    /// # Errors
+    /// The first fault of a rig, or slide without properties.
+    pub fn learn_with(
+        &self,
+        finger: FingerName,
+        movements: &[Movement],
+        method: Method,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<u8>, LearnError> {
         let plan = Plan::new();
         let measured = self
-            .record_at(movements, calibration, done)?
+            .record_at(finger, movements, calibration, done)?
             .iter()
             .map(|slides| {
                 movements

@@ -378,6 +378,18 @@ impl Miso {
         }
     }
 
+    /// What comes of a byte that a part of another finger than a BioTac says.
+    pub(super) fn disturb(&mut self, said: u8, faults: &Faults) -> u8 {
+        if faults.miso_stuck.is_some() {
+            return Self::idle(faults);
+        }
+        // the share is of words, which are two bytes there
+        if faults.flip_share > 0.0 && self.noise.uniform() < faults.flip_share / 2.0 {
+            return said ^ 1 << (self.noise.uniform() * 8.0) as u8;
+        }
+        said
+    }
+
     /// What the line reads as with nobody driving it: its pull-up, or what it is shorted to.
     pub(super) fn idle(faults: &Faults) -> u8 {
         match faults.miso_stuck {

@@ -1,25 +1,36 @@
-//! The BioTac finger: what a contact does to its skin, its fluid and its two pressure signals.
+//! The finger: what a contact does to its skin, and to its fluid or its other transducers.
 //!
 //! A tick goes: the skin is indented (`skin`), sticks or slips along the surface, ridges and fluid turn what they slide
-//! over into pressure (`vibration`), and the amplifiers make the two signals that the sensor samples (`amplifier`).
+//! over into pressure (`vibration`), and the amplifiers make the two signals that the sensor samples (`amplifier`). Fingers without a
+//! fluid have other transducers in its place (`signals`); their skin of solid silicone of Shore 10 A to 20 A is a Hertz contact
+//! of about the same stiffness.
 
 mod amplifier;
+mod analog;
+mod cell;
+mod mems;
+mod signals;
 mod skin;
 mod vibration;
 
 use super::conditions::{Conditions, TICK_S};
 use super::maths::exp;
 use super::noise::Noise;
+use super::parts::PartFault;
 use super::played::{PlayCounts, Playback, Played};
 use super::surface::Surface;
 use super::textures::Texture;
 use amplifier::Amplifiers;
+use signals::newtons;
+pub(super) use signals::{FLUID_PA_PER_G, Felt, Signals};
 use skin::Skin;
+use tactus_core::sensor::FingerName;
 use vibration::Vibrations;
 
 pub use amplifier::{
     PA_PER_N, PAC_NOISE_FIELD_COUNTS, PAC_NOISE_PA, PAC_PA_PER_COUNT, PDC_PA_PER_COUNT,
 };
+pub use signals::Held;
 pub use skin::N_PER_COUNT;
 
 /// Deviations of the contact's state, drawn at every touch and multiplied by [`Conditions::variation`]; all chosen.
@@ -103,7 +114,8 @@ pub struct Finger {
     variation: f64,
     skin: Skin,
     vibrations: Vibrations,
-    amplifiers: Amplifiers,
+    signals: Signals,
+    held: Held,
     /// the present contact
     touch: Option<Touch>,
     /// relative unsteadiness of friction
@@ -137,7 +149,8 @@ impl Finger {
             variation: conditions.variation,
             skin: Skin::default(),
             vibrations: Vibrations::default(),
-            amplifiers: Amplifiers::new(&mut Noise::new(made, 501), &mut noise),
+            signals: Signals::Fluid(Amplifiers::new(&mut Noise::new(made, 501), &mut noise)),
+            held: Held::STILL,
             touch: None,
             unsteady: 0.0,
             amplitude: (0.0, 1.0),
@@ -157,8 +170,63 @@ impl Finger {
     /// default, or [`PAC_NOISE_FIELD_COUNTS`] as in recordings of real devices.
     #[must_use]
     pub fn with_pac_noise(mut self, counts: f64) -> Self {
-        self.amplifiers.set_pac_noise(counts * PAC_PA_PER_COUNT);
+        if let Some(amplifiers) = self.amplifiers() {
+            amplifiers.set_pac_noise(counts * PAC_PA_PER_COUNT);
+        }
         self
+    }
+
+    /// The same skin on the transducers of another kind of finger, whose first seed is `made`.
+    #[must_use]
+    pub fn of(mut self, finger: FingerName, made: u64) -> Self {
+        let made = &mut Noise::new(made, 502);
+        match finger {
+            FingerName::Biotac => {}
+            FingerName::Analog => self.signals = Signals::Analog(analog::Analog::new(made)),
+            FingerName::Mems => self.signals = Signals::Mems(mems::Mems::new(made)),
+        }
+        self
+    }
+
+    /// From now on it is held like this.
+    pub fn hold(&mut self, held: Held) {
+        self.held = held;
+    }
+
+    pub(super) fn signals(&self) -> &Signals {
+        &self.signals
+    }
+
+    fn amplifiers(&mut self) -> Option<&mut Amplifiers> {
+        match &mut self.signals {
+            Signals::Fluid(amplifiers) => Some(amplifiers),
+            _ => None,
+        }
+    }
+
+    /// Feeds the transducers alone, without a contact: for tests of what is behind them. An accelerometer feels as many g as the
+    /// vibration has newtons, without the silicone's resonance.
+    #[cfg(test)]
+    pub(super) fn feed(&mut self, felt: &Felt) {
+        self.signals.tick(felt, &mut self.noise);
+        if let Signals::Mems(mems) = &mut self.signals {
+            mems.feed(felt.held.down + felt.vibration_n);
+        }
+    }
+
+    /// Breaks something of the transducers.
+    pub(super) fn break_part(&mut self, fault: PartFault) {
+        let gain = match fault {
+            PartFault::CellReversed => -1.0,
+            PartFault::CellBlocked => 0.0,
+            _ => 1.0,
+        };
+        match (&mut self.signals, fault) {
+            (Signals::Analog(analog), PartFault::CellWire) => analog.wire_cut = true,
+            (Signals::Analog(analog), _) => analog.cell().set_gain(gain),
+            (Signals::Mems(mems), _) => mems.cell().set_gain(gain),
+            (Signals::Fluid(_), _) => {}
+        }
     }
 
     /// From now on slides feel like these, in an order that `seed` gives; without any, like the surface again.
@@ -198,8 +266,19 @@ impl Finger {
             .vibrations
             .fluid(pressure_pa + PA_PER_N * force, force, detuned);
         let dc_n = force + SHEAR_TO_PDC * self.shear_n.abs();
-        self.amplifiers
-            .tick(fluid_pa, PA_PER_N * dc_n, &mut self.noise);
+        let lever_g = contact.lever_vibration / FLUID_PA_PER_G;
+        let felt = Felt {
+            fluid_pa,
+            slow_pa: PA_PER_N * dc_n,
+            force_n: self.skin.force_n(),
+            vibration_n: newtons(pressure_pa - contact.lever_vibration),
+            shear_n: self.shear_n.abs(),
+            held: Held {
+                acceleration_g: self.held.acceleration_g + lever_g,
+                ..self.held
+            },
+        };
+        self.signals.tick(&felt, &mut self.noise);
     }
 
     /// What of the force the fluid carries at this tick, N. What has run out of a torn skin does not come back; a slack
@@ -322,42 +401,69 @@ impl Finger {
 
     /// From now on P_DC fades: see `Fault::PdcFades`.
     pub fn fade_pdc(&mut self, seconds: f64) {
-        self.amplifiers.fade_pdc(seconds);
+        if let Some(amplifiers) = self.amplifiers() {
+            amplifiers.fade_pdc(seconds);
+        }
     }
 
     /// From now on P_DC has this gain: see `Fault::PdcWeak`.
     pub fn weaken_pdc(&mut self, gain: f64) {
-        self.amplifiers.weaken_pdc(gain);
+        if let Some(amplifiers) = self.amplifiers() {
+            amplifiers.weaken_pdc(gain);
+        }
     }
 
     /// Fills a torn skin, and mends the amplifier.
     pub fn mend(&mut self) {
         (self.leak_s, self.leaked_n) = (None, 0.0);
-        self.amplifiers.mend();
+        match &mut self.signals {
+            Signals::Fluid(amplifiers) => amplifiers.mend(),
+            Signals::Analog(analog) => {
+                analog.wire_cut = false;
+                analog.cell().set_gain(1.0);
+            }
+            Signals::Mems(mems) => mems.cell().set_gain(1.0),
+        }
     }
 
     /// Samples P_AC, in counts, `fraction` (0..1) of a tick after the last but one.
     pub fn sample_pac(&mut self, fraction: f64) -> u16 {
+        self.sample_channel(0, fraction)
+    }
+
+    /// Samples P_DC, in counts, `fraction` (0..1) of a tick after the last but one.
+    pub fn sample_pdc(&mut self, fraction: f64) -> u16 {
+        self.sample_channel(1, fraction)
+    }
+
+    /// What a converter of 12 bits reads of P_AC (0) or P_DC (1). An accelerometer has none.
+    pub(super) fn sample_channel(&mut self, channel: u8, fraction: f64) -> u16 {
+        let noise = &mut self.noise;
+        let amplifiers = match &mut self.signals {
+            Signals::Analog(analog) => {
+                let volts = analog.volts(channel, fraction, noise);
+                return (volts * 4096.0 / analog::SUPPLY_V).clamp(0.0, 4095.0) as u16;
+            }
+            Signals::Mems(_) => return 0,
+            Signals::Fluid(amplifiers) => amplifiers,
+        };
+        if channel != 0 {
+            return amplifiers.sample_pdc(fraction, noise);
+        }
         let Some(playback) = &mut self.playback else {
-            return self.amplifiers.sample_pac(fraction, &mut self.noise);
+            return amplifiers.sample_pac(fraction, noise);
         };
         match playback.pac(fraction) {
             // its noise is in the recording
             Some(recorded) => {
-                let about_rest =
-                    recorded.unwrap_or_else(|| self.amplifiers.pac_noise(&mut self.noise));
-                let (counts, clipped) = self.amplifiers.convert_pac(about_rest);
+                let about_rest = recorded.unwrap_or_else(|| amplifiers.pac_noise(noise));
+                let (counts, clipped) = amplifiers.convert_pac(about_rest);
                 if clipped {
                     playback.clipped();
                 }
                 counts
             }
-            None => self.amplifiers.sample_pac(fraction, &mut self.noise),
+            None => amplifiers.sample_pac(fraction, noise),
         }
-    }
-
-    /// Samples P_DC, in counts, `fraction` (0..1) of a tick after the last but one.
-    pub fn sample_pdc(&mut self, fraction: f64) -> u16 {
-        self.amplifiers.sample_pdc(fraction, &mut self.noise)
     }
 }

@@ -11,13 +11,14 @@ use tactus_core::features::{FEATURE_STEPS, Observation};
 use tactus_core::handheld::guidance::{Again, Event};
 use tactus_core::handheld::touch::Touch;
 use tactus_core::handheld::{FEATURES, MOVEMENT};
+use tactus_core::sensor::FingerName;
 use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
 
 use crate::eval::learn::{self, TableError};
 use crate::sim::collection::{Collection, texture_name};
 use crate::sim::maths::{exp, ln};
 use crate::sim::person::{Hand, Manner};
-use crate::sim::slot::{TRANSFER_NS, word_of_slot};
+use crate::sim::slot::Reader;
 use crate::sim::world::{Setup, Truth, World};
 
 /// The steady part of a slide is its last 1.2 s: over it the speed is measured.
@@ -53,6 +54,7 @@ pub enum HandError {
 /// A person with a probe.
 pub struct Person {
     world: World,
+    reader: Reader,
     slot: u64,
     random: ChaCha8Rng,
     manner: Manner,
@@ -67,8 +69,15 @@ impl Person {
         world.hold(Hand::new(setup.trial_seed, manner));
         let mut random = ChaCha8Rng::seed_from_u64(setup.trial_seed);
         random.set_stream(1);
+        let reader = Reader::new(setup.finger);
+        // parts that do not start give no words, and that is noticed
+        let began_ns = u64::from(reader.power_up_ms()) * 1_000_000;
+        let _ = reader.start_up(began_ns, |transfer, mosi, miso| {
+            world.transfer(transfer, mosi, miso);
+        });
         Self {
             world,
+            reader,
             slot: 0,
             random,
             manner,
@@ -83,9 +92,11 @@ impl Person {
         let at_ns = 150_000_000 + at as u64;
         let slot = self.slot;
         self.slot += 1;
-        word_of_slot(slot, at_ns, |begins_ns, mosi, miso| {
-            self.world.spi(begins_ns, TRANSFER_NS, mosi, miso);
-        })
+        let world = &mut self.world;
+        self.reader
+            .word_of_slot(slot, at_ns, |transfer, mosi, miso| {
+                world.transfer(transfer, mosi, miso);
+            })
     }
 
     /// What the hand means to do from now on.
@@ -180,6 +191,7 @@ pub fn slides(
     let plan = Plan::new();
     let mut touch = Touch::<Plain>::new(&plan);
     let mut person = Person::new(setup, manner);
+    touch.calibrate(person.reader.model().calibration.force_mn_per_count);
     person.run_until(&mut touch, 0.5, |event| *event == Event::Zeroed);
     let (mut good, mut bad, mut row) = (Vec::new(), 0, 0);
     let mut last;
@@ -214,11 +226,23 @@ pub fn learn(
     collection: &Collection,
     done: impl Fn() + Sync,
 ) -> Result<(Vec<u8>, Vec<u8>), TableError> {
+    learn_with(FingerName::Biotac, collection, done)
+}
+
+/// The same with another finger than a BioTac.
+///
+/// # Errors
+/// See [`TableError`].
+pub fn learn_with(
+    finger: FingerName,
+    collection: &Collection,
+    done: impl Fn() + Sync,
+) -> Result<(Vec<u8>, Vec<u8>), TableError> {
     let measured: Vec<_> = collection
         .textures
         .par_iter()
         .map(|&texture| {
-            let setup = collection.setup(texture, 0);
+            let setup = collection.setup_with(finger, texture, 0);
             let made = slides(setup, Manner::default(), collection.trials);
             done();
             made

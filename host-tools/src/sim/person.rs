@@ -8,7 +8,8 @@ use std::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 
 use super::conditions::TICK_S;
-use super::maths::exp;
+use super::finger::Held;
+use super::maths::{cos, exp};
 use super::noise::Noise;
 use super::surface::LENGTH_MM;
 
@@ -32,6 +33,15 @@ const UNEVEN_S: f64 = 0.2;
 /// Physiological tremor, Hz, and its relative bandwidth (8 to 12 Hz in every textbook).
 const TREMOR_HZ: f64 = 10.0;
 const TREMOR_WIDTH: f64 = 0.4;
+/// What only a finger with a mass in it feels: acceleration by tremor, g rms, of a careful hand (Elble and Koller 1990 have some
+/// 0.1 m/s^2 for a stretched hand); by the fingers that rub on the handle while it slides, g rms at 70 mm/s, within a band about this
+/// frequency, Hz (chosen); and how far the handle leans, rad rms, over this time, s (chosen).
+const TREMOR_G: f64 = 0.01;
+const RUB_G: f64 = 0.02;
+const RUB_AT_MM_S: f64 = 70.0;
+const RUB_HZ: f64 = 150.0;
+const LEAN: f64 = 0.2;
+const LEAN_S: f64 = 1.0;
 /// Where a touch begins on the sample, mm from its edge.
 const BEGINS_MM: (f64, f64) = (4.0, 16.0);
 
@@ -83,6 +93,11 @@ pub struct Hand {
     uneven: f64,
     /// a band-pass of noise
     tremor: [f64; 2],
+    /// the handle: noise of its own, tremor, rubbing, and how it leans
+    handle: Noise,
+    shakes: [f64; 2],
+    rubs: [f64; 2],
+    leans: f64,
 }
 
 impl Hand {
@@ -101,6 +116,10 @@ impl Hand {
             wander: 0.0,
             uneven: 0.0,
             tremor: [0.0; 2],
+            handle: Noise::new(seed, STREAM + 1),
+            shakes: [0.0; 2],
+            rubs: [0.0; 2],
+            leans: 0.0,
         }
     }
 
@@ -120,10 +139,13 @@ impl Hand {
         follow(&mut self.wander, WANDER_S, white);
         follow(&mut self.uneven, UNEVEN_S, other);
         // of rms 1: the noise that a resonance lets through
-        let step = TAU * TREMOR_HZ * TICK_S;
-        self.tremor[0] += step * self.tremor[1];
-        self.tremor[1] += (2.0 * TREMOR_WIDTH * step).sqrt() * white
-            - step * (self.tremor[0] + TREMOR_WIDTH * self.tremor[1]);
+        resonate(&mut self.tremor, TREMOR_HZ, TREMOR_WIDTH, white);
+
+        let [white, other] = self.handle.white();
+        resonate(&mut self.shakes, TREMOR_HZ, TREMOR_WIDTH, white);
+        resonate(&mut self.rubs, RUB_HZ, 1.0, other);
+        let step = TICK_S / LEAN_S;
+        self.leans += (2.0 * step).sqrt() * white - step * self.leans;
 
         let steady = 1.0 + self.manner.wander * self.wander + self.manner.tremor * self.tremor[0];
         if self.force_n > 0.0 {
@@ -145,6 +167,16 @@ impl Hand {
         }
     }
 
+    /// How the finger is held: what only transducers with a mass feel.
+    pub fn held(&self) -> Held {
+        let tremor = TREMOR_G * self.manner.tremor / Manner::default().tremor;
+        let rub = RUB_G * self.speed_mm_s.abs() / RUB_AT_MM_S;
+        Held {
+            acceleration_g: tremor * self.shakes[0] + rub * self.rubs[0],
+            down: cos(LEAN * self.leans),
+        }
+    }
+
     /// How deep the sample is in the fingertip, mm; negative is a gap.
     pub fn indentation_mm(&self) -> f64 {
         self.indentation_mm
@@ -159,6 +191,13 @@ impl Hand {
     pub fn speed_mm_s(&self) -> f64 {
         self.speed_mm_s
     }
+}
+
+/// A tick of the noise that a resonance lets through, of rms 1.
+fn resonate(state: &mut [f64; 2], hz: f64, width: f64, white: f64) {
+    let step = TAU * hz * TICK_S;
+    state[0] += step * state[1];
+    state[1] += (2.0 * width * step).sqrt() * white - step * (state[0] + width * state[1]);
 }
 
 #[cfg(test)]

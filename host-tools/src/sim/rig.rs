@@ -1,7 +1,6 @@
 //! The simulated rig: the world of [`crate::sim`] at one end of the pins, the core's [`Control`] at the other, and what the
 //! board's timers do in between, in virtual time.
 
-use std::convert::Infallible;
 use std::time::Duration;
 
 use rand::{RngExt as _, SeedableRng as _};
@@ -9,21 +8,21 @@ use rand_chacha::ChaCha8Rng;
 use tactus_core::dsp::Kernels;
 use tactus_core::features::{Blocks, Movement, PropertySet, SamplePhase, Slide};
 use tactus_core::probe::{RigState, Watch};
-use tactus_core::rig::calibration::{LineFit, RigCalibration, RigCalibrationError};
+use tactus_core::rig::calibration::{RigCalibration, RigCalibrationError};
 use tactus_core::rig::control::Control;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::pins::{Inputs, Outputs};
 use tactus_core::rig::stage::StageConstants;
 use tactus_core::rig::timeout::{MovementTimeout, Wait};
-use tactus_core::rig::unloaded::UnloadedRuns;
 use tactus_core::rig::{Ended, Fault, MAX_REJECTED, Phase, Refused, Rig, RigError};
-use tactus_core::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ, SLOTS_HZ};
-use tactus_core::sensor::{PressureSensor as _, biotac, slot};
+use tactus_core::sensor::biotac;
+use tactus_core::sensor::pressure::{Channel, Pressure, RATE_HZ, SLOTS_HZ};
+use tactus_core::sensor::slot::Unexpected;
 use tactus_core::wire::Event;
 
 use crate::data::recording::Recording;
 use crate::sim::conditions::Conditions;
-use crate::sim::slot::{TRANSFER_NS, word_of_slot};
+use crate::sim::slot::Reader;
 use crate::sim::world::{Setup, World};
 
 const TICK_NS: u64 = 1_000_000;
@@ -58,11 +57,17 @@ pub enum SimError {
     /// The sensor does not say what it is.
     #[error(transparent)]
     Sensor(#[from] biotac::PropertyError),
+    /// A part of the finger does not start.
+    #[error(transparent)]
+    Part(#[from] Unexpected),
 }
 
 /// The board's timers between control and world: sensor slots, step pulses, the 1 kHz tick.
 pub struct SimRig {
     world: World,
+    reader: Reader,
+    /// the finger's parts have started
+    started: bool,
     control: Control,
     random: ChaCha8Rng,
     now_ns: u64,
@@ -105,17 +110,19 @@ impl SimRig {
 
     /// As [`SimRig::new`], with a guard switched off: for tests.
     pub fn unguarded(setup: Setup, unguarded: Unguarded) -> Self {
-        Self::of(World::new(setup), setup.trial_seed, unguarded)
+        Self::of(World::new(setup), setup, unguarded)
     }
 
     /// As [`SimRig::unguarded`], in a world under these conditions.
     pub fn under(setup: Setup, conditions: Conditions, unguarded: Unguarded) -> Self {
-        Self::of(World::under(setup, conditions), setup.trial_seed, unguarded)
+        Self::of(World::under(setup, conditions), setup, unguarded)
     }
 
-    fn of(world: World, seed: u64, unguarded: Unguarded) -> Self {
+    fn of(world: World, setup: Setup, unguarded: Unguarded) -> Self {
+        let reader = Reader::new(setup.finger);
+        let model = reader.model();
         let calibration = RigCalibration {
-            pressure: biotac::BioTac::MODEL.calibration,
+            pressure: model.calibration,
             unloaded_a: (0.037, 0.0),
             newton_per_ampere: 16.4,
             date: 0,
@@ -124,13 +131,10 @@ impl SimRig {
         };
         Self {
             world,
-            control: Control::new(
-                &biotac::BioTac::MODEL,
-                StageConstants::REFERENCE,
-                calibration,
-                unguarded,
-            ),
-            random: ChaCha8Rng::seed_from_u64(seed),
+            started: reader.start().is_empty(),
+            reader,
+            control: Control::new(model, StageConstants::REFERENCE, calibration, unguarded),
+            random: ChaCha8Rng::seed_from_u64(setup.trial_seed),
             now_ns: 0,
             slot: 0,
             words: Vec::new(),
@@ -260,13 +264,19 @@ impl SimRig {
     fn sample(&mut self, at_ns: u64) {
         let slot = self.slot;
         self.slot += 1;
-        let word = word_of_slot(slot, at_ns, |begins_ns, mosi, miso| {
+        if !self.started {
+            self.words.push(None);
+            return;
+        }
+        let mut reader = self.reader.clone();
+        let word = reader.word_of_slot(slot, at_ns, |transfer, mosi, miso| {
             // steps that fall due in the gap are made in it
-            while self.rate != 0 && self.next_step_ns < begins_ns {
+            while self.rate != 0 && self.next_step_ns < transfer.begins_ns {
                 self.step(self.next_step_ns);
             }
-            self.world.spi(begins_ns, TRANSFER_NS, mosi, miso);
+            self.world.transfer(transfer, mosi, miso);
         });
+        self.reader = reader;
         self.words.push(word);
     }
 
@@ -321,119 +331,35 @@ impl SimRig {
     /// # Errors
     /// See [`SimError`].
     pub fn home(&mut self) -> Result<(), SimError> {
-        for _ in 0..=biotac::BioTac::POWER_UP_MS {
+        for _ in 0..=self.reader.power_up_ms() {
             self.tick();
         }
+        self.start_finger()?;
         self.control.home()?;
         self.rest(|_| ())
     }
 
-    /// Measures this rig's motor current without load, and takes it into the calibration.
+    /// Does the finger's start-up list, if it has not been done.
     ///
     /// # Errors
-    /// See [`SimError`].
-    pub fn calibrate_current(&mut self) -> Result<RigCalibration, SimError> {
-        let mut runs = UnloadedRuns::default();
-        while let Some(speed_um_s) = runs.next_speed() {
-            let (from, to, current_a) = self.run_unloaded(speed_um_s)?;
-            runs.took(from, to, current_a);
+    /// A part does not answer as it must; it may be tried again.
+    pub fn start_finger(&mut self) -> Result<(), SimError> {
+        if self.started {
+            return Ok(());
         }
-        let calibration = runs.finish(self.control.calibration())?;
-        self.control.calibrate(calibration)?;
-        Ok(calibration)
-    }
-
-    /// Where the stage stood before a run over the sample and after it, and its mean motor current.
-    fn run_unloaded(&mut self, speed_um_s: u32) -> Result<(f32, f32, Option<f32>), SimError> {
-        let from = self.control.stage_mm();
-        self.control.start_unloaded(speed_um_s)?;
-        self.rest(|_| ())?;
-        Ok((from, self.control.stage_mm(), self.control.mean_current_a()))
-    }
-
-    /// The sensor's serial number, asked for between two slots.
-    ///
-    /// # Errors
-    /// It is not that of a BioTac.
-    pub fn serial(&mut self) -> Result<[u8; 16], SimError> {
-        let mut bytes = biotac::IdentityBytes::default();
-        for (transactions, place) in bytes.reads() {
-            let Ok(answer) = slot::perform(&transactions, |transaction, miso| {
-                let duration_ns = TRANSFER_NS / 2 * miso.len() as u64;
-                self.world
-                    .spi(self.now_ns, duration_ns, transaction.out, miso);
-                // the timer of the slots stands meanwhile
-                self.now_ns += TICK_NS / 4;
-                Ok::<(), Infallible>(())
-            });
-            biotac::keep(place, &answer);
+        let world = &mut self.world;
+        let ended_ns = self.reader.start_up(self.now_ns, |transfer, mosi, miso| {
+            world.transfer(transfer, mosi, miso);
+        })?;
+        self.started = true;
+        while self.now_ns < ended_ns {
+            self.tick();
         }
-        let identity = bytes.decode()?;
-        let mut serial = [0; 16];
-        for (byte, character) in serial.iter_mut().zip(identity.serial.as_str().bytes()) {
-            *byte = character;
+        // until each channel has been heard
+        for _ in 0..10 {
+            self.tick();
         }
-        Ok(serial)
-    }
-
-    /// Measures everything that differs from rig to rig: the motor current without load, newtons per ampere on the
-    /// inclined stage, P_DC in the air, and its counts per newton on a force plate. `date` as 20261121.
-    ///
-    /// # Errors
-    /// See [`SimError`].
-    pub fn calibrate(&mut self, date: u32) -> Result<RigCalibration, SimError> {
-        let serial = self.serial()?;
-        let unloaded = self.calibrate_current()?;
-        let mut incline = LineFit::default();
-        for pull_n in [0.0f32, 1.0, 2.0, 3.0] {
-            self.world.incline(pull_n.into());
-            for _ in 0..2 {
-                // to the right: the way of every slide
-                if let (from, to, Some(current_a)) = self.run_unloaded(25_000)?
-                    && to > from
-                {
-                    incline.push(pull_n, current_a);
-                }
-            }
-        }
-        self.world.incline(0.0);
-        let (_, ampere_per_newton) = incline.line()?;
-        // the plate is what lies under the finger, and reads what really presses on it
-        let mut plate = LineFit::default();
-        for force_mn in [300, 600, 900, 1200] {
-            let Ok(movement) = Movement::new(force_mn, 10_000) else {
-                continue;
-            };
-            let mn_per_count = unloaded.pressure.force_mn_per_count;
-            self.control.start(movement, 0.0)?;
-            while self.control.phase() != Phase::Sliding {
-                self.tick();
-                if let Phase::Faulted(fault) = self.control.phase() {
-                    return Err(fault.into());
-                }
-            }
-            plate.push(
-                self.control.force_mn() / mn_per_count,
-                (self.world.truth().force_n * 1e3) as f32,
-            );
-            self.control.stop();
-            self.rest(|_| ())?;
-        }
-        let (_, force_mn_per_count) = plate.line()?;
-        let calibration = RigCalibration {
-            pressure: Calibration {
-                force_mn_per_count,
-                ..unloaded.pressure
-            },
-            newton_per_ampere: 1.0 / ampere_per_newton,
-            date,
-            serial,
-            ..unloaded
-        };
-        let air = self.control.air_counts();
-        let calibration = air.map_or(calibration, |counts| calibration.with_air(counts));
-        self.control.calibrate(calibration)?;
-        Ok(calibration)
+        Ok(())
     }
 
     /// Makes one movement, beginning at `start` (0 to 1 of the room that the sample leaves); `each` sees what every tick
@@ -585,3 +511,7 @@ impl Rig for SimRig {
         self.go_on(failed)
     }
 }
+
+#[cfg(test)]
+mod fingers;
+mod measuring;

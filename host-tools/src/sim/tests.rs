@@ -3,6 +3,7 @@
 mod bench;
 mod collection;
 mod finger;
+mod fingers;
 mod paper;
 mod protocol;
 mod surface;

@@ -13,16 +13,22 @@
 use super::conditions::Conditions;
 use super::encoder::{Edge, Encoder};
 use super::faults::{Fault, Faults, Miso};
-use super::finger::{Contact, Finger};
+use std::f64::consts::TAU;
+
+use super::finger::{Contact, Finger, Held};
 use super::lever::Lever;
+use super::maths::sin;
 use super::mount::Mount;
+use super::parts::{ClockMode, Peers};
 use super::person::Hand;
 use super::played::{PlayCounts, Played};
 use super::ripple::PwmPhase;
 use super::sensor::SensorPeer;
+use super::slot::Transfer;
 use super::stage::Stage;
 use super::surface::Surface;
 use super::{noise::Noise, textures};
+use tactus_core::sensor::FingerName;
 
 /// What a world is made from.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -35,6 +41,8 @@ pub struct Setup {
     pub trial_seed: u64,
     /// Which fingertip it is.
     pub finger_seed: u64,
+    /// Which kind of finger it is.
+    pub finger: FingerName,
     /// Whether [`World::next_encoder_edge`] is going to be asked: edges are kept until then.
     pub keep_edges: bool,
     /// Whether samples lie on shims: those that are thinner than [`World::SHIMMED_MM`] end at that height. The finger's way
@@ -49,6 +57,7 @@ impl Default for Setup {
             world_seed: 1,
             trial_seed: 1,
             finger_seed: 1,
+            finger: FingerName::Biotac,
             keep_edges: false,
             shimmed: false,
         }
@@ -118,7 +127,7 @@ pub struct World {
     encoder: Encoder,
     surface: Surface,
     finger: Finger,
-    sensor: SensorPeer,
+    peers: Peers,
     /// bytes since chip select fell
     selected: Option<usize>,
     miso: Miso,
@@ -132,6 +141,8 @@ pub struct World {
     pull_n: f64,
     /// holds the finger in place of lever and stage
     hand: Option<Hand>,
+    /// amplitude, g, and frequency, Hz, of what shakes the table under the rig
+    table: (f64, f64),
 }
 
 impl World {
@@ -152,6 +163,8 @@ impl World {
         // one finger in all trials, but each has landings and noise of its own
         let finger_noise = setup.finger_seed.rotate_left(32) ^ trial.uniform().to_bits();
         let [tip_mm, stage_mm] = Self::POWER_UP_MM.map(|(low, high)| trial.between(low, high));
+        let finger = Finger::under([setup.finger_seed, finger_noise], conditions)
+            .of(setup.finger, setup.finger_seed);
         let mut world = Self {
             setup,
             variation: conditions.variation,
@@ -160,13 +173,18 @@ impl World {
             tick_began_ns: 0,
             tick_ends_ns: 0,
             lever: Lever::new(tip_mm, setup.world_seed, setup.trial_seed),
-            mount: Mount::STIFF,
+            // without a second witness of the force, the mount is what yields
+            mount: if setup.finger == FingerName::Mems {
+                Mount::SPRUNG
+            } else {
+                Mount::STIFF
+            },
             stage: Stage::new(stage_mm, setup.world_seed, setup.trial_seed),
             wanted: (false, false),
             encoder: Encoder::new(stage_mm, setup.keep_edges),
             surface: sample(setup.texture, setup.world_seed, conditions.variation),
-            finger: Finger::under([setup.finger_seed, finger_noise], conditions),
-            sensor: SensorPeer::new(setup.finger_seed),
+            peers: Peers::new(&finger, setup.finger_seed),
+            finger,
             selected: None,
             miso: Miso::new(setup.trial_seed),
             faults: Faults::default(),
@@ -176,6 +194,7 @@ impl World {
             sliding_j: 0.0,
             pull_n: 0.0,
             hand: None,
+            table: (0.0, 0.0),
         };
         world.advance_to(0);
         world
@@ -237,24 +256,52 @@ impl World {
         self.stage.enable(stage && on && !self.faults.bridge_off);
     }
 
-    /// One transfer with the sensor, chip select low from `now_ns` for `duration_ns`; fills `miso`.
+    /// One transfer with the finger's first part in mode 0, chip select low from `now_ns` for `duration_ns`; fills `miso`.
     pub fn spi(&mut self, now_ns: u64, duration_ns: u64, mosi: &[u8], miso: &mut [u8]) {
-        self.spi_select(now_ns);
+        let transfer = Transfer {
+            part: 0,
+            mode: ClockMode::of(0),
+            begins_ns: now_ns,
+            takes_ns: duration_ns,
+        };
+        self.transfer(&transfer, mosi, miso);
+    }
+
+    /// The same with any part in any mode.
+    pub fn transfer(&mut self, transfer: &Transfer, mosi: &[u8], miso: &mut [u8]) {
+        self.spi_select_part(transfer.begins_ns, transfer.part, transfer.mode);
         for (mosi, miso) in mosi.iter().zip(miso) {
             *miso = self.spi_byte(*mosi);
         }
-        self.spi_deselect(now_ns + duration_ns);
+        self.spi_deselect(transfer.begins_ns + transfer.takes_ns);
     }
 
-    /// The sensor's end of the bus.
+    /// The sensor's end of the bus, of a BioTac.
+    ///
+    /// # Panics
+    /// It is another finger.
     pub fn sensor(&self) -> &SensorPeer {
-        &self.sensor
+        match &self.peers {
+            Peers::BioTac(sensor) => sensor,
+            _ => panic!("the finger is no BioTac"),
+        }
     }
 
-    /// The sensor's chip select falls.
+    /// What the finger's parts have to complain of: writes to reserved bits, and commands that there are not. A BioTac's are
+    /// [`SensorPeer::complaints`].
+    pub fn complaints(&self) -> u64 {
+        self.peers.complaints()
+    }
+
+    /// The chip select of the finger's first part falls, in mode 0.
     pub fn spi_select(&mut self, now_ns: u64) {
+        self.spi_select_part(now_ns, 0, ClockMode::of(0));
+    }
+
+    /// The chip select of a part falls, with the bus in this mode.
+    pub fn spi_select_part(&mut self, now_ns: u64, part: u8, mode: ClockMode) {
         self.advance_to(now_ns);
-        self.sensor.select(now_ns);
+        self.peers.select(now_ns, part, mode);
         self.selected = Some(0);
     }
 
@@ -265,20 +312,25 @@ impl World {
             return Miso::idle(&self.faults);
         };
         let fraction = self.fraction();
-        self.sensor.byte(mosi, &mut self.finger, fraction);
+        let said = self
+            .peers
+            .byte(self.now_ns, mosi, &mut self.finger, fraction);
+        self.selected = Some(count + 1);
+        let Peers::BioTac(sensor) = &mut self.peers else {
+            return self.miso.disturb(said, &self.faults);
+        };
         if count == 0 {
-            let line = self.sensor.line();
+            let line = sensor.line();
             self.miso.pass(self.now_ns, mosi, line, &self.faults);
         }
-        self.selected = Some(count + 1);
-        let line = self.sensor.line().get(count).copied();
+        let line = sensor.line().get(count).copied();
         line.unwrap_or(Miso::idle(&self.faults))
     }
 
     /// The sensor's chip select rises; time does not pass by it.
     pub fn spi_deselect(&mut self, now_ns: u64) {
         self.selected = None;
-        self.sensor.deselect(now_ns);
+        self.peers.deselect(now_ns);
     }
 
     /// Count of the stage's encoder, 1000 per mm, 0 where it stood at power-up.
@@ -356,6 +408,13 @@ impl World {
         self.mount = mount;
     }
 
+    /// Something on the same table shakes the rig from now on, such as a printer: amplitude, g, and frequency, Hz. A BioTac's fluid
+    /// hardly feels it.
+    pub fn shake(&mut self, g: f64, hz: f64) {
+        self.table = (g, hz);
+        self.finger.hold(Held::STILL);
+    }
+
     /// Has a hand hold the finger from now on, in place of lever and stage, which move without it.
     pub fn hold(&mut self, hand: Hand) {
         self.hand = Some(hand);
@@ -363,6 +422,7 @@ impl World {
 
     /// The finger is on the lever again, wherever that is.
     pub fn put_back(&mut self) {
+        self.finger.hold(Held::STILL);
         self.hand = None;
     }
 
@@ -445,6 +505,7 @@ impl World {
         let shear_n = self.finger.shear_n();
         if let Some(hand) = &mut self.hand {
             hand.tick(self.finger.force_n());
+            self.finger.hold(hand.held());
             self.finger.tick(&Contact {
                 indentation_mm: hand.indentation_mm(),
                 surface: Some(&self.surface),
@@ -452,11 +513,20 @@ impl World {
                 speed_mm_s: hand.speed_mm_s(),
                 lever_vibration: 0.0,
             });
+            self.peers.tick(self.tick_ends_ns, &self.finger);
             self.force_max_n = self.force_max_n.max(self.finger.force_n());
             self.move_motors(0.0, 0.0);
             return;
         }
         let force_n = self.finger.force_n();
+        let (table_g, hz) = self.table;
+        if table_g != 0.0 {
+            let turns = hz * self.tick_ends_ns as f64 * 1e-9;
+            self.finger.hold(Held {
+                acceleration_g: table_g * sin(TAU * turns),
+                ..Held::STILL
+            });
+        }
         self.mount.tick(force_n);
         let [from_mm, to_mm] = self.move_motors(force_n, shear_n);
         self.finger.tick(&Contact {
@@ -467,6 +537,7 @@ impl World {
             lever_vibration: self.lever.vibration_pa(),
         });
 
+        self.peers.tick(self.tick_ends_ns, &self.finger);
         self.force_max_n = self.force_max_n.max(self.finger.force_n());
         self.stage_reach_mm.0 = self.stage_reach_mm.0.min(to_mm);
         self.stage_reach_mm.1 = self.stage_reach_mm.1.max(to_mm);

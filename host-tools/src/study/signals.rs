@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use tactus_core::dsp::{BIN_HZ, Plan, TAPS, Taps};
 use tactus_core::features::Movement;
 use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::sensor::FingerName;
 use tactus_core::sensor::pressure::{Calibration, RATE_HZ};
 
 use super::error::StudyError;
@@ -14,7 +15,7 @@ use crate::data::replay::measure;
 use crate::sim::collection::{Trial, TrialError};
 use crate::sim::finger::PAC_PA_PER_COUNT;
 use crate::sim::rig::SimError;
-use crate::sim::slot::{TRANSFER_NS, word_of_slot};
+use crate::sim::slot::Reader;
 
 /// Numbers of the sessions: see [`super::slides::Session::number`].
 const PRESS: u64 = 5;
@@ -123,12 +124,14 @@ fn press(world: StudyWorld) -> Press {
     let (mut loading, mut unloading, mut air) = (Vec::new(), Vec::new(), Vec::new());
     let mut point = (Vec::new(), 0.0);
     let mut down = true;
+    let mut reader = Reader::new(FingerName::Biotac);
     loop {
         now_ns += step_ns;
         world.lever_step(now_ns, true);
         world.lever_step(now_ns + step_ns / 2, false);
-        let word = word_of_slot(PDC, now_ns + step_ns / 2 + 5_000, |at_ns, mosi, miso| {
-            world.spi(at_ns, TRANSFER_NS, mosi, miso);
+        let at_ns = now_ns + step_ns / 2 + 5_000;
+        let word = reader.word_of_slot(PDC, at_ns, |transfer, mosi, miso| {
+            world.transfer(transfer, mosi, miso);
         });
         let Some(word) = word else { continue };
         let (counts, force_n) = (f64::from(word.counts.get()), world.truth().force_n);

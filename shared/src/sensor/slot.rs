@@ -3,7 +3,7 @@
 
 use core::ops::RangeInclusive;
 
-use embedded_hal::spi::Mode;
+use embedded_hal::spi::{Mode, Phase, Polarity};
 
 /// A part of a finger as the bus sees it: what has a chip select of its own.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -14,6 +14,15 @@ pub struct Port {
     pub mode: Mode,
     /// Clocks that the part works with, Hz.
     pub clock_hz: RangeInclusive<u32>,
+}
+
+impl Port {
+    /// Its SPI mode by number: bit 1 is the clock's polarity, bit 0 its phase.
+    pub fn mode_number(&self) -> u8 {
+        let polarity = u8::from(self.mode.polarity == Polarity::IdleHigh);
+        let phase = u8::from(self.mode.phase == Phase::CaptureOnSecondTransition);
+        polarity << 1 | phase
+    }
 }
 
 /// One period of chip select, and the pause after it. Most significant bit first.

@@ -38,7 +38,7 @@ const WARM_S: f64 = 60.0;
 const DRIFT_TICKS: u32 = TICKS_PER_S / 100;
 
 /// The amplifiers and what they remember.
-pub(super) struct Amplifiers {
+pub(in super::super) struct Amplifiers {
     pac_rest: f64,
     pac_noise_pa: f64,
     pdc_rest: f64,
@@ -139,7 +139,7 @@ impl Amplifiers {
     }
 }
 
-fn between([a, b]: [f64; 2], fraction: f64) -> f64 {
+pub(super) fn between([a, b]: [f64; 2], fraction: f64) -> f64 {
     a + (b - a) * fraction.clamp(0.0, 1.0)
 }
 
@@ -150,26 +150,26 @@ fn counts(value: f64) -> u16 {
 
 /// The lower end of the band: first order.
 #[derive(Default)]
-struct HighPass {
+pub(super) struct HighPass {
     slow: f64,
 }
 
 impl HighPass {
-    fn tick(&mut self, x: f64) -> f64 {
+    pub(super) fn tick(&mut self, x: f64) -> f64 {
         self.slow += (x - self.slow) * (2.0 * PI * BAND_HZ.0 * TICK_S);
         x - self.slow
     }
 }
 
 /// The upper end of the band: second order, Butterworth (chosen; the paper says "anti-aliasing").
-struct LowPass {
+pub(super) struct LowPass {
     b: f64,
     a: [f64; 2],
     z: [f64; 2],
 }
 
 impl LowPass {
-    fn new(hz: f64) -> Self {
+    pub(super) fn new(hz: f64) -> Self {
         let k = tan(PI * hz * TICK_S);
         let norm = 1.0 / (1.0 + k / FRAC_1_SQRT_2 + k * k);
         Self {
@@ -182,7 +182,7 @@ impl LowPass {
         }
     }
 
-    fn tick(&mut self, x: f64) -> f64 {
+    pub(super) fn tick(&mut self, x: f64) -> f64 {
         let y = self.b * x + self.z[0];
         self.z[0] = 2.0 * self.b * x - self.a[0] * y + self.z[1];
         self.z[1] = self.b * x - self.a[1] * y;

@@ -2,6 +2,7 @@
 
 use super::World;
 use crate::sim::faults::{Fault, Faults};
+use crate::sim::parts::{PartFault, Peers};
 
 impl World {
     /// Breaks something now, or presses the stop. Faults add up.
@@ -14,7 +15,10 @@ impl World {
         let now = self.switches();
         let faults = &mut self.faults;
         match fault {
-            Fault::SensorUnplugged => self.sensor.unplug(),
+            Fault::SensorUnplugged => match &mut self.peers {
+                Peers::BioTac(sensor) => sensor.unplug(),
+                peers => peers.break_part(at_ns, PartFault::Unplugged, &mut self.finger),
+            },
             Fault::BitFlips { share } => faults.flip_share = share,
             Fault::WordNoise { share } => faults.noise_share = share,
             Fault::MisoStuck { high } => faults.miso_stuck = Some(high),
@@ -55,6 +59,11 @@ impl World {
         }
     }
 
+    /// Breaks something of the finger's parts; a BioTac has none.
+    pub fn break_part(&mut self, fault: PartFault) {
+        self.peers.break_part(self.now_ns, fault, &mut self.finger);
+    }
+
     /// Lets something break at a time, to the tick: up to 76 us late.
     pub fn schedule(&mut self, at_ns: u64, fault: Fault) {
         self.scheduled.push((at_ns, fault));
@@ -67,7 +76,7 @@ impl World {
     pub fn clear(&mut self) {
         self.faults = Faults::default();
         self.scheduled.clear();
-        self.sensor.plug(self.now_ns);
+        self.peers.mend(self.now_ns);
         self.finger.mend();
         self.stage.jam(false);
         self.stage.decay_fast(false);
