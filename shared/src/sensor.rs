@@ -17,4 +17,4 @@ pub mod slot;
 
 pub use driver::{Driver, Error, PressureSensor, StartError, slot_of};
 pub use finger::{AtRest, FingerModel, FingerName, UnknownFinger};
-pub use finger_code::{FingerCode, NoFinger};
+pub use finger_code::FingerCode;

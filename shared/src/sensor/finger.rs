@@ -19,7 +19,7 @@ pub enum FingerName {
 }
 
 impl FingerName {
-    /// All of them.
+    /// All of them, by their numbers ([`super::FingerCode`]): new ones go to the end.
     pub const ALL: [Self; 3] = [Self::Biotac, Self::Analog, Self::Mems];
 
     /// Its name, at most eight letters of ASCII.

@@ -3,6 +3,7 @@
 use core::fmt;
 use core::str::FromStr;
 
+use super::finger::{FingerName, UnknownFinger};
 use serde::de::{Error, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -10,42 +11,37 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub struct FingerCode(pub u8);
 
-/// The names, by number: new ones go to the end.
-const NAMES: [&str; 3] = ["biotac", "analog", "mems"];
 /// What a number without a name is called, before the number.
 const NAMELESS: &str = "finger-";
 
 impl FingerCode {
     /// SynTouch's BioTac; also the finger of all tables, recordings and messages that do not say.
-    pub const BIOTAC: Self = Self(0);
-    /// A piezo disc and a load cell on an MCP3202.
-    pub const ANALOG: Self = Self(1);
-    /// An accelerometer IIS3DWB, and a load cell on an ADS1220.
-    pub const MEMS: Self = Self(2);
+    pub const BIOTAC: Self = Self::of(FingerName::Biotac);
+    /// Of the `mems`.
+    pub const MEMS: Self = Self::of(FingerName::Mems);
+
+    /// The number of a finger: its place among [`FingerName::ALL`].
+    pub const fn of(finger: FingerName) -> Self {
+        Self(finger as u8)
+    }
 }
 
 impl fmt::Display for FingerCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match NAMES.get(usize::from(self.0)) {
-            Some(name) => f.write_str(name),
+        match FingerName::ALL.get(usize::from(self.0)) {
+            Some(name) => f.write_str(name.as_str()),
             None => write!(f, "{NAMELESS}{}", self.0),
         }
     }
 }
 
-/// It names no finger.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("no finger has this name: there are biotac, analog and mems")]
-pub struct NoFinger;
-
 impl FromStr for FingerCode {
-    type Err = NoFinger;
+    type Err = UnknownFinger;
 
-    fn from_str(name: &str) -> Result<Self, NoFinger> {
-        let known = (0..).zip(NAMES).find(|(_, known)| *known == name);
-        let number = || name.strip_prefix(NAMELESS)?.parse().ok();
-        let code = known.map(|(code, _)| code).or_else(number);
-        code.map(Self).ok_or(NoFinger)
+    fn from_str(name: &str) -> Result<Self, UnknownFinger> {
+        let number = || name.strip_prefix(NAMELESS)?.parse().ok().map(Self);
+        let known = name.parse().ok().map(Self::of);
+        known.or_else(number).ok_or(UnknownFinger)
     }
 }
 
@@ -99,7 +95,7 @@ mod tests {
             assert_eq!(code.to_string().parse(), Ok(code));
         }
         for name in ["", "BioTac", "finger-", "finger-256", "mems "] {
-            assert_eq!(name.parse::<FingerCode>(), Err(NoFinger));
+            assert_eq!(name.parse::<FingerCode>(), Err(UnknownFinger));
         }
         assert_eq!(FingerCode::MEMS.to_string(), "mems");
         assert_eq!(FingerCode(77).to_string(), "finger-77");

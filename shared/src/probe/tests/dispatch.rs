@@ -6,7 +6,7 @@ use crate::probe::seams::{Events, Panel, RigHandle, StoredBytes, UnloadedRun};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::rig::{Fault, Phase};
-use crate::sensor::FingerCode;
+use crate::sensor::{FingerCode, FingerName};
 use crate::store::{Store, StoreError};
 use crate::wire::{
     Command, Counts, Failure, Forget, MemoryError, PART, Request, Status, TextureLearned,
@@ -194,7 +194,7 @@ fn a_stored_table_that_cannot_be_read_is_reported() {
     // nor is one of another finger put in force
     let mut other = vec![0; factory.len() + crate::table::FINGER_LENGTH];
     let table = crate::table::Table::read(&factory).unwrap();
-    crate::table::with_finger(&mut other, &table, FingerCode::ANALOG, 0).unwrap();
+    crate::table::with_finger(&mut other, &table, FingerCode::of(FingerName::Analog), 0).unwrap();
     for (stored, told) in [(factory.clone(), 0), (damaged, 1), (other, 1)] {
         let store = block_on(Store::open(Ram::new())).unwrap();
         let mut buffer = vec![0; SECTOR];

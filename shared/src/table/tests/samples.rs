@@ -4,7 +4,7 @@
 use super::damage::read_all;
 use super::sections::{changed, full};
 use super::*;
-use crate::sensor::FingerCode;
+use crate::sensor::{FingerCode, FingerName};
 
 const NOTES: [Option<bool>; 4] = [Some(true), Some(false), None, Some(true)];
 
@@ -145,7 +145,7 @@ fn the_finger_stays_when_a_table_learns_and_a_table_without_one_is_a_biotacs() {
                 table.of_finger(finger).map(|table| table.crc()),
                 Ok(table.crc())
             );
-            let probe = FingerCode::ANALOG;
+            let probe = FingerCode::of(FingerName::Analog);
             let refused = table.of_finger(probe).map(|table| table.crc());
             let why = TableError::Finger {
                 table: finger,
