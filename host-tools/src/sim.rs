@@ -38,6 +38,7 @@ pub mod slot;
 pub mod stage;
 pub mod surface;
 pub mod textures;
+pub mod wiring;
 pub mod world;
 
 pub use conditions::{Conditions, TICK_S, TICKS_PER_S, TRIAL_VARIATION};

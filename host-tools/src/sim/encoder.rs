@@ -35,6 +35,8 @@ pub struct Encoder {
     cut: Option<Cut>,
     /// lines A and B are exchanged
     swapped: bool,
+    /// counts of a mm
+    per_mm: f64,
     /// count - what [`Encoder::followed`] says
     offset: i64,
     /// counts, when they were reached and how the lines were then, if somebody wants edges
@@ -49,6 +51,7 @@ impl Encoder {
             origin: (position_mm * COUNTS_PER_MM).floor(),
             cut: None,
             swapped: false,
+            per_mm: COUNTS_PER_MM,
             offset: 0,
             passed: edges.then(VecDeque::new),
             shown: lines(0, None),
@@ -63,7 +66,7 @@ impl Encoder {
         };
         let wires = (self.cut, self.swapped);
         let mut pass = |count: i64, boundary: i64| {
-            let at_mm = (boundary as f64 + self.origin) / COUNTS_PER_MM;
+            let at_mm = (boundary as f64 + self.origin) / self.per_mm;
             let share = ((at_mm - from_mm) / (to_mm - from_mm)).clamp(0.0, 1.0);
             let at_ns = began_ns + (share * (ended_ns - began_ns) as f64) as u64;
             passed.push_back((count, edge(at_ns, count, wires)));
@@ -79,6 +82,18 @@ impl Encoder {
     pub fn count(&self, position_mm: f64) -> i32 {
         let followed = followed(self.counts(position_mm), self.cut);
         (self.offset + if self.swapped { -followed } else { followed }) as i32
+    }
+
+    /// An encoder of this share of the lines, with the stage at a position where it counts 0.
+    pub fn set_lines(&mut self, share: f64, position_mm: f64) {
+        self.per_mm = COUNTS_PER_MM * share;
+        self.origin = (position_mm * self.per_mm).floor();
+    }
+
+    /// Whether something drives lines A and B at the chip.
+    pub fn is_wired(&self) -> (bool, bool) {
+        let cut = |line| self.cut == Some(line) || self.cut == Some(Cut::Both);
+        (!cut(Cut::A), !cut(Cut::B))
     }
 
     /// Exchanges lines A and B, or puts them right, at a time with the stage at a position. Edges of that tick that are yet to
@@ -127,14 +142,21 @@ impl Encoder {
         while let Some((_, edge)) = passed.pop_front_if(|(_, edge)| edge.at_ns <= now_ns) {
             if (edge.a, edge.b) != self.shown {
                 self.shown = (edge.a, edge.b);
-                return Some(edge);
+                return Some(match self.swapped {
+                    true => Edge {
+                        a: edge.b,
+                        b: edge.a,
+                        ..edge
+                    },
+                    false => edge,
+                });
             }
         }
         None
     }
 
     fn counts(&self, position_mm: f64) -> i64 {
-        ((position_mm * COUNTS_PER_MM).floor() - self.origin) as i64
+        ((position_mm * self.per_mm).floor() - self.origin) as i64
     }
 }
 

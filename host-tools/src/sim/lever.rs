@@ -68,6 +68,10 @@ pub struct Lever {
     enabled: bool,
     /// DIR's wire comes in inverted (fault)
     inverted: bool,
+    /// a coil has no current: the rotor does not turn
+    coil_open: bool,
+    /// microsteps of a pulse
+    per_pulse: i64,
     /// whether the last rising edge was a step: a short pulse takes it back
     last_edge_stepped: bool,
     last_step_ns: Option<u64>,
@@ -87,6 +91,8 @@ pub struct Lever {
     height_mm: f64,
     error_phase: [f64; 2],
     at_top: bool,
+    /// a finger holds its switch
+    held: bool,
     vibration: Hum,
     noise: Noise,
     began_at: f64,
@@ -131,6 +137,8 @@ impl Lever {
             dir: Pin::default(),
             enabled: false,
             inverted: false,
+            coil_open: false,
+            per_pulse: 1,
             last_edge_stepped: false,
             last_step_ns: None,
             rate: 0.0,
@@ -144,6 +152,7 @@ impl Lever {
             height_mm,
             error_phase: [motor.between(0.0, TAU), motor.between(0.0, TAU)],
             at_top: false,
+            held: false,
             vibration: Hum::SILENT,
             noise: Noise::new(trial_seed, STREAM),
             began_at: rotor,
@@ -189,7 +198,7 @@ impl Lever {
             self.bad_pulses += 1;
             if self.last_edge_stepped {
                 self.last_edge_stepped = false;
-                self.field -= self.direction;
+                self.field -= self.direction * self.per_pulse;
                 self.follow(load_n);
             }
         }
@@ -257,7 +266,12 @@ impl Lever {
 
     /// The limit switch at the top.
     pub fn at_top(&self) -> bool {
-        self.at_top
+        self.at_top || self.held
+    }
+
+    /// A finger holds its switch actuated, or not.
+    pub fn hold_switch(&mut self, held: bool) {
+        self.held = held;
     }
 
     /// Steps down that STEP edges asked for and the rotor did not make, less those up.
@@ -273,6 +287,16 @@ impl Lever {
     /// From now on DIR says the opposite; `false` ends it.
     pub fn invert_dir(&mut self, on: bool) {
         self.inverted = on;
+    }
+
+    /// A coil of the motor is not connected.
+    pub fn open_coil(&mut self) {
+        self.coil_open = true;
+    }
+
+    /// The driver makes so many microsteps of a pulse, and not one.
+    pub fn set_microsteps(&mut self, per_pulse: i64) {
+        self.per_pulse = per_pulse;
     }
 
     /// Turns the screw by its knob while there is no current: so far up, mm. Whether it could be turned.
@@ -308,7 +332,7 @@ impl Lever {
             START_STOP_PER_S
         };
         let can_run_at = (ran_at * ran_at + 2.0 * RAMP_PER_S2).sqrt().min(TOP_PER_S);
-        self.field += sign;
+        self.field += sign * self.per_pulse;
         self.direction = sign;
         self.last_step_ns = Some(at_ns);
         if rate <= START_STOP_PER_S || (!self.stalled && rate <= can_run_at * RATE_SLACK) {
@@ -324,7 +348,7 @@ impl Lever {
 
     /// Turns the rotor to the nearest place where it agrees with the field, or against the hard stop.
     fn follow(&mut self, load_n: f64) {
-        if self.enabled {
+        if self.enabled && !self.coil_open {
             let half = PERIOD as f64 / 2.0;
             let lag = (self.field as f64 - self.rotor + half).rem_euclid(PERIOD as f64) - half;
             self.turn(lag, load_n);

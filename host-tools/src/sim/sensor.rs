@@ -104,6 +104,11 @@ impl SensorPeer {
         &self.complaints
     }
 
+    /// Whether it has power.
+    pub fn is_plugged(&self) -> bool {
+        self.powered_ns.is_some()
+    }
+
     /// Pulls the plug.
     pub fn unplug(&mut self) {
         self.powered_ns = None;

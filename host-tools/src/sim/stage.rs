@@ -77,6 +77,11 @@ pub const LIMIT_HYSTERESIS_MM: f64 = 0.1;
 pub const ADC_V_PER_A: f64 = 1.0;
 /// Reference of the 12-bit converter, V.
 pub const ADC_REFERENCE_V: f64 = 3.3;
+/// L/R of a resistor in the place of the motor, s (chosen: 22 ohm of wire, and a metre of cable).
+pub const RESISTOR_TIME_CONSTANT_S: f64 = 0.1e-6;
+/// A hand pushes the stage at this speed, mm/s (chosen).
+pub const HAND_MM_S: f64 = 30.0;
+
 /// Noise of a reading, counts rms (chosen).
 pub const ADC_NOISE_COUNTS: f64 = 1.5;
 /// Largest error of the zero, counts, and of the gain (chosen; offset of amplifier and resistors, shunt of 0.5 %).
@@ -91,6 +96,10 @@ pub struct Stage {
     enabled: bool,
     jammed: bool,
     decays_fast: bool,
+    /// in the place of the motor, ohm
+    resistor: Option<f64>,
+    /// where a hand pushes it to
+    pushed_mm: Option<f64>,
     /// amplitude of its vibration, um
     vibration_um: f64,
     /// at the end of the last tick, and at its begin
@@ -99,6 +108,8 @@ pub struct Stage {
     speed_mm_s: f64,
     current_a: f64,
     limits: (bool, bool),
+    /// switches that a finger holds
+    held: (bool, bool),
     friction_scale: f64,
     friction_phase: [f64; 2],
     ripple_phase: f64,
@@ -128,12 +139,15 @@ impl Stage {
             enabled: false,
             jammed: false,
             decays_fast: false,
+            resistor: None,
+            pushed_mm: None,
             vibration_um: 0.0,
             position_mm,
             position_before_mm: position_mm,
             speed_mm_s: 0.0,
             current_a: 0.0,
             limits: (false, false),
+            held: (false, false),
             friction_scale: 1.0 + FRICTION_SPREAD * trial.normal(),
             friction_phase: [stage.between(0.0, TAU), stage.between(0.0, TAU)],
             ripple_phase: stage.between(0.0, TAU),
@@ -171,6 +185,30 @@ impl Stage {
         self.decays_fast = fast;
     }
 
+    /// Puts a resistor of so many ohm in the place of the motor, or the motor back.
+    pub fn replace_motor(&mut self, ohm: Option<f64>) {
+        self.resistor = ohm;
+    }
+
+    /// A hand pushes the stage to a place, and leaves it there.
+    pub fn push(&mut self, to_mm: f64) {
+        self.pushed_mm = Some(to_mm.clamp(0.0, TRAVEL_MM));
+    }
+
+    /// A tick in which a hand pushes it.
+    fn follow_hand(&mut self, to_mm: f64) {
+        self.position_before_mm = self.position_mm;
+        let most_mm = HAND_MM_S * TICK_S;
+        let way_mm = (to_mm - self.position_mm).clamp(-most_mm, most_mm);
+        self.position_mm += way_mm;
+        self.current_a = 0.0;
+        if self.position_mm == to_mm {
+            self.pushed_mm = None;
+        }
+        self.along = self.along();
+        self.switch_limits();
+    }
+
     /// Mean current over a period of the PWM, A: driven by the supply, then against it through the diodes until there is none.
     fn fast_current_a(&self) -> f64 {
         let emf_v = self.along.force_n_per_a * self.speed_mm_s * 1e-3 * self.duty.signum();
@@ -194,13 +232,26 @@ impl Stage {
 
     /// Lets one tick pass, the finger pushing the stage with `shear_n` (positive to higher positions).
     pub fn tick(&mut self, shear_n: f64) {
+        if let Some(to_mm) = self.pushed_mm {
+            self.follow_hand(to_mm);
+            return;
+        }
         let force_n_per_a = self.along.force_n_per_a;
-        let (drive_v, conductance) = match (self.enabled, self.decays_fast) {
-            (false, _) => (0.0, 0.0),
-            (true, false) => (self.duty * SUPPLY_V, 1.0 / RESISTANCE_OHM),
-            // as much at the speed of now, which a tick changes little
-            (true, true) => (self.fast_current_a() * RESISTANCE_OHM, 1.0 / RESISTANCE_OHM),
-        };
+        if let Some(ohm) = self.resistor {
+            let drive_v = if self.enabled {
+                self.duty * SUPPLY_V
+            } else {
+                0.0
+            };
+            self.current_a = drive_v / ohm;
+        }
+        let (drive_v, conductance) =
+            match (self.enabled && self.resistor.is_none(), self.decays_fast) {
+                (false, _) => (0.0, 0.0),
+                (true, false) => (self.duty * SUPPLY_V, 1.0 / RESISTANCE_OHM),
+                // as much at the speed of now, which a tick changes little
+                (true, true) => (self.fast_current_a() * RESISTANCE_OHM, 1.0 / RESISTANCE_OHM),
+            };
         // what a faster motor lacks of its current, per V of back-EMF
         let braking = if self.decays_fast { 0.0 } else { conductance };
         let v = self.speed_mm_s * 1e-3;
@@ -208,7 +259,9 @@ impl Stage {
         let push_n = force_n_per_a * drive_v * conductance + shear_n;
         self.position_before_mm = self.position_mm;
         if self.speed_mm_s == 0.0 && push_n == 0.0 {
-            self.current_a = drive_v * conductance;
+            if self.resistor.is_none() {
+                self.current_a = drive_v * conductance;
+            }
             return;
         }
         let drag = force_n_per_a * force_n_per_a * braking + VISCOUS_N_S_PER_M;
@@ -221,7 +274,9 @@ impl Stage {
         } else {
             free - dry * free.signum()
         };
-        self.current_a = drive_v * conductance - force_n_per_a * after * braking;
+        if self.resistor.is_none() {
+            self.current_a = drive_v * conductance - force_n_per_a * after * braking;
+        }
         self.position_mm += after * 1e3 * TICK_S;
         self.speed_mm_s = after * 1e3;
         if !(0.0..=TRAVEL_MM).contains(&self.position_mm) {
@@ -281,7 +336,12 @@ impl Stage {
 
     /// The limit switches at the lower and the upper end.
     pub fn limits(&self) -> (bool, bool) {
-        self.limits
+        (self.limits.0 || self.held.0, self.limits.1 || self.held.1)
+    }
+
+    /// A finger holds its switches actuated, or not.
+    pub fn hold_limits(&mut self, lower: bool, upper: bool) {
+        self.held = (lower, upper);
     }
 
     /// What the converter reads of the mean current at a time: two readings at the same time are the same.
@@ -302,6 +362,15 @@ impl Stage {
         let direction = self.duty.signum();
         let emf_v = self.along.force_n_per_a * self.speed_mm_s * 1e-3 * direction;
         let low_v = if self.decays_fast { -SUPPLY_V } else { 0.0 };
+        if let Some(ohm) = self.resistor {
+            let ends = ripple::Ends {
+                high_a: SUPPLY_V / ohm,
+                low_a: 0.0,
+                stops: false,
+                time_constant_s: RESISTOR_TIME_CONSTANT_S,
+            };
+            return direction * ripple::above_mean_a(ends, self.duty.abs(), phase);
+        }
         let ends = ripple::Ends {
             high_a: (SUPPLY_V - emf_v) / RESISTANCE_OHM,
             low_a: (low_v - emf_v) / RESISTANCE_OHM,

@@ -27,8 +27,13 @@ use super::sensor::SensorPeer;
 use super::slot::Transfer;
 use super::stage::Stage;
 use super::surface::Surface;
+use super::wiring::Wires;
 use super::{noise::Noise, textures};
 use tactus_core::sensor::FingerName;
+
+mod built;
+
+pub use built::Reached;
 
 /// What a world is made from.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -132,6 +137,7 @@ pub struct World {
     selected: Option<usize>,
     miso: Miso,
     faults: Faults,
+    wires: Wires,
     /// latest first
     scheduled: Vec<(u64, Fault)>,
     force_max_n: f64,
@@ -188,6 +194,7 @@ impl World {
             selected: None,
             miso: Miso::new(setup.trial_seed),
             faults: Faults::default(),
+            wires: Wires::default(),
             scheduled: Vec::new(),
             force_max_n: 0.0,
             stage_reach_mm: (stage_mm, stage_mm),
@@ -237,7 +244,12 @@ impl World {
     /// brakes.
     pub fn stage_pwm(&mut self, now_ns: u64, duty: f64) {
         self.advance_to(now_ns);
-        self.stage.set_duty(duty);
+        self.stage.set_duty(self.wires.motor_duty(duty));
+    }
+
+    /// The duty of the bridge that has this share of the PWM and this level of DIR at its inputs' wires.
+    pub fn bridge_duty(&self, pwm: f64, dir: bool) -> f64 {
+        self.wires.duty(pwm, dir)
     }
 
     /// Enable of the stage's H-bridge: low, the motor has no current and the stage coasts. Low at power-up.
@@ -250,10 +262,12 @@ impl World {
     /// Gives both motors current as their enables say, unless the emergency stop has taken their supply.
     fn supply_motors(&mut self) {
         let dips = self.now_ns < self.faults.dip_ends_ns;
-        let on = !self.faults.e_stop.cuts_power() && !dips;
+        let stopped = self.faults.e_stop.cuts_power() && !self.wires.stop_keeps_supply;
+        let on = !stopped && !dips;
         let (lever, stage) = self.wanted;
         self.lever.enable(lever && on, self.finger.force_n());
-        self.stage.enable(stage && on && !self.faults.bridge_off);
+        let open = self.faults.bridge_off || self.wires.enable_open;
+        self.stage.enable(stage && on && !open);
     }
 
     /// One transfer with the finger's first part in mode 0, chip select low from `now_ns` for `duration_ns`; fills `miso`.
@@ -301,8 +315,10 @@ impl World {
     /// The chip select of a part falls, with the bus in this mode.
     pub fn spi_select_part(&mut self, now_ns: u64, part: u8, mode: ClockMode) {
         self.advance_to(now_ns);
-        self.peers.select(now_ns, part, mode);
-        self.selected = Some(0);
+        if self.wires.reach_sensor() {
+            self.peers.select(now_ns, part, mode);
+            self.selected = Some(0);
+        }
     }
 
     /// A byte to the sensor, and MISO meanwhile. The sample of a command is that of the time reached; FF without chip
@@ -347,13 +363,16 @@ impl World {
 
     /// The converter's reading of the stage's mean motor current: 12 bits over 3.3 V, about 2048 without current, 1 V/A.
     pub fn motor_adc(&self) -> u16 {
-        self.faults.amplified(self.stage.adc(self.now_ns))
+        self.amplified(self.stage.adc(self.now_ns))
     }
 
     /// Its reading at this place in a period of the bridge's PWM.
     pub fn motor_adc_within(&self, phase: PwmPhase) -> u16 {
-        let reading = self.stage.adc_within(self.now_ns, phase);
-        self.faults.amplified(reading)
+        self.amplified(self.stage.adc_within(self.now_ns, phase))
+    }
+
+    fn amplified(&self, reading: u16) -> u16 {
+        self.faults.amplified(self.wires.amplified(reading))
     }
 
     /// The limit switch at the top of the lever's travel; `true` is closed.
@@ -367,15 +386,19 @@ impl World {
         (lower, upper)
     }
 
-    /// The limit switches as they are: the lever's, then the stage's.
+    /// The limit switches as they are wired: the lever's, then the stage's.
     fn switches(&self) -> [bool; 3] {
-        let (lower, upper) = self.stage.limits();
-        [self.lever.at_top(), lower, upper]
+        let (lower, upper) = self.wires.limits(self.stage.limits());
+        [
+            self.lever.at_top() != self.wires.normally_open[2],
+            lower,
+            upper,
+        ]
     }
 
     /// The emergency stop's contact for the firmware; `true` is open, as when it is pressed.
     pub fn e_stop(&self) -> bool {
-        self.faults.e_stop.is_open(self.now_ns)
+        self.faults.e_stop.is_open(self.now_ns) && !self.wires.stop_bridged
     }
 
     /// Mounts another sample.

@@ -69,6 +69,8 @@ pub(crate) struct Driver {
     pub(crate) switches: [Option<bool>; 4],
     /// the debug probe gives its 8 MHz
     pub(crate) clock: bool,
+    /// BOR_LEV of the option bytes
+    pub(crate) brown_out: u8,
     /// what the firmware did to the store's sectors
     pub(crate) stored: Vec<FlashWrite>,
     /// an erase was under way when CR of the flash was written last
@@ -145,9 +147,32 @@ impl Driver {
         rig.display_mut().wire(display);
     }
 
+    /// Brings what drives the sensor's and the encoder's wires to the pins that the chip reads as a port: by their alternate functions
+    /// SPI and timer have it to the byte and to the edge.
+    fn lines(&self, board: &mut Board, at: VirtualNanos) {
+        let ids = [
+            pins::SENSOR_SPI[1],
+            pins::SENSOR_SPI[2],
+            pins::ENCODER[0],
+            pins::ENCODER[1],
+        ];
+        let levels = lock(&self.rig).read_pins();
+        for (id, level) in ids.into_iter().zip(levels) {
+            if board.function(id).is_none() {
+                board.drive(at, id, level);
+            }
+        }
+    }
+
     /// The chip is as after a reset: its pins are let go, what drives them from outside must do it again.
     fn restarted(&mut self, board: &mut Board, at: VirtualNanos) {
         board.redrive(at);
+        if let Some(slot) = board.part.bus().slot_of("FLASH") {
+            let registers = board.part.bus_mut().slot_mut(slot).registers_mut();
+            let options = registers.get(FlashRegister::Optcr);
+            let options = flash::with_brown_out(options, self.brown_out);
+            registers.set(FlashRegister::Optcr, options);
+        }
         {
             let mut rig = lock(&self.rig);
             rig.step_timer(at.0, false);
@@ -250,10 +275,14 @@ impl Driver {
             address if PORTS.contains(&address) => {
                 let port = ((address - PORTS.start) >> 10) as usize;
                 let board = session.board_mut();
-                if CONFIGURATION.contains(&(address & 0x3FF)) {
+                let configures = CONFIGURATION.contains(&(address & 0x3FF));
+                if configures {
                     self.wire(board);
                 }
                 self.port(board, now.0, port);
+                if configures {
+                    self.lines(board, now);
+                }
             }
             SPI1_CR1 => lock(&self.rig).spi_control(access.value),
             // The model raises CC1IF to CC4IF with UG while the counter stands. embassy's clock, on TIM5, would count half a

@@ -25,7 +25,7 @@ use super::halt::Halt;
 use super::handler_profile::{HandlerProfile, HandlerProfiler};
 use super::log::Log;
 use super::options::Options;
-use super::pins;
+use super::pins::{self, PinId};
 use super::referee::{Referee, Violation};
 use super::registers::register;
 use super::rig::{Rig, SharedRig, lock};
@@ -96,6 +96,7 @@ impl Emulator {
             resets: 0,
             switches: [None; 4],
             clock: options.clock,
+            brown_out: options.brown_out,
             stored: Vec::new(),
             flash_busy: false,
             flash_stuck: false,
@@ -318,6 +319,12 @@ impl Emulator {
             let board = standing.session.board_mut();
             board.drive(at, pins::BUTTON, Some(pressed));
         })
+    }
+
+    /// A resistor that holds a pin while the chip leaves it alone is missing.
+    pub fn leave_open(&mut self, pin: PinId) -> Result<(), Error> {
+        let at = VirtualNanos(self.now_ns);
+        self.with(move |standing| standing.session.board_mut().drive(at, pin, None))
     }
 
     /// Whether the green, the blue and the red LED are on.

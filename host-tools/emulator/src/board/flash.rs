@@ -75,6 +75,11 @@ impl FlashWrite {
     }
 }
 
+/// OPTCR with this BOR_LEV, its bits 2 and 3.
+pub(crate) fn with_brown_out(optcr: u64, level: u8) -> u64 {
+    optcr & !(3 << 2) | u64::from(level & 3) << 2
+}
+
 /// The flags of SR that a store to the array raises in vain; 0 if the store programs it.
 pub(crate) fn refusal(cr: u64, width: Width) -> u64 {
     let parallelism = match width {

@@ -15,6 +15,8 @@ pub struct Options {
     pub clock: bool,
     /// What the firmware's store holds at power-up, from [`Emulator::store`](super::Emulator::store); blank otherwise.
     pub store: Option<Vec<u8>>,
+    /// BOR_LEV of the chip's option bytes: 0 is level 3, 3 is off, as the chip is delivered (RM0090 3.9.10).
+    pub brown_out: u8,
     /// Whether the core has its MPU, with which the firmware guards its stack. Each access is checked then, which takes twice the
     /// time; without, what the firmware writes to the MPU does nothing, as on a part that has none.
     pub mpu: bool,
@@ -28,6 +30,7 @@ impl Default for Options {
             trace_s: 2,
             clock: true,
             store: None,
+            brown_out: 3,
             mpu: false,
         }
     }

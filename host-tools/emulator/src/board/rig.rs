@@ -265,7 +265,7 @@ impl Rig {
         let magnitude = self
             .duty_port
             .map_or(self.duty_timer, |level| f64::from(u8::from(level)));
-        let duty = if self.stage_up { magnitude } else { -magnitude };
+        let duty = self.world.bridge_duty(magnitude, self.stage_up);
         if duty != self.duty {
             self.duty = duty;
             self.world.stage_pwm(now_ns, duty);
@@ -302,6 +302,16 @@ impl Rig {
     pub(crate) fn wire(&mut self, sensor: bool, encoder: bool) {
         self.sensor_wired = sensor;
         self.encoder_wired = encoder;
+    }
+
+    /// What drives MISO, MOSI, and lines A and B of the encoder, as far as the chip only reads these pins.
+    pub(super) fn read_pins(&mut self) -> [Option<bool>; 4] {
+        let [miso, mosi] = match self.selected {
+            true => self.world.data_lines(),
+            false => [None; 2],
+        };
+        let [a, b] = self.world.encoder_levels(self.encoder_lines);
+        [miso, mosi, a, b]
     }
 
     /// CR1 of SPI1.
