@@ -1,4 +1,5 @@
-//! The self-test of a board and its rig: each part in turn, with what was measured and what to do about it, over defmt.
+//! The self-test of a board and its rig: each part in turn, with what was measured and what to do about it, over defmt. A host that
+//! asks in the first second, or when the self-test is over, is answered instead: see `bringup`.
 //!
 //! Motors move only after all switches were seen closed and somebody squeezed the finger in the hand, and no further than a
 //! bound: the finger must be off its mount, its cable on. P_DC is watched while the lever moves. The watchdog comes last: it starts the chip again, and the next start says whether it did.
@@ -6,15 +7,21 @@ use cortex_m::peripheral::DWT;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::pac::{FLASH, GPIOA, RCC, gpio::vals::Idr, rcc::vals::Sw};
 use embassy_time::{Duration, Timer, block_for};
+use tactus_core::rig::skin::SkinCare;
+use tactus_core::store::StoreError;
 use tactus_core::wire::Reset;
 
 use self::account::{Account, CORE_HZ, Kept, keep, ready};
+use self::bringup::Line;
 use self::rig::rig;
 use self::sensor::sensor;
 use crate::board;
 use crate::chip::{flash, rescue, watchdog};
+use crate::tasks::link;
 
 mod account;
+mod bringup;
+mod motors;
 mod rig;
 mod sensor;
 
@@ -29,6 +36,23 @@ pub async fn selftest() {
         failed: 0,
     });
     let r = board::start();
+    let Some((tx, rx)) = link::open(r.link) else {
+        rescue::refuse("the link's rate cannot be had");
+    };
+    let mut line = Line::new(tx, rx);
+    start_counter();
+    if kept.magic != Kept::HANGS && line.is_asked().await {
+        let parts = bringup::Parts {
+            sensor: r.sensor,
+            lever: r.lever,
+            stage: r.stage,
+            current: r.current,
+            switches: r.switches,
+            store: Some(r.store),
+            watchdog: r.watchdog,
+        };
+        bringup::serve(parts, line, reset, last_words).await;
+    }
     let mut green = Output::new(r.leds.green, Level::Low, Speed::Low);
     let mut blue = Output::new(r.leds.blue, Level::Low, Speed::Low);
     let mut red = Output::new(r.leds.red, Level::Low, Speed::Low);
@@ -90,38 +114,52 @@ pub async fn selftest() {
         );
     }
     // the LEDs keep their levels while they are not dropped
-    core::future::pending().await
+    bringup::wait(line).await
 }
 
-/// Clocks, and the pin that bank 2 of the flash depends on.
-fn chip(account: &mut Account) {
+/// Starts the core's cycle counter.
+fn start_counter() {
     // SAFETY: the cycle counter is nobody else's.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
+}
+
+/// The chip's clocks, and the pin that bank 2 of the flash depends on.
+struct Clock {
+    khz: u32,
+    external: bool,
+    locked: bool,
+    pa12: bool,
+}
+
+fn clock() -> Clock {
     let began = DWT::cycle_count();
     block_for(Duration::from_millis(10));
     let khz = DWT::cycle_count().wrapping_sub(began) / 10;
-    let (control, switch) = (RCC.cr().read(), RCC.cfgr().read().sws());
-    let locked = control.hserdy() && control.pllrdy() && switch == Sw::PLL1_P;
+    let control = RCC.cr().read();
+    Clock {
+        khz,
+        external: control.hserdy(),
+        locked: control.pllrdy() && RCC.cfgr().read().sws() == Sw::PLL1_P,
+        pa12: GPIOA.idr().read().idr(12) == Idr::HIGH,
+    }
+}
+
+/// Clocks, and the pin that bank 2 of the flash depends on.
+fn chip(account: &mut Account) {
+    let clock = clock();
+    let (khz, external) = (clock.khz, clock.external);
     account.check(
-        locked && khz.abs_diff(CORE_HZ / 1000) <= CORE_HZ / 100_000,
+        external && clock.locked && khz.abs_diff(CORE_HZ / 1000) <= CORE_HZ / 100_000,
         "clock",
-        format_args!(
-            "{khz} kHz; HSE {}, PLL {}",
-            ready(control.hserdy()),
-            ready(control.pllrdy())
-        ),
+        format_args!("{khz} kHz; HSE {}, PLL {}", ready(external), ready(clock.locked)),
         "The 8 MHz come from the debug probe on the board: leave it on, and the solder bridges of OSC_IN as delivered (UM1974)",
     );
     account.check(
-        GPIOA.idr().read().idr(12) == Idr::LOW,
+        !clock.pa12,
         "PA12",
-        if GPIOA.idr().read().idr(12) == Idr::LOW {
-            "low"
-        } else {
-            "high"
-        },
+        if clock.pa12 { "high" } else { "low" },
         "PA12 must be low while bank 2 of the flash is used: take the plug out of the USB user connector CN13",
     );
 }
@@ -137,37 +175,34 @@ fn brown_out() {
     }
 }
 
-/// Writes the skin's record as it is and reads it again: nothing else is changed, and nothing at all where it is not read.
+/// Writes the skin's record as it is and reads it again: nothing else is changed, and nothing at all where it is not read. The skin
+/// before and after, and whether there is a table.
+async fn rewrite(store: &mut flash::Storage) -> Result<(SkinCare, SkinCare, bool), StoreError> {
+    let before = store.skin().await?;
+    store.set_skin(&before).await?;
+    let after = store.skin().await?;
+    Ok((before, after, store.table().is_some()))
+}
+
 async fn store(pins: board::Storage, account: &mut Account) {
     const REMEDY: &str = "Nothing was erased. Report this line; the rig works without a store but forgets at power-off";
-    let mut store = match flash::open(pins).await {
-        Ok(store) => store,
-        Err(why) => {
-            account.check(false, "store", why, REMEDY);
-            return;
-        }
+    let done = match flash::open(pins).await {
+        Ok(mut store) => rewrite(&mut store).await,
+        Err(why) => Err(why),
     };
-    let before = match store.skin().await {
-        Ok(skin) => skin,
-        Err(why) => {
-            account.check(false, "store", why, REMEDY);
-            return;
-        }
-    };
-    let written = store.set_skin(&before).await;
-    match (written, store.skin().await) {
-        (Ok(()), Ok(after)) => account.check(
+    match done {
+        Ok((before, after, table)) => account.check(
             (after.energy_j(), after.wear_j()) == (before.energy_j(), before.wear_j()),
             "store",
             format_args!(
                 "the skin's record, {:.1} J, is {:.1} J after writing it; {} table",
                 before.energy_j(),
                 after.energy_j(),
-                if store.table().is_some() { "a" } else { "no" }
+                if table { "a" } else { "no" }
             ),
             REMEDY,
         ),
-        (Err(why), _) | (_, Err(why)) => account.check(false, "store", why, REMEDY),
+        Err(why) => account.check(false, "store", why, REMEDY),
     };
 }
 
@@ -185,9 +220,7 @@ async fn watch(watchdog: board::Watchdog, account: &mut Account) {
         passed: account.passed,
         failed: account.failed,
     });
-    watchdog::tighten(watchdog);
-    // 0.5 s at the least, 1.5 s on a chip: no clock is asked, which could stand
-    critical_section::with(|_| cortex_m::asm::delay(5 * WATCHDOG_US * (CORE_HZ / 1_000_000)));
+    hang(watchdog);
     keep(Kept {
         magic: 0,
         passed: 0,
@@ -199,4 +232,11 @@ async fn watch(watchdog: board::Watchdog, account: &mut Account) {
         "more than 0.5 s of hanging, and no reset",
         "The watchdog's oscillator does not run: replace the board",
     );
+}
+
+/// Hangs with the watchdog on, for longer than it waits.
+fn hang(watchdog: board::Watchdog) {
+    watchdog::tighten(watchdog);
+    // 0.5 s at the least, 1.5 s on a chip: no clock is asked, which could stand
+    critical_section::with(|_| cortex_m::asm::delay(5 * WATCHDOG_US * (CORE_HZ / 1_000_000)));
 }

@@ -4,6 +4,7 @@
 //! nowhere else, so that after any disturbance the next frame is understood again. A frame that is damaged, too long or no
 //! message is counted and dropped: see [`Receiver`].
 
+pub mod bringup;
 mod command;
 mod event;
 mod failure;

@@ -28,14 +28,19 @@ pub(crate) const PACKAGES: [Package; 5] = [
             &["sim"],
             &["study"],
             &["link"],
+            &["bringup"],
             &["cmd"],
         ],
-        // the link knows the core only
+        // link and bring-up know the core only
         strangers: &[
             ("link", "data"),
             ("link", "eval"),
             ("link", "sim"),
             ("link", "study"),
+            ("bringup", "data"),
+            ("bringup", "eval"),
+            ("bringup", "sim"),
+            ("bringup", "study"),
         ],
         outside: &["lib", "main"],
     },

@@ -1,6 +1,7 @@
 //! The generated parts that come from sources: tables of faults, gates, messages, fields, settings, commands of xtask.
 
 use syn::{Expr, Fields, Item, ItemEnum, ItemStruct, Lit, Type};
+use tactus::bringup::{MISTAKES, STEPS};
 use tactus_core::rig::FAULTS;
 
 use super::{files, read};
@@ -28,7 +29,28 @@ pub(super) fn from_sources() -> Vec<(&'static str, &'static str, String)> {
         ("docs/src/wire.md", "wire", wire()),
         ("docs/src/performance.md", "gates", gates()),
         ("docs/src/tests.md", "xtask", xtask()),
+        ("docs/src/bring-up.md", "steps", steps()),
+        ("docs/src/bring-up.md", "mistakes", mistakes()),
     ]
+}
+
+fn steps() -> String {
+    let mut text =
+        String::from("| step | what it checks | how | what is right |\n|---|---|---|---|\n");
+    for step in STEPS {
+        let (key, checks, how, limit) = (step.key, step.checks, step.how, (step.limit)());
+        text += &format!("| `{key}` | {checks} | {how} | {limit} |\n");
+    }
+    text
+}
+
+fn mistakes() -> String {
+    let mut text = String::from("| name | what is wrong | what to do |\n|---|---|---|\n");
+    for mistake in MISTAKES {
+        let (key, what, remedy) = (mistake.key, mistake.what, mistake.remedy);
+        text += &format!("| `{key}` | {what} | {remedy} |\n");
+    }
+    text
 }
 
 fn faults() -> String {

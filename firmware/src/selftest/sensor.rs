@@ -1,9 +1,12 @@
 //! The sensor on its bus: who it is, whether its words come whole and in time, and what it measures when nobody touches it.
 use embassy_time::{Duration, Instant, Timer};
-use tactus_core::sensor::biotac::{BioTac, Diagnosis, IdentityBytes, WordError, WordStats, keep};
+use tactus_core::sensor::biotac::{
+    BioTac, Diagnosis, Identity, IdentityBytes, PropertyError, WordError, WordStats, keep,
+};
 use tactus_core::sensor::pressure::{Channel, Pressure, SLOTS_HZ};
 use tactus_core::sensor::slot::{self, Answer, Transaction};
 use tactus_core::sensor::{PressureSensor as _, slot_of};
+use tactus_core::wire::bringup::{Stopped, limits};
 
 use super::account::{Account, wait_us};
 use crate::board;
@@ -14,8 +17,7 @@ const PDC: u32 = 1;
 /// A slot that begins later than this leaves the sensor less than its 50 us before the next one.
 const LATE_US: u64 = 100;
 
-/// A squeeze, and that it is over, counts of P_DC: 0.23 and 0.06 N.
-const SQUEEZED_COUNTS: f32 = 20.0;
+/// A squeeze is over, counts of P_DC: 0.06 N.
 const LEFT_COUNTS: f32 = 5.0;
 /// The finger lies still for so long, ms, and so long the squeeze is waited for.
 const LEFT_MS: u32 = 500;
@@ -27,6 +29,13 @@ const MOST_DAMAGED: u32 = 10;
 pub(super) struct Sensor(Bus);
 
 impl Sensor {
+    /// Takes the bus and waits until the sensor is up.
+    pub(super) async fn new(pins: board::Sensor) -> Self {
+        let sensor = Self(Bus::new(pins));
+        Timer::after_millis(BioTac::POWER_UP_MS.into()).await;
+        sensor
+    }
+
     /// The answer to transactions; nothing if the bus is off.
     fn perform(&mut self, transactions: &[Transaction]) -> Answer {
         let answer = slot::perform(transactions, |transaction, bytes| {
@@ -37,9 +46,55 @@ impl Sensor {
         answer.unwrap_or_default()
     }
 
+    /// Asks it who it is.
+    pub(super) fn identity(&mut self) -> Result<Identity, PropertyError> {
+        let mut bytes = IdentityBytes::default();
+        for (transactions, place) in bytes.reads() {
+            keep(place, &self.perform(&transactions));
+        }
+        bytes.decode()
+    }
+
     fn word(&mut self, slot: u32) -> Result<Pressure, WordError> {
         BioTac.decode(slot, &self.perform(slot_of::<BioTac>(slot)))
     }
+
+    /// Reads it for a second, in slots as the rig's; `each` gets every word that is good.
+    pub(super) async fn second(&mut self, mut each: impl FnMut(Pressure)) -> Second {
+        let mut second = Second::default();
+        let began = Instant::now();
+        for slot in 0..SLOTS_HZ {
+            let due_us = u64::from(slot) * 1_000_000 / u64::from(SLOTS_HZ);
+            let due = began + Duration::from_micros(due_us);
+            Timer::at(due).await;
+            if Instant::now().saturating_duration_since(due).as_micros() > LATE_US {
+                second.late += 1;
+            }
+            let answer = self.perform(slot_of::<BioTac>(slot));
+            // a bus that is off reads as a sensor that is not there
+            second.last = answer.first_chunk().copied().unwrap_or([0xFF; 2]);
+            let word = BioTac.decode(slot, &answer);
+            second.stats.count(&word);
+            if let Ok(pressure) = word {
+                match pressure.channel {
+                    Channel::Pac => second.pac.add(pressure.counts.get()),
+                    Channel::Pdc => second.pdc.add(pressure.counts.get()),
+                }
+                each(pressure);
+            }
+        }
+        second
+    }
+}
+
+/// What a second of words said.
+#[derive(Default)]
+pub(super) struct Second {
+    pub(super) stats: WordStats,
+    pub(super) late: u32,
+    pub(super) last: [u8; 2],
+    pub(super) pac: Spread,
+    pub(super) pdc: Spread,
 }
 
 /// Mean and standard deviation of counts.
@@ -84,8 +139,28 @@ pub(super) struct Touch {
 }
 
 impl Touch {
+    /// Nobody touches the finger now.
+    pub(super) fn new(sensor: Sensor, rest: f32) -> Self {
+        Self {
+            sensor,
+            rest,
+            counts: rest,
+            damaged: 0,
+        }
+    }
+
+    /// The sensor, for what else it says; and what P_DC is while nobody touches it, when that was measured.
+    pub(super) fn sensor(&mut self) -> &mut Sensor {
+        &mut self.sensor
+    }
+
+    /// Nobody touches the finger now, and this is its P_DC.
+    pub(super) fn rests_at(&mut self, counts: f32) {
+        (self.rest, self.counts, self.damaged) = (counts, counts, 0);
+    }
+
     /// Another word; how far P_DC is above its rest, counts.
-    pub(super) fn rise(&mut self) -> Result<f32, &'static str> {
+    pub(super) fn rise(&mut self) -> Result<f32, Stopped> {
         match self.sensor.word(PDC) {
             Ok(word) => {
                 self.damaged = 0;
@@ -94,18 +169,18 @@ impl Touch {
             Err(_) => self.damaged += 1,
         }
         if self.damaged >= MOST_DAMAGED {
-            return Err("P_DC says nothing, so nobody would see the finger pressed");
+            return Err(Stopped::Silent);
         }
         Ok(self.counts - self.rest)
     }
 
     /// Waits for somebody who squeezes the finger and lays it down: then P_DC lives, and its rest is known.
-    pub(super) async fn squeezed(&mut self) -> Result<(), &'static str> {
+    pub(super) async fn squeezed(&mut self) -> Result<(), Stopped> {
         let (mut squeezed, mut left_ms) = (false, 0);
         for _ in 0..ASKED_MS {
             Timer::after_millis(1).await;
             let rise = self.rise()?;
-            squeezed |= rise > SQUEEZED_COUNTS;
+            squeezed |= rise > limits::SQUEEZED;
             left_ms = if squeezed && rise.abs() < LEFT_COUNTS {
                 left_ms + 1
             } else {
@@ -116,18 +191,13 @@ impl Touch {
                 return Ok(());
             }
         }
-        Err("nobody squeezed it and laid it down")
+        Err(Stopped::NobodySqueezed)
     }
 }
 
 pub(super) async fn sensor(pins: board::Sensor, account: &mut Account) -> Touch {
-    let mut sensor = Sensor(Bus::new(pins));
-    Timer::after_millis(BioTac::POWER_UP_MS.into()).await;
-    let mut bytes = IdentityBytes::default();
-    for (transactions, place) in bytes.reads() {
-        keep(place, &sensor.perform(&transactions));
-    }
-    match bytes.decode() {
+    let mut sensor = Sensor::new(pins).await;
+    match sensor.identity() {
         Ok(id) => account.check(
             true,
             "sensor identity",
@@ -142,26 +212,13 @@ pub(super) async fn sensor(pins: board::Sensor, account: &mut Account) -> Touch 
         ),
     };
 
-    let mut stats = WordStats::default();
-    let (mut pac, mut pdc) = (Spread::default(), Spread::default());
-    let mut late: u32 = 0;
-    let began = Instant::now();
-    for slot in 0..SLOTS_HZ {
-        let due_us = u64::from(slot) * 1_000_000 / u64::from(SLOTS_HZ);
-        let due = began + Duration::from_micros(due_us);
-        Timer::at(due).await;
-        if Instant::now().saturating_duration_since(due).as_micros() > LATE_US {
-            late += 1;
-        }
-        let word = sensor.word(slot);
-        stats.count(&word);
-        if let Ok(pressure) = word {
-            match pressure.channel {
-                Channel::Pac => pac.add(pressure.counts.get()),
-                Channel::Pdc => pdc.add(pressure.counts.get()),
-            }
-        }
-    }
+    let Second {
+        stats,
+        late,
+        pac,
+        pdc,
+        ..
+    } = sensor.second(|_| ()).await;
     let diagnosis = stats.diagnosis();
     account.check(
         diagnosis == Diagnosis::Good && late == 0,
@@ -189,10 +246,5 @@ pub(super) async fn sensor(pins: board::Sensor, account: &mut Account) -> Touch 
         format_args!("{:.0} counts", pdc.mean()),
         "2000 to 3200 are right without contact. Refill the finger as its manual says; keep off anything that presses it",
     );
-    Touch {
-        sensor,
-        rest: pdc.mean(),
-        counts: pdc.mean(),
-        damaged: 0,
-    }
+    Touch::new(sensor, pdc.mean())
 }

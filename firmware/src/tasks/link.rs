@@ -18,7 +18,7 @@ use crate::board::{self, Irqs};
 use crate::chip::slots;
 
 /// embassy's buffer for the line, and the longest write: a longer one would fail, and the flush after it never end.
-const CHUNK: usize = 256;
+pub(crate) const CHUNK: usize = 256;
 
 static DAMAGED_FRAMES: AtomicU32 = AtomicU32::new(0);
 /// Requests for the session.

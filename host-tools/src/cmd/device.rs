@@ -1,6 +1,7 @@
 //! `tactus device`: the probe at the other end of the serial link, and everything that is done with it at the bench.
 
 mod bench;
+mod bringup;
 mod calibrate;
 mod flash;
 mod identify;
@@ -82,6 +83,7 @@ Examples:
   tactus device stop")]
     Stop(line::Where),
     Flash(flash::Args),
+    Bringup(bringup::Args),
     #[command(subcommand)]
     Log(replay::Command),
 }
@@ -106,6 +108,7 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<Don
         Command::Home(at) => calibrate::home(at, out),
         Command::Stop(at) => calibrate::stop(at, out),
         Command::Flash(args) => flash::run(args, out),
+        Command::Bringup(args) => bringup::run(args, out),
         Command::Log(command) => replay::run(command, out),
     };
     done.map(|()| Done::Fully)

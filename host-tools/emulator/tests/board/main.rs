@@ -2,6 +2,7 @@
 //! By name: `cargo test --test board faults::`.
 
 mod boot;
+mod bringup;
 mod changed_cuts;
 mod commands;
 mod common;

@@ -9,6 +9,7 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::task::Poll;
 use std::time::{Duration, Instant};
 
+use tactus::bringup::Trouble;
 use tactus::link::{Job, LinkError, Port, PortError, ReadTable, Request, Transaction};
 use tactus_core::rig::Fault;
 use tactus_core::table::{Table, TableError};
@@ -63,6 +64,9 @@ pub(crate) enum BenchError {
     /// The log cannot be written.
     #[error("{0}; the rig was stopped and lifted")]
     Log(io::Error),
+    /// A bring-up came to no end.
+    #[error(transparent)]
+    BringUp(#[from] Trouble),
     /// There can be no log, or what is shown cannot be written.
     #[error(transparent)]
     Io(#[from] io::Error),
@@ -79,7 +83,10 @@ fn after(why: &PortError, moving: bool) -> &'static str {
 impl BenchError {
     /// Whether the user had it stopped: what a shell takes for Ctrl-C.
     pub(crate) fn is_interrupt(&self) -> bool {
-        matches!(self, Self::Stopped | Self::NotHome | Self::NotLifted)
+        matches!(
+            self,
+            Self::Stopped | Self::NotHome | Self::NotLifted | Self::BringUp(Trouble::Quit)
+        )
     }
 }
 

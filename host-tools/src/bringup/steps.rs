@@ -1,0 +1,480 @@
+//! The steps of the first evening with the self-test image, in their order.
+
+use tactus_core::sensor::pressure::SLOTS_HZ;
+use tactus_core::wire::bringup::{
+    Look, MAX_POINTS, Measure, POINTS, Pin, Saw, SensorSeen, Stopped, limits,
+};
+
+use super::judge::{
+    self, BRAKING_MA, CORE_KHZ, COUNTS_PER_MM, Finding, GAIN, LEVER_MM, LOGIC_V, MOTOR_V, SWITCHES,
+    TRAVEL_MM, Went,
+};
+use super::{Board, Person, Trouble};
+
+/// A step.
+pub struct Step {
+    /// Its name for programs and for `--from`.
+    pub key: &'static str,
+    /// What it checks.
+    pub checks: &'static str,
+    /// How: what the person does, what the board does.
+    pub how: &'static str,
+    /// What is right, with the limits that it is judged by.
+    pub limit: fn() -> String,
+    pub(super) run: fn(&mut Bench<'_>) -> Result<Found, Trouble>,
+}
+
+/// What a step has found, and what can be drawn of it.
+#[derive(Debug)]
+pub struct Found {
+    /// The finding.
+    pub finding: Finding,
+    /// Axes, and points.
+    pub series: Option<Series>,
+}
+
+/// Points that belong together.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// What they show.
+    pub title: &'static str,
+    /// Of the first coordinate and of the second.
+    pub axes: [&'static str; 2],
+    /// The points.
+    pub points: Vec<[f64; 2]>,
+}
+
+impl From<Finding> for Found {
+    fn from(finding: Finding) -> Self {
+        Self {
+            finding,
+            series: None,
+        }
+    }
+}
+
+/// The board and the person at it.
+pub struct Bench<'b> {
+    pub(super) board: &'b mut dyn Board,
+    pub(super) person: &'b mut dyn Person,
+}
+
+macro_rules! ask {
+    ($bench:expr, $measure:expr, $saw:ident) => {
+        match $bench.board.ask($measure)? {
+            Saw::$saw(seen) => seen,
+            other => return Err(Trouble::Unexpected(format!("{other:?}"))),
+        }
+    };
+}
+
+fn range((from, to): (f64, f64), unit: &str) -> String {
+    format!("{from} to {to} {unit}")
+}
+
+/// [`limits::LEVER_PLAY`] at 0.625 um a step.
+fn play() -> String {
+    format!("{:.1} mm", f64::from(limits::LEVER_PLAY) * 0.625e-3)
+}
+
+/// All of them.
+pub static STEPS: &[Step] = &[
+    Step {
+        key: "supply",
+        checks: "supplies",
+        how: "a multimeter at the board's pin 3V3 and at the motors' drivers",
+        limit: || format!("{}, {}", range(LOGIC_V, "V"), range(MOTOR_V, "V")),
+        run: |bench| {
+            let logic_v = bench.person.number(
+                "Measure the voltage at the board's pin 3V3 against GND",
+                "V",
+            )?;
+            let motor_v = bench
+                .person
+                .number("Measure the supply of the motors' drivers", "V")?;
+            Ok(judge::supplies(logic_v, motor_v).into())
+        },
+    },
+    Step {
+        key: "chip",
+        checks: "clocks, PA12, brown-out level, the last reset",
+        how: "the board looks",
+        limit: || {
+            let (khz, off) = CORE_KHZ;
+            format!(
+                "{khz} +- {off} kHz, by the 8 MHz of the ST-LINK; PA12 low; level 3; no last words"
+            )
+        },
+        run: |bench| {
+            let (reset, last_words) = bench.hello()?;
+            let seen = ask!(bench, Measure::Chip, Chip);
+            Ok(judge::chip(&seen, reset, last_words.as_deref()).into())
+        },
+    },
+    Step {
+        key: "pins",
+        checks: "pins that float or are tied",
+        how: "the board pulls each pin up and down",
+        limit: || {
+            "switches not high; encoder driven; MISO and not MOSI driven by the selected sensor; PD14 high, PE13 and PC8 low by their resistors".to_owned()
+        },
+        run: |bench| {
+            // the pins are looked at when the board starts, before their drivers have them
+            bench.board.restart(Measure::Restart)?;
+            Ok(judge::pins(&ask!(bench, Measure::Pins, Pins)).into())
+        },
+    },
+    Step {
+        key: "sensor",
+        checks: "the sensor's identity and its words",
+        how: "the board reads it for a second",
+        limit: || format!("{SLOTS_HZ} words, none garbled, late or silent"),
+        run: |bench| Ok(judge::sensor(&bench.sensor()?).into()),
+    },
+    Step {
+        key: "noise",
+        checks: "what the sensor says without contact",
+        how: "the finger lies still, nothing touches it",
+        limit: || {
+            let (pac, pdc) = (&limits::PAC_RMS, &limits::PDC);
+            let [(pac_from, pac_to), (pdc_from, pdc_to)] =
+                [pac, pdc].map(|one| (one.start(), one.end()));
+            format!("P_AC {pac_from} to {pac_to} counts rms, P_DC {pdc_from} to {pdc_to} counts")
+        },
+        run: |bench| {
+            bench
+                .person
+                .done("Lay the finger down so that nothing touches its tip")?;
+            let seen = bench.sensor()?;
+            let points = bench.points(1.0, 1.0)?;
+            let pac = points
+                .iter()
+                .zip(0..)
+                .map(|(point, at)| [f64::from(at) / 2.2, point[0]]);
+            Ok(Found {
+                finding: judge::noise(&seen),
+                series: Some(Series {
+                    title: "P_AC of the finger that nobody touches",
+                    axes: ["ms", "counts"],
+                    points: pac.collect(),
+                }),
+            })
+        },
+    },
+    Step {
+        key: "switches",
+        checks: "each switch by hand",
+        how: "the person presses one after the other",
+        limit: || "closed, open while it is pressed, and no other one with it".to_owned(),
+        run: |bench| {
+            bench.person.done(
+                "Push the stage to its middle by hand; turn the lever's knob until its switch is free; release the emergency stop",
+            )?;
+            let mut looks = Vec::new();
+            for pin in SWITCHES {
+                let let_go = bench.look()?;
+                bench.person.press(pin, true)?;
+                let pressed = bench.look()?;
+                bench.person.press(pin, false)?;
+                looks.push([let_go, pressed]);
+            }
+            let looks = looks
+                .try_into()
+                .map_err(|_| Trouble::Unexpected("a switch".to_owned()))?;
+            Ok(judge::switches(&looks).into())
+        },
+    },
+    Step {
+        key: "stop",
+        checks: "the second contact of the emergency stop",
+        how: "the person presses it and looks at the drivers' supply",
+        limit: || "both drivers are without supply".to_owned(),
+        run: |bench| {
+            bench.person.press(Pin::EStop, true)?;
+            let seen = bench.look()?.e_stop;
+            let gone = bench.person.choose(
+                "Is the supply of both motors' drivers gone now (their LED, or a multimeter)?",
+                &["yes", "no"],
+            )? == 0;
+            bench.person.press(Pin::EStop, false)?;
+            Ok(judge::stop(seen, gone).into())
+        },
+    },
+    Step {
+        key: "hand",
+        checks: "the encoder's sense and scale, the places of the stage's switches",
+        how: "the person pushes the stage from its left switch to its right one",
+        limit: || {
+            format!(
+                "up to the right, {COUNTS_PER_MM} counts a mm: {}; each switch opens at its end",
+                range(TRAVEL_MM, "mm")
+            )
+        },
+        run: |bench| {
+            bench
+                .person
+                .done("Push the stage by hand to the left until its switch opens")?;
+            let left = bench.look()?;
+            bench
+                .person
+                .done("Push it to the right until its switch opens")?;
+            let right = bench.look()?;
+            bench.person.done("Push it back to its middle")?;
+            Ok(judge::by_hand(&left, &right).into())
+        },
+    },
+    Step {
+        key: "current",
+        checks: "the amplifier of the motor's current at rest",
+        how: "the board converts for 80 ms, the bridge off",
+        limit: || {
+            let (zero, off) = limits::CURRENT_ZERO;
+            format!("{zero} +- {off} counts, below {} rms", limits::CURRENT_RMS)
+        },
+        run: |bench| Ok(judge::rest(&bench.look()?).into()),
+    },
+    Step {
+        key: "finger",
+        checks: "the finger is off its mount, and P_DC lives",
+        how: "the person squeezes it in the hand: without that no motor moves",
+        limit: || format!("P_DC rises by {} counts, and comes back", limits::SQUEEZED),
+        run: |bench| Ok(judge::squeezed(bench.squeeze()?).into()),
+    },
+    Step {
+        key: "lever-sense",
+        checks: "the lever's DIR by 1 mm",
+        how: "the motor makes 1600 steps, the person looks",
+        limit: || "up where it should go up".to_owned(),
+        run: |bench| {
+            // at its top it can only go down
+            let (steps, way) = match bench.look()?.lever_top {
+                true => (1600, "down"),
+                false => (-1600, "up"),
+            };
+            let question = format!(
+                "The lever is going 1 mm {way}, in a second or two. Look at it: which way does it go?"
+            );
+            bench.person.watch(&question)?;
+            let seen = bench.lever(Measure::Lever(steps))?;
+            let went = bench.went("The lever went", [way, "the other way", "nowhere"])?;
+            Ok(judge::lever_sense(&seen, went).into())
+        },
+    },
+    Step {
+        key: "lever-switch",
+        checks: "the lever's switch, and that no step is lost",
+        how: "up to the switch, 2 mm down, up again",
+        limit: || format!("the switch opens at the same place within {}", play()),
+        run: |bench| {
+            let up = bench.lever(Measure::LeverTop)?;
+            let down = bench.lever(Measure::Lever(3200))?;
+            let mut points = bench.points(4.0 * 0.625e-3, 1.0 / 16.0)?;
+            let back = bench.lever(Measure::LeverTop)?;
+            points.extend(bench.points(4.0 * 0.625e-3, 1.0 / 16.0)?);
+            Ok(Found {
+                finding: judge::lever_switch(&up, &down, &back),
+                series: Some(Series {
+                    title: "P_DC above its rest while the lever goes 2 mm down and up, the finger off",
+                    axes: ["mm", "counts"],
+                    points,
+                }),
+            })
+        },
+    },
+    Step {
+        key: "lever-scale",
+        checks: "the lever's microsteps and lead",
+        how: "6400 steps down; the person measures with a caliper",
+        limit: || format!("{:.1} +- {:.1} mm", LEVER_MM.0, LEVER_MM.1),
+        run: |bench| {
+            bench.lever(Measure::LeverTop)?;
+            let before = bench.person.number(
+                "Measure the height of the finger's mount over the plate with a caliper",
+                "mm",
+            )?;
+            for _ in 0..2 {
+                bench.lever(Measure::Lever(3200))?;
+            }
+            let after = bench
+                .person
+                .number("The lever went down. Measure that height again", "mm")?;
+            bench.lever(Measure::LeverTop)?;
+            Ok(judge::lever_scale(before - after).into())
+        },
+    },
+    Step {
+        key: "foam",
+        checks: "the lever against a load",
+        how: "a block of foam under the empty mount; three times 4 mm down and up to the switch",
+        limit: || format!("no step lost beyond {}", play()),
+        run: |bench| {
+            bench.person.done("Put a block of soft foam under the empty mount, so that it is pressed by 2 or 3 mm")?;
+            let mut ways = Vec::new();
+            for _ in 0..3 {
+                let first = bench.lever(Measure::Lever(3200))?;
+                let mut down = bench.lever(Measure::Lever(3200))?;
+                down.steps += first.steps;
+                down.ended = first.ended.and(down.ended);
+                ways.push([down, bench.lever(Measure::LeverTop)?]);
+            }
+            bench.person.done("Take the foam away")?;
+            Ok(judge::foam(&ways).into())
+        },
+    },
+    Step {
+        key: "stage-sense",
+        checks: "the stage's motor, its DIR, and the encoder with it, by 1 mm",
+        how: "the motor goes 1 mm to the right and back, the person looks at the first",
+        limit: || "to the right, counted up, with current of the same sign".to_owned(),
+        run: |bench| {
+            bench.person.watch("The stage is going 1 mm to the right, in a second. Look at it: which way does it go?")?;
+            let right = ask_stage(bench, true)?;
+            let went = bench.went("The stage went", ["to the right", "to the left", "nowhere"])?;
+            let left = ask_stage(bench, false)?;
+            Ok(judge::stage_sense(&right, &left, went).into())
+        },
+    },
+    Step {
+        key: "bridge",
+        checks: "the bridge's decay",
+        how: "1 mm to each side, then the PWM low while the stage still moves",
+        limit: || format!("more than {BRAKING_MA:.0} mA against the movement"),
+        run: |bench| {
+            let right = ask_stage(bench, true)?;
+            let points = bench.points(1e-3, 1.0)?;
+            let left = ask_stage(bench, false)?;
+            Ok(Found {
+                finding: judge::bridge(&right, &left),
+                series: Some(Series {
+                    title: "the motor's current while the stage goes to the right",
+                    axes: ["mm", "mA"],
+                    points,
+                }),
+            })
+        },
+    },
+    Step {
+        key: "resistor",
+        checks: "the amplifier's gain against a known resistor",
+        how: "a resistor of 22 ohm, 5 W, in the place of the stage's motor; duties to 0.48 on both sides",
+        limit: || range(GAIN, "V/A"),
+        run: |bench| {
+            let ohm = bench.person.number("Take the wires of the stage's motor off the bridge, put a resistor of some 22 ohm and 5 W there, and measure it", "ohm")?;
+            let supply_v = bench
+                .person
+                .number("Measure the supply of the bridge", "V")?;
+            let mut done = bench.board.ask(Measure::Ramp)?;
+            if done == Saw::Ramp(Err(Stopped::NotSqueezed)) && bench.squeeze()?.is_ok() {
+                done = bench.board.ask(Measure::Ramp)?;
+            }
+            let Saw::Ramp(done) = done else {
+                return Err(Trouble::Unexpected(format!("{done:?}")));
+            };
+            let mut points = bench.points(1.0, 1.0)?;
+            bench.person.done("Connect the stage's motor again")?;
+            let finding = judge::resistor(done, &points, supply_v, ohm);
+            points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            for point in &mut points {
+                point[0] *= 1e-3;
+            }
+            Ok(Found {
+                finding,
+                series: Some(Series {
+                    title: "current of the resistor by the bridge's duty",
+                    axes: ["duty", "mA"],
+                    points,
+                }),
+            })
+        },
+    },
+    Step {
+        key: "store",
+        checks: "the store",
+        how: "the board writes the skin's record as it is, and reads it",
+        limit: || "the same".to_owned(),
+        run: |bench| {
+            let done = ask!(bench, Measure::Store, Store);
+            Ok(judge::store(&done.map_err(|why| why.to_string())).into())
+        },
+    },
+    Step {
+        key: "watchdog",
+        checks: "the watchdog",
+        how: "the board hangs on purpose",
+        limit: || "it starts again, by the watchdog".to_owned(),
+        run: |bench| Ok(judge::watchdog(bench.board.restart(Measure::Watchdog)?).into()),
+    },
+];
+
+fn ask_stage(
+    bench: &mut Bench<'_>,
+    to_the_right: bool,
+) -> Result<tactus_core::wire::bringup::StageSeen, Trouble> {
+    let mut seen = ask!(bench, Measure::Stage(to_the_right), Stage);
+    if seen.ended == Err(Stopped::NotSqueezed) && bench.squeeze()?.is_ok() {
+        seen = ask!(bench, Measure::Stage(to_the_right), Stage);
+    }
+    Ok(seen)
+}
+
+impl Bench<'_> {
+    fn hello(&mut self) -> Result<(tactus_core::wire::Reset, Option<String>), Trouble> {
+        match self.board.ask(Measure::Hello)? {
+            Saw::Hello {
+                reset, last_words, ..
+            } => Ok((reset, last_words.map(|words| words.to_string()))),
+            other => Err(Trouble::Unexpected(format!("{other:?}"))),
+        }
+    }
+
+    fn look(&mut self) -> Result<Look, Trouble> {
+        Ok(ask!(self, Measure::Look, Look))
+    }
+
+    fn sensor(&mut self) -> Result<SensorSeen, Trouble> {
+        Ok(ask!(self, Measure::Sensor, Sensor))
+    }
+
+    /// Whether the person squeezed the finger, which is off its mount.
+    fn squeeze(&mut self) -> Result<Result<(), Stopped>, Trouble> {
+        // P_DC's rest is that of the last second of words
+        self.person
+            .done("Take the finger off its mount, its cable on, and lay it down")?;
+        self.sensor()?;
+        self.look()?;
+        self.person.squeeze()?;
+        Ok(ask!(self, Measure::Squeeze, Squeeze))
+    }
+
+    fn lever(
+        &mut self,
+        measure: Measure,
+    ) -> Result<tactus_core::wire::bringup::LeverSeen, Trouble> {
+        let mut seen = ask!(self, measure, Lever);
+        if seen.ended == Err(Stopped::NotSqueezed) && self.squeeze()?.is_ok() {
+            seen = ask!(self, measure, Lever);
+        }
+        Ok(seen)
+    }
+
+    fn went(&mut self, question: &str, answers: [&str; 3]) -> Result<Went, Trouble> {
+        let chosen = self.person.choose(question, &answers)?;
+        Ok(Went::ALL.get(chosen).copied().unwrap_or(Went::Nowhere))
+    }
+
+    /// The last series, its coordinates times these.
+    fn points(&mut self, x: f64, y: f64) -> Result<Vec<[f64; 2]>, Trouble> {
+        let mut points = Vec::new();
+        while points.len() < MAX_POINTS {
+            let part = ask!(self, Measure::Series(points.len() as u16), Series);
+            points.extend(
+                part.iter()
+                    .map(|[a, b]| [f64::from(*a) * x, f64::from(*b) * y]),
+            );
+            if part.len() < POINTS {
+                break;
+            }
+        }
+        Ok(points)
+    }
+}

@@ -1,0 +1,21 @@
+//! What is right in a new rig: for the self-test's own checks, and for the host that judges its measurements.
+
+use core::ops::RangeInclusive;
+
+/// P_AC of a BioTac that nobody touches, counts rms. Less is a dead converter, more is a bad ground.
+pub const PAC_RMS: RangeInclusive<f32> = 1.0..=8.0;
+/// P_DC of a finger filled as it should be, in air, counts.
+pub const PDC: RangeInclusive<f32> = 2000.0..=3200.0;
+/// P_DC rises by so much when a hand squeezes the finger, counts: 0.23 N.
+pub const SQUEEZED: f32 = 20.0;
+/// What the converter reads without current, counts: half of its reference; and how far it may be off, which is far beyond what the
+/// amplifier's resistors can do.
+pub const CURRENT_ZERO: (f32, f32) = (2048.0, 60.0);
+/// Noise of the motor's current at rest, counts rms: 13 mA; the slowest slide draws 40.
+pub const CURRENT_RMS: f32 = 16.0;
+/// A motor that stands and draws less than this is hardly driven, A: friction alone takes more.
+pub const WEAK_A: f32 = 0.025;
+/// A shorted motor that is turned by the stage draws more than this the other way, A.
+pub const BRAKING_A: f32 = 0.02;
+/// How far from where it opened the lever's switch may open again, steps: 0.1 mm.
+pub const LEVER_PLAY: i32 = 160;
