@@ -142,14 +142,7 @@ impl Encoder {
         while let Some((_, edge)) = passed.pop_front_if(|(_, edge)| edge.at_ns <= now_ns) {
             if (edge.a, edge.b) != self.shown {
                 self.shown = (edge.a, edge.b);
-                return Some(match self.swapped {
-                    true => Edge {
-                        a: edge.b,
-                        b: edge.a,
-                        ..edge
-                    },
-                    false => edge,
-                });
+                return Some(edge);
             }
         }
         None
