@@ -530,3 +530,84 @@ fn commands() -> String {
     }
     text
 }
+
+/// The number that a name has in an OpenSCAD file.
+fn drawn(file: &str, name: &str) -> f64 {
+    let value = read(file).lines().find_map(|line| {
+        let value = line.strip_prefix(name)?.strip_prefix(" = ")?;
+        value.split_once(';')?.0.parse().ok()
+    });
+    value.unwrap_or_else(|| panic!("{file} has no number {name}"))
+}
+
+#[test]
+fn the_finger_is_built_as_it_is_drawn_and_wired() {
+    let page = read("docs/src/build-finger.md");
+    let finger = |name| drawn("hardware/finger.scad", name);
+    let [end, below_flange] = [finger("end_radius"), finger("skirt")];
+    for sentence in [
+        format!(
+            "| tip | {} mm wide; its end is part of a sphere of {end} mm |",
+            finger("diameter")
+        ),
+        format!("| skin | {} mm thick |", finger("skin")),
+        format!(
+            "| {} mm high, {} mm apart, across the slide |",
+            finger("ridge_height"),
+            finger("ridge_spacing")
+        ),
+    ] {
+        assert!(page.contains(&sentence), "the page lacks: {sentence}");
+    }
+    let rise = end - (end.powi(2) - (finger("diameter") / 2.0).powi(2)).sqrt();
+    let tip = drawn("hardware/case.scad", "tip_below");
+    let below = finger("flange") + below_flange + rise;
+    assert!(
+        (tip - below).abs() < 0.1,
+        "the case has a tip of {tip} mm, the finger {below:.2}"
+    );
+    // the bus, as the firmware has it
+    let board = read("firmware/src/board.rs");
+    for (signal, in_code, pins) in [
+        (
+            "clock",
+            "sck",
+            [
+                "IIS3DWB | SCL, as SPC",
+                "ADS1220 | SCLK",
+                "MCP3202 | CLK (7)",
+            ],
+        ),
+        (
+            "data in",
+            "miso",
+            ["IIS3DWB | SDO", "ADS1220 | DOUT", "MCP3202 | DOUT (6)"],
+        ),
+        (
+            "data out",
+            "mosi",
+            [
+                "IIS3DWB | SDA, as SDI",
+                "ADS1220 | DIN",
+                "MCP3202 | DIN (5)",
+            ],
+        ),
+        (
+            "select",
+            "select",
+            ["IIS3DWB | CS", "MCP3202 | CS (1)", "MCP3202 | CS (1)"],
+        ),
+    ] {
+        let pin = board.lines().find_map(|line| {
+            line.trim()
+                .strip_prefix(in_code)?
+                .strip_prefix(": ")?
+                .strip_suffix(',')
+        });
+        let pin = pin.unwrap_or_else(|| panic!("board.rs names no {in_code}"));
+        for part in pins {
+            let row = format!("| {part} | {pin} (");
+            assert!(page.contains(&row), "{signal}: the page lacks {row}");
+        }
+    }
+}
