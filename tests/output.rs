@@ -282,8 +282,8 @@ fn a_gauge_study_is_one_object_and_compares_operators_of_several_folders() {
         let named: Vec<String> = text
             .lines()
             .map(|line| {
-                line.strip_suffix(",,,")
-                    .map_or(line.to_owned(), |l| format!("{l},{name},,"))
+                line.strip_suffix(",,,,biotac,")
+                    .map_or(line.to_owned(), |l| format!("{l},{name},,,biotac,"))
             })
             .collect();
         std::fs::write(&manifest, named.join("\n")).unwrap();
