@@ -18,8 +18,6 @@ use tactus_core::sensor::FingerCode;
 /// The finger that this image is for.
 pub(crate) const FINGER: FingerCode = FingerCode::BIOTAC;
 
-use crate::chip::critical_section::MASKED;
-
 assign_resources! {
     sensor: Sensor {
         spi: SPI1,
@@ -128,6 +126,8 @@ bind_interrupts!(pub(crate) struct Irqs {
     FLASH => flash::InterruptHandler;
 });
 
+/// The highest priority that critical sections mask.
+pub(crate) const MASKED: Priority = Priority::P1;
 /// Of the chip (RM0090, table 62).
 const INTERRUPTS: usize = 91;
 

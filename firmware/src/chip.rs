@@ -1,7 +1,7 @@
 //! What only this chip can do: its flash, the sensor's slots by its interrupts, its timers' lever, its converter's motor current, its
 //! last acts, and the core's kernels in its assembly.
 mod confusion_kernel;
-pub(crate) mod critical_section;
+mod critical_section;
 pub(crate) mod current;
 mod decision_kernels;
 mod dsp_kernels;

@@ -5,7 +5,6 @@
 //! bound: the finger must be off its mount, its cable on. P_DC is watched while the lever moves. The watchdog comes last: it starts the chip again, and the next start says whether it did.
 use cortex_m::peripheral::DWT;
 use embassy_stm32::gpio::{Level, Output, Speed};
-use embassy_stm32::pac::{FLASH, GPIOA, RCC, gpio::vals::Idr, rcc::vals::Sw};
 use embassy_time::{Duration, Timer, block_for};
 use tactus_core::rig::skin::SkinCare;
 use tactus_core::store::StoreError;
@@ -13,6 +12,7 @@ use tactus_core::wire::Reset;
 
 use self::account::{Account, CORE_HZ, Kept, keep, ready};
 use self::bringup::Line;
+use self::chip::{brown_out, clock, hang, rewrite};
 use self::rig::rig;
 use self::sensor::sensor;
 use crate::board;
@@ -21,11 +21,10 @@ use crate::tasks::link;
 
 mod account;
 mod bringup;
+mod chip;
 mod motors;
 mod rig;
 mod sensor;
-
-const WATCHDOG_US: u32 = 100_000;
 
 /// Tests the board and ends with the green or the red LED. To be called once, from thread mode.
 pub async fn selftest() {
@@ -125,27 +124,6 @@ fn start_counter() {
     core.DWT.enable_cycle_counter();
 }
 
-/// The chip's clocks, and the pin that bank 2 of the flash depends on.
-struct Clock {
-    khz: u32,
-    external: bool,
-    locked: bool,
-    pa12: bool,
-}
-
-fn clock() -> Clock {
-    let began = DWT::cycle_count();
-    block_for(Duration::from_millis(10));
-    let khz = DWT::cycle_count().wrapping_sub(began) / 10;
-    let control = RCC.cr().read();
-    Clock {
-        khz,
-        external: control.hserdy(),
-        locked: control.pllrdy() && RCC.cfgr().read().sws() == Sw::PLL1_P,
-        pa12: GPIOA.idr().read().idr(12) == Idr::HIGH,
-    }
-}
-
 /// Clocks, and the pin that bank 2 of the flash depends on.
 fn chip(account: &mut Account) {
     let clock = clock();
@@ -168,20 +146,11 @@ fn chip(account: &mut Account) {
 /// Option bytes are not the firmware's to write.
 fn brown_out() {
     // BOR_LEV 0 is level 3, 2.7 to 3.6 V (RM0090 3.9.10)
-    if FLASH.optcr().read().bor_lev() != 0 {
+    if brown_out() != 0 {
         defmt::warn!(
             "brown-out reset is not at level 3: set it once, STM32_Programmer_CLI -c port=SWD -ob BOR_LEV=0"
         );
     }
-}
-
-/// Writes the skin's record as it is and reads it again: nothing else is changed, and nothing at all where it is not read. The skin
-/// before and after, and whether there is a table.
-async fn rewrite(store: &mut flash::Storage) -> Result<(SkinCare, SkinCare, bool), StoreError> {
-    let before = store.skin().await?;
-    store.set_skin(&before).await?;
-    let after = store.skin().await?;
-    Ok((before, after, store.table().is_some()))
 }
 
 async fn store(pins: board::Storage, account: &mut Account) {
@@ -232,11 +201,4 @@ async fn watch(watchdog: board::Watchdog, account: &mut Account) {
         "more than 0.5 s of hanging, and no reset",
         "The watchdog's oscillator does not run: replace the board",
     );
-}
-
-/// Hangs with the watchdog on, for longer than it waits.
-fn hang(watchdog: board::Watchdog) {
-    watchdog::tighten(watchdog);
-    // 0.5 s at the least, 1.5 s on a chip: no clock is asked, which could stand
-    critical_section::with(|_| cortex_m::asm::delay(5 * WATCHDOG_US * (CORE_HZ / 1_000_000)));
 }

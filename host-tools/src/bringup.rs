@@ -9,75 +9,18 @@ pub mod judge;
 mod line;
 mod mistakes;
 mod report;
+mod seams;
 mod steps;
-
-use std::io;
-
-use tactus_core::wire::Reset;
-use tactus_core::wire::bringup::{Measure, Pin, Saw};
 
 pub use journal::{Entry, EntryMistake, EntrySeries, Journal};
 pub use line::Line;
 pub use mistakes::{MISTAKES, Mistake, Named};
 pub use report::{Report, plot};
+pub use seams::{Board, Person, Trouble};
 pub use steps::{Bench, Found, STEPS, Series, Step};
 
-/// Why a step came to no end.
-#[derive(Debug, thiserror::Error)]
-pub enum Trouble {
-    /// The person ends it.
-    #[error("stopped: no motor moves. The same command goes on with the step that was not over")]
-    Quit,
-    /// Another image runs.
-    #[error(
-        "another image runs on the board: flash the self-test (cargo xtask flash --self-test, or `tactus device flash`), then the same command again"
-    )]
-    OtherImage,
-    /// The board says nothing.
-    #[error(
-        "the self-test says nothing: flash it (cargo xtask flash --self-test), press the board's black button, then the same command again"
-    )]
-    Silent,
-    /// An answer to another question, or one of another version.
-    #[error("the board answers something else; are tactus and the self-test of one version? {0}")]
-    Unexpected(String),
-    /// Line, journal, or what is shown.
-    #[error(transparent)]
-    Io(#[from] io::Error),
-}
-
-/// The self-test at the other end of a line.
-pub trait Board {
-    /// Asks, and waits for the answer.
-    ///
-    /// # Errors
-    /// See [`Trouble`].
-    fn ask(&mut self, measure: Measure) -> Result<Saw, Trouble>;
-
-    /// Asks for something that ends with a new start of the board, and waits for that: why it started; `None` if it does not.
-    ///
-    /// # Errors
-    /// See [`Trouble`].
-    fn restart(&mut self, measure: Measure) -> Result<Option<Reset>, Trouble>;
-}
-
-/// Who is at the rig.
-pub trait Person {
-    /// Does something, and says when it is done.
-    ///
-    /// # Errors
-    /// [`Trouble::Quit`], as of all others here.
-    fn done(&mut self, please: &str) -> Result<(), Trouble>;
-    /// Looks at something that moves in a moment.
-    fn watch(&mut self, please: &str) -> Result<(), Trouble>;
-    /// Presses a switch and keeps it pressed, or lets it go.
-    fn press(&mut self, switch: Pin, pressed: bool) -> Result<(), Trouble>;
-    /// Begins to squeeze the finger and lays it down; the board watches.
-    fn squeeze(&mut self) -> Result<(), Trouble>;
-    /// Chooses one of these.
-    fn choose(&mut self, question: &str, answers: &[&str]) -> Result<usize, Trouble>;
-    /// Measures something.
-    fn number(&mut self, question: &str, unit: &str) -> Result<f64, Trouble>;
+/// Who is at the rig, and sees how it goes.
+pub trait Evening: Person {
     /// Sees what a step has found; whether to go on, although it has not passed.
     fn found(&mut self, step: &Step, entry: &Entry) -> Result<bool, Trouble>;
     /// What time it is, as 2026-11-24T19:30:00Z.
@@ -90,7 +33,7 @@ pub trait Person {
 /// See [`Trouble`].
 pub fn run(
     board: &mut dyn Board,
-    person: &mut dyn Person,
+    person: &mut dyn Evening,
     journal: &mut Journal,
 ) -> Result<bool, Trouble> {
     for step in STEPS {

@@ -3,10 +3,8 @@
 //! critical section. With all interrupts masked, as cortex-m's own section has it, a slot began up to 200 instructions late.
 use cortex_m::register::{basepri, basepri_max};
 use critical_section::{Impl, RawRestoreState, set_impl};
-use embassy_stm32::interrupt::Priority;
 
-/// The highest priority that is masked.
-pub(crate) const MASKED: Priority = Priority::P1;
+use crate::board::MASKED;
 
 struct AllButSlots;
 set_impl!(AllButSlots);

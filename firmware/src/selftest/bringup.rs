@@ -6,7 +6,6 @@ use core::sync::atomic::Ordering::Relaxed;
 
 use embassy_futures::select::{Either, select};
 use embassy_stm32::gpio::{Flex, Pull, Speed};
-use embassy_stm32::pac::FLASH;
 use embassy_stm32::usart::{BufferedUartRx, BufferedUartTx};
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 use embedded_io_async::{Read as _, Write as _};
@@ -20,9 +19,9 @@ use tactus_core::wire::bringup::{
 use tactus_core::wire::{MAX_FRAME, Receiver, Reset, Text, encode, text};
 
 use super::account::wait_us;
+use super::chip::{brown_out, clock, hang, rewrite};
 use super::motors::{AT_REST, LEVER_STEPS, Motors};
 use super::sensor::{Second, Sensor, Touch};
-use super::{clock, hang, rewrite};
 use crate::board;
 use crate::chip::{flash, rescue};
 use crate::tasks::link;
@@ -251,7 +250,7 @@ fn chip() -> ChipSeen {
         external: clock.external && board::has_clock(),
         locked: clock.locked,
         pa12: clock.pa12,
-        brown_out: FLASH.optcr().read().bor_lev(),
+        brown_out: brown_out(),
     }
 }
 

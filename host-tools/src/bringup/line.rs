@@ -3,7 +3,7 @@
 use tactus_core::wire::bringup::{Answer, Ask, MARK, Measure, Saw};
 use tactus_core::wire::{MAX_FRAME, Report, decode, encode};
 
-use super::Trouble;
+use super::seams::Trouble;
 
 /// The host's end of the line.
 #[derive(Debug, Default)]

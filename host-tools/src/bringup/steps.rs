@@ -9,7 +9,7 @@ use super::judge::{
     self, BRAKING_MA, CORE_KHZ, COUNTS_PER_MM, Finding, GAIN, LEVER_MM, LOGIC_V, MOTOR_V, SWITCHES,
     TRAVEL_MM, Went,
 };
-use super::{Board, Person, Trouble};
+use super::seams::{Board, Person, Trouble};
 
 /// A step.
 pub struct Step {

@@ -8,6 +8,7 @@
 mod amplifier;
 mod analog;
 mod cell;
+mod felt;
 mod mems;
 mod signals;
 mod skin;
@@ -16,13 +17,15 @@ mod vibration;
 use super::conditions::{Conditions, TICK_S};
 use super::maths::exp;
 use super::noise::Noise;
-use super::parts::PartFault;
+use super::parts::fault::PartFault;
 use super::played::{PlayCounts, Playback, Played};
 use super::surface::Surface;
 use super::textures::Texture;
 use amplifier::Amplifiers;
+pub(super) use felt::Felt;
+pub use felt::Held;
 use signals::newtons;
-pub(super) use signals::{FLUID_PA_PER_G, Felt, Signals};
+pub(super) use signals::{FLUID_PA_PER_G, Signals};
 use skin::Skin;
 use tactus_core::sensor::FingerName;
 use vibration::Vibrations;
@@ -30,7 +33,6 @@ use vibration::Vibrations;
 pub use amplifier::{
     PA_PER_N, PAC_NOISE_FIELD_COUNTS, PAC_NOISE_PA, PAC_PA_PER_COUNT, PDC_PA_PER_COUNT,
 };
-pub use signals::Held;
 pub use skin::N_PER_COUNT;
 
 /// Deviations of the contact's state, drawn at every touch and multiplied by [`Conditions::variation`]; all chosen.

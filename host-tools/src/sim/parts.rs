@@ -2,6 +2,8 @@
 //! which are what is tested with them. What no data sheet says is chosen and marked.
 
 pub mod ads1220;
+mod bus;
+pub(super) mod fault;
 pub mod iis3dwb;
 pub mod mcp3202;
 #[cfg(test)]
@@ -9,55 +11,9 @@ mod tests;
 
 use super::finger::{Finger, Signals};
 use super::sensor::SensorPeer;
-
-/// MISO with nobody driving it, by its pull-up.
-const FLOATING: u8 = 0xFF;
-
-/// Polarity and phase of the clock, as the bus's master has them.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct ClockMode {
-    /// The clock is high between transfers.
-    pub idle_high: bool,
-    /// Bits are taken on the second edge.
-    pub second_edge: bool,
-}
-
-impl ClockMode {
-    /// Modes 0 to 3.
-    pub const fn of(mode: u8) -> Self {
-        Self {
-            idle_high: mode & 2 != 0,
-            second_edge: mode & 1 != 0,
-        }
-    }
-
-    /// Bits are taken while the clock rises.
-    pub const fn on_rising(self) -> bool {
-        self.idle_high == self.second_edge
-    }
-}
-
-/// Something that breaks in a finger of parts.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub enum PartFault {
-    /// The supply of the accelerometer dips: its registers are those of power-up again, its identity too, and it is off.
-    AccelerometerBrownOut,
-    /// The supply of the cell's converter dips: its registers are those of power-up again, and it converts no more.
-    CellBrownOut,
-    /// A signal wire of the cell is broken: the input goes to an end of its range.
-    CellWire,
-    /// Signal wires of the cell are exchanged: it says less when it is pressed.
-    CellReversed,
-    /// The plug of all parts is out.
-    Unplugged,
-    /// Something blocks the cell: it says the same, pressed or not.
-    CellBlocked,
-    /// The clocks of accelerometer and converter are off by this share.
-    ClocksOff {
-        /// Of either sign.
-        share: f64,
-    },
-}
+pub use bus::ClockMode;
+use bus::FLOATING;
+pub use fault::PartFault;
 
 /// What answers on the bus.
 #[allow(clippy::large_enum_variant)]
@@ -217,24 +173,5 @@ impl Peers {
             (Self::Mems { cell, .. }, PartFault::CellWire) => cell.cut_wire(),
             _ => finger.break_part(fault),
         }
-    }
-}
-
-/// A part whose master takes bits on the wrong edge: both lines come a bit late.
-#[derive(Clone, Copy, Debug, Default)]
-struct Late {
-    mosi: bool,
-    miso: bool,
-}
-
-impl Late {
-    /// What the part hears of a byte.
-    fn hear(&mut self, mosi: u8) -> u8 {
-        u8::from(std::mem::replace(&mut self.mosi, mosi & 1 != 0)) << 7 | mosi >> 1
-    }
-
-    /// What the master hears of the part's byte.
-    fn say(&mut self, miso: u8) -> u8 {
-        u8::from(std::mem::replace(&mut self.miso, miso & 1 != 0)) << 7 | miso >> 1
     }
 }

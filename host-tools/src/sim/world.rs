@@ -10,21 +10,18 @@
 //!
 //! A world is its [`Setup`] and its inputs: the same give the same words, on any thread.
 
+use std::f64::consts::TAU;
+
 use super::conditions::Conditions;
 use super::encoder::{Edge, Encoder};
 use super::faults::{Fault, Faults, Miso};
-use std::f64::consts::TAU;
-
 use super::finger::{Contact, Finger, Held};
 use super::lever::Lever;
 use super::maths::sin;
 use super::mount::Mount;
-use super::parts::{ClockMode, Peers};
+use super::parts::{PartFault, Peers};
 use super::person::Hand;
-use super::played::{PlayCounts, Played};
 use super::ripple::PwmPhase;
-use super::sensor::SensorPeer;
-use super::slot::Transfer;
 use super::stage::Stage;
 use super::surface::Surface;
 use super::wiring::Wires;
@@ -270,85 +267,6 @@ impl World {
         self.stage.enable(stage && on && !open);
     }
 
-    /// One transfer with the finger's first part in mode 0, chip select low from `now_ns` for `duration_ns`; fills `miso`.
-    pub fn spi(&mut self, now_ns: u64, duration_ns: u64, mosi: &[u8], miso: &mut [u8]) {
-        let transfer = Transfer {
-            part: 0,
-            mode: ClockMode::of(0),
-            begins_ns: now_ns,
-            takes_ns: duration_ns,
-        };
-        self.transfer(&transfer, mosi, miso);
-    }
-
-    /// The same with any part in any mode.
-    pub fn transfer(&mut self, transfer: &Transfer, mosi: &[u8], miso: &mut [u8]) {
-        self.spi_select_part(transfer.begins_ns, transfer.part, transfer.mode);
-        for (mosi, miso) in mosi.iter().zip(miso) {
-            *miso = self.spi_byte(*mosi);
-        }
-        self.spi_deselect(transfer.begins_ns + transfer.takes_ns);
-    }
-
-    /// The sensor's end of the bus, of a BioTac.
-    ///
-    /// # Panics
-    /// It is another finger.
-    pub fn sensor(&self) -> &SensorPeer {
-        match &self.peers {
-            Peers::BioTac(sensor) => sensor,
-            _ => panic!("the finger is no BioTac"),
-        }
-    }
-
-    /// What the finger's parts have to complain of: writes to reserved bits, and commands that there are not. A BioTac's are
-    /// [`SensorPeer::complaints`].
-    pub fn complaints(&self) -> u64 {
-        self.peers.complaints()
-    }
-
-    /// The chip select of the finger's first part falls, in mode 0.
-    pub fn spi_select(&mut self, now_ns: u64) {
-        self.spi_select_part(now_ns, 0, ClockMode::of(0));
-    }
-
-    /// The chip select of a part falls, with the bus in this mode.
-    pub fn spi_select_part(&mut self, now_ns: u64, part: u8, mode: ClockMode) {
-        self.advance_to(now_ns);
-        if self.wires.reach_sensor() {
-            self.peers.select(now_ns, part, mode);
-            self.selected = Some(0);
-        }
-    }
-
-    /// A byte to the sensor, and MISO meanwhile. The sample of a command is that of the time reached; FF without chip
-    /// select, by MISO's pull-up.
-    pub fn spi_byte(&mut self, mosi: u8) -> u8 {
-        let Some(count) = self.selected else {
-            return Miso::idle(&self.faults);
-        };
-        let fraction = self.fraction();
-        let said = self
-            .peers
-            .byte(self.now_ns, mosi, &mut self.finger, fraction);
-        self.selected = Some(count + 1);
-        let Peers::BioTac(sensor) = &mut self.peers else {
-            return self.miso.disturb(said, &self.faults);
-        };
-        if count == 0 {
-            let line = sensor.line();
-            self.miso.pass(self.now_ns, mosi, line, &self.faults);
-        }
-        let line = sensor.line().get(count).copied();
-        line.unwrap_or(Miso::idle(&self.faults))
-    }
-
-    /// The sensor's chip select rises; time does not pass by it.
-    pub fn spi_deselect(&mut self, now_ns: u64) {
-        self.selected = None;
-        self.peers.deselect(now_ns);
-    }
-
     /// Count of the stage's encoder, 1000 per mm, 0 where it stood at power-up.
     pub fn encoder(&self) -> i32 {
         self.encoder
@@ -401,45 +319,6 @@ impl World {
         self.faults.e_stop.is_open(self.now_ns) && !self.wires.stop_bridged
     }
 
-    /// Mounts another sample.
-    ///
-    /// # Errors
-    /// If the finger touches the one that is there or would touch the other, which may be thicker by millimetres.
-    pub fn place(&mut self, texture: u8) -> Result<(), NotLifted> {
-        let surface = sample(texture, self.setup.world_seed, self.variation);
-        self.must_be_over(&self.surface)?;
-        self.must_be_over(&surface)?;
-        self.setup.texture = texture;
-        self.surface = surface;
-        Ok(())
-    }
-
-    /// Has the finger feel recorded slides instead of the mounted sample: each press-and-slide is the next one of an order
-    /// that `seed` gives, over and over. Without any, it feels the sample again.
-    ///
-    /// From where the pressed finger begins to move, P_AC is the recorded one about the simulated finger's rest, and shear
-    /// the recorded force once the skin has stretched that far. The sample still carries the press, and makes P_DC; a still
-    /// finger has the simulated sensor's noise. Samples beyond 12 bits are cut, and a recording that is over is that noise:
-    /// see [`World::played`].
-    pub fn play(&mut self, slides: Vec<Played>, seed: u64) {
-        self.finger.play(slides, seed);
-    }
-
-    /// What has been played, and what of it was cut.
-    pub fn played(&self) -> PlayCounts {
-        self.finger.played()
-    }
-
-    /// Gives the finger a new skin.
-    ///
-    /// # Errors
-    /// If the finger touches the sample.
-    pub fn replace_skin(&mut self) -> Result<(), NotLifted> {
-        self.must_be_over(&self.surface)?;
-        self.finger.replace_skin();
-        Ok(())
-    }
-
     /// What is really so.
     pub fn truth(&self) -> Truth {
         let hand = self.hand.as_ref();
@@ -468,6 +347,54 @@ impl World {
     pub fn reset_extremes(&mut self) {
         self.force_max_n = self.finger.force_n();
         self.stage_reach_mm = (self.stage.position_mm(), self.stage.position_mm());
+    }
+
+    fn inject_at(&mut self, fault: Fault, at_ns: u64, position_mm: f64) {
+        let now = self.switches();
+        let faults = &mut self.faults;
+        match fault {
+            Fault::SensorUnplugged => match &mut self.peers {
+                Peers::BioTac(sensor) => sensor.unplug(),
+                peers => peers.break_part(at_ns, PartFault::Unplugged, &mut self.finger),
+            },
+            Fault::BitFlips { share } => faults.flip_share = share,
+            Fault::WordNoise { share } => faults.noise_share = share,
+            Fault::MisoStuck { high } => faults.miso_stuck = Some(high),
+            Fault::SensorFrozen => faults.frozen = true,
+            Fault::PdcDrift { counts_per_s } => faults.drift = Some((counts_per_s, at_ns)),
+            Fault::PdcStuck => faults.pdc_stuck = true,
+            Fault::PdcFades { seconds } => self.finger.fade_pdc(seconds),
+            Fault::SkinLeaks { seconds } => self.finger.leak(seconds),
+            Fault::PdcWeak { gain } => self.finger.weaken_pdc(gain),
+            Fault::StageJammed => self.stage.jam(true),
+            Fault::EncoderSwapped => self.encoder.swap(true, position_mm, at_ns),
+            Fault::CurrentOffset { amperes } => faults.current = Some(amperes),
+            Fault::CurrentSaturated => faults.current = Some(f64::INFINITY),
+            Fault::SupplyDip { ms } => {
+                faults.dip_ends_ns = at_ns + ms * 1_000_000;
+                self.supply_motors();
+            }
+            Fault::BridgeOff => {
+                faults.bridge_off = true;
+                self.supply_motors();
+            }
+            Fault::FastDecay => self.stage.decay_fast(true),
+            Fault::StageVibrates { um } => self.stage.vibrate(um),
+            Fault::EncoderCut(cut) => self.encoder.set_cut(Some(cut), position_mm, at_ns),
+            Fault::StageLimitStuck { upper, closed } => {
+                faults.switches.stuck[1 + usize::from(upper)] = Some(closed);
+            }
+            Fault::LeverTopStuck { closed } => faults.switches.stuck[0] = Some(closed),
+            Fault::SwitchesBounce { ms } => faults.switches.bounce(now, ms),
+            Fault::LeverLosesSteps { share } => self.lever.lose_steps(share),
+            Fault::LeverRunaway => self.lever.run_away_down(true),
+            Fault::LeverDirInverted => self.lever.invert_dir(true),
+            Fault::EStop => {
+                faults.e_stop.press(at_ns);
+                self.supply_motors();
+            }
+            Fault::EStopGlitch { us } => faults.e_stop.disturb(at_ns, us),
+        }
     }
 
     fn tick(&mut self) {
@@ -581,6 +508,7 @@ fn sample(texture: u8, world_seed: u64, variation: f64) -> Surface {
 }
 
 mod breaking;
+mod bus;
 mod by_hand;
 #[cfg(test)]
 mod tests;

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use tactus::bringup::judge::Finding;
 use tactus::bringup::{
-    self, Board, Entry, Journal, Line, MISTAKES, Person, Report, STEPS, Step, Trouble,
+    self, Board, Entry, Evening, Journal, Line, MISTAKES, Person, Report, STEPS, Step, Trouble,
 };
 use tactus::sim::encoder::Cut;
 use tactus::sim::faults::Fault;
@@ -223,7 +223,9 @@ impl Person for Helper<'_> {
             (self.truth().tip_mm * 20.0).round() / 20.0
         })
     }
+}
 
+impl Evening for Helper<'_> {
     fn found(&mut self, _: &Step, entry: &Entry) -> Result<bool, Trouble> {
         Ok(entry.passed)
     }

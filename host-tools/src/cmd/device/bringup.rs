@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::bail;
 use tactus::bringup::{
-    self, Board, Entry, Journal, Line, Person, Report, STEPS, Step, Trouble, judge,
+    self, Board, Entry, Evening, Journal, Line, Person, Report, STEPS, Step, Trouble, judge,
 };
 use tactus_core::wire::Reset;
 use tactus_core::wire::bringup::{Measure, Pin, Saw};
@@ -301,7 +301,9 @@ impl Person for Terminal {
             }
         }
     }
+}
 
+impl Evening for Terminal {
     fn found(&mut self, step: &Step, entry: &Entry) -> Result<bool, Trouble> {
         let verdict = if entry.passed { "passed" } else { "FAILED" };
         eprintln!("{verdict}  {}: {}", step.checks, entry.saw);

@@ -5,7 +5,7 @@
 
 use super::amplifier::{HighPass, LowPass, between};
 use super::cell::Cell;
-use super::signals::Felt;
+use super::felt::Felt;
 use crate::sim::noise::Noise;
 
 /// Supply of bridge and converter, V.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::signals::Felt;
+use super::felt::Felt;
 use crate::sim::conditions::{TICK_S, TICKS_PER_S};
 use crate::sim::noise::Noise;
 

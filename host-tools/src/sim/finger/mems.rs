@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 
 use super::cell::Cell;
-use super::signals::Felt;
+use super::felt::Felt;
 use crate::sim::conditions::TICK_S;
 use crate::sim::noise::Noise;
 

@@ -1,7 +1,7 @@
 //! TI's ADS1220 by its data sheet SBAS501: commands and registers of 8.5 and 8.6, timing of 6.6, conversion modes of 8.4.2. What I could
 //! not read there is marked "chosen".
 
-use super::{ClockMode, FLOATING, Late};
+use super::bus::{ClockMode, FLOATING, Late};
 use crate::sim::noise::Noise;
 
 /// From power-up to the first command, ns (8.4.1: 50 us).

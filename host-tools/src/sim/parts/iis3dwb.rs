@@ -1,7 +1,7 @@
 //! ST's IIS3DWB: its registers as the public header iis3dwb_reg.h lists them, its bus and its signal chain as the data sheet DS12569
 //! and the application note AN5444 describe them; what I could not read there is marked "chosen".
 
-use super::{ClockMode, FLOATING};
+use super::bus::{ClockMode, FLOATING};
 use crate::sim::conditions::{TICK_S, TICKS_PER_S};
 use crate::sim::maths::tan;
 use crate::sim::noise::Noise;

@@ -1,6 +1,6 @@
 //! Microchip's MCP3202, bit by bit (data sheet DS21034, section 5 and figures 1-1, 5-1).
 
-use super::{ClockMode, FLOATING};
+use super::bus::{ClockMode, FLOATING};
 
 /// Highest reading of 12 bits.
 pub const FULL: u16 = 4095;

@@ -1,9 +1,10 @@
 //! What people do to a rig, and with its finger.
 
-use super::World;
+use super::{NotLifted, World, sample};
 use crate::sim::finger::Held;
 use crate::sim::mount::Mount;
 use crate::sim::person::Hand;
+use crate::sim::played::{PlayCounts, Played};
 
 impl World {
     /// Inclines the stage with a weight on it, so that it is pulled towards lower positions with `pull_n` (paper, Traction:
@@ -44,5 +45,44 @@ impl World {
     /// The hand that holds the finger.
     pub fn hand(&mut self) -> Option<&mut Hand> {
         self.hand.as_mut()
+    }
+
+    /// Mounts another sample.
+    ///
+    /// # Errors
+    /// If the finger touches the one that is there or would touch the other, which may be thicker by millimetres.
+    pub fn place(&mut self, texture: u8) -> Result<(), NotLifted> {
+        let surface = sample(texture, self.setup.world_seed, self.variation);
+        self.must_be_over(&self.surface)?;
+        self.must_be_over(&surface)?;
+        self.setup.texture = texture;
+        self.surface = surface;
+        Ok(())
+    }
+
+    /// Has the finger feel recorded slides instead of the mounted sample: each press-and-slide is the next one of an order
+    /// that `seed` gives, over and over. Without any, it feels the sample again.
+    ///
+    /// From where the pressed finger begins to move, P_AC is the recorded one about the simulated finger's rest, and shear
+    /// the recorded force once the skin has stretched that far. The sample still carries the press, and makes P_DC; a still
+    /// finger has the simulated sensor's noise. Samples beyond 12 bits are cut, and a recording that is over is that noise:
+    /// see [`World::played`].
+    pub fn play(&mut self, slides: Vec<Played>, seed: u64) {
+        self.finger.play(slides, seed);
+    }
+
+    /// What has been played, and what of it was cut.
+    pub fn played(&self) -> PlayCounts {
+        self.finger.played()
+    }
+
+    /// Gives the finger a new skin.
+    ///
+    /// # Errors
+    /// If the finger touches the sample.
+    pub fn replace_skin(&mut self) -> Result<(), NotLifted> {
+        self.must_be_over(&self.surface)?;
+        self.finger.replace_skin();
+        Ok(())
     }
 }

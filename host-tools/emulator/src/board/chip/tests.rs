@@ -7,6 +7,7 @@ use rigless::soc::Width;
 use tactus::sim::encoder::Cut;
 use tactus::sim::faults::Fault;
 use tactus::sim::world::{Setup, World};
+use tactus_core::sensor::FingerName;
 
 use super::*;
 use crate::board::pins;
@@ -48,6 +49,7 @@ const SETUP: Setup = Setup {
     finger_seed: 5,
     keep_edges: true,
     shimmed: false,
+    finger: FingerName::Biotac,
 };
 
 impl Bench {

@@ -200,7 +200,6 @@ fn corner(
                         .then(|| [fixed(&observed[3]), fixed(&observed[4])]),
                     pace: None,
                     bands: observed[5..].iter().map(fixed).collect(),
-                    pace: None,
                 }
             };
             (0..slides).map(&mut slide).collect()

@@ -1,0 +1,23 @@
+//! What breaks in the parts of a finger.
+
+/// Something that breaks in a finger of parts.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum PartFault {
+    /// The supply of the accelerometer dips: its registers are those of power-up again, its identity too, and it is off.
+    AccelerometerBrownOut,
+    /// The supply of the cell's converter dips: its registers are those of power-up again, and it converts no more.
+    CellBrownOut,
+    /// A signal wire of the cell is broken: the input goes to an end of its range.
+    CellWire,
+    /// Signal wires of the cell are exchanged: it says less when it is pressed.
+    CellReversed,
+    /// The plug of all parts is out.
+    Unplugged,
+    /// Something blocks the cell: it says the same, pressed or not.
+    CellBlocked,
+    /// The clocks of accelerometer and converter are off by this share.
+    ClocksOff {
+        /// Of either sign.
+        share: f64,
+    },
+}
