@@ -106,7 +106,7 @@ fn explore_on_the_rig(
         assert!(made.force_max_n <= 2.2, "{finger}: {} N", made.force_max_n);
     }
     println!(
-        "{finger} on the rig: {right} of {all} right, {} slides, force at most {worst_mn:.1} mN off",
+        "{finger} on the rig: {right} of {all} right, slides: {}, force at most {worst_mn:.1} mN off",
         slides.len()
     );
     (right, slides)
