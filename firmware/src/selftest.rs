@@ -3,20 +3,17 @@
 //!
 //! Motors move only after all switches were seen closed and somebody squeezed the finger in the hand, and no further than a
 //! bound: the finger must be off its mount, its cable on. P_DC is watched while the lever moves. The watchdog comes last: it starts the chip again, and the next start says whether it did.
-use cortex_m::peripheral::DWT;
 use embassy_stm32::gpio::{Level, Output, Speed};
-use embassy_time::{Duration, Timer, block_for};
-use tactus_core::rig::skin::SkinCare;
-use tactus_core::store::StoreError;
+use embassy_time::Timer;
 use tactus_core::wire::Reset;
 
 use self::account::{Account, CORE_HZ, Kept, keep, ready};
 use self::bringup::Line;
-use self::chip::{brown_out, clock, hang, rewrite};
+use self::chip::{bor_level, clock, hang, rewrite};
 use self::rig::rig;
 use self::sensor::sensor;
 use crate::board;
-use crate::chip::{flash, rescue, watchdog};
+use crate::chip::{flash, rescue};
 use crate::tasks::link;
 
 mod account;
@@ -146,7 +143,7 @@ fn chip(account: &mut Account) {
 /// Option bytes are not the firmware's to write.
 fn brown_out() {
     // BOR_LEV 0 is level 3, 2.7 to 3.6 V (RM0090 3.9.10)
-    if brown_out() != 0 {
+    if bor_level() != 0 {
         defmt::warn!(
             "brown-out reset is not at level 3: set it once, STM32_Programmer_CLI -c port=SWD -ob BOR_LEV=0"
         );

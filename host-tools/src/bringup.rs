@@ -20,7 +20,7 @@ pub use seams::{Board, Person, Trouble};
 pub use steps::{Bench, Found, STEPS, Series, Step};
 
 /// Who is at the rig, and sees how it goes.
-pub trait Evening: Person {
+pub trait Owner: Person {
     /// Sees what a step has found; whether to go on, although it has not passed.
     fn found(&mut self, step: &Step, entry: &Entry) -> Result<bool, Trouble>;
     /// What time it is, as 2026-11-24T19:30:00Z.
@@ -33,7 +33,7 @@ pub trait Evening: Person {
 /// See [`Trouble`].
 pub fn run(
     board: &mut dyn Board,
-    person: &mut dyn Evening,
+    person: &mut dyn Owner,
     journal: &mut Journal,
 ) -> Result<bool, Trouble> {
     for step in STEPS {

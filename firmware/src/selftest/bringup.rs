@@ -19,7 +19,7 @@ use tactus_core::wire::bringup::{
 use tactus_core::wire::{MAX_FRAME, Receiver, Reset, Text, encode, text};
 
 use super::account::wait_us;
-use super::chip::{brown_out, clock, hang, rewrite};
+use super::chip::{bor_level, clock, hang, rewrite};
 use super::motors::{AT_REST, LEVER_STEPS, Motors};
 use super::sensor::{Second, Sensor, Touch};
 use crate::board;
@@ -250,7 +250,7 @@ fn chip() -> ChipSeen {
         external: clock.external && board::has_clock(),
         locked: clock.locked,
         pa12: clock.pa12,
-        brown_out: brown_out(),
+        brown_out: bor_level(),
     }
 }
 

@@ -33,7 +33,7 @@ pub(super) fn clock() -> Clock {
 }
 
 /// The level of the brown-out reset in the option bytes: 0 is the highest voltage, 3 is off.
-pub(super) fn brown_out() -> u8 {
+pub(super) fn bor_level() -> u8 {
     FLASH.optcr().read().bor_lev()
 }
 

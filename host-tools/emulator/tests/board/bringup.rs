@@ -11,14 +11,14 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use tactus::bringup::judge::Finding;
 use tactus::bringup::{
-    self, Board, Entry, Evening, Journal, Line, MISTAKES, Person, Report, STEPS, Step, Trouble,
+    self, Board, Entry, Journal, Line, MISTAKES, Owner, Person, Report, STEPS, Step, Trouble,
 };
 use tactus::sim::encoder::Cut;
 use tactus::sim::faults::Fault;
 use tactus::sim::person::{Hand, Manner};
 use tactus::sim::stage::{SUPPLY_V, TRAVEL_MM};
 use tactus::sim::wiring::Miswired;
-use tactus::sim::world::{Held, Setup};
+use tactus::sim::world::{Reached, Setup};
 use tactus_core::wire::Reset;
 use tactus_core::wire::bringup::{Measure, Pin, Saw};
 use tactus_emulator::board::{Emulator, Options, pins};
@@ -163,9 +163,9 @@ impl Person for Helper<'_> {
             let mut rig = emulator.rig();
             let world = rig.world();
             match switch {
-                Pin::StageLeft => world.hold_switch(Held::Lower, pressed),
-                Pin::StageRight => world.hold_switch(Held::Upper, pressed),
-                Pin::LeverTop => world.hold_switch(Held::Top, pressed),
+                Pin::StageLeft => world.hold_switch(Reached::Lower, pressed),
+                Pin::StageRight => world.hold_switch(Reached::Upper, pressed),
+                Pin::LeverTop => world.hold_switch(Reached::Top, pressed),
                 _ if pressed => world.inject(Fault::EStop),
                 _ => world.release_stop(),
             }
@@ -225,7 +225,7 @@ impl Person for Helper<'_> {
     }
 }
 
-impl Evening for Helper<'_> {
+impl Owner for Helper<'_> {
     fn found(&mut self, _: &Step, entry: &Entry) -> Result<bool, Trouble> {
         Ok(entry.passed)
     }

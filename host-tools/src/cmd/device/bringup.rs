@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::bail;
 use tactus::bringup::{
-    self, Board, Entry, Evening, Journal, Line, Person, Report, STEPS, Step, Trouble, judge,
+    self, Board, Entry, Journal, Line, Owner, Person, Report, STEPS, Step, Trouble, judge,
 };
 use tactus_core::wire::Reset;
 use tactus_core::wire::bringup::{Measure, Pin, Saw};
@@ -303,7 +303,7 @@ impl Person for Terminal {
     }
 }
 
-impl Evening for Terminal {
+impl Owner for Terminal {
     fn found(&mut self, step: &Step, entry: &Entry) -> Result<bool, Trouble> {
         let verdict = if entry.passed { "passed" } else { "FAILED" };
         eprintln!("{verdict}  {}: {}", step.checks, entry.saw);
