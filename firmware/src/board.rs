@@ -170,8 +170,9 @@ pub(crate) fn start() -> AssignedResources {
         Pull::Down,
     ));
     // Critical sections mask all but the slots' priority, so nobody else may have it, as whoever is not set below would.
+    // not by `Peripherals::steal`, after which nobody could take them
     // SAFETY: nobody else sets priorities.
-    let nvic = unsafe { cortex_m::Peripherals::steal() }.NVIC;
+    let nvic = unsafe { &*cortex_m::peripheral::NVIC::PTR };
     for priority in nvic.ipr.iter().take(INTERRUPTS) {
         // SAFETY: no critical section is open.
         unsafe { priority.write(MASKED as u8) };
