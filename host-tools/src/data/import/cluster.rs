@@ -11,7 +11,7 @@
 //! authors' loader takes 119.
 //!
 //! # What is made of it
-//! What the finger `mems` gives: P_AC is Z in counts of 2 g / 2048, behind a high-pass of 10 Hz, clipped at 2 g; P_DC is the force in
+//! What the finger `mems` gives: P_AC is Z in counts of [`G_PER_COUNT`], behind a high-pass of 10 Hz, clipped at 2 g; P_DC is the force in
 //! counts of [`MN_PER_COUNT`]. There is no tangential force. The rate is that of the times, whatever it is: Z is put on equal
 //! steps along straight lines (a tone of 500 Hz in a record of 6 kHz errs by 3.4 % at most), and taken to 2200 Hz by a
 //! polyphase windowed-sinc filter of constant length in time ([`LOBES`], squared Blackman-Harris).
@@ -25,7 +25,8 @@ use rubato::audioadapter::Adapter as _;
 use rubato::audioadapter_buffers::direct::InterleavedSlice;
 use rubato::{Async, FixedAsync, Resampler as _, SincInterpolationParameters, WindowFunction};
 use tactus_core::features::Movement;
-use tactus_core::sensor::FingerCode;
+use tactus_core::sensor::mems::Mems;
+use tactus_core::sensor::{FingerCode, PressureSensor as _};
 
 use super::{Imported, begin, names, number};
 use crate::data::content::ContentError;
@@ -33,10 +34,10 @@ use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
 use crate::data::recordings::{RecordingError, Result};
 use crate::data::rows::{Row, RowError, Rows};
 
-/// Acceleration of a count, g: 2 g are 2048 counts.
-const G_PER_COUNT: f64 = 2.0 / 2048.0;
-/// Force of a count of P_DC, mN: a cell of 1 mV/V at 9.807 N, gain 128, 24 bits, of which 10 are left out.
-pub const MN_PER_COUNT: f64 = 9.806_65e6 / (1 << 20) as f64;
+/// Acceleration of a count of the finger `mems`, g.
+const G_PER_COUNT: f64 = Mems::MODEL.calibration.pac_pa_per_count as f64 * 1e-3;
+/// Force of a count of its P_DC, mN.
+pub const MN_PER_COUNT: f64 = Mems::MODEL.calibration.force_mn_per_count as f64;
 /// The high-pass before P_AC, Hz.
 const HIGH_PASS_HZ: f64 = 10.0;
 /// The accelerometer's noise, g/sqrt(Hz): the dataset's own figure. It stands in for a record of the still finger.

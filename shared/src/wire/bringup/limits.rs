@@ -2,10 +2,15 @@
 
 use core::ops::RangeInclusive;
 
+use crate::sensor::biotac::BioTac;
+use crate::sensor::{AtRest, PressureSensor};
+
+const AT_REST: AtRest = BioTac::MODEL.at_rest;
+
 /// P_AC of a BioTac that nobody touches, counts rms. Less is a dead converter, more is a bad ground.
-pub const PAC_RMS: RangeInclusive<f32> = 1.0..=8.0;
+pub const PAC_RMS: RangeInclusive<f32> = AT_REST.pac_noise_counts.0..=AT_REST.pac_noise_counts.1;
 /// P_DC of a finger filled as it should be, in air, counts.
-pub const PDC: RangeInclusive<f32> = 2000.0..=3200.0;
+pub const PDC: RangeInclusive<f32> = AT_REST.pdc_counts.0..=AT_REST.pdc_counts.1;
 /// P_DC rises by so much when a hand squeezes the finger, counts: 0.23 N.
 pub const SQUEEZED: f32 = 20.0;
 /// What the converter reads without current, counts: half of its reference; and how far it may be off, which is far beyond what the
