@@ -11,10 +11,10 @@
 //! authors' loader takes 119.
 //!
 //! # What is made of it
-//! What the finger `mems` gives: P_AC is Z in counts of [`G_PER_COUNT`], behind a high-pass of 10 Hz, clipped at 2 g; P_DC is the force in
+//! What the finger `mems` gives: P_AC is Z in counts of 0.98 mg, behind a high-pass of 10 Hz, clipped at 2 g; P_DC is the force in
 //! counts of [`MN_PER_COUNT`]. There is no tangential force. The rate is that of the times, whatever it is: Z is put on equal
 //! steps along straight lines (a tone of 500 Hz in a record of 6 kHz errs by 3.4 % at most), and taken to 2200 Hz by a
-//! polyphase windowed-sinc filter of constant length in time ([`LOBES`], squared Blackman-Harris).
+//! polyphase windowed-sinc filter of constant length in time (128 samples of 2200 Hz, squared Blackman-Harris).
 //!
 //! The steady part is from 10 % to 90 % of the way that `position` shows. A slide's number follows from its name, the
 //! repetition first: "early" and "late" slides are the two repetitions. When they were made is not known.
