@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 use tactus::sim::faults::Fault as Cause;
+use tactus::sim::mount::Mount;
 use tactus::sim::rig::SimRig;
 use tactus::sim::world::Setup;
 use tactus_core::features::Movement;
@@ -71,6 +72,41 @@ fn a_lift_that_goes_down_is_given_up_in_time() {
         })
         .collect();
     assert!(objections.is_empty(), "{}", objections.join("\n"));
+}
+
+/// DIR turns round while the finger hangs over its sample: when it goes up to its switch, to wait there, it comes down. P_DC sees
+/// it; where that is dead, too, the spring of the mount holds it.
+#[test]
+fn a_finger_that_is_parked_downwards_is_given_up_in_time() {
+    for (dead, limits_n) in [(false, 0.05..0.5), (true, 0.0..2.2)] {
+        let parked = |seed: u64| {
+            let mut rig = SimRig::new(Setup {
+                texture: 1 + (seed * 37 % 117) as u8,
+                trial_seed: seed,
+                ..Setup::default()
+            });
+            rig.world().mount(Mount::SPRUNG);
+            rig.home().unwrap();
+            rig.slide(Movement::FOR_ROUGHNESS, 0.5, |_, _| ()).unwrap();
+            rig.world().inject(Cause::LeverDirInverted);
+            if dead {
+                rig.world().inject(Cause::PdcStuck);
+            }
+            rig.world().reset_extremes();
+            for _ in 0..15_000 {
+                rig.tick();
+            }
+            let Phase::Faulted(fault) = rig.control().phase() else {
+                panic!("{seed}: {:?}", rig.control().phase());
+            };
+            assert!(fault.recovery().contains("knob"), "{seed}: {fault}");
+            homed_again_and_again(&mut rig, 7)
+        };
+        let forces: Vec<f64> = (0..50).into_par_iter().map(parked).collect();
+        let most_n = forces.into_iter().fold(0.0, f64::max);
+        println!("at most {most_n:.2} N, P_DC dead: {dead}");
+        assert!(limits_n.contains(&most_n), "{most_n} N, P_DC dead: {dead}");
+    }
 }
 
 /// The screw locks itself: a finger that is still pressed when nothing moves any more is freed by the knob alone, and

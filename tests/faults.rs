@@ -869,13 +869,17 @@ fn a_finger_that_nobody_calibrated_is_guarded_before_its_first_zero() {
         (force_max_n, rig.control().phase())
     };
     for down_at_boot in [false, true] {
-        let (force_max_n, phase) = pressed_by_a_runaway(down_at_boot, Unguarded::default());
+        // nobody looks at the lever's switch
+        let blind = Unguarded::against(Fault::LeverNotHome);
+        let (force_max_n, phase) = pressed_by_a_runaway(down_at_boot, blind);
         // 40 counts are 0.46 N
         assert!((0.4..0.8).contains(&force_max_n), "{force_max_n} N");
         assert_eq!(phase, Phase::Faulted(Fault::ForceHigh));
-        let unguarded = Unguarded::against(Fault::ForceHigh);
-        let (force_max_n, _) = pressed_by_a_runaway(down_at_boot, unguarded);
+        let (force_max_n, _) = pressed_by_a_runaway(down_at_boot, blind.and(Fault::ForceHigh));
         assert!(force_max_n > 2.2, "{force_max_n} N");
+        let (force_max_n, phase) = pressed_by_a_runaway(down_at_boot, Unguarded::default());
+        assert_eq!(force_max_n, 0.0);
+        assert_eq!(phase, Phase::Faulted(Fault::LeverNotHome));
     }
 }
 
@@ -900,6 +904,74 @@ fn a_rig_that_hangs_lifts_its_finger_before_it_says_so() {
         truth.force_n == 0.0 && truth.indentation_mm < -0.5,
         "{truth:?}"
     );
+}
+
+/// A rig that has slid, and now waits.
+fn slid(seed: u64) -> SimRig {
+    let mut rig = SimRig::new(Setup {
+        texture: 1 + draw(seed, 117) as u8,
+        trial_seed: seed,
+        finger_seed: 1 + seed % 5,
+        ..Setup::default()
+    });
+    rig.home().unwrap();
+    let ended = rig.slide(Movement::FOR_ROUGHNESS, 0.5, |_, _| ());
+    assert_eq!(ended, Ok(Ended::Whole));
+    rig.world().reset_extremes();
+    rig
+}
+
+/// Its switch bounces, the stage shakes it, and the motors lose their supply: none of that is a lever that comes down.
+#[test]
+fn a_finger_that_waits_over_its_sample_goes_up_to_its_switch() {
+    let parked: usize = (0..60u32)
+        .into_par_iter()
+        .map(|seed| {
+            let mut rig = slid(u64::from(seed));
+            rig.world().inject(Cause::SwitchesBounce { ms: 50 });
+            rig.world().inject(Cause::StageVibrates { um: 3.0 });
+            // some are asked again on their way up
+            wait(&mut rig, 1_000 + 200 * seed);
+            let is_parked = rig.world().lever_top();
+            if seed % 3 == 0 {
+                wait(&mut rig, 10_000);
+                assert!(rig.world().lever_top(), "{seed}");
+                rig.world().inject(Cause::SupplyDip {
+                    ms: u64::from(3 * seed),
+                });
+                wait(&mut rig, 60_000);
+            }
+            assert_eq!(rig.control().phase(), Phase::Ready, "{seed}");
+            assert_eq!(rig.world().truth().force_max_n, 0.0, "{seed}");
+            for _ in 0..2 {
+                let ended = rig.slide(Movement::FOR_TRACTION, 0.5, |_, _| ());
+                assert_eq!(ended, Ok(Ended::Whole), "{seed}");
+            }
+            usize::from(is_parked)
+        })
+        .sum();
+    assert!((10..50).contains(&parked), "{parked} of 60 were parked");
+}
+
+/// From any moment of its waiting: over the sample the lever goes up in time, and its switch sees it later.
+#[test]
+fn a_runaway_under_a_waiting_finger_without_a_pressure_does_not_touch() {
+    (0..60u32).into_par_iter().for_each(|seed| {
+        let mut rig = slid(u64::from(seed));
+        rig.world().inject(Cause::PdcStuck);
+        wait(&mut rig, 200 * seed);
+        let was_parked = rig.world().lever_top();
+        rig.world().inject(Cause::LeverRunaway);
+        wait(&mut rig, 60_000);
+        let (truth, phase) = (rig.world().truth(), rig.control().phase());
+        assert_eq!(truth.force_max_n, 0.0, "{seed}: {phase:?}");
+        let seen = phase == Phase::Faulted(Fault::LeverNotHome);
+        assert!(
+            seen || (!was_parked && phase == Phase::Ready),
+            "{seed}: {phase:?}"
+        );
+        assert!(seen || rig.world().lever_top(), "{seed}");
+    });
 }
 
 #[test]

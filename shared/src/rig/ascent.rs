@@ -70,13 +70,13 @@ impl Ascent {
         self.lowest = mean.or(self.lowest);
     }
 
-    /// A millisecond of `phase`, its `ms`-th, with a stage that may have `lost` its place: the fault, if P_DC has risen on the
-    /// way to the switch, or while the finger is to stay lifted.
+    /// A millisecond of `phase`, its `ms`-th, with a lever that `seeks` its switch or a stage that does not know its place: the
+    /// fault, if P_DC has risen on the way to the switch, or while the finger is to stay lifted.
     #[inline(never)]
     pub(super) fn tick(
         &mut self,
         phase: Phase,
-        lost: bool,
+        seeks: bool,
         ms: u32,
         meter: &ForceMeter,
     ) -> Option<Fault> {
@@ -84,7 +84,7 @@ impl Ascent {
             Phase::Homing | Phase::Positioning | Phase::Unloaded => {
                 self.rises(meter.mean(), RISEN_MN)
             }
-            Phase::Lifting if lost => self.rises(meter.mean(), RISEN_MN),
+            Phase::Lifting if seeks => self.rises(meter.mean(), RISEN_MN),
             Phase::Faulted(Fault::ForceHigh) => {
                 self.lift(ms, meter);
                 None
@@ -94,7 +94,7 @@ impl Ascent {
                 self.lowest = self
                     .lowest
                     .map(|lowest| lowest + self.finger.counts(WARMING_MN));
-                self.rises(meter.mean(), AIR_MN)
+                self.rises(meter.mean(), if seeks { RISEN_MN } else { AIR_MN })
             }
             _ => None,
         }

@@ -10,6 +10,7 @@ use super::fault::Fault;
 use super::force::ForceMeter;
 use super::guard::{Guard, Seen, Switch, Unguarded, force_limit_mn, may_press};
 use super::lever::{Lever, LeverState};
+use super::phase::{Ended, HIGH_FORCE_MN, Phase, Refused};
 use super::pins::{Inputs, Outputs};
 use super::skin::SkinCare;
 use super::slide::Run;
@@ -17,8 +18,6 @@ use super::stage::{MARGIN_MM, Stage, StageConstants, StageState};
 use crate::features::Movement;
 use crate::sensor::FingerModel;
 use crate::sensor::pressure::Channel;
-
-use super::phase::{Ended, HIGH_FORCE_MN, Phase, Refused};
 
 /// How long the still finger is measured.
 pub const BACKGROUND_MS: u32 = 1000;
@@ -132,12 +131,12 @@ impl Control {
         &self.calibration
     }
 
-    /// Takes other constants, while nothing moves.
+    /// Takes other constants, between movements.
     ///
     /// # Errors
     /// [`Refused::Busy`], or [`Refused::Calibration`] for constants that cannot be used.
     pub fn calibrate(&mut self, calibration: RigCalibration) -> Result<(), Refused> {
-        if !self.is_at_rest() {
+        if self.phase != Phase::Ready && !self.is_at_rest() {
             return Err(Refused::Busy);
         }
         calibration.check().map_err(Refused::Calibration)?;
@@ -269,6 +268,7 @@ impl Control {
         self.ended = None;
         self.air = None;
         self.meter.begin_long();
+        self.lever.park();
         self.ascent.set_out(self.meter.mean());
         self.enter(Phase::Unloaded);
         Ok(())
@@ -341,11 +341,12 @@ impl Control {
         Ok(())
     }
 
-    /// Whether nothing moves and nothing will without a command: ready, parked, or at the end of a fault. The finger is
+    /// Whether nothing moves: ready, parked, or at the end of a fault; a finger that hangs goes up to its switch later. It is
     /// lifted then, unless the fault is [`Fault::LeverNotHome`], or [`Fault::EStop`] and the motors had no supply.
     pub fn is_at_rest(&self) -> bool {
         match self.phase {
-            Phase::Parked | Phase::Ready => true,
+            Phase::Parked => true,
+            Phase::Ready => !self.lever.is_parking(),
             Phase::Faulted(_) => self.lever.is_lifted() || self.ascent.gave_up,
             _ => false,
         }
@@ -379,14 +380,15 @@ impl Control {
         }
         let at_top = self.lever_top.tick(inputs.lever_top);
         let at_left = self.stage_left.tick(inputs.stage_limits.0);
-        let lost = self.stage.state() == StageState::Unknown;
-        let rise = self.ascent.tick(self.phase, lost, self.ms, &self.meter);
+        let seeks = self.lever.is_parking() || self.stage.state() == StageState::Unknown;
+        let rise = self.ascent.tick(self.phase, seeks, self.ms, &self.meter);
         let goes_up = matches!(self.phase, Phase::Homing | Phase::Lifting);
         if let Some(fault) = rise.filter(|_| !(goes_up && self.lever.is_lifted())) {
             self.check(fault);
         }
         match self.watch(inputs) {
             Some(Fault::ForceHigh) if self.phase == Phase::Faulted(Fault::ForceHigh) => {}
+            Some(fault @ Fault::LeverNotHome) => self.check(fault),
             Some(fault) => self.fail(fault),
             None => {}
         }
@@ -415,12 +417,7 @@ impl Control {
                     outputs.lever_steps_s = 0;
                 }
             }
-            Phase::Parked => {
-                outputs.stage_duty = 0.0;
-                outputs.stage_enabled = false;
-                outputs.lever_enabled = false;
-                outputs.lever_steps_s = 0;
-            }
+            Phase::Parked => outputs = Outputs::default(),
             _ => {}
         }
         self.duty = outputs.stage_duty;
@@ -456,6 +453,7 @@ impl Control {
             e_stop: inputs.e_stop,
             hung: inputs.hung,
             lever_top: inputs.lever_top && self.lever.is_down(inputs.steps),
+            lever_left: !inputs.lever_top && self.lever.is_at_switch(),
             // off a switch it may always go
             stage_limit: (moving < 0.0 && inputs.stage_limits.0)
                 || (moving > 0.0 && inputs.stage_limits.1),
@@ -483,7 +481,9 @@ impl Control {
         let moves = outputs.lever_steps_s != 0 || self.phase != Phase::Pressing;
         self.run.press(inputs, moves);
         match self.phase {
-            Phase::Parked | Phase::Ready | Phase::Faulted(_) => {}
+            Phase::Parked | Phase::Faulted(_) => {}
+            Phase::Ready if self.lever.wait() => self.ascent.set_out(self.meter.mean()),
+            Phase::Ready => {}
             Phase::Homing => {
                 if self.lever.is_lifted() {
                     match self.stage.state() {
@@ -508,7 +508,7 @@ impl Control {
                 }
             }
             Phase::Positioning => {
-                if self.stage.state() == StageState::Standing {
+                if self.stage.state() == StageState::Standing && !self.lever.is_parking() {
                     let target = f32::from(self.run.movement().force_mn())
                         / self.calibration.pressure.force_mn_per_count;
                     if self.lever.press(target) {

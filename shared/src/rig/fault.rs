@@ -98,8 +98,8 @@ faults! {
     TasksHung, "tasks hung", "the firmware's tasks have not checked in for 2 s, or what was asked for makes no progress for 30 s", 2, BOTH, ALL,
         "none: the watchdog restarts the probe once the finger is lifted";
     /// The lever did not find its limit switch.
-    LeverNotHome, "lever not home", "limit switch not reached in 1.25 times the travel, P_DC still as high as it had risen on the last way up, or P_DC there or at the first zero more than 40 counts off the calibration's", 2,
-        "lever motor off, stage motor braked", ALL, "turn the lever's knob until the finger is free, check the switch and that DIR is not inverted; calibrate a finger that has drifted, then reset";
+    LeverNotHome, "lever not home", "limit switch not reached in 1.25 times the travel, or released for 20 ms under a lever that stands at it, P_DC still as high as it had risen on the last way up, or P_DC there or at the first zero more than 40 counts off the calibration's", 2,
+        "lever motor off, stage motor braked", ALL, "turn the lever's knob until the finger is free, check its driver, the switch and that DIR is not inverted; calibrate a finger that has drifted, then reset";
     /// The stage did not find its limit switch.
     StageNotHome, "stage not home", "limit switch not reached: the stage falls behind, or has gone 1.25 times the travel", 2, BOTH, ALL,
         "clear the stage's way and check the switch, then reset";

@@ -17,6 +17,9 @@ pub const FORCE_LIMIT_MN: f32 = 2050.0;
 pub const HIGH_FORCE_LIMIT_MN: f32 = 2100.0;
 const SILENT_MS: u32 = 10;
 const FROZEN_MS: u32 = 100;
+/// The switch under a lever that stands there is open for so long when the lever has left it: contacts bounce, and the stage
+/// shakes them (chosen).
+const LEFT_MS: u32 = 20;
 const MOTION_MS: usize = 30;
 /// Damaged words in a second that are one too many.
 const MAX_DAMAGED: u32 = 22;
@@ -82,6 +85,8 @@ pub struct Seen<'a> {
     pub hung: bool,
     /// The lever's upper limit switch, while it should be open.
     pub lever_top: bool,
+    /// The lever's upper limit switch is open, while it should be closed.
+    pub lever_left: bool,
     /// The limit switch that the stage is moving towards, while it should be open.
     pub stage_limit: bool,
     /// How fast the stage should go, mm/s.
@@ -124,6 +129,8 @@ pub struct Guard {
     slice_ms: u32,
     e_stop: Switch,
     lever_top: Switch,
+    /// For how many ms the lever's switch has been open without a break while it should be closed.
+    left_ms: u32,
     stage_limit: Switch,
     /// How far the stage should have come, has come by its encoder and has come by its motor's back-EMF, in mm since it
     /// began to move: the last [`MOTION_MS`] and where the next goes.
@@ -166,6 +173,11 @@ impl Guard {
         // its second contact has taken the motors' supply by then
         let e_stop = self.e_stop.tick(seen.e_stop);
         let lever_top = self.lever_top.tick(seen.lever_top);
+        self.left_ms = if seen.lever_left {
+            self.left_ms.saturating_add(1)
+        } else {
+            0
+        };
         let stage_limit = self.stage_limit.tick(seen.stage_limit);
         // a calibration that says less than the model's does not allow more
         let mn_per_count = mn_per_count.max(model.calibration.force_mn_per_count);
@@ -176,6 +188,7 @@ impl Guard {
             e_stop.then_some(Fault::EStop),
             seen.hung.then_some(Fault::TasksHung),
             lever_top.then_some(Fault::LeverLimit),
+            (self.left_ms >= LEFT_MS).then_some(Fault::LeverNotHome),
             stage_limit.then_some(Fault::StageLimit),
             stage,
         ]

@@ -36,6 +36,9 @@ const CLEAR_MS: u32 = 200;
 const NEAR_TOP_STEPS: i32 = 1600;
 /// The switch closes at the same place each time, this exactly: one sixteenth of a millimetre.
 const SWITCH_STEPS: i32 = 100;
+/// A lever that hangs over the sample for this long goes up to its switch, which sees it come down. One that came down by itself
+/// at the speed of an approach would touch after [`CLEARANCE_STEPS`], 2 s; a choice among movements takes 1 s at most.
+const HANGS_MS: u32 = 1500;
 /// A trim makes no more steps than this: 0.75 mm.
 const TRIM_STEPS: f32 = 1200.0;
 /// The skin creeps after it was pressed, and P_DC with it.
@@ -92,6 +95,8 @@ pub enum LeverState {
     Unknown,
     /// Up, to the limit switch.
     Homing,
+    /// The same of a lifted finger that waits: what is known of the sample stays known.
+    Parking,
     /// Lifted and standing.
     Lifted,
     /// Lifted, and P_DC without contact is measured.
@@ -131,6 +136,8 @@ pub struct Lever {
     /// Count of steps at the limit switch, which is 0 of the travel, once it was found.
     top: i32,
     known: bool,
+    /// Lifted, its limit switch was closed.
+    at_switch: bool,
     /// Count of steps at the last contact.
     contact: Option<i32>,
     progress: Progress,
@@ -158,6 +165,7 @@ impl Lever {
             zero: None,
             top: 0,
             known: false,
+            at_switch: false,
             contact: None,
             progress,
             ms: 0,
@@ -188,6 +196,16 @@ impl Lever {
         self.state == LeverState::Lifted
     }
 
+    /// Whether the finger is lifted and goes up to the limit switch.
+    pub fn is_parking(&self) -> bool {
+        self.state == LeverState::Parking
+    }
+
+    /// Whether it stands at the limit switch, so that the switch must be closed.
+    pub fn is_at_switch(&self) -> bool {
+        self.at_switch && matches!(self.state, LeverState::Lifted | LeverState::Zeroing)
+    }
+
     /// Whether it is so far below the limit switch that the switch must be open.
     pub fn is_down(&self, steps: i32) -> bool {
         let known = !matches!(self.state, LeverState::Unknown | LeverState::Homing);
@@ -203,6 +221,21 @@ impl Lever {
     /// is believes the switch only at the top, for a switch that sticks must not leave the finger down.
     pub fn home(&mut self) {
         self.enter(LeverState::Homing);
+    }
+
+    /// Brings a finger that hangs over the sample up to the limit switch, which says whether it stays lifted, whatever the sensor
+    /// does. Whether it begins to.
+    pub fn park(&mut self) -> bool {
+        let hangs = self.is_lifted() && !self.at_switch;
+        if hangs {
+            self.enter(LeverState::Parking);
+        }
+        hangs
+    }
+
+    /// The lifted finger waits for another millisecond: parks it if it has done so for too long. Whether it begins to.
+    pub fn wait(&mut self) -> bool {
+        self.ms >= HANGS_MS && self.park()
     }
 
     /// Has to be homed again. It goes on knowing its top.
@@ -238,7 +271,7 @@ impl Lever {
     }
 
     fn enter(&mut self, state: LeverState) {
-        if state == LeverState::Lifted {
+        if state == LeverState::Lifted && !self.is_parking() {
             self.progress.lifted();
         }
         self.state = state;
@@ -255,7 +288,7 @@ impl Lever {
         self.ms = self.ms.saturating_add(1);
         match self.state {
             LeverState::Unknown | LeverState::Lifted | LeverState::Holding => Ok(0),
-            LeverState::Homing => {
+            LeverState::Homing | LeverState::Parking => {
                 // Lower than it was, the lever goes on: if the switch is stuck, that is right; if steps were lost, it stands
                 // at its hard stop until the count is right again. Higher, and steps up were lost: there the top is now.
                 if at_top && (!self.known || steps - self.top <= SWITCH_STEPS) {
@@ -265,8 +298,11 @@ impl Lever {
                         steps
                     };
                     self.known = true;
-                    self.contact = None;
-                    self.zero = None;
+                    self.at_switch = true;
+                    if !self.is_parking() {
+                        self.contact = None;
+                        self.zero = None;
+                    }
                     self.enter(LeverState::Lifted);
                     return Ok(0);
                 }
@@ -332,7 +368,9 @@ impl Lever {
                 if self.ms > LIFT_MS {
                     return Err(Fault::LeverNotHome);
                 }
-                if steps <= to || (at_top && steps - self.top <= NEAR_TOP_STEPS) {
+                let at_switch = at_top && steps - self.top <= NEAR_TOP_STEPS;
+                if steps <= to || at_switch {
+                    self.at_switch = at_switch;
                     self.enter(LeverState::Lifted);
                     Ok(0)
                 } else {

@@ -570,6 +570,54 @@ fn a_stop_holds_whenever_it_comes() {
     talk.send(Command::Home, 40.0, |_, _| ()).unwrap();
 }
 
+/// A driver that steps down by itself under a finger that waits, while P_DC says nothing of it: the lever waits at its limit
+/// switch, which opens.
+#[test]
+fn a_lever_that_comes_down_under_a_waiting_finger_is_seen() {
+    let Some(elf) = elf() else { return };
+    let mut talk = board(&elf, 79, 5);
+    let mut random = ChaCha8Rng::seed_from_u64(79);
+    talk.send(identify(1), 80.0, |_, _| ()).unwrap();
+    assert!(!talk.board().rig().world().lever_top(), "it hangs");
+    assert_eq!(fault_within(&mut talk, 10_000), None);
+    assert!(talk.board().rig().world().lever_top());
+    for n in 0..20 {
+        assert_eq!(fault_within(&mut talk, random.random_range(0..500)), None);
+        talk.board().rig().world().reset_extremes();
+        talk.board().inject(Fault::PdcStuck);
+        talk.board().inject(Fault::LeverRunaway);
+        let seen = fault_within(&mut talk, 500);
+        assert_eq!(seen, Some(Seen::LeverNotHome), "{n}");
+        let mut current = true;
+        for (_, output) in talk.board().rig().trace() {
+            if let Output::LeverEnable(on) = output {
+                current = *on;
+            }
+        }
+        assert!(!current, "{n}: its driver still has current");
+        let truth = talk.board().rig().world().truth();
+        assert_eq!(truth.force_max_n, 0.0, "{n}");
+        talk.board().rig().world().clear();
+        talk.board().run_ms(200).unwrap();
+        talk.send(Command::Home, 40.0, |_, _| ()).unwrap();
+    }
+    talk.send(identify(1), 80.0, |_, _| ()).unwrap();
+}
+
+/// The first fault that is reported in this time.
+fn fault_within(talk: &mut Talk, ms: u64) -> Option<Seen> {
+    let until_ns = talk.now_ns() + ms * 1_000_000;
+    let mut seen = None;
+    while talk.now_ns() < until_ns {
+        for report in talk.step().unwrap() {
+            if let Event::Fault(fault) = report.event {
+                seen = seen.or(Some(fault));
+            }
+        }
+    }
+    seen
+}
+
 macro_rules! faults {
     ($($test:ident: $names:expr,)*) => {$(
         #[test]

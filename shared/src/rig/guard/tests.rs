@@ -25,6 +25,7 @@ fn at_rest(ms: u32) -> ([Option<Pressure>; 4], Seen<'static>) {
         e_stop: false,
         hung: false,
         lever_top: false,
+        lever_left: false,
         stage_limit: false,
         stage_wanted_mm_s: 0.0,
         stage_mm: 30.0,
@@ -75,6 +76,15 @@ fn faults_are_seen_when_the_table_says() {
     assert_eq!(
         run(|ms, _, s| s.lever_top = ms >= 500),
         Some((502, Fault::LeverLimit))
+    );
+    assert_eq!(
+        run(|ms, _, s| s.lever_left = ms >= 500),
+        Some((519, Fault::LeverNotHome))
+    );
+    assert_eq!(
+        run(|ms, _, s| s.lever_left = ms % 20 != 0),
+        None,
+        "a contact that bounces is no lever that comes down"
     );
     assert_eq!(
         run(|ms, _, s| s.stage_limit = ms >= 500),

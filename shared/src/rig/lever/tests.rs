@@ -120,6 +120,30 @@ fn a_finger_that_feels_nothing_where_it_felt_the_sample_stops() {
     }
 }
 
+/// A finger that waits over the sample goes to the switch, and what was known of the sample still counts there.
+#[test]
+fn a_finger_that_hangs_is_parked_and_knows_its_sample() {
+    let mut bench = Bench::new(3.0, 0.1);
+    assert_eq!(bench.press().0, Ok(()));
+    bench.lever.lift(bench.way as i32);
+    assert_eq!(bench.until(LeverState::Lifted), Ok(()));
+    assert!(!bench.lever.is_at_switch() && bench.way > 2000.0);
+    let zero = bench.lever.zero();
+    for _ in 0..HANGS_MS {
+        assert!(!bench.lever.wait());
+        assert_eq!(bench.until(LeverState::Lifted), Ok(()));
+    }
+    assert!(bench.lever.wait() && !bench.lever.wait());
+    assert_eq!(bench.until(LeverState::Lifted), Ok(()));
+    assert!(bench.lever.is_at_switch() && bench.way <= 0.0);
+    assert!(!bench.lever.park(), "it is");
+    assert_eq!(bench.lever.zero(), zero);
+    bench.torn = true;
+    let (ended, counts) = bench.press();
+    assert_eq!(ended, Err(Fault::PressureDead));
+    assert!(counts * 0.0115 < 1.3, "{counts}");
+}
+
 #[test]
 fn another_sample_may_be_lower() {
     let mut bench = Bench::new(3.0, 0.1);
