@@ -1,4 +1,4 @@
-//! What only this chip can do: its flash, the sensor's slots by its interrupts, its timers' lever, its converter's motor current, its
+//! What only this chip can do: its flash, the sensor's slots by its interrupts, its sleep, its timers' lever, its converter's motor current, its
 //! last acts, and the core's kernels in its assembly.
 mod confusion_kernel;
 mod critical_section;
@@ -9,6 +9,7 @@ pub(crate) mod flash;
 pub(crate) mod lever;
 pub(crate) mod rescue;
 pub(crate) mod slots;
+pub(crate) mod thread;
 pub(crate) mod watchdog;
 
 pub(crate) use dsp_kernels::Chip;

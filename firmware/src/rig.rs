@@ -12,7 +12,7 @@
 //! Their priorities, and between slots and servo those of the link's bytes and of the lever's steps (TIM1), are in
 //! `board`.
 
-use embassy_executor::{InterruptExecutor, Spawner};
+use embassy_executor::InterruptExecutor;
 use embassy_stm32::interrupt;
 use heapless::spsc::Queue;
 use static_cell::ConstStaticCell;
@@ -21,7 +21,7 @@ use tactus_core::wire::{Event, PROTOCOL};
 
 use crate::board;
 use crate::chip::slots::{WORDS, Word};
-use crate::chip::{rescue, watchdog};
+use crate::chip::{rescue, thread, watchdog};
 use crate::tasks::servo::{self, SAMPLES};
 use crate::tasks::{acquire, link, only, outbox, probe, watch};
 
@@ -34,7 +34,7 @@ fn UART5() {
 }
 
 /// Starts everything. To be called once, from thread mode.
-pub async fn rig(thread: Spawner) {
+pub fn rig() -> ! {
     static WORD_QUEUE: ConstStaticCell<Queue<Word, WORDS>> = ConstStaticCell::new(Queue::new());
     static SAMPLE_QUEUE: ConstStaticCell<Queue<Samples, SAMPLES>> =
         ConstStaticCell::new(Queue::new());
@@ -58,12 +58,14 @@ pub async fn rig(thread: Spawner) {
         finger: board::FINGER,
     });
     // those of thread mode run when all are there, `servo`, which has the motors, at once: it is the last one
-    thread.spawn(only(link::send(tx)));
-    thread.spawn(only(link::receive(rx, &servo::BODY)));
-    thread.spawn(only(watch::watch()));
-    thread.spawn(only(probe::probe(r.store, r.go, samples_out)));
-    thread.spawn(only(acquire::acquire(r.sensor, r.slots, words_in)));
-    SERVO.start(interrupt::UART5).spawn(only(servo::servo(
-        r.lever, r.stage, r.current, r.switches, r.watchdog, words_out, samples_in,
-    )));
+    thread::run(|thread| {
+        thread.spawn(only(link::send(tx)));
+        thread.spawn(only(link::receive(rx, &servo::BODY)));
+        thread.spawn(only(watch::watch()));
+        thread.spawn(only(probe::probe(r.store, r.go, samples_out)));
+        thread.spawn(only(acquire::acquire(r.sensor, r.slots, words_in)));
+        SERVO.start(interrupt::UART5).spawn(only(servo::servo(
+            r.lever, r.stage, r.current, r.switches, r.watchdog, words_out, samples_in,
+        )));
+    })
 }

@@ -2,9 +2,9 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
-#[embassy_executor::main]
-async fn main(spawner: embassy_executor::Spawner) {
-    tactus_firmware::rig(spawner).await;
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    tactus_firmware::rig()
 }
 
 #[cfg(not(target_os = "none"))]

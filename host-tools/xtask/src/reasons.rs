@@ -22,8 +22,8 @@ const fn never(callers: &'static [&'static str], why: &'static str) -> Reason {
 const REASONS: &[Reason] = &[
     never(
         &[
-            "embassy_main_task",
-            "platform::thread::Executor>::run",
+            "tactus_firmware::rig::rig",
+            "chip::thread::run",
             "InterruptExecutor>::start",
             "embassy_stm32::rcc::",
             "embassy_stm32::time::Hertz",
@@ -34,9 +34,10 @@ const REASONS: &[Reason] = &[
         ],
         "start-up: clocks, pins and tasks are the same at every start, before the lever moves",
     ),
-    // all panics without a number or a name to tell are one function: the handler looks at none of their words
+    // all panics without a number or a name to tell are one function, which has the name of any of them: the handler looks at none
+    // of their words
     Reason {
-        panics: &["async_fn_resumed", "result::unwrap_failed"],
+        panics: &["async_fn_resumed", "result::unwrap_failed", "div_by_zero"],
         callers: &["{closure#", "TaskStorage<", "Future>::poll"],
         why: "an async fn that is polled after its end: no executor polls a task that has ended, and each future is awaited once",
     },
