@@ -77,7 +77,7 @@ impl Current {
 
     /// The conversions of the last whole periods; `None` if there are none since the last look, or not yet as many. What stands
     /// still is started anew.
-    pub(crate) fn ring(&mut self) -> Option<[u16; CONVERSIONS]> {
+    pub(crate) fn ring(&mut self) -> Option<impl Iterator<Item = u16>> {
         let stream = DMA2.st(STREAM);
         let left = stream.ndtr().read().ndt();
         // a stream that was switched off says so of itself, too
@@ -90,7 +90,7 @@ impl Current {
         }
         self.left = left;
         self.whole
-            .then(|| core::array::from_fn(|at| RING.get(at).map_or(0, |code| code.load(Relaxed))))
+            .then(|| RING.iter().map(|code| code.load(Relaxed)))
     }
 
     /// Whether the ring was filled since the last look.
@@ -105,7 +105,7 @@ impl Current {
 
     /// The mean current, A; see [`Current::ring`].
     pub(crate) fn amperes(&mut self) -> Option<f32> {
-        let sum: u32 = self.ring()?.iter().map(|code| u32::from(*code)).sum();
+        let sum: u32 = self.ring()?.map(u32::from).sum();
         Some(amperes(sum as f32 / CONVERSIONS as f32))
     }
 

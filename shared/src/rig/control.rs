@@ -16,8 +16,7 @@ use super::skin::SkinCare;
 use super::slide::Run;
 use super::stage::{MARGIN_MM, Stage, StageConstants, StageState};
 use crate::features::Movement;
-use crate::sensor::FingerModel;
-use crate::sensor::pressure::Channel;
+use crate::sensor::{FingerModel, pressure::Channel};
 
 /// How long the still finger is measured.
 pub const BACKGROUND_MS: u32 = 1000;
@@ -369,7 +368,8 @@ impl Control {
     #[inline]
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
         self.ms = self.ms.saturating_add(1);
-        for word in inputs.words.iter().flatten() {
+        for word in &inputs.words {
+            let Some(word) = word else { continue };
             match word.channel {
                 Channel::Pac => self.lever.hear(word.counts, &self.calibration.pressure),
                 Channel::Pdc => self.meter.push(word.counts),

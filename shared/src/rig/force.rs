@@ -40,7 +40,12 @@ impl ForceMeter {
     /// Takes one sample of P_DC.
     pub fn push(&mut self, counts: Counts) {
         let counts = counts.get();
-        let middle = (self.next + KEPT - MEAN_SAMPLES) % KEPT;
+        // the core divides in 12 cycles
+        let middle = if self.next < MEAN_SAMPLES {
+            self.next + (KEPT - MEAN_SAMPLES)
+        } else {
+            self.next - MEAN_SAMPLES
+        };
         let leaving = self.samples.get(self.next).copied().unwrap_or(0);
         let ageing = self.samples.get(middle).copied().unwrap_or(0);
         if self.filled >= KEPT {
@@ -54,7 +59,8 @@ impl ForceMeter {
         if let Some(slot) = self.samples.get_mut(self.next) {
             *slot = counts;
         }
-        self.next = (self.next + 1) % KEPT;
+        let next = self.next + 1;
+        self.next = if next < KEPT { next } else { 0 };
         self.filled = (self.filled + 1).min(KEPT);
         self.long.0 = self.long.0.saturating_add(u32::from(counts));
         self.long.1 = self.long.1.saturating_add(1);

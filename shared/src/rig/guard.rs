@@ -200,34 +200,33 @@ impl Guard {
 
     #[inline]
     fn sensor(&mut self, words: &[Option<Pressure>]) -> [Option<Fault>; 3] {
-        for frozen in &mut self.frozen_ms {
+        for (silent, frozen) in self.silent_ms.iter_mut().zip(&mut self.frozen_ms) {
+            *silent = silent.saturating_add(1);
             *frozen = frozen.saturating_add(1);
         }
-        for word in words.iter().flatten() {
+        let mut damaged = 0;
+        for word in words {
+            let Some(word) = word else {
+                damaged += 1;
+                continue;
+            };
             let channel = word.channel as usize;
-            if let (Some(last), Some(frozen)) =
-                (self.last.get_mut(channel), self.frozen_ms.get_mut(channel))
-                && *last != Some(*word)
-            {
-                *last = Some(*word);
-                *frozen = 0;
-            }
-        }
-        for silent in &mut self.silent_ms {
-            *silent = silent.saturating_add(1);
-        }
-        for word in words.iter().flatten() {
-            if let Some(silent) = self.silent_ms.get_mut(word.channel as usize) {
+            if let (Some(last), Some(silent), Some(frozen)) = (
+                self.last.get_mut(channel),
+                self.silent_ms.get_mut(channel),
+                self.frozen_ms.get_mut(channel),
+            ) {
                 *silent = 0;
+                if *last != Some(*word) {
+                    *last = Some(*word);
+                    *frozen = 0;
+                }
             }
         }
         // where nothing at all is heard, that is silence and no damage
-        let heard = words.iter().flatten().count();
-        let damaged = if heard > 0 {
-            (words.len() - heard) as u32
-        } else {
-            0
-        };
+        if damaged as usize == words.len() {
+            damaged = 0;
+        }
         self.slice_ms += 1;
         if self.slice_ms >= SLICE_MS {
             self.slice_ms = 0;

@@ -93,6 +93,9 @@ pub struct Profile {
     distance_mm: f32,
     speed_mm_s: f32,
     acceleration_mm_s2: f32,
+    /// How long a ramp takes, and the whole way, s.
+    ramp_s: f32,
+    duration_s: f32,
     ms: u32,
 }
 
@@ -102,27 +105,27 @@ impl Profile {
         let distance_mm = libm::fabsf(way);
         // a short way has no constant part
         let speed_mm_s = speed_mm_s.min(libm::sqrtf(distance_mm * acceleration_mm_s2));
+        let ramp_s = speed_mm_s / acceleration_mm_s2;
+        let duration_s = if speed_mm_s > 0.0 {
+            distance_mm / speed_mm_s + ramp_s
+        } else {
+            0.0
+        };
         Self {
             from_mm,
             direction: if way < 0.0 { -1.0 } else { 1.0 },
             distance_mm,
             speed_mm_s,
             acceleration_mm_s2,
+            ramp_s,
+            duration_s,
             ms: 0,
         }
     }
 
-    fn ramp_s(&self) -> f32 {
-        self.speed_mm_s / self.acceleration_mm_s2
-    }
-
     /// Duration in s.
     pub fn duration_s(&self) -> f32 {
-        if self.speed_mm_s > 0.0 {
-            self.distance_mm / self.speed_mm_s + self.ramp_s()
-        } else {
-            0.0
-        }
+        self.duration_s
     }
 
     /// Velocity in mm/s at this moment of the move.
@@ -132,7 +135,7 @@ impl Profile {
 
     /// Position in mm, velocity in mm/s and acceleration in mm/s^2 at `t` seconds.
     pub fn at(&self, t: f32) -> (f32, f32, f32) {
-        let (ramp, end) = (self.ramp_s(), self.duration_s());
+        let (ramp, end) = (self.ramp_s, self.duration_s);
         let a = self.acceleration_mm_s2;
         let (way, v, a) = if t >= end {
             (self.distance_mm, 0.0, 0.0)

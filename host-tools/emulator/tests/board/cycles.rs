@@ -2,7 +2,6 @@
 //! worst millisecond, and slower.
 
 use tactus_emulator::runs::bench::cycles::{CORE_HZ, Cycles, RESERVE, missed, slowed, trace};
-use tactus_tests::expected_to_fail;
 
 use crate::common::elf;
 
@@ -51,7 +50,5 @@ fn slots_and_servo_keep_their_time_on_a_core_that_waits_for_its_flash() {
     eprintln!("as it is: {intact:?}");
     assert_eq!(missed(&intact), [""; 0]);
     let busy = 100.0 * cycles.busy();
-    expected_to_fail("% of the core", || {
-        assert!(busy < BUSY, "a slide takes {busy:.1} % of the core");
-    });
+    assert!(busy <= BUSY, "a slide takes {busy:.1} % of the core");
 }
