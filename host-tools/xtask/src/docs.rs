@@ -2,13 +2,15 @@
 use anyhow::{Result, ensure};
 use clap::Args;
 
+use crate::emulate;
 use crate::shell::{cargo, root, run, target};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask docs            the book as pages, in target/book (needs mdBook)
   cargo xtask docs --check    links, commands, outputs, recordings and generated tables, without mdBook
-  cargo xtask docs --write    writes outputs, recordings, tables and the moving picture again";
+  cargo xtask docs --write    writes outputs, recordings, tables and the moving picture again
+  cargo xtask docs --scope    draws the oscilloscope's pictures again, from the pins of the emulated board";
 
 #[derive(Args)]
 pub(crate) struct Options {
@@ -18,9 +20,16 @@ pub(crate) struct Options {
     /// Write what is generated from the code instead of building pages
     #[arg(long)]
     write: bool,
+    /// Draw the oscilloscope's pictures again; builds firmware and emulator
+    #[arg(long, conflicts_with_all = ["check", "write"])]
+    scope: bool,
 }
 
 pub(crate) fn docs(options: &Options) -> Result<()> {
+    if options.scope {
+        let pages = root().join("docs/src");
+        return emulate::start("scope", &["--out".into(), pages.into()]);
+    }
     if options.check || options.write {
         let mut test = cargo();
         test.args(["test", "--package", "tactus", "--test", "book"]);

@@ -75,6 +75,11 @@ impl Talk {
         &mut self.emulator
     }
 
+    /// The board, without the host.
+    pub fn into_board(self) -> Emulator {
+        self.emulator
+    }
+
     /// The time it has reached, ns.
     pub fn now_ns(&self) -> u64 {
         self.emulator.now_ns()

@@ -9,6 +9,7 @@ use crate::scenario::PlayError;
 
 use super::bench::error::BenchError;
 use super::cuts::held::CutError;
+use super::scope::error::ScopeError;
 use super::soak::day::DayError;
 use super::soak::hour_report::HourError;
 
@@ -45,4 +46,6 @@ pub(crate) enum RunError {
     NoSlide,
     #[error("the display has no verdict in its headline")]
     NoVerdict,
+    #[error(transparent)]
+    Scope(#[from] ScopeError),
 }

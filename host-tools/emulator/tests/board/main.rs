@@ -18,6 +18,7 @@ mod handheld_link;
 mod long_table;
 mod old_store;
 mod referee;
+mod scope;
 mod selftest;
 mod serve;
 mod settings;
