@@ -69,6 +69,8 @@ mistakes! {
         "It is bridged, or its pin is shorted to ground, or another switch was pressed";
     SWITCHES_EXCHANGED = "switches-exchanged": "another switch opens than the one that is pressed",
         "Exchange their wires";
+    SWITCHES_JOINED = "switches-joined": "another switch opens with the one that is pressed",
+        "Each switch leads from a pin of its own to ground by a wire of its own";
     STOP_SUPPLY = "stop-supply": "the emergency stop leaves the motors their supply",
         "Put its second contact into the supply of both motors' drivers";
     ENCODER_EXCHANGED = "encoder-exchanged": "the encoder counts down to the right",
