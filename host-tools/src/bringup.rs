@@ -1,23 +1,31 @@
-//! The first evening of a new rig: a person and the self-test image go through its parts step by step, and what is wrong is named.
+//! The first evening of a new rig: a person and the self-test image go through its parts step by step, then with the rig's own
+//! firmware, and what is wrong is named.
 //!
 //! The board only measures ([`tactus_core::wire::bringup`]); limits and names of mistakes are here ([`judge`], [`MISTAKES`]), where a
 //! PC tests them. [`run`] goes through [`STEPS`] over whatever carries bytes to the board ([`Board`]) and asks whoever is there
 //! ([`Person`]). It knows the core only.
 
+mod found;
 mod journal;
 pub mod judge;
 mod line;
 mod mistakes;
+mod mounted;
 mod report;
 mod seams;
 mod steps;
+pub mod weights;
 
+pub use found::{Found, Series};
 pub use journal::{Entry, EntryMistake, EntrySeries, Journal};
 pub use line::Line;
 pub use mistakes::{MISTAKES, Mistake, Named};
+pub use mounted::Mounted;
 pub use report::{Report, plot};
-pub use seams::{Board, Person, Trouble};
-pub use steps::{Bench, Found, STEPS, Series, Step};
+pub use seams::{Board, Person, Probe, Trouble};
+pub use steps::{Bench, Image, STEPS, Step};
+
+use steps::Run;
 
 /// Who is at the rig, and sees how it goes.
 pub trait Owner: Person {
@@ -27,25 +35,76 @@ pub trait Owner: Person {
     fn now(&self) -> String;
 }
 
-/// Goes through the steps that have not passed yet, up to the first one that fails unless the person goes on; whether all have passed.
+/// Who is at the other end of the line.
+pub enum Ends<'b> {
+    /// The image that measures.
+    SelfTest(&'b mut dyn Board),
+    /// The rig's own.
+    Rig(&'b mut dyn Probe),
+}
+
+/// How far it went.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Ended {
+    /// All steps have passed.
+    Passed,
+    /// One has not.
+    Failed,
+    /// The next one takes this image.
+    Flash(Image),
+}
+
+/// The image that the next step takes; `None`: all have passed.
+pub fn next_image(journal: &Journal) -> Option<Image> {
+    let mut steps = STEPS.iter();
+    let next = steps.find(|step| !journal.has_passed(step.key));
+    next.map(Step::image)
+}
+
+/// Goes through the steps that have not passed yet, up to the first one that fails unless the person goes on, or that takes another
+/// image.
 ///
 /// # Errors
 /// See [`Trouble`].
 pub fn run(
-    board: &mut dyn Board,
+    mut ends: Ends<'_>,
     person: &mut dyn Owner,
     journal: &mut Journal,
-) -> Result<bool, Trouble> {
+) -> Result<Ended, Trouble> {
     for step in STEPS {
         if journal.has_passed(step.key) {
             continue;
         }
-        let found = (step.run)(&mut Bench { board, person })?;
+        let found = match (&step.run, &mut ends) {
+            (Run::SelfTest(run), Ends::SelfTest(board)) => run(&mut Bench {
+                board: &mut **board,
+                person,
+            })?,
+            (Run::Rig(run), Ends::Rig(probe)) => {
+                let weighed = journal
+                    .last("scale")
+                    .and_then(|entry| entry.series.as_ref());
+                let now = person.now();
+                let digits = now.chars().filter(char::is_ascii_digit).take(8);
+                run(&mut Mounted {
+                    weighed: weighed.map_or(Vec::new(), |series| series.points.clone()),
+                    today: digits.collect::<String>().parse().unwrap_or(0),
+                    probe: &mut **probe,
+                    person,
+                })?
+            }
+            _ => return Ok(Ended::Flash(step.image())),
+        };
         let entry = Entry::new(step, person.now(), &found);
         journal.add(entry.clone())?;
         if !person.found(step, &entry)? {
             break;
         }
     }
-    Ok(STEPS.iter().all(|step| journal.has_passed(step.key)))
+    Ok(
+        match STEPS.iter().all(|step| journal.has_passed(step.key)) {
+            true => Ended::Passed,
+            false => Ended::Failed,
+        },
+    )
 }

@@ -6,7 +6,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::steps::{Found, Series, Step};
+use super::found::{Found, Series};
+use super::steps::Step;
 
 /// A step that is over.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]

@@ -1,6 +1,8 @@
 //! What measurements of a new rig mean: limits, and which mistake shows like this. Pure functions of what the board and the person
 //! at it said.
 
+pub mod mounted;
+
 use tactus_core::wire::Reset;
 use tactus_core::wire::bringup::limits::{
     BRAKING_A, CURRENT_RMS, CURRENT_ZERO, LEVER_PLAY, PAC_RMS, PDC, WEAK_A,

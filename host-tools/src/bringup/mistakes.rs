@@ -111,6 +111,24 @@ mistakes! {
         "Take its two wires off the bridge, and put the resistor there";
     CURRENT_GAIN = "current-gain": "the amplifier of the motor's current has another gain than 1 V/A",
         "INA240A1 (20 V/V) and a shunt of 50 mohm; A2 has 50 V/V, A3 100, A4 200";
+    SCALE_LINE = "scale-line": "P_DC and the weights are on no line",
+        "Each weight rests on the tip alone and stands still, the finger held so that it does not give way; weigh again";
+    SCALE_FAR = "scale-far": "a count of P_DC is worth another force than a finger's can be",
+        "5.75 to 23 mN a count are possible: see whether the weights are g; else the finger's filling or its amplifier is wrong";
+    FINGER_LEAKS = "finger-leaks": "P_DC falls under a weight that stands, or does not come back after it",
+        "Wait a minute and weigh again; if it stays so, look for fluid at the skin's rim and refill the finger";
+    ZERO_DRIFTS = "zero-drifts": "P_DC in the air is not the same twice",
+        "A finger warms up for a quarter of an hour; keep the sun off it; if it stays so the skin leaks";
+    STAGE_SPEED = "stage-speed": "the stage does not keep the speed that it is asked for",
+        "Oil and align its screw, look for what drags on it or its cables, and whether the bridge's supply holds 12 V meanwhile";
+    SAMPLES_LOST = "samples-lost": "the firmware lost samples",
+        "Report it, with the log (tactus device status --log FILE)";
+    SLIDE_QUIET = "slide-quiet": "the finger hears nothing of the slide",
+        "See whether it touches the paper and the stage moves below it; fix the paper to the stage";
+    SLIDE_TRACTION = "slide-traction": "the stage's motor pulls no harder with the finger on it",
+        "See whether the finger touches the paper, and run step `resistor` again: a wrong gain or sign";
+    FAULT = "fault": "the rig's firmware refused, or saw a fault",
+        "Remove the cause that it names, then: tactus device home, and the same command again";
     STORE = "store": "the store does not keep what is written",
         "Report what it says; the rig works, but forgets at power-off";
     WATCHDOG = "watchdog": "the watchdog does not start the board again",

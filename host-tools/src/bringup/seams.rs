@@ -2,8 +2,8 @@
 
 use std::io;
 
-use tactus_core::wire::Reset;
 use tactus_core::wire::bringup::{Measure, Pin, Saw};
+use tactus_core::wire::{Command, Report, Reset};
 
 /// Why a step came to no end.
 #[derive(Debug, thiserror::Error)]
@@ -42,6 +42,20 @@ pub trait Board {
     /// # Errors
     /// See [`Trouble`].
     fn restart(&mut self, measure: Measure) -> Result<Option<Reset>, Trouble>;
+}
+
+/// The rig's firmware at the other end of a line.
+pub trait Probe {
+    /// Asks for something, and waits until it is over; `each` gets all that is said meanwhile. Within: why it was refused or
+    /// came to nothing.
+    ///
+    /// # Errors
+    /// See [`Trouble`].
+    fn ask(
+        &mut self,
+        command: Command,
+        each: &mut dyn FnMut(&Report),
+    ) -> Result<Result<(), String>, Trouble>;
 }
 
 /// Who is at the rig.

@@ -1,14 +1,17 @@
-//! The steps of the first evening with the self-test image, in their order.
+//! The steps of the first evening, in their order.
 
 use tactus_core::sensor::pressure::SLOTS_HZ;
 use tactus_core::wire::bringup::{
     Look, MAX_POINTS, Measure, POINTS, Pin, Saw, SensorSeen, Stopped, limits,
 };
 
+use super::found::{Found, Series};
+use super::judge::mounted::{AIR_COUNTS, OFF_LINE, SPEED_SHARE, UNEVEN_MM};
 use super::judge::{
-    self, BRAKING_MA, CORE_KHZ, COUNTS_PER_MM, Finding, GAIN, LEVER_MM, LOGIC_V, MOTOR_V, SWITCHES,
+    self, BRAKING_MA, CORE_KHZ, COUNTS_PER_MM, GAIN, LEVER_MM, LOGIC_V, MOTOR_V, SWITCHES,
     TRAVEL_MM, Went,
 };
+use super::mounted::Mounted;
 use super::seams::{Board, Person, Trouble};
 
 /// A step.
@@ -21,36 +24,32 @@ pub struct Step {
     pub how: &'static str,
     /// What is right, with the limits that it is judged by.
     pub limit: fn() -> String,
-    pub(super) run: fn(&mut Bench<'_>) -> Result<Found, Trouble>,
+    pub(super) run: Run,
 }
 
-/// What a step has found, and what can be drawn of it.
-#[derive(Debug)]
-pub struct Found {
-    /// The finding.
-    pub finding: Finding,
-    /// Axes, and points.
-    pub series: Option<Series>,
+/// What is done, and the image that it takes.
+pub(super) enum Run {
+    SelfTest(fn(&mut Bench<'_>) -> Result<Found, Trouble>),
+    Rig(fn(&mut Mounted<'_>) -> Result<Found, Trouble>),
 }
 
-/// Points that belong together.
-#[derive(Clone, Debug)]
-pub struct Series {
-    /// What they show.
-    pub title: &'static str,
-    /// Of the first coordinate and of the second.
-    pub axes: [&'static str; 2],
-    /// The points.
-    pub points: Vec<[f64; 2]>,
-}
-
-impl From<Finding> for Found {
-    fn from(finding: Finding) -> Self {
-        Self {
-            finding,
-            series: None,
+impl Step {
+    /// The image that it takes.
+    pub fn image(&self) -> Image {
+        match self.run {
+            Run::SelfTest(_) => Image::SelfTest,
+            Run::Rig(_) => Image::Rig,
         }
     }
+}
+
+/// An image of the firmware.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Image {
+    /// That which measures.
+    SelfTest,
+    /// The rig's own.
+    Rig,
 }
 
 /// The board and the person at it.
@@ -68,6 +67,14 @@ macro_rules! ask {
     };
 }
 
+/// Weights that somebody has, and what one g is, mN.
+const WEIGHTS_G: [u8; 3] = [50, 100, 150];
+const MN_PER_G: f64 = 9.806_65;
+/// How long the last one stands, s.
+const HELD_S: u32 = 4;
+/// Title of the points of the force scale.
+const SCALE: &str = "weights on the finger by the counts of P_DC above that in the air";
+
 fn range((from, to): (f64, f64), unit: &str) -> String {
     format!("{from} to {to} {unit}")
 }
@@ -84,7 +91,7 @@ pub static STEPS: &[Step] = &[
         checks: "supplies",
         how: "a multimeter at the board's pin 3V3 and at the motors' drivers",
         limit: || format!("{}, {}", range(LOGIC_V, "V"), range(MOTOR_V, "V")),
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             let logic_v = bench.person.number(
                 "Measure the voltage at the board's pin 3V3 against GND",
                 "V",
@@ -93,7 +100,7 @@ pub static STEPS: &[Step] = &[
                 .person
                 .number("Measure the supply of the motors' drivers", "V")?;
             Ok(judge::supplies(logic_v, motor_v).into())
-        },
+        }),
     },
     Step {
         key: "chip",
@@ -105,11 +112,11 @@ pub static STEPS: &[Step] = &[
                 "{khz} +- {off} kHz, by the 8 MHz of the ST-LINK; PA12 low; level 3; no last words"
             )
         },
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             let (reset, last_words) = bench.hello()?;
             let seen = ask!(bench, Measure::Chip, Chip);
             Ok(judge::chip(&seen, reset, last_words.as_deref()).into())
-        },
+        }),
     },
     Step {
         key: "pins",
@@ -118,18 +125,18 @@ pub static STEPS: &[Step] = &[
         limit: || {
             "switches not high; encoder driven; MISO and not MOSI driven by the selected sensor; PD14 high, PE13 and PC8 low by their resistors".to_owned()
         },
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             // the pins are looked at when the board starts, before their drivers have them
             bench.board.restart(Measure::Restart)?;
             Ok(judge::pins(&ask!(bench, Measure::Pins, Pins)).into())
-        },
+        }),
     },
     Step {
         key: "sensor",
         checks: "the sensor's identity and its words",
         how: "the board reads it for a second",
         limit: || format!("{SLOTS_HZ} words, none garbled, late or silent"),
-        run: |bench| Ok(judge::sensor(&bench.sensor()?).into()),
+        run: Run::SelfTest(|bench| Ok(judge::sensor(&bench.sensor()?).into())),
     },
     Step {
         key: "noise",
@@ -141,7 +148,7 @@ pub static STEPS: &[Step] = &[
                 [pac, pdc].map(|one| (one.start(), one.end()));
             format!("P_AC {pac_from} to {pac_to} counts rms, P_DC {pdc_from} to {pdc_to} counts")
         },
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             bench
                 .person
                 .done("Lay the finger down so that nothing touches its tip")?;
@@ -159,14 +166,14 @@ pub static STEPS: &[Step] = &[
                     points: pac.collect(),
                 }),
             })
-        },
+        }),
     },
     Step {
         key: "switches",
         checks: "each switch by hand",
         how: "the person presses one after the other",
         limit: || "closed, open while it is pressed, and no other one with it".to_owned(),
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             bench.person.done(
                 "Push the stage to its middle by hand; turn the lever's knob until its switch is free; release the emergency stop",
             )?;
@@ -182,14 +189,14 @@ pub static STEPS: &[Step] = &[
                 .try_into()
                 .map_err(|_| Trouble::Unexpected("a switch".to_owned()))?;
             Ok(judge::switches(&looks).into())
-        },
+        }),
     },
     Step {
         key: "stop",
         checks: "the second contact of the emergency stop",
         how: "the person presses it and looks at the drivers' supply",
         limit: || "both drivers are without supply".to_owned(),
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             bench.person.press(Pin::EStop, true)?;
             let seen = bench.look()?.e_stop;
             let gone = bench.person.choose(
@@ -198,7 +205,7 @@ pub static STEPS: &[Step] = &[
             )? == 0;
             bench.person.press(Pin::EStop, false)?;
             Ok(judge::stop(seen, gone).into())
-        },
+        }),
     },
     Step {
         key: "hand",
@@ -210,7 +217,7 @@ pub static STEPS: &[Step] = &[
                 range(TRAVEL_MM, "mm")
             )
         },
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             bench
                 .person
                 .done("Push the stage by hand to the left until its switch opens")?;
@@ -221,7 +228,7 @@ pub static STEPS: &[Step] = &[
             let right = bench.look()?;
             bench.person.done("Push it back to its middle")?;
             Ok(judge::by_hand(&left, &right).into())
-        },
+        }),
     },
     Step {
         key: "current",
@@ -231,21 +238,21 @@ pub static STEPS: &[Step] = &[
             let (zero, off) = limits::CURRENT_ZERO;
             format!("{zero} +- {off} counts, below {} rms", limits::CURRENT_RMS)
         },
-        run: |bench| Ok(judge::rest(&bench.look()?).into()),
+        run: Run::SelfTest(|bench| Ok(judge::rest(&bench.look()?).into())),
     },
     Step {
         key: "finger",
         checks: "the finger is off its mount, and P_DC lives",
         how: "the person squeezes it in the hand: without that no motor moves",
         limit: || format!("P_DC rises by {} counts, and comes back", limits::SQUEEZED),
-        run: |bench| Ok(judge::squeezed(bench.squeeze()?).into()),
+        run: Run::SelfTest(|bench| Ok(judge::squeezed(bench.squeeze()?).into())),
     },
     Step {
         key: "lever-sense",
         checks: "the lever's DIR by 1 mm",
         how: "the motor makes 1600 steps, the person looks",
         limit: || "up where it should go up".to_owned(),
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             // at its top it can only go down
             let (steps, way) = match bench.look()?.lever_top {
                 true => (1600, "down"),
@@ -258,14 +265,14 @@ pub static STEPS: &[Step] = &[
             let seen = bench.lever(Measure::Lever(steps))?;
             let went = bench.went("The lever went", [way, "the other way", "nowhere"])?;
             Ok(judge::lever_sense(&seen, went).into())
-        },
+        }),
     },
     Step {
         key: "lever-switch",
         checks: "the lever's switch, and that no step is lost",
         how: "up to the switch, 2 mm down, up again",
         limit: || format!("the switch opens at the same place within {}", play()),
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             let up = bench.lever(Measure::LeverTop)?;
             let down = bench.lever(Measure::Lever(3200))?;
             let mut points = bench.points(4.0 * 0.625e-3, 1.0 / 16.0)?;
@@ -279,14 +286,14 @@ pub static STEPS: &[Step] = &[
                     points,
                 }),
             })
-        },
+        }),
     },
     Step {
         key: "lever-scale",
         checks: "the lever's microsteps and lead",
         how: "6400 steps down; the person measures with a caliper",
         limit: || format!("{:.1} +- {:.1} mm", LEVER_MM.0, LEVER_MM.1),
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             bench.lever(Measure::LeverTop)?;
             let before = bench.person.number(
                 "Measure the height of the finger's mount over the plate with a caliper",
@@ -300,14 +307,14 @@ pub static STEPS: &[Step] = &[
                 .number("The lever went down. Measure that height again", "mm")?;
             bench.lever(Measure::LeverTop)?;
             Ok(judge::lever_scale(before - after).into())
-        },
+        }),
     },
     Step {
         key: "foam",
         checks: "the lever against a load",
         how: "a block of foam under the empty mount; three times 4 mm down and up to the switch",
         limit: || format!("no step lost beyond {}", play()),
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             bench.person.done("Put a block of soft foam under the empty mount, so that it is pressed by 2 or 3 mm")?;
             let mut ways = Vec::new();
             for _ in 0..3 {
@@ -319,27 +326,27 @@ pub static STEPS: &[Step] = &[
             }
             bench.person.done("Take the foam away")?;
             Ok(judge::foam(&ways).into())
-        },
+        }),
     },
     Step {
         key: "stage-sense",
         checks: "the stage's motor, its DIR, and the encoder with it, by 1 mm",
         how: "the motor goes 1 mm to the right and back, the person looks at the first",
         limit: || "to the right, counted up, with current of the same sign".to_owned(),
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             bench.person.watch("The stage is going 1 mm to the right, in a second. Look at it: which way does it go?")?;
             let right = ask_stage(bench, true)?;
             let went = bench.went("The stage went", ["to the right", "to the left", "nowhere"])?;
             let left = ask_stage(bench, false)?;
             Ok(judge::stage_sense(&right, &left, went).into())
-        },
+        }),
     },
     Step {
         key: "bridge",
         checks: "the bridge's decay",
         how: "1 mm to each side, then the PWM low while the stage still moves",
         limit: || format!("more than {BRAKING_MA:.0} mA against the movement"),
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             let right = ask_stage(bench, true)?;
             let points = bench.points(1e-3, 1.0)?;
             let left = ask_stage(bench, false)?;
@@ -351,14 +358,14 @@ pub static STEPS: &[Step] = &[
                     points,
                 }),
             })
-        },
+        }),
     },
     Step {
         key: "resistor",
         checks: "the amplifier's gain against a known resistor",
         how: "a resistor of 22 ohm, 5 W, in the place of the stage's motor; duties to 0.48 on both sides",
         limit: || range(GAIN, "V/A"),
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             let ohm = bench.person.number("Take the wires of the stage's motor off the bridge, put a resistor of some 22 ohm and 5 W there, and measure it", "ohm")?;
             let supply_v = bench
                 .person
@@ -385,24 +392,93 @@ pub static STEPS: &[Step] = &[
                     points,
                 }),
             })
-        },
+        }),
     },
     Step {
         key: "store",
         checks: "the store",
         how: "the board writes the skin's record as it is, and reads it",
         limit: || "the same".to_owned(),
-        run: |bench| {
+        run: Run::SelfTest(|bench| {
             let done = ask!(bench, Measure::Store, Store);
             Ok(judge::store(&done.map_err(|why| why.to_string())).into())
-        },
+        }),
     },
     Step {
         key: "watchdog",
         checks: "the watchdog",
         how: "the board hangs on purpose",
         limit: || "it starts again, by the watchdog".to_owned(),
-        run: |bench| Ok(judge::watchdog(bench.board.restart(Measure::Watchdog)?).into()),
+        run: Run::SelfTest(|bench| {
+            Ok(judge::watchdog(bench.board.restart(Measure::Watchdog)?).into())
+        }),
+    },
+    Step {
+        key: "scale",
+        checks: "the force scale, by weights",
+        how: "three weights, one after the other, on the tip of the finger, which lies on its back",
+        limit: || {
+            format!(
+                "a line within {:.0} %, 5.75 to 23 mN a count; back within {AIR_COUNTS} counts",
+                100.0 * OFF_LINE
+            )
+        },
+        run: Run::SelfTest(|bench| {
+            bench.person.done("Lay the finger down with its tip up, in something that holds it, and let nothing touch the tip")?;
+            let [air, _] = bench.sensor()?.pdc;
+            let mut points = Vec::new();
+            for grams in WEIGHTS_G {
+                let grams = bench.person.number(
+                    &format!("Put some {grams} g on its tip so that it stays there by itself, and say how much it is"),
+                    "g",
+                )?;
+                let [pdc, _] = bench.sensor()?.pdc;
+                points.push([f64::from(pdc - air), grams * MN_PER_G]);
+            }
+            let [first, _] = bench.sensor()?.pdc;
+            for _ in 1..HELD_S {
+                bench.sensor()?;
+            }
+            let [last, _] = bench.sensor()?.pdc;
+            bench.person.done("Take the weight away")?;
+            let [after, _] = bench.sensor()?.pdc;
+            Ok(Found {
+                finding: judge::mounted::scale(&points, last - first, after - air),
+                series: Some(Series {
+                    title: SCALE,
+                    axes: ["counts", "mN"],
+                    points,
+                }),
+            })
+        }),
+    },
+    Step {
+        key: "zero",
+        checks: "P_DC in the air, and that the force scale is kept",
+        how: "the rig's firmware calibrates twice, the finger on its mount",
+        limit: || format!("twice the same within {AIR_COUNTS} counts"),
+        run: Run::Rig(|mounted| mounted.zero()),
+    },
+    Step {
+        key: "speed",
+        checks: "the stage's speed by its encoder",
+        how: "runs at four speeds there and back, the finger in the air",
+        limit: || {
+            format!(
+                "within {:.0} % of 10, 25, 40 and 63 mm/s, even to {UNEVEN_MM} mm",
+                100.0 * SPEED_SHARE
+            )
+        },
+        run: Run::Rig(|mounted| mounted.speed()),
+    },
+    Step {
+        key: "slide",
+        checks: "the first slide",
+        how: "one slide over computer paper",
+        limit: || {
+            "no fault, no lost word; louder than the still finger, and with traction".to_owned()
+        },
+        run: Run::Rig(|mounted| mounted.slide()),
     },
 ];
 

@@ -4,7 +4,7 @@ use super::calibration::{LineFit, RigCalibration, RigCalibrationError};
 
 /// Speeds of the runs, um/s, each there and back: from the slowest movement of the study to the fastest that most of the
 /// grid needs.
-const SPEEDS_UM_S: [u32; 4] = [10_000, 25_000, 40_000, 63_000];
+pub const SPEEDS_UM_S: [u32; 4] = [10_000, 25_000, 40_000, 63_000];
 
 /// The runs that are made and those that are still to be made.
 ///

@@ -6,22 +6,25 @@
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use tactus::bringup::judge::Finding;
 use tactus::bringup::{
-    self, Board, Entry, Journal, Line, MISTAKES, Owner, Person, Report, STEPS, Step, Trouble,
+    self, Board, Ended, Ends, Entry, Image, Journal, Line, MISTAKES, Owner, Person, Probe, Report,
+    STEPS, Step, Trouble,
 };
+use tactus::link::Request;
 use tactus::sim::encoder::Cut;
 use tactus::sim::faults::Fault;
 use tactus::sim::person::{Hand, Manner};
 use tactus::sim::stage::{SUPPLY_V, TRAVEL_MM};
 use tactus::sim::wiring::Miswired;
 use tactus::sim::world::{Reached, Setup};
-use tactus_core::wire::Reset;
 use tactus_core::wire::bringup::{Measure, Pin, Saw};
+use tactus_core::wire::{Command, Report as Told, Reset};
 use tactus_emulator::board::{Emulator, Options, pins};
+use tactus_emulator::host::talk::{Talk, TalkError};
 
 use crate::common::elf_of;
 
@@ -97,6 +100,74 @@ impl Board for Wire<'_> {
     }
 }
 
+/// The rig's firmware at the other end of the link.
+struct Linked(Talk);
+
+impl Probe for Linked {
+    fn ask(
+        &mut self,
+        command: Command,
+        each: &mut dyn FnMut(&Told),
+    ) -> Result<Result<(), String>, Trouble> {
+        let done = self.0.run(Request::command(command), 120.0, |_, report| {
+            if let Some(report) = report {
+                each(report);
+            }
+        });
+        match done {
+            Ok(()) => Ok(Ok(())),
+            Err(TalkError::Refused(why)) => Ok(Err(why)),
+            Err(why) => Err(Trouble::Unexpected(why.to_string())),
+        }
+    }
+}
+
+/// Who mounts the finger and looks.
+struct Onlooker;
+
+impl Person for Onlooker {
+    fn done(&mut self, please: &str) -> Result<(), Trouble> {
+        // the simulated world has its finger on the mount
+        assert!(
+            please.starts_with("Put the finger on its mount"),
+            "{please}"
+        );
+        Ok(())
+    }
+
+    fn watch(&mut self, _: &str) -> Result<(), Trouble> {
+        Ok(())
+    }
+
+    fn press(&mut self, switch: Pin, _: bool) -> Result<(), Trouble> {
+        panic!("nobody presses {switch:?}")
+    }
+
+    fn squeeze(&mut self) -> Result<(), Trouble> {
+        panic!("the finger is on its mount")
+    }
+
+    fn choose(&mut self, question: &str, _: &[&str]) -> Result<usize, Trouble> {
+        panic!("{question}")
+    }
+
+    fn number(&mut self, question: &str, _: &str) -> Result<f64, Trouble> {
+        panic!("{question}")
+    }
+}
+
+impl Owner for Onlooker {
+    fn found(&mut self, _: &Step, entry: &Entry) -> Result<bool, Trouble> {
+        Ok(entry.passed)
+    }
+
+    fn now(&self) -> String {
+        NOW.to_owned()
+    }
+}
+
+const NOW: &str = "2026-11-24T20:00:00Z";
+
 /// Does what is asked. Sees the world, never the board.
 struct Helper<'r> {
     rig: &'r Rig,
@@ -108,6 +179,14 @@ struct Helper<'r> {
 impl Helper<'_> {
     fn truth(&self) -> tactus::sim::world::Truth {
         self.rig.emulator.borrow().rig().world().truth()
+    }
+
+    /// Lays a weight on the finger, N.
+    fn weigh(&self, newton: f64) {
+        if let Some(hand) = self.rig.emulator.borrow().rig().world().hand() {
+            hand.intend(newton, 0.0);
+        }
+        self.rig.run_ms(2000);
     }
 
     fn push(&self, to_mm: f64) {
@@ -141,6 +220,22 @@ impl Person for Helper<'_> {
             self.rig.run_ms(500);
         } else if begins("Connect the stage's motor") {
             self.rig.emulator.borrow().rig().world().replace_motor(None);
+        } else if begins("Lay the finger down with its tip up") {
+            // what lies on it neither trembles nor wanders
+            let still = Manner {
+                tremor: 0.0,
+                wander: 0.0,
+                ..Manner::default()
+            };
+            self.rig
+                .emulator
+                .borrow()
+                .rig()
+                .world()
+                .hold(Hand::new(1, still));
+            self.rig.run_ms(500);
+        } else if begins("Take the weight away") {
+            self.weigh(0.0);
         } else {
             // the simulated world has no foam, and nothing touches its finger
             assert!(
@@ -210,6 +305,11 @@ impl Person for Helper<'_> {
             self.logic_v
         } else if question.contains("supply") {
             SUPPLY_V
+        } else if let Some(grams) = question.strip_prefix("Put some ") {
+            let (grams, _) = grams.split_once(" g ").unwrap();
+            let grams: f64 = grams.parse().unwrap();
+            self.weigh(grams * 9.806_65e-3);
+            grams
         } else if question.contains("ohm") {
             self.rig
                 .emulator
@@ -231,7 +331,7 @@ impl Owner for Helper<'_> {
     }
 
     fn now(&self) -> String {
-        "2026-11-24T20:00:00Z".to_owned()
+        NOW.to_owned()
     }
 }
 
@@ -291,15 +391,15 @@ impl Drop for Folder {
     }
 }
 
-/// An evening that begins with a step; those before have passed.
-fn evening(built: &Built, from: usize) -> Option<Evening> {
-    let elf = elf_of("TACTUS_SELFTEST_ELF")?;
+/// A board with an image on it, and the rig as it was built.
+fn start(elf: &Path, built: &Built, store: Option<Vec<u8>>) -> Emulator {
     let options = Options {
         clock: built.clock,
         brown_out: built.brown_out,
+        store,
         ..Options::default()
     };
-    let mut emulator = Emulator::start(&elf, built.setup, options).unwrap();
+    let mut emulator = Emulator::start(elf, built.setup, options).unwrap();
     for mistake in &built.mistakes {
         emulator.rig().world().miswire(*mistake);
     }
@@ -309,8 +409,13 @@ fn evening(built: &Built, from: usize) -> Option<Evening> {
     for pin in &built.open {
         emulator.leave_open(*pin).unwrap();
     }
+    emulator
+}
+
+/// The steps with the self-test image; the board afterwards.
+fn with_self_test(elf: &Path, built: &Built, journal: &mut Journal) -> (Ended, Emulator) {
     let rig = Rig {
-        emulator: RefCell::new(emulator),
+        emulator: RefCell::new(start(elf, built, None)),
         lets_go_ns: Cell::new(None),
     };
     let mut wire = Wire(&rig, Line::default());
@@ -319,39 +424,89 @@ fn evening(built: &Built, from: usize) -> Option<Evening> {
         watched: (0.0, 0.0),
         logic_v: built.logic_v,
     };
+    assert!(wire.hello().unwrap().is_some(), "no answer");
+    if journal.has_passed("switches") {
+        helper.done("Push the stage to its middle").unwrap();
+    }
+    let ended = bringup::run(Ends::SelfTest(&mut wire), &mut helper, journal);
+    let ended = ended.unwrap_or_else(|why| {
+        let mut emulator = rig.emulator.borrow_mut();
+        let resets = emulator.resets().unwrap();
+        panic!("{why}: {resets:?}, {}", Report::new(journal).text())
+    });
+    // weights, and the squeeze of a hand, and no more
+    let force_max_n = rig.emulator.borrow().rig().world().truth().force_max_n;
+    assert!(force_max_n < 1.6, "{force_max_n} N");
+    (ended, rig.emulator.into_inner())
+}
+
+/// The steps with the rig's own image, its store as it was left.
+fn with_rig(
+    elf: &Path,
+    built: &Built,
+    store: Option<Vec<u8>>,
+    journal: &mut Journal,
+) -> (Ended, Emulator) {
+    let healthy = Built {
+        faults: Vec::new(),
+        ..built.clone()
+    };
+    let mut talk = Talk::new(start(elf, &healthy, store));
+    assert_eq!(talk.ready(|_, _| ()).unwrap(), None);
+    // what broke meanwhile
+    for fault in &built.faults {
+        talk.board().inject(*fault);
+    }
+    let mut linked = Linked(talk);
+    let ended = bringup::run(Ends::Rig(&mut linked), &mut Onlooker, journal);
+    let ended = ended.unwrap_or_else(|why| panic!("{why}: {}", Report::new(journal).text()));
+    let board = linked.0.into_board();
+    let force_max_n = board.rig().world().truth().force_max_n;
+    assert!(force_max_n < 2.2, "{force_max_n} N");
+    (ended, board)
+}
+
+/// An evening that begins with a step; those before have passed.
+fn evening(built: &Built, from: usize) -> Option<Evening> {
+    let self_test = elf_of("TACTUS_SELFTEST_ELF")?;
+    let rig = elf_of("TACTUS_ELF")?;
     let folder = Folder::new();
     let mut journal = Journal::open(&folder.0.join("journal.jsonl")).unwrap();
     for step in STEPS.iter().take(from) {
         let found = Finding::default().into();
-        journal.add(Entry::new(step, helper.now(), &found)).unwrap();
+        journal
+            .add(Entry::new(step, NOW.to_owned(), &found))
+            .unwrap();
     }
-    assert!(wire.hello().unwrap().is_some(), "no answer");
-    if STEPS.iter().take(from).any(|step| step.key == "switches") {
-        helper.done("Push the stage to its middle").unwrap();
+    let (mut ended, mut store) = (Ended::Flash(Image::Rig), None);
+    let mut boards = Vec::new();
+    if bringup::next_image(&journal) == Some(Image::SelfTest) {
+        let (how, mut board) = with_self_test(&self_test, built, &mut journal);
+        (ended, store) = (how, Some(board.store().unwrap()));
+        boards.push(board);
     }
-    let passed = bringup::run(&mut wire, &mut helper, &mut journal).unwrap_or_else(|why| {
-        let mut emulator = rig.emulator.borrow_mut();
-        let resets = emulator.resets().unwrap();
-        panic!("{why}: {resets:?}, {}", Report::new(&journal).text())
-    });
+    if ended == Ended::Flash(Image::Rig) {
+        let (how, board) = with_rig(&rig, built, store, &mut journal);
+        ended = how;
+        boards.push(board);
+    }
     let report = Report::new(&journal);
     report.write(&folder.0).unwrap();
     let step = STEPS.iter().rfind(|step| journal.last(step.key).is_some());
     let last = step.and_then(|step| journal.last(step.key)).unwrap();
     // one mistake may be named at two pins
     let named: BTreeSet<String> = last.mistakes.iter().map(|one| one.key.clone()).collect();
-    let mut emulator = rig.emulator.into_inner();
     let evening = Evening {
-        passed,
+        passed: ended == Ended::Passed,
         failed: last.step.clone(),
         named: named.into_iter().collect(),
         text: report.text(),
     };
-    eprintln!("{}{} s", evening.text, emulator.now_ns() / 1_000_000_000);
-    assert_eq!(emulator.violations().unwrap(), []);
-    // the squeeze of a hand, and no more
-    let force_max_n = emulator.rig().world().truth().force_max_n;
-    assert!(force_max_n < 1.0, "{force_max_n} N");
+    eprintln!("{}", evening.text);
+    for mut board in boards {
+        eprintln!("{} s", board.now_ns() / 1_000_000_000);
+        assert_eq!(board.violations().unwrap(), []);
+    }
     Some(evening)
 }
 
@@ -589,6 +744,42 @@ fn of_stage() -> Vec<Case> {
             miswired(Miswired::CurrentGain(2.5)),
         ),
     ]
+}
+
+fn of_weights() -> Vec<Case> {
+    vec![
+        Case("scale", "scale-far", broken(Fault::PdcWeak { gain: 0.3 })),
+        Case("scale", "finger-dead", broken(Fault::PdcStuck)),
+        Case(
+            "scale",
+            "finger-leaks",
+            broken(Fault::SkinLeaks { seconds: 20.0 }),
+        ),
+    ]
+}
+
+fn of_finger_and_stage() -> Vec<Case> {
+    vec![
+        Case(
+            "zero",
+            "zero-drifts",
+            broken(Fault::PdcDrift { counts_per_s: 0.4 }),
+        ),
+        Case("zero", "fault", broken(Fault::StageJammed)),
+        Case("speed", "fault", broken(Fault::BridgeOff)),
+        Case("slide", "fault", broken(Fault::StageJammed)),
+        Case("slide", "fault", broken(Fault::BitFlips { share: 2e-4 })),
+    ]
+}
+
+#[test]
+fn mistakes_that_weights_show_are_named() {
+    play(&of_weights(), false);
+}
+
+#[test]
+fn mistakes_that_the_rigs_firmware_sees_are_named() {
+    play(&of_finger_and_stage(), false);
 }
 
 #[test]

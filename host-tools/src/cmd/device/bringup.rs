@@ -7,12 +7,14 @@ use std::time::{Duration, Instant};
 
 use anyhow::bail;
 use tactus::bringup::{
-    self, Board, Entry, Journal, Line, Owner, Person, Report, STEPS, Step, Trouble, judge,
+    self, Board, Ended, Ends, Entry, Image, Journal, Line, Owner, Person, Probe, Report, STEPS,
+    Step, Trouble, judge,
 };
-use tactus_core::wire::Reset;
+use tactus::link::{LinkError, PortError, Request};
 use tactus_core::wire::bringup::{Measure, Pin, Saw};
+use tactus_core::wire::{Command, Report as Told, Reset};
 
-use super::bench::{BenchError, Interrupt};
+use super::bench::{Bench, BenchError, Interrupt};
 use super::line::{Open, Where};
 use crate::cmd::output::{Format, print_json};
 
@@ -20,7 +22,7 @@ use crate::cmd::output::{Format, print_json};
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  cargo xtask flash --self-test            the image that measures; it stays on the board meanwhile
+  cargo xtask flash --self-test            the image that measures; it stays on the board until it has passed
   tactus device bringup                    goes on where it stopped last time
   tactus device bringup --list             the steps, and what is right in each
   tactus device bringup --report rig2      another rig
@@ -72,23 +74,29 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         port: how.port.clone(),
         ..Where::default()
     };
-    let open = place.open().map_err(BenchError::from)?;
-    let mut board = Serial {
-        open,
-        line: Line::default(),
-        interrupt: interrupt.clone(),
-    };
     let mut person = Terminal {
-        interrupt,
+        interrupt: interrupt.clone(),
         lines: lines(),
     };
-    eprintln!(
-        "Looking for the self-test. If nothing comes in a minute, press the board's black button."
-    );
-    let done = board
-        .hello(STARTS)
-        .and_then(|reset| reset.ok_or(Trouble::Silent))
-        .and_then(|_| bringup::run(&mut board, &mut person, &mut journal));
+    let done = if bringup::next_image(&journal) == Some(Image::Rig) {
+        let (bench, _) = Bench::open(&place)?;
+        let mut linked = Linked(bench);
+        bringup::run(Ends::Rig(&mut linked), &mut person, &mut journal)
+    } else {
+        let open = place.open().map_err(BenchError::from)?;
+        let mut board = Serial {
+            open,
+            line: Line::default(),
+            interrupt,
+        };
+        eprintln!(
+            "Looking for the self-test. If nothing comes in a minute, press the board's black button."
+        );
+        board
+            .hello(STARTS)
+            .and_then(|reset| reset.ok_or(Trouble::Silent))
+            .and_then(|_| bringup::run(Ends::SelfTest(&mut board), &mut person, &mut journal))
+    };
     let report = Report::new(&journal);
     report.write(&how.report)?;
     match how.format {
@@ -98,13 +106,43 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     out.flush()?;
     let folder = how.report.display();
     eprintln!("The report is in {folder}: report.txt, report.json and curves.");
-    if !done.map_err(BenchError::BringUp)? {
-        bail!("a step has not passed; the same command runs it again");
+    match done.map_err(BenchError::BringUp)? {
+        Ended::Passed => {
+            eprintln!(
+                "All steps have passed. Next: tactus device identify, or tactus device train"
+            );
+        }
+        Ended::Flash(_) => eprintln!(
+            "The self-test has done its part. Next: cargo xtask flash, then the same command: the rig's firmware does the last steps"
+        ),
+        Ended::Failed => bail!("a step has not passed; the same command runs it again"),
     }
-    eprintln!(
-        "Next: cargo xtask flash, put the finger on its mount, and go on with the page \"The first evening\" of the book"
-    );
     Ok(())
+}
+
+/// The rig's firmware at the other end of the link.
+struct Linked(Bench);
+
+impl Probe for Linked {
+    fn ask(
+        &mut self,
+        command: Command,
+        each: &mut dyn FnMut(&Told),
+    ) -> Result<Result<(), String>, Trouble> {
+        let done = self.0.run(Request::command(command), |report| {
+            each(report);
+            Ok(())
+        });
+        match done {
+            Ok(()) => Ok(Ok(())),
+            Err(BenchError::Port {
+                why: PortError::Link(LinkError::Refused(why)),
+                ..
+            }) => Ok(Err(why.to_string())),
+            Err(why) if why.is_interrupt() => Err(Trouble::Quit),
+            Err(why) => Err(io::Error::other(why.to_string()).into()),
+        }
+    }
 }
 
 fn list(journal: Option<Journal>, out: &mut impl Write) -> anyhow::Result<()> {

@@ -5,9 +5,10 @@ use std::io::Write;
 use anyhow::ensure;
 use clap::ArgGroup;
 use serde::Serialize;
+use tactus::bringup::weights;
 use tactus::eval::show::day;
 use tactus::link::Request;
-use tactus_core::rig::calibration::{LineFit, RigCalibration};
+use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::pressure::Calibration;
 use tactus_core::wire::Command;
 
@@ -156,7 +157,7 @@ fn weigh(bench: &mut Bench, weights: &[u16], told: &mut impl Write) -> anyhow::R
         writeln!(told, "{mn} mN: {counts:.1} counts")?;
         points.push((counts, f32::from(mn)));
     }
-    let (mn_per_count, residuals) = fit(&points)?;
+    let (mn_per_count, residuals) = weights::line(&points)?;
     for ((_, mn), residual) in points.iter().zip(residuals) {
         let share = 100.0 * residual / mn;
         writeln!(
@@ -165,23 +166,6 @@ fn weigh(bench: &mut Bench, weights: &[u16], told: &mut impl Write) -> anyhow::R
         )?;
     }
     Ok(mn_per_count)
-}
-
-/// The line through counts and weights in mN, and through 0 and 0, where the finger is in the air: mN a count, and how far each
-/// weight is off it, mN.
-fn fit(points: &[(f32, f32)]) -> anyhow::Result<(f32, Vec<f32>)> {
-    let mut line = LineFit::default();
-    line.push(0.0, 0.0);
-    points
-        .iter()
-        .for_each(|&(counts, mn)| line.push(counts, mn));
-    let (at_0, mn_per_count) = line.line()?;
-    ensure!(
-        mn_per_count > 0.0,
-        "P_DC falls under a weight: the load cell is wired the wrong way round. Swap its two signal wires"
-    );
-    let off = |&(counts, mn): &(f32, f32)| mn - (at_0 + mn_per_count * counts);
-    Ok((mn_per_count, points.iter().map(off).collect()))
 }
 
 /// A weight in N, or in g with a g behind it, as mN: what a fingertip's line holds for.
@@ -286,30 +270,5 @@ mod tests {
         for wrong in ["", "g", "50", "10g", "250g", "NaN", "1kg", "30gg"] {
             assert!(newton(wrong).is_err(), "{wrong}");
         }
-    }
-
-    #[test]
-    fn a_line_has_residuals_and_a_reversed_cell_is_found() {
-        // 10 mN a count, and the third weight 20 mN too light
-        let points = [(29.4, 294.0), (58.8, 588.0), (90.3, 883.0), (117.7, 1177.0)];
-        let (scale, residuals) = fit(&points).unwrap();
-        assert!((scale - 10.0).abs() < 0.1, "{scale}");
-        let worst = residuals
-            .iter()
-            .copied()
-            .fold(0.0, |a: f32, b| if b.abs() > a.abs() { b } else { a });
-        assert!(
-            (-20.0..-10.0).contains(&worst) && worst == residuals[2],
-            "{residuals:?}"
-        );
-        let reversed = points.map(|(counts, mn)| (-counts, mn));
-        assert!(
-            fit(&reversed)
-                .unwrap_err()
-                .to_string()
-                .contains("Swap its two signal wires")
-        );
-        // one weight laid on twice is no line
-        assert!(fit(&[(29.4, 294.0), (58.8, 588.0), (58.8, 1200.0)]).is_err());
     }
 }
