@@ -2,6 +2,7 @@
 //!
 //! [`PressureSensor`] is the seam: a finger is a file that implements it. [`biotac`], [`analog`] and [`mems`] are the three there are.
 //! What they do on the bus is data: [`slot`]. All later rooms see [`pressure`] and what a kind of finger is like: [`FingerModel`].
+//! [`paa5100je`] measures how fast a hand moves, on a bus of its own.
 
 pub mod ads1220;
 pub mod analog;
@@ -12,6 +13,7 @@ mod finger_code;
 pub mod iis3dwb;
 pub mod mcp3202;
 pub mod mems;
+pub mod paa5100je;
 pub mod pressure;
 pub mod slot;
 
