@@ -154,6 +154,12 @@ fn frames_of_version_7_are_what_they_were() {
     }
 }
 
+/// Version 9 of the messages.
+#[test]
+fn frames_of_version_9_are_what_they_were() {
+    assert_frames::<Report>("reports-9.jsonl", 139, |_| false);
+}
+
 /// Version 4 of the messages: every kind of reason, alone in a frame.
 #[test]
 fn reasons_are_what_they_were_on_the_line() {

@@ -16,12 +16,13 @@ const TRIALS: usize = 15;
 /// Explorations of each texture.
 const EXPLORED: usize = 2;
 
-/// A hand with these deviations of ln(pace) and ln(force) from slide to slide, and a sensor of its speed that is 5 % off.
+/// A hand with these deviations of ln(pace) and ln(force) from slide to slide, and a sensor of motion, which 1.25 mm of height put off by
+/// 5 %.
 fn hand(pace_spread: f64, force_spread: f64) -> Manner {
     Manner {
         pace_spread,
         force_spread,
-        speed_error: Some(0.05),
+        tilt_mm: Some(1.25),
         ..Manner::default()
     }
 }

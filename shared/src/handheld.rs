@@ -15,6 +15,7 @@ pub mod judge;
 pub mod picture;
 pub mod screen;
 mod small;
+mod speed;
 mod spelling;
 pub mod states;
 pub mod touch;
@@ -25,5 +26,6 @@ pub use judge::{FEATURES, JudgeError, Judgement, LEADING, MAX_SLIDES, MOVEMENT, 
 pub use picture::Picture;
 pub use screen::{About, Screen, Trouble};
 pub use small::Small;
+pub use speed::Moved;
 pub use spelling::{Place, WHEEL};
 pub use states::{Answer, Asked, Choice, Handheld, Job, TICKS_HZ};

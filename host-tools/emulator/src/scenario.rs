@@ -6,6 +6,8 @@ use std::path::Path;
 
 use tactus::eval::show::count;
 use tactus::sim::faults::Fault;
+use tactus::sim::flow::HEIGHT_MM;
+use tactus::sim::handheld::ground;
 use tactus::sim::person::Hand;
 use tactus::sim::scenario::{InvalidScenario, Scenario, Step, TIMEOUT_S, texture};
 use tactus::sim::world::NotLifted;
@@ -123,8 +125,11 @@ impl Played<'_> {
     fn power_up(&mut self, store: Option<Vec<u8>>) -> Result<(), PlayError> {
         let setup = self.scenario.setup(self.texture, self.starts);
         self.starts += 1;
+        let sensor = self.scenario.hand.tilt_mm;
+        let motion = sensor.map(|_| ground(self.texture, HEIGHT_MM));
         let options = Options {
             store,
+            motion,
             ..Options::default()
         };
         let board = Emulator::start(self.elf, setup, options)?;

@@ -228,6 +228,7 @@ impl SlideFiles {
             pdc: self.bio.pdc,
             pdc_rate_hz: ROW_RATE_HZ,
             outside_mn: None,
+            pace: None,
             shear_rate_hz: ROW_RATE_HZ,
         };
         let imported = |cause| fault(ContentError::Imported(Box::new(cause)));

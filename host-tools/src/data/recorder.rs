@@ -43,6 +43,8 @@ struct Begun {
     forces: Vec<(u32, i16)>,
     /// P_DC from the slide's begin on, counts about that of the lifted finger, where the probe says it
     pdc: Vec<i16>,
+    /// how fast it was, where the probe says it
+    pace: Option<i16>,
 }
 
 impl Recorder {
@@ -90,6 +92,7 @@ impl Recorder {
                 slide.blocks.push(block.clone());
             }
             Event::Pdc(counts) => slide.pdc.extend_from_slice(counts),
+            Event::Pace(pace) => slide.pace = Some(*pace),
             Event::SlideReport { .. } => {
                 let slide = std::mem::take(slide);
                 return Some(self.finish(texture, slide));
@@ -126,6 +129,7 @@ impl Recorder {
         Ok(Recording {
             texture,
             number: self.numbers,
+            pace: slide.pace,
             ..recording
         })
     }

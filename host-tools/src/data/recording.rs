@@ -37,6 +37,8 @@ pub struct Recording {
     /// Tangential force in mN before and after constant speed, positive against the motion; `None` if the rig could not
     /// measure it.
     pub outside_mn: Option<[Vec<i16>; 2]>,
+    /// How fast it was, where that was measured: see [`Observation::pace`](tactus_core::features::Observation::pace).
+    pub pace: Option<i16>,
     /// Rate of the tangential force in Hz, also where there is none.
     pub shear_rate_hz: u32,
 }
@@ -105,6 +107,7 @@ impl Recording {
             pdc_rate_hz,
             // a rig says shear at constant speed only, a handheld none
             outside_mn: (inside > 0).then(|| [vec![0; before], vec![0; after]]),
+            pace: None,
             shear_rate_hz: SHEAR_HZ,
         };
         recording.check().is_ok().then_some(recording)
@@ -146,6 +149,7 @@ impl Recording {
         }
         let steady = self.pdc.get(self.steady(self.pdc_rate_hz));
         slide.push_pdc(steady.unwrap_or_default());
+        slide.set_pace(self.pace);
     }
 
     /// P_AC of the finger at rest before this slide, in counts about its baseline.

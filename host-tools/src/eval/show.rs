@@ -151,6 +151,10 @@ impl<'t, W: Write> Show<'t, W> {
                 observed.roughness_is_bound,
                 posterior,
             ),
+            Event::Pace(pace) => {
+                let percent = 100.0 * (f64::from(*pace) / 1024.0).exp();
+                self.line(&format!("  speed: {percent:.0} % of the movement's"))
+            }
             Event::Rejected { why, .. } => self.line(&format!("  rejected: {why}")),
             Event::Fault(fault) => self.line(&format!("  fault: {fault}")),
             Event::Trouble(why) => self.line(&format!("  trouble: {why}")),

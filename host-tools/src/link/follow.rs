@@ -3,7 +3,7 @@
 
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Explorer, ExplorerError, NEGLIGIBLE};
-use tactus_core::features::{Block, FEATURE_STEPS, PropertySet, Slide, SlideError};
+use tactus_core::features::{Block, FEATURE_STEPS, Observation, PropertySet, Slide, SlideError};
 use tactus_core::probe::explore::Random;
 use tactus_core::table::{Action, Contents, MAX_TEXTURES, Table};
 use tactus_core::wire::{
@@ -127,6 +127,8 @@ pub struct Follower<'t> {
     /// P_DC of the slide so far, and which samples are at constant speed.
     pdc: Vec<i16>,
     steady: Option<(u32, u32)>,
+    /// How fast the slide was, where the probe says so.
+    pace: Option<i16>,
     /// What the probe chose last.
     chosen: Option<Action>,
     agreement: Agreement,
@@ -156,6 +158,7 @@ impl<'t> Follower<'t> {
             samples: None,
             pdc: Vec::new(),
             steady: None,
+            pace: None,
             chosen: None,
             agreement: Agreement::default(),
         })
@@ -179,11 +182,16 @@ impl<'t> Follower<'t> {
                 expected,
             } => {
                 self.samples = Some(Slide::new(self.plan, *movement));
+                self.pace = None;
                 self.chosen(*slide, *action, expected)
             }
             Event::Block(block) => self.block(block),
             Event::Pdc(counts) => {
                 self.pdc.extend_from_slice(counts);
+                Ok(())
+            }
+            Event::Pace(pace) => {
+                self.pace = Some(*pace);
                 Ok(())
             }
             Event::SlideReport {
@@ -303,8 +311,12 @@ impl<'t> Follower<'t> {
         self.in_order(slide)?;
         let compared = self.compare(slide, observed);
         // with what the probe reported, so that a difference of the slide is not counted again
+        let observation = Observation {
+            pace: self.pace.take(),
+            ..observed.observation()
+        };
         self.explorer
-            .observe(action, &observed.observation())
+            .observe(action, &observation)
             .map_err(|_| FollowError::Observe { slide })?;
         let here = self.explorer.posterior();
         let agreement = &mut self.agreement;

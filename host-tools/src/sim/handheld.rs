@@ -1,13 +1,11 @@
 //! The handheld probe in the simulated world: a hand that does what the display says, and the table that is learned from it.
 
-use std::collections::VecDeque;
-
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tactus_core::dsp::{Plain, Plan};
 use tactus_core::explorer::Method;
-use tactus_core::features::{FEATURE_STEPS, Observation};
+use tactus_core::features::Observation;
 use tactus_core::handheld::guidance::{Again, Event};
 use tactus_core::handheld::touch::Touch;
 use tactus_core::handheld::{FEATURES, MOVEMENT};
@@ -16,18 +14,15 @@ use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
 
 use crate::eval::learn::{self, TableError};
 use crate::sim::collection::{Collection, texture_name};
-use crate::sim::maths::{exp, ln};
+use crate::sim::flow::{Ground, HEIGHT_MM};
+use crate::sim::maths::exp;
+use crate::sim::motion::MotionSensor;
 use crate::sim::person::{Hand, Manner};
 use crate::sim::slot::Reader;
 use crate::sim::world::{Setup, Truth, World};
 
-/// The steady part of a slide is its last 1.2 s: over it the speed is measured.
-const STEADY_S: f64 = 1.2;
-const STEADY_SLOTS: usize = (STEADY_S * SLOTS_HZ as f64) as usize;
-/// Parts of a unit that a step of [`Observation::pace`] is.
-const PACE_STEPS: f64 = FEATURE_STEPS as f64;
-/// Speeds that a person can have, in ln of what is asked for.
-const PACES: f64 = 1.5;
+/// Slots from one reading of the sensor of motion to the next: 10 ms.
+const READING_SLOTS: u64 = SLOTS_HZ as u64 / 100;
 /// From the sound to the slide, s (chosen).
 const REACTION_S: (f64, f64) = (0.2, 0.5);
 /// How long a person slides, s: until the bar is full, and a little more.
@@ -51,6 +46,16 @@ pub enum HandError {
     },
 }
 
+/// A texture as an optical sensor of motion at this height sees it: nothing of glass and of what is polished (chosen).
+pub fn ground(texture: u8, height_mm: f64) -> Ground {
+    let name = texture_name(texture).to_lowercase();
+    if name.contains("glass") || name.contains("polished") {
+        Ground::Glass
+    } else {
+        Ground::Seen(height_mm)
+    }
+}
+
 /// A person with a probe.
 pub struct Person {
     world: World,
@@ -58,8 +63,8 @@ pub struct Person {
     slot: u64,
     random: ChaCha8Rng,
     manner: Manner,
-    /// Where the finger was on the sample at the latest slots, mm.
-    places_mm: VecDeque<f64>,
+    motion: Option<MotionSensor>,
+    texture: u8,
 }
 
 impl Person {
@@ -81,7 +86,10 @@ impl Person {
             slot: 0,
             random,
             manner,
-            places_mm: VecDeque::new(),
+            motion: manner
+                .tilt_mm
+                .map(|_| MotionSensor::new(setup.trial_seed, ground(setup.texture, HEIGHT_MM))),
+            texture: setup.texture,
         }
     }
 
@@ -125,11 +133,10 @@ impl Person {
     ) -> Option<Event> {
         for _ in 0..(seconds * f64::from(SLOTS_HZ)) as u32 {
             let word = self.word();
-            if let Some(hand) = self.world.hand() {
-                self.places_mm.push_back(hand.x_mm());
-                if self.places_mm.len() > STEADY_SLOTS {
-                    self.places_mm.pop_front();
-                }
+            let due = self.slot.is_multiple_of(READING_SLOTS);
+            if let (Some(motion), Some(hand), true) = (&mut self.motion, self.world.hand(), due) {
+                let at_ns = self.slot * 1_000_000_000 / u64::from(SLOTS_HZ);
+                touch.moved(motion.poll(at_ns, hand.x_mm()));
             }
             if let Some(event) = touch.word(word)
                 && until(&event)
@@ -146,6 +153,13 @@ impl Person {
         let pace_mm_s = f64::from(<(u16, u32)>::from(MOVEMENT).1) * 1e-3;
         let force_n = target_n * exp(self.manner.force_spread * self.normal());
         let pace_mm_s = pace_mm_s * exp(self.manner.pace_spread * self.normal());
+        if let Some(tilt_mm) = self.manner.tilt_mm {
+            let height_mm = HEIGHT_MM + tilt_mm * self.normal();
+            let ground = ground(self.texture, height_mm);
+            if let Some(motion) = &mut self.motion {
+                motion.flow().over(ground);
+            }
+        }
         self.intend(force_n, 0.0);
         self.run_until(touch, 5.0, |event| *event == Event::Still);
         let reaction_s = self.random.random_range(REACTION_S.0..REACTION_S.1);
@@ -153,29 +167,16 @@ impl Person {
         self.intend(force_n, pace_mm_s);
         let over = |event: &Event| matches!(event, Event::Slid(_) | Event::Again(_));
         let measured = self.run_until(touch, SLIDE_S, over);
-        let pace = self.measured_pace();
         self.intend(force_n, 0.0);
         self.run_until(touch, 0.1, |_| false);
         self.intend(0.0, 0.0);
         let pause_s = self.random.random_range(0.3..0.5);
         self.run_until(touch, pause_s, |_| false);
         match measured? {
-            Event::Slid(observation) => Some(Ok(Observation {
-                pace,
-                ..observation
-            })),
+            Event::Slid(observation) => Some(Ok(observation)),
             Event::Again(why) => Some(Err(why)),
             _ => None,
         }
-    }
-
-    /// What a sensor of speed says of the steady part of the slide that is over now.
-    fn measured_pace(&mut self) -> Option<i16> {
-        let error = self.manner.speed_error? * self.normal();
-        let (first, last) = (self.places_mm.front()?, self.places_mm.back()?);
-        let wanted_mm_s = f64::from(<(u16, u32)>::from(MOVEMENT).1) * 1e-3;
-        let pace = ln(((last - first) / STEADY_S).max(1e-3) / wanted_mm_s) + error;
-        Some((pace.clamp(-PACES, PACES) * PACE_STEPS).round() as i16)
     }
 }
 
@@ -326,6 +327,49 @@ mod tests {
             right >= 11 && wrong == 0 && made <= 3 * 12,
             "{right} {wrong} {made}"
         );
+    }
+
+    /// A hand that holds its pace, and the probe at the height that its sensor of motion is for.
+    const LEVEL: Manner = Manner {
+        tremor: 0.005,
+        wander: 0.04,
+        uneven: 0.0,
+        force_spread: 0.1,
+        pace_spread: 0.0,
+        tilt_mm: Some(0.0),
+    };
+
+    #[test]
+    fn what_is_too_smooth_to_be_felt_is_noticed_where_it_is_seen() {
+        let tile = texture_number("smooth tile").unwrap();
+        let felt = slides(world(1).setup(tile, 0), Manner::default(), 3);
+        assert!(
+            matches!(felt, Err(HandError::NoGoodSlide { why: None, .. })),
+            "{felt:?}"
+        );
+        let (good, bad) = slides(world(1).setup(tile, 0), LEVEL, 3).unwrap();
+        assert_eq!((good.len(), bad), (3, 0));
+    }
+
+    #[test]
+    fn fifty_hands_are_measured_as_they_mean_to_slide_and_none_on_glass() {
+        let glass = texture_number("frosted glass").unwrap();
+        let burlap = texture_number("burlap").unwrap();
+        (1..=50).into_par_iter().for_each(|seed| {
+            let world = Collection {
+                seed,
+                textures: vec![burlap, glass],
+                trials: 1,
+            };
+            let pace = |texture| {
+                let (good, _) = slides(world.setup(texture, seed), LEVEL, 1).unwrap();
+                good.first().unwrap().pace
+            };
+            // 3 %: what has not come up to speed, frames, counts
+            let measured = pace(burlap).unwrap();
+            assert!(measured.abs() < 31, "{seed}: {measured}");
+            assert_eq!(pace(glass), None, "{seed}");
+        });
     }
 
     /// The hand of the scenario `uneven`.

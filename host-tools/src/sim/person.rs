@@ -59,8 +59,9 @@ pub struct Manner {
     pub force_spread: f64,
     /// Deviations of ln(pace) from slide to slide: rms.
     pub pace_spread: f64,
-    /// The probe measures its speed, and ln(speed) of a slide is off by this: rms. `None` without a sensor of speed.
-    pub speed_error: Option<f64>,
+    /// The probe has a sensor of motion, whose height over the surface is off by so many mm from slide to slide: rms. `None` without
+    /// one.
+    pub tilt_mm: Option<f64>,
 }
 
 impl Default for Manner {
@@ -73,7 +74,7 @@ impl Default for Manner {
             // a person who looks at the display (chosen)
             force_spread: 0.10,
             pace_spread: 0.12,
-            speed_error: None,
+            tilt_mm: None,
         }
     }
 }

@@ -23,6 +23,7 @@ const MAX_FORCE_N: f64 = 10.0;
 const MAX_PACE_MM_S: f64 = 500.0;
 /// Deviations of a hand are no larger than what they deviate from.
 const MAX_DEVIATION: f64 = 1.0;
+const MAX_TILT_MM: f64 = 10.0;
 /// Seeds have room for trials behind them.
 const MAX_SEED: u64 = 1_000_000;
 /// Tones that a person can hear, Hz.
@@ -270,7 +271,7 @@ impl Scenario {
             uneven,
             force_spread,
             pace_spread,
-            speed_error,
+            tilt_mm,
         } = self.hand;
         for (what, is) in [
             ("tremor", tremor),
@@ -278,10 +279,16 @@ impl Scenario {
             ("uneven", uneven),
             ("force_spread", force_spread),
             ("pace_spread", pace_spread),
-            ("speed_error", speed_error.unwrap_or(0.0)),
         ] {
             within("the hand", what, is, 0.0, MAX_DEVIATION)?;
         }
+        within(
+            "the hand",
+            "tilt_mm",
+            tilt_mm.unwrap_or(0.0),
+            0.0,
+            MAX_TILT_MM,
+        )?;
         for (step, number) in self.step.iter().zip(1..) {
             step.check(number)?;
         }

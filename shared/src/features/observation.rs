@@ -135,7 +135,7 @@ impl From<&Measurement> for Observation {
             properties: slide.properties,
             bands: up_to(slide.fused_bands().into_iter().filter_map(fixed)),
             pressure,
-            pace: None,
+            pace: slide.pace,
         }
     }
 }

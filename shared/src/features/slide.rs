@@ -91,6 +91,7 @@ pub struct Slide<'p, K = Plain> {
     shears: u32,
     /// Sum of P_DC and of its squares, and their number.
     pdc: (i64, u64, u32),
+    pace: Option<i16>,
     lost: u32,
     kernels: PhantomData<K>,
 }
@@ -112,6 +113,7 @@ impl<'p, K: Kernels> Slide<'p, K> {
             shear_mn: 0,
             shears: 0,
             pdc: (0, 0, 0),
+            pace: None,
             lost: 0,
             kernels: PhantomData,
         }
@@ -139,6 +141,7 @@ impl<'p, K: Kernels> Slide<'p, K> {
         self.spectrum = other.spectrum.clone();
         (self.shear_mn, self.shears) = (other.shear_mn, other.shears);
         self.pdc = other.pdc;
+        self.pace = other.pace;
         self.lost = other.lost;
     }
 
@@ -220,6 +223,11 @@ impl<'p, K: Kernels> Slide<'p, K> {
         *number += samples.len() as u32;
     }
 
+    /// How fast it was, where that was measured: see [`Observation::pace`](super::observation::Observation::pace).
+    pub fn set_pace(&mut self, pace: Option<i16>) {
+        self.pace = pace;
+    }
+
     /// The properties, when the steady part is over.
     ///
     /// # Errors
@@ -253,6 +261,7 @@ impl<'p, K: Kernels> Slide<'p, K> {
             properties: Properties::new([traction, Some(roughness), Some(libm::logf(centroid_hz))]),
             roughness_is_bound,
             pdc: mean_and_sd(self.pdc),
+            pace: self.pace,
             background,
             spectrum,
         })
@@ -278,6 +287,8 @@ pub struct Measurement {
     pub roughness_is_bound: bool,
     /// Mean and standard deviation of P_DC during the slide in counts about the lifted finger's; `None` if it was not given.
     pub pdc: Option<(f32, f32)>,
+    /// See [`Observation::pace`](super::observation::Observation::pace).
+    pub pace: Option<i16>,
     /// Power of the still finger in counts^2.
     pub background: f32,
     /// Averaged spectrum of the unfiltered P_AC, window mean removed.

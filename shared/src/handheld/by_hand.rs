@@ -6,6 +6,7 @@ use embedded_storage_async::nor_flash::NorFlash;
 use super::jobs::{Outcome, work};
 use super::judge::{Judgement, MOVEMENT};
 use super::screen::{About, Screen};
+use super::speed::Moved;
 use super::states::{Answer, Asked, Handheld, Job, TICKS_HZ};
 use crate::dsp;
 use crate::explorer::Kernels;
@@ -45,6 +46,11 @@ pub trait Hand {
 
     /// The oldest word of the sensor that nobody has taken.
     fn word(&mut self) -> Option<Option<Pressure>>;
+
+    /// How far it has moved since this was asked last, by its sensor of motion, if there is one: see [`Handheld::moved`].
+    fn moved(&mut self) -> Option<Moved> {
+        None
+    }
 
     /// Whether the button is pressed.
     fn is_pressed(&mut self) -> bool;
@@ -132,6 +138,9 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
     pub async fn tick(&mut self) {
         self.hand.wait().await;
         self.ticks = self.ticks.wrapping_add(1);
+        if let Some(moved) = self.hand.moved() {
+            self.handheld.moved(moved);
+        }
         let streams = self.hand.streams() && self.handheld.prompt().is_some();
         while let Some(word) = self.hand.word() {
             self.handheld.word(word);

@@ -14,12 +14,15 @@ use heapless::String;
 mod letters;
 
 use self::letters::{Anchor, BOLD, Font, LARGE, SMALL};
-use super::guidance::{Again, ZONE_MN};
+use super::guidance::{Again, Way, ZONE_MN};
 use super::screen::{About, Entry, Row, Screen, Trouble, first_line};
 use super::spelling::{Place, WHEEL};
+use crate::table::PACED;
 
 /// The bar's end, mN.
 const BAR_MN: f32 = 1200.0;
+/// A slide is too fast or too slow when it is off by this part of its way.
+const AHEAD: f32 = 0.15;
 const WIDTH: i32 = super::picture::WIDTH as i32;
 const MIDDLE: i32 = WIDTH / 2;
 
@@ -256,9 +259,14 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             of,
             force_mn,
             progress,
+            way,
         } => {
             brush.title("Slide", &count(*slide, *of))?;
-            brush.pace(*progress, *force_mn)?;
+            brush.pace(
+                *progress,
+                if PACED { *way } else { Way::NoSensor },
+                *force_mn,
+            )?;
             brush.force(*force_mn, 48)
         }
         Screen::Lift { slide } => {
@@ -413,13 +421,14 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.button("menu", "teach")
     }
 
-    /// How far the slide is, and how far it ought to be: 5 cm while the bar fills.
-    fn pace(&mut self, progress: Option<f32>, force_mn: f32) -> Done<D> {
+    /// How far the slide ought to be, and how far it is, where that is seen: 5 cm while the bar fills.
+    fn pace(&mut self, progress: Option<f32>, way: Way, force_mn: f32) -> Done<D> {
         let Some(progress) = progress else {
             self.centre("Slide", 12, &LARGE)?;
             return self.centre("5 cm in 2 s", 31, &SMALL);
         };
-        let end = 10 + (107.0 * progress.clamp(0.0, 1.0)) as i32;
+        let place = |part: f32| 10 + (107.0 * part.clamp(0.0, 1.0)) as i32;
+        let end = place(progress);
         self.fill(0, 26, WIDTH, 3, false)?;
         // centimetres
         for x in (4..=124).step_by(24) {
@@ -427,9 +436,17 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         }
         // the finger's place
         self.triangle(end, 14, 11, false)?;
+        let mut ahead = 0.0;
+        if let Way::Seen(way) = way {
+            self.fill(0, 29, place(way), 4, false)?;
+            ahead = way - progress;
+        }
         let order = match force_mn {
             mn if mn < *ZONE_MN.start() => "press harder",
             mn if mn > *ZONE_MN.end() => "press lighter",
+            _ if way == Way::Unseen => "speed not seen",
+            _ if ahead > AHEAD => "slower",
+            _ if ahead < -AHEAD => "faster",
             _ => "keep going",
         };
         self.centre(order, 34, &SMALL)

@@ -45,6 +45,18 @@ pub enum Phase {
     Lift,
 }
 
+/// The way of a slide so far, by a sensor of motion.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub enum Way {
+    /// There is none.
+    #[default]
+    NoSensor,
+    /// Not all of it was seen.
+    Unseen,
+    /// In parts of all of it.
+    Seen(f32),
+}
+
 /// A touch as it is shown.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct View {
@@ -54,4 +66,6 @@ pub struct View {
     pub force_mn: f32,
     /// How much of the slide is done, 0 to 1.
     pub progress: f32,
+    /// The way of the slide so far.
+    pub way: Way,
 }

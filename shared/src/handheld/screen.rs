@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::guidance::{Again, Phase, View};
+use super::guidance::{Again, Phase, View, Way};
 use super::judge::LEADING;
 use super::spelling::{Place, WHEEL};
 use crate::table::Name;
@@ -89,6 +89,8 @@ pub enum Screen<'a> {
         force_mn: f32,
         /// How much is done, 0 to 1; `None` before it begins.
         progress: Option<f32>,
+        /// The way so far.
+        way: Way,
     },
     /// The slide is made: the finger is to be lifted.
     Lift {
@@ -184,6 +186,7 @@ impl Screen<'_> {
                 of,
                 force_mn,
                 progress: (view.phase == Phase::Sliding).then_some(view.progress),
+                way: view.way,
             },
             phase => Self::Press {
                 slide,

@@ -13,6 +13,7 @@ use super::button::Button;
 use super::guidance::{Again, Event};
 use super::judge::{JudgeError, Judgement, MAX_SLIDES, trials};
 use super::screen::{About, Row, Screen, Trouble};
+use super::speed::Moved;
 use super::spelling::Spelling;
 use super::touch::Touch;
 use crate::dsp::Plan;
@@ -180,6 +181,11 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         if let Some(event) = self.touch.word(word) {
             self.on_touch(event);
         }
+    }
+
+    /// A reading of the sensor of motion, every 10 ms.
+    pub fn moved(&mut self, moved: Moved) {
+        self.touch.moved(moved);
     }
 
     /// So many words were lost on the way.

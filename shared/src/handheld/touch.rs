@@ -1,16 +1,18 @@
 //! One touch by hand, from its sensor words: when the finger is pressed well, when it slides, and whether the slide is good.
 //!
-//! Nothing tells the probe that it moves but what it feels. A slide has begun when P_AC is livelier than that of the still
-//! finger; its steady part has a fixed length, and must last to its end at about the same force and pace.
+//! A slide has begun when P_AC is livelier than that of the still finger, or, of a probe with a sensor of motion, when that sees it
+//! move; its steady part has a fixed length, and must last to its end at about the same force and pace.
 
 use heapless::{Deque, Vec};
 
-use super::guidance::{Again, Event, Phase, View, ZONE_MN};
+use super::guidance::{Again, Event, Phase, View, Way, ZONE_MN};
 use super::judge::MOVEMENT;
+use super::speed::{Moved, Speedometer};
 use crate::dsp::Plan;
 use crate::explorer::Kernels;
 use crate::features::{BLOCK, Block, Blocks, Observation, SamplePhase, Slide, SlideError};
 use crate::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ};
+use crate::table::PACED;
 
 /// Samples of a channel that are looked at together: 10 ms.
 const LOOK: usize = 22;
@@ -110,6 +112,7 @@ pub struct Touch<'p, K> {
     /// Still P_AC that is not yet old enough to be background.
     latest: Deque<[i16; LOOK], DELAY>,
     tenths: Vec<f32, TENTHS>,
+    speed: Speedometer,
 }
 
 impl<'p, K: Kernels> Touch<'p, K> {
@@ -144,6 +147,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
             changes: 0,
             latest: Deque::new(),
             tenths: Vec::new(),
+            speed: Speedometer::default(),
         }
     }
 
@@ -158,6 +162,18 @@ impl<'p, K: Kernels> Touch<'p, K> {
     /// From now on a count of P_DC means so many mN.
     pub fn calibrate(&mut self, mn_per_count: f32) {
         self.mn_per_count = mn_per_count;
+    }
+
+    /// Takes a reading of the sensor of motion: one every 10 ms. Without them the speed is not known.
+    pub fn moved(&mut self, moved: Moved) {
+        if PACED {
+            self.speed.take(moved);
+        }
+    }
+
+    /// Whether the probe moves; `None` where no sensor sees that.
+    fn moves(&self) -> Option<bool> {
+        if PACED { self.speed.moves() } else { None }
     }
 
     /// The slide that was good last, until the finger is pressed again.
@@ -203,7 +219,18 @@ impl<'p, K: Kernels> Touch<'p, K> {
             phase: self.phase,
             force_mn: self.force_mn().max(0.0),
             progress,
+            way: self.way(),
         }
+    }
+
+    fn way(&self) -> Way {
+        if !PACED || !self.speed.is_there() {
+            return Way::NoSensor;
+        }
+        let seconds = (COMING_UP + STEADY) as f32 / RATE_HZ as f32;
+        let all_mm = MOVEMENT.speed_mm_s() * seconds;
+        let way_mm = self.speed.way_mm();
+        way_mm.map_or(Way::Unseen, |way_mm| Way::Seen(way_mm / all_mm))
     }
 
     /// So many words were lost before they came here.
@@ -461,7 +488,10 @@ impl<'p, K: Kernels> Touch<'p, K> {
         } else {
             0
         };
-        if self.begins >= BEGINS {
+        if self.moves().unwrap_or(self.begins >= BEGINS) {
+            if PACED {
+                self.speed.begin();
+            }
             self.tenths.clear();
             self.phase = Phase::Sliding;
             (self.still_mean, self.samples, self.stopped, self.tenth) = (mean, 0, 0, 0.0);
@@ -486,6 +516,9 @@ impl<'p, K: Kernels> Touch<'p, K> {
         };
         self.put(&phase, &self.about_rest());
         let steady = self.samples >= COMING_UP;
+        if PACED && self.samples == COMING_UP {
+            self.speed.steady();
+        }
         let force_mn = self.force_mn();
         if steady && force_mn > *ZONE_MN.end() {
             return Some(self.again(Again::TooHard));
@@ -493,7 +526,10 @@ impl<'p, K: Kernels> Touch<'p, K> {
         if steady && force_mn < *ZONE_MN.start() {
             return Some(self.again(Again::TooLight));
         }
-        let quiet = lively < self.still_mean * (1.0 + (LIVELY - 1.0) / 2.0);
+        let quiet = match self.moves() {
+            Some(moves) => !moves,
+            None => lively < self.still_mean * (1.0 + (LIVELY - 1.0) / 2.0),
+        };
         self.stopped = if quiet { self.stopped + 1 } else { 0 };
         if self.stopped >= STOPPED {
             return Some(self.again(Again::TooShort));
@@ -526,6 +562,10 @@ impl<'p, K: Kernels> Touch<'p, K> {
         }
         let last = core::mem::take(&mut self.blocks).end(0);
         self.take(last);
+        if PACED {
+            let seconds = STEADY as f32 / RATE_HZ as f32;
+            self.slide.set_pace(self.speed.pace(seconds, MOVEMENT));
+        }
         let mut slide = Slide::<K>::new(self.plan, MOVEMENT);
         slide.adopt(&self.slide);
         match slide.finish() {

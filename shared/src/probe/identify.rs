@@ -10,7 +10,7 @@ use crate::explorer::{
 };
 use crate::features::PropertySet;
 use crate::rig::{Rig, RigError};
-use crate::table::{Contents, MAX_TEXTURES, Name, Table};
+use crate::table::{Contents, MAX_TEXTURES, Name, PACED, Table};
 use crate::up_to;
 use crate::wire::{Event, Failure, Identify, MAX_EXPECTED_OUTCOMES, Verdict};
 
@@ -68,6 +68,9 @@ where
                 }
             }
             ExplorationStep::Measured(action, measurement, posterior) => {
+                if PACED && let Some(pace) = measurement.pace {
+                    tell(Event::Pace(pace));
+                }
                 tell(Event::SlideReport {
                     slide,
                     action,

@@ -155,6 +155,9 @@ pub enum Event {
         /// What they say.
         now: Verification,
     },
+    /// How fast the slide was whose report comes next, where the probe measured it: natural logarithm of its speed in parts of the
+    /// movement's, in steps of 1/1024. New in version 9.
+    Pace(i16),
 }
 
 /// Why the chip started.

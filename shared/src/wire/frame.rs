@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// Version of the messages. The two ends must have the same.
-pub const PROTOCOL: u8 = 8;
+pub const PROTOCOL: u8 = 9;
 /// Longest message, bytes.
 pub const MAX_MESSAGE: usize = 768;
 /// Longest frame without its closing 0: message, CRC, and what COBS adds, a byte and one for every 254.

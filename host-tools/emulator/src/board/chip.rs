@@ -18,7 +18,7 @@ use rigless::soc::{Bus, Region};
 use rigless::time::VirtualNanos;
 
 use super::exti::Exti;
-use super::peers::{DisplayPins, SensorPins, Serial};
+use super::peers::{DisplayPins, MotionPins, SensorPins, Serial};
 use super::pins::{PinId, REST_LEVELS};
 use super::rig::SharedRig;
 use super::taps::{Current, Encoder, Pwm, Step, Tapped, channel};
@@ -75,6 +75,7 @@ impl Part {
         ];
         f427.usart[USART3].attach(Serial(rig.clone()));
         f427.spi[0].attach(SensorPins(rig.clone()));
+        f427.spi[3].attach(MotionPins(rig.clone()));
         f427.i2c[0].attach(DisplayPins(rig.clone()));
         Ok(Self {
             exti: Exti::default(),

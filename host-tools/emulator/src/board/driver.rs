@@ -24,6 +24,7 @@ use super::timing::{SLOT_COUNT, Timing};
 use super::upset::Switch;
 
 const SPI1_CR1: u64 = 0x4001_3000;
+const SPI4_CR1: u64 = 0x4001_3400;
 const TIM5_SR: u64 = 0x4000_0C10;
 const TIM5_EGR: u64 = 0x4000_0C14;
 const RCC_CR: u64 = 0x4002_3800;
@@ -105,6 +106,9 @@ impl Driver {
         if select.is_some_and(|high| rig.select_sensor(now_ns, !high)) {
             command_ends = true;
         }
+        if let Some(high) = at(pins::MOTION_CS) {
+            rig.motion().select(!high);
+        }
         // DIR before EN and STEP, as it is set before them
         if let Some(high) = at(pins::LEVER_DIR) {
             rig.lever_dir(now_ns, high);
@@ -136,6 +140,9 @@ impl Driver {
         let sensor = pins::SENSOR_SPI
             .iter()
             .all(|pin| board.function(*pin) == Some(pins::SPI1_FUNCTION));
+        let motion = pins::MOTION_SPI
+            .iter()
+            .all(|pin| board.function(*pin) == Some(pins::SPI4_FUNCTION));
         let encoder = pins::ENCODER
             .iter()
             .all(|pin| board.function(*pin) == Some(pins::TIM3_4_FUNCTION));
@@ -144,6 +151,7 @@ impl Driver {
             .all(|pin| board.function(*pin) == Some(pins::I2C1_FUNCTION));
         let mut rig = lock(&self.rig);
         rig.wire(sensor, encoder);
+        rig.motion().wire(motion);
         rig.display_mut().wire(display);
     }
 
@@ -178,6 +186,7 @@ impl Driver {
             rig.step_timer(at.0, false);
             rig.stage_duty(at.0, 0.0);
             rig.spi_control(0);
+            rig.motion().control(0);
         }
         self.wire(board);
         for port in 0..=5 {
@@ -288,6 +297,7 @@ impl Driver {
                 }
             }
             SPI1_CR1 => lock(&self.rig).spi_control(access.value),
+            SPI4_CR1 => lock(&self.rig).motion().control(access.value),
             // The model raises CC1IF to CC4IF with UG while the counter stands. embassy's clock, on TIM5, would count half a
             // period too many: it would start at 65.5 ms, and some timers would come 65.5 ms late.
             TIM5_EGR => {

@@ -77,7 +77,7 @@ impl Emulator {
             let at = Some(flash::STORE.start);
             images.push(Image::new(Path::new("store"), store.clone(), at)?);
         }
-        let rig = Arc::new(Mutex::new(Rig::new(setup, options.trace_s * 1_000_000_000)));
+        let rig = Arc::new(Mutex::new(Rig::new(setup, &options)));
         let (commands, commanded) = channel();
         let (reaches, reached) = channel();
         let mut driver = Driver {

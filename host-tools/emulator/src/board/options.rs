@@ -2,6 +2,8 @@
 
 use std::num::NonZeroU64;
 
+use tactus::sim::flow::Ground;
+
 /// What else a run is made from.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -17,6 +19,8 @@ pub struct Options {
     pub store: Option<Vec<u8>>,
     /// BOR_LEV of the chip's option bytes: 0 is level 3, 3 is off, as the chip is delivered (RM0090 3.9.10).
     pub brown_out: u8,
+    /// What the handheld's sensor of motion is over, if there is one.
+    pub motion: Option<Ground>,
     /// Whether the core has its MPU, with which the firmware guards its stack. Each access is checked then, which takes twice the
     /// time; without, what the firmware writes to the MPU does nothing, as on a part that has none.
     pub mpu: bool,
@@ -31,6 +35,7 @@ impl Default for Options {
             clock: true,
             store: None,
             brown_out: 3,
+            motion: None,
             mpu: false,
         }
     }

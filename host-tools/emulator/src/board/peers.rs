@@ -1,4 +1,5 @@
-//! The far ends of the chip's buses: the host on USART3, the sensor on SPI1, the display on I2C1.
+//! The far ends of the chip's buses: the host on USART3, the sensor on SPI1, the handheld's sensor of motion on SPI4, the display on
+//! I2C1.
 
 use rigless::chip::{Timeline, i2c, spi, uart};
 use rigless::snapshot::Store;
@@ -43,6 +44,20 @@ impl spi::Peer for SensorPins {
         };
         rig.spi_frame(now, bits, mosi, miso);
         miso
+    }
+}
+
+/// The motion sensor's end of SPI4.
+#[derive(Debug)]
+pub(crate) struct MotionPins(pub(crate) SharedRig);
+
+impl Store for MotionPins {}
+
+impl spi::Peer for MotionPins {
+    fn transfer(&mut self, mosi: u32, bits: u8, context: &mut Timeline<'_, '_>) -> u32 {
+        lock(&self.0)
+            .motion_byte(context.now().0, mosi as u8, bits)
+            .into()
     }
 }
 

@@ -34,6 +34,10 @@ pub const SENSOR_CS: PinId = PinId(D, 14);
 /// The sensor's clock, MISO and MOSI, with SPI1's alternate function.
 pub(crate) const SENSOR_SPI: [PinId; 3] = [PinId(A, 5), PinId(A, 6), PinId(B, 5)];
 pub(crate) const SPI1_FUNCTION: u8 = 5;
+/// Chip select of the handheld's sensor of motion, low active; its clock, MISO and MOSI, with SPI4's alternate function.
+pub(crate) const MOTION_CS: PinId = PinId(E, 4);
+pub(crate) const MOTION_SPI: [PinId; 3] = [PinId(E, 2), PinId(E, 5), PinId(E, 6)];
+pub(crate) const SPI4_FUNCTION: u8 = 5;
 /// Each rising edge is a step of the lever.
 pub const LEVER_STEP: PinId = PinId(E, 9);
 pub(crate) const TIM1_FUNCTION: u8 = 1;

@@ -7,6 +7,8 @@ use tactus::sim::world::{Setup, World};
 
 use super::display::Display;
 use super::line::LineNoise;
+use super::motion::MotionPeer;
+use super::options::Options;
 use super::record::{Recorder, Slide};
 use super::scope::{BridgePwm, Frame, Scope};
 use super::wave::Wave;
@@ -71,6 +73,7 @@ pub struct Rig {
     sensor_wired: bool,
     encoder_wired: bool,
     spi_control: u64,
+    motion: MotionPeer,
     encoder_lines: (bool, bool),
     trace_ns: u64,
     trace: VecDeque<(u64, Output)>,
@@ -96,7 +99,7 @@ impl std::fmt::Debug for Rig {
 }
 
 impl Rig {
-    pub(crate) fn new(setup: Setup, trace_ns: u64) -> Self {
+    pub(crate) fn new(setup: Setup, options: &Options) -> Self {
         Self {
             world: World::new(Setup {
                 keep_edges: true,
@@ -124,8 +127,9 @@ impl Rig {
             sensor_wired: false,
             encoder_wired: false,
             spi_control: 0,
+            motion: MotionPeer::new(setup.trial_seed, options.motion),
             encoder_lines: (false, false),
-            trace_ns,
+            trace_ns: options.trace_s * 1_000_000_000,
             trace: VecDeque::new(),
             scope: None,
             recorder: Recorder::default(),
@@ -397,6 +401,18 @@ impl Rig {
         let late = self.bit << 7 | miso >> 1;
         self.bit = miso & 1;
         late
+    }
+
+    /// The handheld's sensor of motion.
+    pub fn motion(&mut self) -> &mut MotionPeer {
+        &mut self.motion
+    }
+
+    /// A byte over its bus, at its end.
+    pub(super) fn motion_byte(&mut self, now_ns: u64, mosi: u8, bits: u8) -> u8 {
+        self.advance_to(now_ns);
+        let x_mm = self.world.hand().map(|hand| hand.x_mm());
+        self.motion.byte(now_ns, x_mm.unwrap_or(0.0), mosi, bits)
     }
 
     /// Disturbs the line to the host until a time: this share of the bytes, either way, has a wrong bit or is lost.

@@ -68,6 +68,11 @@ impl Person {
         self.force_n = force_n;
     }
 
+    /// Means to slide at this pace from now on.
+    pub fn slide_at(&mut self, pace_mm_s: f64) {
+        self.pace_mm_s = pace_mm_s;
+    }
+
     /// Whether the hand is free: it neither presses nor is on its way.
     pub fn is_idle(&self) -> bool {
         self.at == At::Idle

@@ -34,6 +34,9 @@ pub(crate) struct Args {
     /// What lies under the finger: a texture of Table 1; drawn by the seed unless given
     #[arg(long, value_name = "NAME")]
     texture: Option<String>,
+    /// The probe has a sensor of motion
+    #[arg(long)]
+    motion: bool,
 }
 
 /// What the display says in the end.
@@ -64,7 +67,11 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
         texture: truth.to_owned(),
         world: WORLD,
         seed: args.seed,
-        hand: Manner::default(),
+        hand: Manner {
+            // the hand holds it level
+            tilt_mm: args.motion.then_some(0.0),
+            ..Manner::default()
+        },
         step: vec![Step::Explore {
             force_n: FORCE_N,
             pace_mm_s: PACE_MM_S,

@@ -9,6 +9,8 @@ use tactus::data::recordings::{RecordingSet, RecordingWriter};
 use tactus::eval::learn::learn;
 use tactus::link::{PushTable, ReadTable, Request};
 use tactus::sim::collection::Collection;
+use tactus::sim::flow::HEIGHT_MM;
+use tactus::sim::handheld::ground;
 use tactus::sim::person::Manner;
 use tactus::sim::world::Setup;
 use tactus_core::dsp::{Plain, Plan};
@@ -32,10 +34,10 @@ const BURLAP: u8 = 101;
 /// A handheld probe over a texture of the world that its own table is learned from, and the person who holds it.
 pub(crate) struct Held {
     pub(crate) talk: Talk,
-    person: Person,
+    pub(crate) person: Person,
     /// What the person was asked to do, once each time that it changed.
     prompts: Vec<Prompt>,
-    reports: Vec<Report>,
+    pub(crate) reports: Vec<Report>,
 }
 
 impl Held {
@@ -58,6 +60,7 @@ impl Held {
         let setup: Setup = collection.setup(number, 77);
         let options = Options {
             store,
+            motion: manner.tilt_mm.map(|_| ground(number, HEIGHT_MM)),
             ..Options::default()
         };
         let mut board = Emulator::start(elf, setup, options).unwrap();
@@ -480,7 +483,7 @@ fn known_weights_set_the_force_that_the_person_is_shown() {
         uneven: 0.0,
         force_spread: 0.0,
         pace_spread: 0.0,
-        speed_error: None,
+        tilt_mm: None,
     };
     let Some(mut held) = Held::new("burlap", steady) else {
         return;

@@ -7,7 +7,7 @@ use tactus::eval::evaluate::{Method, explorer};
 use tactus::eval::verify::false_accept;
 use tactus::link::Request;
 use tactus_core::explorer::{Config, Strategy};
-use tactus_core::features::{Movement, PropertySet};
+use tactus_core::features::{Movement, Observation, PropertySet};
 use tactus_core::table::Table;
 use tactus_core::wire::{Command, Event, Identify};
 
@@ -78,14 +78,20 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     }
     let mut prompts = Prompts::default();
     let mut movement: Option<Movement> = None;
+    let mut pace = None;
     bench.run(Request::command(Command::Verify(wanted)), |report| {
         match &report.event {
             Event::Chosen { movement: next, .. } => movement = Some(*next),
+            Event::Pace(measured) => pace = Some(*measured),
             Event::SlideReport {
                 action, observed, ..
             } => {
                 // a slide that says nothing here is the probe's to judge
-                let _ = here.observe(*action, &observed.observation());
+                let observation = Observation {
+                    pace: pace.take(),
+                    ..observed.observation()
+                };
+                let _ = here.observe(*action, &observation);
             }
             Event::Verified { slides, now, .. } => {
                 let slide = Slide {

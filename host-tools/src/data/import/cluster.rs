@@ -214,6 +214,7 @@ impl Name {
             pdc: pdc.collect(),
             pdc_rate_hz: PDC_RATE_HZ,
             outside_mn: None,
+            pace: None,
             shear_rate_hz: PDC_RATE_HZ,
         };
         slide.cut(&[], &pac, None).map(Some).map_err(fault)

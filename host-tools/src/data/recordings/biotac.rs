@@ -206,6 +206,7 @@ impl Manifest {
                     pdc: field(pdc).to_vec(),
                     pdc_rate_hz: pdc.rate_hz,
                     outside_mn: None,
+                    pace: None,
                     shear_rate_hz: shear.unwrap_or(pdc).rate_hz,
                 };
                 let slide = slide.cut(&[], field(pac), shear.map(field));

@@ -17,6 +17,7 @@
 //! | `moved` | whether the sample was moved or turned since the slide before: `yes`, `no`, or empty where nobody said; may be missing |
 //! | `finger` | the finger: `biotac`, `analog` or `mems`; empty or missing for a BioTac |
 //! | `calibrated` | day on which that finger's force per count was measured, as 20261121; 1 where nobody knew the day; empty, 0 or missing if it was not, or is not known |
+//! | `pace` | natural logarithm of the slide's mean speed in parts of `speed_mm_s`, in steps of 1/1024, by a sensor of motion; empty or missing where it was not measured |
 //!
 //! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it; each is a
 //! one-dimensional array of `<i2` (numpy.int16). The hash is the SHA-256 of the whole file in hexadecimal. The rows may come
@@ -59,7 +60,15 @@ pub const COLUMNS: [&str; 19] = [
 ];
 
 /// Columns that follow them, which older manifests do not have.
-pub const LABELS: [&str; 6] = ["lot", "operator", "note", "moved", "finger", "calibrated"];
+pub const LABELS: [&str; 7] = [
+    "lot",
+    "operator",
+    "note",
+    "moved",
+    "finger",
+    "calibrated",
+    "pace",
+];
 
 /// What the manifest says, checked.
 #[derive(Debug)]
@@ -81,6 +90,7 @@ struct Entry {
     pdc_rate_hz: u32,
     shear: Option<Stream>,
     shear_rate_hz: u32,
+    pace: Option<i16>,
 }
 
 #[derive(Debug)]
@@ -181,7 +191,7 @@ impl Entry {
             Stream::of(row, file, sha256)?
                 .ok_or_else(|| row.error(Some(file), ContentError::NoFile))
         };
-        let [lot, operator, note, moved, finger, calibrated] =
+        let [lot, operator, note, moved, finger, calibrated, pace] =
             LABELS.map(|column| row.text(column).to_owned());
         let moved = match moved.as_str() {
             "" => None,
@@ -218,6 +228,10 @@ impl Entry {
             pdc_rate_hz: rate("pdc_rate_hz")?,
             shear: Stream::of(row, "shear_file", "shear_sha256")?,
             shear_rate_hz: rate("shear_rate_hz")?,
+            pace: match pace.as_str() {
+                "" => None,
+                _ => Some(row.parse("pace", "a whole number of 1/1024")?),
+            },
         })
     }
 
@@ -239,6 +253,7 @@ impl Entry {
             pdc,
             pdc_rate_hz: self.pdc_rate_hz,
             outside_mn: None,
+            pace: self.pace,
             shear_rate_hz: self.shear_rate_hz,
         };
         let slide = slide.cut(&still, &pac, shear.as_deref());

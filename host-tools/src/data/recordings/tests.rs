@@ -28,6 +28,7 @@ fn slide(texture: usize, number: u32) -> Recording {
         pdc: vec![base; 10],
         pdc_rate_hz: 100,
         outside_mn: None,
+        pace: None,
         shear_rate_hz: 110,
     };
     slide.cut(&[], &pac, Some(&[-base; 11])).unwrap()
@@ -491,7 +492,11 @@ fn labels_come_back_and_older_manifests_have_none() {
     let textures = vec![texture(1), texture(2)];
     let writer = RecordingWriter::begin(folder.path(), textures, "test").unwrap();
     let mut writer = writer.labelled(given.clone());
-    writer.write(&slide(0, 1)).unwrap();
+    let measured = Recording {
+        pace: Some(-341),
+        ..slide(0, 1)
+    };
+    writer.write(&measured).unwrap();
     let mut writer = writer.labelled(Labels::default());
     writer.write(&slide(1, 1)).unwrap();
     writer.finish().unwrap();
@@ -500,6 +505,15 @@ fn labels_come_back_and_older_manifests_have_none() {
         set.slides(texture)[0].labels.clone()
     };
     assert_eq!([labels(0), labels(1)], [given, Labels::default()]);
+    let pace = |folder, texture| {
+        RecordingSet::open(folder)
+            .unwrap()
+            .load_texture(texture)
+            .unwrap()[0]
+            .pace
+    };
+    let paces = [0, 1].map(|texture| pace(folder.path(), texture));
+    assert_eq!(paces, [Some(-341), None]);
     // what is neither yes nor no is none
     let manifest = folder.path().join("manifest.csv");
     let text = fs::read_to_string(&manifest).unwrap();
@@ -516,17 +530,18 @@ fn labels_come_back_and_older_manifests_have_none() {
     crate::data::import::import(folder.path(), &to, &mut |_, _| ()).unwrap();
     let copied = RecordingSet::open(&to).unwrap();
     assert_eq!(copied.slides(0)[0].labels, labels(0));
+    assert_eq!(pace(&to, 0), Some(-341));
     // as they were written before there were labels
     let manifest = folder.path().join("manifest.csv");
     let text = fs::read_to_string(&manifest).unwrap();
-    let older = text.replace(",lot,operator,note,moved,finger,calibrated", "");
+    let older = text.replace(",lot,operator,note,moved,finger,calibrated,pace", "");
     let older = older.replace(
-        ",\"7, front\",\"Ánna \"\"A\"\"\",,no,finger-200,20261121",
+        ",\"7, front\",\"Ánna \"\"A\"\"\",,no,finger-200,20261121,-341",
         "",
     );
     let older: String = older
         .lines()
-        .map(|line| format!("{}\n", line.strip_suffix(",,,,,biotac,").unwrap_or(line)))
+        .map(|line| format!("{}\n", line.strip_suffix(",,,,,biotac,,").unwrap_or(line)))
         .collect();
     fs::write(&manifest, older).unwrap();
     assert_eq!(

@@ -203,6 +203,8 @@ impl RecordingWriter {
         row.push(labels.finger.to_string());
         let day = (labels.calibrated != 0).then(|| labels.calibrated.to_string());
         row.push(day.unwrap_or_default());
+        let pace = slide.pace.map(|pace| pace.to_string());
+        row.push(pace.unwrap_or_default());
         let written = csv(std::iter::once(&row)).and_then(|row| self.journal.write_all(&row));
         written.map_err(|e| io_error(&self.folder.join(ROWS), e))?;
         self.rows.push(row);

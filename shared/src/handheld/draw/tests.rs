@@ -36,12 +36,14 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
         force_mn,
         down,
     };
-    let slide = |progress| Screen::Slide {
+    let seen = |progress, way| Screen::Slide {
         slide: 2,
         of: 5,
         force_mn: 520.0,
         progress,
+        way,
     };
+    let slide = |progress| seen(progress, Way::NoSensor);
     let rows = |rows: &[Row<'static>]| Vec::from_slice(rows).unwrap();
     each("air", &Screen::Air);
     each("ready", &Screen::Ready { textures: 117 });
@@ -52,6 +54,10 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
     each("slide", &slide(None));
     each("slide-begun", &slide(Some(0.2)));
     each("slide-going", &slide(Some(0.8)));
+    each("slide-seen", &seen(Some(0.5), Way::Seen(0.52)));
+    each("slide-unseen", &seen(Some(0.5), Way::Unseen));
+    each("slide-slow", &seen(Some(0.7), Way::Seen(0.4)));
+    each("slide-fast", &seen(Some(0.5), Way::Seen(0.8)));
     for (name, why, lift) in [
         ("again-hard", Again::TooHard, true),
         ("again-light", Again::TooLight, false),

@@ -265,3 +265,102 @@ proptest! {
         }
     }
 }
+
+/// What happens to a probe whose sensor of motion says so every 10 ms, from where the parts begin: for so long, counts.
+fn feel_moving(parts: &[Part], seen: &[(f64, Moved)]) -> List<Event> {
+    let plan = Plan::new();
+    let mut touch = Touch::<Plain>::new(&plan);
+    let each = seen.iter();
+    let mut readings = each.flat_map(|(s, moved)| std::vec![*moved; (s * 100.0) as usize]);
+    let mut events = List::new();
+    for (number, word) in words(parts).into_iter().enumerate() {
+        if number.is_multiple_of(44) {
+            touch.moved(readings.next().unwrap_or(Some([0, 0])));
+        }
+        events.extend(touch.word(word));
+    }
+    events
+}
+
+/// Of the press and of a slide that begins 1.25 s after it.
+fn pressed_and_slid(rms: f64) -> List<Part> {
+    with(
+        pressed(500.0),
+        std::vec![part(0.1, 500.0, 0.0), part(2.0, 500.0, rms)],
+    )
+}
+
+#[test]
+fn a_slide_that_is_seen_has_its_speed() {
+    // 25.1 mm/s are 229 counts a second
+    for counts in [[0, 3], [-4, 0], [2, 2]] {
+        let events = feel_moving(
+            &pressed_and_slid(30.0),
+            &[(1.25, Some([0, 0])), (2.0, Some(counts))],
+        );
+        let observed = events.iter().find_map(|event| match event {
+            Event::Slid(observation) => Some(observation.pace),
+            _ => None,
+        });
+        let expected = (pace_counts(counts) / 229.0_f64).ln() * 1024.0;
+        let measured = f64::from(observed.unwrap().unwrap());
+        assert!(
+            (measured - expected).abs() < 15.0,
+            "{counts:?}: {measured} {expected}"
+        );
+    }
+}
+
+/// Counts of a second.
+fn pace_counts([x, y]: [i16; 2]) -> f64 {
+    f64::from(x).hypot(f64::from(y)) * 100.0
+}
+
+#[test]
+fn a_texture_that_is_too_smooth_to_be_felt_is_noticed_where_it_is_seen() {
+    let parts = pressed_and_slid(0.0);
+    let slid = |events: &[Event]| events.iter().any(|event| matches!(event, Event::Slid(_)));
+    assert!(!slid(&feel(&words(&parts))));
+    let seen = [(1.25, Some([0, 0])), (2.0, Some([0, 2]))];
+    assert!(slid(&feel_moving(&parts, &seen)));
+}
+
+#[test]
+fn what_is_lively_and_does_not_move_is_no_slide() {
+    let parts = pressed_and_slid(30.0);
+    let events = feel_moving(&parts, &[(4.0, Some([0, 0]))]);
+    let over = events
+        .iter()
+        .any(|event| matches!(event, Event::Slid(_) | Event::Again(_)));
+    assert!(!over, "{events:?}");
+    // and one that stands still again was too short, however lively it is
+    let seen = [
+        (1.25, Some([0, 0])),
+        (0.5, Some([0, 2])),
+        (2.0, Some([0, 0])),
+    ];
+    assert_eq!(again(&feel_moving(&parts, &seen)), Some(Again::TooShort));
+}
+
+#[test]
+fn a_slide_that_is_not_seen_all_the_way_has_no_speed() {
+    let parts = pressed_and_slid(30.0);
+    for seen in [
+        &[(4.0, None)][..],
+        &[
+            (1.25, Some([0, 0])),
+            (0.8, Some([0, 2])),
+            (0.01, None),
+            (2.0, Some([0, 2])),
+        ],
+    ] {
+        let events = feel_moving(&parts, seen);
+        let observed = events.iter().find_map(|event| match event {
+            Event::Slid(observation) => Some(observation.clone()),
+            _ => None,
+        });
+        assert_eq!(observed.unwrap().pace, None, "{seen:?}");
+    }
+    // without any it is as without a sensor
+    assert_eq!(feel_moving(&parts, &[(4.0, None)]), feel(&words(&parts)));
+}

@@ -297,6 +297,7 @@ impl Monitor {
             | Event::Pdc(_)
             | Event::Weighed { .. }
             | Event::Verified { .. }
+            | Event::Pace(_)
             | Event::Done(_)
             | Event::Refused { .. }
             | Event::TrainingSlide { .. }

@@ -79,6 +79,7 @@ fn biotac_layout_is_taken_from_the_manifest() {
         pdc: (940..943).collect(),
         pdc_rate_hz: 500,
         outside_mn: None,
+        pace: None,
         shear_rate_hz: 400,
     };
     let expected = expected.cut(&[], &pac, Some(&[943, 944])).unwrap();

@@ -63,6 +63,7 @@ proptest! {
             pdc: vec![3; 10],
             pdc_rate_hz,
             outside_mn: None,
+            pace: None,
             shear_rate_hz: 100,
         };
         let slide = slide.cut(still, &pac, shear.as_deref()).unwrap();
