@@ -611,3 +611,24 @@ fn the_finger_is_built_as_it_is_drawn_and_wired() {
         }
     }
 }
+
+#[test]
+fn the_motion_sensor_is_wired_as_the_firmware_has_it() {
+    let board = read("firmware/src/board.rs");
+    let page = read("docs/src/handheld.md");
+    let (_, pins) = board.split_once("motion: Motion {").unwrap();
+    for (signal, in_code) in [
+        ("SCK", "sck"),
+        ("MISO", "miso"),
+        ("MOSI", "mosi"),
+        ("CS", "select"),
+    ] {
+        let line = pins.lines().find_map(|line| {
+            let pin = line.trim().strip_prefix(in_code)?;
+            pin.strip_prefix(": ")?.strip_suffix(',')
+        });
+        let pin = line.unwrap();
+        let row = format!("| {signal} | {pin}");
+        assert!(page.contains(&row), "the page lacks {row}");
+    }
+}

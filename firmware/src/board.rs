@@ -98,6 +98,14 @@ assign_resources! {
         buzzer: PC9,
         tones: TIM8,
     }
+    /// The handheld's sensor of motion, if it has one.
+    motion: Motion {
+        spi: SPI4,
+        sck: PE2,
+        miso: PE5,
+        mosi: PE6,
+        select: PE4,
+    }
     errata: Errata {
         pa12: PA12,
     }

@@ -7,6 +7,7 @@ mod decision_kernels;
 mod dsp_kernels;
 pub(crate) mod flash;
 pub(crate) mod lever;
+pub(crate) mod motion;
 pub(crate) mod rescue;
 pub(crate) mod slots;
 pub(crate) mod thread;

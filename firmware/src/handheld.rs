@@ -3,7 +3,7 @@
 //! | executor | task | does | tells |
 //! |---|---|---|---|
 //! | interrupts of TIM2 and SPI1 | `chip::slots` | a sensor word every 227 us, while they are wanted | words to `hand` |
-//! | UART7's interrupt, woken by the clock's | `hand` | states, button, buzzer, table, requests; owns the store | pictures to `show`, reports to `send` |
+//! | UART7's interrupt, woken by the clock's | `hand` | states, button, buzzer, sensor of motion, table, requests; owns the store | pictures to `show`, reports to `send` |
 //! | UART7's interrupt | `receive`, `send` | frames of USART3 | requests to `hand` |
 //! | UART7's interrupt | `show` | the display, by I2C1 and its DMA | |
 //! | UART7's interrupt | `acquire` | starts the slots when the sensor is ready | |
@@ -55,7 +55,9 @@ pub fn handheld() -> ! {
     };
     hands.spawn(only(link::send(tx)));
     hands.spawn(only(link::receive(rx, &hand::BODY)));
-    hands.spawn(only(hand::hand(r.store, r.handle, r.go, words_out)));
+    hands.spawn(only(hand::hand(
+        r.store, r.handle, r.go, r.motion, words_out,
+    )));
     hands.spawn(only(display::show(r.display)));
     hands.spawn(only(hand::watch()));
     hand::sleep()

@@ -15,6 +15,7 @@ type Listed = &'static [(&'static str, &'static [&'static str])];
 const OWNERS: Listed = &[
     ("chip/current.rs", &["ADC1", "ADC123_COMMON", "DMA2"]),
     ("chip/lever.rs", &["TIM1"]),
+    ("chip/motion.rs", &["SPI4"]),
     ("chip/slots.rs", &["SPI1", "TIM2"]),
     ("chip/watchdog.rs", &["IWDG"]),
 ];

@@ -15,11 +15,13 @@ use static_cell::StaticCell;
 use tactus_core::dsp::Plan;
 use tactus_core::handheld::by_hand::{self, ByHand, Hand, Shown};
 use tactus_core::handheld::jobs::{self, Outcome};
-use tactus_core::handheld::{About, Handheld, Picture, Screen, Small, TICKS_HZ, draw};
+use tactus_core::handheld::{About, Handheld, Moved, Picture, Screen, Small, TICKS_HZ, draw};
 use tactus_core::probe::seams::Events;
 use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::PressureSensor as _;
+use tactus_core::sensor::paa5100je::{MotionFault, Paa5100je};
+use tactus_core::table::PACED;
 use tactus_core::wire::{Event, PROTOCOL, Reset, Text};
 
 use super::display;
@@ -28,6 +30,7 @@ use super::link::{BUSY, Body, HEARD, JOBS, TABLE};
 use super::outbox::{self, STREAM};
 use crate::board;
 use crate::chip::flash::{self, MappedTable};
+use crate::chip::motion::MotionBus;
 use crate::chip::slots::{self, Finger, Word};
 use crate::chip::watchdog;
 
@@ -178,6 +181,9 @@ struct Parts {
     listens: bool,
     same: bool,
     ticks: u32,
+    /// The sensor of motion, in images that have one, and whether it failed when that was logged last.
+    motion: Option<Paa5100je<MotionBus>>,
+    motion_fails: bool,
 }
 
 impl Hand for Parts {
@@ -193,6 +199,25 @@ impl Hand for Parts {
 
     fn word(&mut self) -> Option<Word> {
         self.words.dequeue()
+    }
+
+    fn moved(&mut self) -> Option<Moved> {
+        // leaves the driver out of the other image
+        let sensor = self.motion.as_mut().filter(|_| PACED)?;
+        let moved = sensor.poll(Instant::now().as_millis() as u32);
+        let fault = sensor.fault();
+        if fault.is_some() != self.motion_fails {
+            self.motion_fails = fault.is_some();
+            match fault {
+                None => defmt::info!("motion sensor: works"),
+                Some(MotionFault::Bus) => defmt::error!("motion sensor: no bus"),
+                Some(MotionFault::Identity([id, inverse])) => {
+                    defmt::error!("motion sensor: answers {=u8} {=u8}", id, inverse);
+                }
+                Some(MotionFault::Forgot) => defmt::error!("motion sensor: lost its power"),
+            }
+        }
+        Some(moved)
     }
 
     fn is_pressed(&mut self) -> bool {
@@ -293,6 +318,7 @@ pub(crate) async fn hand(
     flash: board::Storage,
     handle: board::Handle,
     go: board::Go,
+    motion: board::Motion,
     words: Consumer<'static, Word>,
 ) {
     static PLAN: StaticCell<Plan> = StaticCell::new();
@@ -326,6 +352,8 @@ pub(crate) async fn hand(
         listens: false,
         same: false,
         ticks: 0,
+        motion: PACED.then(|| Paa5100je::new(MotionBus::new(motion))),
+        motion_fails: false,
     };
     let mut probe = Probe {
         rig: ByHand::new(parts, handheld, UNMEASURED),

@@ -12,6 +12,8 @@ use crate::shell::{self, cargo, root, target};
 pub(crate) const RIG: &str = "tactus-rig";
 /// The image that a hand holds.
 pub(crate) const HANDHELD: &str = "tactus-handheld";
+/// The same with a sensor of motion.
+pub(crate) const MOTION: &str = "tactus-handheld-motion";
 
 /// Has the firmware identify a texture, or serves its serial port where a TCP port for it is given.
 pub(crate) fn emulate(options: &[OsString]) -> Result<()> {
@@ -19,6 +21,13 @@ pub(crate) fn emulate(options: &[OsString]) -> Result<()> {
         let option = option.to_string_lossy();
         option == "--port" || option.starts_with("--port=")
     };
+    if options.iter().any(|option| option == "--handheld") {
+        let others = options.iter().filter(|option| *option != "--handheld");
+        let others: Vec<OsString> = others.cloned().collect();
+        let motion = others.iter().any(|option| option == "--motion");
+        let image = if motion { MOTION } else { HANDHELD };
+        return start_with(image, "handheld", &others);
+    }
     let run = if options.iter().any(served) {
         "serve"
     } else {
@@ -27,8 +36,13 @@ pub(crate) fn emulate(options: &[OsString]) -> Result<()> {
     start(run, options)
 }
 
-/// Builds firmware and emulator and starts a run of it.
+/// Builds the rig's firmware and the emulator and starts a run of it.
 pub(crate) fn start(run: &str, options: &[OsString]) -> Result<()> {
+    start_with(RIG, run, options)
+}
+
+/// Builds an image and the emulator and starts a run of it.
+fn start_with(image: &str, run: &str, options: &[OsString]) -> Result<()> {
     let help = options.iter().any(|o| o == "--help" || o == "-h");
     // an ELF that is named is the one to run
     let named = options
@@ -40,7 +54,7 @@ pub(crate) fn start(run: &str, options: &[OsString]) -> Result<()> {
         let elf = if help || named {
             None
         } else {
-            let elf = firmware::compile(&[RIG])?.remove(0);
+            let elf = firmware::compile(&[image])?.remove(0);
             Some(elf)
         };
         emulator.join().expect("a build does not panic")?;
@@ -127,6 +141,7 @@ pub(crate) fn with_images<'t>(
         ("TACTUS_SELFTEST_ELF", "tactus-selftest"),
         ("TACTUS_SILICON_ELF", "tactus-silicon"),
         ("TACTUS_HANDHELD_ELF", HANDHELD),
+        ("TACTUS_MOTION_ELF", MOTION),
     ];
     for (variable, name) in images {
         tests.env(variable, firmware::image(elves, name)?);

@@ -9,10 +9,11 @@ use sha2::{Digest as _, Sha256};
 use crate::shell::root;
 use crate::toolchain;
 
-/// The images by the profile that each is built with: the rig for speed, the handheld for a small chip.
-const PROFILES: [(&str, &[&str]); 2] = [
+/// The images by profile and features that each is built with: the rig for speed, the handheld for a small chip.
+const PROFILES: [(&str, &[&str], &[&str]); 3] = [
     (
         "firmware",
+        &[],
         &[
             "tactus-rig",
             "tactus-selftest",
@@ -20,18 +21,24 @@ const PROFILES: [(&str, &[&str]); 2] = [
             "tactus-bench",
         ],
     ),
-    (HANDHELD, &["tactus-handheld"]),
+    (HANDHELD, &[], &["tactus-handheld"]),
+    (
+        HANDHELD,
+        &["--features=motion"],
+        &["tactus-handheld-motion"],
+    ),
 ];
 const HANDHELD: &str = "handheld";
 /// At `opt-level = "z"` LLVM inlines what is worth 5 of its instructions. At 12 what is inlined is still smaller than its call
 /// more often than not: the image is 1.1 KB smaller (it grows again from 18 on).
 const HANDHELD_FLAGS: [&str; 1] = ["-Cllvm-args=--inline-threshold=12"];
 /// The images that are flashed. The bench image is for the emulated board only.
-const FLASHED: [&str; 4] = [
+const FLASHED: [&str; 5] = [
     "tactus-rig",
     "tactus-selftest",
     "tactus-silicon",
     "tactus-handheld",
+    "tactus-handheld-motion",
 ];
 
 /// Builds every image of the firmware that is flashed and says what came out; the ELFs.
@@ -59,7 +66,7 @@ pub(crate) fn compile(images: &[&str]) -> Result<Vec<PathBuf>> {
     let toolchain = toolchain::get()?;
     eprintln!("Building with {}", toolchain.version());
     let mut elves = Vec::new();
-    for (profile, all) in PROFILES {
+    for (profile, features, all) in PROFILES {
         let wanted = || images.iter().filter(|image| all.contains(image));
         if wanted().count() == 0 {
             continue;
@@ -71,6 +78,7 @@ pub(crate) fn compile(images: &[&str]) -> Result<Vec<PathBuf>> {
         };
         let mut cargo = toolchain.cargo_build(flags);
         cargo.args(["--package", "tactus-firmware", "--profile", profile]);
+        cargo.args(features);
         cargo.args(wanted().flat_map(|image| ["--bin", image]));
         // progress and diagnostics go to stderr; stdout says where the ELFs are
         cargo.arg("--message-format=json-render-diagnostics");

@@ -57,6 +57,7 @@ enum Cli {
     /// Builds the firmware and the emulator first; that takes some minutes the first time.
     #[command(after_help = "Examples:
   cargo xtask emulate --texture 10 --log     with the firmware's own log
+  cargo xtask emulate --handheld --motion    the handheld with a sensor of motion, in a hand
   cargo xtask emulate --port 7429            serves its serial port at tcp:127.0.0.1:7429 instead
   cargo xtask emulate --help                 all options")]
     #[command(disable_help_flag = true)]

@@ -16,6 +16,7 @@ mod handheld;
 mod handheld_compare;
 mod handheld_link;
 mod long_table;
+mod motion;
 mod old_store;
 mod referee;
 mod scope;

@@ -10,6 +10,7 @@ use tactus::sim::world::{Setup, World};
 use tactus_core::sensor::FingerName;
 
 use super::*;
+use crate::board::options::Options;
 use crate::board::pins;
 use crate::board::rig::{Output, Rig, lock};
 
@@ -54,7 +55,11 @@ const SETUP: Setup = Setup {
 
 impl Bench {
     fn new() -> Self {
-        let rig = Arc::new(Mutex::new(Rig::new(SETUP, 1_000 * MS)));
+        let trace = Options {
+            trace_s: 1,
+            ..Options::default()
+        };
+        let rig = Arc::new(Mutex::new(Rig::new(SETUP, &trace)));
         let board = Board::new(&rig, NonZeroU64::new(168_000_000).unwrap(), true).unwrap();
         let mut bench = Self {
             board,
