@@ -282,8 +282,8 @@ fn a_gauge_study_is_one_object_and_compares_operators_of_several_folders() {
         let named: Vec<String> = text
             .lines()
             .map(|line| {
-                line.strip_suffix(",,,,biotac,")
-                    .map_or(line.to_owned(), |l| format!("{l},{name},,,biotac,"))
+                line.strip_suffix(",,,,biotac,,")
+                    .map_or(line.to_owned(), |l| format!("{l},{name},,,biotac,,"))
             })
             .collect();
         std::fs::write(&manifest, named.join("\n")).unwrap();
@@ -472,8 +472,8 @@ fn a_table_says_whether_the_samples_of_its_slides_were_moved() {
     let rows = std::fs::read_to_string(&manifest).unwrap();
     let learned = |labels: &dyn Fn(&str, u32) -> &'static str| {
         let label = |line: &str| {
-            // nobody said so far, nor of which finger
-            let line = line.rsplitn(4, ',').last().unwrap();
+            // nobody said so far, nor of which finger and at what speed
+            let line = line.rsplitn(5, ',').last().unwrap();
             let fields: Vec<&str> = line.split(',').collect();
             let moved = match fields[2].parse() {
                 Ok(slide) => labels(fields[1], slide),

@@ -26,7 +26,7 @@ const KB: u64 = 1024;
 const MAX_FLASH: [(&str, u64); 2] = [(RIG, 160 * KB), (HANDHELD, 160 * KB)];
 /// Images that miss the 160 KB, and what they reached instead: they may not grow. Slopes over the speed and what reads the sensor take
 /// 8 KB.
-const MISSES: [(&str, u64); 1] = [(MOTION, 171_700)];
+const MISSES: [(&str, u64); 1] = [(MOTION, 171_645)];
 const HANDHELD: &str = "tactus-handheld";
 const MAX_VARIABLES: u64 = 64 * KB;
 /// Twice the deepest stack has to fit into what memory.x leaves above the variables and the guard.
