@@ -597,6 +597,11 @@ fn the_finger_is_built_as_it_is_drawn_and_wired() {
             "select",
             ["IIS3DWB | CS", "MCP3202 | CS (1)", "MCP3202 | CS (1)"],
         ),
+        (
+            "second select",
+            "select_2",
+            ["ADS1220 | CS", "ADS1220 | CS", "ADS1220 | CS"],
+        ),
     ] {
         let pin = board.lines().find_map(|line| {
             line.trim()

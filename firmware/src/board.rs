@@ -13,10 +13,19 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Peri, PeripheralType, bind_interrupts, flash, peripherals, usart};
-use tactus_core::sensor::FingerCode;
+#[cfg(feature = "finger-analog")]
+pub(crate) use tactus_core::sensor::analog::Analog as Finger;
+#[cfg(not(any(feature = "finger-analog", feature = "finger-mems")))]
+pub(crate) use tactus_core::sensor::biotac::BioTac as Finger;
+#[cfg(all(feature = "finger-mems", not(feature = "finger-analog")))]
+pub(crate) use tactus_core::sensor::mems::Mems as Finger;
+use tactus_core::sensor::{FingerCode, PressureSensor as _};
+
+#[cfg(all(feature = "finger-analog", feature = "finger-mems"))]
+compile_error!("an image is for one finger: choose `finger-analog` or `finger-mems`");
 
 /// The finger that this image is for.
-pub(crate) const FINGER: FingerCode = FingerCode::BIOTAC;
+pub(crate) const FINGER: FingerCode = FingerCode::of(Finger::MODEL.name);
 
 assign_resources! {
     sensor: Sensor {
@@ -26,6 +35,8 @@ assign_resources! {
         // not PA7, which is the Ethernet PHY's CRS_DV
         mosi: PB5,
         select: PD14,
+        /// Of a finger's second part.
+        select_2: PD15,
     }
     slots: Slots {
         timer: TIM2,

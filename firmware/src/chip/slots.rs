@@ -13,22 +13,19 @@ use embassy_stm32::gpio::{AfType, AnyPin, Flex, OutputType, Pin as _, Pull, Spee
 use embassy_stm32::interrupt;
 use embassy_stm32::pac::gpio::{Gpio, regs::Bsrr};
 use embassy_stm32::pac::spi::regs::Cr1;
-use embassy_stm32::pac::spi::vals::{Br, Cpha, Cpol, Dff, Mstr};
+use embassy_stm32::pac::spi::vals::{Br, Dff, Mstr};
 use embassy_stm32::pac::{SPI1, TIM2};
 use embassy_stm32::{Peri, peripherals, rcc};
-use embedded_hal::spi::{Phase, Polarity};
 use heapless::spsc::Producer;
-use tactus_core::sensor::PressureSensor;
-use tactus_core::sensor::biotac::{BioTac, WordStats};
 use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
-use tactus_core::sensor::slot::{Answer, Transaction, length_us};
+use tactus_core::sensor::slot::{Answer, Port, Transaction, length_us};
+use tactus_core::sensor::{BadWord, PressureSensor};
 
-use crate::board::{self, held};
+use crate::board::{self, Finger, held};
 use crate::chip;
 
-/// The finger.
-pub(crate) type Finger = BioTac;
-const FINGER: Finger = BioTac;
+/// Why an answer of the finger is no sample.
+pub(crate) type FingerError = <Finger as PressureSensor>::Error;
 
 /// A sensor word; `None` is a damaged or missing one.
 pub(crate) type Word = Option<Pressure>;
@@ -37,9 +34,18 @@ pub(crate) const WORDS: usize = 128;
 
 /// The timer's clock, and that of the bus before it is divided: both 84 MHz.
 const TIMER_HZ: u32 = 84_000_000;
-/// The bus: 84 MHz / 16.
-const SPI_HZ: u32 = 5_250_000;
-const DIVIDER: Br = Br::DIV16;
+/// The bus: the fastest clock that all parts of the finger can be read with. It is divided by 2 to this power, and 2.
+const DIVIDER: u8 = {
+    let (mut divider, mut ports) = (0, Finger::PORTS);
+    while let [port, others @ ..] = ports {
+        while TIMER_HZ >> (divider + 1) > *port.clock_hz.end() {
+            divider += 1;
+        }
+        ports = others;
+    }
+    divider
+};
+const SPI_HZ: u32 = TIMER_HZ >> (DIVIDER + 1);
 /// Cycles of the core, 168 MHz, in a byte.
 const BYTE_CYCLES: u32 = 8 * (2 * TIMER_HZ / SPI_HZ);
 /// Ticks of the timer in a byte.
@@ -53,8 +59,20 @@ const SLACK_US: u32 = 7;
 
 /// Alternate function of SPI1's pins (data sheet, table 12).
 const SPI1_FUNCTION: u8 = 5;
-/// Parts of the finger that the board has chip selects for.
-const SELECTS: usize = 1;
+/// Chip selects: the board has two.
+const SELECTS: usize = Finger::PORTS.len();
+/// Whether all parts want the same mode of the bus: then it is set up once.
+const ONE_MODE: bool = {
+    let (mut one, mut ports) = (true, Finger::PORTS);
+    while let [port, others @ ..] = ports {
+        one &= port.mode_number() == Finger::PORTS[0].mode_number();
+        assert!(*port.clock_hz.start() <= SPI_HZ && SPI_HZ <= *port.clock_hz.end());
+        ports = others;
+    }
+    one
+};
+/// CPOL and CPHA are the number of the mode, at the low end of CR1 (RM0090 28.5.1).
+const MODE: u32 = 0b11;
 
 /// Whether all transactions have an even number of bytes, so that frames can be of two. One interrupt is then enough for two bytes.
 const WIDE: bool = {
@@ -80,12 +98,6 @@ const WIDE: bool = {
     even
 };
 const FRAME_BYTES: usize = if WIDE { 2 } else { 1 };
-const _: () = {
-    let [port] = Finger::PORTS else {
-        panic!("the board has chip selects for another number of parts")
-    };
-    assert!(*port.clock_hz.start() <= SPI_HZ && SPI_HZ <= *port.clock_hz.end());
-};
 
 /// A transaction as the interrupts do it. The board test `slots` plants mistakes in it, by this layout.
 #[derive(Clone, Copy)]
@@ -100,6 +112,8 @@ struct Step {
     /// Bytes, and the index of the first one that comes in as the answer.
     bytes: u8,
     answer: u8,
+    /// The part's mode of the bus, by its number.
+    mode: u8,
 }
 
 impl Step {
@@ -116,6 +130,7 @@ impl Step {
             port: transaction.port,
             bytes: index as u8,
             answer: index as u8 - transaction.answer,
+            mode: Finger::PORTS[transaction.port as usize].mode_number(),
         }
     }
 }
@@ -217,7 +232,13 @@ const LOOKS: u32 = 32;
 impl Bus {
     /// Takes the bus; no select is low.
     pub(crate) fn new(pins: board::Sensor) -> Self {
+        #[cfg(not(feature = "finger-mems"))]
         let selects = [Select::new(pins.select.into())];
+        #[cfg(feature = "finger-mems")]
+        let selects = [
+            Select::new(pins.select.into()),
+            Select::new(pins.select_2.into()),
+        ];
         let out = AfType::output(OutputType::PushPull, Speed::VeryHigh);
         // nobody there then reads as FF FF
         let input = AfType::input(Pull::Up);
@@ -225,19 +246,12 @@ impl Bus {
         for (pin, how) in led.iter_mut().zip([out, out, input]) {
             pin.set_as_af_unchecked(SPI1_FUNCTION, how);
         }
-        let mut control = Cr1::default();
-        if let [port, ..] = Finger::PORTS {
-            control.set_cpol(match port.mode.polarity {
-                Polarity::IdleLow => Cpol::IDLE_LOW,
-                Polarity::IdleHigh => Cpol::IDLE_HIGH,
-            });
-            control.set_cpha(match port.mode.phase {
-                Phase::CaptureOnFirstTransition => Cpha::FIRST_EDGE,
-                Phase::CaptureOnSecondTransition => Cpha::SECOND_EDGE,
-            });
-        }
-        control.set_dff(if WIDE { Dff::BITS16 } else { Dff::BITS8 });
-        control.set_br(DIVIDER);
+        let mut control = Cr1(if let [port, ..] = Finger::PORTS {
+            port.mode_number().into()
+        } else {
+            0
+        });
+        control.set_br(Br::from_bits(DIVIDER));
         control.set_mstr(Mstr::MASTER);
         // selects are by software: no mode fault
         control.set_ssm(true);
@@ -271,6 +285,15 @@ impl Bus {
         }
     }
 
+    /// Sets the bus to a mode, by its number, where the parts differ in it; no select is low, and no frame under way (RM0090 28.5.1).
+    #[inline(always)]
+    fn set_mode(&mut self, mode: u8) {
+        if !ONE_MODE {
+            SPI1.cr1()
+                .write_value(Cr1(self.control.0 & !MODE | u32::from(mode)));
+        }
+    }
+
     /// Sends a frame. The one before has been read, so the data register is free, and the next that is received belongs to this one.
     fn send(&mut self, frame: u16) {
         SPI1.dr().write(|w| w.set_dr(frame));
@@ -281,16 +304,17 @@ impl Bus {
         SPI1.dr().read().dr().to_be_bytes()
     }
 
-    /// Does a transaction and waits for it: for who has nothing else to do. What comes in takes the place of `bytes`.
+    /// Does a transaction and waits for it, before the slots begin: for who has nothing else to do. What comes in takes the place of
+    /// `bytes`.
     pub(crate) fn transact(
         &mut self,
         transaction: &Transaction,
         bytes: &mut [u8],
     ) -> Result<(), NoFrame> {
+        let port = Finger::PORTS.get(usize::from(transaction.port));
+        self.set_mode(port.map_or(0, Port::mode_number));
         self.select(transaction.port, true);
-        let done = bytes
-            .chunks_mut(FRAME_BYTES)
-            .all(|frame| self.wait_for_frame(frame));
+        let done = bytes.iter_mut().all(|byte| self.wait_for_byte(byte));
         self.select(transaction.port, false);
         if done {
             return Ok(());
@@ -299,24 +323,16 @@ impl Bus {
         Err(NoFrame)
     }
 
-    fn wait_for_frame(&mut self, bytes: &mut [u8]) -> bool {
-        self.send(
-            bytes
-                .iter()
-                .fold(0, |frame, byte| frame << 8 | u16::from(*byte)),
-        );
-        let cycles = FRAME_BYTES as u32 * BYTE_CYCLES;
-        chip::wait_cycles(cycles);
+    /// Frames are bytes as long as nobody has begun the slots.
+    fn wait_for_byte(&mut self, byte: &mut u8) -> bool {
+        self.send((*byte).into());
+        chip::wait_cycles(BYTE_CYCLES);
         for _ in 0..2 * LOOKS {
             if SPI1.sr().read().rxne() {
-                let came_in = self.received().into_iter().skip(2 - FRAME_BYTES);
-                bytes
-                    .iter_mut()
-                    .zip(came_in)
-                    .for_each(|(to, from)| *to = from);
+                [_, *byte] = self.received();
                 return true;
             }
-            chip::wait_cycles(cycles / LOOKS);
+            chip::wait_cycles(BYTE_CYCLES / LOOKS);
         }
         false
     }
@@ -328,7 +344,6 @@ struct Slots {
     _timer: Peri<'static, peripherals::TIM2>,
     finger: Finger,
     words: Producer<'static, Word>,
-    stats: WordStats,
     /// Words were lost: who takes them sees where, as the next one is no good.
     gap: bool,
     /// Slots that have begun.
@@ -366,14 +381,15 @@ pub(crate) fn listen(on: bool) {
 /// Begins the slots; to be called once, when the sensor has started. `interrupt`s of SPI1 and TIM2 have one priority.
 pub(crate) fn begin(mut bus: Bus, timer: board::Slots, words: Producer<'static, Word>) {
     bus.interrupts = true;
+    bus.control
+        .set_dff(if WIDE { Dff::BITS16 } else { Dff::BITS8 });
     bus.restart();
     rcc::enable_and_reset::<peripherals::TIM2>();
     let slots = Slots {
         bus,
         _timer: timer.timer,
-        finger: FINGER,
+        finger: Finger::default(),
         words,
-        stats: WordStats::default(),
         gap: false,
         begun: 0,
         left: &[],
@@ -467,8 +483,10 @@ impl Slots {
         }
         if step.answer < step.bytes && self.sent > 0 {
             // an answer that does not come
-            let word = self.finger.decode(self.begun.wrapping_sub(1), &[]);
-            self.damaged(&word);
+            match self.finger.decode(self.begun.wrapping_sub(1), &[]) {
+                Err(why) => self.damaged(&why),
+                Ok(_) => self.lose(),
+            }
         } else {
             self.late();
         }
@@ -479,6 +497,7 @@ impl Slots {
         let [step, left @ ..] = self.left else {
             return;
         };
+        self.bus.set_mode(step.mode);
         self.bus.select(step.port, true);
         self.bus.send(step.out.first().copied().unwrap_or_default());
         self.sent = FRAME_BYTES;
@@ -534,17 +553,19 @@ impl Slots {
         let word = self.finger.decode(self.begun.wrapping_sub(1), &self.answer);
         match word {
             Ok(word) => self.put(Some(word)),
-            Err(_) => self.damaged(&word),
+            Err(why) => self.damaged(&why),
         }
     }
 
     #[cold]
-    fn damaged(&mut self, word: &Result<Pressure, <Finger as PressureSensor>::Error>) {
-        let stats = &mut self.stats;
-        stats.count(word);
-        PARITY.store(stats.parity.saturating_add(stats.padding), Relaxed);
-        let silent = stats.no_sensor;
-        ERROR_FRAMES.store(stats.error_frames.saturating_add(silent), Relaxed);
+    fn damaged(&mut self, why: &FingerError) {
+        if let Some(kind) = Finger::kind(why) {
+            let counter = match kind {
+                BadWord::Garbled => &PARITY,
+                BadWord::Refused | BadWord::Silent => &ERROR_FRAMES,
+            };
+            counter.fetch_add(1, Relaxed);
+        }
         self.lose();
     }
 

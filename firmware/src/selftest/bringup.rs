@@ -255,13 +255,7 @@ fn chip() -> ChipSeen {
 }
 
 async fn sensor(touch: &mut Touch, series: &mut Vec<[i16; 2], MAX_POINTS>) -> SensorSeen {
-    let identity = match touch.sensor().identity() {
-        Ok(id) => Ok(text(format_args!(
-            "{}, firmware {}, flex {}",
-            id.serial, id.firmware, id.flex
-        ))),
-        Err(why) => Err(text(why)),
-    };
+    let identity = touch.sensor().identity();
     let mut pac = 0;
     let second = touch.sensor().second(|pressure| {
         let counts = pressure.counts.get() as i16;
@@ -273,19 +267,23 @@ async fn sensor(touch: &mut Touch, series: &mut Vec<[i16; 2], MAX_POINTS>) -> Se
         }
     });
     let Second {
-        stats,
+        words,
+        garbled,
+        refused,
+        silent,
         late,
         last,
         pac,
         pdc,
+        ..
     } = second.await;
     touch.rests_at(pdc.mean());
     SensorSeen {
         identity,
-        words: stats.words,
-        garbled: stats.parity + stats.padding,
-        error_frames: stats.error_frames,
-        silent: stats.no_sensor,
+        words,
+        garbled,
+        error_frames: refused,
+        silent,
         late,
         last,
         pac: [pac.mean(), pac.rms()],

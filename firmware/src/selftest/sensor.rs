@@ -1,24 +1,27 @@
 //! The sensor on its bus: who it is, whether its words come whole and in time, and what it measures when nobody touches it.
 use embassy_time::{Duration, Instant, Timer};
-use tactus_core::sensor::biotac::{
-    BioTac, Diagnosis, Identity, IdentityBytes, PropertyError, WordError, WordStats, keep,
-};
+use tactus_core::sensor::biotac::{IdentityBytes, keep};
 use tactus_core::sensor::pressure::{Channel, Pressure, SLOTS_HZ};
-use tactus_core::sensor::slot::{self, Answer, Transaction};
-use tactus_core::sensor::{PressureSensor as _, slot_of};
+use tactus_core::sensor::slot::{self, Answer, Transaction, Unexpected};
+use tactus_core::sensor::{BadWord, FingerName, PressureSensor as _, slot_of};
 use tactus_core::wire::bringup::{Stopped, limits};
+use tactus_core::wire::{Text, text};
 
 use super::account::{Account, wait_us};
-use crate::board;
-use crate::chip::slots::Bus;
+use crate::board::{self, Finger};
+use crate::chip::slots::{Bus, FingerError};
+use crate::tasks::acquire;
 
 /// The slot that gives P_DC.
 const PDC: u32 = 1;
-/// A slot that begins later than this leaves the sensor less than its 50 us before the next one.
+/// A slot that begins later than this leaves a BioTac less than its 50 us before the next one.
 const LATE_US: u64 = 100;
+/// Slots in which a finger that has just begun fills its filters.
+const FILLS: u32 = 16;
 
-/// A squeeze is over, counts of P_DC: 0.06 N.
-const LEFT_COUNTS: f32 = 5.0;
+/// The finger is squeezed, and a squeeze is over, counts of P_DC.
+const SQUEEZED_COUNTS: f32 = Finger::MODEL.counts(limits::SQUEEZED_MN);
+const LEFT_COUNTS: f32 = Finger::MODEL.counts(57.5);
 /// The finger lies still for so long, ms, and so long the squeeze is waited for.
 const LEFT_MS: u32 = 500;
 const ASKED_MS: u32 = 30_000;
@@ -26,61 +29,91 @@ const ASKED_MS: u32 = 30_000;
 const MOST_DAMAGED: u32 = 10;
 
 /// The bus of the sensor, used directly.
-pub(super) struct Sensor(Bus);
+pub(super) struct Sensor {
+    bus: Bus,
+    finger: Finger,
+    started: Result<(), Unexpected>,
+}
 
 impl Sensor {
-    /// Takes the bus and waits until the sensor is up.
+    /// Takes the bus, waits until the sensor is up, and starts its parts.
     pub(super) async fn new(pins: board::Sensor) -> Self {
-        let sensor = Self(Bus::new(pins));
-        Timer::after_millis(BioTac::POWER_UP_MS.into()).await;
-        sensor
+        let mut bus = Bus::new(pins);
+        Timer::after_millis(Finger::POWER_UP_MS.into()).await;
+        Self {
+            started: acquire::parts(&mut bus),
+            bus,
+            finger: Finger::default(),
+        }
     }
 
     /// The answer to transactions; nothing if the bus is off.
     fn perform(&mut self, transactions: &[Transaction]) -> Answer {
         let answer = slot::perform(transactions, |transaction, bytes| {
-            let done = self.0.transact(transaction, bytes);
+            let done = self.bus.transact(transaction, bytes);
             wait_us(transaction.gap_us);
             done
         });
         answer.unwrap_or_default()
     }
 
-    /// Asks it who it is.
-    pub(super) fn identity(&mut self) -> Result<Identity, PropertyError> {
+    /// Who it is: a BioTac says it, other fingers have parts that answered as they must.
+    pub(super) fn identity(&mut self) -> Result<Text, Text> {
+        let name = Finger::MODEL.name;
+        if name != FingerName::Biotac {
+            let started = self.started.map_err(text);
+            return started.map(|()| text(format_args!("{name}, {} parts", Finger::PORTS.len())));
+        }
         let mut bytes = IdentityBytes::default();
         for (transactions, place) in bytes.reads() {
             keep(place, &self.perform(&transactions));
         }
-        bytes.decode()
+        let id = bytes.decode().map_err(text)?;
+        Ok(text(format_args!(
+            "{}, firmware {}, flex {}",
+            id.serial, id.firmware, id.flex
+        )))
     }
 
-    fn word(&mut self, slot: u32) -> Result<Pressure, WordError> {
-        BioTac.decode(slot, &self.perform(slot_of::<BioTac>(slot)))
+    fn word(&mut self, slot: u32) -> (Result<Pressure, FingerError>, Answer) {
+        let answer = self.perform(slot_of::<Finger>(slot));
+        (self.finger.decode(slot, &answer), answer)
     }
 
     /// Reads it for a second, in slots as the rig's; `each` gets every word that is good.
     pub(super) async fn second(&mut self, mut each: impl FnMut(Pressure)) -> Second {
         let mut second = Second::default();
         let began = Instant::now();
-        for slot in 0..SLOTS_HZ {
+        for slot in 0..FILLS + SLOTS_HZ {
             let due_us = u64::from(slot) * 1_000_000 / u64::from(SLOTS_HZ);
             let due = began + Duration::from_micros(due_us);
             Timer::at(due).await;
-            if Instant::now().saturating_duration_since(due).as_micros() > LATE_US {
-                second.late += 1;
+            let late = Instant::now().saturating_duration_since(due).as_micros() > LATE_US;
+            let (word, answer) = self.word(slot);
+            if slot < FILLS {
+                continue;
             }
-            let answer = self.perform(slot_of::<BioTac>(slot));
+            second.words += 1;
+            second.late += u32::from(late);
             // a bus that is off reads as a sensor that is not there
             second.last = answer.first_chunk().copied().unwrap_or([0xFF; 2]);
-            let word = BioTac.decode(slot, &answer);
-            second.stats.count(&word);
-            if let Ok(pressure) = word {
-                match pressure.channel {
-                    Channel::Pac => second.pac.add(pressure.counts.get()),
-                    Channel::Pdc => second.pdc.add(pressure.counts.get()),
+            match word {
+                Ok(pressure) => {
+                    match pressure.channel {
+                        Channel::Pac => second.pac.add(pressure.counts.get()),
+                        Channel::Pdc => second.pdc.add(pressure.counts.get()),
+                    }
+                    each(pressure);
                 }
-                each(pressure);
+                Err(why) => {
+                    match Finger::kind(&why) {
+                        Some(BadWord::Garbled) => second.garbled += 1,
+                        Some(BadWord::Refused) => second.refused += 1,
+                        Some(BadWord::Silent) => second.silent += 1,
+                        None => {}
+                    }
+                    second.why = Some(why);
+                }
             }
         }
         second
@@ -90,7 +123,12 @@ impl Sensor {
 /// What a second of words said.
 #[derive(Default)]
 pub(super) struct Second {
-    pub(super) stats: WordStats,
+    pub(super) words: u32,
+    pub(super) garbled: u32,
+    pub(super) refused: u32,
+    pub(super) silent: u32,
+    /// What was wrong with the last one of these.
+    why: Option<FingerError>,
     pub(super) late: u32,
     pub(super) last: [u8; 2],
     pub(super) pac: Spread,
@@ -161,7 +199,7 @@ impl Touch {
 
     /// Another word; how far P_DC is above its rest, counts.
     pub(super) fn rise(&mut self) -> Result<f32, Stopped> {
-        match self.sensor.word(PDC) {
+        match self.sensor.word(PDC).0 {
             Ok(word) => {
                 self.damaged = 0;
                 self.counts += (f32::from(word.counts.get()) - self.counts) / 8.0;
@@ -180,7 +218,7 @@ impl Touch {
         for _ in 0..ASKED_MS {
             Timer::after_millis(1).await;
             let rise = self.rise()?;
-            squeezed |= rise > limits::SQUEEZED;
+            squeezed |= rise > SQUEEZED_COUNTS;
             left_ms = if squeezed && rise.abs() < LEFT_COUNTS {
                 left_ms + 1
             } else {
@@ -197,54 +235,57 @@ impl Touch {
 
 pub(super) async fn sensor(pins: board::Sensor, account: &mut Account) -> Touch {
     let mut sensor = Sensor::new(pins).await;
-    match sensor.identity() {
-        Ok(id) => account.check(
-            true,
-            "sensor identity",
-            format_args!("{}, firmware {}, flex {}", id.serial, id.firmware, id.flex),
-            "",
-        ),
-        Err(why) => account.check(
-            false,
-            "sensor identity",
-            why,
-            "SCK PA5, MISO PA6, MOSI PB5, CS PD14, 3.3 V and ground",
-        ),
+    let (answers, who) = match sensor.identity() {
+        Ok(who) => (true, who),
+        Err(why) => (false, why),
     };
-
-    let Second {
-        stats,
-        late,
-        pac,
-        pdc,
-        ..
-    } = sensor.second(|_| ()).await;
-    let diagnosis = stats.diagnosis();
     account.check(
-        diagnosis == Diagnosis::Good && late == 0,
+        answers,
+        "sensor identity",
+        who.as_str(),
+        "SCK PA5, MISO PA6, MOSI PB5, CS PD14, of a second part PD15, 3.3 V and ground",
+    );
+
+    let second = sensor.second(|_| ()).await;
+    let Second {
+        words,
+        garbled,
+        refused,
+        silent,
+        late,
+        ..
+    } = second;
+    let well = second.why.is_none() && late == 0;
+    let why = second.why.map_or_else(Text::new, text);
+    account.check(
+        well,
         "sensor words",
         format_args!(
-            "words: {}, {} garbled, error frames: {}, {} silent, {late} late: {diagnosis}",
-            stats.words,
-            stats.parity + stats.padding,
-            stats.error_frames,
-            stats.no_sensor
+            "words: {words}, {garbled} garbled, error frames: {refused}, {silent} silent, {late} late. {why}"
         ),
         "Shorten the cable and check the pins named above",
     );
-    let within = |(least, most): (f32, f32), counts: f32| (least..=most).contains(&counts);
-    let at_rest = BioTac::MODEL.at_rest;
-    account.check(
-        within(at_rest.pac_noise_counts, pac.rms()),
+    let at_rest = Finger::MODEL.at_rest;
+    let mut rests = |name, is: f32, (least, most): (f32, f32), remedy| {
+        let within = (least..=most).contains(&is);
+        account.check(
+            within,
+            name,
+            format_args!("{is:.2} counts; {least:.1} to {most:.1} are right"),
+            remedy,
+        );
+    };
+    rests(
         "P_AC noise",
-        format_args!("{:.2} counts rms", pac.rms()),
-        "1 to 8 are right. Less: the sensor does not convert. More: is the finger touched? Check its ground",
+        second.pac.rms(),
+        at_rest.pac_noise_counts,
+        "Less: the sensor does not convert. More: is the finger touched? Check its ground",
     );
-    account.check(
-        within(at_rest.pdc_counts, pdc.mean()),
+    rests(
         "P_DC",
-        format_args!("{:.0} counts", pdc.mean()),
-        "2000 to 3200 are right without contact. Refill the finger as its manual says; keep off anything that presses it",
+        second.pdc.mean(),
+        at_rest.pdc_counts,
+        "Keep off anything that presses it. Refill a BioTac as its manual says; trim an amplified cell to 1000 counts",
     );
-    Touch::new(sensor, pdc.mean())
+    Touch::new(sensor, second.pdc.mean())
 }

@@ -28,15 +28,21 @@ use super::display;
 use super::level::OneLevel;
 use super::link::{BUSY, Body, HEARD, JOBS, TABLE};
 use super::outbox::{self, STREAM};
-use crate::board;
+use crate::board::{self, Finger};
 use crate::chip::flash::{self, MappedTable};
 use crate::chip::motion::MotionBus;
-use crate::chip::slots::{self, Finger, Word};
+use crate::chip::slots::{self, Word};
 use crate::chip::watchdog;
 
 /// The table that comes with the handheld: textures of a simulated world under a simulated hand. Its
 /// whitening says how slides of one texture by hand differ; the user trains a real probe.
-static FACTORY: &[u8] = include_bytes!("../../handheld.tact");
+static FACTORY: &[u8] = if cfg!(feature = "finger-analog") {
+    include_bytes!("../../handheld-analog.tact")
+} else if cfg!(feature = "finger-mems") {
+    include_bytes!("../../handheld-mems.tact")
+} else {
+    include_bytes!("../../handheld.tact")
+};
 /// Ticks from one word in the log about sleep to the next.
 const SAY: u32 = 5 * TICKS_HZ;
 /// `hand` gets on at least this often, ms. The longest that it does is to turn a page of settings, to erase the largest sector,

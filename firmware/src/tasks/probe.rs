@@ -21,7 +21,13 @@ use crate::chip::flash::{self, MappedTable};
 
 /// The table that comes with the firmware: textures of a simulated world, which suit the emulated board. A real rig
 /// is trained by its user, or receives a table from the host.
-static FACTORY: &[u8] = include_bytes!("../../factory.tact");
+static FACTORY: &[u8] = if cfg!(feature = "finger-analog") {
+    include_bytes!("../../factory-analog.tact")
+} else if cfg!(feature = "finger-mems") {
+    include_bytes!("../../factory-mems.tact")
+} else {
+    include_bytes!("../../factory.tact")
+};
 /// The sensor's first words are there by now.
 const HEARD_MS: u64 = 150;
 

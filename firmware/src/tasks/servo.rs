@@ -25,9 +25,9 @@ use tactus_core::rig::stage::StageConstants;
 use tactus_core::sensor::PressureSensor as _;
 
 use super::link::Body;
-use crate::board;
+use crate::board::{self, Finger};
 use crate::chip::current::{self, Current};
-use crate::chip::slots::{Finger, Word};
+use crate::chip::slots::Word;
 use crate::chip::{lever, rescue, watchdog};
 
 /// Samples on their way to the features: a quarter of a second.

@@ -244,7 +244,7 @@ pub static STEPS: &[Step] = &[
         key: "finger",
         checks: "the finger is off its mount, and P_DC lives",
         how: "the person squeezes it in the hand: without that no motor moves",
-        limit: || format!("P_DC rises by {} counts, and comes back", limits::SQUEEZED),
+        limit: || format!("P_DC rises by {} mN, and comes back", limits::SQUEEZED_MN),
         run: Run::SelfTest(|bench| Ok(judge::squeezed(bench.squeeze()?).into())),
     },
     Step {

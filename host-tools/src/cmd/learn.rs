@@ -15,6 +15,7 @@ use tactus::eval::show::count;
 use tactus::sim::collection::texture_name;
 use tactus_core::explorer;
 use tactus_core::features::{FeatureSet, Movement, Observation};
+use tactus_core::sensor::FingerName;
 use tactus_core::table::{FALSE_ALARM, Table};
 
 use super::args::{Expecting, Features, Recordings, false_alarm};
@@ -98,6 +99,9 @@ pub(crate) struct ByHand {
     /// Another seed is another world, and another hand
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// The finger that slides: biotac, analog or mems
+    #[arg(long, value_name = "NAME", default_value_t = FingerName::Biotac)]
+    finger: FingerName,
     /// How to print what was learned
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
@@ -166,7 +170,7 @@ pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()>
     let collection = collection(&args.textures, args.trials, args.seed)?;
     let textures = collection.textures.len() as u64;
     let (bytes, left_out) = with_progress(textures, "sliding by hand", |done| {
-        tactus::sim::handheld::learn(&collection, done)
+        tactus::sim::handheld::learn_with(args.finger, &collection, done)
     })?;
     write_table(&args.out, &bytes)?;
     let left_out = left_out.into_iter().map(|n| texture_name(n).to_owned());

@@ -4,11 +4,11 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use serde::Serialize;
-use tactus::data::recording::{Recording, Texture};
+use tactus::data::recording::{Labels, Recording, Texture};
 use tactus::data::recordings::RecordingWriter;
 use tactus::eval::show::count;
 use tactus::sim::collection::{Collection, calibrated, texture_name};
-use tactus_core::sensor::FingerName;
+use tactus_core::sensor::{FingerCode, FingerName};
 
 use super::output::{Format, print_json};
 use super::progress::progress;
@@ -71,7 +71,12 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         args.trials,
         numbers.join(",")
     );
-    let mut writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
+    let labels = Labels {
+        finger: FingerCode::of(args.finger),
+        ..Labels::default()
+    };
+    let writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
+    let mut writer = writer.labelled(labels);
     let calibration = calibrated(collection.setup_with(args.finger, collection.textures[0], 0))?;
     let each = Collection::MOVEMENTS.len() * args.trials as usize;
     // those that an interrupted command has not come to

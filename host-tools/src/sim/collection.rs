@@ -7,7 +7,7 @@ use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
 use tactus_core::features::{Movement, Observation, SlideError};
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::sensor::FingerName;
+use tactus_core::sensor::{FingerCode, FingerName};
 
 use crate::data::recording::Recording;
 use crate::data::replay::measure;
@@ -189,7 +189,9 @@ impl Collection {
             })
             .collect::<Result<Vec<_>, TrialError>>()?;
         let names = self.names();
-        Ok(learn::learn(method, None, &names, movements, &measured)?)
+        let table = learn::learn(method, None, &names, movements, &measured)?;
+        let named = learn::name_finger(&table, FingerCode::of(finger), 0);
+        Ok(named.map_err(TableError::from)?)
     }
 }
 

@@ -9,8 +9,8 @@ use tactus_core::features::Observation;
 use tactus_core::handheld::guidance::{Again, Event};
 use tactus_core::handheld::touch::Touch;
 use tactus_core::handheld::{FEATURES, MOVEMENT};
-use tactus_core::sensor::FingerName;
 use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
+use tactus_core::sensor::{FingerCode, FingerName};
 
 use crate::eval::learn::{self, TableError};
 use crate::sim::collection::{Collection, texture_name};
@@ -223,17 +223,6 @@ pub fn slides(
 ///
 /// # Errors
 /// See [`TableError`].
-pub fn learn(
-    collection: &Collection,
-    done: impl Fn() + Sync,
-) -> Result<(Vec<u8>, Vec<u8>), TableError> {
-    learn_with(FingerName::Biotac, collection, done)
-}
-
-/// The same with another finger than a BioTac.
-///
-/// # Errors
-/// See [`TableError`].
 pub fn learn_with(
     finger: FingerName,
     collection: &Collection,
@@ -265,6 +254,7 @@ pub fn learn_with(
         }
     }
     let table = learn::learn(Method::Fused, Some(FEATURES), &names, &[MOVEMENT], &known)?;
+    let table = learn::name_finger(&table, FingerCode::of(finger), 0)?;
     Ok((table, left_out))
 }
 
@@ -319,7 +309,7 @@ mod tests {
     #[test]
     fn a_hand_recognises_what_a_hand_trained() {
         let collection = world(12);
-        let (table, left_out) = learn(&collection, || ()).unwrap();
+        let (table, left_out) = learn_with(FingerName::Biotac, &collection, || ()).unwrap();
         assert_eq!(left_out, [0u8; 0]);
         let [all, right, _, wrong, made] = explore(&collection, &table);
         assert_eq!(all, 12);
@@ -412,7 +402,7 @@ mod tests {
             .map(|r| r.1)
             .sum();
         eprintln!("{bad} slides rejected");
-        let (table, left_out) = learn(&collection, || ()).unwrap();
+        let (table, left_out) = learn_with(FingerName::Biotac, &collection, || ()).unwrap();
         eprintln!("no good slide: {left_out:?}; {} bytes", table.len());
         explore(&collection, &table);
         // none of another world's textures is known

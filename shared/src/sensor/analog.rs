@@ -6,14 +6,14 @@
 //! The converter samples while it is read (data sheet DS21034, 5.1), the BioTac when it is asked: in split use the two
 //! differ by the gap, which shifts both channels alike.
 
-use crate::sensor::driver::PressureSensor;
+use crate::sensor::driver::{BadWord, PressureSensor};
 use crate::sensor::finger::{AtRest, FingerModel, FingerName};
 use crate::sensor::mcp3202::{self, CONVERSIONS, NullBit, PORT};
 use crate::sensor::pressure::{Calibration, Channel, Pressure};
 use crate::sensor::slot::{Port, StartStep, Transaction};
 
 /// The finger as a [`PressureSensor`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Analog;
 
 impl PressureSensor for Analog {
@@ -48,6 +48,13 @@ impl PressureSensor for Analog {
             return Err(AnalogError::Cell(counts.get()));
         }
         Ok(Pressure { channel, counts })
+    }
+
+    fn kind(why: &AnalogError) -> Option<BadWord> {
+        Some(match why {
+            AnalogError::Silent(_) => BadWord::Silent,
+            AnalogError::Cell(_) => BadWord::Refused,
+        })
     }
 }
 

@@ -1,4 +1,4 @@
-//! The BioTac fingertip: commands, words, properties, and how well the link works.
+//! The BioTac fingertip: commands, words and properties.
 //!
 //! Sources, cited by these names:
 //! - SPM: BioTac SP Product Manual V2, 2015 (CNCR-NTU/biotac_sp_ros, doc/), whose protocol is the BioTac's;
@@ -10,7 +10,6 @@
 
 mod command;
 mod finger;
-mod link;
 mod property;
 #[cfg(test)]
 mod tests;
@@ -18,6 +17,5 @@ mod word;
 
 pub use command::{Channel, FULL_FRAME, GAP_US, PRESSURE_SLOTS, READ_MOSI, REST_US};
 pub use finger::BioTac;
-pub use link::{Diagnosis, WordStats};
 pub use property::{Ascii, Identity, IdentityBytes, Property, PropertyError, keep};
 pub use word::{BadParity, ErrorCode, WordError, decode, encode, encode_error};

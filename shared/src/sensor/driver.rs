@@ -40,6 +40,20 @@ pub trait PressureSensor {
     /// # Errors
     /// The answers are no sample. Count it and treat the sample as lost: there is no older value to use.
     fn decode(&mut self, n: u32, answer: &[u8]) -> Result<Pressure, Self::Error>;
+
+    /// How such an answer is counted; not at all, if the finger has just begun.
+    fn kind(why: &Self::Error) -> Option<BadWord>;
+}
+
+/// Answers that are no sample, as all fingers count them.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum BadWord {
+    /// It was damaged on its way.
+    Garbled,
+    /// The finger says that it has no sample.
+    Refused,
+    /// Nobody answers.
+    Silent,
 }
 
 /// What is done in slot `n`.

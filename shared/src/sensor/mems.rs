@@ -3,7 +3,7 @@
 //! Z is read in each of the 4400 slots; a half-band filter takes it to 2200 Hz, and a high-pass of 10 Hz takes gravity and tilt
 //! away, and most of a hand's tremor. The cell is read in every fourth slot, 1100 times a second, and held between.
 
-use crate::sensor::driver::PressureSensor;
+use crate::sensor::driver::{BadWord, PressureSensor};
 use crate::sensor::finger::{AtRest, FingerModel, FingerName};
 use crate::sensor::pressure::{Calibration, Channel, Counts, Pressure, RATE_HZ};
 use crate::sensor::slot::{Port, StartStep, Transaction};
@@ -195,6 +195,14 @@ impl PressureSensor for Mems {
             Channel::Pdc => self.pdc()?,
         };
         Ok(Pressure { channel, counts })
+    }
+
+    fn kind(why: &MemsError) -> Option<BadWord> {
+        match why {
+            MemsError::Begins => None,
+            MemsError::Silent => Some(BadWord::Silent),
+            MemsError::Off | MemsError::Stale | MemsError::Cell => Some(BadWord::Refused),
+        }
     }
 }
 

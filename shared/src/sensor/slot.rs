@@ -18,10 +18,10 @@ pub struct Port {
 
 impl Port {
     /// Its SPI mode by number: bit 1 is the clock's polarity, bit 0 its phase.
-    pub fn mode_number(&self) -> u8 {
-        let polarity = u8::from(self.mode.polarity == Polarity::IdleHigh);
-        let phase = u8::from(self.mode.phase == Phase::CaptureOnSecondTransition);
-        polarity << 1 | phase
+    pub const fn mode_number(&self) -> u8 {
+        let polarity = matches!(self.mode.polarity, Polarity::IdleHigh);
+        let phase = matches!(self.mode.phase, Phase::CaptureOnSecondTransition);
+        (polarity as u8) << 1 | phase as u8
     }
 }
 
@@ -40,6 +40,9 @@ pub struct Transaction {
 
 /// Most bytes of a transaction, and of the answers of a slot.
 pub const MAX_BYTES: usize = 16;
+
+/// A sentence.
+type Text = heapless::String<120>;
 
 /// The answers of a slot's transactions, one after the other.
 pub type Answer = heapless::Vec<u8, MAX_BYTES>;
@@ -112,10 +115,7 @@ impl StartStep {
 }
 
 /// A part of a finger does not answer as it must before it is used.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error(
-    "the {part} answers {got:02X} to {sent:02X} and not {want:02X}: check its power, its wires, its chip select and the SPI mode"
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Unexpected {
     /// Which one.
     pub part: &'static str,
@@ -125,6 +125,50 @@ pub struct Unexpected {
     pub got: u8,
     /// The byte that should have come, in the bits that matter.
     pub want: u8,
+}
+
+impl core::error::Error for Unexpected {}
+
+impl core::fmt::Display for Unexpected {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(&self.sentence())
+    }
+}
+
+impl Unexpected {
+    /// What is wrong, and what to check. Put together by hand: on a chip, the machinery of formats is a kilobyte.
+    pub fn sentence(&self) -> Text {
+        const DIGITS: &str = "0123456789ABCDEF";
+        let hex = |byte: u8| {
+            let digit = |nibble: u8| {
+                DIGITS
+                    .get(nibble.into()..=nibble.into())
+                    .unwrap_or_default()
+            };
+            [digit(byte >> 4), digit(byte & 0xF)]
+        };
+        let [got, sent, want] = [self.got, self.sent, self.want].map(hex);
+        let parts = [
+            "the ",
+            self.part,
+            " answers ",
+            got[0],
+            got[1],
+            " to ",
+            sent[0],
+            sent[1],
+            " and not ",
+            want[0],
+            want[1],
+            ": check its power, its wires, its chip select and the SPI mode",
+        ];
+        let mut sentence = Text::new();
+        for part in parts {
+            // a part with a long name costs the end
+            let _ = sentence.push_str(part);
+        }
+        sentence
+    }
 }
 
 /// Does transactions one after the other, and gives their answers. `transact` gets the bytes to send and puts in their place

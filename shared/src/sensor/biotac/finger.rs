@@ -4,14 +4,14 @@ use embedded_hal::spi::MODE_0;
 
 use super::command::PRESSURE_SLOTS;
 use super::word::{WordError, decode};
-use crate::sensor::driver::PressureSensor;
+use crate::sensor::driver::{BadWord, PressureSensor};
 use crate::sensor::finger::{AtRest, FingerModel, FingerName};
 use crate::sensor::pressure::{Calibration, Channel, Pressure};
 use crate::sensor::slot::{Port, StartStep, Transaction};
 
 /// A BioTac as a [`PressureSensor`]. Its other channels are read with [`Channel::transactions`](super::Channel::transactions) and
 /// [`decode`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct BioTac;
 
 const SLOTS: [[Transaction; 2]; 2] = {
@@ -47,6 +47,14 @@ impl PressureSensor for BioTac {
         Ok(Pressure {
             channel: Channel::of_slot(n),
             counts: decode(word)?,
+        })
+    }
+
+    fn kind(why: &WordError) -> Option<BadWord> {
+        Some(match why {
+            WordError::Parity(_) | WordError::Padding(_) => BadWord::Garbled,
+            WordError::ErrorFrame(_) => BadWord::Refused,
+            WordError::NoSensor => BadWord::Silent,
         })
     }
 }

@@ -214,3 +214,19 @@ fn answers_are_the_last_bytes() {
     assert_eq!(answer.unwrap()[..], expected);
     assert_eq!(expected, [1, 2, 3]);
 }
+
+#[test]
+fn what_is_wrong_with_a_part_fits_into_a_sentence() {
+    for step in Mems::START.iter().filter(|step| !step.expect.is_empty()) {
+        let error = step.check(Mems::PORTS, &[]).unwrap_err();
+        let said = std::string::ToString::to_string(&error);
+        let named = std::format!(
+            "the {} answers FF to {:02X} and not {:02X}: ",
+            error.part,
+            step.transaction.out[0],
+            error.want
+        );
+        assert!(said.starts_with(&named), "{said}");
+        assert!(said.ends_with("and the SPI mode"), "{said}");
+    }
+}

@@ -11,8 +11,8 @@ const AT_REST: AtRest = BioTac::MODEL.at_rest;
 pub const PAC_RMS: RangeInclusive<f32> = AT_REST.pac_noise_counts.0..=AT_REST.pac_noise_counts.1;
 /// P_DC of a finger filled as it should be, in air, counts.
 pub const PDC: RangeInclusive<f32> = AT_REST.pdc_counts.0..=AT_REST.pdc_counts.1;
-/// P_DC rises by so much when a hand squeezes the finger, counts: 0.23 N.
-pub const SQUEEZED: f32 = 20.0;
+/// P_DC rises by so much when a hand squeezes the finger, mN.
+pub const SQUEEZED_MN: f32 = 230.0;
 /// What the converter reads without current, counts: half of its reference; and how far it may be off, which is far beyond what the
 /// amplifier's resistors can do.
 pub const CURRENT_ZERO: (f32, f32) = (2048.0, 60.0);
