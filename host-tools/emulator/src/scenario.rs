@@ -10,7 +10,8 @@ use tactus::sim::flow::HEIGHT_MM;
 use tactus::sim::handheld::ground;
 use tactus::sim::person::Hand;
 use tactus::sim::scenario::{InvalidScenario, Scenario, Step, TIMEOUT_S, texture};
-use tactus::sim::world::NotLifted;
+use tactus::sim::world::{NotLifted, Setup};
+use tactus_core::sensor::FingerName;
 
 use crate::board::{Display, Emulator, Error, Options, Output};
 
@@ -76,14 +77,16 @@ pub enum Unmet {
     NotEnough(u32),
 }
 
-/// Plays a scenario on a board with this ELF, which may hold a store from before. Gives the board as it is in the end.
+/// Plays a scenario with a finger on a board with its ELF, which may hold a store from before. Gives the board as it is in the end.
 pub fn play(
     scenario: &Scenario,
+    finger: FingerName,
     elf: &Path,
     store: Option<Vec<u8>>,
 ) -> Result<Emulator, PlayError> {
     let mut played = Played {
         scenario,
+        finger,
         elf,
         texture: texture(&scenario.texture)?,
         starts: 0,
@@ -107,6 +110,7 @@ pub fn play(
 /// A scenario on a board.
 struct Played<'s> {
     scenario: &'s Scenario,
+    finger: FingerName,
     elf: &'s Path,
     texture: u8,
     /// How often the board was switched on: every time is another trial.
@@ -123,7 +127,10 @@ impl Played<'_> {
     }
 
     fn power_up(&mut self, store: Option<Vec<u8>>) -> Result<(), PlayError> {
-        let setup = self.scenario.setup(self.texture, self.starts);
+        let setup = Setup {
+            finger: self.finger,
+            ..self.scenario.setup(self.texture, self.starts)
+        };
         self.starts += 1;
         let sensor = self.scenario.hand.tilt_mm;
         let motion = sensor.map(|_| ground(self.texture, HEIGHT_MM));

@@ -102,9 +102,10 @@ impl Driver {
         let rig = self.rig.clone();
         let mut rig = lock(&rig);
         let mut at = |pin: PinId| (pin.port() == port).then(|| board.level(pin));
-        let select = at(pins::SENSOR_CS);
-        if select.is_some_and(|high| rig.select_sensor(now_ns, !high)) {
-            command_ends = true;
+        for (part, pin) in (0..).zip([pins::SENSOR_CS, pins::SENSOR_CS_2]) {
+            if at(pin).is_some_and(|high| rig.select_part(now_ns, part, !high)) {
+                command_ends = true;
+            }
         }
         if let Some(high) = at(pins::MOTION_CS) {
             rig.motion().select(!high);

@@ -31,6 +31,8 @@ const F: u8 = 5;
 
 /// Chip select of the sensor, low active.
 pub const SENSOR_CS: PinId = PinId(D, 14);
+/// That of a finger's second part.
+pub const SENSOR_CS_2: PinId = PinId(D, 15);
 /// The sensor's clock, MISO and MOSI, with SPI1's alternate function.
 pub(crate) const SENSOR_SPI: [PinId; 3] = [PinId(A, 5), PinId(A, 6), PinId(B, 5)];
 pub(crate) const SPI1_FUNCTION: u8 = 5;
@@ -78,8 +80,9 @@ pub const LEDS: [PinId; 3] = [PinId(B, 0), PinId(B, 7), PinId(B, 14)];
 pub const GO: PinId = PinId(C, 10);
 
 /// Levels that resistors of the drivers give to pins that the chip leaves alone, so that nothing moves in a reset.
-pub(crate) const REST_LEVELS: [(PinId, bool); 9] = [
+pub(crate) const REST_LEVELS: [(PinId, bool); 10] = [
     (SENSOR_CS, true),
+    (SENSOR_CS_2, true),
     (LEVER_STEP, false),
     (LEVER_DIR, false),
     (LEVER_ENABLE, false),

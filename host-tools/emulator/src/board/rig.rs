@@ -3,7 +3,9 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use tactus::sim::parts::ClockMode;
 use tactus::sim::world::{Setup, World};
+use tactus_core::sensor::FingerName;
 
 use super::display::Display;
 use super::line::LineNoise;
@@ -13,8 +15,17 @@ use super::record::{Recorder, Slide};
 use super::scope::{BridgePwm, Frame, Scope};
 use super::wave::Wave;
 
-/// Shortest byte of a 10 MHz clock, the sensor's fastest, ns.
-const FASTEST_BYTE_NS: u64 = 800;
+/// Shortest byte of the fastest clock of a finger's parts, ns: 10 MHz of BioTac and IIS3DWB, 0.9 MHz of the MCP3202 at 2.7 V
+/// (DS21034), 150 ns a clock of the ADS1220 (SBAS501, 6.6).
+const fn fastest_byte_ns(finger: FingerName) -> &'static [u64] {
+    match finger {
+        FingerName::Biotac => &[800],
+        FingerName::Analog => &[8888],
+        FingerName::Mems => &[800, 1200],
+    }
+}
+/// What reads Z from the accelerometer, in each slot.
+const READ_Z: u8 = 0xAC;
 /// CR1 of an SPI (RM0090 28.5.1): clock phase, clock polarity.
 const CR1_MODE: u64 = 0b11;
 const CR1_LSB_FIRST: u64 = 1 << 7;
@@ -49,6 +60,7 @@ pub enum Output {
 /// The rig and the wires between it and the chip.
 pub struct Rig {
     world: World,
+    finger: FingerName,
     /// STEP by the timer, and by the port if that has the pin
     step_timer: bool,
     step_port: Option<bool>,
@@ -61,7 +73,8 @@ pub struct Rig {
     lever_enabled: bool,
     stage_enabled: bool,
     duty: f64,
-    selected: bool,
+    /// Which part of the finger is selected.
+    selected: Option<u8>,
     pub(super) selected_ns: u64,
     /// bytes of this select so far, and the time of the last one
     bytes: u32,
@@ -101,6 +114,7 @@ impl std::fmt::Debug for Rig {
 impl Rig {
     pub(crate) fn new(setup: Setup, options: &Options) -> Self {
         Self {
+            finger: setup.finger,
             world: World::new(Setup {
                 keep_edges: true,
                 // virtual time is the PC's
@@ -118,7 +132,7 @@ impl Rig {
             lever_enabled: false,
             stage_enabled: false,
             duty: 0.0,
-            selected: false,
+            selected: None,
             selected_ns: 0,
             bytes: 0,
             commanded: false,
@@ -316,12 +330,13 @@ impl Rig {
         }
     }
 
-    /// Whether a sample command ends with it.
-    pub(crate) fn select_sensor(&mut self, now_ns: u64, selected: bool) -> bool {
-        if selected == self.selected {
+    /// Chip select of a part falls, or rises. Whether a sample command ends with it.
+    pub(crate) fn select_part(&mut self, now_ns: u64, part: u8, selected: bool) -> bool {
+        let is_there = usize::from(part) < fastest_byte_ns(self.finger).len();
+        if !is_there || selected == (self.selected == Some(part)) {
             return false;
         }
-        self.selected = selected;
+        self.selected = selected.then_some(part);
         let commanded = std::mem::take(&mut self.commanded);
         if let Some(scope) = &mut self.scope {
             scope.select.push((now_ns, !selected));
@@ -329,7 +344,8 @@ impl Rig {
         if selected {
             self.selected_ns = now_ns;
             self.bytes = 0;
-            self.world.spi_select(now_ns);
+            let mode = ClockMode::of((self.spi_control & CR1_MODE) as u8);
+            self.world.spi_select_part(now_ns, part, mode);
         } else {
             self.world.spi_deselect(now_ns);
         }
@@ -345,8 +361,8 @@ impl Rig {
     /// What drives MISO, MOSI, and lines A and B of the encoder, as far as the chip only reads these pins.
     pub(super) fn read_pins(&mut self) -> [Option<bool>; 4] {
         let [miso, mosi] = match self.selected {
-            true => self.world.data_lines(),
-            false => [None; 2],
+            Some(_) => self.world.data_lines(),
+            None => [None; 2],
         };
         let [a, b] = self.world.encoder_levels(self.encoder_lines);
         [miso, mosi, a, b]
@@ -373,18 +389,23 @@ impl Rig {
 
     /// A byte over the sensor's bus, at its end.
     pub(super) fn spi_byte(&mut self, now_ns: u64, mosi: u8) -> u8 {
-        if !self.sensor_wired || !self.selected {
+        let Some(part) = self.selected.filter(|_| self.sensor_wired) else {
             return 0xFF;
-        }
+        };
         let first = self.bytes == 0;
         let too_fast = now_ns.saturating_sub(if first {
             self.selected_ns
         } else {
             self.byte_ns
-        }) < FASTEST_BYTE_NS;
+        }) < fastest_byte_ns(self.finger)[usize::from(part)];
         self.bytes += 1;
         self.byte_ns = now_ns;
-        if first && mosi & 0x80 != 0 {
+        let samples = match self.finger {
+            FingerName::Biotac => mosi & 0x80 != 0,
+            FingerName::Analog => true,
+            FingerName::Mems => part == 0 && mosi == READ_Z,
+        };
+        if first && samples {
             self.commands += 1;
             self.commanded = true;
             self.recorder.command(self.selected_ns);
@@ -394,7 +415,8 @@ impl Rig {
             return 0xFF;
         }
         let miso = self.world.spi_byte(mosi);
-        if self.spi_control & CR1_MODE == 0 {
+        // other fingers' parts know the mode since they were selected
+        if self.spi_control & CR1_MODE == 0 || self.finger != FingerName::Biotac {
             return miso;
         }
         // read a bit late; the sensor itself is taken to understand (chosen): three of four words fail parity

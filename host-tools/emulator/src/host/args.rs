@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 use tactus::eval::evaluate::Method;
+use tactus_core::sensor::FingerName;
 
 use crate::board::Error;
 
@@ -108,8 +109,11 @@ pub struct World {
     pub texture: Option<String>,
     /// Let the finger feel recordings of this material of data/biotac instead: its name or its number. The firmware knows
     /// all 20, from other slides
-    #[arg(long, value_name = "MATERIAL", conflicts_with_all = ["texture", "among"])]
+    #[arg(long, value_name = "MATERIAL", conflicts_with_all = ["texture", "among", "finger"])]
     pub recording: Option<String>,
+    /// The finger that the firmware is for: biotac, analog (piezo disc and load cell) or mems (accelerometer and load cell)
+    #[arg(long, value_name = "NAME", default_value_t = FingerName::Biotac)]
+    pub finger: FingerName,
     /// How many textures the firmware is to know; the unknown one is among them
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u8).range(2..=117))]
     pub among: u8,

@@ -8,6 +8,7 @@ use tactus::sim::collection::{Collection, texture_number};
 use tactus::sim::recorded::RecordedTexture;
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::sensor::FingerName;
 use tactus_core::table::Table;
 
 use super::args::{World, hex_sha256};
@@ -16,7 +17,7 @@ use super::under_finger::{self, Known, KnownError, TRIALS, Unknown};
 
 /// Where the textures come from.
 enum Textures {
-    Simulated(Collection),
+    Simulated(FingerName, Collection),
     Recorded(RecordedTexture),
 }
 
@@ -56,9 +57,9 @@ impl Chosen {
         // trials that nothing was learned from
         let trial = 1 + u64::from(random.next_u32() % 1000);
         Ok(Self {
-            unknown: under_finger::mounted(&collection, texture, trial),
+            unknown: under_finger::mounted_with(cli.finger, &collection, texture, trial),
             seed: random.next_u32(),
-            textures: Textures::Simulated(collection),
+            textures: Textures::Simulated(cli.finger, collection),
         })
     }
 
@@ -88,10 +89,10 @@ impl Chosen {
     fn learn_anew(&self, method: Method) -> Result<Known, KnownError> {
         let bar;
         let known = match &self.textures {
-            Textures::Simulated(collection) => {
+            Textures::Simulated(finger, collection) => {
                 let count = collection.textures.len() as u64;
                 bar = progress::bar("learning textures", count, ", {eta} left");
-                under_finger::simulated(collection, method, || bar.inc(1))?
+                under_finger::simulated_with(*finger, collection, method, || bar.inc(1))?
             }
             Textures::Recorded(recorded_texture) => {
                 bar = progress::spinner("learning materials");
@@ -105,12 +106,12 @@ impl Chosen {
     /// A file named for all that the table depends on: the world, and this program, which holds core and simulator. None
     /// for recordings: what they hold is not in their name.
     fn kept_in(&self, method: Method) -> Option<PathBuf> {
-        let Textures::Simulated(collection) = &self.textures else {
+        let Textures::Simulated(finger, collection) = &self.textures else {
             return None;
         };
         let program = std::env::current_exe().ok()?;
         let key = format!(
-            "{} {method:?} {collection:?}",
+            "{} {finger} {method:?} {collection:?}",
             hex_sha256(&std::fs::read(&program).ok()?),
         );
         let name = &hex_sha256(key.as_bytes())[..16];

@@ -9,6 +9,7 @@ use tactus::sim::recorded::{PlayError, RecordedTexture};
 use tactus::sim::world::Setup;
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::sensor::FingerName;
 
 use crate::board::{Emulator, Error, Options};
 
@@ -95,17 +96,39 @@ pub fn simulated(
     method: Method,
     done: impl Fn() + Sync,
 ) -> Result<Known, KnownError> {
+    simulated_with(FingerName::Biotac, collection, method, done)
+}
+
+/// The same with another finger than a BioTac.
+pub fn simulated_with(
+    finger: FingerName,
+    collection: &Collection,
+    method: Method,
+    done: impl Fn() + Sync,
+) -> Result<Known, KnownError> {
     let first = collection.textures.first().copied().unwrap_or(1);
-    let calibration = calibrated(collection.setup(first, 0)).map_err(LearnError::from)?;
-    let table = collection.learn(method, calibration, done)?;
+    let setup = collection.setup_with(finger, first, 0);
+    let calibration = calibrated(setup).map_err(LearnError::from)?;
+    let movements = &Collection::MOVEMENTS;
+    let table = collection.learn_with(finger, movements, method, calibration, done)?;
     Ok(Known { calibration, table })
 }
 
 /// A texture of a simulated world in a trial that nothing was learned from: those from 1 on.
 pub fn mounted(collection: &Collection, texture: u8, trial: u64) -> Unknown {
+    mounted_with(FingerName::Biotac, collection, texture, trial)
+}
+
+/// The same with another finger than a BioTac.
+pub fn mounted_with(
+    finger: FingerName,
+    collection: &Collection,
+    texture: u8,
+    trial: u64,
+) -> Unknown {
     Unknown {
         name: texture_name(texture).to_owned(),
-        setup: collection.setup(texture, trial),
+        setup: collection.setup_with(finger, texture, trial),
         recorded: None,
     }
 }

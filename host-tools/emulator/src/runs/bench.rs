@@ -18,6 +18,7 @@ use std::process::ExitCode;
 use clap::Args as Arguments;
 use serde_json::Value;
 use tactus_core::explorer::Method;
+use tactus_core::sensor::FingerName;
 
 use self::counter::Bench;
 use self::error::BenchError;
@@ -39,6 +40,9 @@ pub(crate) struct Args {
     /// The rig's image, whose acquisition, load and latency are measured during a slide
     #[arg(long)]
     rig: Option<PathBuf>,
+    /// The finger that the rig's image is for; of another one than a BioTac, the rig alone is measured
+    #[arg(long, value_name = "NAME", default_value_t = FingerName::Biotac, requires = "rig")]
+    finger: FingerName,
     /// For people, or JSON for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
@@ -65,6 +69,19 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode, RunError> {
 
 fn count(args: &Args) -> Result<bool, BenchError> {
     let text = args.format == Format::Text;
+    if let Some(rig) = args
+        .rig
+        .as_ref()
+        .filter(|_| args.finger != FingerName::Biotac)
+    {
+        let rows = on_the_rig(rig, args.finger, None)?;
+        if text {
+            print(&rows, "one of the simulated rig");
+        } else {
+            println!("{}", Value::from_iter(rows.iter().map(Row::json)));
+        }
+        return Ok(rows.iter().all(Row::ok));
+    }
     let mut bench = Bench::start(&args.firmware.elf, false)?;
     if args.growth {
         return growth(&mut bench, args.plot.as_deref());
@@ -78,7 +95,7 @@ fn count(args: &Args) -> Result<bool, BenchError> {
     let mut slow = None;
     if let Some(rig) = &args.rig {
         let cycles = text.then(|| cycles::trace(rig, u64::MAX)).transpose()?;
-        rows.extend(on_the_rig(rig, cycles.as_ref())?);
+        rows.extend(on_the_rig(rig, args.finger, cycles.as_ref())?);
         if let Some(cycles) = cycles {
             let by = cycles::RESERVE * cycles.worst_ratio();
             slow = Some((cycles, cycles::slowed(rig, by)));

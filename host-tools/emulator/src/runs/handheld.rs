@@ -1,13 +1,15 @@
 //! An exploration by the handheld's firmware: a hand presses and slides, and the display says what it is.
 
 use clap::Args as Arguments;
+use serde_json::json;
 use tactus::sim::person::Manner;
 use tactus::sim::scenario::{Scenario, Step, texture};
 use tactus::sim::textures::TEXTURES;
+use tactus_core::sensor::FingerName;
 
 use super::error::RunError;
 use crate::board::Display;
-use crate::host::args::Firmware;
+use crate::host::args::{Firmware, Format};
 use crate::scenario::{self, PlayError};
 
 /// The firmware's table is of this world.
@@ -37,6 +39,12 @@ pub(crate) struct Args {
     /// The probe has a sensor of motion
     #[arg(long)]
     motion: bool,
+    /// The finger that the firmware is for: biotac, analog (piezo disc and load cell) or mems (accelerometer and load cell)
+    #[arg(long, value_name = "NAME", default_value_t = FingerName::Biotac)]
+    finger: FingerName,
+    /// For people, or a line of JSON at the end for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 /// What the display says in the end.
@@ -49,7 +57,8 @@ enum Told {
 
 /// Has a hand explore, and says what the display told it.
 pub(crate) fn run(args: &Args) -> Result<(), RunError> {
-    args.firmware.show(true)?;
+    let text = args.format == Format::Text;
+    let sha256 = args.firmware.show(text)?;
     let truth = match &args.texture {
         Some(name) => {
             let number = texture(name).map_err(PlayError::from)?;
@@ -58,10 +67,12 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
         // neighbours of the table are alike
         None => TEXTURES[(args.seed * 31) as usize % TEXTURES.len()].name,
     };
-    println!(
-        "An unknown texture in a hand. Under the finger: {truth} (seed {}).",
-        args.seed
-    );
+    if text {
+        println!(
+            "An unknown texture in a hand. Under the finger: {truth} (seed {}).",
+            args.seed
+        );
+    }
     let scenario = Scenario {
         about: "an exploration".to_owned(),
         texture: truth.to_owned(),
@@ -78,21 +89,54 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
             slides: SLIDES,
         }],
     };
-    let board = scenario::play(&scenario, &args.firmware.elf, None)?;
+    let mut board = scenario::play(&scenario, args.finger, &args.firmware.elf, None)?;
     let seconds = board.now_ns() as f64 * 1e-9;
     let told = told(board.rig().display());
-    match told {
-        Some(Told::Sure(name)) => println!("It is {name}."),
-        Some(Told::Perhaps(name)) => println!("{name}?"),
-        Some(Told::Unknown) => println!("It is none of those known."),
+    let (says, verdict) = match told {
+        Some(Told::Sure(name)) => (format!("It is {name}."), name == truth),
+        Some(Told::Perhaps(name)) => (format!("{name}?"), false),
+        Some(Told::Unknown) => ("It is none of those known.".to_owned(), false),
         None => return Err(RunError::NoVerdict),
+    };
+    let open = matches!(told, Some(Told::Perhaps(_)));
+    let verdict = match (verdict, open) {
+        (true, _) => "Right",
+        (_, true) => "Undecided",
+        _ => "Wrong",
+    };
+    let log = board.log()?;
+    // what the firmware said last
+    let last = |what: &str| {
+        let mut lines = log.iter().rev();
+        lines.find_map(|(_, line)| Some(line.split_once(what)?.1.trim().to_owned()))
+    };
+    let (awake, slots) = (last("awake listening:"), last("sensor slots:"));
+    if !text {
+        let awake: Option<f64> = awake.and_then(|share| share.parse().ok());
+        let line = json!({
+            "finger": args.finger.as_str(),
+            "truth": truth,
+            "says": says,
+            "verdict": verdict,
+            "seconds": seconds,
+            "awake": awake,
+            "slots": slots,
+            "force_max_n": board.rig().world().truth().force_max_n,
+            "seed": args.seed,
+            "elf_sha256": sha256,
+        });
+        println!("{line}");
+        return Ok(());
     }
-    match told {
-        Some(Told::Sure(name)) if name == truth => println!("Right."),
-        Some(Told::Perhaps(_)) => println!("Undecided: it was {truth}."),
-        _ => println!("Wrong: it was {truth}."),
+    println!("{says}");
+    match verdict {
+        "Right" => println!("Right."),
+        _ => println!("{verdict}: it was {truth}."),
     }
     println!("{seconds:.1} s of the board's time.");
+    if let (Some(awake), Some(slots)) = (awake, slots) {
+        println!("Awake while it listens: {awake} of the time. Sensor slots: {slots}.");
+    }
     Ok(())
 }
 

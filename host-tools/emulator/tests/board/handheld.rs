@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use tactus::sim::scenario::Scenario;
+use tactus_core::sensor::FingerName;
 use tactus_emulator::board::Emulator;
 
 use crate::common::elf_of;
@@ -26,7 +27,7 @@ fn play(name: &str) -> Option<(Emulator, Vec<String>)> {
     let elf = elf()?;
     assert!(SCENARIOS.contains(&name));
     let scenario = Scenario::read(&folder().join(format!("{name}.json"))).unwrap();
-    let mut board = tactus_emulator::scenario::play(&scenario, &elf, None)
+    let mut board = tactus_emulator::scenario::play(&scenario, FingerName::Biotac, &elf, None)
         .unwrap_or_else(|why| panic!("{name}: {why}"));
     let log: Vec<String> = board
         .log()
@@ -112,7 +113,8 @@ fn the_share_of_time_awake_is_true() {
     let Some(elf) = elf() else { return };
     let ready = br#"{"about": "", "texture": "burlap", "step": [{"see": {"text": ["Press", "and hold"]}}]}"#;
     let ready = Scenario::parse(ready).unwrap();
-    let mut board = tactus_emulator::scenario::play(&ready, &elf, None).unwrap();
+    let mut board =
+        tactus_emulator::scenario::play(&ready, FingerName::Biotac, &elf, None).unwrap();
     let clock_hz = tactus_emulator::board::Options::default().instructions_per_second;
     let awake = |board: &mut Emulator, what: &str| {
         board.run_ms(1000).unwrap();

@@ -287,7 +287,7 @@ fn the_converter_sees_the_ripple_of_the_current_and_its_mean_over_whole_periods(
 fn transfer(bench: &mut Bench, mosi: &[u8]) -> (Vec<u8>, [u64; 2]) {
     const DR: u64 = 0x4001_300C;
     let began = bench.now;
-    lock(&bench.rig).select_sensor(began, true);
+    lock(&bench.rig).select_part(began, 0, true);
     let mut miso = Vec::new();
     for byte in mosi {
         bench.write(DR, (*byte).into());
@@ -295,7 +295,7 @@ fn transfer(bench: &mut Bench, mosi: &[u8]) -> (Vec<u8>, [u64; 2]) {
         bench.pass_until(ends.0);
         miso.push(bench.read(DR) as u8);
     }
-    lock(&bench.rig).select_sensor(bench.now, false);
+    lock(&bench.rig).select_part(bench.now, 0, false);
     (miso, [began, bench.now])
 }
 

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use tactus::sim::world::Setup;
 use tactus_core::rig::lever::RETRACT_STEPS_S;
+use tactus_core::sensor::FingerName;
 use tactus_core::wire::{Command, Event, Identify, Phase};
 
 use super::cycles::{CORE_HZ, Cycles};
@@ -29,12 +30,20 @@ fn first_step_up(board: &mut Emulator, since_ns: u64) -> Option<u64> {
 }
 
 /// Load and latency of the rig's image while it makes a slide; the cycles are of another run.
-pub(super) fn on_the_rig(elf: &Path, cycles: Option<&Cycles>) -> Result<Vec<Row>, BenchError> {
+pub(super) fn on_the_rig(
+    elf: &Path,
+    finger: FingerName,
+    cycles: Option<&Cycles>,
+) -> Result<Vec<Row>, BenchError> {
     let options = Options {
         trace_s: 2,
         ..Options::default()
     };
-    let emulator = Emulator::start(elf, Setup::default(), options)?;
+    let setup = Setup {
+        finger,
+        ..Setup::default()
+    };
+    let emulator = Emulator::start(elf, setup, options)?;
     // what does the slots: nothing in it waits for the wire
     let handlers = ["TIM2", "SPI1"].map(|name| emulator.symbol(name).map(|(address, _)| address));
     let handlers = handlers.into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -49,7 +58,7 @@ pub(super) fn on_the_rig(elf: &Path, cycles: Option<&Cycles>) -> Result<Vec<Row>
     };
     // times in ns and instructions so far
     let (mut begun, mut over, mut told) = (None, None, None);
-    let mut lifts_ns = None;
+    let (mut lifts_ns, mut commands) = (None, 0);
     let mut failed = None;
     talk.send(Command::Identify(identify), TIMEOUT_S, |board, report| {
         let mut now = |board: &mut Emulator| {
@@ -62,6 +71,7 @@ pub(super) fn on_the_rig(elf: &Path, cycles: Option<&Cycles>) -> Result<Vec<Row>
                 begun = now(board);
                 let counted = board.count_handlers(handlers.clone());
                 failed = counted.err();
+                commands = board.rig().sensor_commands();
             }
             Some(Event::Phase(Phase::Lifting)) if over.is_none() => over = now(board),
             Some(Event::Verdict(_)) => {
@@ -84,8 +94,7 @@ pub(super) fn on_the_rig(elf: &Path, cycles: Option<&Cycles>) -> Result<Vec<Row>
     let lifts_ns = lifts_ns.ok_or(BenchError::Rig(
         "the finger is not lifted before the verdict",
     ))?;
-    // the timer's update and its compare
-    let slots = timer.runs as f64 / 2.0;
+    let slots = (talk.board().rig().sensor_commands() - commands) as f64;
     let seconds = (over.0 - begun.0) as f64 * 1e-9;
     let busy = (over.1 - begun.1) as f64 / (seconds * CORE_HZ);
     let row = |kernel: &str, unit, measured, cycles| Row {
@@ -106,17 +115,27 @@ pub(super) fn on_the_rig(elf: &Path, cycles: Option<&Cycles>) -> Result<Vec<Row>
     };
     let ([begins, asks], [answered, sent]) = (turns(&timer), turns(&bus));
     let late_ms = (told_ns + BEFORE_STEP_NS - lifts_ns) as f64 * 1e-6;
-    Ok(vec![
-        row(
-            "slot, not waiting",
-            "slot",
-            slot,
-            cycles.map(Cycles::of_slot),
-        ),
-        row("- begins, command goes out", "slot", begins, None),
-        row("- command is over", "slot", sent, None),
-        row("- answer is asked for", "slot", asks, None),
-        row("- answer is over, decoded, queued", "slot", answered, None),
+    let slot = row(
+        "slot, not waiting",
+        "slot",
+        slot,
+        cycles.map(Cycles::of_slot),
+    );
+    // the gate is a BioTac's; other fingers' slots have filters, and differ from each other
+    let is_biotac = finger == FingerName::Biotac;
+    let mut rows = vec![Row {
+        gate: slot.gate.filter(|_| is_biotac),
+        ..slot
+    }];
+    if is_biotac {
+        rows.extend([
+            row("- begins, command goes out", "slot", begins, None),
+            row("- command is over", "slot", sent, None),
+            row("- answer is asked for", "slot", asks, None),
+            row("- answer is over, decoded, queued", "slot", answered, None),
+        ]);
+    }
+    rows.extend([
         row(
             "core busy during a slide",
             "% at 168 MHz",
@@ -129,5 +148,6 @@ pub(super) fn on_the_rig(elf: &Path, cycles: Option<&Cycles>) -> Result<Vec<Row>
             late_ms,
             None,
         ),
-    ])
+    ]);
+    Ok(rows)
 }
