@@ -14,6 +14,7 @@ pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask bench                  the table for people
   cargo xtask bench --format json    a list of {kernel, unit, instructions, gate, ok}
+  cargo xtask bench --finger mems    a slot of another finger, and how busy the core is with it
   cargo xtask bench --pc spectrum    times on this PC of benches with `spectrum` in their name";
 
 /// The image that counts.
@@ -26,6 +27,9 @@ pub(crate) struct Options {
     /// For people, or JSON for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
+    /// Measure the load of the rig's image for another finger alone: analog or mems
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["growth", "pc"])]
+    finger: Option<String>,
     /// Measure times on this PC instead: good for comparing two versions on one PC
     #[arg(long)]
     pc: bool,
@@ -53,7 +57,7 @@ pub(crate) fn bench(options: &Options) -> Result<()> {
         cargo.args(["bench", "--package", "tactus-tests", "--bench", "*", "--"]);
         return run(cargo.args(&options.options));
     }
-    let mut program = program(options.plot.is_some())?;
+    let mut program = program(options.plot.is_some(), options.finger.as_deref())?;
     if options.format == Format::Json {
         program.args(["--format", "json"]);
     }
@@ -76,7 +80,7 @@ const MISSED: i32 = 2;
 
 /// An error if a gate is missed that was met, or one that is not met yet has become worse.
 pub(crate) fn gates() -> Result<()> {
-    let output = program(false)?.args(["--format", "json"]).output()?;
+    let output = program(false, None)?.args(["--format", "json"]).output()?;
     eprint!("{}", String::from_utf8_lossy(&output.stderr));
     // a row that is not ok does not say whether its gate is missed or its result is wrong: that must not pass for the former
     ensure!(
@@ -129,8 +133,9 @@ fn judge(is: f64, ok: bool, was: Option<f64>) -> Result<String, String> {
 }
 
 /// Builds the bench image, the rig's, and what counts their instructions, and draws if need be.
-fn program(draws: bool) -> Result<Command> {
-    let elves = firmware::compile(&[IMAGE, RIG])?;
+fn program(draws: bool, finger: Option<&str>) -> Result<Command> {
+    let rig = firmware::image_for(RIG, finger)?;
+    let elves = firmware::compile(&[IMAGE, &rig])?;
     let mut build = emulate::build();
     if draws {
         build.args(["--features", "plot"]);
@@ -138,7 +143,10 @@ fn program(draws: bool) -> Result<Command> {
     run(&mut build)?;
     let mut program = emulate::program("bench");
     program.arg("--elf").arg(firmware::image(&elves, IMAGE)?);
-    program.arg("--rig").arg(firmware::image(&elves, RIG)?);
+    program.arg("--rig").arg(firmware::image(&elves, &rig)?);
+    if let Some(finger) = finger {
+        program.args(["--finger", finger]);
+    }
     Ok(program)
 }
 

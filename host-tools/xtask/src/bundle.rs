@@ -29,7 +29,7 @@ pub(crate) fn bundle(out: &Path) -> Result<()> {
         images.push((firmware::name(&elf)?.to_owned(), bytes));
     }
     let mut tables = Files::new();
-    for name in TABLES {
+    for name in TABLES.into_iter().flat_map(|(_, names)| names) {
         let table = root().join("firmware").join(name);
         let bytes = std::fs::read(&table).with_context(|| table.display().to_string())?;
         tables.insert(name.to_owned(), bytes);

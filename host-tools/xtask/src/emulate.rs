@@ -15,46 +15,49 @@ pub(crate) const HANDHELD: &str = "tactus-handheld";
 /// The same with a sensor of motion.
 pub(crate) const MOTION: &str = "tactus-handheld-motion";
 
-/// Has the firmware identify a texture, or serves its serial port where a TCP port for it is given.
+/// Has the firmware identify a texture, the rig's or with `--handheld` the handheld's, or serves its serial port where a TCP port
+/// for it is given.
 pub(crate) fn emulate(options: &[OsString]) -> Result<()> {
-    let served = |option: &OsString| {
-        let option = option.to_string_lossy();
-        option == "--port" || option.starts_with("--port=")
+    let (by_hand, options): (Vec<_>, Vec<_>) =
+        options.iter().cloned().partition(|o| o == "--handheld");
+    let run = match (by_hand.is_empty(), value(&options, "--port")) {
+        (false, _) => "handheld",
+        (true, Some(_)) => "serve",
+        (true, None) => "identify",
     };
-    if options.iter().any(|option| option == "--handheld") {
-        let others = options.iter().filter(|option| *option != "--handheld");
-        let others: Vec<OsString> = others.cloned().collect();
-        let motion = others.iter().any(|option| option == "--motion");
-        let image = if motion { MOTION } else { HANDHELD };
-        return start_with(image, "handheld", &others);
-    }
-    let run = if options.iter().any(served) {
-        "serve"
-    } else {
-        "identify"
-    };
-    start(run, options)
+    start(run, &options)
 }
 
-/// Builds the rig's firmware and the emulator and starts a run of it.
+/// The value of an option, `--name value` or `--name=value`.
+fn value(options: &[OsString], name: &str) -> Option<String> {
+    let options: Vec<_> = options.iter().map(|o| o.to_string_lossy()).collect();
+    options.iter().enumerate().find_map(|(at, option)| {
+        match option.strip_prefix(name)?.strip_prefix('=') {
+            Some(value) => Some(value.to_owned()),
+            None if option == name => Some(options.get(at + 1)?.clone().into_owned()),
+            None => None,
+        }
+    })
+}
+
+/// Builds firmware and emulator and starts a run of it.
 pub(crate) fn start(run: &str, options: &[OsString]) -> Result<()> {
-    start_with(RIG, run, options)
-}
-
-/// Builds an image and the emulator and starts a run of it.
-fn start_with(image: &str, run: &str, options: &[OsString]) -> Result<()> {
     let help = options.iter().any(|o| o == "--help" || o == "-h");
     // an ELF that is named is the one to run
-    let named = options
-        .iter()
-        .any(|o| o == "--elf" || o.to_string_lossy().starts_with("--elf="));
+    let named = value(options, "--elf").is_some();
     // each of the builds has a long tail of a single thread
     let elf = std::thread::scope(|scope| {
         let emulator = scope.spawn(|| shell::run(&mut build()));
         let elf = if help || named {
             None
         } else {
-            let elf = firmware::compile(&[image])?.remove(0);
+            let kind = match run {
+                "handheld" if options.iter().any(|o| o == "--motion") => MOTION,
+                "handheld" => HANDHELD,
+                _ => RIG,
+            };
+            let image = firmware::image_for(kind, value(options, "--finger").as_deref())?;
+            let elf = firmware::compile(&[&image])?.remove(0);
             Some(elf)
         };
         emulator.join().expect("a build does not panic")?;
@@ -62,7 +65,10 @@ fn start_with(image: &str, run: &str, options: &[OsString]) -> Result<()> {
     })?;
     let mut emulator = program(run);
     if let Some(elf) = elf {
-        firmware::describe(&elf)?;
+        // stdout is the run's where a program reads it
+        if value(options, "--format").as_deref() != Some("json") {
+            firmware::describe(&elf)?;
+        }
         emulator.arg("--elf").arg(elf);
     }
     shell::run(emulator.args(options))
@@ -142,6 +148,8 @@ pub(crate) fn with_images<'t>(
         ("TACTUS_SILICON_ELF", "tactus-silicon"),
         ("TACTUS_HANDHELD_ELF", HANDHELD),
         ("TACTUS_MOTION_ELF", MOTION),
+        ("TACTUS_ANALOG_ELF", "tactus-rig-analog"),
+        ("TACTUS_MEMS_ELF", "tactus-rig-mems"),
     ];
     for (variable, name) in images {
         tests.env(variable, firmware::image(elves, name)?);

@@ -12,16 +12,27 @@ const TRIALS: &str = "5";
 /// Slides of each texture that the handheld's table is learned from: a hand scatters more than a rig.
 const SLIDES_BY_HAND: &str = "15";
 
-/// The rig's table and the handheld's.
-pub(crate) const TABLES: [&str; 2] = ["factory.tact", "handheld.tact"];
+/// The rig's table and the handheld's of each finger, with the finger's name.
+pub(crate) const TABLES: [(&str, [&str; 2]); 3] = [
+    ("biotac", ["factory.tact", "handheld.tact"]),
+    ("analog", ["factory-analog.tact", "handheld-analog.tact"]),
+    ("mems", ["factory-mems.tact", "handheld-mems.tact"]),
+];
 
 /// Makes the tables and writes them, or compares them with those that are committed.
 pub(crate) fn factory(check: bool) -> Result<()> {
-    let work = target().join(format!("factory-{}", std::process::id()));
-    let made = make(&work);
-    // half a gigabyte of recordings
-    let _ = std::fs::remove_dir_all(&work);
-    for (name, made) in TABLES.into_iter().zip(made?) {
+    for (finger, names) in TABLES {
+        let work = target().join(format!("factory-{}", std::process::id()));
+        let made = make(&work, finger, names);
+        // half a gigabyte of recordings
+        let _ = std::fs::remove_dir_all(&work);
+        take(names, made?, check)?;
+    }
+    Ok(())
+}
+
+fn take(names: [&str; 2], made: [Vec<u8>; 2], check: bool) -> Result<()> {
+    for (name, made) in names.into_iter().zip(made) {
         let file = root().join("firmware").join(name);
         if check {
             let committed =
@@ -38,31 +49,27 @@ pub(crate) fn factory(check: bool) -> Result<()> {
     Ok(())
 }
 
-fn make(work: &Path) -> Result<[Vec<u8>; 2]> {
+fn make(work: &Path, finger: &str, names: [&str; 2]) -> Result<[Vec<u8>; 2]> {
     std::fs::create_dir_all(work).with_context(|| format!("cannot make {}", work.display()))?;
     let recordings = work.join("recordings");
-    let [table, by_hand] = TABLES.map(|name| work.join(name));
+    let [table, by_hand] = names.map(|name| work.join(name));
     let tactus = || {
         let mut cargo = cargo();
         cargo.args(["run", "--quiet", "--release", "--package", "tactus", "--"]);
         cargo
     };
     let mut simulate = tactus();
-    simulate.args(["simulate", "--seed", SEED, "--trials", TRIALS, "--out"]);
+    let world = ["--seed", SEED, "--finger", finger];
+    simulate.arg("simulate").args(world);
+    simulate.args(["--trials", TRIALS, "--out"]);
     run(simulate.arg(&recordings)).context("the simulation failed")?;
     let mut learn = tactus();
     learn.args(["learn", "--train-slides", TRIALS, "--recordings"]);
     learn.arg(&recordings).arg("--out").arg(&table);
     run(&mut learn).context("the learning failed")?;
     let mut learn = tactus();
-    learn.args([
-        "learn-by-hand",
-        "--seed",
-        SEED,
-        "--trials",
-        SLIDES_BY_HAND,
-        "--out",
-    ]);
+    learn.arg("learn-by-hand").args(world);
+    learn.args(["--trials", SLIDES_BY_HAND, "--out"]);
     run(learn.arg(&by_hand)).context("the learning by hand failed")?;
     let read = |file: &Path| {
         std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))

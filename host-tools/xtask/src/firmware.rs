@@ -10,7 +10,7 @@ use crate::shell::root;
 use crate::toolchain;
 
 /// The images by profile and features that each is built with: the rig for speed, the handheld for a small chip.
-const PROFILES: [(&str, &[&str], &[&str]); 3] = [
+const PROFILES: [(&str, &[&str], &[&str]); 7] = [
     (
         "firmware",
         &[],
@@ -21,25 +21,55 @@ const PROFILES: [(&str, &[&str], &[&str]); 3] = [
             "tactus-bench",
         ],
     ),
+    ("firmware", &[ANALOG], &["tactus-rig-analog"]),
+    ("firmware", &[MEMS], &["tactus-rig-mems"]),
     (HANDHELD, &[], &["tactus-handheld"]),
     (
         HANDHELD,
         &["--features=motion"],
         &["tactus-handheld-motion"],
     ),
+    (HANDHELD, &[ANALOG], &["tactus-handheld-analog"]),
+    (HANDHELD, &[MEMS], &["tactus-handheld-mems"]),
 ];
+const ANALOG: &str = "--features=finger-analog";
+const MEMS: &str = "--features=finger-mems";
+/// The fingers beside the BioTac, each a feature of the firmware: their names end those of their images.
+const FINGERS: [&str; 2] = ["analog", "mems"];
 const HANDHELD: &str = "handheld";
 /// At `opt-level = "z"` LLVM inlines what is worth 5 of its instructions. At 12 what is inlined is still smaller than its call
 /// more often than not: the image is 1.1 KB smaller (it grows again from 18 on).
 const HANDHELD_FLAGS: [&str; 1] = ["-Cllvm-args=--inline-threshold=12"];
-/// The images that are flashed. The bench image is for the emulated board only.
-const FLASHED: [&str; 5] = [
+/// The images that are flashed, and gated: the handheld's for other fingers are built for `emulate` and `seeds` alone so far.
+/// The bench image is for the emulated board only.
+const FLASHED: [&str; 7] = [
     "tactus-rig",
     "tactus-selftest",
     "tactus-silicon",
     "tactus-handheld",
     "tactus-handheld-motion",
+    "tactus-rig-analog",
+    "tactus-rig-mems",
 ];
+
+/// The image of a kind for a finger: "tactus-rig-mems".
+pub(crate) fn image_for(kind: &str, finger: Option<&str>) -> Result<String> {
+    match finger {
+        None | Some("biotac") => Ok(kind.to_owned()),
+        Some(finger) if FINGERS.contains(&finger) => {
+            let image = format!("{kind}-{finger}");
+            let is_built = PROFILES
+                .iter()
+                .any(|(.., all)| all.contains(&image.as_str()));
+            ensure!(
+                is_built,
+                "there is no image {image}: leave out --motion or --finger"
+            );
+            Ok(image)
+        }
+        Some(other) => bail!("no finger is called {other}: there are biotac, analog and mems"),
+    }
+}
 
 /// Builds every image of the firmware that is flashed and says what came out; the ELFs.
 pub(crate) fn build() -> Result<Vec<PathBuf>> {
@@ -208,6 +238,18 @@ mod tests {
         assert_eq!(Size::sum(segments.into_iter()).unwrap(), size);
         assert!(Size::sum([(0x6000_0000, 4, 4)].into_iter()).is_err());
         assert!(Size::of(b"no ELF").is_err());
+    }
+
+    #[test]
+    fn an_image_is_named_for_its_finger() {
+        let mems = image_for("tactus-handheld", Some("mems")).unwrap();
+        assert_eq!(mems, "tactus-handheld-mems");
+        assert!(image_for("tactus-handheld-motion", Some("mems")).is_err());
+        assert_eq!(
+            image_for("tactus-rig", Some("biotac")).unwrap(),
+            "tactus-rig"
+        );
+        assert!(image_for("tactus-rig", Some("piezo")).is_err());
     }
 
     #[test]

@@ -57,6 +57,8 @@ enum Cli {
     /// Builds the firmware and the emulator first; that takes some minutes the first time.
     #[command(after_help = "Examples:
   cargo xtask emulate --texture 10 --log     with the firmware's own log
+  cargo xtask emulate --finger mems          with another finger: analog or mems
+  cargo xtask emulate --handheld             a hand that explores with the handheld
   cargo xtask emulate --handheld --motion    the handheld with a sensor of motion, in a hand
   cargo xtask emulate --port 7429            serves its serial port at tcp:127.0.0.1:7429 instead
   cargo xtask emulate --help                 all options")]
@@ -91,7 +93,7 @@ enum Cli {
     /// Make the tables that come with the firmware, firmware/factory.tact and firmware/handheld.tact
     ///
     /// Simulates 5 trials of 3 movements on each of the 117 textures of world 1 and learns them, and 15 slides of a hand for
-    /// the handheld probe, which takes a minute or two.
+    /// the handheld probe, which takes a minute or two for each finger: those of another one have its name.
     Factory {
         /// Leave the committed file alone; an error if it is not byte for byte what is made now
         #[arg(long)]

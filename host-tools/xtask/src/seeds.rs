@@ -19,6 +19,7 @@ pub(crate) const EXAMPLES: &str = "Examples:
   cargo xtask seeds study --seeds 1-10 -- --simulations 8000
   cargo xtask seeds identify --seeds 200-330  every method
   cargo xtask seeds rig --jobs 1              on the emulated board
+  cargo xtask seeds rig --finger mems         with another finger
   cargo xtask seeds handheld                  the handheld, in a hand that differs from seed to seed
   cargo xtask seeds verify                    the same texture, and another one, held against what was learned
   cargo xtask seeds press --seeds 63          all presses of a world, with P_DC sound, dead, dying and leaking";
@@ -37,6 +38,9 @@ pub(crate) struct Options {
     /// The summary to write
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// The finger of the emulated board: biotac, analog or mems
+    #[arg(long, value_name = "NAME", default_value = "biotac")]
+    finger: String,
     /// Further options of what is run
     #[arg(last = true)]
     options: Vec<String>,
@@ -213,7 +217,7 @@ fn ending(code: Option<i32>, stdout: &str, right: Option<&str>) -> Ending {
 /// Runs all seeds; an error if one failed.
 pub(crate) fn seeds(options: &Options) -> Result<()> {
     let what = options.what;
-    let program = build(what)?;
+    let program = build(what, &options.finger)?;
     let scratch = target().join("seeds").join(what.name());
     std::fs::create_dir_all(&scratch).with_context(|| scratch.display().to_string())?;
     let seeds = options.seeds.clone().unwrap_or_else(|| what.seeds());
@@ -401,7 +405,7 @@ struct Program {
     arguments: Vec<String>,
 }
 
-fn build(what: What) -> Result<Program> {
+fn build(what: What, finger: &str) -> Result<Program> {
     let image = match what {
         What::Rig => Some(emulate::RIG),
         What::Handheld => Some(emulate::HANDHELD),
@@ -409,11 +413,17 @@ fn build(what: What) -> Result<Program> {
     };
     if let Some(image) = image {
         shell::run(&mut emulate::build())?;
-        let elf = firmware::compile(&[image])?.remove(0);
+        let image = firmware::image_for(image, Some(finger))?;
+        let elf = firmware::compile(&[&image])?.remove(0);
         let path = PathBuf::from(emulate::program("identify").get_program());
-        let arguments = vec!["--elf".into(), elf.to_string_lossy().into_owned()];
+        let elf = elf.to_string_lossy().into_owned();
+        let arguments = vec!["--elf".into(), elf, "--finger".into(), finger.into()];
         return Ok(Program { path, arguments });
     }
+    ensure!(
+        finger == "biotac",
+        "--finger is for the emulated board: rig or handheld"
+    );
     if what == What::Press {
         return Ok(Program {
             path: test_program("tactus-tests", "presses")?,
