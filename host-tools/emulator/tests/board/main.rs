@@ -11,6 +11,7 @@ mod cycles;
 mod explore;
 mod fault_cases;
 mod faults;
+mod fingers;
 mod halt;
 mod handheld;
 mod handheld_compare;
