@@ -22,6 +22,7 @@ pub mod stage;
 pub mod steps;
 pub mod timeout;
 pub mod unloaded;
+pub mod weigh;
 
 use crate::dsp::Kernels;
 use crate::features::{PropertySet, Slide};

@@ -109,7 +109,7 @@ impl Request<RigCalibration> {
 }
 
 impl Request<f32> {
-    /// Has a handheld probe measure P_DC under a weight of so many mN: counts above that of the lifted finger.
+    /// Has a probe measure P_DC under a weight of so many mN: counts above that of the lifted finger.
     pub fn weigh(mn: u16) -> Self {
         Self::new(Command::Weigh(mn), None, |event, answer| {
             if let Event::Weighed { counts, .. } = event {

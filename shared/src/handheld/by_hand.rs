@@ -15,6 +15,7 @@ use crate::probe::seams::{Events, RigHandle, StoredBytes, UnloadedRun};
 use crate::probe::{Probe, RigState, TableInUse, Watch};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
+use crate::rig::weigh::{LOOKS_HZ, Weighing};
 use crate::rig::{Fault, Refused, Rig, RigError};
 use crate::sensor::pressure::Pressure;
 use crate::store::Store;
@@ -29,12 +30,8 @@ const REMIND: u32 = TICKS_HZ;
 const PATIENCE: u32 = 60 * TICKS_HZ;
 /// Ticks in the air over which P_DC's zero is taken, which follows it within half a second.
 const AIR: u32 = 2 * TICKS_HZ;
-/// Ticks for which a weight has to lie still: its mean is of 1.5 s.
-const WEIGHED: u32 = 3 * TICKS_HZ / 2;
-/// Counts that a weight's P_DC may wander meanwhile, and the share of it.
-const WANDERS: (f32, f32) = (2.0, 0.04);
-/// A weight is there from this share of what it should give by the constants so far: a fingertip's are off by half at most.
-const THERE: f32 = 0.4;
+// a look at a weight is a tick
+const _: () = assert!(LOOKS_HZ == TICKS_HZ);
 /// Ticks within which a sensor that works again is noticed.
 const CLEARED: u32 = TICKS_HZ;
 
@@ -338,30 +335,26 @@ impl<H: Hand, K: Kernels> RigHandle for ByHand<'_, H, K> {
         Err(Failure::Rig(RigError::NobodyThere))
     }
 
-    /// Mean P_DC under a weight that lies still, counts above that in the air.
     async fn weigh(&mut self, mn: u16) -> Result<f32, Failure> {
         // the weight before may still be there
         self.handheld.ask_to_lift();
         self.lifted().await.map_err(Failure::Rig)?;
         self.handheld.ask_for_weight(mn);
         self.heed();
-        let least = THERE * f32::from(mn) / self.calibration.pressure.force_mn_per_count;
-        let (mut mean, mut ticks) = (0.0, 0);
+        let scale = self.calibration.pressure.force_mn_per_count;
+        let mut weighing = Weighing::in_air(mn, scale);
+        let mut before = None;
         for _ in 0..PATIENCE {
             self.go_on().await.map_err(Failure::Rig)?;
-            let Some(counts) = self.handheld.counts_above_air().filter(|c| *c > least) else {
-                ticks = 0;
+            let (now, above) = (self.handheld.air_counts(), self.handheld.counts_above_air());
+            let (Some(now), Some(above)) = (now, above) else {
                 continue;
             };
-            let (most, share) = WANDERS;
-            if ticks == 0 || libm::fabsf(counts - mean) > most.max(share * mean) {
-                (mean, ticks) = (counts, 0);
-            }
-            ticks += 1;
-            mean += (counts - mean) / ticks as f32;
-            if ticks >= WEIGHED {
+            // the touch takes a P_DC that has fallen for the air's
+            let fallen = now - *before.get_or_insert(now);
+            if let Some(counts) = weighing.take(above + fallen) {
                 self.handheld.release();
-                return Ok(mean);
+                return Ok(counts);
             }
         }
         self.handheld.release();

@@ -387,13 +387,13 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
         Screen::Fault(trouble) => brush.fault(trouble),
         Screen::About(about) => brush.about_probe(about),
         Screen::Calibrated(Ok(scale)) => {
-            brush.title("Calibrate", "")?;
-            brush.headline("Force is set", 16)?;
-            let hundredths = libm::roundf(100.0 * scale) as u16;
+            let hundredths = libm::roundf(100.0 * scale.mn_per_count) as u16;
             let (whole, rest) = (hundredths / 100, hundredths % 100);
-            let scale = say(format_args!("{whole}.{rest:02} mN a count"));
-            brush.centre(&scale, 40, &SMALL)?;
-            brush.button("go on", "")
+            let off = scale.off_mn as u16;
+            let text = say(format_args!(
+                "A count is {whole}.{rest:02} mN. At worst {off} mN off."
+            ));
+            brush.sentence("Force is set", &text)
         }
         Screen::Calibrated(Err(why)) => brush.sentence("Force not set", why),
     }

@@ -5,6 +5,7 @@ use heapless::Vec;
 use super::guidance::{Again, Phase, View, Way};
 use super::judge::LEADING;
 use super::spelling::{Place, WHEEL};
+use crate::rig::weigh::ForceScale;
 use crate::table::Name;
 
 /// Entries of a list that are shown at once.
@@ -170,8 +171,8 @@ pub enum Screen<'a> {
     Fault(&'a Trouble),
     /// The probe.
     About(About),
-    /// The force was set by weights, mN a count of P_DC, or why not.
-    Calibrated(Result<f32, &'a str>),
+    /// The force was set by weights, or why not.
+    Calibrated(Result<ForceScale, &'a str>),
     /// Nothing: the display is off.
     Dark,
 }

@@ -19,6 +19,7 @@ use super::touch::Touch;
 use crate::dsp::Plan;
 use crate::explorer::Kernels;
 use crate::features::Observation;
+use crate::rig::weigh::ForceScale;
 use crate::sensor::pressure::Pressure;
 use crate::table::{Name, Table};
 
@@ -100,8 +101,8 @@ enum Page {
     Learned(Result<Name, &'static str>),
     Fault(Trouble),
     About,
-    /// The force was set, mN a count, or why not.
-    Calibrated(Result<f32, &'static str>),
+    /// The force was set, or why not.
+    Calibrated(Result<ForceScale, &'static str>),
     Dark,
 }
 

@@ -73,13 +73,12 @@ pub trait RigHandle: Rig<Error = RigError> {
     /// It was not measured; the constants are those of before.
     async fn calibrate(&mut self) -> Result<RigCalibration, Failure>;
 
-    /// Measures P_DC under a weight of so many mN that a person puts on the finger, in counts above that in the air.
+    /// Measures P_DC under a weight of so many mN that a person puts on the lifted finger, in counts above that in the air; below
+    /// 0 where P_DC falls under it, as that of a load cell that is wired the wrong way round.
     ///
     /// # Errors
-    /// No such weight was put on the finger; [`Failure::OtherProbe`]: the rig presses by itself.
-    async fn weigh(&mut self, _mn: u16) -> Result<f32, Failure> {
-        Err(Failure::OtherProbe)
-    }
+    /// No such weight was put on the finger.
+    async fn weigh(&mut self, mn: u16) -> Result<f32, Failure>;
 }
 
 /// Where the bytes of the stored table are read: mapped flash on the chip, a copy on a PC. They must stay readable beside

@@ -15,12 +15,16 @@ use crate::rig::control::Control;
 use crate::rig::pins::Outputs;
 use crate::rig::skin::SkinCare;
 use crate::rig::timeout::{MovementTimeout, Wait};
+use crate::rig::weigh::{LOOKS_HZ, Weighing};
 use crate::rig::{Ended, Phase, Refused, Rig, RigError, most_mn};
 use crate::store::Store;
-use crate::wire::{Event, Failure, MemoryError};
+use crate::wire::{Event, Failure, MemoryError, Prompt};
 
 /// How often the samples are looked after, ms.
 pub const LOOK_MS: u32 = 10;
+const _: () = assert!(LOOK_MS * LOOKS_HZ == 1000);
+/// A weight is waited for as long, looks.
+const PATIENCE: u32 = 60 * LOOKS_HZ;
 
 /// What the servo shall do.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -268,6 +272,35 @@ impl<S: Servo> RigHandle for ServoRig<S> {
         self.servo.command(command).await.map_err(RigError::Refused)
     }
 
+    async fn weigh(&mut self, mn: u16) -> Result<f32, Failure> {
+        if self.rest().await.map_err(Failure::Rig)?.phase == Phase::Parked {
+            self.home().await.map_err(Failure::Rig)?;
+        }
+        let scale = self.state().calibration.pressure.force_mn_per_count;
+        let mut weighing = Weighing::new(mn, scale);
+        for look in 0..PATIENCE {
+            if look.is_multiple_of(LOOKS_HZ) {
+                self.servo.tell(Event::Prompt(if weighing.wants_weight() {
+                    Prompt::Weigh(mn)
+                } else {
+                    Prompt::Lift
+                }));
+            }
+            self.servo.wait().await;
+            if self.servo.is_stopped() {
+                return Err(Failure::Rig(RigError::Stopped));
+            }
+            let rig = self.state();
+            if let Phase::Faulted(fault) = rig.phase {
+                return Err(Failure::Rig(RigError::Fault(fault)));
+            }
+            if let Some(counts) = weighing.take(rig.force_mn / scale) {
+                return Ok(counts);
+            }
+        }
+        Err(Failure::Rig(RigError::NobodyThere))
+    }
+
     async fn set_high_force<F: NorFlash>(
         &mut self,
         allow: bool,
@@ -359,3 +392,6 @@ impl<S: Servo> Rig for ServoRig<S> {
             && self.rest().await.is_ok()
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -181,7 +181,7 @@ const PLAUSIBLE_MN: core::ops::RangeInclusive<f32> = 5.75..=23.0;
 /// Least R^2 that counts as a line; the paper's force line has 0.995 (fig. 3).
 const LEAST_R2: f64 = 0.99;
 
-/// A straight line through points as they come: force against P_DC (fig. 3), motor current against load on the inclined
+/// A straight line through points as they come: motor current against load on the inclined
 /// stage (Methods, "Traction of texture"), motor current against speed.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct LineFit {

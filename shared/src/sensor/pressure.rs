@@ -224,8 +224,11 @@ pub struct BeyondLinear {
 /// What is wrong with a calibration record.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum CalibrationError {
-    /// A scale, or the end of the linear range, is not a number above 0.
-    #[error("a scale of the calibration is not above 0: calibrate again")]
+    /// A scale, or the end of the linear range, is not a number above 0, or no finger has so many mN per count.
+    #[error(
+        "a scale of the calibration is absurd (a count of P_DC is 5.75 to 23 mN; below 0, a load cell's signal wires are swapped): \
+         calibrate again"
+    )]
     Scale,
     /// P_AC at rest is outside the converter's range.
     #[error("P_AC at rest is outside 0..4095 counts: measure it again without contact")]

@@ -12,7 +12,13 @@ const SLIDE: &str = "5 cm in 2 s";
 const LIFT: &str = "Lift";
 const WEIGH: &str = "Put on";
 /// Weights that a person has at hand, as the display names them, mN; one that ends as another comes before it.
-const WEIGHTS: [(&str, u16); 3] = [("150 g", 1471), ("100 g", 981), ("50 g", 490)];
+const WEIGHTS: [(&str, u16); 5] = [
+    ("150 g", 1471),
+    ("120 g", 1177),
+    ("90 g", 883),
+    ("60 g", 588),
+    ("30 g", 294),
+];
 
 /// The weight that the display asks for, if the person has it.
 fn weight(shows: impl Fn(&str) -> bool) -> Option<u16> {

@@ -594,8 +594,8 @@ fn the_force_is_set_on_its_own_screen() {
     held.press_for(100);
     held.until("ready", 5.0, |board| shows(board, "and hold"));
     held.take("set the force", 2);
-    held.until("the first weight", 10.0, |board| shows(board, "50 g"));
-    held.until("the end", 60.0, |board| shows(board, "Force is set"));
+    held.until("the first weight", 10.0, |board| shows(board, "30 g"));
+    held.until("the end", 90.0, |board| shows(board, "Force is set"));
     held.press_for(100);
     held.until("ready", 5.0, |board| shows(board, "and hold"));
     let store = held.talk.board().store().unwrap();

@@ -2,13 +2,13 @@
 
 use std::io::Write;
 
-use anyhow::ensure;
+use anyhow::{Context as _, ensure};
 use clap::ArgGroup;
 use serde::Serialize;
-use tactus::bringup::weights;
 use tactus::eval::show::day;
 use tactus::link::Request;
 use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::weigh::ForceScale;
 use tactus_core::sensor::pressure::Calibration;
 use tactus_core::wire::Command;
 
@@ -24,7 +24,7 @@ Examples:
   tactus device calibrate --show            what is in use
   tactus device calibrate --drifted         if a finger in the air seems to touch something: takes its P_DC anew
   tactus device calibrate --weights 30g,60g,90g,120g,150g
-                                            a handheld: asks for these weights on its finger
+                                            asks for these weights on the lifted finger
   tactus device calibrate --newton-per-ampere 16.2 --force-mn-per-count 11.4
                                             also takes what was measured on an incline and on a scale
 
@@ -48,8 +48,8 @@ pub(crate) struct Args {
     /// Contact force per count of P_DC, mN, measured by presses on a scale
     #[arg(long, value_name = "X")]
     force_mn_per_count: Option<f32>,
-    /// A handheld's finger: three known weights or more, N, which it asks for one after the other; with its tip up, each is
-    /// laid on it
+    /// Three known weights or more, N, or g as in 30g, which the probe asks for one after the other: each is laid on the finger,
+    /// or a kitchen scale is pressed against it until it shows that
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = newton)]
     weights: Vec<u16>,
     /// How to print what is in use
@@ -105,6 +105,10 @@ fn sensor(c: &RigCalibration) -> Option<String> {
 
 /// Measures, shows or sets the rig's constants.
 pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    ensure!(
+        how.weights.is_empty() || how.weights.len() >= 3,
+        "a line takes three weights or more, as in --weights 30g,60g,90g,120g,150g"
+    );
     let (mut bench, _) = Bench::open(&how.at)?;
     let mut calibration = bench.get(Request::read_calibration())?;
     if how.show {
@@ -155,17 +159,23 @@ fn weigh(bench: &mut Bench, weights: &[u16], told: &mut impl Write) -> anyhow::R
     for &mn in weights {
         let counts = bench.perform(Request::weigh(mn), told)?;
         writeln!(told, "{mn} mN: {counts:.1} counts")?;
+        ensure!(
+            counts > 0.0,
+            "P_DC falls under a weight: the load cell is wired the wrong way round. Swap its two signal wires"
+        );
         points.push((counts, f32::from(mn)));
     }
-    let (mn_per_count, residuals) = weights::line(&points)?;
-    for ((_, mn), residual) in points.iter().zip(residuals) {
-        let share = 100.0 * residual / mn;
+    let scale = ForceScale::of(&points);
+    let scale = scale.context("the weights do not lie on a line through 0: weigh again")?;
+    for (counts, mn) in points {
+        let off = mn - scale.mn_per_count * counts;
+        let share = 100.0 * off / mn;
         writeln!(
             told,
-            "{mn:.0} mN: {residual:+.0} mN off the line ({share:+.1} %)"
+            "{mn:.0} mN: {off:+.0} mN off the line ({share:+.1} %)"
         )?;
     }
-    Ok(mn_per_count)
+    Ok(scale.mn_per_count)
 }
 
 /// A weight in N, or in g with a g behind it, as mN: what a fingertip's line holds for.

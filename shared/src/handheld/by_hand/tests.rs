@@ -6,6 +6,7 @@ use crate::explorer::{Answer, Verification};
 use crate::handheld::weights::WEIGHTS_MN;
 use crate::probe::Memory;
 use crate::probe::explore::Random;
+use crate::rig::weigh::ForceScale;
 use crate::sensor::FingerCode;
 use crate::sensor::pressure::{Calibration, Channel, Counts};
 use crate::store::Store;
@@ -79,7 +80,7 @@ impl Obedient {
             Some(Prompt::Press) => (self.presses_mn, 0.0),
             Some(Prompt::Slide) if self.since < 30 => (self.presses_mn, 0.0),
             Some(Prompt::Slide) => (self.presses_mn, 40.0),
-            Some(Prompt::Weigh(mn)) if self.wrong == Some(mn) => (700.0, 0.0),
+            Some(Prompt::Weigh(mn)) if self.wrong == Some(mn) => (1177.0, 0.0),
             Some(Prompt::Weigh(mn)) => (mn.into(), 0.0),
             Some(Prompt::Lift | Prompt::Again(_)) | None => (0.0, 0.0),
         }
@@ -274,15 +275,13 @@ fn weights_and_the_air_give_the_calibration_that_forces_are_shown_by() {
     let air = calibration.pressure.pdc_no_contact;
     assert!((air - AIR).abs() < 0.2, "{air}");
     assert_eq!(prompts(&rig), [Prompt::Lift]);
-    let mut line = crate::rig::calibration::LineFit::default();
-    for mn in [490, 980, 1470] {
+    let points = [490, 980, 1470].map(|mn| {
         let counts = block_on(rig.weigh(mn)).unwrap();
-        line.push(counts, mn.into());
         assert!((counts - f32::from(mn) / 14.0).abs() < 0.5, "{counts}");
-    }
-    let (_, mn_per_count) = line.line().unwrap();
+        (counts, f32::from(mn))
+    });
     let mut kept = calibration;
-    kept.pressure.force_mn_per_count = mn_per_count;
+    kept.pressure.force_mn_per_count = ForceScale::of(&points).unwrap().mn_per_count;
     block_on(rig.set_calibration(kept)).unwrap();
     // 0.5 N of this finger is 0.5 N now, and can be slid with
     let mut slide = Slide::<Plain>::new(&plan, MOVEMENT);
@@ -342,7 +341,7 @@ fn a_person_sets_the_force_by_weights_without_a_host_and_it_is_kept() {
 
     // one weight is another than it should be: nothing is kept
     let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
-    rig.hand.wrong = Some(981);
+    rig.hand.wrong = Some(883);
     block_on(rig.set_force(&mut memory));
     assert_eq!(rig.calibration(), set);
     assert!(
@@ -350,6 +349,23 @@ fn a_person_sets_the_force_by_weights_without_a_host_and_it_is_kept() {
         "{}",
         shown(&rig)
     );
+    let flash = memory.close().0.unwrap().close().again();
+    let mut store = block_on(Store::open(flash)).unwrap();
+    assert_eq!(block_on(store.calibration()), Ok(Some(set)));
+    // a load cell that is wired the wrong way round: the first weight tells
+    let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
+    rig.hand.wrong = None;
+    rig.hand.mn_per_count = -9.35;
+    rig.hand.told.clear();
+    block_on(rig.set_force(&mut memory));
+    assert_eq!(rig.calibration(), set);
+    assert!(
+        shown(&rig).contains("Swap the cell's wires"),
+        "{}",
+        shown(&rig)
+    );
+    assert!(!prompts(&rig).contains(&Prompt::Weigh(WEIGHTS_MN[1])));
+    rig.hand.mn_per_count = 14.0;
     let flash = memory.close().0.unwrap().close().again();
     let mut store = block_on(Store::open(flash)).unwrap();
     assert_eq!(block_on(store.calibration()), Ok(Some(set)));

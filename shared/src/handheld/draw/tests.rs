@@ -11,6 +11,7 @@ use crate::handheld::jobs::words;
 use crate::handheld::picture::{HEIGHT, Picture, WIDTH};
 use crate::handheld::screen::LINES;
 use crate::handheld::spelling::Spelling;
+use crate::rig::weigh::ForceScale;
 use crate::store::StoreError;
 use crate::table::{Name, TableError};
 use crate::wire::MemoryError;
@@ -75,7 +76,13 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
     each("weigh", &weigh);
     each("thinking", &Screen::Thinking { slide: 2 });
     for (name, done) in [
-        ("force-set", Ok(11.37)),
+        (
+            "force-set",
+            Ok(ForceScale {
+                mn_per_count: 11.37,
+                off_mn: 14.0,
+            }),
+        ),
         (
             "force-not-set",
             Err("The weights do not agree. Weigh again."),

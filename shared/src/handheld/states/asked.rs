@@ -8,6 +8,7 @@ use crate::handheld::guidance::{Phase, View};
 use crate::handheld::judge::Judgement;
 use crate::handheld::screen::Trouble;
 use crate::handheld::touch::Taken;
+use crate::rig::weigh::ForceScale;
 use crate::rig::{self, Fault};
 use crate::table::Name;
 use crate::wire::Prompt;
@@ -94,8 +95,8 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         }
     }
 
-    /// What came of [`Job::Calibrate`](super::Job::Calibrate): mN a count, or why it is as it was, if there is more to say.
-    pub fn calibrated(&mut self, done: Result<f32, Option<&'static str>>) {
+    /// What came of [`Job::Calibrate`](super::Job::Calibrate): the force per count, or why it is as it was, if there is more to say.
+    pub fn calibrated(&mut self, done: Result<ForceScale, Option<&'static str>>) {
         self.release();
         let page = match done {
             Ok(scale) => Page::Calibrated(Ok(scale)),

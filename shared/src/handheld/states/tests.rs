@@ -113,7 +113,10 @@ impl<'p> Bench<'p> {
                 }
                 Err(why) => self.probe.judged(Err(why)),
             },
-            Some(Job::Calibrate) => self.probe.calibrated(Ok(11.0)),
+            Some(Job::Calibrate) => self.probe.calibrated(Ok(ForceScale {
+                mn_per_count: 11.0,
+                off_mn: 5.0,
+            })),
             Some(Job::Teach(choice)) => {
                 let slides = self.episode.take().unwrap().observed[0].1;
                 self.learned.push((choice, slides));

@@ -84,6 +84,10 @@ impl RigHandle for Bench {
         super::super::calibrate::by_motor(self).await
     }
 
+    async fn weigh(&mut self, _: u16) -> Result<f32, Failure> {
+        Err(Failure::Rig(RigError::NobodyThere))
+    }
+
     async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), Self::Error> {
         self.state.calibration = calibration;
         Ok(())

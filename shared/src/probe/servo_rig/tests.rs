@@ -1,0 +1,137 @@
+//! A person who lays weights on the lifted finger of a rig.
+
+use super::*;
+use crate::rig::Fault;
+use crate::rig::weigh::ForceScale;
+use crate::sensor::pressure::Calibration;
+use embassy_futures::block_on;
+use std::vec::Vec as List;
+
+const CALIBRATION: RigCalibration = RigCalibration {
+    pressure: Calibration::PAPER,
+    unloaded_a: (0.0, 0.0),
+    newton_per_ampere: 16.4,
+    date: 0,
+    air_known: true,
+    serial: [0; 16],
+};
+
+/// A rig that stands, and whose finger has so many mN a count.
+struct Standing {
+    state: RigState,
+    mn_per_count: f32,
+    prompts: List<Prompt>,
+    looks: u32,
+    /// Stopped by the host, or faulted, from this look on.
+    stops: u32,
+    faults: u32,
+    homed: bool,
+}
+
+impl Standing {
+    fn rig(mn_per_count: f32) -> ServoRig<Self> {
+        ServoRig::new(Self {
+            state: RigState::parked(CALIBRATION),
+            mn_per_count,
+            prompts: List::new(),
+            looks: 0,
+            stops: u32::MAX,
+            faults: u32::MAX,
+            homed: false,
+        })
+    }
+}
+
+impl Servo for Standing {
+    async fn command(&mut self, command: RigCommand) -> Result<(), Refused> {
+        self.homed |= command == RigCommand::Home;
+        self.state.phase = Phase::Ready;
+        Ok(())
+    }
+
+    async fn wait(&mut self) {
+        self.looks += 1;
+        let mn = match self.prompts.last() {
+            Some(Prompt::Weigh(mn)) => f32::from(*mn),
+            _ => 0.0,
+        };
+        // P_DC in the air has drifted by 3 counts since its zero
+        let counts = 3.0 + mn / self.mn_per_count;
+        self.state.force_mn = counts * CALIBRATION.pressure.force_mn_per_count;
+        if self.looks >= self.faults {
+            self.state.phase = Phase::Faulted(Fault::SensorSilent);
+        }
+    }
+
+    fn state(&self) -> RigState {
+        self.state
+    }
+
+    fn samples(&mut self) -> Option<Samples> {
+        None
+    }
+
+    fn lost(&self) -> u32 {
+        0
+    }
+
+    fn stop(&mut self) {}
+
+    fn is_stopped(&self) -> bool {
+        self.looks >= self.stops
+    }
+
+    fn streams(&self) -> bool {
+        false
+    }
+
+    fn tell(&mut self, event: Event) {
+        if let Event::Prompt(prompt) = event {
+            self.prompts.push(prompt);
+        }
+    }
+}
+
+#[test]
+fn weights_on_a_lifted_finger_give_its_force_per_count() {
+    let mut rig = Standing::rig(9.35);
+    let points = [294, 588, 883, 1177, 1471].map(|mn| {
+        let counts = block_on(rig.weigh(mn)).unwrap();
+        (counts, f32::from(mn))
+    });
+    // where it stands nobody knows before it has homed
+    assert!(rig.servo.homed);
+    let scale = ForceScale::of(&points).unwrap();
+    assert!((scale.mn_per_count - 9.35).abs() < 0.01, "{scale:?}");
+    // each weight is taken off before the next
+    let mut prompts = rig.servo.prompts.clone();
+    prompts.dedup();
+    assert_eq!(prompts.len(), 10);
+    assert_eq!(
+        prompts[..3],
+        [Prompt::Lift, Prompt::Weigh(294), Prompt::Lift]
+    );
+}
+
+#[test]
+fn a_reversed_cell_a_stop_a_fault_and_nobody_end_it() {
+    let fell = block_on(Standing::rig(-9.35).weigh(588)).unwrap();
+    assert!((fell + 62.9).abs() < 0.1, "{fell}");
+    let mut rig = Standing::rig(9.35);
+    rig.servo.stops = 50;
+    assert_eq!(
+        block_on(rig.weigh(588)),
+        Err(Failure::Rig(RigError::Stopped))
+    );
+    let mut rig = Standing::rig(9.35);
+    rig.servo.faults = 50;
+    let fault = RigError::Fault(Fault::SensorSilent);
+    assert_eq!(block_on(rig.weigh(588)), Err(Failure::Rig(fault)));
+    // so heavy a count that the weight makes no difference; the host is told every second that it is waited for
+    let mut rig = Standing::rig(1e6);
+    assert_eq!(
+        block_on(rig.weigh(588)),
+        Err(Failure::Rig(RigError::NobodyThere))
+    );
+    assert_eq!(rig.servo.prompts.len(), 60);
+}
