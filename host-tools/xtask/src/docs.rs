@@ -31,6 +31,19 @@ pub(crate) fn docs(options: &Options) -> Result<()> {
         return emulate::start("scope", &["--out".into(), pages.into()]);
     }
     if options.check || options.write {
+        // the picture that a test of the simulator draws
+        let mut test = cargo();
+        test.args([
+            "test",
+            "--package",
+            "tactus",
+            "--lib",
+            "come_out_of_all_fingers",
+        ]);
+        if options.write {
+            test.env("TACTUS_BOOK", "write");
+        }
+        run(&mut test)?;
         let mut test = cargo();
         test.args(["test", "--package", "tactus", "--test", "book"]);
         test.args(["--test", "bad_input"]);

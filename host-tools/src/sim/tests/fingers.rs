@@ -1,10 +1,14 @@
-//! One vibration and one force through every finger's transducers, parts, wire and decoder: what comes out agrees.
+//! One vibration and one force through every finger's transducers, parts, wire and decoder: what comes out agrees. The book's
+//! picture of it is drawn here.
 
 use std::f64::consts::TAU;
+use std::fs;
+use std::path::Path;
 
 use tactus_core::sensor::pressure::{Channel, SLOTS_HZ};
 use tactus_core::sensor::{FingerModel, FingerName};
 
+use crate::eval::chart::{Chart, Figure, MARKS, Mark, Series, WIDTH, buffer};
 use crate::sim::conditions::TICK_S;
 use crate::sim::finger::{Felt, Finger, Held, PA_PER_N};
 use crate::sim::parts::Peers;
@@ -119,93 +123,174 @@ fn tone(name: FingerName, hz: f64, counts: f64) -> (f64, f64) {
     (sine.hypot(cosine) / counts, cosine.atan2(sine))
 }
 
-/// Tones with whole periods in half a second.
+/// Tones with whole periods in half a second, Hz: those of the band, and of its ends.
 const TONES_HZ: [f64; 7] = [30.0, 60.0, 120.0, 240.0, 400.0, 560.0, 700.0];
+const ENDS_HZ: [f64; 4] = [10.0, 20.0, 850.0, 1000.0];
+/// When the force steps from 0 to 1 N, s.
+const STEP_S: f64 = 0.5;
 
-#[test]
-fn a_vibration_comes_out_of_all_fingers_alike() {
-    for name in FingerName::ALL {
-        let at = |hz: f64| tone(name, hz, 400.0);
-        let db = |hz: f64| 20.0 * at(hz).0.log10();
-        let measured: Vec<_> = TONES_HZ.iter().map(|&hz| at(hz)).collect();
-        for ((gain, _), hz) in measured.iter().zip(TONES_HZ) {
-            let db = 20.0 * gain.log10();
+/// How a vibration comes out of a finger.
+struct Vibration {
+    name: FingerName,
+    /// Frequency, Hz, gain, dB, and phase in radians without that of the high-pass, going on from the one before.
+    tones: Vec<(f64, f64, f64)>,
+    /// Delay by the phases from 30 to 700 Hz.
+    delay_s: f64,
+}
+
+impl Vibration {
+    fn of(name: FingerName) -> Self {
+        let mut all = [&TONES_HZ[..], &ENDS_HZ].concat();
+        all.sort_by(f64::total_cmp);
+        let mut before = 0.0;
+        let tones = all.into_iter().map(|hz| {
+            let (gain, phase) = tone(name, hz, 400.0);
+            let mut phase = phase - (10.0 / hz).atan();
+            while phase > before + 0.5 {
+                phase -= TAU;
+            }
+            before = phase;
+            (hz, 20.0 * gain.log10(), phase)
+        });
+        let tones: Vec<_> = tones.collect();
+        let band = tones.iter().filter(|(hz, ..)| TONES_HZ.contains(hz));
+        let (squares, both) = band.fold((0.0, 0.0), |(squares, both), (hz, _, phase)| {
+            (squares + (TAU * hz).powi(2), both + TAU * hz * phase)
+        });
+        Self {
+            name,
+            tones,
+            delay_s: -both / squares,
+        }
+    }
+
+    fn db(&self, hz: f64) -> f64 {
+        let tone = self.tones.iter().find(|tone| tone.0 == hz);
+        tone.unwrap().1
+    }
+
+    fn is_as_promised(&self) {
+        let name = self.name;
+        for hz in TONES_HZ {
             // the high-pass takes half a decibel at 30 Hz; the low-passes begin
+            let db = self.db(hz);
             assert!((-1.4..0.4).contains(&db), "{name}, {hz} Hz: {db:.2} dB");
         }
-        let (low, high) = (db(10.0), db(1_000.0));
+        let (low, high) = (self.db(10.0), self.db(1000.0));
         eprintln!("{name}: {low:.2} dB at 10 Hz, {high:.2} dB at 1000 Hz");
         assert!((-3.6..-2.4).contains(&low), "{name}: {low:.2} dB at 10 Hz");
         assert!(
             (-5.5..-2.0).contains(&high),
             "{name}: {high:.2} dB at 1000 Hz"
         );
-        // the phase of a delay, once the high-pass's is taken away
-        let mut turns = 0.0;
-        let mut before = 0.0;
-        let phases: Vec<f64> = measured
-            .iter()
-            .zip(TONES_HZ)
-            .map(|((_, phase), hz)| {
-                let phase = phase - (10.0 / hz).atan();
-                while phase + turns > before + 0.5 {
-                    turns -= TAU;
-                }
-                before = phase + turns;
-                before
-            })
-            .collect();
-        let squares: f64 = TONES_HZ.iter().map(|hz| (TAU * hz).powi(2)).sum();
-        let both: f64 = TONES_HZ
-            .iter()
-            .zip(&phases)
-            .map(|(hz, p)| TAU * hz * p)
-            .sum();
-        let delay_s = -both / squares;
-        let most = TONES_HZ
-            .iter()
-            .zip(&phases)
-            .map(|(hz, phase)| (phase + TAU * hz * delay_s).abs().to_degrees())
-            .fold(0.0, f64::max);
-        eprintln!("{name}: {:.3} ms late, {most:.1} degrees", 1e3 * delay_s);
+        let band = self.tones.iter().filter(|(hz, ..)| TONES_HZ.contains(hz));
+        let off = band.map(|(hz, _, phase)| (phase + TAU * hz * self.delay_s).abs());
+        let most = off.fold(0.0, f64::max).to_degrees();
+        let late_ms = 1e3 * self.delay_s;
+        eprintln!("{name}: {late_ms:.3} ms late, {most:.1} degrees");
         let expected_ms = if name == FingerName::Mems {
             1.4..2.1
         } else {
             0.0..0.4
         };
-        assert!(expected_ms.contains(&(1e3 * delay_s)), "{name}");
+        assert!(expected_ms.contains(&late_ms), "{name}");
         assert!(most < 15.0, "{name}: {most:.1} degrees off a pure delay");
     }
 }
 
-#[test]
-fn a_force_comes_out_of_all_fingers_alike() {
-    for name in FingerName::ALL {
-        let model = Reader::new(name).model();
-        let step_s = 0.5;
-        let [_, pdc] = Wire::new(name).hear(1.0, |s| [f64::from(u8::from(s >= step_s)), 0.0]);
-        let mean = |from_s: f64, to_s: f64| {
-            let part: Vec<f64> = pdc
-                .iter()
-                .filter(|(s, _)| (from_s..to_s).contains(s))
-                .map(|(_, c)| *c)
-                .collect();
-            part.iter().sum::<f64>() / part.len() as f64
-        };
-        let (rest, pressed) = (mean(0.0, step_s), mean(0.7, 1.0));
-        let mn = (pressed - rest) * f64::from(model.calibration.force_mn_per_count);
-        let half = f64::midpoint(rest, pressed);
-        let (at_s, _) = pdc.iter().find(|(s, c)| *s >= step_s && *c > half).unwrap();
-        let late_ms = 1e3 * (at_s - step_s);
-        eprintln!("{name}: {mn:.1} mN, {late_ms:.2} ms late, at rest {rest:.0} counts");
-        assert!((mn - 1000.0).abs() < 10.0, "{name}: {mn:.1} mN");
-        assert!((0.0..3.0).contains(&late_ms), "{name}: {late_ms} ms");
-        let (least, most) = model.at_rest.pdc_counts;
-        assert!(
-            (f64::from(least)..f64::from(most)).contains(&rest),
-            "{name}"
-        );
+/// How a step of force comes out of a finger: mN above that at rest, at times in ms since the step.
+fn step(name: FingerName) -> Vec<(f64, f64)> {
+    let model = Reader::new(name).model();
+    let [_, pdc] = Wire::new(name).hear(1.0, |s| [f64::from(u8::from(s >= STEP_S)), 0.0]);
+    let mean = |from_s: f64, to_s: f64| {
+        let part: Vec<f64> = pdc
+            .iter()
+            .filter(|(s, _)| (from_s..to_s).contains(s))
+            .map(|(_, c)| *c)
+            .collect();
+        part.iter().sum::<f64>() / part.len() as f64
+    };
+    let (rest, pressed) = (mean(0.0, STEP_S), mean(0.7, 1.0));
+    let mn_per_count = f64::from(model.calibration.force_mn_per_count);
+    let mn = (pressed - rest) * mn_per_count;
+    let half = f64::midpoint(rest, pressed);
+    let (at_s, _) = pdc.iter().find(|(s, c)| *s >= STEP_S && *c > half).unwrap();
+    let late_ms = 1e3 * (at_s - STEP_S);
+    eprintln!("{name}: {mn:.1} mN, {late_ms:.2} ms late, at rest {rest:.0} counts");
+    assert!((mn - 1000.0).abs() < 10.0, "{name}: {mn:.1} mN");
+    assert!((0.0..3.0).contains(&late_ms), "{name}: {late_ms} ms");
+    let (least, most) = model.at_rest.pdc_counts;
+    let at_rest = f64::from(least)..f64::from(most);
+    assert!(at_rest.contains(&rest), "{name}");
+    pdc.iter()
+        .map(|(s, c)| (1e3 * (s - STEP_S), (c - rest) * mn_per_count))
+        .collect()
+}
+
+/// The picture of the book, of what was measured here.
+fn picture(vibrations: &[Vibration], steps: &[Vec<(f64, f64)>]) -> String {
+    type Points = Vec<(f64, f64)>;
+    let panel = |title: &str, x: &str, y: &str, marks: bool, of: &dyn Fn(usize) -> Points| {
+        let series = vibrations.iter().enumerate().map(|(n, vibration)| {
+            let mark = if marks { MARKS[n] } else { Mark::None };
+            Series::curve(n, mark, vibration.name.to_string(), of(n))
+        });
+        let series: Vec<Series> = series.collect();
+        let ends = series.iter().flat_map(|s| &s.points).map(|p| p.0);
+        let range = buffer(ends);
+        Chart {
+            size: (WIDTH, 270),
+            x_text: if marks {
+                &|hz| format!("{:.0}", 10f64.powf(hz))
+            } else {
+                &|ms| format!("{ms:.0}")
+            },
+            ..Chart::new(title, x, y, range, series)
+        }
+        .figure("")
+        .unwrap()
+    };
+    let hz = "frequency, Hz";
+    let tones = |n: usize, y: &dyn Fn(&(f64, f64, f64)) -> f64| -> Points {
+        let tones = vibrations[n].tones.iter();
+        tones.map(|tone| (tone.0.log10(), y(tone))).collect()
+    };
+    let delay_ms = |(hz, _, phase): &(f64, f64, f64)| -1e3 * phase / (TAU * hz);
+    let figures = [
+        panel("P_AC: gain", hz, "dB", true, &|n| tones(n, &|t| t.1)),
+        panel("P_AC: delay", hz, "ms", true, &|n| {
+            let mut all = tones(n, &delay_ms);
+            // below, a millisecond is a degree
+            all.retain(|(log, _)| *log > 1.4);
+            all
+        }),
+        panel("P_DC: a step of 1 N", "ms", "mN", false, &|n| {
+            let around = steps[n].iter().copied();
+            around.filter(|(ms, _)| (-5.0..40.0).contains(ms)).collect()
+        }),
+    ];
+    Figure::stacked("fingers", "The same signal through all fingers", &figures).svg
+}
+
+/// Compares the book's picture with this one, or writes it: `cargo xtask docs --write`.
+fn is_in_the_book(svg: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/src/plot-fingers.svg");
+    if std::env::var("TACTUS_BOOK").as_deref() == Ok("write") {
+        fs::write(&path, svg).unwrap();
     }
+    let there = fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        there == svg,
+        "plot-fingers.svg: not as the test has it; `cargo xtask docs --write` writes it again"
+    );
+}
+
+#[test]
+fn a_vibration_and_a_force_come_out_of_all_fingers_alike() {
+    let vibrations = FingerName::ALL.map(Vibration::of);
+    vibrations.iter().for_each(Vibration::is_as_promised);
+    let steps = FingerName::ALL.map(step);
+    is_in_the_book(&picture(&vibrations, &steps));
 }
 
 #[test]
