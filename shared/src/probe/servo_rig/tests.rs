@@ -5,6 +5,7 @@ use crate::rig::Fault;
 use crate::rig::weigh::ForceScale;
 use crate::sensor::pressure::Calibration;
 use embassy_futures::block_on;
+use std::boxed::Box;
 use std::vec::Vec as List;
 
 const CALIBRATION: RigCalibration = RigCalibration {
@@ -115,23 +116,21 @@ fn weights_on_a_lifted_finger_give_its_force_per_count() {
 
 #[test]
 fn a_reversed_cell_a_stop_a_fault_and_nobody_end_it() {
-    let fell = block_on(Standing::rig(-9.35).weigh(588)).unwrap();
+    let weigh = |rig: &mut ServoRig<Standing>| block_on(rig.weigh(588)).map_err(Box::new);
+    let failed = |why| Err(Box::new(Failure::Rig(why)));
+    let fell = weigh(&mut Standing::rig(-9.35)).unwrap();
     assert!((fell + 62.9).abs() < 0.1, "{fell}");
     let mut rig = Standing::rig(9.35);
     rig.servo.stops = 50;
-    assert_eq!(
-        block_on(rig.weigh(588)),
-        Err(Failure::Rig(RigError::Stopped))
-    );
+    assert_eq!(weigh(&mut rig), failed(RigError::Stopped));
     let mut rig = Standing::rig(9.35);
     rig.servo.faults = 50;
-    let fault = RigError::Fault(Fault::SensorSilent);
-    assert_eq!(block_on(rig.weigh(588)), Err(Failure::Rig(fault)));
+    assert_eq!(
+        weigh(&mut rig),
+        failed(RigError::Fault(Fault::SensorSilent))
+    );
     // so heavy a count that the weight makes no difference; the host is told every second that it is waited for
     let mut rig = Standing::rig(1e6);
-    assert_eq!(
-        block_on(rig.weigh(588)),
-        Err(Failure::Rig(RigError::NobodyThere))
-    );
+    assert_eq!(weigh(&mut rig), failed(RigError::NobodyThere));
     assert_eq!(rig.servo.prompts.len(), 60);
 }
