@@ -146,7 +146,7 @@ fn explore_by_hand(finger: FingerName, world: &Collection, trials: Range<u64>) -
     let all = right.len();
     let right = right.into_iter().filter(|right| *right).count();
     let trials = world.trials;
-    println!("{finger} by hand, {trials} slides: {right} of {all} right");
+    println!("{finger} by hand, learned from {trials} of each: {right} of {all} right");
     [right, all]
 }
 
@@ -164,7 +164,7 @@ fn three_explorations_of_each_texture_by_hand() {
             let [right, all] = explore_by_hand(finger, &world, 7..10);
             assert!(
                 100 * right >= least_percent * all,
-                "{finger}, {trials} slides: {right} of {all}"
+                "{finger}, learned from {trials} of each: {right} of {all}"
             );
         }
     }
