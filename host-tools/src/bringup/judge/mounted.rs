@@ -150,7 +150,7 @@ pub fn speed(why: Option<&str>, places: &[(u32, Live)]) -> Finding {
     let uneven_mm = runs.iter().map(|(_, off)| *off).fold(0.0, f64::max);
     let missing = runs.len() != 2 * asked.len();
     Finding::new(format!(
-        "{} runs, speeds {:.1} % off at most, within {uneven_mm:.2} mm of an even movement",
+        "runs without load: {}, speeds {:.1} % off at most, within {uneven_mm:.2} mm of an even movement",
         runs.len(),
         off * 100.0
     ))
