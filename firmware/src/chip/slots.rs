@@ -6,8 +6,7 @@
 //! byte, or takes two DMA streams with an interrupt each for the two bytes of a word.
 use core::cell::UnsafeCell;
 use core::mem::ManuallyDrop;
-use core::sync::atomic::Ordering::Relaxed;
-use core::sync::atomic::{AtomicBool, AtomicU32};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, OutputType, Pin as _, Pull, Speed};
 use embassy_stm32::interrupt;
@@ -373,9 +372,21 @@ static SET_UP: AtomicBool = AtomicBool::new(false);
 /// Stops the slots, or lets them go on where they stopped. Before they have begun it is heard, too.
 pub(crate) fn listen(on: bool) {
     WANTED.store(on, Relaxed);
+    pause(false);
+}
+
+/// Stops the slots though they are wanted, or lets them go on if they are.
+pub(crate) fn pause(on: bool) {
     if SET_UP.load(Relaxed) {
-        TIM2.cr1().modify(|w| w.set_cen(on));
+        TIM2.cr1()
+            .modify(|w| w.set_cen(!on && WANTED.load(Relaxed)));
     }
+}
+
+/// Answers since boot that were no sample, of those that are counted by kind.
+pub(crate) fn unreadable() -> u32 {
+    let parity = PARITY.load(Relaxed);
+    parity.wrapping_add(ERROR_FRAMES.load(Relaxed))
 }
 
 /// Begins the slots; to be called once, when the sensor has started. `interrupt`s of SPI1 and TIM2 have one priority.
@@ -412,7 +423,7 @@ pub(crate) fn begin(mut bus: Bus, timer: board::Slots, words: Producer<'static, 
     }
     // nobody who listens runs before this does
     SET_UP.store(true, Relaxed);
-    listen(WANTED.load(Relaxed));
+    pause(false);
 }
 
 #[interrupt]

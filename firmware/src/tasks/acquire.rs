@@ -2,6 +2,7 @@
 use embassy_time::Timer;
 use heapless::spsc::Producer;
 use tactus_core::sensor::PressureSensor as _;
+use tactus_core::sensor::pressure::SLOTS_HZ;
 use tactus_core::sensor::slot::{self, Unexpected};
 #[cfg(feature = "finger-mems")]
 use tactus_core::wire::{Event, Failure};
@@ -27,6 +28,26 @@ pub(crate) async fn acquire(
     #[cfg(feature = "finger-mems")]
     start(&mut bus).await;
     slots::begin(bus, timer, words);
+    if Finger::DEAF_MS > 0 {
+        leave_alone().await;
+    }
+}
+
+/// Stops the slots for a while when nothing readable has come for half a minute: a sensor that took noise for a command may be deaf
+/// as long as it is clocked. Whoever plugs in a loose cable is done by then. The rig has stood still since the first 10 ms of it.
+async fn leave_alone() {
+    const LOOK_S: u32 = 30;
+    /// All but those of half a second: in fewer a handheld sleeps.
+    const SLOTS: u32 = LOOK_S * SLOTS_HZ - SLOTS_HZ / 2;
+    loop {
+        let before = slots::unreadable();
+        Timer::after_secs(LOOK_S.into()).await;
+        if slots::unreadable().wrapping_sub(before) > SLOTS {
+            slots::pause(true);
+            Timer::after_millis(Finger::DEAF_MS.into()).await;
+            slots::pause(false);
+        }
+    }
 }
 
 // as a condition in `acquire` it would leave its code in every image

@@ -34,6 +34,8 @@ pub trait PressureSensor {
     /// What is done in a slot, for as many slots as it takes until all begins again. Slot `n` does
     /// `SLOTS[n % SLOTS.len()]`, and gives the sample of [`Channel::of_slot`](crate::sensor::pressure::Channel::of_slot).
     const SLOTS: &'static [&'static [Transaction]];
+    /// Time without clock after which a finger answers again that took noise for a command, ms; 0: no such command is known.
+    const DEAF_MS: u32 = 0;
 
     /// The sample of slot `n` in its answers.
     ///

@@ -72,8 +72,9 @@ impl i2c::Peer for DisplayPins {
         lock(&self.0).display_mut().start(address, read)
     }
 
-    fn write(&mut self, byte: u8, _: &mut Timeline<'_, '_>) -> bool {
-        lock(&self.0).display_mut().byte(byte);
+    fn write(&mut self, byte: u8, context: &mut Timeline<'_, '_>) -> bool {
+        let now_ns = context.now().0;
+        lock(&self.0).display_mut().byte(now_ns, byte);
         true
     }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use tactus::sim::world::Setup;
 use tactus_core::rig::Fault as Seen;
-use tactus_core::wire::Event;
+use tactus_core::wire::{Command, Event};
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::talk::Talk;
 
@@ -143,6 +143,49 @@ fn a_slot_that_reads_before_it_asks_has_no_sample() {
     // each later read comes 160 us after the command of the slot before
     assert_eq!(complaints, [(NOT_ASKED, 1)]);
     assert_eq!(seen, Some(Seen::SensorSilent));
+}
+
+/// One command of thousands is A1, as noise on a select that floats may make it: the sensor streams, until it hears no clock for 5 s.
+#[test]
+fn a_sensor_that_streams_is_left_alone_until_it_answers() {
+    /// The frame that asks for P_AC, and the one that starts the streaming mode.
+    const ASKS: u16 = 0x8000;
+    const STREAM: u16 = 0xA100;
+    for variable in ["TACTUS_ELF", "TACTUS_HANDHELD_ELF"] {
+        let Some(elf) = elf_of(variable) else { return };
+        let mut board = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
+        board.run_ms(BEFORE_SLOTS_MS).unwrap();
+        let [place] = transactions(&mut board, ASKS)[..] else {
+            panic!("one transaction asks for P_AC")
+        };
+        let frames = [ASKS, STREAM].map(u16::to_le_bytes);
+        write(&mut board, place + FRAME_AT, &frames[0], &frames[1]);
+        while !board.rig().world().sensor().is_streaming() {
+            board.run_ms(1).unwrap();
+            assert!(
+                board.now_ns() < 1_000_000_000,
+                "{variable}: no command came"
+            );
+        }
+        write(&mut board, place + FRAME_AT, &frames[1], &frames[0]);
+        let deaf_ns = board.now_ns();
+        while board.rig().world().sensor().is_streaming() {
+            board.run_ms(100).unwrap();
+            let deaf_s = (board.now_ns() - deaf_ns) as f64 * 1e-9;
+            assert!(deaf_s < 37.0, "{variable}: deaf for {deaf_s} s");
+        }
+        // it is asked as before, and whoever uses it need not know
+        let commands = board.rig().sensor_commands();
+        board.run_ms(1000).unwrap();
+        let asked = board.rig().sensor_commands() - commands;
+        assert!(asked.abs_diff(4400) < 30, "{variable}: {asked} commands");
+        if variable == "TACTUS_ELF" {
+            let mut talk = Talk::new(board);
+            // that the board has booted is still on the line
+            let _ = talk.send(Command::Status, 1.0, |_, _| ());
+            talk.send(Command::Home, 40.0, |_, _| ()).unwrap();
+        }
+    }
 }
 
 #[test]

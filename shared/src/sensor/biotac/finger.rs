@@ -40,6 +40,8 @@ impl PressureSensor for BioTac {
     const POWER_UP_MS: u32 = 100;
     const START: &'static [StartStep] = &[];
     const SLOTS: &'static [&'static [Transaction]] = &[&SLOTS[0], &SLOTS[1]];
+    /// The command A1 starts a streaming mode, which only 5 s without clock end (SPM); a tenth more for its own clock.
+    const DEAF_MS: u32 = 5500;
 
     fn decode(&mut self, n: u32, answer: &[u8]) -> Result<Pressure, WordError> {
         // an answer that did not come
