@@ -11,6 +11,7 @@ pub(crate) mod motion;
 pub(crate) mod rescue;
 pub(crate) mod slots;
 pub(crate) mod thread;
+mod transform_kernel;
 pub(crate) mod watchdog;
 
 pub(crate) use dsp_kernels::Chip;

@@ -9,7 +9,9 @@ mod plan;
 mod spectrum;
 
 pub use fir::BandPower;
-pub use kernels::{Kernels, Plain};
+pub use kernels::{Kernels, Plain, Reals};
 pub use microfft::Complex32;
-pub use plan::{Angles, FRAME, Folded, PAIRS, PASS_BAND_HZ, Plan, TAPS, Taps, angles};
+pub use plan::{
+    Angles, FRAME, Folded, HALVES, HalfFilters, PASS_BAND_HZ, Plan, TAPS, Taps, angles,
+};
 pub use spectrum::{BIN_HZ, BINS, FrameSum, HOP, Spectrum, SpectrumSum};

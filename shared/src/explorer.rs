@@ -10,6 +10,9 @@ mod episode;
 pub mod kernels;
 mod likelihoods;
 mod novelty;
+#[cfg(any(test, feature = "timed"))]
+mod objective;
+pub mod overlap;
 mod paced;
 mod posterior;
 mod student;
@@ -22,6 +25,8 @@ pub use config::{Config, ExplorerError, Method, NEGLIGIBLE, ObserveError, Strate
 pub use confusions::{Confusions, Degrees};
 pub use episode::EpisodeSummary;
 pub use kernels::Kernels;
+#[cfg(any(test, feature = "timed"))]
+pub use objective::{Objective, SlideTime};
 pub use posterior::{Explorer, Told, Verdict};
 pub use verify::ENOUGH_TRIALS;
 

@@ -24,6 +24,10 @@ pub mod store;
 pub mod table;
 pub mod wire;
 
+/// CRC-32 without a table: that would take 1 KB of the chip's flash.
+const CRC32: crc::Crc<u32, crc::NoTable> =
+    crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
+
 /// Adds as many items as the buffer has space for; `extend` would panic at one more.
 fn fill<T, const N: usize>(buffer: &mut heapless::Vec<T, N>, items: impl Iterator<Item = T>) {
     for item in items {

@@ -51,68 +51,68 @@ const RESULTS: usize = 4096;
 
 /// What is done, and the cycles that it takes by the emulator's model (the test `silicon_image` of the emulated board keeps it true).
 const CASES: [(&str, Workload, Option<Method>, u32); 13] = [
-    ("band power", Workload::BandPower, None, 542_731),
-    ("frame", Workload::Frame, None, 47_909),
-    ("slide", Workload::Slide, None, 1_855_979),
+    ("band power", Workload::BandPower, None, 502_219),
+    ("frame", Workload::Frame, None, 32_135),
+    ("slide", Workload::Slide, None, 1_437_320),
     (
         "begin, paper",
         Workload::Begin,
         Some(Method::Paper),
-        325_341,
+        266_632,
     ),
     (
         "first choice, paper",
         Workload::FirstChoice,
         Some(Method::Paper),
-        1808,
+        1782,
     ),
     (
         "posterior, paper",
         Workload::Observe,
         Some(Method::Paper),
-        4399,
+        4422,
     ),
     (
         "choice, paper",
         Workload::Choice,
         Some(Method::Paper),
-        47_410,
+        36_195,
     ),
     (
         "decision, paper",
         Workload::Decision,
         Some(Method::Paper),
-        112_144,
+        100_405,
     ),
     (
         "begin, fused",
         Workload::Begin,
         Some(Method::Fused),
-        1_732_045,
+        838_310,
     ),
     (
         "first choice, fused",
         Workload::FirstChoice,
         Some(Method::Fused),
-        909,
+        906,
     ),
     (
         "posterior, fused",
         Workload::Observe,
         Some(Method::Fused),
-        35_592,
+        35_332,
     ),
     (
         "choice, fused",
         Workload::Choice,
         Some(Method::Fused),
-        228_325,
+        127_140,
     ),
     (
         "decision, fused",
         Workload::Decision,
         Some(Method::Fused),
-        324_615,
+        222_619,
     ),
 ];
 /// A kernel may take so many per cent of what the model says: what the model lacks is to be seen, not to be judged.

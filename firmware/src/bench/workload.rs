@@ -5,9 +5,10 @@ use core::hint::black_box;
 
 use heapless::Vec;
 use tactus_core::dsp::{BandPower, FRAME, HOP, Plan, SpectrumSum};
+use tactus_core::explorer::kernels::Candidate;
 use tactus_core::explorer::{Config, Explorer, Kernels, Method};
 use tactus_core::features::{
-    BLOCK, Block, Movement, Observation, Properties, Property, PropertySet, Slide,
+    BLOCK, Block, MAX_FEATURES, Movement, Observation, Properties, Property, PropertySet, Slide,
 };
 use tactus_core::sensor::pressure::RATE_HZ;
 use tactus_core::table::{Action, Table};
@@ -40,11 +41,13 @@ pub enum Workload {
     Choice,
     /// From the last sample of a slide to the next choice.
     Decision,
+    /// Confusion of the first of some whitened means with the others, all learned from as many slides.
+    Confuse,
 }
 
 impl Workload {
     /// All, by their codes.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Nothing,
         Self::BandPower,
         Self::Frame,
@@ -54,6 +57,7 @@ impl Workload {
         Self::Observe,
         Self::Choice,
         Self::Decision,
+        Self::Confuse,
     ];
 }
 
@@ -171,6 +175,29 @@ pub fn run<K: Kernels>(
                 slide.finish().map(|slide| Observation::from(&slide))
             });
             put_observation(&observed.ok()?, put);
+        }
+        Workload::Confuse => {
+            let (&slides, means) = words.split_first()?;
+            let slides = u8::try_from(slides).ok()?;
+            let mut all: Vec<Candidate, 64> = means
+                .as_chunks::<MAX_FEATURES>()
+                .0
+                .iter()
+                .zip(1u8..)
+                .map(|(&mean, nth)| {
+                    let squares = mean.iter().map(|m| i32::from(*m).pow(2) as u32);
+                    Candidate {
+                        mean,
+                        square: squares.fold(0, u32::saturating_add),
+                        probability: 1.0 / f32::from(nth),
+                        confused: f32::from(nth),
+                        slides,
+                    }
+                })
+                .collect();
+            let (first, others) = all.split_first_mut()?;
+            counter.count(|| K::confuse_whitened(first, others, slides));
+            all.iter().for_each(|c| put(&c.confused.to_le_bytes()));
         }
         _ => {
             let table = Table::read(table).ok()?;

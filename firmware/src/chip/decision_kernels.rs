@@ -6,12 +6,19 @@ use core::mem::offset_of;
 
 use tactus_core::dsp::Plain;
 use tactus_core::dsp::fixed::{EXP2, LN, LN_2, LOG2_E, PARTS};
-use tactus_core::explorer::kernels::{Candidate, Kernels, LiveTexture, Spread};
+use tactus_core::explorer::kernels::{Candidate, Kernels, Likeness, LiveGaussian, Spread};
 use tactus_core::features::MAX_FEATURES;
 use tactus_core::table::{Gaussians, PAIRS, Row, Words};
 
 use super::confusion_kernel::confuse;
 use super::dsp_kernels::Chip;
+
+// loads of two or three fields at once
+const _: () = assert!(
+    offset_of!(Candidate, mean) == 0
+        && offset_of!(Candidate, square) == 28
+        && offset_of!(Candidate, confused) == offset_of!(Candidate, probability) + 4
+);
 
 global_asm!(
     // the assembler is not told of the FPU otherwise
@@ -257,47 +264,64 @@ global_asm!(
     "pop {{r4-r9}}",
     "bx lr",
     ".size tactus_reset_to_prior, . - tactus_reset_to_prior",
-    ".section .text.tactus_candidates,\"ax\",%progbits",
-    ".global tactus_candidates",
-    ".type tactus_candidates,%function",
+    ".section .text.tactus_confuse_whitened,\"ax\",%progbits",
+    ".global tactus_confuse_whitened",
+    ".type tactus_confuse_whitened,%function",
     ".thumb_func",
-    // r0: the one mean, 14 numbers, and r2 and r3 its sum of squares; r1: the others, and the first behind them on the
-    // stack. r1 is then where the distance is.
-    "tactus_candidates:",
+    // r0: the one texture; r1: the others, r2 where they end, behind the first; r3: [`EXP2`]; on the stack a `Likeness`. Half
+    // of what is far, less half of the one's square, is where the sum of the products begins: twice that less the other's
+    // square is below 0 where they are not far.
+    "tactus_confuse_whitened:",
     "push {{r4-r11, lr}}",
-    "push {{r2, r3}}",
-    "ldr lr, [sp, #44]",
-    "add lr, lr, #{distance}",
-    "add r1, r1, #{distance}",
+    "mov lr, r2",
+    "ldrd r4, r5, [sp, #36]",
+    "push {{r0}}",
+    "push {{r3-r5}}",
+    "vldr d0, [r0, #{probability}]",
+    "ldr r12, [r0, #{square}]",
+    "add r12, r12, #1",
+    "lsr r12, r12, #1",
+    "rsb r12, r12, r5, lsr #1",
     "ldm r0, {{r4-r10}}",
     "2:",
-    "mov r2, #0",
-    "mov r3, #0",
-    "ldrd r0, r11, [r1, #-{distance}]",
-    "smlald r2, r3, r0, r4",
-    "smlald r2, r3, r11, r5",
-    "ldrd r0, r11, [r1, #8-{distance}]",
-    "smlald r2, r3, r0, r6",
-    "smlald r2, r3, r11, r7",
-    "ldrd r0, r11, [r1, #16-{distance}]",
-    "smlald r2, r3, r0, r8",
-    "smlald r2, r3, r11, r9",
-    "ldr r0, [r1, #24-{distance}]",
-    "smlald r2, r3, r0, r10",
-    "ldrd r11, r12, [r1, #{square}-{distance}]",
-    "subs r11, r11, r2",
-    "sbc r12, r12, r3",
-    "subs r11, r11, r2",
-    "sbc r12, r12, r3",
-    "ldrd r2, r3, [sp]",
-    "adds r11, r11, r2",
-    "adc r12, r12, r3",
-    "strd r11, r12, [r1], #{size}",
+    "ldm r1!, {{r0, r2, r3}}",
+    "smlad r11, r4, r0, r12",
+    "smlad r11, r5, r2, r11",
+    "smlad r11, r6, r3, r11",
+    "ldm r1!, {{r0, r2, r3}}",
+    "smlad r11, r7, r0, r11",
+    "smlad r11, r8, r2, r11",
+    "smlad r11, r9, r3, r11",
+    "ldrd r0, r2, [r1], #{size} - 24",
+    "smlad r11, r10, r0, r11",
+    "subs r2, r2, r11, lsl #1",
+    "bpl 3f",
+    "ldm sp, {{r0, r3, r11}}",
+    "add r2, r2, r11",
+    // octaves in Q18: whole ones, 5 bits of a part, 13 between
+    "umull r11, r2, r2, r3",
+    "ubfx r3, r2, #13, #5",
+    "add r0, r0, r3, lsl #3",
+    "ldrd r0, r3, [r0]",
+    "lsl r11, r2, #19",
+    "umull r3, r11, r11, r3",
+    "sub r0, r0, r11",
+    "lsr r2, r2, #18",
+    "lsr r0, r0, r2",
+    "vmov s4, r0",
+    "vcvt.f32.u32 s4, s4, #30",
+    // probability, and what it is confused with
+    "vldr d3, [r1, #{probability} - {size}]",
+    "vmla.f32 s1, s4, s6",
+    "vmla.f32 s7, s4, s0",
+    "vstr s7, [r1, #{probability} + 4 - {size}]",
+    "3:",
     "cmp r1, lr",
     "bne 2b",
-    "pop {{r2, r3}}",
+    "pop {{r0-r3}}",
+    "vstr s1, [r3, #{probability} + 4]",
     "pop {{r4-r11, pc}}",
-    ".size tactus_candidates, . - tactus_candidates",
+    ".size tactus_confuse_whitened, . - tactus_confuse_whitened",
     ".section .text.tactus_products,\"ax\",%progbits",
     ".global tactus_products",
     ".type tactus_products,%function",
@@ -327,7 +351,7 @@ global_asm!(
     ".size tactus_sqrt, . - tactus_sqrt",
     ".text",
     square = const offset_of!(Candidate, square),
-    distance = const offset_of!(Candidate, distance),
+    probability = const offset_of!(Candidate, probability),
     size = const size_of::<Candidate>(),
 );
 
@@ -379,13 +403,14 @@ unsafe extern "C" {
     fn tactus_divide(numbers: *mut f32, end: *const f32, by: f32);
     /// There are 8, 16, 24... numbers up to `end`.
     fn tactus_reset_to_prior(numbers: *mut i32, end: *const i32);
-    /// `from` has 14 numbers and begins at a whole word, `square` is the sum of their squares; there is at least one of
-    /// `others`, and `behind` is where the last of them ends.
-    fn tactus_candidates(
-        from: *const i16,
+    /// There is at least one of `others`, and `behind` is where the last of them ends.
+    fn tactus_confuse_whitened(
+        a: *mut Candidate,
         others: *mut Candidate,
-        square: u64,
         behind: *const Candidate,
+        exp2: *const [u32; 2],
+        octaves: u32,
+        far: u32,
     );
     safe fn tactus_products(row: &Row, others: &Words) -> i64;
     safe fn tactus_sqrt(x: f32) -> f32;
@@ -507,22 +532,19 @@ impl Kernels for Chip {
         tactus_products(row, others)
     }
 
-    fn candidate_distances(from: &Candidate, others: &mut [Candidate]) {
-        let range = others.as_mut_ptr_range();
-        if !range.is_empty() {
+    fn confuse_whitened(a: &mut Candidate, others: &mut [Candidate], fewer: u8) {
+        let Likeness { octaves, far } = Likeness::new(fewer);
+        let others = others.as_mut_ptr_range();
+        if !others.is_empty() {
             // SAFETY: there is one at least, and the others end where it is said.
             unsafe {
-                tactus_candidates(from.mean.as_ptr(), range.start, from.square, range.end);
+                tactus_confuse_whitened(a, others.start, others.end, EXP2.as_ptr(), octaves, far);
             }
         }
     }
 
-    fn confuse(a: &mut LiveTexture, others: &mut [LiveTexture]) {
-        let others = others.as_mut_ptr_range();
-        if !others.is_empty() {
-            // SAFETY: there is one at least, and the others end where it is said.
-            unsafe { confuse(a, others.start, others.end) };
-        }
+    fn confuse(a: &mut LiveGaussian, others: &mut [LiveGaussian]) {
+        confuse(a, others);
     }
 
     fn sqrt(x: f32) -> f32 {

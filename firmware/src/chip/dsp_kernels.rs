@@ -4,14 +4,27 @@
 use core::arch::{asm, global_asm};
 use core::mem::MaybeUninit;
 
-use tactus_core::dsp::{Angles, Complex32, FRAME, Folded, Kernels, Plain, TAPS, Taps};
+use tactus_core::dsp::{
+    Angles, Complex32, FRAME, Folded, HALVES, HalfFilters, Kernels, Plain, Reals, TAPS, Taps,
+};
+
+use super::transform_kernel;
 
 /// Outputs of the band-pass that are computed at once.
-const AT_ONCE: usize = 6;
+const AT_ONCE: usize = 12;
+/// How many times that at most from one buffer.
+const MOST: usize = 22;
+/// Words of even samples, of sums and of odd ones that these take: the last ones are read, and do not count.
+const WORDS: usize = (TAPS - 1 + MOST * AT_ONCE) / 4 + 4;
 
-// Six outputs at once, two products an instruction: r2, r4 and r6 are those that begin with the first sample of a pair, r3,
-// r5 and r7 those between them; r8 to r10 are pairs of samples, r11 and r12 pairs of coefficients. Six of the 34 steps make
-// the loop: it has to fit into the flash accelerator's 1 KB, and an inline assembly block leaves too few registers.
+/// In RAM: the flash is slower, and what it caches of data is less.
+#[unsafe(link_section = ".data.tactus_halves")]
+static HALF_FILTERS: HalfFilters = HALVES;
+
+// Two outputs by three filters of half the length instead of four ([`HALVES`]), six of each at once, two products an
+// instruction: r2, r4 and r6 are those that begin with the first sample of a pair, r3, r5 and r7 those between them; r8 to
+// r10 are pairs of samples, r11 and r12 pairs of coefficients. Six of the 18 steps make the loop: all has to fit into the
+// flash accelerator's 1 KB, and an inline assembly block leaves too few registers.
 global_asm!(
     // the assembler is not told of the FPU otherwise
     ".fpu fpv4-sp-d16",
@@ -19,7 +32,7 @@ global_asm!(
     "ldrd r11, r12, [r0], #8",
     "smlad r2, \\a, r11, r2",
     "smlad r3, \\a, r12, r3",
-    "ldr \\a, [r1], #4",
+    "ldr \\a, [r1], #12",
     "smlad r4, \\b, r11, r4",
     "smlad r5, \\b, r12, r5",
     "smlad r6, \\c, r11, r6",
@@ -27,75 +40,189 @@ global_asm!(
     ".endm",
     ".macro tactus_fir_square y",
     "asr \\y, \\y, #8",
-    "smlal r8, r9, \\y, \\y",
+    "smlal r11, r12, \\y, \\y",
+    ".endm",
+    // of two filters of even samples, then of sums less those, that begin here: `x` and `y` are those of odd samples
+    ".macro tactus_fir_outputs x, y, at",
+    "ldrd r8, r9, [sp, #\\at]",
+    "ldrd r10, lr, [sp, #24 + \\at]",
+    "add r8, r8, \\x",
+    "add r9, r9, \\y",
+    "sub r10, r10, \\x",
+    "sub lr, lr, \\y",
+    "tactus_fir_square r8",
+    "tactus_fir_square r9",
+    "tactus_fir_square r10",
     ".endm",
     ".section .text.tactus_band_energy,\"ax\",%progbits",
     ".global tactus_band_energy",
     ".type tactus_band_energy,%function",
     ".thumb_func",
-    // r0: pairs of coefficients; r1: samples; r2: how many sixes, not 0. Sum of squares in r0 and r1.
+    // r0: pairs of coefficients; r1: words of samples; r2: how many twelves, not 0. Sum of squares in r0 and r1.
     "tactus_band_energy:",
     "push {{r4-r11, lr}}",
-    "mov r8, #0",
-    "mov r9, #0",
-    // 0: sum of squares; 8: sixes to go
-    "push {{r2, r3}}",
-    "push {{r8, r9}}",
-    "1:",
-    "ldr r8, [r1], #4",
-    "ldr r9, [r1], #4",
-    "ldr r10, [r1], #4",
-    // half of what is shifted out: rounded
+    // 0: filters of even samples; 24: of sums, less those one later; 48: sum of squares; 56: an odd output without the even
+    // samples one later; 60: twelves to go
+    "sub sp, sp, #64",
+    "mov r3, #0",
+    "strd r3, r3, [sp, #48]",
+    "str r2, [sp, #60]",
+    "add r0, r0, #288",
+    // half of what is shifted out, for the even outputs
     "mov r2, #128",
-    "mov r3, #128",
-    "mov r4, #128",
-    "mov r5, #128",
-    "mov r6, #128",
-    "mov r7, #128",
-    "mov lr, #5",
+    "bl 8f",
+    "strd r2, r3, [sp]",
+    "strd r4, r5, [sp, #8]",
+    "strd r6, r7, [sp, #16]",
+    "1:",
+    "sub r0, r0, #432",
+    "sub r1, r1, #236",
+    // for the odd ones, which are less that of even samples
+    "mov r2, #256",
+    "bl 8f",
+    "add r8, sp, #4",
+    "ldm r8, {{r8-r12}}",
+    "sub r2, r2, r8",
+    "sub r3, r3, r9",
+    "sub r4, r4, r10",
+    "sub r5, r5, r11",
+    "sub r6, r6, r12",
+    "strd r2, r3, [sp, #24]",
+    "strd r4, r5, [sp, #32]",
+    "strd r6, r7, [sp, #40]",
+    "sub r1, r1, #236",
+    "mov r2, #0",
+    "bl 8f",
+    "ldrd r11, r12, [sp, #48]",
+    "tactus_fir_outputs r2, r3, 0",
+    "tactus_fir_square lr",
+    "tactus_fir_outputs r4, r5, 8",
+    "tactus_fir_square lr",
+    "tactus_fir_outputs r6, r7, 16",
+    "str lr, [sp, #56]",
+    "strd r11, r12, [sp, #48]",
+    // even samples of the next twelve
+    "sub r1, r1, #212",
+    "mov r2, #128",
+    "bl 8f",
+    "strd r2, r3, [sp]",
+    "strd r4, r5, [sp, #8]",
+    "strd r6, r7, [sp, #16]",
+    "ldrd r11, r12, [sp, #48]",
+    "ldrd r8, r9, [sp, #56]",
+    "sub r8, r8, r2",
+    "tactus_fir_square r8",
+    "strd r11, r12, [sp, #48]",
+    "subs r9, r9, #1",
+    "str r9, [sp, #60]",
+    "bne 1b",
+    "mov r0, r11",
+    "mov r1, r12",
+    "add sp, sp, #64",
+    "pop {{r4-r11, pc}}",
+    // Six outputs of one filter, from r2 on, and r2 added to each.
+    "8:",
+    "push {{lr}}",
+    "ldr r8, [r1], #12",
+    "ldr r9, [r1], #12",
+    "ldr r10, [r1], #12",
+    "ldrd r11, r12, [r0], #8",
+    "smlad r3, r8, r12, r2",
+    "smlad r4, r9, r11, r2",
+    "smlad r5, r9, r12, r2",
+    "smlad r6, r10, r11, r2",
+    "smlad r7, r10, r12, r2",
+    "smlad r2, r8, r11, r2",
+    "ldr r8, [r1], #12",
+    "mov lr, #2",
     "2:",
-    "tactus_fir_step r8, r9, r10",
     "tactus_fir_step r9, r10, r8",
     "tactus_fir_step r10, r8, r9",
     "tactus_fir_step r8, r9, r10",
     "tactus_fir_step r9, r10, r8",
     "tactus_fir_step r10, r8, r9",
+    "tactus_fir_step r8, r9, r10",
     "subs lr, lr, #1",
     "bne 2b",
-    "tactus_fir_step r8, r9, r10",
     "tactus_fir_step r9, r10, r8",
     "tactus_fir_step r10, r8, r9",
-    // the last step, without the pair behind the samples
-    "ldrd r11, r12, [r0], #-264",
-    "smlad r2, r8, r11, r2",
-    "smlad r3, r8, r12, r3",
-    "smlad r4, r9, r11, r4",
-    "smlad r5, r9, r12, r5",
-    "smlad r6, r10, r11, r6",
-    "smlad r7, r10, r12, r7",
-    "ldrd r8, r9, [sp]",
-    "tactus_fir_square r2",
-    "tactus_fir_square r3",
-    "tactus_fir_square r4",
-    "tactus_fir_square r5",
-    "tactus_fir_square r6",
-    "tactus_fir_square r7",
-    "ldr r2, [sp, #8]",
-    "strd r8, r9, [sp]",
-    // 36 pairs were read, the next six outputs begin with the fourth of them
-    "sub r1, r1, #132",
-    "subs r2, r2, #1",
-    "str r2, [sp, #8]",
-    "bne 1b",
-    "pop {{r0, r1, r2, r3}}",
-    "pop {{r4-r11, pc}}",
+    "tactus_fir_step r8, r9, r10",
+    "tactus_fir_step r9, r10, r8",
+    // the last coefficient of those between
+    "ldrd r11, r12, [r0], #8",
+    "smlad r3, r10, r12, r3",
+    "smlad r5, r8, r12, r5",
+    "smlad r7, r9, r12, r7",
+    "pop {{pc}}",
     ".size tactus_band_energy, . - tactus_band_energy",
+    ".section .text.tactus_halve,\"ax\",%progbits",
+    ".global tactus_halve",
+    ".type tactus_halve,%function",
+    ".thumb_func",
+    // r0: samples; r1: words; r2: how many fours of samples, and two follow them
+    "tactus_halve:",
+    "push {{r4-r6}}",
+    "ldr r3, [r0], #4",
+    "2:",
+    "ldr r12, [r0], #4",
+    "pkhbt r4, r3, r12, lsl #16",
+    "pkhtb r6, r12, r3, asr #16",
+    "ldr r3, [r0], #4",
+    // odd ones and the even ones after them
+    "pkhbt r5, r12, r3, lsl #16",
+    "sadd16 r5, r5, r6",
+    "stm r1!, {{r4-r6}}",
+    "subs r2, r2, #1",
+    "bne 2b",
+    "uxth r4, r3",
+    "lsr r5, r3, #16",
+    "mov r6, r5",
+    "stm r1, {{r4-r6}}",
+    "pop {{r4-r6}}",
+    "bx lr",
+    ".size tactus_halve, . - tactus_halve",
     ".text",
 );
 
 unsafe extern "C" {
-    /// `samples` has [`TAPS`] - 1 and 6 `sixes` samples, of which none is outside -4096..=4095.
-    fn tactus_band_energy(pairs: *const [u32; 2], samples: *const i16, sixes: usize) -> u64;
+    /// `words` are those that `tactus_halve` made of [`TAPS`] - 1 and 12 `twelves` samples, 3 more, and at least one is to be
+    /// computed.
+    fn tactus_band_energy(
+        filters: *const HalfFilters,
+        words: *const [u32; 3],
+        twelves: usize,
+    ) -> u64;
+    /// Makes `words` of 4 `fours` and 2 samples, one more than `fours`: even samples, sums of an odd one and the even one
+    /// after it, and odd ones, two to a word. No sample is outside -16384..=16383.
+    fn tactus_halve(samples: *const i16, words: *mut [u32; 3], fours: usize);
+}
+
+/// [`Kernels::clip`] of a multiple of 4 samples, not 0.
+///
+/// # Safety
+/// They are there, as many in both.
+#[inline(never)]
+unsafe fn clip(samples: *const i16, clipped: *mut i16, many: usize) {
+    // SAFETY: it reads and writes as many; words need not be aligned.
+    unsafe {
+        asm!(
+            "2:",
+            "ldr {a}, [{from}], #4",
+            "ldr {b}, [{from}], #4",
+            "ssat16 {a}, #13, {a}",
+            "ssat16 {b}, #13, {b}",
+            "str {a}, [{to}], #4",
+            "str {b}, [{to}], #4",
+            "cmp {from}, {end}",
+            "bne 2b",
+            from = inout(reg) samples => _,
+            to = inout(reg) clipped => _,
+            end = in(reg) samples.add(many),
+            a = out(reg) _,
+            b = out(reg) _,
+            options(nostack),
+        );
+    }
 }
 
 /// [`Kernels::fold_frame`], two angles at a time: sums of two samples by one instruction, and then what `Plain` does, in its
@@ -283,15 +410,35 @@ unsafe fn add_power(bins: *const Complex32, sums: *mut f32, many: usize) {
 pub(crate) struct Chip;
 
 impl Kernels for Chip {
-    fn band_energy(taps: &Taps, samples: &[i16]) -> u64 {
-        let sixes = samples.len().saturating_sub(TAPS - 1) / AT_ONCE;
-        let rest = samples.get(sixes * AT_ONCE..).unwrap_or_default();
-        let rest = Plain::band_energy(taps, rest);
-        if sixes == 0 {
-            return rest;
+    fn clip(samples: &[i16], clipped: &mut [i16]) {
+        let many = samples.len().min(clipped.len()) & !3;
+        if many > 0 {
+            // SAFETY: there are so many of both.
+            unsafe { clip(samples.as_ptr(), clipped.as_mut_ptr(), many) };
         }
-        // SAFETY: it reads all pairs and, as `sixes` was computed, no sample that is not there; words need not be aligned.
-        rest + unsafe { tactus_band_energy(taps.pairs().as_ptr(), samples.as_ptr(), sixes) }
+        let rest = samples.get(many..).zip(clipped.get_mut(many..));
+        let (samples, clipped) = rest.unwrap_or_default();
+        Plain::clip(samples, clipped);
+    }
+
+    fn band_energy(taps: &Taps, samples: &[i16]) -> u64 {
+        let mut words = MaybeUninit::<[[u32; 3]; WORDS]>::uninit();
+        let words: *mut [u32; 3] = words.as_mut_ptr().cast();
+        let (mut sum, mut rest) = (0, samples);
+        loop {
+            let twelves = rest.len().saturating_sub(TAPS - 1) / AT_ONCE;
+            let twelves = twelves.min(MOST);
+            if twelves == 0 {
+                return sum + Plain::band_energy(taps, rest);
+            }
+            // SAFETY: as `twelves` was computed, no sample is read that is not there, and the words have room for them; what of
+            // these was never written does not count.
+            unsafe {
+                tactus_halve(rest.as_ptr(), words, (TAPS - 1 + AT_ONCE * twelves) / 4);
+                sum += tactus_band_energy(&raw const HALF_FILTERS, words, twelves);
+            }
+            rest = rest.get(AT_ONCE * twelves..).unwrap_or_default();
+        }
     }
 
     fn fold_frame<'r>(
@@ -318,5 +465,16 @@ impl Kernels for Chip {
         }
         // SAFETY: there are so many.
         unsafe { add_power(bins.as_ptr(), sums.as_mut_ptr(), many) };
+    }
+
+    fn transform(angles: &Angles, values: &mut [Complex32]) {
+        transform_kernel::transform(angles, values);
+    }
+
+    fn transform_reals<'r>(
+        angles: &Angles,
+        reals: &'r mut Reals,
+    ) -> &'r mut [Complex32; FRAME / 16] {
+        transform_kernel::transform_reals(angles, reals)
     }
 }

@@ -6,7 +6,7 @@
 use super::kernels::Kernels;
 use super::plan::{HISTORY, Taps};
 
-/// Samples filtered at once, whole sixes for kernels that take so many. No result depends on it.
+/// Samples filtered at once, whole twelves for kernels that take so many. No result depends on it.
 const BLOCK: usize = 264;
 /// Samples that begin at a whole word, for kernels that read two at once.
 #[derive(Clone, Debug)]
@@ -52,7 +52,7 @@ impl BandPower {
     pub fn push<K: Kernels>(&mut self, taps: &Taps, samples: &[i16]) {
         let mut samples = samples;
         while !samples.is_empty() {
-            samples = self.take(samples);
+            samples = self.take::<K>(samples);
             if self.filled >= BLOCK {
                 self.flush::<K>(taps);
             }
@@ -60,14 +60,12 @@ impl BandPower {
     }
 
     /// Takes as many samples as the block has room for, and gives the others back.
-    fn take<'s>(&mut self, samples: &'s [i16]) -> &'s [i16] {
+    fn take<'s, K: Kernels>(&mut self, samples: &'s [i16]) -> &'s [i16] {
         let buffer = self.samples.0.get_mut(HISTORY + self.filled..);
         let buffer = buffer.unwrap_or_default();
         let many = samples.len().min(buffer.len());
         let (now, later) = samples.split_at_checked(many).unwrap_or_default();
-        for (slot, &sample) in buffer.iter_mut().zip(now) {
-            *slot = sample.clamp(-4096, 4095);
-        }
+        K::clip(now, buffer.get_mut(..many).unwrap_or_default());
         self.filled += many;
         later
     }

@@ -5,11 +5,16 @@
 use core::mem::MaybeUninit;
 
 use microfft::Complex32;
+use microfft::complex::{cfft_32, cfft_64, cfft_128};
+use microfft::real::rfft_64;
 
 use super::plan::{Angles, FRAME, Folded, TAPS, Taps};
 
 /// What costs the time of a slide.
 pub trait Kernels {
+    /// Copies samples; beyond what 12 bits can differ by, -4096..=4095, they are clipped. There are as many of both.
+    fn clip(samples: &[i16], clipped: &mut [i16]);
+
     /// Filters `samples` and returns the sum of the squared outputs, in Q14 counts^2: each output is the sum of products
     /// (Q15) rounded to Q7.
     ///
@@ -33,6 +38,47 @@ pub trait Kernels {
 
     /// Adds |X|^2 of each bin to its sum.
     fn add_power(bins: &[Complex32], sums: &mut [f32]);
+
+    /// Transforms 32, 64 or 128 values in place, as microfft does (decimation in time, radix 2); others stay as they are. The sign of
+    /// a 0 is open.
+    fn transform(_: &Angles, values: &mut [Complex32]) {
+        transform(values);
+    }
+
+    /// The lower half of the transform of reals, as microfft does it: that of the last bin, which is real, is the imaginary part of
+    /// the first one.
+    fn transform_reals<'r>(_: &Angles, reals: &'r mut Reals) -> &'r mut [Complex32; FRAME / 16] {
+        transform_reals(reals)
+    }
+}
+
+/// What is left of a frame that was folded three times.
+pub type Reals = [f32; FRAME / 8];
+
+// both not generic: microfft is compiled once, with this crate
+#[inline(never)]
+fn transform_reals(reals: &mut Reals) -> &mut [Complex32; FRAME / 16] {
+    rfft_64(reals)
+}
+
+#[inline(never)]
+fn transform(values: &mut [Complex32]) {
+    match values.len() {
+        128 => in_place(values, cfft_128),
+        64 => in_place(values, cfft_64),
+        32 => in_place(values, cfft_32),
+        _ => {}
+    }
+}
+
+#[inline]
+fn in_place<const N: usize>(
+    values: &mut [Complex32],
+    cfft: fn(&mut [Complex32; N]) -> &mut [Complex32; N],
+) {
+    if let Ok(values) = values.try_into() {
+        cfft(values);
+    }
 }
 
 /// Plain Rust, the same on chip and PC.
@@ -40,6 +86,12 @@ pub trait Kernels {
 pub struct Plain;
 
 impl Kernels for Plain {
+    fn clip(samples: &[i16], clipped: &mut [i16]) {
+        for (slot, &sample) in clipped.iter_mut().zip(samples) {
+            *slot = sample.clamp(-4096, 4095);
+        }
+    }
+
     fn band_energy(taps: &Taps, samples: &[i16]) -> u64 {
         samples
             .windows(TAPS)

@@ -1,6 +1,5 @@
 //! What every slide needs and no slide changes: the coefficients of the band-pass, and the angles of window and transform.
 
-use core::array;
 use core::f64::consts::{PI, TAU};
 
 use microfft::Complex32;
@@ -14,9 +13,6 @@ pub const PASS_BAND_HZ: (f64, f64) = (20.0, 700.0);
 
 /// Samples before the one that an output is for.
 pub(crate) const HISTORY: usize = TAPS - 1;
-/// Pairs of coefficients that cover all of them from an even sample on, and from an odd one.
-pub const PAIRS: usize = TAPS.div_ceil(2);
-
 /// Samples in a frame.
 pub const FRAME: usize = 512;
 
@@ -57,26 +53,12 @@ impl Default for Plan {
 #[derive(Clone, Debug)]
 pub struct Taps {
     taps: [i16; TAPS],
-    pairs: [[u32; 2]; PAIRS],
 }
 
 impl Taps {
     /// The band-pass.
     pub fn band_pass() -> Self {
-        let taps = BAND_PASS;
-        let mut pairs = [[0; 2]; PAIRS];
-        let at = |n: Option<usize>| n.and_then(|n| taps.iter().rev().nth(n)).copied();
-        let word = |low: Option<i16>, high: Option<i16>| {
-            let half = |tap: Option<i16>| u32::from(tap.unwrap_or(0) as u16);
-            half(low) | half(high) << 16
-        };
-        for (pair, n) in pairs.iter_mut().zip((0..).step_by(2)) {
-            *pair = [
-                word(at(Some(n)), at(Some(n + 1))),
-                word(at(n.checked_sub(1)), at(Some(n))),
-            ];
-        }
-        Self { taps, pairs }
+        Self { taps: BAND_PASS }
     }
 
     /// The coefficients in Q15, newest sample first.
@@ -88,13 +70,59 @@ impl Taps {
     pub(crate) fn reversed(&self) -> impl Iterator<Item = &i16> {
         self.taps.iter().rev()
     }
+}
 
-    /// The same two to a word, the older sample's in the low half, for kernels that multiply pairs of samples. Of each two
-    /// words the first is for an output whose oldest sample is the first of a pair, the other for the output after it, which
-    /// begins with the second of that pair.
-    pub fn pairs(&self) -> &[[u32; 2]; PAIRS] {
-        &self.pairs
+/// Pairs of coefficients of [`HALVES`] that cover all of a filter's from an even sample on, and from an odd one.
+const HALF_PAIRS: usize = TAPS.div_ceil(4) + 1;
+
+/// See [`HALVES`].
+pub type HalfFilters = [[[u32; 2]; HALF_PAIRS]; 3];
+
+/// Two outputs by three filters of half the length (fast FIR algorithm): with the even coefficients E and the odd ones O of the
+/// band-pass, and the even samples e and the odd ones o, an even output is `E e[m] + O o[m]`, and the odd one after it
+/// `(E + O) (o[m] + e[m+1]) - E e[m+1] - O o[m]`. These are E + O, O and E, oldest sample first (the filter is symmetric), for
+/// kernels that multiply pairs of samples: two coefficients to a word, the older sample's in the low half. Of each two words
+/// the first is for an output whose oldest sample is the first of a pair, the other for the output after it, which begins with
+/// the second of that pair.
+pub const HALVES: HalfFilters = halves();
+
+#[expect(
+    clippy::indexing_slicing,
+    reason = "the compiler runs it, and has no iterators"
+)]
+const fn halves() -> HalfFilters {
+    let mut filters = [[[0; 2]; HALF_PAIRS]; 3];
+    let mut pair = 0;
+    while pair < HALF_PAIRS {
+        let mut odd = 0;
+        while odd < 2 {
+            // of the filters, the older coefficient of the word
+            let older = (2 * pair).wrapping_sub(odd);
+            let [even_0, odd_0] = [coefficient(older, 0), coefficient(older, 1)];
+            let newer = older.wrapping_add(1);
+            let [even_1, odd_1] = [coefficient(newer, 0), coefficient(newer, 1)];
+            filters[0][pair][odd] = word(even_0 + odd_0, even_1 + odd_1);
+            filters[1][pair][odd] = word(odd_0, odd_1);
+            filters[2][pair][odd] = word(even_0, even_1);
+            odd += 1;
+        }
+        pair += 1;
     }
+    filters
+}
+
+/// An even coefficient, or the odd one after it; 0 where there is none. A sum of both must fit into 16 bits, too.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "the compiler runs it, and has no iterators"
+)]
+const fn coefficient(n: usize, odd: usize) -> i16 {
+    let at = n.wrapping_mul(2).wrapping_add(odd);
+    if at < TAPS { BAND_PASS[at] } else { 0 }
+}
+
+const fn word(low: i16, high: i16) -> u32 {
+    low as u16 as u32 | (high as u16 as u32) << 16
 }
 
 /// The band-pass, designed by the compiler: the chip would take 1 KB of code for it.
@@ -143,10 +171,8 @@ const fn ideal(edge: f64, m: f64) -> f64 {
     }
 }
 
-/// Cosine of an angle in turns, fewer than 2^31 of them. That of `libm` takes angles of any size in radians, and 5 KB of
-/// flash to tell how many turns they are.
-#[inline]
-pub(crate) const fn cos_of_turns(turns: f64) -> f64 {
+/// Cosine of an angle in turns, fewer than 2^31 of them: the compiler runs it, and cannot run that of `libm`.
+const fn cos_of_turns(turns: f64) -> f64 {
     let turns = if turns < 0.0 { -turns } else { turns };
     let part = turns - turns as u32 as f64;
     // to an eighth of a turn, where the series below are as good as f64 is
@@ -180,12 +206,33 @@ const fn series(x: f64, first: u32) -> f64 {
 pub type Angles = [[f32; 2]; FRAME / 4];
 
 /// See [`Angles`].
+#[inline]
 pub fn angles() -> Angles {
-    array::from_fn(|n| {
-        let turns = n as f64 / FRAME as f64;
-        // a sine is a cosine a quarter of a turn later
-        [turns, turns - 0.25].map(|turns| cos_of_turns(turns) as f32)
-    })
+    let mut angles = [[0.0; 2]; FRAME / 4];
+    // a sine is a cosine a quarter of a turn later, and a cosine is the same on both sides of 0
+    let pairs = COSINES.iter().zip(COSINES.iter().rev());
+    for (angle, (cos, sin)) in angles.iter_mut().zip(pairs) {
+        *angle = [*cos, *sin];
+    }
+    angles
+}
+
+/// Cosines of every 512th part of a turn from 0 to a quarter, computed by the compiler: what computes them takes more flash
+/// than they do.
+const COSINES: [f32; FRAME / 4 + 1] = cosines();
+
+#[expect(
+    clippy::indexing_slicing,
+    reason = "the compiler runs it, and has no iterators"
+)]
+const fn cosines() -> [f32; FRAME / 4 + 1] {
+    let mut cosines = [0.0; FRAME / 4 + 1];
+    let mut n = 0;
+    while n < cosines.len() {
+        cosines[n] = cos_of_turns(n as f64 / FRAME as f64) as f32;
+        n += 1;
+    }
+    cosines
 }
 
 /// A frame that was folded: a complex number for every odd bin, then the reals that the even ones are the transform of, each
@@ -278,5 +325,40 @@ pub(super) mod tests {
     fn coefficients_are_symmetric() {
         let taps = Taps::band_pass();
         assert!(taps.as_slice().iter().eq(taps.reversed()));
+    }
+
+    #[test]
+    fn three_filters_of_half_the_length_are_the_band_pass() {
+        let x: Vec<i32> = (0..101)
+            .map(|n| (n * n * 37 + n * 101) % 8192 - 4096)
+            .collect();
+        let at = |n: usize| x.get(n).copied().unwrap_or(0);
+        let [sums, odd, even] = HALVES;
+        // the second word of a pair begins one sample later
+        let filter = |pairs: &[[u32; 2]; HALF_PAIRS], m: usize, x: &dyn Fn(usize) -> i32| {
+            let words = pairs
+                .iter()
+                .map(|pair| pair[m % 2])
+                .zip((m - m % 2..).step_by(2));
+            let product = |(word, n): (u32, usize)| {
+                i32::from(word as i16) * x(n) + (word as i32 >> 16) * x(n + 1)
+            };
+            words.map(product).sum::<i32>()
+        };
+        for n in 0..35 {
+            let y = x.iter().skip(n).zip(BAND_PASS);
+            let y: i32 = y.map(|(x, h)| x * i32::from(h)).sum();
+            let m = n / 2;
+            let of_odd = filter(&odd, m, &|m| at(2 * m + 1));
+            let of_even = |m| filter(&even, m, &|m| at(2 * m));
+            let by_three = match n % 2 {
+                0 => of_even(m) + of_odd,
+                _ => {
+                    let of_sums = filter(&sums, m, &|m| at(2 * m + 1) + at(2 * m + 2));
+                    of_sums - of_even(m + 1) - of_odd
+                }
+            };
+            assert_eq!(by_three, y, "{n}");
+        }
     }
 }

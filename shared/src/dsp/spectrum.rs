@@ -3,7 +3,7 @@
 //!
 //! Only powers are wanted, so a frame need not be transformed as a whole and unpacked. The odd bins of n reals are a complex
 //! transform of n/4 values, each bin or its mirror image; the even ones are the transform of n/2 reals. [`Kernels::fold`]
-//! makes these of those, and after three times what is left is short. The transforms themselves are microfft's.
+//! makes these of those, and after three times what is left is short. The transforms themselves are microfft's, or equal to them.
 //!
 //! The mean of the slide is to be removed before the windows, but it is known only at the end. A Hann window has three
 //! non-zero bins, so the mean only reaches bins 0 and 1 of each frame, and [`SpectrumSum::finish`] takes it out again by
@@ -13,10 +13,8 @@ use core::mem::MaybeUninit;
 use core::ops::Range;
 
 use microfft::Complex32;
-use microfft::complex::{cfft_32, cfft_64, cfft_128};
-use microfft::real::rfft_64;
 
-use super::kernels::Kernels;
+use super::kernels::{Kernels, Reals};
 use super::plan::{Angles, FRAME, Folded};
 use crate::sensor::pressure::RATE_HZ;
 
@@ -62,13 +60,19 @@ impl FrameSum {
     };
 
     /// Adds the power of a frame that was folded once.
-    // not generic: compiled with this crate, for speed, and microfft with it
+    // not generic: compiled with this crate, for speed
     #[inline(never)]
-    fn add(&mut self, angles: &Angles, folded: &mut Folded, fold: Fold, add_power: AddPower) {
+    fn add(&mut self, angles: &Angles, folded: &mut Folded, kernels: FrameKernels) {
+        let FrameKernels {
+            fold,
+            transform,
+            transform_reals,
+            add_power,
+        } = kernels;
         let ([odd, reals], _) = folded.as_chunks_mut::<{ FRAME / 4 }>() else {
             return;
         };
-        let odd = cfft_128(odd);
+        transform(angles, odd);
         let [real_0, real_1] = &mut self.real;
         *real_1 += odd.first().map_or(0.0, |first| first.re);
         add_power(odd, &mut self.odd);
@@ -77,7 +81,8 @@ impl FrameSum {
         let ([odd, reals_2], _) = odd.as_chunks_mut::<{ FRAME / 8 }>() else {
             return;
         };
-        add_power(cfft_64(odd), &mut self.twice_odd);
+        transform(angles, odd);
+        add_power(odd, &mut self.twice_odd);
 
         let ([folded, ..], _) = reals.as_chunks_mut::<{ FRAME / 8 }>() else {
             return;
@@ -86,7 +91,8 @@ impl FrameSum {
         let ([odd, reals], _) = folded.as_chunks_mut::<{ FRAME / 16 }>() else {
             return;
         };
-        add_power(cfft_32(odd), &mut self.four_times_odd);
+        transform(angles, odd);
+        add_power(odd, &mut self.four_times_odd);
 
         let mut rest = [0.0; FRAME / 8];
         let ([early, late], _) = rest.as_chunks_mut::<{ FRAME / 16 }>() else {
@@ -95,7 +101,7 @@ impl FrameSum {
         for ((early, late), pair) in early.iter_mut().zip(late).zip(reals) {
             (*early, *late) = (pair.re, pair.im);
         }
-        let eights = rfft_64(&mut rest);
+        let eights = transform_reals(angles, &mut rest);
         // the first of them has that of the last bin, which is real as well, in place of its imaginary part
         if let Some(ends) = eights.first_mut() {
             *real_0 += ends.re;
@@ -134,10 +140,24 @@ impl FrameSum {
     }
 }
 
-/// [`Kernels::fold`].
-type Fold = fn(&Angles, &[Complex32], &mut [Complex32]);
-/// [`Kernels::add_power`].
-type AddPower = fn(&[Complex32], &mut [f32]);
+/// Those of [`Kernels`] that a frame takes.
+struct FrameKernels {
+    fold: fn(&Angles, &[Complex32], &mut [Complex32]),
+    transform: fn(&Angles, &mut [Complex32]),
+    transform_reals: for<'r> fn(&Angles, &'r mut Reals) -> &'r mut [Complex32; FRAME / 16],
+    add_power: fn(&[Complex32], &mut [f32]),
+}
+
+impl FrameKernels {
+    const fn of<K: Kernels>() -> Self {
+        Self {
+            fold: K::fold,
+            transform: K::transform,
+            transform_reals: K::transform_reals,
+            add_power: K::add_power,
+        }
+    }
+}
 
 /// The spectrum of a slide while its samples arrive.
 #[derive(Clone, Debug)]
@@ -172,7 +192,7 @@ impl SpectrumSum {
             if self.filled >= FRAME {
                 let mut buffer = MaybeUninit::uninit();
                 let folded = K::fold_frame(angles, &self.frame, &mut buffer);
-                self.sum.add(angles, folded, K::fold, K::add_power);
+                self.sum.add(angles, folded, FrameKernels::of::<K>());
                 self.frame.copy_within(HOP.., 0);
                 self.filled = FRAME - HOP;
             }
@@ -186,9 +206,17 @@ impl SpectrumSum {
         let buffer = self.frame.get_mut(self.filled..).unwrap_or_default();
         let many = samples.len().min(buffer.len());
         let (now, later) = samples.split_at_checked(many).unwrap_or_default();
-        // a frame's sum is in 32 bits
+        let (buffer, _) = buffer.split_at_mut_checked(many).unwrap_or_default();
+        // four at a time; a frame's sum is in 32 bits
         let mut total = 0;
-        for (slot, &sample) in buffer.iter_mut().zip(now) {
+        let (fours, last) = now.as_chunks();
+        let (four_slots, last_slots) = buffer.as_chunks_mut();
+        for (slots, four) in four_slots.iter_mut().zip(fours) {
+            let [a, b, c, d] = *four;
+            *slots = *four;
+            total += i32::from(a) + i32::from(b) + i32::from(c) + i32::from(d);
+        }
+        for (slot, &sample) in last_slots.iter_mut().zip(last) {
             *slot = sample;
             total += i32::from(sample);
         }

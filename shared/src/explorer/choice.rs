@@ -4,10 +4,12 @@ use heapless::{Vec, VecView};
 use serde::{Deserialize, Serialize};
 
 use super::config::{Method, NEGLIGIBLE, Strategy};
-use super::kernels::{Kernels, LiveTexture, confused};
+use super::kernels::{Kernels, LiveGaussian, LiveTexture, confused, exp_neg, left};
+#[cfg(any(test, feature = "timed"))]
+use super::objective::{Objective, SlideTime};
 use super::posterior::Explorer;
 use super::whitened;
-use crate::features::{Property, PropertySet};
+use crate::features::Property;
 use crate::table::{Action, Gaussian, MAX_ACTIONS, Table};
 
 /// Slides of a movement that come to nothing, one after the other, before it is left out for the rest of the exploration.
@@ -22,6 +24,18 @@ pub struct ExpectedOutcome {
     pub uncertainty: f32,
     /// Its benefit (eq. 12), lower the more often it was made.
     pub benefit: f32,
+}
+
+#[cfg(any(test, feature = "timed"))]
+impl ExpectedOutcome {
+    /// Bits by which this action, made `made` times before, is expected to lower an `uncertainty` (eq. 11); never below 0. The
+    /// more often it was made the less it is worth, by the exponent of eq. 12.
+    pub fn bits(&self, uncertainty: f32, made: u8) -> f32 {
+        // a logarithm of 0 is no number to compare
+        let left = self.uncertainty.max(f32::MIN_POSITIVE);
+        let gained = libm::log2f(uncertainty.max(f32::MIN_POSITIVE) / left);
+        gained.max(0.0) / (f32::from(made) + 1.0)
+    }
 }
 
 /// Degree of confusion of two textures by one property (eq. 7): 1 for equal, 0 for disjoint distributions.
@@ -50,16 +64,8 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     pub fn choose(&self, outcomes: &[ExpectedOutcome], random: u32) -> Action {
         let chosen = match self.config.strategy {
             Strategy::Bayesian => {
-                // the first of equals
                 let outcomes = outcomes.iter().filter(|o| !self.is_left_out(o.action));
-                let best = outcomes.reduce(|best, next| {
-                    if next.benefit > best.benefit {
-                        next
-                    } else {
-                        best
-                    }
-                });
-                best.map(|o| o.action)
+                self.most_useful(outcomes)
             }
             Strategy::Cycling => {
                 let turns = self.turns().count().max(1);
@@ -76,6 +82,60 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             movement: 0,
             property: None,
         })
+    }
+
+    /// Of these outcomes the best one's action, the first of equals.
+    #[inline(always)]
+    fn most_useful<'o>(
+        &self,
+        outcomes: impl Iterator<Item = &'o ExpectedOutcome>,
+    ) -> Option<Action> {
+        #[cfg(any(test, feature = "timed"))]
+        if let Objective::BitsPerSecond(time) = self.config.objective {
+            return self.choose_by_rate(outcomes, time);
+        }
+        let best = outcomes.reduce(|best, next| {
+            if next.benefit > best.benefit {
+                next
+            } else {
+                best
+            }
+        });
+        best.map(|o| o.action)
+    }
+
+    #[cfg(any(test, feature = "timed"))]
+    /// Uncertainty (eq. 11) after a slide that tells nothing: every texture is confused with every other one.
+    fn uncertainty_now(&self) -> f32 {
+        // as eq. 10, which keeps the digits late in an exploration
+        let left = |p: &f32| p * (1.0 - p).max(0.0);
+        self.posterior.iter().map(left).sum()
+    }
+
+    #[cfg(any(test, feature = "timed"))]
+    /// Of these `outcomes`, the action that brings the most bits per second; of equals the one of greater benefit, then the
+    /// first.
+    fn choose_by_rate<'o>(
+        &self,
+        outcomes: impl Iterator<Item = &'o ExpectedOutcome>,
+        time: SlideTime,
+    ) -> Option<Action> {
+        let now = self.uncertainty_now();
+        let rate = |outcome: &ExpectedOutcome| {
+            let at = self.actions.iter().position(|a| *a == outcome.action);
+            let made = at.and_then(|at| self.made.get(at)).copied();
+            let movement = self.table.movement(outcome.action.movement)?;
+            Some(outcome.bits(now, made?) / time.seconds(movement))
+        };
+        let rated = outcomes.filter_map(|outcome| Some((rate(outcome)?, outcome)));
+        let best = rated.reduce(|best, next| {
+            if (next.0, next.1.benefit) > (best.0, best.1.benefit) {
+                next
+            } else {
+                best
+            }
+        });
+        best.map(|(_, outcome)| outcome.action)
     }
 
     /// The expected outcome of every action after the slides so far, in the order of the actions.
@@ -132,78 +192,131 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         if K::ONLY_FUSED || method == Method::Fused {
             return whitened::uncertainty::<K, N>(&self.table, movement, &self.posterior);
         }
+        if let Some(property) = self.only_property(action) {
+            let mut live: Vec<LiveGaussian, N> = Vec::new();
+            let action = Action::of(movement, property);
+            self.gather_one(method, action, &self.posterior, &mut live);
+            return uncertainty_of_one(&mut live, K::confuse);
+        }
         let mut live: Vec<LiveTexture, N> = Vec::new();
-        let properties = self.gather(method, action, &self.posterior, &mut live);
-        uncertainty_of(&mut live, properties, K::confuse, K::sqrt)
+        self.gather(action, &self.posterior, &mut live);
+        uncertainty_of(&mut live, self.measured.iter().count(), K::sqrt)
     }
 
-    /// The textures that are still likely, with what is expected of the properties that `action` looks at; how many these
-    /// are.
+    /// The one property that `action` looks at; `None` where these are several.
+    pub(super) fn only_property(&self, action: Action) -> Option<Property> {
+        let mut measured = self.measured.iter();
+        let (first, second) = (measured.next(), measured.next());
+        action.property.or(first.filter(|_| second.is_none()))
+    }
+
+    /// The textures that are still likely, with what is expected of the property that `action` looks at.
     // where a method is known while compiling, what the others take is left out here as well
     #[inline(always)]
-    pub(super) fn gather(
+    pub(super) fn gather_one(
         &self,
         method: Method,
         action: Action,
         posterior: &[f32],
-        live: &mut Vec<LiveTexture, N>,
-    ) -> usize {
-        let looked_at: PropertySet = match action.property {
-            Some(property) => [property].into_iter().collect(),
-            None => self.measured,
-        };
+        live: &mut Vec<LiveGaussian, N>,
+    ) {
         if method == Method::Paper {
-            gather(&self.table, action, posterior, live);
-        } else {
-            let expect = |texture, property| self.expected(texture, action.movement, property);
-            for (&probability, texture) in posterior.iter().zip(0..) {
-                if probability >= NEGLIGIBLE {
-                    let mut candidate = LiveTexture::new(probability);
-                    for (slot, property) in candidate.expected.iter_mut().zip(looked_at.iter()) {
-                        *slot = expect(texture, property).unwrap_or(*slot);
-                    }
-                    // `live` has space: `posterior` is no longer than N
-                    let _ = live.push(candidate);
-                }
+            return gather_one(&self.table, action, posterior, live, K::sqrt);
+        }
+        for (&probability, texture) in posterior.iter().zip(0..) {
+            if probability >= NEGLIGIBLE {
+                let expected = action
+                    .property
+                    .and_then(|property| self.expected(texture, action.movement, property));
+                push(live, probability, expected, K::sqrt);
             }
         }
-        looked_at.iter().count()
+    }
+
+    /// The textures that are still likely, with what is expected of all properties that are measured.
+    pub(super) fn gather(&self, action: Action, posterior: &[f32], live: &mut Vec<LiveTexture, N>) {
+        for (&probability, texture) in posterior.iter().zip(0..) {
+            if probability >= NEGLIGIBLE {
+                let mut candidate = LiveTexture::new(probability);
+                for (slot, property) in candidate.expected.iter_mut().zip(self.measured.iter()) {
+                    let expected = self.expected(texture, action.movement, property);
+                    *slot = expected.unwrap_or(*slot);
+                }
+                // `live` has space: `posterior` is no longer than N
+                let _ = live.push(candidate);
+            }
+        }
     }
 }
+
+/// Of a property of which nothing was learned.
+const UNKNOWN: Gaussian = Gaussian { mean: 0.0, sd: 1.0 };
 
 // The loops over all textures are not generic: so they are compiled with this crate, for speed.
 
 /// The textures that are still likely, with what is expected of the property that is looked at.
 #[inline(never)]
-fn gather(table: &Table<'_>, action: Action, posterior: &[f32], live: &mut VecView<LiveTexture>) {
+fn gather_one(
+    table: &Table<'_>,
+    action: Action,
+    posterior: &[f32],
+    live: &mut VecView<LiveGaussian>,
+    sqrt: fn(f32) -> f32,
+) {
     let known = table.gaussians(action);
     for (&probability, texture) in posterior.iter().zip(0..) {
         if probability >= NEGLIGIBLE {
-            let mut candidate = LiveTexture::new(probability);
-            if let ([slot, ..], Some(known)) = (&mut candidate.expected, known.get(texture)) {
-                *slot = known;
-            }
+            let known = known.get(texture);
+            let candidate = LiveGaussian::new(probability, known.unwrap_or(UNKNOWN), sqrt);
             // `live` has space: it is as long as the posterior
             let _ = live.push(candidate);
         }
     }
 }
 
-/// Expected uncertainty (eq. 11) of these textures, of which so many properties are looked at.
+/// One more of the textures that are still likely.
 #[inline(never)]
-fn uncertainty_of(
-    live: &mut [LiveTexture],
-    properties: usize,
-    confuse: fn(&mut LiveTexture, &mut [LiveTexture]),
+fn push(
+    live: &mut VecView<LiveGaussian>,
+    probability: f32,
+    expected: Option<Gaussian>,
     sqrt: fn(f32) -> f32,
+) {
+    // `live` has space: it is as long as the posterior
+    let _ = live.push(LiveGaussian::new(
+        probability,
+        expected.unwrap_or(UNKNOWN),
+        sqrt,
+    ));
+}
+
+/// Expected uncertainty (eq. 11) of these textures.
+#[inline(never)]
+fn uncertainty_of_one(
+    live: &mut [LiveGaussian],
+    confuse: fn(&mut LiveGaussian, &mut [LiveGaussian]),
 ) -> f32 {
     let mut rest = &mut *live;
     while let Some((a, others)) = rest.split_first_mut() {
-        confuse_with(a, others, properties, confuse, sqrt);
+        confuse(a, others);
         rest = others;
     }
-    let left = |c: &LiveTexture| c.probability * c.confused / (c.probability + c.confused);
-    live.iter().map(left).sum()
+    live.iter()
+        .map(|c| left(c.weight, c.root, c.confused))
+        .sum()
+}
+
+/// Expected uncertainty (eq. 11) of these textures, of which so many properties are looked at.
+#[inline(never)]
+fn uncertainty_of(live: &mut [LiveTexture], properties: usize, sqrt: fn(f32) -> f32) -> f32 {
+    let mut rest = &mut *live;
+    while let Some((a, others)) = rest.split_first_mut() {
+        confuse_with(a, others, properties, sqrt);
+        rest = others;
+    }
+    live.iter()
+        .map(|c| left(c.probability, 1.0, c.confused))
+        .sum()
 }
 
 /// Confusion of one texture with all others (eq. 7), by so many properties.
@@ -212,12 +325,8 @@ pub(super) fn confuse_with(
     a: &mut LiveTexture,
     others: &mut [LiveTexture],
     properties: usize,
-    confuse: fn(&mut LiveTexture, &mut [LiveTexture]),
     sqrt: fn(f32) -> f32,
 ) {
-    if properties == 1 {
-        return confuse(a, others);
-    }
     for b in others {
         let pairs = a.expected.iter().zip(&b.expected).take(properties);
         let confusion: f32 = pairs.map(|(a, b)| confused(*a, *b, sqrt)).product();
@@ -234,5 +343,7 @@ pub fn benefit(uncertainty: f32, made: u8) -> f32 {
     if made == 0 {
         return 1.0 - uncertainty.clamp(0.0, 1.0);
     }
-    1.0 - libm::powf(uncertainty.clamp(0.0, 1.0), 1.0 / (f32::from(made) + 1.0))
+    // a power of `libm` would take 1.3 KB of flash
+    let log = libm::logf(uncertainty.clamp(0.0, 1.0));
+    1.0 - exp_neg(-log / (f32::from(made) + 1.0))
 }

@@ -4,6 +4,8 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
+#[cfg(any(test, feature = "timed"))]
+use super::objective::Objective;
 use crate::features::{FeatureSet, Property};
 use crate::table::{Action, Contents};
 
@@ -89,6 +91,9 @@ pub struct Config {
     ///
     /// [`Explorer::verification`]: super::Explorer::verification
     pub verify: bool,
+    /// What Bayesian exploration chooses the next movement for.
+    #[cfg(any(test, feature = "timed"))]
+    pub objective: Objective,
 }
 
 impl Default for Config {
@@ -102,6 +107,8 @@ impl Default for Config {
             open: false,
             false_alarm: None,
             verify: false,
+            #[cfg(any(test, feature = "timed"))]
+            objective: Objective::Bits,
         }
     }
 }

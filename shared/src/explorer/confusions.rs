@@ -5,7 +5,7 @@ use heapless::Vec;
 
 use super::choice::{ExpectedOutcome, benefit, confuse_with};
 use super::config::{Method, NEGLIGIBLE};
-use super::kernels::{Candidate, Kernels, LiveTexture};
+use super::kernels::{Candidate, Kernels, LiveGaussian, LiveTexture, left};
 use super::posterior::{Explorer, LEAST};
 use super::whitened;
 use crate::table::{Action, MAX_ACTIONS};
@@ -22,7 +22,8 @@ pub type Degrees = [f32; LANES];
 /// They serve every explorer of the same table, candidates and method: [`Explorer::expected_outcomes_by`].
 #[derive(Clone, Copy, Debug)]
 pub struct Confusions<M> {
-    /// Square matrices, one for every few actions. A texture with itself has 0: eq. 10 leaves it out.
+    /// Square matrices, one for every few actions, and below each a row of what every texture has to do with its own degrees
+    /// (`LiveGaussian`'s root). A texture with itself has 0: eq. 10 leaves it out.
     matrices: M,
     textures: usize,
 }
@@ -31,7 +32,7 @@ impl<M: AsRef<[Degrees]> + AsMut<[Degrees]>> Confusions<M> {
     /// How much memory those of an explorer take.
     pub fn len_for<const N: usize, K>(explorer: &Explorer<'_, N, K>) -> usize {
         let textures = explorer.posterior.len();
-        explorer.actions.len().div_ceil(LANES) * textures * textures
+        explorer.actions.len().div_ceil(LANES) * textures * (textures + 1)
     }
 
     /// Computes them; `None` where the memory is not as large as [`Confusions::len_for`] says.
@@ -45,11 +46,20 @@ impl<M: AsRef<[Degrees]> + AsMut<[Degrees]>> Confusions<M> {
         }
         all.fill([0.0; LANES]);
         let textures = explorer.posterior.len();
-        let matrices = all.chunks_exact_mut(textures * textures);
+        let matrices = all.chunks_exact_mut(textures * (textures + 1));
         for (matrix, actions) in matrices.zip(explorer.actions.chunks(LANES)) {
+            let own = textures * textures;
+            matrix
+                .iter_mut()
+                .skip(own)
+                .for_each(|roots| *roots = [1.0; LANES]);
             for (lane, action) in actions.iter().enumerate() {
                 explorer.confuse_all(*action, |a, b, degree| {
-                    for at in [a * textures + b, b * textures + a] {
+                    let at = match b {
+                        Some(b) => [a * textures + b, b * textures + a],
+                        None => [own + a; 2],
+                    };
+                    for at in at {
                         let degrees = matrix.get_mut(at);
                         if let Some(slot) = degrees.and_then(|degrees| degrees.get_mut(lane)) {
                             *slot = degree;
@@ -85,8 +95,20 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         }
         let textures = confusions.textures;
         let matrices = confusions.matrices.as_ref();
-        let matrices = matrices.chunks_exact((textures * textures).max(1));
-        let uncertainty = matrices.flat_map(|matrix| uncertainty(matrix, textures, &live));
+        let matrices = matrices.chunks_exact((textures * (textures + 1)).max(1));
+        let mut weights: Vec<[Degrees; 2], N> = Vec::new();
+        let uncertainty = matrices.flat_map(|matrix| {
+            weights.clear();
+            let (degrees, roots) = matrix
+                .split_at_checked(textures * textures)
+                .unwrap_or_default();
+            for &(texture, probability) in &live {
+                let roots = roots.get(usize::from(texture)).copied().unwrap_or_default();
+                // `weights` has space: it is as long as `live`
+                let _ = weights.push([roots.map(|root| probability * root), roots]);
+            }
+            uncertainty(degrees, textures, &live, &weights)
+        });
         let actions = self.actions.iter().zip(&self.made).zip(uncertainty);
         actions
             .map(|((&action, &made), uncertainty)| ExpectedOutcome {
@@ -98,8 +120,8 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     }
 
     /// Passes `tell` the degree of confusion of every two candidates by an action, as the kernels compute it: these add it
-    /// to both, times a probability that is 1 here.
-    fn confuse_all(&self, action: Action, tell: impl FnMut(usize, usize, f32)) {
+    /// to both, times a probability that is 1 here; and a candidate's own root, where it has one.
+    fn confuse_all(&self, action: Action, mut tell: impl FnMut(usize, Option<usize>, f32)) {
         let is_candidate = |log: &i32| *log >= LEAST;
         let certain: Vec<f32, N> = self
             .log
@@ -111,17 +133,30 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         let method = self.config.method;
         if method == Method::Fused {
             let mut live: Vec<Candidate, N> = Vec::new();
-            whitened::gather(&self.table, action.movement, &certain, &mut live, K::sqrt);
-            let confuse = |a: &mut Candidate, others: &mut [Candidate]| {
-                K::candidate_distances(a, others);
-                whitened::confuse_with(a, others);
-            };
+            let confuse = whitened::gather::<K>(&self.table, action.movement, &certain, &mut live);
+            let confuse = |a: &mut Candidate, others: &mut [Candidate]| confuse.with(a, others);
             confuse_each(&mut live, &candidates, confuse, |c| &mut c.confused, tell);
+        } else if let Some(property) = self.only_property(action) {
+            let mut live: Vec<LiveGaussian, N> = Vec::new();
+            let action = Action::of(action.movement, property);
+            self.gather_one(method, action, &certain, &mut live);
+            for (c, texture) in live.iter_mut().zip(&candidates) {
+                tell(usize::from(*texture), None, c.root);
+                c.weight = 1.0;
+            }
+            confuse_each(
+                &mut live,
+                &candidates,
+                K::confuse,
+                |c| &mut c.confused,
+                tell,
+            );
         } else {
             let mut live: Vec<LiveTexture, N> = Vec::new();
-            let properties = self.gather(method, action, &certain, &mut live);
+            self.gather(action, &certain, &mut live);
+            let properties = self.measured.iter().count();
             let confuse = |a: &mut LiveTexture, others: &mut [LiveTexture]| {
-                confuse_with(a, others, properties, K::confuse, K::sqrt);
+                confuse_with(a, others, properties, K::sqrt);
             };
             confuse_each(&mut live, &candidates, confuse, |c| &mut c.confused, tell);
         }
@@ -134,7 +169,7 @@ fn confuse_each<L>(
     textures: &[u16],
     confuse: impl Fn(&mut L, &mut [L]),
     confused: impl Fn(&mut L) -> &mut f32,
-    mut tell: impl FnMut(usize, usize, f32),
+    mut tell: impl FnMut(usize, Option<usize>, f32),
 ) {
     let (mut rest, mut textures) = (live, textures);
     while let (Some((a, others)), Some((of_a, after))) =
@@ -143,18 +178,23 @@ fn confuse_each<L>(
         confuse(a, others);
         for (b, of_b) in others.iter_mut().zip(after) {
             let degree = core::mem::take(confused(b));
-            tell(usize::from(*of_a), usize::from(*of_b), degree);
+            tell(usize::from(*of_a), Some(usize::from(*of_b)), degree);
         }
         (rest, textures) = (others, after);
     }
 }
 
 /// Uncertainty that is expected to remain (eq. 10) by each of some actions, of which this is the matrix, when these textures
-/// are that probable.
+/// are that probable, and have these weights and roots.
 #[inline(never)]
-fn uncertainty(matrix: &[Degrees], textures: usize, live: &[(u16, f32)]) -> Degrees {
-    let mut left = [0.0; LANES];
-    for some in live.chunks(ROWS) {
+fn uncertainty(
+    matrix: &[Degrees],
+    textures: usize,
+    live: &[(u16, f32)],
+    weights: &[[Degrees; 2]],
+) -> Degrees {
+    let mut all = [0.0; LANES];
+    for (some, own) in live.chunks(ROWS).zip(weights.chunks(ROWS)) {
         let rows = core::array::from_fn(|row| {
             // where there are fewer, the first of them again
             let (texture, _) = some.get(row).or(some.first())?;
@@ -167,21 +207,22 @@ fn uncertainty(matrix: &[Degrees], textures: usize, live: &[(u16, f32)]) -> Degr
         };
         // What is added, and in which order, is as where degrees are computed: those before a texture, then those after it.
         let mut confused = [[0.0; LANES]; ROWS];
-        for &(texture, probability) in live {
+        for (&(texture, _), [weights, _]) in live.iter().zip(weights) {
             for (confused, row) in confused.iter_mut().zip([a, b, c, d]) {
                 let Some(degrees) = row.get(usize::from(texture)) else {
                     continue;
                 };
-                for (sum, degree) in confused.iter_mut().zip(degrees) {
-                    *sum += degree * probability;
+                for ((sum, degree), weight) in confused.iter_mut().zip(degrees).zip(weights) {
+                    *sum += degree * weight;
                 }
             }
         }
-        for ((_, probability), confused) in some.iter().zip(confused) {
-            for (left, confused) in left.iter_mut().zip(confused) {
-                *left += probability * confused / (probability + confused);
+        for ([weights, roots], confused) in own.iter().zip(confused) {
+            let own = weights.iter().zip(roots);
+            for ((sum, confused), (weight, root)) in all.iter_mut().zip(confused).zip(own) {
+                *sum += left(*weight, *root, confused);
             }
         }
     }
-    left
+    all
 }

@@ -2,8 +2,9 @@
 //!
 //! [`Plain`] is the reference. Another implementation must give the same integers, and the same floats to the bit.
 
+use super::overlap::OVERLAP;
 use crate::dsp::Plain;
-use crate::dsp::fixed::{exp_neg_q30, ln_q16};
+use crate::dsp::fixed::{LN_2, LOG2_E, exp_neg_q30, exp2_neg_q30, ln_q16};
 use crate::features::{MAX_FEATURES, Property};
 use crate::table::{Gaussian, Gaussians, Numbers, PAIRS, Row, Words, dot, fill, products, words};
 
@@ -14,12 +15,10 @@ use crate::table::{Gaussian, Gaussians, Numbers, PAIRS, Row, Words, dot, fill, p
 pub struct Candidate {
     /// Its whitened mean, filled up with zeros.
     pub mean: [i16; MAX_FEATURES],
+    /// Sum of squares of the mean; `u32::MAX` where 32 bits do not hold it.
+    pub square: u32,
     /// Its probability.
     pub probability: f32,
-    /// Sum of squares of the mean.
-    pub square: u64,
-    /// Squared distance from the texture that it is compared with.
-    pub distance: u64,
     /// Sum over all others of confusion times probability: the numerator of eq. 8.
     pub confused: f32,
     /// Slides that it was learned from.
@@ -73,9 +72,8 @@ impl Candidate {
         ];
         Self {
             mean,
+            square: u32::try_from(square).unwrap_or(u32::MAX),
             probability,
-            square: square as u64,
-            distance: 0,
             confused: 0.0,
             slides,
         }
@@ -98,10 +96,51 @@ pub(crate) fn mask(features: usize) -> Mask {
     mask
 }
 
-/// A texture that is still likely, while an expected uncertainty is computed from Gaussians. The order of the fields is
-/// fixed, as that of [`Candidate`].
+/// A texture that is still likely, while an expected uncertainty is computed from the Gaussians of one property. The order of
+/// the fields is fixed, as that of [`Candidate`].
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
+pub struct LiveGaussian {
+    /// Its probability times `root`.
+    pub weight: f32,
+    /// Sum over all others of confusion times probability, the numerator of eq. 8, by `root`.
+    pub confused: f32,
+    /// What is expected.
+    pub mean: f32,
+    /// Its variance, in such a unit that distances are in steps of [`OVERLAP`].
+    pub variance: f32,
+    /// What it contributes to a degree of confusion by its standard deviation alone.
+    pub root: f32,
+}
+
+impl LiveGaussian {
+    /// One that is not compared yet.
+    #[inline(always)]
+    pub(crate) fn new(probability: f32, of: Gaussian, sqrt: fn(f32) -> f32) -> Self {
+        /// 100 ln 2 / 31^2: (m_i - m_j)^2 / 4 octaves are 5^2 parts of 31^2 steps.
+        const UNIT: f32 = 0.072_127_7;
+        /// The square root of twice that.
+        const ROOT: f32 = 0.379_809_68;
+        let root = sqrt(ROOT * of.sd);
+        Self {
+            weight: probability * root,
+            confused: 0.0,
+            mean: of.mean,
+            variance: UNIT * of.sd * of.sd,
+            root,
+        }
+    }
+}
+
+/// Numerator of eq. 11 for a texture of such a weight, root and sum ([`LiveGaussian`]).
+#[inline]
+pub(crate) fn left(weight: f32, root: f32, confused: f32) -> f32 {
+    let (probability, confused) = (weight / root, confused * root);
+    probability * confused / (probability + confused)
+}
+
+/// A texture that is still likely, while an expected uncertainty is computed from Gaussians of several properties.
+#[derive(Clone, Copy, Debug)]
 pub struct LiveTexture {
     /// Its probability.
     pub probability: f32,
@@ -123,7 +162,33 @@ impl LiveTexture {
 }
 
 /// Textures that far apart are not confused: 25 ln 2, where the exponential is half of the last place of a number near 1.
-pub const FAR: f32 = 17.33;
+pub(crate) const FAR: f32 = 17.33;
+
+/// What squared distances of whitened means, Q16, are worth (eq. 7).
+#[derive(Clone, Copy, Debug)]
+pub struct Likeness {
+    /// The degree of confusion is 2 to the power of less the distance times this, of which the upper half is in Q18.
+    pub octaves: u32,
+    /// Means that far apart, an even number, are not confused: 25 octaves, as with Gaussians.
+    pub far: u32,
+}
+
+impl Likeness {
+    /// Of two textures, of which the one with fewer slides was learned from so many, 1 at least.
+    #[inline(always)]
+    pub fn new(fewer: u8) -> Self {
+        // the exponent is the squared distance times n / (8 (n + 1))
+        let n = u32::from(fewer.max(1));
+        let far = ((25 * 8 * LN_2 as u64) >> 16) as u32;
+        Self {
+            octaves: 2 * LOG2_E / (n + 1) * n,
+            far: (far * (n + 1) / n) & !1,
+        }
+    }
+}
+
+/// Kernels for whitened means may count on sums of squares below this, 90 standard deviations: distances have 31 bits then.
+pub const MOST_SQUARE: u32 = 1 << 29;
 
 /// Degree of confusion of two textures by one property (eq. 7), with this square root.
 #[inline]
@@ -281,12 +346,14 @@ pub trait Kernels: crate::dsp::Kernels {
         products(row, others)
     }
 
-    /// Sets the squared distance of each of `others` from the mean of `from`.
-    fn candidate_distances(from: &Candidate, others: &mut [Candidate]);
+    /// Adds the confusion of `a` with each of `others` (eq. 7), by their whitened means, to what they are confused with. All
+    /// sums of squares are below [`MOST_SQUARE`]; that of `a` counts as the next even number. Of `a` and each of them, the one
+    /// with fewer slides was learned from `fewer`, 1 at least.
+    fn confuse_whitened(a: &mut Candidate, others: &mut [Candidate], fewer: u8);
 
-    /// Adds the confusion of `a` with each of `others` (eq. 7), by the first property that is looked at, to what they are
-    /// confused with. Means and standard deviations are a table's: finite, and these above 0.
-    fn confuse(a: &mut LiveTexture, others: &mut [LiveTexture]);
+    /// Adds the confusion of `a` with each of `others` (eq. 7) to what they are confused with. Means and standard deviations
+    /// are a table's: finite, and these above 0.
+    fn confuse(a: &mut LiveGaussian, others: &mut [LiveGaussian]);
 
     /// Square root of a number that is not negative, correctly rounded (IEEE 754).
     fn sqrt(x: f32) -> f32;
@@ -338,26 +405,37 @@ impl Kernels for Plain {
         (top, total)
     }
 
-    fn candidate_distances(from: &Candidate, others: &mut [Candidate]) {
-        for other in others {
-            let apart = from.mean.iter().zip(&other.mean).map(|(a, b)| {
+    #[inline(never)]
+    fn confuse_whitened(a: &mut Candidate, others: &mut [Candidate], fewer: u8) {
+        let Likeness { octaves, far } = Likeness::new(fewer);
+        let mut sum = a.confused;
+        for b in others {
+            let squares = a.mean.iter().zip(&b.mean).map(|(a, b)| {
                 let apart = i64::from(*a) - i64::from(*b);
                 (apart * apart) as u64
             });
-            other.distance = apart.sum();
-        }
-    }
-
-    fn confuse(a: &mut LiveTexture, others: &mut [LiveTexture]) {
-        let [of_a, ..] = a.expected;
-        let mut sum = a.confused;
-        for b in others {
-            let [of_b, ..] = b.expected;
-            let confusion = confused(of_a, of_b, Self::sqrt);
-            if confusion > 0.0 {
+            let distance = squares.sum::<u64>() + u64::from(a.square & 1);
+            if distance < u64::from(far) {
+                let octaves = (distance * u64::from(octaves)) >> 32;
+                let confusion = exp2_neg_q30(octaves as u32) as f32 * (1.0 / (1u32 << 30) as f32);
                 sum += confusion * b.probability;
                 b.confused += confusion * a.probability;
             }
+        }
+        a.confused = sum;
+    }
+
+    fn confuse(a: &mut LiveGaussian, others: &mut [LiveGaussian]) {
+        let mut sum = a.confused;
+        for b in others {
+            let narrowness = 1.0 / Self::sqrt(a.variance + b.variance);
+            let apart = (a.mean - b.mean) * narrowness;
+            let step = (apart as i32).clamp(-32, 31) + 32;
+            let [constant, linear, square, _] =
+                OVERLAP.get(step as usize).copied().unwrap_or_default();
+            let confusion = (constant + (linear + square * apart) * apart) * narrowness;
+            sum += confusion * b.weight;
+            b.confused += confusion * a.weight;
         }
         a.confused = sum;
     }
@@ -368,9 +446,9 @@ impl Kernels for Plain {
 }
 
 /// 1.5 * 2^23: adding it leaves a number's whole part in the lowest bits.
-pub const ROUND: f32 = 12_582_912.0;
+const ROUND: f32 = 12_582_912.0;
 /// 2^x for -0.5..=0.5, from the sixth power on; after them comes 1 (Cephes, exp2f).
-pub const EXP2: [f32; 6] = [
+const EXP2: [f32; 6] = [
     1.535_336_2e-4,
     1.339_887_4e-3,
     9.618_437e-3,

@@ -3,6 +3,7 @@
 mod confusions;
 mod drift;
 mod fused;
+mod objective;
 mod paced;
 mod rules;
 mod student;

@@ -8,9 +8,12 @@ use heapless::{Vec, VecView};
 
 use super::config::NEGLIGIBLE;
 use super::episode::Episode;
-use super::kernels::{Candidate, DEGREES_OF_FREEDOM, Kernels, Spread, distance, mask, scales};
+use super::kernels::{
+    Candidate, DEGREES_OF_FREEDOM, Kernels, MOST_SQUARE, Spread, distance, mask, scales,
+};
 use super::novelty::{NoveltyModel, Source, student_norm};
-use crate::dsp::fixed::{exp_neg_q30, ln_q16};
+use crate::dsp::Plain;
+use crate::dsp::fixed::ln_q16;
 use crate::table::{Contents, Table};
 
 /// [`Kernels::add_likelihoods`].
@@ -161,25 +164,6 @@ pub(super) fn q16(ln: f32) -> i32 {
     (ln.max(-256.0) * 65536.0) as i32
 }
 
-/// e^(-x) is 0 from here on, Q16: [`exp_neg_q30`].
-const FAR: u32 = 22 << 16;
-
-/// Degree of confusion of two textures (eq. 7, of the means of whitened slides) whose means are so far apart, Q16: 1 where
-/// one was never learned. `fewer` is the smaller number of slides of the two.
-#[inline(always)]
-fn confusion(apart: u32, fewer: u8) -> f32 {
-    if fewer == 0 {
-        return 1.0;
-    }
-    // |m_i - m_j|^2 / (8 (1 + 1/n))
-    let n = u32::from(fewer);
-    let exponent = match apart.checked_mul(n) {
-        Some(product) => product / (8 * (n + 1)),
-        None => (u64::from(apart) * u64::from(n) / u64::from(8 * (n + 1))) as u32,
-    };
-    exp_neg_q30(exponent) as f32 * (1.0 / (1u32 << 30) as f32)
-}
-
 /// Sum over the textures that are still likely of the numerator of eq. 11, after a movement.
 pub(super) fn uncertainty<K: Kernels, const N: usize>(
     table: &Table<'_>,
@@ -187,59 +171,98 @@ pub(super) fn uncertainty<K: Kernels, const N: usize>(
     posterior: &[f32],
 ) -> f32 {
     let mut live: Vec<Candidate, N> = Vec::new();
-    gather(table, movement, posterior, &mut live, K::sqrt);
+    let confuse = gather::<K>(table, movement, posterior, &mut live);
     let mut rest = live.as_mut_slice();
     while let Some((a, others)) = rest.split_first_mut() {
-        K::candidate_distances(a, others);
-        confuse_with(a, others);
+        confuse.with(a, others);
         rest = others;
     }
     let left = |c: &Candidate| c.probability * c.confused / (c.probability + c.confused);
     live.iter().map(left).sum()
 }
 
-/// The textures that are still likely.
+/// How textures are confused with each other.
+#[derive(Clone, Copy)]
+pub(super) struct Confuse {
+    /// [`Kernels::confuse_whitened`].
+    with: fn(&mut Candidate, &mut [Candidate], u8),
+    /// How many slides all of them were learned from; `None` where these are different numbers, or none.
+    slides: Option<u8>,
+}
+
+impl Confuse {
+    /// Confusion of one texture with all others.
+    pub(super) fn with(self, a: &mut Candidate, others: &mut [Candidate]) {
+        if let Some(slides) = self.slides {
+            return (self.with)(a, others, slides);
+        }
+        let mut rest = others;
+        while let Some(first) = rest.first().map(|b| b.slides) {
+            let many = rest.iter().take_while(|b| b.slides == first).count();
+            let (alike, later) = rest.split_at_mut_checked(many).unwrap_or_default();
+            rest = later;
+            let slides = first.min(a.slides);
+            if slides > 0 {
+                (self.with)(a, alike, slides);
+                continue;
+            }
+            // one that was never learned is confused with all
+            for b in alike {
+                a.confused += b.probability;
+                b.confused += a.probability;
+            }
+        }
+    }
+}
+
+/// The textures that are still likely, and how they are confused.
+pub(super) fn gather<K: Kernels>(
+    table: &Table<'_>,
+    movement: u8,
+    posterior: &[f32],
+    live: &mut VecView<Candidate>,
+) -> Confuse {
+    let (slides, bounded) = gather_live(table, movement, posterior, live, K::sqrt);
+    let with = if bounded {
+        K::confuse_whitened
+    } else {
+        Plain::confuse_whitened
+    };
+    Confuse { with, slides }
+}
+
+/// The textures that are still likely; how many slides all of them were learned from, if these are as many, and whether
+/// their sums of squares are bounded as kernels want it.
 #[inline(never)]
-pub(super) fn gather(
+fn gather_live(
     table: &Table<'_>,
     movement: u8,
     posterior: &[f32],
     live: &mut VecView<Candidate>,
     sqrt: fn(f32) -> f32,
-) {
+) -> (Option<u8>, bool) {
     let Contents::Fused(_, features) = table.contents() else {
-        return;
+        return (None, false);
     };
     let column = table.column(movement);
     let mask = mask(features.into());
     let drifts = table.drifts(movement);
     // exact where all were learned from as many slides as the first one
     let scales = drifts.map(|drifts| scales(drifts, column.slides(0), sqrt));
+    let (mut first, mut alike, mut most) = (0, true, 0);
     for (&probability, texture) in posterior.iter().zip(0..) {
         if probability >= NEGLIGIBLE {
             let (mean, slides) = (column.mean(texture), column.slides(texture));
             let candidate = Candidate::new(mean, &mask, scales.as_ref(), probability, slides);
+            if live.is_empty() {
+                first = slides;
+            }
+            alike &= slides == first;
+            most = most.max(candidate.square);
             // `live` has space: it is as long as the posterior
             let _ = live.push(candidate);
         }
     }
-}
-
-/// Confusion of one texture with all others, whose distances from it are known.
-#[inline(never)]
-pub(super) fn confuse_with(a: &mut Candidate, others: &mut [Candidate]) {
-    let mut confused = a.confused;
-    for b in others {
-        // the last factor of the exponent is 2 at most
-        let far = b.distance >= u64::from(16 * FAR);
-        if far && a.slides > 0 && b.slides > 0 {
-            continue;
-        }
-        // no distance counts where one was never learned
-        let apart = if far { 0 } else { b.distance as u32 };
-        let confusion = confusion(apart, a.slides.min(b.slides));
-        confused += confusion * b.probability;
-        b.confused += confusion * a.probability;
-    }
-    a.confused = confused;
+    let slides = Some(first).filter(|first| alike && *first > 0);
+    (slides, most < MOST_SQUARE)
 }

@@ -58,9 +58,9 @@ proptest! {
 fn memory_of_another_size_is_refused() {
     let bytes = plain(&[0.0, 0.2, 0.4], 2);
     let explorer = explorer(&bytes, Strategy::Bayesian);
-    // six actions, four to a matrix
+    // six actions, four to a matrix, which has one row more than textures
     let needed = Confusions::<Vec<Degrees>>::len_for(&explorer);
-    assert_eq!(needed, 2 * 3 * 3);
+    assert_eq!(needed, 2 * 3 * 4);
     for wrong in [0, needed - 1, needed + 1] {
         assert!(Confusions::new(&explorer, vec![Degrees::default(); wrong]).is_none());
     }

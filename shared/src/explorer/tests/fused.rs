@@ -152,6 +152,7 @@ const OPEN: Config = Config {
     threshold: 0.99,
     max_slides: 10,
     open: true,
+    objective: Objective::Bits,
 };
 const CLOSED: Config = Config {
     open: false,
@@ -884,6 +885,6 @@ fn what_lies_behind_a_mean_does_not_count() {
     for candidate in [last, first] {
         assert_eq!(candidate.mean[..4], mean);
         assert_eq!(candidate.mean[4..], [0; MAX_FEATURES - 4]);
-        assert_eq!(candidate.square, square as u64);
+        assert_eq!(i64::from(candidate.square), square);
     }
 }
