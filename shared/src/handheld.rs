@@ -22,7 +22,10 @@ pub mod touch;
 pub mod weights;
 
 pub use draw::draw;
-pub use judge::{FEATURES, JudgeError, Judgement, LEADING, MAX_SLIDES, MOVEMENT, free_name, judge};
+pub use judge::{
+    ASK_AFTER, FEATURES, JudgeError, Judgement, LEADING, MAX_SLIDES, MOVEMENT, free_name, judge,
+    judge_at_most,
+};
 pub use picture::Picture;
 pub use screen::{About, Screen, Trouble};
 pub use small::Small;

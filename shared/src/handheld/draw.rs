@@ -315,13 +315,16 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             }
             Ok(())
         }
-        Screen::Verdict { rows, sure } => {
+        Screen::Verdict { rows, sure, open } => {
             if *sure {
                 brush.headline(rows.first().map_or("?", |row| row.name), -1)?;
             } else {
                 brush.headline(&perhaps(rows), -1)?;
             }
             brush.rows(rows, 20)?;
+            if *open {
+                brush.left("Slide on to be sure", 0, 42)?;
+            }
             brush.button("next", "teach")
         }
         Screen::Changed { rows } => {

@@ -13,8 +13,10 @@ use crate::table::{Action, MAX_TEXTURES, Name, Table};
 pub const MOVEMENT: Movement = Movement::FOR_FINENESS;
 /// The features that a handheld's table is learned from.
 pub const FEATURES: FeatureSet = FeatureSet::Pressure;
-/// Slides after which the most probable texture is the answer, sure or not.
-pub const MAX_SLIDES: usize = 5;
+/// Slides after which the most probable texture is the answer, sure or not, and the person may go on.
+pub const ASK_AFTER: usize = 5;
+/// Slides after which nobody is asked for more: in the simulated world the next two tell 1 % more textures, or 2 %.
+pub const MAX_SLIDES: usize = 10;
 /// Textures that a verdict shows.
 pub const LEADING: usize = 3;
 
@@ -76,9 +78,27 @@ pub fn judge<K: Kernels>(
     reference: Option<u16>,
     false_alarm: Option<f32>,
 ) -> Result<(Judgement, EpisodeSummary), JudgeError> {
+    let most = match reference {
+        Some(_) => ASK_AFTER,
+        None => MAX_SLIDES,
+    };
+    judge_at_most::<K>(table, slides, reference, false_alarm, most)
+}
+
+/// The same where `most` slides, up to 255, are the last ones, sure or not.
+///
+/// # Errors
+/// See [`judge`].
+pub fn judge_at_most<K: Kernels>(
+    table: Table<'_>,
+    slides: &[Observation],
+    reference: Option<u16>,
+    false_alarm: Option<f32>,
+    most: usize,
+) -> Result<(Judgement, EpisodeSummary), JudgeError> {
     let config = Config {
         method: Method::Fused,
-        max_slides: MAX_SLIDES as u8,
+        max_slides: most as u8,
         open: true,
         false_alarm,
         verify: reference.is_some(),

@@ -123,6 +123,8 @@ pub enum Screen<'a> {
         rows: Vec<Row<'a>, LEADING>,
         /// The first one is 99 % sure.
         sure: bool,
+        /// Further slides may tell more; then there are two rows at most.
+        open: bool,
     },
     /// It is one of those known, but not as it was learned.
     Changed {

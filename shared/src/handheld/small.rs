@@ -4,7 +4,7 @@ use core::mem::MaybeUninit;
 
 use crate::dsp::{Angles, Complex32, FRAME, Folded, Kernels as Signals, Plain, Taps};
 use crate::explorer::Kernels;
-use crate::explorer::kernels::{Candidate, LiveTexture, Spread};
+use crate::explorer::kernels::{Candidate, LiveGaussian, Spread};
 use crate::table::Gaussians;
 
 /// [`Plain`], for tables with whitened features only.
@@ -12,6 +12,10 @@ use crate::table::Gaussians;
 pub struct Small;
 
 impl Signals for Small {
+    fn clip(samples: &[i16], clipped: &mut [i16]) {
+        Plain::clip(samples, clipped);
+    }
+
     fn band_energy(taps: &Taps, samples: &[i16]) -> u64 {
         Plain::band_energy(taps, samples)
     }
@@ -56,11 +60,11 @@ impl Kernels for Small {
         Plain::posterior(logs, posterior)
     }
 
-    fn candidate_distances(from: &Candidate, others: &mut [Candidate]) {
-        Plain::candidate_distances(from, others);
+    fn confuse_whitened(a: &mut Candidate, others: &mut [Candidate], fewer: u8) {
+        Plain::confuse_whitened(a, others, fewer);
     }
 
-    fn confuse(_: &mut LiveTexture, _: &mut [LiveTexture]) {}
+    fn confuse(_: &mut LiveGaussian, _: &mut [LiveGaussian]) {}
 
     fn sqrt(x: f32) -> f32 {
         Plain::sqrt(x)

@@ -11,7 +11,7 @@ use self::lists::{Entries, List};
 
 use super::button::Button;
 use super::guidance::{Again, Event};
-use super::judge::{JudgeError, Judgement, MAX_SLIDES, trials};
+use super::judge::{ASK_AFTER, JudgeError, Judgement, LEADING, MAX_SLIDES, trials};
 use super::screen::{About, Row, Screen, Trouble};
 use super::speed::Moved;
 use super::spelling::Spelling;
@@ -27,6 +27,8 @@ use crate::table::{Name, Table};
 pub const TICKS_HZ: u32 = 100;
 /// Slides that a texture is learned from when the person began with training.
 const TRAINING_SLIDES: usize = 3;
+/// Textures that a verdict shows which further slides may change.
+const OPEN_ROWS: usize = 2;
 /// Nothing happens for this long: the display goes dark and the sensor rests, ticks.
 const DARK_AFTER: u32 = 60 * TICKS_HZ;
 /// "Again" is shown at least this long, ticks.
@@ -223,7 +225,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         let go_on = if self.training {
             self.episode.len() < TRAINING_SLIDES
         } else {
-            judgement.open && self.reference.is_none()
+            judgement.open && self.reference.is_none() && self.episode.len() < ASK_AFTER
         };
         if go_on {
             self.judgement = Some(judgement);
@@ -338,8 +340,10 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     pub fn screen<'s>(&'s self, table: Option<&Table<'s>>, about: &About) -> Screen<'s> {
         let name = |texture: u16| table.and_then(|table| table.name(texture)).unwrap_or("?");
         let rows = |judgement: &Judgement| {
+            let rows = if judgement.open { OPEN_ROWS } else { LEADING };
             let leading = judgement.leading.iter();
             leading
+                .take(rows)
                 .map(|(texture, probability)| Row {
                     name: name(*texture),
                     probability: *probability,
@@ -349,7 +353,11 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         let (slide, of) = match &self.asked {
             Some(asked) => (asked.slide, asked.of),
             None if self.training => (self.episode.len() as u8 + 1, TRAINING_SLIDES as u8),
-            None => (self.episode.len() as u8 + 1, MAX_SLIDES as u8),
+            None => {
+                let goes_on = self.episode.len() >= ASK_AFTER && self.reference.is_none();
+                let of = if goes_on { MAX_SLIDES } else { ASK_AFTER };
+                (self.episode.len() as u8 + 1, of as u8)
+            }
         };
         match &self.page {
             Page::Ready if !self.touch.has_zero() => Screen::Air,
@@ -386,6 +394,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                 (Some(judgement), None) => Screen::Verdict {
                     rows: rows(judgement),
                     sure: judgement.sure,
+                    open: judgement.open,
                 },
             },
             Page::Choose(list, at) => {

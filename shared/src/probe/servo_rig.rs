@@ -43,6 +43,8 @@ pub enum RigCommand {
     Calibrate(RigCalibration),
     /// Whether movements may press with up to 2 N.
     AllowHighForce(bool),
+    /// A person is asked to lay a weight of so many mN on the lifted finger; 0, none is expected any more.
+    Weigh(u16),
     /// Another sample may lie under the finger.
     SampleChanged,
     /// Goes on from this wear of the skin.
@@ -73,6 +75,7 @@ impl RigCommand {
                 control.allow_high_force(allow);
                 Ok(())
             }
+            Self::Weigh(mn) => control.weigh(mn),
             Self::SampleChanged => {
                 control.sample_changed();
                 Ok(())
@@ -211,6 +214,38 @@ impl<S: Servo> ServoRig<S> {
         self.rest().await.map(|_| ())
     }
 
+    /// Counts of a weight above the air, once it has lain on the finger and was taken away.
+    async fn weigh_expected(&mut self, mn: u16) -> Result<f32, RigError> {
+        let scale = self.rest().await?.calibration.pressure.force_mn_per_count;
+        let (mut weighing, mut weighed) = (Weighing::new(mn, scale), None);
+        for look in 0..PATIENCE {
+            if look.is_multiple_of(LOOKS_HZ) {
+                let waits = weighing.wants_weight() && weighed.is_none();
+                let prompt = if waits {
+                    Prompt::Weigh(mn)
+                } else {
+                    Prompt::Lift
+                };
+                self.servo.tell(Event::Prompt(prompt));
+            }
+            self.servo.wait().await;
+            if self.servo.is_stopped() {
+                return Err(RigError::Stopped);
+            }
+            let rig = self.servo.state();
+            if let Phase::Faulted(fault) = rig.phase {
+                return Err(RigError::Fault(fault));
+            }
+            let counts = rig.force_mn / scale;
+            match weighed {
+                None => weighed = weighing.take(counts),
+                Some(weight) if weighing.is_air(counts) => return Ok(weight),
+                Some(_) => {}
+            }
+        }
+        Err(RigError::NobodyThere)
+    }
+
     /// Has something begun, unless all was stopped.
     async fn command(&mut self, command: RigCommand) -> Result<(), RigError> {
         if self.servo.is_stopped() {
@@ -276,29 +311,13 @@ impl<S: Servo> RigHandle for ServoRig<S> {
         if self.rest().await.map_err(Failure::Rig)?.phase == Phase::Parked {
             self.home().await.map_err(Failure::Rig)?;
         }
-        let scale = self.state().calibration.pressure.force_mn_per_count;
-        let mut weighing = Weighing::new(mn, scale);
-        for look in 0..PATIENCE {
-            if look.is_multiple_of(LOOKS_HZ) {
-                self.servo.tell(Event::Prompt(if weighing.wants_weight() {
-                    Prompt::Weigh(mn)
-                } else {
-                    Prompt::Lift
-                }));
-            }
-            self.servo.wait().await;
-            if self.servo.is_stopped() {
-                return Err(Failure::Rig(RigError::Stopped));
-            }
-            let rig = self.state();
-            if let Phase::Faulted(fault) = rig.phase {
-                return Err(Failure::Rig(RigError::Fault(fault)));
-            }
-            if let Some(counts) = weighing.take(rig.force_mn / scale) {
-                return Ok(counts);
-            }
-        }
-        Err(Failure::Rig(RigError::NobodyThere))
+        self.command(RigCommand::Weigh(mn))
+            .await
+            .map_err(Failure::Rig)?;
+        let weighed = self.weigh_expected(mn).await;
+        // a weight that is still there is a press now
+        let _ = self.servo.command(RigCommand::Weigh(0)).await;
+        weighed.map_err(Failure::Rig)
     }
 
     async fn set_high_force<F: NorFlash>(

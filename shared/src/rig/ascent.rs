@@ -13,6 +13,9 @@ const AIR_MN: f32 = 460.0;
 pub(super) const RELEASE_MS: u32 = 20;
 /// P_DC that has risen by so much on the way up, mN, says that something presses: the lever, if it goes down.
 const RISEN_MN: f32 = 92.0;
+/// The same of a pressed finger that is lifted, whose stage may still be braking, mN: 20 counts of a BioTac, and 1.26 N with them are far
+/// below the guard's limit, which a lever that goes down at the speed of lifting overshoots by up to 0.15 N.
+const LIFTED_RISEN_MN: f32 = 230.0;
 /// A finger that waits in the air may warm up: what it says there follows so many mN a millisecond, 30 counts of a BioTac a
 /// minute (chosen). Somebody may touch it, too: only [`AIR_MN`] more say that the lever has come down.
 const WARMING_MN: f32 = 0.00575;
@@ -32,6 +35,8 @@ pub(super) struct Ascent {
     lowest: Option<f32>,
     /// That is kept: the finger was pressed too hard since lever and stage were home, and may be so still.
     pressed: bool,
+    /// A weight of so many mN may come to lie on the finger while it waits.
+    weight_mn: f32,
     /// The finger cannot be lifted: the lever's driver stays off.
     pub(super) gave_up: bool,
     /// P_DC above no contact when the driver of a finger that was pressed too hard had been off for [`RELEASE_MS`].
@@ -45,6 +50,7 @@ impl Ascent {
             finger,
             lowest: None,
             pressed: false,
+            weight_mn: 0.0,
             gave_up: false,
             released: 0.0,
         }
@@ -70,6 +76,11 @@ impl Ascent {
         self.lowest = mean.or(self.lowest);
     }
 
+    /// So many mN more may come to lie on the finger, for as long as it waits.
+    pub(super) fn expect(&mut self, mn: u16) {
+        self.weight_mn = f32::from(mn);
+    }
+
     /// A millisecond of `phase`, its `ms`-th, with a lever that `seeks` its switch or a stage that does not know its place: the
     /// fault, if P_DC has risen on the way to the switch, or while the finger is to stay lifted.
     #[inline(never)]
@@ -80,21 +91,45 @@ impl Ascent {
         ms: u32,
         meter: &ForceMeter,
     ) -> Option<Fault> {
+        if phase != Phase::Ready {
+            self.weight_mn = 0.0;
+        }
         match phase {
             Phase::Homing | Phase::Positioning | Phase::Unloaded => {
                 self.rises(meter.mean(), RISEN_MN)
             }
             Phase::Lifting if seeks => self.rises(meter.mean(), RISEN_MN),
+            Phase::Lifting => {
+                // it was lifted when it was pressed last
+                if ms <= 1 {
+                    self.set_out(meter.mean());
+                }
+                self.rises(meter.mean(), LIFTED_RISEN_MN)
+            }
             Phase::Faulted(Fault::ForceHigh) => {
                 self.lift(ms, meter);
                 None
+            }
+            // a switch that was closed on the way does not say when the finger is up, nor do steps, nor that nothing was felt where
+            // the sample should be: P_DC says when it is not
+            Phase::Faulted(Fault::LeverLimit | Fault::NoContact | Fault::PressureDead) => {
+                if ms <= 1 && !self.pressed {
+                    self.set_out(meter.mean());
+                }
+                self.rises(meter.mean(), RISEN_MN)
+                    .map(|_| Fault::LeverNotHome)
             }
             Phase::Ready => {
                 self.pressed = false;
                 self.lowest = self
                     .lowest
                     .map(|lowest| lowest + self.finger.counts(WARMING_MN));
-                self.rises(meter.mean(), if seeks { RISEN_MN } else { AIR_MN })
+                let most_mn = if seeks {
+                    RISEN_MN
+                } else {
+                    AIR_MN + self.weight_mn
+                };
+                self.rises(meter.mean(), most_mn)
             }
             _ => None,
         }
@@ -102,6 +137,7 @@ impl Ascent {
 
     /// P_DC on the way, mean of 10 ms: the fault, if it has risen by more than `mn`. The first time somebody may lean on
     /// the finger, and it is lifted; then no further try makes a step before P_DC has fallen again.
+    #[inline(never)]
     fn rises(&mut self, mean: Option<f32>, mn: f32) -> Option<Fault> {
         let mean = mean?;
         let lowest = self.lowest.map_or(mean, |lowest| lowest.min(mean));
@@ -180,6 +216,28 @@ mod tests {
             ascent.rises(Some(2700.0), RISEN_MN),
             Some(Fault::LeverNotHome)
         );
+    }
+
+    #[test]
+    fn a_lever_that_felt_nothing_is_watched_on_its_way_up() {
+        for (fault, seen) in [
+            (Fault::LeverLimit, Some(Fault::LeverNotHome)),
+            (Fault::NoContact, Some(Fault::LeverNotHome)),
+            (Fault::PressureDead, Some(Fault::LeverNotHome)),
+            // the lever knows that it was pressed
+            (Fault::Unsteady, None),
+        ] {
+            let mut meter = ForceMeter::new(2600.0);
+            let mut ascent = Ascent::new(&BioTac::MODEL);
+            let mut found = None;
+            for ms in 1..100 {
+                for _ in 0..2 {
+                    meter.push(Counts::new(2600 + ms as u16).unwrap());
+                }
+                found = found.or(ascent.tick(Phase::Faulted(fault), true, ms, &meter));
+            }
+            assert_eq!(found, seen, "{fault:?}");
+        }
     }
 
     #[test]

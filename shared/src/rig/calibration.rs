@@ -1,11 +1,9 @@
 //! The constants of one rig, and how they are found: lines through measured points.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
 use serde::{Deserialize, Serialize};
 
+use crate::CRC32;
 use crate::sensor::pressure::{Calibration, CalibrationError};
-
-const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// What was measured of one rig, on which day, and with which sensor.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -80,7 +80,7 @@ faults! {
         "check cable length, ground and clock phase, then reset";
     /// The sensor says the same thing again and again.
     SensorFrozen, "sensor frozen", "P_AC the same for 100 ms, which always has noise", 102, BOTH, ALL,
-        "switch the sensor's power off and on, then reset";
+        "switch the probe and its sensor off and on";
     /// Samples of a slide are missing.
     SlideGap, "gap in a slide", "a damaged or late word between the background and the end of the slide", 2,
         "nothing: the slide is finished", "the slide: it is repeated", "none";
@@ -101,7 +101,7 @@ faults! {
     LeverNotHome, "lever not home", "limit switch not reached in 1.25 times the travel, or released for 20 ms under a lever that stands at it, P_DC still as high as it had risen on the last way up, or P_DC there or at the first zero more than 40 counts off the calibration's", 2,
         "lever motor off, stage motor braked", ALL, "turn the lever's knob until the finger is free, check its driver, the switch and that DIR is not inverted; calibrate a finger that has drifted, then reset";
     /// The stage did not find its limit switch.
-    StageNotHome, "stage not home", "limit switch not reached: the stage falls behind, or has gone 1.25 times the travel", 2, BOTH, ALL,
+    StageNotHome, "stage not home", "limit switch not reached: the stage falls behind, or has gone 1.25 times the travel, or 3 mm where it touches it again", 2, BOTH, ALL,
         "clear the stage's way and check the switch, then reset";
     /// The finger presses, and P_DC does not say so.
     PressureDead, "pressure dead", "P_AC shows contact and P_DC does not rise within 0.5 mm, or no longer rises while P_AC shows that the pressure does, or no contact 1 mm below that of the last press on this sample", 2,

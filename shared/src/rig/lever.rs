@@ -14,6 +14,13 @@ use crate::sensor::pressure::{Calibration, Counts};
 pub const STEP_UM: f32 = 0.625;
 /// Steps per second while approaching: 0.5 mm/s (Methods, "Force Control with Stepper Motor").
 pub const APPROACH_STEPS_S: i32 = 800;
+/// Steps per second through the air, down to the first contact in P_AC or P_DC: 2 mm/s, at which a stepper stops on a step. Until
+/// the mean of P_DC shows it and the motor stands, 11 ms, it makes 22 um: 50 mN on a hard sample, half of the lightest press.
+pub const DESCENT_STEPS_S: i32 = 3200;
+/// After that the lever stands until the whole mean of P_DC, 10 ms, and the one before are of the standing finger.
+const REST_MS: u32 = 20;
+/// It goes slowly from this far above the last contact on, 0.15 mm: that was seen some hundredths of a millimetre below the surface.
+const NEAR_STEPS: i32 = 240;
 /// Steps per second while lifting, upwards: 2 mm/s, still within what a stepper starts and stops at without a ramp.
 pub const RETRACT_STEPS_S: i32 = -3200;
 /// Steps per second while the force is trimmed: slow enough to stop on a step.
@@ -140,6 +147,9 @@ pub struct Lever {
     at_switch: bool,
     /// Count of steps at the last contact.
     contact: Option<i32>,
+    /// It comes down through the air, and for so long it stands where it touched then, ms.
+    descends: bool,
+    rest_ms: u32,
     progress: Progress,
     ms: u32,
 }
@@ -167,6 +177,8 @@ impl Lever {
             known: false,
             at_switch: false,
             contact: None,
+            descends: false,
+            rest_ms: 0,
             progress,
             ms: 0,
         }
@@ -334,6 +346,7 @@ impl Lever {
                     self.stood = 0;
                     self.pressed = 0.0;
                     self.crept = 0.0;
+                    (self.descends, self.rest_ms) = (false, 0);
                     self.enter(LeverState::Approaching(None));
                     return Ok(APPROACH_STEPS_S);
                 }
@@ -387,10 +400,18 @@ impl Lever {
         steps: i32,
         contact: Option<i32>,
     ) -> Result<i32, Fault> {
+        if self.rest_ms > 0 {
+            self.rest_ms -= 1;
+            return Ok(0);
+        }
         let (counts, mean) = (meter.counts_now(), meter.counts());
         let contact_counts = self.finger.counts(CONTACT_MN);
         let contact = contact.or_else(|| (mean > contact_counts).then_some(steps));
         self.state = LeverState::Approaching(contact);
+        if contact.is_some() && core::mem::take(&mut self.descends) {
+            self.rest_ms = REST_MS;
+            return Ok(0);
+        }
         self.progress.judge(steps, mean, contact.is_some())?;
         let lowest = contact.map_or(MAX_STEPS, |_| END_STEPS);
         let at_end = self.ms > APPROACH_MS || steps - self.top >= lowest;
@@ -407,7 +428,16 @@ impl Lever {
                 return Err(Fault::PressureDead);
             }
             None if at_end => return Err(Fault::NoContact),
-            None => return Ok(APPROACH_STEPS_S),
+            None => {
+                // slowly while the zero is still to be believed, and where the sample is or may be
+                let near = self.contact.is_some_and(|at| at - steps < NEAR_STEPS);
+                self.descends = self.ms >= CLEAR_MS && !near && !self.progress.is_touched();
+                return Ok(if self.descends {
+                    DESCENT_STEPS_S
+                } else {
+                    APPROACH_STEPS_S
+                });
+            }
             Some(_) if at_end => return Err(Fault::LeverSlips),
             Some(at) => self.contact = Some(at),
         }

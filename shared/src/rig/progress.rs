@@ -138,6 +138,11 @@ impl Progress {
         self.of_piece += rise;
     }
 
+    /// Whether P_AC shows a contact that P_DC does not.
+    pub(super) fn is_touched(&self) -> bool {
+        self.touched.is_some()
+    }
+
     /// Judges a millisecond of an approach: the steps made, P_DC above no contact, and whether it shows contact.
     ///
     /// # Errors

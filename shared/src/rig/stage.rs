@@ -65,7 +65,12 @@ pub const MARGIN_MM: f32 = 1.0;
 const MAX_INTEGRAL: f32 = 0.25;
 /// While homing, no guard tells a blocked stage from a silent encoder: less is allowed.
 const HOMING_FOLLOWING_MM: f32 = 0.5;
-const HOMING_MM_S: f32 = 10.0;
+/// The switch is searched at this speed; it is 4 mm before the hard stop, and the shorted motor brakes within one. Then ...
+const SEARCH_MM_S: f32 = 40.0;
+/// ... it is touched again at this speed, in which the 3 ms until it is believed are 30 um.
+const TOUCH_MM_S: f32 = 10.0;
+/// The touch begins [`MARGIN_MM`] from the switch, and goes at most so far.
+const TOUCH_MM: f32 = 3.0 * MARGIN_MM;
 /// The stage has arrived when it stands this near, mm: friction holds it within 0.2 mm, and every move begins where it
 /// stands.
 const ARRIVED_MM: f32 = 0.3;
@@ -78,7 +83,7 @@ pub enum StageState {
     /// It does not know where it is; the motor is off.
     Unknown,
     /// Towards the left limit switch.
-    Homing,
+    Homing(Profile),
     /// Standing; the motor is off.
     Standing,
     /// On its way.
@@ -164,8 +169,8 @@ pub struct Stage {
     zero: i32,
     /// The last counts, newest last.
     counts: [i32; VELOCITY_MS + 1],
-    /// Homing: where the profile has come to, mm from where it began.
-    homing: (i32, u32),
+    /// The limit switch was found in search, and is to be touched slowly.
+    searched: bool,
 }
 
 impl Stage {
@@ -176,7 +181,7 @@ impl Stage {
             state: StageState::Unknown,
             zero: 0,
             counts: [0; VELOCITY_MS + 1],
-            homing: (0, 0),
+            searched: false,
         }
     }
 
@@ -206,10 +211,24 @@ impl Stage {
         newest
     }
 
-    /// Looks for the left limit switch.
+    /// Looks for the left limit switch: in search first, and when that has found it and the stage is off it again, slowly.
     pub fn home(&mut self) {
-        self.homing = (self.now(), 0);
-        self.state = StageState::Homing;
+        let (way, speed_mm_s) = if self.searched {
+            (TOUCH_MM, TOUCH_MM_S)
+        } else {
+            (1.25 * self.constants.travel_mm, SEARCH_MM_S)
+        };
+        self.state = StageState::Homing(self.profile(self.position_mm() - way, speed_mm_s));
+    }
+
+    fn profile(&self, to_mm: f32, speed_mm_s: f32) -> Profile {
+        let acceleration = self.constants.acceleration_mm_s2;
+        Profile::new(self.position_mm(), to_mm, speed_mm_s, acceleration)
+    }
+
+    /// Whether the limit switch still has to be touched slowly: [`Stage::home`] once more.
+    pub fn is_searched(&self) -> bool {
+        self.searched
     }
 
     /// Moves to `to_mm`, kept [`MARGIN_MM`] from the limit switches. Only a standing stage does; the profile says how long
@@ -222,12 +241,7 @@ impl Stage {
         let to_mm = to_mm
             .min(self.constants.travel_mm - MARGIN_MM)
             .max(MARGIN_MM);
-        let profile = Profile::new(
-            self.position_mm(),
-            to_mm,
-            speed_mm_s,
-            self.constants.acceleration_mm_s2,
-        );
+        let profile = self.profile(to_mm, speed_mm_s);
         self.state = StageState::Moving(profile);
         Some(profile)
     }
@@ -235,14 +249,15 @@ impl Stage {
     /// The motor goes off, and the stage no longer knows where it is.
     pub fn forget(&mut self) {
         self.state = StageState::Unknown;
+        self.searched = false;
     }
 
     /// The motor goes off, whatever it was doing.
     pub fn stop(&mut self) {
-        if self.state != StageState::Unknown && self.state != StageState::Homing {
-            self.state = StageState::Standing;
+        if self.searched || matches!(self.state, StageState::Unknown | StageState::Homing(_)) {
+            self.forget();
         } else {
-            self.state = StageState::Unknown;
+            self.state = StageState::Standing;
         }
     }
 
@@ -257,68 +272,58 @@ impl Stage {
         let [.., newest] = &mut self.counts;
         *newest = count;
         let c = self.constants;
-        match self.state {
-            StageState::Unknown | StageState::Standing => Ok(0.0),
-            StageState::Homing => {
-                if at_left {
-                    self.zero = count;
-                    self.state = StageState::Standing;
-                    return Ok(0.0);
-                }
-                let (from, ms) = self.homing;
-                self.homing.1 = ms + 1;
-                let t = ms as f32 * 1e-3;
-                let way = (from - count) as f32 * c.mm_per_count;
-                let off = HOMING_MM_S * t - way;
-                if off > HOMING_FOLLOWING_MM || t * HOMING_MM_S > c.travel_mm * 1.25 {
-                    return Err(Fault::StageNotHome);
-                }
-                let duty = c.duty_per_mm_s * HOMING_MM_S
-                    + c.duty_friction
-                    + c.p * (HOMING_MM_S + self.velocity_mm_s())
-                    + (c.i * off).clamp(-MAX_INTEGRAL, MAX_INTEGRAL);
-                Ok((-duty).clamp(-1.0, 1.0))
-            }
-            StageState::Moving(mut profile) => {
-                profile.ms += 1;
-                let t = profile.ms as f32 * 1e-3;
-                let (x, v, a) = profile.at(t);
-                let off = x - self.position_mm();
-                let over = profile
-                    .ms
-                    .saturating_sub(libm::ceilf(profile.duration_s() * 1e3) as u32);
-                let following = FOLLOWING_MM + FOLLOWING_S * profile.speed_mm_s;
-                if libm::fabsf(off) > following || over > ARRIVE_MS {
-                    return Err(Fault::StageOff);
-                }
-                if over > 0
-                    && libm::fabsf(off) < ARRIVED_MM
-                    && libm::fabsf(self.velocity_mm_s()) < 0.5
-                {
-                    self.state = StageState::Standing;
-                    return Ok(0.0);
-                }
-                self.state = StageState::Moving(profile);
-                // the velocity lags by half of what it is taken over
-                let (_, v_then, _) = profile.at(t - VELOCITY_MS as f32 * 0.5e-3);
-                let friction = if v == 0.0 {
-                    0.0
-                } else {
-                    libm::copysignf(c.duty_friction, v)
-                };
-                let duty = c.duty_per_mm_s * v
-                    + friction
-                    + c.duty_per_mm_s2 * a
-                    + c.p
-                        * (if t < VELOCITY_MS as f32 * 0.5e-3 {
-                            0.0
-                        } else {
-                            v_then
-                        } - self.velocity_mm_s())
-                    + (c.i * off).clamp(-MAX_INTEGRAL, MAX_INTEGRAL);
-                Ok(duty.clamp(-1.0, 1.0))
-            }
+        let homes = matches!(self.state, StageState::Homing(_));
+        let (StageState::Homing(mut profile) | StageState::Moving(mut profile)) = self.state else {
+            return Ok(0.0);
+        };
+        if homes && at_left {
+            self.zero = count;
+            self.searched = !self.searched;
+            self.state = StageState::Standing;
+            return Ok(0.0);
         }
+        profile.ms += 1;
+        let t = profile.ms as f32 * 1e-3;
+        let (x, v, a) = profile.at(t);
+        let off = x - self.position_mm();
+        let over = profile
+            .ms
+            .saturating_sub(libm::ceilf(profile.duration_s() * 1e3) as u32);
+        if homes {
+            if libm::fabsf(off) > HOMING_FOLLOWING_MM || over > 0 {
+                return Err(Fault::StageNotHome);
+            }
+            self.state = StageState::Homing(profile);
+        } else {
+            let following = FOLLOWING_MM + FOLLOWING_S * profile.speed_mm_s;
+            if libm::fabsf(off) > following || over > ARRIVE_MS {
+                return Err(Fault::StageOff);
+            }
+            if over > 0 && libm::fabsf(off) < ARRIVED_MM && libm::fabsf(self.velocity_mm_s()) < 0.5
+            {
+                self.state = StageState::Standing;
+                return Ok(0.0);
+            }
+            self.state = StageState::Moving(profile);
+        }
+        // the velocity lags by half of what it is taken over
+        let lag_s = VELOCITY_MS as f32 * 0.5e-3;
+        let v_then = if t < lag_s {
+            0.0
+        } else {
+            profile.at(t - lag_s).1
+        };
+        let friction = if v == 0.0 {
+            0.0
+        } else {
+            libm::copysignf(c.duty_friction, v)
+        };
+        let duty = c.duty_per_mm_s * v
+            + friction
+            + c.duty_per_mm_s2 * a
+            + c.p * (v_then - self.velocity_mm_s())
+            + (c.i * off).clamp(-MAX_INTEGRAL, MAX_INTEGRAL);
+        Ok(duty.clamp(-1.0, 1.0))
     }
 }
 
@@ -367,12 +372,62 @@ mod tests {
         assert!(stage.tick(0, false).unwrap() < 0.0, "to the left");
         assert_eq!(stage.tick(-20, true), Ok(0.0));
         assert_eq!(stage.position_mm(), 0.0, "the switch is the origin");
+        // once more, slowly, from where it stands
+        assert!(stage.is_searched());
+        for _ in 0..VELOCITY_MS {
+            assert_eq!(stage.tick(-20, false), Ok(0.0));
+        }
+        stage.home();
+        assert!(stage.tick(-20, false).unwrap() < 0.0, "to the left");
+        assert_eq!(stage.tick(-20, true), Ok(0.0));
+        assert!(!stage.is_searched());
         // outside the travel is brought inside
         stage.go(500.0, 50.0).unwrap();
         assert!(stage.tick(-20, true).unwrap() > 0.0);
         assert_eq!(stage.go(10.0, 50.0), None, "busy");
         stage.stop();
         assert_eq!(stage.state(), StageState::Standing);
+    }
+
+    /// Follows the profile to the hair, or stands still, without ever closing the switch: how far it goes.
+    fn searches(stage: &mut Stage, follows: bool) -> f32 {
+        stage.home();
+        let mut furthest = 0.0f32;
+        for _ in 0..60_000 {
+            let at = stage.position_mm();
+            let StageState::Homing(profile) = stage.state() else {
+                panic!("it homes");
+            };
+            let (to, ..) = profile.at((profile.ms + 1) as f32 * 1e-3);
+            furthest = furthest.max(-at);
+            let count = stage.now() + if follows { ((to - at) * 1e3) as i32 } else { 0 };
+            match stage.tick(count, false) {
+                Ok(_) => {}
+                Err(why) => {
+                    assert_eq!(why, Fault::StageNotHome);
+                    return furthest;
+                }
+            }
+        }
+        panic!("no end in a minute");
+    }
+
+    #[test]
+    fn a_switch_that_is_not_found_has_an_end() {
+        let new = || Stage::new(StageConstants::REFERENCE);
+        assert_eq!(searches(&mut new(), false), 0.0);
+        assert!((searches(&mut new(), true) - 1.25 * 77.0).abs() < 0.1);
+        let mut found = new();
+        found.home();
+        assert_eq!(found.tick(0, true), Ok(0.0));
+        assert!((searches(&mut found, true) - TOUCH_MM).abs() < 0.1);
+        // what was only searched is not known
+        let mut found = new();
+        found.home();
+        assert_eq!(found.tick(0, true), Ok(0.0));
+        found.stop();
+        assert_eq!(found.state(), StageState::Unknown);
+        assert!(!found.is_searched());
     }
 
     #[test]

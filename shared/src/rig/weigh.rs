@@ -8,6 +8,9 @@ const STILL: u32 = 3 * LOOKS_HZ / 2;
 const WANDERS: (f32, f32) = (2.0, 0.04);
 /// A weight is there from this share of what it should give by the constants so far: a fingertip's are off by half at most.
 const THERE: f32 = 0.4;
+/// A weight has been taken away when so much of it is left, mN: half of the least one, and far below what a rig's guard takes for a
+/// press on a finger that waits.
+const GONE_MN: f32 = 100.0;
 /// How far a weight may be off the line, mN: 3 g, since a kitchen scale shows whole ones, and the share of it (chosen).
 const OFF: (f32, f32) = (30.0, 0.08);
 
@@ -16,6 +19,8 @@ const OFF: (f32, f32) = (30.0, 0.08);
 pub struct Weighing {
     /// Counts by which a weight differs from the air at least.
     least: f32,
+    /// Counts by which the air differs from itself at most, once a weight has been taken away.
+    gone: f32,
     /// P_DC in the air, once it was still.
     air: Option<f32>,
     mean: f32,
@@ -27,6 +32,7 @@ impl Weighing {
     pub fn new(mn: u16, mn_per_count: f32) -> Self {
         Self {
             least: THERE * f32::from(mn) / mn_per_count,
+            gone: GONE_MN / mn_per_count,
             air: None,
             mean: 0.0,
             looks: 0,
@@ -44,6 +50,11 @@ impl Weighing {
     /// Whether the weight is to be put on now.
     pub fn wants_weight(&self) -> bool {
         self.air.is_some()
+    }
+
+    /// Whether P_DC says that the weight has been taken away again.
+    pub fn is_air(&self, counts: f32) -> bool {
+        libm::fabsf(counts - self.air.unwrap_or_default()) < self.gone
     }
 
     /// Takes P_DC, counts about that in the air as it was known before, [`LOOKS_HZ`] times a second. The weight's mean above the

@@ -1,12 +1,11 @@
 //! Where everything lies in the flash, and the header of a table's slot.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::correct::Checksum;
+use crate::CRC32;
 use crate::table::TableError;
 
-pub(super) const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// Bytes that the flash programs at once.
 pub(super) const WORD: usize = 4;
 /// Where the sectors of a store begin and end, in the smallest of them: two for small tables, two of the settings, two for

@@ -4,10 +4,11 @@ use embedded_storage_async::nor_flash::NorFlash;
 
 use super::error::StoreError;
 use super::layout::{
-    COMMIT, COMMIT_AT, CRC32, Correct, HEADER, Push, Slot, StoredTable, TABLE_AT, WORD, header,
+    COMMIT, COMMIT_AT, Correct, HEADER, Push, Slot, StoredTable, TABLE_AT, WORD, header,
     is_committed,
 };
 use super::sectors::Store;
+use crate::CRC32;
 use crate::sensor::FingerCode;
 use crate::table::{Table, TableError};
 

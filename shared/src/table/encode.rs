@@ -5,7 +5,7 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, CRC32, Contents, MAGIC, MAX_MOVEMENTS, PACED, PACED_VERSION,
+    Action, CELL_BYTES, CRC_BYTES, Contents, MAGIC, MAX_MOVEMENTS, PACED, PACED_VERSION,
     PLAIN_VERSION, SLOPES, TableError, Tally, VERSION,
 };
 use super::gaussian::{SD_LEAST, SD_STEP, mean_step};
@@ -14,6 +14,7 @@ use super::slopes::{self, put_slope};
 use super::training_stats::{Experience, Whitened};
 use super::view::Table;
 use super::whitening::Whitening;
+use crate::CRC32;
 use crate::features::{FeatureSet, Movement, Property, PropertySet};
 
 /// One texture of a table of Gaussians to be written.

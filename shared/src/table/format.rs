@@ -2,7 +2,6 @@
 
 use core::fmt;
 
-use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::String;
 use serde::{Deserialize, Serialize};
 
@@ -28,7 +27,6 @@ pub(super) const MOVEMENT_BYTES: usize = 6;
 pub(super) const PROPERTIES: usize = Property::ALL.len();
 pub(super) const CELL_BYTES: usize = 4;
 pub(super) const CRC_BYTES: usize = 4;
-pub(super) const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Most movements in a table: the whole grid of the pilot study.
 pub const MAX_MOVEMENTS: usize = 36;

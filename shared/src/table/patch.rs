@@ -1,10 +1,11 @@
 //! Changing a table where it lies: as many bytes as before.
 
 use super::encode::EncodeError;
-use super::format::{CRC32, Contents, LABEL_BYTES, Tally};
+use super::format::{Contents, LABEL_BYTES, Tally};
 use super::training_stats::Whitened;
 use super::view::Table;
 use super::whitening::Whitening;
+use crate::CRC32;
 
 /// Puts what a fused table has learned on the go of a texture at a movement in its place, and marks the table as made from
 /// the one that it was.

@@ -12,10 +12,11 @@
 //! | 1 | 1: always at the same spot; 2: moved or turned between trials |
 
 use super::encode::EncodeError;
-use super::format::{CRC32, TableError};
+use super::format::TableError;
 use super::one_section::rewrite_section;
 use super::sections::SAMPLES;
 use super::view::Table;
+use crate::CRC32;
 
 /// Bytes of a texture in the section.
 const ENTRY: usize = 5;

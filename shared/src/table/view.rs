@@ -1,13 +1,13 @@
 //! Reading a table where it is stored.
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, CRC32, Contents, HEADER, LABEL_BYTES, Layout, MAGIC,
-    MAX_MOVEMENTS, MOVEMENT_BYTES, PACED, PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally,
-    VERSION, array,
+    Action, CELL_BYTES, CRC_BYTES, Contents, HEADER, LABEL_BYTES, Layout, MAGIC, MAX_MOVEMENTS,
+    MOVEMENT_BYTES, PACED, PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally, VERSION, array,
 };
 use super::gaussian::{Gaussian, Gaussians, SD_STEP, mean_step};
 use super::training_stats::{Experience, Whitened};
 use super::whitening::{Column, Row, View, Whitening, Words};
+use crate::CRC32;
 use crate::features::{MAX_FEATURES, Movement, Property, PropertySet, Vector};
 
 /// A checked texture table, borrowed from where it is stored.

@@ -135,7 +135,7 @@ impl Identify {
             max_slides: self.max_slides,
             open: self.open,
             false_alarm: self.false_alarm.filter(|share| is_false_alarm(*share)),
-            verify: false,
+            ..Config::default()
         }
     }
 }

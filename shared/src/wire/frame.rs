@@ -1,9 +1,10 @@
 //! Frames: a message in postcard's format, its CRC-32, both in COBS, and a closing 0.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::Vec;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+
+use crate::CRC32;
 
 /// Version of the messages. The two ends must have the same.
 pub const PROTOCOL: u8 = 9;
@@ -13,7 +14,6 @@ pub const MAX_MESSAGE: usize = 768;
 pub const MAX_FRAME: usize = MAX_MESSAGE + CRC_BYTES + (MAX_MESSAGE + CRC_BYTES) / 254 + 1;
 
 const CRC_BYTES: usize = 4;
-const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Why a message does not fit into a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]

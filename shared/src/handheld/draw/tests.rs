@@ -97,6 +97,7 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
             row("burlap", 0.0001),
         ]),
         sure: true,
+        open: false,
     };
     each("verdict", &sure);
     let unsure = Screen::Verdict {
@@ -106,8 +107,15 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
             row("Balsa wood", 0.06),
         ]),
         sure: false,
+        open: false,
     };
     each("verdict-unsure", &unsure);
+    let open = Screen::Verdict {
+        rows: rows(&[row("Cardboard", 0.61), row("Copy paper", 0.33)]),
+        sure: false,
+        open: true,
+    };
+    each("verdict-open", &open);
     let long = Screen::Verdict {
         rows: rows(&[
             row(LONG, 1.0),
@@ -115,6 +123,7 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
             row("1", 0.0),
         ]),
         sure: true,
+        open: false,
     };
     each("verdict-long", &long);
     let unknown = Screen::Unknown {

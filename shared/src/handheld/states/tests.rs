@@ -382,7 +382,7 @@ fn who_is_not_sure_is_asked_to_slide_again_and_five_slides_are_the_end() {
         open,
         ..Judgement::default()
     };
-    for slides in 1..=MAX_SLIDES {
+    for slides in 1..=ASK_AFTER {
         for event in [Event::Down, Event::Still, Event::Slid(slide(Some(0)))] {
             bench.probe.on_touch(event);
         }
@@ -394,7 +394,7 @@ fn who_is_not_sure_is_asked_to_slide_again_and_five_slides_are_the_end() {
             panic!("nothing to judge");
         };
         assert_eq!(all.len(), slides);
-        bench.probe.judged(Ok(unsure(slides < MAX_SLIDES)));
+        bench.probe.judged(Ok(unsure(slides < ASK_AFTER)));
         bench.probe.on_touch(Event::Up);
         assert_eq!(
             (bench.shown().as_str(), bench.probe.go().is_some()),
@@ -404,6 +404,65 @@ fn who_is_not_sure_is_asked_to_slide_again_and_five_slides_are_the_end() {
     // what comes next is another sample
     bench.probe.on_touch(Event::Down);
     assert!(bench.probe.episode.is_empty());
+}
+
+/// After five slides the leading one is shown, and more slides of the same episode may follow, up to ten; or the button ends it.
+#[test]
+fn who_is_not_sure_after_five_slides_may_go_on_to_ten_or_end_it() {
+    let plan = Plan::new();
+    let judgement = |open| Judgement {
+        leading: [(0, 0.6), (1, 0.3), (2, 0.1)].into_iter().collect(),
+        open,
+        ..Judgement::default()
+    };
+    let slide_once = |bench: &mut Bench<'_>, slides: usize| {
+        bench.probe.on_touch(Event::Down);
+        let asked = match bench.probe.screen(None, &About::default()) {
+            Screen::Press { slide, of, .. } => (usize::from(slide), of),
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(asked, (slides, if slides <= ASK_AFTER { 5 } else { 10 }));
+        bench.probe.on_touch(Event::Still);
+        bench.probe.on_touch(Event::Slid(slide(Some(0))));
+        let Some(Job::Judge { slides: all, .. }) = bench.probe.job() else {
+            panic!("nothing to judge");
+        };
+        assert_eq!(all.len(), slides);
+        bench.probe.judged(Ok(judgement(slides < MAX_SLIDES)));
+        bench.probe.on_touch(Event::Up);
+    };
+    for end_after in [ASK_AFTER, 7, MAX_SLIDES] {
+        let mut bench = Bench::new(&plan);
+        for slides in 1..=end_after {
+            slide_once(&mut bench, slides);
+            let screen = bench.probe.screen(None, &About::default());
+            let Screen::Verdict { rows, sure, open } = screen else {
+                assert!(slides < ASK_AFTER, "{screen:?}");
+                continue;
+            };
+            assert!(slides >= ASK_AFTER && !sure);
+            assert_eq!(
+                (open, rows.len()),
+                if slides < MAX_SLIDES {
+                    (true, 2)
+                } else {
+                    (false, 3)
+                }
+            );
+        }
+        if end_after < MAX_SLIDES {
+            bench.press(10);
+            assert_eq!(bench.probe.page, Page::Ready);
+        }
+        // what comes next is another sample
+        bench.probe.on_touch(Event::Down);
+        assert!(bench.probe.episode.is_empty());
+    }
+    // and it can be taught at once
+    let mut bench = Bench::new(&plan);
+    (1..=ASK_AFTER).for_each(|slides| slide_once(&mut bench, slides));
+    bench.press(70);
+    assert_eq!(bench.probe.page, Page::Choose(super::List::Name, 0));
 }
 
 #[test]

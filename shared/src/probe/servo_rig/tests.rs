@@ -27,6 +27,11 @@ struct Standing {
     stops: u32,
     faults: u32,
     homed: bool,
+    /// Weights that the guard was told of, and what lay on the finger just then, mN.
+    expected: List<u16>,
+    lay_mn: List<f32>,
+    /// P_DC, which follows what is laid on by 20 counts a look.
+    counts: f32,
 }
 
 impl Standing {
@@ -39,6 +44,9 @@ impl Standing {
             stops: u32::MAX,
             faults: u32::MAX,
             homed: false,
+            expected: List::new(),
+            lay_mn: List::new(),
+            counts: 3.0,
         })
     }
 }
@@ -46,6 +54,10 @@ impl Standing {
 impl Servo for Standing {
     async fn command(&mut self, command: RigCommand) -> Result<(), Refused> {
         self.homed |= command == RigCommand::Home;
+        if let RigCommand::Weigh(mn) = command {
+            self.expected.push(mn);
+            self.lay_mn.push((self.counts - 3.0) * self.mn_per_count);
+        }
         self.state.phase = Phase::Ready;
         Ok(())
     }
@@ -58,7 +70,8 @@ impl Servo for Standing {
         };
         // P_DC in the air has drifted by 3 counts since its zero
         let counts = 3.0 + mn / self.mn_per_count;
-        self.state.force_mn = counts * CALIBRATION.pressure.force_mn_per_count;
+        self.counts += (counts - self.counts).clamp(-20.0, 20.0);
+        self.state.force_mn = self.counts * CALIBRATION.pressure.force_mn_per_count;
         if self.looks >= self.faults {
             self.state.phase = Phase::Faulted(Fault::SensorSilent);
         }
@@ -104,10 +117,15 @@ fn weights_on_a_lifted_finger_give_its_force_per_count() {
     assert!(rig.servo.homed);
     let scale = ForceScale::of(&points).unwrap();
     assert!((scale.mn_per_count - 9.35).abs() < 0.01, "{scale:?}");
-    // each weight is taken off before the next
+    // each weight is taken off before the next, and the last one, too
     let mut prompts = rig.servo.prompts.clone();
     prompts.dedup();
-    assert_eq!(prompts.len(), 10);
+    assert_eq!(prompts.len(), 11);
+    let expected = [294, 588, 883, 1177, 1471].map(|mn| [mn, 0]);
+    assert_eq!(rig.servo.expected, expected.concat());
+    // and is away when the guard is told so
+    let most_mn = rig.servo.lay_mn.iter().copied().fold(0.0, f32::max);
+    assert!(most_mn < 100.0, "{most_mn}");
     assert_eq!(
         prompts[..3],
         [Prompt::Lift, Prompt::Weigh(294), Prompt::Lift]
@@ -123,6 +141,7 @@ fn a_reversed_cell_a_stop_a_fault_and_nobody_end_it() {
     let mut rig = Standing::rig(9.35);
     rig.servo.stops = 50;
     assert_eq!(weigh(&mut rig), failed(RigError::Stopped));
+    assert_eq!(rig.servo.expected, [588, 0]);
     let mut rig = Standing::rig(9.35);
     rig.servo.faults = 50;
     assert_eq!(

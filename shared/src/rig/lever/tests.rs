@@ -17,6 +17,9 @@ struct Bench {
     compliance: f32,
     /// The skin is torn: the finger feels nothing.
     torn: bool,
+    /// P_DC of the finger and the height over the sample at which it still came down fast, and the ms of it all.
+    fast: (f32, f32),
+    ms: u32,
 }
 
 impl Bench {
@@ -31,6 +34,8 @@ impl Bench {
             clear_mm,
             compliance,
             torn: false,
+            fast: (0.0, f32::INFINITY),
+            ms: 0,
         }
     }
 
@@ -62,6 +67,11 @@ impl Bench {
             let (steps, at_top) = (self.way as i32, self.way <= 0.0);
             let rate = self.lever.tick(&mut self.meter, steps, at_top)?;
             self.way += rate as f32 * 1e-3;
+            self.ms += 1;
+            if rate > APPROACH_STEPS_S {
+                let height = self.clear_mm - self.way * STEP_UM * 1e-3;
+                self.fast = (self.fast.0.max(self.counts()), self.fast.1.min(height));
+            }
             if self.lever.state() == wanted {
                 return Ok(());
             }
@@ -152,4 +162,47 @@ fn another_sample_may_be_lower() {
     bench.clear_mm = 6.0;
     bench.lever.forget_contact();
     assert_eq!(bench.press().0, Ok(()));
+}
+
+#[test]
+fn it_comes_down_fast_until_it_touches_and_slowly_where_it_knows_the_sample() {
+    for compliance in [0.0, 0.1, 1.0, 2.0, 4.0] {
+        for seed in 1..=10 {
+            let mut bench = Bench::new(6.0, compliance);
+            bench.seed = seed;
+            let (ended, counts) = bench.press();
+            assert_eq!(ended, Ok(()), "{compliance} mm/N");
+            assert!((counts - 43.5).abs() < 1.0, "{counts}");
+            // 6 mm take 12 s at the speed of an approach; two thirds of the lightest press
+            assert!(bench.fast.1 < 0.0, "{:?}", bench.fast);
+            assert!(bench.fast.0 * 11.5 < 66.0, "{:?}", bench.fast);
+            let first_ms = bench.ms;
+            assert!(first_ms < 12_000, "{first_ms}");
+            bench.lever.lift(bench.way as i32);
+            (bench.fast, bench.ms) = ((0.0, f32::INFINITY), 0);
+            assert_eq!(bench.press().0, Ok(()));
+            // half of what shows contact, on the softest sample
+            assert!(bench.fast.0 * 11.5 < 17.25, "{:?}", bench.fast);
+            assert!((-0.12..0.15).contains(&bench.fast.1), "{:?}", bench.fast);
+        }
+    }
+}
+
+#[test]
+fn a_zero_is_proven_at_the_speed_of_an_approach() {
+    let mut bench = Bench::new(3.0, 0.0);
+    bench.until(LeverState::Lifted).unwrap();
+    assert!(bench.lever.press(43.5));
+    bench.until(LeverState::Approaching(None)).unwrap();
+    let from = bench.way;
+    let mut ms = 0;
+    while bench.fast.1.is_infinite() {
+        bench.until(LeverState::Approaching(None)).unwrap();
+        ms += 1;
+    }
+    let way_mm = (bench.way - from) * STEP_UM * 1e-3;
+    assert!(
+        ms >= 199 && (0.09..0.11).contains(&way_mm),
+        "{ms} ms, {way_mm} mm"
+    );
 }
