@@ -5,6 +5,7 @@ mod device;
 mod evaluate;
 mod features;
 mod gauge;
+mod growth;
 mod identify;
 mod import;
 mod known;
@@ -57,6 +58,7 @@ enum Command {
     Simulate(simulate::Args),
     LearnByHand(learn::ByHand),
     Study(study::Args),
+    Growth(growth::Args),
     #[command(subcommand)]
     Device(device::Command),
     Textures(known::Args),
@@ -98,6 +100,7 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         Some(Command::Simulate(args)) => simulate::run(&args, out)?,
         Some(Command::LearnByHand(args)) => learn::by_hand(&args, out)?,
         Some(Command::Study(args)) => study::run(&args, out)?,
+        Some(Command::Growth(args)) => growth::run(&args, out)?,
         Some(Command::Device(command)) => done = device::run(&command, out)?,
         Some(Command::Textures(args)) => known::run(&args, out)?,
         Some(Command::Completions(args)) => manual::completions(&args, Tactus::command(), out)?,

@@ -7,4 +7,5 @@ pub mod person;
 pub mod power_cut;
 pub mod progress;
 pub mod talk;
+pub mod timeline;
 pub mod under_finger;

@@ -15,11 +15,17 @@ use tactus_core::sensor::FingerName;
 
 use crate::board::{Display, Emulator, Error, Options, Output};
 
+/// By now the firmware hears its host.
+const BOOTED_MS: u64 = 500;
 /// How often the person looks, ns.
 const LOOK_NS: u64 = 20_000_000;
+/// What the display says when it waits for a touch.
+const PRESS: &str = "and hold";
 /// What the display says when it wants a slide, and when it wants none any more.
 const SLIDE: &str = "5 cm in 2 s";
 const OVER: [&str; 2] = ["next", "yes"];
+/// What a verdict says that is open: further slides may tell more.
+const OPEN: &str = "Slide on to be sure";
 
 /// Why a scenario did not come out as it says.
 #[derive(Debug, thiserror::Error)]
@@ -77,6 +83,41 @@ pub enum Unmet {
     NotEnough(u32),
 }
 
+/// What the person has seen of an exploration.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Seen {
+    /// The display is on.
+    Lit,
+    /// It waits for a touch.
+    Press,
+    /// It wants a slide.
+    Slide,
+    /// It wants none any more.
+    Over,
+}
+
+impl Seen {
+    fn of(display: &Display) -> Option<Self> {
+        display.picture()?;
+        let over = || OVER.iter().any(|over| display.shows(over));
+        if display.shows(PRESS) {
+            Some(Self::Press)
+        } else if display.shows(SLIDE) {
+            Some(Self::Slide)
+        } else {
+            Some(if over() { Self::Over } else { Self::Lit })
+        }
+    }
+}
+
+/// A board on which a scenario was played.
+pub struct PlayedBoard {
+    /// As it is in the end.
+    pub board: Emulator,
+    /// What the person saw, and when it was there first, ns.
+    pub seen: Vec<(u64, Seen)>,
+}
+
 /// Plays a scenario with a finger on a board with its ELF, which may hold a store from before. Gives the board as it is in the end.
 pub fn play(
     scenario: &Scenario,
@@ -84,13 +125,27 @@ pub fn play(
     elf: &Path,
     store: Option<Vec<u8>>,
 ) -> Result<Emulator, PlayError> {
+    play_to(scenario, finger, elf, store, &[]).map(|played| played.board)
+}
+
+/// The same, and when it is switched on its host sends these bytes. From then on it tells what it does:
+/// [`Emulator::received`].
+pub fn play_to(
+    scenario: &Scenario,
+    finger: FingerName,
+    elf: &Path,
+    store: Option<Vec<u8>>,
+    host: &[u8],
+) -> Result<PlayedBoard, PlayError> {
     let mut played = Played {
         scenario,
         finger,
         elf,
+        host,
         texture: texture(&scenario.texture)?,
         starts: 0,
         board: None,
+        looks: Vec::new(),
     };
     played.power_up(store)?;
     for (step, number) in scenario.step.iter().zip(1..) {
@@ -100,11 +155,14 @@ pub fn play(
                 number,
                 at_s: played.board().now_ns() as f64 * 1e-9,
                 unmet,
-                display: played.seen(),
+                display: played.shown(),
             });
         }
     }
-    Ok(played.board.take().expect("it was switched on"))
+    Ok(PlayedBoard {
+        board: played.board.take().expect("it was switched on"),
+        seen: played.looks,
+    })
 }
 
 /// A scenario on a board.
@@ -112,10 +170,13 @@ struct Played<'s> {
     scenario: &'s Scenario,
     finger: FingerName,
     elf: &'s Path,
+    host: &'s [u8],
     texture: u8,
     /// How often the board was switched on: every time is another trial.
     starts: u64,
     board: Option<Emulator>,
+    /// What was seen of an exploration, and when.
+    looks: Vec<(u64, Seen)>,
 }
 
 /// What a step comes to: what was wrong.
@@ -146,6 +207,11 @@ impl Played<'_> {
             .world()
             .hold(Hand::new(setup.trial_seed, manner));
         self.board = Some(board);
+        if !self.host.is_empty() {
+            self.run_s(BOOTED_MS as f64 * 1e-3)?;
+            let host = self.host;
+            self.board().send(host);
+        }
         Ok(())
     }
 
@@ -157,13 +223,23 @@ impl Played<'_> {
 
     /// Looks until it is so.
     fn until(&mut self, within_s: f64, seen: impl Fn(&Display) -> bool) -> Result<bool, Error> {
-        let limit_ns = self.board().now_ns() + (within_s * 1e9) as u64;
-        self.board()
-            .run_to(limit_ns, LOOK_NS, |rig| seen(rig.display()))
+        let Self { board, looks, .. } = self;
+        let board = board.as_mut().expect("it was switched on");
+        let limit_ns = board.now_ns() + (within_s * 1e9) as u64;
+        board.run_to(limit_ns, LOOK_NS, |rig| {
+            let now_ns = rig.world().now_ns();
+            let display = rig.display();
+            if let Some(now) = Seen::of(display)
+                && looks.last().is_none_or(|(_, last)| *last != now)
+            {
+                looks.push((now_ns, now));
+            }
+            seen(display)
+        })
     }
 
     fn run_s(&mut self, seconds: f64) -> Result<(), Error> {
-        self.board().run_ms((seconds * 1e3) as u64)
+        self.until(seconds, |_| false).map(|_| ())
     }
 
     fn slide(&mut self, force_n: f64, pace_mm_s: f64, seconds: f64) -> Done {
@@ -171,7 +247,7 @@ impl Played<'_> {
         if !self.until(TIMEOUT_S, |display| display.shows(SLIDE))? {
             return Ok(Err(Unmet::NoSlideWanted));
         }
-        self.board().run_ms(Step::REACTION_MS)?;
+        self.run_s(Step::REACTION_MS as f64 * 1e-3)?;
         self.intend(force_n, pace_mm_s);
         self.run_s(seconds)?;
         self.intend(force_n, 0.0);
@@ -228,13 +304,14 @@ impl Played<'_> {
                 force_n,
                 pace_mm_s,
                 slides,
+                seconds,
             } => {
                 for _ in 0..*slides {
-                    if let Err(unmet) = self.slide(*force_n, *pace_mm_s, Step::EXPLORED_S)? {
+                    if let Err(unmet) = self.slide(*force_n, *pace_mm_s, *seconds)? {
                         return Ok(Err(unmet));
                     }
                     if self.until(Step::VERDICT_S, |display| {
-                        OVER.iter().any(|over| display.shows(over))
+                        OVER.iter().any(|over| display.shows(over)) && !display.shows(OPEN)
                     })? {
                         return Ok(Ok(()));
                     }
@@ -269,7 +346,7 @@ impl Played<'_> {
     }
 
     /// The display in letters: two rows of points in each.
-    fn seen(&mut self) -> String {
+    fn shown(&mut self) -> String {
         let rig = self.board().rig();
         let Some(picture) = rig.display().picture() else {
             return "(off)".into();

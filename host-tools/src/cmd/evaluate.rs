@@ -10,6 +10,7 @@ use tactus::eval::evaluate::{Method, Outcome, Summary, evaluate};
 use tactus::eval::experiment::{Experiment, Protocol};
 use tactus::eval::pictures::evaluation::figures;
 use tactus::eval::reliability::{AtThreshold, Statements, by_threshold, statements};
+use tactus::eval::seconds::mean_seconds;
 use tactus::eval::show::count;
 use tactus::eval::verdicts::Verdicts;
 use tactus_core::explorer::{self, Config};
@@ -37,6 +38,9 @@ struct Evaluation {
     verdicts: Verdicts,
     /// Mean number of slides until then.
     mean_slides_told: f64,
+    /// Mean time until then, s, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mean_seconds_told: Option<f64>,
     /// How often it was right when it said so, by what it said.
     reliability: Vec<Statements>,
     /// What another threshold would change.
@@ -64,7 +68,12 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     );
     let canvas = args.plot.open()?;
     let (experiment, protocol) = experiment::open(args)?;
+    ensure!(
+        args.choosing.objective.is_none() || args.properties.is_none(),
+        "--objective needs movements of which the speed is known, and --properties has none"
+    );
     let config = args.stop.config(args.method);
+    let config = args.choosing.config(config, args.slide_time())?;
     if args.lifelong {
         return novelty::lifelong(args, &experiment, config, canvas, out);
     }
@@ -94,6 +103,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     } else {
         Vec::new()
     };
+    let time = args.choosing.time(args.slide_time());
     let evaluation = Evaluation {
         reliability: statements(&courses, args.stop.threshold),
         by_threshold: by_threshold(&courses, args.stop.threshold),
@@ -107,6 +117,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         seed: args.seed,
         verdicts: Verdicts::of(told.iter().map(Outcome::told)),
         mean_slides_told: Summary::new(&told, experiment.names(), max_slides).mean_slides,
+        mean_seconds_told: time.map(|time| mean_seconds(&told, experiment.movements(), time)),
         summary,
     };
     match args.format {
@@ -147,8 +158,10 @@ fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
     let share = |share: f64| format!("{:5.1} %", share * 100.0);
     writeln!(
         out,
-        "what the user is told, after {:.2} slides (mean)",
-        e.mean_slides_told
+        "what the user is told, after {:.2} slides{} (mean)",
+        e.mean_slides_told,
+        e.mean_seconds_told
+            .map_or(String::new(), |s| format!(", {s:.1} s"))
     )?;
     for (name, value, remark) in verdict_rows(&e.verdicts) {
         writeln!(out, "{}", row(name, share(value) + &remark))?;

@@ -17,6 +17,7 @@ use tactus::eval::experiment::{Experiment, Protocol};
 use tactus::eval::learn::Expected;
 use tactus::eval::pictures::exploration::Exploration;
 use tactus::eval::pictures::timeline::{Timeline, Watch};
+use tactus::eval::seconds;
 use tactus::eval::show::{Show, count, is_right};
 use tactus::eval::transcript::{Answer, Transcript};
 use tactus::sim::collection::{Collection, calibrated, texture_name};
@@ -28,7 +29,7 @@ use tactus_core::probe::explore::{ExplorationStep, ExploreError, Rejection, expl
 use tactus_core::rig::Rig;
 use tactus_core::table::Table;
 
-use super::args::{Expecting, Recordings, Stop};
+use super::args::{Choosing, Expecting, Recordings, Stop};
 use super::learn::{at_least_two, learned_here};
 use super::output::{Done, Format, print_json};
 use super::plot::{Canvas, Plot};
@@ -91,6 +92,8 @@ pub(crate) struct Args {
     expecting: Expecting,
     #[command(flatten)]
     stop: Stop,
+    #[command(flatten)]
+    choosing: Choosing,
     /// Another seed draws other slides; with --simulated also another world, and another texture unless one is given
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -177,7 +180,7 @@ fn identify_recorded(
             drift: Some(args.expecting.drift),
             ..Expected::default()
         });
-        let run = experiment.run(index as u64);
+        let run = experiment.run_alone(index as u64);
         learned = run.learn(args.method.unwrap_or(Method::Fused).method())?;
         let seen = &run.training()[index];
         let mut measured = measured[index].iter();
@@ -300,6 +303,7 @@ where
         open: true,
         ..args.stop.config(method)
     };
+    let config = args.choosing.config(config, seconds::RIG)?;
     let mut explorer = Explorer::<MAX_TEXTURES>::new(table, rig.measures(), config)?;
     out.flush()?;
     let mut slides = Transcript::default();

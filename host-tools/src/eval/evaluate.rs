@@ -10,7 +10,7 @@ use tactus_core::explorer::{
 };
 use tactus_core::features::PropertySet;
 use tactus_core::rig::MAX_REJECTED;
-use tactus_core::table::{Action, Table, TableError};
+use tactus_core::table::{Action, MAX_MOVEMENTS, Table, TableError};
 
 use crate::eval::experiment::{Experiment, Run};
 use crate::eval::learn;
@@ -85,6 +85,8 @@ pub struct Outcome {
     pub told: Told,
     /// Slides made.
     pub slides: u8,
+    /// How many of them with each movement.
+    pub made: [u8; MAX_MOVEMENTS],
     /// Whether it would have been called unknown, had that been an answer.
     pub unknown_like: bool,
 }
@@ -133,6 +135,12 @@ impl<'b> Shared<'b> {
             explorer,
         }
     }
+
+    /// Of the table in these bytes.
+    fn with(bytes: &'b [u8], of: &Experiment, config: Config) -> Result<Self, EvaluateError> {
+        let explorer = explorer(bytes, of.measured(), config, of.candidates())?;
+        Ok(Self::new(explorer, config.strategy))
+    }
 }
 
 /// Plays one run to its end, with the degrees of confusion of [`Shared`] or computing them where they are asked for.
@@ -155,6 +163,7 @@ pub fn play_with<const N: usize>(
 ) -> Outcome {
     explorer.restart();
     let mut failed = 0;
+    let mut made = [0; MAX_MOVEMENTS];
     let verdict = loop {
         if let Some(verdict) = explorer.verdict() {
             break verdict;
@@ -179,6 +188,7 @@ pub fn play_with<const N: usize>(
             continue;
         };
         failed = 0;
+        made[usize::from(action.movement)] += 1;
         explorer
             .observe(action, slide)
             .expect("every slide has the properties that the explorer was told of");
@@ -190,6 +200,7 @@ pub fn play_with<const N: usize>(
         sure: verdict.sure,
         told: verdict.told(),
         slides: explorer.slides(),
+        made,
         unknown_like: explorer.is_unknown(),
     }
 }
@@ -222,32 +233,33 @@ pub(super) fn evaluate_by<T: Send>(
     done: impl Fn() + Sync,
     play: impl Fn(&mut Explorer<'_, MAX_TEXTURES>, Kept<'_>, Run<'_>) -> T + Sync,
 ) -> Result<Vec<T>, EvaluateError> {
+    let learn = |run| experiment.run(run).learn(config.method);
+    let run = |explorer: &mut Explorer<'_, MAX_TEXTURES>, kept: Kept<'_>, index| {
+        let outcome = play(explorer, kept, experiment.run(index));
+        done();
+        outcome
+    };
     // where every run learns from the same slides, one table serves all
     if experiment.is_fixed() {
-        let bytes = experiment.run(0).learn(config.method)?;
-        let candidates = experiment.candidates();
-        let explorer = explorer(&bytes, experiment.measured(), config, candidates)?;
-        let shared = Shared::new(explorer, config.strategy);
-        let run = |explorer: &mut Box<Explorer<'_, MAX_TEXTURES>>, index| {
-            let outcome = play(explorer, shared.confusions.as_ref(), experiment.run(index));
-            done();
-            outcome
-        };
+        let bytes = learn(0)?;
+        let shared = Shared::with(&bytes, experiment, config)?;
+        let run = |explorer: &mut Box<_>, index| run(explorer, shared.confusions.as_ref(), index);
         let all = (0..runs).into_par_iter();
         return Ok(all.map_init(|| shared.explorer.clone(), run).collect());
     }
-    (0..runs)
-        .into_par_iter()
-        .map(|index| {
-            let run = experiment.run(index);
-            let bytes = run.learn(config.method)?;
-            let candidates = experiment.candidates();
-            let mut explorer = explorer(&bytes, experiment.measured(), config, candidates)?;
-            let outcome = play(&mut explorer, None, run);
-            done();
-            Ok(outcome)
-        })
-        .collect()
+    let round = experiment.round();
+    let rounds = (0..runs.div_ceil(round)).into_par_iter();
+    let played = rounds.map(|number| {
+        let first = number * round;
+        let bytes = learn(first)?;
+        let mut shared = Shared::with(&bytes, experiment, config)?;
+        let kept = shared.confusions.as_ref();
+        let runs = first..runs.min(first + round);
+        let played = runs.map(|index| run(&mut shared.explorer, kept, index));
+        Ok(played.collect())
+    });
+    let played: Result<Vec<Vec<T>>, EvaluateError> = played.collect();
+    Ok(played?.into_iter().flatten().collect())
 }
 
 /// Degrees of confusion, where they are kept.
@@ -439,6 +451,7 @@ mod tests {
             sure,
             told: if sure { Told::Sure } else { Told::Undecided },
             slides,
+            made: [0; MAX_MOVEMENTS],
             unknown_like: slides == 4,
         };
         let names = ["a".to_owned(), "b".to_owned(), "c".to_owned()];

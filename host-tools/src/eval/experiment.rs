@@ -1,8 +1,9 @@
 //! What every quoted figure means: which slides a table is learned from, and which the unknown texture shows.
 //!
-//! A run is one virtual exploration. Its training slides are drawn anew, one texture is unknown (in turn), and each slide
-//! that an explorer asks for is drawn from that texture's test slides: with replacement, as in the reference program, or each
-//! once, as `identify` has it.
+//! A run is one virtual exploration: one texture is unknown, in turn, and each slide that an explorer asks for is drawn from
+//! that texture's test slides: with replacement, as in the reference program, or each once, as `identify` has it. Runs go in
+//! rounds, in which every texture is the unknown one once. The training slides of a round are drawn anew, and its runs share
+//! the table: learning one takes a hundred times as long as a run.
 
 use std::collections::{HashMap, HashSet};
 
@@ -18,7 +19,10 @@ use crate::data::fabricslide::{FabricSet, FabricSlide};
 use crate::data::properties::PropertyTable;
 use crate::data::replay::MeasuredSlide;
 use crate::eval::learn::{Expected, TableError, learn_for};
-use crate::eval::show::count;
+
+mod error;
+
+pub use error::ExperimentError;
 
 /// How slides are divided into training and test.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
@@ -42,58 +46,6 @@ const SESSION: usize = 34;
 const BLOCKED_BELOW: u32 = 30;
 /// ... and tests on numbers above this.
 const BLOCKED_ABOVE: u32 = 34;
-
-/// Why an experiment cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum ExperimentError {
-    /// Too few slides.
-    #[error(
-        "{texture}, {movement}: {} to train from, and --train-slides is {wanted}; ask for fewer", count(*there as u64, "slide")
-    )]
-    Training {
-        /// Name of the texture.
-        texture: String,
-        /// The movement.
-        movement: Movement,
-        /// Slides there are.
-        there: usize,
-        /// Slides asked for.
-        wanted: usize,
-    },
-    /// Nothing left to test on.
-    #[error(
-        "{texture}, {movement}: no slide is left to test on; train on fewer slides or give more with --test"
-    )]
-    Test {
-        /// Name of the texture.
-        texture: String,
-        /// The movement.
-        movement: Movement,
-    },
-    /// As [`Self::Training`], where all of them are to be used.
-    #[error(
-        "{texture}, {movement}: {there} training slide; how slides of one texture differ takes at least two"
-    )]
-    Few {
-        /// Name of the texture.
-        texture: String,
-        /// The movement.
-        movement: Movement,
-        /// Slides there are.
-        there: usize,
-    },
-    /// A standard deviation needs two slides.
-    #[error("--train-slides {0}: how slides of one texture differ takes at least two slides")]
-    One(usize),
-    /// The folder of test slides lacks something.
-    #[error(
-        "the test folder has no {0}, which the training folder has; give a folder of the same textures"
-    )]
-    Missing(String),
-    /// More movements than a table holds.
-    #[error("too many movements, {0}; a table holds {max} at most", max = table::MAX_MOVEMENTS)]
-    Movements(usize),
-}
 
 /// Slides of one texture and movement.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -466,11 +418,48 @@ impl Experiment {
         !self.drawn
     }
 
+    /// Runs of a round: so many, one after the other, learn from the same slides, where these are drawn.
+    pub fn round(&self) -> u64 {
+        self.unknowns.len() as u64
+    }
+
     /// Draws run number `run`. The same number gives the same run, whichever thread asks for it.
     pub fn run(&self, run: u64) -> Run<'_> {
+        // runs count from below, rounds from above
+        let mut of_round = self.stream(u64::MAX - run / self.round());
+        Run {
+            orders: self.orders(&mut of_round),
+            ..self.begin(run)
+        }
+    }
+
+    /// As [`Experiment::run`], with training slides of its own: for those who learn a table for each run anyway. Runs are
+    /// independent then.
+    pub fn run_alone(&self, run: u64) -> Run<'_> {
+        let mut alone = self.begin(run);
+        alone.orders = self.orders(&mut alone.random);
+        alone
+    }
+
+    fn stream(&self, number: u64) -> ChaCha8Rng {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        random.set_stream(run);
-        let unknown = self.unknowns[(run % self.unknowns.len() as u64) as usize];
+        random.set_stream(number);
+        random
+    }
+
+    /// The run in the order of time.
+    fn begin(&self, run: u64) -> Run<'_> {
+        Run {
+            experiment: self,
+            orders: HashMap::new(),
+            shown: HashSet::new(),
+            unknown: self.unknowns[(run % self.round()) as usize],
+            random: self.stream(run),
+        }
+    }
+
+    /// In which order slides are taken, by movement and how many there are.
+    fn orders(&self, random: &mut ChaCha8Rng) -> HashMap<(usize, usize), Vec<usize>> {
         // As in the reference program, the same places in the session are drawn for all textures: slides of one place share
         // what the session did to them.
         let mut orders: HashMap<(usize, usize), Vec<usize>> = HashMap::new();
@@ -479,18 +468,12 @@ impl Experiment {
                 let slides = pool.train.len();
                 orders.entry((movement, slides)).or_insert_with(|| {
                     let mut order: Vec<usize> = (0..slides).collect();
-                    order.shuffle(&mut random);
+                    order.shuffle(random);
                     order
                 });
             }
         }
-        Run {
-            experiment: self,
-            orders,
-            shown: HashSet::new(),
-            unknown,
-            random,
-        }
+        orders
     }
 }
 

@@ -173,7 +173,7 @@ pub fn leave_out(
     let presented: Vec<_> = (0..runs)
         .into_par_iter()
         .map(|index| {
-            let mut run = experiment.run(index);
+            let mut run = experiment.run_alone(index);
             let presented = run.unknown;
             let textures = experiment.names().len();
             let first = presented + 1 + run.random.random_range(0..textures - 1);
@@ -187,7 +187,7 @@ pub fn leave_out(
             let new = episode(experiment, open, &mut run, outs[0], &tables[0])?;
             let known = episode(experiment, open, &mut run, outs[1], &tables[1])?;
             let told = |out: &[usize], bytes: &[u8]| {
-                let run = as_told.run(index);
+                let run = as_told.run_alone(index);
                 let mut explorer = explorer(bytes, as_told.measured(), open, None)?;
                 let outcome = play(&mut explorer, None, open.strategy, run);
                 let is_right = place(presented, out) == Some(outcome.identified);

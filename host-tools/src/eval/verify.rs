@@ -109,7 +109,7 @@ pub fn verify(
     let visits: Vec<Vec<Visit>> = (0..runs)
         .into_par_iter()
         .map(|index| {
-            let mut run = experiment.run(index);
+            let mut run = experiment.run_alone(index);
             let bytes = run.learn(config.method)?;
             let presented = run.unknown;
             let other = |random: usize| (presented + 1 + random) % textures;

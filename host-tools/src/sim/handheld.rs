@@ -262,7 +262,7 @@ pub fn learn_with(
 mod tests {
     use super::*;
     use crate::sim::collection::texture_number;
-    use tactus_core::handheld::{MAX_SLIDES, judge};
+    use tactus_core::handheld::{ASK_AFTER, MAX_SLIDES, judge_at_most};
     use tactus_core::table::Table;
 
     fn world(among: u8) -> Collection {
@@ -287,10 +287,12 @@ mod tests {
                 continue;
             };
             all += 1;
-            let mut judged = (1..=MAX_SLIDES).map(|n| {
+            let mut judged = (1..=ASK_AFTER).map(|n| {
                 (
                     n,
-                    judge::<Plain>(table, &measured[..n], None, None).unwrap().0,
+                    judge_at_most::<Plain>(table, &measured[..n], None, None, ASK_AFTER)
+                        .unwrap()
+                        .0,
                 )
             });
             let (n, judged) = judged.find(|(_, judged)| !judged.open).unwrap();
@@ -416,8 +418,11 @@ mod tests {
             let Ok((measured, _)) = slides(other.setup(texture, 1), Manner::default(), 5) else {
                 continue;
             };
-            let mut judged = (1..=MAX_SLIDES)
-                .map(|n| judge::<Plain>(read, &measured[..n], None, None).unwrap().0);
+            let mut judged = (1..=ASK_AFTER).map(|n| {
+                judge_at_most::<Plain>(read, &measured[..n], None, None, ASK_AFTER)
+                    .unwrap()
+                    .0
+            });
             let judged = judged.find(|judged| !judged.open).unwrap();
             all += 1;
             new += usize::from(judged.unknown);
@@ -425,5 +430,83 @@ mod tests {
         }
         let unsure = all - new - taken;
         eprintln!("{all} of another world: unknown {new}, unsure {unsure}, taken for one {taken}");
+    }
+
+    /// Slides of a touch in [`what_more_slides_tell`].
+    const MOST: usize = 12;
+
+    /// Explores touches that the factory's table of a finger was not learned from: how many, and of how many, after 1 to [`MOST`] slides, the right
+    /// texture is sure, another one is, and none is said to fit.
+    fn explore_factory(
+        finger: FingerName,
+        trials: std::ops::Range<u64>,
+    ) -> (usize, Vec<[usize; 3]>) {
+        let file = match finger {
+            FingerName::Biotac => "handheld.tact",
+            FingerName::Analog => "handheld-analog.tact",
+            FingerName::Mems => "handheld-mems.tact",
+        };
+        let firmware = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware");
+        let table = std::fs::read(firmware.join(file)).unwrap();
+        let table = Table::read(&table).unwrap();
+        let world = world(117);
+        let touches: Vec<_> = (1..=117)
+            .filter_map(|texture| Some((texture, table.find(texture_name(texture))?)))
+            .flat_map(|known| trials.clone().map(move |trial| (known, trial)))
+            .collect();
+        let ended: Vec<_> = touches
+            .par_iter()
+            .filter_map(|&((texture, is), trial)| {
+                let setup = world.setup_with(finger, texture, trial);
+                // nearly too smooth to be noticed
+                let (measured, _) = slides(setup, Manner::default(), MOST as u32).ok()?;
+                let mut judged = (1..=MOST).map(|n| {
+                    let judged = judge_at_most::<Plain>(table, &measured[..n], None, None, MOST);
+                    (n, judged.unwrap().0)
+                });
+                let (n, last) = judged.find(|(_, judged)| !judged.open).unwrap();
+                Some((n, last.leading[0].0 == is, last))
+            })
+            .collect();
+        let counts = (1..=MOST).map(|most| {
+            let mut counts = [0; 3];
+            for (_, right, last) in ended.iter().filter(|(n, ..)| *n <= most) {
+                let outcome = match (last.unknown, last.sure, right) {
+                    (true, ..) => 2,
+                    (_, true, true) => 0,
+                    (_, true, false) => 1,
+                    _ => continue,
+                };
+                counts[outcome] += 1;
+            }
+            counts
+        });
+        (ended.len(), counts.collect())
+    }
+
+    #[test]
+    #[ignore = "the book's figures; minutes"]
+    fn what_more_slides_tell() {
+        for finger in FingerName::ALL {
+            let (all, counts) = explore_factory(finger, 100..102);
+            for ([right, wrong, unknown], n) in counts.iter().zip(1..) {
+                println!(
+                    "{finger}, at most {n}: right {right}, wrong {wrong}, unknown {unknown} of {all}"
+                );
+            }
+            let after = |slides: usize| counts[slides - 1];
+            let [asked, last, more] = [ASK_AFTER, MAX_SLIDES, MOST].map(after);
+            // of a hundred: going on tells five more, and none of them wrong
+            assert!(
+                100 * (last[0] - asked[0]) >= 5 * all,
+                "{finger}: {counts:?}"
+            );
+            assert!(
+                last[1] <= asked[1] + all / 100 && last[1] <= 2,
+                "{finger}: {counts:?}"
+            );
+            // and more than that tells two more at most
+            assert!(100 * (more[0] - last[0]) <= 2 * all, "{finger}: {counts:?}");
+        }
     }
 }

@@ -515,3 +515,5 @@ impl Rig for SimRig {
 #[cfg(test)]
 mod fingers;
 mod measuring;
+#[cfg(test)]
+mod weights;

@@ -111,6 +111,9 @@ pub enum Step {
         pace_mm_s: f64,
         /// At most so many.
         slides: u32,
+        /// How long each is, s.
+        #[serde(default = "explored")]
+        seconds: f64,
     },
     /// The button is pressed so many times, for so long each.
     Press {
@@ -146,6 +149,10 @@ pub enum Step {
 
 fn timeout() -> f64 {
     TIMEOUT_S
+}
+
+fn explored() -> f64 {
+    Step::EXPLORED_S
 }
 
 fn once() -> u32 {
@@ -374,16 +381,16 @@ impl Step {
                 force_n,
                 pace_mm_s,
                 seconds,
+            }
+            | Self::Explore {
+                force_n,
+                pace_mm_s,
+                seconds,
+                ..
             } => {
                 force(*force_n)?;
                 pace(*pace_mm_s)?;
                 time(*seconds)
-            }
-            Self::Explore {
-                force_n, pace_mm_s, ..
-            } => {
-                force(*force_n)?;
-                pace(*pace_mm_s)
             }
             Self::Wait { seconds } => time(*seconds),
             Self::Place { texture: name } => texture(name).map(|_| ()),
@@ -401,9 +408,9 @@ impl Step {
         match self {
             Self::See { within_s, .. } | Self::Dark { within_s } => *within_s,
             Self::Slide { seconds, .. } => slide_s(*seconds),
-            Self::Explore { slides, .. } => {
-                f64::from(*slides) * (slide_s(Self::EXPLORED_S) + Self::VERDICT_S)
-            }
+            Self::Explore {
+                slides, seconds, ..
+            } => f64::from(*slides) * (slide_s(*seconds) + Self::VERDICT_S),
             Self::Press { ms, times } => {
                 f64::from(*times) * (*ms as f64 + Self::RELEASED_MS as f64) * 1e-3
             }
@@ -421,7 +428,7 @@ impl Step {
 
     /// From what is seen to what is done, ms.
     pub const REACTION_MS: u64 = 300;
-    /// How long a slide of [`Step::Explore`] is, and how long its verdict is waited for, s.
+    /// How long a slide of [`Step::Explore`] is unless it says so, and how long its verdict is waited for, s.
     pub const EXPLORED_S: f64 = 1.8;
     /// See [`Step::EXPLORED_S`].
     pub const VERDICT_S: f64 = 1.0;

@@ -104,6 +104,11 @@ impl SensorPeer {
         &self.complaints
     }
 
+    /// Whether it is in its streaming mode, and answers nothing.
+    pub fn is_streaming(&self) -> bool {
+        self.streaming
+    }
+
     /// Whether it has power.
     pub fn is_plugged(&self) -> bool {
         self.powered_ns.is_some()

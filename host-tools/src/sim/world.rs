@@ -50,6 +50,8 @@ pub struct Setup {
     /// Whether samples lie on shims: those that are thinner than [`World::SHIMMED_MM`] end at that height. The finger's way
     /// down, at 0.5 mm/s, then takes 9 s at most and not up to half a minute.
     pub shimmed: bool,
+    /// Of which world the texture is; this one's, unless given. So one rig slides over more textures than Table 1 has.
+    pub samples_of: Option<u64>,
 }
 
 impl Default for Setup {
@@ -62,12 +64,13 @@ impl Default for Setup {
             finger: FingerName::Biotac,
             keep_edges: false,
             shimmed: false,
+            samples_of: None,
         }
     }
 }
 
 /// What is really so, as no pin tells it.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Truth {
     /// Time of these values: the end of the tick, at most 76 us ahead of the time reached.
     pub at_ns: u64,
@@ -185,7 +188,11 @@ impl World {
             stage: Stage::new(stage_mm, setup.world_seed, setup.trial_seed),
             wanted: (false, false),
             encoder: Encoder::new(stage_mm, setup.keep_edges),
-            surface: sample(setup.texture, setup.world_seed, conditions.variation),
+            surface: sample(
+                setup.texture,
+                setup.samples_of.unwrap_or(setup.world_seed),
+                conditions.variation,
+            ),
             peers: Peers::new(&finger, setup.finger_seed),
             finger,
             selected: None,

@@ -2,15 +2,16 @@
 use anyhow::{Result, ensure};
 use clap::Args;
 
-use crate::emulate;
 use crate::shell::{cargo, root, run, target};
+use crate::{emulate, timeline};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask docs            the book as pages, in target/book (needs mdBook)
   cargo xtask docs --check    links, commands, outputs, recordings and generated tables, without mdBook
   cargo xtask docs --write    writes outputs, recordings, tables and the moving picture again
-  cargo xtask docs --scope    draws the oscilloscope's pictures again, from the pins of the emulated board";
+  cargo xtask docs --scope    draws the oscilloscope's pictures again, from the pins of the emulated board
+  cargo xtask docs --timeline draws what each second goes to, on emulated boards";
 
 #[derive(Args)]
 pub(crate) struct Options {
@@ -23,12 +24,19 @@ pub(crate) struct Options {
     /// Draw the oscilloscope's pictures again; builds firmware and emulator
     #[arg(long, conflicts_with_all = ["check", "write"])]
     scope: bool,
+    /// Draw what each second goes to again; builds firmware and emulator
+    #[arg(long, conflicts_with_all = ["check", "write", "scope"])]
+    timeline: bool,
 }
 
 pub(crate) fn docs(options: &Options) -> Result<()> {
     if options.scope {
         let pages = root().join("docs/src");
         return emulate::start("scope", &["--out".into(), pages.into()]);
+    }
+    if options.timeline {
+        let picture = root().join("docs/src/timeline.svg");
+        return timeline::timeline(&picture.to_string_lossy(), &[]);
     }
     if options.check || options.write {
         // the picture that a test of the simulator draws
@@ -44,10 +52,12 @@ pub(crate) fn docs(options: &Options) -> Result<()> {
             test.env("TACTUS_BOOK", "write");
         }
         run(&mut test)?;
-        // the page of bad input reads the recordings that the book's tests write
-        for name in ["book", "bad_input"] {
+        // outputs, plots, and the page of bad input are made from the recordings that one of the book's tests writes
+        let all = [("book", "the_recordings"), ("book", ""), ("bad_input", "")];
+        let begin = usize::from(!options.write);
+        for (name, filter) in &all[begin..] {
             let mut test = cargo();
-            test.args(["test", "--package", "tactus", "--test", name]);
+            test.args(["test", "--package", "tactus", "--test", name, filter]);
             if options.write {
                 // one after the other: two of them may write one page
                 test.env("TACTUS_BOOK", "write")

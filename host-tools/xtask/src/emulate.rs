@@ -29,7 +29,7 @@ pub(crate) fn emulate(options: &[OsString]) -> Result<()> {
 }
 
 /// The value of an option, `--name value` or `--name=value`.
-fn value(options: &[OsString], name: &str) -> Option<String> {
+pub(crate) fn value(options: &[OsString], name: &str) -> Option<String> {
     let options: Vec<_> = options.iter().map(|o| o.to_string_lossy()).collect();
     options.iter().enumerate().find_map(|(at, option)| {
         match option.strip_prefix(name)?.strip_prefix('=') {

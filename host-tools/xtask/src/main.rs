@@ -12,6 +12,7 @@ mod seeds;
 mod shell;
 mod size;
 mod test;
+mod timeline;
 mod toolchain;
 
 use std::ffi::OsString;
@@ -60,6 +61,7 @@ enum Cli {
   cargo xtask emulate --finger mems          with another finger: analog or mems
   cargo xtask emulate --handheld             a hand that explores with the handheld
   cargo xtask emulate --handheld --motion    the handheld with a sensor of motion, in a hand
+  cargo xtask emulate --timeline FILE.svg    what each second goes to, of rig and handheld, medians of 20 seeds
   cargo xtask emulate --port 7429            serves its serial port at tcp:127.0.0.1:7429 instead
   cargo xtask emulate --help                 all options")]
     #[command(disable_help_flag = true)]
@@ -174,7 +176,7 @@ enum Cli {
 fn main() -> ExitCode {
     let done = match Cli::parse() {
         Cli::Build => firmware::build().map(|_| ()),
-        Cli::Emulate { options } => emulate::emulate(&options),
+        Cli::Emulate { options } => timeline::emulate(&options),
         Cli::Campaign { options } => emulate::campaign(&options),
         Cli::Soak { options } => emulate::start("soak", &options),
         Cli::Check => return ended(test::check()),

@@ -1,10 +1,7 @@
 //! Many seeds of what draws from one: none may fail, and wrong verdicts are counted.
-use std::io::{IsTerminal as _, Write as _};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail, ensure};
@@ -13,6 +10,9 @@ use serde_json::{Value, json};
 
 use crate::shell::{self, cargo, target};
 use crate::{emulate, firmware};
+
+pub(crate) mod board;
+use board::{Ending, Explored};
 
 pub(crate) const EXAMPLES: &str = "Examples:
   cargo xtask seeds study                     seeds 1 to 100 of the whole study, with few simulations
@@ -161,8 +161,8 @@ impl What {
                 })
                 .into()
             }
-            Self::Rig => vec![seeded(&["identify"])],
-            Self::Handheld => vec![seeded(&["handheld"])],
+            Self::Rig => vec![seeded(&["identify", "--format", "json"])],
+            Self::Handheld => vec![seeded(&["handheld", "--format", "json"])],
             Self::Press => {
                 let test = ["the_whole_campaign", "--ignored", "--nocapture"];
                 vec![Run {
@@ -181,17 +181,6 @@ fn range(text: &str) -> Result<RangeInclusive<u64>, String> {
         (Ok(from), Ok(to)) if from <= to => Ok(from..=to),
         _ => Err("two numbers are wanted, the lower first: 1-50".into()),
     }
-}
-
-/// How a run ended.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Ending {
-    Right,
-    Wrong,
-    Undecided,
-    /// It has no verdict to give.
-    Done,
-    Failed,
 }
 
 /// What a run's output says of its end, or what is right by the caller. An exit code of 3 is "not identified": no failure.
@@ -225,26 +214,15 @@ pub(crate) fn seeds(options: &Options) -> Result<()> {
         .clone()
         .flat_map(|seed| what.runs(seed, &scratch))
         .collect();
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let jobs = options.jobs.unwrap_or(cores).clamp(1, runs.len().max(1));
+    let jobs = options.jobs.unwrap_or_else(shell::cores);
     let began = Instant::now();
-    let (next, ended) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
-    std::thread::scope(|scope| {
-        for _ in 0..jobs {
-            scope.spawn(|| {
-                while let Some(run) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let result = perform(&program, run, &options.options, &scratch);
-                    let mut ended = ended.lock().unwrap_or_else(|e| e.into_inner());
-                    if let Some(line) = result.line() {
-                        println!("{line}");
-                    }
-                    ended.push(result);
-                    progress(ended.len(), runs.len());
-                }
-            });
+    let ended = shell::each_of(&runs, jobs, |run| {
+        let result = perform(&program, run, &options.options, &scratch);
+        if let Some(line) = result.line() {
+            println!("{line}");
         }
+        result
     });
-    let ended = ended.into_inner().unwrap_or_else(|e| e.into_inner());
     let count = |wanted| ended.iter().filter(|r| r.ending == wanted).count();
     let listed = |wanted| {
         let of = ended.iter().filter(|r| r.ending == wanted);
@@ -252,6 +230,7 @@ pub(crate) fn seeds(options: &Options) -> Result<()> {
             .collect::<Vec<Value>>()
     };
     let failed = count(Ending::Failed);
+    let board = board::figures(ended.iter().filter_map(|r| r.explored.as_ref()));
     let summary = json!({
         "what": what.name(),
         "seeds": [seeds.start(), seeds.end()],
@@ -261,6 +240,7 @@ pub(crate) fn seeds(options: &Options) -> Result<()> {
         "undecided": listed(Ending::Undecided),
         "right": count(Ending::Right),
         "seconds": began.elapsed().as_secs(),
+        "board": board,
     });
     let file = options
         .out
@@ -278,6 +258,9 @@ pub(crate) fn seeds(options: &Options) -> Result<()> {
         count(Ending::Undecided),
         file.display()
     );
+    if let Some(board) = board {
+        println!("{}", board::sentence(&board));
+    }
     ensure!(
         failed == 0,
         "runs that failed: {failed} of {}; they are listed above",
@@ -294,6 +277,8 @@ struct Ended {
     repeat: String,
     /// The last thing that it said.
     said: String,
+    /// What it says for programs, on the emulated board.
+    explored: Option<Explored>,
 }
 
 impl Ended {
@@ -328,8 +313,8 @@ fn perform(program: &Program, run: &Run, further: &[String], scratch: &Path) -> 
     let parts = std::iter::once(command.get_program()).chain(command.get_args());
     let parts = parts.map(|part| part.to_string_lossy().into_owned());
     let repeat = set.into_iter().chain(parts).collect::<Vec<_>>().join(" ");
-    let (ending, said) = match command.output() {
-        Err(why) => (Ending::Failed, format!("cannot be started: {why}")),
+    let (ending, said, explored) = match command.output() {
+        Err(why) => (Ending::Failed, format!("cannot be started: {why}"), None),
         Ok(Output {
             status,
             stdout,
@@ -339,7 +324,11 @@ fn perform(program: &Program, run: &Run, further: &[String], scratch: &Path) -> 
                 String::from_utf8_lossy(&stdout),
                 String::from_utf8_lossy(&stderr),
             );
-            let ending = ending(status.code(), &stdout, run.right);
+            let explored = Explored::of(&stdout);
+            let ending = match (ending(status.code(), &stdout, run.right), &explored) {
+                (Ending::Done, Some(explored)) => explored.ending,
+                (ending, _) => ending,
+            };
             let told = if ending == Ending::Failed {
                 stderr
             } else {
@@ -365,12 +354,16 @@ fn perform(program: &Program, run: &Run, further: &[String], scratch: &Path) -> 
                 .iter()
                 .any(|word| line.starts_with(word))
             };
+            let of_board = explored.as_ref().filter(|_| ending != Ending::Failed);
+            let of_board = of_board.map(|explored| explored.said.as_str());
             let said = panicked
+                .or(of_board)
                 .or_else(|| lines.clone().find(says))
                 .or_else(|| lines.next());
             (
                 ending,
                 said.map_or_else(|| status.to_string(), ToOwned::to_owned),
+                explored,
             )
         }
     };
@@ -386,16 +379,7 @@ fn perform(program: &Program, run: &Run, further: &[String], scratch: &Path) -> 
         ending,
         repeat,
         said,
-    }
-}
-
-fn progress(done: usize, all: usize) {
-    if std::io::stderr().is_terminal() {
-        eprint!("\r{done} of {all} ");
-        if done == all {
-            eprintln!();
-        }
-        let _ = std::io::stderr().flush();
+        explored,
     }
 }
 

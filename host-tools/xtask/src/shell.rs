@@ -1,6 +1,9 @@
 //! Where things are, and how other programs are run.
+use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context as _, Result, bail};
 
@@ -28,6 +31,43 @@ pub(crate) fn has_subcommand(name: &str) -> bool {
         .args([name, "--version"])
         .output()
         .is_ok_and(|o| o.status.success())
+}
+
+/// Processors of this machine.
+pub(crate) fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// Does something with each of many, so many at a time, and says on a terminal how far it is: the results, in no order.
+pub(crate) fn each_of<T: Sync, R: Send>(
+    all: &[T],
+    at_a_time: usize,
+    work: impl Fn(&T) -> R + Sync,
+) -> Vec<R> {
+    let (next, ended) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    std::thread::scope(|scope| {
+        for _ in 0..at_a_time.clamp(1, all.len().max(1)) {
+            scope.spawn(|| {
+                while let Some(one) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let result = work(one);
+                    let mut ended = ended.lock().unwrap_or_else(PoisonError::into_inner);
+                    ended.push(result);
+                    progress(ended.len(), all.len());
+                }
+            });
+        }
+    });
+    ended.into_inner().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn progress(done: usize, all: usize) {
+    if std::io::stderr().is_terminal() {
+        eprint!("\r{done} of {all} ");
+        if done == all {
+            eprintln!();
+        }
+        let _ = std::io::stderr().flush();
+    }
 }
 
 /// Runs a command with its output where ours goes; an error unless it succeeds.

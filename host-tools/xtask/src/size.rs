@@ -24,9 +24,6 @@ const KB: u64 = 1024;
 /// Flash of an image, and of that of another finger, without the table that comes with it. An image that is not listed is not gated. The handheld had 128 KB
 /// before it compared textures in spite of drift and had a link.
 const MAX_FLASH: [(&str, u64); 2] = [(RIG, 160 * KB), (HANDHELD, 160 * KB)];
-/// Images that miss the 160 KB, and what they reached instead: they may not grow. Slopes over the speed and what reads the sensor of motion
-/// take 8 KB.
-const MISSES: [(&str, u64); 2] = [(MOTION, 171_809), ("tactus-rig-mems", 164_168)];
 const HANDHELD: &str = "tactus-handheld";
 const MAX_VARIABLES: u64 = 64 * KB;
 /// Twice the deepest stack has to fit into what memory.x leaves above the variables and the guard.
@@ -141,9 +138,8 @@ fn worst_stack(image: &Measured) -> Option<u64> {
 
 /// Most flash that an image may take, the table that comes with it included.
 fn max_flash(image: &Measured) -> Option<u64> {
-    let missed = MISSES.iter().find(|(name, _)| *name == image.name);
     let of_kind = |(name, _): &&(&str, u64)| image.name.starts_with(name);
-    let (_, most) = missed.or_else(|| MAX_FLASH.iter().find(of_kind))?;
+    let (_, most) = MAX_FLASH.iter().find(of_kind)?;
     Some(most + image.table)
 }
 
@@ -241,15 +237,6 @@ fn text(images: &[Measured]) -> String {
             line(format_args!(
                 "flash includes a table of {} bytes, the stack's share is half of what is above its guard",
                 image.table
-            ));
-        }
-    }
-    for (name, _) in MISSES {
-        for image in images.iter().filter(|image| image.name == name) {
-            let most = 160 * KB + image.table;
-            line(format_args!(
-                "{name} misses the 160 KB and its table by {} bytes",
-                image.size.flash.saturating_sub(most)
             ));
         }
     }

@@ -47,6 +47,9 @@ pub struct Display {
     at: (u8, u8),
     unknown: Vec<u8>,
     bytes: u64,
+    /// the last whole picture that differed from the one before it, and when its last byte came, ns
+    whole: [u8; WIDTH * HEIGHT / 8],
+    whole_ns: Option<u64>,
 }
 
 impl Default for Display {
@@ -68,6 +71,8 @@ impl Default for Display {
             at: (0, 0),
             unknown: Vec::new(),
             bytes: 0,
+            whole: [0; WIDTH * HEIGHT / 8],
+            whole_ns: None,
         }
     }
 }
@@ -102,6 +107,7 @@ impl Display {
 
     fn shows_in(&self, text: &str, fonts: &[&MonoFont<'_>]) -> bool {
         self.picture().is_some_and(|picture| {
+            let picture = rows(&picture);
             fonts.iter().any(|font| {
                 let width = font.character_size.width as usize * text.chars().count();
                 let height = font.character_size.height as usize;
@@ -118,6 +124,11 @@ impl Display {
     /// Bytes that came to it.
     pub fn bytes(&self) -> u64 {
         self.bytes
+    }
+
+    /// When what it shows was wholly written, ns; `None` before the first picture. The same picture again is no new one.
+    pub fn written_ns(&self) -> Option<u64> {
+        self.whole_ns
     }
 
     /// Pulls its plug, or puts it in again: then it is as after its reset.
@@ -140,7 +151,8 @@ impl Display {
         self.wired && self.plugged && address == ADDRESS && !read
     }
 
-    pub(super) fn byte(&mut self, byte: u8) {
+    /// A byte, which is over now.
+    pub(super) fn byte(&mut self, now_ns: u64, byte: u8) {
         self.bytes += 1;
         match self.next {
             Next::Control => {
@@ -160,6 +172,7 @@ impl Display {
             }
             Next::Data { rest } => {
                 self.put(byte);
+                self.look_at_whole(now_ns);
                 if !rest {
                     self.next = Next::Control;
                 }
@@ -204,6 +217,15 @@ impl Display {
         self.command.clear();
     }
 
+    /// After a byte of the picture: if it was the last one of an area, the picture is whole.
+    fn look_at_whole(&mut self, now_ns: u64) {
+        let first = (self.columns.0, self.pages.0);
+        if self.at == first && self.whole != self.ram {
+            self.whole = self.ram;
+            self.whole_ns = Some(now_ns);
+        }
+    }
+
     /// A byte of the picture: eight points of a column.
     fn put(&mut self, byte: u8) {
         let (column, page) = self.at;
@@ -245,31 +267,42 @@ fn write(text: &str, font: &MonoFont<'_>) -> Picture {
     picture
 }
 
+/// The rows of a picture, a point a bit: words are looked for at every step of a run, and point by point that took a tenth of it.
+fn rows(picture: &Picture) -> [u128; HEIGHT] {
+    let lit = |x: usize, y: usize| u128::from(picture.is_lit(x, y)) << x;
+    std::array::from_fn(|y| (0..WIDTH).fold(0, |row, x| row | lit(x, y)))
+}
+
 /// Whether that corner of `part` is somewhere in `whole`, inverted or not.
-fn is_in(whole: &Picture, part: &Picture, width: usize, height: usize) -> bool {
+fn is_in(whole: &[u128; HEIGHT], part: &Picture, width: usize, height: usize) -> bool {
+    let part = &rows(part)[..height];
+    let wide = u128::MAX.checked_shr((WIDTH - width) as u32).unwrap_or(0);
     // headlines begin a row above the glass, with a row of the font that is empty, and what ends at its right edge leaves
     // the gap to the next letter, a column, beyond it
-    let is_at = |left: usize, rows_above: usize, top: usize, inverted: bool| {
-        (0..height).all(|y| {
-            (0..width).all(|x| match (top + y).checked_sub(rows_above) {
-                Some(row) if left + x < WIDTH => {
-                    (whole.is_lit(left + x, row) != inverted) == part.is_lit(x, y)
-                }
-                _ => !part.is_lit(x, y),
-            })
+    let is_at = |left: usize, rows_above: usize, top: usize, inverted: u128| {
+        let on_glass = u128::MAX.checked_shr(left as u32).unwrap_or(0) & wide;
+        part.iter().enumerate().all(|(y, row)| {
+            let seen = (top + y).checked_sub(rows_above).map_or(0, |at| {
+                (whole[at] ^ inverted).checked_shr(left as u32).unwrap_or(0) & on_glass
+            });
+            seen == *row
         })
     };
     (0..=WIDTH - width + 1)
-        .any(|x| (0..=HEIGHT - height + 1).any(|y| is_at(x, 1, y, false) || is_at(x, 1, y, true)))
+        .any(|x| (0..=HEIGHT - height + 1).any(|y| is_at(x, 1, y, 0) || is_at(x, 1, y, u128::MAX)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn send(display: &mut Display, bytes: &[u8]) {
+    fn send_at(display: &mut Display, at_ns: u64, bytes: &[u8]) {
         assert!(display.start(ADDRESS, false));
-        bytes.iter().for_each(|byte| display.byte(*byte));
+        bytes.iter().for_each(|byte| display.byte(at_ns, *byte));
+    }
+
+    fn send(display: &mut Display, bytes: &[u8]) {
+        send_at(display, 0, bytes);
     }
 
     #[test]
@@ -288,6 +321,16 @@ mod tests {
         send(&mut display, &[&[0x40], &text.bytes()[..500]].concat());
         send(&mut display, &[&[0x40], &text.bytes()[500..]].concat());
         assert!(display.picture() == Some(text));
+        assert_eq!(display.written_ns(), Some(0));
+        // the same again is nothing new, and half a picture is none
+        let again = [&[0x40], &write("Tactus", &FONT_7X13_BOLD).bytes()[..]].concat();
+        send_at(&mut display, 5, &again);
+        send_at(&mut display, 6, &[0x40; 500]);
+        assert_eq!(display.written_ns(), Some(0));
+        send_at(&mut display, 7, &[&[0x40], &[0; 525][..]].concat());
+        assert_eq!(display.written_ns(), Some(7));
+        send_at(&mut display, 8, &again);
+        assert_eq!(display.written_ns(), Some(8));
         assert!(display.shows("Tactus") && display.shows("act") && !display.shows("cat"));
         // at the edges
         let mut edges = Picture::new();

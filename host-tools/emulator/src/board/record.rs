@@ -3,7 +3,7 @@
 use tactus::sim::world::Truth;
 
 /// Less force is no contact, N.
-const CONTACT_N: f64 = 0.05;
+pub(crate) const CONTACT_N: f64 = 0.05;
 /// A slower stage does not slide, mm/s.
 const SLIDES_MM_S: f64 = 1.0;
 /// Shorter movements are no slides, s.
@@ -26,6 +26,8 @@ pub struct Slide {
     pub ended_ns: u64,
     /// Contact force when the stage began to move, N.
     pub force_n: f64,
+    /// Mean contact force from then on, N.
+    pub force_mean_n: f64,
     /// Largest contact force, N.
     pub force_max_n: f64,
     /// Mean speed of the steady part, mm/s; 0 if there is none.
@@ -40,14 +42,26 @@ pub struct Slide {
     pub slot_jitter_us: f64,
 }
 
+/// A contact as it really was.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Touch {
+    /// When it began, ns.
+    pub began_ns: u64,
+    /// When the finger was off again, ns.
+    pub ended_ns: Option<u64>,
+}
+
 /// Takes notes.
 #[derive(Debug, Default)]
 pub(crate) struct Recorder {
     slides: Vec<Slide>,
+    touches: Vec<Touch>,
     now: Option<Slide>,
     expected_mm_s: Option<f64>,
     /// one in a ms
     speeds: Vec<f64>,
+    /// their sum, N, one for each speed
+    forces_n: f64,
     next_speed_ns: u64,
     commands: Vec<u64>,
 }
@@ -55,6 +69,10 @@ pub(crate) struct Recorder {
 impl Recorder {
     pub(crate) fn slides(&self) -> &[Slide] {
         &self.slides
+    }
+
+    pub(crate) fn touches(&self) -> &[Touch] {
+        &self.touches
     }
 
     pub(crate) fn expect_speed(&mut self, mm_s: f64) {
@@ -69,7 +87,18 @@ impl Recorder {
     }
 
     pub(crate) fn tick(&mut self, now_ns: u64, truth: &Truth) {
-        let slides = truth.force_n > CONTACT_N && truth.speed_mm_s.abs() > SLIDES_MM_S;
+        let touches = truth.force_n > CONTACT_N;
+        match self.touches.last_mut() {
+            Some(touch) if touch.ended_ns.is_none() => {
+                touch.ended_ns = (!touches).then_some(now_ns);
+            }
+            _ if touches => self.touches.push(Touch {
+                began_ns: now_ns,
+                ended_ns: None,
+            }),
+            _ => {}
+        }
+        let slides = touches && truth.speed_mm_s.abs() > SLIDES_MM_S;
         match &mut self.now {
             None if slides => {
                 self.now = Some(Slide {
@@ -79,6 +108,7 @@ impl Recorder {
                     ..Slide::default()
                 });
                 self.speeds.clear();
+                self.forces_n = 0.0;
                 self.commands.clear();
                 self.next_speed_ns = now_ns;
             }
@@ -87,6 +117,7 @@ impl Recorder {
                 if now_ns >= self.next_speed_ns {
                     self.next_speed_ns += 1_000_000;
                     self.speeds.push(truth.speed_mm_s.abs());
+                    self.forces_n += truth.force_n;
                 }
             }
             Some(slide) => {
@@ -102,6 +133,7 @@ impl Recorder {
     }
 
     fn finish(&mut self, mut slide: Slide) {
+        slide.force_mean_n = self.forces_n / self.speeds.len().max(1) as f64;
         let wanted = self.expected_mm_s.unwrap_or_else(|| {
             let mut sorted = self.speeds.clone();
             sorted.sort_by(f64::total_cmp);

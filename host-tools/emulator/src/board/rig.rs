@@ -11,7 +11,7 @@ use super::display::Display;
 use super::line::LineNoise;
 use super::motion::MotionPeer;
 use super::options::Options;
-use super::record::{Recorder, Slide};
+use super::record::{Recorder, Slide, Touch};
 use super::scope::{BridgePwm, Frame, Scope};
 use super::wave::Wave;
 
@@ -202,6 +202,11 @@ impl Rig {
     /// How every slide so far was really made.
     pub fn slides(&self) -> &[Slide] {
         self.recorder.slides()
+    }
+
+    /// Every contact so far.
+    pub fn touches(&self) -> &[Touch] {
+        self.recorder.touches()
     }
 
     /// Sample commands that the sensor got since power-up, one in each slot.

@@ -295,6 +295,14 @@ impl Exploration {
         (newtons, share)
     }
 
+    /// Of each slide, by how much of it its force is off.
+    fn force_errors(&self) -> Vec<f64> {
+        let each = self.slides.iter();
+        let each = each
+            .map(|(movement, slide)| (slide.force_n / f64::from(movement.force_n()) - 1.0).abs());
+        each.collect()
+    }
+
     /// Largest relative error of a slide's speed.
     pub fn speed_error(&self) -> f64 {
         let errors = self.slides.iter().map(|(_, slide)| slide.speed_error);
@@ -437,6 +445,10 @@ impl Exploration {
             "violations": self.violations.iter().map(ToString::to_string).collect::<Vec<_>>(),
             "force_error_max": force_share,
             "force_error_max_n": force_n,
+            "force_errors": self.force_errors(),
+            "lost": u64::from(self.counts.lost_samples) + u64::from(self.counts.lost_reports) + self.lost_reports,
+            "late": self.counts.late_slots,
+            "damaged": self.counts.parity_errors + self.counts.error_frames,
             "speed_error_max": self.speed_error(),
             "slot_jitter_us": self.jitter_us(),
             "features_difference": number(self.features_difference()),

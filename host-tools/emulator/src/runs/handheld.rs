@@ -2,23 +2,30 @@
 
 use clap::Args as Arguments;
 use serde_json::json;
+use tactus::link::Session;
 use tactus::sim::person::Manner;
 use tactus::sim::scenario::{Scenario, Step, texture};
 use tactus::sim::textures::TEXTURES;
 use tactus_core::sensor::FingerName;
+use tactus_core::wire::{Command, Counts, Event};
 
 use super::error::RunError;
-use crate::board::Display;
+use crate::board::{Display, Emulator, Error};
 use crate::host::args::{Firmware, Format};
-use crate::scenario::{self, PlayError};
+use crate::host::timeline::{Part, Timeline};
+use crate::scenario::{self, PlayError, Seen};
 
 /// The firmware's table is of this world.
 const WORLD: u64 = 1;
 /// How the slides are meant: as the display asks for them.
 const FORCE_N: f64 = 0.5;
 const PACE_MM_S: f64 = 25.0;
-/// Slides until there must be a verdict: five that count, and others that are made again.
-const SLIDES: u32 = 20;
+/// Slides until there must be a verdict: ten that count, and three times as many that are made again.
+const SLIDES: u32 = 40;
+/// The firmware's force is a mean over so long, ns.
+const MEAN_NS: u64 = 100_000_000;
+/// Until then the status is here.
+const ANSWERED_MS: u64 = 200;
 /// Letters that the rows below a headline have at most: longer texts are headlines.
 const ROW: usize = 11;
 /// Letters of a headline in the smallest font, and of a name before its question mark.
@@ -42,9 +49,19 @@ pub(crate) struct Args {
     /// The finger that the firmware is for: biotac, analog (piezo disc and load cell) or mems (accelerometer and load cell)
     #[arg(long, value_name = "NAME", default_value_t = FingerName::Biotac)]
     finger: FingerName,
+    /// How long the hand slides each time, s
+    #[arg(long, value_name = "S", default_value_t = Step::EXPLORED_S, value_parser = slide_s)]
+    slide_s: f64,
     /// For people, or a line of JSON at the end for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
+}
+
+fn slide_s(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(seconds) if (0.1..=10.0).contains(&seconds) => Ok(seconds),
+        _ => Err("0.1 to 10 s".into()),
+    }
 }
 
 /// What the display says in the end.
@@ -87,10 +104,25 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
             force_n: FORCE_N,
             pace_mm_s: PACE_MM_S,
             slides: SLIDES,
+            seconds: args.slide_s,
         }],
     };
-    let mut board = scenario::play(&scenario, args.finger, &args.firmware.elf, None)?;
+    let mut session = Session::default();
+    let mut status = Vec::new();
+    // a request for the status is never too long
+    let _ = session.request(Command::Status, &mut status);
+    let played = scenario::play_to(&scenario, args.finger, &args.firmware.elf, None, &status)?;
+    let mut board = played.board;
+    let timeline = timeline(&board, &played.seen);
+    let heard = Heard::of(&mut board, session)?;
     let seconds = board.now_ns() as f64 * 1e-9;
+    // negative where the verdict was there before the hand stood
+    let stood_ns = board.rig().slides().last().map(|slide| slide.ended_ns);
+    let written_ns = board.rig().display().written_ns();
+    let end_to_screen_s = match (stood_ns, written_ns) {
+        (Some(from), Some(to)) => Some((to as f64 - from as f64) * 1e-9),
+        _ => None,
+    };
     let told = told(board.rig().display());
     let (says, verdict) = match told {
         Some(Told::Sure(name)) => (format!("It is {name}."), name == truth),
@@ -119,9 +151,18 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
             "says": says,
             "verdict": verdict,
             "seconds": seconds,
+            "seconds_to_ready": timeline.seconds_to_ready(),
+            "seconds_to_verdict": timeline.seconds_to_verdict(),
+            "timeline": timeline.json(),
+            "slides": board.rig().slides().len(),
+            "slide_end_to_screen_s": end_to_screen_s,
             "awake": awake,
             "slots": slots,
             "force_max_n": board.rig().world().truth().force_max_n,
+            "force_errors": heard.force_errors,
+            "lost": heard.lost,
+            "late": heard.late,
+            "damaged": heard.damaged,
             "seed": args.seed,
             "elf_sha256": sha256,
         });
@@ -133,11 +174,128 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
         "Right" => println!("Right."),
         _ => println!("{verdict}: it was {truth}."),
     }
-    println!("{seconds:.1} s of the board's time.");
+    println!(
+        "{}{seconds:.1} s of the board's time.",
+        timeline.sentence("touch")
+    );
+    if let Some(seconds) = end_to_screen_s {
+        let when = if seconds < 0.0 { "before" } else { "after" };
+        println!(
+            "The verdict was on the display {:.2} s {when} the hand stood.",
+            seconds.abs()
+        );
+    }
     if let (Some(awake), Some(slots)) = (awake, slots) {
         println!("Awake while it listens: {awake} of the time. Sensor slots: {slots}.");
     }
     Ok(())
+}
+
+/// What time went to, by the world's contacts and slides and by what the display showed.
+fn timeline(board: &Emulator, seen: &[(u64, Seen)]) -> Timeline {
+    /// What begins where several things happen at once, in the order in which they do.
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+    enum Mark {
+        Ready,
+        Spent(Part),
+        Verdict,
+    }
+    let rig = board.rig();
+    let mut marks = Vec::new();
+    for touch in rig.touches() {
+        marks.push((touch.began_ns, Mark::Spent(Part::Settle)));
+        let off = touch.ended_ns;
+        marks.extend(off.map(|at_ns| (at_ns, Mark::Spent(Part::Lift))));
+    }
+    for slide in rig.slides() {
+        marks.push((slide.began_ns, Mark::Spent(Part::Slide)));
+        let off = Some(slide.ended_ns);
+        let lifted = rig.touches().iter().any(|touch| touch.ended_ns == off);
+        let next = if lifted { Part::Lift } else { Part::Decision };
+        marks.push((slide.ended_ns, Mark::Spent(next)));
+    }
+    let touched = rig.touches().first().map(|touch| touch.began_ns);
+    let first = seen.first().map_or(0, |(at_ns, _)| *at_ns);
+    marks.extend(seen.iter().filter_map(|&(at_ns, seen)| {
+        let mark = match seen {
+            // later it is on between others
+            Seen::Lit if at_ns > first => return None,
+            Seen::Lit => Mark::Spent(Part::SelfCheck),
+            // the slide was taken in, and the person goes on
+            Seen::Press if touched.is_some_and(|touched| at_ns > touched) => {
+                Mark::Spent(Part::Lift)
+            }
+            Seen::Press => Mark::Ready,
+            Seen::Slide => Mark::Spent(Part::Reaction),
+            Seen::Over => Mark::Verdict,
+        };
+        Some((at_ns, mark))
+    }));
+    marks.sort_unstable();
+    let mut timeline = Timeline::new();
+    for (at_ns, mark) in marks {
+        match mark {
+            Mark::Ready => timeline.ready(at_ns),
+            Mark::Spent(part) if Some(at_ns) == touched => timeline.begin(at_ns, part),
+            Mark::Spent(part) => timeline.enter(at_ns, Some(part)),
+            Mark::Verdict => {
+                timeline.verdict(at_ns);
+                break;
+            }
+        }
+    }
+    timeline
+}
+
+/// What the firmware told its host meanwhile, against the world.
+struct Heard {
+    /// Of each slide, by how much of the world's mean force the firmware's is off: means over the same time.
+    force_errors: Vec<f64>,
+    /// Samples and reports.
+    lost: u64,
+    /// Slots.
+    late: u64,
+    /// Words and frames.
+    damaged: u64,
+}
+
+impl Heard {
+    fn of(board: &mut Emulator, mut session: Session) -> Result<Self, Error> {
+        let mut status = Vec::new();
+        let _ = session.request(Command::Status, &mut status);
+        board.send(&status);
+        board.run_ms(ANSWERED_MS)?;
+        let (mut forces, mut counts) = (Vec::new(), Counts::default());
+        for (at_ns, byte) in board.received() {
+            for report in session.receive(&[byte]) {
+                match report.event {
+                    // told at the end of a mean of 100 ms
+                    Event::Live(live) => forces.push((at_ns, f64::from(live.force_mn) * 1e-3)),
+                    Event::Status(status) => counts = status.counts,
+                    _ => {}
+                }
+            }
+        }
+        let slides = board.rig().slides().to_vec();
+        let force_errors = slides.iter().filter_map(|slide| {
+            let of = slide.began_ns + MEAN_NS..slide.ended_ns;
+            let told = forces.iter().filter(|(at_ns, _)| of.contains(at_ns));
+            let told: Vec<f64> = told.map(|(_, newton)| *newton).collect();
+            let mean_n = told.iter().sum::<f64>() / told.len() as f64;
+            (!told.is_empty()).then_some((mean_n / slide.force_mean_n - 1.0).abs())
+        });
+        Ok(Self {
+            force_errors: force_errors.collect(),
+            lost: u64::from(counts.lost_samples)
+                + u64::from(counts.lost_reports)
+                + session.missing(),
+            late: counts.late_slots.into(),
+            damaged: u64::from(counts.parity_errors)
+                + u64::from(counts.error_frames)
+                + u64::from(counts.damaged_frames)
+                + session.damaged(),
+        })
+    }
 }
 
 /// The headline of the verdict; `None` where there is none.

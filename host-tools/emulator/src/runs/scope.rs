@@ -506,10 +506,11 @@ fn stop(scope: &Scope, trace: &[(u64, Output)]) -> Result<Picture, ScopeError> {
                 row: 0,
                 from_to_ns: (0.0, quiet),
             },
+            // three looks, 1 ms apart, may all find it open while it bounces
             Span {
                 what: "stopped within",
-                row: 0,
-                from_to_ns: (quiet, *off),
+                row: 1,
+                from_to_ns: (0.0, *off),
             },
         ],
     })

@@ -44,7 +44,7 @@ fn slots_and_servo_keep_their_time_on_a_core_that_waits_for_its_flash() {
     let margin_us = slow.map(|slow| slow.margin_us());
     eprintln!("a command ends {margin_us:?} us before it would be late");
     // a check that finds nothing on any core would find nothing here
-    assert_ne!(missed(&slowed(&elf, 12.0)), [""; 0]);
+    assert_ne!(missed(&slowed(&elf, 24.0)), [""; 0]);
     // nor one that finds something on all of them
     let intact = slowed(&elf, 1.0);
     eprintln!("as it is: {intact:?}");

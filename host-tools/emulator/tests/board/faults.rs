@@ -286,7 +286,7 @@ pub(crate) fn is_time(when: When, board: &mut Emulator) -> bool {
     let truth = board.rig().world().truth();
     match when {
         // 0.8 s of the way down are left at least
-        When::Approaching => truth.force_n == 0.0 && (-0.75..-0.4).contains(&truth.indentation_mm),
+        When::Approaching => truth.force_n == 0.0 && (-1.8..-0.4).contains(&truth.indentation_mm),
         When::Pressing => truth.force_n > 0.15 && truth.speed_mm_s.abs() < 1.0,
         When::Sliding => truth.force_n > 0.15 && truth.speed_mm_s > 5.0,
     }

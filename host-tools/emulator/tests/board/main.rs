@@ -29,3 +29,4 @@ mod silicon_image;
 mod slots;
 mod teach;
 mod verify;
+mod weights;

@@ -9,8 +9,10 @@ use tactus::data::properties::PropertyTable;
 use tactus::eval::evaluate::Method;
 use tactus::eval::experiment::{Experiment, Protocol};
 use tactus::eval::learn::Expected;
+use tactus::eval::seconds;
+use tactus_core::explorer::SlideTime;
 
-use crate::cmd::args::{Expecting, Features, Recordings, Stop};
+use crate::cmd::args::{Choosing, Expecting, Features, Recordings, Stop};
 use crate::cmd::output::Format;
 use crate::cmd::plot::Plot;
 use crate::cmd::textures::{finger_of, measure_folder, names};
@@ -52,6 +54,7 @@ Examples:
   tactus evaluate --recordings DIR --novelty leave-one-out
   tactus evaluate --recordings DIR --novelty leave-one-out --left-out 5     tables of all but five
   tactus evaluate --recordings DIR --plot pictures
+  tactus evaluate --fabrics DIR --objective bits-per-second      slow slides have to tell more
   tactus evaluate --recordings DIR --verify --protocol blocked
   tactus evaluate --recordings DIR --lifelong
   tactus evaluate --recordings DIR --lifelong --plot drift.svg")]
@@ -101,6 +104,8 @@ pub(crate) struct Args {
     pub(crate) expecting: Expecting,
     #[command(flatten)]
     pub(crate) stop: Stop,
+    #[command(flatten)]
+    pub(crate) choosing: Choosing,
     /// The same seed gives the same figures, whatever the number of cores
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
@@ -112,6 +117,14 @@ pub(crate) struct Args {
 }
 
 impl Args {
+    /// How long slides take.
+    pub(crate) fn slide_time(&self) -> SlideTime {
+        match self.fabrics {
+            Some(_) => seconds::FABRICS,
+            None => seconds::RIG,
+        }
+    }
+
     /// Number of virtual explorations, or of sessions.
     pub(crate) fn runs(&self) -> u64 {
         self.runs.unwrap_or(if self.lifelong { 50 } else { 8000 })

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use tactus_core::dsp::{Plain, Plan};
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{Movement, PropertySet};
-use tactus_core::handheld::{MAX_SLIDES, judge};
+use tactus_core::handheld::{ASK_AFTER, judge_at_most};
 use tactus_core::probe::explore::{ExplorationStep, explore};
 use tactus_core::rig::{Fault, Phase};
 use tactus_core::sensor::FingerName;
@@ -135,8 +135,12 @@ fn explore_by_hand(finger: FingerName, world: &Collection, trials: Range<u64>) -
         .map(|&(texture, trial)| {
             let setup = world.setup_with(finger, texture, trial);
             let (measured, _) = handheld::slides(setup, Manner::default(), 5).unwrap();
-            let judged = (1..=MAX_SLIDES)
-                .map(|n| judge::<Plain>(table, &measured[..n], None, None).unwrap().0)
+            let judged = (1..=ASK_AFTER)
+                .map(|n| {
+                    judge_at_most::<Plain>(table, &measured[..n], None, None, ASK_AFTER)
+                        .unwrap()
+                        .0
+                })
                 .find(|judged| !judged.open)
                 .unwrap();
             let is = table.find(texture_name(texture)) == Some(judged.leading[0].0);

@@ -50,6 +50,7 @@ const SETUP: Setup = Setup {
     finger_seed: 5,
     keep_edges: true,
     shimmed: false,
+    samples_of: None,
     finger: FingerName::Biotac,
 };
 

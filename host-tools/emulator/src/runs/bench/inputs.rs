@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus::data::recording::PAC_RATE_HZ;
 use tactus::data::recordings::RecordingSet;
 use tactus::eval::learn;
+use tactus_core::explorer::kernels::MOST_SQUARE;
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{
     FeatureSet, MAX_FEATURES, Movement, Observation, Properties, Property, PropertySet,
@@ -93,6 +95,46 @@ pub(super) fn synthetic(method: Method, textures: usize) -> Result<Vec<u8>, Benc
 /// that a figure tells of the code.
 pub(super) fn of_gates(method: Method) -> Result<Vec<u8>, BenchError> {
     synthetic(method, OF_GATES)
+}
+
+/// Signals and whitened means that the figures below do not go through: any number of samples, beyond what 12 bits can differ
+/// by; means near and far, and as far from the middle as the kernel takes them.
+pub(super) fn extremes(bench: &mut Bench) -> Result<(), BenchError> {
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let mut check = |what: String, workload, words: &[i16]| {
+        let counted = bench.count(workload, &[], words)?;
+        let different = || BenchError::Different(vec![what]);
+        counted.equal.then_some(()).ok_or_else(different)
+    };
+    for samples in (1..20).map(|n| 31 * n).chain([264, 330, 1000]) {
+        let reach = *[30.0, 4096.0, 32767.0].choose(&mut random).unwrap_or(&1.0);
+        let words: Vec<i16> = (0..samples)
+            .map(|_| random.random_range(-reach..=reach) as i16)
+            .collect();
+        check(
+            format!("samples: {samples}, reach: {reach}"),
+            Workload::BandPower,
+            &words,
+        )?;
+    }
+    for round in 0..60 {
+        let (slides, textures) = (random.random_range(1..=255), random.random_range(2..60));
+        // the largest has a sum of squares just below the bound
+        let bound = f64::from(MOST_SQUARE - 1) / MAX_FEATURES as f64;
+        let reach = [300.0, 3000.0, bound.sqrt()][round % 3];
+        let corners = random.random_bool(0.3);
+        let mut words = vec![slides];
+        for _ in 0..textures * MAX_FEATURES {
+            let at: f64 = random.random_range(-1.0..=1.0);
+            words.push((reach * if corners { at.signum() } else { at }) as i16);
+        }
+        check(
+            format!("{textures} means to {reach}"),
+            Workload::Confuse,
+            &words,
+        )?;
+    }
+    Ok(())
 }
 
 /// Posteriors that the figures below do not go through: few textures and odd numbers of them, all numbers of features,
