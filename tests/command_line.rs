@@ -507,7 +507,8 @@ fn evaluate_prints_one_json_object() {
     assert!(
         e["median_slides"].as_f64().unwrap() <= 11.0 && e["mean_slides"].as_f64().unwrap() <= 10.0
     );
-    assert!(!e["confused"].as_array().unwrap().is_empty());
+    let confused = !e["confused"].as_array().unwrap().is_empty();
+    assert_eq!(confused, e["accuracy"].as_f64() < Some(1.0));
     assert_eq!(
         text,
         printed(&arguments),

@@ -49,7 +49,7 @@ fn a_homing_that_goes_down_adds_no_force_to_the_last_one() {
 /// DIR turns round while the finger presses, and then it is to be lifted.
 #[test]
 fn a_lift_that_goes_down_is_given_up_in_time() {
-    let objections: Vec<String> = (0..24)
+    let objections: Vec<String> = (0..200)
         .into_par_iter()
         .filter_map(|seed| {
             let mut rig = SimRig::new(Setup {

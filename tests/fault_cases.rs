@@ -83,7 +83,7 @@ fn a_case_says_what_broke() {
 fn a_rig_without_a_guard_fails() {
     let case = Case {
         stiff: true,
-        ..case(7, Activity::Identify, 10, &[(9_000, Fault::LeverRunaway)])
+        ..case(7, Activity::Identify, 10, &[(6_600, Fault::LeverRunaway)])
     };
     let guarded = outcome(&case);
     assert!(guarded.wrong.is_empty(), "{guarded}");
@@ -125,7 +125,7 @@ fn the_spring_holds_a_finger_whose_pressure_is_weak() {
     let weak = Fault::PdcWeak {
         gain: 0.238_497_425_065_986_06,
     };
-    the_spring_holds(48, Activity::Train, 72, &[(31_781, weak)]);
+    the_spring_holds(48, Activity::Train, 72, &[(10_700, weak)]);
 }
 
 /// A skin that leaks within nine seconds, from between two movements on.
@@ -134,7 +134,7 @@ fn the_spring_holds_a_finger_that_leaks_slowly() {
     let leak = Fault::SkinLeaks {
         seconds: 9.432_495_918_938_178,
     };
-    the_spring_holds(267, Activity::Train, 104, &[(20_981, leak)]);
+    the_spring_holds(267, Activity::Train, 104, &[(8_400, leak)]);
 }
 
 /// A skin that tears quickly while the finger is down.
@@ -151,8 +151,8 @@ fn the_spring_holds_a_finger_that_leaks_quickly() {
 #[test]
 fn the_spring_holds_under_an_inverted_lever_without_a_sensor() {
     let faults = [
-        (9_574, Fault::LeverDirInverted),
-        (11_598, Fault::MisoStuck { high: false }),
+        (6_600, Fault::LeverDirInverted),
+        (8_624, Fault::MisoStuck { high: false }),
     ];
     the_spring_holds(213, Activity::Label, 54, &faults);
 }
@@ -165,6 +165,24 @@ fn an_inverted_lever_is_told_with_its_knob() {
     let outcome = outcome(&case(130, Activity::Label, 68, &faults));
     let knob = |named: &rig::Fault| named.recovery().contains("knob");
     assert!(outcome.named.iter().any(knob), "{outcome}");
+}
+
+/// The wire of DIR goes wrong while the finger is lifted, so that the lever goes up where it is to press; then its switch says
+/// that it is at the top. What is to lift it from there goes down as far as it was thought to have come.
+#[test]
+fn an_inverted_lever_below_a_closed_switch_is_told_with_its_knob() {
+    let closed = Fault::LeverTopStuck { closed: true };
+    for (seed, texture, inverted_ms, closed_ms) in [
+        (205_362, 3, 26_262, 30_097),
+        (209_075, 62, 17_194, 27_356),
+        (209_734, 96, 16_572, 24_201),
+    ] {
+        let faults = [(inverted_ms, Fault::LeverDirInverted), (closed_ms, closed)];
+        ends_well(seed, Activity::Train, texture, &faults);
+        let outcome = outcome(&case(seed, Activity::Train, texture, &faults));
+        let knob = |named: &rig::Fault| named.recovery().contains("knob");
+        assert!(outcome.named.iter().any(knob), "{outcome}");
+    }
 }
 
 /// A driver that steps down by itself while the stage's current is measured without load, and after it while the rig waits: the

@@ -302,7 +302,7 @@ fn judge(case: &Case, when: When, seed: u64, unguarded: Unguarded) -> Result<(),
         rig.control().start(movement, 0.3).unwrap();
         let (phase, wait_ms) = match when {
             When::Returning => (Phase::Positioning, 40 + draw(seed + 2, 400)),
-            When::Approaching => (Phase::Pressing, 1000 + draw(seed + 2, 3000)),
+            When::Approaching => (Phase::Pressing, 400 + draw(seed + 2, 1000)),
             When::Touching => (Phase::Pressing, 0),
             When::Settling => (Phase::Pressing, draw(seed + 2, 300)),
             When::Background => (Phase::Background, draw(seed + 2, 900)),

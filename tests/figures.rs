@@ -1,7 +1,6 @@
 //! `evaluate` beside the reference program of the protocols (numpy, seed 1).
 
 use std::path::Path;
-use std::process::Command;
 
 use tactus::data::fabricslide::FabricSet;
 use tactus::data::properties::PropertyTable;
@@ -12,7 +11,7 @@ use tactus::eval::experiment::{Experiment, Protocol};
 use tactus::eval::lifelong::{Lifelong, Moment, lifelong};
 use tactus::eval::novelty::leave_one_out;
 use tactus_core::explorer::Config;
-use tactus_tests::{data, skipped};
+use tactus_tests::{data, numpy, skipped};
 
 const RUNS: u64 = 8000;
 
@@ -138,27 +137,11 @@ fn property_worlds_give_the_reference_figures() {
 #[test]
 fn numpy_finds_the_same_in_the_worlds() {
     let Some(folder) = data("worlds") else { return };
-    let oracle = concat!(env!("CARGO_MANIFEST_DIR"), "/oracle/evaluate.py");
-    let has = Command::new("python3")
-        .args(["-c", "import numpy"])
-        .output();
-    if !has.is_ok_and(|has| has.status.success()) {
-        return skipped("no python3 with numpy (apt-get install python3-numpy)");
-    }
     for world in 1..=3 {
         let file = folder.join(format!("world_{world}.csv"));
-        let python = Command::new("python3")
-            .arg(oracle)
-            .arg(&file)
-            .arg(RUNS.to_string())
-            .output()
-            .unwrap();
-        assert!(python.status.success(), "{python:?}");
-        let told = String::from_utf8(python.stdout).unwrap();
-        let told: Vec<&str> = told.split_whitespace().collect();
-        let of = |what| {
-            let at = told.iter().position(|word| *word == what).unwrap();
-            told[at + 1].parse::<f64>().unwrap()
+        let numpy = match numpy::evaluate(&file, RUNS) {
+            Ok(found) => found,
+            Err(why) => return skipped(why),
         };
         let set = PropertyTable::read(&file).unwrap();
         let s = summary(
@@ -166,16 +149,16 @@ fn numpy_finds_the_same_in_the_worlds() {
             Method::Paper,
             RUNS,
         );
-        println!("world {world}: {:.4}, {told:?}", s.accuracy);
+        println!("world {world}: {:.4}, {numpy:?}", s.accuracy);
         // four standard errors of the difference of two such shares
-        for (is, numpys) in [(s.accuracy, of("accuracy")), (s.converged, of("sure"))] {
+        for (is, numpys) in [(s.accuracy, numpy.accuracy), (s.converged, numpy.sure)] {
             let error = 4.0 * (2.0 * numpys * (1.0 - numpys) / RUNS as f64).sqrt();
             assert!(
                 (is - numpys).abs() <= error,
                 "world {world}: {is} for {numpys}"
             );
         }
-        assert_eq!(s.median_slides, of("median"));
+        assert_eq!(s.median_slides, numpy.median);
     }
 }
 

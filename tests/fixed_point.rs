@@ -13,6 +13,7 @@ use tactus::eval::learn::Expected;
 use tactus_core::explorer::{Config, Method, Told};
 use tactus_core::features::Property;
 use tactus_core::features::{FeatureSet, Observation};
+use tactus_core::table::MAX_MOVEMENTS;
 use tactus_tests::data;
 
 #[path = "oracle/mod.rs"]
@@ -121,6 +122,7 @@ impl Oracle {
                     sure,
                     told: told(sure),
                     slides,
+                    made: [0; MAX_MOVEMENTS],
                     unknown_like: false,
                 };
             }
@@ -167,6 +169,7 @@ fn explore_fused(
                 sure,
                 told: told(sure),
                 slides: episode.slides() as u8,
+                made: [0; MAX_MOVEMENTS],
                 unknown_like: episode.novel(trained),
             };
         }

@@ -5,6 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 pub mod cluster;
+pub mod numpy;
 
 /// The folder of test data `name` ("biotac", "worlds"): below `TACTUS_DATA`, else below `../shared/data`.
 ///

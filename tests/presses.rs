@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
 use tactus::sim::collection::Collection;
 use tactus::sim::faults::Fault as Cause;
 use tactus::sim::mount::Mount;
@@ -14,7 +15,8 @@ use tactus::sim::rig::SimRig;
 use tactus::sim::world::Setup;
 use tactus_core::features::Movement;
 use tactus_core::rig::guard::Unguarded;
-use tactus_core::rig::{Ended, Fault};
+use tactus_core::rig::{Ended, Fault, Phase};
+use tactus_core::sensor::FingerName;
 
 /// Prints how the presses ended, and objects to those that were too hard, and to sound ones that were not made.
 fn judge(presses: &[Press]) {
@@ -244,4 +246,113 @@ fn a_sprung_mount_holds_a_torn_finger_at_its_first_press() {
     let [with, without] = hardest_n;
     println!("with the mount {with:.2} N at most, without it {without:.2} N");
     assert!(without > 8.0, "{without:.2} N");
+}
+
+/// What one rig does from power-up to the second press.
+struct Pressed {
+    name: String,
+    ready_s: f64,
+    /// From the command until the finger is pressed, s: where the sample is not known, and where it is.
+    pressed_s: [f64; 2],
+    /// Largest share of what was asked for on the way, and by how much it was off when the stage began to move.
+    most: f64,
+    off_n: f64,
+    /// Where the stage is by its encoder, less where it is, mm.
+    stage_off_mm: f64,
+}
+
+fn two_presses(finger: FingerName, seed: u64) -> Pressed {
+    let collection = Collection {
+        seed,
+        textures: Vec::new(),
+        trials: 1,
+    };
+    let texture = (1 + seed * 37 % 117) as u8;
+    let setup = Setup {
+        shimmed: true,
+        ..collection.setup_with(finger, texture, 1)
+    };
+    let name = format!("{finger}, seed {seed}, texture {texture}");
+    let mut rig = SimRig::new(setup);
+    rig.home().unwrap_or_else(|why| panic!("{name}: {why}"));
+    let ready_s = rig.now().as_secs_f64();
+    let stage_mm = rig.world().truth().stage_mm;
+    let mut pressed = Pressed {
+        ready_s,
+        pressed_s: [0.0; 2],
+        most: 0.0,
+        off_n: 0.0,
+        stage_off_mm: f64::from(rig.control().stage_mm()) - stage_mm,
+        name,
+    };
+    // the lightest, then another
+    for (at, mn) in [100, 500].into_iter().enumerate() {
+        let (began_s, wanted_n) = (rig.now().as_secs_f64(), f64::from(mn) * 1e-3);
+        rig.world().reset_extremes();
+        let movement = Movement::new(mn, 63_100).unwrap();
+        rig.control().start(movement, 0.3).unwrap();
+        while rig.control().phase() != Phase::Background {
+            rig.tick();
+            let phase = rig.control().phase();
+            let pressing = matches!(
+                phase,
+                Phase::Positioning | Phase::Pressing | Phase::Background
+            );
+            assert!(pressing, "{}: {phase:?}", pressed.name);
+        }
+        pressed.pressed_s[at] = rig.now().as_secs_f64() - began_s;
+        pressed.most = pressed.most.max(rig.world().truth().force_max_n / wanted_n);
+        while rig.control().phase() != Phase::Sliding {
+            rig.tick();
+        }
+        let off_n = (rig.world().truth().force_n - wanted_n).abs();
+        // a count of a BioTac, or 5 %
+        pressed.off_n = pressed.off_n.max(off_n / (0.05 * wanted_n).max(0.0115));
+        rig.rest(|_| ()).unwrap();
+    }
+    pressed
+}
+
+/// 50 seeds of each finger: soon ready, soon pressed, and never by much more than was asked for.
+#[test]
+fn a_rig_is_soon_ready_and_presses_soon_and_no_harder() {
+    for finger in [FingerName::Biotac, FingerName::Analog, FingerName::Mems] {
+        let rigs: Vec<_> = (1..=50)
+            .into_par_iter()
+            .map(|seed| two_presses(finger, seed))
+            .collect();
+        let sorted = |of: fn(&Pressed) -> f64| {
+            let mut values: Vec<f64> = rigs.iter().map(of).collect();
+            values.sort_by(f64::total_cmp);
+            (values[25], values[49], values[0])
+        };
+        let ready = sorted(|rig| rig.ready_s);
+        let pressed = [
+            sorted(|rig| rig.pressed_s[0]),
+            sorted(|rig| rig.pressed_s[1]),
+        ];
+        let (most, off) = (sorted(|rig| rig.most), sorted(|rig| rig.off_n));
+        let stage = sorted(|rig| rig.stage_off_mm);
+        println!(
+            "{finger}: ready {ready:.2?}, pressed {pressed:.2?}, most {most:.3?}, off {off:.3?}, stage {stage:.3?}"
+        );
+        for rig in &rigs {
+            assert!(
+                rig.most < 1.15,
+                "{}: {} of what was asked for",
+                rig.name,
+                rig.most
+            );
+            assert!(
+                rig.off_n < 1.0,
+                "{}: off by {} of what may be",
+                rig.name,
+                rig.off_n
+            );
+        }
+        assert!(ready.0 < 5.0 && ready.1 < 7.0, "{ready:?}");
+        assert!(pressed[0].0 < 6.0 && pressed[1].0 < 5.0, "{pressed:?}");
+        // the switch is touched slowly: it closes at the same place
+        assert!(stage.1 - stage.2 < 0.1, "{stage:?}");
+    }
 }

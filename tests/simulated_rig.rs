@@ -395,6 +395,7 @@ enum Command {
     },
     Place(u8),
     SampleChanged,
+    Weigh(u16),
 }
 
 fn command() -> impl Strategy<Value = Command> {
@@ -416,6 +417,7 @@ fn command() -> impl Strategy<Value = Command> {
         1 => (any_float(), any_float(), any_float()).prop_map(|(mn_per_count, no_contact, newton_per_ampere)| Command::Calibrate { mn_per_count, no_contact, newton_per_ampere }),
         1 => (1u8..=117).prop_map(Command::Place),
         1 => Just(Command::SampleChanged),
+        1 => (0u16..=2000).prop_map(Command::Weigh),
     ]
 }
 
@@ -433,6 +435,7 @@ fn obey(control: &mut Control, command: &Command) -> Result<(), Refused> {
             Ok(())
         }
         Command::Reset => control.reset(),
+        Command::Weigh(mn) => control.weigh(mn),
         Command::AllowHighForce(allow) => {
             control.allow_high_force(allow);
             Ok(())

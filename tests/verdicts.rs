@@ -150,7 +150,7 @@ fn two_hundred_identifications_in_the_simulated_world_agree_with_evaluate() {
     compare(
         &folder,
         "3",
-        &["--method", "paper", "--max-slides", "2"],
+        &["--method", "paper", "--max-slides", "1"],
         25,
         2,
     );

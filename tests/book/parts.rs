@@ -302,13 +302,6 @@ fn gates() -> String {
             number(&row[1])
         );
     }
-    for row in rows(&constant(XTASK, "MISSES").unwrap()) {
-        text += &format!(
-            "| flash without its table, misses the 160 KB | {} | {} |\n",
-            said(&row[0], XTASK),
-            number(&row[1])
-        );
-    }
     let variables = number(&constant(XTASK, "MAX_VARIABLES").unwrap());
     text += &format!("| variables | each image | {variables} |\n");
     const EMULATOR: &str = "host-tools/emulator/src";

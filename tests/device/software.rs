@@ -1,0 +1,242 @@
+//! A probe in software: the simulated rig under the core's own probe behind the frames of the link.
+
+use super::*;
+
+pub(super) const UNKNOWN: u8 = 47;
+
+pub(super) fn world() -> Collection {
+    Collection {
+        seed: 5,
+        textures: vec![10, UNKNOWN, 100],
+        trials: 3,
+    }
+}
+
+/// Calibration and table of a probe for that world; learned once.
+pub(super) fn known() -> &'static (RigCalibration, Vec<u8>) {
+    static KNOWN: OnceLock<(RigCalibration, Vec<u8>)> = OnceLock::new();
+    KNOWN.get_or_init(|| {
+        let calibration = calibrated(world().setup(10, 0)).unwrap();
+        let table = world().learn(Method::Fused, calibration, || ()).unwrap();
+        (calibration, table)
+    })
+}
+
+pub(super) trait Line: Read + Write + Send {}
+impl<T: Read + Write + Send> Line for T {}
+
+/// The probe's end of the line.
+pub(super) struct Wire {
+    line: Box<dyn Line>,
+    receiver: Receiver,
+    number: u16,
+    at_ms: u64,
+    /// ms of the rig's time between two looks at the line, each of which takes a real one
+    hurry: u64,
+    watch: Watch,
+    rig: RigState,
+    table: TableInUse,
+    streams: bool,
+    /// stop in this millisecond; and until the request is over
+    stop: bool,
+    stopped: bool,
+    busy: bool,
+    requests: VecDeque<Request>,
+    /// all commands that came, for the test
+    asked: Sender<wire::Command>,
+    gone: bool,
+}
+
+impl Wire {
+    /// Takes in what has come, and answers what can be answered at any time.
+    fn look(&mut self) {
+        let mut bytes = [0; 1024];
+        let length = match self.line.read(&mut bytes) {
+            Ok(0) => return self.gone = true,
+            Ok(length) => length,
+            Err(why) => {
+                let nothing = [ErrorKind::WouldBlock, ErrorKind::TimedOut];
+                return self.gone |= !nothing.contains(&why.kind());
+            }
+        };
+        for &byte in &bytes[..length] {
+            let Some(request) = self.receiver.push::<Request>(byte) else {
+                continue;
+            };
+            let request = request.unwrap();
+            let _ = self.asked.send(request.command.clone());
+            let busy = self.busy || !self.requests.is_empty();
+            if receive(&request, busy, self) == Turn::Queue {
+                self.requests.push_back(request);
+            }
+        }
+    }
+}
+
+impl Panel for Wire {
+    fn finger(&self) -> FingerCode {
+        FingerCode::BIOTAC
+    }
+
+    fn rig(&self) -> RigState {
+        self.rig
+    }
+
+    fn table(&self) -> TableInUse {
+        self.table
+    }
+
+    fn counts(&self) -> Counts {
+        Counts::default()
+    }
+
+    fn stop(&mut self, all: bool) {
+        self.stop = true;
+        self.stopped |= all;
+    }
+
+    fn stream(&mut self, on: bool) {
+        self.streams = on;
+    }
+
+    fn tell(&mut self, tell: Event) {
+        let report = Report {
+            number: self.number,
+            at_ms: self.at_ms as u32,
+            event: tell,
+        };
+        self.number = self.number.wrapping_add(1);
+        let mut buffer = [0; MAX_FRAME + 1];
+        let frame = wire::encode(&report, &mut buffer).unwrap();
+        self.gone |= self.line.write_all(frame).is_err();
+    }
+}
+
+impl Host for Wire {
+    fn tell(&mut self, event: Event) {
+        Panel::tell(self, event);
+    }
+
+    fn table(&mut self, table: TableInUse) {
+        self.table = table;
+    }
+
+    fn tick(&mut self, now: Duration, rig: &RigState) {
+        self.at_ms = now.as_millis() as u64;
+        self.rig = *rig;
+        if self.at_ms.is_multiple_of(Watch::EVERY_MS) {
+            let mut watch = self.watch;
+            watch.look(rig, |event| Panel::tell(self, event));
+            self.watch = watch;
+        }
+        if self.at_ms.is_multiple_of(self.hurry) {
+            self.look();
+            thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn stops(&mut self) -> bool {
+        std::mem::take(&mut self.stop)
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.stopped
+    }
+
+    fn streams(&self) -> bool {
+        self.streams
+    }
+}
+
+/// Serves one host after the other.
+pub(super) fn serve(
+    lines: impl IntoIterator<Item = Box<dyn Line>>,
+    hurry: u64,
+    asked: Sender<wire::Command>,
+) {
+    let (calibration, factory) = known();
+    let mut rig = SimRig::new(world().setup(UNKNOWN, 100));
+    rig.control().calibrate(*calibration).unwrap();
+    rig.home().unwrap();
+    let wire = RefCell::new(Wire {
+        line: Box::new(std::io::empty()),
+        receiver: Receiver::default(),
+        number: 0,
+        at_ms: 0,
+        hurry,
+        watch: Watch::default(),
+        rig: rig.state(None),
+        table: TableInUse::NONE,
+        streams: false,
+        stop: false,
+        stopped: false,
+        busy: false,
+        requests: VecDeque::new(),
+        asked,
+        gone: false,
+    });
+    let (mut buffer, plan) = (vec![0; TABLE], Plan::new());
+    let flash = RamFlash::blank();
+    let probe = probe::switch_on(rig, flash, factory, &mut buffer, &plan, &wire);
+    let mut probe = probe.unwrap();
+    embassy_futures::block_on(probe.rig.set_skin(SkinCare::after(1.5, 0.25)));
+    for line in lines {
+        wire.borrow_mut().line = line;
+        wire.borrow_mut().gone = false;
+        while !wire.borrow().gone {
+            wire.borrow_mut().look();
+            thread::sleep(Duration::from_millis(1));
+            let request = wire.borrow_mut().requests.pop_front();
+            let Some(request) = request else {
+                probe.rig.servo.tick();
+                continue;
+            };
+            wire.borrow_mut().busy = true;
+            embassy_futures::block_on(probe.serve::<Plain>(&request));
+            let mut wire = wire.borrow_mut();
+            (wire.busy, wire.stopped) = (false, false);
+            // its finger really is in the air
+            assert!(probe.rig.servo.rig().world().truth().force_n == 0.0);
+        }
+    }
+}
+
+/// A probe on a TCP port of its own: its address, and the commands that it gets.
+pub(super) fn probe(hurry: u64) -> (String, Told<wire::Command>) {
+    // before anybody waits for it
+    known();
+    let (asked, told) = mpsc::channel();
+    let (listener, at) = listen();
+    thread::spawn(move || {
+        let streams = listener.incoming().map(|stream| {
+            let stream = stream.unwrap();
+            let wait = Some(Duration::from_millis(1));
+            stream.set_read_timeout(wait).unwrap();
+            Box::new(stream) as Box<dyn Line>
+        });
+        serve(streams, hurry, asked);
+    });
+    (at, told)
+}
+
+pub(super) fn listen() -> (TcpListener, String) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let at = format!("tcp:{}", listener.local_addr().unwrap());
+    (listener, at)
+}
+
+/// One host, on this line.
+pub(super) fn once(line: impl Line + 'static) -> [Box<dyn Line>; 1] {
+    [Box::new(line)]
+}
+
+/// Somebody on a TCP port of its own, one host after the other.
+pub(super) fn line(answer: impl Fn(TcpStream) + Send + 'static) -> String {
+    let (listener, at) = listen();
+    thread::spawn(move || {
+        for stream in listener.incoming() {
+            answer(stream.unwrap());
+        }
+    });
+    at
+}
