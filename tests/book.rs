@@ -7,6 +7,8 @@
 mod parts;
 #[path = "book/picture.rs"]
 mod picture;
+#[path = "book/schema.rs"]
+mod schema;
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -129,6 +131,7 @@ fn generated_parts_are_as_the_code_has_them() {
     }
     let screens = fs::read(root().join("shared/src/handheld/golden/screens.svg")).unwrap();
     wrong.extend(compare("docs/src/screens.svg", &screens).err());
+    wrong.extend(compare("docs/src/wire.json", schema::schema().as_bytes()).err());
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 

@@ -1,6 +1,8 @@
 //! `tactus device` as a user meets it, at a probe in software: the simulated rig under the core's own probe behind the
 //! frames of the link, on a TCP port or a pseudo terminal; and at lines that are no probe's.
 
+#[path = "device/client.rs"]
+mod client;
 #[path = "device/software.rs"]
 mod software;
 #[path = "device/tables.rs"]

@@ -117,7 +117,7 @@ fn plain(text: &str) -> String {
 }
 
 /// The documentation of an item, its paragraphs as lines.
-fn doc(attributes: &[syn::Attribute]) -> String {
+pub(super) fn doc(attributes: &[syn::Attribute]) -> String {
     let lines = attributes.iter().filter_map(|attribute| {
         let named = attribute.meta.require_name_value().ok()?;
         match &named.value {
@@ -214,7 +214,7 @@ fn wire() -> String {
 }
 
 /// Whether it is part of a message.
-fn is_sent(attributes: &[syn::Attribute]) -> bool {
+pub(super) fn is_sent(attributes: &[syn::Attribute]) -> bool {
     use quote::ToTokens as _;
     attributes.iter().any(|attribute| {
         attribute.path().is_ident("derive")
@@ -241,7 +241,7 @@ fn held(found: &ItemStruct) -> String {
 }
 
 /// The value of a constant below `folder`, as its expression.
-fn constant(folder: &str, name: &str) -> Option<Expr> {
+pub(super) fn constant(folder: &str, name: &str) -> Option<Expr> {
     sources(folder)
         .iter()
         .flat_map(|file| &file.items)

@@ -10,6 +10,15 @@ use tactus_core::wire::{
 /// A request that may be made twice is made so often before the line is given up.
 pub const MAX_TRIES: u8 = 5;
 
+/// What to do about a probe that speaks this version.
+fn remedy(of: &u8) -> &'static str {
+    if *of > PROTOCOL {
+        "this program is older, install the tactus of the probe's version, or flash this one's firmware: `tactus device flash`"
+    } else {
+        "the probe is older, flash the firmware of this version: `tactus device flash`"
+    }
+}
+
 /// Why a transaction failed, and what to do.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum LinkError {
@@ -26,7 +35,9 @@ pub enum LinkError {
     },
     /// The other end is of another version.
     #[error(
-        "the probe speaks version {0} of the messages, this program version {PROTOCOL}: flash the firmware of this version, `tactus device flash`"
+        "the probe speaks version {of} of the messages, this program version {PROTOCOL}: {remedy}",
+        of = .0,
+        remedy = remedy(.0)
     )]
     Protocol(u8),
     /// The request was damaged on its way, and nobody but the user may repeat it.
