@@ -74,6 +74,40 @@ fn object(arguments: &[&str], code: i32) -> serde_json::Value {
 }
 
 #[test]
+fn the_doctor_says_what_is_wrong_and_changes_nothing() {
+    let (at, asked) = probe(1);
+    let doctor = ["doctor", "--port", &at, "--format", "json"];
+    let told = object(&doctor, 0);
+    let checks = told["checks"].as_array().unwrap();
+    let of = |name: &str| {
+        let check = checks.iter().find(|check| check["name"] == name);
+        let state = &check.unwrap_or_else(|| panic!("no {name} in {told}"))["state"];
+        state.as_str().unwrap().to_owned()
+    };
+    for good in ["port", "versions", "line", "rig", "sensor", "skin", "store"] {
+        assert_eq!(of(good), "good", "{good}: {told}");
+    }
+    // the firmware's own table, and a scale that nobody measured
+    assert_eq!([of("table"), of("force scale")], ["look", "look"]);
+    let writes: Vec<wire::Command> = asked
+        .try_iter()
+        .filter(|command| !matches!(command, wire::Command::Status | wire::Command::ReadTable(_)))
+        .collect();
+    assert_eq!(writes, [wire::Command::SetFalseAlarm(None)]);
+
+    let nobody = line(|mut stream| stream.write_all(&[0x55; 4000]).unwrap());
+    let told = object(&["doctor", "--port", &nobody, "--format", "json"], 1);
+    assert_eq!(told["checks"][0]["state"], "bad", "{told}");
+    let out = device(&["doctor", "--port", "/dev/none"]).output().unwrap();
+    assert_eq!(out.status.code(), Some(1));
+    let said = String::from_utf8(out.stdout).unwrap();
+    assert!(
+        said.starts_with("BAD   port") && said.contains("no such port"),
+        "{said}"
+    );
+}
+
+#[test]
 fn what_changes_the_probe_prints_one_object() {
     let (at, _) = probe(1000);
     let temp = tempfile::tempdir().unwrap();

@@ -87,7 +87,10 @@ impl Panel for Wire {
     }
 
     fn counts(&self) -> Counts {
-        Counts::default()
+        Counts {
+            slots: (self.at_ms * 22 / 5) as u32,
+            ..Counts::default()
+        }
     }
 
     fn stop(&mut self, all: bool) {

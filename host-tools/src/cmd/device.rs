@@ -3,6 +3,7 @@
 mod bench;
 mod bringup;
 mod calibrate;
+mod doctor;
 mod flash;
 mod identify;
 mod line;
@@ -36,6 +37,7 @@ Try first:
   tactus device list                           the serial ports, and which of them is a board
   tactus device monitor --emulated             the emulated board, live (cargo xtask emulate builds it)
   tactus device status                         the state of the probe that is plugged in
+  tactus device doctor                         whether all is well with it, and what to do if not
   tactus device identify --log session.jsonl   what lies under its finger
   tactus device log replay session.jsonl       the same decisions, computed again on this PC
 
@@ -54,6 +56,7 @@ Examples:
         format: Format,
     },
     Status(status::Args),
+    Doctor(doctor::Args),
     /// Watch the probe live, and have it identify, home or stop by a key
     #[command(after_help = "\
 Examples:
@@ -93,6 +96,7 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<Don
     let done = match command {
         Command::List { format } => line::list(*format, out),
         Command::Status(args) => status::run(args, out),
+        Command::Doctor(args) => doctor::run(args, out),
         Command::Monitor(args) => monitor::run(args),
         Command::Identify(args) => return identify::run(args, out),
         Command::Verify(args) => return verify::run(args, out),
