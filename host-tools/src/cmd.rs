@@ -1,6 +1,7 @@
 //! The command `tactus`: a file for each of its commands, with the arguments, what is done and what is said.
 
 mod args;
+mod convert;
 mod device;
 mod evaluate;
 mod features;
@@ -65,6 +66,7 @@ enum Command {
     Completions(manual::Completions),
     Man(manual::Man),
     Import(import::Args),
+    Convert(convert::Args),
 }
 
 /// What to try first, and what scripts need to know.
@@ -106,6 +108,7 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         Some(Command::Completions(args)) => manual::completions(&args, Tactus::command(), out)?,
         Some(Command::Man(args)) => manual::pages(&args, Tactus::command(), out)?,
         Some(Command::Import(args)) => import::run(&args, out)?,
+        Some(Command::Convert(args)) => convert::run(&args, out)?,
     }
     out.flush()?;
     Ok(done)

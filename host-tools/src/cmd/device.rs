@@ -7,7 +7,7 @@ mod doctor;
 mod flash;
 mod identify;
 mod line;
-mod log;
+pub(crate) mod log;
 mod loss;
 mod monitor;
 mod owner;

@@ -34,15 +34,22 @@ const FIX: &str = "; save a one-dimensional array of numpy.int16 with numpy.save
 
 /// The file of `samples`: format version 1, `<i2`, one dimension.
 pub fn write(samples: &[i16]) -> Vec<u8> {
-    let shape = format!(
-        "{{'descr': '<i2', 'fortran_order': False, 'shape': ({}, ), }}",
-        samples.len()
-    );
-    // samples begin at byte 128
-    let header = format!("{shape:<117}\n");
+    let data: Vec<u8> = samples
+        .iter()
+        .flat_map(|sample| sample.to_le_bytes())
+        .collect();
+    array("<i2", &[samples.len()], &data)
+}
+
+/// The file of an array: format version 1, in C's order. `kind` is numpy's word for an element, "<f4" for example.
+pub fn array(kind: &str, shape: &[usize], data: &[u8]) -> Vec<u8> {
+    let shape: String = shape.iter().map(|length| format!("{length}, ")).collect();
+    let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
+    // elements begin at byte 128
+    let header = format!("{header:<117}\n");
     let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
     bytes.extend_from_slice(header.as_bytes());
-    bytes.extend(samples.iter().flat_map(|sample| sample.to_le_bytes()));
+    bytes.extend_from_slice(data);
     bytes
 }
 
