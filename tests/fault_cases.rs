@@ -185,6 +185,61 @@ fn an_inverted_lever_below_a_closed_switch_is_told_with_its_knob() {
     }
 }
 
+/// The same without a sensor, when the finger is lifted because of that: nothing says that it is down. The fault that was named says
+/// that a person looks, and how the finger is freed.
+#[test]
+fn an_inverted_lever_without_a_sensor_below_a_closed_switch_is_told_with_its_knob() {
+    let faults = [
+        (24_522, Fault::MisoStuck { high: true }),
+        (26_154, Fault::LeverDirInverted),
+        (26_502, Fault::LeverTopStuck { closed: true }),
+    ];
+    the_spring_holds(14_559, Activity::Train, 13, &faults);
+}
+
+/// The stage did not find its limit switch and went over it to the hard stop. When the switch is repaired it is closed where the stage
+/// stands: the origin is where it opens, and not there.
+#[test]
+fn a_stage_beyond_its_repaired_switch_finds_where_it_opens() {
+    let faults = [
+        (
+            8_545,
+            Fault::PdcFades {
+                seconds: 4.167_844_254_963_095,
+            },
+        ),
+        (
+            10_122,
+            Fault::StageLimitStuck {
+                upper: false,
+                closed: false,
+            },
+        ),
+    ];
+    ends_well(1_294, Activity::Label, 104, &faults);
+}
+
+/// P_DC that had sunk says the truth again while the rig stands at its fault, at the lever's switch: that is no lever that comes down.
+#[test]
+fn a_drift_that_is_repaired_at_a_fault_does_not_keep_the_rig_from_homing() {
+    let faults = [
+        (
+            1_639,
+            Fault::PdcFades {
+                seconds: 0.098_440_724_680_469_62,
+            },
+        ),
+        (11_939, Fault::StageVibrates { um: 0.5 }),
+        (
+            20_413,
+            Fault::PdcDrift {
+                counts_per_s: -3.399_227_899_245_355,
+            },
+        ),
+    ];
+    ends_well(9_139, Activity::Train, 85, &faults);
+}
+
 /// A driver that steps down by itself while the stage's current is measured without load, and after it while the rig waits: the
 /// finger is lifted, or the fault says how it is freed.
 #[test]

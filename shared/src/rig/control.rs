@@ -22,6 +22,8 @@ use crate::sensor::{FingerModel, pressure::Channel};
 pub const BACKGROUND_MS: u32 = 1000;
 /// Speed of the stage while the finger is lifted.
 const RETURN_MM_S: f32 = 50.0;
+/// The hard stop is nearer than this to where the limit switch opens, mm: it is 4 mm before it.
+const BEYOND_MM: f32 = 7.0;
 /// Slower than this the stage stands, mm/s.
 const STANDS_MM_S: f32 = 0.5;
 /// A lifted finger shows no more than this above its zero, mN.
@@ -342,7 +344,10 @@ impl Control {
         let at_top = self.lever_top.tick(inputs.lever_top);
         let at_left = self.stage_left.tick(inputs.stage_limits.0);
         let seeks = self.lever.is_parking() || self.stage.state() == StageState::Unknown;
-        let rise = self.ascent.tick(self.phase, seeks, self.ms, &self.meter);
+        // where the lever has come to rest at its switch, P_DC that rises is a sensor that is mended or a hand, and no lever
+        let rests = matches!(self.phase, Phase::Faulted(_)) && self.lever.rests();
+        let rise = (!rests).then(|| self.ascent.tick(self.phase, seeks, self.ms, &self.meter));
+        let rise = rise.flatten();
         let goes_up = matches!(self.phase, Phase::Homing | Phase::Lifting);
         if let Some(fault) = rise.filter(|_| !(goes_up && self.lever.is_lifted())) {
             self.check(fault);
@@ -462,6 +467,16 @@ impl Control {
                         }
                         StageState::Standing if self.stage.position_mm() < MARGIN_MM / 2.0 => {
                             self.stage.go(MARGIN_MM, RETURN_MM_S);
+                        }
+                        // it stood beyond the switch, towards its hard stop: the origin is where the switch opens
+                        StageState::Standing
+                            if self.stage.is_searched() && inputs.stage_limits.0 =>
+                        {
+                            let to = self.stage.position_mm() + MARGIN_MM;
+                            if to > BEYOND_MM {
+                                self.check(Fault::StageNotHome);
+                            }
+                            self.stage.go(to, RETURN_MM_S);
                         }
                         StageState::Standing if self.stage.is_searched() => self.stage.home(),
                         StageState::Standing => self.enter(Phase::Ready),

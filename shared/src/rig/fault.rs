@@ -74,7 +74,7 @@ faults! {
     StageOff, "stage off its path", "more than 1 mm and the way of 40 ms off the profile, or not arrived 0.3 s after its end", 2, BOTH, ALL,
         "check load, supply and encoder, then reset";
     /// No readable word from the sensor.
-    SensorSilent, "sensor silent", "no readable word of P_AC or of P_DC for 10 ms", 12, BOTH, ALL, "check the sensor's cable and power, then reset";
+    SensorSilent, "sensor silent", "no readable word of P_AC or of P_DC for 10 ms", 12, BOTH, ALL, "look whether the finger is up, and turn the lever's knob until it is: without the sensor only switch and steps say so; check the sensor's cable and power, then reset";
     /// Too many words are damaged.
     SensorErrors, "sensor link bad", "23 damaged words within a second: half a percent", 2, BOTH, ALL,
         "check cable length, ground and clock phase, then reset";
@@ -101,11 +101,11 @@ faults! {
     LeverNotHome, "lever not home", "limit switch not reached in 1.25 times the travel, or released for 20 ms under a lever that stands at it, P_DC still as high as it had risen on the last way up, or P_DC there or at the first zero more than 40 counts off the calibration's", 2,
         "lever motor off, stage motor braked", ALL, "turn the lever's knob until the finger is free, check its driver, the switch and that DIR is not inverted; calibrate a finger that has drifted, then reset";
     /// The stage did not find its limit switch.
-    StageNotHome, "stage not home", "limit switch not reached: the stage falls behind, or has gone 1.25 times the travel, or 3 mm where it touches it again", 2, BOTH, ALL,
+    StageNotHome, "stage not home", "limit switch not reached: the stage falls behind, or has gone 1.25 times the travel, or 3 mm where it touches it again, or is still in the switch 7 mm from where it closed", 2, BOTH, ALL,
         "clear the stage's way and check the switch, then reset";
     /// The finger presses, and P_DC does not say so.
     PressureDead, "pressure dead", "P_AC shows contact and P_DC does not rise within 0.5 mm, or no longer rises while P_AC shows that the pressure does, or no contact 1 mm below that of the last press on this sample", 2,
-        BOTH, ALL, "check the fingertip and the sensor's P_DC, then reset";
+        BOTH, ALL, "look whether the finger is up, and turn the lever's knob until it is; check the fingertip and the sensor's P_DC, then reset";
 }
 
 impl Fault {

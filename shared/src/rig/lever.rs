@@ -21,6 +21,8 @@ pub const DESCENT_STEPS_S: i32 = 3200;
 const REST_MS: u32 = 20;
 /// It goes slowly from this far above the last contact on, 0.15 mm: that was seen some hundredths of a millimetre below the surface.
 const NEAR_STEPS: i32 = 240;
+/// The mean of P_DC is of 10 ms, and the skin comes back within 100 (chosen).
+const RESTS_MS: u32 = 100;
 /// Steps per second while lifting, upwards: 2 mm/s, still within what a stepper starts and stops at without a ramp.
 pub const RETRACT_STEPS_S: i32 = -3200;
 /// Steps per second while the force is trimmed: slow enough to stop on a step.
@@ -206,6 +208,11 @@ impl Lever {
     /// Whether the finger is certainly off the sample, and the motor stands.
     pub fn is_lifted(&self) -> bool {
         self.state == LeverState::Lifted
+    }
+
+    /// Whether it is lifted and has stood for so long that P_DC says nothing of its way any more.
+    pub fn rests(&self) -> bool {
+        self.is_lifted() && self.ms > RESTS_MS
     }
 
     /// Whether the finger is lifted and goes up to the limit switch.
