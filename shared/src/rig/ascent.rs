@@ -61,13 +61,17 @@ impl Ascent {
         (self.lowest, self.pressed) = (None, false);
     }
 
-    /// The lever begins to look for its switch; whether what was known of P_DC without contact is to be found anew. After a
-    /// press it is not: each try would begin where the last one ended.
-    pub(super) fn begin(&mut self) -> bool {
-        if self.pressed {
+    /// The lever begins to look for its switch, at P_DC of `mean`; whether what was known of P_DC without contact is to be found anew.
+    /// After a press it is not: each try would begin where the last one ended. But where P_DC is what the calibration measured in
+    /// the `air`, nothing presses: what had seemed so was noise, or somebody has freed the finger.
+    pub(super) fn begin(&mut self, mean: Option<f32>, air: Option<f32>) -> bool {
+        let is_free = mean
+            .zip(air)
+            .is_some_and(|(mean, air)| libm::fabsf(mean - air) < self.finger.counts(RISEN_MN));
+        if self.pressed && !is_free {
             return false;
         }
-        self.forget();
+        self.lowest = None;
         true
     }
 
@@ -185,25 +189,48 @@ mod tests {
     #[test]
     fn what_rose_once_must_fall_before_the_next_try() {
         let mut ascent = Ascent::new(&BioTac::MODEL);
-        assert!(ascent.begin());
+        assert!(ascent.begin(None, None));
         for mean in [None, Some(2700.0), Some(2650.0), Some(2658.0)] {
             assert_eq!(ascent.rises(mean, RISEN_MN), None);
         }
         assert_eq!(ascent.rises(Some(2659.0), RISEN_MN), Some(Fault::ForceHigh));
         for _ in 0..3 {
-            assert!(!ascent.begin(), "the zero is kept");
+            assert!(
+                !ascent.begin(Some(2659.0), Some(2640.0)),
+                "the zero is kept"
+            );
             assert_eq!(
                 ascent.rises(Some(2659.0), RISEN_MN),
                 Some(Fault::LeverNotHome)
             );
         }
         // somebody has freed it
-        assert!(!ascent.begin());
+        assert!(!ascent.begin(None, None));
         assert_eq!(ascent.rises(Some(2651.0), RISEN_MN), None);
         ascent.pressed = false;
-        assert!(ascent.begin());
+        assert!(ascent.begin(None, None));
         assert_eq!(ascent.lowest(), None);
         assert_eq!(ascent.rises(Some(2800.0), RISEN_MN), None);
+    }
+
+    #[test]
+    fn noise_that_seemed_a_press_is_forgotten_where_p_dc_is_as_it_was_in_the_air() {
+        let mut ascent = Ascent::new(&BioTac::MODEL);
+        assert!(ascent.begin(None, Some(2600.0)));
+        // words of noise make it seem lower than it is
+        assert_eq!(ascent.rises(Some(2570.0), AIR_MN), None);
+        assert_eq!(ascent.rises(Some(2611.0), AIR_MN), Some(Fault::ForceHigh));
+        assert!(!ascent.begin(Some(2608.5), Some(2600.0)));
+        assert!(!ascent.begin(Some(2600.0), None), "nobody has measured it");
+        assert!(!ascent.begin(None, Some(2600.0)), "the sensor is silent");
+        assert!(ascent.begin(Some(2607.5), Some(2600.0)));
+        assert_eq!(ascent.rises(Some(2607.5), RISEN_MN), None);
+        // a lever that goes down after all is seen within those counts
+        assert_eq!(
+            ascent.rises(Some(2616.0), RISEN_MN),
+            Some(Fault::LeverNotHome)
+        );
+        assert!(!ascent.begin(Some(2616.0), Some(2600.0)));
     }
 
     #[test]
@@ -211,7 +238,7 @@ mod tests {
         let mut ascent = Ascent::new(&BioTac::MODEL);
         ascent.zero(2600.0);
         ascent.pressed = true;
-        assert!(!ascent.begin());
+        assert!(!ascent.begin(None, None));
         assert_eq!(
             ascent.rises(Some(2700.0), RISEN_MN),
             Some(Fault::LeverNotHome)

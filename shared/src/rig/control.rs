@@ -178,7 +178,12 @@ impl Control {
                 self.stage.forget();
                 self.compared = false;
                 self.recovered = None;
-                if self.ascent.begin() {
+                let pressure = &self.calibration.pressure;
+                let air = self
+                    .calibration
+                    .air_known
+                    .then_some(pressure.pdc_no_contact);
+                if self.ascent.begin(self.meter.mean(), air) {
                     self.forget_default();
                 }
                 self.enter(Phase::Homing);
