@@ -1,6 +1,7 @@
 //! The command `tactus`: a file for each of its commands, with the arguments, what is done and what is said.
 
 mod args;
+mod config;
 mod convert;
 mod device;
 mod evaluate;
@@ -67,6 +68,7 @@ enum Command {
     Man(manual::Man),
     Import(import::Args),
     Convert(convert::Args),
+    Config(config::Args),
 }
 
 /// What to try first, and what scripts need to know.
@@ -78,6 +80,7 @@ const CONVENTIONS: &str = "\
 Environment:
   TACTUS_RECORDINGS   the folder, where --recordings is not given
   TACTUS_PORT         the probe's port, where --port is not given
+  TACTUS_CONFIG       the file of settings, in place of tactus.toml: `tactus config --help`
 
 Exit codes: 0 done; 1 an error; 2 wrong usage; 3 not identified: none of those known, or not sure; 130 after Ctrl-C.";
 
@@ -85,8 +88,9 @@ Exit codes: 0 done; 1 an error; 2 wrong usage; 3 not identified: none of those k
 pub(crate) fn run() -> anyhow::Result<Done> {
     let out = &mut io::BufWriter::new(io::stdout().lock());
     let mut done = Done::Fully;
-    let Tactus { quiet, command } = Tactus::parse();
-    if quiet {
+    let arguments = config::read(&Tactus::command(), std::env::args_os())?;
+    let Tactus { quiet, command } = Tactus::parse_from(arguments);
+    if quiet || config::is_quiet() {
         progress::be_quiet();
     }
     match command {
@@ -109,6 +113,7 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         Some(Command::Man(args)) => manual::pages(&args, Tactus::command(), out)?,
         Some(Command::Import(args)) => import::run(&args, out)?,
         Some(Command::Convert(args)) => convert::run(&args, out)?,
+        Some(Command::Config(args)) => config::run(&args, out)?,
     }
     out.flush()?;
     Ok(done)

@@ -8,11 +8,12 @@ use tactus_core::explorer::{self, Config, SlideTime, Strategy};
 use tactus_core::features::FeatureSet;
 use tactus_core::table::{Drift, is_false_alarm};
 
+use super::config;
 use super::output::UsageError;
 
 #[derive(Args, Clone)]
 pub(crate) struct Recordings {
-    /// Folder of recordings; that of TACTUS_RECORDINGS unless given
+    /// Folder of recordings; that of TACTUS_RECORDINGS or of tactus.toml unless given
     #[arg(long, value_name = "DIR")]
     pub(crate) recordings: Option<PathBuf>,
 }
@@ -23,10 +24,9 @@ impl Recordings {
     /// # Errors
     /// Neither does.
     pub(crate) fn folder(&self) -> Result<PathBuf, UsageError> {
-        let named = || std::env::var_os("TACTUS_RECORDINGS").filter(|folder| !folder.is_empty());
         let folder = self.recordings.clone();
-        folder.or_else(|| named().map(PathBuf::from)).ok_or_else(|| {
-            let say = "give a folder of recordings: --recordings DIR, or TACTUS_RECORDINGS in the environment";
+        folder.or_else(config::recordings).ok_or_else(|| {
+            let say = "give a folder of recordings: --recordings DIR, TACTUS_RECORDINGS in the environment, or `recordings` in tactus.toml";
             UsageError(say.to_owned())
         })
     }

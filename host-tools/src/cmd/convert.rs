@@ -27,7 +27,7 @@ Examples:
 In an .npz, `pac_7`, `pdc_7`, `shear_7` and `still_7` are the streams of the slide of row 7 of `texture`, `slide`, `movement`, `properties` and
 `ln_bands`. The book lists the channels of an .mcap.")]
 pub(crate) struct Args {
-    /// A folder of recordings, or a session's log
+    /// A folder of recordings, or a session's log; "-" reads a log from standard input
     from: PathBuf,
     /// Write an MCAP file
     #[arg(long, value_name = "FILE")]

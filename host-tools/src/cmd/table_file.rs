@@ -1,6 +1,6 @@
 //! Table files: written whole, and checked when read.
 
-use std::io::Read as _;
+use std::io::{self, Read};
 use std::path::Path;
 
 use anyhow::{Context as _, ensure};
@@ -39,10 +39,20 @@ pub(crate) fn write_table(file: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     write_whole(file, bytes).with_context(|| file.display().to_string())
 }
 
+/// A file to read; "-" is standard input.
+pub(crate) fn opened(file: &Path) -> io::Result<Box<dyn Read>> {
+    Ok(if file == Path::new("-") {
+        Box::new(io::stdin().lock())
+    } else {
+        Box::new(std::fs::File::open(file)?)
+    })
+}
+
+/// The table in a file; "-" is standard input.
 pub(crate) fn read_table<'b>(file: &Path, bytes: &'b mut Vec<u8>) -> anyhow::Result<Table<'b>> {
     let name = file.display();
     bytes.clear();
-    std::fs::File::open(file)
+    opened(file)
         .and_then(|file| file.take(MAX_BYTES).read_to_end(bytes))
         .with_context(|| format!("{name}: no table here, `tactus learn --out FILE` writes one"))?;
     let table = Table::read(bytes).with_context(|| name.to_string())?;

@@ -13,6 +13,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use tactus_core::wire::{Command, PROTOCOL, Report};
 
+use crate::cmd::table_file::opened;
+
 /// One line.
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -111,9 +113,9 @@ pub(crate) enum LogError {
 /// Most bytes of a line: the longest reports, many times over.
 const MAX_LINE: u64 = 1 << 20;
 
-/// Reads a log line by line.
+/// Reads a log line by line; "-" is standard input.
 pub(crate) fn read(path: &Path, mut each: impl FnMut(Line<'static>)) -> Result<(), LogError> {
-    let file = File::open(path)?;
+    let file = opened(path)?;
     let (mut lines, mut line) = (BufReader::new(file), Vec::new());
     for number in 1.. {
         line.clear();

@@ -34,7 +34,7 @@ Examples:
 pub(crate) enum Command {
     /// Compute every decision of the session again, and compare
     Replay {
-        /// The log
+        /// The log; "-" reads standard input
         file: PathBuf,
         #[command(flatten)]
         plot: Plot,
@@ -44,7 +44,7 @@ pub(crate) enum Command {
     },
     /// Show the session's explorations as they were shown live
     Show {
-        /// The log
+        /// The log; "-" reads standard input
         file: PathBuf,
         #[command(flatten)]
         plot: Plot,
@@ -54,7 +54,7 @@ pub(crate) enum Command {
     },
     /// Draw what the monitor shows of the session, as a moving picture (SVG)
     Film {
-        /// The log
+        /// The log; "-" reads standard input
         file: PathBuf,
         /// The picture; what is there of this name is replaced
         #[arg(long, value_name = "FILE.svg", value_parser = svg_file)]
