@@ -114,11 +114,11 @@ impl Sources {
                 return *here;
             }
             let uses = self.0[from].1.items.iter();
-            let brought = uses.filter_map(|item| match item {
+            let mut brought = uses.filter_map(|item| match item {
                 Item::Use(what) => brings(&what.tree, &name),
                 _ => None,
             });
-            words = brought.last().unwrap_or(words);
+            words = brought.next_back().unwrap_or(words);
         }
         let place = words.iter().rev().nth(1);
         let place = place.unwrap_or_else(|| panic!("{name} in {}: which?", self.0[from].0));
