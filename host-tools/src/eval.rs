@@ -5,6 +5,7 @@ mod calibrate;
 #[cfg(feature = "plots")]
 pub mod chart;
 pub mod courses;
+pub mod early;
 pub mod evaluate;
 pub mod experiment;
 pub mod gauge;

@@ -6,6 +6,8 @@ mod candidates;
 mod choice;
 mod config;
 mod confusions;
+#[cfg(any(test, feature = "early"))]
+mod early;
 mod episode;
 pub mod kernels;
 mod likelihoods;
@@ -23,6 +25,8 @@ pub use answer::{Answer, Verification};
 pub use choice::{ExpectedOutcome, benefit, confusion};
 pub use config::{Config, ExplorerError, Method, NEGLIGIBLE, ObserveError, Strategy};
 pub use confusions::{Confusions, Degrees};
+#[cfg(any(test, feature = "early"))]
+pub use early::{Look, most_doubt};
 pub use episode::EpisodeSummary;
 pub use kernels::Kernels;
 #[cfg(any(test, feature = "timed"))]

@@ -7,13 +7,14 @@
 //!
 //! # Binary form, version 4, little-endian
 //!
-//! A table without sections is written as version 3, one that knows speeds (section 4) as version 5; they are the same
-//! otherwise. All are read, version 5 by a build that knows speeds.
+//! A table without sections is written as version 3, one that knows speeds (section 4) as version 5, one that knows shorter
+//! slides (section 6) as version 6; they are the same otherwise. All are read, version 5 by a build that knows speeds, version 6
+//! by one that can end a slide early.
 //!
 //! | bytes | what |
 //! |---|---|
 //! | 4 | magic `TACT` |
-//! | 2 | version, 4, or 3, or 5 |
+//! | 2 | version, 4, or 3, 5, or 6 |
 //! | 1 | contents, 0: Gaussians, 1: fused |
 //! | 1 | Gaussians: properties measured, a bit each: 1 traction, 2 roughness, 4 fineness; fused: place in `features::FeatureSet::ALL` |
 //! | 4 | length of the whole table in bytes |
@@ -47,12 +48,22 @@
 //!
 //! Section 5, of either kind of table: the finger that it was learned with (1: 0 `biotac`, 1 `analog`, 2 `mems`), and the day on which
 //! that finger's force per count was measured (4, as 20261121). Without it a table is a BioTac's. A probe of another finger refuses it.
+//!
+//! Section 6, of either kind of table, is what the first part of a slide says: one section for each length, the shortest first
+//! ([`with_lengths`]). A table has slopes or lengths, never both.
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 2 | the length in ms at constant speed |
+//! | | as the table itself, learned from slides of this length: header to trials, a trial of 0 where a movement's slides are not longer |
+//! | | the contents of section 1 and of section 2, where the table has these |
 
 mod drift;
 mod encode;
 mod finger;
 mod format;
 mod gaussian;
+mod lengths;
 mod limits;
 mod matrix;
 mod one_section;
@@ -72,10 +83,11 @@ pub use encode::{
 };
 pub use finger::{FINGER_LENGTH, with_finger};
 pub use format::{
-    Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, Name, PACED, TableError, Tally,
-    VERSION,
+    Action, Contents, EARLY, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, Name, PACED, TableError,
+    Tally, VERSION,
 };
 pub use gaussian::{Gaussian, Gaussians, SD_LEAST, SD_STEP, mean_step};
+pub use lengths::{MAX_LENGTHS, Shorter, lengths_length, with_lengths};
 pub(crate) use limits::Numbers;
 pub use limits::{Against, EPISODES, FALSE_ALARM, Limits, Tail, is_false_alarm};
 pub use patch::{recentre, retell};

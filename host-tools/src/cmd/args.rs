@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use tactus::eval::evaluate::Method;
 use tactus_core::explorer::{self, Config, SlideTime, Strategy};
 use tactus_core::features::FeatureSet;
-use tactus_core::table::{Drift, is_false_alarm};
+use tactus_core::table::{Drift, MAX_LENGTHS, is_false_alarm};
 
 use super::config;
 use super::output::UsageError;
@@ -68,6 +68,54 @@ fn drift(text: &str) -> Result<Drift, String> {
     drift.filter(|drift| drift.is_possible()).ok_or_else(|| {
         "two numbers from 0 to 10, such as 0.1,0.04, or 0 for no drift at all".to_owned()
     })
+}
+
+/// When a slide may end before its end.
+#[derive(Args, Clone)]
+pub(crate) struct Ending {
+    /// With --early: the lengths at which a slide may end, s at constant speed
+    #[arg(long, value_name = "S,S,...", value_delimiter = ',', default_value = "1,2,3", requires = "early", value_parser = length)]
+    pub(crate) lengths: Vec<u16>,
+    /// With --early: how improbable all other textures together have to be; several are tried one after the other
+    #[arg(long, value_name = "P,P,...", value_delimiter = ',', requires = "early", value_parser = doubt)]
+    pub(crate) doubt: Vec<f64>,
+}
+
+impl Ending {
+    /// The lengths in ms.
+    ///
+    /// # Errors
+    /// See [`rising`].
+    pub(crate) fn lengths_ms(&self) -> Result<Vec<u16>, UsageError> {
+        rising(&self.lengths)
+    }
+}
+
+/// Lengths as a table has them.
+///
+/// # Errors
+/// They are too many, or one is not longer than the one before.
+pub(crate) fn rising(lengths_ms: &[u16]) -> Result<Vec<u16>, UsageError> {
+    if lengths_ms.len() > MAX_LENGTHS || !lengths_ms.is_sorted_by(|a, b| a < b) {
+        let say = format!("--lengths: at most {MAX_LENGTHS}, the shortest first, such as 1,2,3");
+        return Err(UsageError(say));
+    }
+    Ok(lengths_ms.to_vec())
+}
+
+/// A length in s, as ms.
+pub(crate) fn length(text: &str) -> Result<u16, String> {
+    match text.trim().parse::<f64>() {
+        Ok(s) if (0.3..=60.0).contains(&s) => Ok((s * 1e3).round() as u16),
+        _ => Err("seconds from 0.3 to 60, such as 1.5".to_owned()),
+    }
+}
+
+fn doubt(text: &str) -> Result<f64, String> {
+    match text.trim().parse() {
+        Ok(p) if 0.0 < p && p < 1.0 => Ok(p),
+        _ => Err("a probability between 0 and 1, such as 0.001".to_owned()),
+    }
 }
 
 pub(crate) fn false_alarm(text: &str) -> Result<f32, String> {

@@ -4,12 +4,13 @@ use std::collections::HashMap;
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 use serde::Serialize;
 use tactus::data::recordings::RecordingSet;
-use tactus::data::replay::MeasuredSlide;
+use tactus::data::replay::{MeasuredSlide, measure_cut};
+use tactus::eval::early::{is_longer, of_length};
 use tactus::eval::evaluate::Method;
-use tactus::eval::learn::{Expected, name_finger};
+use tactus::eval::learn::{Expected, know_lengths, name_finger};
 use tactus::eval::samples::{note, of_all};
 use tactus::eval::show::count;
 use tactus::sim::collection::texture_name;
@@ -18,7 +19,7 @@ use tactus_core::features::{FeatureSet, Movement, Observation};
 use tactus_core::sensor::FingerName;
 use tactus_core::table::{FALSE_ALARM, Table};
 
-use super::args::{Expecting, Features, Recordings, false_alarm};
+use super::args::{Expecting, Features, Recordings, false_alarm, length, rising};
 use super::output::{Format, print_json};
 use super::progress::with_progress;
 use super::table_file::{TableFile, write_table};
@@ -30,6 +31,7 @@ use super::textures::{collection, finger_of, measure_folder, names};
 Examples:
   tactus learn --recordings DIR --out table
   tactus learn --recordings DIR --method paper --out table     the table of the paper's method
+  tactus learn --recordings DIR --lengths 1,2,3 --out table    and what slides say after 1, 2 and 3 s
   tactus device table push table                               gives it to the probe")]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -48,6 +50,10 @@ pub(crate) struct Args {
     /// Share of the known textures that may be taken for new ones, unless `identify` says otherwise
     #[arg(long, value_name = "SHARE", default_value_t = FALSE_ALARM, value_parser = false_alarm)]
     false_alarm: f32,
+    /// Learn the first parts of the slides too, of these lengths, s at constant speed, such as 1,2,3: for `evaluate --early`. Images
+    /// without the core's feature `early` refuse such a table
+    #[arg(long, value_name = "S,S,...", value_delimiter = ',', value_parser = length)]
+    lengths: Vec<u16>,
     /// The file to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -125,6 +131,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         &expected,
     )
     .with_context(|| folder.display().to_string())?;
+    let bytes = with_lengths(args, &set, bytes, &expected)?;
     write_table(&args.out, &bytes)?;
     let mut short = Vec::new();
     for (texture, measured) in set.textures().iter().zip(&measured) {
@@ -163,6 +170,45 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         writeln!(out, "{}, {}: only {slides}", short.texture, short.movement)?;
     }
     Ok(())
+}
+
+/// The table with what the first parts of its slides say, if that was asked for.
+fn with_lengths(
+    args: &Args,
+    set: &RecordingSet,
+    bytes: Vec<u8>,
+    expected: &Expected,
+) -> anyhow::Result<Vec<u8>> {
+    if args.lengths.is_empty() {
+        return Ok(bytes);
+    }
+    let lengths_ms = rising(&args.lengths)?;
+    ensure!(
+        !Table::read(&bytes)?.is_paced(),
+        "--lengths: these slides have speeds of their own, as those of a hand; a table knows speeds or lengths, not both"
+    );
+    let textures = set.textures().len() as u64;
+    let slides = with_progress(textures, "measuring first parts", |done| {
+        measure_cut(set, &lengths_ms, |_| done())
+    })?;
+    let features = args.features.map(Features::set);
+    let shorter = (0..).zip(&lengths_ms).map(|(n, &ms)| {
+        let of_length = of_length(&slides, n);
+        let movements = (0..).zip(set.movements());
+        let longer = movements.filter(|(_, movement)| is_longer(&slides, *movement, n));
+        let movements = longer.map(|(at, _)| 1_u64 << at).sum();
+        let (slides, method) = (args.train_slides, args.method);
+        let table = learn_first(set, &of_length, slides, method, features, expected)?;
+        Ok((ms, table, movements))
+    });
+    let shorter = shorter.collect::<anyhow::Result<Vec<_>>>()?;
+    if let Some((ms, ..)) = shorter.iter().find(|(.., movements)| *movements == 0) {
+        bail!(
+            "--lengths: no movement's slides are all longer than {} s",
+            f64::from(*ms) / 1e3
+        );
+    }
+    Ok(know_lengths(&bytes, &shorter)?)
 }
 
 /// Learns a handheld probe's table.
@@ -240,7 +286,8 @@ pub(crate) fn learned_here(
         false_alarm: table.limits().map_or(FALSE_ALARM, |l| l.false_alarm),
     };
     let own = learn_first(set, measured, trials, learned_as, None, &expected);
-    let is_own = own.is_ok_and(|own| own == table.as_bytes());
+    let whole = know_lengths(table.as_bytes(), &[]);
+    let is_own = own.is_ok_and(|own| whole.is_ok_and(|whole| own == whole));
     LearnedHere {
         first: if is_own { trials } else { 0 },
         met: HashMap::new(),

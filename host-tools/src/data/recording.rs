@@ -152,6 +152,21 @@ impl Recording {
         slide.set_pace(self.pace);
     }
 
+    /// The same slide, had it ended after so many ms at constant speed; `None` if it does not last longer.
+    pub fn first(&self, ms: u16) -> Option<Self> {
+        let (start, end) = self.window;
+        let until = start + f32::from(ms) / 1000.0;
+        if until >= end {
+            return None;
+        }
+        let shear = self.shear_mn();
+        let first = Self {
+            window: (start, until),
+            ..self.clone()
+        };
+        first.cut(&self.still(), &self.pac(), shear.as_deref()).ok()
+    }
+
     /// P_AC of the finger at rest before this slide, in counts about its baseline.
     pub fn still(&self) -> Vec<i16> {
         self.samples(true, |block| &block.pac)

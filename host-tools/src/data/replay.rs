@@ -58,6 +58,59 @@ pub fn measure_all(
     set: &RecordingSet,
     done: impl Fn(&Texture) + Sync,
 ) -> Result<Vec<Vec<MeasuredSlide>>, MeasureError> {
+    measure_each(set, done, |plan, slide| {
+        Ok(MeasuredSlide {
+            number: slide.number,
+            movement: slide.movement,
+            measurement: measure(plan, slide)?,
+        })
+    })
+}
+
+/// A recorded slide, and what its first part alone would have said.
+#[derive(Clone, Debug)]
+pub struct CutSlide {
+    /// The whole slide.
+    pub whole: MeasuredSlide,
+    /// How long it is at constant speed, s.
+    pub seconds: f32,
+    /// Its first part, for each length that was asked for; `None` where it does not last longer.
+    pub first: Vec<Option<Measurement>>,
+}
+
+/// As [`measure_all`], and the first part of each slide, of each of these lengths, in ms at constant speed.
+///
+/// # Errors
+/// As [`measure_all`]; the first part of a slide may be too short to have properties, too.
+pub fn measure_cut(
+    set: &RecordingSet,
+    lengths_ms: &[u16],
+    done: impl Fn(&Texture) + Sync,
+) -> Result<Vec<Vec<CutSlide>>, MeasureError> {
+    measure_each(set, done, |plan, slide| {
+        let first = |&ms: &u16| {
+            slide
+                .first(ms)
+                .map(|first| measure(plan, &first))
+                .transpose()
+        };
+        Ok(CutSlide {
+            first: lengths_ms.iter().map(first).collect::<Result<_, _>>()?,
+            seconds: slide.window.1 - slide.window.0,
+            whole: MeasuredSlide {
+                number: slide.number,
+                movement: slide.movement,
+                measurement: measure(plan, slide)?,
+            },
+        })
+    })
+}
+
+fn measure_each<T: Send>(
+    set: &RecordingSet,
+    done: impl Fn(&Texture) + Sync,
+    of: impl Fn(&Plan, &Recording) -> Result<T, SlideError> + Sync,
+) -> Result<Vec<Vec<T>>, MeasureError> {
     let plan = Plan::new();
     (0..set.textures().len())
         .into_par_iter()
@@ -67,15 +120,10 @@ pub fn measure_all(
                 .load_texture(index)?
                 .iter()
                 .map(|slide| {
-                    let measurement = measure(&plan, slide).map_err(|why| MeasureError::Slide {
+                    of(&plan, slide).map_err(|why| MeasureError::Slide {
                         texture: texture.name.clone(),
                         number: slide.number,
                         why,
-                    })?;
-                    Ok(MeasuredSlide {
-                        number: slide.number,
-                        movement: slide.movement,
-                        measurement,
                     })
                 })
                 .collect::<Result<Vec<_>, MeasureError>>()?;

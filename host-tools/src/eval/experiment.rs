@@ -21,22 +21,10 @@ use crate::data::replay::MeasuredSlide;
 use crate::eval::learn::{Expected, TableError, learn_for};
 
 mod error;
+mod protocol;
 
 pub use error::ExperimentError;
-
-/// How slides are divided into training and test.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
-#[cfg_attr(feature = "arguments", derive(clap::ValueEnum))]
-#[serde(rename_all = "lowercase")]
-pub enum Protocol {
-    /// Training slides at random from all of a session, tested on the rest: optimistic.
-    Interleaved,
-    /// Training slides at random from the first 19 of 34 (of another number, the same share), tested on the later ones;
-    /// with --test, trained on slide numbers below 30 and tested on those above 34.
-    Blocked,
-    /// Trained on the first slides of a session, tested on all later ones; with --test, on all of that folder.
-    Drift,
-}
+pub use protocol::Protocol;
 
 /// Slides of a session that [`Protocol::Blocked`] trains from, out of [`SESSION`].
 const BLOCKED_TRAINING: usize = 19;
@@ -552,6 +540,31 @@ impl<'e> Run<'e> {
 
     /// One more slide of the unknown texture; `None` where each is shown once, and all of this movement were.
     pub fn slide(&mut self, movement: usize) -> Option<&'e Observation> {
+        let n = self.draw(movement)?;
+        Some(self.shown(movement, n))
+    }
+
+    /// The slide of the unknown texture of which the number was drawn.
+    pub(super) fn shown(&self, movement: usize, n: usize) -> &'e Observation {
+        self.drawn(self.experiment, movement, n)
+    }
+
+    /// A slide of the unknown texture in an experiment with the same slides, by the number that was drawn.
+    pub(super) fn drawn<'o>(
+        &self,
+        of: &'o Experiment,
+        movement: usize,
+        n: usize,
+    ) -> &'o Observation {
+        let pool = &of.pools[self.unknown][movement];
+        match &pool.test {
+            Some(test) => &test[n],
+            None => &pool.train[self.place(movement, pool, of.train_slides + n)],
+        }
+    }
+
+    /// The number of one more slide.
+    pub(super) fn draw(&mut self, movement: usize) -> Option<usize> {
         let pool = &self.experiment.pools[self.unknown][movement];
         let learned = self.experiment.train_slides;
         let slides = match &pool.test {
@@ -567,16 +580,12 @@ impl<'e> Run<'e> {
         {
             return None;
         }
-        let n = loop {
+        loop {
             // drawn again until it is a new one: so the first slide of a run is the same either way
             let n = self.random.random_range(0..slides);
             if !self.experiment.once || self.shown.insert((movement, n)) {
-                break n;
+                break Some(n);
             }
-        };
-        Some(match &pool.test {
-            Some(test) => &test[n],
-            None => &pool.train[self.place(movement, pool, learned + n)],
-        })
+        }
     }
 }

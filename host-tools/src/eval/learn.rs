@@ -6,8 +6,8 @@ use tactus_core::features::{FeatureSet, Movement, Observation, PropertySet, Vect
 use tactus_core::sensor::FingerCode;
 use tactus_core::table::{
     self, Contents, Drift, Drifts, EncodeError, Experience, FALSE_ALARM, FINGER_LENGTH, Limits,
-    Population, Scatter, Sections, Table, Tail, WhitenError, Whitened, Whitening, whiten_drifting,
-    with_finger, with_sections,
+    Population, Scatter, Sections, Shorter, Table, Tail, WhitenError, Whitened, Whitening,
+    lengths_length, whiten_drifting, with_finger, with_lengths, with_sections,
 };
 
 use super::calibrate::limits;
@@ -127,6 +127,28 @@ pub fn name_finger(
         .len();
     named.truncate(length);
     Ok(named)
+}
+
+/// A table with what shorter slides say, the shortest first: their length in ms, a table learned from the first parts of the same
+/// slides, and a bit for each movement whose slides are longer. Without any, the table without what it has of them.
+///
+/// # Errors
+/// A table is none, or not of the same textures and movements.
+pub fn know_lengths(bytes: &[u8], shorter: &[(u16, Vec<u8>, u64)]) -> Result<Vec<u8>, EncodeError> {
+    let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
+    let shorter = shorter.iter().map(|(ms, table, movements)| {
+        let table = Table::read(table).map_err(EncodeError::Invalid)?;
+        Ok(Shorter {
+            ms: *ms,
+            table,
+            movements: *movements,
+        })
+    });
+    let shorter = shorter.collect::<Result<Vec<_>, EncodeError>>()?;
+    let mut out = vec![0; bytes.len() + lengths_length(&shorter)];
+    let length = with_lengths(&mut out, &table, &shorter)?.as_bytes().len();
+    out.truncate(length);
+    Ok(out)
 }
 
 /// As [`learn`], for what else is expected.

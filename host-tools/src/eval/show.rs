@@ -355,6 +355,17 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
         "finger: {}; day of its force calibration: {calibrated}",
         table.finger()
     )?;
+    let lengths: Vec<String> = table
+        .lengths_ms()
+        .map(|ms| (f64::from(ms) / 1e3).to_string())
+        .collect();
+    if !lengths.is_empty() {
+        writeln!(
+            out,
+            "it knows slides that end early, after {} s",
+            lengths.join(", ")
+        )?;
+    }
     if let Contents::Fused(set, features) = table.contents() {
         let features = count(features, "feature");
         writeln!(out, "{features}: {}", set.name())?;

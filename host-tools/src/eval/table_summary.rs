@@ -24,6 +24,8 @@ pub struct TableSummary {
     pub drift: Option<Drift>,
     /// The share of false alarms that its limits are for; `null` where it has none.
     pub false_alarm: Option<f32>,
+    /// Lengths at which it knows what a slide says before its end, s at constant speed.
+    pub lengths_s: Vec<f64>,
     /// The movements.
     pub movements: Vec<MovementSummary>,
     /// The textures, in the order of the table.
@@ -87,6 +89,7 @@ impl TableSummary {
             finger_calibrated: table.calibrated(),
             drift: table.drift(),
             false_alarm: table.limits().map(|limits| limits.false_alarm),
+            lengths_s: table.lengths_ms().map(|ms| f64::from(ms) / 1e3).collect(),
             movements: table
                 .movements()
                 .map(|movement| MovementSummary {

@@ -28,14 +28,31 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             .position(|&a| a == action)
             .filter(|&at| at < self.made.len());
         let made = made.ok_or(ObserveError::Action(action))?;
+        self.compare(action, slide)?;
+        self.count(made, action);
+        Ok(())
+    }
+
+    /// What a slide says of every candidate.
+    #[inline(always)]
+    pub(super) fn compare(
+        &mut self,
+        action: Action,
+        slide: &Observation,
+    ) -> Result<(), ObserveError> {
         match action.property {
             None if K::ONLY_FUSED || self.config.method == Method::Fused => {
-                self.observe_features(action, slide)?;
+                self.observe_features(action, slide)
             }
-            _ if K::ONLY_FUSED => return Err(ObserveError::Action(action)),
-            Some(property) => self.observe_property(action, property, slide)?,
-            None => self.observe_properties(action, slide)?,
+            _ if K::ONLY_FUSED => Err(ObserveError::Action(action)),
+            Some(property) => self.observe_property(action, property, slide),
+            None => self.observe_properties(action, slide),
         }
+    }
+
+    /// One slide more, of the action at this place.
+    #[inline(always)]
+    pub(super) fn count(&mut self, made: usize, action: Action) {
         if let Some(made) = self.made.get_mut(made) {
             *made = made.saturating_add(1);
         }
@@ -43,7 +60,6 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             *failed = 0;
         }
         self.slides = self.slides.saturating_add(1);
-        Ok(())
     }
 
     /// The value of a property of a slide, at most twice as far out as any mean that a table can hold: squares stay finite.
@@ -184,7 +200,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         self.log_odds = elsewhere.and_then(|(elsewhere, can_tell)| match &self.limits {
             Some(limits) => {
                 let slides = self.slides.saturating_add(1);
-                let limit = limits.limit(Against::Drifted, slides, self.config.false_alarm);
+                let limit = self.limit(limits, Against::Drifted, slides);
                 Some(elsewhere - top - limit)
             }
             None => can_tell.then(|| elsewhere - (top + self.mean_of(sum))),

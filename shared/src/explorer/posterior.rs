@@ -7,7 +7,7 @@ use core::marker::PhantomData;
 
 use heapless::Vec;
 
-use super::config::Config;
+use super::config::{Config, Method};
 use super::episode::{Episode, MovementSums};
 use super::kernels::Kernels;
 use super::novelty::NoveltyModel;
@@ -16,7 +16,7 @@ use super::student::ShrinkagePrior;
 use super::whitened;
 use crate::dsp::Plain;
 use crate::features::{PropertySet, Vector};
-use crate::table::{Action, Against, Contents, Limits, MAX_ACTIONS, MAX_MOVEMENTS, Table};
+use crate::table::{Action, Against, Contents, EARLY, Limits, MAX_ACTIONS, MAX_MOVEMENTS, Table};
 use crate::up_to;
 
 /// Logarithm of the posterior, Q16, of a texture that is no candidate. The slides of an exploration make it neither a
@@ -144,6 +144,10 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         self.failed = self.table.movements().map(|_| 0).collect();
         self.episode.clear();
         self.log_odds = None;
+        if EARLY && self.config.method == Method::Fused {
+            // one for each action; those of shorter slides are behind them
+            self.novelty_models.truncate(self.actions.len());
+        }
     }
 
     /// The table.
@@ -208,9 +212,27 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         let Some(limits) = self.limits.filter(|_| drifts && self.slides > 0) else {
             return false;
         };
-        let limit = limits.limit(Against::Same, self.slides, self.config.false_alarm);
+        let limit = self.limit(&limits, Against::Same, self.slides);
         let score = self.score(&self.episode, Against::Same);
         score.is_some_and(|score| score > limit)
+    }
+
+    /// The limit after so many slides; with a shorter one among them its own, where that is less.
+    #[inline(always)]
+    pub(super) fn limit(&self, limits: &Limits, against: Against, slides: u8) -> f32 {
+        let share = self.config.false_alarm;
+        let mut least = limits.limit(against, slides, share);
+        if EARLY {
+            for sums in self
+                .episode
+                .iter()
+                .filter(|v| !self.table.is_whole(v.movement))
+            {
+                let own = self.table.limits_at(sums.movement);
+                least = own.map_or(least, |own| least.min(own.limit(against, slides, share)));
+            }
+        }
+        least
     }
 
     /// How much an episode looks like none of the candidates, by the movements made, their slides and the whitened mean of
@@ -255,13 +277,13 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     }
 
     /// The movements made, with the number of slides and their whitened mean: what a fused table can learn from this
-    /// exploration.
+    /// exploration. A slide that ended early is none of them.
     pub fn observed(&self) -> impl Iterator<Item = (u8, u8, Vector)> + '_ {
         let features = match self.table.contents() {
             Contents::Fused(_, features) => usize::from(features),
             Contents::Gaussians(_) => 0,
         };
-        let episode = self.episode.iter().filter(move |_| features > 0);
+        let episode = self.whole_slides().filter(move |_| features > 0);
         episode.map(move |v| (v.movement, v.slides, v.mean(features)))
     }
 
@@ -269,7 +291,14 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     pub fn paces(&self) -> impl Iterator<Item = i16> + '_ {
         let slopes = |movement| self.table.slopes_at(movement);
         let pace = move |v: &MovementSums| slopes(v.movement).map_or(0, |s| v.pace(&s).0);
-        self.episode.iter().map(pace)
+        self.whole_slides().map(pace)
+    }
+
+    fn whole_slides(&self) -> impl Iterator<Item = &MovementSums> {
+        let table = self.table;
+        self.episode
+            .iter()
+            .filter(move |v| table.is_whole(v.movement))
     }
 
     /// The most probable texture as things stand, the first of equals: the answer also where no further slide can be made.

@@ -2,6 +2,7 @@
 
 mod confusions;
 mod drift;
+mod early;
 mod fused;
 mod objective;
 mod paced;

@@ -233,7 +233,21 @@ impl<'p, K: Kernels> Slide<'p, K> {
     /// # Errors
     /// See [`SlideError`].
     pub fn finish(mut self) -> Result<Measurement, SlideError> {
-        let wanted = self.steady.end.saturating_sub(self.steady.start);
+        self.measure(self.steady.end.saturating_sub(self.steady.start))
+    }
+
+    /// The properties of what has come so far, as of a slide whose steady part was not longer; of it so many samples of P_AC must
+    /// be there. The slide goes on as if nobody had looked.
+    ///
+    /// # Errors
+    /// See [`SlideError`].
+    #[cfg(any(test, feature = "early"))]
+    pub fn look(&mut self, samples: u32) -> Result<Measurement, SlideError> {
+        self.measure(samples)
+    }
+
+    #[inline(always)]
+    fn measure(&mut self, wanted: u32) -> Result<Measurement, SlideError> {
         let got = self.spectrum.samples();
         if self.lost > 0 {
             return Err(SlideError::Gap(self.lost));
@@ -360,6 +374,29 @@ mod tests {
             rest = later;
         }
         slide.finish()
+    }
+
+    #[test]
+    fn a_look_is_the_slide_that_ends_there_and_changes_nothing() {
+        let samples = texture(6000);
+        let plan = Plan::new();
+        let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
+        slide.set_background(2.0);
+        slide.start(300..6000);
+        for end in [1400, 2500, 2777] {
+            slide.push(&samples[slide.position as usize..end]);
+            let steady = end as u32 - 300;
+            let ended = measure(&samples, 300..end as u32, &[6000]);
+            assert!(ended.is_ok());
+            assert_eq!(slide.look(steady), ended);
+            let unfinished = SlideError::Unfinished {
+                got: steady,
+                wanted: steady + 1,
+            };
+            assert_eq!(slide.look(steady + 1), Err(unfinished));
+        }
+        slide.push(&samples[2777..]);
+        assert_eq!(slide.finish(), measure(&samples, 300..6000, &[100]));
     }
 
     #[test]

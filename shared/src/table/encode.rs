@@ -5,10 +5,11 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, Contents, MAGIC, MAX_MOVEMENTS, PACED, PACED_VERSION,
-    PLAIN_VERSION, SLOPES, TableError, Tally, VERSION,
+    Action, CELL_BYTES, CRC_BYTES, Contents, EARLY, EARLY_VERSION, LENGTH, MAGIC, MAX_MOVEMENTS,
+    PACED, PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally, VERSION,
 };
 use super::gaussian::{SD_LEAST, SD_STEP, mean_step};
+use super::lengths;
 use super::sections::{Sections, each};
 use super::slopes::{self, put_slope};
 use super::training_stats::{Experience, Whitened};
@@ -300,6 +301,18 @@ pub fn amend<'o>(
     if old.is_paced() {
         return rewrite_paced(out, old, rows);
     }
+    if EARLY && old.lengths().next().is_some() {
+        let kept = rows.clone().map(|row| match row.cells {
+            Cells::Old(_, texture) => Some(texture),
+            // nobody knows what a shorter slide of it would be like
+            Cells::New(_) => None,
+        });
+        let length = lengths::amended_length(old, kept.clone())?;
+        let write = |writer: &mut Writer<'_>| {
+            lengths::write_amended(old, kept, |bytes| writer.put(bytes));
+        };
+        return rewrite(out, old, old.lineage(), rows, (length, write));
+    }
     let sections = old.sections;
     rewrite(
         out,
@@ -544,9 +557,17 @@ fn write<'o, 'a>(
     let names_end = writer.at;
     sections(&mut writer);
     let written = writer.buffer.get(names_end..writer.at).unwrap_or_default();
-    if PACED && each(written).flatten().any(|(kind, _)| kind == SLOPES) {
+    let has = |wanted| each(written).flatten().any(|(kind, _)| kind == wanted);
+    let newer = if PACED && has(SLOPES) {
+        Some(PACED_VERSION)
+    } else if EARLY && has(LENGTH) {
+        Some(EARLY_VERSION)
+    } else {
+        None
+    };
+    if let Some(version) = newer {
         writer.at = MAGIC.len();
-        writer.put(&PACED_VERSION.to_le_bytes());
+        writer.put(&version.to_le_bytes());
         writer.at = names_end + of_sections;
     }
     let crc = CRC32.checksum(writer.written());

@@ -1,7 +1,10 @@
 //! Changing a table where it lies: as many bytes as before.
 
+use heapless::Vec;
+
 use super::encode::EncodeError;
 use super::format::{Contents, LABEL_BYTES, Tally};
+use super::lengths::MAX_LENGTHS;
 use super::training_stats::Whitened;
 use super::view::Table;
 use super::whitening::Whitening;
@@ -54,7 +57,8 @@ pub fn retell(
 }
 
 /// Puts other features in the place of those that are whitened to 0 at a movement: what was learned keeps its place among the
-/// whitened, and slides that differ from those of before by as much are whitened as those were.
+/// whitened, and slides that differ from those of before by as much are whitened as those were. Of shorter slides nothing is known
+/// of that movement then.
 ///
 /// # Errors
 /// The bytes are no fused table of so many features, or have no such movement.
@@ -68,9 +72,18 @@ pub fn recentre(bytes: &mut [u8], movement: u8, centre: &[i16]) -> Result<(), En
         return Err(EncodeError::Contents);
     }
     let at = table.layout().whitenings + usize::from(movement) * Whitening::bytes(features);
+    let movements = usize::from(table.movements);
+    let cells = usize::from(table.textures) * movements;
+    let shorter: Vec<usize, MAX_LENGTHS> = crate::up_to(table.trials_of_lengths());
     let new = centre.iter().flat_map(|x| x.to_le_bytes());
     for (to, from) in bytes.iter_mut().skip(at).zip(new) {
         *to = from;
+    }
+    for trials in shorter {
+        let of_all = bytes.iter_mut().skip(trials).take(cells);
+        for trials in of_all.skip(movement.into()).step_by(movements) {
+            *trials = 0;
+        }
     }
     if let Some((body, crc)) = bytes.split_last_chunk_mut() {
         *crc = CRC32.checksum(body).to_le_bytes();

@@ -10,12 +10,12 @@
 //! of its whitening. Kind 2, what textures are like, and the limits of scores: [`Limits`], begin and excess of six tails; per
 //! movement the axes of the population as a whitening, and d variances along them. Kind 3 is for people: [`super::samples`].
 //! Kind 4, how means go with the speed: [`super::slopes`].
-//! Kind 5, the finger that it was learned with: [`super::finger`].
+//! Kind 5, the finger that it was learned with: [`super::finger`]. Kind 6, what shorter slides say: [`super::lengths`].
 
 use heapless::Vec;
 
 use super::drift::{Drift, Drifts};
-use super::format::{MAX_MOVEMENTS, PACED, SLOPES, TableError, array};
+use super::format::{EARLY, LENGTH, MAX_MOVEMENTS, PACED, SLOPES, TableError, array};
 use super::limits::{Limits, Numbers};
 use super::population::{LEAST, Population};
 use super::slopes::{self, Slopes};
@@ -24,13 +24,13 @@ use super::whitening::{View, Whitening};
 use crate::features::MAX_FEATURES;
 
 /// Bytes of kind and length.
-const HEAD: usize = 4;
-const DRIFT: u16 = 1;
-const NOVELTY: u16 = 2;
+pub(super) const HEAD: usize = 4;
+pub(super) const DRIFT: u16 = 1;
+pub(super) const NOVELTY: u16 = 2;
 pub(super) const SAMPLES: u16 = 3;
 pub(super) const FINGER: u16 = 5;
 /// Bytes of the drift's two numbers.
-const TWO: usize = 8;
+pub(super) const TWO: usize = 8;
 
 /// What a fused table is made with beside textures.
 #[derive(Clone, Copy, Debug)]
@@ -91,7 +91,7 @@ impl Sections<'_> {
 }
 
 /// Bytes of a movement's variances of the drift.
-const fn of_drift(features: usize) -> usize {
+pub(super) const fn of_drift(features: usize) -> usize {
     4 * features.div_ceil(2)
 }
 
@@ -102,7 +102,7 @@ fn of_slopes(slopes: &Slopes<'_>, features: usize) -> usize {
 }
 
 /// Bytes of a movement's population.
-const fn of_population(features: usize) -> usize {
+pub(super) const fn of_population(features: usize) -> usize {
     Whitening::bytes(features) + 4 * features
 }
 
@@ -165,6 +165,9 @@ impl<'a> Table<'a> {
 
     /// Variances of the drift along each two axes of a movement, where there is any.
     pub(crate) fn drifts(&self, movement: u8) -> Option<Numbers<'a>> {
+        if let Some((shorter, movement)) = self.shorter(movement) {
+            return shorter.drifts(movement);
+        }
         let bytes = of_drift(self.features());
         let at = usize::from(movement) * bytes;
         self.drifts.get(at..at + bytes).map(Numbers::new)
@@ -188,6 +191,9 @@ impl<'a> Table<'a> {
 
     /// Axes and variances.
     fn population_bytes(&self, movement: u8) -> Option<&'a [u8]> {
+        if let Some((shorter, movement)) = self.shorter(movement) {
+            return shorter.population_bytes(movement);
+        }
         let features = self.features();
         let at = Limits::BYTES + usize::from(movement) * of_population(features);
         self.novelty.get(at..)?.get(..of_population(features))
@@ -231,26 +237,11 @@ impl<'a> Table<'a> {
             let (kind, contents) = section.ok_or(TableError::Sections)?;
             let fits = match kind {
                 DRIFT => {
-                    let rest = contents.get(TWO..).unwrap_or_default();
-                    let variances = rest.chunks(of_drift(features).max(1));
-                    rest.len() == movements * of_drift(features)
+                    are_drifts(contents, features, movements)
                         && self.drift().is_some_and(Drift::is_possible)
-                        && variances.map(Numbers::new).all(|v| v.are_variances(0.0))
                 }
-                NOVELTY => {
-                    let (limits, populations) =
-                        contents.split_at_checked(Limits::BYTES).unwrap_or_default();
-                    let mut populations_of = populations.chunks(of_population(features).max(1));
-                    populations.len() == movements * of_population(features)
-                        && Limits::read(limits).is_some_and(|limits| limits.are_possible())
-                        && populations_of.all(|population| {
-                            let found = population.split_at_checked(Whitening::bytes(features));
-                            found.is_some_and(|(axes, variances)| {
-                                View::new(axes, features).is_some()
-                                    && Numbers::new(variances).are_variances(LEAST)
-                            })
-                        })
-                }
+                NOVELTY => are_limits(contents, features, movements),
+                LENGTH if EARLY => continue,
                 SLOPES if PACED => {
                     slopes::are_slopes(contents, features, self.textures.into(), movements)
                 }
@@ -266,6 +257,33 @@ impl<'a> Table<'a> {
                 return Err(TableError::Section(kind));
             }
         }
+        if EARLY && !self.are_lengths() {
+            return Err(TableError::Section(LENGTH));
+        }
         Ok(())
     }
+}
+
+/// Whether the contents of a section of drift have its variances.
+#[inline(always)]
+pub(super) fn are_drifts(contents: &[u8], features: usize, movements: usize) -> bool {
+    let rest = contents.get(TWO..).unwrap_or_default();
+    let mut variances = rest.chunks(of_drift(features).max(1));
+    rest.len() == movements * of_drift(features)
+        && variances.all(|v| Numbers::new(v).are_variances(0.0))
+}
+
+/// Whether these are the contents of a section of limits and population.
+#[inline(always)]
+pub(super) fn are_limits(contents: &[u8], features: usize, movements: usize) -> bool {
+    let (limits, populations) = contents.split_at_checked(Limits::BYTES).unwrap_or_default();
+    let mut populations_of = populations.chunks(of_population(features).max(1));
+    populations.len() == movements * of_population(features)
+        && Limits::read(limits).is_some_and(|limits| limits.are_possible())
+        && populations_of.all(|population| {
+            let found = population.split_at_checked(Whitening::bytes(features));
+            found.is_some_and(|(axes, variances)| {
+                View::new(axes, features).is_some() && Numbers::new(variances).are_variances(LEAST)
+            })
+        })
 }

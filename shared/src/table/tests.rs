@@ -3,6 +3,7 @@
 mod damage;
 mod fused;
 mod learning;
+mod lengths;
 mod samples;
 mod sections;
 pub(crate) mod slopes;

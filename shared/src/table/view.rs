@@ -1,8 +1,9 @@
 //! Reading a table where it is stored.
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, Contents, HEADER, LABEL_BYTES, Layout, MAGIC, MAX_MOVEMENTS,
-    MOVEMENT_BYTES, PACED, PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally, VERSION, array,
+    Action, CELL_BYTES, CRC_BYTES, Contents, EARLY, EARLY_VERSION, HEADER, LABEL_BYTES, LENGTH,
+    Layout, MAGIC, MAX_MOVEMENTS, MOVEMENT_BYTES, PACED, PACED_VERSION, PLAIN_VERSION, SLOPES,
+    TableError, Tally, VERSION, array,
 };
 use super::gaussian::{Gaussian, Gaussians, SD_STEP, mean_step};
 use super::training_stats::{Experience, Whitened};
@@ -62,7 +63,8 @@ impl<'a> Table<'a> {
         }
         let version = u16::from_le_bytes([v0, v1]);
         let paced = PACED && version == PACED_VERSION;
-        if version != VERSION && version != PLAIN_VERSION && !paced {
+        let early = EARLY && version == EARLY_VERSION;
+        if version != VERSION && version != PLAIN_VERSION && !paced && !early {
             return Err(TableError::Version(version));
         }
         let length = u32::from_le_bytes([l0, l1, l2, l3]) as usize;
@@ -103,6 +105,9 @@ impl<'a> Table<'a> {
         if PACED && paced == table.slopes.is_empty() {
             return Err(TableError::Section(SLOPES));
         }
+        if EARLY && (early != table.lengths().next().is_some() || early && table.has_slopes()) {
+            return Err(TableError::Section(LENGTH));
+        }
         Ok(table)
     }
 
@@ -125,13 +130,7 @@ impl<'a> Table<'a> {
                 return Err(TableError::TwinMovement(index));
             }
         }
-        match self.contents {
-            Contents::Gaussians(measured) => self.check_deviations(measured)?,
-            Contents::Fused(..) => {
-                let broken = (0..self.movements).find(|&m| self.whitening(m).is_none());
-                broken.map_or(Ok(()), |m| Err(TableError::Whitening(m)))?;
-            }
-        }
+        self.check_cells()?;
         for texture in 0..self.textures {
             let number = self.number(texture);
             if (0..texture).any(|other| self.number(other) == number) {
@@ -151,6 +150,18 @@ impl<'a> Table<'a> {
             }
         }
         Ok(at)
+    }
+
+    /// That the cells of every movement can be compared with slides.
+    #[inline(always)]
+    pub(super) fn check_cells(&self) -> Result<(), TableError> {
+        match self.contents {
+            Contents::Gaussians(measured) => self.check_deviations(measured),
+            Contents::Fused(..) => {
+                let broken = (0..self.movements).find(|&m| self.whitening(m).is_none());
+                broken.map_or(Ok(()), |m| Err(TableError::Whitening(m)))
+            }
+        }
     }
 
     #[inline]
@@ -184,6 +195,9 @@ impl<'a> Table<'a> {
 
     /// The bytes of a texture's cell at a movement.
     pub(super) fn cell_bytes(&self, texture: u16, movement: u8) -> Option<&'a [u8]> {
+        if let Some((shorter, movement)) = self.shorter(movement) {
+            return shorter.cell_bytes(texture, movement);
+        }
         if texture >= self.textures || movement >= self.movements {
             return None;
         }
@@ -288,6 +302,9 @@ impl<'a> Table<'a> {
 
     /// Number of trials that a texture was learned from at a movement, 255 for more.
     pub fn trials(&self, texture: u16, movement: u8) -> u8 {
+        if let Some((shorter, movement)) = self.shorter(movement) {
+            return shorter.trials(texture, movement);
+        }
         if texture >= self.textures || movement >= self.movements {
             return 0;
         }
@@ -313,6 +330,9 @@ impl<'a> Table<'a> {
 
     /// [`Table::gaussian`] of every texture, for those who ask for many.
     pub fn gaussians(&self, action: Action) -> Gaussians<'a> {
+        if let Some((shorter, movement)) = self.shorter(action.movement) {
+            return shorter.gaussians(Action { movement, ..action });
+        }
         let movement = usize::from(action.movement);
         let measured = action.property.filter(|p| self.measured().contains(*p));
         let measured = measured.filter(|_| action.movement < self.movements);
@@ -352,6 +372,9 @@ impl<'a> Table<'a> {
 
     /// The whitened means at a movement; none in a table of Gaussians and outside the table.
     pub(crate) fn column(&self, movement: u8) -> Column<'a> {
+        if let Some((shorter, movement)) = self.shorter(movement) {
+            return shorter.column(movement);
+        }
         let (_, cell) = self.contents.sizes();
         let at = self.layout().cells + usize::from(movement) * cell;
         let means = match self.contents {
@@ -399,6 +422,9 @@ impl<'a> Table<'a> {
 
     /// The bytes of the whitening at a movement and all behind it, and of how many features it is.
     fn bytes_from_whitening(&self, movement: u8) -> Option<(&'a [u8], usize)> {
+        if let Some((shorter, movement)) = self.shorter(movement) {
+            return shorter.bytes_from_whitening(movement);
+        }
         let Contents::Fused(_, features) = self.contents else {
             return None;
         };

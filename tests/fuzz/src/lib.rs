@@ -15,6 +15,7 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 use embassy_futures::block_on;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use tactus::eval::learn::know_lengths;
 use tactus_core::explorer::{Config, Explorer, Method, Strategy};
 use tactus_core::features::{FUSED_BANDS, Observation, Properties};
 use tactus_core::probe::teach::put_in_force;
@@ -195,6 +196,11 @@ fn explore(table: &Table<'_>, method: Method, bytes: &[u8], mode: u8) {
             pressure: Some([number(), number()]),
             pace: None,
         };
+        let before = explorer.posterior().to_vec();
+        if let Ok(Some(look)) = explorer.look(action, 1, &slide) {
+            assert!((0.0..=1.001).contains(&look.doubt), "{method:?}: {look:?}");
+        }
+        assert_eq!(explorer.posterior(), before, "a look changes nothing");
         if explorer.observe(action, &slide).is_err() {
             return;
         }
@@ -367,10 +373,17 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
             }
             seeds
         }
-        "table" => flash::tables()
-            .iter()
-            .map(|table| behind(1, &table[..table.len() - 4]))
-            .collect(),
+        "table" => {
+            let with_length = |table: &Vec<u8>| {
+                let shorter = [(1000, table.clone(), u64::MAX)];
+                know_lengths(table, &shorter).expect("a table of two lengths")
+            };
+            let tables = flash::tables();
+            let tables = tables.iter().cloned().chain(tables.iter().map(with_length));
+            tables
+                .map(|table| behind(1, &table[..table.len() - 4]))
+                .collect()
+        }
         "store" => (0..=images().len() as u8)
             .map(|image| vec![image, 1, 0, 9, 4, 0, 3, 2, 1, 3, 7, 1, 0, 6, 0, 4, 0])
             .collect(),

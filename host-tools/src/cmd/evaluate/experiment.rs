@@ -12,7 +12,7 @@ use tactus::eval::learn::Expected;
 use tactus::eval::seconds;
 use tactus_core::explorer::SlideTime;
 
-use crate::cmd::args::{Choosing, Expecting, Features, Recordings, Stop};
+use crate::cmd::args::{Choosing, Ending, Expecting, Features, Recordings, Stop};
 use crate::cmd::output::Format;
 use crate::cmd::plot::Plot;
 use crate::cmd::textures::{finger_of, measure_folder, names};
@@ -41,6 +41,8 @@ episode of its own.
 --verify holds the slides of each texture against its own reference and against those of three others, as `tactus verify`
 does, and counts the errors: at the limits, and where both are equal.
 These need the method fused.
+--early looks at each slide at a few lengths, by a table that was learned from slides of those lengths, and says how much
+shorter explorations are when a slide ends as soon as the verdict is certain, and how much more often they are wrong.
 
 --plot draws what is told of each texture (confusion), how often it was right when it said 99 %
 (reliability), and slides and errors by threshold (slides-by-threshold, errors-by-threshold). With
@@ -56,6 +58,7 @@ Examples:
   tactus evaluate --recordings DIR --plot pictures
   tactus evaluate --fabrics DIR --objective bits-per-second      slow slides have to tell more
   tactus evaluate --recordings DIR --verify --protocol blocked
+  tactus evaluate --recordings DIR --early --protocol blocked
   tactus evaluate --recordings DIR --lifelong
   tactus evaluate --recordings DIR --lifelong --plot drift.svg")]
 pub(crate) struct Args {
@@ -91,6 +94,11 @@ pub(crate) struct Args {
     /// Count how often slides are rightly called the same as a reference, and how often wrongly
     #[arg(long, conflicts_with_all = ["lifelong", "novelty"])]
     pub(crate) verify: bool,
+    /// End a slide as soon as the verdict is certain, and count what that saves and what it costs
+    #[arg(long, conflicts_with_all = ["lifelong", "novelty", "verify", "properties", "fabrics", "test"])]
+    pub(crate) early: bool,
+    #[command(flatten)]
+    pub(crate) ending: Ending,
     /// Slides to learn from, per texture and movement: 5 unless given, or all training rows of --properties
     #[arg(long, value_name = "N")]
     pub(crate) train_slides: Option<usize>,
@@ -166,17 +174,17 @@ pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
         let (names, slides) = (names(&set), args.train_slides.unwrap_or(5));
         let experiment =
             Experiment::recorded(names, &measured, test, args.protocol, slides, args.seed)?;
-        let protocol = match args.protocol {
-            Protocol::Interleaved => "interleaved",
-            Protocol::Blocked => "blocked",
-            Protocol::Drift => "drift",
-        };
-        (experiment, protocol)
+        (experiment, args.protocol.name())
     };
     let features = args.features.map(Features::set);
-    let experiment = experiment.expecting(Expected {
+    let experiment = experiment.expecting(expected(args));
+    Ok((experiment.with_features(features), name))
+}
+
+/// What fused tables are to expect.
+pub(super) fn expected(args: &Args) -> Expected {
+    Expected {
         drift: Some(args.expecting.drift),
         ..Expected::default()
-    });
-    Ok((experiment.with_features(features), name))
+    }
 }

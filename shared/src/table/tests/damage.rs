@@ -218,7 +218,7 @@ fn every_error_says_what_is_wrong() {
         ),
         (
             TableError::Version(1),
-            "version 1, and this program reads versions 3 to 5: learn the table anew",
+            "version 1, and this program reads versions 3 to 6: learn the table anew",
         ),
         (TableError::Method(7), "method 7 is unknown"),
         (

@@ -158,7 +158,8 @@ fn damaged_slopes_are_refused() {
         damaged(&|bytes| bytes.truncate(at)),
         Err(TableError::Section(4))
     );
-    assert_eq!(damaged(&|bytes| bytes[4] = 6), Err(TableError::Version(6)));
+    assert_eq!(damaged(&|bytes| bytes[4] = 6), Err(TableError::Section(4)));
+    assert_eq!(damaged(&|bytes| bytes[4] = 7), Err(TableError::Version(7)));
     for length in 0..whole.len() {
         assert!(Table::read(&whole[..length]).is_err());
     }

@@ -1,0 +1,319 @@
+//! What the first part of a slide says: an own table for each of a few lengths.
+//!
+//! The beginning of a slide is not like its whole, and short windows scatter more: a slide that is to end early is compared with
+//! the first parts of the slides that were learned from. In a table of M movements those of the n-th length of movement m are the
+//! movement n M + m of whoever asks for cells, trials, drift or population; the whole slides are length 0.
+//!
+//! Section of kind 6, one for each length, the shortest first:
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 2 | the length in ms at constant speed |
+//! | | header, movements, whitenings, cells and trials, as the table has them for whole slides |
+//! | | contents of section 1, and of section 2, where the table has them |
+
+use super::encode::{EncodeError, rewrite_with};
+use super::format::{CRC_BYTES, EARLY, HEADER, LENGTH, MAX_MOVEMENTS, SLOPES, array};
+use super::limits::Limits;
+use super::sections::{
+    DRIFT, HEAD, NOVELTY, TWO, are_drifts, are_limits, each, of_drift, of_population,
+};
+use super::view::Table;
+
+/// Most lengths of a table.
+pub const MAX_LENGTHS: usize = 6;
+const _: () = assert!((MAX_LENGTHS + 1) * MAX_MOVEMENTS <= u8::MAX as usize);
+/// Bytes of the length.
+const MS: usize = 2;
+/// Where the header has the number of textures.
+const COUNT: usize = 12;
+
+/// What slides of one length say, for [`with_lengths`].
+#[derive(Clone, Copy, Debug)]
+pub struct Shorter<'t> {
+    /// Their length in ms at constant speed.
+    pub ms: u16,
+    /// The same textures at the same movements, learned from the first parts of the same slides.
+    pub table: Table<'t>,
+    /// The movements whose slides are longer than that, a bit each; nothing is known of the others.
+    pub movements: u64,
+}
+
+impl Shorter<'_> {
+    fn is_longer(&self, movement: usize) -> bool {
+        movement < u64::BITS as usize && self.movements >> movement & 1 == 1
+    }
+
+    /// Bytes of the contents of its section.
+    fn length(&self) -> usize {
+        let table = &self.table;
+        let of = |kind| table.section(kind).map_or(0, <[u8]>::len);
+        MS + table.layout().lineage + of(DRIFT) + of(NOVELTY)
+    }
+
+    fn write(&self, put: &mut dyn FnMut(&[u8])) {
+        let (table, layout) = (&self.table, self.table.layout());
+        put(&self.ms.to_le_bytes());
+        put(table.bytes.get(..layout.trials).unwrap_or_default());
+        for trials in table.bytes.get(layout.trials..layout.lineage).into_iter() {
+            for (&trials, at) in trials.iter().zip(0_usize..) {
+                let longer = self.is_longer(at % usize::from(table.movements).max(1));
+                put(&[if longer { trials } else { 0 }]);
+            }
+        }
+        for kind in [DRIFT, NOVELTY] {
+            put(table.section(kind).unwrap_or_default());
+        }
+    }
+}
+
+/// Bytes that the sections of these lengths take.
+pub fn lengths_length(shorter: &[Shorter<'_>]) -> usize {
+    shorter.iter().map(|s| HEAD + s.length()).sum()
+}
+
+/// Writes `old` into `out` with these lengths, the shortest first, in place of those it has.
+///
+/// # Errors
+/// As [`super::encode`]; [`EncodeError::Contents`] for a table that is not of the same textures and movements, and
+/// [`EncodeError::NoSpace`] for one of more bytes than a section can have.
+pub fn with_lengths<'o>(
+    out: &'o mut [u8],
+    old: &Table<'_>,
+    shorter: &[Shorter<'_>],
+) -> Result<Table<'o>, EncodeError> {
+    for s in shorter {
+        let same = s.table.textures == old.textures
+            && s.table.contents == old.contents
+            && s.table.movements().eq(old.movements())
+            && s.table.names().eq(old.names());
+        if !same {
+            return Err(EncodeError::Contents);
+        }
+        let length = s.length();
+        u16::try_from(length).map_err(|_| EncodeError::NoSpace(length))?;
+    }
+    let others = || old.other_sections(LENGTH);
+    let of_others: usize = others()
+        .map(|(head, contents)| head.len() + contents.len())
+        .sum();
+    let length = of_others + lengths_length(shorter);
+    // it is part of making the table, not learned later
+    let lineage = array(old.bytes, old.layout().lineage).map_or(0, u32::from_le_bytes);
+    rewrite_with(out, old, lineage, length, |put| {
+        for (head, contents) in others() {
+            put(&head);
+            put(contents);
+        }
+        for s in shorter {
+            put(&LENGTH.to_le_bytes());
+            put(&(s.length() as u16).to_le_bytes());
+            s.write(put);
+        }
+    })
+}
+
+/// Bytes of all sections when these textures are kept, `None` for one that is new or learned anew.
+pub(super) fn amended_length(
+    old: &Table<'_>,
+    kept: impl Iterator<Item = Option<u16>>,
+) -> Result<usize, EncodeError> {
+    let others = old.other_sections(LENGTH);
+    let others: usize = others
+        .map(|(head, contents)| head.len() + contents.len())
+        .sum();
+    let (count, lengths) = (kept.count(), old.lengths().count());
+    let own = old.lengths().map(|shorter| shorter.amended_length(count));
+    let most = own.clone().max().unwrap_or(0);
+    u16::try_from(most).map_err(|_| EncodeError::NoSpace(most))?;
+    Ok(others + lengths * HEAD + own.sum::<usize>())
+}
+
+/// Gives their bytes, piece by piece.
+pub(super) fn write_amended(
+    old: &Table<'_>,
+    kept: impl Iterator<Item = Option<u16>> + Clone,
+    mut put: impl FnMut(&[u8]),
+) {
+    for (head, contents) in old.other_sections(LENGTH) {
+        put(&head);
+        put(contents);
+    }
+    let count = kept.clone().count();
+    for length in old.lengths() {
+        put(&LENGTH.to_le_bytes());
+        put(&(length.amended_length(count) as u16).to_le_bytes());
+        put(&length.ms.to_le_bytes());
+        let (table, layout) = (&length.table, length.table.layout());
+        put(table.bytes.get(..COUNT).unwrap_or_default());
+        put(&(count as u16).to_le_bytes());
+        let (_, cell) = table.contents.sizes();
+        put(table.bytes.get(COUNT + 2..layout.cells).unwrap_or_default());
+        for texture in kept.clone() {
+            for movement in 0..table.movements {
+                match texture.and_then(|texture| table.cell_bytes(texture, movement)) {
+                    Some(bytes) => put(bytes),
+                    None => (0..cell).for_each(|_| put(&[0])),
+                }
+            }
+        }
+        for texture in kept.clone() {
+            for movement in 0..table.movements {
+                put(&[texture.map_or(0, |texture| table.trials(texture, movement))]);
+            }
+        }
+        put(length.rest);
+    }
+}
+
+/// One of the lengths, where its table lies.
+#[derive(Clone, Copy)]
+pub(super) struct Length<'a> {
+    ms: u16,
+    /// What it has for slides of this length: without names and numbers.
+    table: Table<'a>,
+    /// What is behind the trials.
+    rest: &'a [u8],
+}
+
+impl Length<'_> {
+    /// Bytes of its section's contents, had it so many textures.
+    fn amended_length(&self, textures: usize) -> usize {
+        let movements = usize::from(self.table.movements);
+        MS + self.table.contents.layout(textures, movements).lineage + self.rest.len()
+    }
+}
+
+impl<'a> Table<'a> {
+    /// Number of shorter lengths that it knows, and what each is, in ms at constant speed.
+    pub fn lengths_ms(&self) -> impl Iterator<Item = u16> + use<'a> {
+        self.lengths().map(|length| length.ms)
+    }
+
+    pub(super) fn lengths(&self) -> impl Iterator<Item = Length<'a>> + Clone + use<'a> {
+        let table = *self;
+        let sections = if EARLY { self.sections } else { &[] };
+        let mut rest = sections;
+        core::iter::from_fn(move || {
+            loop {
+                let (head, after) = rest.split_first_chunk::<HEAD>()?;
+                let [k0, k1, l0, l1] = *head;
+                let (contents, after) =
+                    after.split_at_checked(u16::from_le_bytes([l0, l1]).into())?;
+                rest = after;
+                if u16::from_le_bytes([k0, k1]) == LENGTH {
+                    return table.length_of(contents);
+                }
+            }
+        })
+    }
+
+    /// What a section of kind 6 has; `None` where it is too short.
+    fn length_of(&self, contents: &'a [u8]) -> Option<Length<'a>> {
+        let ms = u16::from_le_bytes(array(contents, 0)?);
+        let bytes = contents.get(MS..)?;
+        let rest = bytes.get(self.layout().lineage..)?;
+        let drift = self.section(DRIFT).map_or(0, <[u8]>::len);
+        let (drifts, novelty) = rest.split_at_checked(drift)?;
+        let mut table = Table {
+            bytes,
+            sections: &[],
+            drifts: &[],
+            novelty,
+            slopes: &[],
+            ..*self
+        };
+        if self.drift().is_some_and(|drift| !drift.is_none()) {
+            table.drifts = drifts.get(TWO..).unwrap_or_default();
+        }
+        Some(Length { ms, table, rest })
+    }
+
+    /// The table of the length that a movement stands for, and which of its movements that is; `None` for whole slides.
+    #[inline(always)]
+    pub(super) fn shorter(&self, movement: u8) -> Option<(Table<'a>, u8)> {
+        if !EARLY || movement < self.movements {
+            return None;
+        }
+        let (n, movement) = (movement / self.movements, movement % self.movements);
+        let length = self.lengths().nth(usize::from(n) - 1)?;
+        Some((length.table, movement))
+    }
+
+    /// What stands for a movement of which the slide has had the `n`th length, from 1; `None` if there is no such length.
+    #[cfg(any(test, feature = "early"))]
+    pub(crate) fn at_length(&self, movement: u8, n: u8) -> Option<u8> {
+        let known = movement < self.movements && n > 0;
+        let known = known && usize::from(n) <= self.lengths().count();
+        known.then(|| n * self.movements + movement)
+    }
+
+    /// Whether this is a movement's own number, not that of a shorter slide of it.
+    pub(crate) fn is_whole(&self, movement: u8) -> bool {
+        !EARLY || movement < self.movements
+    }
+
+    /// As [`Table::limits`], of slides of the length that a movement stands for.
+    pub(crate) fn limits_at(&self, movement: u8) -> Option<Limits> {
+        match self.shorter(movement) {
+            Some((shorter, _)) => shorter.limits(),
+            None => self.limits(),
+        }
+    }
+
+    /// That every length is what its section says, each longer than the one before.
+    pub(super) fn are_lengths(&self) -> bool {
+        let (features, movements) = (self.features(), usize::from(self.movements));
+        let sections = each(self.sections).flatten();
+        let there = sections.filter(|(kind, _)| *kind == LENGTH).count();
+        let drift = self
+            .section(DRIFT)
+            .map(|_| TWO + movements * of_drift(features));
+        let novelty = Limits::BYTES + movements * of_population(features);
+        let novelty = self.section(NOVELTY).map(|_| novelty);
+        let behind = drift.unwrap_or(0) + novelty.unwrap_or(0);
+        let mut longest = 0;
+        let mut whole = 0;
+        for length in self.lengths() {
+            let same = |from, to| length.table.bytes.get(from..to) == self.bytes.get(from..to);
+            let (cut, _) = length
+                .rest
+                .split_at_checked(drift.unwrap_or(0))
+                .unwrap_or_default();
+            let fits = same(0, 4)
+                && same(6, 8)
+                && same(COUNT, HEADER)
+                && same(HEADER, self.layout().whitenings)
+                && length.ms > longest
+                && length.rest.len() == behind
+                && length.table.check_cells().is_ok()
+                && (drift.is_none() || are_drifts(cut, features, movements))
+                && (novelty.is_none() || are_limits(length.table.novelty, features, movements));
+            if !fits {
+                return false;
+            }
+            longest = length.ms;
+            whole += 1;
+        }
+        whole == there && there <= MAX_LENGTHS
+    }
+
+    /// Where the trials of each length begin among the bytes of the table.
+    pub(super) fn trials_of_lengths(&self) -> impl Iterator<Item = usize> + use<'a> {
+        let trials = self.layout().trials;
+        let sections = if EARLY { self.sections } else { &[] };
+        let mut at = self.bytes.len() - CRC_BYTES - self.sections.len();
+        each(sections)
+            .flatten()
+            .filter_map(move |(kind, contents)| {
+                let begin = at + HEAD;
+                at = begin + contents.len();
+                (kind == LENGTH).then_some(begin + MS + trials)
+            })
+    }
+
+    /// Whether it has the section of speeds, whether or not this build knows them.
+    pub(super) fn has_slopes(&self) -> bool {
+        self.section(SLOPES).is_some()
+    }
+}
