@@ -41,8 +41,7 @@ pub(super) fn run(args: &Args, config: Config, out: &mut impl Write) -> anyhow::
     let doubts = match (&args.ending.doubt[..], usual) {
         ([], Some(usual)) => vec![usual],
         ([], None) => {
-            let say =
-                "--early is for the method fused; --method paper needs --doubt, and is wrong more often with any";
+            let say = "--early is for the method fused; --method paper needs --doubt, and is wrong more often with any";
             return Err(UsageError(say.to_owned()).into());
         }
         (given, _) => given.to_vec(),
