@@ -4,13 +4,13 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use super::amended;
 use super::format::{
     Action, CELL_BYTES, CRC_BYTES, Contents, EARLY, EARLY_VERSION, LENGTH, MAGIC, MAX_MOVEMENTS,
-    PACED, PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally, VERSION,
+    PACED, PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally, VERSION, each,
 };
 use super::gaussian::{SD_LEAST, SD_STEP, mean_step};
-use super::lengths;
-use super::sections::{Sections, each};
+use super::sections::Sections;
 use super::slopes::{self, put_slope};
 use super::training_stats::{Experience, Whitened};
 use super::view::Table;
@@ -307,9 +307,9 @@ pub fn amend<'o>(
             // nobody knows what a shorter slide of it would be like
             Cells::New(_) => None,
         });
-        let length = lengths::amended_length(old, kept.clone())?;
+        let length = amended::amended_length(old, kept.clone()).map_err(EncodeError::NoSpace)?;
         let write = |writer: &mut Writer<'_>| {
-            lengths::write_amended(old, kept, |bytes| writer.put(bytes));
+            amended::write_amended(old, kept, |bytes| writer.put(bytes));
         };
         return rewrite(out, old, old.lineage(), rows, (length, write));
     }

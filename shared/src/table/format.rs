@@ -22,6 +22,13 @@ pub const PACED: bool = cfg!(any(test, feature = "pace"));
 pub(super) const SLOPES: u16 = 4;
 /// Version of those that know what slides say before their end, which is the same otherwise.
 pub(super) const EARLY_VERSION: u16 = 6;
+/// Bytes of a section's kind and length.
+pub(super) const HEAD: usize = 4;
+/// The kind of the section of drift, and bytes of its two numbers.
+pub(super) const DRIFT: u16 = 1;
+pub(super) const TWO: usize = 8;
+/// Bytes of a length of shorter slides in its section.
+pub(super) const MS: usize = 2;
 /// Whether this build can end a slide early. A probe that cannot saves the space, and refuses such tables.
 pub const EARLY: bool = cfg!(any(test, feature = "early"));
 /// The kind of the sections that say it, one for each length.
@@ -295,4 +302,24 @@ impl Contents {
 
 pub(super) fn array<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {
     bytes.get(at..)?.first_chunk().copied()
+}
+
+/// Kinds and contents of sections; `None` for the rest where it is no section.
+pub(super) fn each(bytes: &[u8]) -> impl Iterator<Item = Option<(u16, &[u8])>> + Clone {
+    let mut rest = bytes;
+    core::iter::from_fn(move || {
+        if rest.is_empty() {
+            return None;
+        }
+        let section = rest.split_first_chunk::<HEAD>().and_then(|(head, after)| {
+            let [k0, k1, l0, l1] = *head;
+            let (contents, after) = after.split_at_checked(u16::from_le_bytes([l0, l1]).into())?;
+            rest = after;
+            Some((u16::from_le_bytes([k0, k1]), contents))
+        });
+        if section.is_none() {
+            rest = &[];
+        }
+        Some(section)
+    })
 }

@@ -13,18 +13,16 @@
 //! | | contents of section 1, and of section 2, where the table has them |
 
 use super::encode::{EncodeError, rewrite_with};
-use super::format::{CRC_BYTES, EARLY, HEADER, LENGTH, MAX_MOVEMENTS, SLOPES, array};
-use super::limits::Limits;
-use super::sections::{
-    DRIFT, HEAD, NOVELTY, TWO, are_drifts, are_limits, each, of_drift, of_population,
+use super::format::{
+    CRC_BYTES, DRIFT, EARLY, HEAD, HEADER, LENGTH, MAX_MOVEMENTS, MS, SLOPES, TWO, array, each,
 };
+use super::limits::Limits;
+use super::sections::{NOVELTY, are_drifts, are_limits, of_drift, of_population};
 use super::view::Table;
 
 /// Most lengths of a table.
 pub const MAX_LENGTHS: usize = 6;
 const _: () = assert!((MAX_LENGTHS + 1) * MAX_MOVEMENTS <= u8::MAX as usize);
-/// Bytes of the length.
-const MS: usize = 2;
 /// Where the header has the number of textures.
 const COUNT: usize = 12;
 
@@ -113,131 +111,10 @@ pub fn with_lengths<'o>(
     })
 }
 
-/// Bytes of all sections when these textures are kept, `None` for one that is new or learned anew.
-pub(super) fn amended_length(
-    old: &Table<'_>,
-    kept: impl Iterator<Item = Option<u16>>,
-) -> Result<usize, EncodeError> {
-    let others = old.other_sections(LENGTH);
-    let others: usize = others
-        .map(|(head, contents)| head.len() + contents.len())
-        .sum();
-    let (count, lengths) = (kept.count(), old.lengths().count());
-    let own = old.lengths().map(|shorter| shorter.amended_length(count));
-    let most = own.clone().max().unwrap_or(0);
-    u16::try_from(most).map_err(|_| EncodeError::NoSpace(most))?;
-    Ok(others + lengths * HEAD + own.sum::<usize>())
-}
-
-/// Gives their bytes, piece by piece.
-pub(super) fn write_amended(
-    old: &Table<'_>,
-    kept: impl Iterator<Item = Option<u16>> + Clone,
-    mut put: impl FnMut(&[u8]),
-) {
-    for (head, contents) in old.other_sections(LENGTH) {
-        put(&head);
-        put(contents);
-    }
-    let count = kept.clone().count();
-    for length in old.lengths() {
-        put(&LENGTH.to_le_bytes());
-        put(&(length.amended_length(count) as u16).to_le_bytes());
-        put(&length.ms.to_le_bytes());
-        let (table, layout) = (&length.table, length.table.layout());
-        put(table.bytes.get(..COUNT).unwrap_or_default());
-        put(&(count as u16).to_le_bytes());
-        let (_, cell) = table.contents.sizes();
-        put(table.bytes.get(COUNT + 2..layout.cells).unwrap_or_default());
-        for texture in kept.clone() {
-            for movement in 0..table.movements {
-                match texture.and_then(|texture| table.cell_bytes(texture, movement)) {
-                    Some(bytes) => put(bytes),
-                    None => (0..cell).for_each(|_| put(&[0])),
-                }
-            }
-        }
-        for texture in kept.clone() {
-            for movement in 0..table.movements {
-                put(&[texture.map_or(0, |texture| table.trials(texture, movement))]);
-            }
-        }
-        put(length.rest);
-    }
-}
-
-/// One of the lengths, where its table lies.
-#[derive(Clone, Copy)]
-pub(super) struct Length<'a> {
-    ms: u16,
-    /// What it has for slides of this length: without names and numbers.
-    table: Table<'a>,
-    /// What is behind the trials.
-    rest: &'a [u8],
-}
-
-impl Length<'_> {
-    /// Bytes of its section's contents, had it so many textures.
-    fn amended_length(&self, textures: usize) -> usize {
-        let movements = usize::from(self.table.movements);
-        MS + self.table.contents.layout(textures, movements).lineage + self.rest.len()
-    }
-}
-
 impl<'a> Table<'a> {
     /// Number of shorter lengths that it knows, and what each is, in ms at constant speed.
     pub fn lengths_ms(&self) -> impl Iterator<Item = u16> + use<'a> {
         self.lengths().map(|length| length.ms)
-    }
-
-    pub(super) fn lengths(&self) -> impl Iterator<Item = Length<'a>> + Clone + use<'a> {
-        let table = *self;
-        let sections = if EARLY { self.sections } else { &[] };
-        let mut rest = sections;
-        core::iter::from_fn(move || {
-            loop {
-                let (head, after) = rest.split_first_chunk::<HEAD>()?;
-                let [k0, k1, l0, l1] = *head;
-                let (contents, after) =
-                    after.split_at_checked(u16::from_le_bytes([l0, l1]).into())?;
-                rest = after;
-                if u16::from_le_bytes([k0, k1]) == LENGTH {
-                    return table.length_of(contents);
-                }
-            }
-        })
-    }
-
-    /// What a section of kind 6 has; `None` where it is too short.
-    fn length_of(&self, contents: &'a [u8]) -> Option<Length<'a>> {
-        let ms = u16::from_le_bytes(array(contents, 0)?);
-        let bytes = contents.get(MS..)?;
-        let rest = bytes.get(self.layout().lineage..)?;
-        let drift = self.section(DRIFT).map_or(0, <[u8]>::len);
-        let (drifts, novelty) = rest.split_at_checked(drift)?;
-        let mut table = Table {
-            bytes,
-            sections: &[],
-            drifts: &[],
-            novelty,
-            slopes: &[],
-            ..*self
-        };
-        if self.drift().is_some_and(|drift| !drift.is_none()) {
-            table.drifts = drifts.get(TWO..).unwrap_or_default();
-        }
-        Some(Length { ms, table, rest })
-    }
-
-    /// The table of the length that a movement stands for, and which of its movements that is; `None` for whole slides.
-    #[inline(always)]
-    pub(super) fn shorter(&self, movement: u8) -> Option<(Table<'a>, u8)> {
-        if !EARLY || movement < self.movements {
-            return None;
-        }
-        let (n, movement) = (movement / self.movements, movement % self.movements);
-        let length = self.lengths().nth(usize::from(n) - 1)?;
-        Some((length.table, movement))
     }
 
     /// What stands for a movement of which the slide has had the `n`th length, from 1; `None` if there is no such length.

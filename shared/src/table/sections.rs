@@ -15,7 +15,9 @@
 use heapless::Vec;
 
 use super::drift::{Drift, Drifts};
-use super::format::{EARLY, LENGTH, MAX_MOVEMENTS, PACED, SLOPES, TableError, array};
+use super::format::{
+    DRIFT, EARLY, HEAD, LENGTH, MAX_MOVEMENTS, PACED, SLOPES, TWO, TableError, array, each,
+};
 use super::limits::{Limits, Numbers};
 use super::population::{LEAST, Population};
 use super::slopes::{self, Slopes};
@@ -23,14 +25,9 @@ use super::view::Table;
 use super::whitening::{View, Whitening};
 use crate::features::MAX_FEATURES;
 
-/// Bytes of kind and length.
-pub(super) const HEAD: usize = 4;
-pub(super) const DRIFT: u16 = 1;
 pub(super) const NOVELTY: u16 = 2;
 pub(super) const SAMPLES: u16 = 3;
 pub(super) const FINGER: u16 = 5;
-/// Bytes of the drift's two numbers.
-pub(super) const TWO: usize = 8;
 
 /// What a fused table is made with beside textures.
 #[derive(Clone, Copy, Debug)]
@@ -113,32 +110,7 @@ pub(crate) struct PopulationView<'t> {
     pub(crate) variances: Numbers<'t>,
 }
 
-/// Kinds and contents of sections; `None` for the rest where it is no section.
-pub(super) fn each(bytes: &[u8]) -> impl Iterator<Item = Option<(u16, &[u8])>> {
-    let mut rest = bytes;
-    core::iter::from_fn(move || {
-        if rest.is_empty() {
-            return None;
-        }
-        let section = rest.split_first_chunk::<HEAD>().and_then(|(head, after)| {
-            let [k0, k1, l0, l1] = *head;
-            let (contents, after) = after.split_at_checked(u16::from_le_bytes([l0, l1]).into())?;
-            rest = after;
-            Some((u16::from_le_bytes([k0, k1]), contents))
-        });
-        if section.is_none() {
-            rest = &[];
-        }
-        Some(section)
-    })
-}
-
 impl<'a> Table<'a> {
-    pub(super) fn section(&self, wanted: u16) -> Option<&'a [u8]> {
-        let mut each = each(self.sections).flatten();
-        each.find_map(|(kind, contents)| (kind == wanted).then_some(contents))
-    }
-
     /// Heads and contents of all sections but those of this kind.
     pub(super) fn other_sections(
         &self,
@@ -256,9 +228,6 @@ impl<'a> Table<'a> {
             if features == 0 || again || !fits {
                 return Err(TableError::Section(kind));
             }
-        }
-        if EARLY && !self.are_lengths() {
-            return Err(TableError::Section(LENGTH));
         }
         Ok(())
     }

@@ -125,7 +125,7 @@ fn print(figures: &Figures, out: &mut impl Write) -> anyhow::Result<()> {
         row("slides to their end".to_owned(), &figures.whole)
     )?;
     for change in &figures.early {
-        let name = format!("doubt {} or less", change.doubt);
+        let name = format!("doubt {:.1e} or less", change.doubt);
         writeln!(out, "{}", row(name, &change.ended))?;
         let (by, error) = (change.difference, change.error);
         writeln!(
