@@ -714,6 +714,7 @@ fn a_finger_that_is_not_in_the_air_is_neither_dragged_nor_pressed_further() {
             let unmeasured = RigCalibration {
                 pressure: Calibration::PAPER,
                 air_known: false,
+                turned: 0,
                 ..calibration
             };
             reboot(&mut rig, unmeasured, unguarded);

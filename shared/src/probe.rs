@@ -1,7 +1,7 @@
 //! What a probe does when it is asked, the same on the chip, on the emulated board and in a PC's simulated probe: requests
 //! come to [`receive`], those that wait for their turn go to [`Probe::serve`]. What a probe runs on is behind [`seams`].
 
-mod calibrate;
+pub(crate) mod calibrate;
 mod dispatch;
 pub mod explore;
 mod identify;

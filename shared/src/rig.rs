@@ -21,6 +21,7 @@ pub mod slide_path;
 pub mod stage;
 pub mod steps;
 pub mod timeout;
+pub mod turning;
 pub mod unloaded;
 pub mod weigh;
 

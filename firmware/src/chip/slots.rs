@@ -80,18 +80,12 @@ const WIDE: bool = {
         let mut rest = *slot;
         while let [transaction, others @ ..] = rest {
             even &= transaction.out.len().is_multiple_of(2) && !transaction.out.is_empty();
-            assert!(
-                (transaction.port as usize) < SELECTS,
-                "there is no such chip select"
-            );
+            assert!((transaction.port as usize) < SELECTS, "no such chip select");
             rest = others;
         }
         let byte_ns = 8 * 1_000_000_000_u64.div_ceil(SPI_HZ as u64) as u32;
-        let slot_us = 1_000_000 / SLOTS_HZ;
-        assert!(
-            length_us(slot, byte_ns, SLACK_US) <= slot_us,
-            "a slot is too long"
-        );
+        let us = length_us(slot, byte_ns, SLACK_US);
+        assert!(us <= 1_000_000 / SLOTS_HZ, "a slot is too long");
         slots = others;
     }
     even
@@ -387,6 +381,12 @@ pub(crate) fn pause(on: bool) {
 pub(crate) fn unreadable() -> u32 {
     let parity = PARITY.load(Relaxed);
     parity.wrapping_add(ERROR_FRAMES.load(Relaxed))
+}
+
+/// Gravity along the finger, counts of P_AC: see [`PressureSensor::gravity`].
+pub(crate) fn gravity() -> Option<f32> {
+    // SAFETY: see `Shared`; neither interrupt runs meanwhile.
+    cortex_m::interrupt::free(|_| unsafe { (*SHARED.0.get()).as_ref() }?.finger.gravity())
 }
 
 /// Begins the slots; to be called once, when the sensor has started. `interrupt`s of SPI1 and TIM2 have one priority.

@@ -173,6 +173,7 @@ const UNMEASURED: RigCalibration = RigCalibration {
     newton_per_ampere: 1.0,
     date: 0,
     air_known: false,
+    turned: 0,
     serial: [0; 16],
 };
 
@@ -193,6 +194,8 @@ struct Parts {
 }
 
 impl Hand for Parts {
+    const TURNS: bool = cfg!(feature = "finger-mems");
+
     async fn wait(&mut self) {
         self.ticker.next().await;
         progress();
@@ -224,6 +227,10 @@ impl Hand for Parts {
             }
         }
         Some(moved)
+    }
+
+    fn gravity(&self) -> Option<f32> {
+        slots::gravity()
     }
 
     fn is_pressed(&mut self) -> bool {

@@ -33,6 +33,10 @@ impl Servo for ServoHandle {
         self.0.dequeue()
     }
 
+    fn gravity(&self) -> Option<f32> {
+        slots::gravity()
+    }
+
     fn lost(&self) -> u32 {
         let acquired = slots::LOST.load(Relaxed);
         acquired.wrapping_add(servo::LOST.load(Relaxed))

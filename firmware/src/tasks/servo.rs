@@ -59,6 +59,7 @@ pub(crate) const UNMEASURED: RigCalibration = RigCalibration {
     newton_per_ampere: 16.4,
     date: 0,
     air_known: false,
+    turned: 0,
     serial: [0; 16],
 };
 

@@ -44,11 +44,11 @@ impl Mounted<'_> {
             Event::Calibration(bytes) => Some(bytes.clone()),
             _ => None,
         })?;
-        Ok(said.and_then(|bytes| {
-            let bytes = bytes.as_slice().try_into();
-            let bytes = bytes.map_err(|_| "it has constants of another version".to_owned())?;
-            RigCalibration::from_bytes(bytes).map_err(|why| why.to_string())
-        }))
+        Ok(
+            said.and_then(|bytes| {
+                RigCalibration::from_bytes(&bytes).map_err(|why| why.to_string())
+            }),
+        )
     }
 
     /// P_DC in the air, twice; then the force scale that was weighed is kept.

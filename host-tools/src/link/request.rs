@@ -1,6 +1,7 @@
 //! Single requests, and which reports answer them.
 
-use tactus_core::rig::calibration::{RigCalibration, RigCalibrationError};
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::turning::Turned;
 use tactus_core::table::Name;
 use tactus_core::wire::{Command, Event, Forget, Identify, Status, TextureLearned, Train, Verdict};
 
@@ -76,10 +77,8 @@ impl Request<()> {
     /// [`LinkError::Calibration`] for constants that cannot be.
     pub fn write_calibration(calibration: &RigCalibration) -> Result<Self, LinkError> {
         calibration.check()?;
-        let bytes = calibration.to_bytes();
-        // 60 bytes into 64
         Ok(Self::command(Command::WriteCalibration(
-            bytes.into_iter().collect(),
+            calibration.to_bytes(),
         )))
     }
 }
@@ -120,10 +119,27 @@ impl Request<f32> {
     }
 }
 
+impl Request<Turned> {
+    /// Has a probe measure gravity along its finger, which a person turns over.
+    pub fn turn_over() -> Self {
+        Self::new(Command::TurnOver, None, |event, answer| {
+            if let Event::Turned {
+                g_counts,
+                offset_counts,
+            } = *event
+            {
+                *answer = Some(Turned {
+                    g_counts,
+                    offset_counts,
+                });
+            }
+            Ok(())
+        })
+    }
+}
+
 fn take_calibration(event: &Event, answer: &mut Option<RigCalibration>) -> Result<(), LinkError> {
     if let Event::Calibration(bytes) = event {
-        let bytes = bytes.as_slice().try_into();
-        let bytes = bytes.map_err(|_| RigCalibrationError::Damaged)?;
         *answer = Some(RigCalibration::from_bytes(bytes)?);
     }
     Ok(())

@@ -37,6 +37,7 @@ fn calibration() -> RigCalibration {
         newton_per_ampere: 16.4,
         date: 20_261_121,
         air_known: true,
+        turned: 0,
         serial: *b"BT-0000000000001",
     }
 }

@@ -205,6 +205,7 @@ fn may_repeat(command: &Command) -> bool {
         | Command::Forget(Forget::Texture(_))
         | Command::Calibrate
         | Command::Weigh(_)
+        | Command::TurnOver
         | Command::Verify(_)
         | Command::CommitTable => false,
     }

@@ -170,6 +170,9 @@ impl Peers {
                 accelerometer.set_clock(share);
                 cell.set_clock(share);
             }
+            (Self::Mems { accelerometer, .. }, PartFault::AccelerometerOff { share, zero_g }) => {
+                accelerometer.set_scale(share, zero_g);
+            }
             (Self::Mems { cell, .. }, PartFault::CellWire) => cell.cut_wire(),
             _ => finger.break_part(fault),
         }

@@ -3,7 +3,7 @@
 //!
 //! The hand feels the force and gives way to it, so that it is a spring and a damper to the finger rather than a place.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +42,8 @@ const RUB_AT_MM_S: f64 = 70.0;
 const RUB_HZ: f64 = 150.0;
 const LEAN: f64 = 0.2;
 const LEAN_S: f64 = 1.0;
+/// Time that a hand takes to turn the probe over, s (chosen).
+const TURN_S: f64 = 1.0;
 /// Where a touch begins on the sample, mm from its edge.
 const BEGINS_MM: (f64, f64) = (4.0, 16.0);
 
@@ -99,6 +101,11 @@ pub struct Hand {
     shakes: [f64; 2],
     rubs: [f64; 2],
     leans: f64,
+    /// How far it leans, rad: rms.
+    lean: f64,
+    /// It holds the finger upside down, or means to; how far it is turned, rad.
+    over: bool,
+    turned: f64,
 }
 
 impl Hand {
@@ -121,6 +128,9 @@ impl Hand {
             shakes: [0.0; 2],
             rubs: [0.0; 2],
             leans: 0.0,
+            lean: LEAN,
+            over: false,
+            turned: 0.0,
         }
     }
 
@@ -128,6 +138,16 @@ impl Hand {
     pub fn intend(&mut self, force_n: f64, pace_mm_s: f64) {
         self.force_n = force_n;
         self.pace_mm_s = pace_mm_s;
+    }
+
+    /// From now on it means to hold the finger upside down, or no more.
+    pub fn turn(&mut self, over: bool) {
+        self.over = over;
+    }
+
+    /// From now on it leans by so much, rad rms: less than in the hand where it stands on something.
+    pub fn lean(&mut self, rad: f64) {
+        self.lean = rad;
     }
 
     /// A tick against this force on the finger.
@@ -147,6 +167,10 @@ impl Hand {
         resonate(&mut self.rubs, RUB_HZ, 1.0, other);
         let step = TICK_S / LEAN_S;
         self.leans += (2.0 * step).sqrt() * white - step * self.leans;
+
+        let aim = if self.over { PI } else { 0.0 };
+        let most = PI / TURN_S * TICK_S;
+        self.turned += (aim - self.turned).clamp(-most, most);
 
         let steady = 1.0 + self.manner.wander * self.wander + self.manner.tremor * self.tremor[0];
         if self.force_n > 0.0 {
@@ -174,7 +198,7 @@ impl Hand {
         let rub = RUB_G * self.speed_mm_s.abs() / RUB_AT_MM_S;
         Held {
             acceleration_g: tremor * self.shakes[0] + rub * self.rubs[0],
-            down: cos(LEAN * self.leans),
+            down: cos(self.lean * self.leans + self.turned),
         }
     }
 

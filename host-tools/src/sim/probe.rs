@@ -113,6 +113,10 @@ impl<H: Host> Servo for SimServo<'_, H> {
         self.samples.pop_front()
     }
 
+    fn gravity(&self) -> Option<f32> {
+        self.rig.gravity()
+    }
+
     fn lost(&self) -> u32 {
         0
     }

@@ -127,6 +127,7 @@ impl SimRig {
             newton_per_ampere: 16.4,
             date: 0,
             air_known: false,
+            turned: 0,
             serial: [0; 16],
         };
         Self {
@@ -173,6 +174,11 @@ impl SimRig {
     /// The world behind the pins: its truth, its faults.
     pub fn world(&mut self) -> &mut World {
         &mut self.world
+    }
+
+    /// Gravity along the finger as its decoder says, counts of P_AC: see [`tactus_core::sensor::PressureSensor::gravity`].
+    pub fn gravity(&self) -> Option<f32> {
+        self.reader.gravity()
     }
 
     /// The control at the other end.

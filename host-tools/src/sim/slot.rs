@@ -103,6 +103,15 @@ impl Reader {
         }
     }
 
+    /// Gravity along it, counts of P_AC: see [`PressureSensor::gravity`].
+    pub fn gravity(&self) -> Option<f32> {
+        match self {
+            Self::BioTac(finger) => finger.gravity(),
+            Self::Analog(finger) => finger.gravity(),
+            Self::Mems(finger) => finger.gravity(),
+        }
+    }
+
     /// How a transaction is made that begins at this time, ns.
     pub fn transfer(&self, transaction: &Transaction, begins_ns: u64) -> Transfer {
         let port = self.ports().get(usize::from(transaction.port));

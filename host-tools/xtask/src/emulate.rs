@@ -150,6 +150,7 @@ pub(crate) fn with_images<'t>(
         ("TACTUS_MOTION_ELF", MOTION),
         ("TACTUS_ANALOG_ELF", "tactus-rig-analog"),
         ("TACTUS_MEMS_ELF", "tactus-rig-mems"),
+        ("TACTUS_HANDHELD_MEMS_ELF", "tactus-handheld-mems"),
     ];
     for (variable, name) in images {
         tests.env(variable, firmware::image(elves, name)?);

@@ -15,6 +15,8 @@ use crate::probe::seams::{Events, RigHandle, StoredBytes, UnloadedRun};
 use crate::probe::{Probe, RigState, TableInUse, Watch};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
+#[cfg(any(feature = "turns", test))]
+use crate::rig::turning::{Turned, Turning};
 use crate::rig::weigh::{LOOKS_HZ, Weighing};
 use crate::rig::{Fault, Refused, Rig, RigError};
 use crate::sensor::pressure::Pressure;
@@ -38,6 +40,9 @@ const CLEARED: u32 = TICKS_HZ;
 /// What a handheld probe is made of, on the chip or in a test.
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait Hand {
+    /// Whether its finger feels gravity.
+    const TURNS: bool = false;
+
     /// Waits for the next hundredth of a second.
     async fn wait(&mut self);
 
@@ -46,6 +51,11 @@ pub trait Hand {
 
     /// How far it has moved since this was asked last, by its sensor of motion, if there is one: see [`Handheld::moved`].
     fn moved(&mut self) -> Option<Moved> {
+        None
+    }
+
+    /// Gravity along the finger, counts of P_AC, see [`crate::sensor::PressureSensor::gravity`].
+    fn gravity(&self) -> Option<f32> {
         None
     }
 
@@ -116,6 +126,10 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
             memory: 0.0,
             serves: false,
         };
+        #[cfg(any(feature = "turns", test))]
+        {
+            by_hand.handheld.turns = H::TURNS;
+        }
         by_hand.use_calibration(calibration);
         by_hand
     }
@@ -360,6 +374,31 @@ impl<H: Hand, K: Kernels> RigHandle for ByHand<'_, H, K> {
         self.handheld.release();
         Err(Failure::Rig(RigError::NobodyThere))
     }
+
+    // in images that never do it, a future of it would take flash
+    #[cfg(any(feature = "turns", test))]
+    async fn turn_over(&mut self) -> Result<Turned, Failure> {
+        if !H::TURNS {
+            return Err(Failure::OtherProbe);
+        }
+        self.handheld.ask_to_turn(false);
+        self.heed();
+        let (mut turning, mut over) = (Turning::default(), false);
+        for _ in 0..PATIENCE {
+            self.go_on().await.map_err(Failure::Rig)?;
+            let gravity = self.hand.gravity();
+            if let Some(turned) = gravity.and_then(|counts| turning.take(counts)) {
+                self.handheld.release();
+                return Ok(turned);
+            }
+            if turning.wants_turn() && !over {
+                over = true;
+                self.handheld.ask_to_turn(true);
+            }
+        }
+        self.handheld.release();
+        Err(Failure::Rig(RigError::NobodyThere))
+    }
 }
 
 /// Who hears what the probe does, and what of it the display shows in the end.
@@ -462,6 +501,8 @@ pub async fn step<H, K, F, B, E>(
         rig.hand.wait().await;
         match job {
             Job::Calibrate => rig.set_force(memory).await,
+            #[cfg(any(feature = "turns", test))]
+            Job::TurnOver => rig.set_gravity(memory).await,
             job => work(job, &mut rig.handheld, memory, events, log).await,
         }
         rig.heed();

@@ -11,6 +11,7 @@ use embedded_graphics::pixelcolor::BinaryColor;
 use embedded_graphics::primitives::Rectangle;
 use heapless::String;
 
+mod calibration;
 mod letters;
 
 use self::letters::{Anchor, BOLD, Font, LARGE, SMALL};
@@ -277,22 +278,9 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             brush.centre("Lift", 18, &LARGE)?;
             brush.centre("the finger", 38, &LARGE)
         }
-        Screen::Weigh { mn, force_mn } => {
-            brush.title("Calibrate", "keep still")?;
-            brush.centre("Put on", 13, &LARGE)?;
-            // what is written on weights
-            let grams = (u32::from(*mn) * 1000 + 4903) / 9807;
-            brush.centre(&say(format_args!("{grams} g")), 32, &LARGE)?;
-            let reads = *force_mn as u16;
-            let reads = say(format_args!(
-                "{}.{:02} N, reads {}.{:02}",
-                mn / 1000,
-                mn % 1000 / 10,
-                reads / 1000,
-                reads % 1000 / 10
-            ));
-            brush.centre(&reads, 54, &SMALL)
-        }
+        Screen::Weigh { mn, force_mn } => brush.weigh(*mn, *force_mn),
+        #[cfg(any(feature = "turns", test))]
+        Screen::Turn { over } => brush.turn(*over),
         Screen::Again { why, lift } => {
             brush.title("Again", "")?;
             brush.headline(why.why(), 17)?;
@@ -389,16 +377,12 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
         Screen::Learned(Err(why)) => brush.sentence("Not learned", why),
         Screen::Fault(trouble) => brush.fault(trouble),
         Screen::About(about) => brush.about_probe(about),
-        Screen::Calibrated(Ok(scale)) => {
-            let hundredths = libm::roundf(100.0 * scale.mn_per_count) as u16;
-            let (whole, rest) = (hundredths / 100, hundredths % 100);
-            let off = scale.off_mn as u16;
-            let text = say(format_args!(
-                "A count is {whole}.{rest:02} mN. At worst {off} mN off."
-            ));
-            brush.sentence("Force is set", &text)
-        }
+        Screen::Calibrated(Ok(scale)) => brush.scale(scale),
         Screen::Calibrated(Err(why)) => brush.sentence("Force not set", why),
+        #[cfg(any(feature = "turns", test))]
+        Screen::Turned(Ok(turned)) => brush.turned(turned),
+        #[cfg(any(feature = "turns", test))]
+        Screen::Turned(Err(why)) => brush.sentence("Not turned", why),
     }
 }
 

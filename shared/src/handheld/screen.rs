@@ -5,6 +5,8 @@ use heapless::Vec;
 use super::guidance::{Again, Phase, View, Way};
 use super::judge::LEADING;
 use super::spelling::{Place, WHEEL};
+#[cfg(any(feature = "turns", test))]
+use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
 use crate::table::Name;
 
@@ -105,6 +107,12 @@ pub enum Screen<'a> {
         /// Contact force, mN.
         force_mn: f32,
     },
+    /// The finger is to point straight down, or up, and to be still.
+    #[cfg(any(feature = "turns", test))]
+    Turn {
+        /// It has been still the first way, and is to be turned over.
+        over: bool,
+    },
     /// A slide was no good.
     Again {
         /// Why.
@@ -175,6 +183,9 @@ pub enum Screen<'a> {
     About(About),
     /// The force was set by weights, or why not.
     Calibrated(Result<ForceScale, &'a str>),
+    /// The accelerometer was turned over, or why it says nothing.
+    #[cfg(any(feature = "turns", test))]
+    Turned(Result<Turned, &'a str>),
     /// Nothing: the display is off.
     Dark,
 }

@@ -19,6 +19,8 @@ use super::touch::Touch;
 use crate::dsp::Plan;
 use crate::explorer::Kernels;
 use crate::features::Observation;
+#[cfg(any(feature = "turns", test))]
+use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
 use crate::sensor::pressure::Pressure;
 use crate::table::{Name, Table};
@@ -53,6 +55,9 @@ pub enum Job {
     Teach(Choice),
     /// Set the force by weights, and call [`Handheld::calibrated`].
     Calibrate,
+    /// Turn the accelerometer over, and call [`Handheld::turned`].
+    #[cfg(any(feature = "turns", test))]
+    TurnOver,
 }
 
 /// Which slide the host wants.
@@ -90,6 +95,9 @@ enum Page {
     Air,
     /// The host wants P_DC under a weight of so many mN.
     Weigh(u16),
+    /// The finger is to be turned over; it has been still the first way.
+    #[cfg(any(feature = "turns", test))]
+    Turn(bool),
     /// A slide was no good; the slides before it stand.
     Again(Again),
     /// The job is being done.
@@ -105,6 +113,9 @@ enum Page {
     About,
     /// The force was set, or why not.
     Calibrated(Result<ForceScale, &'static str>),
+    /// It was turned over, or why not.
+    #[cfg(any(feature = "turns", test))]
+    Turned(Result<Turned, &'static str>),
     Dark,
 }
 
@@ -132,6 +143,9 @@ pub struct Handheld<'p, K> {
     go: Option<bool>,
     /// Textures of the table.
     textures: u16,
+    /// Its finger feels gravity.
+    #[cfg(any(feature = "turns", test))]
+    pub(super) turns: bool,
     job: Option<Job>,
     melody: &'static [Note],
     note: u8,
@@ -166,6 +180,8 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             reference: None,
             go: None,
             textures,
+            #[cfg(any(feature = "turns", test))]
+            turns: false,
             job: None,
             melody: &[],
             note: 0,
@@ -294,6 +310,10 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             | Page::Again(_)
             | Page::Thinking
             | Page::Verdict => true,
+            #[cfg(any(feature = "turns", test))]
+            Page::Turn(_) => true,
+            #[cfg(any(feature = "turns", test))]
+            Page::Turned(_) => false,
             // it may come back
             Page::Fault(trouble) => !matches!(trouble, Trouble::Memory(_)),
             Page::Choose(..)
@@ -415,6 +435,10 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             Page::Fault(trouble) => Screen::Fault(trouble),
             Page::About => Screen::About(about.clone()),
             Page::Calibrated(done) => Screen::Calibrated(*done),
+            #[cfg(any(feature = "turns", test))]
+            Page::Turn(over) => Screen::Turn { over: *over },
+            #[cfg(any(feature = "turns", test))]
+            Page::Turned(done) => Screen::Turned(*done),
             Page::Dark => Screen::Dark,
         }
     }
@@ -424,6 +448,8 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             list,
             judgement: self.judgement.as_ref(),
             textures: self.textures,
+            #[cfg(any(feature = "turns", test))]
+            turns: self.turns,
         }
     }
 

@@ -1,18 +1,24 @@
-//! The force is set without a computer: known weights on the finger, asked for on the display.
+//! A finger is calibrated without a computer, asked for on the display: known weights on it set the force, and an accelerometer is
+//! turned over.
 
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::by_hand::{ByHand, Hand};
 use crate::explorer::Kernels;
 use crate::probe::Memory;
+use crate::probe::calibrate::keep;
 use crate::probe::seams::{RigHandle, StoredBytes};
 use crate::rig::RigError;
 use crate::rig::calibration::RigCalibration;
+#[cfg(any(feature = "turns", test))]
+use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
 use crate::wire::Failure;
 
 /// Weights as a kitchen scale shows them, 30, 60, 90, 120 and 150 g, as forces in mN.
 pub const WEIGHTS_MN: [u16; 5] = [294, 588, 883, 1177, 1471];
+/// What the display says where the store fails.
+const NOT_KEPT: &str = "It is not kept. Switch off and on.";
 /// What the display says where P_DC falls under a weight.
 const FALLS: &str = "P_DC falls. Swap the cell's wires.";
 
@@ -51,21 +57,51 @@ impl<H: Hand, K: Kernels> ByHand<'_, H, K> {
         let set = self.set_calibration(calibration).await;
         set.map_err(|_| Some("No finger is like that. Weigh again."))?;
         let kept = match memory.store() {
-            Ok(store) => store.set_calibration(&calibration).await.is_ok(),
+            Ok(store) => keep(store, &calibration).await.is_ok(),
             Err(_) => false,
         };
-        if kept {
-            Ok(scale)
-        } else {
-            Err(Some("The memory does not keep it. Switch off and on."))
+        kept.then_some(scale).ok_or(Some(NOT_KEPT))
+    }
+
+    /// Has the person turn the finger over, keeps what a count of acceleration is then, and shows that.
+    #[cfg(any(feature = "turns", test))]
+    pub(super) async fn set_gravity<F: NorFlash, B: StoredBytes<F>>(
+        &mut self,
+        memory: &mut Memory<'_, F, B>,
+    ) {
+        let before = self.calibration();
+        let done = self.turn_and_keep(memory).await;
+        if done.is_err() {
+            let _ = self.set_calibration(before).await;
         }
+        self.handheld.turned(done);
+    }
+
+    #[cfg(any(feature = "turns", test))]
+    async fn turn_and_keep<F: NorFlash, B: StoredBytes<F>>(
+        &mut self,
+        memory: &mut Memory<'_, F, B>,
+    ) -> Result<Turned, Option<&'static str>> {
+        let turned = self.turn_over().await.map_err(|why| words(&why))?;
+        let mg = turned.mg_per_count();
+        let mg = mg.ok_or(Some("That is not 1 g. Hold it straight."))?;
+        let mut calibration = self.calibration();
+        calibration.pressure.pac_pa_per_count = mg;
+        calibration.turned = RigCalibration::UNDATED;
+        let set = self.set_calibration(calibration).await;
+        set.map_err(|_| Some("No finger is like that. Turn it again."))?;
+        let kept = match memory.store() {
+            Ok(store) => keep(store, &calibration).await.is_ok(),
+            Err(_) => false,
+        };
+        kept.then_some(turned).ok_or(Some(NOT_KEPT))
     }
 }
 
 /// What the display says of it; nothing where the person gave up, or a fault is shown already.
 fn words(why: &Failure) -> Option<&'static str> {
     match why {
-        Failure::Rig(RigError::NobodyThere) => Some("No weight lay still for a minute."),
+        Failure::Rig(RigError::NobodyThere) => Some("Nothing was still for a minute."),
         _ => None,
     }
 }

@@ -47,7 +47,7 @@ pub(super) async fn by_motor<R: RigHandle>(rig: &mut R) -> Result<RigCalibration
 }
 
 /// Keeps a calibration. Settings that cannot be read have lost theirs: they are begun anew.
-pub(super) async fn keep<F: NorFlash>(
+pub(crate) async fn keep<F: NorFlash>(
     store: &mut Store<F>,
     calibration: &RigCalibration,
 ) -> Result<(), StoreError> {

@@ -4,7 +4,6 @@
 use core::pin::pin;
 
 use embedded_storage_async::nor_flash::NorFlash;
-use heapless::Vec;
 
 use super::memory::Memory;
 use super::seams::{Events, Panel, RigHandle, StoredBytes};
@@ -13,6 +12,8 @@ use crate::dsp::Plan;
 use crate::explorer::{Answer, Kernels};
 use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
+#[cfg(any(feature = "turns", test))]
+use crate::rig::turning::Turned;
 use crate::table::is_false_alarm;
 use crate::wire::{Command, Event, Failure, Request, Status};
 
@@ -89,7 +90,7 @@ fn status(panel: &impl Panel) -> Status {
 
 /// The event that reports these constants to the host.
 fn told(calibration: &RigCalibration) -> Event {
-    Event::Calibration(Vec::from_slice(&calibration.to_bytes()).unwrap_or_default())
+    Event::Calibration(calibration.to_bytes())
 }
 
 /// A probe: a rig and a memory, and who hears of them.
@@ -199,10 +200,9 @@ where
                 Ok(calibrate::keep(memory.store()?, &calibration).await?)
             }
             Command::WriteCalibration(bytes) => {
-                let bytes = bytes
-                    .as_slice()
-                    .try_into()
-                    .map_err(|_| Failure::CalibrationLength)?;
+                if !matches!(bytes.len(), 60 | RigCalibration::BYTES) {
+                    return Err(Failure::CalibrationLength);
+                }
                 let calibration = RigCalibration::from_bytes(bytes)?;
                 rig.set_calibration(calibration)
                     .await
@@ -234,6 +234,21 @@ where
                 memory.episode = None;
                 let counts = rig.weigh(*mn).await?;
                 events.tell(Event::Weighed { mn: *mn, counts });
+                Ok(())
+            }
+            #[cfg(not(any(feature = "turns", test)))]
+            Command::TurnOver => Err(Failure::OtherProbe),
+            #[cfg(any(feature = "turns", test))]
+            Command::TurnOver => {
+                let Turned {
+                    g_counts,
+                    offset_counts,
+                } = rig.turn_over().await?;
+                memory.episode = None;
+                events.tell(Event::Turned {
+                    g_counts,
+                    offset_counts,
+                });
                 Ok(())
             }
             Command::SetFalseAlarm(share) => {

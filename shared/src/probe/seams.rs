@@ -5,6 +5,7 @@ use embedded_storage_async::nor_flash::NorFlash;
 use super::status::{RigState, TableInUse};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
+use crate::rig::turning::Turned;
 use crate::rig::{Rig, RigError};
 use crate::sensor::FingerCode;
 use crate::store::Store;
@@ -79,6 +80,14 @@ pub trait RigHandle: Rig<Error = RigError> {
     /// # Errors
     /// No such weight was put on the finger.
     async fn weigh(&mut self, mn: u16) -> Result<f32, Failure>;
+
+    /// Measures gravity along the finger, which a person turns over.
+    ///
+    /// # Errors
+    /// Nobody turned it over. [`Failure::OtherProbe`]: it has no accelerometer.
+    async fn turn_over(&mut self) -> Result<Turned, Failure> {
+        Err(Failure::OtherProbe)
+    }
 }
 
 /// Where the bytes of the stored table are read: mapped flash on the chip, a copy on a PC. They must stay readable beside

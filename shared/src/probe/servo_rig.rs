@@ -15,6 +15,8 @@ use crate::rig::control::Control;
 use crate::rig::pins::Outputs;
 use crate::rig::skin::SkinCare;
 use crate::rig::timeout::{MovementTimeout, Wait};
+#[cfg(any(feature = "turns", test))]
+use crate::rig::turning::{Turned, Turning};
 use crate::rig::weigh::{LOOKS_HZ, Weighing};
 use crate::rig::{Ended, Phase, Refused, Rig, RigError, most_mn};
 use crate::store::Store;
@@ -23,6 +25,9 @@ use crate::wire::{Event, Failure, MemoryError, Prompt};
 /// How often the samples are looked after, ms.
 pub const LOOK_MS: u32 = 10;
 const _: () = assert!(LOOK_MS * LOOKS_HZ == 1000);
+/// While a finger is turned over so much may press on it, mN: a hand takes it off its mount, and its tip's weight turns, too.
+#[cfg(any(feature = "turns", test))]
+const TURNED_MN: u16 = 1000;
 /// A weight is waited for as long, looks.
 const PATIENCE: u32 = 60 * LOOKS_HZ;
 
@@ -143,6 +148,11 @@ pub trait Servo {
     /// The oldest samples that nobody has taken.
     fn samples(&mut self) -> Option<Samples>;
 
+    /// Gravity along the finger, counts of P_AC; `None` from a finger that does not feel it.
+    fn gravity(&self) -> Option<f32> {
+        None
+    }
+
     /// Samples since boot that were dropped because a queue to the session was full.
     fn lost(&self) -> u32;
 
@@ -157,6 +167,44 @@ pub trait Servo {
 
     /// Sends raw samples to the host.
     fn tell(&mut self, event: Event);
+}
+
+/// What a person is asked to do to a lifted finger, and what came of it so far.
+enum Asked {
+    /// To lay a weight of so many mN on it: counts above the air. It is over when the weight was taken away again.
+    Weight(u16, Weighing, Option<f32>),
+    /// To turn it over.
+    #[cfg(any(feature = "turns", test))]
+    Turn(Turning, Option<Turned>),
+}
+
+impl Asked {
+    fn prompt(&self) -> Prompt {
+        match self {
+            Self::Weight(mn, weighing, None) if weighing.wants_weight() => Prompt::Weigh(*mn),
+            Self::Weight(..) => Prompt::Lift,
+            #[cfg(any(feature = "turns", test))]
+            Self::Turn(turning, _) if turning.wants_turn() => Prompt::TurnOver,
+            #[cfg(any(feature = "turns", test))]
+            Self::Turn(..) => Prompt::Still,
+        }
+    }
+
+    /// Looks at the finger; whether it is over.
+    #[cfg_attr(not(any(feature = "turns", test)), expect(unused_variables))]
+    fn look(&mut self, rig: &RigState, gravity: Option<f32>) -> bool {
+        let counts = rig.force_mn / rig.calibration.pressure.force_mn_per_count;
+        match self {
+            Self::Weight(_, weighing, weighed @ None) => *weighed = weighing.take(counts),
+            Self::Weight(_, weighing, Some(_)) => return weighing.is_air(counts),
+            #[cfg(any(feature = "turns", test))]
+            Self::Turn(turning, turned) => {
+                *turned = gravity.and_then(|g| turning.take(g));
+                return turned.is_some();
+            }
+        }
+        false
+    }
 }
 
 /// A rig moved by a servo.
@@ -214,36 +262,35 @@ impl<S: Servo> ServoRig<S> {
         self.rest().await.map(|_| ())
     }
 
-    /// Counts of a weight above the air, once it has lain on the finger and was taken away.
-    async fn weigh_expected(&mut self, mn: u16) -> Result<f32, RigError> {
-        let scale = self.rest().await?.calibration.pressure.force_mn_per_count;
-        let (mut weighing, mut weighed) = (Weighing::new(mn, scale), None);
+    /// Lifts the finger, on which a person may press with so many mN, and waits until what they are asked to do is done.
+    async fn with_person(&mut self, mn: u16, asked: &mut Asked) -> Result<(), RigError> {
+        if self.rest().await?.phase == Phase::Parked {
+            self.home().await?;
+        }
+        self.command(RigCommand::Weigh(mn)).await?;
+        let mut done = Err(RigError::NobodyThere);
         for look in 0..PATIENCE {
             if look.is_multiple_of(LOOKS_HZ) {
-                let waits = weighing.wants_weight() && weighed.is_none();
-                let prompt = if waits {
-                    Prompt::Weigh(mn)
-                } else {
-                    Prompt::Lift
-                };
-                self.servo.tell(Event::Prompt(prompt));
+                self.servo.tell(Event::Prompt(asked.prompt()));
             }
             self.servo.wait().await;
-            if self.servo.is_stopped() {
-                return Err(RigError::Stopped);
-            }
             let rig = self.servo.state();
-            if let Phase::Faulted(fault) = rig.phase {
-                return Err(RigError::Fault(fault));
+            if self.servo.is_stopped() {
+                done = Err(RigError::Stopped);
+                break;
             }
-            let counts = rig.force_mn / scale;
-            match weighed {
-                None => weighed = weighing.take(counts),
-                Some(weight) if weighing.is_air(counts) => return Ok(weight),
-                Some(_) => {}
+            if let Phase::Faulted(fault) = rig.phase {
+                done = Err(RigError::Fault(fault));
+                break;
+            }
+            if asked.look(&rig, self.servo.gravity()) {
+                done = Ok(());
+                break;
             }
         }
-        Err(RigError::NobodyThere)
+        // what still presses is a press now
+        let _ = self.servo.command(RigCommand::Weigh(0)).await;
+        done
     }
 
     /// Has something begun, unless all was stopped.
@@ -308,16 +355,28 @@ impl<S: Servo> RigHandle for ServoRig<S> {
     }
 
     async fn weigh(&mut self, mn: u16) -> Result<f32, Failure> {
-        if self.rest().await.map_err(Failure::Rig)?.phase == Phase::Parked {
-            self.home().await.map_err(Failure::Rig)?;
+        let scale = self.servo.state().calibration.pressure.force_mn_per_count;
+        let mut weight = Asked::Weight(mn, Weighing::new(mn, scale), None);
+        let done = self.with_person(mn, &mut weight).await;
+        done.map_err(Failure::Rig)?;
+        match weight {
+            Asked::Weight(_, _, Some(counts)) => Ok(counts),
+            _ => Err(Failure::Rig(RigError::NobodyThere)),
         }
-        self.command(RigCommand::Weigh(mn))
-            .await
-            .map_err(Failure::Rig)?;
-        let weighed = self.weigh_expected(mn).await;
-        // a weight that is still there is a press now
-        let _ = self.servo.command(RigCommand::Weigh(0)).await;
-        weighed.map_err(Failure::Rig)
+    }
+
+    #[cfg(any(feature = "turns", test))]
+    async fn turn_over(&mut self) -> Result<Turned, Failure> {
+        if self.servo.gravity().is_none() {
+            return Err(Failure::OtherProbe);
+        }
+        let mut turn = Asked::Turn(Turning::default(), None);
+        let done = self.with_person(TURNED_MN, &mut turn).await;
+        done.map_err(Failure::Rig)?;
+        match turn {
+            Asked::Turn(_, Some(turned)) => Ok(turned),
+            _ => Err(Failure::Rig(RigError::NobodyThere)),
+        }
     }
 
     async fn set_high_force<F: NorFlash>(

@@ -1,7 +1,9 @@
 //! The constants of one rig, and how they are found: lines through measured points.
 
+use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
+use super::turning;
 use crate::CRC32;
 use crate::sensor::pressure::{Calibration, CalibrationError};
 
@@ -19,6 +21,8 @@ pub struct RigCalibration {
     pub date: u32,
     /// Whether P_DC in the air is this finger's, and no default.
     pub air_known: bool,
+    /// Day on which the accelerometer was turned over, and `pressure.pac_pa_per_count` with it measured, in mg; as `date`.
+    pub turned: u32,
     /// Serial number of the sensor, as the sensor says it.
     pub serial: [u8; 16],
 }
@@ -52,24 +56,27 @@ impl RigCalibration {
         (current_a - standstill - per_mm_s * speed_mm_s) * self.newton_per_ampere
     }
 
-    /// Length of a stored record.
-    pub const BYTES: usize = 60;
+    /// Most bytes of a stored record.
+    pub const BYTES: usize = 64;
 
-    /// The record as it is stored: nine f32, the date, the serial number, and a CRC-32 of these; little-endian. The highest bit
-    /// of the date says whether P_DC in the air is known: set, if it is without a date, or is not with one.
-    pub fn to_bytes(&self) -> [u8; Self::BYTES] {
-        let mut bytes = [0; Self::BYTES];
-        let (body, end) = bytes.split_at_mut(Self::BYTES - 4);
+    /// The record as it is stored: nine f32, the date, the serial number, the day on which the accelerometer was turned over, if
+    /// it was, and a CRC-32 of these; little-endian. The highest bit of the date says whether P_DC in the air is known: set, if it is
+    /// without a date, or is not with one.
+    #[inline(never)]
+    pub fn to_bytes(&self) -> Vec<u8, { Self::BYTES }> {
         let numbers = self.numbers().into_iter().flat_map(f32::to_le_bytes);
         let other_air = self.air_known != (self.date != 0);
         let date = self.date | if other_air { Self::OTHER_AIR } else { 0 };
         let fields = numbers.chain(date.to_le_bytes()).chain(self.serial);
-        for (slot, byte) in body.iter_mut().zip(fields) {
-            *slot = byte;
+        let mut bytes = Vec::new();
+        // there is room for all of them
+        for byte in fields {
+            let _ = bytes.push(byte);
         }
-        for (slot, byte) in end.iter_mut().zip(CRC32.checksum(body).to_le_bytes()) {
-            *slot = byte;
+        if self.turned != 0 {
+            let _ = bytes.extend_from_slice(&self.turned.to_le_bytes());
         }
+        let _ = bytes.extend_from_slice(&CRC32.checksum(&bytes).to_le_bytes());
         bytes
     }
 
@@ -78,17 +85,24 @@ impl RigCalibration {
     /// # Errors
     /// [`RigCalibrationError::Damaged`], or what [`RigCalibration::check`] says.
     #[inline]
-    pub fn from_bytes(bytes: &[u8; Self::BYTES]) -> Result<Self, RigCalibrationError> {
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, RigCalibrationError> {
         let (body, crc) = bytes
             .split_last_chunk::<4>()
             .ok_or(RigCalibrationError::Damaged)?;
         if CRC32.checksum(body) != u32::from_le_bytes(*crc) {
             return Err(RigCalibrationError::Damaged);
         }
-        let (body, serial) = body
-            .split_last_chunk::<16>()
+        let (numbers, rest) = body
+            .split_first_chunk::<{ 10 * 4 }>()
             .ok_or(RigCalibrationError::Damaged)?;
-        let mut words = body.as_chunks::<4>().0.iter();
+        let (serial, turned) = rest
+            .split_first_chunk::<16>()
+            .ok_or(RigCalibrationError::Damaged)?;
+        let turned = match turned {
+            [] => 0,
+            day => u32::from_le_bytes(day.try_into().map_err(|_| RigCalibrationError::Damaged)?),
+        };
+        let mut words = numbers.as_chunks::<4>().0.iter();
         let mut number = || {
             words
                 .next()
@@ -107,6 +121,7 @@ impl RigCalibration {
             newton_per_ampere: number(),
             date: words.next().map_or(0, |word| u32::from_le_bytes(*word)),
             air_known: false,
+            turned,
             serial: *serial,
         };
         let other_air = record.date & Self::OTHER_AIR != 0;
@@ -144,6 +159,12 @@ impl RigCalibration {
         if !PLAUSIBLE_MN.contains(&self.pressure.force_mn_per_count) {
             return Err(RigCalibrationError::Pressure(CalibrationError::Scale));
         }
+        let mg = &self.pressure.pac_pa_per_count;
+        // in images of other fingers it is not used
+        let turns = cfg!(any(feature = "turns", test));
+        if turns && self.turned != 0 && !turning::PLAUSIBLE_MG.contains(mg) {
+            return Err(RigCalibrationError::Turned);
+        }
         let (standstill, per_mm_s) = self.unloaded_a;
         let good = standstill.is_finite() && per_mm_s.is_finite();
         if !(good && self.newton_per_ampere > 0.0 && self.newton_per_ampere.is_finite()) {
@@ -171,6 +192,9 @@ pub enum RigCalibrationError {
     /// The points do not lie on a line: R^2 below 0.99.
     #[error("the points do not lie on a line (R^2 below 0.99): measure again")]
     NoLine,
+    /// What a count of an accelerometer is worth. New in version 10.
+    #[error("an accelerometer's count is within a tenth of 0.976 mg: turn the finger over again")]
+    Turned,
 }
 
 /// Contact force per count that a fingertip can have, mN: the paper's 11.5, half of it and twice as much (chosen).
@@ -277,6 +301,7 @@ mod tests {
             newton_per_ampere: 8.0,
             date: 20_261_121,
             air_known: true,
+            turned: 0,
             serial: *b"BT-0000000000001",
         };
         assert!((rig.shear_n(0.25, 25.0) - 0.8).abs() < 1e-5);
@@ -298,14 +323,43 @@ mod tests {
             Err(RigCalibrationError::Current)
         );
         assert_eq!(RigCalibration::from_bytes(&rig.to_bytes()), Ok(rig));
-        for bit in 0..8 * RigCalibration::BYTES {
-            let mut bytes = rig.to_bytes();
-            bytes[bit / 8] ^= 1 << (bit % 8);
-            assert_eq!(
-                RigCalibration::from_bytes(&bytes),
-                Err(RigCalibrationError::Damaged)
-            );
+        let mg = Calibration {
+            pac_pa_per_count: 0.95,
+            ..Calibration::PAPER
+        };
+        let turned = RigCalibration {
+            pressure: mg,
+            turned: 20_261_126,
+            ..rig
+        };
+        // that of before version 10, but for an accelerometer that was turned over
+        assert_eq!(rig.to_bytes().len(), 60);
+        assert_eq!(turned.to_bytes().len(), RigCalibration::BYTES);
+        assert_eq!(RigCalibration::from_bytes(&turned.to_bytes()), Ok(turned));
+        for whole in [rig.to_bytes(), turned.to_bytes()] {
+            for bit in 0..8 * whole.len() {
+                let mut bytes = whole.clone();
+                bytes[bit / 8] ^= 1 << (bit % 8);
+                assert_eq!(
+                    RigCalibration::from_bytes(&bytes),
+                    Err(RigCalibrationError::Damaged)
+                );
+            }
+            for length in 0..whole.len() {
+                assert_eq!(
+                    RigCalibration::from_bytes(&whole[..length]),
+                    Err(RigCalibrationError::Damaged)
+                );
+            }
         }
+        assert_eq!(
+            RigCalibration {
+                turned: 20_261_126,
+                ..rig
+            }
+            .check(),
+            Err(RigCalibrationError::Turned)
+        );
         for (date, air_known) in [(0, false), (0, true), (1, false), (1, true)] {
             let rig = RigCalibration {
                 date,

@@ -69,6 +69,7 @@ mod tests {
         newton_per_ampere: 8.0,
         date: 20_261_121,
         air_known: true,
+        turned: 0,
         serial: [b'0'; 16],
     };
 

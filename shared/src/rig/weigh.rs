@@ -14,6 +14,29 @@ const GONE_MN: f32 = 100.0;
 /// How far a weight may be off the line, mN: 3 g, since a kitchen scale shows whole ones, and the share of it (chosen).
 const OFF: (f32, f32) = (30.0, 0.08);
 
+/// Waits for something to keep still.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub(super) struct Still {
+    mean: f32,
+    looks: u32,
+}
+
+impl Still {
+    /// Takes a look, counts. The mean of the last ones, once it has been still for [`STILL`] of them.
+    pub(super) fn take(&mut self, counts: f32) -> Option<f32> {
+        let (most, share) = WANDERS;
+        let off = libm::fabsf(counts - self.mean);
+        // not-a-number is not still
+        let still = off <= most.max(share * libm::fabsf(self.mean));
+        if self.looks == 0 || !still {
+            (self.mean, self.looks) = (counts, 0);
+        }
+        self.looks = (self.looks + 1).min(STILL);
+        self.mean += (counts - self.mean) / self.looks as f32;
+        (self.looks == STILL).then_some(self.mean)
+    }
+}
+
 /// The air, and then one weight.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Weighing {
@@ -23,8 +46,7 @@ pub struct Weighing {
     gone: f32,
     /// P_DC in the air, once it was still.
     air: Option<f32>,
-    mean: f32,
-    looks: u32,
+    still: Still,
 }
 
 impl Weighing {
@@ -34,8 +56,7 @@ impl Weighing {
             least: THERE * f32::from(mn) / mn_per_count,
             gone: GONE_MN / mn_per_count,
             air: None,
-            mean: 0.0,
-            looks: 0,
+            still: Still::default(),
         }
     }
 
@@ -60,25 +81,14 @@ impl Weighing {
     /// Takes P_DC, counts about that in the air as it was known before, [`LOOKS_HZ`] times a second. The weight's mean above the
     /// air, once it has lain still; below 0 where P_DC falls under it, as that of a load cell that is wired the wrong way round.
     pub fn take(&mut self, counts: f32) -> Option<f32> {
-        let (most, share) = WANDERS;
-        let off = libm::fabsf(counts - self.mean);
-        // not-a-number is not still
-        let still = off <= most.max(share * libm::fabsf(self.mean));
-        if self.looks == 0 || !still {
-            (self.mean, self.looks) = (counts, 0);
-        }
-        self.looks = (self.looks + 1).min(STILL);
-        self.mean += (counts - self.mean) / self.looks as f32;
-        if self.looks < STILL {
-            return None;
-        }
-        let above = self.mean - self.air.unwrap_or_default();
+        let mean = self.still.take(counts)?;
+        let above = mean - self.air.unwrap_or_default();
         let there = libm::fabsf(above) >= self.least;
         if self.wants_weight() {
             return there.then_some(above);
         }
         if !there {
-            (self.air, self.looks) = (Some(self.mean), 0);
+            (self.air, self.still) = (Some(mean), Still::default());
         }
         None
     }

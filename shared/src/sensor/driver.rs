@@ -43,6 +43,11 @@ pub trait PressureSensor {
     /// The answers are no sample. Count it and treat the sample as lost: there is no older value to use.
     fn decode(&mut self, n: u32, answer: &[u8]) -> Result<Pressure, Self::Error>;
 
+    /// Gravity along the finger in its last answers, counts of P_AC; `None` from a finger that does not feel it.
+    fn gravity(&self) -> Option<f32> {
+        None
+    }
+
     /// How such an answer is counted; not at all, if the finger has just begun.
     fn kind(why: &Self::Error) -> Option<BadWord>;
 }

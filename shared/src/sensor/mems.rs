@@ -197,6 +197,12 @@ impl PressureSensor for Mems {
         Ok(Pressure { channel, counts })
     }
 
+    fn gravity(&self) -> Option<f32> {
+        // what the high-pass takes away
+        let lsb = (self.slow? >> 15) as i32;
+        Some(lsb as f32 / PAC_LSB as f32)
+    }
+
     fn kind(why: &MemsError) -> Option<BadWord> {
         match why {
             MemsError::Begins => None,

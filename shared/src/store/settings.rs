@@ -93,7 +93,6 @@ impl<F: NorFlash> Store<F> {
         let Some(bytes) = self.fetch(KEY_CALIBRATION, &mut buffer).await? else {
             return Ok(None);
         };
-        let bytes = bytes.try_into().map_err(|_| SettingsError::Corrupt)?;
         RigCalibration::from_bytes(bytes)
             .map(Some)
             .map_err(StoreError::Calibration)

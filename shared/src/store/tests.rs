@@ -98,6 +98,7 @@ fn calibration(n: u8) -> RigCalibration {
         newton_per_ampere: 8.0,
         date: 20_261_121,
         air_known: true,
+        turned: 0,
         serial: [b'0'; 16],
     }
 }

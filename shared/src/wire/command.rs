@@ -81,6 +81,8 @@ pub enum Command {
     /// Keeps whether movements may press with up to 2 N: only for a finger whose mount yields, or whose lever is stopped, before
     /// 2.2 N. New in version 7.
     SetHighForce(bool),
+    /// Measures gravity along a finger with an accelerometer, which a person turns over: [`super::Event::Turned`]. New in version 10.
+    TurnOver,
 }
 
 /// An exploration.

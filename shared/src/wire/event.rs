@@ -158,6 +158,13 @@ pub enum Event {
     /// How fast the slide was whose report comes next, where the probe measured it: natural logarithm of its speed in parts of the
     /// movement's, in steps of 1/1024. New in version 9.
     Pace(i16),
+    /// What an accelerometer felt that was turned over. New in version 10.
+    Turned {
+        /// Counts of P_AC that 1 g makes.
+        g_counts: f32,
+        /// Its zero is off by so many counts.
+        offset_counts: f32,
+    },
 }
 
 /// Why the chip started.

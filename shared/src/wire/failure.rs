@@ -196,7 +196,7 @@ pub enum Failure {
     #[error(transparent)]
     Calibration(#[from] RigCalibrationError),
     /// A calibration of another length.
-    #[error("a calibration has 60 bytes")]
+    #[error("a calibration has 60 or 64 bytes")]
     CalibrationLength,
     /// The table ends before the byte that was asked for.
     #[error("the table has no such byte")]

@@ -51,6 +51,10 @@ pub enum Prompt {
     Again(Again),
     /// Put a weight of so many mN on the finger and keep it still.
     Weigh(u16),
+    /// Keep the finger still, pointing straight down or up. New in version 10.
+    Still,
+    /// Turn the finger over, so that it points the other way, and keep it still. New in version 10.
+    TurnOver,
 }
 
 impl fmt::Display for Prompt {
@@ -63,6 +67,10 @@ impl fmt::Display for Prompt {
                 write!(f, "that was {why}: lift the finger, then press again")
             }
             Self::Weigh(mn) => write!(f, "put {mn} mN on the finger and keep it still"),
+            Self::Still => f.write_str("keep the finger still, pointing straight down"),
+            Self::TurnOver => {
+                f.write_str("turn it over, so that it points straight up, and keep it still")
+            }
         }
     }
 }

@@ -24,6 +24,7 @@ pub(crate) fn calibration() -> RigCalibration {
         newton_per_ampere: 16.4,
         date: 1,
         air_known: true,
+        turned: 0,
         serial: *b"BT000000FUZZFUZZ",
     }
 }

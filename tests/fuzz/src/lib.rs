@@ -68,7 +68,6 @@ pub fn wire(data: &[u8]) {
 fn heard(request: Request) {
     said_again(&request);
     if let Command::WriteCalibration(bytes) = &request.command
-        && let Ok(bytes) = <&[u8; RigCalibration::BYTES]>::try_from(bytes.as_slice())
         && let Ok(calibration) = RigCalibration::from_bytes(bytes)
     {
         calibration.check().expect("what is read has been checked");
@@ -354,7 +353,7 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
                     seed: 1,
                     false_alarm: Some(0.02),
                 }),
-                Command::WriteCalibration(flash::calibration().to_bytes().into_iter().collect()),
+                Command::WriteCalibration(flash::calibration().to_bytes()),
                 Command::WriteTable {
                     offset: 256,
                     bytes: (0..40).collect(),

@@ -11,6 +11,8 @@ const PRESS: &str = "slide ";
 const SLIDE: &str = "5 cm in 2 s";
 const LIFT: &str = "Lift";
 const WEIGH: &str = "Put on";
+const POINT: &str = "Point it";
+const TURN: &str = "Turn it";
 /// Weights that a person has at hand, as the display names them, mN; one that ends as another comes before it.
 const WEIGHTS: [(&str, u16); 5] = [
     ("150 g", 1471),
@@ -112,6 +114,11 @@ impl Person {
             let display: &Display = rig.display();
             display.shows(text)
         };
+        let turned = if shows(TURN) {
+            Some(true)
+        } else {
+            shows(POINT).then_some(false)
+        };
         let (at, intent) = match self.at {
             At::Idle if shows(WEIGH) && weight(shows).or(self.weight).is_some() => {
                 let mn = weight(shows).or(self.weight).unwrap_or(0);
@@ -142,6 +149,13 @@ impl Person {
             at => (at, None),
         };
         self.at = at;
+        // as long as the display says nothing else, it stays as it is
+        let turned = turned.or((at == At::Pressing).then_some(false));
+        if let Some(over) = turned
+            && let Some(hand) = board.rig().world().hand()
+        {
+            hand.turn(over);
+        }
         if let Some((force_n, pace_mm_s)) = intent
             && let Some(hand) = board.rig().world().hand()
         {

@@ -226,7 +226,7 @@ fn held(talk: &mut Talk) -> Result<Held, CutError> {
         table: (status.table_crc, status.table_bytes),
         textures: status.textures,
         factory: status.factory,
-        calibration: calibration.to_bytes(),
+        calibration: calibration.to_bytes().to_vec(),
         skin_mj: status.skin_mj,
     })
 }

@@ -11,12 +11,14 @@ use tactus::link::{PushTable, ReadTable, Request};
 use tactus::sim::collection::Collection;
 use tactus::sim::flow::HEIGHT_MM;
 use tactus::sim::handheld::ground;
+use tactus::sim::parts::PartFault;
 use tactus::sim::person::Manner;
 use tactus::sim::world::Setup;
 use tactus_core::dsp::{Plain, Plan};
 use tactus_core::explorer::{Method, Strategy};
 use tactus_core::features::{FeatureSet, Measurement, Observation, Slide};
 use tactus_core::rig::calibration::{LineFit, RigCalibration};
+use tactus_core::sensor::FingerName;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire::{
     Command, Event, Forget, Identify, Phase, Prompt, Report, SlideReport, Status, Train,
@@ -57,10 +59,14 @@ impl Held {
             trials: 1,
         };
         let number = tactus::sim::scenario::texture(texture).unwrap();
-        let setup: Setup = collection.setup(number, 77);
+        let setup = collection.setup(number, 77);
+        Self::of(elf, setup, manner, store)
+    }
+
+    fn of(elf: &Path, setup: Setup, manner: Manner, store: Option<Vec<u8>>) -> Self {
         let options = Options {
             store,
-            motion: manner.tilt_mm.map(|_| ground(number, HEIGHT_MM)),
+            motion: manner.tilt_mm.map(|_| ground(setup.texture, HEIGHT_MM)),
             ..Options::default()
         };
         let mut board = Emulator::start(elf, setup, options).unwrap();
@@ -104,10 +110,15 @@ impl Held {
 
     /// Takes an entry of the menu, so many behind the first.
     pub(crate) fn take(&mut self, entry: &str, number: u32) {
+        self.take_of(entry, number, 4);
+    }
+
+    /// The same in a menu of so many.
+    pub(crate) fn take_of(&mut self, entry: &str, number: u32, entries: u32) {
         self.click();
         self.until("the menu", 1.0, |board| shows(board, "Menu"));
         (0..number).for_each(|_| self.click());
-        let place = format!("{} of 4", number + 1);
+        let place = format!("{} of {entries}", number + 1);
         self.until(entry, 1.0, |board| {
             shows(board, entry) && shows(board, &place)
         });
@@ -607,6 +618,60 @@ fn the_force_is_set_on_its_own_screen() {
     held.press_for(100);
     held.until("ready", 5.0, |board| shows(board, "and hold"));
     half_a_newton_is_half_a_newton(&mut held);
+    held.end();
+}
+
+/// A finger with an accelerometer is turned over: no computer, and then one.
+#[test]
+fn a_finger_is_turned_over_on_its_own_screen_and_for_a_host() {
+    let Some(elf) = elf_of("TACTUS_HANDHELD_MEMS_ELF") else {
+        return;
+    };
+    let setup = Setup {
+        texture: BURLAP,
+        finger: FingerName::Mems,
+        ..Setup::default()
+    };
+    let mut held = Held::of(&elf, setup, Manner::default(), None);
+    let off = PartFault::AccelerometerOff {
+        share: 0.03,
+        zero_g: -0.04,
+    };
+    let mut rig = held.talk.board().rig();
+    rig.world().break_part(off);
+    rig.world().hand().unwrap().lean(0.02);
+    drop(rig);
+    held.take_of("turn it over", 3, 5);
+    held.until("the first way", 5.0, |board| shows(board, "Point it"));
+    held.until("the other way", 20.0, |board| shows(board, "Turn it"));
+    held.until("the end", 20.0, |board| shows(board, "Turned over"));
+    held.press_for(100);
+    held.until("ready", 5.0, |board| shows(board, "and hold"));
+    let store = held.talk.board().store().unwrap();
+    drop(held);
+    let mut held = Held::of(&elf, setup, Manner::default(), Some(store));
+    let kept = held.run(Request::read_calibration(), TIMEOUT_S).unwrap();
+    assert_eq!(kept.turned, RigCalibration::UNDATED);
+    let g_counts = 1.03e3 / 0.976;
+    let share = 1e3 / kept.pressure.pac_pa_per_count / g_counts;
+    assert!((share - 1.0).abs() < 0.005, "{share}");
+    // the same for a host, which tells more
+    let mut rig = held.talk.board().rig();
+    rig.world().break_part(off);
+    rig.world().hand().unwrap().lean(0.02);
+    drop(rig);
+    let turned = held.run(Request::turn_over(), TIMEOUT_S).unwrap();
+    assert!(
+        (turned.g_counts / g_counts - 1.0).abs() < 0.005,
+        "{turned:?}"
+    );
+    assert!(
+        (turned.offset_counts * 0.976 + 40.0).abs() < 5.0,
+        "{turned:?}"
+    );
+    assert_eq!(held.prompts, [Prompt::Still, Prompt::TurnOver]);
+    // and it slides as before
+    held.slide_until("slide 2 of 5");
     held.end();
 }
 

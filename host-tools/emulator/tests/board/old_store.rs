@@ -151,7 +151,7 @@ fn changed_bits_of_a_header_and_of_a_record_are_put_right() {
     changed[newest_at - 32 + 9] ^= 0x10;
     // the newest calibration, a byte behind its head
     let calibration = holds["calibration"].as_str().unwrap();
-    let mut places = changed.windows(RigCalibration::BYTES);
+    let mut places = changed.windows(calibration.len() / 2);
     let at = places.rposition(|bytes| hex(bytes) == calibration).unwrap();
     changed[at + 20] ^= 0x81;
     let (mut talk, told) = troubles(&elf, changed);

@@ -48,7 +48,7 @@ fn pages_turn_in_time_and_nothing_is_lost() {
     for n in 1..=430 {
         let bytes = calibration(20_260_000 + n).to_bytes();
         let began_ns = talk.board().now_ns();
-        let command = Command::WriteCalibration(bytes.into_iter().collect());
+        let command = Command::WriteCalibration(bytes);
         talk.send(command, 20.0, |_, _| ()).unwrap();
         longest_ms = longest_ms.max(((talk.board().now_ns() - began_ns) / 1_000_000, n));
     }

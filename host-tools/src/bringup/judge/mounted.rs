@@ -65,6 +65,7 @@ pub fn scale(points: &[[f64; 2]], held: f32, after: f32) -> Finding {
                 newton_per_ampere: 1.0,
                 date: 0,
                 air_known: false,
+                turned: 0,
                 serial: [0; 16],
             };
             let percent = 100.0 * share;

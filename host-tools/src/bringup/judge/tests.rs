@@ -225,6 +225,7 @@ fn calibrated(pdc_no_contact: f32) -> Result<RigCalibration, String> {
         newton_per_ampere: 16.4,
         date: 0,
         air_known: true,
+        turned: 0,
         serial: [0; 16],
     })
 }

@@ -432,6 +432,7 @@ fn moves(command: &Command) -> bool {
             | Command::Train(_)
             | Command::Calibrate
             | Command::Weigh(_)
+            | Command::TurnOver
             | Command::Verify(_)
     )
 }

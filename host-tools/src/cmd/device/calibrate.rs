@@ -9,7 +9,9 @@ use tactus::eval::show::day;
 use tactus::link::Request;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::weigh::ForceScale;
+use tactus_core::sensor::mems::Mems;
 use tactus_core::sensor::pressure::Calibration;
+use tactus_core::sensor::{FingerCode, FingerName, PressureSensor as _};
 use tactus_core::wire::Command;
 
 use super::bench::{Bench, BenchError};
@@ -25,6 +27,7 @@ Examples:
   tactus device calibrate --drifted         if a finger in the air seems to touch something: takes its P_DC anew
   tactus device calibrate --weights 30g,60g,90g,120g,150g
                                             asks for these weights on the lifted finger
+  tactus device calibrate --turn-over       only asks for a finger with an accelerometer to be turned over
   tactus device calibrate --newton-per-ampere 16.2 --force-mn-per-count 11.4
                                             also takes what was measured on an incline and on a scale
 
@@ -36,11 +39,15 @@ pub(crate) struct Args {
     /// Print what is in use, and change nothing
     #[arg(long, conflicts_with_all = ["drifted", "date", "newton_per_ampere", "force_mn_per_count", "weights"])]
     show: bool,
+    /// Measure what a count of acceleration is worth, and nothing else: the finger points straight down and keeps still, then straight
+    /// up. For a finger with an accelerometer
+    #[arg(long, conflicts_with_all = ["show", "drifted", "newton_per_ampere", "force_mn_per_count", "weights"])]
+    turn_over: bool,
     /// The finger has drifted further than the probe allows: discard the P_DC that it had in the air, and measure it anew
     #[arg(long)]
     drifted: bool,
-    /// The day on which the force per count was measured, as 20261121; today unless given
-    #[arg(long, value_name = "YYYYMMDD", requires = "scale", value_parser = clap::value_parser!(u32).range(20_000_101..=29_991_231))]
+    /// The day on which the force per count, or the acceleration per count, was measured, as 20261121; today unless given
+    #[arg(long, value_name = "YYYYMMDD", value_parser = clap::value_parser!(u32).range(20_000_101..=29_991_231))]
     date: Option<u32>,
     /// Shear per motor current, N/A, from pulls on an inclined stage
     #[arg(long, value_name = "X")]
@@ -72,6 +79,10 @@ pub(crate) struct CalibrationSummary {
     unloaded_ma: f32,
     unloaded_ma_per_mm_s: f32,
     shear_n_per_a: f32,
+    /// The day on which an accelerometer was turned over, as `force_scale_date`.
+    turned_over: Option<String>,
+    /// What that said of a count of P_AC, mg; `null`: it was not.
+    mg_per_count: Option<f32>,
 }
 
 impl CalibrationSummary {
@@ -86,6 +97,8 @@ impl CalibrationSummary {
             unloaded_ma: unloaded_a * 1e3,
             unloaded_ma_per_mm_s: a_per_mm_s * 1e3,
             shear_n_per_a: c.newton_per_ampere,
+            turned_over: turned(c),
+            mg_per_count: turned(c).map(|_| c.pressure.pac_pa_per_count),
         }
     }
 }
@@ -94,6 +107,11 @@ impl CalibrationSummary {
 /// scale that was not measured.
 fn date(c: &RigCalibration) -> Option<String> {
     day(c.scale_day()?)
+}
+
+/// The day on which its accelerometer was turned over, in the same way.
+fn turned(c: &RigCalibration) -> Option<String> {
+    day((c.turned != 0).then_some(c.turned)?)
 }
 
 /// The sensor's serial number.
@@ -114,6 +132,13 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if how.show {
         return print(how.format, &calibration, out);
     }
+    ensure!(
+        how.date.is_none()
+            || how.turn_over
+            || how.force_mn_per_count.is_some()
+            || !how.weights.is_empty(),
+        "--date is the day of a measurement: give --weights, --force-mn-per-count or --turn-over with it"
+    );
     // a fault is told on the way; an object is all there is otherwise
     let mut nowhere = std::io::sink();
     let told: &mut dyn Write = match how.format {
@@ -121,6 +146,12 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         Format::Json => &mut nowhere,
     };
     let mut told = told;
+    if how.turn_over {
+        calibration.pressure.pac_pa_per_count = turn_over(&mut bench, &mut told)?;
+        calibration.turned = how.date.unwrap_or_else(today);
+        let kept = keep(&mut bench, &calibration)?;
+        return print(how.format, &kept, out);
+    }
     if how.drifted {
         calibration.air_known = false;
         bench.get(Request::write_calibration(&calibration)?)?;
@@ -144,13 +175,42 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if how.force_mn_per_count.is_some() || !how.weights.is_empty() {
         calibration.date = how.date.unwrap_or_else(today);
     }
-    bench.get(Request::write_calibration(&calibration)?)?;
+    let kept = keep(&mut bench, &calibration)?;
+    print(how.format, &kept, out)
+}
+
+/// Has the probe keep these constants, and asks it for them.
+fn keep(bench: &mut Bench, calibration: &RigCalibration) -> anyhow::Result<RigCalibration> {
+    bench.get(Request::write_calibration(calibration)?)?;
     let kept = bench.get(Request::read_calibration())?;
     ensure!(
-        kept == calibration,
+        kept == *calibration,
         "the probe keeps other constants than it was given: calibrate again"
     );
-    print(how.format, &kept, out)
+    Ok(kept)
+}
+
+/// Acceleration per count, mg, of a finger that a person turns over as asked.
+fn turn_over(bench: &mut Bench, told: &mut impl Write) -> anyhow::Result<f32> {
+    let finger = bench.get(Request::status())?.finger;
+    ensure!(
+        finger == FingerCode::MEMS,
+        "this probe's finger has no accelerometer: only {} is turned over",
+        FingerName::Mems
+    );
+    let turned = bench.perform(Request::turn_over(), told)?;
+    let nominal = Mems::MODEL.calibration.pac_pa_per_count;
+    let mg = 1e3 / turned.g_counts;
+    writeln!(
+        told,
+        "1 g is {:.1} counts: a count is {mg:.4} mg ({:+.1} % of the data sheet's); at 0 g it says {:+.0} mg",
+        turned.g_counts,
+        100.0 * (mg / nominal - 1.0),
+        turned.offset_counts * mg
+    )?;
+    turned.mg_per_count().context(
+        "no sound accelerometer is like that. Point the finger straight down, then straight up, against something upright, and keep it still. If it says the same again, check its supply",
+    )
 }
 
 /// Contact force per count, mN, from known weights, which are asked for.
@@ -204,7 +264,7 @@ fn today() -> u32 {
 }
 
 /// The constants in words.
-pub(crate) fn calibration_rows(c: &RigCalibration) -> [(&'static str, String); 5] {
+pub(crate) fn calibration_rows(c: &RigCalibration) -> Vec<(&'static str, String)> {
     let (offset_ma, slope_ma) = (c.unloaded_a.0 * 1e3, c.unloaded_a.1 * 1e3);
     let motor = format!("{offset_ma:.1} mA + {slope_ma:.3} mA per mm/s without load");
     let mn = c.pressure.force_mn_per_count;
@@ -218,7 +278,7 @@ pub(crate) fn calibration_rows(c: &RigCalibration) -> [(&'static str, String); 5
     } else {
         ", which nobody measured"
     };
-    [
+    let mut rows = vec![
         (
             "force scale",
             match date(c) {
@@ -242,7 +302,17 @@ pub(crate) fn calibration_rows(c: &RigCalibration) -> [(&'static str, String); 5
             "shear",
             format!("{:.2} N/A above that", c.newton_per_ampere),
         ),
-    ]
+    ];
+    if let Some(day) = turned(c) {
+        let mg = c.pressure.pac_pa_per_count;
+        let text = if c.turned == RigCalibration::UNDATED {
+            format!("{mg:.4} mg a count, turned over on a day {day}")
+        } else {
+            format!("{mg:.4} mg a count, turned over on {day}")
+        };
+        rows.push(("accelerometer", text));
+    }
+    rows
 }
 
 /// Ends a fault.

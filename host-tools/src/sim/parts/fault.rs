@@ -20,4 +20,11 @@ pub enum PartFault {
         /// Of either sign.
         share: f64,
     },
+    /// The accelerometer says this share more than the data sheet has it, and this much where it should say 0.
+    AccelerometerOff {
+        /// Of either sign.
+        share: f64,
+        /// In g.
+        zero_g: f64,
+    },
 }

@@ -52,6 +52,8 @@ pub struct Iis3dwb {
     noise: Noise,
     /// Share that its clock is off by.
     clock: f64,
+    /// Share that its scale is off by, and what it says at 0, g: pieces differ (how far could not be read in DS12569).
+    scale: (f64, f64),
     powered_ns: u64,
     on_since_ns: Option<u64>,
     resets_until_ns: u64,
@@ -103,6 +105,7 @@ impl Iis3dwb {
             registers: [0; 128],
             noise: Noise::new(seed, 610),
             clock: 0.0,
+            scale: (0.0, 0.0),
             powered_ns: 0,
             on_since_ns: None,
             resets_until_ns: 0,
@@ -140,6 +143,11 @@ impl Iis3dwb {
         self.low_pass.tune(corner * (1.0 + share));
     }
 
+    /// Its scale is off by this share, and its zero by so much, g.
+    pub fn set_scale(&mut self, share: f64, zero_g: f64) {
+        self.scale = (share, zero_g);
+    }
+
     /// Writes to reserved bits so far.
     pub fn complaints(&self) -> u64 {
         self.complaints
@@ -172,7 +180,9 @@ impl Iis3dwb {
         let density = if one_axis { NOISE.0 } else { NOISE.1 };
         // white up to half of the tick rate
         let noise = density * (f64::from(TICKS_PER_S) / 2.0).sqrt() * self.noise.white()[0];
-        self.chain = [self.chain[1], self.low_pass.tick(g + noise)];
+        let (share, zero_g) = self.scale;
+        let felt = g * (1.0 + share) + zero_g + noise;
+        self.chain = [self.chain[1], self.low_pass.tick(felt)];
         self.tick_ns = now_ns;
     }
 

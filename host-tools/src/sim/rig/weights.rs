@@ -6,12 +6,14 @@ use tactus_core::handheld::weights::WEIGHTS_MN;
 use tactus_core::probe::RigState;
 use tactus_core::probe::seams::RigHandle as _;
 use tactus_core::probe::servo_rig::{LOOK_MS, RigCommand, Samples, Servo, ServoRig};
+use tactus_core::rig::turning::Turned;
 use tactus_core::rig::weigh::ForceScale;
 use tactus_core::rig::{Fault, Phase, Refused, RigError};
 use tactus_core::sensor::FingerName;
 use tactus_core::wire::{Event, Failure, Prompt};
 
 use crate::sim::faults::Fault as WorldFault;
+use crate::sim::noise::Noise;
 use crate::sim::parts::PartFault;
 use crate::sim::person::{Hand, Manner};
 use crate::sim::rig::SimRig;
@@ -106,6 +108,10 @@ impl Servo for Weights {
         None
     }
 
+    fn gravity(&self) -> Option<f32> {
+        self.rig.gravity()
+    }
+
     fn lost(&self) -> u32 {
         0
     }
@@ -125,7 +131,9 @@ impl Servo for Weights {
             Event::Prompt(Prompt::Weigh(mn)) => f64::from(mn) * 1e-3 * self.share,
             _ => 0.0,
         };
-        self.rig.world().hand().unwrap().intend(newton, 0.0);
+        let hand = self.rig.world().hand().unwrap();
+        hand.intend(newton, 0.0);
+        hand.turn(event == Event::Prompt(Prompt::TurnOver));
     }
 }
 
@@ -196,4 +204,68 @@ fn a_lever_that_comes_down_in_place_of_a_weight_is_seen() {
         let most_n = rig.world().truth().force_max_n;
         assert!(most_n < MOST_N, "{finger}, {seed}: {most_n:.3} N");
     });
+}
+
+/// A person who points the finger down and turns it over, as asked. What comes of it, and a g and the zero in truth, in counts.
+fn turned(seed: u64, lean_rad: f64) -> (Result<Turned, Failure>, [f64; 2]) {
+    let mut draws = Noise::new(seed, 77);
+    let (share, zero_g) = (draws.between(-0.03, 0.03), draws.between(-0.06, 0.06));
+    let off = PartFault::AccelerometerOff { share, zero_g };
+    let mut rig = Weights::on(calibrated(FingerName::Mems, seed, Some(off)), seed, 1.0);
+    let hand = rig.servo.rig.world().hand().unwrap();
+    hand.lean(lean_rad);
+    let counts_per_g = 1e3 / 0.976;
+    let truth = [(1.0 + share) * counts_per_g, zero_g * counts_per_g];
+    (block_on(rig.turn_over()), truth)
+}
+
+#[test]
+fn an_accelerometer_that_is_turned_over_says_what_a_count_is() {
+    (1..=50u64).into_par_iter().for_each(|seed| {
+        // it stands on something
+        let (turned, [g, zero]) = turned(seed, 0.02);
+        let turned = turned.unwrap_or_else(|why| panic!("{seed}: {why}"));
+        assert!(
+            (f64::from(turned.g_counts) / g - 1.0).abs() < 0.005,
+            "{seed}: {turned:?}, {g}"
+        );
+        assert!(
+            (f64::from(turned.offset_counts) - zero).abs() < 6.0,
+            "{seed}: {turned:?}, {zero}"
+        );
+        assert!(turned.mg_per_count().is_some(), "{seed}: {turned:?}");
+    });
+}
+
+/// In a hand that leans by 11 degrees rms a g looks smaller, and what is too far askew is refused.
+#[test]
+fn a_hand_that_leans_measures_a_little_less() {
+    let each = (1..=50u64).into_par_iter().map(|seed| {
+        let (turned, [g, _]) = turned(seed, 0.2);
+        let turned = turned.ok()?;
+        let share = f64::from(turned.g_counts) / g - 1.0;
+        assert!((-0.12..0.01).contains(&share), "{seed}: {share}");
+        turned.mg_per_count().map(|_| share)
+    });
+    let each: Vec<Option<f64>> = each.collect();
+    let kept: Vec<f64> = each.iter().flatten().copied().collect();
+    let mean = kept.iter().sum::<f64>() / kept.len() as f64;
+    println!(
+        "{} of 50 kept, {:.1} % on average",
+        kept.len(),
+        100.0 * mean
+    );
+    assert!(
+        kept.len() >= 40 && mean > -0.05,
+        "{} kept, {mean}",
+        kept.len()
+    );
+}
+
+#[test]
+fn a_finger_without_an_accelerometer_is_not_turned_over() {
+    for finger in [FingerName::Biotac, FingerName::Analog] {
+        let mut rig = Weights::on(calibrated(finger, 1, None), 1, 1.0);
+        assert_eq!(block_on(rig.turn_over()), Err(Failure::OtherProbe));
+    }
 }

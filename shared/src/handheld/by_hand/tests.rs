@@ -26,6 +26,7 @@ const UNMEASURED: RigCalibration = RigCalibration {
     newton_per_ampere: 1.0,
     date: 0,
     air_known: false,
+    turned: 0,
     serial: [0; 16],
 };
 
@@ -51,6 +52,8 @@ struct Obedient {
     streams: bool,
     /// Instead of this weight another one is put on, mN.
     wrong: Option<u16>,
+    /// What 1 g makes, and 0, counts.
+    g: (f32, f32),
 }
 
 impl Obedient {
@@ -71,6 +74,7 @@ impl Obedient {
             ticks: 0,
             streams: false,
             wrong: None,
+            g: (1024.6, 0.0),
         }
     }
 
@@ -82,12 +86,31 @@ impl Obedient {
             Some(Prompt::Slide) => (self.presses_mn, 40.0),
             Some(Prompt::Weigh(mn)) if self.wrong == Some(mn) => (1177.0, 0.0),
             Some(Prompt::Weigh(mn)) => (mn.into(), 0.0),
-            Some(Prompt::Lift | Prompt::Again(_)) | None => (0.0, 0.0),
+            Some(Prompt::Lift | Prompt::Again(_) | Prompt::Still | Prompt::TurnOver) | None => {
+                (0.0, 0.0)
+            }
         }
     }
 }
 
 impl Hand for Obedient {
+    const TURNS: bool = true;
+
+    fn gravity(&self) -> Option<f32> {
+        let (g, zero) = self.g;
+        let way = match self.prompt {
+            // it takes a while
+            Some(Prompt::TurnOver) if self.since > 40 => -1.0,
+            _ => 1.0,
+        };
+        let trembles = if self.ticks.is_multiple_of(2) {
+            6.0
+        } else {
+            -6.0
+        };
+        self.listens.then_some(way * g + zero + trembles)
+    }
+
     async fn wait(&mut self) {
         self.ticks += 1;
         self.since += 1;
@@ -307,6 +330,49 @@ impl<F: NorFlash> StoredBytes<F> for Nothing {
     fn bytes(&mut self, _: &mut Store<F>) -> Option<&[u8]> {
         None
     }
+}
+
+#[test]
+fn a_person_turns_the_finger_over_without_a_host_and_it_is_kept() {
+    let plan = Plan::new();
+    let store = block_on(Store::open(Ram::<SECTOR>::new())).unwrap();
+    let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
+    let mut rig = held(&plan);
+    rig.serves = false;
+    // 3 % less than the data sheet's, and 60 counts off
+    rig.hand.g = (994.0, 60.0);
+    block_on(rig.set_gravity(&mut memory));
+    let set = rig.calibration();
+    let mg = set.pressure.pac_pa_per_count;
+    assert!((mg * 0.994 - 1.0).abs() < 1e-3, "{mg}");
+    assert_eq!(set.turned, RigCalibration::UNDATED);
+    // the force is what it was
+    assert_eq!(set.scale_day(), None);
+    assert_eq!(prompts(&rig), [Prompt::Still, Prompt::TurnOver]);
+    let about = About::default();
+    let shown = |rig: &Held<'_>| std::format!("{:?}", rig.handheld.screen(None, &about));
+    assert!(shown(&rig).starts_with("Turned(Ok("), "{}", shown(&rig));
+    let flash = memory.close().0.unwrap().close().again();
+    let mut store = block_on(Store::open(flash)).unwrap();
+    assert_eq!(block_on(store.calibration()), Ok(Some(set)));
+
+    // 15 % less, and an offset that no sound part has
+    for g in [(870.0, 0.0), (1024.6, 300.0)] {
+        let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
+        rig.hand.g = g;
+        block_on(rig.set_gravity(&mut memory));
+        assert_eq!(rig.calibration(), set);
+        assert!(shown(&rig).contains("That is not 1 g"), "{}", shown(&rig));
+        let flash = memory.close().0.unwrap().close().again();
+        store = block_on(Store::open(flash)).unwrap();
+        assert_eq!(block_on(store.calibration()), Ok(Some(set)));
+    }
+    // it lies on its side until nobody waits any more
+    let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
+    rig.hand.g = (0.0, 0.0);
+    block_on(rig.set_gravity(&mut memory));
+    assert_eq!(rig.calibration(), set);
+    assert!(shown(&rig).contains("Nothing was still"), "{}", shown(&rig));
 }
 
 #[test]

@@ -11,6 +11,7 @@ use crate::handheld::jobs::words;
 use crate::handheld::picture::{HEIGHT, Picture, WIDTH};
 use crate::handheld::screen::LINES;
 use crate::handheld::spelling::Spelling;
+use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
 use crate::store::StoreError;
 use crate::table::{Name, TableError};
@@ -74,6 +75,15 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
         force_mn: 472.0,
     };
     each("weigh", &weigh);
+    each("turn-down", &Screen::Turn { over: false });
+    each("turn-over", &Screen::Turn { over: true });
+    let turned = Turned {
+        g_counts: 1041.3,
+        offset_counts: -38.0,
+    };
+    each("turned", &Screen::Turned(Ok(turned)));
+    let askew = Screen::Turned(Err("That is not 1 g. Hold it straight."));
+    each("turned-askew", &askew);
     each("thinking", &Screen::Thinking { slide: 2 });
     for (name, done) in [
         (

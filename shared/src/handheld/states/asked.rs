@@ -8,6 +8,8 @@ use crate::handheld::guidance::{Phase, View};
 use crate::handheld::judge::Judgement;
 use crate::handheld::screen::Trouble;
 use crate::handheld::touch::Taken;
+#[cfg(any(feature = "turns", test))]
+use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
 use crate::rig::{self, Fault};
 use crate::table::Name;
@@ -42,6 +44,15 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     /// Asks the person to put a weight of so many mN on the finger.
     pub fn ask_for_weight(&mut self, mn: u16) {
         self.ask(Asked::default(), Page::Weigh(mn));
+    }
+
+    /// Asks the person to point the finger straight down, and then to turn it `over`.
+    #[cfg(any(feature = "turns", test))]
+    pub fn ask_to_turn(&mut self, over: bool) {
+        self.ask(Asked::default(), Page::Turn(over));
+        if over {
+            self.sound(super::GOOD);
+        }
     }
 
     /// What came of the last request, once.
@@ -98,17 +109,28 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     /// What came of [`Job::Calibrate`](super::Job::Calibrate): the force per count, or why it is as it was, if there is more to say.
     pub fn calibrated(&mut self, done: Result<ForceScale, Option<&'static str>>) {
         self.release();
-        let page = match done {
-            Ok(scale) => Page::Calibrated(Ok(scale)),
-            Err(Some(why)) => Page::Calibrated(Err(why)),
+        self.came_of(done, Page::Calibrated);
+    }
+
+    /// What came of [`Job::TurnOver`](super::Job::TurnOver), in the same way.
+    #[cfg(any(feature = "turns", test))]
+    pub fn turned(&mut self, done: Result<Turned, Option<&'static str>>) {
+        self.release();
+        self.came_of(done, Page::Turned);
+    }
+
+    fn came_of<T>(
+        &mut self,
+        done: Result<T, Option<&'static str>>,
+        page: impl Fn(Result<T, &'static str>) -> Page,
+    ) {
+        let (sound, done) = match done {
+            Ok(found) => (super::SURE_IT_IS, Ok(found)),
+            Err(Some(why)) => (super::BAD, Err(why)),
             Err(None) => return,
         };
-        self.sound(if done.is_ok() {
-            super::SURE_IT_IS
-        } else {
-            super::BAD
-        });
-        self.show(page);
+        self.sound(sound);
+        self.show(page(done));
     }
 
     /// From now on a count of P_DC means so many mN.
@@ -122,6 +144,10 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         Some(match (&self.page, self.touch.view().phase) {
             (Page::Again(why), _) => Prompt::Again(*why),
             (Page::Weigh(mn), _) if self.touch.has_zero() => Prompt::Weigh(*mn),
+            #[cfg(any(feature = "turns", test))]
+            (Page::Turn(false), _) => Prompt::Still,
+            #[cfg(any(feature = "turns", test))]
+            (Page::Turn(true), _) => Prompt::TurnOver,
             (Page::Touching, Phase::Slide | Phase::Sliding) => Prompt::Slide,
             (Page::Touching, Phase::Air | Phase::Press) if self.touch.has_zero() => Prompt::Press,
             _ => Prompt::Lift,

@@ -89,6 +89,11 @@ impl<K: Kernels> Handheld<'_, K> {
                 self.job = Some(Job::Calibrate);
                 self.show(Page::Air);
             }
+            #[cfg(any(feature = "turns", test))]
+            Entry::TurnOver => {
+                self.job = Some(Job::TurnOver);
+                self.show(Page::Turn(false));
+            }
             Entry::Known(texture) if list == List::Reference => self.compare(texture),
             Entry::Known(texture) => self.teach(Choice::Known(texture)),
             Entry::Numbered => self.teach(Choice::Numbered),

@@ -117,6 +117,7 @@ impl<'p> Bench<'p> {
                 mn_per_count: 11.0,
                 off_mn: 5.0,
             })),
+            Some(Job::TurnOver) => self.probe.turned(Err(Some("no g"))),
             Some(Job::Teach(choice)) => {
                 let slides = self.episode.take().unwrap().observed[0].1;
                 self.learned.push((choice, slides));
@@ -611,6 +612,7 @@ proptest! {
                 }
                 Some(Job::Teach(_)) => prop_assert!(judged, "learned from what nobody judged"),
                 Some(Job::Calibrate) => probe.calibrated(Err(Some("no line"))),
+                Some(Job::TurnOver) => probe.turned(Err(Some("no g"))),
                 None => {}
             }
             let screen = probe.screen(Some(&table), &About::default());

@@ -14,6 +14,7 @@ const CALIBRATION: RigCalibration = RigCalibration {
     newton_per_ampere: 16.4,
     date: 0,
     air_known: true,
+    turned: 0,
     serial: [0; 16],
 };
 

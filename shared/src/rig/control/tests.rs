@@ -11,6 +11,7 @@ fn a_lever_that_cannot_press_is_a_fault_and_lifts() {
         newton_per_ampere: 8.0,
         date: 0,
         air_known: false,
+        turned: 0,
         serial: [0; 16],
     };
     let mut control = Control::new(

@@ -1,6 +1,5 @@
 //! What the firmware may hold after a cut, and what it does hold.
 
-use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::{Reset, Verdict};
 
 use crate::board::{self, FlashWrite};
@@ -49,7 +48,7 @@ pub(crate) struct Held {
     /// It came with the firmware.
     pub(crate) factory: bool,
     /// Constants of the rig.
-    pub(crate) calibration: [u8; RigCalibration::BYTES],
+    pub(crate) calibration: Vec<u8>,
     /// Work that the skin has seen, mJ, and that part of it that wears.
     pub(crate) skin_mj: (u32, u32),
 }
@@ -98,7 +97,7 @@ mod tests {
             table: (table, 100),
             textures: 4,
             factory: false,
-            calibration: [1; RigCalibration::BYTES],
+            calibration: vec![1],
             skin_mj: (skin, 0),
         }
     }
@@ -112,7 +111,7 @@ mod tests {
         // what is stored last is there, and what comes before is not
         assert_eq!(judge(&states, &held(2, 1)), None);
         let uncalibrated = Held {
-            calibration: [0; RigCalibration::BYTES],
+            calibration: vec![0],
             ..held(2, 2)
         };
         assert_eq!(judge(&states, &uncalibrated), None);

@@ -163,7 +163,7 @@ pub struct BoardOutcome {
 struct Kept {
     table: (u32, u32),
     textures: u16,
-    calibration: [u8; RigCalibration::BYTES],
+    calibration: RigCalibration,
     false_alarm: Option<f32>,
 }
 
@@ -175,7 +175,7 @@ impl Kept {
         Ok(Self {
             table: (status.table_crc, status.table_bytes),
             textures: status.textures,
-            calibration: calibration.to_bytes(),
+            calibration,
             false_alarm: status.false_alarm,
         })
     }

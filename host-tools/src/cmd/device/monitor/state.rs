@@ -296,6 +296,7 @@ impl Monitor {
             Event::Damaged(_)
             | Event::Pdc(_)
             | Event::Weighed { .. }
+            | Event::Turned { .. }
             | Event::Verified { .. }
             | Event::Pace(_)
             | Event::Done(_)
