@@ -128,6 +128,19 @@ impl Profile {
         }
     }
 
+    /// Ends it as soon as its ramp allows: from now on the ramp down. One that is on its ramp down goes on.
+    fn brake(&mut self) {
+        let t = self.ms as f32 * 1e-3;
+        // on the ramp up it is not as fast as it was to be
+        let ramp_s = self.ramp_s.min(t);
+        if t + ramp_s < self.duration_s {
+            self.speed_mm_s = self.acceleration_mm_s2 * ramp_s;
+            self.ramp_s = ramp_s;
+            self.duration_s = t + ramp_s;
+            self.distance_mm = self.speed_mm_s * t;
+        }
+    }
+
     /// Duration in s.
     pub fn duration_s(&self) -> f32 {
         self.duration_s
@@ -258,6 +271,14 @@ impl Stage {
             self.forget();
         } else {
             self.state = StageState::Standing;
+        }
+    }
+
+    /// Ends a way as soon as the acceleration of its ramps allows; the stage stands then as at the end of any.
+    #[inline]
+    pub fn brake(&mut self) {
+        if let StageState::Moving(profile) = &mut self.state {
+            profile.brake();
         }
     }
 

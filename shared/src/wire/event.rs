@@ -158,6 +158,9 @@ pub enum Event {
     /// How fast the slide was whose report comes next, where the probe measured it: natural logarithm of its speed in parts of the
     /// movement's, in steps of 1/1024. New in version 9.
     Pace(i16),
+    /// The slide whose report comes next ended early, after so many ms at constant speed, for the verdict is certain: it is reported
+    /// as it was then. New in version 9.
+    Early(u16),
 }
 
 /// Why the chip started.

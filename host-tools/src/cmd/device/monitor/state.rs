@@ -298,6 +298,7 @@ impl Monitor {
             | Event::Weighed { .. }
             | Event::Verified { .. }
             | Event::Pace(_)
+            | Event::Early(_)
             | Event::Done(_)
             | Event::Refused { .. }
             | Event::TrainingSlide { .. }
