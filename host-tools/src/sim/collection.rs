@@ -190,7 +190,10 @@ impl Collection {
             let mut longer = (1_u64 << movements.len()) - 1;
             let mut first = slides.clone();
             for slide in first.iter_mut().flatten() {
-                match (slide.first(ms), movements.iter().position(|m| *m == slide.movement)) {
+                match (
+                    slide.first(ms),
+                    movements.iter().position(|m| *m == slide.movement),
+                ) {
                     (Some(first), _) => *slide = first,
                     // the whole one stands for it, and says nothing
                     (None, at) => longer &= !at.map_or(0, |at| 1 << at),
@@ -232,7 +235,13 @@ impl Collection {
                     .collect::<Result<Vec<Vec<_>>, TrialError>>()
             })
             .collect::<Result<Vec<_>, TrialError>>()?;
-        Ok(learn::learn(method, None, &self.names(), movements, &measured)?)
+        Ok(learn::learn(
+            method,
+            None,
+            &self.names(),
+            movements,
+            &measured,
+        )?)
     }
 }
 

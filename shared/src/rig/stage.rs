@@ -385,6 +385,40 @@ mod tests {
     }
 
     #[test]
+    fn a_brake_stands_after_v2_over_2a_without_a_jolt() {
+        for (to, speed) in [(40.0, 63.0), (5.0, 40.0), (20.5, 10.0)] {
+            let whole = Profile::new(20.0, to, speed, 1000.0);
+            let last = (whole.duration_s() * 1e3) as u32;
+            for ms in 0..last + 5 {
+                let mut profile = Profile { ms, ..whole };
+                let t = ms as f32 * 1e-3;
+                let (x, v, a) = profile.at(t);
+                profile.brake();
+                let (x_then, v_then, _) = profile.at(t);
+                assert!(
+                    (x_then - x).abs() < 1e-3 && (v_then - v).abs() < 1e-2,
+                    "{ms}"
+                );
+                // what was braking already goes on
+                let slows = a * v < 0.0;
+                let way = v * v / 2000.0 * v.signum();
+                let stands = profile.at(1e3).0;
+                assert!(
+                    (stands - (x + way)).abs() < 0.02,
+                    "{ms}: {stands} {x} {way}"
+                );
+                assert!(slows || profile.duration_s() <= whole.duration_s() + 1e-4);
+                let over = profile.duration_s() - t;
+                assert!(over < v.abs() / 1000.0 + 2e-3, "{ms}: {over}");
+                for after in 0..200 {
+                    let (_, now, a) = profile.at(t + after as f32 * 1e-3);
+                    assert!(a.abs() <= 1000.0 && now.abs() <= v.abs() + 1e-2);
+                }
+            }
+        }
+    }
+
+    #[test]
     fn a_stage_that_does_not_know_where_it_is_does_not_move() {
         let mut stage = Stage::new(StageConstants::REFERENCE);
         assert_eq!(stage.go(30.0, 50.0), None);

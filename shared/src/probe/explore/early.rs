@@ -1,8 +1,8 @@
 //! A slide that may end before its end: see [`crate::explorer::Look`].
 
-use crate::explorer::{Explorer, Kernels, ObserveError};
 #[cfg(any(test, feature = "early"))]
 use crate::explorer::most_doubt;
+use crate::explorer::{Explorer, Kernels, ObserveError};
 use crate::features::{Measurement, Observation, Slide, SlideError};
 use crate::rig::Rig;
 #[cfg(any(test, feature = "early"))]
