@@ -88,7 +88,7 @@ fn samples_of(ms: u16) -> u32 {
     u32::from(ms) * RATE_HZ / 1000
 }
 
-/// Takes a slide in.
+/// Takes in a slide that ended at this length, or at its end.
 pub(super) fn observe<const N: usize, K: Kernels>(
     explorer: &mut Explorer<'_, N, K>,
     action: Action,
@@ -96,10 +96,10 @@ pub(super) fn observe<const N: usize, K: Kernels>(
     slide: &Measurement,
 ) -> Result<(), ObserveError> {
     let slide = Observation::from(slide);
-    #[cfg(any(test, feature = "early"))]
-    if let Some(length) = length {
+    match length {
         // the table knows the length: it was looked at
-        return explorer.observe_early(action, length.n, &slide).map(|_| ());
+        #[cfg(any(test, feature = "early"))]
+        Some(length) => explorer.observe_early(action, length.n, &slide).map(|_| ()),
+        _ => explorer.observe(action, &slide),
     }
-    explorer.observe(action, &slide)
 }
