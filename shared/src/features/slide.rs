@@ -256,7 +256,8 @@ impl<'p, K: Kernels> Slide<'p, K> {
         self.measure(samples)
     }
 
-    #[inline(always)]
+    #[cfg_attr(any(test, feature = "early"), inline(never))]
+    #[cfg_attr(not(any(test, feature = "early")), inline(always))]
     fn measure(&mut self, wanted: u32) -> Result<Measurement, SlideError> {
         let got = self.spectrum.samples();
         if self.lost > 0 {

@@ -166,7 +166,8 @@ impl<'a> Table<'a> {
     }
 
     /// That the cells of every movement can be compared with slides.
-    #[inline(always)]
+    #[cfg_attr(any(test, feature = "early"), inline(never))]
+    #[cfg_attr(not(any(test, feature = "early")), inline(always))]
     pub(super) fn check_cells(&self) -> Result<(), TableError> {
         match self.contents {
             Contents::Gaussians(measured) => self.check_deviations(measured),
@@ -240,6 +241,11 @@ impl<'a> Table<'a> {
         if !EARLY || movement < self.movements {
             return None;
         }
+        self.shorter_at(movement)
+    }
+
+    #[inline(never)]
+    fn shorter_at(&self, movement: u8) -> Option<(Table<'a>, u8)> {
         let (n, movement) = (movement / self.movements, movement % self.movements);
         let length = self.length(usize::from(n) - 1)?;
         Some((length.table, movement))
