@@ -13,7 +13,7 @@ use crate::toolchain;
 const PROFILES: [(&str, &[&str], &[&str]); 7] = [
     (
         "firmware",
-        &["--features=early"],
+        &[],
         &[
             "tactus-rig",
             "tactus-selftest",
@@ -21,7 +21,7 @@ const PROFILES: [(&str, &[&str], &[&str]); 7] = [
             "tactus-bench",
         ],
     ),
-    ("firmware", &[ANALOG_EARLY], &["tactus-rig-analog"]),
+    ("firmware", &[ANALOG], &["tactus-rig-analog"]),
     ("firmware", &[MEMS], &["tactus-rig-mems"]),
     (HANDHELD, &[], &["tactus-handheld"]),
     (
@@ -33,7 +33,6 @@ const PROFILES: [(&str, &[&str], &[&str]); 7] = [
     (HANDHELD, &[MEMS], &["tactus-handheld-mems"]),
 ];
 const ANALOG: &str = "--features=finger-analog";
-const ANALOG_EARLY: &str = "--features=finger-analog,early";
 const MEMS: &str = "--features=finger-mems";
 /// The fingers beside the BioTac, each a feature of the firmware: their names end those of their images.
 const FINGERS: [&str; 2] = ["analog", "mems"];
