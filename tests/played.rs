@@ -142,6 +142,7 @@ fn explore_all(set: &RecordingSet, method: Method, train: usize, seed: u64) -> T
                     panic!("{}: {why}", recorded_texture.names[texture])
                 }
                 ExplorationStep::Chosen(..)
+                | ExplorationStep::Early(_)
                 | ExplorationStep::Decided { .. }
                 | ExplorationStep::Verified(..)
                 | ExplorationStep::CutShort(..) => {}

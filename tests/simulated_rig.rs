@@ -63,6 +63,7 @@ fn two_hundred_explorations() {
                     }
                     ExplorationStep::Rejected(_, why) => panic!("{}: {why}", texture_name(unknown)),
                     ExplorationStep::Chosen(..)
+                    | ExplorationStep::Early(_)
                     | ExplorationStep::Decided { .. }
                     | ExplorationStep::Verified(..)
                     | ExplorationStep::CutShort(..) => {}

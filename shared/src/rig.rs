@@ -35,6 +35,9 @@ pub use phase::{Ended, HIGH_FORCE_MN, Phase, Refused, RigError, most_mn};
 /// movements.
 pub const MAX_REJECTED: u8 = 6;
 
+/// Whether no more of a slide is needed.
+pub type Enough<'a, K> = &'a mut dyn FnMut(&mut Slide<'_, K>) -> bool;
+
 /// A board, a simulator or a recording: it makes one movement and delivers the samples.
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait Rig {
@@ -55,6 +58,19 @@ pub trait Rig {
     /// # Errors
     /// The movement failed. The stage then stands still and the finger is lifted.
     async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error>;
+
+    /// As [`Rig::perform`]; the slide ends as soon as `enough`, asked after each of its blocks, says that no more of it is needed,
+    /// and takes in none of what comes after that. A rig that makes all slides to their end does not ask.
+    ///
+    /// # Errors
+    /// As [`Rig::perform`].
+    async fn perform_until<K: Kernels>(
+        &mut self,
+        slide: &mut Slide<'_, K>,
+        _enough: Enough<'_, K>,
+    ) -> Result<(), Self::Error> {
+        self.perform(slide).await
+    }
 
     /// Waits until the finger is lifted, which takes longer than it takes to judge the slide. For a rig whose movements
     /// end with that, or that has no finger, there is nothing to wait for.

@@ -46,6 +46,10 @@ impl Servo for ServoHandle {
         servo::stop();
     }
 
+    fn end_slide(&mut self) {
+        servo::end_slide();
+    }
+
     fn is_stopped(&self) -> bool {
         servo::is_stopped()
     }

@@ -23,6 +23,7 @@ use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::pins::{Inputs, MAX_WORDS};
 use tactus_core::rig::stage::StageConstants;
 use tactus_core::sensor::PressureSensor as _;
+use tactus_core::table::EARLY;
 
 use super::link::Body;
 use crate::board::{self, Finger};
@@ -39,6 +40,8 @@ static ANSWER: Signal<CriticalSectionRawMutex, Result<(), Refused>> = Signal::ne
 static ENDED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 /// Stop and lift, whatever is being done.
 static STOP: AtomicBool = AtomicBool::new(false);
+/// No more of the slide is needed.
+static END_SLIDE: AtomicBool = AtomicBool::new(false);
 /// The session was told to stop: between two movements the rig has nothing to stop.
 static STOPPED: AtomicBool = AtomicBool::new(false);
 static STATE: Mutex<CriticalSectionRawMutex, Cell<RigState>> =
@@ -83,6 +86,11 @@ pub(crate) async fn command(command: RigCommand) -> Result<(), Refused> {
 /// Stops what is being done now.
 pub(crate) fn stop() {
     STOP.store(true, Relaxed);
+}
+
+/// Ends the slide that is being made, if one is.
+pub(crate) fn end_slide() {
+    END_SLIDE.store(EARLY, Relaxed);
 }
 
 /// Stops what is being done, and what would come after it until [`forget_stop`].
@@ -198,6 +206,10 @@ pub(crate) async fn servo(
         ticker.next().await;
         if STOP.swap(false, Relaxed) {
             control.stop();
+        }
+        // before a command: what was to be ended is not the next one
+        if EARLY && END_SLIDE.swap(false, Relaxed) {
+            control.end_slide();
         }
         if let Some(command) = COMMAND.try_take() {
             ended = None;

@@ -23,15 +23,15 @@ use tactus::eval::transcript::{Answer, Transcript};
 use tactus::sim::collection::{Collection, calibrated, texture_name};
 use tactus::sim::rig::SimRig;
 use tactus_core::dsp::Plan;
-use tactus_core::explorer::{self, Config, Explorer};
+use tactus_core::explorer::{self, Config, Explorer, most_doubt};
 use tactus_core::features::Observation;
 use tactus_core::probe::explore::{ExplorationStep, ExploreError, Rejection, explore};
 use tactus_core::rig::Rig;
 use tactus_core::table::Table;
 
-use super::args::{Choosing, Expecting, Recordings, Stop};
+use super::args::{Choosing, Expecting, Recordings, Stop, length, rising};
 use super::learn::{at_least_two, learned_here};
-use super::output::{Done, Format, print_json};
+use super::output::{Done, Format, UsageError, print_json};
 use super::plot::{Canvas, Plot};
 use super::progress::with_progress;
 use super::table_file::read_table;
@@ -60,6 +60,7 @@ Examples:
   tactus identify --simulated --among 117 --method paper      as published: one property a slide, 117 textures
   tactus identify --recordings DIR --material 'bath towel'
   tactus identify --recordings DIR --material 3 --table FILE  with a table that `tactus learn` wrote
+  tactus identify --simulated --early                         slides end as soon as the verdict is certain
   tactus identify --simulated --plot burlap.svg               with pictures
 
 --plot draws how probable each texture was (posterior), the unknown beside its two best candidates (spectrum), and the last
@@ -79,6 +80,12 @@ pub(crate) struct Args {
     /// How many textures the simulated probe knows; the unknown one is among them
     #[arg(long, value_name = "N", default_value_t = 20, requires = "simulated", value_parser = clap::value_parser!(u8).range(2..=117))]
     among: u8,
+    /// End a slide of the simulated rig as soon as the verdict is certain
+    #[arg(long, requires = "simulated")]
+    early: bool,
+    /// With --early: the lengths at which a slide may end, s at constant speed
+    #[arg(long, value_name = "S,S,...", value_delimiter = ',', default_value = "0.5,1,2", requires = "early", value_parser = length)]
+    lengths: Vec<u16>,
     /// Texture table to use; without it one is learned from slides drawn at random, and the rest are presented
     #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,
@@ -129,6 +136,9 @@ struct Identification {
     /// Work of sliding that wore the simulated skin, J.
     #[serde(skip_serializing_if = "Option::is_none")]
     skin_j: Option<f32>,
+    /// Seconds of sliding at constant speed, with slides that do not count.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sliding_s: Option<f64>,
 }
 
 /// Explores on recordings or on the simulated rig.
@@ -362,6 +372,7 @@ where
         verdict: Answer::new(verdict, explorer.slides(), table),
         rig_s: None,
         skin_j: None,
+        sliding_s: None,
     })
 }
 
@@ -406,8 +417,17 @@ fn identify_simulated(
     let calibration = calibrated(collection.setup(unknown, 0))?;
     let method = args.method.unwrap_or(Method::Fused).method();
     let textures = collection.textures.len() as u64;
+    let lengths_ms = rising(&args.lengths)?;
+    if args.early && most_doubt(method).is_none() {
+        let say = "--early is for the method fused: any other is wrong more often when it is asked more often";
+        return Err(UsageError(say.to_owned()).into());
+    }
     let bytes = with_progress(textures, "learning textures", |done| {
-        collection.learn(method, calibration, done)
+        if args.early {
+            collection.learn_lengths(method, calibration, &lengths_ms, done)
+        } else {
+            collection.learn(method, calibration, done)
+        }
     })?;
     let table = Table::read(&bytes)?;
     let mut rig = SimRig::new(collection.setup(unknown, 1 + u64::from(random.next_u32() % 1000)));
@@ -433,10 +453,12 @@ fn identify_simulated(
     }
     let found = explore_and_show(&mut rig, &mut pictures, args, &mut random, name, never, out)?;
     let seconds = rig.now().as_secs_f64();
+    let sliding_s: f64 = rig.performed().iter().map(|made| made.steady_s).sum();
     let skin = rig.control().skin();
     let found = Identification {
         rig_s: Some(seconds),
         skin_j: Some(skin.energy_j()),
+        sliding_s: args.early.then_some(sliding_s),
         ..found
     };
     if is_text {
@@ -446,6 +468,9 @@ fn identify_simulated(
             skin.energy_j(),
             if skin.is_worn() { ", look at it" } else { "" }
         )?;
+        if args.early {
+            writeln!(out, "{sliding_s:.1} s of sliding at constant speed.")?;
+        }
     } else {
         print_json(&found, out)?;
     }

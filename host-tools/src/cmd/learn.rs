@@ -50,8 +50,8 @@ pub(crate) struct Args {
     /// Share of the known textures that may be taken for new ones, unless `identify` says otherwise
     #[arg(long, value_name = "SHARE", default_value_t = FALSE_ALARM, value_parser = false_alarm)]
     false_alarm: f32,
-    /// Learn the first parts of the slides too, of these lengths, s at constant speed, such as 1,2,3: for `evaluate --early`. Images
-    /// without the core's feature `early` refuse such a table
+    /// Learn the first parts of the slides too, of these lengths, s at constant speed, such as 1,2,3: slides may end early
+    /// then. Firmware without the feature `early` refuses such a table
     #[arg(long, value_name = "S,S,...", value_delimiter = ',', value_parser = length)]
     lengths: Vec<u16>,
     /// The file to write

@@ -45,6 +45,8 @@ struct Begun {
     pdc: Vec<i16>,
     /// how fast it was, where the probe says it
     pace: Option<i16>,
+    /// it ended before its end
+    early: bool,
 }
 
 impl Recorder {
@@ -58,7 +60,8 @@ impl Recorder {
         }
     }
 
-    /// Takes in a report; the slide that counts from now on, for the texture of this index.
+    /// Takes in a report; the slide that counts from now on, for the texture of this index. One that ended early is no recording of
+    /// its movement.
     ///
     /// # Errors
     /// See [`RecordError`].
@@ -93,8 +96,12 @@ impl Recorder {
             }
             Event::Pdc(counts) => slide.pdc.extend_from_slice(counts),
             Event::Pace(pace) => slide.pace = Some(*pace),
+            Event::Early(_) => slide.early = true,
             Event::SlideReport { .. } => {
                 let slide = std::mem::take(slide);
+                if slide.early {
+                    return None;
+                }
                 return Some(self.finish(texture, slide));
             }
             _ => {}

@@ -60,11 +60,19 @@ impl<'t, W: Write> Show<'t, W> {
                 measurement.roughness_is_bound,
                 posterior,
             ),
+            ExplorationStep::Early(ms) => self.early(ms),
             ExplorationStep::Rejected(_, why) => self.line(&format!("  rejected: {why}")),
             // shown with the truth: see `finish`
             ExplorationStep::Decided { .. } | ExplorationStep::Verified(..) => Ok(()),
             ExplorationStep::CutShort(known, slides) => self.answer(*known, slides),
         }
+    }
+
+    fn early(&mut self, ms: u16) -> io::Result<()> {
+        let seconds = f64::from(ms) / 1e3;
+        self.line(&format!(
+            "  ended after {seconds} s at constant speed: that is certain"
+        ))
     }
 
     /// Shows what comes next, and why.
@@ -155,6 +163,7 @@ impl<'t, W: Write> Show<'t, W> {
                 let percent = 100.0 * (f64::from(*pace) / 1024.0).exp();
                 self.line(&format!("  speed: {percent:.0} % of the movement's"))
             }
+            Event::Early(ms) => self.early(*ms),
             Event::Rejected { why, .. } => self.line(&format!("  rejected: {why}")),
             Event::Fault(fault) => self.line(&format!("  fault: {fault}")),
             Event::Trouble(why) => self.line(&format!("  trouble: {why}")),

@@ -38,6 +38,9 @@ pub struct SlideRecord {
     pub roughness_is_bound: bool,
     /// Fineness, a logarithm.
     pub fineness_ln: Option<f32>,
+    /// When it ended, seconds at constant speed, if that was before its end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ended_after_s: Option<f64>,
     /// Why the slide does not count, if it does not.
     pub rejected: Option<String>,
     /// The textures after the slide, the most probable first.
@@ -97,11 +100,18 @@ impl Transcript {
                 let bound = measurement.roughness_is_bound;
                 self.measured(&measurement.properties, bound, posterior, table);
             }
+            ExplorationStep::Early(ms) => self.early(*ms),
             ExplorationStep::Rejected(_, why) => self.rejected(why),
             // the answer is beside the slides: see [`Answer`]
             ExplorationStep::Decided { .. }
             | ExplorationStep::Verified(..)
             | ExplorationStep::CutShort(..) => {}
+        }
+    }
+
+    fn early(&mut self, ms: u16) {
+        if let Some(slide) = self.slides.last_mut() {
+            slide.ended_after_s = Some(f64::from(ms) / 1e3);
         }
     }
 
@@ -111,6 +121,7 @@ impl Transcript {
             Event::Chosen {
                 action, expected, ..
             } => self.slides.push(SlideRecord::new(*action, expected, table)),
+            Event::Early(ms) => self.early(*ms),
             Event::SlideReport {
                 observed,
                 posterior,
@@ -170,6 +181,7 @@ impl SlideRecord {
             roughness_ln: None,
             roughness_is_bound: false,
             fineness_ln: None,
+            ended_after_s: None,
             rejected: None,
             posterior: Vec::new(),
         }

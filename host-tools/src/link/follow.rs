@@ -3,8 +3,11 @@
 
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Explorer, ExplorerError, NEGLIGIBLE};
-use tactus_core::features::{Block, FEATURE_STEPS, Observation, PropertySet, Slide, SlideError};
+use tactus_core::features::{
+    Block, FEATURE_STEPS, Measurement, Observation, PropertySet, Slide, SlideError,
+};
 use tactus_core::probe::explore::Random;
+use tactus_core::sensor::pressure::RATE_HZ;
 use tactus_core::table::{Action, Contents, MAX_TEXTURES, Table};
 use tactus_core::wire::{
     Event, ExpectedOutcome, Identify, MAX_EXPECTED_OUTCOMES, SlideReport, Verdict,
@@ -129,6 +132,10 @@ pub struct Follower<'t> {
     steady: Option<(u32, u32)>,
     /// How fast the slide was, where the probe says so.
     pace: Option<i16>,
+    /// The slide as it was at each length of the table that it has reached.
+    looks: Vec<Result<Measurement, SlideError>>,
+    /// The length at which it ended, from 1, where that was before its end.
+    early: Option<u8>,
     /// What the probe chose last.
     chosen: Option<Action>,
     agreement: Agreement,
@@ -159,6 +166,8 @@ impl<'t> Follower<'t> {
             pdc: Vec::new(),
             steady: None,
             pace: None,
+            looks: Vec::new(),
+            early: None,
             chosen: None,
             agreement: Agreement::default(),
         })
@@ -183,6 +192,8 @@ impl<'t> Follower<'t> {
             } => {
                 self.samples = Some(Slide::new(self.plan, *movement));
                 self.pace = None;
+                self.looks.clear();
+                self.early = None;
                 self.chosen(*slide, *action, expected)
             }
             Event::Block(block) => self.block(block),
@@ -192,6 +203,12 @@ impl<'t> Follower<'t> {
             }
             Event::Pace(pace) => {
                 self.pace = Some(*pace);
+                Ok(())
+            }
+            Event::Early(ms) => {
+                let mut lengths = (1..).zip(self.explorer.table().lengths_ms());
+                let ended = lengths.find(|(_, length)| length == ms);
+                self.early = ended.map(|(n, _)| n);
                 Ok(())
             }
             Event::SlideReport {
@@ -286,6 +303,7 @@ impl<'t> Follower<'t> {
             // a person has pressed anew
             *slide = Slide::new(self.plan, slide.movement());
             self.pdc.clear();
+            self.looks.clear();
         }
         self.steady = block.steady.or(self.steady);
         let expected = slide.next_block();
@@ -298,6 +316,14 @@ impl<'t> Follower<'t> {
             });
         }
         slide.take(block);
+        // as the probe does: after each block of a slide
+        let mut lengths = self.explorer.table().lengths_ms().skip(self.looks.len());
+        if let Some(ms) = lengths.next() {
+            let wanted = u32::from(ms) * RATE_HZ / 1000;
+            if !block.still && slide.samples() >= wanted {
+                self.looks.push(slide.look(wanted));
+            }
+        }
         Ok(())
     }
 
@@ -315,9 +341,13 @@ impl<'t> Follower<'t> {
             pace: self.pace.take(),
             ..observed.observation()
         };
-        self.explorer
-            .observe(action, &observation)
-            .map_err(|_| FollowError::Observe { slide })?;
+        let taken = match self.early.take() {
+            Some(n) => self.explorer.observe_early(action, n, &observation),
+            None => self.explorer.observe(action, &observation).map(|()| true),
+        };
+        if taken != Ok(true) {
+            return Err(FollowError::Observe { slide });
+        }
         let here = self.explorer.posterior();
         let agreement = &mut self.agreement;
         agreement.posteriors += 1;
@@ -347,9 +377,12 @@ impl<'t> Follower<'t> {
                 let (from, to) = self.steady.take().unwrap_or_default();
                 let steady = pdc.get(from as usize..to as usize);
                 samples.push_pdc(steady.unwrap_or_default());
-                samples
-                    .finish()
-                    .map_err(|why| FollowError::Slide { slide, why })?
+                let early = self.early.map(|n| self.looks.get(usize::from(n) - 1));
+                let measured = match early {
+                    Some(look) => look.cloned().unwrap_or(Err(SlideError::NotStarted)),
+                    None => samples.finish(),
+                };
+                measured.map_err(|why| FollowError::Slide { slide, why })?
             }
         };
         let here = SlideReport::from(&here);

@@ -166,9 +166,56 @@ impl Collection {
         calibration: RigCalibration,
         done: impl Fn() + Sync,
     ) -> Result<Vec<u8>, LearnError> {
+        let slides = self.record_at(finger, movements, calibration, done)?;
+        let table = self.learn_from(movements, method, &slides)?;
+        let named = learn::name_finger(&table, FingerCode::of(finger), 0);
+        Ok(named.map_err(TableError::from)?)
+    }
+
+    /// As [`Collection::learn`], with what slides say after each of these lengths, in ms at constant speed, the shortest first.
+    ///
+    /// # Errors
+    /// The first fault of a rig, or slide without properties; lengths that no table has.
+    pub fn learn_lengths(
+        &self,
+        method: Method,
+        calibration: RigCalibration,
+        lengths_ms: &[u16],
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<u8>, LearnError> {
+        let movements = &Self::MOVEMENTS;
+        let slides = self.record(calibration, done)?;
+        let whole = self.learn_from(movements, method, &slides)?;
+        let shorter = lengths_ms.iter().map(|&ms| {
+            let mut longer = (1_u64 << movements.len()) - 1;
+            let mut first = slides.clone();
+            for slide in first.iter_mut().flatten() {
+                match (
+                    slide.first(ms),
+                    movements.iter().position(|m| *m == slide.movement),
+                ) {
+                    (Some(first), _) => *slide = first,
+                    // the whole one stands for it, and says nothing
+                    (None, at) => longer &= !at.map_or(0, |at| 1 << at),
+                }
+            }
+            Ok((ms, self.learn_from(movements, method, &first)?, longer))
+        });
+        let shorter = shorter.collect::<Result<Vec<_>, LearnError>>()?;
+        let table = learn::know_lengths(&whole, &shorter).map_err(TableError::from)?;
+        let named = learn::name_finger(&table, FingerCode::of(FingerName::Biotac), 0);
+        Ok(named.map_err(TableError::from)?)
+    }
+
+    /// The table of these slides, each texture's in the order of time.
+    fn learn_from(
+        &self,
+        movements: &[Movement],
+        method: Method,
+        slides: &[Vec<Recording>],
+    ) -> Result<Vec<u8>, LearnError> {
         let plan = Plan::new();
-        let measured = self
-            .record_at(finger, movements, calibration, done)?
+        let measured = slides
             .iter()
             .map(|slides| {
                 movements
@@ -188,10 +235,13 @@ impl Collection {
                     .collect::<Result<Vec<Vec<_>>, TrialError>>()
             })
             .collect::<Result<Vec<_>, TrialError>>()?;
-        let names = self.names();
-        let table = learn::learn(method, None, &names, movements, &measured)?;
-        let named = learn::name_finger(&table, FingerCode::of(finger), 0);
-        Ok(named.map_err(TableError::from)?)
+        Ok(learn::learn(
+            method,
+            None,
+            &self.names(),
+            movements,
+            &measured,
+        )?)
     }
 }
 

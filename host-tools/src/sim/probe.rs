@@ -125,6 +125,10 @@ impl<H: Host> Servo for SimServo<'_, H> {
         self.rig.control().stop();
     }
 
+    fn end_slide(&mut self) {
+        self.rig.control().end_slide();
+    }
+
     fn is_stopped(&self) -> bool {
         self.host.borrow().is_stopped()
     }

@@ -14,7 +14,7 @@ use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::pins::{Inputs, Outputs};
 use tactus_core::rig::stage::StageConstants;
 use tactus_core::rig::timeout::{MovementTimeout, Wait};
-use tactus_core::rig::{Ended, Fault, MAX_REJECTED, Phase, Refused, Rig, RigError};
+use tactus_core::rig::{Ended, Enough, Fault, MAX_REJECTED, Phase, Refused, Rig, RigError};
 use tactus_core::sensor::biotac;
 use tactus_core::sensor::pressure::{Channel, Pressure, RATE_HZ, SLOTS_HZ};
 use tactus_core::sensor::slot::Unexpected;
@@ -98,6 +98,8 @@ pub struct Performed {
     pub force_max_n: f64,
     /// Mean speed of the steady part, mm/s.
     pub speed_mm_s: f64,
+    /// How long that was, s.
+    pub steady_s: f64,
     /// Largest relative deviation of the mean speed of any 100 ms of the steady part.
     pub speed_error: f64,
 }
@@ -379,6 +381,19 @@ impl SimRig {
         start: f32,
         mut each: impl FnMut(&Outputs, &[u16]),
     ) -> Result<Ended, SimError> {
+        self.slide_until(movement, start, |outputs, pdc| {
+            each(outputs, pdc);
+            false
+        })
+    }
+
+    /// As [`SimRig::slide`]; the slide ends early when `each` says so.
+    fn slide_until(
+        &mut self,
+        movement: Movement,
+        start: f32,
+        mut each: impl FnMut(&Outputs, &[u16]) -> bool,
+    ) -> Result<Ended, SimError> {
         self.control.start(movement, start)?;
         self.world.reset_extremes();
         let mut timeout = MovementTimeout::default();
@@ -386,7 +401,9 @@ impl SimRig {
         let mut speeds = Vec::new();
         loop {
             self.tick();
-            each(&self.outputs, &self.pdc);
+            if each(&self.outputs, &self.pdc) {
+                self.control.end_slide();
+            }
             let now_ms = self.now_ns / TICK_NS;
             if now_ms.is_multiple_of(Watch::EVERY_MS) && self.listener.is_some() {
                 let state = self.state(None);
@@ -419,6 +436,7 @@ impl SimRig {
             let mean = |speeds: &[f64]| speeds.iter().sum::<f64>() / speeds.len() as f64;
             let wanted = f64::from(movement.speed_um_s()) * 1e-3;
             truth.speed_mm_s = mean(&speeds);
+            truth.steady_s = speeds.len() as f64 * 1e-3;
             let off = speeds
                 .windows(100.min(speeds.len()))
                 .map(|w| (mean(w) / wanted - 1.0).abs());
@@ -486,18 +504,33 @@ impl Rig for SimRig {
     }
 
     async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), SimError> {
+        self.perform_until(slide, &mut |_| false).await
+    }
+
+    async fn perform_until<K: Kernels>(
+        &mut self,
+        slide: &mut Slide<'_, K>,
+        enough: Enough<'_, K>,
+    ) -> Result<(), SimError> {
         if self.control.phase() == Phase::Parked {
             self.home()?;
         }
         let start = self.random.random();
         let (mut blocks, mut taken) = (Blocks::default(), Vec::new());
         let listens = self.listener.is_some();
-        let ended = self.slide(slide.movement(), start, |outputs, _| {
+        let mut over = false;
+        let ended = self.slide_until(slide.movement(), start, |outputs, _| {
             let (phase, pac) = (&outputs.sample_phase, &outputs.pac);
-            if let Some(block) = blocks.put(phase, pac, outputs.shear_mn) {
+            let Some(block) = blocks.put(phase, pac, outputs.shear_mn) else {
+                return false;
+            };
+            let goes_on = !over;
+            if goes_on {
                 slide.take(&block);
-                taken.extend(listens.then_some(block));
+                over = !block.still && enough(slide);
             }
+            taken.extend(listens.then_some(block));
+            goes_on && over
         })?;
         if let Some((_, listener)) = &mut self.listener {
             let now_ms = (self.now_ns / TICK_NS) as u32;
@@ -509,7 +542,11 @@ impl Rig for SimRig {
             Ended::Gap(samples) => samples,
             _ => 0,
         };
-        slide.take(&blocks.end(lost));
+        if over {
+            slide.lose(lost);
+        } else {
+            slide.take(&blocks.end(lost));
+        }
         Ok(())
     }
 

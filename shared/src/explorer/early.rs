@@ -57,7 +57,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         };
         let (log, posterior) = (self.log.clone(), self.posterior.clone());
         let (log_odds, slides, visits) = (self.log_odds, self.slides, self.episode.len());
-        let look = self.compare(part, slide).map(|()| {
+        let look = self.compare_part(part, slide).map(|()| {
             self.slides = slides.saturating_add(1);
             self.as_it_stands()
         });
@@ -81,9 +81,17 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         let Some((made, part)) = self.part(action, n) else {
             return Ok(false);
         };
-        self.compare(part, slide)?;
+        self.compare_part(part, slide)?;
         self.count(made, action);
         Ok(true)
+    }
+
+    fn compare_part(&mut self, part: Action, slide: &Observation) -> Result<(), ObserveError> {
+        if K::PAPER_EARLY {
+            self.compare(part, slide)
+        } else {
+            self.observe_features(part, slide)
+        }
     }
 
     fn as_it_stands(&self) -> Look {
@@ -110,7 +118,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     fn part(&mut self, action: Action, n: u8) -> Option<(usize, Action)> {
         let least = match (self.config.method, action.property) {
             (Method::Fused, None) => 1,
-            (Method::Paper, Some(_)) => 2,
+            (Method::Paper, Some(_)) if K::PAPER_EARLY => 2,
             _ => return None,
         };
         if self.candidates < 2 || self.config.verify {

@@ -153,8 +153,7 @@ impl<'p, K: Kernels> Slide<'p, K> {
     pub fn take(&mut self, block: &Block) {
         let missing = u32::from(block.number.wrapping_sub(self.next)) * BLOCK as u32;
         self.next = block.number.wrapping_add(1);
-        self.lost = self.lost.saturating_add(missing);
-        self.lost = self.lost.saturating_add(block.lost);
+        self.lose(missing.saturating_add(block.lost));
         if let Some((from, to)) = block.steady {
             self.start(from..to);
         }
@@ -164,6 +163,11 @@ impl<'p, K: Kernels> Slide<'p, K> {
             self.push(&block.pac);
             self.push_shear(&block.shear_mn);
         }
+    }
+
+    /// So many samples were lost: the slide has no properties then.
+    pub fn lose(&mut self, samples: u32) {
+        self.lost = self.lost.saturating_add(samples);
     }
 
     /// P_AC of the pressed, still finger, in counts about its baseline: the background of eq. 16.
@@ -236,6 +240,12 @@ impl<'p, K: Kernels> Slide<'p, K> {
         self.measure(self.steady.end.saturating_sub(self.steady.start))
     }
 
+    /// Samples of P_AC at constant speed that have come.
+    #[cfg(any(test, feature = "early"))]
+    pub fn samples(&self) -> u32 {
+        self.spectrum.samples()
+    }
+
     /// The properties of what has come so far, as of a slide whose steady part was not longer; of it so many samples of P_AC must
     /// be there. The slide goes on as if nobody had looked.
     ///
@@ -246,7 +256,8 @@ impl<'p, K: Kernels> Slide<'p, K> {
         self.measure(samples)
     }
 
-    #[inline(always)]
+    #[cfg_attr(any(test, feature = "early"), inline(never))]
+    #[cfg_attr(not(any(test, feature = "early")), inline(always))]
     fn measure(&mut self, wanted: u32) -> Result<Measurement, SlideError> {
         let got = self.spectrum.samples();
         if self.lost > 0 {

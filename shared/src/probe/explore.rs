@@ -2,9 +2,9 @@
 
 use crate::dsp::Plan;
 use crate::explorer::{ExpectedOutcome, Explorer, Kernels, Verdict, Verification};
-use crate::features::{Measurement, Observation, Slide};
+use crate::features::{Measurement, Slide};
 use crate::rig::{MAX_REJECTED, Rig, RigError};
-use crate::table::Action;
+use crate::table::{Action, EARLY};
 use crate::wire::Failure;
 pub use crate::wire::Rejection;
 
@@ -38,6 +38,8 @@ impl Random {
 pub enum ExplorationStep<'a, E> {
     /// This action comes next; the slice has the expected outcomes of all actions.
     Chosen(Action, &'a [ExpectedOutcome]),
+    /// The slide that was made ended early, after so many ms at constant speed: the verdict is certain.
+    Early(u16),
     /// The slide was made and taken in; the posterior of every texture.
     Measured(Action, &'a Measurement, &'a [f32]),
     /// Where that was asked: whether it is the only candidate, after so many slides that counted.
@@ -144,19 +146,21 @@ async fn slides<R: Rig, const N: usize, K: Kernels>(
             .ok_or(ExploreError::Movement(action.movement))?;
         let mut slide = Slide::<K>::new(plan, movement);
         let made = match rig.lifted().await {
-            Ok(()) => rig.perform(&mut slide).await,
-            failed => failed,
+            Ok(()) => early::perform(rig, explorer, action, &mut slide).await,
+            Err(failed) => Err(failed),
         };
         let why = match made {
             Err(why) if !rig.recover(&why).await => return Err(ExploreError::Rig(why)),
             Err(why) => Rejection::Rig(why),
-            Ok(()) => match slide.finish() {
+            Ok(length) => match early::measure(slide, length) {
                 Err(why) => Rejection::Slide(why),
-                Ok(measurement) => match explorer.observe(action, &Observation::from(&measurement))
-                {
+                Ok(measurement) => match early::observe(explorer, action, length, &measurement) {
                     Err(why) => Rejection::Observe(why),
                     Ok(()) => {
                         rejected = 0;
+                        if EARLY && let Some(length) = length {
+                            tell(ExplorationStep::Early(length.ms));
+                        }
                         let posterior = explorer.posterior();
                         tell(ExplorationStep::Measured(action, &measurement, posterior));
                         if explorer.config().verify
@@ -177,5 +181,6 @@ async fn slides<R: Rig, const N: usize, K: Kernels>(
     }
 }
 
+mod early;
 #[cfg(test)]
 mod tests;

@@ -67,6 +67,7 @@ where
                     });
                 }
             }
+            ExplorationStep::Early(ms) => tell(Event::Early(ms)),
             ExplorationStep::Measured(action, measurement, posterior) => {
                 if PACED && let Some(pace) = measurement.pace {
                     tell(Event::Pace(pace));

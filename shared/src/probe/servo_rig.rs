@@ -18,8 +18,9 @@ use crate::rig::timeout::{MovementTimeout, Wait};
 #[cfg(any(feature = "turns", test))]
 use crate::rig::turning::{Turned, Turning};
 use crate::rig::weigh::{LOOKS_HZ, Weighing};
-use crate::rig::{Ended, Phase, Refused, Rig, RigError, most_mn};
+use crate::rig::{Ended, Enough, Phase, Refused, Rig, RigError, most_mn};
 use crate::store::Store;
+use crate::table::EARLY;
 use crate::wire::{Event, Failure, MemoryError, Prompt};
 
 /// How often the samples are looked after, ms.
@@ -158,6 +159,9 @@ pub trait Servo {
 
     /// Stops what is being done now: the stage stands, the finger is lifted.
     fn stop(&mut self);
+
+    /// Ends the slide that is being made, if one is: see [`Control::end_slide`].
+    fn end_slide(&mut self);
 
     /// Whether the whole request is stopped: nothing further is to begin.
     fn is_stopped(&self) -> bool;
@@ -415,6 +419,14 @@ impl<S: Servo> Rig for ServoRig<S> {
     }
 
     async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), RigError> {
+        self.perform_until(slide, &mut |_| false).await
+    }
+
+    async fn perform_until<K: Kernels>(
+        &mut self,
+        slide: &mut Slide<'_, K>,
+        enough: Enough<'_, K>,
+    ) -> Result<(), RigError> {
         if self.servo.state().phase == Phase::Parked {
             self.home().await?;
         }
@@ -424,8 +436,17 @@ impl<S: Servo> Rig for ServoRig<S> {
         self.command(RigCommand::Start(slide.movement(), start))
             .await?;
         let streams = self.servo.streams();
-        let mut take = |servo: &mut S, block: Block| {
-            slide.take(&block);
+        let mut over = false;
+        let mut take = |servo: &mut S, block: Block, last: bool| {
+            if EARLY && over {
+                slide.lose(block.lost);
+            } else {
+                slide.take(&block);
+                over = EARLY && !last && !block.still && enough(slide);
+                if over {
+                    servo.end_slide();
+                }
+            }
             if streams {
                 servo.tell(Event::Block(block));
             }
@@ -438,7 +459,7 @@ impl<S: Servo> Rig for ServoRig<S> {
                     while let Some(samples) = servo.samples() {
                         let (phase, pac) = (&samples.sample_phase, &samples.pac);
                         if let Some(block) = blocks.put(phase, pac, samples.shear_mn) {
-                            take(servo, block);
+                            take(servo, block, false);
                         }
                     }
                 },
@@ -450,7 +471,7 @@ impl<S: Servo> Rig for ServoRig<S> {
             _ => 0,
         };
         let gap = gap + self.servo.lost().wrapping_sub(lost_before);
-        take(&mut self.servo, blocks.end(gap));
+        take(&mut self.servo, blocks.end(gap), true);
         match ended? {
             Some(Ended::Whole | Ended::Gap(_)) => Ok(()),
             Some(Ended::Stopped) | None => {

@@ -284,6 +284,16 @@ impl Control {
         }
     }
 
+    /// Ends the slide that is being made, if one is: the stage brakes as at its end, and what comes after is the same. All guards
+    /// watch on.
+    #[inline]
+    pub fn end_slide(&mut self) {
+        if self.phase == Phase::Sliding {
+            self.stage.brake();
+            self.run.cut(self.ms);
+        }
+    }
+
     /// Ends a fault. Lever and stage have to be homed again.
     ///
     /// # Errors

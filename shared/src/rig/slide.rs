@@ -150,6 +150,11 @@ impl Run {
         (ticks > 0).then(|| sum / ticks as f32)
     }
 
+    /// The constant speed ends with the tick `ms` of the slide.
+    pub(super) fn cut(&mut self, ms: u32) {
+        self.steady_ms.end = self.steady_ms.end.min(ms.saturating_add(1));
+    }
+
     /// How a slide of so many ms has ended.
     pub(super) fn ended(&mut self, ms: u32) -> Ended {
         let missing = samples(ms).abs_diff(self.words);

@@ -128,6 +128,19 @@ impl Profile {
         }
     }
 
+    /// Ends it as soon as its ramp allows: from now on the ramp down. One that is on its ramp down goes on.
+    fn brake(&mut self) {
+        let t = self.ms as f32 * 1e-3;
+        // on the ramp up it is not as fast as it was to be
+        let ramp_s = self.ramp_s.min(t);
+        if t + ramp_s < self.duration_s {
+            self.speed_mm_s = self.acceleration_mm_s2 * ramp_s;
+            self.ramp_s = ramp_s;
+            self.duration_s = t + ramp_s;
+            self.distance_mm = self.speed_mm_s * t;
+        }
+    }
+
     /// Duration in s.
     pub fn duration_s(&self) -> f32 {
         self.duration_s
@@ -261,6 +274,14 @@ impl Stage {
         }
     }
 
+    /// Ends a way as soon as the acceleration of its ramps allows; the stage stands then as at the end of any.
+    #[inline]
+    pub fn brake(&mut self) {
+        if let StageState::Moving(profile) = &mut self.state {
+            profile.brake();
+        }
+    }
+
     /// One millisecond: the encoder's count, and whether the left limit switch is pressed. Returns the duty of the motor,
     /// -1 to 1.
     ///
@@ -361,6 +382,40 @@ mod tests {
         // too short to reach its speed
         integrates(10.0, 10.5, 100.0);
         assert_eq!(Profile::new(5.0, 5.0, 50.0, 1000.0).duration_s(), 0.0);
+    }
+
+    #[test]
+    fn a_brake_stands_after_v2_over_2a_without_a_jolt() {
+        for (to, speed) in [(40.0, 63.0), (5.0, 40.0), (20.5, 10.0)] {
+            let whole = Profile::new(20.0, to, speed, 1000.0);
+            let last = (whole.duration_s() * 1e3) as u32;
+            for ms in 0..last + 5 {
+                let mut profile = Profile { ms, ..whole };
+                let t = ms as f32 * 1e-3;
+                let (x, v, a) = profile.at(t);
+                profile.brake();
+                let (x_then, v_then, _) = profile.at(t);
+                assert!(
+                    (x_then - x).abs() < 1e-3 && (v_then - v).abs() < 1e-2,
+                    "{ms}"
+                );
+                // what was braking already goes on
+                let slows = a * v < 0.0;
+                let way = v * v / 2000.0 * v.signum();
+                let stands = profile.at(1e3).0;
+                assert!(
+                    (stands - (x + way)).abs() < 0.02,
+                    "{ms}: {stands} {x} {way}"
+                );
+                assert!(slows || profile.duration_s() <= whole.duration_s() + 1e-4);
+                let over = profile.duration_s() - t;
+                assert!(over < v.abs() / 1000.0 + 2e-3, "{ms}: {over}");
+                for after in 0..200 {
+                    let (_, now, a) = profile.at(t + after as f32 * 1e-3);
+                    assert!(a.abs() <= 1000.0 && now.abs() <= v.abs() + 1e-2);
+                }
+            }
+        }
     }
 
     #[test]

@@ -165,6 +165,9 @@ pub enum Event {
         /// Its zero is off by so many counts.
         offset_counts: f32,
     },
+    /// The slide whose report comes next ended early, after so many ms at constant speed, for the verdict is certain: it is reported
+    /// as it was then. New in version 10.
+    Early(u16),
 }
 
 /// Why the chip started.

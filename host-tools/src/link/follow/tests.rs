@@ -123,6 +123,7 @@ fn exploration(method: Method) -> (Vec<u8>, Vec<Event>) {
         |event| {
             events.push(match event {
                 ExplorationStep::Verified(..) => return,
+                ExplorationStep::Early(ms) => Event::Early(ms),
                 ExplorationStep::Chosen(action, expected) => {
                     let mut expected: Vec<ExpectedOutcome> = expected
                         .iter()

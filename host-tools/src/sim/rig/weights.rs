@@ -118,6 +118,8 @@ impl Servo for Weights {
 
     fn stop(&mut self) {}
 
+    fn end_slide(&mut self) {}
+
     fn is_stopped(&self) -> bool {
         false
     }

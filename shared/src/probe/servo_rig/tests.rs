@@ -92,6 +92,8 @@ impl Servo for Standing {
 
     fn stop(&mut self) {}
 
+    fn end_slide(&mut self) {}
+
     fn is_stopped(&self) -> bool {
         self.looks >= self.stops
     }

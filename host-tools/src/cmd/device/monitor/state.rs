@@ -299,6 +299,7 @@ impl Monitor {
             | Event::Turned { .. }
             | Event::Verified { .. }
             | Event::Pace(_)
+            | Event::Early(_)
             | Event::Done(_)
             | Event::Refused { .. }
             | Event::TrainingSlide { .. }

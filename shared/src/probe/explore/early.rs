@@ -1,0 +1,105 @@
+//! A slide that may end before its end: see [`crate::explorer::Look`].
+
+#[cfg(any(test, feature = "early"))]
+use crate::explorer::most_doubt;
+use crate::explorer::{Explorer, Kernels, ObserveError};
+use crate::features::{Measurement, Observation, Slide, SlideError};
+use crate::rig::Rig;
+#[cfg(any(test, feature = "early"))]
+use crate::sensor::pressure::RATE_HZ;
+use crate::table::Action;
+
+/// A length of the table, at which a slide ended.
+#[derive(Clone, Copy)]
+pub(super) struct Length {
+    /// Its number, from 1.
+    #[cfg(any(test, feature = "early"))]
+    n: u8,
+    /// At constant speed.
+    pub(super) ms: u16,
+}
+
+/// Makes a slide; the length at which it ended, if the verdict was certain before its end.
+#[cfg(any(test, feature = "early"))]
+pub(super) async fn perform<R: Rig, const N: usize, K: Kernels>(
+    rig: &mut R,
+    explorer: &mut Explorer<'_, N, K>,
+    action: Action,
+    slide: &mut Slide<'_, K>,
+) -> Result<Option<Length>, R::Error> {
+    let Some(most) = most_doubt(explorer.config().method) else {
+        return rig.perform(slide).await.map(|()| None);
+    };
+    let mut lengths = (1..).zip(explorer.table().lengths_ms());
+    let mut next = lengths.next();
+    let mut ended = None;
+    let enough = &mut |slide: &mut Slide<'_, K>| {
+        let Some((n, ms)) = next.filter(|(_, ms)| slide.samples() >= samples_of(*ms)) else {
+            return false;
+        };
+        next = lengths.next();
+        let length = Length { n, ms };
+        // whatever is wrong with the slide is for its end to say
+        let look = slide.look(samples_of(ms)).ok().and_then(|slide| {
+            let look = explorer.look(action, n, &Observation::from(&slide));
+            look.ok().flatten()
+        });
+        ended = look
+            .is_some_and(|look| look.is_enough(most))
+            .then_some(length);
+        ended.is_some()
+    };
+    rig.perform_until(slide, enough).await.map(|()| ended)
+}
+
+#[cfg(not(any(test, feature = "early")))]
+pub(super) async fn perform<R: Rig, const N: usize, K: Kernels>(
+    rig: &mut R,
+    _explorer: &mut Explorer<'_, N, K>,
+    _action: Action,
+    slide: &mut Slide<'_, K>,
+) -> Result<Option<Length>, R::Error> {
+    rig.perform(slide).await.map(|()| None)
+}
+
+/// What a slide says that ended at this length, or at its end.
+#[cfg(any(test, feature = "early"))]
+pub(super) fn measure<K: Kernels>(
+    mut slide: Slide<'_, K>,
+    length: Option<Length>,
+) -> Result<Measurement, SlideError> {
+    match length {
+        Some(length) => slide.look(samples_of(length.ms)),
+        None => slide.finish(),
+    }
+}
+
+#[cfg(not(any(test, feature = "early")))]
+pub(super) fn measure<K: Kernels>(
+    slide: Slide<'_, K>,
+    _length: Option<Length>,
+) -> Result<Measurement, SlideError> {
+    slide.finish()
+}
+
+/// Samples of P_AC in so many ms.
+#[cfg(any(test, feature = "early"))]
+fn samples_of(ms: u16) -> u32 {
+    u32::from(ms) * RATE_HZ / 1000
+}
+
+/// Takes in a slide that ended at this length, or at its end.
+pub(super) fn observe<const N: usize, K: Kernels>(
+    explorer: &mut Explorer<'_, N, K>,
+    action: Action,
+    length: Option<Length>,
+    slide: &Measurement,
+) -> Result<(), ObserveError> {
+    let slide = Observation::from(slide);
+    match length {
+        // the table knows the length: it was looked at
+        #[cfg(any(test, feature = "early"))]
+        Some(length) => explorer.observe_early(action, length.n, &slide).map(|_| ()),
+        _ => explorer.observe(action, &slide),
+    }
+}
