@@ -12,7 +12,10 @@ use tactus::data::table_file::TableFileError;
 use tactus::eval::evaluate::EvaluateError;
 use tactus::eval::experiment::ExperimentError;
 use tactus::eval::first::FirstError;
+use tactus::eval::learn::TableError as LearnError;
 use tactus::eval::verify::VerifyError;
+use tactus::sim::collection::TrialError;
+use tactus::sim::rig::SimError;
 use tactus_core::explorer::{ExplorerError, ObserveError};
 use tactus_core::features::{MovementError, SlideError as OfSlide};
 use tactus_core::table::TableError as OfTable;
@@ -40,6 +43,13 @@ create_exception!(
     TableError,
     TactusError,
     "A table cannot be learned, read, explored or written."
+);
+
+create_exception!(
+    tactus,
+    SimulationError,
+    TactusError,
+    "The simulated rig has a fault, or gives no slide."
 );
 
 /// A cause and all causes of that, as the command says them.
@@ -98,6 +108,9 @@ raise! {
     ExplorerError => TableError,
     ObserveError => TableError,
     VerifyError => TableError,
+    LearnError => TableError,
+    SimError => SimulationError,
+    TrialError => SimulationError,
 }
 
 pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -105,5 +118,6 @@ pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("TactusError", py.get_type::<TactusError>())?;
     module.add("RecordingError", py.get_type::<RecordingError>())?;
     module.add("SlideError", py.get_type::<SlideError>())?;
+    module.add("SimulationError", py.get_type::<SimulationError>())?;
     module.add("TableError", py.get_type::<TableError>())
 }

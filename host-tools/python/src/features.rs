@@ -1,12 +1,14 @@
 //! What one slide says: from samples to properties, band powers and spectrum.
 
+use std::sync::OnceLock;
+
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tactus::data::recording::{PAC_RATE_HZ, Recording};
 use tactus::data::replay::{MeasuredSlide, measure};
 use tactus_core::dsp::{BIN_HZ, BINS, Plan};
-use tactus_core::features::{Measurement, Movement, Property};
+use tactus_core::features::{Measurement, Movement, Observation, Property};
 
 use crate::error::{Raise as _, SlideError, sentence};
 use crate::values::array;
@@ -28,6 +30,11 @@ impl From<&MeasuredSlide> for Features {
 }
 
 impl Features {
+    /// What an exploration makes of it.
+    pub(crate) fn observation(&self) -> Observation {
+        Observation::from(&self.measurement)
+    }
+
     fn property(&self, property: Property) -> Option<f32> {
         self.measurement.properties.get(property)
     }
@@ -116,6 +123,12 @@ impl Features {
     }
 }
 
+/// What every slide needs and no slide changes.
+pub(crate) fn plan() -> &'static Plan {
+    static PLAN: OnceLock<Plan> = OnceLock::new();
+    PLAN.get_or_init(Plan::new)
+}
+
 /// A movement from newtons and millimetres per second.
 pub(crate) fn movement(force_n: f32, speed_mm_s: f32) -> PyResult<Movement> {
     Movement::from_si(force_n, speed_mm_s).map_err(|why| why.raise())
@@ -185,7 +198,7 @@ fn features(
         };
         let cut = recording.cut(&still.unwrap_or_default(), pac, shear.as_deref());
         let cut = cut.map_err(|why| SlideError::new_err(sentence(&why)))?;
-        let mut measurement = measure(&Plan::new(), &cut).map_err(|why| why.raise())?;
+        let mut measurement = measure(plan(), &cut).map_err(|why| why.raise())?;
         measurement.pdc = measurement.pdc.filter(|_| pdc.is_some());
         Ok(Features {
             movement,

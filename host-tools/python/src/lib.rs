@@ -4,8 +4,10 @@
 mod arguments;
 mod error;
 mod evaluate;
+mod explorer;
 mod features;
 mod recordings;
+mod simulate;
 mod table;
 mod values;
 mod work;
@@ -20,5 +22,7 @@ fn _tactus(module: &Bound<'_, PyModule>) -> PyResult<()> {
     recordings::add(module)?;
     table::add(module)?;
     evaluate::add(module)?;
+    explorer::add(module)?;
+    simulate::add(module)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

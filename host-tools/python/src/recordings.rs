@@ -8,14 +8,14 @@ use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
+use rayon::prelude::*;
 use tactus::data::recording::{PAC_RATE_HZ, Recording};
 use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::{MeasureError, MeasuredSlide, measure, measure_all};
-use tactus_core::dsp::Plan;
-use tactus_core::features::{BAND_EDGES, FUSED_BANDS, Property};
+use tactus_core::features::{BAND_EDGES, FUSED_BANDS, Property, SlideError};
 
 use crate::error::Raise as _;
-use crate::features::Features;
+use crate::features::{Features, plan};
 use crate::values::{array, rows};
 use crate::work::work;
 
@@ -37,6 +37,20 @@ pub(crate) struct Slide {
     still: PyOnceLock<Py<PyArray1<i16>>>,
     pdc: PyOnceLock<Py<PyArray1<i16>>>,
     shear: PyOnceLock<Option<Py<PyArray1<i16>>>>,
+}
+
+impl Slide {
+    /// A slide over a texture of this name.
+    pub(crate) fn new(recording: Recording, texture: &str) -> Self {
+        Self {
+            recording,
+            texture: texture.to_owned(),
+            pac: PyOnceLock::new(),
+            still: PyOnceLock::new(),
+            pdc: PyOnceLock::new(),
+            shear: PyOnceLock::new(),
+        }
+    }
 }
 
 /// A texture by its name or its number.
@@ -187,14 +201,7 @@ impl Recordings {
         let index = self.find(&texture)?;
         let slides = work(py, |_| self.set.load_texture(index))?;
         let texture = &self.set.textures()[index].name;
-        let slides = slides.into_iter().map(|recording| Slide {
-            recording,
-            texture: texture.clone(),
-            pac: PyOnceLock::new(),
-            still: PyOnceLock::new(),
-            pdc: PyOnceLock::new(),
-            shear: PyOnceLock::new(),
-        });
+        let slides = slides.into_iter().map(|slide| Slide::new(slide, texture));
         Ok(slides.collect())
     }
 
@@ -365,7 +372,7 @@ impl Slide {
     /// The `Features` of the slide. Raises SlideError where it has none.
     fn features(&self, py: Python<'_>) -> PyResult<Features> {
         py.detach(|| {
-            let measured = measure(&Plan::new(), &self.recording);
+            let measured = measure(plan(), &self.recording);
             let measurement = measured.map_err(|why| why.raise())?;
             Ok(Features {
                 movement: self.recording.movement,
@@ -384,7 +391,27 @@ impl Slide {
     }
 }
 
+/// The `Features` of many slides, in their order, computed on all cores.
+///
+/// Raises SlideError where one has none, KeyboardInterrupt after Ctrl-C.
+#[pyfunction]
+fn features_of(py: Python<'_>, slides: Vec<Py<Slide>>) -> PyResult<Vec<Features>> {
+    let recordings: Vec<&Recording> = slides.iter().map(|slide| &slide.get().recording).collect();
+    work(py, |between| {
+        let of = |recording: &&Recording| {
+            between();
+            let measurement = measure(plan(), recording)?;
+            Ok::<_, SlideError>(Features {
+                movement: recording.movement,
+                measurement,
+            })
+        };
+        recordings.par_iter().panic_fuse().map(of).collect()
+    })
+}
+
 pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Recordings>()?;
-    module.add_class::<Slide>()
+    module.add_class::<Slide>()?;
+    module.add_function(wrap_pyfunction!(features_of, module)?)
 }

@@ -5,18 +5,20 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict};
 use tactus::data::table_file::read_table;
 use tactus::data::whole::write_whole;
 use tactus::eval::evaluate::Method;
-use tactus::eval::first::learn_first;
-use tactus::eval::learn::Expected;
+use tactus::eval::first::{FirstError, learn_first};
+use tactus::eval::learn::{Expected, learn_for};
 use tactus::eval::table_summary::TableSummary;
 use tactus_core::explorer;
+use tactus_core::features::Movement;
 use tactus_core::table::{FALSE_ALARM, Table as Read};
 
 use crate::arguments;
 use crate::error::Raise as _;
+use crate::features::Features;
 use crate::recordings::Recordings;
 use crate::values::object;
 use crate::work::work;
@@ -24,7 +26,7 @@ use crate::work::work;
 /// A texture table: what is known of every texture at every movement. `len()` counts its textures, `bytes()` is its file.
 #[pyclass(frozen, module = "tactus")]
 pub(crate) struct Table {
-    bytes: Arc<[u8]>,
+    pub(crate) bytes: Arc<[u8]>,
 }
 
 impl Table {
@@ -39,6 +41,14 @@ impl Table {
     fn read(&self) -> PyResult<Read<'_>> {
         Read::read(&self.bytes).map_err(|why| why.raise())
     }
+}
+
+/// What a fused table is to expect.
+fn expected(drift: (f32, f32), false_alarm: Option<f32>) -> PyResult<Expected> {
+    Ok(Expected {
+        drift: Some(arguments::drift(drift)?),
+        false_alarm: arguments::false_alarm(false_alarm)?.unwrap_or(FALSE_ALARM),
+    })
 }
 
 #[pymethods]
@@ -64,13 +74,62 @@ impl Table {
     ) -> PyResult<Self> {
         let method = arguments::method(method)?;
         let features = arguments::features(features)?;
-        let expected = Expected {
-            drift: Some(arguments::drift(drift)?),
-            false_alarm: arguments::false_alarm(false_alarm)?.unwrap_or(FALSE_ALARM),
-        };
+        let expected = expected(drift, false_alarm)?;
         let (set, measured) = (&recordings.set, recordings.measured(py)?);
         let learn = |_: &(dyn Fn() + Sync)| {
             learn_first(set, measured, train_slides, method, features, &expected)
+        };
+        Self::of(work(py, learn)?)
+    }
+
+    /// Learns a table from features of one's own: a dict from the name of each texture to its list of `Features`. Each texture needs
+    /// two slides at least of every movement that occurs. Arguments and errors as of `learn`.
+    #[staticmethod]
+    #[pyo3(signature = (slides, *, method="fused", features=None, drift=(0.1, 0.04), false_alarm=None))]
+    fn learn_slides(
+        py: Python<'_>,
+        slides: &Bound<'_, PyDict>,
+        method: &str,
+        features: Option<&str>,
+        drift: (f32, f32),
+        false_alarm: Option<f32>,
+    ) -> PyResult<Self> {
+        let method = arguments::method(method)?.method();
+        let features = arguments::features(features)?;
+        let expected = expected(drift, false_alarm)?;
+        let (mut names, mut all) = (Vec::new(), Vec::new());
+        for (name, slides) in slides {
+            names.push(name.extract::<String>()?);
+            all.push(slides.extract::<Vec<Py<Features>>>()?);
+        }
+        let mut movements: Vec<Movement> = Vec::new();
+        for slide in all.iter().flatten().map(|slide| slide.get()) {
+            if !movements.contains(&slide.movement) {
+                movements.push(slide.movement);
+            }
+        }
+        let of = |slides: &[Py<Features>], movement: Movement| {
+            let slides = slides.iter().map(|slide| slide.get());
+            let same = slides.filter(|slide| slide.movement == movement);
+            same.map(Features::observation).collect::<Vec<_>>()
+        };
+        let mut observed = Vec::new();
+        for (texture, slides) in names.iter().zip(&all) {
+            let texture = texture.clone();
+            let row: Vec<_> = movements.iter().map(|&m| of(slides, m)).collect();
+            if let Some((few, &movement)) = row.iter().zip(&movements).find(|(s, _)| s.len() < 2) {
+                let there = few.len();
+                return Err(FirstError::Few {
+                    texture,
+                    movement,
+                    there,
+                }
+                .raise());
+            }
+            observed.push(row);
+        }
+        let learn = |_: &(dyn Fn() + Sync)| {
+            learn_for(&expected, method, features, &names, &movements, &observed)
         };
         Self::of(work(py, learn)?)
     }

@@ -18,7 +18,7 @@ def members(node):
 def test_the_package_is_typed():
     assert pathlib.Path(tactus.__file__).with_name("py.typed").exists()
     stubbed = {node.name for node in STUBS.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
-    assert stubbed | {"__version__"} == set(tactus.__all__)
+    assert stubbed | {"__version__", "TEXTURES"} == set(tactus.__all__)
 
 
 @pytest.mark.parametrize("node", [n for n in STUBS.body if isinstance(n, ast.ClassDef)], ids=lambda n: n.name)

@@ -6,10 +6,14 @@ wrong is a `TactusError` with the sentence of the command line. Long work releas
 
 from . import _tactus
 from ._tactus import (
+    TEXTURES,
+    Explorer,
     Features,
     Properties,
     RecordingError,
     Recordings,
+    SimulatedRig,
+    SimulationError,
     Slide,
     SlideError,
     Table,
@@ -17,23 +21,34 @@ from ._tactus import (
     TactusError,
     __version__,
     features,
+    features_of,
+    learn_by_hand,
+    simulate,
 )
 
 __all__ = [
+    "Explorer",
     "Features",
     "Properties",
     "RecordingError",
     "Recordings",
+    "SimulatedRig",
+    "SimulationError",
     "Slide",
     "SlideError",
     "Table",
+    "TEXTURES",
     "TableError",
     "TactusError",
     "__version__",
     "evaluate",
     "evaluate_verify",
     "features",
+    "features_of",
+    "learn_by_hand",
     "novelty",
+    "simulate",
+    "verify",
 ]
 
 _DEFAULTS = {
@@ -101,3 +116,28 @@ def evaluate_verify(recordings, **arguments):
     (pairs of both, limit by limit); `same` and `other`, what is told of the reference's own slides and of others'.
     """
     return _tactus.verifications(recordings, _arguments(arguments))
+
+
+def verify(table, texture, slides, **arguments):
+    """Say whether slides are of a texture of a table, slide by slide until it is told, as `tactus verify` does.
+
+    table: a fused `Table` with limits. texture: a name of it. slides: `Features` in the order of time; those of movements that the
+    table does not have are passed over. arguments: threshold, max_slides and false_alarm, as of `Explorer`.
+
+    Returns a list of dicts, one for each slide that counted: `score`, `limit`, `answer` ("Same", "Different", "Unsure"); the last
+    one has the answer. Raises TableError where the table has no limits, KeyError where it does not have the texture.
+    """
+    most = arguments.get("max_slides", 10)
+    explorer = Explorer(table, among=[texture], method="fused-cycle", **arguments)
+    settings, told = set(table.settings), []
+    for slide in slides:
+        if len(told) == most or told and told[-1]["answer"] != "Unsure":
+            break
+        if (slide.force_n, slide.speed_mm_s) not in settings:
+            continue
+        explorer.update(slide)
+        now = explorer.verification()
+        if now is None:
+            raise TableError("the table has no limits: learn it with --method fused from three textures at least")
+        told.append(now)
+    return told

@@ -1,10 +1,11 @@
 from os import PathLike
-from typing import Any, Dict, List, Optional, Tuple, Union
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
 __version__: str
+TEXTURES: List[str]
 
 class TactusError(Exception):
     """Whatever goes wrong in this package: the sentence of the command line, which says what to do."""
@@ -14,6 +15,9 @@ class RecordingError(TactusError):
 
 class SlideError(TactusError):
     """A slide has no features: it is too short, silent, or not whole."""
+
+class SimulationError(TactusError):
+    """The simulated rig has a fault, or gives no slide."""
 
 class TableError(TactusError):
     """A table cannot be learned, read, explored or written."""
@@ -91,6 +95,8 @@ class Slide:
     def shear_rate_hz(self) -> int: ...
     def features(self) -> Features: ...
 
+def features_of(slides: Sequence[Slide]) -> List[Features]: ...
+
 class Recordings:
     """A folder of recorded slides."""
 
@@ -127,6 +133,15 @@ class Table:
         recordings: Recordings,
         *,
         train_slides: int = 5,
+        method: str = "fused",
+        features: Optional[str] = None,
+        drift: Tuple[float, float] = (0.1, 0.04),
+        false_alarm: Optional[float] = None,
+    ) -> Table: ...
+    @staticmethod
+    def learn_slides(
+        slides: Mapping[str, Sequence[Features]],
+        *,
         method: str = "fused",
         features: Optional[str] = None,
         drift: Tuple[float, float] = (0.1, 0.04),
@@ -192,3 +207,61 @@ def evaluate_verify(
     drift: Tuple[float, float] = (0.1, 0.04),
     false_alarm: Optional[float] = None,
 ) -> Dict[str, Any]: ...
+
+class Explorer:
+    """An exploration of one unknown texture with a table, as the probe makes it."""
+
+    def __init__(
+        self,
+        table: Table,
+        *,
+        among: Optional[Sequence[str]] = None,
+        method: Optional[str] = None,
+        threshold: float = 0.99,
+        max_slides: int = 10,
+        open: bool = True,
+        false_alarm: Optional[float] = None,
+        measures: Optional[Sequence[str]] = None,
+        seed: int = 1,
+    ) -> None: ...
+    def restart(self) -> None: ...
+    def next_movement(self) -> Dict[str, Any]: ...
+    def expected(self) -> List[Dict[str, Any]]: ...
+    def update(self, slide: Features, property: Optional[str] = None) -> None: ...
+    def reject(self, force_n: float, speed_mm_s: float) -> bool: ...
+    @property
+    def posterior(self) -> NDArray[np.float32]: ...
+    @property
+    def textures(self) -> List[str]: ...
+    @property
+    def slides(self) -> int: ...
+    def verdict(self) -> Optional[Dict[str, Any]]: ...
+    def best(self) -> Dict[str, Any]: ...
+    def verification(self) -> Optional[Dict[str, Any]]: ...
+
+def verify(
+    table: Table,
+    texture: str,
+    slides: Iterable[Features],
+    *,
+    threshold: float = 0.99,
+    max_slides: int = 10,
+    false_alarm: Optional[float] = None,
+) -> List[Dict[str, Any]]: ...
+
+class SimulatedRig:
+    """A simulated rig with a texture under its finger."""
+
+    def __init__(self, texture: str, *, seed: int = 1, trial: int = 1, finger: str = "biotac") -> None: ...
+    @property
+    def texture(self) -> str: ...
+    @property
+    def time_s(self) -> float: ...
+    def slide(self, force_n: float, speed_mm_s: float) -> Slide: ...
+
+def simulate(
+    textures: Optional[Sequence[str]] = None, *, trials: int = 5, seed: int = 1, finger: str = "biotac"
+) -> Dict[str, List[Slide]]: ...
+def learn_by_hand(
+    textures: Optional[Sequence[str]] = None, *, trials: int = 5, seed: int = 1, finger: str = "biotac"
+) -> Tuple[Table, List[str]]: ...
