@@ -14,6 +14,8 @@ use tactus::eval::experiment::ExperimentError;
 use tactus::eval::first::FirstError;
 use tactus::eval::learn::TableError as LearnError;
 use tactus::eval::verify::VerifyError;
+use tactus::link::PortError;
+use tactus::link::line::LineError;
 use tactus::sim::collection::TrialError;
 use tactus::sim::rig::SimError;
 use tactus_core::explorer::{ExplorerError, ObserveError};
@@ -50,6 +52,13 @@ create_exception!(
     SimulationError,
     TactusError,
     "The simulated rig has a fault, or gives no slide."
+);
+
+create_exception!(
+    tactus,
+    ProbeError,
+    TactusError,
+    "There is no line to a probe, it is gone, or it refuses."
 );
 
 /// A cause and all causes of that, as the command says them.
@@ -110,6 +119,8 @@ raise! {
     VerifyError => TableError,
     LearnError => TableError,
     SimError => SimulationError,
+    LineError => ProbeError,
+    PortError => ProbeError,
     TrialError => SimulationError,
 }
 
@@ -119,5 +130,6 @@ pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("RecordingError", py.get_type::<RecordingError>())?;
     module.add("SlideError", py.get_type::<SlideError>())?;
     module.add("SimulationError", py.get_type::<SimulationError>())?;
+    module.add("ProbeError", py.get_type::<ProbeError>())?;
     module.add("TableError", py.get_type::<TableError>())
 }

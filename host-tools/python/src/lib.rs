@@ -6,6 +6,7 @@ mod error;
 mod evaluate;
 mod explorer;
 mod features;
+mod probe;
 mod recordings;
 mod simulate;
 mod table;
@@ -24,5 +25,6 @@ fn _tactus(module: &Bound<'_, PyModule>) -> PyResult<()> {
     evaluate::add(module)?;
     explorer::add(module)?;
     simulate::add(module)?;
+    probe::add(module)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

@@ -7,8 +7,11 @@ wrong is a `TactusError` with the sentence of the command line. Long work releas
 from . import _tactus
 from ._tactus import (
     TEXTURES,
+    Events,
     Explorer,
     Features,
+    Probe,
+    ProbeError,
     Properties,
     RecordingError,
     Recordings,
@@ -27,8 +30,11 @@ from ._tactus import (
 )
 
 __all__ = [
+    "Events",
     "Explorer",
     "Features",
+    "Probe",
+    "ProbeError",
     "Properties",
     "RecordingError",
     "Recordings",
