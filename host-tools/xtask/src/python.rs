@@ -41,7 +41,15 @@ pub(crate) fn check() -> Result<()> {
     tests.args(["-m", "pytest", "-rs"]);
     tests.current_dir(root().join(PACKAGE));
     tests.env("TACTUS_COMMAND", command);
-    run(tests.env("PYTHONDONTWRITEBYTECODE", "1"))
+    run(tests.env("PYTHONDONTWRITEBYTECODE", "1"))?;
+    println!("== a session with a probe in software");
+    let mut session = cargo();
+    // as the step of the tests has built it
+    session.args(["test", "--workspace", "--test", "device"]);
+    session
+        .args(["--", "package::"])
+        .env("TACTUS_PYTHON", python);
+    run(&mut session)
 }
 
 /// The workspace of the package has settings of its own.
