@@ -7,6 +7,7 @@
 pub mod follow;
 #[cfg(feature = "serial")]
 pub mod line;
+pub mod log;
 #[cfg(feature = "serial")]
 pub mod owner;
 mod port;

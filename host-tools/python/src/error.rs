@@ -16,6 +16,7 @@ use tactus::eval::learn::TableError as LearnError;
 use tactus::eval::verify::VerifyError;
 use tactus::link::PortError;
 use tactus::link::line::LineError;
+use tactus::link::log::LogError;
 use tactus::sim::collection::TrialError;
 use tactus::sim::rig::SimError;
 use tactus_core::explorer::{ExplorerError, ObserveError};
@@ -121,6 +122,7 @@ raise! {
     SimError => SimulationError,
     LineError => ProbeError,
     PortError => ProbeError,
+    LogError => ProbeError,
     TrialError => SimulationError,
 }
 

@@ -1,6 +1,8 @@
 //! A probe at a serial or a TCP port.
 
 use std::collections::VecDeque;
+use std::fs::File;
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::task::Poll;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -9,6 +11,7 @@ use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use tactus::data::recorder::Recorder;
 use tactus::link::line::{Line, found, only_nucleo, open};
+use tactus::link::log;
 use tactus::link::owner::Owner;
 use tactus::link::{Job, Port, PortError, ReadTable, Request, Transaction};
 use tactus_core::explorer::Strategy;
@@ -387,7 +390,23 @@ impl Probe {
     }
 }
 
+/// Reads a log that `tactus device --log FILE` wrote: a list of dicts, one for each line, each with one key: "session" (who wrote it),
+/// "command" (what the probe was asked for) or "report" (number, at_ms and event, as `Probe.identify` gives them).
+///
+/// Raises ProbeError where it is no log, or of another version, OSError where it cannot be read.
+#[pyfunction]
+fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Bound<'_, PyAny>>> {
+    let lines = py.detach(|| {
+        let (mut lines, file) = (Vec::new(), File::open(&path)?);
+        let read = log::read(file, |line| lines.push(line));
+        read.map_err(|why| why.raise_of(&path.display().to_string()))?;
+        Ok::<_, PyErr>(lines)
+    })?;
+    lines.iter().map(|line| object(py, line)).collect()
+}
+
 pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Probe>()?;
-    module.add_class::<Events>()
+    module.add_class::<Events>()?;
+    module.add_function(wrap_pyfunction!(read_log, module)?)
 }

@@ -184,3 +184,24 @@ def test_ctrl_c_stops_the_rig():
             run.kill()
     assert (run.returncode, out) == (0, "stopped, Ready\n")
     assert [name for name, _ in probe.asked] == ["Identify", "Stop", "Status"]
+
+
+def test_a_log_of_the_command_is_read(command, tmp_path):
+    import json
+
+    log = tmp_path / "session.jsonl"
+    command("device", "status", "--port", Probe().port, "--log", log)
+    read = tactus.read_log(log)
+    lines = [json.loads(line) for line in log.read_text().splitlines()]
+    assert read == lines
+    assert [next(iter(line)) for line in read][:2] == ["session", "command"]
+    assert {"command": "Status"} in read
+    assert any("Status" in line["report"]["event"] for line in read if "report" in line)
+    log.write_text(log.read_text() + "no line\n")
+    with pytest.raises(tactus.ProbeError, match=f"line {len(lines) + 1} is no line of a session's log"):
+        tactus.read_log(log)
+    log.write_text('{"session":{"tactus":"9","protocol":99,"port":"x"}}\n')
+    with pytest.raises(tactus.ProbeError, match="version 99"):
+        tactus.read_log(log)
+    with pytest.raises(OSError):
+        tactus.read_log(tmp_path / "nowhere")

@@ -26,6 +26,7 @@ from ._tactus import (
     features,
     features_of,
     learn_by_hand,
+    read_log,
     simulate,
 )
 
@@ -53,6 +54,7 @@ __all__ = [
     "features_of",
     "learn_by_hand",
     "novelty",
+    "read_log",
     "simulate",
     "verify",
 ]
