@@ -3,6 +3,8 @@
 
 #[path = "device/client.rs"]
 mod client;
+#[path = "device/package.rs"]
+mod package;
 #[path = "device/software.rs"]
 mod software;
 #[path = "device/tables.rs"]

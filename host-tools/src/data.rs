@@ -11,4 +11,5 @@ pub mod recording;
 pub mod recordings;
 pub mod replay;
 pub mod rows;
+pub mod table_file;
 pub mod whole;

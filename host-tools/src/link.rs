@@ -1,10 +1,15 @@
-//! The host's end of the link to the probe, without IO and without a clock: bytes come in, bytes go out.
+//! The host's end of the link to the probe; without the feature `serial` without IO of its own: bytes come in, bytes go out.
 //!
 //! [`Session`] makes requests and understands reports. A [`Transaction`] is one request ([`Request`]) or a sequence of them
 //! ([`PushTable`], [`ReadTable`]); [`Job`] runs it to its end, whatever is damaged or lost on the way.
 //! [`Port`] runs jobs over anything that reads and writes: a serial line, a TCP connection.
 
 pub mod follow;
+#[cfg(feature = "serial")]
+pub mod line;
+pub mod log;
+#[cfg(feature = "serial")]
+pub mod owner;
 mod port;
 mod request;
 mod session;

@@ -2,7 +2,7 @@
 
 use crate::rules::Package;
 
-pub(crate) const PACKAGES: [Package; 5] = [
+pub(crate) const PACKAGES: [Package; 6] = [
     Package {
         folder: "shared",
         steps: &[
@@ -61,6 +61,12 @@ pub(crate) const PACKAGES: [Package; 5] = [
         steps: &[&["board"], &["host"], &["scenario"], &["runs"]],
         strangers: &[],
         outside: &["lib", "main"],
+    },
+    Package {
+        folder: "host-tools/python",
+        steps: &[],
+        strangers: &[],
+        outside: &[],
     },
     Package {
         folder: "host-tools/xtask",

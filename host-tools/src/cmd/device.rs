@@ -10,7 +10,6 @@ mod line;
 pub(crate) mod log;
 mod loss;
 mod monitor;
-mod owner;
 mod record;
 mod refresh;
 mod rename;

@@ -4,16 +4,11 @@ use std::io::{self, Write};
 
 use anyhow::ensure;
 use clap::ValueEnum as _;
-use serde::Serialize;
-use tactus::eval::courses::courses;
-use tactus::eval::evaluate::{Method, Outcome, Summary, evaluate};
-use tactus::eval::experiment::{Experiment, Protocol};
+use tactus::eval::evaluation::{Asked, Evaluation, evaluation};
+use tactus::eval::experiment::Protocol;
 use tactus::eval::pictures::evaluation::figures;
-use tactus::eval::reliability::{AtThreshold, Statements, by_threshold, statements};
-use tactus::eval::seconds::mean_seconds;
 use tactus::eval::show::count;
-use tactus::eval::verdicts::Verdicts;
-use tactus_core::explorer::{self, Config};
+use tactus_core::explorer;
 
 use super::output::{Format, percent, print_json, verdict_rows};
 use super::progress::with_progress;
@@ -23,34 +18,6 @@ mod early;
 mod experiment;
 mod novelty;
 mod verify;
-
-/// What `evaluate` prints.
-#[derive(Serialize)]
-struct Evaluation {
-    method: Method,
-    protocol: &'static str,
-    train_slides: usize,
-    runs: u64,
-    textures: usize,
-    threshold: f32,
-    max_slides: u8,
-    seed: u64,
-    /// What users would have been told: see [`as_told`].
-    verdicts: Verdicts,
-    /// Mean number of slides until then.
-    mean_slides_told: f64,
-    /// Mean time until then, s, where that was asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    mean_seconds_told: Option<f64>,
-    /// How often it was right when it said so, by what it said.
-    reliability: Vec<Statements>,
-    /// What another threshold would change.
-    by_threshold: Vec<AtThreshold>,
-    /// Figures of explorations that know that the texture is one of the table's, with slides drawn with replacement: the
-    /// paper's protocol.
-    #[serde(flatten)]
-    summary: Summary,
-}
 
 /// Plays the explorations that the arguments ask for.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
@@ -92,59 +59,29 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     // a program gets what the pictures show
     let with_courses = canvas.is_some() || args.format == Format::Json;
-    let stages = if with_courses { 3 } else { 2 };
-    let stage = |number: u32| format!("exploring, {number} of {stages}");
-    let outcomes = with_progress(args.runs(), stage(1), |done| {
-        evaluate(&experiment, config, args.runs(), done)
-    })?;
-    let max_slides = args.stop.max_slides;
-    let summary = Summary::new(&outcomes, experiment.names(), max_slides);
-    let (experiment, config) = as_told(experiment, config);
-    let told = with_progress(args.runs(), stage(2), |done| {
-        evaluate(&experiment, config, args.runs(), done)
-    })?;
-    let courses = if with_courses {
-        with_progress(args.runs(), stage(3), |done| {
-            courses(&experiment, config, args.runs(), done)
-        })?
-    } else {
-        Vec::new()
-    };
-    let time = args.choosing.time(args.slide_time());
-    let evaluation = Evaluation {
-        reliability: statements(&courses, args.stop.threshold),
-        by_threshold: by_threshold(&courses, args.stop.threshold),
+    let asked = Asked {
         method: args.method,
         protocol,
-        train_slides: experiment.train_slides(),
         runs: args.runs(),
-        textures: experiment.names().len(),
-        threshold: args.stop.threshold,
-        max_slides,
         seed: args.seed,
-        verdicts: Verdicts::of(told.iter().map(Outcome::told)),
-        mean_slides_told: Summary::new(&told, experiment.names(), max_slides).mean_slides,
-        mean_seconds_told: time.map(|time| mean_seconds(&told, experiment.movements(), time)),
-        summary,
+        config,
+        time: args.choosing.time(args.slide_time()),
+        with_courses,
     };
+    let names = experiment.names().to_vec();
+    let (evaluation, courses) = evaluation(experiment, &asked, |[stage, stages], work| {
+        let what = format!("exploring, {stage} of {stages}");
+        with_progress(args.runs(), what, work)
+    })?;
     match args.format {
         Format::Json => print_json(&evaluation, out)?,
         Format::Text => print_evaluation(&evaluation, out)?,
     }
     if let Some(canvas) = canvas {
-        let figures = figures(&courses, experiment.names(), args.stop.threshold)?;
+        let figures = figures(&courses, &names, args.stop.threshold)?;
         canvas.write("tactus evaluate", &figures, out)?;
     }
     Ok(())
-}
-
-/// The experiment as `identify` meets it: the texture may be none of those known, and no slide counts twice.
-fn as_told(experiment: Experiment, config: Config) -> (Experiment, Config) {
-    let config = Config {
-        open: true,
-        ..config
-    };
-    (experiment.each_slide_once(), config)
 }
 
 fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {

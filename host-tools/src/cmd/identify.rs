@@ -14,6 +14,7 @@ use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::{Replay, ReplayError};
 use tactus::eval::evaluate::{MAX_TEXTURES, Method};
 use tactus::eval::experiment::{Experiment, Protocol};
+use tactus::eval::first::at_least_two;
 use tactus::eval::learn::Expected;
 use tactus::eval::pictures::exploration::Exploration;
 use tactus::eval::pictures::timeline::{Timeline, Watch};
@@ -30,12 +31,12 @@ use tactus_core::rig::Rig;
 use tactus_core::table::Table;
 
 use super::args::{Choosing, Expecting, Recordings, Stop, length, rising};
-use super::learn::{at_least_two, learned_here};
+use super::learn::learned_here;
 use super::output::{Done, Format, UsageError, print_json};
 use super::plot::{Canvas, Plot};
 use super::progress::with_progress;
 use super::table_file::read_table;
-use super::textures::{find_material, find_textures, measure_folder, names, of_one_finger};
+use super::textures::{find_material, find_textures, measure_folder, of_one_finger};
 
 pub(crate) const FIRST_STEPS: &str = "\
 Try first:
@@ -185,7 +186,7 @@ fn identify_recorded(
     } else {
         let (slides, interleaved) = (args.train_slides, Protocol::Interleaved);
         let experiment =
-            Experiment::recorded(names(&set), &measured, None, interleaved, slides, args.seed)?;
+            Experiment::recorded(set.names(), &measured, None, interleaved, slides, args.seed)?;
         let experiment = experiment.expecting(Expected {
             drift: Some(args.expecting.drift),
             ..Expected::default()

@@ -10,12 +10,12 @@ use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::{MeasuredSlide, measure_cut};
 use tactus::eval::early::{is_longer, of_length};
 use tactus::eval::evaluate::Method;
-use tactus::eval::learn::{Expected, know_lengths, name_finger};
-use tactus::eval::samples::{note, of_all};
+use tactus::eval::first::learn_first;
+use tactus::eval::learn::{Expected, know_lengths};
 use tactus::eval::show::count;
 use tactus::sim::collection::texture_name;
 use tactus_core::explorer;
-use tactus_core::features::{FeatureSet, Movement, Observation};
+use tactus_core::features::Movement;
 use tactus_core::sensor::FingerName;
 use tactus_core::table::{FALSE_ALARM, Table};
 
@@ -23,7 +23,7 @@ use super::args::{Expecting, Features, Recordings, false_alarm, length, rising};
 use super::output::{Format, print_json};
 use super::progress::with_progress;
 use super::table_file::{TableFile, write_table};
-use super::textures::{collection, finger_of, measure_folder, names};
+use super::textures::{collection, measure_folder};
 
 /// Learn a texture table from the first slides of every texture
 #[derive(clap::Args)]
@@ -246,15 +246,6 @@ pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()>
     Ok(())
 }
 
-/// That slides to learn from are enough.
-pub(crate) fn at_least_two(slides: usize) -> anyhow::Result<()> {
-    ensure!(
-        slides >= 2,
-        "--train-slides {slides}: how slides of one texture differ takes at least two slides"
-    );
-    Ok(())
-}
-
 /// The slides of a folder that a table has seen: the first of every texture and movement, if it was learned from this folder.
 pub(crate) struct LearnedHere {
     first: usize,
@@ -292,65 +283,4 @@ pub(crate) fn learned_here(
         first: if is_own { trials } else { 0 },
         met: HashMap::new(),
     }
-}
-
-/// The table learned from the first slides of every texture and movement: so many, or all where there are fewer.
-pub(crate) fn learn_first(
-    set: &RecordingSet,
-    measured: &[Vec<MeasuredSlide>],
-    slides: usize,
-    method: Method,
-    features: Option<FeatureSet>,
-    expected: &Expected,
-) -> anyhow::Result<Vec<u8>> {
-    at_least_two(slides)?;
-    let movements = set.movements();
-    let first = |name: &str, measured: &[MeasuredSlide], movement: Movement| {
-        let same = measured.iter().filter(|s| s.movement == movement);
-        let trials: Vec<_> = same
-            .map(|s| Observation::from(&s.measurement))
-            .take(slides)
-            .collect();
-        let there = trials.len();
-        ensure!(
-            there >= 2,
-            "{name}, {movement}: {there} {}, and how slides of one texture differ takes at least two",
-            if there == 1 { "slide" } else { "slides" }
-        );
-        Ok(trials)
-    };
-    let first = set
-        .textures()
-        .iter()
-        .zip(measured)
-        .map(|(texture, measured)| {
-            let trials = movements
-                .iter()
-                .map(|&movement| first(&texture.name, measured, movement));
-            trials.collect()
-        });
-    let first: Vec<Vec<Vec<Observation>>> = first.collect::<anyhow::Result<_>>()?;
-    let method = method.method();
-    let bytes = tactus::eval::learn::learn_for(
-        expected,
-        method,
-        features,
-        &names(set),
-        &movements,
-        &first,
-    )?;
-    // what the recordings say of the very slides that were learned from
-    let moved = |texture: usize| {
-        let keys = set.slides(texture);
-        let of = |movement: &Movement| {
-            let same = measured[texture].iter().filter(|s| s.movement == *movement);
-            let numbers: Vec<u32> = same.map(|s| s.number).take(slides).collect();
-            let used = keys.iter().filter(move |key| numbers.contains(&key.number));
-            used.map(|key| key.labels.moved)
-        };
-        of_all(movements.iter().flat_map(of))
-    };
-    let noted = note(&bytes, |texture| moved(texture.into()))?;
-    let (finger, calibrated) = finger_of(set)?;
-    Ok(name_finger(&noted, finger, calibrated)?)
 }

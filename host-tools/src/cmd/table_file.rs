@@ -3,13 +3,11 @@
 use std::io::{self, Read};
 use std::path::Path;
 
-use anyhow::{Context as _, ensure};
+use anyhow::Context as _;
 use serde::Serialize;
+use tactus::data::table_file::{self, TableFileError};
 use tactus::data::whole::write_whole;
 use tactus_core::table::Table;
-
-/// Most bytes of a table that are read: more textures and movements than a table can have.
-const MAX_BYTES: u64 = 64 << 20;
 
 /// A good table file, for programs.
 #[derive(Serialize)]
@@ -49,18 +47,9 @@ pub(crate) fn opened(file: &Path) -> io::Result<Box<dyn Read>> {
 }
 
 /// The table in a file; "-" is standard input.
-pub(crate) fn read_table<'b>(file: &Path, bytes: &'b mut Vec<u8>) -> anyhow::Result<Table<'b>> {
-    let name = file.display();
-    bytes.clear();
-    opened(file)
-        .and_then(|file| file.take(MAX_BYTES).read_to_end(bytes))
-        .with_context(|| format!("{name}: no table here, `tactus learn --out FILE` writes one"))?;
-    let table = Table::read(bytes).with_context(|| name.to_string())?;
-    table.check_samples().with_context(|| name.to_string())?;
-    let behind = bytes.len() - table.as_bytes().len();
-    ensure!(
-        behind == 0,
-        "{name}: other bytes follow the table; the file is not what `tactus learn` wrote"
-    );
-    Ok(table)
+pub(crate) fn read_table<'b>(
+    file: &Path,
+    bytes: &'b mut Vec<u8>,
+) -> Result<Table<'b>, TableFileError> {
+    table_file::read_table(file, opened(file), bytes)
 }

@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, ensure};
+use anyhow::Context as _;
 use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::{MeasuredSlide, measure_all};
 use tactus::sim::collection::{Collection, plain_name, texture_number};
 use tactus::sim::textures::TEXTURES;
-use tactus_core::sensor::FingerCode;
 use tactus_core::table::Table;
 
 use super::names::{nearest, unknown};
@@ -18,7 +17,7 @@ pub(crate) fn measure_folder(
     folder: &Path,
 ) -> anyhow::Result<(RecordingSet, Vec<Vec<MeasuredSlide>>)> {
     let set = RecordingSet::open(folder)?;
-    finger_of(&set).with_context(|| folder.display().to_string())?;
+    set.finger().with_context(|| folder.display().to_string())?;
     let textures = set.textures().len() as u64;
     let measured = with_progress(textures, "measuring slides", |done| {
         measure_all(&set, |_| done())
@@ -29,30 +28,9 @@ pub(crate) fn measure_folder(
 
 /// That slides of this folder can be compared with those that a table was learned from.
 pub(crate) fn of_one_finger(set: &RecordingSet, table: Table<'_>) -> anyhow::Result<()> {
-    let (finger, _) = finger_of(set)?;
+    let (finger, _) = set.finger()?;
     table.of_finger(finger).context("the table")?;
     Ok(())
-}
-
-/// The finger that recordings were made with, and the day of its calibration, where it is the same of all.
-pub(crate) fn finger_of(set: &RecordingSet) -> anyhow::Result<(FingerCode, u32)> {
-    let slides = (0..set.textures().len()).flat_map(|texture| set.slides(texture));
-    let mut all = slides.map(|key| (key.labels.finger, key.labels.calibrated));
-    let (finger, mut calibrated) = all.next().unwrap_or_default();
-    for (other, date) in all {
-        ensure!(
-            other == finger,
-            "slides of two fingers, {finger} and {other}, cannot be compared: keep them in folders of their own"
-        );
-        if date != calibrated {
-            calibrated = 0;
-        }
-    }
-    Ok((finger, calibrated))
-}
-
-pub(crate) fn names(set: &RecordingSet) -> Vec<String> {
-    set.textures().iter().map(|t| t.name.clone()).collect()
 }
 
 /// Index of the texture that is meant by a number or a name.

@@ -8,6 +8,7 @@ use serde::Serialize;
 use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::{MeasuredSlide, measure};
 use tactus::eval::evaluate::{Method, explorer};
+use tactus::eval::first::learn_first;
 use tactus::eval::learn::Expected;
 use tactus::eval::show::count;
 use tactus::eval::verify::{false_accept, put};
@@ -20,7 +21,6 @@ use tactus_core::table::{Action, POPULATION, Table};
 use tactus_core::wire::Failure;
 
 use super::args::Stop;
-use super::learn::learn_first;
 use super::names::find;
 use super::output::{Done, Format, UsageError, percent, print_json};
 use super::progress::with_progress;

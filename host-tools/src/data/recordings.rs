@@ -15,8 +15,9 @@ mod writer;
 use std::path::{Path, PathBuf};
 
 use tactus_core::features::Movement;
+use tactus_core::sensor::FingerCode;
 
-use crate::data::recording::{Recording, SlideKey, Texture};
+use crate::data::recording::{Labels, Recording, SlideKey, Texture};
 pub use files::{RecordingError, Result};
 pub use writer::RecordingWriter;
 
@@ -85,6 +86,36 @@ impl RecordingSet {
     /// texture.
     pub fn slides(&self, index: usize) -> &[SlideKey] {
         self.slides.get(index).map_or(&[], Vec::as_slice)
+    }
+
+    /// Names of the textures.
+    pub fn names(&self) -> Vec<String> {
+        self.textures.iter().map(|t| t.name.clone()).collect()
+    }
+
+    /// The finger that the slides were made with, and the day of its calibration, where it is the same of all, else 0.
+    ///
+    /// # Errors
+    /// They were made with two fingers.
+    pub fn finger(&self) -> Result<(FingerCode, u32)> {
+        let mut all = self.slides.iter().flatten();
+        let first = all.next().map(|key| &key.labels);
+        let (finger, mut calibrated) =
+            first.map_or_else(Default::default, |l| (l.finger, l.calibrated));
+        for Labels {
+            finger: other,
+            calibrated: date,
+            ..
+        } in all.map(|key| &key.labels)
+        {
+            if *other != finger {
+                return Err(RecordingError::TwoFingers(finger, *other));
+            }
+            if *date != calibrated {
+                calibrated = 0;
+            }
+        }
+        Ok((finger, calibrated))
     }
 
     /// The movements of the set, in the order in which they are first seen.

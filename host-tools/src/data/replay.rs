@@ -114,6 +114,7 @@ fn measure_each<T: Send>(
     let plan = Plan::new();
     (0..set.textures().len())
         .into_par_iter()
+        .panic_fuse()
         .map(|index| {
             let texture = &set.textures()[index];
             let measured = set

@@ -270,11 +270,11 @@ pub(super) fn evaluate_from<T: Send>(
         let bytes = learn(0)?;
         let shared = Shared::with(&bytes, experiment, config)?;
         let run = |explorer: &mut Box<_>, index| run(explorer, shared.confusions.as_ref(), index);
-        let all = (0..runs).into_par_iter();
+        let all = (0..runs).into_par_iter().panic_fuse();
         return Ok(all.map_init(|| shared.explorer.clone(), run).collect());
     }
     let round = experiment.round();
-    let rounds = (0..runs.div_ceil(round)).into_par_iter();
+    let rounds = (0..runs.div_ceil(round)).into_par_iter().panic_fuse();
     let played = rounds.map(|number| {
         let first = number * round;
         let bytes = learn(first)?;

@@ -172,6 +172,7 @@ pub fn leave_out(
     };
     let presented: Vec<_> = (0..runs)
         .into_par_iter()
+        .panic_fuse()
         .map(|index| {
             let mut run = experiment.run_alone(index);
             let presented = run.unknown;

@@ -108,6 +108,7 @@ pub fn verify(
     let textures = experiment.names().len();
     let visits: Vec<Vec<Visit>> = (0..runs)
         .into_par_iter()
+        .panic_fuse()
         .map(|index| {
             let mut run = experiment.run_alone(index);
             let bytes = run.learn(config.method)?;

@@ -7,6 +7,7 @@ mod factory;
 mod firmware;
 mod flash;
 mod fuzz;
+mod python;
 mod reasons;
 mod seeds;
 mod shell;

@@ -16,7 +16,7 @@ use steps::{CHECK, QUICK, SLOW, STEPS, Step};
 use summary::{Outcome, Ran, summary};
 
 /// Names the file to which tests that are skipped add a line each.
-const SKIP_LOG: &str = "TACTUS_SKIP_LOG";
+pub(crate) const SKIP_LOG: &str = "TACTUS_SKIP_LOG";
 /// A build has one long tail of a single thread, and a step waits for the one before: two at a time keep two cores busy.
 const AT_ONCE: usize = 2;
 

@@ -10,12 +10,14 @@ use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use tactus::bringup::Trouble;
+use tactus::link::line::Line;
+use tactus::link::owner::Owner;
 use tactus::link::{Job, LinkError, Port, PortError, ReadTable, Request, Transaction};
 use tactus_core::rig::Fault;
 use tactus_core::table::{Table, TableError};
 use tactus_core::wire::{Command, Event, Phase, Prompt, Report, Status};
 
-use super::line::{Emulator, Line, OpenError, Where};
+use super::line::{Emulator, OpenError, Where};
 use super::log::Log;
 
 /// A probe that says nothing for so long is taken for gone: its longest silence is an erase of its flash, 2 s.
@@ -123,7 +125,7 @@ pub(crate) struct Bench {
     heard: Heard,
     /// ends last
     _emulator: Option<Emulator>,
-    _owner: Option<super::owner::Owner>,
+    _owner: Option<Owner>,
 }
 
 /// What the reports have said of the rig, and the log that keeps them.

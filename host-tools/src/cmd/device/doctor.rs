@@ -8,6 +8,7 @@ use anyhow::ensure;
 use serde::Serialize;
 use tactus::eval::show::{count, day};
 use tactus::link::Request;
+use tactus::link::line::LineError;
 use tactus_core::rig::Fault;
 use tactus_core::rig::skin::WARN_J;
 use tactus_core::table::Table;
@@ -147,7 +148,7 @@ fn unreached(why: &BenchError, checks: &mut Checks) {
     match why {
         BenchError::Open(why) => {
             let remedy = match why {
-                OpenError::Denied(_) => UDEV,
+                OpenError::Line(LineError::Denied(_)) => UDEV,
                 _ => "`tactus device list` shows the ports of this PC",
             };
             checks.bad("port", why.to_string(), remedy);
@@ -431,7 +432,7 @@ mod tests {
     #[test]
     fn a_port_that_may_not_be_opened_has_a_rule_for_udev() {
         let mut checks = Checks::default();
-        let why = OpenError::Denied("/dev/ttyACM0".into());
+        let why = OpenError::from(LineError::Denied("/dev/ttyACM0".into()));
         unreached(&BenchError::Open(why), &mut checks);
         let mut told = Vec::new();
         checks.print(&mut told).unwrap();

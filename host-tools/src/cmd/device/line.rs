@@ -1,26 +1,18 @@
 //! Where the probe is: serial ports, TCP ports, and an emulated board that is started for it.
 
-use std::fmt;
-use std::io::{self, BufRead as _, BufReader, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs as _};
+use std::io::{self, BufRead as _, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc;
 use std::time::{Duration, SystemTime};
 
-use super::owner::{Owned, Owner};
 use crate::cmd::config;
 use crate::cmd::output::{Format, print_json};
 use clap::Args;
 use serde::Serialize;
-use serialport::{SerialPortInfo, SerialPortType, UsbPortInfo};
+use tactus::link::line::{Found, Line, LineError, found, lines, only_nucleo, open, tcp};
+use tactus::link::owner::Owner;
 
-/// The probe's line.
-const BAUD: u32 = 921_600;
-/// Reads come back after that, so that somebody looks at the keyboard; writes may take as long.
-const READ: Duration = Duration::from_millis(50);
-/// USB vendor of the NUCLEO's ST-LINK.
-const ST: u16 = 0x0483;
 /// Longest that the emulator takes to build its world: recordings are read.
 const STARTING: Duration = Duration::from_secs(120);
 
@@ -52,42 +44,9 @@ pub(crate) struct Where {
 /// Why there is no line to the probe, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum OpenError {
-    /// Nothing is plugged in.
-    #[error(
-        "no serial port of a NUCLEO here: plug in the board's USB socket CN1 (LD4 must be lit), give --port, or try --emulated"
-    )]
-    None,
-    /// More than one.
-    #[error("several boards are plugged in: choose one with --port\n{}", lines(.0))]
-    Several(Vec<Found>),
-    /// No such port.
-    #[error("{port}: there is no such port. {}", others(.found))]
-    NotThere { port: String, found: Vec<Found> },
-    /// Another program has it.
-    #[error(
-        "{0} is busy: another program has it open (another tactus, a terminal such as minicom, ModemManager). Close that; \
-         `fuser -v {0}` names it"
-    )]
-    Busy(String),
-    /// Another tactus has it.
+    /// There is none.
     #[error(transparent)]
-    Owned(#[from] Owned),
-    /// The user may not.
-    #[error(
-        "{0}: you may not open this port. On Linux: sudo usermod -aG dialout $USER, then log in again"
-    )]
-    Denied(String),
-    /// Something else.
-    #[error("{port} cannot be opened: {why}; is it a serial port?")]
-    Serial {
-        port: String,
-        why: serialport::Error,
-    },
-    /// No such address, or nobody there.
-    #[error(
-        "{address}: {why}. Is the emulated board running there (`cargo xtask emulate --port N`)?"
-    )]
-    Tcp { address: String, why: io::Error },
+    Line(#[from] LineError),
     /// The emulator or the firmware is not built; a variable can name it.
     #[error(
         "{what} is not built: run `cargo xtask emulate` once, which builds it (or name it with {variable})"
@@ -99,77 +58,6 @@ pub(crate) enum OpenError {
     /// The emulator ended, or did not start.
     #[error("the emulated board does not start: {0}")]
     Emulator(String),
-}
-
-/// A serial port of this PC.
-#[derive(Clone, PartialEq, Debug)]
-pub(crate) struct Found {
-    name: String,
-    usb: Option<UsbPortInfo>,
-}
-
-impl Found {
-    fn is_nucleo(&self) -> bool {
-        self.usb.as_ref().is_some_and(|usb| usb.vid == ST)
-    }
-}
-
-impl From<SerialPortInfo> for Found {
-    fn from(port: SerialPortInfo) -> Self {
-        let usb = match port.port_type {
-            SerialPortType::UsbPort(usb) => Some(usb),
-            _ => None,
-        };
-        Self {
-            name: port.port_name,
-            usb,
-        }
-    }
-}
-
-impl fmt::Display for Found {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:<16}", self.name)?;
-        let Some(usb) = &self.usb else {
-            return f.write_str("  no USB device");
-        };
-        write!(f, "  {:04x}:{:04x}", usb.vid, usb.pid)?;
-        let texts = [&usb.manufacturer, &usb.product, &usb.serial_number];
-        for text in texts.into_iter().flatten() {
-            write!(f, "  {text}")?;
-        }
-        if self.is_nucleo() {
-            f.write_str("  <- a NUCLEO: try this one")?;
-        }
-        Ok(())
-    }
-}
-
-fn lines(ports: &[Found]) -> String {
-    let lines: Vec<String> = ports.iter().map(|port| format!("  {port}")).collect();
-    lines.join("\n")
-}
-
-fn others(found: &[Found]) -> String {
-    if found.is_empty() {
-        "This PC has no serial port now: plug in the board's USB socket CN1, or try --emulated"
-            .to_owned()
-    } else {
-        format!("There are:\n{}", lines(found))
-    }
-}
-
-/// The serial ports of this PC; boards first. Those of the mainboard that no chip answers at are left out.
-pub(crate) fn found() -> Vec<Found> {
-    let ports = serialport::available_ports().unwrap_or_default();
-    let mut ports: Vec<Found> = ports
-        .into_iter()
-        .map(Found::from)
-        // every Linux has 32 of these, there or not
-        .filter(|port| port.usb.is_some() || !port.name.starts_with("/dev/ttyS"))
-        .collect();
-    ports.sort_by_key(|port| (!port.is_nucleo(), port.name.clone()));
-    ports
 }
 
 /// A port in `device list --format json`.
@@ -220,10 +108,6 @@ pub(crate) fn list(format: Format, out: &mut impl Write) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What carries bytes to the probe and back; reads come back soon, with or without any.
-pub(crate) trait Line: Read + Write + Send {}
-impl<T: Read + Write + Send> Line for T {}
-
 /// A line that is open.
 pub(crate) struct Open {
     pub(crate) line: Box<dyn Line>,
@@ -249,73 +133,14 @@ impl Where {
             Some(port) => port,
             None => only_nucleo(found())?,
         };
-        // however its address was written
-        let same = tcp_address(&name).map(|address| format!("tcp:{address}"));
-        let owner = Some(Owner::take(same.as_ref().unwrap_or(&name))?);
-        let line = match tcp_address(&name) {
-            Some(address) => tcp(address)?,
-            None => serial(&name)?,
-        };
+        let (line, owner) = open(&name)?;
         Ok(Open {
             line,
             name,
             emulator: None,
-            owner,
+            owner: Some(owner),
         })
     }
-}
-
-fn only_nucleo(found: Vec<Found>) -> Result<String, OpenError> {
-    let mut nucleos: Vec<Found> = found.into_iter().filter(Found::is_nucleo).collect();
-    match nucleos.len() {
-        0 => Err(OpenError::None),
-        1 => Ok(nucleos.remove(0).name),
-        _ => Err(OpenError::Several(nucleos)),
-    }
-}
-
-/// The address in "tcp:HOST:PORT" or in "HOST:PORT", which no serial port is called.
-fn tcp_address(name: &str) -> Option<&str> {
-    name.strip_prefix("tcp:").or_else(|| {
-        let (host, port) = name.rsplit_once(':')?;
-        let is_address = !host.is_empty() && port.parse::<u16>().is_ok();
-        (is_address && !Path::new(name).exists()).then_some(name)
-    })
-}
-
-fn serial(port: &str) -> Result<Box<dyn Line>, OpenError> {
-    use io::ErrorKind as Io;
-    use serialport::ErrorKind as Serial;
-    let port = port.to_owned();
-    let why = match serialport::new(&port, BAUD).timeout(READ).open() {
-        Ok(line) => return Ok(Box::new(line)),
-        Err(why) => why,
-    };
-    Err(match why.kind() {
-        Serial::Io(Io::PermissionDenied) => OpenError::Denied(port),
-        // serialport's word for a port that somebody else has, or one that Windows does not know
-        Serial::NoDevice if Path::new(&port).exists() || cfg!(windows) => OpenError::Busy(port),
-        Serial::NoDevice | Serial::Io(Io::NotFound) => {
-            let found = found();
-            OpenError::NotThere { port, found }
-        }
-        _ => OpenError::Serial { port, why },
-    })
-}
-
-fn tcp(address: &str) -> Result<Box<dyn Line>, OpenError> {
-    let error = |why| OpenError::Tcp {
-        address: address.to_owned(),
-        why,
-    };
-    let to = address.to_socket_addrs().map_err(error)?.next();
-    let to = to.ok_or_else(|| error(io::ErrorKind::NotFound.into()))?;
-    let stream = TcpStream::connect_timeout(&to, Duration::from_secs(5)).map_err(error)?;
-    stream
-        .set_read_timeout(Some(READ))
-        .and_then(|()| stream.set_nodelay(true))
-        .map_err(error)?;
-    Ok(Box::new(stream))
 }
 
 /// An emulated board, in a process of its own.
@@ -436,76 +261,31 @@ fn built(what: &'static str, variable: &'static str, files: &[&str]) -> Result<P
 
 #[cfg(test)]
 mod tests {
+    use serialport::UsbPortInfo;
+
     use super::*;
 
-    fn port(name: &str, vid: u16) -> Found {
+    #[test]
+    fn a_board_is_pointed_out_in_the_list() {
         let usb = UsbPortInfo {
-            vid,
+            vid: 0x0483,
             pid: 0x374b,
             serial_number: Some("066EFF".into()),
             manufacturer: None,
             product: Some("STM32 STLink".into()),
         };
-        Found {
+        let found = |name: &str, usb| Found {
             name: name.into(),
-            usb: Some(usb),
-        }
-    }
-
-    #[test]
-    fn an_address_is_no_serial_port() {
-        for (name, address) in [
-            ("tcp:127.0.0.1:7429", Some("127.0.0.1:7429")),
-            ("127.0.0.1:7429", Some("127.0.0.1:7429")),
-            ("bench.local:7429", Some("bench.local:7429")),
-            ("[::1]:7429", Some("[::1]:7429")),
-            ("/dev/ttyACM0", None),
-            ("COM3", None),
-            ("COM3:", None),
-            (":7429", None),
-            ("host:99999", None),
-        ] {
-            assert_eq!(tcp_address(name), address, "{name}");
-        }
-    }
-
-    #[test]
-    fn the_only_board_is_taken_and_of_two_the_user_chooses() {
-        let other = port("/dev/ttyUSB0", 0x1a86);
-        let [a, b] = ["/dev/ttyACM0", "/dev/ttyACM1"].map(|name| port(name, ST));
-        assert_eq!(
-            only_nucleo(vec![other.clone(), a.clone()]).unwrap(),
-            "/dev/ttyACM0"
-        );
-        let none = only_nucleo(vec![other]).unwrap_err().to_string();
-        assert!(
-            none.contains("CN1") && none.contains("--emulated"),
-            "{none}"
-        );
-        let both = only_nucleo(vec![a, b]).unwrap_err().to_string();
-        assert!(
-            both.contains("--port") && both.contains("ttyACM0") && both.contains("ttyACM1"),
-            "{both}"
-        );
-    }
-
-    #[test]
-    fn a_board_is_pointed_out_in_the_list() {
-        assert_eq!(
-            port("/dev/ttyACM0", ST).to_string(),
-            "/dev/ttyACM0      0483:374b  STM32 STLink  066EFF  <- a NUCLEO: try this one"
-        );
-        let json = serde_json::to_value(Listed::from(&port("/dev/ttyACM0", ST))).unwrap();
+            usb,
+        };
+        let board = found("/dev/ttyACM0", Some(usb));
+        let json = serde_json::to_value(Listed::from(&board)).unwrap();
         assert_eq!(json["usb_vendor"], 0x0483);
         assert_eq!(
             (&json["is_nucleo"], &json["serial_number"]),
             (&true.into(), &"066EFF".into())
         );
-        let plain = Found {
-            name: "/dev/ttyAMA0".into(),
-            usb: None,
-        };
+        let plain = found("/dev/ttyAMA0", None);
         assert!(serde_json::to_value(Listed::from(&plain)).unwrap()["usb_vendor"].is_null());
-        assert_eq!(plain.to_string(), "/dev/ttyAMA0      no USB device");
     }
 }

@@ -6,28 +6,14 @@
 
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::{self, BufRead as _, BufReader, BufWriter, Read as _, Write as _};
-use std::ops::RangeInclusive;
+use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
+use tactus::link::log;
+pub(crate) use tactus::link::log::{Line, LogError};
 use tactus_core::wire::{Command, PROTOCOL, Report};
 
 use crate::cmd::table_file::opened;
-
-/// One line.
-#[derive(Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum Line<'a> {
-    Session {
-        tactus: Cow<'a, str>,
-        protocol: u8,
-        port: Cow<'a, str>,
-    },
-    #[serde(alias = "ask")]
-    Command(Box<Cow<'a, Command>>),
-    Report(Box<Cow<'a, Report>>),
-}
 
 /// Writes the log. A failure is kept until the caller asks for it.
 #[derive(Debug)]
@@ -87,50 +73,9 @@ fn named(path: &Path, why: &io::Error) -> io::Error {
     io::Error::new(why.kind(), format!("{}: {why}", path.display()))
 }
 
-/// Versions of the messages whose logs are read: since the first of them only reasons have become more than sentences.
-const LOGGED: RangeInclusive<u8> = 3..=PROTOCOL;
-
-/// Why a log cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum LogError {
-    /// A line is none of a log.
-    #[error(
-        "line {line} is no line of a session's log ({why}); `tactus device identify --log FILE` writes one"
-    )]
-    Line { line: usize, why: serde_json::Error },
-    /// Messages of another version.
-    #[error(
-        "written with version {0} of the messages, this program reads {oldest} to {PROTOCOL}: replay it with the tactus \
-         that wrote it",
-        oldest = LOGGED.start()
-    )]
-    Protocol(u8),
-    /// The file cannot be read.
-    #[error(transparent)]
-    Io(#[from] io::Error),
-}
-
-/// Most bytes of a line: the longest reports, many times over.
-const MAX_LINE: u64 = 1 << 20;
-
 /// Reads a log line by line; "-" is standard input.
-pub(crate) fn read(path: &Path, mut each: impl FnMut(Line<'static>)) -> Result<(), LogError> {
-    let file = opened(path)?;
-    let (mut lines, mut line) = (BufReader::new(file), Vec::new());
-    for number in 1.. {
-        line.clear();
-        if lines.by_ref().take(MAX_LINE).read_until(b'\n', &mut line)? == 0 {
-            break;
-        }
-        let read = serde_json::from_slice(&line);
-        match read.map_err(|why| LogError::Line { line: number, why })? {
-            Line::Session { protocol, .. } if !LOGGED.contains(&protocol) => {
-                return Err(LogError::Protocol(protocol));
-            }
-            line => each(line),
-        }
-    }
-    Ok(())
+pub(crate) fn read(path: &Path, each: impl FnMut(Line<'static>)) -> Result<(), LogError> {
+    log::read(opened(path)?, each)
 }
 
 /// A table, as its parts come.

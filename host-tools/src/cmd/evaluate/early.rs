@@ -16,7 +16,6 @@ use super::experiment::{Args, expected};
 use crate::cmd::args::Features;
 use crate::cmd::output::{Format, UsageError, print_json};
 use crate::cmd::progress::with_progress;
-use crate::cmd::textures::{finger_of, names};
 
 /// What `evaluate --early` prints.
 #[derive(Serialize)]
@@ -48,7 +47,7 @@ pub(super) fn run(args: &Args, config: Config, out: &mut impl Write) -> anyhow::
     };
     let folder = args.from.folder()?;
     let set = RecordingSet::open(&folder)?;
-    finger_of(&set)?;
+    set.finger()?;
     let lengths_ms = args.ending.lengths_ms()?;
     let textures = set.textures().len() as u64;
     let slides = with_progress(textures, "measuring slides", |done| {
@@ -56,7 +55,7 @@ pub(super) fn run(args: &Args, config: Config, out: &mut impl Write) -> anyhow::
     })?;
     let features = args.features.map(Features::set);
     let lengths = Lengths::new(&lengths_ms, &slides, |measured| {
-        let (names, slides) = (names(&set), args.train_slides.unwrap_or(5));
+        let (names, slides) = (set.names(), args.train_slides.unwrap_or(5));
         let experiment =
             Experiment::recorded(names, measured, None, args.protocol, slides, args.seed)?;
         let experiment = experiment.expecting(expected(args)).with_features(features);

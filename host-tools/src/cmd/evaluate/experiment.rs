@@ -15,7 +15,7 @@ use tactus_core::explorer::SlideTime;
 use crate::cmd::args::{Choosing, Ending, Expecting, Features, Recordings, Stop};
 use crate::cmd::output::Format;
 use crate::cmd::plot::Plot;
-use crate::cmd::textures::{finger_of, measure_folder, names};
+use crate::cmd::textures::measure_folder;
 
 /// Play thousands of virtual explorations and count the right answers
 #[derive(clap::Args, Clone)]
@@ -161,17 +161,17 @@ pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
         let (set, measured) = measure_folder(&args.from.folder()?)?;
         let test = args.test.as_deref().map(measure_folder).transpose()?;
         if let Some((test, _)) = &test {
-            let [here, there] = [finger_of(&set)?.0, finger_of(test)?.0];
+            let [here, there] = [set.finger()?.0, test.finger()?.0];
             ensure!(
                 here == there,
                 "--test has slides of the finger {there}, and the others are of {here}: they cannot be compared"
             );
         }
-        let test = test.map(|(set, measured)| (names(&set), measured));
+        let test = test.map(|(set, measured)| (set.names(), measured));
         let test = test
             .as_ref()
             .map(|(names, measured)| (names.as_slice(), measured.as_slice()));
-        let (names, slides) = (names(&set), args.train_slides.unwrap_or(5));
+        let (names, slides) = (set.names(), args.train_slides.unwrap_or(5));
         let experiment =
             Experiment::recorded(names, &measured, test, args.protocol, slides, args.seed)?;
         (experiment, args.protocol.name())

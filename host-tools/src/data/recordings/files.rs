@@ -8,6 +8,7 @@ use std::path::{Component, Path, PathBuf};
 
 use flate2::read::GzDecoder;
 use sha2::{Digest as _, Sha256};
+use tactus_core::sensor::FingerCode;
 
 use crate::data::content::ContentError;
 use crate::data::recording::Texture;
@@ -125,6 +126,11 @@ pub enum RecordingError {
     /// Other files would lie among the recordings.
     #[error("{}: is not empty; give a new folder, so that nothing is mixed up", .0.display())]
     NotEmpty(PathBuf),
+    /// Slides of different fingers.
+    #[error(
+        "slides of two fingers, {0} and {1}, cannot be compared: keep them in folders of their own"
+    )]
+    TwoFingers(FingerCode, FingerCode),
     /// The folder to write to is taken.
     #[error("{}: already holds recordings ({manifest}); give a new folder, or remove these first", folder.display())]
     Taken {

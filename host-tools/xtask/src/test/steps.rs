@@ -5,7 +5,7 @@ use anyhow::Result;
 
 use super::failures::run_tests;
 use crate::shell::{cargo, run};
-use crate::{bench, emulate, firmware, fuzz, size};
+use crate::{bench, emulate, firmware, fuzz, python, size};
 
 /// How long each parser is attacked ...
 const FUZZ_S: u64 = 10;
@@ -35,7 +35,8 @@ pub(super) const QUICK: [&str; 5] = [
     "documentation",
 ];
 /// ... and what it leaves out.
-pub(super) const SLOW: [&str; 7] = [
+pub(super) const SLOW: [&str; 8] = [
+    "python",
     "fuzz",
     "firmware",
     "lints of the emulator",
@@ -46,7 +47,7 @@ pub(super) const SLOW: [&str; 7] = [
 ];
 
 /// All steps, in the order in which they begin if nothing else keeps them: what others wait for, and what takes long, first.
-pub(super) const STEPS: [Step; 13] = [
+pub(super) const STEPS: [Step; 14] = [
     step("formatting", "", &[], || {
         cargo_step(&["fmt", "--all", "--check"])
     }),
@@ -74,6 +75,11 @@ pub(super) const STEPS: [Step; 13] = [
         let mut tests = cargo();
         tests.args(["test", "--workspace", "--no-fail-fast"]);
         announce_and_test(&mut tests)
+    }),
+    // its tests compare with the command that was built there
+    step("python", "wheel", &["tests"], || {
+        println!("== the Python package");
+        python::check()
     }),
     step("lints of the emulator", "emulator", &[], || {
         emulate::lints().iter_mut().try_for_each(announce_and_run)

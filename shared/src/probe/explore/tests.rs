@@ -95,7 +95,9 @@ fn explored(stimuli: &[Stimulus], config: Config) -> (Outcome, Vec<String>, Vec<
         || random.next().unwrap(),
         |event| {
             told.push(match event {
-                ExplorationStep::Decided { .. } | ExplorationStep::Verified(..) => return,
+                ExplorationStep::Decided { .. }
+                | ExplorationStep::Verified(..)
+                | ExplorationStep::Early(_) => return,
                 ExplorationStep::Chosen(action, expected) => {
                     assert!(expected.iter().any(|o| o.action == action));
                     format!("{} {}", action.what(), action.movement)
@@ -202,6 +204,7 @@ fn a_slide_is_judged_while_the_finger_is_lifted() {
                     }
                     ExplorationStep::CutShort(..) => "cut short",
                     ExplorationStep::Verified(..) => "verified",
+                    ExplorationStep::Early(_) => "early",
                 });
             },
         );

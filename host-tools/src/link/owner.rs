@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime};
 
 /// The port is this process's for as long as this lives.
 #[derive(Debug)]
-pub(crate) struct Owner(#[expect(dead_code, reason = "its lock ends with it")] Option<File>);
+pub struct Owner(#[expect(dead_code, reason = "its lock ends with it")] Option<File>);
 
 /// Another command has the port.
 #[derive(PartialEq, Debug, thiserror::Error)]
@@ -17,7 +17,7 @@ pub(crate) struct Owner(#[expect(dead_code, reason = "its lock ends with it")] O
      command",
     ago(*.for_)
 )]
-pub(crate) struct Owned {
+pub struct Owned {
     port: String,
     command: String,
     process: u32,
@@ -63,7 +63,7 @@ impl Owner {
     ///
     /// # Errors
     /// Another command of this user has it.
-    pub(crate) fn take(port: &str) -> Result<Self, Owned> {
+    pub fn take(port: &str) -> Result<Self, Owned> {
         match folder() {
             Some(folder) => Self::take_in(&folder, port),
             None => Ok(Self(None)),

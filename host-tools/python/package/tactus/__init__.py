@@ -1,0 +1,151 @@
+"""Tactus in Python: texture identification by touch, by the same code that runs on the chip and in the command `tactus`.
+
+Recordings become features, features a table, and a table explores. All arrays that come out are read-only numpy arrays. What goes
+wrong is a `TactusError` with the sentence of the command line. Long work releases the interpreter's lock, and Ctrl-C ends it.
+"""
+
+from . import _tactus
+from ._tactus import (
+    TEXTURES,
+    Events,
+    Explorer,
+    Features,
+    Probe,
+    ProbeError,
+    Properties,
+    RecordingError,
+    Recordings,
+    SimulatedRig,
+    SimulationError,
+    Slide,
+    SlideError,
+    Table,
+    TableError,
+    TactusError,
+    __version__,
+    features,
+    features_of,
+    learn_by_hand,
+    read_log,
+    simulate,
+)
+
+__all__ = [
+    "Events",
+    "Explorer",
+    "Features",
+    "Probe",
+    "ProbeError",
+    "Properties",
+    "RecordingError",
+    "Recordings",
+    "SimulatedRig",
+    "SimulationError",
+    "Slide",
+    "SlideError",
+    "Table",
+    "TEXTURES",
+    "TableError",
+    "TactusError",
+    "__version__",
+    "evaluate",
+    "evaluate_verify",
+    "features",
+    "features_of",
+    "learn_by_hand",
+    "novelty",
+    "read_log",
+    "simulate",
+    "verify",
+]
+
+_DEFAULTS = {
+    "method": "fused",
+    "protocol": "interleaved",
+    "train_slides": None,
+    "runs": 8000,
+    "seed": 1,
+    "threshold": 0.99,
+    "max_slides": 10,
+    "features": None,
+    "drift": (0.1, 0.04),
+    "false_alarm": None,
+    "test": None,
+    "reliability": True,
+}
+
+
+def _arguments(given):
+    for name in given:
+        if name not in _DEFAULTS:
+            raise TypeError(f"{name!r} is none of the arguments {', '.join(_DEFAULTS)}")
+    return {**_DEFAULTS, **given}
+
+
+def evaluate(recordings, **arguments):
+    """Play virtual explorations and count the right answers, as `tactus evaluate` does.
+
+    recordings: `Recordings` or `Properties`; every texture is the unknown one in turn.
+    method: "fused", "fused-cycle", "fused-random", "student-all", "student", "paper", "cycle" or "random".
+    protocol: "interleaved", "blocked" or "drift": which slides are learned from, and which are tested.
+    train_slides: slides to learn from, per texture and movement (5, or all of `Properties`).
+    runs: virtual explorations (8000). seed: of all draws (1).
+    threshold: an exploration ends when a texture is more probable than this (0.99). max_slides: or after so many (10).
+    features: "force", "pressure", "bands" or "properties"; the best that every slide has, unless given.
+    drift: standard deviations of band powers (ln) and of traction (share) from session to session (0.1, 0.04).
+    false_alarm: share of known textures that may be taken for new ones; the table's own, unless given.
+    test: other `Recordings` to take the test slides from.
+    reliability: whether `reliability` and `by_threshold` are computed, a third of the work (True).
+
+    Returns a dict with what `tactus evaluate --format json` prints, to the digit: shares 0 to 1, slides, `verdicts`,
+    `reliability`, `by_threshold`, `confused`.
+    Raises TactusError where the slides do not suffice, ValueError for an argument, KeyboardInterrupt after Ctrl-C.
+    """
+    return _tactus.evaluate(recordings, _arguments(arguments))
+
+
+def novelty(recordings, left_out=1, **arguments):
+    """Leave textures out of the table in turn, and count how they are noticed, as `tactus evaluate --novelty leave-one-out`.
+
+    left_out: textures that are left out together. Other arguments, results and errors as of `evaluate`; method "fused" only.
+
+    Returns a dict: `novelty`, a list by slides (1, 2, 3) of shares told of `known` and of `unknown` textures; `verdicts_new` and
+    `verdicts_known`, what users are told in the end.
+    """
+    return _tactus.leave_out(recordings, left_out, _arguments(arguments))
+
+
+def evaluate_verify(recordings, **arguments):
+    """Count how often slides are rightly called the same as a reference, and how often wrongly, as `tactus evaluate --verify`.
+
+    Arguments, results and errors as of `evaluate`; method "fused" only.
+
+    Returns a dict: `verify`, a list by slides (1, 2, 3) with `equal_error`, `false_reject`, `false_accept` (shares) and `curve`
+    (pairs of both, limit by limit); `same` and `other`, what is told of the reference's own slides and of others'.
+    """
+    return _tactus.verifications(recordings, _arguments(arguments))
+
+
+def verify(table, texture, slides, **arguments):
+    """Say whether slides are of a texture of a table, slide by slide until it is told, as `tactus verify` does.
+
+    table: a fused `Table` with limits. texture: a name of it. slides: `Features` in the order of time; those of movements that the
+    table does not have are passed over. arguments: threshold, max_slides and false_alarm, as of `Explorer`.
+
+    Returns a list of dicts, one for each slide that counted: `score`, `limit`, `answer` ("Same", "Different", "Unsure"); the last
+    one has the answer. Raises TableError where the table has no limits, KeyError where it does not have the texture.
+    """
+    most = arguments.get("max_slides", 10)
+    explorer = Explorer(table, among=[texture], method="fused-cycle", **arguments)
+    settings, told = set(table.settings), []
+    for slide in slides:
+        if len(told) == most or told and told[-1]["answer"] != "Unsure":
+            break
+        if (slide.force_n, slide.speed_mm_s) not in settings:
+            continue
+        explorer.update(slide)
+        now = explorer.verification()
+        if now is None:
+            raise TableError("the table has no limits: learn it with --method fused from three textures at least")
+        told.append(now)
+    return told

@@ -1,0 +1,213 @@
+//! What one slide says: from samples to properties, band powers and spectrum.
+
+use std::sync::OnceLock;
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use tactus::data::recording::{PAC_RATE_HZ, Recording};
+use tactus::data::replay::{MeasuredSlide, measure};
+use tactus_core::dsp::{BIN_HZ, BINS, Plan};
+use tactus_core::features::{Measurement, Movement, Observation, Property};
+
+use crate::error::{Raise as _, SlideError, sentence};
+use crate::values::array;
+
+/// What one slide measures.
+#[pyclass(frozen, module = "tactus")]
+pub(crate) struct Features {
+    pub(crate) movement: Movement,
+    pub(crate) measurement: Measurement,
+}
+
+impl From<&MeasuredSlide> for Features {
+    fn from(slide: &MeasuredSlide) -> Self {
+        Self {
+            movement: slide.movement,
+            measurement: slide.measurement.clone(),
+        }
+    }
+}
+
+impl Features {
+    /// What an exploration makes of it.
+    pub(crate) fn observation(&self) -> Observation {
+        Observation::from(&self.measurement)
+    }
+
+    fn property(&self, property: Property) -> Option<f32> {
+        self.measurement.properties.get(property)
+    }
+}
+
+#[pymethods]
+impl Features {
+    /// Contact force of the movement, N.
+    #[getter]
+    fn force_n(&self) -> f32 {
+        self.movement.force_n()
+    }
+
+    /// Speed of the movement, mm/s.
+    #[getter]
+    fn speed_mm_s(&self) -> f32 {
+        self.movement.speed_mm_s()
+    }
+
+    /// Mean tangential force at constant speed, N (eq. 14); None where the rig cannot measure it.
+    #[getter]
+    fn traction_n(&self) -> Option<f32> {
+        self.property(Property::Traction)
+    }
+
+    /// Natural logarithm of the band-passed power above the background, counts^2 (eq. 16).
+    #[getter]
+    fn roughness_ln(&self) -> Option<f32> {
+        self.property(Property::Roughness)
+    }
+
+    /// Whether the texture is at most this rough: its power is lost in the background.
+    #[getter]
+    fn roughness_is_bound(&self) -> bool {
+        self.measurement.roughness_is_bound
+    }
+
+    /// Natural logarithm of the spectral centroid, Hz (eq. 19).
+    #[getter]
+    fn fineness_unfiltered_ln(&self) -> Option<f32> {
+        self.property(Property::Fineness)
+    }
+
+    /// float32 of shape (8,): natural logarithms of band powers from 20 to 1000 Hz, counts^2 per bin.
+    #[getter]
+    fn ln_psd_bands<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
+        array(py, self.measurement.ln_bands().to_vec())
+    }
+
+    /// float32 of shape (12,): those of the fused way of deciding, from 17 to 1000 Hz.
+    #[getter]
+    fn ln_fused_bands<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
+        array(py, self.measurement.fused_bands().to_vec())
+    }
+
+    /// float32 of shape (257,): mean power spectrum of P_AC at constant speed, counts^2 per bin.
+    #[getter]
+    fn spectrum<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
+        array(py, self.measurement.spectrum.psd().to_vec())
+    }
+
+    /// float32 of shape (257,): the frequency of each bin of `spectrum`, Hz.
+    #[getter]
+    fn frequencies_hz<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
+        array(py, (0..BINS).map(|bin| bin as f32 * BIN_HZ).collect())
+    }
+
+    /// Power of the still finger after the band-pass, counts^2.
+    #[getter]
+    fn background(&self) -> f32 {
+        self.measurement.background
+    }
+
+    /// Mean and standard deviation of P_DC at constant speed, counts; None where it was not given.
+    #[getter]
+    fn pdc(&self) -> Option<(f32, f32)> {
+        self.measurement.pdc
+    }
+
+    fn __repr__(&self) -> String {
+        let values = Property::ALL.map(|property| match self.property(property) {
+            Some(value) => format!("{property} {value:.3}"),
+            None => format!("no {property}"),
+        });
+        format!("<tactus.Features {}: {}>", self.movement, values.join(", "))
+    }
+}
+
+/// What every slide needs and no slide changes.
+pub(crate) fn plan() -> &'static Plan {
+    static PLAN: OnceLock<Plan> = OnceLock::new();
+    PLAN.get_or_init(Plan::new)
+}
+
+/// A movement from newtons and millimetres per second.
+pub(crate) fn movement(force_n: f32, speed_mm_s: f32) -> PyResult<Movement> {
+    Movement::from_si(force_n, speed_mm_s).map_err(|why| why.raise())
+}
+
+/// Samples that lie in one piece.
+fn samples<'a>(name: &str, array: &'a PyReadonlyArray1<'_, i16>) -> PyResult<&'a [i16]> {
+    array.as_slice().map_err(|_| {
+        PyValueError::new_err(format!(
+            "{name} is not contiguous: numpy.ascontiguousarray makes it so"
+        ))
+    })
+}
+
+/// The `Features` of a slide of which the samples are here.
+///
+/// pac: int16 of shape (samples,), P_AC at 2200 Hz in counts about the still baseline, from the start of the record.
+/// window_s: start and end of the part at constant speed, s. force_n, speed_mm_s: the movement.
+/// still: P_AC of the finger at rest (int16, 2200 Hz), or background: its power after the band-pass, counts^2. One is needed.
+/// shear_mn: tangential force, int16, mN, at shear_rate_hz. pdc: P_DC, int16, counts, at pdc_rate_hz. Both from the same start.
+///
+/// Raises SlideError where there are no features in it, ValueError where an array is not contiguous.
+#[pyfunction]
+#[pyo3(signature = (pac, *, window_s, force_n, speed_mm_s, still=None, background=None, shear_mn=None, shear_rate_hz=100, pdc=None, pdc_rate_hz=100))]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "all but the first have names where it is called"
+)]
+fn features(
+    py: Python<'_>,
+    pac: PyReadonlyArray1<'_, i16>,
+    window_s: (f32, f32),
+    force_n: f32,
+    speed_mm_s: f32,
+    still: Option<PyReadonlyArray1<'_, i16>>,
+    background: Option<f32>,
+    shear_mn: Option<PyReadonlyArray1<'_, i16>>,
+    shear_rate_hz: u32,
+    pdc: Option<PyReadonlyArray1<'_, i16>>,
+    pdc_rate_hz: u32,
+) -> PyResult<Features> {
+    let of = |name, array: &Option<PyReadonlyArray1<'_, i16>>| -> PyResult<Option<Vec<i16>>> {
+        let copied = |array| samples(name, array).map(<[i16]>::to_vec);
+        array.as_ref().map(copied).transpose()
+    };
+    let movement = movement(force_n, speed_mm_s)?;
+    let (still, pdc) = (of("still", &still)?, of("pdc", &pdc)?);
+    let shear = of("shear_mn", &shear_mn)?;
+    let pac = samples("pac", &pac)?;
+    py.detach(|| {
+        let recording = Recording {
+            texture: 0,
+            number: 0,
+            movement,
+            window: window_s,
+            blocks: Vec::new(),
+            background,
+            // a slide without it has none of its features
+            pdc: pdc.clone().unwrap_or_else(|| vec![0; pac.len()]),
+            pdc_rate_hz: match pdc {
+                Some(_) => pdc_rate_hz,
+                None => PAC_RATE_HZ,
+            },
+            outside_mn: None,
+            pace: None,
+            shear_rate_hz,
+        };
+        let cut = recording.cut(&still.unwrap_or_default(), pac, shear.as_deref());
+        let cut = cut.map_err(|why| SlideError::new_err(sentence(&why)))?;
+        let mut measurement = measure(plan(), &cut).map_err(|why| why.raise())?;
+        measurement.pdc = measurement.pdc.filter(|_| pdc.is_some());
+        Ok(Features {
+            movement,
+            measurement,
+        })
+    })
+}
+
+pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Features>()?;
+    module.add_function(wrap_pyfunction!(features, module)?)
+}

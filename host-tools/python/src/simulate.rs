@@ -1,0 +1,180 @@
+//! The simulated world: a rig and a hand that slide over textures of Table 1.
+
+use std::sync::{Mutex, PoisonError};
+
+use pyo3::exceptions::{PyKeyError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use tactus::sim::collection::{Collection, calibrated, texture_name, texture_number};
+use tactus::sim::handheld::learn_with;
+use tactus::sim::rig::SimRig;
+use tactus::sim::textures::TEXTURES;
+use tactus_core::sensor::FingerName;
+
+use crate::features::movement;
+use crate::recordings::Slide;
+use crate::table::Table;
+use crate::work::work;
+
+/// A simulated rig with a texture under its finger.
+///
+/// texture: its name in Table 1 or its number. seed: the world; others have other textures of the same names. trial: where the
+/// sample lies, and what its noise is like. finger: "biotac", "analog" or "mems".
+///
+/// Raises KeyError for a texture that Table 1 does not have, SimulationError where the rig does not start.
+#[pyclass(frozen, module = "tactus")]
+pub(crate) struct SimulatedRig {
+    rig: Mutex<SimRig>,
+    texture: &'static str,
+}
+
+fn number(name: &str) -> PyResult<u8> {
+    texture_number(name.trim()).ok_or_else(|| {
+        PyKeyError::new_err(format!(
+            "{name}: not in Table 1; tactus.TEXTURES has all of them"
+        ))
+    })
+}
+
+fn finger_named(name: &str) -> PyResult<FingerName> {
+    name.parse::<FingerName>()
+        .map_err(|why| PyValueError::new_err(why.to_string()))
+}
+
+/// Those textures, each once, or all.
+fn collection(textures: Option<Vec<String>>, trials: u32, seed: u64) -> PyResult<Collection> {
+    let mut numbers = match textures {
+        Some(names) => names
+            .iter()
+            .map(|name| number(name))
+            .collect::<PyResult<Vec<u8>>>()?,
+        None => TEXTURES.iter().map(|texture| texture.number).collect(),
+    };
+    numbers.sort_unstable();
+    numbers.dedup();
+    if numbers.is_empty() || !(1..=1000).contains(&trials) {
+        return Err(PyValueError::new_err(
+            "textures: one at least; trials: 1 to 1000",
+        ));
+    }
+    Ok(Collection {
+        seed,
+        textures: numbers,
+        trials,
+    })
+}
+
+#[pymethods]
+impl SimulatedRig {
+    #[new]
+    #[pyo3(signature = (texture, *, seed=1, trial=1, finger="biotac"))]
+    fn new(py: Python<'_>, texture: &str, seed: u64, trial: u64, finger: &str) -> PyResult<Self> {
+        let (number, finger) = (number(texture)?, finger_named(finger)?);
+        let world = Collection {
+            seed,
+            textures: vec![number],
+            trials: 1,
+        };
+        let rig = work(py, |_| {
+            let calibration = calibrated(world.setup_with(finger, number, 0))?;
+            let mut rig = SimRig::new(world.setup_with(finger, number, trial));
+            // these constants are the ones it measured
+            rig.control().calibrate(calibration)?;
+            rig.home().map(|()| rig)
+        })?;
+        Ok(Self {
+            rig: Mutex::new(rig),
+            texture: texture_name(number),
+        })
+    }
+
+    /// Name of the texture under the finger.
+    #[getter]
+    fn texture(&self) -> &'static str {
+        self.texture
+    }
+
+    /// Time of the rig, s.
+    #[getter]
+    fn time_s(&self, py: Python<'_>) -> f64 {
+        // a slide may be under way on another thread
+        py.detach(|| {
+            let rig = self.rig.lock().unwrap_or_else(PoisonError::into_inner);
+            rig.now().as_secs_f64()
+        })
+    }
+
+    /// Presses with so many newtons, slides with so many mm/s, and lifts: the `Slide`, with its samples.
+    ///
+    /// Raises SlideError for a movement that no rig makes, SimulationError for a fault of the rig.
+    fn slide(&self, py: Python<'_>, force_n: f32, speed_mm_s: f32) -> PyResult<Slide> {
+        let movement = movement(force_n, speed_mm_s)?;
+        let slide = work(py, |_| {
+            let mut rig = self.rig.lock().unwrap_or_else(PoisonError::into_inner);
+            rig.record(movement)
+        })?;
+        Ok(Slide::new(slide, self.texture))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<tactus.SimulatedRig over {}>", self.texture)
+    }
+}
+
+/// Records slides on the simulated rig: a dict from the name of each texture to its list of `Slide`, the samples that
+/// `tactus simulate` writes.
+///
+/// textures: names in Table 1 or numbers; all 117, unless given. trials: of each texture at each of the study's three movements.
+/// seed: the world. finger: "biotac", "analog" or "mems".
+///
+/// Raises KeyError for a texture that Table 1 does not have, SimulationError for a fault of the rig, KeyboardInterrupt after Ctrl-C.
+#[pyfunction]
+#[pyo3(signature = (textures=None, *, trials=5, seed=1, finger="biotac"))]
+fn simulate<'py>(
+    py: Python<'py>,
+    textures: Option<Vec<String>>,
+    trials: u32,
+    seed: u64,
+    finger: &str,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (collection, finger) = (collection(textures, trials, seed)?, finger_named(finger)?);
+    let first = collection.textures[0];
+    let calibration = work(py, |_| calibrated(collection.setup_with(finger, first, 0)))?;
+    let recorded = work(py, |between| {
+        collection.record_with(finger, calibration, between)
+    })?;
+    let all = PyDict::new(py);
+    for (slides, &number) in recorded.into_iter().zip(&collection.textures) {
+        let name = texture_name(number);
+        let slides: Vec<Slide> = slides.into_iter().map(|s| Slide::new(s, name)).collect();
+        all.set_item(name, slides)?;
+    }
+    Ok(all)
+}
+
+/// Learns a handheld probe's table from slides of a simulated hand, as `tactus learn-by-hand` does, byte for byte: the `Table`,
+/// and the names of textures without enough good slides, which are not in it.
+///
+/// Arguments and errors as of `simulate`; trials: slides of each texture.
+#[pyfunction]
+#[pyo3(signature = (textures=None, *, trials=5, seed=1, finger="biotac"))]
+fn learn_by_hand(
+    py: Python<'_>,
+    textures: Option<Vec<String>>,
+    trials: u32,
+    seed: u64,
+    finger: &str,
+) -> PyResult<(Table, Vec<&'static str>)> {
+    let (collection, finger) = (collection(textures, trials, seed)?, finger_named(finger)?);
+    let (bytes, left_out) = work(py, |between| learn_with(finger, &collection, between))?;
+    let left_out = left_out.into_iter().map(texture_name).collect();
+    Ok((Table::of(bytes)?, left_out))
+}
+
+pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let names: Vec<&str> = TEXTURES.iter().map(|texture| texture.name).collect();
+    module.add("TEXTURES", names)?;
+    module.add_class::<SimulatedRig>()?;
+    module.add_function(wrap_pyfunction!(simulate, module)?)?;
+    module.add_function(wrap_pyfunction!(learn_by_hand, module)?)
+}

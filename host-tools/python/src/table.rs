@@ -1,0 +1,217 @@
+//! Texture tables: learned, read, shown, written.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use tactus::data::table_file::read_table;
+use tactus::data::whole::write_whole;
+use tactus::eval::evaluate::Method;
+use tactus::eval::first::{FirstError, learn_first};
+use tactus::eval::learn::{Expected, learn_for};
+use tactus::eval::table_summary::TableSummary;
+use tactus_core::explorer;
+use tactus_core::features::Movement;
+use tactus_core::table::{FALSE_ALARM, Table as Read};
+
+use crate::arguments;
+use crate::error::Raise as _;
+use crate::features::Features;
+use crate::recordings::Recordings;
+use crate::values::object;
+use crate::work::work;
+
+/// A texture table: what is known of every texture at every movement. `len()` counts its textures, `bytes()` is its file.
+#[pyclass(frozen, module = "tactus")]
+pub(crate) struct Table {
+    pub(crate) bytes: Arc<[u8]>,
+}
+
+impl Table {
+    /// Of bytes that were learned or checked.
+    pub(crate) fn of(bytes: Vec<u8>) -> PyResult<Self> {
+        Read::read(&bytes).map_err(|why| why.raise())?;
+        Ok(Self {
+            bytes: bytes.into(),
+        })
+    }
+
+    fn read(&self) -> PyResult<Read<'_>> {
+        Read::read(&self.bytes).map_err(|why| why.raise())
+    }
+}
+
+/// What a fused table is to expect.
+fn expected(drift: (f32, f32), false_alarm: Option<f32>) -> PyResult<Expected> {
+    Ok(Expected {
+        drift: Some(arguments::drift(drift)?),
+        false_alarm: arguments::false_alarm(false_alarm)?.unwrap_or(FALSE_ALARM),
+    })
+}
+
+#[pymethods]
+impl Table {
+    /// Learns a table from the first slides of every texture and movement, as `tactus learn` does, byte for byte.
+    ///
+    /// train_slides: so many of each, or as many as there are, two at least. method: what the table is for.
+    /// features: of a fused table, "force", "pressure", "bands" or "properties"; the best that every slide has, unless given.
+    /// drift: standard deviations of band powers (ln) and of traction (share) that it expects from session to session.
+    /// false_alarm: share of known textures that may be taken for new ones, 0.0005 to 0.2.
+    ///
+    /// Raises TableError where the slides make no table, RecordingError where they cannot be read.
+    #[staticmethod]
+    #[pyo3(signature = (recordings, *, train_slides=5, method="fused", features=None, drift=(0.1, 0.04), false_alarm=None))]
+    fn learn(
+        py: Python<'_>,
+        recordings: &Recordings,
+        train_slides: usize,
+        method: &str,
+        features: Option<&str>,
+        drift: (f32, f32),
+        false_alarm: Option<f32>,
+    ) -> PyResult<Self> {
+        let method = arguments::method(method)?;
+        let features = arguments::features(features)?;
+        let expected = expected(drift, false_alarm)?;
+        let (set, measured) = (&recordings.set, recordings.measured(py)?);
+        let learn = |_: &(dyn Fn() + Sync)| {
+            learn_first(set, measured, train_slides, method, features, &expected)
+        };
+        Self::of(work(py, learn)?)
+    }
+
+    /// Learns a table from features of one's own: a dict from the name of each texture to its list of `Features`. Each texture needs
+    /// two slides at least of every movement that occurs. Arguments and errors as of `learn`.
+    #[staticmethod]
+    #[pyo3(signature = (slides, *, method="fused", features=None, drift=(0.1, 0.04), false_alarm=None))]
+    fn learn_slides(
+        py: Python<'_>,
+        slides: &Bound<'_, PyDict>,
+        method: &str,
+        features: Option<&str>,
+        drift: (f32, f32),
+        false_alarm: Option<f32>,
+    ) -> PyResult<Self> {
+        let method = arguments::method(method)?.method();
+        let features = arguments::features(features)?;
+        let expected = expected(drift, false_alarm)?;
+        let (mut names, mut all) = (Vec::new(), Vec::new());
+        for (name, slides) in slides {
+            names.push(name.extract::<String>()?);
+            all.push(slides.extract::<Vec<Py<Features>>>()?);
+        }
+        let mut movements: Vec<Movement> = Vec::new();
+        for slide in all.iter().flatten().map(|slide| slide.get()) {
+            if !movements.contains(&slide.movement) {
+                movements.push(slide.movement);
+            }
+        }
+        let of = |slides: &[Py<Features>], movement: Movement| {
+            let slides = slides.iter().map(|slide| slide.get());
+            let same = slides.filter(|slide| slide.movement == movement);
+            same.map(Features::observation).collect::<Vec<_>>()
+        };
+        let mut observed = Vec::new();
+        for (texture, slides) in names.iter().zip(&all) {
+            let texture = texture.clone();
+            let row: Vec<_> = movements.iter().map(|&m| of(slides, m)).collect();
+            if let Some((few, &movement)) = row.iter().zip(&movements).find(|(s, _)| s.len() < 2) {
+                let there = few.len();
+                return Err(FirstError::Few {
+                    texture,
+                    movement,
+                    there,
+                }
+                .raise());
+            }
+            observed.push(row);
+        }
+        let learn = |_: &(dyn Fn() + Sync)| {
+            learn_for(&expected, method, features, &names, &movements, &observed)
+        };
+        Self::of(work(py, learn)?)
+    }
+
+    /// Reads a file that `save` or `tactus learn` wrote, with every check of it. Raises TableError.
+    #[staticmethod]
+    fn load(path: PathBuf) -> PyResult<Self> {
+        let mut bytes = Vec::new();
+        read_table(&path, File::open(&path), &mut bytes).map_err(|why| why.raise())?;
+        Self::of(bytes)
+    }
+
+    /// The table in these bytes, with every check of it. Raises TableError.
+    #[staticmethod]
+    fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
+        let mut read = Vec::new();
+        read_table(Path::new("these bytes"), Ok(bytes), &mut read).map_err(|why| why.raise())?;
+        Self::of(read)
+    }
+
+    /// Writes the table; a file of that name is replaced whole or not at all. Raises OSError.
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        Ok(write_whole(&path, &self.bytes)?)
+    }
+
+    /// What `tactus table show --format json` prints, as a dict: movements, textures, and what is known of each.
+    fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        object(py, &TableSummary::new(self.read()?))
+    }
+
+    /// Names of the textures, in the order of the table.
+    #[getter]
+    fn textures(&self) -> PyResult<Vec<String>> {
+        Ok(self.read()?.names().map(str::to_owned).collect())
+    }
+
+    /// The movements: pairs of force (N) and speed (mm/s).
+    #[getter]
+    fn settings(&self) -> PyResult<Vec<(f32, f32)>> {
+        let table = self.read()?;
+        let movements = table.movements();
+        Ok(movements.map(|m| (m.force_n(), m.speed_mm_s())).collect())
+    }
+
+    /// The best method for what the table holds: "fused" or "student-all", which shares its tables with "paper" and "student".
+    #[getter]
+    fn method(&self) -> PyResult<String> {
+        let best = explorer::Method::of(self.read()?.contents());
+        Ok(arguments::method_name(Method::of(best)))
+    }
+
+    /// The finger that the table was learned with.
+    #[getter]
+    fn finger(&self) -> PyResult<String> {
+        Ok(self.read()?.finger().to_string())
+    }
+
+    /// CRC-32 of the table, eight hexadecimal digits.
+    #[getter]
+    fn checksum(&self) -> PyResult<String> {
+        Ok(format!("{:08x}", self.read()?.crc()))
+    }
+
+    fn __bytes__<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &self.bytes)
+    }
+
+    fn __len__(&self) -> PyResult<usize> {
+        Ok(self.read()?.textures().into())
+    }
+
+    fn __repr__(&self) -> PyResult<String> {
+        let (table, method) = (self.read()?, self.method()?);
+        let textures = table.textures();
+        let bytes = self.bytes.len();
+        Ok(format!(
+            "<tactus.Table for {method}: {textures} textures, {bytes} bytes, checksum {:08x}>",
+            table.crc()
+        ))
+    }
+}
+
+pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Table>()
+}

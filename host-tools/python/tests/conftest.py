@@ -1,0 +1,66 @@
+"""Where recordings and the command are. A test that lacks something is skipped, and fails where it must not be."""
+
+import os
+import pathlib
+import subprocess
+
+import pytest
+
+import tactus
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+REQUIRED = os.environ.get("CI") == "true" or os.environ.get("TACTUS_REQUIRE_DATA") == "1"
+
+
+def lacking(why, required=REQUIRED):
+    """Skips the test, or fails it where that must not be."""
+    if required:
+        pytest.fail(why)
+    pytest.skip(why)
+
+
+def pytest_runtest_logreport(report):
+    """xtask lists what was skipped."""
+    log = os.environ.get("TACTUS_SKIP_LOG")
+    if log and report.skipped:
+        with open(log, "a") as file:
+            file.write(f"python {report.nodeid}: {report.longrepr[-1]}\n")
+
+
+def data(name):
+    """A folder of recordings that the repository does not have."""
+    folder = pathlib.Path(os.environ.get("TACTUS_DATA", ROOT.parent / "shared/data")) / name
+    if not folder.is_dir():
+        lacking(f"no folder {folder}", os.environ.get("TACTUS_REQUIRE_DATA") == "1")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def small():
+    """Six simulated textures, which the repository has."""
+    return tactus.Recordings(ROOT / "tests/recordings/simulated")
+
+
+@pytest.fixture(scope="session")
+def biotac():
+    """680 slides of a real finger."""
+    return tactus.Recordings(data("biotac"))
+
+
+@pytest.fixture(scope="session")
+def worlds():
+    return data("worlds")
+
+
+@pytest.fixture(scope="session")
+def command():
+    """Runs the command `tactus`: what it prints, or its complaint."""
+    name = os.environ.get("TACTUS_COMMAND", ROOT / "target/debug/tactus")
+    if not pathlib.Path(name).is_file():
+        lacking(f"{name} is not built: cargo build")
+
+    def run(*arguments):
+        done = subprocess.run([name, *map(str, arguments)], capture_output=True, text=True)
+        return done.stdout if done.returncode in (0, 3) else done.stderr.strip().removeprefix("error: ")
+
+    return run

@@ -1,0 +1,115 @@
+//! A table from the first slides of a folder of recordings: what `tactus learn` does.
+
+use tactus_core::features::{FeatureSet, Movement, Observation};
+use tactus_core::table::EncodeError;
+
+use crate::data::recordings::{RecordingError, RecordingSet};
+use crate::data::replay::MeasuredSlide;
+use crate::eval::evaluate::Method;
+use crate::eval::learn::{Expected, TableError, learn_for, name_finger};
+use crate::eval::samples::{note, of_all};
+use crate::eval::show::count;
+
+/// Why a folder makes no table.
+#[derive(Debug, thiserror::Error)]
+pub enum FirstError {
+    /// A standard deviation needs two slides.
+    #[error("--train-slides {0}: how slides of one texture differ takes at least two slides")]
+    One(usize),
+    /// As [`Self::One`], of one texture and movement.
+    #[error(
+        "{texture}, {movement}: {}, and how slides of one texture differ takes at least two", count(*there as u64, "slide")
+    )]
+    Few {
+        /// Name of the texture.
+        texture: String,
+        /// The movement.
+        movement: Movement,
+        /// Slides there are.
+        there: usize,
+    },
+    /// The slides make no table.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// What the recordings say of samples and finger cannot be noted.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+    /// The slides cannot be compared.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+}
+
+/// That slides to learn from are enough.
+///
+/// # Errors
+/// [`FirstError::One`].
+pub fn at_least_two(slides: usize) -> Result<(), FirstError> {
+    if slides < 2 {
+        return Err(FirstError::One(slides));
+    }
+    Ok(())
+}
+
+/// The table learned from the first slides of every texture and movement: so many, or all where there are fewer.
+///
+/// # Errors
+/// See [`FirstError`].
+pub fn learn_first(
+    set: &RecordingSet,
+    measured: &[Vec<MeasuredSlide>],
+    slides: usize,
+    method: Method,
+    features: Option<FeatureSet>,
+    expected: &Expected,
+) -> Result<Vec<u8>, FirstError> {
+    at_least_two(slides)?;
+    let movements = set.movements();
+    let first = |name: &str, measured: &[MeasuredSlide], movement: Movement| {
+        let same = measured.iter().filter(|s| s.movement == movement);
+        let trials: Vec<_> = same
+            .map(|s| Observation::from(&s.measurement))
+            .take(slides)
+            .collect();
+        let there = trials.len();
+        if there < 2 {
+            let texture = name.to_owned();
+            return Err(FirstError::Few {
+                texture,
+                movement,
+                there,
+            });
+        }
+        Ok(trials)
+    };
+    let textures = set.textures().iter().zip(measured);
+    let first = textures.map(|(texture, measured)| {
+        let trials = movements
+            .iter()
+            .map(|&movement| first(&texture.name, measured, movement));
+        trials.collect()
+    });
+    let first: Vec<Vec<Vec<Observation>>> = first.collect::<Result<_, FirstError>>()?;
+    let names = set.names();
+    let bytes = learn_for(
+        expected,
+        method.method(),
+        features,
+        &names,
+        &movements,
+        &first,
+    )?;
+    // what the recordings say of the very slides that were learned from
+    let moved = |texture: usize| {
+        let keys = set.slides(texture);
+        let of = |movement: &Movement| {
+            let same = measured[texture].iter().filter(|s| s.movement == *movement);
+            let numbers: Vec<u32> = same.map(|s| s.number).take(slides).collect();
+            let used = keys.iter().filter(move |key| numbers.contains(&key.number));
+            used.map(|key| key.labels.moved)
+        };
+        of_all(movements.iter().flat_map(of))
+    };
+    let noted = note(&bytes, |texture| moved(texture.into()))?;
+    let (finger, calibrated) = set.finger()?;
+    Ok(name_finger(&noted, finger, calibrated)?)
+}

@@ -1,0 +1,295 @@
+//! What carries bytes to the probe: serial ports and TCP ports, by the names that `--port` takes.
+
+use std::fmt;
+use std::io::{self, Read, Write};
+use std::net::{TcpStream, ToSocketAddrs as _};
+use std::path::Path;
+use std::time::Duration;
+
+use serialport::{SerialPortInfo, SerialPortType, UsbPortInfo};
+
+use super::owner::{Owned, Owner};
+
+/// The probe's line.
+const BAUD: u32 = 921_600;
+/// Reads come back after that, so that somebody looks at the keyboard; writes may take as long.
+const READ: Duration = Duration::from_millis(50);
+/// USB vendor of the NUCLEO's ST-LINK.
+const ST: u16 = 0x0483;
+
+/// Why there is no line to the probe, and what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum LineError {
+    /// Nothing is plugged in.
+    #[error(
+        "no serial port of a NUCLEO here: plug in the board's USB socket CN1 (LD4 must be lit), give --port, or try --emulated"
+    )]
+    None,
+    /// More than one.
+    #[error("several boards are plugged in: choose one with --port\n{}", lines(.0))]
+    Several(Vec<Found>),
+    /// No such port.
+    #[error("{port}: there is no such port. {}", others(.found))]
+    NotThere {
+        /// Its name.
+        port: String,
+        /// Those that there are.
+        found: Vec<Found>,
+    },
+    /// Another program has it.
+    #[error(
+        "{0} is busy: another program has it open (another tactus, a terminal such as minicom, ModemManager). Close that; \
+         `fuser -v {0}` names it"
+    )]
+    Busy(String),
+    /// Another tactus has it.
+    #[error(transparent)]
+    Owned(#[from] Owned),
+    /// The user may not.
+    #[error(
+        "{0}: you may not open this port. On Linux: sudo usermod -aG dialout $USER, then log in again"
+    )]
+    Denied(String),
+    /// Something else.
+    #[error("{port} cannot be opened: {why}; is it a serial port?")]
+    Serial {
+        /// Its name.
+        port: String,
+        /// What the system says.
+        why: serialport::Error,
+    },
+    /// No such address, or nobody there.
+    #[error(
+        "{address}: {why}. Is the emulated board running there (`cargo xtask emulate --port N`)?"
+    )]
+    Tcp {
+        /// Host and port.
+        address: String,
+        /// What the system says.
+        why: io::Error,
+    },
+}
+
+/// A serial port of this PC.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Found {
+    /// Its name.
+    pub name: String,
+    /// What the USB device says of itself, if it is one.
+    pub usb: Option<UsbPortInfo>,
+}
+
+impl Found {
+    /// Whether it is an ST-LINK, as a NUCLEO has.
+    pub fn is_nucleo(&self) -> bool {
+        self.usb.as_ref().is_some_and(|usb| usb.vid == ST)
+    }
+}
+
+impl From<SerialPortInfo> for Found {
+    fn from(port: SerialPortInfo) -> Self {
+        let usb = match port.port_type {
+            SerialPortType::UsbPort(usb) => Some(usb),
+            _ => None,
+        };
+        Self {
+            name: port.port_name,
+            usb,
+        }
+    }
+}
+
+impl fmt::Display for Found {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:<16}", self.name)?;
+        let Some(usb) = &self.usb else {
+            return f.write_str("  no USB device");
+        };
+        write!(f, "  {:04x}:{:04x}", usb.vid, usb.pid)?;
+        let texts = [&usb.manufacturer, &usb.product, &usb.serial_number];
+        for text in texts.into_iter().flatten() {
+            write!(f, "  {text}")?;
+        }
+        if self.is_nucleo() {
+            f.write_str("  <- a NUCLEO: try this one")?;
+        }
+        Ok(())
+    }
+}
+
+/// A line for each.
+pub fn lines(ports: &[Found]) -> String {
+    let lines: Vec<String> = ports.iter().map(|port| format!("  {port}")).collect();
+    lines.join("\n")
+}
+
+fn others(found: &[Found]) -> String {
+    if found.is_empty() {
+        "This PC has no serial port now: plug in the board's USB socket CN1, or try --emulated"
+            .to_owned()
+    } else {
+        format!("There are:\n{}", lines(found))
+    }
+}
+
+/// The serial ports of this PC; boards first. Those of the mainboard that no chip answers at are left out.
+pub fn found() -> Vec<Found> {
+    let ports = serialport::available_ports().unwrap_or_default();
+    let mut ports: Vec<Found> = ports
+        .into_iter()
+        .map(Found::from)
+        // every Linux has 32 of these, there or not
+        .filter(|port| port.usb.is_some() || !port.name.starts_with("/dev/ttyS"))
+        .collect();
+    ports.sort_by_key(|port| (!port.is_nucleo(), port.name.clone()));
+    ports
+}
+
+/// What carries bytes to the probe and back; reads come back soon, with or without any.
+pub trait Line: Read + Write + Send {}
+impl<T: Read + Write + Send> Line for T {}
+
+/// Opens the port of this name, and keeps other commands from it.
+///
+/// # Errors
+/// See [`LineError`].
+pub fn open(name: &str) -> Result<(Box<dyn Line>, Owner), LineError> {
+    // however its address was written
+    let same = tcp_address(name).map(|address| format!("tcp:{address}"));
+    let owner = Owner::take(same.as_deref().unwrap_or(name))?;
+    let line = match tcp_address(name) {
+        Some(address) => tcp(address)?,
+        None => serial(name)?,
+    };
+    Ok((line, owner))
+}
+
+/// The only NUCLEO among these.
+///
+/// # Errors
+/// There is none, or there are several.
+pub fn only_nucleo(found: Vec<Found>) -> Result<String, LineError> {
+    let mut nucleos: Vec<Found> = found.into_iter().filter(Found::is_nucleo).collect();
+    match nucleos.len() {
+        0 => Err(LineError::None),
+        1 => Ok(nucleos.remove(0).name),
+        _ => Err(LineError::Several(nucleos)),
+    }
+}
+
+/// The address in "tcp:HOST:PORT" or in "HOST:PORT", which no serial port is called.
+fn tcp_address(name: &str) -> Option<&str> {
+    name.strip_prefix("tcp:").or_else(|| {
+        let (host, port) = name.rsplit_once(':')?;
+        let is_address = !host.is_empty() && port.parse::<u16>().is_ok();
+        (is_address && !Path::new(name).exists()).then_some(name)
+    })
+}
+
+fn serial(port: &str) -> Result<Box<dyn Line>, LineError> {
+    use io::ErrorKind as Io;
+    use serialport::ErrorKind as Serial;
+    let port = port.to_owned();
+    let why = match serialport::new(&port, BAUD).timeout(READ).open() {
+        Ok(line) => return Ok(Box::new(line)),
+        Err(why) => why,
+    };
+    Err(match why.kind() {
+        Serial::Io(Io::PermissionDenied) => LineError::Denied(port),
+        // serialport's word for a port that somebody else has, or one that Windows does not know
+        Serial::NoDevice if Path::new(&port).exists() || cfg!(windows) => LineError::Busy(port),
+        Serial::NoDevice | Serial::Io(Io::NotFound) => {
+            let found = found();
+            LineError::NotThere { port, found }
+        }
+        _ => LineError::Serial { port, why },
+    })
+}
+
+/// Opens a TCP port, "HOST:PORT".
+///
+/// # Errors
+/// [`LineError::Tcp`].
+pub fn tcp(address: &str) -> Result<Box<dyn Line>, LineError> {
+    let error = |why| LineError::Tcp {
+        address: address.to_owned(),
+        why,
+    };
+    let to = address.to_socket_addrs().map_err(error)?.next();
+    let to = to.ok_or_else(|| error(io::ErrorKind::NotFound.into()))?;
+    let stream = TcpStream::connect_timeout(&to, Duration::from_secs(5)).map_err(error)?;
+    stream
+        .set_read_timeout(Some(READ))
+        .and_then(|()| stream.set_nodelay(true))
+        .map_err(error)?;
+    Ok(Box::new(stream))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn port(name: &str, vid: u16) -> Found {
+        let usb = UsbPortInfo {
+            vid,
+            pid: 0x374b,
+            serial_number: Some("066EFF".into()),
+            manufacturer: None,
+            product: Some("STM32 STLink".into()),
+        };
+        Found {
+            name: name.into(),
+            usb: Some(usb),
+        }
+    }
+
+    #[test]
+    fn an_address_is_no_serial_port() {
+        for (name, address) in [
+            ("tcp:127.0.0.1:7429", Some("127.0.0.1:7429")),
+            ("127.0.0.1:7429", Some("127.0.0.1:7429")),
+            ("bench.local:7429", Some("bench.local:7429")),
+            ("[::1]:7429", Some("[::1]:7429")),
+            ("/dev/ttyACM0", None),
+            ("COM3", None),
+            ("COM3:", None),
+            (":7429", None),
+            ("host:99999", None),
+        ] {
+            assert_eq!(tcp_address(name), address, "{name}");
+        }
+    }
+
+    #[test]
+    fn the_only_board_is_taken_and_of_two_the_user_chooses() {
+        let other = port("/dev/ttyUSB0", 0x1a86);
+        let [a, b] = ["/dev/ttyACM0", "/dev/ttyACM1"].map(|name| port(name, ST));
+        assert_eq!(
+            only_nucleo(vec![other.clone(), a.clone()]).unwrap(),
+            "/dev/ttyACM0"
+        );
+        let none = only_nucleo(vec![other]).unwrap_err().to_string();
+        assert!(
+            none.contains("CN1") && none.contains("--emulated"),
+            "{none}"
+        );
+        let both = only_nucleo(vec![a, b]).unwrap_err().to_string();
+        assert!(
+            both.contains("--port") && both.contains("ttyACM0") && both.contains("ttyACM1"),
+            "{both}"
+        );
+    }
+
+    #[test]
+    fn a_board_is_pointed_out() {
+        assert_eq!(
+            port("/dev/ttyACM0", ST).to_string(),
+            "/dev/ttyACM0      0483:374b  STM32 STLink  066EFF  <- a NUCLEO: try this one"
+        );
+        let plain = Found {
+            name: "/dev/ttyAMA0".into(),
+            usb: None,
+        };
+        assert_eq!(plain.to_string(), "/dev/ttyAMA0      no USB device");
+    }
+}

@@ -1,0 +1,114 @@
+//! The Python package: built by pip as a user has it, and held against the command by pytest, in a virtual environment.
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context as _, Result, bail};
+
+use crate::shell::{cargo, root, run, target};
+
+/// The package, from the top.
+const PACKAGE: &str = "host-tools/python";
+/// Without these there is no test.
+const NEEDED: [&str; 2] = ["numpy", "pytest"];
+/// Without these some examples are skipped.
+const WELCOME: [&str; 2] = ["matplotlib", "scikit-learn"];
+/// What the package asks for.
+const OLD_ENOUGH: &str =
+    "import sys, venv, ensurepip; sys.exit(0 if sys.version_info >= (3, 9) else 1)";
+
+/// Lints the package, has pip build and install it, and runs its tests. Skipped where there is no Python or no way to what pip
+/// needs; in CI that is an error.
+pub(crate) fn check() -> Result<()> {
+    let python = match environment() {
+        Ok(python) => python,
+        Err(why) => return skip(&format!("{why:#}")),
+    };
+    let manifest = root().join(PACKAGE).join("Cargo.toml");
+    let mut lints = here(cargo());
+    lints.args(["clippy", "--release", "--features", "pyo3/extension-module"]);
+    lints.arg("--manifest-path").arg(&manifest);
+    run(lints.args(["--", "-Dwarnings"]))?;
+    run(here(cargo()).args(["fmt", "--check"]))?;
+    println!("== pip install ./{PACKAGE}");
+    run(pip(&python).arg(root().join(PACKAGE)))?;
+    println!("== pytest {PACKAGE}");
+    let command = target().join("debug").join(program("tactus"));
+    if !command.is_file() {
+        run(cargo().args(["build", "--package", "tactus", "--bin", "tactus"]))?;
+    }
+    let mut tests = Command::new(&python);
+    tests.args(["-m", "pytest", "-rs"]);
+    tests.current_dir(root().join(PACKAGE));
+    tests.env("TACTUS_COMMAND", command);
+    run(tests.env("PYTHONDONTWRITEBYTECODE", "1"))?;
+    println!("== a session with a probe in software");
+    let mut session = cargo();
+    // as the step of the tests has built it
+    session.args(["test", "--workspace", "--test", "device"]);
+    session
+        .args(["--", "package::"])
+        .env("TACTUS_PYTHON", python);
+    run(&mut session)
+}
+
+/// The workspace of the package has settings of its own.
+fn here(mut cargo: Command) -> Command {
+    cargo.current_dir(root().join(PACKAGE));
+    cargo
+}
+
+/// The Python of `target/python`, with what the tests need.
+fn environment() -> Result<PathBuf> {
+    let folder = target().join("python");
+    let python = folder.join(if cfg!(windows) { "Scripts" } else { "bin" });
+    let python = python.join(program("python"));
+    if !fits(&python) {
+        if !fits(Path::new("python3")) {
+            bail!("no Python 3.9 or newer with venv (apt-get install python3-venv)");
+        }
+        let mut make = Command::new("python3");
+        run(make.args(["-m", "venv", "--clear"]).arg(&folder))?;
+    }
+    // not its script: that one names the folder in which it was made
+    let needed = run(pip(&python).args(NEEDED));
+    needed.context("pip cannot install numpy and pytest: is there a network?")?;
+    if run(pip(&python).args(WELCOME)).is_err() {
+        println!("without {}: their tests are skipped", WELCOME.join(" and "));
+    }
+    Ok(python)
+}
+
+fn fits(python: &Path) -> bool {
+    let mut ask = Command::new(python);
+    ask.args(["-c", OLD_ENOUGH]).stderr(Stdio::null());
+    ask.status().is_ok_and(|status| status.success())
+}
+
+fn pip(python: &Path) -> Command {
+    let mut pip = Command::new(python);
+    pip.args(["-m", "pip", "install", "--quiet"]);
+    pip.arg("--disable-pip-version-check");
+    pip
+}
+
+fn program(name: &str) -> String {
+    format!("{name}{}", std::env::consts::EXE_SUFFIX)
+}
+
+/// Says that the tests are skipped, where xtask lists it.
+fn skip(why: &str) -> Result<()> {
+    let is = |variable: &str, value: &str| std::env::var(variable).as_deref() == Ok(value);
+    if is("CI", "true") || is("TACTUS_REQUIRE_DATA", "1") {
+        bail!("the Python package is not tested: {why}");
+    }
+    eprintln!("SKIPPED the Python package: {why}");
+    if let Some(log) = std::env::var_os(crate::test::SKIP_LOG) {
+        let mut log = std::fs::OpenOptions::new()
+            .append(true)
+            .create(true)
+            .open(log)?;
+        writeln!(log, "the Python package: {why}")?;
+    }
+    Ok(())
+}

@@ -1,0 +1,51 @@
+//! The Python package at the probe in software. `cargo xtask test --step python` says which Python has it; without one there is
+//! nothing to test here.
+
+use super::*;
+
+/// What a user would write: everything that moves, at a probe of three textures with the second one under its finger.
+const SESSION: &str = "
+import json, sys
+import numpy, tactus
+with tactus.Probe(sys.argv[1]) as probe:
+    assert probe.status()['phase'] == 'Ready', probe.status()
+    table = probe.table()
+    assert len(table) == 3 == probe.status()['textures']
+    events = [report['event'] for report in probe.identify(seed=7)]
+    verdict = next(event['Verdict'] for event in events if 'Verdict' in event)
+    slides = probe.record('unknown', slides=2, seed=3)
+    assert len(slides) == 2 and slides[0].texture == 'unknown', slides
+    for slide in slides:
+        features = slide.features()
+        explorer = tactus.Explorer(table)
+        explorer.update(features)
+        assert explorer.best()['texture'] == verdict['name'], explorer
+    for report in probe.identify(seed=8):
+        if 'Chosen' in report['event']:
+            break
+    probe.stop()
+    assert probe.status()['phase'] == 'Ready'
+    assert probe.losses == (0, 0), probe.losses
+    trained = [r['event']['TrainingSlide']['left'] for r in probe.train('new one', trials=2, seed=4) if 'TrainingSlide' in r['event']]
+    assert trained == list(range(len(table.settings) * 2))[::-1], trained
+    assert probe.table().textures == [*table.textures, 'new one']
+    print(json.dumps(verdict))
+";
+
+#[test]
+fn a_session_in_python_is_that_of_the_command() {
+    let Some(python) = std::env::var_os("TACTUS_PYTHON") else {
+        return;
+    };
+    let (at, _) = probe(1000);
+    let mut session = Command::new(python);
+    session.args(["-c", SESSION, &at]);
+    session.env("XDG_RUNTIME_DIR", env!("CARGO_TARGET_TMPDIR"));
+    let Output { stdout, stderr, .. } = session.output().unwrap();
+    let said = String::from_utf8_lossy(&stderr);
+    let verdict: serde_json::Value = serde_json::from_slice(&stdout).expect(&said);
+    let again = ["identify", "--port", &at, "--seed", "7", "--format", "json"];
+    let found = object(&again, 0);
+    assert_eq!(verdict["name"], found["verdict"]["texture"]);
+    assert_eq!(verdict["name"], texture_name(UNKNOWN));
+}
