@@ -61,7 +61,7 @@ Examples:
   tactus identify --simulated --among 117 --method paper      as published: one property a slide, 117 textures
   tactus identify --recordings DIR --material 'bath towel'
   tactus identify --recordings DIR --material 3 --table FILE  with a table that `tactus learn` wrote
-  tactus identify --simulated --early                         slides end as soon as the verdict is certain
+  tactus identify --simulated --early                         a slide ends when that is certain
   tactus identify --simulated --plot burlap.svg               with pictures
 
 --plot draws how probable each texture was (posterior), the unknown beside its two best candidates (spectrum), and the last
