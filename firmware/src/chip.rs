@@ -9,6 +9,7 @@ pub(crate) mod flash;
 pub(crate) mod lever;
 pub(crate) mod motion;
 pub(crate) mod rescue;
+mod select;
 pub(crate) mod slots;
 pub(crate) mod thread;
 mod transform_kernel;

@@ -17,6 +17,6 @@ pub mod paa5100je;
 pub mod pressure;
 pub mod slot;
 
-pub use driver::{BadWord, Driver, Error, PressureSensor, StartError, slot_of};
+pub use driver::{BadWord, Driver, Error, GRAVITY_PARTS, PressureSensor, StartError, slot_of};
 pub use finger::{AtRest, FingerModel, FingerName, UnknownFinger};
 pub use finger_code::FingerCode;

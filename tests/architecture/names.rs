@@ -1,5 +1,6 @@
 //! What a path means: from a module, through imports, faces and globs, to the files that define it.
 
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use syn::{ImplItem, Item, Type};
@@ -31,6 +32,8 @@ pub(crate) struct Names<'s> {
     pub(crate) source: &'s Source,
     /// The files with an `impl Type` that defines this associated function or constant.
     associated: BTreeMap<(Definition, String), BTreeSet<FileId>>,
+    /// What is looked up now: a module that imports a name by itself leads nowhere.
+    looking: RefCell<BTreeSet<Definition>>,
 }
 
 /// Imports of imports of imports: more than this is a circle of `pub use`.
@@ -41,6 +44,7 @@ impl<'s> Names<'s> {
         let mut names = Self {
             source,
             associated: BTreeMap::new(),
+            looking: RefCell::default(),
         };
         for module in 0..source.modules.len() {
             if !source.modules[module].is_test {
@@ -139,10 +143,17 @@ impl<'s> Names<'s> {
 
     /// What a module calls by this name.
     fn lookup(&self, module: ModuleId, name: &str, depth: usize) -> Found {
-        let mut found = Found::default();
-        if depth == 0 {
-            return found;
+        let looked = (module, name.to_owned());
+        if depth == 0 || !self.looking.borrow_mut().insert(looked.clone()) {
+            return Found::default();
         }
+        let found = self.lookup_once(module, name, depth);
+        self.looking.borrow_mut().remove(&looked);
+        found
+    }
+
+    fn lookup_once(&self, module: ModuleId, name: &str, depth: usize) -> Found {
+        let mut found = Found::default();
         let here = &self.source.modules[module];
         for named in here.names.get(name).into_iter().flatten() {
             match named {

@@ -430,8 +430,6 @@ fn before_ln() -> *const u32 {
 }
 
 impl Kernels for Chip {
-    const PAPER_EARLY: bool = false;
-
     fn reset_to_prior(logs: &mut [i32]) {
         let (eights, rest) = logs.as_chunks_mut::<8>();
         let eights = eights.as_flattened_mut().as_mut_ptr_range();

@@ -6,11 +6,10 @@
 //! byte, or takes two DMA streams with an interrupt each for the two bytes of a word.
 use core::cell::UnsafeCell;
 use core::mem::ManuallyDrop;
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering::Relaxed};
 
-use embassy_stm32::gpio::{AfType, AnyPin, Flex, OutputType, Pin as _, Pull, Speed};
+use embassy_stm32::gpio::{AfType, Flex, OutputType, Pull, Speed};
 use embassy_stm32::interrupt;
-use embassy_stm32::pac::gpio::{Gpio, regs::Bsrr};
 use embassy_stm32::pac::spi::regs::Cr1;
 use embassy_stm32::pac::spi::vals::{Br, Dff, Mstr};
 use embassy_stm32::pac::{SPI1, TIM2};
@@ -18,10 +17,11 @@ use embassy_stm32::{Peri, peripherals, rcc};
 use heapless::spsc::Producer;
 use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
 use tactus_core::sensor::slot::{Answer, Port, Transaction, length_us};
-use tactus_core::sensor::{BadWord, PressureSensor};
+use tactus_core::sensor::{BadWord, GRAVITY_PARTS, PressureSensor};
 
 use crate::board::{self, Finger, held};
 use crate::chip;
+use crate::chip::select::Select;
 
 /// Why an answer of the finger is no sample.
 pub(crate) type FingerError = <Finger as PressureSensor>::Error;
@@ -60,6 +60,8 @@ const SLACK_US: u32 = 7;
 const SPI1_FUNCTION: u8 = 5;
 /// Chip selects: the board has two.
 const SELECTS: usize = Finger::PORTS.len();
+/// Whether the finger feels gravity.
+const FELT: bool = cfg!(feature = "finger-mems");
 /// Whether all parts want the same mode of the bus: then it is set up once.
 const ONE_MODE: bool = {
     let (mut one, mut ports) = (true, Finger::PORTS);
@@ -136,11 +138,9 @@ const FRAMES: usize = most().1;
 const fn most() -> (usize, usize) {
     let (mut steps, mut frames, mut slots) = (0, 0, Finger::SLOTS);
     while let [slot, others @ ..] = slots {
-        steps = if slot.len() > steps {
-            slot.len()
-        } else {
-            steps
-        };
+        if slot.len() > steps {
+            steps = slot.len();
+        }
         let mut rest = *slot;
         while let [transaction, others @ ..] = rest {
             let these = transaction.out.len().div_ceil(FRAME_BYTES);
@@ -189,34 +189,6 @@ pub(crate) struct Bus {
     control: Cr1,
     /// It was told to say when a frame is over.
     interrupts: bool,
-}
-
-/// A chip select. embassy's output computes port and bit from the pin's number each time, four times in a slot.
-struct Select {
-    _pin: ManuallyDrop<Flex<'static>>,
-    port: Gpio,
-    mask: u32,
-}
-
-impl Select {
-    /// It is high.
-    fn new(pin: Peri<'static, AnyPin>) -> Self {
-        let (port, mask) = (pin.block(), 1 << pin.pin());
-        let mut pin = held(pin);
-        pin.set_high();
-        pin.set_as_output(Speed::VeryHigh);
-        Self {
-            _pin: pin,
-            port,
-            mask,
-        }
-    }
-
-    /// By the register that leaves the port's other pins alone.
-    fn set(&self, low: bool) {
-        let mask = if low { self.mask << 16 } else { self.mask };
-        self.port.bsrr().write_value(Bsrr(mask));
-    }
 }
 
 /// Looks at a frame in its time.
@@ -383,10 +355,13 @@ pub(crate) fn unreadable() -> u32 {
     parity.wrapping_add(ERROR_FRAMES.load(Relaxed))
 }
 
-/// Gravity along the finger, counts of P_AC: see [`PressureSensor::gravity`].
+/// Gravity along the finger, see [`PressureSensor::gravity`]; beyond all of it before it is known.
+static GRAVITY: AtomicI32 = AtomicI32::new(i32::MIN);
+
+/// Gravity along the finger, counts of P_AC.
 pub(crate) fn gravity() -> Option<f32> {
-    // SAFETY: see `Shared`; neither interrupt runs meanwhile.
-    cortex_m::interrupt::free(|_| unsafe { (*SHARED.0.get()).as_ref() }?.finger.gravity())
+    let parts = Some(GRAVITY.load(Relaxed)).filter(|parts| FELT && *parts > i32::MIN)?;
+    Some(parts as f32 / GRAVITY_PARTS)
 }
 
 /// Begins the slots; to be called once, when the sensor has started. `interrupt`s of SPI1 and TIM2 have one priority.
@@ -421,7 +396,6 @@ pub(crate) fn begin(mut bus: Bus, timer: board::Slots, words: Producer<'static, 
         interrupt::InterruptExt::enable(interrupt::SPI1);
         interrupt::InterruptExt::enable(interrupt::TIM2);
     }
-    // nobody who listens runs before this does
     SET_UP.store(true, Relaxed);
     pause(false);
 }
@@ -563,7 +537,12 @@ impl Slots {
     fn word(&mut self) {
         let word = self.finger.decode(self.begun.wrapping_sub(1), &self.answer);
         match word {
-            Ok(word) => self.put(Some(word)),
+            Ok(word) => {
+                if let Some(gravity) = self.finger.gravity() {
+                    GRAVITY.store(gravity, Relaxed);
+                }
+                self.put(Some(word));
+            }
             Err(why) => self.damaged(&why),
         }
     }

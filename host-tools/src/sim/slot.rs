@@ -7,7 +7,7 @@ use tactus_core::sensor::biotac::BioTac;
 use tactus_core::sensor::mems::Mems;
 use tactus_core::sensor::pressure::Pressure;
 use tactus_core::sensor::slot::{self, Port, StartStep, Transaction, Unexpected};
-use tactus_core::sensor::{FingerModel, FingerName, PressureSensor, slot_of};
+use tactus_core::sensor::{FingerModel, FingerName, GRAVITY_PARTS, PressureSensor, slot_of};
 
 use super::parts::ClockMode;
 
@@ -105,11 +105,12 @@ impl Reader {
 
     /// Gravity along it, counts of P_AC: see [`PressureSensor::gravity`].
     pub fn gravity(&self) -> Option<f32> {
-        match self {
+        let parts = match self {
             Self::BioTac(finger) => finger.gravity(),
             Self::Analog(finger) => finger.gravity(),
             Self::Mems(finger) => finger.gravity(),
-        }
+        };
+        parts.map(|parts| parts as f32 / GRAVITY_PARTS)
     }
 
     /// How a transaction is made that begins at this time, ns.

@@ -103,7 +103,7 @@ fn skip(why: &str) -> Result<()> {
         bail!("the Python package is not tested: {why}");
     }
     eprintln!("SKIPPED the Python package: {why}");
-    if let Some(log) = std::env::var_os(crate::test::SKIP_LOG) {
+    if let Some(log) = std::env::var_os(crate::shell::SKIP_LOG) {
         let mut log = std::fs::OpenOptions::new()
             .append(true)
             .create(true)

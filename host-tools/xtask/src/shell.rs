@@ -7,6 +7,9 @@ use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context as _, Result, bail};
 
+/// Names the file to which tests that are skipped add a line each.
+pub(crate) const SKIP_LOG: &str = "TACTUS_SKIP_LOG";
+
 /// The top of the repository.
 pub(crate) fn root() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));

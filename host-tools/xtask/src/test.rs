@@ -11,12 +11,10 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::shell::{has_subcommand, target};
+use crate::shell::{SKIP_LOG, has_subcommand, target};
 use steps::{CHECK, QUICK, SLOW, STEPS, Step};
 use summary::{Outcome, Ran, summary};
 
-/// Names the file to which tests that are skipped add a line each.
-pub(crate) const SKIP_LOG: &str = "TACTUS_SKIP_LOG";
 /// A build has one long tail of a single thread, and a step waits for the one before: two at a time keep two cores busy.
 const AT_ONCE: usize = 2;
 

@@ -57,7 +57,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         };
         let (log, posterior) = (self.log.clone(), self.posterior.clone());
         let (log_odds, slides, visits) = (self.log_odds, self.slides, self.episode.len());
-        let look = self.compare_part(part, slide).map(|()| {
+        let look = self.compare(part, slide).map(|()| {
             self.slides = slides.saturating_add(1);
             self.as_it_stands()
         });
@@ -81,17 +81,9 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         let Some((made, part)) = self.part(action, n) else {
             return Ok(false);
         };
-        self.compare_part(part, slide)?;
+        self.compare(part, slide)?;
         self.count(made, action);
         Ok(true)
-    }
-
-    fn compare_part(&mut self, part: Action, slide: &Observation) -> Result<(), ObserveError> {
-        if K::PAPER_EARLY {
-            self.compare(part, slide)
-        } else {
-            self.observe_features(part, slide)
-        }
     }
 
     fn as_it_stands(&self) -> Look {
@@ -118,7 +110,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     fn part(&mut self, action: Action, n: u8) -> Option<(usize, Action)> {
         let least = match (self.config.method, action.property) {
             (Method::Fused, None) => 1,
-            (Method::Paper, Some(_)) if K::PAPER_EARLY => 2,
+            (Method::Paper, Some(_)) => 2,
             _ => return None,
         };
         if self.candidates < 2 || self.config.verify {

@@ -318,8 +318,6 @@ const MOST_OFF: i32 = (1 << 26) - 1;
 pub trait Kernels: crate::dsp::Kernels {
     /// Every table has whitened features: what the methods for others take is left out of the code.
     const ONLY_FUSED: bool = false;
-    /// The paper's method may end slides early, too, which is not done unless somebody asks for it.
-    const PAPER_EARLY: bool = true;
 
     /// Sets logarithms to 0, the prior.
     fn reset_to_prior(logs: &mut [i32]);

@@ -150,7 +150,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     }
 
     /// All features, whitened.
-    pub(super) fn observe_features(
+    fn observe_features(
         &mut self,
         action: Action,
         slide: &Observation,

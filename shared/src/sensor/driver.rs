@@ -43,14 +43,18 @@ pub trait PressureSensor {
     /// The answers are no sample. Count it and treat the sample as lost: there is no older value to use.
     fn decode(&mut self, n: u32, answer: &[u8]) -> Result<Pressure, Self::Error>;
 
-    /// Gravity along the finger in its last answers, counts of P_AC; `None` from a finger that does not feel it.
-    fn gravity(&self) -> Option<f32> {
+    /// Gravity along the finger in its last answers, [`GRAVITY_PARTS`] of a count of P_AC; `None` from a finger that does not feel
+    /// it.
+    fn gravity(&self) -> Option<i32> {
         None
     }
 
     /// How such an answer is counted; not at all, if the finger has just begun.
     fn kind(why: &Self::Error) -> Option<BadWord>;
 }
+
+/// [`PressureSensor::gravity`] has so many to a count: whole numbers for interrupts.
+pub const GRAVITY_PARTS: f32 = 16.0;
 
 /// Answers that are no sample, as all fingers count them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

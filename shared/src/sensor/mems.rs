@@ -3,7 +3,7 @@
 //! Z is read in each of the 4400 slots; a half-band filter takes it to 2200 Hz, and a high-pass of 10 Hz takes gravity and tilt
 //! away, and most of a hand's tremor. The cell is read in every fourth slot, 1100 times a second, and held between.
 
-use crate::sensor::driver::{BadWord, PressureSensor};
+use crate::sensor::driver::{BadWord, GRAVITY_PARTS, PressureSensor};
 use crate::sensor::finger::{AtRest, FingerModel, FingerName};
 use crate::sensor::pressure::{Calibration, Channel, Counts, Pressure, RATE_HZ};
 use crate::sensor::slot::{Port, StartStep, Transaction};
@@ -197,10 +197,10 @@ impl PressureSensor for Mems {
         Ok(Pressure { channel, counts })
     }
 
-    fn gravity(&self) -> Option<f32> {
+    fn gravity(&self) -> Option<i32> {
+        const { assert!(PAC_LSB as f32 == GRAVITY_PARTS) };
         // what the high-pass takes away
-        let lsb = (self.slow? >> 15) as i32;
-        Some(lsb as f32 / PAC_LSB as f32)
+        Some((self.slow? >> 15) as i32)
     }
 
     fn kind(why: &MemsError) -> Option<BadWord> {

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::amended;
 use super::format::{
-    AMENDS_LENGTHS, Action, CELL_BYTES, CRC_BYTES, Contents, EARLY, EARLY_VERSION, LENGTH, MAGIC,
-    MAX_MOVEMENTS, PACED, PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally, VERSION, each,
+    Action, CELL_BYTES, CRC_BYTES, Contents, EARLY, EARLY_VERSION, LENGTH, MAGIC, MAX_MOVEMENTS,
+    PACED, PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally, VERSION, each,
 };
 use super::gaussian::{SD_LEAST, SD_STEP, mean_step};
 use super::sections::Sections;
@@ -301,7 +301,7 @@ pub fn amend<'o>(
     if old.is_paced() {
         return rewrite_paced(out, old, rows);
     }
-    if AMENDS_LENGTHS && old.lengths().next().is_some() {
+    if EARLY && old.lengths().next().is_some() {
         let kept = rows.clone().map(|row| match row.cells {
             Cells::Old(_, texture) => Some(texture),
             // nobody knows what a shorter slide of it would be like
@@ -312,17 +312,6 @@ pub fn amend<'o>(
             amended::write_amended(old, kept, |bytes| writer.put(bytes));
         };
         return rewrite(out, old, old.lineage(), rows, (length, write));
-    }
-    if EARLY && !AMENDS_LENGTHS {
-        let others = || old.other_sections(LENGTH);
-        let length = others().map(|(head, contents)| head.len() + contents.len());
-        let write = |writer: &mut Writer<'_>| {
-            for (head, contents) in others() {
-                writer.put(&head);
-                writer.put(contents);
-            }
-        };
-        return rewrite(out, old, old.lineage(), rows, (length.sum(), write));
     }
     let sections = old.sections;
     rewrite(
@@ -571,7 +560,7 @@ fn write<'o, 'a>(
     let has = |wanted| each(written).flatten().any(|(kind, _)| kind == wanted);
     let newer = if PACED && has(SLOPES) {
         Some(PACED_VERSION)
-    } else if AMENDS_LENGTHS && has(LENGTH) {
+    } else if EARLY && has(LENGTH) {
         Some(EARLY_VERSION)
     } else {
         None

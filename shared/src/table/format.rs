@@ -31,9 +31,6 @@ pub(super) const TWO: usize = 8;
 pub(super) const MS: usize = 2;
 /// Whether this build can end a slide early. A probe that cannot saves the space, and refuses such tables.
 pub const EARLY: bool = cfg!(any(test, feature = "early"));
-/// Whether a table that is amended keeps what it says of shorter slides. A probe saves the space: the texture that it was amended
-/// for is one that no shorter slide is known of, and until all are known none ends early.
-pub(super) const AMENDS_LENGTHS: bool = EARLY && cfg!(any(test, feature = "amend-lengths"));
 /// The kind of the sections that say it, one for each length.
 pub(super) const LENGTH: u16 = 6;
 pub(super) const GAUSSIANS: u8 = 0;

@@ -166,8 +166,7 @@ impl<'a> Table<'a> {
     }
 
     /// That the cells of every movement can be compared with slides.
-    #[cfg_attr(any(test, feature = "early"), inline(never))]
-    #[cfg_attr(not(any(test, feature = "early")), inline(always))]
+    #[inline(always)]
     pub(super) fn check_cells(&self) -> Result<(), TableError> {
         match self.contents {
             Contents::Gaussians(measured) => self.check_deviations(measured),
@@ -208,16 +207,13 @@ impl<'a> Table<'a> {
     /// The lengths that it knows, the shortest first.
     pub(super) fn lengths(&self) -> impl Iterator<Item = Length<'a>> + Clone + use<'a> {
         let table = *self;
-        (0_usize..).map_while(move |n| table.length(n))
+        let sections = if EARLY { self.sections } else { &[] };
+        let sections = each(sections).flatten().filter(|(kind, _)| *kind == LENGTH);
+        sections.map_while(move |(_, contents)| table.length_of(contents))
     }
 
-    /// The `n`th length, from 0; `None` where there is none, or its section is too short. Once in the image: what asks for it is
-    /// not done often.
-    #[inline(never)]
-    fn length(&self, n: usize) -> Option<Length<'a>> {
-        let sections = if EARLY { self.sections } else { &[] };
-        let mut sections = each(sections).flatten().filter(|(kind, _)| *kind == LENGTH);
-        let (_, contents) = sections.nth(n)?;
+    /// What a section of kind 6 has; `None` where it is too short.
+    fn length_of(&self, contents: &'a [u8]) -> Option<Length<'a>> {
         let (ms, bytes) = contents.split_first_chunk::<MS>()?;
         let rest = bytes.get(self.layout().lineage..)?;
         let drift = self.section(DRIFT).map_or(0, <[u8]>::len);
@@ -241,13 +237,8 @@ impl<'a> Table<'a> {
         if !EARLY || movement < self.movements {
             return None;
         }
-        self.shorter_at(movement)
-    }
-
-    #[inline(never)]
-    fn shorter_at(&self, movement: u8) -> Option<(Table<'a>, u8)> {
         let (n, movement) = (movement / self.movements, movement % self.movements);
-        let length = self.length(usize::from(n) - 1)?;
+        let length = self.lengths().nth(usize::from(n) - 1)?;
         Some((length.table, movement))
     }
 
