@@ -57,25 +57,31 @@ fn seen(elf: &Path, world: &Collection, known: &Known, texture: u8) -> Seen {
         seed: 11,
         ..Identify::default()
     };
-    let explored = explore(&mut talk, &known.table, asked, &unknown.name, |board, report| {
-        let (now_ns, truth) = (board.now_ns(), board.rig().world().truth());
-        most_n = most_n.max(truth.force_max_n);
-        if sliding {
-            path.1 = truth.stage_mm;
-        }
-        let Some(report) = report else { return };
-        timeline.hear(now_ns, &report.event, &truth);
-        match report.event {
-            Event::Early(ms) => early.push(ms),
-            Event::Phase(phase) => {
-                sliding = phase == Phase::Sliding;
-                if sliding {
-                    path = (truth.stage_mm, truth.stage_mm);
-                }
+    let explored = explore(
+        &mut talk,
+        &known.table,
+        asked,
+        &unknown.name,
+        |board, report| {
+            let (now_ns, truth) = (board.now_ns(), board.rig().world().truth());
+            most_n = most_n.max(truth.force_max_n);
+            if sliding {
+                path.1 = truth.stage_mm;
             }
-            _ => {}
-        }
-    });
+            let Some(report) = report else { return };
+            timeline.hear(now_ns, &report.event, &truth);
+            match report.event {
+                Event::Early(ms) => early.push(ms),
+                Event::Phase(phase) => {
+                    sliding = phase == Phase::Sliding;
+                    if sliding {
+                        path = (truth.stage_mm, truth.stage_mm);
+                    }
+                }
+                _ => {}
+            }
+        },
+    );
     Seen {
         explored: explored.unwrap(),
         early,
@@ -90,7 +96,9 @@ fn seen(elf: &Path, world: &Collection, known: &Known, texture: u8) -> Seen {
 fn a_slide_ends_when_the_verdict_is_certain() {
     let Some(elf) = elf() else { return };
     let (collection, known) = world(3, 47, 6);
-    let [whole, early] = known.each_ref().map(|known| seen(&elf, &collection, known, 47));
+    let [whole, early] = known
+        .each_ref()
+        .map(|known| seen(&elf, &collection, known, 47));
     for seen in [&whole, &early] {
         // the PC that follows has seen the slide end at the same length, with the same features
         assert_eq!(seen.explored.missed(), [""; 0]);
@@ -108,9 +116,8 @@ fn a_slide_ends_when_the_verdict_is_certain() {
     assert_eq!(early.early.len(), 1);
     let ms = early.early[0];
     assert!(LENGTHS_MS.contains(&ms));
-    let seconds = |slide: &tactus_emulator::board::Slide| {
-        (slide.ended_ns - slide.began_ns) as f64 * 1e-9
-    };
+    let seconds =
+        |slide: &tactus_emulator::board::Slide| (slide.ended_ns - slide.began_ns) as f64 * 1e-9;
     println!(
         "{movement}: {:.2} s and {:.1} mm; {same}: {:.2} s and {:.1} mm for {ms} ms, verdict after {:.1} and {:.1} s",
         seconds(long),
@@ -130,7 +137,11 @@ fn a_slide_ends_when_the_verdict_is_certain() {
     );
     // where the stage was says the same: one ramp's time at full speed stands for two ramps
     let way_mm = speed_mm_s * (took_s - speed_mm_s / 1000.0);
-    assert!((early.way_mm - way_mm).abs() < 0.05 * way_mm + 0.3, "{} mm of {way_mm}", early.way_mm);
+    assert!(
+        (early.way_mm - way_mm).abs() < 0.05 * way_mm + 0.3,
+        "{} mm of {way_mm}",
+        early.way_mm
+    );
     assert!(early.seconds_to_verdict < whole.seconds_to_verdict);
 }
 
@@ -151,33 +162,42 @@ fn the_guard_trips_while_a_slide_is_ended() {
     };
     let (mut sliding_ms, mut fast_mm_s, mut injected) = (0, 0.0_f64, false);
     let mut told = Vec::new();
-    let ended = explore(&mut talk, &early.table, asked, &unknown.name, |board, report| {
-        if let Some(report) = report {
-            match report.event {
-                Event::Phase(Phase::Sliding) => (sliding_ms, fast_mm_s) = (1, 0.0),
-                Event::Phase(_) => sliding_ms = 0,
-                Event::Verdict(_) | Event::SlideReport { .. } => told.push("a verdict"),
-                Event::Fault(tactus_core::rig::Fault::EStop) => told.push("the stop"),
-                _ => {}
+    let ended = explore(
+        &mut talk,
+        &early.table,
+        asked,
+        &unknown.name,
+        |board, report| {
+            if let Some(report) = report {
+                match report.event {
+                    Event::Phase(Phase::Sliding) => (sliding_ms, fast_mm_s) = (1, 0.0),
+                    Event::Phase(_) => sliding_ms = 0,
+                    Event::Verdict(_) | Event::SlideReport { .. } => told.push("a verdict"),
+                    Event::Fault(tactus_core::rig::Fault::EStop) => told.push("the stop"),
+                    _ => {}
+                }
+                return;
             }
-            return;
-        }
-        let speed_mm_s = board.rig().world().truth().speed_mm_s.abs();
-        fast_mm_s = fast_mm_s.max(speed_mm_s);
-        sliding_ms += u32::from(sliding_ms > 0);
-        // up to 2 s no slide of this world ends by itself
-        let brakes = (600..1000).contains(&sliding_ms) && speed_mm_s < 0.8 * fast_mm_s;
-        if brakes && !injected {
-            injected = true;
-            board.inject(Fault::EStop);
-        }
-    });
+            let speed_mm_s = board.rig().world().truth().speed_mm_s.abs();
+            fast_mm_s = fast_mm_s.max(speed_mm_s);
+            sliding_ms += u32::from(sliding_ms > 0);
+            // up to 2 s no slide of this world ends by itself
+            let brakes = (600..1000).contains(&sliding_ms) && speed_mm_s < 0.8 * fast_mm_s;
+            if brakes && !injected {
+                injected = true;
+                board.inject(Fault::EStop);
+            }
+        },
+    );
     assert!(injected, "no slide was ended");
     assert!(ended.is_err(), "{ended:?}");
     assert_eq!(told, ["the stop"]);
     let truth = talk.board().rig().world().truth();
     assert!(truth.force_max_n < 2.2, "{truth:?}");
-    assert!(truth.speed_mm_s.abs() < 0.5 && truth.force_n == 0.0, "{truth:?}");
+    assert!(
+        truth.speed_mm_s.abs() < 0.5 && truth.force_n == 0.0,
+        "{truth:?}"
+    );
 }
 
 /// How much sooner a person knows, over 20 worlds: `cargo test --release -p tactus-emulator --test board early:: -- --ignored --nocapture`

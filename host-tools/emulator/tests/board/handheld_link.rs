@@ -670,7 +670,9 @@ fn a_finger_is_turned_over_on_its_own_screen_and_for_a_host() {
         "{turned:?}"
     );
     assert_eq!(held.prompts, [Prompt::Still, Prompt::TurnOver]);
-    // and it slides as before
+    // it is turned back, and slides as before
+    held.talk.board().rig().world().hand().unwrap().turn(false);
+    held.talk.board().run_ms(3000).unwrap();
     held.slide_until("slide 2 of 5");
     held.end();
 }

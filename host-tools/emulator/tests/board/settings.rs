@@ -30,7 +30,7 @@ fn calibration_after(talk: &mut Talk, command: Command) -> RigCalibration {
     let mut told = None;
     let hear = |_: &mut Emulator, report: Option<&tactus_core::wire::Report>| {
         if let Some(Event::Calibration(bytes)) = report.map(|r| &r.event) {
-            told = bytes.as_slice().try_into().ok();
+            told = Some(bytes.clone());
         }
     };
     talk.send(command, 120.0, hear).unwrap();
