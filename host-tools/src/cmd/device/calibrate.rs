@@ -20,7 +20,7 @@ use crate::cmd::output::{Format, print_json, print_rows};
 
 /// Measure what differs from rig to rig, or show and set it
 #[derive(clap::Args)]
-#[command(group(ArgGroup::new("scale").args(["force_mn_per_count", "weights"])), after_help = "\
+#[command(group(ArgGroup::new("scale").args(["force_mn_per_count", "turn_over", "weights"])), after_help = "\
 Examples:
   tactus device calibrate                   measures the motor's current without load, and P_DC in the air
   tactus device calibrate --show            what is in use
@@ -41,13 +41,13 @@ pub(crate) struct Args {
     show: bool,
     /// Measure what a count of acceleration is worth, and nothing else: the finger points straight down and keeps still, then straight
     /// up. For a finger with an accelerometer
-    #[arg(long, conflicts_with_all = ["show", "drifted", "newton_per_ampere", "force_mn_per_count", "weights"])]
+    #[arg(long, conflicts_with_all = ["show", "drifted", "newton_per_ampere"])]
     turn_over: bool,
     /// The finger has drifted further than the probe allows: discard the P_DC that it had in the air, and measure it anew
     #[arg(long)]
     drifted: bool,
     /// The day on which the force per count, or the acceleration per count, was measured, as 20261121; today unless given
-    #[arg(long, value_name = "YYYYMMDD", value_parser = clap::value_parser!(u32).range(20_000_101..=29_991_231))]
+    #[arg(long, value_name = "YYYYMMDD", requires = "scale", value_parser = clap::value_parser!(u32).range(20_000_101..=29_991_231))]
     date: Option<u32>,
     /// Shear per motor current, N/A, from pulls on an inclined stage
     #[arg(long, value_name = "X")]
@@ -132,13 +132,6 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if how.show {
         return print(how.format, &calibration, out);
     }
-    ensure!(
-        how.date.is_none()
-            || how.turn_over
-            || how.force_mn_per_count.is_some()
-            || !how.weights.is_empty(),
-        "--date is the day of a measurement: give --weights, --force-mn-per-count or --turn-over with it"
-    );
     // a fault is told on the way; an object is all there is otherwise
     let mut nowhere = std::io::sink();
     let told: &mut dyn Write = match how.format {
