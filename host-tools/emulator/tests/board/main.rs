@@ -8,7 +8,6 @@ mod commands;
 mod common;
 mod current;
 mod cycles;
-mod early;
 mod explore;
 mod fault_cases;
 mod faults;
