@@ -18,7 +18,7 @@ use crate::wire::Failure;
 /// Weights as a kitchen scale shows them, 30, 60, 90, 120 and 150 g, as forces in mN.
 pub const WEIGHTS_MN: [u16; 5] = [294, 588, 883, 1177, 1471];
 /// What the display says where the store fails.
-const NOT_KEPT: &str = "Not kept. Switch off and on.";
+const NOT_KEPT: &str = "Not kept. Restart it.";
 /// What the display says where P_DC falls under a weight.
 const FALLS: &str = "P_DC falls. Swap the cell's wires.";
 
@@ -55,7 +55,7 @@ impl<H: Hand, K: Kernels> ByHand<'_, H, K> {
         calibration.pressure.force_mn_per_count = scale.mn_per_count;
         calibration.date = RigCalibration::UNDATED;
         let set = self.set_calibration(calibration).await;
-        set.map_err(|_| Some("Impossible. Weigh again."))?;
+        set.map_err(|_| Some("Wrong. Weigh again."))?;
         let kept = match memory.store() {
             Ok(store) => keep(store, &calibration).await.is_ok(),
             Err(_) => false,
@@ -89,7 +89,7 @@ impl<H: Hand, K: Kernels> ByHand<'_, H, K> {
         calibration.pressure.pac_pa_per_count = mg;
         calibration.turned = RigCalibration::UNDATED;
         let set = self.set_calibration(calibration).await;
-        set.map_err(|_| Some("Impossible. Turn it again."))?;
+        set.map_err(|_| Some("Wrong. Turn it again."))?;
         let kept = match memory.store() {
             Ok(store) => keep(store, &calibration).await.is_ok(),
             Err(_) => false,
