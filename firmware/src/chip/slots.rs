@@ -60,8 +60,6 @@ const SLACK_US: u32 = 7;
 const SPI1_FUNCTION: u8 = 5;
 /// Chip selects: the board has two.
 const SELECTS: usize = Finger::PORTS.len();
-/// Whether the finger feels gravity.
-const FELT: bool = cfg!(feature = "finger-mems");
 /// Whether all parts want the same mode of the bus: then it is set up once.
 const ONE_MODE: bool = {
     let (mut one, mut ports) = (true, Finger::PORTS);
@@ -82,7 +80,10 @@ const WIDE: bool = {
         let mut rest = *slot;
         while let [transaction, others @ ..] = rest {
             even &= transaction.out.len().is_multiple_of(2) && !transaction.out.is_empty();
-            assert!((transaction.port as usize) < SELECTS, "no such chip select");
+            assert!(
+                (transaction.port as usize) < SELECTS,
+                "there is no such chip select"
+            );
             rest = others;
         }
         let byte_ns = 8 * 1_000_000_000_u64.div_ceil(SPI_HZ as u64) as u32;
@@ -360,8 +361,8 @@ static GRAVITY: AtomicI32 = AtomicI32::new(i32::MIN);
 
 /// Gravity along the finger, counts of P_AC.
 pub(crate) fn gravity() -> Option<f32> {
-    let parts = Some(GRAVITY.load(Relaxed)).filter(|parts| FELT && *parts > i32::MIN)?;
-    Some(parts as f32 / GRAVITY_PARTS)
+    let parts = GRAVITY.load(Relaxed);
+    (Finger::FEELS_GRAVITY && parts > i32::MIN).then_some(parts as f32 / GRAVITY_PARTS)
 }
 
 /// Begins the slots; to be called once, when the sensor has started. `interrupt`s of SPI1 and TIM2 have one priority.
@@ -396,6 +397,7 @@ pub(crate) fn begin(mut bus: Bus, timer: board::Slots, words: Producer<'static, 
         interrupt::InterruptExt::enable(interrupt::SPI1);
         interrupt::InterruptExt::enable(interrupt::TIM2);
     }
+    // nobody who listens runs before this does
     SET_UP.store(true, Relaxed);
     pause(false);
 }

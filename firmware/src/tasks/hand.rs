@@ -194,7 +194,7 @@ struct Parts {
 }
 
 impl Hand for Parts {
-    const TURNS: bool = cfg!(feature = "finger-mems");
+    const FEELS_GRAVITY: bool = Finger::FEELS_GRAVITY;
 
     async fn wait(&mut self) {
         self.ticker.next().await;

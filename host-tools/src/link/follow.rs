@@ -7,7 +7,7 @@ use tactus_core::features::{
     Block, FEATURE_STEPS, Measurement, Observation, PropertySet, Slide, SlideError,
 };
 use tactus_core::probe::explore::Random;
-use tactus_core::sensor::pressure::RATE_HZ;
+use tactus_core::sensor::pressure::samples_in;
 use tactus_core::table::{Action, Contents, MAX_TEXTURES, Table};
 use tactus_core::wire::{
     Event, ExpectedOutcome, Identify, MAX_EXPECTED_OUTCOMES, SlideReport, Verdict,
@@ -319,7 +319,7 @@ impl<'t> Follower<'t> {
         // as the probe does: after each block of a slide
         let mut lengths = self.explorer.table().lengths_ms().skip(self.looks.len());
         if let Some(ms) = lengths.next() {
-            let wanted = u32::from(ms) * RATE_HZ / 1000;
+            let wanted = samples_in(ms);
             if !block.still && slide.samples() >= wanted {
                 self.looks.push(slide.look(wanted));
             }

@@ -256,8 +256,7 @@ impl<'p, K: Kernels> Slide<'p, K> {
         self.measure(samples)
     }
 
-    #[cfg_attr(any(test, feature = "early"), inline(never))]
-    #[cfg_attr(not(any(test, feature = "early")), inline(always))]
+    #[inline(always)]
     fn measure(&mut self, wanted: u32) -> Result<Measurement, SlideError> {
         let got = self.spectrum.samples();
         if self.lost > 0 {

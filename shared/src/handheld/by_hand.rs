@@ -41,7 +41,7 @@ const CLEARED: u32 = TICKS_HZ;
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait Hand {
     /// Whether its finger feels gravity.
-    const TURNS: bool = false;
+    const FEELS_GRAVITY: bool = false;
 
     /// Waits for the next hundredth of a second.
     async fn wait(&mut self);
@@ -128,7 +128,7 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
         };
         #[cfg(any(feature = "turns", test))]
         {
-            by_hand.handheld.turns = H::TURNS;
+            by_hand.handheld.turns = H::FEELS_GRAVITY;
         }
         by_hand.use_calibration(calibration);
         by_hand
@@ -378,7 +378,7 @@ impl<H: Hand, K: Kernels> RigHandle for ByHand<'_, H, K> {
     // in images that never do it, a future of it would take flash
     #[cfg(any(feature = "turns", test))]
     async fn turn_over(&mut self) -> Result<Turned, Failure> {
-        if !H::TURNS {
+        if !H::FEELS_GRAVITY {
             return Err(Failure::OtherProbe);
         }
         self.handheld.ask_to_turn(false);

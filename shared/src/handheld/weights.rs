@@ -55,7 +55,7 @@ impl<H: Hand, K: Kernels> ByHand<'_, H, K> {
         calibration.pressure.force_mn_per_count = scale.mn_per_count;
         calibration.date = RigCalibration::UNDATED;
         let set = self.set_calibration(calibration).await;
-        set.map_err(|_| Some("Wrong. Weigh again."))?;
+        set.map_err(|_| Some("Wrong scale. Weigh again."))?;
         let kept = match memory.store() {
             Ok(store) => keep(store, &calibration).await.is_ok(),
             Err(_) => false,
@@ -101,7 +101,7 @@ impl<H: Hand, K: Kernels> ByHand<'_, H, K> {
 /// What the display says of it; nothing where the person gave up, or a fault is shown already.
 fn words(why: &Failure) -> Option<&'static str> {
     match why {
-        Failure::Rig(RigError::NobodyThere) => Some("Nothing still."),
+        Failure::Rig(RigError::NobodyThere) => Some("Nothing was still."),
         _ => None,
     }
 }

@@ -11,10 +11,10 @@ const LEAST: f32 = 0.7 * COUNTS_PER_G;
 /// What it should be by the data sheet of the IIS3DWB.
 const MG_PER_COUNT: f32 = Mems::MODEL.calibration.pac_pa_per_count;
 const COUNTS_PER_G: f32 = 1e3 / MG_PER_COUNT;
-/// What a count can be, mg: within a tenth of the data sheet's. A finger that is turned over 15 degrees askew shows 3 % less, and
-/// ST's parts of this kind are within some per cent (chosen: the data sheet's own limits could not be read).
+/// What a count can be, mg: within a tenth of the data sheet's (chosen, since its own limits could not be read). A finger that is
+/// turned over 15 degrees askew shows 3 % less.
 pub const PLAUSIBLE_MG: RangeInclusive<f32> = 0.9 * MG_PER_COUNT..=1.1 * MG_PER_COUNT;
-/// How far its zero may be off, mg (chosen: three times what ST's parts of this kind are off at most).
+/// How far its zero may be off, mg (chosen, for the same reason).
 const MOST_OFFSET_MG: f32 = 250.0;
 
 /// First one way, then the other.

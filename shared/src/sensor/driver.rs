@@ -36,6 +36,8 @@ pub trait PressureSensor {
     const SLOTS: &'static [&'static [Transaction]];
     /// Time without clock after which a finger answers again that took noise for a command, ms; 0: no such command is known.
     const DEAF_MS: u32 = 0;
+    /// Whether it feels gravity: see [`PressureSensor::gravity`].
+    const FEELS_GRAVITY: bool = false;
 
     /// The sample of slot `n` in its answers.
     ///

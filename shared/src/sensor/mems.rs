@@ -167,6 +167,7 @@ impl PressureSensor for Mems {
     const PORTS: &'static [Port] = &[iis3dwb::PORT, ads1220::PORT];
     const POWER_UP_MS: u32 = iis3dwb::POWER_UP_MS;
     const START: &'static [StartStep] = &START;
+    const FEELS_GRAVITY: bool = true;
     const SLOTS: &'static [&'static [Transaction]] = &[
         &[iis3dwb::READ_Z],
         &[iis3dwb::READ_Z, ads1220::READ],

@@ -111,6 +111,11 @@ pub struct Calibration {
     pub linear_mn: f32,
 }
 
+/// Samples of a channel in so many ms.
+pub const fn samples_in(ms: u16) -> u32 {
+    ms as u32 * RATE_HZ / 1000
+}
+
 /// Voltage of one count: 12 bits over 0..3.3 V (Methods, "BioTac").
 const MV_PER_COUNT: f32 = 3300.0 / 4096.0;
 

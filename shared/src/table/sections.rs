@@ -234,8 +234,7 @@ impl<'a> Table<'a> {
 }
 
 /// Whether the contents of a section of drift have its variances.
-#[cfg_attr(any(test, feature = "early"), inline(never))]
-#[cfg_attr(not(any(test, feature = "early")), inline(always))]
+#[inline(always)]
 pub(super) fn are_drifts(contents: &[u8], features: usize, movements: usize) -> bool {
     let rest = contents.get(TWO..).unwrap_or_default();
     let mut variances = rest.chunks(of_drift(features).max(1));
@@ -244,8 +243,7 @@ pub(super) fn are_drifts(contents: &[u8], features: usize, movements: usize) -> 
 }
 
 /// Whether these are the contents of a section of limits and population.
-#[cfg_attr(any(test, feature = "early"), inline(never))]
-#[cfg_attr(not(any(test, feature = "early")), inline(always))]
+#[inline(always)]
 pub(super) fn are_limits(contents: &[u8], features: usize, movements: usize) -> bool {
     let (limits, populations) = contents.split_at_checked(Limits::BYTES).unwrap_or_default();
     let mut populations_of = populations.chunks(of_population(features).max(1));

@@ -19,6 +19,19 @@ const MOST_N: f64 = 2.2;
 /// Day of the calibration.
 const DAY: u32 = 20_261_125;
 
+/// A rig with the finger `mems`, which is ready.
+fn mems() -> Option<Talk> {
+    let setup = Setup {
+        texture: 60,
+        finger: FingerName::Mems,
+        ..Setup::default()
+    };
+    let elf = elf_of("TACTUS_MEMS_ELF")?;
+    let mut talk = Talk::new(Emulator::start(&elf, setup, Options::default()).unwrap());
+    ready(&mut talk);
+    Some(talk)
+}
+
 /// Lays on what the probe asks for, and takes it away again when it asks for that.
 struct Scale {
     /// The world's force on the finger at the last moment that the weight lay there, N.
@@ -51,16 +64,7 @@ impl Scale {
 
 #[test]
 fn a_rig_is_weighed_and_reads_what_lies_on_its_finger() {
-    let Some(elf) = elf_of("TACTUS_MEMS_ELF") else {
-        return;
-    };
-    let setup = Setup {
-        texture: 60,
-        finger: FingerName::Mems,
-        ..Setup::default()
-    };
-    let mut talk = Talk::new(Emulator::start(&elf, setup, Options::default()).unwrap());
-    ready(&mut talk);
+    let Some(mut talk) = mems() else { return };
     let mut calibration = talk
         .run(Request::calibrate(), TIMEOUT_S, |_, _| ())
         .unwrap();
@@ -105,16 +109,7 @@ fn a_rig_is_weighed_and_reads_what_lies_on_its_finger() {
 
 #[test]
 fn a_rigs_accelerometer_is_turned_over_and_what_it_says_is_kept() {
-    let Some(elf) = elf_of("TACTUS_MEMS_ELF") else {
-        return;
-    };
-    let setup = Setup {
-        texture: 60,
-        finger: FingerName::Mems,
-        ..Setup::default()
-    };
-    let mut talk = Talk::new(Emulator::start(&elf, setup, Options::default()).unwrap());
-    ready(&mut talk);
+    let Some(mut talk) = mems() else { return };
     let off = PartFault::AccelerometerOff {
         share: -0.025,
         zero_g: 0.05,

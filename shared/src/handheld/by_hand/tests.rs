@@ -94,7 +94,7 @@ impl Obedient {
 }
 
 impl Hand for Obedient {
-    const TURNS: bool = true;
+    const FEELS_GRAVITY: bool = true;
 
     fn gravity(&self) -> Option<f32> {
         let (g, zero) = self.g;
@@ -372,7 +372,7 @@ fn a_person_turns_the_finger_over_without_a_host_and_it_is_kept() {
     rig.hand.g = (0.0, 0.0);
     block_on(rig.set_gravity(&mut memory));
     assert_eq!(rig.calibration(), set);
-    assert!(shown(&rig).contains("Nothing still"), "{}", shown(&rig));
+    assert!(shown(&rig).contains("Nothing was still"), "{}", shown(&rig));
 }
 
 #[test]

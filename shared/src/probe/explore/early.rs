@@ -6,7 +6,7 @@ use crate::explorer::{Explorer, Kernels, ObserveError};
 use crate::features::{Measurement, Observation, Slide, SlideError};
 use crate::rig::Rig;
 #[cfg(any(test, feature = "early"))]
-use crate::sensor::pressure::RATE_HZ;
+use crate::sensor::pressure::samples_in;
 use crate::table::Action;
 
 /// A length of the table, at which a slide ended.
@@ -34,13 +34,13 @@ pub(super) async fn perform<R: Rig, const N: usize, K: Kernels>(
     let mut next = lengths.next();
     let mut ended = None;
     let enough = &mut |slide: &mut Slide<'_, K>| {
-        let Some((n, ms)) = next.filter(|(_, ms)| slide.samples() >= samples_of(*ms)) else {
+        let Some((n, ms)) = next.filter(|(_, ms)| slide.samples() >= samples_in(*ms)) else {
             return false;
         };
         next = lengths.next();
         let length = Length { n, ms };
         // whatever is wrong with the slide is for its end to say
-        let look = slide.look(samples_of(ms)).ok().and_then(|slide| {
+        let look = slide.look(samples_in(ms)).ok().and_then(|slide| {
             let look = explorer.look(action, n, &Observation::from(&slide));
             look.ok().flatten()
         });
@@ -69,7 +69,7 @@ pub(super) fn measure<K: Kernels>(
     length: Option<Length>,
 ) -> Result<Measurement, SlideError> {
     match length {
-        Some(length) => slide.look(samples_of(length.ms)),
+        Some(length) => slide.look(samples_in(length.ms)),
         None => slide.finish(),
     }
 }
@@ -80,12 +80,6 @@ pub(super) fn measure<K: Kernels>(
     _length: Option<Length>,
 ) -> Result<Measurement, SlideError> {
     slide.finish()
-}
-
-/// Samples of P_AC in so many ms.
-#[cfg(any(test, feature = "early"))]
-fn samples_of(ms: u16) -> u32 {
-    u32::from(ms) * RATE_HZ / 1000
 }
 
 /// Takes in a slide that ended at this length, or at its end.
