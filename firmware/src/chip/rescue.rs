@@ -1,5 +1,4 @@
 //! What is left to do when the firmware gives up: stop the stage, lift the finger, remember why, start again.
-use core::fmt::Write as _;
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
 use core::ptr::{addr_of, addr_of_mut};
@@ -159,10 +158,18 @@ pub(crate) fn guard_stack() {
 fn panic(_: &PanicInfo<'_>) -> ! {
     let mut text: String<WORDS> = String::new();
     let _ = text.push_str("panic, called from");
-    callers(|at| {
-        let _ = write!(text, " {at:#x}");
-    });
+    callers(|at| address(&mut text, at as u32));
     give_up(&text)
+}
+
+/// Writes an address behind a text, as far as there is space. What formats numbers of any kind would take 1 KB of flash.
+fn address(text: &mut String<WORDS>, at: u32) {
+    let _ = text.push_str(" 0x");
+    let digits = (35 - (at | 1).leading_zeros()) / 4;
+    for place in (0..digits).rev() {
+        let digit = char::from_digit(at >> (4 * place) & 15, 16);
+        let _ = text.push(digit.unwrap_or('?'));
+    }
 }
 
 /// Where functions on the stack return to, the last one first. What looks like it and is left over of others is among them.
@@ -212,6 +219,7 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
         give_up("the stack overflowed");
     }
     let mut text: String<WORDS> = String::new();
-    let _ = write!(text, "hard fault at {:#010x}", frame.pc());
+    let _ = text.push_str("hard fault at");
+    address(&mut text, frame.pc());
     give_up(&text)
 }
