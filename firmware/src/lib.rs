@@ -4,6 +4,8 @@
 #![cfg_attr(target_os = "none", no_std)]
 #![cfg(target_os = "none")]
 
+#[cfg(feature = "arm")]
+mod arm;
 mod bench;
 mod board;
 mod chip;
@@ -12,6 +14,8 @@ mod rig;
 mod selftest;
 mod tasks;
 
+#[cfg(feature = "arm")]
+pub use arm::arm;
 pub use bench::{bench, silicon, workload};
 pub use handheld::handheld;
 pub use rig::rig;

@@ -22,10 +22,10 @@ use tactus_core::wire::{Event, PROTOCOL};
 use crate::board;
 use crate::chip::slots::{WORDS, Word};
 use crate::chip::{rescue, thread, watchdog};
-use crate::tasks::servo::{self, SAMPLES};
-use crate::tasks::{acquire, link, only, outbox, probe, watch};
+use crate::tasks::drive::{self, SAMPLES};
+use crate::tasks::{acquire, link, only, outbox, probe, servo, watch};
 
-static SERVO: InterruptExecutor = InterruptExecutor::new();
+pub(crate) static SERVO: InterruptExecutor = InterruptExecutor::new();
 
 #[interrupt]
 fn UART5() {
@@ -60,7 +60,7 @@ pub fn rig() -> ! {
     // those of thread mode run when all are there, `servo`, which has the motors, at once: it is the last one
     thread::run(|thread| {
         thread.spawn(only(link::send(tx)));
-        thread.spawn(only(link::receive(rx, &servo::BODY)));
+        thread.spawn(only(link::receive(rx, &drive::BODY)));
         thread.spawn(only(watch::watch()));
         thread.spawn(only(probe::probe(r.store, r.go, samples_out)));
         thread.spawn(only(acquire::acquire(r.sensor, r.slots, words_in)));

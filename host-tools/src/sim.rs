@@ -11,6 +11,8 @@
 // for that; its tests compare with tolerances
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
+pub mod arm;
+pub mod arm_program;
 pub mod collection;
 mod conditions;
 pub mod encoder;
@@ -25,6 +27,7 @@ mod maths;
 pub mod motion;
 pub mod mount;
 mod noise;
+pub mod over_link;
 pub mod parts;
 pub mod person;
 pub use person as hand;

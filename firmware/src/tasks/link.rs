@@ -10,6 +10,8 @@ use static_cell::ConstStaticCell;
 use tactus_core::probe::seams::Panel;
 use tactus_core::probe::{RigState, TableInUse, Turn, receive as receive_request};
 use tactus_core::sensor::FingerCode;
+#[cfg(feature = "arm")]
+use tactus_core::wire::ArmReport;
 use tactus_core::wire::{Counts, Event, Receiver, Request};
 
 use super::level::OneLevel;
@@ -142,6 +144,11 @@ impl Panel for AtAnyTime {
 
     fn stop(&mut self, all: bool) {
         (self.0.stop)(all);
+    }
+
+    #[cfg(feature = "arm")]
+    fn arm(&mut self, report: ArmReport) {
+        super::arm::hear(report);
     }
 
     fn stream(&mut self, on: bool) {

@@ -7,21 +7,23 @@ use heapless::spsc::Consumer;
 use static_cell::StaticCell;
 use tactus_core::dsp::Plan;
 use tactus_core::probe::seams::{Events, RigHandle as _};
-use tactus_core::probe::servo_rig::{Samples, ServoRig};
+use tactus_core::probe::servo_rig::{Samples, Servo as _, ServoRig};
 use tactus_core::probe::{self, Memory, Probe, TableInUse};
 use tactus_core::wire::{Event, Failure};
 
+use super::drive;
 use super::link::{BUSY, JOBS, TABLE};
 use super::outbox::tell;
 use super::rig_handle::ServoHandle;
-use super::servo;
 use crate::board;
 use crate::chip::Chip;
 use crate::chip::flash::{self, MappedTable};
 
 /// The table that comes with the firmware: textures of a simulated world, which suit the emulated board. A real rig
 /// is trained by its user, or receives a table from the host.
-static FACTORY: &[u8] = if cfg!(feature = "finger-analog") {
+static FACTORY: &[u8] = if cfg!(feature = "arm") {
+    include_bytes!("../../arm.tact")
+} else if cfg!(feature = "finger-analog") {
     include_bytes!("../../factory-analog.tact")
 } else if cfg!(feature = "finger-mems") {
     include_bytes!("../../factory-mems.tact")
@@ -42,7 +44,8 @@ pub(crate) async fn probe(
     // Whatever was before the reset, the finger is lifted first, and waits for nothing but the sensor. The stage does not
     // move before the calibration is there, which says whether the finger is in the air.
     Timer::after_millis(HEARD_MS).await;
-    let lifted = rig.lift().await.is_ok();
+    // An arm is told to stop, and asked for more once somebody asks for a slide: it may not be there.
+    let lifted = !ServoHandle::HAS_STAGE || rig.lift().await.is_ok();
     let opening = async {
         let mut store = flash::open(flash).await?;
         if let Err(why) = store.mend().await {
@@ -50,7 +53,7 @@ pub(crate) async fn probe(
         }
         Ok(store)
     };
-    let mut store = flash::wait(opening, servo::progress).await;
+    let mut store = flash::wait(opening, drive::progress).await;
     let restored = match &mut store {
         Ok(store) => probe::restore(store, &mut rig).await,
         Err(why) => Err(*why),
@@ -66,15 +69,15 @@ pub(crate) async fn probe(
     };
     probe.memory.reload(&mut probe.events).await;
     // a lever that does not go up must not be asked again before somebody has looked at it
-    if lifted {
+    if lifted && ServoHandle::HAS_STAGE {
         let _ = probe.rig.home().await;
     }
     loop {
-        servo::forget_stop();
+        drive::forget_stop();
         BUSY.store(false, Relaxed);
-        servo::waits();
+        drive::waits();
         let request = JOBS.receive().await;
-        servo::progress();
+        drive::progress();
         BUSY.store(true, Relaxed);
         probe.serve::<Chip>(&request).await;
     }

@@ -8,25 +8,27 @@ use tactus_core::probe::servo_rig::{LOOK_MS, RigCommand, Samples, Servo};
 use tactus_core::rig::Refused;
 use tactus_core::wire::Event;
 
+use super::drive;
 use super::outbox::{STREAM, tell};
-use super::servo;
 use crate::chip::slots;
 
 /// The probe's end of the servo.
 pub(crate) struct ServoHandle(pub(crate) Consumer<'static, Samples>);
 
 impl Servo for ServoHandle {
+    const HAS_STAGE: bool = cfg!(not(feature = "arm"));
+
     async fn command(&mut self, command: RigCommand) -> Result<(), Refused> {
-        servo::command(command).await
+        drive::command(command).await
     }
 
     async fn wait(&mut self) {
-        let _ = with_timeout(Duration::from_millis(LOOK_MS.into()), servo::ended()).await;
-        servo::progress();
+        let _ = with_timeout(Duration::from_millis(LOOK_MS.into()), drive::ended()).await;
+        drive::progress();
     }
 
     fn state(&self) -> RigState {
-        servo::state()
+        drive::state()
     }
 
     fn samples(&mut self) -> Option<Samples> {
@@ -39,19 +41,19 @@ impl Servo for ServoHandle {
 
     fn lost(&self) -> u32 {
         let acquired = slots::LOST.load(Relaxed);
-        acquired.wrapping_add(servo::LOST.load(Relaxed))
+        acquired.wrapping_add(drive::LOST.load(Relaxed))
     }
 
     fn stop(&mut self) {
-        servo::stop();
+        drive::stop();
     }
 
     fn end_slide(&mut self) {
-        servo::end_slide();
+        drive::end_slide();
     }
 
     fn is_stopped(&self) -> bool {
-        servo::is_stopped()
+        drive::is_stopped()
     }
 
     fn streams(&self) -> bool {

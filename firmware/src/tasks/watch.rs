@@ -2,8 +2,8 @@
 use embassy_time::{Duration, Ticker};
 use tactus_core::probe::Watch;
 
+use super::drive;
 use super::outbox::tell;
-use super::servo;
 
 #[embassy_executor::task]
 pub(crate) async fn watch() {
@@ -11,7 +11,10 @@ pub(crate) async fn watch() {
     let mut watch = Watch::default();
     loop {
         ticker.next().await;
-        servo::check_in();
-        watch.look(&servo::state(), tell);
+        drive::check_in();
+        #[cfg(feature = "arm")]
+        watch.look_for_arm(&drive::state(), tell);
+        #[cfg(not(feature = "arm"))]
+        watch.look(&drive::state(), tell);
     }
 }

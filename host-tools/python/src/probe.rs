@@ -13,10 +13,10 @@ use tactus::data::recorder::Recorder;
 use tactus::link::line::{Line, found, only_nucleo, open};
 use tactus::link::log;
 use tactus::link::owner::Owner;
-use tactus::link::{Job, Port, PortError, ReadTable, Request, Transaction};
+use tactus::link::{Job, Port, PortError, PushTable, ReadTable, Request, Transaction};
 use tactus_core::explorer::Strategy;
 use tactus_core::table::{Name, Table as Read};
-use tactus_core::wire::{Command, Identify, Report, Train};
+use tactus_core::wire::{ArmReport, ArmState, Command, Identify, Report, Train};
 
 use crate::arguments;
 use crate::error::{ProbeError, Raise as _};
@@ -34,6 +34,8 @@ const STOPPING: Duration = Duration::from_secs(35);
 #[pyclass(frozen, module = "tactus")]
 pub(crate) struct Probe {
     name: String,
+    /// What is to be sent while something is under way: whoever reads the port sends it.
+    outgoing: Mutex<Vec<Command>>,
     inner: Mutex<Option<Inner>>,
 }
 
@@ -144,6 +146,11 @@ impl Probe {
                 if let Some(report) = inner.reports.pop_front() {
                     return Ok((Some(report), true));
                 }
+                let mut outgoing = self.outgoing.lock().unwrap_or_else(PoisonError::into_inner);
+                for command in outgoing.drain(..) {
+                    inner.port.send(command)?;
+                }
+                drop(outgoing);
                 inner.step()?;
                 let report = inner.reports.pop_front();
                 Ok((report, inner.job.is_some() || !inner.reports.is_empty()))
@@ -193,6 +200,24 @@ fn name_of(name: &str) -> PyResult<Name> {
     name.ok_or_else(|| PyValueError::new_err("the name of a texture has 1 to 40 bytes"))
 }
 
+/// "Busy", "Pressed", ..., or {"Slid": {"length_um": ..., "speed_um_s": ...}}, as on the link.
+fn state_of(state: &Bound<'_, PyAny>) -> PyResult<ArmState> {
+    if let Ok(slid) = state.get_item("Slid") {
+        return Ok(ArmState::Slid {
+            length_um: slid.get_item("length_um")?.extract()?,
+            speed_um_s: slid.get_item("speed_um_s")?.extract()?,
+        });
+    }
+    match state.extract::<&str>()? {
+        "Busy" => Ok(ArmState::Busy),
+        "Pressed" => Ok(ArmState::Pressed),
+        "Steady" => Ok(ArmState::Steady),
+        "Lifted" => Ok(ArmState::Lifted),
+        "Failed" => Ok(ArmState::Failed),
+        other => Err(PyValueError::new_err(format!("{other}: no arm's state"))),
+    }
+}
+
 #[pymethods]
 impl Probe {
     #[new]
@@ -208,6 +233,7 @@ impl Probe {
             .map_err(|why| why.raise())?;
         Ok(Self {
             name,
+            outgoing: Mutex::default(),
             inner: Mutex::new(Some(Inner {
                 port: Port::new(line, timeout),
                 job: None,
@@ -231,6 +257,21 @@ impl Probe {
     /// The `Table` in use.
     fn table(&self, py: Python<'_>) -> PyResult<Table> {
         Table::of(self.complete(py, ReadTable::default())?)
+    }
+
+    /// Gives the probe a `Table`, which it keeps and uses from now on.
+    fn write_table(&self, py: Python<'_>, table: &Table) -> PyResult<()> {
+        let push = PushTable::new(&table.bytes).map_err(|why| why.raise())?;
+        self.complete(py, push)
+    }
+
+    /// Says how far an arm is with an order, while something is under way: see `Rig`.
+    fn _tell_arm(&self, number: u16, state: &Bound<'_, PyAny>) -> PyResult<()> {
+        let state: ArmState = state_of(state)?;
+        let report = ArmReport { number, state };
+        let mut outgoing = self.outgoing.lock().unwrap_or_else(PoisonError::into_inner);
+        outgoing.push(Command::Arm(report));
+        Ok(())
     }
 
     /// Whether the probe sends raw samples (events `Block` and `Pdc`) from now on.

@@ -188,6 +188,7 @@ fn may_repeat(command: &Command) -> bool {
         Command::Status
         | Command::Stop
         | Command::ReadCalibration
+        | Command::Arm(_)
         | Command::WriteCalibration(_)
         | Command::Stream(_)
         | Command::ReadTable(_)

@@ -5,7 +5,7 @@ use std::fmt;
 use rayon::prelude::*;
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
-use tactus_core::features::{Movement, Observation, SlideError};
+use tactus_core::features::{FeatureSet, Movement, Observation, SlideError};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::{FingerCode, FingerName};
 
@@ -172,6 +172,24 @@ impl Collection {
         Ok(named.map_err(TableError::from)?)
     }
 
+    /// A fused table for a rig that does not measure shear, as one that an arm moves: of band powers alone.
+    ///
+    /// # Errors
+    /// The first fault of a rig, or slide without properties.
+    pub fn learn_without_shear(
+        &self,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<u8>, LearnError> {
+        let movements = &Self::MOVEMENTS;
+        let slides = self.record(calibration, done)?;
+        let measured = self.measure(movements, &slides)?;
+        let bands = Some(FeatureSet::Bands);
+        let table = learn::learn(Method::Fused, bands, &self.names(), movements, &measured)?;
+        let named = learn::name_finger(&table, FingerCode::of(FingerName::Biotac), 0);
+        Ok(named.map_err(TableError::from)?)
+    }
+
     /// As [`Collection::learn`], with what slides say after each of these lengths, in ms at constant speed, the shortest first.
     ///
     /// # Errors
@@ -214,8 +232,24 @@ impl Collection {
         method: Method,
         slides: &[Vec<Recording>],
     ) -> Result<Vec<u8>, LearnError> {
+        let measured = self.measure(movements, slides)?;
+        Ok(learn::learn(
+            method,
+            None,
+            &self.names(),
+            movements,
+            &measured,
+        )?)
+    }
+
+    /// What these slides say: of each texture, of each movement, of each trial.
+    fn measure(
+        &self,
+        movements: &[Movement],
+        slides: &[Vec<Recording>],
+    ) -> Result<Vec<Vec<Vec<Observation>>>, TrialError> {
         let plan = Plan::new();
-        let measured = slides
+        slides
             .iter()
             .map(|slides| {
                 movements
@@ -234,14 +268,7 @@ impl Collection {
                     })
                     .collect::<Result<Vec<Vec<_>>, TrialError>>()
             })
-            .collect::<Result<Vec<_>, TrialError>>()?;
-        Ok(learn::learn(
-            method,
-            None,
-            &self.names(),
-            movements,
-            &measured,
-        )?)
+            .collect()
     }
 }
 

@@ -9,12 +9,14 @@ use tactus_core::dsp::Plan;
 use tactus_core::probe::seams::{Events, StoredBytes};
 use tactus_core::probe::servo_rig::{LOOK_MS, RigCommand, Samples, Servo, ServoRig};
 use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
+use tactus_core::rig::pins::Outputs;
 use tactus_core::rig::{Ended, Refused};
 use tactus_core::sensor::FingerCode;
 use tactus_core::store::{Store, StoreError};
 use tactus_core::wire::Event;
 
 use super::flash::RamFlash;
+use super::over_link::ArmRig;
 use super::rig::SimRig;
 
 /// Who is at the other end of a simulated probe.
@@ -47,17 +49,116 @@ pub trait Host {
     }
 }
 
+/// A simulated rig that a servo drives: ours, or one that an arm moves.
+pub trait Driven {
+    /// See [`Servo::HAS_STAGE`].
+    const HAS_STAGE: bool;
+
+    /// A millisecond passes.
+    fn tick(&mut self) -> &Outputs;
+
+    /// How the last movement ended, told once.
+    fn take_ended(&mut self) -> Option<Ended>;
+
+    /// What it is doing, as a probe shows it.
+    fn state(&mut self, ended: Option<Ended>) -> RigState;
+
+    /// Virtual time since power-up.
+    fn now(&self) -> Duration;
+
+    /// Has it do something.
+    ///
+    /// # Errors
+    /// It refuses that.
+    fn command(&mut self, command: RigCommand) -> Result<(), Refused>;
+
+    /// Stops what is being done.
+    fn stop(&mut self);
+
+    /// No more of the slide is needed.
+    fn end_slide(&mut self) {}
+
+    /// See [`Servo::gravity`].
+    fn gravity(&self) -> Option<f32> {
+        None
+    }
+}
+
+impl Driven for SimRig {
+    const HAS_STAGE: bool = true;
+
+    fn tick(&mut self) -> &Outputs {
+        Self::tick(self)
+    }
+
+    fn take_ended(&mut self) -> Option<Ended> {
+        self.control().take_ended()
+    }
+
+    fn state(&mut self, ended: Option<Ended>) -> RigState {
+        Self::state(self, ended)
+    }
+
+    fn now(&self) -> Duration {
+        Self::now(self)
+    }
+
+    fn command(&mut self, command: RigCommand) -> Result<(), Refused> {
+        command.apply(self.control())
+    }
+
+    fn stop(&mut self) {
+        self.control().stop();
+    }
+
+    fn end_slide(&mut self) {
+        self.control().end_slide();
+    }
+
+    fn gravity(&self) -> Option<f32> {
+        Self::gravity(self)
+    }
+}
+
+impl Driven for ArmRig {
+    const HAS_STAGE: bool = false;
+
+    fn tick(&mut self) -> &Outputs {
+        Self::tick(self)
+    }
+
+    fn take_ended(&mut self) -> Option<Ended> {
+        self.rig().take_ended()
+    }
+
+    fn state(&mut self, ended: Option<Ended>) -> RigState {
+        Self::state(self, ended)
+    }
+
+    fn now(&self) -> Duration {
+        Self::now(self)
+    }
+
+    fn command(&mut self, command: RigCommand) -> Result<(), Refused> {
+        command.apply_over_link(self.rig())
+    }
+
+    fn stop(&mut self) {
+        self.rig().stop();
+    }
+}
+
 /// The servo of a simulated rig: virtual time passes while somebody waits for it.
-pub struct SimServo<'p, H> {
-    rig: SimRig,
+pub struct SimServo<'p, H, R = SimRig> {
+    rig: R,
     host: &'p RefCell<H>,
     ended: Option<Ended>,
     state: RigState,
     samples: VecDeque<Samples>,
 }
 
-impl<'p, H: Host> SimServo<'p, H> {
-    fn new(mut rig: SimRig, host: &'p RefCell<H>) -> Self {
+impl<'p, H: Host, R: Driven> SimServo<'p, H, R> {
+    fn new(mut rig: R, host: &'p RefCell<H>) -> Self {
         Self {
             state: rig.state(None),
             rig,
@@ -68,18 +169,18 @@ impl<'p, H: Host> SimServo<'p, H> {
     }
 
     /// The rig: its world, its clock.
-    pub fn rig(&mut self) -> &mut SimRig {
+    pub fn rig(&mut self) -> &mut R {
         &mut self.rig
     }
 
     /// A millisecond passes.
     pub fn tick(&mut self) {
         if self.host.borrow_mut().stops() {
-            self.rig.control().stop();
+            self.rig.stop();
         }
         let samples = &mut self.samples;
         Samples::of(self.rig.tick(), |part| samples.push_back(part));
-        if let Some(ended) = self.rig.control().take_ended() {
+        if let Some(ended) = self.rig.take_ended() {
             self.ended = Some(ended);
         }
         self.state = self.rig.state(self.ended);
@@ -87,10 +188,12 @@ impl<'p, H: Host> SimServo<'p, H> {
     }
 }
 
-impl<H: Host> Servo for SimServo<'_, H> {
+impl<H: Host, R: Driven> Servo for SimServo<'_, H, R> {
+    const HAS_STAGE: bool = R::HAS_STAGE;
+
     async fn command(&mut self, command: RigCommand) -> Result<(), Refused> {
         self.ended = None;
-        let answer = command.apply(self.rig.control());
+        let answer = self.rig.command(command);
         self.tick();
         answer
     }
@@ -122,11 +225,11 @@ impl<H: Host> Servo for SimServo<'_, H> {
     }
 
     fn stop(&mut self) {
-        self.rig.control().stop();
+        self.rig.stop();
     }
 
     fn end_slide(&mut self) {
-        self.rig.control().end_slide();
+        self.rig.end_slide();
     }
 
     fn is_stopped(&self) -> bool {
@@ -176,21 +279,22 @@ impl<H: Host> Events for Told<'_, H> {
 }
 
 /// A simulated probe.
-pub type SimProbe<'p, H> = Probe<'p, ServoRig<SimServo<'p, H>>, RamFlash, TableCopy, Told<'p, H>>;
+pub type SimProbe<'p, H, R = SimRig> =
+    Probe<'p, ServoRig<SimServo<'p, H, R>>, RamFlash, TableCopy, Told<'p, H>>;
 
 /// Switches a probe on: `rig` has found its switches, `flash` is as an earlier life left it, `factory` is the table that
 /// comes with the firmware. `buffer` takes the longest table.
 ///
 /// # Errors
 /// The flash has no room for a store. Of what else is wrong with it the host is told, as by the firmware.
-pub fn switch_on<'p, H: Host>(
-    rig: SimRig,
+pub fn switch_on<'p, H: Host, R: Driven>(
+    rig: R,
     flash: RamFlash,
     factory: &'p [u8],
     buffer: &'p mut [u8],
     plan: &'p Plan,
     host: &'p RefCell<H>,
-) -> Result<SimProbe<'p, H>, StoreError> {
+) -> Result<SimProbe<'p, H, R>, StoreError> {
     let mut rig = ServoRig::new(SimServo::new(rig, host));
     let mut store = block_on(Store::open(flash))?;
     for done in [
@@ -215,7 +319,9 @@ pub fn switch_on<'p, H: Host>(
 ///
 /// # Errors
 /// See [`switch_on`].
-pub fn switch_off_and_on<H: Host>(probe: SimProbe<'_, H>) -> Result<SimProbe<'_, H>, StoreError> {
+pub fn switch_off_and_on<H: Host, R: Driven>(
+    probe: SimProbe<'_, H, R>,
+) -> Result<SimProbe<'_, H, R>, StoreError> {
     switch_off_changed_and_on(probe, &[])
 }
 
@@ -223,10 +329,10 @@ pub fn switch_off_and_on<H: Host>(probe: SimProbe<'_, H>) -> Result<SimProbe<'_,
 ///
 /// # Errors
 /// See [`switch_on`].
-pub fn switch_off_changed_and_on<'p, H: Host>(
-    probe: SimProbe<'p, H>,
+pub fn switch_off_changed_and_on<'p, H: Host, R: Driven>(
+    probe: SimProbe<'p, H, R>,
     bits: &[usize],
-) -> Result<SimProbe<'p, H>, StoreError> {
+) -> Result<SimProbe<'p, H, R>, StoreError> {
     let Probe {
         rig, memory, plan, ..
     } = probe;

@@ -20,7 +20,6 @@ use super::lever::Lever;
 use super::maths::sin;
 use super::mount::Mount;
 use super::parts::{PartFault, Peers};
-use super::person::Hand;
 use super::ripple::PwmPhase;
 use super::stage::Stage;
 use super::surface::Surface;
@@ -29,8 +28,10 @@ use super::{noise::Noise, textures};
 use tactus_core::sensor::FingerName;
 
 mod built;
+mod holder;
 
 pub use built::Reached;
+use holder::Holder;
 
 /// What a world is made from.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -146,7 +147,7 @@ pub struct World {
     /// a weight on the inclined stage, N
     pull_n: f64,
     /// holds the finger in place of lever and stage
-    hand: Option<Hand>,
+    holder: Option<Holder>,
     /// amplitude, g, and frequency, Hz, of what shakes the table under the rig
     table: (f64, f64),
 }
@@ -204,7 +205,7 @@ impl World {
             stage_reach_mm: (stage_mm, stage_mm),
             sliding_j: 0.0,
             pull_n: 0.0,
-            hand: None,
+            holder: None,
             table: (0.0, 0.0),
         };
         world.advance_to(0);
@@ -328,7 +329,7 @@ impl World {
 
     /// What is really so.
     pub fn truth(&self) -> Truth {
-        let hand = self.hand.as_ref();
+        let holder = self.holder.as_ref();
         Truth {
             at_ns: self.tick_ends_ns,
             texture: self.setup.texture,
@@ -341,8 +342,8 @@ impl World {
             lever_bad_pulses: self.lever.bad_pulses(),
             stage_mm: self.stage.position_mm(),
             stage_reach_mm: self.stage_reach_mm,
-            sample_mm: hand.map_or_else(|| self.stage.on_sample_mm(), Hand::x_mm),
-            speed_mm_s: hand.map_or_else(|| self.stage.speed_mm_s(), Hand::speed_mm_s),
+            sample_mm: holder.map_or_else(|| self.stage.on_sample_mm(), Holder::x_mm),
+            speed_mm_s: holder.map_or_else(|| self.stage.speed_mm_s(), Holder::speed_mm_s),
             current_a: self.stage.current_a(),
             mount_mm: self.mount.pushed_mm(),
             sliding_j: self.sliding_j,
@@ -420,14 +421,14 @@ impl World {
         self.tick_ends_ns = whole * 2_500_000 + rest * 2_500_000 / 33;
 
         let shear_n = self.finger.shear_n();
-        if let Some(hand) = &mut self.hand {
-            hand.tick(self.finger.force_n());
-            self.finger.hold(hand.held());
+        if let Some(holder) = &mut self.holder {
+            holder.tick(self.finger.force_n());
+            self.finger.hold(holder.held());
             self.finger.tick(&Contact {
-                indentation_mm: hand.indentation_mm(),
+                indentation_mm: holder.indentation_mm(),
                 surface: Some(&self.surface),
-                x_mm: hand.x_mm(),
-                speed_mm_s: hand.speed_mm_s(),
+                x_mm: holder.x_mm(),
+                speed_mm_s: holder.speed_mm_s(),
                 lever_vibration: 0.0,
             });
             self.peers.tick(self.tick_ends_ns, &self.finger);
@@ -482,8 +483,8 @@ impl World {
     }
 
     fn indentation_mm(&self) -> f64 {
-        if let Some(hand) = &self.hand {
-            return hand.indentation_mm();
+        if let Some(holder) = &self.holder {
+            return holder.indentation_mm();
         }
         self.over_tip_mm(&self.surface) + self.stage.heave_mm()
     }
@@ -501,7 +502,7 @@ impl World {
 
     fn must_be_over(&self, surface: &Surface) -> Result<(), NotLifted> {
         let over_mm = self.over_tip_mm(surface);
-        let indentation_mm = self.hand.as_ref().map_or(over_mm, Hand::indentation_mm);
+        let indentation_mm = self.holder.as_ref().map_or(over_mm, Holder::indentation_mm);
         if indentation_mm > 0.0 {
             return Err(NotLifted { indentation_mm });
         }

@@ -32,7 +32,7 @@ pub(crate) fn bundle(out: &Path) -> Result<()> {
     for name in TABLES.into_iter().flat_map(|(_, names)| names) {
         let table = root().join("firmware").join(name);
         let bytes = std::fs::read(&table).with_context(|| table.display().to_string())?;
-        tables.insert(name.to_owned(), bytes);
+        tables.insert((*name).to_owned(), bytes);
     }
     let files = files(images, tables)?;
     write(&out, &files)?;

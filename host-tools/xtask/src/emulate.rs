@@ -14,6 +14,8 @@ pub(crate) const RIG: &str = "tactus-rig";
 pub(crate) const HANDHELD: &str = "tactus-handheld";
 /// The same with a sensor of motion.
 pub(crate) const MOTION: &str = "tactus-handheld-motion";
+/// The image of a probe on somebody else's arm.
+pub(crate) const ARM: &str = "tactus-arm";
 
 /// Has the firmware identify a texture, the rig's or with `--handheld` the handheld's, or serves its serial port where a TCP port
 /// for it is given.
@@ -54,6 +56,7 @@ pub(crate) fn start(run: &str, options: &[OsString]) -> Result<()> {
             let kind = match run {
                 "handheld" if options.iter().any(|o| o == "--motion") => MOTION,
                 "handheld" => HANDHELD,
+                _ if value(options, "--arm-port").is_some() => ARM,
                 _ => RIG,
             };
             let image = firmware::image_for(kind, value(options, "--finger").as_deref())?;
@@ -148,6 +151,7 @@ pub(crate) fn with_images<'t>(
         ("TACTUS_SILICON_ELF", "tactus-silicon"),
         ("TACTUS_HANDHELD_ELF", HANDHELD),
         ("TACTUS_MOTION_ELF", MOTION),
+        ("TACTUS_ARM_ELF", ARM),
         ("TACTUS_ANALOG_ELF", "tactus-rig-analog"),
         ("TACTUS_MEMS_ELF", "tactus-rig-mems"),
         ("TACTUS_HANDHELD_MEMS_ELF", "tactus-handheld-mems"),

@@ -12,11 +12,12 @@ const TRIALS: &str = "5";
 /// Slides of each texture that the handheld's table is learned from: a hand scatters more than a rig.
 const SLIDES_BY_HAND: &str = "15";
 
-/// The rig's table and the handheld's of each finger, with the finger's name.
-pub(crate) const TABLES: [(&str, [&str; 2]); 3] = [
-    ("biotac", ["factory.tact", "handheld.tact"]),
-    ("analog", ["factory-analog.tact", "handheld-analog.tact"]),
-    ("mems", ["factory-mems.tact", "handheld-mems.tact"]),
+/// The rig's table and the handheld's of each finger, with the finger's name; then that of a probe on an arm, for the only finger that
+/// has an image for it.
+pub(crate) const TABLES: [(&str, &[&str]); 3] = [
+    ("biotac", &["factory.tact", "handheld.tact", "arm.tact"]),
+    ("analog", &["factory-analog.tact", "handheld-analog.tact"]),
+    ("mems", &["factory-mems.tact", "handheld-mems.tact"]),
 ];
 
 /// Makes the tables and writes them, or compares them with those that are committed.
@@ -31,8 +32,8 @@ pub(crate) fn factory(check: bool) -> Result<()> {
     Ok(())
 }
 
-fn take(names: [&str; 2], made: [Vec<u8>; 2], check: bool) -> Result<()> {
-    for (name, made) in names.into_iter().zip(made) {
+fn take(names: &[&str], made: Vec<Vec<u8>>, check: bool) -> Result<()> {
+    for (name, made) in names.iter().zip(made) {
         let file = root().join("firmware").join(name);
         if check {
             let committed =
@@ -49,10 +50,10 @@ fn take(names: [&str; 2], made: [Vec<u8>; 2], check: bool) -> Result<()> {
     Ok(())
 }
 
-fn make(work: &Path, finger: &str, names: [&str; 2]) -> Result<[Vec<u8>; 2]> {
+fn make(work: &Path, finger: &str, names: &[&str]) -> Result<Vec<Vec<u8>>> {
     std::fs::create_dir_all(work).with_context(|| format!("cannot make {}", work.display()))?;
     let recordings = work.join("recordings");
-    let [table, by_hand] = names.map(|name| work.join(name));
+    let files: Vec<_> = names.iter().map(|name| work.join(name)).collect();
     let tactus = || {
         let mut cargo = cargo();
         cargo.args(["run", "--quiet", "--release", "--package", "tactus", "--"]);
@@ -63,18 +64,25 @@ fn make(work: &Path, finger: &str, names: [&str; 2]) -> Result<[Vec<u8>; 2]> {
     simulate.arg("simulate").args(world);
     simulate.args(["--trials", TRIALS, "--out"]);
     run(simulate.arg(&recordings)).context("the simulation failed")?;
-    let mut learn = tactus();
-    learn.args(["learn", "--train-slides", TRIALS, "--recordings"]);
-    learn.arg(&recordings).arg("--out").arg(&table);
-    run(&mut learn).context("the learning failed")?;
-    let mut learn = tactus();
-    learn.arg("learn-by-hand").args(world);
-    learn.args(["--trials", SLIDES_BY_HAND, "--out"]);
-    run(learn.arg(&by_hand)).context("the learning by hand failed")?;
-    let read = |file: &Path| {
+    for (file, name) in files.iter().zip(names) {
+        let mut learn = tactus();
+        if name.starts_with("handheld") {
+            learn.arg("learn-by-hand").args(world);
+            learn.args(["--trials", SLIDES_BY_HAND]);
+        } else {
+            learn.args(["learn", "--train-slides", TRIALS, "--recordings"]);
+            learn.arg(&recordings);
+        }
+        if name.starts_with("arm") {
+            // whoever moves the finger may know the shear, the probe does not
+            learn.args(["--features", "bands"]);
+        }
+        run(learn.arg("--out").arg(file)).context("the learning failed")?;
+    }
+    let read = |file: &std::path::PathBuf| {
         std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))
     };
-    Ok([read(&table)?, read(&by_hand)?])
+    files.iter().map(read).collect()
 }
 
 fn same(name: &str, committed: &[u8], made: &[u8]) -> Result<()> {

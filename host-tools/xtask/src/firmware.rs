@@ -10,7 +10,7 @@ use crate::shell::root;
 use crate::toolchain;
 
 /// The images by profile and features that each is built with: the rig for speed, the handheld for a small chip.
-const PROFILES: [(&str, &[&str], &[&str]); 7] = [
+const PROFILES: [(&str, &[&str], &[&str]); 8] = [
     (
         "firmware",
         &[],
@@ -21,6 +21,7 @@ const PROFILES: [(&str, &[&str], &[&str]); 7] = [
             "tactus-bench",
         ],
     ),
+    ("firmware", &["--features=arm"], &["tactus-arm"]),
     ("firmware", &[ANALOG], &["tactus-rig-analog"]),
     ("firmware", &[MEMS], &["tactus-rig-mems"]),
     (HANDHELD, &[], &["tactus-handheld"]),
@@ -54,12 +55,13 @@ const HANDHELD_FLAGS: [&str; 5] = [
     "-Cllvm-args=-enable-shrink-wrap=false",
 ];
 /// The images that are flashed, and gated. The bench image is for the emulated board only.
-const FLASHED: [&str; 9] = [
+const FLASHED: [&str; 10] = [
     "tactus-rig",
     "tactus-selftest",
     "tactus-silicon",
     "tactus-handheld",
     "tactus-handheld-motion",
+    "tactus-arm",
     "tactus-rig-analog",
     "tactus-rig-mems",
     "tactus-handheld-analog",

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use panics::{Panics, Symbol, panics, symbols};
 
-use crate::emulate::{self, MOTION};
+use crate::emulate::{self, ARM, MOTION};
 use crate::firmware::{self, Size};
 use crate::reasons;
 use crate::shell::{root, run};
@@ -23,7 +23,7 @@ Examples:
 const KB: u64 = 1024;
 /// Flash of an image, and of that of another finger, without the table that comes with it. An image that is not listed is not gated. The handheld had 128 KB
 /// before it compared textures in spite of drift and had a link.
-const MAX_FLASH: [(&str, u64); 2] = [(RIG, 160 * KB), (HANDHELD, 160 * KB)];
+const MAX_FLASH: [(&str, u64); 3] = [(RIG, 160 * KB), (HANDHELD, 160 * KB), (ARM, 160 * KB)];
 const HANDHELD: &str = "tactus-handheld";
 const MAX_VARIABLES: u64 = 64 * KB;
 /// Twice the deepest stack has to fit into what memory.x leaves above the variables and the guard.
@@ -120,12 +120,20 @@ fn stack(elf: &Path) -> Result<Value> {
 /// Bytes of the table that comes with an image.
 fn table(image: &str) -> Result<u64> {
     let image = if image == MOTION { HANDHELD } else { image };
+    if image == ARM {
+        return bytes_of("arm.tact");
+    }
     let of = |kind, table| {
         Some(image.strip_prefix(kind)?.to_owned() + ".tact").map(|end| format!("{table}{end}"))
     };
     let Some(name) = of(RIG, "factory").or_else(|| of(HANDHELD, "handheld")) else {
         return Ok(0);
     };
+    bytes_of(&name)
+}
+
+/// Bytes of a table beside the firmware.
+fn bytes_of(name: &str) -> Result<u64> {
     let file = root().join("firmware").join(name);
     let table = std::fs::metadata(&file).with_context(|| file.display().to_string())?;
     Ok(table.len())

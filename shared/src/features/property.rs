@@ -76,6 +76,8 @@ pub struct PropertySet(u8);
 impl PropertySet {
     /// All three.
     pub const ALL: Self = Self(0b111);
+    /// Those of P_AC, which a rig has whatever moves it: roughness and fineness.
+    pub const WITHOUT_SHEAR: Self = Self(0b110);
 
     /// Whether `property` is in the set.
     pub const fn contains(self, property: Property) -> bool {
@@ -139,6 +141,10 @@ mod tests {
         );
         assert_eq!(PropertySet::from_bits(set.bits()), Some(set));
         assert_eq!(PropertySet::from_bits(8), None);
+        assert_eq!(
+            PropertySet::WITHOUT_SHEAR.iter().collect::<Vec<_>>(),
+            [Property::Roughness, Property::Fineness]
+        );
         assert!(set.and(PropertySet::from_bits(0b010).unwrap()).is_empty());
         assert_eq!(set.and(PropertySet::ALL), set);
     }

@@ -46,6 +46,27 @@ pub(super) async fn by_motor<R: RigHandle>(rig: &mut R) -> Result<RigCalibration
     Ok(calibration)
 }
 
+/// Measures P_DC in the air, which is all that a rig can measure of itself that an arm moves.
+pub(super) async fn in_air<R: RigHandle>(rig: &mut R) -> Result<RigCalibration, Failure> {
+    rig.home().await.map_err(Failure::Rig)?;
+    let mut measured = [0.0; 2];
+    for counts in &mut measured {
+        rig.run_unloaded(0).await.map_err(Failure::Rig)?;
+        *counts = rig.state().air_counts.unwrap_or(f32::NAN);
+    }
+    let [first, counts] = measured;
+    // nor is nothing at all
+    if !((counts - first).abs() <= DRIFT_COUNTS) {
+        return Err(Failure::Rig(RigError::Fault(Fault::Unsteady)));
+    }
+    let calibration = rig.state().calibration.with_air(counts);
+    calibration.check()?;
+    rig.set_calibration(calibration)
+        .await
+        .map_err(Failure::Rig)?;
+    Ok(calibration)
+}
+
 /// Keeps a calibration. Settings that cannot be read have lost theirs: they are begun anew.
 pub(crate) async fn keep<F: NorFlash>(
     store: &mut Store<F>,

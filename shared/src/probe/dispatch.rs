@@ -34,6 +34,8 @@ pub const fn turn(command: &Command, busy: bool) -> Turn {
         Command::Status | Command::Stop | Command::Stream(_) | Command::ReadCalibration => {
             Turn::Now
         }
+        #[cfg(any(feature = "arm", test))]
+        Command::Arm(_) => Turn::Now,
         _ if busy => Turn::Busy,
         _ => Turn::Queue,
     }
@@ -55,6 +57,8 @@ pub fn receive(request: &Request, busy: bool, panel: &mut impl Panel) -> Turn {
                 Command::Status => panel.tell(Event::Status(status(panel))),
                 Command::Stop => panel.stop(busy),
                 Command::Stream(on) => panel.stream(on),
+                #[cfg(any(feature = "arm", test))]
+                Command::Arm(report) => panel.arm(report),
                 _ => panel.tell(told(&panel.rig().calibration)),
             }
             panel.tell(Event::Done(id));
@@ -264,6 +268,8 @@ where
             Command::Status | Command::Stop | Command::Stream(_) | Command::ReadCalibration => {
                 Ok(())
             }
+            #[cfg(any(feature = "arm", test))]
+            Command::Arm(_) => Ok(()),
         }
     }
 }

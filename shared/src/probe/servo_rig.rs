@@ -12,6 +12,8 @@ use crate::dsp::Kernels;
 use crate::features::{Block, Blocks, Movement, PropertySet, SamplePhase, Slide};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::control::Control;
+#[cfg(any(feature = "arm", test))]
+use crate::rig::over_link::RigOverLink;
 use crate::rig::pins::Outputs;
 use crate::rig::skin::SkinCare;
 use crate::rig::timeout::{MovementTimeout, Wait};
@@ -94,6 +96,36 @@ impl RigCommand {
     }
 }
 
+#[cfg(any(feature = "arm", test))]
+impl RigCommand {
+    /// Has a rig do it that an arm moves.
+    ///
+    /// # Errors
+    /// The rig refuses it.
+    pub fn apply_over_link(self, rig: &mut RigOverLink) -> Result<(), Refused> {
+        match self {
+            Self::Home | Self::Recover => {
+                rig.reset()?;
+                rig.home()
+            }
+            Self::Lift => rig.home(),
+            Self::Start(movement, start) => rig.start(movement, start),
+            Self::StartUnloaded(_) => rig.measure_air(),
+            Self::Calibrate(calibration) => rig.calibrate(calibration),
+            Self::AllowHighForce(allow) => {
+                rig.allow_high_force(allow);
+                Ok(())
+            }
+            Self::Weigh(mn) => rig.weigh(mn),
+            Self::SampleChanged => Ok(()),
+            Self::Skin(skin) => {
+                *rig.skin() = skin;
+                Ok(())
+            }
+        }
+    }
+}
+
 /// A tick's samples, or some of them.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Samples {
@@ -137,6 +169,9 @@ impl Samples {
 /// What runs [`Control`], and hands on its samples.
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait Servo {
+    /// Whether it has a stage of ours, whose motor's current is the shear; otherwise an arm moves the finger.
+    const HAS_STAGE: bool = true;
+
     /// Gives a command and waits for the answer. Samples from before the command are dropped.
     async fn command(&mut self, command: RigCommand) -> Result<(), Refused>;
 
@@ -350,7 +385,11 @@ impl<S: Servo> RigHandle for ServoRig<S> {
     }
 
     async fn calibrate(&mut self) -> Result<RigCalibration, Failure> {
-        calibrate::by_motor(self).await
+        if S::HAS_STAGE {
+            calibrate::by_motor(self).await
+        } else {
+            calibrate::in_air(self).await
+        }
     }
 
     async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), RigError> {
@@ -411,7 +450,11 @@ impl<S: Servo> Rig for ServoRig<S> {
     type Error = RigError;
 
     fn measures(&self) -> PropertySet {
-        PropertySet::ALL
+        if S::HAS_STAGE {
+            PropertySet::ALL
+        } else {
+            PropertySet::WITHOUT_SHEAR
+        }
     }
 
     fn most_mn(&self) -> u16 {

@@ -2,6 +2,8 @@
 
 use crate::rig::calibration::RigCalibration;
 use crate::rig::control::Control;
+#[cfg(any(feature = "arm", test))]
+use crate::rig::over_link::RigOverLink;
 use crate::rig::skin::SkinCare;
 use crate::rig::{Ended, Phase};
 use crate::wire::{Event, Live};
@@ -76,6 +78,21 @@ impl RigState {
             skin: *control.skin(),
         }
     }
+
+    /// The state after a tick of a rig that an arm moves. Where the arm is, it alone knows.
+    #[cfg(any(feature = "arm", test))]
+    pub fn over_link(rig: &mut RigOverLink, ended: Option<Ended>) -> Self {
+        Self {
+            phase: rig.phase(),
+            at_rest: rig.is_at_rest(),
+            ended,
+            force_mn: rig.force_mn(),
+            air_counts: rig.air_counts(),
+            high_force: rig.high_force(),
+            skin: *rig.skin(),
+            ..Self::parked(*rig.calibration())
+        }
+    }
 }
 
 /// The table in force.
@@ -117,8 +134,22 @@ impl Watch {
     /// Looks from one report of a moving rig to the next.
     const LIVE: u32 = 10;
 
+    /// The same for an arm, which presses by the force that is reported: 10 ms.
+    #[cfg(any(feature = "arm", test))]
+    const LIVE_FOR_ARM: u32 = 2;
+
     /// Looks at the rig.
-    pub fn look(&mut self, rig: &RigState, mut tell: impl FnMut(Event)) {
+    pub fn look(&mut self, rig: &RigState, tell: impl FnMut(Event)) {
+        self.look_every::<{ Self::LIVE }>(rig, tell);
+    }
+
+    /// Looks at a rig that an arm moves.
+    #[cfg(any(feature = "arm", test))]
+    pub fn look_for_arm(&mut self, rig: &RigState, tell: impl FnMut(Event)) {
+        self.look_every::<{ Self::LIVE_FOR_ARM }>(rig, tell);
+    }
+
+    fn look_every<const LIVE: u32>(&mut self, rig: &RigState, mut tell: impl FnMut(Event)) {
         if self.phase != Some(rig.phase) {
             self.phase = Some(rig.phase);
             if let Phase::Faulted(fault) = rig.phase {
@@ -127,7 +158,7 @@ impl Watch {
             tell(Event::Phase(rig.phase.into()));
         }
         self.looks = self.looks.wrapping_add(1);
-        if self.looks.is_multiple_of(Self::LIVE) && !rig.at_rest {
+        if self.looks.is_multiple_of(LIVE) && !rig.at_rest {
             tell(Event::Live(Live {
                 force_mn: rig.force_mn as i16,
                 steps: rig.steps,

@@ -14,6 +14,9 @@ use crate::sensor::pressure::{Channel, RATE_HZ};
 const STEADY_S: f32 = 3.0;
 /// After the ramp the servo has this long to settle before samples count, s.
 const STEADY_MARGIN_S: f32 = 0.2;
+/// A word of an arm may be so long on its way, ms: that is left out at the end of a slide over the link.
+#[cfg(any(feature = "arm", test))]
+pub(super) const LINK_MS: u32 = 150;
 /// P_AC words of a slide may differ from what its time holds by so many.
 const WORDS_OFF: u32 = 4;
 
@@ -74,6 +77,28 @@ impl Run {
             steady_ms: libm::ceilf(begin_s * 1e3) as u32..libm::floorf(end_s * 1e3) as u32,
             ..Self::NONE
         })
+    }
+
+    /// The slide of a movement that an arm makes, and its length at constant speed, mm. Its time begins with the arm's word that the
+    /// speed is constant, and ends before it would be over if that came late.
+    #[cfg(any(feature = "arm", test))]
+    pub(super) fn over_link(movement: Movement) -> (Self, f32) {
+        let length_mm = (movement.speed_mm_s() * STEADY_S).min(SlidePath::LONGEST_MM);
+        let path = SlidePath::new(movement, length_mm);
+        let begin_s = STEADY_MARGIN_S.min(0.2 * path.steady_s());
+        let end_ms = libm::floorf(path.steady_s() * 1e3) as u32;
+        let run = Self {
+            movement,
+            steady_ms: libm::ceilf(begin_s * 1e3) as u32..end_ms.saturating_sub(LINK_MS),
+            ..Self::NONE
+        };
+        (run, length_mm)
+    }
+
+    /// Ms at constant speed of a slide over the link.
+    #[cfg(any(feature = "arm", test))]
+    pub(super) fn slide_ms(&self) -> u32 {
+        self.steady_ms.end + LINK_MS
     }
 
     /// A run with the finger lifted, which takes so many s at this speed.

@@ -4,6 +4,8 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::explorer::{Config, Method, Strategy};
+#[cfg(any(feature = "arm", test))]
+use crate::rig::arm::ArmReport;
 use crate::table::{Contents, MAX_TEXTURES, Name, is_false_alarm};
 
 /// Bytes of a table in one message.
@@ -83,6 +85,10 @@ pub enum Command {
     SetHighForce(bool),
     /// Measures gravity along a finger with an accelerometer, which a person turns over: [`super::Event::Turned`]. New in version 10.
     TurnOver,
+    /// An arm that moves the finger says how far it has come with what [`super::Event::Arm`] asked for: whenever that changes, and at
+    /// least every 100 ms while it is open. Only a probe that an arm moves takes it, at any time. New in version 11.
+    #[cfg(any(feature = "arm", test))]
+    Arm(ArmReport),
 }
 
 /// An exploration.

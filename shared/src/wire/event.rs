@@ -13,6 +13,8 @@ use crate::features::{
     BLOCK, Block, FUSED_BANDS, Measurement, Movement, Observation, Properties, Property,
 };
 use crate::rig::Fault;
+#[cfg(any(feature = "arm", test))]
+use crate::rig::arm::ArmOrder;
 use crate::sensor::FingerCode;
 use crate::table::{Action, MAX_TEXTURES, Name};
 
@@ -168,6 +170,10 @@ pub enum Event {
     /// The slide whose report comes next ended early, after so many ms at constant speed, for the verdict is certain: it is reported
     /// as it was then. New in version 10.
     Early(u16),
+    /// The arm that moves the finger is to do this, in the place of what it does; said again until the arm answers, with
+    /// [`super::Command::Arm`]. New in version 11.
+    #[cfg(any(feature = "arm", test))]
+    Arm(ArmOrder),
 }
 
 /// Why the chip started.

@@ -10,6 +10,7 @@ use super::error::RunError;
 use super::identify::print_log;
 use crate::board::{Emulator, Options};
 use crate::host::args::World;
+use crate::host::arm::{ArmPort, mount};
 use crate::host::learned::Chosen;
 
 /// What is served, and where.
@@ -20,6 +21,10 @@ pub(crate) struct Args {
     /// TCP port of this PC; 0 is any free one
     #[arg(long, value_name = "N", default_value_t = 0)]
     port: u16,
+    /// Put the finger on a simulated arm, which a program moves through this TCP port of this PC; 0 is any free one. For the
+    /// firmware `tactus-arm`
+    #[arg(long, value_name = "N")]
+    arm_port: Option<u16>,
 }
 
 /// How far the board runs between two looks at the socket, ms.
@@ -27,7 +32,11 @@ const STEP_MS: u64 = 1;
 
 /// Gives the line to whoever connects last, until the process ends.
 pub(crate) fn run(args: &Args) -> Result<(), RunError> {
-    let Args { world, port } = args;
+    let Args {
+        world,
+        port,
+        arm_port,
+    } = args;
     world.firmware.show(true)?;
     let chosen = Chosen::new(world)?;
     let listener = TcpListener::bind(("127.0.0.1", *port)).map_err(|source| RunError::Listen {
@@ -38,11 +47,21 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     let mut board = chosen
         .unknown
         .start(&world.firmware.elf, Options::default())?;
+    let mut arm = None;
+    if let Some(port) = *arm_port {
+        mount(&mut board, world.seed);
+        let bound = ArmPort::bind(port).map_err(|source| RunError::Listen { port, source })?;
+        println!("arm at {}", bound.address()?);
+        arm = Some(bound);
+    }
     println!("serial port at {}, until Ctrl-C", listener.local_addr()?);
     let began = Instant::now();
     let mut client: Option<TcpStream> = None;
     loop {
         board.run_ms(STEP_MS)?;
+        if let Some(arm) = &mut arm {
+            arm.look(&mut board);
+        }
         // the latest one has the line, as a cable has two ends
         if let Ok((stream, _)) = listener.accept() {
             stream.set_nonblocking(true)?;

@@ -1,6 +1,7 @@
 //! The tests that run firmware on the emulated board, as one program: its threads share the machine's cores to the end.
 //! By name: `cargo test --test board faults::`.
 
+mod arm;
 mod boot;
 mod bringup;
 mod changed_cuts;

@@ -29,6 +29,7 @@ from ._tactus import (
     read_log,
     simulate,
 )
+from .rig import Rig, Stopped
 
 __all__ = [
     "Events",
@@ -39,10 +40,12 @@ __all__ = [
     "Properties",
     "RecordingError",
     "Recordings",
+    "Rig",
     "SimulatedRig",
     "SimulationError",
     "Slide",
     "SlideError",
+    "Stopped",
     "Table",
     "TEXTURES",
     "TableError",

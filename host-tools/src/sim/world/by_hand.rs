@@ -1,6 +1,8 @@
 //! What people do to a rig, and with its finger.
 
+use super::holder::Holder;
 use super::{NotLifted, World, sample};
+use crate::sim::arm::Arm;
 use crate::sim::finger::Held;
 use crate::sim::mount::Mount;
 use crate::sim::person::Hand;
@@ -33,18 +35,34 @@ impl World {
 
     /// Has a hand hold the finger from now on, in place of lever and stage, which move without it.
     pub fn hold(&mut self, hand: Hand) {
-        self.hand = Some(hand);
+        self.holder = Some(Holder::Hand(hand));
     }
 
     /// The finger is on the lever again, wherever that is.
     pub fn put_back(&mut self) {
         self.finger.hold(Held::STILL);
-        self.hand = None;
+        self.holder = None;
     }
 
     /// The hand that holds the finger.
     pub fn hand(&mut self) -> Option<&mut Hand> {
-        self.hand.as_mut()
+        match &mut self.holder {
+            Some(Holder::Hand(hand)) => Some(hand),
+            _ => None,
+        }
+    }
+
+    /// Has an arm hold the finger from now on, in place of lever and stage, which move without it.
+    pub fn mount_on(&mut self, arm: Arm) {
+        self.holder = Some(Holder::Arm(arm));
+    }
+
+    /// The arm that holds the finger.
+    pub fn arm(&mut self) -> Option<&mut Arm> {
+        match &mut self.holder {
+            Some(Holder::Arm(arm)) => Some(arm),
+            _ => None,
+        }
     }
 
     /// Mounts another sample.

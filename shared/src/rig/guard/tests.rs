@@ -222,7 +222,7 @@ fn the_table_has_every_fault_once_and_a_fault_can_be_ignored() {
         assert_eq!(row.fault.recovery(), row.recovery);
         assert!(!FAULTS[..at].iter().any(|other| other.name == row.name));
     }
-    assert_eq!(Fault::PressureDead as usize + 1, FAULTS.len());
+    assert_eq!(Fault::ArmOff as usize + 1, FAULTS.len());
     let mut guard = Guard::new(Unguarded::against(Fault::EStop));
     let (words, seen) = at_rest(0);
     let seen = Seen {

@@ -300,6 +300,7 @@ impl Monitor {
             | Event::Verified { .. }
             | Event::Pace(_)
             | Event::Early(_)
+            | Event::Arm(_)
             | Event::Done(_)
             | Event::Refused { .. }
             | Event::TrainingSlide { .. }

@@ -1,0 +1,169 @@
+//! An arm that holds the finger of the emulated board: moved by the simulator's own program, or through a TCP port by a program in
+//! whatever language, as a real arm's controller is by its driver.
+
+use std::io::{BufRead as _, BufReader, ErrorKind, Write as _};
+use std::net::{TcpListener, TcpStream};
+
+use tactus::sim::arm::Arm;
+use tactus::sim::arm_program::ArmProgram;
+use tactus_core::wire::{self, Command, Event, MAX_FRAME, Report, Request};
+
+use crate::board::Emulator;
+
+/// Ids of requests that no session of a host comes to while one is tested.
+const FIRST_ID: u16 = 0x8000;
+
+/// Puts the finger on an arm.
+pub fn mount(board: &mut Emulator, seed: u64) {
+    board.rig().world().mount_on(Arm::new(seed));
+}
+
+/// The simulator's program at an arm, and its place on the line beside a host.
+#[derive(Debug)]
+pub struct OnTheLine {
+    program: ArmProgram,
+    id: u16,
+    now_ms: u64,
+}
+
+impl OnTheLine {
+    /// A program that waits for orders; the finger is put on its arm.
+    pub fn new(board: &mut Emulator, seed: u64) -> Self {
+        mount(board, seed);
+        Self {
+            program: ArmProgram::new(seed),
+            id: FIRST_ID,
+            now_ms: board.now_ns() / 1_000_000,
+        }
+    }
+
+    /// The program.
+    pub fn program(&mut self) -> &mut ArmProgram {
+        &mut self.program
+    }
+
+    /// Hears what the probe says.
+    pub fn hear(&mut self, report: &Report) {
+        match &report.event {
+            Event::Arm(order) => self.program.ask(*order),
+            Event::Live(live) => self.program.force(f64::from(live.force_mn) * 1e-3),
+            _ => {}
+        }
+    }
+
+    /// Goes on to the board's time: to be called every ms.
+    pub fn look(&mut self, board: &mut Emulator) {
+        let now_ms = board.now_ns() / 1_000_000;
+        while self.now_ms < now_ms {
+            self.now_ms += 1;
+            let reports = match board.rig().world().arm() {
+                Some(arm) => self.program.tick(arm),
+                None => return,
+            };
+            for report in reports {
+                let command = Command::Arm(report);
+                let mut buffer = [0; MAX_FRAME + 1];
+                self.id = self.id.wrapping_add(1) | FIRST_ID;
+                let request = Request {
+                    id: self.id,
+                    command,
+                };
+                if let Ok(frame) = wire::encode(&request, &mut buffer) {
+                    board.send(frame);
+                }
+            }
+        }
+    }
+}
+
+/// An arm behind a TCP port. A line "ALONG UP" asks for velocities, mm/s; they hold until the next one, or until the connection ends.
+/// Every 10 ms of the board's time the port says "MS X HEIGHT ALONG": the time, where the finger is on the sample and how high over it,
+/// mm, and how fast it goes along it, mm/s, by the arm's encoders.
+pub struct ArmPort {
+    listener: TcpListener,
+    client: Option<(BufReader<TcpStream>, String)>,
+    said_ms: u64,
+}
+
+/// Time from one line of the arm to the next, ms.
+const SAYS_MS: u64 = 10;
+
+impl ArmPort {
+    /// Listens.
+    ///
+    /// # Errors
+    /// The port cannot be had.
+    pub fn bind(port: u16) -> std::io::Result<Self> {
+        let listener = TcpListener::bind(("127.0.0.1", port))?;
+        listener.set_nonblocking(true)?;
+        Ok(Self {
+            listener,
+            client: None,
+            said_ms: 0,
+        })
+    }
+
+    /// Where it listens.
+    ///
+    /// # Errors
+    /// The system does not say.
+    pub fn address(&self) -> std::io::Result<std::net::SocketAddr> {
+        self.listener.local_addr()
+    }
+
+    /// Takes what has come, and says where the arm is: to be called every ms. An arm without a driver stands.
+    pub fn look(&mut self, board: &mut Emulator) {
+        if let Ok((stream, _)) = self.listener.accept()
+            && stream.set_nonblocking(true).is_ok()
+            && stream.set_nodelay(true).is_ok()
+        {
+            self.client = Some((BufReader::new(stream), String::new()));
+        }
+        let now_ms = board.now_ns() / 1_000_000;
+        let says = now_ms >= self.said_ms + SAYS_MS;
+        let mut rig = board.rig();
+        let Some(arm) = rig.world().arm() else { return };
+        let Some((stream, line)) = &mut self.client else {
+            return;
+        };
+        let exchanged = take(stream, line, arm).and_then(|()| {
+            if says {
+                self.said_ms = now_ms;
+                let (x, height, along) = (arm.x_mm(), arm.height_mm(), arm.speed_mm_s());
+                let said = format!("{now_ms} {x:.4} {height:.4} {along:.3}\n");
+                stream.get_mut().write_all(said.as_bytes())?;
+            }
+            Ok(())
+        });
+        if exchanged.is_err() {
+            arm.go(0.0, 0.0);
+            self.client = None;
+        }
+    }
+}
+
+/// Takes the lines that have come whole.
+fn take(
+    stream: &mut BufReader<TcpStream>,
+    line: &mut String,
+    arm: &mut Arm,
+) -> std::io::Result<()> {
+    loop {
+        match stream.read_line(line) {
+            Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
+            Ok(_) if line.ends_with('\n') => {
+                let mut numbers = line.split_whitespace().map(str::parse::<f64>);
+                match (numbers.next(), numbers.next()) {
+                    (Some(Ok(along)), Some(Ok(up))) if along.is_finite() && up.is_finite() => {
+                        arm.go(along, up);
+                    }
+                    _ => return Err(ErrorKind::InvalidData.into()),
+                }
+                line.clear();
+            }
+            Ok(_) => {}
+            Err(why) if why.kind() == ErrorKind::WouldBlock => return Ok(()),
+            Err(why) => return Err(why),
+        }
+    }
+}
