@@ -6,6 +6,8 @@ use core::sync::atomic::{AtomicBool, AtomicU32};
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+#[cfg(feature = "arm")]
+use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use tactus_core::probe::RigState;
 use tactus_core::probe::servo_rig::RigCommand;
@@ -13,6 +15,8 @@ use tactus_core::rig::Refused;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::PressureSensor as _;
 use tactus_core::table::EARLY;
+#[cfg(feature = "arm")]
+use tactus_core::wire::ArmReport;
 
 use super::link::Body;
 use crate::board::Finger;
@@ -40,6 +44,13 @@ static SILENT_MS: AtomicU32 = AtomicU32::new(0);
 static STUCK_MS: AtomicU32 = AtomicU32::new(0);
 /// It waits for the host, and may do so for ever.
 const WAITS: u32 = u32::MAX;
+
+/// Words of an arm between two ticks: it says one in 50 ms.
+#[cfg(feature = "arm")]
+pub(super) const REPORTS: usize = 8;
+/// What the arm has said; what has no room is said again.
+#[cfg(feature = "arm")]
+pub(super) static HEARD: Channel<CriticalSectionRawMutex, ArmReport, REPORTS> = Channel::new();
 
 /// The reference rig's constants, until measured ones are read from the store.
 pub(crate) const UNMEASURED: RigCalibration = RigCalibration {
@@ -140,4 +151,8 @@ pub(crate) static BODY: Body = Body {
     state,
     stop: |all| if all { stop_for_good() } else { stop() },
     lost: || LOST.load(Relaxed),
+    #[cfg(feature = "arm")]
+    arm: |report| {
+        let _ = HEARD.try_send(report);
+    },
 };
