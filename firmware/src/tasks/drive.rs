@@ -4,6 +4,8 @@ use core::cell::Cell;
 use core::sync::atomic::Ordering::Relaxed;
 use core::sync::atomic::{AtomicBool, AtomicU32};
 
+use embassy_executor::InterruptExecutor;
+use embassy_stm32::interrupt;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 #[cfg(feature = "arm")]
@@ -20,6 +22,15 @@ use tactus_core::wire::ArmReport;
 
 use super::link::Body;
 use crate::board::Finger;
+
+/// Runs the task that drives the rig, and nothing else.
+pub(crate) static SERVO: InterruptExecutor = InterruptExecutor::new();
+
+#[interrupt]
+fn UART5() {
+    // SAFETY: called from here only, and started before the interrupt is on.
+    unsafe { SERVO.on_interrupt() }
+}
 
 /// Samples on their way to the features: a quarter of a second.
 pub(crate) const SAMPLES: usize = 256;
