@@ -19,8 +19,7 @@ use tactus_core::wire::{Event, PROTOCOL};
 use crate::board;
 use crate::chip::slots::{WORDS, Word};
 use crate::chip::{rescue, thread, watchdog};
-use crate::rig::SERVO;
-use crate::tasks::drive::{self, SAMPLES};
+use crate::tasks::drive::{self, SAMPLES, SERVO};
 use crate::tasks::{acquire, arm as task, link, only, outbox, probe, watch};
 
 /// Starts everything. To be called once, from thread mode.

@@ -12,7 +12,6 @@
 //! Their priorities, and between slots and servo those of the link's bytes and of the lever's steps (TIM1), are in
 //! `board`.
 
-use embassy_executor::InterruptExecutor;
 use embassy_stm32::interrupt;
 use heapless::spsc::Queue;
 use static_cell::ConstStaticCell;
@@ -22,16 +21,8 @@ use tactus_core::wire::{Event, PROTOCOL};
 use crate::board;
 use crate::chip::slots::{WORDS, Word};
 use crate::chip::{rescue, thread, watchdog};
-use crate::tasks::drive::{self, SAMPLES};
+use crate::tasks::drive::{self, SAMPLES, SERVO};
 use crate::tasks::{acquire, link, only, outbox, probe, servo, watch};
-
-pub(crate) static SERVO: InterruptExecutor = InterruptExecutor::new();
-
-#[interrupt]
-fn UART5() {
-    // SAFETY: called from here only, and started before the interrupt is on.
-    unsafe { SERVO.on_interrupt() }
-}
 
 /// Starts everything. To be called once, from thread mode.
 pub fn rig() -> ! {

@@ -51,7 +51,7 @@ pub(crate) const PACKAGES: [Package; 6] = [
             &["board"],
             &["chip"],
             &["tasks"],
-            &["bench", "selftest", "handheld", "rig"],
+            &["bench", "selftest", "handheld", "rig", "arm"],
         ],
         strangers: &[],
         outside: &["lib", "bin"],

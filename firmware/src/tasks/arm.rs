@@ -5,7 +5,6 @@ use core::sync::atomic::Ordering::Relaxed;
 
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Ticker};
 use heapless::Vec;
@@ -18,22 +17,13 @@ use tactus_core::rig::pins::{Inputs, MAX_WORDS};
 use tactus_core::sensor::PressureSensor as _;
 use tactus_core::wire::{ArmOrder, ArmReport, Event};
 
-use super::drive::{self, ANSWER, COMMAND, ENDED, LOST, STATE, STOP, UNMEASURED};
+use super::drive::{self, ANSWER, COMMAND, ENDED, HEARD, LOST, REPORTS, STATE, STOP, UNMEASURED};
 use super::outbox::tell;
 use crate::board::{self, Finger};
 use crate::chip::slots::Word;
 use crate::chip::{rescue, watchdog};
 
-/// Words of the arm between two ticks: it says one in 50 ms.
-const REPORTS: usize = 8;
-
-static HEARD: Channel<CriticalSectionRawMutex, ArmReport, REPORTS> = Channel::new();
 static ORDER: Signal<CriticalSectionRawMutex, ArmOrder> = Signal::new();
-
-/// The arm says this. What has no room is said again.
-pub(crate) fn hear(report: ArmReport) {
-    let _ = HEARD.try_send(report);
-}
 
 /// Hands orders to the link, whose writers are all at one level: the tick's is another.
 #[embassy_executor::task]

@@ -4,8 +4,12 @@ use core::cell::Cell;
 use core::sync::atomic::Ordering::Relaxed;
 use core::sync::atomic::{AtomicBool, AtomicU32};
 
+use embassy_executor::InterruptExecutor;
+use embassy_stm32::interrupt;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+#[cfg(feature = "arm")]
+use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use tactus_core::probe::RigState;
 use tactus_core::probe::servo_rig::RigCommand;
@@ -13,9 +17,20 @@ use tactus_core::rig::Refused;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::PressureSensor as _;
 use tactus_core::table::EARLY;
+#[cfg(feature = "arm")]
+use tactus_core::wire::ArmReport;
 
 use super::link::Body;
 use crate::board::Finger;
+
+/// Runs the task that drives the rig, and nothing else.
+pub(crate) static SERVO: InterruptExecutor = InterruptExecutor::new();
+
+#[interrupt]
+fn UART5() {
+    // SAFETY: called from here only, and started before the interrupt is on.
+    unsafe { SERVO.on_interrupt() }
+}
 
 /// Samples on their way to the features: a quarter of a second.
 pub(crate) const SAMPLES: usize = 256;
@@ -40,6 +55,13 @@ static SILENT_MS: AtomicU32 = AtomicU32::new(0);
 static STUCK_MS: AtomicU32 = AtomicU32::new(0);
 /// It waits for the host, and may do so for ever.
 const WAITS: u32 = u32::MAX;
+
+/// Words of an arm between two ticks: it says one in 50 ms.
+#[cfg(feature = "arm")]
+pub(super) const REPORTS: usize = 8;
+/// What the arm has said; what has no room is said again.
+#[cfg(feature = "arm")]
+pub(super) static HEARD: Channel<CriticalSectionRawMutex, ArmReport, REPORTS> = Channel::new();
 
 /// The reference rig's constants, until measured ones are read from the store.
 pub(crate) const UNMEASURED: RigCalibration = RigCalibration {
@@ -140,4 +162,8 @@ pub(crate) static BODY: Body = Body {
     state,
     stop: |all| if all { stop_for_good() } else { stop() },
     lost: || LOST.load(Relaxed),
+    #[cfg(feature = "arm")]
+    arm: |report| {
+        let _ = HEARD.try_send(report);
+    },
 };

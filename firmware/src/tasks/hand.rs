@@ -164,6 +164,8 @@ pub(crate) static BODY: Body = Body {
     state: || STATE.lock(Cell::get),
     stop: |all| STOPPED.store(all, Relaxed),
     lost: || 0,
+    #[cfg(feature = "arm")]
+    arm: |_| (),
 };
 
 /// A fingertip that nobody has measured; what belongs to motors is not used.

@@ -79,6 +79,9 @@ pub(crate) struct Body {
     pub(crate) stop: fn(bool),
     /// Samples that were lost behind the acquisition.
     pub(crate) lost: fn() -> u32,
+    /// Hears what the arm says.
+    #[cfg(feature = "arm")]
+    pub(crate) arm: fn(ArmReport),
 }
 
 #[embassy_executor::task]
@@ -148,7 +151,7 @@ impl Panel for AtAnyTime {
 
     #[cfg(feature = "arm")]
     fn arm(&mut self, report: ArmReport) {
-        super::arm::hear(report);
+        (self.0.arm)(report);
     }
 
     fn stream(&mut self, on: bool) {

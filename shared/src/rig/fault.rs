@@ -112,7 +112,7 @@ faults! {
     ArmSilent of "arm", "arm silent", "no word of the arm about what it was asked for in 0.5 s", 502, ARM, ALL,
         "look whether the finger is up, and move the arm away by its own controls; check that its program runs, then reset";
     /// The arm does not stop when it is to. New in version 11.
-    ArmRuns of "arm", "arm does not stop", "0.15 s after a stop was demanded the force is over the limit still, or after 2 s the finger still presses", 152, ARM, ALL,
+    ArmRuns of "arm", "arm does not stop", "0.2 s after a stop was demanded the force is over the limit still, or after 2 s the finger still presses", 202, ARM, ALL,
         "press the arm's own emergency stop, and move it away by its controls; then reset";
     /// The arm did something else than it was asked for. New in version 11.
     ArmOff of "arm", "arm off its order", "it says that it presses and P_DC is more than 2 counts and 10 % off the force; it says that it is lifted and P_DC is not; its slide was 5 % shorter, longer, slower or faster than was asked for, by what it says or by the probe's clock; it was not done in its time; or it says that it cannot", 2,

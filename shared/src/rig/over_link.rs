@@ -48,8 +48,8 @@ const RAMP_MS: u32 = 2000;
 /// It says that it is lifted: by then P_DC says so, too, ms.
 const RELEASE_MS: u32 = 500;
 /// After a stop was demanded the force is under the limit by then, and the finger lifted by then, ms: an arm is taken to stand 100 ms
-/// after it.
-const STOPS_MS: u32 = 150;
+/// after it, and has as long to go up.
+const STOPS_MS: u32 = 200;
 const FREE_MS: u32 = 2000;
 /// Then nobody waits any more for an arm that does not lift the finger, ms.
 const GAVE_UP_MS: u32 = 5000;
