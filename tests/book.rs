@@ -238,6 +238,25 @@ fn the_film_is_what_its_command_makes() {
     compare("docs/src/monitor.svg", &svg).unwrap();
 }
 
+/// What the viewers show of a session, drawn from the MCAP file.
+#[test]
+fn the_channels_are_what_their_command_draws() {
+    let temp = tempfile::tempdir().unwrap();
+    let names = ["session.jsonl", "session.mcap", "channels.svg"];
+    let [log, mcap, drawn] = names.map(|name| temp.path().join(name));
+    let packed = fs::File::open(root().join("tests/golden/identify.jsonl.gz")).unwrap();
+    let mut unpacked = fs::File::create(&log).unwrap();
+    std::io::copy(&mut flate2::read::GzDecoder::new(packed), &mut unpacked).unwrap();
+    let [log, mcap, drawn] = [&log, &mcap, &drawn].map(|path| path.to_str().unwrap());
+    tactus(&["convert", log, "--mcap", mcap, "--plot", drawn]);
+    let page = read("docs/src/convert.md");
+    assert!(page.contains("tactus convert session.jsonl --mcap session.mcap --plot channels.svg"));
+    assert!(page.contains("](plot-channels.svg)"));
+    let svg = fs::read(drawn).unwrap();
+    assert!(svg.len() < 100_000, "{} bytes", svg.len());
+    compare("docs/src/plot-channels.svg", &svg).unwrap();
+}
+
 /// Pictures of recordings that are not in the repository: made again where they are, when the book is written.
 const OF_OTHERS: (&str, [&str; 2]) = (
     "evaluate --recordings biotac --lifelong --runs 20",
@@ -523,7 +542,8 @@ fn commands() -> String {
         let names: Vec<&str> = path.iter().map(String::as_str).collect();
         let help = help(&names);
         // a group of commands is in the list above, unless it does something itself
-        if !help.contains("\nCommands:\n") || help.contains("\nArguments:\n") {
+        let itself = ["\nArguments:\n", "\n       tactus "];
+        if !help.contains("\nCommands:\n") || itself.iter().any(|part| help.contains(part)) {
             text += &format!(
                 "\n## tactus {}\n\n```text\n{}\n```\n",
                 path.join(" "),

@@ -116,6 +116,63 @@ fn help_says_what_it_is_and_what_to_try_first() {
 }
 
 #[test]
+fn verbose_tells_files_and_choices_beside_the_same_results() {
+    let recordings = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+    let plain = [
+        "identify",
+        "--recordings",
+        recordings,
+        "--material",
+        "1",
+        "--train-slides",
+        "2",
+    ];
+    let verbose = [&plain[..], &["--verbose"]].concat();
+    let [quiet, told] = [&plain[..], &verbose].map(tactus);
+    assert_eq!(quiet.stdout, told.stdout);
+    assert!(!String::from_utf8_lossy(&quiet.stderr).contains("INFO"));
+    let told = String::from_utf8_lossy(&told.stderr);
+    for words in [
+        "reads the manifest folder=",
+        "slides=",
+        "reads samples texture=",
+        "chooses movement=",
+    ] {
+        assert!(told.contains(words), "{words}: {told}");
+    }
+}
+
+#[test]
+fn a_table_goes_through_pipes() {
+    let recordings = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+    let temp = tempfile::tempdir().unwrap();
+    let table = temp.path().join("table");
+    let learn = |to: &str| {
+        tactus(&[
+            "learn",
+            "--recordings",
+            recordings,
+            "--train-slides",
+            "2",
+            "--out",
+            to,
+        ])
+    };
+    let said = learn(path(&table)).stdout;
+    let piped = learn("-");
+    assert!(piped.stdout == fs::read(&table).unwrap());
+    // what is said of it is beside it
+    let beside = String::from_utf8_lossy(&piped.stderr).replacen('-', path(&table), 1);
+    assert_eq!(beside, String::from_utf8_lossy(&said));
+    let check = Command::new(env!("CARGO_BIN_EXE_tactus"))
+        .args(["table", "check", "-"])
+        .stdin(fs::File::open(&table).unwrap())
+        .output()
+        .unwrap();
+    assert!(check.status.success(), "{check:?}");
+}
+
+#[test]
 fn without_arguments_a_simulated_probe_recognises_a_texture() {
     let shown = printed(&[]);
     for part in [

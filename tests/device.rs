@@ -110,6 +110,96 @@ fn the_doctor_says_what_is_wrong_and_changes_nothing() {
 }
 
 #[test]
+fn the_doctor_remembers_faults_and_how_old_the_table_is() {
+    let (at, _) = probe(1);
+    let temp = tempfile::tempdir().unwrap();
+    let doctor = |code| {
+        let mut doctor = device(&["doctor", "--port", &at, "--format", "json"]);
+        let out = doctor.env("XDG_DATA_HOME", temp.path()).output().unwrap();
+        assert_eq!(out.status.code(), Some(code), "{out:?}");
+        serde_json::from_slice::<serde_json::Value>(&out.stdout).unwrap()
+    };
+    let first = doctor(0);
+    assert_eq!(first["faults"], serde_json::json!([]));
+    assert_eq!(first["table"]["finger"], "biotac");
+    assert_eq!(first["table"]["days"], 0);
+    // as if this PC had seen the table ten days ago, and a fault today
+    let file = temp.path().join("tactus/history.jsonl");
+    let seen = fs::read_to_string(&file).unwrap();
+    let mut seen: serde_json::Value = serde_json::from_str(&seen).unwrap();
+    let now = seen["at"].as_i64().unwrap();
+    seen["at"] = (now - 10 * 86_400).into();
+    let fault =
+        serde_json::json!({"at": now, "port": seen["port"], "what": {"fault": "StageStall"}});
+    fs::write(&file, format!("{seen}\n{fault}\n")).unwrap();
+    let told = doctor(0);
+    assert_eq!(told["table"]["days"], 10);
+    assert_eq!(told["faults"][0]["fault"], "stage blocked");
+    let checks = told["checks"].as_array().unwrap();
+    let last = checks.iter().find(|check| check["name"] == "last faults");
+    let last = last.unwrap();
+    assert_eq!(last["state"], "look");
+    assert!(
+        last["remedy"]
+            .as_str()
+            .unwrap()
+            .contains("tactus device home")
+    );
+}
+
+#[test]
+fn a_fault_that_a_command_sees_is_remembered() {
+    let temp = tempfile::tempdir().unwrap();
+    let faulted = says(&[|| Event::Fault(tactus_core::rig::Fault::EStop)]);
+    let mut status = device(&["status", "--port", &faulted]);
+    status.env("XDG_DATA_HOME", temp.path()).output().unwrap();
+    let kept = fs::read_to_string(temp.path().join("tactus/history.jsonl")).unwrap();
+    assert!(kept.contains(r#""what":{"fault":"EStop"}"#), "{kept}");
+}
+
+#[test]
+fn what_a_probe_reports_goes_into_an_mcap_as_it_comes() {
+    let (at, asked) = probe(100);
+    let out = device(&["log", "--mcap", "-", "--seconds", "1", "--port", &at, "-vv"])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{said}");
+    let summary = mcap::Summary::read(&out.stdout).unwrap().unwrap();
+    let topics = summary.channels.values().map(|channel| &channel.topic[..]);
+    let topics: Vec<&str> = topics.collect();
+    for topic in ["/pac", "/rig", "/posterior", "/fault", "/log"] {
+        assert!(topics.contains(&topic), "{topics:?}");
+    }
+    let messages = mcap::MessageStream::new(&out.stdout).unwrap();
+    assert!(messages.map(Result::unwrap).count() > 0);
+    let asked: Vec<wire::Command> = asked.try_iter().collect();
+    let streams = |on| {
+        asked
+            .iter()
+            .filter(|c| **c == wire::Command::Stream(on))
+            .count()
+    };
+    assert!(streams(true) == 1 && streams(false) == 1, "{asked:?}");
+    // every frame of it
+    for words in [
+        "opens port=",
+        "sends id=",
+        "Stream",
+        "receives number=",
+        "TablePart",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let out = device(&["status", "--port", &at, "-v"]).output().unwrap();
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(
+        said.contains("opens port=") && !said.contains("receives"),
+        "{said}"
+    );
+}
+
+#[test]
 fn what_changes_the_probe_prints_one_object() {
     let (at, _) = probe(1000);
     let temp = tempfile::tempdir().unwrap();

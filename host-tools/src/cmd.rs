@@ -23,11 +23,12 @@ mod study;
 mod table;
 mod table_file;
 mod textures;
+mod verbose;
 mod verify;
 
 use std::io::{self, Write as _};
 
-use clap::{CommandFactory as _, Parser, Subcommand};
+use clap::{ArgAction, CommandFactory as _, Parser, Subcommand};
 
 pub(crate) use device::BenchError;
 pub(crate) use output::{Done, UsageError};
@@ -41,6 +42,9 @@ struct Tactus {
     /// Show no progress and no notices on the terminal, only results and errors
     #[arg(long, short, global = true)]
     quiet: bool,
+    /// Tell on standard error which files are read and written, and what is chosen; twice (-vv): also every frame to and from a probe
+    #[arg(long, short, global = true, action = ArgAction::Count)]
+    verbose: u8,
     #[command(subcommand)]
     command: Option<Command>,
 }
@@ -89,7 +93,13 @@ pub(crate) fn run() -> anyhow::Result<Done> {
     let out = &mut io::BufWriter::new(io::stdout().lock());
     let mut done = Done::Fully;
     let arguments = config::read(&Tactus::command(), std::env::args_os())?;
-    let Tactus { quiet, command } = Tactus::parse_from(arguments);
+    let Tactus {
+        quiet,
+        verbose,
+        command,
+    } = Tactus::parse_from(arguments);
+    verbose::be_verbose(verbose);
+    config::tell();
     if quiet || config::is_quiet() {
         progress::be_quiet();
     }

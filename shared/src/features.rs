@@ -9,7 +9,7 @@ mod slide;
 pub use block::{BLOCK, Block, Blocks, SamplePhase};
 pub use movement::{Movement, MovementError};
 pub use observation::{
-    FEATURE_STEPS, FeatureSet, MAX_FEATURES, Observation, Vector, WHITE_STEPS, fixed,
+    FEATURE_STEPS, FeatureSet, MAX_FEATURES, Observation, PDC_UNIT, Vector, WHITE_STEPS, fixed,
 };
 pub use property::{Properties, Property, PropertySet};
 pub use slide::{BAND_EDGES, FUSED_BANDS, FUSED_EDGES, Measurement, Slide, SlideError, roughness};

@@ -7,7 +7,7 @@ use super::*;
 const SESSION: &str = "
 import json, sys
 import numpy, tactus
-with tactus.Probe(sys.argv[1]) as probe:
+with tactus.Probe(sys.argv[1], log=sys.argv[2]) as probe:
     assert probe.status()['phase'] == 'Ready', probe.status()
     table = probe.table()
     assert len(table) == 3 == probe.status()['textures']
@@ -30,6 +30,14 @@ with tactus.Probe(sys.argv[1]) as probe:
     assert trained == list(range(len(table.settings) * 2))[::-1], trained
     assert probe.table().textures == [*table.textures, 'new one']
     print(json.dumps(verdict))
+with_samples = [line['report']['event'] for line in tactus.read_log(sys.argv[2]) if 'report' in line]
+assert any('SlideReport' in event for event in with_samples) and any('Block' in event for event in with_samples)
+try:
+    tactus.Probe(sys.argv[1], log=sys.argv[2])
+except FileExistsError:
+    pass
+else:
+    raise AssertionError('a log was written over')
 ";
 
 #[test]
@@ -38,8 +46,10 @@ fn a_session_in_python_is_that_of_the_command() {
         return;
     };
     let (at, _) = probe(1000);
+    let temp = tempfile::tempdir().unwrap();
+    let log = temp.path().join("session.jsonl");
     let mut session = Command::new(python);
-    session.args(["-c", SESSION, &at]);
+    session.args(["-c", SESSION, &at, path(&log)]);
     session.env("XDG_RUNTIME_DIR", env!("CARGO_TARGET_TMPDIR"));
     let Output { stdout, stderr, .. } = session.output().unwrap();
     let said = String::from_utf8_lossy(&stderr);
@@ -48,4 +58,35 @@ fn a_session_in_python_is_that_of_the_command() {
     let found = object(&again, 0);
     assert_eq!(verdict["name"], found["verdict"]["texture"]);
     assert_eq!(verdict["name"], texture_name(UNKNOWN));
+    // the command reads what the package wrote
+    let replayed = object(&["log", "replay", path(&log), "--format", "json"], 0);
+    assert_eq!(replayed["same"], true, "{replayed}");
+}
+
+#[test]
+fn the_live_example_plots_a_probe_while_it_explores() {
+    let Some(python) = std::env::var_os("TACTUS_PYTHON") else {
+        return;
+    };
+    let has = Command::new(&python)
+        .args(["-c", "import matplotlib"])
+        .output();
+    if !has.is_ok_and(|has| has.status.success()) {
+        tactus_tests::skipped("no matplotlib: pip install matplotlib");
+        return;
+    }
+    let (at, _) = probe(1000);
+    let temp = tempfile::tempdir().unwrap();
+    let [picture, log] = ["live.png", "session.jsonl"].map(|name| temp.path().join(name));
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/python/examples/live.py");
+    let mut live = Command::new(python);
+    live.args([example, &at, path(&picture), path(&log)]);
+    live.env("XDG_RUNTIME_DIR", env!("CARGO_TARGET_TMPDIR"));
+    let Output { stdout, stderr, .. } = live.output().unwrap();
+    let said = String::from_utf8(stdout).unwrap();
+    let why = String::from_utf8_lossy(&stderr);
+    assert!(said.starts_with("slide 1 comes\n"), "{said}{why}");
+    assert!(said.contains(texture_name(UNKNOWN)), "{said}{why}");
+    assert!(fs::read(picture).unwrap().starts_with(b"\x89PNG"));
+    assert!(fs::read_to_string(log).unwrap().contains("Verdict"));
 }

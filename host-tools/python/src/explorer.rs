@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use serde::Serialize;
 use tactus::eval::evaluate::{MAX_TEXTURES, Method, explorer};
 use tactus::eval::transcript::Answer;
+use tactus::eval::verify;
 use tactus_core::explorer::{self, ExpectedOutcome};
 use tactus_core::features::{Property, PropertySet};
 use tactus_core::probe::explore::Random;
@@ -244,6 +245,14 @@ impl Explorer {
     fn verification<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let now = self.inner().core.verification();
         now.map(|now| object(py, &now)).transpose()
+    }
+
+    /// With one candidate: the share of other textures that would pass as well as these slides, 0 to 1 (what `tactus verify` calls
+    /// false_accept); None where no other texture of the table has slides of their movements.
+    fn false_accept(&self) -> Option<f64> {
+        let inner = self.inner();
+        let reference = inner.core.best().texture;
+        verify::false_accept(&inner.core, reference)
     }
 
     fn __repr__(&self) -> String {

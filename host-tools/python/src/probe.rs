@@ -11,7 +11,7 @@ use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use tactus::data::recorder::Recorder;
 use tactus::link::line::{Line, found, only_nucleo, open};
-use tactus::link::log;
+use tactus::link::log::{self, Log};
 use tactus::link::owner::Owner;
 use tactus::link::{Job, Port, PortError, PushTable, ReadTable, Request, Transaction};
 use tactus_core::explorer::Strategy;
@@ -28,9 +28,10 @@ use crate::values::object;
 const STOPPING: Duration = Duration::from_secs(35);
 
 /// A probe. port: its serial port, or tcp:HOST:PORT; the only NUCLEO that is plugged in, unless given. timeout_s: a probe that says
-/// nothing for so long is taken for gone; its longest silence is 2 s.
+/// nothing for so long is taken for gone; its longest silence is 2 s. log: a new file for all requests and reports, as
+/// `tactus device --log FILE` writes it, for `read_log`, `tactus device log` and `tactus convert`.
 ///
-/// Raises ProbeError where there is no such port, or somebody else has it.
+/// Raises ProbeError where there is no such port, or somebody else has it; OSError where there is such a file, or it cannot be written.
 #[pyclass(frozen, module = "tactus")]
 pub(crate) struct Probe {
     name: String,
@@ -41,6 +42,7 @@ pub(crate) struct Probe {
 
 struct Inner {
     port: Port<Box<dyn Line>>,
+    log: Option<Log>,
     /// what is under way, and the reports of it that nobody has taken yet
     job: Option<Job<Request<()>>>,
     reports: VecDeque<Report>,
@@ -48,15 +50,33 @@ struct Inner {
 }
 
 impl Inner {
+    fn asks(&mut self, command: &Command) {
+        if let Some(log) = &mut self.log {
+            log.asked(command);
+        }
+    }
+
+    /// Begins a transaction; its first request is in the log.
+    fn begin<E: Transaction>(&mut self, transaction: E) -> Result<Job<E>, PortError> {
+        let job = self.port.begin(transaction)?;
+        if let Some(command) = job.command() {
+            self.asks(&command.clone());
+        }
+        Ok(job)
+    }
+
     /// Reads once, and keeps what came.
     fn step(&mut self) -> Result<(), PortError> {
         let Some(job) = &mut self.job else {
             return Ok(());
         };
-        let reports = &mut self.reports;
-        let stepped = self
-            .port
-            .step(job, |report| reports.push_back(report.clone()));
+        let (reports, log) = (&mut self.reports, &mut self.log);
+        let stepped = self.port.step(job, |report| {
+            if let Some(log) = log {
+                log.told(report);
+            }
+            reports.push_back(report.clone());
+        });
         if !matches!(stepped, Ok(Poll::Pending)) {
             self.job = None;
         }
@@ -68,6 +88,7 @@ impl Inner {
         if self.job.is_none() {
             return Ok(());
         }
+        self.asks(&Command::Stop);
         self.port.send(Command::Stop)?;
         let began = Instant::now();
         while self.job.is_some() && began.elapsed() < STOPPING {
@@ -93,7 +114,10 @@ impl Probe {
             let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
             let inner = inner.as_mut();
             let inner = inner.ok_or_else(|| ProbeError::new_err("the probe was closed"))?;
-            work(inner).map_err(|why| why.raise_of(&self.name))
+            let done = work(inner).map_err(|why| why.raise_of(&self.name))?;
+            // what was said is in the file before it is believed
+            inner.log.as_mut().map_or(Ok(()), Log::flush)?;
+            Ok(done)
         })
     }
 
@@ -107,9 +131,16 @@ impl Probe {
         E::Outcome: Send,
     {
         self.idle(py)?;
-        let mut job = self.with(py, |inner| inner.port.begin(transaction))?;
+        let mut job = self.with(py, |inner| inner.begin(transaction))?;
         loop {
-            let stepped = self.with(py, |inner| inner.port.step(&mut job, |_| ()))?;
+            let stepped = self.with(py, |inner| {
+                let log = &mut inner.log;
+                inner.port.step(&mut job, |report| {
+                    if let Some(log) = log {
+                        log.told(report);
+                    }
+                })
+            })?;
             if let Poll::Ready(outcome) = stepped {
                 return Ok(outcome);
             }
@@ -131,7 +162,7 @@ impl Probe {
         probe.idle(py)?;
         probe.with(py, |inner| {
             inner.reports.clear();
-            inner.job = Some(inner.port.begin(Request::command(command))?);
+            inner.job = Some(inner.begin(Request::command(command))?);
             Ok(())
         })?;
         Ok(Events {
@@ -221,8 +252,13 @@ fn state_of(state: &Bound<'_, PyAny>) -> PyResult<ArmState> {
 #[pymethods]
 impl Probe {
     #[new]
-    #[pyo3(signature = (port=None, *, timeout_s=5.0))]
-    fn new(py: Python<'_>, port: Option<String>, timeout_s: f64) -> PyResult<Self> {
+    #[pyo3(signature = (port=None, *, timeout_s=5.0, log=None))]
+    fn new(
+        py: Python<'_>,
+        port: Option<String>,
+        timeout_s: f64,
+        log: Option<PathBuf>,
+    ) -> PyResult<Self> {
         let timeout = Duration::try_from_secs_f64(timeout_s)
             .map_err(|why| PyValueError::new_err(format!("timeout_s: {why}")))?;
         let (name, line, owner) = py
@@ -231,11 +267,13 @@ impl Probe {
                 open(&name).map(|(line, owner)| (name, line, owner))
             })
             .map_err(|why| why.raise())?;
+        let log = log.map(|path| Log::create(&path, &name)).transpose()?;
         Ok(Self {
             name,
             outgoing: Mutex::default(),
             inner: Mutex::new(Some(Inner {
                 port: Port::new(line, timeout),
+                log,
                 job: None,
                 reports: VecDeque::new(),
                 _owner: owner,

@@ -1,16 +1,20 @@
 //! The simulated world: a rig and a hand that slide over textures of Table 1.
 
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use tactus::data::recording::Recording;
+use tactus::data::recordings::RecordingError;
 use tactus::sim::collection::{Collection, calibrated, texture_name, texture_number};
 use tactus::sim::handheld::learn_with;
 use tactus::sim::rig::SimRig;
 use tactus::sim::textures::TEXTURES;
 use tactus_core::sensor::FingerName;
 
+use crate::error::Raise as _;
 use crate::features::movement;
 use crate::recordings::Slide;
 use crate::table::Table;
@@ -125,17 +129,20 @@ impl SimulatedRig {
 /// `tactus simulate` writes.
 ///
 /// textures: names in Table 1 or numbers; all 117, unless given. trials: of each texture at each of the study's three movements.
-/// seed: the world. finger: "biotac", "analog" or "mems".
+/// seed: the world. finger: "biotac", "analog" or "mems". folder: a new folder to write them to, too, byte for byte as
+/// `tactus simulate --out` does; `Recordings` opens it.
 ///
-/// Raises KeyError for a texture that Table 1 does not have, SimulationError for a fault of the rig, KeyboardInterrupt after Ctrl-C.
+/// Raises KeyError for a texture that Table 1 does not have, RecordingError where the folder cannot be written or holds other
+/// recordings, SimulationError for a fault of the rig, KeyboardInterrupt after Ctrl-C.
 #[pyfunction]
-#[pyo3(signature = (textures=None, *, trials=5, seed=1, finger="biotac"))]
+#[pyo3(signature = (textures=None, *, trials=5, seed=1, finger="biotac", folder=None))]
 fn simulate<'py>(
     py: Python<'py>,
     textures: Option<Vec<String>>,
     trials: u32,
     seed: u64,
     finger: &str,
+    folder: Option<PathBuf>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (collection, finger) = (collection(textures, trials, seed)?, finger_named(finger)?);
     let first = collection.textures[0];
@@ -143,6 +150,24 @@ fn simulate<'py>(
     let recorded = work(py, |between| {
         collection.record_with(finger, calibration, between)
     })?;
+    if let Some(folder) = folder {
+        py.detach(|| -> Result<(), RecordingError> {
+            let mut writer = collection.writer(&folder, finger)?;
+            for (texture, slides) in recorded.iter().enumerate() {
+                for slide in slides {
+                    if !writer.has(texture, slide.number) {
+                        let slide = Recording {
+                            texture,
+                            ..slide.clone()
+                        };
+                        writer.write(&slide)?;
+                    }
+                }
+            }
+            writer.finish()
+        })
+        .map_err(|why| why.raise())?;
+    }
     let all = PyDict::new(py);
     for (slides, &number) in recorded.into_iter().zip(&collection.textures) {
         let name = texture_name(number);

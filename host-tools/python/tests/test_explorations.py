@@ -81,6 +81,7 @@ def test_a_verification_is_the_commands(biotac, command, tmp_path):
         at = ["--table", tmp_path / "table", "--texture", biotac.textures[0], "--sample", biotac.folder]
         said = json.loads(command("verify", *at, "--material", material, "--format", "json"))
         ours = tactus.verify(table, biotac.textures[0], biotac.measured_slides(material))
+        assert ours[-1]["false_accept"] == said["false_accept"]
         assert [(o["score"], o["limit"], o["answer"].lower()) for o in ours] == [
             (s["score"], s["limit"], s["answer"]) for s in said["slides"]
         ]
@@ -92,7 +93,11 @@ def test_a_verification_is_the_commands(biotac, command, tmp_path):
 def test_simulated_slides_are_the_commands(command, tmp_path):
     command("simulate", "--out", tmp_path / "world", "--textures", ",".join(THREE), "--trials", 2, "--seed", 4)
     theirs = tactus.Recordings(tmp_path / "world")
-    ours = tactus.simulate(THREE, trials=2, seed=4)
+    ours = tactus.simulate(THREE, trials=2, seed=4, folder=tmp_path / "mine")
+    files = {path.name: path.read_bytes() for path in (tmp_path / "world").iterdir()}
+    assert {path.name: path.read_bytes() for path in (tmp_path / "mine").iterdir()} == files
+    with pytest.raises(tactus.RecordingError):
+        tactus.simulate(THREE, trials=2, seed=5, folder=tmp_path / "mine")
     assert list(ours) == theirs.textures and len(theirs) == len(ours) * 3 * 2
     for name, slides in ours.items():
         for our, their in zip(slides, theirs.slides(name)):

@@ -97,6 +97,13 @@ pub(crate) fn read(
     Ok(arguments)
 }
 
+/// Tells which file is in use, where that is to be told.
+pub(crate) fn tell() {
+    if let Some(file) = &config().file {
+        tracing::info!(file = %file.display(), "settings");
+    }
+}
+
 /// Whether nothing is to be shown but results.
 pub(crate) fn is_quiet() -> bool {
     config().said.quiet

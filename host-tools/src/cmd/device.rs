@@ -5,8 +5,10 @@ mod bringup;
 mod calibrate;
 mod doctor;
 mod flash;
+mod history;
 mod identify;
 mod line;
+mod listen;
 pub(crate) mod log;
 mod loss;
 mod monitor;
@@ -86,8 +88,7 @@ Examples:
     Stop(line::Where),
     Flash(flash::Args),
     Bringup(bringup::Args),
-    #[command(subcommand)]
-    Log(replay::Command),
+    Log(replay::Args),
 }
 
 /// Does what is asked for.
@@ -112,7 +113,7 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<Don
         Command::Stop(at) => calibrate::stop(at, out),
         Command::Flash(args) => flash::run(args, out),
         Command::Bringup(args) => bringup::run(args, out),
-        Command::Log(command) => replay::run(command, out),
+        Command::Log(args) => replay::run(args, out),
     };
     done.map(|()| Done::Fully)
 }

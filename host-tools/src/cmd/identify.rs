@@ -328,6 +328,11 @@ where
         |event| {
             slides.step(&event, table);
             pictures.step(&event, table);
+            if let ExplorationStep::Chosen(action, expected) = &event {
+                let movement = table.movement(action.movement).map(|m| m.to_string());
+                let property = action.property.map(|p| p.to_string());
+                tracing::info!(movement, property, of = expected.len(), "chooses");
+            }
             match event {
                 // shown below: recordings that run out are no failure
                 ExplorationStep::CutShort(..) => {}

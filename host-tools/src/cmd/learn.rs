@@ -22,7 +22,7 @@ use tactus_core::table::{FALSE_ALARM, Table};
 use super::args::{Expecting, Features, Recordings, false_alarm, length, rising};
 use super::output::{Format, print_json};
 use super::progress::with_progress;
-use super::table_file::{TableFile, write_table};
+use super::table_file::{TableFile, beside, write_table};
 use super::textures::{collection, measure_folder};
 
 /// Learn a texture table from the first slides of every texture
@@ -32,7 +32,8 @@ Examples:
   tactus learn --recordings DIR --out table
   tactus learn --recordings DIR --method paper --out table     the table of the paper's method
   tactus learn --recordings DIR --lengths 1,2,3 --out table    and what slides say after 1, 2 and 3 s
-  tactus device table push table                               gives it to the probe")]
+  tactus device table push table                               gives it to the probe
+  tactus learn --recordings DIR --out - | tactus device table push - --yes")]
 pub(crate) struct Args {
     #[command(flatten)]
     from: Recordings,
@@ -54,7 +55,7 @@ pub(crate) struct Args {
     /// then. Firmware without the feature `early` refuses such a table
     #[arg(long, value_name = "S,S,...", value_delimiter = ',', value_parser = length)]
     lengths: Vec<u16>,
-    /// The file to write
+    /// The file to write; "-": standard output
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// How to print what was learned
@@ -93,7 +94,7 @@ Examples:
   tactus learn-by-hand --out table
   tactus learn-by-hand --textures burlap,47,'silk satin' --out table")]
 pub(crate) struct ByHand {
-    /// The file to write
+    /// The file to write; "-": standard output
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Textures of Table 1, by number or name; all 117 unless given
@@ -133,6 +134,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     .with_context(|| folder.display().to_string())?;
     let bytes = with_lengths(args, &set, bytes, &expected)?;
     write_table(&args.out, &bytes)?;
+    let out = &mut beside(&args.out, out);
     let mut short = Vec::new();
     for (texture, measured) in set.textures().iter().zip(&measured) {
         for movement in set.movements() {
@@ -219,6 +221,7 @@ pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()>
         tactus::sim::handheld::learn_with(args.finger, &collection, done)
     })?;
     write_table(&args.out, &bytes)?;
+    let out = &mut beside(&args.out, out);
     let left_out = left_out.into_iter().map(|n| texture_name(n).to_owned());
     let learned = Learned {
         table: TableFile::new(&args.out, Table::read(&bytes)?),

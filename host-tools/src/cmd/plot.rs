@@ -61,6 +61,11 @@ fn is_svg(path: &Path) -> bool {
 }
 
 impl Plot {
+    /// Whether pictures are wanted.
+    pub(crate) fn is_asked(&self) -> bool {
+        self.plot.is_some()
+    }
+
     /// Where pictures are to go, if any are wanted: found out before the work, not after it.
     ///
     /// # Errors

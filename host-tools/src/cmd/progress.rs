@@ -19,9 +19,14 @@ pub(crate) fn be_quiet() {
     let _ = QUIET.set(());
 }
 
+/// Whether nothing is to be shown but results and errors.
+pub(crate) fn is_quiet() -> bool {
+    QUIET.get().is_some()
+}
+
 /// Tells something beside the results, unless it is to be quiet.
 pub(crate) fn notice(what: &str) {
-    if QUIET.get().is_none() {
+    if !is_quiet() {
         eprintln!("{what}");
     }
 }
@@ -29,7 +34,8 @@ pub(crate) fn notice(what: &str) {
 /// A bar on the terminal; nothing where there is none, and with `--quiet`.
 pub(crate) fn progress(length: u64, what: impl Into<Cow<'static, str>>) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::hidden());
-    if QUIET.get().is_none() {
+    // a bar would be torn by the lines of --verbose
+    if !is_quiet() && !tracing::enabled!(tracing::Level::INFO) {
         bar.set_draw_target(ProgressDrawTarget::stderr());
     }
     let style = ProgressStyle::with_template("{msg} {wide_bar} {pos} of {len} done{left}")

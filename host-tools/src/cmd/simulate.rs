@@ -4,11 +4,10 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use serde::Serialize;
-use tactus::data::recording::{Labels, Recording, Texture};
-use tactus::data::recordings::RecordingWriter;
+use tactus::data::recording::Recording;
 use tactus::eval::show::count;
-use tactus::sim::collection::{Collection, calibrated, texture_name};
-use tactus_core::sensor::{FingerCode, FingerName};
+use tactus::sim::collection::{Collection, calibrated};
+use tactus_core::sensor::FingerName;
 
 use super::output::{Format, print_json};
 use super::progress::progress;
@@ -55,28 +54,8 @@ struct Simulated {
 /// Records the textures asked for.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let collection = collection(&args.textures, args.trials, args.seed)?;
-    let named = collection.textures.iter().map(|&number| Texture {
-        id: number.into(),
-        name: texture_name(number).to_owned(),
-    });
     let textures = collection.textures.len();
-    let numbers: Vec<String> = collection.textures.iter().map(u8::to_string).collect();
-    let finger = match args.finger {
-        FingerName::Biotac => String::new(),
-        other => format!(" --finger {other}"),
-    };
-    let command = format!(
-        "tactus simulate --seed {} --trials {} --textures {}{finger}",
-        args.seed,
-        args.trials,
-        numbers.join(",")
-    );
-    let labels = Labels {
-        finger: FingerCode::of(args.finger),
-        ..Labels::default()
-    };
-    let writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
-    let mut writer = writer.labelled(labels);
+    let mut writer = collection.writer(&args.out, args.finger)?;
     let calibration = calibrated(collection.setup_with(args.finger, collection.textures[0], 0))?;
     let each = Collection::MOVEMENTS.len() * args.trials as usize;
     // those that an interrupted command has not come to

@@ -64,6 +64,8 @@ impl RecordingSet {
         } else {
             return Err(RecordingError::NoManifest(folder.to_owned()));
         };
+        let rows: usize = slides.iter().map(Vec::len).sum();
+        tracing::info!(folder = %folder.display(), textures = textures.len(), slides = rows, "reads the manifest");
         Ok(Self {
             folder: folder.to_owned(),
             textures,
@@ -141,10 +143,13 @@ impl RecordingSet {
                 count: self.textures.len(),
             });
         }
-        match &self.source {
+        let slides = match &self.source {
             Source::Own(manifest) => manifest.load(&self.folder, index),
             Source::Biotac(manifest) => manifest.load(&self.folder, index),
-        }
+        }?;
+        let texture = &self.textures[index].name;
+        tracing::info!(texture, slides = slides.len(), "reads samples");
+        Ok(slides)
     }
 }
 

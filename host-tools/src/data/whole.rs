@@ -9,6 +9,8 @@ use std::path::Path;
 /// # Errors
 /// The system's.
 pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
+    let bytes = bytes.as_ref();
+    tracing::info!(file = %path.display(), bytes = bytes.len(), "writes");
     let mut part = path.as_os_str().to_owned();
     part.push(".part");
     fs::write(&part, bytes).and_then(|()| fs::rename(&part, path))

@@ -161,6 +161,7 @@ pub fn open(name: &str) -> Result<(Box<dyn Line>, Owner), LineError> {
         Some(address) => tcp(address)?,
         None => serial(name)?,
     };
+    tracing::info!(port = name, "opens");
     Ok((line, owner))
 }
 

@@ -1,8 +1,14 @@
 //! Logs of sessions, which `tactus device --log` writes: a line of JSON for every command and every report.
+//!
+//! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":7,"port":"/dev/ttyACM0"}}`. Each other one is
+//! `{"command":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log itself:
+//! the table in use (the parts that were read), the raw samples (blocks), what was measured, chosen and answered.
 
 use std::borrow::Cow;
-use std::io::{self, BufRead as _, BufReader, Read};
+use std::fs::File;
+use std::io::{self, BufRead as _, BufReader, BufWriter, Read, Write as _};
 use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use tactus_core::wire::{Command, PROTOCOL, Report};
@@ -29,6 +35,73 @@ pub enum Line<'a> {
 
 /// Versions of the messages whose logs are read: since the first of them only reasons have become more than sentences.
 const LOGGED: RangeInclusive<u8> = 3..=PROTOCOL;
+
+/// Writes the log. A failure is kept until the caller asks for it.
+#[derive(Debug)]
+pub struct Log {
+    path: PathBuf,
+    file: BufWriter<File>,
+    failed: io::Result<()>,
+}
+
+impl Log {
+    /// Begins a log of what is said at a port; a file that is there already is left alone.
+    ///
+    /// # Errors
+    /// It is there, or cannot be written.
+    pub fn create(path: &Path, port: &str) -> io::Result<Self> {
+        tracing::info!(file = %path.display(), "writes");
+        let file = File::create_new(path).map_err(|why| match why.kind() {
+            io::ErrorKind::AlreadyExists => {
+                io::Error::new(why.kind(), "is there already: give the log another name")
+            }
+            _ => why,
+        });
+        let mut log = Self {
+            path: path.to_owned(),
+            file: BufWriter::new(file.map_err(|why| named(path, &why))?),
+            failed: Ok(()),
+        };
+        log.line(&Line::Session {
+            tactus: env!("CARGO_PKG_VERSION").into(),
+            protocol: PROTOCOL,
+            port: port.into(),
+        });
+        log.flush()?;
+        Ok(log)
+    }
+
+    /// Something is asked of the probe.
+    pub fn asked(&mut self, command: &Command) {
+        self.line(&Line::Command(Box::new(Cow::Borrowed(command))));
+    }
+
+    /// The probe says something.
+    pub fn told(&mut self, report: &Report) {
+        self.line(&Line::Report(Box::new(Cow::Borrowed(report))));
+    }
+
+    fn line(&mut self, line: &Line<'_>) {
+        if self.failed.is_ok() {
+            let written = serde_json::to_writer(&mut self.file, line).map_err(io::Error::from);
+            self.failed = written.and_then(|()| self.file.write_all(b"\n"));
+        }
+    }
+
+    /// Everything so far is in the file.
+    ///
+    /// # Errors
+    /// Something could not be written.
+    pub fn flush(&mut self) -> io::Result<()> {
+        let written = std::mem::replace(&mut self.failed, Ok(()));
+        let flushed = written.and_then(|()| self.file.flush());
+        flushed.map_err(|why| named(&self.path, &why))
+    }
+}
+
+fn named(path: &Path, why: &io::Error) -> io::Error {
+    io::Error::new(why.kind(), format!("{}: {why}", path.display()))
+}
 
 /// Why a log cannot be read.
 #[derive(Debug, thiserror::Error)]

@@ -1,6 +1,7 @@
 //! The textures of a simulated world: recorded trial by trial, and learned.
 
 use std::fmt;
+use std::path::Path;
 
 use rayon::prelude::*;
 use tactus_core::dsp::Plan;
@@ -9,7 +10,8 @@ use tactus_core::features::{FeatureSet, Movement, Observation, SlideError};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::{FingerCode, FingerName};
 
-use crate::data::recording::Recording;
+use crate::data::recording::{Labels, Recording, Texture};
+use crate::data::recordings::{RecordingError, RecordingWriter};
 use crate::data::replay::measure;
 use crate::eval::learn::{self, TableError};
 use crate::sim::rig::{SimError, SimRig};
@@ -45,6 +47,36 @@ impl Collection {
         textures.push(unknown);
         textures.sort_unstable();
         textures
+    }
+
+    /// Begins a folder of recordings of it, or goes on with one that was interrupted.
+    ///
+    /// # Errors
+    /// The folder cannot be written, or holds other recordings.
+    pub fn writer(
+        &self,
+        folder: &Path,
+        finger: FingerName,
+    ) -> Result<RecordingWriter, RecordingError> {
+        let named = self.textures.iter().map(|&number| Texture {
+            id: number.into(),
+            name: texture_name(number).to_owned(),
+        });
+        let numbers: Vec<String> = self.textures.iter().map(u8::to_string).collect();
+        let (seed, trials, numbers) = (self.seed, self.trials, numbers.join(","));
+        let finger_said = match finger {
+            FingerName::Biotac => String::new(),
+            other => format!(" --finger {other}"),
+        };
+        let command = format!(
+            "tactus simulate --seed {seed} --trials {trials} --textures {numbers}{finger_said}"
+        );
+        let labels = Labels {
+            finger: FingerCode::of(finger),
+            ..Labels::default()
+        };
+        let writer = RecordingWriter::begin(folder, named.collect(), &command)?;
+        Ok(writer.labelled(labels))
     }
 
     /// A rig of this world with a texture under it. Different trials of one texture are `trial` apart.

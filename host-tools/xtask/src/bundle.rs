@@ -10,12 +10,15 @@ use object::{Endianness, elf};
 
 use crate::factory::TABLES;
 use crate::firmware::{self, hash, shown};
+use crate::sbom;
 use crate::shell::root;
 
 /// Where the chip's flash begins, and how much of it an image has (memory.x).
 const FLASH: u32 = 0x0800_0000;
 const FLASH_LENGTH: usize = 1024 << 10;
 const SUMS: &str = "SHA256SUMS";
+/// Every crate in the images, as CycloneDX.
+const BILL: &str = "sbom.cdx.json";
 
 /// Names and contents.
 type Files = BTreeMap<String, Vec<u8>>;
@@ -34,7 +37,7 @@ pub(crate) fn bundle(out: &Path) -> Result<()> {
         let bytes = std::fs::read(&table).with_context(|| table.display().to_string())?;
         tables.insert((*name).to_owned(), bytes);
     }
-    let files = files(images, tables)?;
+    let files = files(images, tables, sbom::firmware()?)?;
     write(&out, &files)?;
     for (name, bytes) in &files {
         println!("{:>9}  {}", bytes.len(), shown(&out.join(name)));
@@ -43,7 +46,7 @@ pub(crate) fn bundle(out: &Path) -> Result<()> {
 }
 
 /// Everything that is in a release.
-fn files(images: Vec<(String, Vec<u8>)>, tables: Files) -> Result<Files> {
+fn files(images: Vec<(String, Vec<u8>)>, tables: Files, bill: Vec<u8>) -> Result<Files> {
     let mut files = Files::new();
     for (name, elf) in images {
         let flat = flat(&loads(&elf)?).with_context(|| name.clone())?;
@@ -52,6 +55,15 @@ fn files(images: Vec<(String, Vec<u8>)>, tables: Files) -> Result<Files> {
         files.insert(format!("{name}.elf"), elf);
     }
     files.extend(tables);
+    files.insert(BILL.into(), bill);
+    let licences = [
+        (
+            "LICENSE-MIT",
+            include_bytes!("../../../LICENSE-MIT").as_slice(),
+        ),
+        ("LICENSE-APACHE", include_bytes!("../../../LICENSE-APACHE")),
+    ];
+    files.extend(licences.map(|(name, text)| (name.to_owned(), text.to_owned())));
     files.insert("FLASHING.md".into(), flashing().into());
     files.insert(SUMS.into(), sums(&files).into());
     Ok(files)
@@ -161,6 +173,7 @@ fn flashing() -> String {
         .replace("{version}", env!("CARGO_PKG_VERSION"))
         .replace("{chip}", crate::flash::CHIP)
         .replace("{SUMS}", SUMS)
+        .replace("{BILL}", BILL)
 }
 
 #[cfg(test)]
@@ -198,11 +211,17 @@ mod tests {
             files(
                 Vec::new(),
                 [("factory.tact".to_owned(), b"table".to_vec())].into(),
+                b"{}".to_vec(),
             )
             .unwrap()
         };
         let names: Vec<_> = release().into_keys().collect();
-        assert_eq!(names, ["FLASHING.md", SUMS, "factory.tact"]);
+        let licences = ["LICENSE-APACHE", "LICENSE-MIT"];
+        let [apache, mit] = licences;
+        assert_eq!(
+            names,
+            ["FLASHING.md", apache, mit, SUMS, "factory.tact", BILL]
+        );
         write(folder.path(), &release()).unwrap();
         let first = std::fs::read(folder.path().join(SUMS)).unwrap();
         write(folder.path(), &release()).unwrap();

@@ -9,6 +9,7 @@ mod flash;
 mod fuzz;
 mod python;
 mod reasons;
+mod sbom;
 mod seeds;
 mod shell;
 mod size;

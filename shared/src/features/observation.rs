@@ -14,7 +14,7 @@ pub const FEATURE_STEPS: f32 = 1024.0;
 /// Parts of a within-texture standard deviation that one step of a whitened [`Vector`] is.
 pub const WHITE_STEPS: f32 = 256.0;
 /// Counts of P_DC that are the unit of its features.
-const PDC_UNIT: f32 = 100.0;
+pub const PDC_UNIT: f32 = 100.0;
 
 /// Features of a slide in steps of 1/1024 of their units, or whitened ones in steps of 1/256 standard deviation.
 pub type Vector = Vec<i16, MAX_FEATURES>;

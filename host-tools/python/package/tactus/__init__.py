@@ -136,7 +136,7 @@ def verify(table, texture, slides, **arguments):
     table does not have are passed over. arguments: threshold, max_slides and false_alarm, as of `Explorer`.
 
     Returns a list of dicts, one for each slide that counted: `score`, `limit`, `answer` ("Same", "Different", "Unsure"); the last
-    one has the answer. Raises TableError where the table has no limits, KeyError where it does not have the texture.
+    one has the answer, and `false_accept`, the share of other textures that would have passed for it (None: not known). Raises TableError where the table has no limits, KeyError where it does not have the texture.
     """
     most = arguments.get("max_slides", 10)
     explorer = Explorer(table, among=[texture], method="fused-cycle", **arguments)
@@ -151,4 +151,6 @@ def verify(table, texture, slides, **arguments):
         if now is None:
             raise TableError("the table has no limits: learn it with --method fused from three textures at least")
         told.append(now)
+    if told:
+        told[-1]["false_accept"] = explorer.false_accept()
     return told

@@ -241,6 +241,7 @@ class Explorer:
     def verdict(self) -> Optional[Dict[str, Any]]: ...
     def best(self) -> Dict[str, Any]: ...
     def verification(self) -> Optional[Dict[str, Any]]: ...
+    def false_accept(self) -> Optional[float]: ...
 
 def verify(
     table: Table,
@@ -263,7 +264,12 @@ class SimulatedRig:
     def slide(self, force_n: float, speed_mm_s: float) -> Slide: ...
 
 def simulate(
-    textures: Optional[Sequence[str]] = None, *, trials: int = 5, seed: int = 1, finger: str = "biotac"
+    textures: Optional[Sequence[str]] = None,
+    *,
+    trials: int = 5,
+    seed: int = 1,
+    finger: str = "biotac",
+    folder: Union[str, PathLike[str], None] = None,
 ) -> Dict[str, List[Slide]]: ...
 def learn_by_hand(
     textures: Optional[Sequence[str]] = None, *, trials: int = 5, seed: int = 1, finger: str = "biotac"
@@ -279,7 +285,9 @@ class Events(Iterator[Dict[str, Any]]):
 class Probe:
     """A probe at a serial or a TCP port."""
 
-    def __init__(self, port: Optional[str] = None, *, timeout_s: float = 5.0) -> None: ...
+    def __init__(
+        self, port: Optional[str] = None, *, timeout_s: float = 5.0, log: Union[str, PathLike[str], None] = None
+    ) -> None: ...
     @property
     def port(self) -> str: ...
     @property

@@ -1,12 +1,13 @@
 //! Recordings and logs as MCAP: messages in JSON, each channel with its schema.
 
 use std::collections::BTreeMap;
-use std::io::{BufWriter, Write as _};
+use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Context as _;
 use mcap::WriteOptions;
 use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
 use serde_json::{Map, Value, json};
 use tactus::data::recording::PAC_RATE_HZ;
 use tactus::data::recordings::RecordingSet;
@@ -16,9 +17,8 @@ use tactus_core::features::{Block, Movement, Property};
 use tactus_core::table::Table;
 use tactus_core::wire::{Event, Report, SlideReport};
 
+use super::{To, create};
 use crate::cmd::device::log::{self, Line, TableParts};
-
-type File = BufWriter<std::fs::File>;
 
 /// The channels, each with what its messages hold: a name, and JSON's word for what it is.
 const CHANNELS: [(&str, &[(&str, &str)]); 13] = [
@@ -97,15 +97,17 @@ const ERROR: u8 = 4;
 const PAUSE_NS: u64 = 1_000_000_000;
 
 struct Writer {
-    mcap: mcap::Writer<File>,
+    mcap: mcap::Writer<NoSeek<To>>,
     channels: BTreeMap<&'static str, (u16, u32)>,
 }
 
 impl Writer {
-    fn new(to: File, of: &Path, time: &str) -> anyhow::Result<Self> {
+    fn new(to: To, of: &Path, time: &str) -> anyhow::Result<Self> {
         let library = concat!("tactus ", env!("CARGO_PKG_VERSION"));
+        // standard output cannot be sought in
         let options = WriteOptions::new().compression(None).library(library);
-        let mut mcap = options.create(to)?;
+        let options = options.disable_seeking(true);
+        let mut mcap = options.create(NoSeek::new(to))?;
         let mut channels = BTreeMap::new();
         for (topic, fields) in CHANNELS {
             let (name, schema) = if topic == LOG {
@@ -184,7 +186,7 @@ impl Writer {
 
     fn finish(mut self) -> anyhow::Result<()> {
         self.mcap.finish()?;
-        Ok(self.mcap.into_inner().flush()?)
+        Ok(self.mcap.into_inner().into_inner().flush()?)
     }
 }
 
@@ -223,9 +225,9 @@ fn force_and_speed(movement: Movement) -> (f64, f64) {
 
 /// All slides of a folder, one after the other: when they were made is not known.
 pub(super) fn recordings(
-    to: File,
+    to: To,
     set: &RecordingSet,
-    mut done: impl FnMut(),
+    done: &(dyn Fn() + Sync),
 ) -> anyhow::Result<()> {
     let time = "slides one after the other from 0 on, a second between them: recordings do not say when they were made";
     let mut to = Writer::new(to, set.folder(), time)?;
@@ -267,15 +269,8 @@ pub(super) fn recordings(
 }
 
 /// A log, by the probe's own clock.
-pub(super) fn log(to: File, from: &Path) -> anyhow::Result<()> {
-    let mut log = Converted {
-        to: Writer::new(to, from, "since the probe booted, by its own clock")?,
-        now_ns: 0,
-        parts: TableParts::default(),
-        names: Vec::new(),
-        next: None,
-        failed: Ok(()),
-    };
+pub(super) fn log(to: To, from: &Path) -> anyhow::Result<()> {
+    let mut log = Converted::new(to, from)?;
     log::read(from, |line| {
         if log.failed.is_ok() {
             log.failed = log.line(&line);
@@ -284,6 +279,32 @@ pub(super) fn log(to: File, from: &Path) -> anyhow::Result<()> {
     .with_context(|| from.display().to_string())?;
     log.failed?;
     log.to.finish()
+}
+
+/// A probe's reports, written as they come.
+pub(crate) struct Live(Converted);
+
+impl Live {
+    /// Begins a file of what the probe at this port says.
+    pub(crate) fn create(path: &Path, port: &str) -> anyhow::Result<Self> {
+        let mut converted = Converted::new(create(path)?, Path::new(port))?;
+        let by = concat!("written by tactus ", env!("CARGO_PKG_VERSION"));
+        converted.to.log(0, INFO, by)?;
+        Ok(Self(converted))
+    }
+
+    /// Writes a report, unless one before it could not be written.
+    pub(crate) fn hear(&mut self, report: &Report, written: &mut anyhow::Result<()>) {
+        if written.is_ok() {
+            self.0.now_ns = u64::from(report.at_ms) * 1_000_000;
+            *written = self.0.report(report);
+        }
+    }
+
+    /// Ends the file: without it, readers have no index.
+    pub(crate) fn finish(self) -> anyhow::Result<()> {
+        self.0.to.finish()
+    }
 }
 
 struct Converted {
@@ -298,6 +319,17 @@ struct Converted {
 }
 
 impl Converted {
+    fn new(to: To, from: &Path) -> anyhow::Result<Self> {
+        Ok(Self {
+            to: Writer::new(to, from, "since the probe booted, by its own clock")?,
+            now_ns: 0,
+            parts: TableParts::default(),
+            names: Vec::new(),
+            next: None,
+            failed: Ok(()),
+        })
+    }
+
     fn line(&mut self, line: &Line<'_>) -> anyhow::Result<()> {
         match line {
             Line::Session { tactus, port, .. } => {

@@ -1,22 +1,22 @@
 //! Recordings as one `.npz` file: `numpy.load` opens it.
 
-use std::io::{Seek, Write};
+use std::io::Write;
 
 use anyhow::Context as _;
 use tactus::data::recordings::{RecordingSet, npy};
 use tactus::data::replay::MeasuredSlide;
 use tactus_core::features::Property;
 use zip::ZipWriter;
-use zip::write::SimpleFileOptions;
+use zip::write::{SimpleFileOptions, StreamWriter};
 
 /// Writes the samples of every slide, and what is known of them: arrays with a row for each slide.
-pub(super) fn write<W: Write + Seek>(
+pub(super) fn write<W: Write>(
     to: W,
     set: &RecordingSet,
     measured: &[Vec<MeasuredSlide>],
-    mut done: impl FnMut(),
-) -> anyhow::Result<W> {
-    let mut npz = Npz(ZipWriter::new(to));
+    done: &(dyn Fn() + Sync),
+) -> anyhow::Result<()> {
+    let mut npz = Npz(ZipWriter::new_stream(to));
     let mut rows = Rows::default();
     for (index, (texture, measured)) in set.textures().iter().zip(measured).enumerate() {
         let slides = set.load_texture(index)?;
@@ -51,7 +51,7 @@ pub(super) fn write<W: Write + Seek>(
         done();
     }
     rows.write(&mut npz)?;
-    Ok(npz.0.finish()?)
+    Ok(npz.0.finish()?.flush()?)
 }
 
 /// An array for each, a row for each slide.
@@ -68,7 +68,7 @@ struct Rows {
 }
 
 impl Rows {
-    fn write<W: Write + Seek>(&self, npz: &mut Npz<W>) -> anyhow::Result<()> {
+    fn write<W: Write>(&self, npz: &mut Npz<W>) -> anyhow::Result<()> {
         let slides = self.number.len();
         for (name, texts) in [
             ("texture", &self.texture),
@@ -90,9 +90,9 @@ impl Rows {
     }
 }
 
-struct Npz<W: Write + Seek>(ZipWriter<W>);
+struct Npz<W: Write>(ZipWriter<StreamWriter<W>>);
 
-impl<W: Write + Seek> Npz<W> {
+impl<W: Write> Npz<W> {
     fn add(&mut self, name: &str, array: &[u8]) -> anyhow::Result<()> {
         // numpy reads either; without a time the same recordings are the same file
         let stored = SimpleFileOptions::default()

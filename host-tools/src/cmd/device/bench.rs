@@ -17,6 +17,7 @@ use tactus_core::rig::Fault;
 use tactus_core::table::{Table, TableError};
 use tactus_core::wire::{Command, Event, Phase, Prompt, Report, Status};
 
+use super::history::History;
 use super::line::{Emulator, OpenError, Where};
 use super::log::Log;
 
@@ -131,6 +132,7 @@ pub(crate) struct Bench {
 /// What the reports have said of the rig, and the log that keeps them.
 struct Heard {
     log: Option<Log>,
+    history: History,
     /// what the rig does
     phase: Option<Phase>,
     /// when it last reported where it is
@@ -144,10 +146,14 @@ impl Heard {
         if let Some(log) = &mut self.log {
             log.told(report);
         }
+        self.history.hear(report);
         match &report.event {
             Event::Phase(now) => self.phase = Some(*now),
             Event::Status(status) => self.phase = Some(status.phase),
             Event::Live(_) => self.located = Instant::now(),
+            Event::Chosen {
+                slide, movement, ..
+            } => tracing::info!(slide, %movement, "the probe chooses"),
             Event::Done(id) | Event::Refused { id, .. } if self.moving == Some(*id) => {
                 self.moving = None;
             }
@@ -183,14 +189,15 @@ impl Bench {
         };
         let mut bench = Self {
             port: Port::new(open.line, greeting),
-            name: open.name,
             interrupt,
             heard: Heard {
                 log: log.transpose()?,
+                history: History::of(&open.name),
                 phase: None,
                 located: Instant::now(),
                 moving: None,
             },
+            name: open.name,
             _emulator: open.emulator,
             _owner: open.owner,
         };
@@ -225,6 +232,11 @@ impl Bench {
     pub(crate) fn losses(&self) -> (u64, u64) {
         let session = self.port.session();
         (session.damaged(), session.missing())
+    }
+
+    /// What this PC remembers of the probe.
+    pub(crate) fn history(&self) -> &History {
+        &self.heard.history
     }
 
     /// Whether the user wants to end.

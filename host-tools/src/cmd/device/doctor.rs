@@ -16,6 +16,7 @@ use tactus_core::wire::{Command, PROTOCOL, Status};
 use time::{Date, Month, OffsetDateTime};
 
 use super::bench::{Bench, BenchError};
+use super::history::{Remembered, What};
 use super::line::{OpenError, Where};
 use crate::cmd::output::{Format, print_json};
 
@@ -28,7 +29,7 @@ Examples:
   tactus device doctor --format json > doctor.json    to send to somebody
 
 Nothing moves. It takes some five seconds, since the probe's clock is held against this PC's. The probe writes one of its settings again,
-as it is, to show that its store works. Exit code: 0 if nothing is wrong, 1 otherwise; what is only worth a look leaves 0.")]
+as it is, to show that its store works. Last faults, and how old the table is, are what this PC has seen of the probe at this port. Exit code: 0 if nothing is wrong, 1 otherwise; what is only worth a look leaves 0.")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,
@@ -46,6 +47,8 @@ const MAX_PPM: f64 = 1500.0;
 const EMULATED_PPM: f64 = 50_000.0;
 /// A load cell drifts, and a BioTac loses water, in half a year.
 const OLD_DAYS: i64 = 180;
+/// So many of the last faults are shown.
+const FAULTS: usize = 5;
 /// Damaged words of all words: the firmware's own limit within a second.
 const MAX_DAMAGED: f64 = 0.005;
 
@@ -75,10 +78,41 @@ struct Summary<'a> {
     tactus: &'static str,
     protocol: u8,
     checks: &'a [Check],
+    /// The last ones that this PC saw at this port, the newest first.
+    faults: &'a [Past],
+    /// `null`: it cannot be read.
+    table: Option<&'a InUse>,
+}
+
+/// A fault that is over.
+#[derive(Serialize)]
+struct Past {
+    /// Day and time, UTC.
+    at: String,
+    fault: String,
+    remedy: String,
+}
+
+/// The table in use.
+#[derive(Serialize)]
+struct InUse {
+    finger: String,
+    textures: u16,
+    checksum: String,
+    factory: bool,
+    /// Day of the force scale that it was learned by; `null`: none, or not known.
+    calibrated: Option<String>,
+    /// The day on which this PC saw it first at this port.
+    seen_since: String,
+    days: i64,
 }
 
 #[derive(Default)]
-struct Checks(Vec<Check>);
+struct Checks {
+    all: Vec<Check>,
+    faults: Vec<Past>,
+    table: Option<InUse>,
+}
 
 impl Checks {
     fn good(&mut self, name: &'static str, saw: String) {
@@ -94,7 +128,7 @@ impl Checks {
     }
 
     fn add(&mut self, name: &'static str, state: State, saw: String, remedy: Option<String>) {
-        self.0.push(Check {
+        self.all.push(Check {
             name,
             state,
             saw,
@@ -103,7 +137,7 @@ impl Checks {
     }
 
     fn print(&self, out: &mut impl Write) -> anyhow::Result<()> {
-        for check in &self.0 {
+        for check in &self.all {
             let state = match check.state {
                 State::Good => "good",
                 State::Look => "look",
@@ -132,12 +166,14 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             let summary = Summary {
                 tactus: env!("CARGO_PKG_VERSION"),
                 protocol: PROTOCOL,
-                checks: &checks.0,
+                checks: &checks.all,
+                faults: &checks.faults,
+                table: checks.table.as_ref(),
             };
             print_json(&summary, out)?;
         }
     }
-    let bad = checks.0.iter().filter(|check| check.state == State::Bad);
+    let bad = checks.all.iter().filter(|check| check.state == State::Bad);
     let bad = bad.count() as u64;
     ensure!(bad == 0, "{} failed", count(bad, "check"));
     Ok(())
@@ -179,9 +215,10 @@ fn examine(bench: &mut Bench, status: &Status, checks: &mut Checks) -> Result<()
         Some(fault) => checks.bad("rig", fault.to_string(), remedy(fault)),
         None => checks.good("rig", "no fault".to_owned()),
     }
+    last_faults(bench.history().faults(FAULTS), now(), checks);
     acquisition(status, checks);
     table(bench, status, checks)?;
-    force_scale(status.calibrated, today(), checks);
+    force_scale(status.calibrated, now().date(), checks);
     let wear_j = status.skin_mj.1 as f32 * 1e-3;
     let worn = format!("{wear_j:.1} of {WARN_J:.0} J of wear");
     if wear_j < WARN_J {
@@ -201,6 +238,48 @@ fn examine(bench: &mut Bench, status: &Status, checks: &mut Checks) -> Result<()
         }
     }
     Ok(())
+}
+
+/// What this PC has seen of the probe; a fault of the last day is worth a look.
+fn last_faults(faults: Vec<Remembered>, now: OffsetDateTime, checks: &mut Checks) {
+    let lasts = faults
+        .iter()
+        .any(|one| now - one.time() < time::Duration::DAY);
+    checks.faults = faults.iter().map(Past::from).collect();
+    let (newest, remedy) = match checks.faults.first() {
+        None => {
+            checks.good("last faults", "none that this PC saw".to_owned());
+            return;
+        }
+        Some(newest) => (
+            format!("{}, {}", newest.fault, newest.at),
+            checks.faults.iter().map(|past| {
+                let Past { at, fault, remedy } = past;
+                format!("{at}: {fault}. {remedy}")
+            }),
+        ),
+    };
+    let remedy = remedy.collect::<Vec<_>>().join("\n");
+    let state = if lasts { State::Look } else { State::Good };
+    checks.add("last faults", state, newest, Some(remedy));
+}
+
+impl From<&Remembered> for Past {
+    fn from(one: &Remembered) -> Self {
+        let (fault, remedy) = match &one.what {
+            What::Fault(fault) => (fault.to_string(), remedy(*fault)),
+            What::Died(words) => (
+                format!("the firmware gave up: {words}"),
+                "a mistake of the firmware: flash the newest, and tell its authors these words"
+                    .to_owned(),
+            ),
+            What::Table(_) => Default::default(),
+        };
+        let at = one.time();
+        let (day, hour, minute) = (day_of(at.date()), at.hour(), at.minute());
+        let at = format!("{day} {hour:02}:{minute:02} UTC");
+        Self { at, fault, remedy }
+    }
 }
 
 fn remedy(fault: Fault) -> String {
@@ -311,8 +390,21 @@ fn table(bench: &mut Bench, status: &Status, checks: &mut Checks) -> Result<(), 
             return Ok(());
         }
     };
+    let since = bench.history().table_since(table.crc(), now());
+    let in_use = InUse {
+        finger: table.finger().to_string(),
+        textures: table.textures(),
+        checksum: format!("{:08x}", table.crc()),
+        factory: status.factory,
+        calibrated: date(table.calibrated()).map(day_of),
+        seen_since: day_of(since.date()),
+        days: (now() - since).whole_days(),
+    };
     let textures = count(table.textures(), "texture");
-    let seen = format!("{textures}, finger {}", table.finger());
+    let (finger, since, days) = (&in_use.finger, &in_use.seen_since, in_use.days);
+    let age = count(days.unsigned_abs(), "day");
+    let seen = format!("{textures}, finger {finger}, here since {since} ({age})");
+    checks.table = Some(in_use);
     if let Err(why) = table.of_finger(status.finger) {
         checks.bad("table", why.to_string(), "push a table of this finger");
     } else if status.factory {
@@ -330,6 +422,9 @@ fn table(bench: &mut Bench, status: &Status, checks: &mut Checks) -> Result<(), 
             seen,
             "`tactus device refresh` moves it to this scale",
         );
+    } else if days > OLD_DAYS {
+        let remedy = "`tactus device refresh` moves it to the finger as it is now";
+        checks.look("table", seen, remedy);
     } else {
         checks.good("table", seen);
     }
@@ -343,8 +438,13 @@ fn date(of: u32) -> Option<Date> {
     Date::from_calendar_date(year, month, u8::try_from(of % 100).ok()?).ok()
 }
 
-fn today() -> Date {
-    OffsetDateTime::now_utc().date()
+fn day_of(date: Date) -> String {
+    let (year, month, day) = date.to_calendar_date();
+    format!("{year}-{:02}-{day:02}", u8::from(month))
+}
+
+fn now() -> OffsetDateTime {
+    OffsetDateTime::now_utc()
 }
 
 fn force_scale(calibrated: u32, today: Date, checks: &mut Checks) {
@@ -381,7 +481,7 @@ mod tests {
     use super::*;
 
     fn states(checks: &Checks) -> Vec<State> {
-        checks.0.iter().map(|check| check.state).collect()
+        checks.all.iter().map(|check| check.state).collect()
     }
 
     #[test]
@@ -393,6 +493,25 @@ mod tests {
         }
         use State::{Bad, Good, Look};
         assert_eq!(states(&checks), [Look, Good, Good, Good, Look, Bad]);
+    }
+
+    #[test]
+    fn a_fault_of_today_is_worth_a_look_and_has_its_remedy() {
+        let line = r#"{"at":1795000000,"port":"here","what":{"fault":"StageStall"}}"#;
+        let fault: Remembered = serde_json::from_str(line).unwrap();
+        let mut checks = Checks::default();
+        last_faults(Vec::new(), fault.time(), &mut checks);
+        for days in [0, 2] {
+            let now = fault.time() + time::Duration::days(days);
+            last_faults(vec![fault.clone()], now, &mut checks);
+        }
+        assert_eq!(states(&checks), [State::Good, State::Look, State::Good]);
+        let Past { at, fault, remedy } = &checks.faults[0];
+        assert_eq!(
+            (&at[..], &fault[..]),
+            ("2026-11-18 11:06 UTC", "stage blocked")
+        );
+        assert!(remedy.contains("tactus device home"), "{remedy}");
     }
 
     #[test]

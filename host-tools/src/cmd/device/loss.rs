@@ -8,6 +8,7 @@ use tactus::eval::show::count;
 use tactus_core::table::Table;
 
 use super::bench::{Bench, read_answer};
+use super::history;
 use crate::cmd::output::Format;
 use crate::cmd::table_file::write_table;
 
@@ -100,11 +101,9 @@ pub(crate) fn confirm(
 
 /// Where tables are kept.
 fn folder() -> anyhow::Result<PathBuf> {
-    let given = |variable| std::env::var_os(variable).map(PathBuf::from);
-    let data = given("XDG_DATA_HOME").or_else(|| Some(given("HOME")?.join(".local/share")));
-    let folder = data
+    let folder = history::folder()
         .context("there is no home folder to keep the probe's table in: name a file with --backup")?
-        .join("tactus/backups");
+        .join("backups");
     std::fs::create_dir_all(&folder)
         .with_context(|| format!("{}: name another file with --backup", folder.display()))?;
     Ok(folder)

@@ -19,19 +19,33 @@ use tactus_core::table::Table;
 use tactus_core::wire::{self, Event, Forget, Identify, Report, Verdict};
 
 use super::log::{Line, LogError, TableParts, read};
-use super::monitor;
+use super::{listen, monitor};
 use crate::cmd::output::{Format, percent, print_json};
 use crate::cmd::plot::{Plot, svg_file};
 
-/// Show the log of a session (--log), or compute its decisions again
-#[derive(Subcommand)]
-#[command(after_help = "\
+/// Listen to a probe (--mcap), show the log of a session (--log), or compute its decisions again
+#[derive(clap::Args)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = "\
 Examples:
+  tactus device log --mcap session.mcap                    what the probe reports until Ctrl-C, for Foxglove and PlotJuggler
+  tactus device log --mcap - --seconds 60 > minute.mcap
   tactus device log show session.jsonl
   tactus device log show session.jsonl --plot pictures     as `tactus identify` draws them
   tactus device log film session.jsonl --out film.svg      the monitor, as it would have shown the session
-  tactus device log replay session.jsonl    computes every decision again; exit code 1 if one differs")]
-pub(crate) enum Command {
+  tactus device log replay session.jsonl    computes every decision again; exit code 1 if one differs"
+)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    listen: listen::Listen,
+}
+
+#[derive(Subcommand)]
+enum Command {
     /// Compute every decision of the session again, and compare
     Replay {
         /// The log; "-" reads standard input
@@ -72,8 +86,15 @@ fn size(text: &str) -> Result<(u16, u16), String> {
         .ok_or_else(|| "columns and lines from 60x21 to 200x60, such as 80x24".to_owned())
 }
 
-/// Shows or replays a log.
-pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()> {
+/// Writes, shows or replays a log.
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    match &args.command {
+        Some(command) => of_a_file(command, out),
+        None => listen::run(&args.listen, out),
+    }
+}
+
+fn of_a_file(command: &Command, out: &mut impl Write) -> anyhow::Result<()> {
     let (file, plot) = match command {
         Command::Replay { file, plot, .. } | Command::Show { file, plot, .. } => (file, plot),
         Command::Film { file, out, size } => {

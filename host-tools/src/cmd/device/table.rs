@@ -16,7 +16,7 @@ use super::bench::Bench;
 use super::line::Where;
 use super::loss::{Consent, replaced};
 use crate::cmd::output::{Format, print_json};
-use crate::cmd::table_file::{TableFile, read_table, write_table};
+use crate::cmd::table_file::{TableFile, beside, read_table, write_table};
 
 /// Show, fetch or replace the probe's texture table
 #[derive(Subcommand)]
@@ -40,7 +40,7 @@ pub(crate) enum Command {
     Pull {
         #[command(flatten)]
         at: Where,
-        /// The file to write
+        /// The file to write; "-": standard output
         file: PathBuf,
         /// How to print what was written
         #[arg(long, value_enum, default_value_t = Format::Text)]
@@ -50,7 +50,7 @@ pub(crate) enum Command {
     Push {
         #[command(flatten)]
         at: Where,
-        /// The table, as `tactus learn` or `table pull` wrote it
+        /// The table, as `tactus learn` or `table pull` wrote it; "-" reads standard input
         file: PathBuf,
         #[command(flatten)]
         consent: Consent,
@@ -137,6 +137,7 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
         Command::Pull { at, file, format } => {
             let bytes = Bench::open(at)?.0.table()?;
             write_table(file, &bytes)?;
+            let out = &mut beside(file, out);
             let table = Table::read(&bytes)?;
             if *format == Format::Json {
                 return print_json(&TableFile::new(file, table), out);

@@ -113,7 +113,7 @@ fn title(movement: Movement) -> String {
 }
 
 /// At most two points for each column of the picture.
-fn drawn(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+pub(super) fn drawn(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     if points.len() <= 2 * COLUMNS {
         return points.to_vec();
     }
