@@ -30,6 +30,7 @@ function module() {
 
 test("WebAssembly gives the native replies, byte by byte", async () => {
   const lines = readFileSync(replies, "utf8").trimEnd().split("\n");
+  assert.ok(lines.length > 100, `${replies} has ${lines.length} lines`);
   const { ask } = module();
   let explorations = 0;
   for (let n = 0; n < lines.length; n += 2) {

@@ -54,7 +54,7 @@ const Rig = (() => {
     finger(tip);
     const arrow = make(svg, "path", { class: "arrow", d: "", visibility: "hidden" });
     // ten times as large
-    make(svg, "path", { class: "ray", d: "M1.5 0 L44.5 -20.5 M1.5 -3 L47 -37" });
+    const ray = make(svg, "path", { class: "ray" });
     const close = make(svg, "g", { "clip-path": "url(#lens-clip)" });
     make(close, "circle", { class: "lens", cx: 58, cy: -27, r: 15 });
     const under = make(close, "path", { class: "sample" });
@@ -65,7 +65,7 @@ const Rig = (() => {
     // a scale
     make(svg, "path", { class: "tick", d: "M-49 -36 v-1.5 M-49 -36.75 h20 M-29 -36 v-1.5" });
     make(svg, "text", { class: "unit", x: -39, y: -38.4, "text-anchor": "middle" }, "20 mm");
-    parts = { svg, stage, shims, sample, tip, arrow, under, skin, ridges, now: svg.querySelector("desc") };
+    parts = { svg, ray, stage, shims, sample, tip, arrow, under, skin, ridges, now: svg.querySelector("desc") };
     fit();
     addEventListener("resize", fit);
   }
@@ -99,6 +99,7 @@ const Rig = (() => {
     parts.shims.setAttribute("d", under > 0 ? `M1 0 V${-under} H${SAMPLE - 1} V0 Z M1 ${-under / 2} H${SAMPLE - 1}` : "");
     parts.sample.setAttribute("d", `M0 ${-under} V${-top} ${outline} V${-under} Z`);
     parts.sample.setAttribute("fill", fill);
+    parts.ray.setAttribute("d", `M2 ${1 - top} L45.5 -18.7 M2 ${-1 - top} L47 -37`);
     parts.tip.setAttribute("transform", `translate(0 ${(-frame.tip_mm).toFixed(3)})`);
     const moves = Math.abs(frame.speed_mm_s) > 1;
     parts.arrow.setAttribute("visibility", moves ? "visible" : "hidden");
