@@ -19,6 +19,7 @@ mod pace;
 pub mod page;
 #[cfg(feature = "plots")]
 pub mod pictures;
+pub mod places;
 pub mod refresh;
 pub mod reliability;
 pub mod report;

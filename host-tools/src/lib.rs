@@ -4,6 +4,7 @@ pub mod bringup;
 pub mod data;
 pub mod eval;
 pub mod link;
+pub mod live;
 pub mod sim;
 #[cfg(feature = "study")]
 pub mod study;

@@ -2,7 +2,7 @@
 
 use crate::rules::Package;
 
-pub(crate) const PACKAGES: [Package; 6] = [
+pub(crate) const PACKAGES: [Package; 7] = [
     Package {
         folder: "shared",
         steps: &[
@@ -26,6 +26,7 @@ pub(crate) const PACKAGES: [Package; 6] = [
             &["data"],
             &["eval"],
             &["sim"],
+            &["live"],
             &["study"],
             &["link"],
             &["bringup"],
@@ -36,10 +37,12 @@ pub(crate) const PACKAGES: [Package; 6] = [
             ("link", "data"),
             ("link", "eval"),
             ("link", "sim"),
+            ("link", "live"),
             ("link", "study"),
             ("bringup", "data"),
             ("bringup", "eval"),
             ("bringup", "sim"),
+            ("bringup", "live"),
             ("bringup", "study"),
         ],
         outside: &["lib", "main"],
@@ -61,6 +64,12 @@ pub(crate) const PACKAGES: [Package; 6] = [
         steps: &[&["board"], &["host"], &["scenario"], &["runs"]],
         strangers: &[],
         outside: &["lib", "main"],
+    },
+    Package {
+        folder: "host-tools/page",
+        steps: &[],
+        strangers: &[],
+        outside: &[],
     },
     Package {
         folder: "host-tools/python",

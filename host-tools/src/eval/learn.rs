@@ -1,5 +1,6 @@
 //! Texture tables learned from slides, for every way of deciding.
 
+use serde::{Deserialize, Serialize};
 use tactus_core::explorer::ExplorerError;
 use tactus_core::explorer::Method;
 use tactus_core::features::{FeatureSet, Movement, Observation, PropertySet, Vector};
@@ -149,6 +150,52 @@ pub fn know_lengths(bytes: &[u8], shorter: &[(u16, Vec<u8>, u64)]) -> Result<Vec
     let length = with_lengths(&mut out, &table, &shorter)?.as_bytes().len();
     out.truncate(length);
     Ok(out)
+}
+
+/// What a slide of a trial says, and what its first part alone would have said.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct ObservedTrial {
+    /// The whole slide.
+    pub whole: Observation,
+    /// Its first part, for each length that was asked for; `None` where it does not last longer.
+    pub first: Vec<Option<Observation>>,
+}
+
+/// As [`learn_for`], with what slides say after each of these lengths, in ms at constant speed, the shortest first: those that each
+/// trial was observed at.
+///
+/// # Errors
+/// See [`TableError`].
+pub fn learn_lengths(
+    expected: &Expected,
+    method: Method,
+    names: &[String],
+    movements: &[Movement],
+    lengths_ms: &[u16],
+    trials: &[Vec<Vec<ObservedTrial>>],
+) -> Result<Vec<u8>, TableError> {
+    let learn = |slide: &dyn Fn(&ObservedTrial) -> Observation| {
+        let of = |cell: &Vec<ObservedTrial>| cell.iter().map(slide).collect();
+        let slides: Vec<Vec<Vec<Observation>>> = trials
+            .iter()
+            .map(|row| row.iter().map(of).collect())
+            .collect();
+        learn_for(expected, method, None, names, movements, &slides)
+    };
+    let whole = learn(&|trial| trial.whole.clone())?;
+    let shorter = lengths_ms.iter().enumerate().map(|(n, &ms)| {
+        let first = |trial: &ObservedTrial| trial.first.get(n).cloned().flatten();
+        let is_longer = |movement: usize| {
+            let mut cells = trials.iter().filter_map(|row| row.get(movement)).flatten();
+            cells.all(|trial| first(trial).is_some())
+        };
+        let longer = (0..movements.len()).filter(|movement| is_longer(*movement));
+        // where it does not last longer the whole one stands for it, and says nothing
+        let table = learn(&|trial| first(trial).unwrap_or_else(|| trial.whole.clone()))?;
+        Ok((ms, table, longer.map(|movement| 1 << movement).sum()))
+    });
+    let shorter = shorter.collect::<Result<Vec<_>, TableError>>()?;
+    Ok(know_lengths(&whole, &shorter)?)
 }
 
 /// As [`learn`], for what else is expected.

@@ -13,7 +13,7 @@ use tactus_core::sensor::{FingerCode, FingerName};
 use crate::data::recording::{Labels, Recording, Texture};
 use crate::data::recordings::{RecordingError, RecordingWriter};
 use crate::data::replay::measure;
-use crate::eval::learn::{self, TableError};
+use crate::eval::learn::{self, Expected, ObservedTrial, TableError};
 use crate::sim::rig::{SimError, SimRig};
 use crate::sim::textures::TEXTURES;
 use crate::sim::world::Setup;
@@ -233,28 +233,51 @@ impl Collection {
         lengths_ms: &[u16],
         done: impl Fn() + Sync,
     ) -> Result<Vec<u8>, LearnError> {
-        let movements = &Self::MOVEMENTS;
         let slides = self.record(calibration, done)?;
-        let whole = self.learn_from(movements, method, &slides)?;
-        let shorter = lengths_ms.iter().map(|&ms| {
-            let mut longer = (1_u64 << movements.len()) - 1;
-            let mut first = slides.clone();
-            for slide in first.iter_mut().flatten() {
-                match (
-                    slide.first(ms),
-                    movements.iter().position(|m| *m == slide.movement),
-                ) {
-                    (Some(first), _) => *slide = first,
-                    // the whole one stands for it, and says nothing
-                    (None, at) => longer &= !at.map_or(0, |at| 1 << at),
-                }
-            }
-            Ok((ms, self.learn_from(movements, method, &first)?, longer))
+        let plan = Plan::new();
+        let trials = slides.iter().zip(&self.textures).map(|(slides, &texture)| {
+            self.observe(&plan, &Self::MOVEMENTS, texture, slides, lengths_ms)
         });
-        let shorter = shorter.collect::<Result<Vec<_>, LearnError>>()?;
-        let table = learn::know_lengths(&whole, &shorter).map_err(TableError::from)?;
+        let trials = trials.collect::<Result<Vec<_>, TrialError>>()?;
+        let usual = Expected::default();
+        let (names, movements) = (self.names(), &Self::MOVEMENTS);
+        let table = learn::learn_lengths(&usual, method, &names, movements, lengths_ms, &trials)?;
         let named = learn::name_finger(&table, FingerCode::of(FingerName::Biotac), 0);
         Ok(named.map_err(TableError::from)?)
+    }
+
+    /// What the slides of a texture say, whole and after each of these lengths, in ms at constant speed: movement by movement.
+    ///
+    /// # Errors
+    /// [`TrialError::Slide`].
+    pub fn observe(
+        &self,
+        plan: &Plan,
+        movements: &[Movement],
+        texture: u8,
+        slides: &[Recording],
+        lengths_ms: &[u16],
+    ) -> Result<Vec<Vec<ObservedTrial>>, TrialError> {
+        let of_movement = |movement: &Movement| {
+            let trials = slides.iter().filter(|s| s.movement == *movement);
+            let observed = (1..).zip(trials).map(|(trial, slide)| {
+                let at = Trial {
+                    world: self.seed,
+                    texture,
+                    slide: Some((*movement, trial)),
+                };
+                let first = lengths_ms.iter().map(|&ms| {
+                    let first = slide.first(ms);
+                    first.map(|first| at.measure(plan, &first)).transpose()
+                });
+                Ok(ObservedTrial {
+                    first: first.collect::<Result<_, _>>()?,
+                    whole: at.measure(plan, slide)?,
+                })
+            });
+            observed.collect()
+        };
+        movements.iter().map(of_movement).collect()
     }
 
     /// The table of these slides, each texture's in the order of time.
@@ -281,26 +304,16 @@ impl Collection {
         slides: &[Vec<Recording>],
     ) -> Result<Vec<Vec<Vec<Observation>>>, TrialError> {
         let plan = Plan::new();
-        slides
-            .iter()
-            .map(|slides| {
-                movements
-                    .iter()
-                    .map(|movement| {
-                        let trials = slides.iter().filter(|s| s.movement == *movement);
-                        let observed = (1..).zip(trials).map(|(trial, slide)| {
-                            let at = Trial {
-                                world: self.seed,
-                                texture: self.textures[slide.texture],
-                                slide: Some((*movement, trial)),
-                            };
-                            at.measure(&plan, slide)
-                        });
-                        observed.collect()
-                    })
-                    .collect::<Result<Vec<Vec<_>>, TrialError>>()
-            })
-            .collect()
+        let whole = |slides: Vec<Vec<ObservedTrial>>| -> Vec<Vec<Observation>> {
+            let cells = slides.into_iter();
+            let whole = |cell: Vec<ObservedTrial>| cell.into_iter().map(|trial| trial.whole);
+            cells.map(|cell| whole(cell).collect()).collect()
+        };
+        let measured = slides.iter().zip(&self.textures).map(|(slides, &texture)| {
+            self.observe(&plan, movements, texture, slides, &[])
+                .map(whole)
+        });
+        measured.collect()
     }
 }
 

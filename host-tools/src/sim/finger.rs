@@ -393,7 +393,12 @@ impl Finger {
 
     /// Puts on a new skin.
     pub fn replace_skin(&mut self) {
-        self.wear = 0.0;
+        self.put_on_skin(0.0);
+    }
+
+    /// Puts on a skin that is worn: 0 is new, at 1 its ridges are gone.
+    pub fn put_on_skin(&mut self, wear: f64) {
+        self.wear = wear.clamp(0.0, 1.0);
     }
 
     /// From now on the skin leaks: see `Fault::SkinLeaks`.

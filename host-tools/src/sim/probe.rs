@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use embassy_futures::block_on;
+use embassy_futures::{block_on, yield_now};
 use tactus_core::dsp::Plan;
 use tactus_core::probe::seams::{Events, StoredBytes};
 use tactus_core::probe::servo_rig::{LOOK_MS, RigCommand, Samples, Servo, ServoRig};
@@ -32,6 +32,14 @@ pub trait Host {
 
     /// It is `now` by the rig's clock, and this is its state: heard a thousand times a second.
     fn tick(&mut self, _now: Duration, _rig: &RigState) {}
+
+    /// The rig before each millisecond, for a host that looks at its world or changes it.
+    fn look(&mut self, _rig: &mut SimRig) {}
+
+    /// Whether time stands still: what waits for the rig waits on, until it is polled again and this says no.
+    fn pauses(&self) -> bool {
+        false
+    }
 
     /// Whether the rig is to be stopped in this millisecond.
     fn stops(&mut self) -> bool {
@@ -175,6 +183,7 @@ impl<'p, H: Host, R: Driven> SimServo<'p, H, R> {
 
     /// A millisecond passes.
     pub fn tick(&mut self) {
+        self.host.borrow_mut().look(&mut self.rig);
         if self.host.borrow_mut().stops() {
             self.rig.stop();
         }
@@ -201,6 +210,9 @@ impl<H: Host, R: Driven> Servo for SimServo<'_, H, R> {
     async fn wait(&mut self) {
         let before = self.ended;
         for _ in 0..LOOK_MS {
+            while self.host.borrow().pauses() {
+                yield_now().await;
+            }
             self.tick();
             if self.ended != before {
                 return;

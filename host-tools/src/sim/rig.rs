@@ -198,6 +198,11 @@ impl SimRig {
         Duration::from_nanos(self.now_ns)
     }
 
+    /// P_DC words of the last tick.
+    pub fn pdc(&self) -> &[u16] {
+        &self.pdc
+    }
+
     /// What the control last set the pins to.
     pub fn outputs(&self) -> &Outputs {
         &self.outputs

@@ -7,7 +7,7 @@ use object::{Object as _, ObjectSegment as _};
 use sha2::{Digest as _, Sha256};
 
 use crate::shell::root;
-use crate::toolchain;
+use crate::toolchain::{self, CHIP};
 
 /// The images by profile and features that each is built with: the rig for speed, the handheld for a small chip.
 const PROFILES: [(&str, &[&str], &[&str]); 8] = [
@@ -109,7 +109,7 @@ pub(crate) fn elves() -> Result<Vec<PathBuf>> {
 
 /// Builds these images of the firmware: the ELFs, by name.
 pub(crate) fn compile(images: &[&str]) -> Result<Vec<PathBuf>> {
-    let toolchain = toolchain::get()?;
+    let toolchain = toolchain::get(CHIP)?;
     eprintln!("Building with {}", toolchain.version());
     let mut elves = Vec::new();
     for (profile, features, all) in PROFILES {
@@ -122,7 +122,7 @@ pub(crate) fn compile(images: &[&str]) -> Result<Vec<PathBuf>> {
         } else {
             &[]
         };
-        let mut cargo = toolchain.cargo_build(&[&FLAGS, more].concat());
+        let mut cargo = toolchain.cargo_build(CHIP, &[&FLAGS, more].concat());
         cargo.args(["--package", "tactus-firmware", "--profile", profile]);
         cargo.args(features);
         cargo.args(wanted().flat_map(|image| ["--bin", image]));

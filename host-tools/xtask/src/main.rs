@@ -7,6 +7,7 @@ mod factory;
 mod firmware;
 mod flash;
 mod fuzz;
+mod page;
 mod python;
 mod reasons;
 mod sbom;
@@ -103,6 +104,12 @@ enum Cli {
         #[arg(long)]
         check: bool,
     },
+    /// Build the page with a simulated probe for a browser: target/page/index.html
+    ///
+    /// One file without any network: a double click opens it. Builds for WebAssembly with the active Rust toolchain if that has the
+    /// target wasm32-unknown-unknown (`rustup target add wasm32-unknown-unknown`), otherwise with Debian's Rust packages.
+    #[command(after_help = page::EXAMPLES)]
+    Page(page::Options),
     /// Run many explorations and power cuts on emulated boards and hold them against the bars
     ///
     /// In a simulated world and on recordings of a real finger, side by side on all cores; then the power is cut at every word
@@ -190,6 +197,7 @@ fn main() -> ExitCode {
         Cli::Size(options) => size::size(&options),
         Cli::Bundle { out } => bundle::bundle(&out),
         Cli::Factory { check } => factory::factory(check),
+        Cli::Page(options) => page::page(&options),
         Cli::Seeds(options) => seeds::seeds(&options),
         Cli::Mutants { options } => mutants(options),
         Cli::Fuzz(options) => fuzz::fuzz(&options),

@@ -1,11 +1,10 @@
 //! The Python package: built by pip as a user has it, and held against the command by pytest, in a virtual environment.
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::shell::{cargo, root, run, target};
+use crate::shell::{self, cargo, root, run, target};
 
 /// The package, from the top.
 const PACKAGE: &str = "host-tools/python";
@@ -96,19 +95,11 @@ fn program(name: &str) -> String {
     format!("{name}{}", std::env::consts::EXE_SUFFIX)
 }
 
-/// Says that the tests are skipped, where xtask lists it.
+/// Says that the tests are skipped, where xtask lists it; in CI that is an error.
 fn skip(why: &str) -> Result<()> {
     let is = |variable: &str, value: &str| std::env::var(variable).as_deref() == Ok(value);
     if is("CI", "true") || is("TACTUS_REQUIRE_DATA", "1") {
         bail!("the Python package is not tested: {why}");
     }
-    eprintln!("SKIPPED the Python package: {why}");
-    if let Some(log) = std::env::var_os(crate::shell::SKIP_LOG) {
-        let mut log = std::fs::OpenOptions::new()
-            .append(true)
-            .create(true)
-            .open(log)?;
-        writeln!(log, "the Python package: {why}")?;
-    }
-    Ok(())
+    shell::skip("the Python package", why)
 }

@@ -86,6 +86,19 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
+/// Says that something is not tested and why, where the account of the steps lists it.
+pub(crate) fn skip(what: &str, why: &str) -> Result<()> {
+    eprintln!("SKIPPED {what}: {why}");
+    if let Some(log) = std::env::var_os(SKIP_LOG) {
+        let mut log = std::fs::OpenOptions::new()
+            .append(true)
+            .create(true)
+            .open(log)?;
+        writeln!(log, "{what}: {why}")?;
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,4 +1,4 @@
-//! What can build for the chip on this machine.
+//! What can build for the chip, and for browsers, on this machine.
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -7,15 +7,37 @@ use anyhow::{Context as _, Result, bail};
 
 use crate::shell::{cargo, root, run, target};
 
-/// The chip's target: Cortex-M4 with its FPU.
-pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
+/// What is built for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Target {
+    /// Its name.
+    pub(crate) triple: &'static str,
+    /// What of the standard library is built with it, where a toolchain brings the source only.
+    library: &'static str,
+    /// The folder below `target`, of the active toolchain and of Debian's: neither builds the other's work anew.
+    folders: [&'static str; 2],
+}
 
-/// What builds the firmware.
+/// The chip: Cortex-M4 with its FPU.
+pub(crate) const CHIP: Target = Target {
+    triple: "thumbv7em-none-eabihf",
+    library: "core",
+    folders: ["chip", "debian"],
+};
+
+/// WebAssembly in a browser.
+pub(crate) const BROWSER: Target = Target {
+    triple: "wasm32-unknown-unknown",
+    library: "std,panic_abort",
+    folders: ["page-build", "page-debian"],
+};
+
+/// What builds for a [`Target`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Toolchain {
-    /// The one cargo runs with; it brings the chip's `core`.
+    /// The one cargo runs with; it brings the target's library.
     Active,
-    /// Debian's packages, which bring the source of `core`.
+    /// Debian's packages, which bring the library's source.
     Debian,
 }
 
@@ -47,10 +69,11 @@ fn choose(found: Found) -> Choice {
     }
 }
 
-/// A toolchain for the chip, installed if need be.
-pub(crate) fn get() -> Result<Toolchain> {
+/// A toolchain for a target, installed if need be.
+pub(crate) fn get(target: Target) -> Result<Toolchain> {
+    let help = help(target);
     let found = Found {
-        active_has_target: active_has_target(),
+        active_has_target: active_has(target),
         debian: debian_lacks().is_none(),
         may_install: Path::new("/usr/bin/apt-get").exists()
             && stdout("id", &["-u"]).as_deref() == Some("0"),
@@ -58,47 +81,59 @@ pub(crate) fn get() -> Result<Toolchain> {
     match choose(found) {
         Choice::Use(toolchain) => Ok(toolchain),
         Choice::InstallDebian => {
-            install_debian()?;
+            install_debian(target)?;
             match debian_lacks() {
                 None => Ok(Toolchain::Debian),
-                Some(what) => bail!("Debian's packages are installed, but {what}.\n{HELP}"),
+                Some(what) => bail!("Debian's packages are installed, but {what}.\n{help}"),
             }
         }
-        Choice::Neither => bail!("no Rust toolchain here builds for {TARGET}.\n{HELP}"),
+        Choice::Neither => bail!(
+            "no Rust toolchain here builds for {}.\n{help}",
+            target.triple
+        ),
     }
 }
 
-const HELP: &str = "\
+fn help(target: Target) -> String {
+    format!(
+        "\
 Install one of:
-  with rustup         rustup target add thumbv7em-none-eabihf
+  with rustup         rustup target add {}
   Debian 12, as root  apt-get update
                       apt-get install --no-install-recommends rustc-web cargo-web rust-web-src rust-web-llvm lld-22 llvm-22
   newer Debian        apt-get install --no-install-recommends rustc cargo rust-src lld   (Rust 1.95 or newer)
-and run the command again.";
+and run the command again.",
+        target.triple
+    )
+}
 
 impl Toolchain {
-    /// A `cargo build` for the chip, without profile and package.
+    /// A `cargo build` for a target, without profile and package.
     ///
-    /// The ELF is not to depend on who builds it and where, so RUSTFLAGS from outside do not count and folders are left out
-    /// of it. Warnings are denied in the workspace only: cargo caps the lints of dependencies. The toolchains have a target
-    /// folder each, so that neither builds the other's work anew.
-    pub(crate) fn cargo_build(self, flags: &[&str]) -> Command {
+    /// What is built is not to depend on who builds it and where, so RUSTFLAGS from outside do not count and folders are left out
+    /// of it. Warnings are denied in the workspace only: cargo caps the lints of dependencies.
+    pub(crate) fn cargo_build(self, to: Target, flags: &[&str]) -> Command {
         let mut cargo = match self {
             Self::Active => cargo(),
             Self::Debian => debian_cargo(),
         };
-        let folder = match self {
-            Self::Active => "chip",
-            Self::Debian => "debian",
-        };
         cargo
             .env("CARGO_ENCODED_RUSTFLAGS", rustflags(flags))
-            .args(["build", "--target", TARGET, "--target-dir"])
-            .arg(target().join(folder));
+            .args(["build", "--target", to.triple, "--target-dir"])
+            .arg(self.folder(to));
         if self == Self::Debian {
-            cargo.arg("-Zbuild-std=core");
+            cargo.arg(format!("-Zbuild-std={}", to.library));
         }
         cargo
+    }
+
+    /// Where it puts what it builds for a target.
+    pub(crate) fn folder(self, to: Target) -> PathBuf {
+        let [active, debian] = to.folders;
+        target().join(match self {
+            Self::Active => active,
+            Self::Debian => debian,
+        })
     }
 
     /// Name and version of the compiler.
@@ -112,7 +147,7 @@ impl Toolchain {
     }
 }
 
-/// What every build of the firmware gets, then these.
+/// What every such build gets, then these.
 fn rustflags(more: &[&str]) -> OsString {
     let mut flags = OsString::from("-Dwarnings");
     for flag in more {
@@ -158,7 +193,7 @@ fn debian_cargo() -> Command {
     cargo
 }
 
-/// What Debian's toolchain lacks to build for the chip, if anything.
+/// What Debian's toolchain lacks to build for another target, if anything.
 fn debian_lacks() -> Option<String> {
     if !Path::new(DEBIAN_CARGO).exists() {
         return Some(format!("there is no {DEBIAN_CARGO}"));
@@ -197,9 +232,10 @@ fn path_with_rust_lld() -> Option<OsString> {
     found.then(|| std::env::join_paths(folders).ok()).flatten()
 }
 
-fn install_debian() -> Result<()> {
-    eprintln!("No Rust toolchain here builds for {TARGET}: installing Debian's packages.");
-    apt_get(&["update"])?;
+fn install_debian(target: Target) -> Result<()> {
+    let triple = target.triple;
+    eprintln!("No Rust toolchain here builds for {triple}: installing Debian's packages.");
+    apt_get(target, &["update"])?;
     // Debian 12 has a new Rust beside its own old one, for browsers; newer releases have only their own
     let web = stdout("apt-cache", &["policy", "rustc-web"])
         .is_some_and(|policy| policy.contains("Candidate: 1."));
@@ -216,20 +252,23 @@ fn install_debian() -> Result<()> {
         &["rustc", "cargo", "rust-src", "lld"]
     };
     let install = ["install", "--yes", "--no-install-recommends"];
-    apt_get(&[&install, packages].concat())
+    apt_get(target, &[&install, packages].concat())
 }
 
-fn apt_get(arguments: &[&str]) -> Result<()> {
+fn apt_get(target: Target, arguments: &[&str]) -> Result<()> {
     // somebody else's apt-get may hold the lock for a while
     let mut apt_get = Command::new("apt-get");
     apt_get.args(["--option", "DPkg::Lock::Timeout=300"]);
     apt_get.env("DEBIAN_FRONTEND", "noninteractive");
-    run(apt_get.args(arguments)).context(HELP)
+    run(apt_get.args(arguments)).with_context(|| help(target))
 }
 
-fn active_has_target() -> bool {
-    stdout("rustc", &["--print", "target-libdir", "--target", TARGET])
-        .is_some_and(|folder| Path::new(&folder).is_dir())
+fn active_has(target: Target) -> bool {
+    stdout(
+        "rustc",
+        &["--print", "target-libdir", "--target", target.triple],
+    )
+    .is_some_and(|folder| Path::new(&folder).is_dir())
 }
 
 fn stdout(program: &str, arguments: &[&str]) -> Option<String> {

@@ -55,8 +55,9 @@ pub(super) async fn in_air<R: RigHandle>(rig: &mut R) -> Result<RigCalibration, 
         *counts = rig.state().air_counts.unwrap_or(f32::NAN);
     }
     let [first, counts] = measured;
-    // nor is nothing at all
-    if !((counts - first).abs() <= DRIFT_COUNTS) {
+    // not-a-number is not steady
+    let is_steady = libm::fabsf(counts - first) <= DRIFT_COUNTS;
+    if !is_steady {
         return Err(Failure::Rig(RigError::Fault(Fault::Unsteady)));
     }
     let calibration = rig.state().calibration.with_air(counts);

@@ -99,8 +99,16 @@ impl World {
     /// # Errors
     /// If the finger touches the sample.
     pub fn replace_skin(&mut self) -> Result<(), NotLifted> {
+        self.put_on_skin(0.0)
+    }
+
+    /// Gives the finger a skin that is worn: 0 is new, at 1 its ridges are gone.
+    ///
+    /// # Errors
+    /// If the finger touches the sample.
+    pub fn put_on_skin(&mut self, wear: f64) -> Result<(), NotLifted> {
         self.must_be_over(&self.surface)?;
-        self.finger.replace_skin();
+        self.finger.put_on_skin(wear);
         Ok(())
     }
 }

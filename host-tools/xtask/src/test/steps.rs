@@ -5,7 +5,7 @@ use anyhow::Result;
 
 use super::failures::run_tests;
 use crate::shell::{cargo, run};
-use crate::{bench, emulate, firmware, fuzz, python, size};
+use crate::{bench, emulate, firmware, fuzz, page, python, size};
 
 /// How long each parser is attacked ...
 const FUZZ_S: u64 = 10;
@@ -35,8 +35,9 @@ pub(super) const QUICK: [&str; 5] = [
     "documentation",
 ];
 /// ... and what it leaves out.
-pub(super) const SLOW: [&str; 8] = [
+pub(super) const SLOW: [&str; 9] = [
     "python",
+    "page",
     "fuzz",
     "firmware",
     "lints of the emulator",
@@ -47,7 +48,7 @@ pub(super) const SLOW: [&str; 8] = [
 ];
 
 /// All steps, in the order in which they begin if nothing else keeps them: what others wait for, and what takes long, first.
-pub(super) const STEPS: [Step; 14] = [
+pub(super) const STEPS: [Step; 15] = [
     step("formatting", "", &[], || {
         cargo_step(&["fmt", "--all", "--check"])
     }),
@@ -80,6 +81,11 @@ pub(super) const STEPS: [Step; 14] = [
     step("python", "wheel", &["tests"], || {
         println!("== the Python package");
         python::check()
+    }),
+    // its reference is a test that was built there
+    step("page", "page", &["tests"], || {
+        println!("== the page");
+        page::check()
     }),
     step("lints of the emulator", "emulator", &[], || {
         emulate::lints().iter_mut().try_for_each(announce_and_run)

@@ -1,0 +1,497 @@
+"use strict";
+// The page: what is pressed, what happens, and how time goes on.
+(() => {
+  const at = id => document.getElementById(id);
+  const sentences = {
+    Parked: "The rig waits.", Homing: "It looks for its limit switches.", Ready: "The finger is lifted.",
+    Positioning: "The stage goes to where the slide begins.", Pressing: "The finger comes down.",
+    Background: "It touches, and listens to the still finger first.", Sliding: "It slides.",
+    Lifting: "The finger is lifted.", Unloaded: "The stage moves without load.", Faulted: "Something went wrong: the finger is lifted.",
+  };
+  let set = Settings.read();
+  let known = null;
+  let all = [];
+  let playing = false, busy = false, asked = null, slides = 0, last = null, verdict = null;
+  let frames = [], began = performance.now();
+  const ink = document.createElement("span");
+  ink.hidden = true;
+  document.body.append(ink);
+  const canvases = { pac: at("pac"), spectrum: at("spectrum"), pdc: at("pdc"), ink };
+
+  // Numbers that are drawn from the seed: the same link shows the same.
+  function draw() {
+    set.seed = (Math.imul(set.seed, 1664525) + 1013904223) >>> 0 || 1;
+    return set.seed / 4294967296;
+  }
+
+  const nameOf = number => all[number - 1] ?? `texture ${number}`;
+  const isKnown = number => known.numbers.includes(number);
+  function say(doing) { if (at("doing").textContent !== doing) at("doing").textContent = doing; }
+  function aloud(text) { at("aloud").textContent = text; }
+  function problem(why) {
+    at("problem").hidden = !why;
+    at("problem").textContent = why ?? "";
+  }
+  function headline(parts, kind = "") {
+    at("verdict").className = `verdict ${kind}`;
+    at("verdict").replaceChildren(...parts.map(part => {
+      if (typeof part === "string") return part;
+      const b = document.createElement("b");
+      b.textContent = part.name;
+      return b;
+    }));
+    aloud(at("verdict").textContent);
+  }
+
+  function enable(on) {
+    for (const id of ["play", "step", "surprise", "move", "apply", "learn", "confirm", "again"]) at(id).disabled = !on;
+    at("unknown").disabled = !on || known === null || known.textures.length >= 117;
+    at("play").textContent = playing && busy ? "Pause" : busy ? "Go on" : "Start";
+  }
+
+  // ---- the world
+
+  async function makeWorld() {
+    busy = false; playing = false; known = null; verdict = null;
+    enable(false);
+    forget();
+    const drawn = { world: set.world, textures: set.n, paper: set.paper, drift: set.d, trial: set.seed % 1000 };
+    let reply = Probe.ask({ do: "world", ...drawn });
+    at("work").hidden = false;
+    while (reply.is === "preparing") {
+      at("progress").max = reply.of;
+      at("progress").value = reply.done;
+      if (reply.done < reply.of) {
+        say("Getting ready");
+        headline([`It slides over the textures of world ${set.world} to learn them: ${reply.done} of ${reply.of}.`]);
+        // let the browser draw and hear
+        await new Promise(done => setTimeout(done));
+      }
+      reply = Probe.ask({ do: "prepare" });
+    }
+    at("work").hidden = true;
+    delete reply.is;
+    knows(reply);
+    if (set.wear > 0) Probe.ask({ do: "skin", wear: set.wear });
+    const frame = Probe.ask({ do: "step", ms: 0 });
+    Rig.show(frame);
+    say("Ready");
+    headline([`It knows ${known.textures.length} textures. Have it touch one.`]);
+    enable(true);
+  }
+
+  function knows(now) {
+    known = now;
+    Places.know(known);
+    choices();
+    Mind.posterior(at("posterior"), at("others"), known.textures, known.textures.map(() => 1 / known.textures.length));
+    at("figures").textContent = `The table: ${known.textures.length} textures, ${(known.bytes / 1024).toFixed(0)} KB, checksum ${known.crc.toString(16).padStart(8, "0")}.`;
+  }
+
+  function choices() {
+    const list = at("texture");
+    const option = number => new Option(nameOf(number), number);
+    const group = (label, numbers) => {
+      const element = document.createElement("optgroup");
+      element.label = label;
+      element.append(...numbers.map(option));
+      return element;
+    };
+    const numbers = all.map((_, n) => n + 1).sort((a, b) => nameOf(a).localeCompare(nameOf(b), "en"));
+    const unknown = numbers.filter(number => !isKnown(number));
+    list.replaceChildren(group("It knows", numbers.filter(isKnown)));
+    if (unknown.length) list.append(group("It does not know", unknown));
+    if (set.x > 0) list.value = set.x;
+  }
+
+  function forget() {
+    slides = 0;
+    Places.clear();
+    Traces.clear();
+    at("slides").replaceChildren(cells(["None yet."], 6));
+    at("benefit").replaceChildren();
+    at("novel").classList.remove("known");
+    at("teach").hidden = true;
+    at("taught").hidden = true;
+    at("truth").textContent = "";
+    problem();
+  }
+
+  // ---- requests
+
+  function identify(number) {
+    if (busy || !known) return;
+    forget();
+    set.x = number;
+    at("texture").value = number;
+    begin(number, { do: "identify", texture: number, seed: set.seed, threshold: set.t, false_alarm: set.fa, max_slides: 10 });
+    if (!busy) return;
+    verdict = null;
+    Mind.posterior(at("posterior"), at("others"), known.textures, known.textures.map(() => 1 / known.textures.length));
+    Places.likely([]);
+    headline(["What is this?"]);
+    Settings.write(set);
+  }
+
+  function begin(number, request) {
+    try {
+      Probe.ask(request);
+    } catch (why) {
+      problem(sentence(why));
+      return;
+    }
+    asked = { number, by: request.do };
+    busy = true;
+    playing = true;
+    last = null;
+    at("truth").textContent = `Under the finger: ${nameOf(number)}${isKnown(number) ? "" : ", which it has never touched"}. The probe is not told.`;
+    enable(true);
+    lock();
+  }
+
+  const sentence = why => { const text = why.message; return `${text[0].toUpperCase()}${text.slice(1)}${text.endsWith(".") ? "" : "."}`; };
+
+  // While it is at work, what would disturb it waits.
+  function lock() {
+    for (const id of ["surprise", "unknown", "move", "apply"]) at(id).disabled = busy || !known;
+    if (!busy && known && known.textures.length >= 117) at("unknown").disabled = true;
+  }
+
+  function surprise() {
+    if (busy || !known) return;
+    const numbers = known.numbers.filter(number => number !== null);
+    identify(numbers[Math.floor(draw() * numbers.length)]);
+  }
+
+  function unknown() {
+    if (busy || !known) return;
+    const numbers = all.map((_, n) => n + 1).filter(number => !isKnown(number));
+    if (numbers.length) identify(numbers[Math.floor(draw() * numbers.length)]);
+  }
+
+  // ---- what happens
+
+  function cells(texts, span) {
+    const row = document.createElement("tr");
+    for (const text of texts) {
+      const cell = document.createElement("td");
+      cell.textContent = text;
+      if (span) cell.colSpan = span;
+      row.append(cell);
+    }
+    return row;
+  }
+
+  const fixed = (value, digits, unit = "") => value === null ? "none" : `${value.toFixed(digits)}${unit}`;
+
+  function most(posterior) {
+    let best = 0;
+    posterior.forEach((p, n) => { if (p > posterior[best]) best = n; });
+    return best;
+  }
+
+  function stands(standing) {
+    if (!standing) return;
+    Mind.posterior(at("posterior"), at("others"), known.textures, standing.posterior);
+    Places.likely(standing.posterior);
+    const novel = standing.log_odds !== null;
+    at("novel").classList.toggle("known", novel);
+    if (novel) {
+      // the limit is at 60 % of the scale; far away it is compressed
+      const over = Math.tanh(standing.log_odds / 12);
+      at("needle").style.left = `${over < 0 ? 60 + 60 * over : 60 + 40 * over}%`;
+      const meter = at("novel-meter");
+      meter.setAttribute("aria-valuenow", over.toFixed(2));
+      meter.setAttribute("aria-valuetext", over > 0 ? "less like any texture it knows than it may be: new" : "like a texture it knows");
+    }
+  }
+
+  function happened(one) {
+    switch (one.what) {
+      case "chosen":
+        if (slides === 0 && one.slide === 1) Places.clear();
+        Mind.benefit(at("benefit"), known.movements, one.expected, one);
+        Places.turn(one.movement);
+        at("why").textContent = `Chosen for slide ${one.slide}: ${Mind.movementName(known.movements[one.movement])}${one.property ? `, for ${one.property}` : ""}. It should take away the most doubt; each quarter of a bar is a factor of ten.`;
+        break;
+      case "look":
+        stands(one.standing);
+        Places.land(asked?.by === "identify" ? lookedAt : null, one.place, true);
+        if (one.standing) say(`After ${one.ms / 1000} s of sliding: most like ${known.textures[most(one.standing.posterior)]}.`);
+        break;
+      case "slide": {
+        stands(one.standing);
+        Places.land(one.movement, one.place, false);
+        if (slides === 0) at("slides").replaceChildren();
+        slides += 1;
+        const best = most(one.standing.posterior), m = one.measured;
+        const early = one.early_ms ? `, ended after ${one.early_ms / 1000} s` : "";
+        at("slides").append(cells([String(one.slide), Mind.movementName([m.force_n, m.speed_mm_s]) + early, fixed(m.traction_n, 2, " N"),
+          fixed(m.roughness_ln, 2), fixed(m.fineness_ln, 2), `${known.textures[best]}, ${Mind.percent(one.standing.posterior[best])}`]));
+        break;
+      }
+      case "moved": {
+        const m = one.measured;
+        Places.land(one.movement, one.place, false);
+        at("moved").textContent = `Measured: traction ${fixed(m.traction_n, 2, " N")}, roughness ${fixed(m.roughness_ln, 2)}, fineness ${fixed(m.fineness_ln, 2)}. ${one.movement === null ? "The probe has learned nothing at this movement, so the map has no place for it." : "The ring in the map is this slide."}`;
+        headline(["Measured by hand."]);
+        break;
+      }
+      case "rejected":
+        say(`The slide does not count: ${one.why}.`);
+        break;
+      case "refused":
+        problem(`${one.why}.`.replace("..", "."));
+        break;
+      case "verdict":
+        verdict = one;
+        answer(one);
+        break;
+      case "learned":
+        knows(one.known);
+        at("teach").hidden = true;
+        at("taught").hidden = false;
+        at("taught-say").textContent = `Learned: ${one.name}, from ${one.slides} ${one.slides === 1 ? "slide" : "slides"}. It knows ${one.known.textures.length} textures now. Put it under the finger again?`;
+        aloud(at("taught-say").textContent);
+        break;
+      case "done":
+        busy = false;
+        playing = false;
+        say(asked?.by === "identify" && verdict ? "Its answer" : "Done");
+        enable(true);
+        lock();
+        break;
+    }
+    if (one.what === "chosen") lookedAt = one.movement;
+  }
+  let lookedAt = null;
+
+  const sure = p => p >= 0.9995 ? "more than\u00a099.9\u00a0%" : Mind.percent(p);
+
+  function answer(one) {
+    const of = `after ${one.slides} ${one.slides === 1 ? "slide" : "slides"}`;
+    const truth = nameOf(asked.number);
+    const name = { name: one.texture };
+    if (one.told === "sure") headline(["It is ", name, `, ${sure(one.probability)} sure ${of}.`], "sure");
+    if (one.told === "changed") headline(["It feels like ", name, ", but not as I learned it."], "changed");
+    if (one.told === "new") headline([`This is none of those I know, ${of}.`], "new");
+    if (one.told === "undecided") headline(["Not sure; most likely ", name, `, ${Mind.percent(one.probability)} ${of}.`]);
+    const taught = known.numbers[one.index] === null ? one.texture : null;
+    const right = one.told === "new" ? !isKnown(asked.number) && !lessons.has(asked.number) : one.texture === truth || taught !== null && lessons.get(asked.number) === taught;
+    const judged = one.told === "undecided" ? "" : right ? " Right." : one.told === "changed" && !right ? " It is something else." : " That is wrong.";
+    at("truth").textContent = `Under the finger: ${truth}.${judged}`;
+    if (one.wants_label) {
+      at("teach").hidden = false;
+      at("name").value = lessons.get(asked.number) ?? truth.slice(0, 31);
+      const changed = one.told === "changed";
+      at("teach-say").textContent = changed ? `Is it ${one.texture}?` : one.told === "new" ? "What is it called? It learns it from these slides." : "It wants to know: what is it?";
+      at("teach-yes").hidden = !changed;
+      at("teach-label").textContent = changed ? "No, its name is" : "Its name";
+    }
+  }
+
+  // Names that were taught here, by number of the texture.
+  const lessons = new Map();
+  function label(name) {
+    problem();
+    lessons.set(asked.number, name);
+    try {
+      Probe.ask({ do: "label", name });
+      take(Probe.ask({ do: "step", ms: 0 }));
+    } catch (why) {
+      problem(sentence(why));
+    }
+  }
+
+  // ---- time
+
+  const AUTO = { Sliding: 1.5, Background: 2, Pressing: 10, Positioning: 8, Lifting: 10 };
+  function speedNow(phase) {
+    if (set.speed === "auto") return AUTO[phase] ?? 12;
+    return set.speed === "max" ? 60 : Number(set.speed);
+  }
+
+  function take(frame) {
+    last = frame;
+    Traces.take(frame);
+    for (const one of frame.happened) happened(one);
+  }
+
+  function show(frame) {
+    Rig.show(frame);
+    at("g-force").textContent = `${Math.max(0, frame.force_n).toFixed(2)} N`;
+    at("g-speed").textContent = `${Math.abs(frame.speed_mm_s).toFixed(0)} mm/s`;
+    at("g-shear").textContent = `${Math.abs(frame.shear_n).toFixed(2)} N`;
+    at("g-time").textContent = `${(frame.at_ms / 1000).toFixed(1)} s`;
+    if (busy && frame.phase !== shownPhase) {
+      shownPhase = frame.phase;
+      say(sentences[frame.phase] ?? "");
+      Rig.say(sentences[frame.phase] ?? "");
+    }
+  }
+  let shownPhase = null;
+
+  let before = 0, owed = 0;
+  function tick(now) {
+    const passed = Math.min(100, now - before);
+    before = now;
+    if (playing && busy) {
+      frames.push(now);
+      if (frames.length > 240) frames.shift();
+      owed += passed * speedNow(last?.phase);
+      let ms = Math.min(500, Math.floor(owed));
+      owed -= ms;
+      // a slide does not begin in the middle of a quick step
+      while (ms > 0 && busy) {
+        const part = Math.min(ms, 40), phase = last?.phase;
+        take(Probe.ask({ do: "step", ms: part }));
+        ms -= part;
+        if (last.phase !== phase && speedNow(last.phase) < speedNow(phase)) { owed = 0; break; }
+      }
+      if (last) show(last);
+    }
+    Traces.draw(canvases);
+    requestAnimationFrame(tick);
+  }
+
+  function onwards() {
+    // to the end of the next slide, at once
+    if (!busy) return surprise();
+    playing = false;
+    for (let n = 0; n < 4000 && busy; n++) {
+      take(Probe.ask({ do: "step", ms: 50 }));
+      if (last.happened.some(one => one.what === "slide" || one.what === "verdict")) break;
+    }
+    if (last) show(last);
+    enable(true);
+    lock();
+  }
+
+  // ---- controls
+
+  function outputs() {
+    at("o-count").textContent = at("count").value;
+    at("o-threshold").textContent = Settings.share(Settings.THRESHOLDS[at("threshold").value]);
+    at("o-alarm").textContent = Settings.share(Settings.ALARMS[at("alarm").value]);
+    at("o-drift").textContent = Settings.driftName(Number(at("drift").value));
+    at("o-force").textContent = `${Number(at("force").value).toFixed(2)} N`;
+    at("o-mms").textContent = `${at("mms").value} mm/s`;
+    const wear = Number(at("wear").value);
+    at("o-wear").textContent = wear === 0 ? "new" : wear === 1 ? "no ridges left" : `${Math.round(100 * wear)} % gone`;
+  }
+
+  function controls() {
+    at("count").value = set.n;
+    at("method").value = set.paper ? "paper" : "fused";
+    at("threshold").value = Settings.THRESHOLDS.indexOf(set.t);
+    at("alarm").value = Settings.ALARMS.indexOf(set.fa);
+    at("drift").value = set.d;
+    at("world").value = set.world;
+    at("wear").value = set.wear;
+    at("speed").value = set.speed;
+    outputs();
+  }
+
+  async function apply() {
+    if (busy) return;
+    const world = Math.round(Number(at("world").value));
+    if (!(world >= 1 && world <= 9999)) return problem("The world is a number from 1 to 9999.");
+    set = { ...set, n: Number(at("count").value), paper: at("method").value === "paper", d: Number(at("drift").value), world };
+    lessons.clear();
+    Settings.write(set);
+    await guarded(makeWorld);
+  }
+
+  async function guarded(work) {
+    try {
+      await work();
+    } catch (why) {
+      at("work").hidden = true;
+      headline(["This did not work."]);
+      problem(sentence(why));
+      for (const id of ["apply"]) at(id).disabled = false;
+    }
+  }
+
+  at("play").addEventListener("click", () => {
+    if (!busy) return at("texture").value ? identify(Number(at("texture").value)) : surprise();
+    playing = !playing;
+    enable(true);
+    lock();
+  });
+  at("step").addEventListener("click", onwards);
+  at("surprise").addEventListener("click", surprise);
+  at("unknown").addEventListener("click", unknown);
+  at("speed").addEventListener("change", () => { set.speed = at("speed").value; owed = 0; Settings.write(set); });
+  at("texture").addEventListener("change", () => { set.x = Number(at("texture").value); Settings.write(set); });
+  at("move").addEventListener("click", () => {
+    if (busy || !known) return;
+    problem();
+    const number = Number(at("texture").value) || known.numbers[0];
+    draw();
+    begin(number, { do: "move", texture: number, seed: set.seed, force_n: Number(at("force").value), speed_mm_s: Number(at("mms").value) });
+    if (busy) headline(["A movement by hand."]);
+  });
+  at("wear").addEventListener("change", () => {
+    set.wear = Number(at("wear").value);
+    Settings.write(set);
+    if (known) Probe.ask({ do: "skin", wear: set.wear });
+  });
+  for (const id of ["threshold", "alarm"]) {
+    at(id).addEventListener("change", () => {
+      set.t = Settings.THRESHOLDS[at("threshold").value];
+      set.fa = Settings.ALARMS[at("alarm").value];
+      Settings.write(set);
+    });
+  }
+  for (const id of ["count", "threshold", "alarm", "drift", "force", "mms", "wear"]) at(id).addEventListener("input", outputs);
+  at("apply").addEventListener("click", apply);
+  at("teach").addEventListener("submit", event => {
+    event.preventDefault();
+    const name = at("name").value.trim();
+    if (!name) return problem("Give it a name first.");
+    label(name);
+  });
+  at("confirm").addEventListener("click", () => verdict && label(verdict.texture));
+  at("again").addEventListener("click", () => { draw(); identify(asked.number); });
+  at("link").addEventListener("click", async () => {
+    Settings.write(set);
+    try {
+      await navigator.clipboard.writeText(location.href);
+      at("linked").textContent = "Copied.";
+    } catch {
+      at("linked").textContent = "The address of this page is the link: copy it from there.";
+    }
+  });
+  addEventListener("resize", Traces.again);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", Traces.again);
+
+  // ---- the beginning
+
+  async function start() {
+    controls();
+    Rig.build(at("rig"));
+    Places.build(at("map"));
+    // the first picture before the work
+    await new Promise(done => requestAnimationFrame(() => setTimeout(done)));
+    if (typeof WebAssembly !== "object") throw new Error("this browser has no WebAssembly: take a newer one");
+    await Probe.load();
+    all = Probe.ask({ do: "textures" }).names;
+    await makeWorld();
+    window.tactus.ready = performance.now() - began;
+    before = performance.now();
+    requestAnimationFrame(tick);
+    // someone who wants no motion begins it
+    if (!matchMedia("(prefers-reduced-motion: reduce)").matches) {
+      if (set.x > 0) identify(set.x); else surprise();
+    }
+  }
+
+  // for tests: what is under way, and how fast
+  window.tactus = {
+    ready: null,
+    now: () => ({ busy, playing, slides, verdict, last, set, known, memory: Probe.bytes() }),
+    framesPerSecond: () => frames.length < 2 ? 0 : 1000 * (frames.length - 1) / (frames.at(-1) - frames[0]),
+  };
+  guarded(start);
+})();

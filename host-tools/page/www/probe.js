@@ -1,0 +1,30 @@
+"use strict";
+// The probe: the core and the simulated rig as WebAssembly, asked in JSON.
+const Probe = (() => {
+  let exports;
+  const encoder = new TextEncoder();
+  const decoder = new TextDecoder();
+
+  // The module stands in the page itself, so that the page works from a file, too.
+  async function load() {
+    const text = document.getElementById("wasm").textContent;
+    const binary = atob(text.trim());
+    const bytes = new Uint8Array(binary.length);
+    for (let n = 0; n < binary.length; n++) bytes[n] = binary.charCodeAt(n);
+    exports = (await WebAssembly.instantiate(bytes, {})).instance.exports;
+  }
+
+  // Asks for something, and gets what the core says. An error of the core is an Error with its sentence.
+  function ask(request) {
+    const bytes = encoder.encode(JSON.stringify(request));
+    const at = exports.request(bytes.length);
+    new Uint8Array(exports.memory.buffer, at, bytes.length).set(bytes);
+    const length = exports.ask();
+    const reply = JSON.parse(decoder.decode(new Uint8Array(exports.memory.buffer, exports.reply(), length)));
+    if (reply.is === "error") throw new Error(reply.why);
+    return reply;
+  }
+
+  const bytes = () => exports.memory.buffer.byteLength;
+  return { load, ask, bytes };
+})();

@@ -1,0 +1,18 @@
+//! A simulated probe that somebody watches: it goes on step by step, and says at each what a display shows.
+//!
+//! The probe is the core's own, as on the chip: [`Session`] has it asked, lets time pass for it, and collects what it says. Besides,
+//! the same core is asked what the probe does not say: what is probable while a slide goes on, and where a slide lies among the
+//! textures. Requests and replies are JSON, so that a page needs one function.
+
+mod message;
+mod scene;
+mod session;
+mod slides;
+mod standing;
+
+pub use message::{Frame, Happening, Reply, Request, Settings};
+pub use session::Session;
+pub use slides::{LENGTHS_MS, TRIALS, Trials, WORLD};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,82 @@
+//! What a watched probe has learned from: trials of a simulated world, made here or before.
+
+use serde::{Deserialize, Serialize};
+use tactus_core::dsp::Plan;
+use tactus_core::explorer::Method;
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::sensor::{FingerCode, FingerName};
+use tactus_core::table::{Drift, EncodeError};
+
+use crate::eval::learn::{Expected, ObservedTrial, TableError, learn_lengths, name_finger};
+use crate::sim::collection::{Collection, TrialError, record_texture, texture_name};
+
+/// The world whose trials come with the program: that of the firmware's table.
+pub const WORLD: u64 = 1;
+/// Trials of each texture and movement.
+pub const TRIALS: u32 = 5;
+/// Lengths at which a slide may end, ms at constant speed.
+pub const LENGTHS_MS: [u16; 3] = [500, 1000, 2000];
+
+/// The trials of one texture.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Trials {
+    /// Its number in Table 1.
+    pub texture: u8,
+    /// Per movement of [`Collection::MOVEMENTS`].
+    pub movements: Vec<Vec<ObservedTrial>>,
+}
+
+impl Trials {
+    /// Has the rig of a world make them.
+    ///
+    /// # Errors
+    /// The first fault of the rig, or slide without properties.
+    pub fn make(world: u64, texture: u8, calibration: RigCalibration) -> Result<Self, TrialError> {
+        let collection = Collection {
+            seed: world,
+            textures: vec![texture],
+            trials: TRIALS,
+        };
+        let setup = collection.setup(texture, 0);
+        let movements = &Collection::MOVEMENTS;
+        let slides = record_texture(setup, calibration, movements, TRIALS)?;
+        let plan = Plan::new();
+        Ok(Self {
+            texture,
+            movements: collection.observe(&plan, movements, texture, &slides, &LENGTHS_MS)?,
+        })
+    }
+
+    /// All textures of [`WORLD`], as they were made before.
+    ///
+    /// # Errors
+    /// The file that comes with the program is not of this version; a test looks.
+    pub fn of_world() -> Result<Vec<Self>, postcard::Error> {
+        postcard::from_bytes(include_bytes!("world-1.trials"))
+    }
+}
+
+/// The table that these trials make, for the fused method or the paper's.
+///
+/// # Errors
+/// See [`TableError`].
+pub(super) fn table(trials: &[Trials], paper: bool, drift: f32) -> Result<Vec<u8>, TableError> {
+    let usual = Drift::default();
+    let expected = Expected {
+        drift: Some(Drift {
+            bands: drift * usual.bands,
+            traction: drift * usual.traction,
+        }),
+        ..Expected::default()
+    };
+    let method = if paper { Method::Paper } else { Method::Fused };
+    let names: Vec<String> = trials
+        .iter()
+        .map(|trials| texture_name(trials.texture).to_owned())
+        .collect();
+    let slides: Vec<_> = trials.iter().map(|t| t.movements.clone()).collect();
+    let movements = &Collection::MOVEMENTS;
+    let table = learn_lengths(&expected, method, &names, movements, &LENGTHS_MS, &slides)?;
+    let named = name_finger(&table, FingerCode::of(FingerName::Biotac), 0);
+    named.map_err(|why: EncodeError| why.into())
+}
