@@ -123,7 +123,7 @@ impl ArmProgram {
     }
 
     fn later(&mut self) -> u64 {
-        self.now_ms + self.noise.between(0.5, 1.5).mul_add(ON_ITS_WAY_MS, 0.5) as u64
+        self.now_ms + (self.noise.between(0.5, 1.5) * ON_ITS_WAY_MS + 0.5) as u64
     }
 
     /// The probe asks for this.

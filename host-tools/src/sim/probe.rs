@@ -33,7 +33,7 @@ pub trait Host {
     /// It is `now` by the rig's clock, and this is its state: heard a thousand times a second.
     fn tick(&mut self, _now: Duration, _rig: &RigState) {}
 
-    /// The rig before each millisecond, for a host that looks at its world or changes it.
+    /// Our rig before each millisecond, for a host that looks at its world or changes it.
     fn look(&mut self, _rig: &mut SimRig) {}
 
     /// Whether time stands still: what waits for the rig waits on, until it is polled again and this says no.
@@ -90,6 +90,9 @@ pub trait Driven {
     fn gravity(&self) -> Option<f32> {
         None
     }
+
+    /// Lets the host look at it before each millisecond, if it is what [`Host::look`] is for.
+    fn show(&mut self, _host: &mut impl Host) {}
 }
 
 impl Driven for SimRig {
@@ -125,6 +128,10 @@ impl Driven for SimRig {
 
     fn gravity(&self) -> Option<f32> {
         Self::gravity(self)
+    }
+
+    fn show(&mut self, host: &mut impl Host) {
+        host.look(self);
     }
 }
 
@@ -183,7 +190,7 @@ impl<'p, H: Host, R: Driven> SimServo<'p, H, R> {
 
     /// A millisecond passes.
     pub fn tick(&mut self) {
-        self.host.borrow_mut().look(&mut self.rig);
+        self.rig.show(&mut *self.host.borrow_mut());
         if self.host.borrow_mut().stops() {
             self.rig.stop();
         }

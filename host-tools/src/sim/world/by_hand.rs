@@ -35,7 +35,7 @@ impl World {
 
     /// Has a hand hold the finger from now on, in place of lever and stage, which move without it.
     pub fn hold(&mut self, hand: Hand) {
-        self.holder = Some(Holder::Hand(hand));
+        self.holder = Some(Holder::Hand(Box::new(hand)));
     }
 
     /// The finger is on the lever again, wherever that is.
@@ -54,7 +54,7 @@ impl World {
 
     /// Has an arm hold the finger from now on, in place of lever and stage, which move without it.
     pub fn mount_on(&mut self, arm: Arm) {
-        self.holder = Some(Holder::Arm(arm));
+        self.holder = Some(Holder::Arm(Box::new(arm)));
     }
 
     /// The arm that holds the finger.

@@ -5,8 +5,8 @@ use crate::sim::finger::Held;
 use crate::sim::person::Hand;
 
 pub(super) enum Holder {
-    Hand(Hand),
-    Arm(Arm),
+    Hand(Box<Hand>),
+    Arm(Box<Arm>),
 }
 
 impl Holder {
