@@ -83,7 +83,6 @@ fn an_exploration_is_told_step_by_step() {
         }
     }
     assert!(frames > 300, "{frames}");
-    assert_eq!(phases[0], "Positioning");
     for phase in ["Pressing", "Background", "Sliding", "Lifting"] {
         assert!(phases.contains(&json!(phase)), "{phases:?}");
     }
@@ -139,24 +138,26 @@ fn a_texture_that_is_new_is_taught_and_found_again() {
 
 #[test]
 fn a_skin_that_wears_makes_the_known_changed_and_in_the_end_new() {
-    let mut told = Vec::new();
-    for wear in [0.0, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0] {
-        let (mut session, known) = probe(&world(20, false, 1.0));
-        ask(&mut session, &json!({"do": "skin", "wear": wear}));
-        for at in [0, 5, 10, 15] {
-            let texture = known["numbers"][at].as_u64().unwrap() as u8;
+    let (mut session, known) = probe(&world(20, false, 1.0));
+    let mut changed = 0;
+    for at in [0, 3, 6, 9, 12, 15] {
+        let texture = known["numbers"][at].as_u64().unwrap() as u8;
+        let mut told = Vec::new();
+        for wear in 0..=20 {
+            ask(
+                &mut session,
+                &json!({"do": "skin", "wear": f64::from(wear) / 20.0}),
+            );
             let verdict = explore(&mut session, texture, 7);
-            told.push((wear, verdict["told"].as_str().unwrap().to_owned()));
+            told.push(verdict["told"].as_str().unwrap().to_owned());
         }
+        let name = &known["textures"][at];
+        assert_eq!(told[0], "sure", "{name} with a new skin");
+        assert_eq!(told[20], "new", "{name} without ridges: {told:?}");
+        changed += u32::from(told.iter().any(|told| told == "changed"));
     }
-    println!("{told:?}");
-    let count = |least: f64, what: &str| {
-        let those = told.iter().filter(|(wear, _)| *wear >= least);
-        those.filter(|(_, told)| told == what).count()
-    };
-    assert!(told[..4].iter().all(|(_, told)| told == "sure"), "{told:?}");
-    assert!(count(0.05, "changed") >= 2, "{told:?}");
-    assert!(count(0.5, "sure") <= 2, "{told:?}");
+    // the band between the two limits is narrow
+    assert!(changed >= 3, "{changed} of 6");
 }
 
 #[test]
@@ -216,39 +217,40 @@ fn a_movement_by_hand_is_measured_and_a_stop_lifts() {
     assert_eq!(explore(&mut session, 1, 2)["told"], "sure");
 }
 
-/// Requests for which WebAssembly has to give the same replies, byte by byte: 50 seeds, each another texture, at last a lesson and
-/// the paper's method.
-fn requests() -> Vec<Value> {
-    let prepare = json!({"do": "prepare"});
-    let step = json!({"do": "step", "ms": 400_000});
-    let mut all = vec![world(20, false, 1.0), prepare.clone()];
-    for seed in 1..=50_u32 {
-        all.push(identify((seed * 7 % 117 + 1) as u8, seed));
-        all.push(step.clone());
-    }
-    all.push(json!({"do": "label", "name": "learned here"}));
-    all.push(step.clone());
-    all.extend([world(30, true, 0.0), prepare]);
-    for seed in 1..=5 {
-        all.extend([identify(20, seed), step.clone()]);
-    }
-    all
-}
-
-/// With TACTUS_PAGE_REPLIES, `cargo xtask test --step page` compares them with those in the browser.
+/// With TACTUS_PAGE_REPLIES, `cargo xtask test --step page` asks the same in WebAssembly and compares the replies byte by byte: 50
+/// seeds, each another texture, then a lesson, at last the paper's method.
 #[test]
 fn replies() {
     let mut session = Session::default();
     let mut lines = Vec::new();
-    for request in requests() {
+    let mut ask = |request: &Value| {
         let request = request.to_string();
         let reply = session.ask(&request);
         let parsed: Value = serde_json::from_str(&reply).unwrap();
         assert!(parsed["is"] != "error", "{request}: {reply}");
-        if request.contains("\"step\"") {
-            assert_eq!(parsed["busy"], false, "{request} is not over in time");
-        }
         lines.push((request, reply));
+        parsed
+    };
+    let done = |ask: &mut dyn FnMut(&Value) -> Value, request: Value| {
+        ask(&request);
+        // short steps: V8 goes on to faster code between calls only
+        let mut frames = 0;
+        while ask(&json!({"do": "step", "ms": 500}))["busy"] == true {
+            frames += 1;
+            assert!(frames < 1000, "{request} is not over in time");
+        }
+    };
+    let prepare = json!({"do": "prepare"});
+    ask(&world(20, false, 1.0));
+    ask(&prepare);
+    for seed in 1..=50_u32 {
+        done(&mut ask, identify((seed * 7 % 117 + 1) as u8, seed));
+    }
+    done(&mut ask, json!({"do": "label", "name": "learned here"}));
+    ask(&world(30, true, 0.0));
+    ask(&prepare);
+    for seed in 1..=5 {
+        done(&mut ask, identify(20, seed));
     }
     if let Some(file) = std::env::var_os("TACTUS_PAGE_REPLIES") {
         let mut file = BufWriter::new(std::fs::File::create(file).unwrap());

@@ -52,7 +52,7 @@ test("memory stays flat over 200 explorations", async () => {
   const sizes = [];
   for (let n = 1; n <= 200; n++) {
     ask(`{"do":"identify","texture":${n % 117 + 1},"seed":${n},"threshold":0.99,"false_alarm":0.02,"max_slides":3}`);
-    for (let frame = '"busy":true'; frame.includes('"busy":true');) frame = ask('{"do":"step","ms":2000}');
+    for (let frame = '"busy":true'; frame.includes('"busy":true');) frame = ask('{"do":"step","ms":200}');
     sizes.push(memory.buffer.byteLength);
   }
   const [early, late] = [sizes[19], sizes[199]];

@@ -1,5 +1,6 @@
 //! What is seen of a probe: its host in the simulation.
 
+use std::cell::Cell;
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -31,6 +32,8 @@ const PDC_MS: u64 = 10;
 pub(super) struct Scene {
     /// The time at which it stands still; `None`: it does not.
     pub(super) until: Option<Duration>,
+    /// Whether somebody waits for it to go on.
+    pub(super) waits: Cell<bool>,
     /// What is to be done to the rig before its next millisecond.
     pub(super) texture: Option<u8>,
     pub(super) wear: Option<f64>,
@@ -57,6 +60,7 @@ impl Scene {
     pub(super) fn new() -> Self {
         Self {
             until: None,
+            waits: Cell::new(false),
             texture: None,
             wear: None,
             stop: false,
@@ -333,7 +337,11 @@ impl Host for Scene {
     }
 
     fn pauses(&self) -> bool {
-        self.until.is_some_and(|until| self.now >= until)
+        let pauses = self.until.is_some_and(|until| self.now >= until);
+        if pauses {
+            self.waits.set(true);
+        }
+        pauses
     }
 
     fn stops(&mut self) -> bool {

@@ -275,7 +275,16 @@ impl Running {
             let mut scene = self.scene.borrow_mut();
             scene.until = Some(scene.now() + Duration::from_millis(ms.into()));
         }
-        self.poll();
+        // a store that writes lets others go first, too: on until it waits for the time, or for a job
+        let goes_on = |running: &Self| {
+            let scene = running.scene.borrow();
+            scene.busy && !scene.waits.get()
+        };
+        self.scene.borrow().waits.set(false);
+        while {
+            self.poll();
+            goes_on(self)
+        } {}
     }
 
     fn poll(&mut self) {
