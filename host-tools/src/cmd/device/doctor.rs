@@ -539,7 +539,7 @@ mod tests {
             };
             let mut checks = Checks::default();
             acquisition(&status, &mut checks);
-            checks.0[0].state
+            checks.all[0].state
         };
         assert_eq!(with(1000, 0, 0), State::Good);
         assert_eq!(with(1000, 5, 0), State::Look);

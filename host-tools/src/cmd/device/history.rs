@@ -203,7 +203,7 @@ mod tests {
             file: Some(temp.path().join("history.jsonl")),
             port: "here".to_owned(),
         };
-        let day = |days| OffsetDateTime::UNIX_EPOCH + Duration::days(20_000 + days);
+        let day = |days: i64| OffsetDateTime::UNIX_EPOCH + Duration::days(20_000 + days);
         assert_eq!(history.table_since(7, day(0)), day(0));
         assert_eq!(history.table_since(7, day(3)), day(0));
         assert_eq!(history.table_since(8, day(4)), day(4));
