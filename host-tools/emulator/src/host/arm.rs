@@ -51,6 +51,14 @@ impl OnTheLine {
         }
     }
 
+    /// What a [`Talk`](super::talk::Talk) calls for each report, and for none after each look.
+    pub fn follow(&mut self, board: &mut Emulator, report: Option<&Report>) {
+        match report {
+            Some(report) => self.hear(report),
+            None => self.look(board),
+        }
+    }
+
     /// Goes on to the board's time: to be called every ms.
     pub fn look(&mut self, board: &mut Emulator) {
         let now_ms = board.now_ns() / 1_000_000;

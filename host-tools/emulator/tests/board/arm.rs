@@ -39,9 +39,14 @@ fn explore(elf: &PathBuf, max_slides: u8, how: Option<Misbehaves>) -> Explored {
     let unknown = mounted(&world, TEXTURE, 3);
     let mut talk = Talk::new(unknown.start(elf, Options::default()).unwrap());
     let mut arm = OnTheLine::new(talk.board(), 1);
-    talk.board().run_ms(600).unwrap();
-    arm.look(talk.board());
-    talk.teach(&calibration, &table, |_, _| ()).unwrap();
+    // it is parked, until somebody asks for a slide
+    let booted = |event: &Event| matches!(event, Event::Booted { .. }).then_some(Ok(()));
+    let booted = talk.wait(1.0, |board, report| arm.follow(board, report), booted);
+    booted.unwrap();
+    talk.teach(&calibration, &table, |board, report| {
+        arm.follow(board, report);
+    })
+    .unwrap();
     arm.program().misbehave(how);
     talk.board().rig().world().reset_extremes();
     let (mut verdict, mut faults, mut slides) = (None, Vec::new(), 0);
@@ -50,14 +55,11 @@ fn explore(elf: &PathBuf, max_slides: u8, how: Option<Misbehaves>) -> Explored {
         ..Identify::default()
     });
     let done = talk.run(Request::command(identify), 300.0, |board, report| {
-        let Some(report) = report else {
-            return arm.look(board);
-        };
-        arm.hear(report);
-        match &report.event {
-            Event::Verdict(told) => verdict = Some(told.clone()),
-            Event::Fault(fault) => faults.push(*fault),
-            Event::SlideReport { .. } => slides += 1,
+        arm.follow(board, report);
+        match report.map(|report| &report.event) {
+            Some(Event::Verdict(told)) => verdict = Some(told.clone()),
+            Some(Event::Fault(fault)) => faults.push(*fault),
+            Some(Event::SlideReport { .. }) => slides += 1,
             _ => {}
         }
     });
