@@ -233,9 +233,15 @@ fn replies() {
     };
     let done = |ask: &mut dyn FnMut(&Value) -> Value, request: Value| {
         ask(&request);
-        // short steps: V8 goes on to faster code between calls only
         let mut frames = 0;
-        while ask(&json!({"do": "step", "ms": 500}))["busy"] == true {
+        loop {
+            let frame = ask(&json!({"do": "step", "ms": 500}));
+            if let Some(texture) = request.get("texture").filter(|_| frames > 10) {
+                assert_eq!(frame["texture"], *texture, "{request}");
+            }
+            if frame["busy"] == false {
+                break;
+            }
             frames += 1;
             assert!(frames < 1000, "{request} is not over in time");
         }

@@ -8,7 +8,7 @@ use tactus_core::dsp::{Plain, SpectrumSum};
 use tactus_core::explorer::Config;
 use tactus_core::features::{BLOCK, Block, Observation};
 use tactus_core::probe::RigState;
-use tactus_core::rig::Phase;
+use tactus_core::rig::{Phase, RigError};
 use tactus_core::table::Table;
 use tactus_core::wire::{self, Event};
 
@@ -35,7 +35,7 @@ pub(super) struct Scene {
     /// Whether somebody waits for it to go on.
     pub(super) waits: Cell<bool>,
     /// What is to be done to the rig before its next millisecond.
-    pub(super) texture: Option<u8>,
+    texture: Option<u8>,
     pub(super) wear: Option<f64>,
     pub(super) stop: bool,
     /// The table in force, and its maps.
@@ -86,6 +86,21 @@ impl Scene {
         self.now
     }
 
+    /// Number of what lies under the finger.
+    pub(super) fn texture(&self) -> u8 {
+        self.truth.texture
+    }
+
+    /// Another texture is to be put under the finger, which was `lifted` for that.
+    pub(super) fn place(&mut self, texture: u8, lifted: Result<(), RigError>) {
+        match lifted {
+            Ok(()) => self.texture = Some(texture),
+            Err(why) => self.happens(Happening::Refused {
+                why: why.to_string(),
+            }),
+        }
+    }
+
     /// An exploration begins.
     pub(super) fn explores(&mut self, config: Config) {
         self.followed = Followed::begin(config);
@@ -128,7 +143,7 @@ impl Scene {
     }
 
     /// Where a slide lies among the textures at its movement.
-    pub(super) fn place(
+    pub(super) fn place_of(
         &self,
         table: Table<'_>,
         movement: u8,
@@ -196,7 +211,7 @@ impl Scene {
             self.happened.push(Happening::Look {
                 ms,
                 standing: self.followed.so_far(table, &seen),
-                place: self.place(table, movement, &seen),
+                place: self.place_of(table, movement, &seen),
             });
         }
     }
@@ -230,7 +245,7 @@ impl Scene {
             } => {
                 let seen = observed.observation();
                 let early_ms = self.early_ms.take();
-                let place = self.place(table, action.movement, &seen);
+                let place = self.place_of(table, action.movement, &seen);
                 let standing = self
                     .followed
                     .observed(table, action, seen.clone(), early_ms);
@@ -319,11 +334,11 @@ impl Host for Scene {
     }
 
     fn look(&mut self, rig: &mut SimRig) {
-        if let Some(texture) = self.texture {
-            // while the finger is down it stays; the probe lifts it first
-            if rig.place(texture).is_ok() {
-                self.texture = None;
-            }
+        if let Some(texture) = self.texture.take()
+            && let Err(why) = rig.place(texture)
+        {
+            let why = why.to_string();
+            self.happened.push(Happening::Refused { why });
         }
         if let Some(wear) = self.wear
             && rig.world().put_on_skin(wear).is_ok()

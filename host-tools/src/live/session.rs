@@ -34,8 +34,18 @@ enum Job {
     Move(Movement, u32),
 }
 
+impl Job {
+    /// With this texture under the finger.
+    fn on(self, texture: u8) -> Result<(Self, Option<u8>), &'static str> {
+        if !(1..=117).contains(&texture) {
+            return Err("textures have the numbers 1 to 117");
+        }
+        Ok((self, Some(texture)))
+    }
+}
+
 /// What waits for its turn.
-type Desk = Rc<RefCell<Option<Job>>>;
+type Desk = Rc<RefCell<Option<(Job, Option<u8>)>>>;
 
 /// A world in the making.
 struct Preparing {
@@ -108,8 +118,8 @@ impl Session {
                     method: running.paper.then_some(Method::Paper),
                     ..Identify::default()
                 };
-                running.place(texture)?;
-                running.follow(Job::Serve(Box::new(Command::Identify(wanted))))
+                let job = Job::Serve(Box::new(Command::Identify(wanted)));
+                running.follow(job.on(texture)?)
             }
             Request::Move {
                 texture,
@@ -119,8 +129,7 @@ impl Session {
             } => {
                 let movement = Movement::from_si(force_n, speed_mm_s)?;
                 let running = self.idle()?;
-                running.place(texture)?;
-                running.follow(Job::Move(movement, seed))
+                running.follow(Job::Move(movement, seed).on(texture)?)
             }
             Request::Label { name } => {
                 let name = Name::try_from(name.trim()).map_err(|_| "the name is too long")?;
@@ -128,7 +137,7 @@ impl Session {
                     return Err("a texture needs a name".into());
                 }
                 self.idle()?
-                    .follow(Job::Serve(Box::new(Command::Label(name))))
+                    .follow((Job::Serve(Box::new(Command::Label(name))), None))
             }
             Request::Skin { wear } => {
                 self.running()?.scene.borrow_mut().wear = Some(wear.clamp(0.0, 1.0));
@@ -255,15 +264,7 @@ fn sentence(why: &dyn std::error::Error) -> String {
 }
 
 impl Running {
-    fn place(&mut self, texture: u8) -> Result<(), &'static str> {
-        if !(1..=117).contains(&texture) {
-            return Err("textures have the numbers 1 to 117");
-        }
-        self.scene.borrow_mut().texture = Some(texture);
-        Ok(())
-    }
-
-    fn follow(&mut self, job: Job) -> Answered {
+    fn follow(&mut self, job: (Job, Option<u8>)) -> Answered {
         self.scene.borrow_mut().busy = true;
         *self.desk.borrow_mut() = Some(job);
         Ok(Reply::Frame(self.scene.borrow_mut().frame()))
@@ -318,7 +319,7 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
             // nothing moves: whatever is due is done
             scene.until = None;
         }
-        let job = loop {
+        let (job, texture) = loop {
             if let Some(job) = desk.borrow_mut().take() {
                 break job;
             }
@@ -326,6 +327,11 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
         };
         // a new request gets its time with the next step
         scene.borrow_mut().busy = true;
+        if let Some(texture) = texture.filter(|texture| scene.borrow().texture() != *texture) {
+            // whoever changes the sample lifts the finger out of the way first
+            let lifted = probe.rig.lift().await;
+            scene.borrow_mut().place(texture, lifted);
+        }
         match job {
             Job::Serve(command) => {
                 let command = *command;
@@ -377,7 +383,7 @@ async fn make<'p>(
                 movement: at,
                 place: at
                     .zip(table)
-                    .and_then(|(at, table)| scene.borrow().place(table, at, &seen)),
+                    .and_then(|(at, table)| scene.borrow().place_of(table, at, &seen)),
                 measured: Measured::new(movement, &seen),
             }
         }
