@@ -3,7 +3,7 @@
 (() => {
   const at = id => document.getElementById(id);
   const sentences = {
-    Parked: "The rig waits.", Homing: "It looks for its limit switches.", Ready: "The finger is lifted.",
+    Parked: "The rig waits.", Homing: "The finger goes up to its limit switch.", Ready: "The finger is lifted.",
     Positioning: "The stage goes to where the slide begins.", Pressing: "The finger comes down.",
     Background: "It touches, and listens to the still finger first.", Sliding: "It slides.",
     Lifting: "The finger is lifted.", Unloaded: "The stage moves without load.", Faulted: "Something went wrong: the finger is lifted.",
@@ -127,6 +127,7 @@
     begin(number, { do: "identify", texture: number, seed: set.seed, threshold: set.t, false_alarm: set.fa, max_slides: 10 });
     if (!busy) return;
     verdict = null;
+    document.body.dataset.told = "";
     Mind.posterior(at("posterior"), at("others"), known.textures, known.textures.map(() => 1 / known.textures.length));
     Places.likely([]);
     headline(["What is this?"]);
@@ -245,6 +246,7 @@
         break;
       case "verdict":
         verdict = one;
+        document.body.dataset.told = one.told;
         answer(one);
         break;
       case "learned":

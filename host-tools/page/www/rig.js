@@ -41,8 +41,6 @@ const Rig = (() => {
     make(svg, "path", { class: "ground", d: "M-84 12 H84" });
     const lens = make(svg, "clipPath", { id: "lens-clip" });
     make(lens, "circle", { cx: 58, cy: -27, r: 15 });
-    // the lever comes down between the rails
-    make(svg, "path", { class: "lever", d: "M-5.5 -47 H5.5 V-30 H-5.5 Z" });
     const stage = make(svg, "g", {});
     const shims = make(stage, "path", { class: "shim" });
     const sample = make(stage, "path", { class: "sample" });
@@ -50,7 +48,7 @@ const Rig = (() => {
     make(stage, "rect", { class: "lever", x: SAMPLE / 2 - 14, y: 3, width: 28, height: 5, rx: 0.8 });
     make(svg, "rect", { class: "lever", x: -80, y: 8, width: 160, height: 2.5, rx: 0.8 });
     const tip = make(svg, "g", {});
-    make(tip, "path", { class: "lever", d: "M-9 -27 H9 V-33 H5.5 V-60 H-5.5 V-33 H-9 Z" });
+    make(tip, "path", { class: "lever", d: "M-9 -27 H9 V-33 H5.5 V-120 H-5.5 V-33 H-9 Z" });
     finger(tip);
     const arrow = make(svg, "path", { class: "arrow", d: "", visibility: "hidden" });
     // ten times as large
