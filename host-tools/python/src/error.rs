@@ -14,9 +14,9 @@ use tactus::eval::experiment::ExperimentError;
 use tactus::eval::first::FirstError;
 use tactus::eval::learn::TableError as LearnError;
 use tactus::eval::verify::VerifyError;
-use tactus::link::PortError;
 use tactus::link::line::LineError;
 use tactus::link::log::LogError;
+use tactus::link::{LinkError, PortError};
 use tactus::sim::collection::TrialError;
 use tactus::sim::rig::SimError;
 use tactus_core::explorer::{ExplorerError, ObserveError};
@@ -121,6 +121,7 @@ raise! {
     LearnError => TableError,
     SimError => SimulationError,
     LineError => ProbeError,
+    LinkError => ProbeError,
     PortError => ProbeError,
     LogError => ProbeError,
     TrialError => SimulationError,

@@ -239,7 +239,7 @@ fn state_of(state: &Bound<'_, PyAny>) -> PyResult<ArmState> {
             speed_um_s: slid.get_item("speed_um_s")?.extract()?,
         });
     }
-    match state.extract::<&str>()? {
+    match state.extract::<String>()?.as_str() {
         "Busy" => Ok(ArmState::Busy),
         "Pressed" => Ok(ArmState::Pressed),
         "Steady" => Ok(ArmState::Steady),
