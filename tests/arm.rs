@@ -252,8 +252,10 @@ fn an_arm_that_presses_too_hard_is_stopped() {
         let how = Misbehaves::ComesDown { mm_s, stops_ms };
         ends_in(how, &[Fault::ForceHigh]);
     }
-    // less than too hard, and not what was asked for
-    ends_in(Misbehaves::Presses(1.2), &[Fault::ArmOff]);
+    // at the greatest force that is too hard, at the others it is not what was asked for; 1.2 times the least force is within what
+    // P_DC may be off
+    let either = &[Fault::ForceHigh, Fault::ArmOff];
+    ends_in(Misbehaves::Presses(1.4), either);
 }
 
 /// Its line of permission is what stops it then, as it is wired here.

@@ -4,17 +4,18 @@ pub(super) mod mcap;
 mod npz;
 mod parquet;
 mod picture;
+mod to;
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::io::Write;
+use std::path::PathBuf;
 
-use anyhow::{Context as _, ensure};
+use anyhow::ensure;
 use clap::ArgGroup;
 use serde::Serialize;
 use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::measure_all;
 
+use self::to::create;
 use super::output::{Format, UsageError, print_json};
 use super::plot::Plot;
 use super::progress::with_progress;
@@ -152,19 +153,4 @@ fn of_recordings(args: &Args) -> anyhow::Result<()> {
         parquet::recordings(create(path)?, &set, &measured, table)?;
     }
     Ok(())
-}
-
-/// Where a file goes.
-type To = BufWriter<Box<dyn Write + Send>>;
-
-/// A new file, or standard output.
-fn create(path: &Path) -> anyhow::Result<To> {
-    tracing::info!(file = %path.display(), "writes");
-    // whoever has it locked is this thread
-    Ok(BufWriter::new(if is_pipe(path) {
-        Box::new(io::stdout())
-    } else {
-        let file = File::create_new(path);
-        Box::new(file.with_context(|| path.display().to_string())?)
-    }))
 }

@@ -17,7 +17,7 @@ use tactus_core::features::{Block, Movement, Property};
 use tactus_core::table::Table;
 use tactus_core::wire::{Event, Report, SlideReport};
 
-use super::{To, create};
+use super::to::{To, create};
 use crate::cmd::device::log::{self, Line, TableParts};
 
 /// The channels, each with what its messages hold: a name, and JSON's word for what it is.
