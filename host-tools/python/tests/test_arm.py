@@ -26,6 +26,7 @@ class Probe:
 
     def __init__(self, script):
         self.script, self.states, self.number = script, queue.Queue(), 0
+        self.force_mn = 0
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.port = "tcp:127.0.0.1:%d" % self.listener.getsockname()[1]
         self.failed = None
@@ -62,6 +63,7 @@ class Probe:
         self.tell({"Arm": {"number": number, "task": task}})
 
     def live(self, force_mn):
+        self.force_mn = force_mn
         self.tell({"Live": {"force_mn": force_mn, "steps": 0, "stage_um": 0, "speed_um_s": 0, "current_ma": 0}})
 
     def heard(self, number, state, seconds=3.0):
@@ -71,7 +73,8 @@ class Probe:
             try:
                 said = self.states.get(timeout=0.05)
             except queue.Empty:
-                self.live(0)
+                # a probe says its force all the time
+                self.live(self.force_mn)
                 continue
             if said == (number, state):
                 return time.monotonic()
