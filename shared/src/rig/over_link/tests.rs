@@ -298,6 +298,7 @@ fn what_an_arm_says_is_compared_with_force_clock_and_order() {
     // it says that it is lifted, and is not
     let mut bench = Bench::sliding(movement);
     bench.rig.stop();
+    bench.run(1);
     bench.says(ArmState::Lifted, RELEASE_MS + 5);
     assert_eq!(bench.rig.phase(), Phase::Faulted(Fault::ArmOff));
     bench.says(ArmState::Lifted, FREE_MS + 5);
