@@ -1,6 +1,6 @@
 //! The image of a probe on somebody else's arm: it identifies with the simulator's arm at its link, and stops one that misbehaves.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use tactus::link::Request;
 use tactus::sim::arm_program::Misbehaves;
@@ -28,7 +28,7 @@ struct Explored {
     force_max_n: f64,
 }
 
-fn explore(elf: &PathBuf, max_slides: u8, how: Option<Misbehaves>) -> Explored {
+fn explore(elf: &Path, max_slides: u8, how: Option<Misbehaves>) -> Explored {
     let world = Collection {
         seed: 1,
         textures: Collection::spread(TEXTURE, 4),
