@@ -9,6 +9,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use tactus::data::recorder::Recorder;
 use tactus::link::line::{Line, found, only_nucleo, open};
 use tactus::link::log::{self, Log};
@@ -16,7 +17,7 @@ use tactus::link::owner::Owner;
 use tactus::link::{Job, Port, PortError, PushTable, ReadTable, Request, Transaction};
 use tactus_core::explorer::Strategy;
 use tactus_core::table::{Name, Table as Read};
-use tactus_core::wire::{ArmReport, ArmState, Command, Identify, Report, Train};
+use tactus_core::wire::{ArmReport, ArmState, Command, Event, Identify, Report, Train};
 
 use crate::arguments;
 use crate::error::{ProbeError, Raise as _};
@@ -211,7 +212,7 @@ impl Events {
 
     fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let report = self.probe.get().next(py)?;
-        report.map(|report| object(py, &report)).transpose()
+        report.map(|report| reported(py, &report)).transpose()
     }
 
     /// Stops what is under way, and waits until the finger is lifted.
@@ -323,7 +324,8 @@ impl Probe {
     }
 
     /// Has the probe find out what lies under its finger: an iterator of its reports, dicts with number, at_ms (its clock) and event
-    /// as on the link: Chosen, SlideReport, Rejected, Verdict and others. Ctrl-C and `close()` stop the rig and lift the finger.
+    /// as on the link: Chosen, SlideReport (with a `posterior` of one probability for each texture), Rejected, Verdict and others. Ctrl-C
+    /// and `close()` stop the rig and lift the finger.
     ///
     /// among: names of the textures that it may be. Other arguments as of `Explorer`. learn: whether the probe learns from a verdict
     /// that is certain. seed: where slides begin, and random choices; drawn anew, unless given.
@@ -481,7 +483,26 @@ fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Bound<'_, PyAny>>> {
         read.map_err(|why| why.raise_of(&path.display().to_string()))?;
         Ok::<_, PyErr>(lines)
     })?;
-    lines.iter().map(|line| object(py, line)).collect()
+    let lines = lines.iter().map(|line| match line {
+        log::Line::Report(report) => {
+            let line = PyDict::new(py);
+            line.set_item("report", reported(py, report)?)?;
+            Ok(line.into_any())
+        }
+        other => object(py, other),
+    });
+    lines.collect()
+}
+
+/// A report as a dictionary. Its posterior is one probability for each texture; on the line and in a log only those are that are not
+/// negligible, with their places.
+fn reported<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyAny>> {
+    let dict = object(py, report)?;
+    if let Event::SlideReport { posterior, .. } = &report.event {
+        let slide = dict.get_item("event")?.get_item("SlideReport")?;
+        slide.set_item("posterior", object(py, posterior)?)?;
+    }
+    Ok(dict)
 }
 
 pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -76,7 +76,7 @@ def chosen(slide):
 
 
 def reported(slide):
-    return {"SlideReport": {"slide": slide, "action": {"movement": 0}, "observed": OBSERVED, "posterior": []}}
+    return {"SlideReport": {"slide": slide, "action": {"movement": 0}, "observed": OBSERVED, "posterior": [3, [[1, 0.75], [2, 0.25]]]}}
 
 
 def test_the_status_is_the_links():
@@ -100,6 +100,7 @@ def test_an_exploration_is_an_iterator_of_events():
         assert names == ["Chosen", "SlideReport", "Chosen", "SlideReport", "Verdict", "Done"]
         assert events[4]["event"]["Verdict"]["name"] == "Burlap"
         assert events[1]["event"]["SlideReport"]["observed"]["properties"] == [0.5, 1.5, None]
+        assert events[1]["event"]["SlideReport"]["posterior"] == [0.0, 0.75, 0.25]
         assert [report["number"] for report in events] == list(range(6)) and events[2]["at_ms"] == 100
         asked = probe.asked[0][1]
         assert (asked["max_slides"], asked["seed"], asked["open"]) == (4, 7, True)
