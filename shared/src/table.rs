@@ -58,7 +58,6 @@
 //! | | as the table itself, learned from slides of this length: header to trials, a trial of 0 where a movement's slides are not longer |
 //! | | the contents of section 1 and of section 2, where the table has these |
 
-mod amended;
 mod drift;
 mod encode;
 mod finger;

@@ -52,7 +52,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "SHARE", default_value_t = FALSE_ALARM, value_parser = false_alarm)]
     false_alarm: f32,
     /// Learn the first parts of the slides too, of these lengths, s at constant speed, such as 1,2,3: slides may end early
-    /// then. Firmware without the feature `early` refuses such a table
+    /// then. The image tactus-rig takes such a table, the others refuse it
     #[arg(long, value_name = "S,S,...", value_delimiter = ',', value_parser = length)]
     lengths: Vec<u16>,
     /// The file to write; "-": standard output

@@ -13,7 +13,7 @@ use crate::toolchain::{self, CHIP};
 const PROFILES: [(&str, &[&str], &[&str]); 8] = [
     (
         "firmware",
-        &[],
+        &["--features=early"],
         &[
             "tactus-rig",
             "tactus-selftest",

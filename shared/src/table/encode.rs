@@ -4,7 +4,6 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::amended;
 use super::format::{
     Action, CELL_BYTES, CRC_BYTES, Contents, EARLY, EARLY_VERSION, LENGTH, MAGIC, MAX_MOVEMENTS,
     PACED, PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally, VERSION, each,
@@ -255,7 +254,8 @@ fn rewrite<'o, 'a>(
     )
 }
 
-/// Writes `old` into `out` with one change. All other textures stay the same to the bit.
+/// Writes `old` into `out` with one change. All other textures stay the same to the bit; what a table knows of shorter slides is left
+/// out, unless a texture gets another name: every one that is there must be known of them.
 ///
 /// # Errors
 /// As [`encode`], and [`EncodeError::Texture`].
@@ -301,28 +301,19 @@ pub fn amend<'o>(
     if old.is_paced() {
         return rewrite_paced(out, old, rows);
     }
-    if EARLY && old.lengths().next().is_some() {
-        let kept = rows.clone().map(|row| match row.cells {
-            Cells::Old(_, texture) => Some(texture),
-            // nobody knows what a shorter slide of it would be like
-            Cells::New(_) => None,
-        });
-        let length = amended::amended_length(old, kept.clone()).map_err(EncodeError::NoSpace)?;
-        let write = |writer: &mut Writer<'_>| {
-            amended::write_amended(old, kept, |bytes| writer.put(bytes));
-        };
-        return rewrite(out, old, old.lineage(), rows, (length, write));
-    }
-    let sections = old.sections;
-    rewrite(
-        out,
-        old,
-        old.lineage(),
-        rows,
-        (sections.len(), |writer: &mut Writer<'_>| {
-            writer.put(sections)
-        }),
-    )
+    // what shorter slides say is of these textures and no others
+    let same = matches!(change, Change::Rename { .. });
+    let left_out = if EARLY && !same { LENGTH } else { 0 };
+    let others = || old.other_sections(left_out);
+    let of_others = others().map(|(head, contents)| head.len() + contents.len());
+    let of_others = of_others.sum();
+    let write = |writer: &mut Writer<'_>| {
+        for (head, contents) in others() {
+            writer.put(&head);
+            writer.put(contents);
+        }
+    };
+    rewrite(out, old, old.lineage(), rows, (of_others, write))
 }
 
 /// As [`rewrite`], of a table that knows speeds: every row with its slopes, those of all textures for a new one.

@@ -120,9 +120,9 @@ impl<'a> Table<'a> {
     /// What stands for a movement of which the slide has had the `n`th length, from 1; `None` if there is no such length.
     #[cfg(any(test, feature = "early"))]
     pub(crate) fn at_length(&self, movement: u8, n: u8) -> Option<u8> {
-        let known = movement < self.movements && n > 0;
-        let known = known && usize::from(n) <= self.lengths().count();
-        known.then(|| n * self.movements + movement)
+        let at = n.checked_mul(self.movements)?.checked_add(movement)?;
+        let known = movement < self.movements && self.shorter(at).is_some();
+        known.then_some(at)
     }
 
     /// Whether this is a movement's own number, not that of a shorter slide of it.
@@ -138,11 +138,9 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// That every length is what its section says, each longer than the one before.
-    pub(super) fn are_lengths(&self) -> bool {
+    /// How many lengths it has; `None` where one is not what its section says, or not longer than the one before.
+    pub(super) fn count_lengths(&self) -> Option<usize> {
         let (features, movements) = (self.features(), usize::from(self.movements));
-        let sections = each(self.sections).flatten();
-        let there = sections.filter(|(kind, _)| *kind == LENGTH).count();
         let drift = self
             .section(DRIFT)
             .map(|_| TWO + movements * of_drift(features));
@@ -150,8 +148,12 @@ impl<'a> Table<'a> {
         let novelty = self.section(NOVELTY).map(|_| novelty);
         let behind = drift.unwrap_or(0) + novelty.unwrap_or(0);
         let mut longest = 0;
-        let mut whole = 0;
-        for length in self.lengths() {
+        let mut count = 0;
+        for (kind, contents) in each(self.sections).flatten() {
+            if kind != LENGTH {
+                continue;
+            }
+            let length = self.length_of(contents)?;
             let same = |from, to| length.table.bytes.get(from..to) == self.bytes.get(from..to);
             let (cut, _) = length
                 .rest
@@ -167,12 +169,12 @@ impl<'a> Table<'a> {
                 && (drift.is_none() || are_drifts(cut, features, movements))
                 && (novelty.is_none() || are_limits(length.table.novelty, features, movements));
             if !fits {
-                return false;
+                return None;
             }
             longest = length.ms;
-            whole += 1;
+            count += 1;
         }
-        whole == there && there <= MAX_LENGTHS
+        (count <= MAX_LENGTHS).then_some(count)
     }
 
     /// Where the trials of each length begin among the bytes of the table.

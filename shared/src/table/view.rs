@@ -116,8 +116,8 @@ impl<'a> Table<'a> {
             return Err(TableError::Section(SLOPES));
         }
         if EARLY {
-            let is_early = table.section(LENGTH).is_some();
-            if early != is_early || early && table.has_slopes() || !table.are_lengths() {
+            let is_early = table.count_lengths().map(|lengths| lengths > 0);
+            if is_early != Some(early) || early && table.has_slopes() {
                 return Err(TableError::Section(LENGTH));
             }
         }
@@ -213,7 +213,7 @@ impl<'a> Table<'a> {
     }
 
     /// What a section of kind 6 has; `None` where it is too short.
-    fn length_of(&self, contents: &'a [u8]) -> Option<Length<'a>> {
+    pub(super) fn length_of(&self, contents: &'a [u8]) -> Option<Length<'a>> {
         let (ms, bytes) = contents.split_first_chunk::<MS>()?;
         let rest = bytes.get(self.layout().lineage..)?;
         let drift = self.section(DRIFT).map_or(0, <[u8]>::len);
@@ -237,9 +237,21 @@ impl<'a> Table<'a> {
         if !EARLY || movement < self.movements {
             return None;
         }
-        let (n, movement) = (movement / self.movements, movement % self.movements);
-        let length = self.lengths().nth(usize::from(n) - 1)?;
-        Some((length.table, movement))
+        self.find_shorter(movement)
+    }
+
+    /// Once in the image, not wherever a table is read.
+    #[cold]
+    #[inline(never)]
+    fn find_shorter(&self, movement: u8) -> Option<(Table<'a>, u8)> {
+        let mut left = movement;
+        for length in self.lengths() {
+            left = left.checked_sub(self.movements)?;
+            if left < self.movements {
+                return Some((length.table, left));
+            }
+        }
+        None
     }
 
     fn stored_movement(&self, index: u8) -> Option<(u16, u32)> {

@@ -9,6 +9,7 @@ mod commands;
 mod common;
 mod current;
 mod cycles;
+mod early;
 mod explore;
 mod fault_cases;
 mod faults;

@@ -178,8 +178,6 @@ fn nobody_looks_where_a_length_is_not_known_of_all() {
     let taught = crate::table::amend(&mut out, &table, put).unwrap();
     let mut explorer = Fused::new(taught, PropertySet::ALL, fused).unwrap();
     assert_eq!(explorer.look(AT[0], 1, &z).unwrap(), None);
-    let mut explorer = Fused::among(taught, PropertySet::ALL, fused, 0..5).unwrap();
-    assert!(explorer.look(AT[0], 1, &z).unwrap().is_some());
 }
 
 #[test]
