@@ -8,7 +8,7 @@ use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{ElfFile, ProgramHeader as _};
 use object::{Endianness, elf};
 
-use crate::factory::TABLES;
+use crate::factory::{FOLDER, TABLES};
 use crate::firmware::{self, hash, shown};
 use crate::sbom;
 use crate::shell::root;
@@ -33,7 +33,7 @@ pub(crate) fn bundle(out: &Path) -> Result<()> {
     }
     let mut tables = Files::new();
     for name in TABLES.into_iter().flat_map(|(_, names)| names) {
-        let table = root().join("firmware").join(name);
+        let table = root().join(FOLDER).join(name);
         let bytes = std::fs::read(&table).with_context(|| table.display().to_string())?;
         tables.insert((*name).to_owned(), bytes);
     }

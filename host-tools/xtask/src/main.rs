@@ -95,7 +95,7 @@ enum Cli {
         #[arg(long, value_name = "DIR", default_value = "target/bundle")]
         out: PathBuf,
     },
-    /// Make the tables that come with the firmware, firmware/factory.tact and firmware/handheld.tact
+    /// Make the tables that come with the firmware, shared/tables/*.tact
     ///
     /// Simulates 5 trials of 3 movements on each of the 117 textures of world 1 and learns them, and 15 slides of a hand for
     /// the handheld probe, which takes a minute or two for each finger: those of another one have its name.

@@ -34,7 +34,7 @@ pub(crate) fn check() -> Result<()> {
     println!("== pytest {PACKAGE}");
     let command = target().join("debug").join(program("tactus"));
     if !command.is_file() {
-        run(cargo().args(["build", "--package", "tactus", "--bin", "tactus"]))?;
+        run(cargo().args(["build", "--package", "tactus-probe", "--bin", "tactus"]))?;
     }
     let mut tests = Command::new(&python);
     tests.args(["-m", "pytest", "-rs"]);
