@@ -61,6 +61,7 @@
 mod amended;
 mod drift;
 mod encode;
+pub mod factory;
 mod finger;
 mod format;
 mod gaussian;
