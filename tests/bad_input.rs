@@ -82,7 +82,7 @@ fn root() -> &'static Path {
 }
 
 fn recordings(to: &Path) {
-    for entry in fs::read_dir(root().join("tests/recordings/simulated")).unwrap() {
+    for entry in fs::read_dir(root().join("host-tools/recordings/simulated")).unwrap() {
         let entry = entry.unwrap();
         fs::copy(entry.path(), to.join(entry.file_name())).unwrap();
     }

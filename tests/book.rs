@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Where the simulated recordings are, and the command that makes them: [`simulate`].
-const RECORDINGS: &str = "tests/recordings/simulated";
+const RECORDINGS: &str = "host-tools/recordings/simulated";
 const TEXTURES: &str = "Computer paper,Coarse suede,Burlap,Denim twill,Corduroy,Terry cloth";
 /// The exploration of the moving picture.
 const PICTURE: &str = "docs/src/identify.svg";
@@ -292,7 +292,7 @@ fn pictures_of_others_recordings_stand_beside_their_command() {
 /// The pictures of the page about pictures, the command of each, and what comes before it.
 const PLOTS: [(&str, &[&str]); 4] = [
     (
-        "evaluate --recordings tests/recordings/simulated --train-slides 2 --method paper --runs 2000 --seed 1",
+        "evaluate --recordings host-tools/recordings/simulated --train-slides 2 --method paper --runs 2000 --seed 1",
         &["confusion", "reliability"],
     ),
     (
@@ -301,7 +301,7 @@ const PLOTS: [(&str, &[&str]); 4] = [
     ),
     ("table show TABLE", &["map"]),
     (
-        "gauge --recordings tests/recordings/simulated",
+        "gauge --recordings host-tools/recordings/simulated",
         &["control-roughness-1"],
     ),
 ];
@@ -311,7 +311,7 @@ fn plots_are_what_their_commands_draw() {
     let temp = tempfile::tempdir().unwrap();
     let [table, drawn] = ["table", "drawn"].map(|name| temp.path().join(name));
     let [table, drawn] = [&table, &drawn].map(|path| path.to_str().unwrap());
-    let learn = "learn --recordings tests/recordings/simulated --train-slides 3 --out TABLE";
+    let learn = "learn --recordings host-tools/recordings/simulated --train-slides 3 --out TABLE";
     let page = read("docs/src/pictures.md");
     let mut wrong = Vec::new();
     for (command, pictures) in [(learn, &[][..])].into_iter().chain(PLOTS) {

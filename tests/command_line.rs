@@ -1,5 +1,7 @@
 //! The command `tactus` as a user meets it: what it prints, how it fails.
 
+use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::fs;
 use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -117,7 +119,7 @@ fn help_says_what_it_is_and_what_to_try_first() {
 
 #[test]
 fn verbose_tells_files_and_choices_beside_the_same_results() {
-    let recordings = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+    let recordings = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
     let plain = [
         "identify",
         "--recordings",
@@ -144,7 +146,7 @@ fn verbose_tells_files_and_choices_beside_the_same_results() {
 
 #[test]
 fn a_table_goes_through_pipes() {
-    let recordings = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+    let recordings = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
     let temp = tempfile::tempdir().unwrap();
     let table = temp.path().join("table");
     let learn = |to: &str| {
@@ -848,7 +850,7 @@ fn a_table_is_learned_from_the_cluster_dataset() {
         "{said}"
     );
     // slides of a BioTac say nothing about it
-    let simulated = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+    let simulated = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
     let said = complaint(&["report", path(&table), "--recordings", simulated]);
     let why = "learned with the finger mems, but the finger here is biotac";
     assert!(
@@ -870,4 +872,34 @@ fn a_table_is_learned_from_the_cluster_dataset() {
         .concat(),
     );
     assert!(said.contains("blocked"), "{said}");
+}
+
+/// Name and bytes of each file of a folder, not of the folders in it.
+fn contents(folder: &Path) -> BTreeMap<OsString, Vec<u8>> {
+    let files = fs::read_dir(folder).unwrap().map(Result::unwrap);
+    let files = files.filter(|entry| entry.file_type().unwrap().is_file());
+    files
+        .map(|entry| (entry.file_name(), fs::read(entry.path()).unwrap()))
+        .collect()
+}
+
+#[test]
+fn what_the_command_brings_along_is_what_the_repository_has() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path().join("tactus-data");
+    let unpack = ["unpack", path(&folder)];
+    let told = printed(&unpack);
+    assert!(told.contains("6 textures, 54 slides"), "{told}");
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    // not assert_eq, which would print all bytes
+    assert!(contents(&folder) == contents(&here.join("../shared/tables")));
+    let recordings = folder.join("recordings");
+    assert!(contents(&recordings) == contents(&here.join("recordings/simulated")));
+    // once more changes nothing, and a table of somebody's own is left alone
+    assert_eq!(printed(&unpack), told);
+    let own = folder.join("factory.tact");
+    fs::write(&own, "mine").unwrap();
+    let said = complaint(&unpack);
+    assert!(said.contains("give another folder"), "{said}");
+    assert_eq!(fs::read(&own).unwrap(), b"mine");
 }

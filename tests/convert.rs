@@ -14,7 +14,7 @@ use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::measure_all;
 use tactus_core::features::{FUSED_BANDS, Property};
 
-const RECORDINGS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+const RECORDINGS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
 
 fn tactus(arguments: &[&str]) -> Output {
     let mut tactus = Command::new(env!("CARGO_BIN_EXE_tactus"));

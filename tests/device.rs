@@ -1082,7 +1082,7 @@ fn completions_and_manual_pages_know_the_commands() {
     let temp = tempfile::tempdir().unwrap();
     let table = temp.path().join("table");
     fs::write(&table, &known().1).unwrap();
-    let simulated = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+    let simulated = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
     let theirs = ["--recordings", simulated, "--table", path(&table)];
     let in_table = plain_name(Table::read(&known().1).unwrap().name(0).unwrap());
     for shell in ["bash", "zsh", "fish"] {

@@ -7,9 +7,10 @@ use tactus::sim::fault_case::{Activity, Bench, Case, Outcome};
 use tactus::sim::faults::Fault;
 use tactus_core::rig;
 use tactus_core::rig::guard::Unguarded;
+use tactus_core::table::factory;
 
 /// The table that comes with the firmware.
-const FACTORY: &[u8] = include_bytes!("../firmware/factory.tact");
+const FACTORY: &[u8] = factory::RIG;
 
 fn outcome(case: &Case) -> Outcome {
     Bench::new(FACTORY).unwrap().run(case).unwrap()

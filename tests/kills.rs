@@ -118,7 +118,7 @@ const SIMULATE: Writes<'_> = Writes {
 };
 
 fn simulated() -> &'static str {
-    concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated")
+    concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated")
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 
-const SIMULATED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+const SIMULATED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
 
 fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
@@ -279,7 +279,7 @@ fn a_file_of_settings_says_port_recordings_and_defaults() {
 fn tables_and_logs_are_read_from_standard_input() {
     let table = std::fs::File::open(concat!(
         env!("CARGO_MANIFEST_DIR"),
-        "/../firmware/factory.tact"
+        "/../shared/tables/factory.tact"
     ));
     let show = |file: &str, stdin: Stdio| {
         let out = command(&["table", "show", file])
@@ -289,7 +289,7 @@ fn tables_and_logs_are_read_from_standard_input() {
         assert!(out.status.success(), "{out:?}");
         out.stdout
     };
-    let named = concat!(env!("CARGO_MANIFEST_DIR"), "/../firmware/factory.tact");
+    let named = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/tables/factory.tact");
     assert_eq!(show("-", table.unwrap().into()), show(named, Stdio::null()));
 }
 

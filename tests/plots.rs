@@ -37,7 +37,7 @@ fn tactus(arguments: &[&str]) -> (String, String) {
 
 const RECORDINGS: [&str; 4] = [
     "--recordings",
-    "tests/recordings/simulated",
+    "host-tools/recordings/simulated",
     "--train-slides",
     "2",
 ];
@@ -179,14 +179,14 @@ fn pictures_can_be_read_and_change_nothing_else() {
         (vec!["device", "log", "show", log], exploration()),
         (vec!["device", "log", "replay", paper_log], exploration()),
         (
-            vec!["table", "show", "firmware/factory.tact"],
+            vec!["table", "show", "shared/tables/factory.tact"],
             all(&["map"]),
         ),
         (
             vec![
                 "table",
                 "show",
-                "firmware/handheld.tact",
+                "shared/tables/handheld.tact",
                 "--format",
                 "json",
             ],

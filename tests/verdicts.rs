@@ -158,7 +158,7 @@ fn two_hundred_identifications_in_the_simulated_world_agree_with_evaluate() {
 
 #[test]
 fn identify_ends_when_the_recordings_run_out() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
     // nothing is ever more probable than 1: three slides of each of three movements, two of them learned from
     let shown = printed(&[
         "identify",

@@ -1,6 +1,6 @@
 //! Plot a posterior: explore recordings slide by slide, and draw the probabilities as an SVG file.
 //!
-//! `cargo run --release -p tactus --example plot_posterior`
+//! `cargo run --release -p tactus-probe --example plot_posterior`
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -17,7 +17,7 @@ const UNKNOWN: usize = 3;
 const LEARNED: usize = 2;
 
 pub(crate) fn main() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/recordings/simulated");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/simulated");
     let set = RecordingSet::open(&folder).expect("a folder of recordings");
     let slides = measure_all(&set, |_| ()).expect("slides with features");
     let names: Vec<String> = set.textures().iter().map(|t| t.name.clone()).collect();

@@ -1,6 +1,6 @@
 //! Read a folder of recordings: textures, movements, samples, and the features of each slide.
 //!
-//! `cargo run --release -p tactus --example read_recordings`
+//! `cargo run --release -p tactus-probe --example read_recordings`
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use tactus_core::dsp::Plan;
 use tactus_core::features::Property;
 
 pub(crate) fn main() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/recordings/simulated");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/simulated");
     let folder = folder.canonicalize().expect("the repository's recordings");
     // the manifest only; samples are read texture by texture
     let set = RecordingSet::open(&folder).expect("a folder of recordings");

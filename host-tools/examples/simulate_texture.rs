@@ -1,6 +1,6 @@
 //! Simulate a texture: the simulated rig homes, calibrates its motor current, and slides over burlap.
 //!
-//! `cargo run --release -p tactus --example simulate_texture`
+//! `cargo run --release -p tactus-probe --example simulate_texture`
 
 use tactus::data::replay::measure;
 use tactus::sim::collection::{calibrated, texture_number};

@@ -1,6 +1,6 @@
 //! Talk to a probe: ask how it is.
 //!
-//! `TACTUS_PROBE=127.0.0.1:7429 cargo run --release -p tactus --example talk_to_a_probe`, with the address of
+//! `TACTUS_PROBE=127.0.0.1:7429 cargo run --release -p tactus-probe --example talk_to_a_probe`, with the address of
 //! `cargo xtask emulate --port 7429`. Without it, the other end is played by a thread that knows one answer.
 
 use std::io::{Read as _, Write as _};

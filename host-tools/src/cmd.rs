@@ -23,6 +23,7 @@ mod study;
 mod table;
 mod table_file;
 mod textures;
+mod unpack;
 mod verbose;
 mod verify;
 
@@ -73,6 +74,7 @@ enum Command {
     Import(import::Args),
     Convert(convert::Args),
     Config(config::Args),
+    Unpack(unpack::Args),
 }
 
 /// What to try first, and what scripts need to know.
@@ -124,6 +126,7 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         Some(Command::Import(args)) => import::run(&args, out)?,
         Some(Command::Convert(args)) => convert::run(&args, out)?,
         Some(Command::Config(args)) => config::run(&args, out)?,
+        Some(Command::Unpack(args)) => unpack::run(&args, out)?,
     }
     out.flush()?;
     Ok(done)

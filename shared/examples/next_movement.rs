@@ -4,13 +4,11 @@
 
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::PropertySet;
-use tactus_core::table::Table;
-
-/// The table that comes with the rig's firmware: 117 simulated textures at three movements.
-const FACTORY: &[u8] = include_bytes!("../../firmware/factory.tact");
+use tactus_core::table::{Table, factory};
 
 pub(crate) fn main() {
-    let table = Table::read(FACTORY).expect("the factory's table is whole");
+    // 117 simulated textures at three movements
+    let table = Table::read(factory::RIG).expect("the factory's table is whole");
     let config = Config {
         method: Method::of(table.contents()),
         ..Config::default()

@@ -60,6 +60,7 @@
 
 mod drift;
 mod encode;
+pub mod factory;
 mod finger;
 mod format;
 mod gaussian;

@@ -9,10 +9,10 @@ import json, sys
 import numpy, tactus
 with tactus.Probe(sys.argv[1], log=sys.argv[2]) as probe:
     assert probe.status()['phase'] == 'Ready', probe.status()
-    table = probe.table()
-    assert len(table) == 3 == probe.status()['textures']
     events = [report['event'] for report in probe.identify(seed=7)]
     verdict = next(event['Verdict'] for event in events if 'Verdict' in event)
+    table = probe.table()
+    assert len(table) == 3 == probe.status()['textures']
     slides = probe.record('unknown', slides=2, seed=3)
     assert len(slides) == 2 and slides[0].texture == 'unknown', slides
     for slide in slides:

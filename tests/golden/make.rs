@@ -388,8 +388,8 @@ fn tables(out: &Path, world: &Collection, calibration: RigCalibration) {
         let bytes = learn(method, features, &world.names(), &movements, &slides).unwrap();
         table(out, name, &bytes);
     }
-    table(out, "factory", &fs::read("firmware/factory.tact").unwrap());
-    table(out, "handheld", &fs::read("firmware/handheld.tact").unwrap());
+    table(out, "factory", &fs::read("shared/tables/factory.tact").unwrap());
+    table(out, "handheld", &fs::read("shared/tables/handheld.tact").unwrap());
 }
 
 fn table(out: &Path, name: &str, bytes: &[u8]) {

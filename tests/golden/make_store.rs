@@ -58,7 +58,7 @@ fn life(
     flash: RamFlash,
     commands: &[Command],
 ) -> RamFlash {
-    let factory = fs::read("firmware/factory.tact").unwrap();
+    let factory = fs::read("shared/tables/factory.tact").unwrap();
     let (mut buffer, plan, host) = (vec![0; SECTOR], Plan::new(), RefCell::new(Said));
     let mut rig = SimRig::new(world.setup(texture, trial));
     rig.control().calibrate(calibration).unwrap();

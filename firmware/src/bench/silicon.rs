@@ -20,7 +20,7 @@ use tactus_core::dsp::{Plain, Plan};
 use tactus_core::explorer::{Kernels, Method};
 use tactus_core::features::{Movement, Observation, Properties, Property, PropertySet};
 use tactus_core::sensor::pressure::{RATE_HZ, SLOTS_HZ};
-use tactus_core::table::{Action, Experience, Table, Texture, encode};
+use tactus_core::table::{Action, Experience, Table, Texture, encode, factory};
 
 use super::Cycles;
 use super::workload::{Counter, ObservedSlide, Workload, run};
@@ -31,7 +31,7 @@ use crate::chip::current::{CONVERSIONS, Current};
 const CORE_HZ: u32 = 168_000_000;
 
 /// The table of features, as it comes with the rig.
-static FUSED: &[u8] = include_bytes!("../../factory.tact");
+static FUSED: &[u8] = factory::RIG;
 /// Textures of a table of Gaussians, which the chip makes itself.
 const NAMES: [&str; 24] = [
     "a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l", "m", "n", "o", "p", "q", "r", "s",

@@ -21,7 +21,7 @@ use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::PressureSensor as _;
 use tactus_core::sensor::paa5100je::{MotionFault, Paa5100je};
-use tactus_core::table::PACED;
+use tactus_core::table::{PACED, factory};
 use tactus_core::wire::{Event, PROTOCOL, Reset, Text};
 
 use super::display;
@@ -36,13 +36,7 @@ use crate::chip::watchdog;
 
 /// The table that comes with the handheld: textures of a simulated world under a simulated hand. Its
 /// whitening says how slides of one texture by hand differ; the user trains a real probe.
-static FACTORY: &[u8] = if cfg!(feature = "finger-analog") {
-    include_bytes!("../../handheld-analog.tact")
-} else if cfg!(feature = "finger-mems") {
-    include_bytes!("../../handheld-mems.tact")
-} else {
-    include_bytes!("../../handheld.tact")
-};
+static FACTORY: &[u8] = factory::handheld(Finger::MODEL.name);
 /// Ticks from one word in the log about sleep to the next.
 const SAY: u32 = 5 * TICKS_HZ;
 /// `hand` gets on at least this often, ms. The longest that it does is to turn a page of settings, to erase the largest sector,

@@ -9,26 +9,24 @@ use tactus_core::dsp::Plan;
 use tactus_core::probe::seams::{Events, RigHandle as _};
 use tactus_core::probe::servo_rig::{Samples, Servo as _, ServoRig};
 use tactus_core::probe::{self, Memory, Probe, TableInUse};
+use tactus_core::sensor::PressureSensor as _;
+use tactus_core::table::factory;
 use tactus_core::wire::{Event, Failure};
 
 use super::drive;
 use super::link::{BUSY, JOBS, TABLE};
 use super::outbox::tell;
 use super::rig_handle::ServoHandle;
-use crate::board;
+use crate::board::{self, Finger};
 use crate::chip::Chip;
 use crate::chip::flash::{self, MappedTable};
 
 /// The table that comes with the firmware: textures of a simulated world, which suit the emulated board. A real rig
 /// is trained by its user, or receives a table from the host.
 static FACTORY: &[u8] = if cfg!(feature = "arm") {
-    include_bytes!("../../arm.tact")
-} else if cfg!(feature = "finger-analog") {
-    include_bytes!("../../factory-analog.tact")
-} else if cfg!(feature = "finger-mems") {
-    include_bytes!("../../factory-mems.tact")
+    factory::ARM
 } else {
-    include_bytes!("../../factory.tact")
+    factory::rig(Finger::MODEL.name)
 };
 /// The sensor's first words are there by now.
 const HEARD_MS: u64 = 150;

@@ -4,42 +4,72 @@ import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 
-/// Starts a browser; `close` ends it.
+/// A browser that says nothing for so long does not work any more.
+const ANSWER_S = 60;
+
+/// The promise's result, or after so many seconds an error with this sentence.
+export function within(seconds, sentence, promise) {
+  let timer;
+  const late = new Promise((_, failed) => { timer = setTimeout(() => failed(new Error(sentence)), 1000 * seconds); });
+  return Promise.race([promise, late]).finally(() => clearTimeout(timer));
+}
+
+/// Starts a browser; `kill` ends it, whatever it is doing.
 export async function launch(program) {
   const profile = mkdtempSync(join(tmpdir(), "tactus-page-"));
   const options = ["--headless=new", "--remote-debugging-pipe", `--user-data-dir=${profile}`, "--no-first-run", "--disable-gpu",
     "--disable-background-networking", "--disable-component-update", "--mute-audio", "--force-device-scale-factor=1", "about:blank"];
-  // in a container root has no sandbox
-  if (process.getuid?.() === 0) options.unshift("--no-sandbox");
-  const child = spawn(program, options, { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] });
+  // in a container root has no sandbox, and shared memory is often small
+  if (process.getuid?.() === 0) options.unshift("--no-sandbox", "--disable-dev-shm-usage");
+  // a group of its own, so that its helpers end with it
+  const child = spawn(program, options, { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"], detached: true });
   const waiting = new Map(), listeners = [];
-  let next = 1, rest = "";
+  let next = 1, rest = "", over = null;
+  const ended = why => {
+    over ??= why;
+    for (const { failed } of waiting.values()) failed(new Error(over));
+    waiting.clear();
+  };
+  child.on("error", why => ended(`${program} does not start: ${why.message}`));
+  child.on("exit", (code, signal) => ended(`the browser has ended (${signal ?? `code ${code}`})`));
+  // a pipe that breaks is told by the exit
+  for (const pipe of [child.stdio[3], child.stdio[4]]) pipe.on("error", () => {});
   child.stdio[4].setEncoding("utf8").on("data", text => {
     rest += text;
     for (let end; (end = rest.indexOf("\0")) >= 0;) {
       const message = JSON.parse(rest.slice(0, end));
       rest = rest.slice(end + 1);
       if (message.id) {
-        const { done, failed } = waiting.get(message.id);
+        const asked = waiting.get(message.id);
         waiting.delete(message.id);
-        if (message.error) failed(new Error(message.error.message)); else done(message.result);
+        if (message.error) asked?.failed(new Error(message.error.message)); else asked?.done(message.result);
       } else {
         for (const listener of listeners) listener(message);
       }
     }
   });
-  child.on("exit", () => { for (const { failed } of waiting.values()) failed(new Error("the browser has ended")); });
-  const send = (method, params = {}, sessionId) => new Promise((done, failed) => {
-    waiting.set(next, { done, failed });
-    child.stdio[3].write(`${JSON.stringify({ id: next++, method, params, sessionId })}\0`);
-  });
-  const close = async () => {
-    const ended = new Promise(done => child.once("exit", done));
-    child.kill();
-    await ended;
-    rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
+  const send = (method, params = {}, sessionId) => {
+    if (over) return Promise.reject(new Error(over));
+    const id = next++;
+    const answer = new Promise((done, failed) => {
+      waiting.set(id, { done, failed });
+      child.stdio[3].write(`${JSON.stringify({ id, method, params, sessionId })}\0`);
+    });
+    return within(ANSWER_S, `the browser did not answer ${method} in ${ANSWER_S} s`, answer).finally(() => waiting.delete(id));
   };
-  return { send, close, on: listener => listeners.push(listener) };
+  const kill = async () => {
+    // its own helpers may outlive it by a moment, and write to the profile
+    if (child.pid) try { process.kill(-child.pid, "SIGKILL"); } catch (why) { if (why.code !== "ESRCH") throw why; }
+    for (let n = 0; n < 100 && !over; n++) await new Promise(done => setTimeout(done, 50));
+    try { rmSync(profile, { recursive: true, force: true, maxRetries: 5, retryDelay: 100 }); } catch (why) { console.error(`${profile} stays: ${why.message}`); }
+  };
+  try {
+    await send("Browser.getVersion");
+  } catch (why) {
+    await kill();
+    throw why;
+  }
+  return { pid: child.pid, send, kill, on: listener => listeners.push(listener) };
 }
 
 /// A tab that collects what is wrong: errors of scripts, of the console, of the content-security policy, and whatever it loads.
@@ -50,6 +80,7 @@ export async function tab(browser, { width, height, touch = false, scheme = "lig
   const errors = [], loaded = [];
   browser.on(({ method, params, sessionId: of }) => {
     if (of !== sessionId) return;
+    if (method === "Inspector.targetCrashed") errors.push("the page's process has crashed");
     if (method === "Runtime.exceptionThrown") errors.push(params.exceptionDetails.exception?.description ?? params.exceptionDetails.text);
     if (method === "Runtime.consoleAPICalled" && ["error", "warning"].includes(params.type)) errors.push(params.args.map(a => a.value ?? a.description).join(" "));
     if (method === "Log.entryAdded" && params.entry.level !== "info" && params.entry.level !== "verbose") errors.push(params.entry.text);

@@ -3,7 +3,8 @@ import assert from "node:assert/strict";
 import { readFileSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { pathToFileURL } from "node:url";
-import { launch, tab } from "./browser.mjs";
+import { Worker } from "node:worker_threads";
+import { launch, tab, within } from "./browser.mjs";
 
 const [page, wasm, replies, chromium] = process.argv.slice(2);
 const url = hash => `${pathToFileURL(page)}${hash}`;
@@ -12,6 +13,8 @@ const tests = [];
 const test = (name, run) => tests.push({ name, run });
 const WIDTHS = [360, 390, 768, 1280, 2560];
 const NOW = "tactus.now()";
+// all of it, and one test: what takes longer hangs
+const ALL_S = Number(process.env.TACTUS_PAGE_LIMIT_S ?? 360), TEST_S = 150;
 
 function module() {
   const instance = new WebAssembly.Instance(new WebAssembly.Module(readFileSync(wasm)), {});
@@ -52,7 +55,11 @@ test("memory stays flat over 200 explorations", async () => {
   const sizes = [];
   for (let n = 1; n <= 200; n++) {
     ask(`{"do":"identify","texture":${n % 117 + 1},"seed":${n},"threshold":0.99,"false_alarm":0.02,"max_slides":3}`);
-    for (let frame = '"busy":true'; frame.includes('"busy":true');) frame = ask('{"do":"step","ms":200}');
+    let frames = 0;
+    for (let frame = '"busy":true'; frame.includes('"busy":true');) {
+      frame = ask('{"do":"step","ms":200}');
+      assert.ok(++frames < 3000, `exploration ${n} is not over after 10 minutes of rig time`);
+    }
     sizes.push(memory.buffer.byteLength);
   }
   const [early, late] = [sizes[19], sizes[199]];
@@ -253,22 +260,52 @@ test("no clipped text, and contrast AA, at every width in light and dark", async
   }
 });
 
-let failed = 0;
+/// Ends everything when the time is up, also while this thread computes without end.
+function watch() {
+  const guard = new Worker(`
+    const { parentPort, workerData } = require("node:worker_threads");
+    const { writeSync } = require("node:fs");
+    let name = "the start of the browser", browser = null;
+    parentPort.on("message", now => { name = now.name ?? name; browser = now.browser ?? browser; });
+    setTimeout(() => {
+      writeSync(1, "FAILED " + name + "\\nnot over: all tests together have " + workerData + " s, and are ended now\\n");
+      if (browser) try { process.kill(-browser, "SIGKILL"); } catch {}
+      process.kill(process.pid, "SIGKILL");
+    }, 1000 * workerData);
+  `, { eval: true, workerData: ALL_S });
+  guard.unref();
+  return guard;
+}
+
+let passed = 0, failed = 0;
 const began = Date.now();
-browser = await launch(chromium);
+const guard = watch();
+const start = async () => {
+  browser = await launch(chromium);
+  guard.postMessage({ browser: browser.pid });
+};
 try {
+  await start();
   for (const { name, run } of tests) {
-    const start = Date.now();
+    guard.postMessage({ name });
+    const from = Date.now();
     try {
-      const said = await run();
-      console.log(`ok     ${name} (${((Date.now() - start) / 1000).toFixed(1)} s)${said ? `: ${said}` : ""}`);
+      const said = await within(TEST_S, `not over in ${TEST_S} s`, run());
+      passed += 1;
+      console.log(`ok     ${name} (${((Date.now() - from) / 1000).toFixed(1)} s)${said ? `: ${said}` : ""}`);
     } catch (why) {
       failed += 1;
       console.log(`FAILED ${name}\n${why.stack ?? why}`);
+      // the next test gets a browser that nothing hangs in
+      await browser.kill();
+      await start();
     }
   }
+} catch (why) {
+  failed += 1;
+  console.log(`FAILED the browser\n${why.stack ?? why}`);
 } finally {
-  await browser.close();
+  await browser?.kill();
 }
-console.log(`${tests.length - failed} of ${tests.length} passed in ${((Date.now() - began) / 1000).toFixed(0)} s`);
+console.log(`${passed} of ${tests.length} passed in ${((Date.now() - began) / 1000).toFixed(0)} s`);
 process.exit(failed ? 1 : 0);

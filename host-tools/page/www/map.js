@@ -2,7 +2,7 @@
 // The textures in a plane, and where slides land among them.
 const Places = (() => {
   const WIDE = 500, HIGH = 400, EDGE = 34;
-  let svg, known, movement = 0, dots = [], labels = [], landed = [], scale;
+  let svg, known, movement = 0, dots = [], labels = [], widths = [], landed = [], scale;
 
   function build(element) {
     svg = element;
@@ -23,6 +23,7 @@ const Places = (() => {
     known = now;
     movement = Math.min(movement, known.maps.length - 1);
     landed = [];
+    widths = [];
     svg.replaceChildren();
     fit();
     const radius = known.textures.length > 60 ? 3 : 4.5;
@@ -39,7 +40,6 @@ const Places = (() => {
     known.maps[movement].forEach((place, n) => {
       const [x, y] = scale(place);
       dots[n].style.transform = `translate(${x}px, ${y}px)`;
-      labels[n].setAttribute("x", x); labels[n].setAttribute("y", y - 9);
     });
     for (const one of landed) one.ring.setAttribute("visibility", one.movement === movement ? "visible" : "hidden");
     tidy();
@@ -55,21 +55,42 @@ const Places = (() => {
     tidy();
   }
 
-  // Names of what is likely; where they would lie over each other, the likelier one's.
+  // Where a name can stand about its dot: above, below, beside it, at its corners.
+  const SPOTS = [[0, -1], [0, 1], [1, 0], [-1, 0], [1, -1], [-1, -1], [1, 1], [-1, 1]];
+  const ABOVE = 9, BELOW = 19, BESIDE = 9, UP = 13, DOWN = 5, GAP = 2, EDGES = 3;
+  const lies = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+
+  function boxAt([x, y], [right, down], width) {
+    const half = width / 2;
+    const middle = right === 0 ? Math.min(WIDE - half - EDGES, Math.max(half + EDGES, x)) : x + right * (BESIDE + half);
+    const line = down < 0 ? y - ABOVE : down > 0 ? y + BELOW : y + DOWN;
+    return { middle, line, left: middle - half - GAP, right: middle + half + GAP, top: line - UP - GAP, bottom: line + DOWN };
+  }
+
+  // Names of what is likely, each at the first free spot about its dot; one that has none is left out.
   function tidy() {
     const order = dots.map((_, n) => n).sort((a, b) => (posterior[b] ?? 0) - (posterior[a] ?? 0));
     const few = dots.length <= 24, taken = [];
+    const places = known.maps[movement].map(scale);
     order.forEach((n, rank) => {
       const p = posterior[n] ?? 0;
       dots[n].setAttribute("class", `dot${p > 0.01 ? rank === 0 ? " likely best" : " likely" : ""}`);
-      const place = scale(known.maps[movement][n]);
-      const half = known.textures[n].length * 4.2;
-      const x = Math.min(WIDE - half - 4, Math.max(half + 4, place[0])), y = Math.max(16, place[1] - 9);
-      const free = !taken.some(other => Math.abs(other.x - x) < other.half + half + 4 && Math.abs(other.y - y) < 17);
-      const shown = free && (p > 0.01 || few);
-      labels[n].setAttribute("visibility", shown ? "visible" : "hidden");
-      labels[n].setAttribute("x", x); labels[n].setAttribute("y", y);
-      if (shown) taken.push({ x, y, half });
+      let best = null;
+      if (p > 0.01 || few) {
+        const width = widths[n] ||= labels[n].getComputedTextLength();
+        for (const spot of SPOTS) {
+          const box = boxAt(places[n], spot, width);
+          if (box.left < 0 || box.right > WIDE || box.top < 0 || box.bottom > HIGH || taken.some(other => lies(other, box))) continue;
+          // a name had better not stand on another one's dot
+          const covered = places.filter(([x, y], other) => other !== n && x > box.left && x < box.right && y > box.top && y < box.bottom).length;
+          if (best === null || covered < best.covered) best = { ...box, covered };
+          if (covered === 0) break;
+        }
+      }
+      labels[n].setAttribute("visibility", best ? "visible" : "hidden");
+      if (!best) return;
+      labels[n].setAttribute("x", best.middle); labels[n].setAttribute("y", best.line);
+      taken.push(best);
     });
   }
 

@@ -328,7 +328,8 @@ impl Probe {
     /// and `close()` stop the rig and lift the finger.
     ///
     /// among: names of the textures that it may be. Other arguments as of `Explorer`. learn: whether the probe learns from a verdict
-    /// that is certain. seed: where slides begin, and random choices; drawn anew, unless given.
+    /// that is certain. seed: where slides begin, and random choices; drawn anew, unless given. Into a log go the table first and raw
+    /// samples, too: with them `tactus device log replay` computes every decision again.
     ///
     /// Raises ProbeError where the probe refuses or is gone, KeyError for a texture that it does not know.
     #[pyo3(signature = (*, among=None, method=None, threshold=0.99, max_slides=10, open=true, learn=false, false_alarm=None, seed=None))]
@@ -360,8 +361,14 @@ impl Probe {
             wanted.method = Some(method.method());
             wanted.strategy = method.strategy();
         }
-        if let Some(names) = among {
-            let table = slf.get().table(slf.py())?;
+        let (probe, py) = (slf.get(), slf.py());
+        let logs = probe.with(py, |inner| Ok(inner.log.is_some()))?;
+        let table = (logs || among.is_some()).then(|| probe.table(py));
+        let table = table.transpose()?;
+        if logs {
+            probe.stream(py, true)?;
+        }
+        if let (Some(names), Some(table)) = (among, &table) {
             let table = Read::read(&table.bytes).map_err(|why| why.raise())?;
             for name in names {
                 let texture = table.find(&name);

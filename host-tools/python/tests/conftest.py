@@ -38,7 +38,7 @@ def data(name):
 @pytest.fixture(scope="session")
 def small():
     """Six simulated textures, which the repository has."""
-    return tactus.Recordings(ROOT / "tests/recordings/simulated")
+    return tactus.Recordings(ROOT / "host-tools/recordings/simulated")
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ import pytest
 from conftest import ROOT, lacking
 
 EXAMPLES = ROOT / "host-tools/python/examples"
-SMALL = ROOT / "tests/recordings/simulated"
+SMALL = ROOT / "host-tools/recordings/simulated"
 
 
 def example(name, *arguments, folder):

@@ -42,7 +42,7 @@ pub(crate) const FIRST_STEPS: &str = "\
 Try first:
   tactus                                           a simulated probe recognises an unknown texture
   tactus identify --simulated --texture burlap     another one
-With a folder of recordings, such as tests/recordings/simulated (there with --train-slides 2):
+With a folder of recordings, such as `tactus unpack` writes (there with --train-slides 2):
   tactus identify --recordings DIR --material 91   a recorded texture is recognised from its slides
   tactus features --recordings DIR                 what every slide measures
   tactus evaluate --recordings DIR                 how often the answers are right, and how sure

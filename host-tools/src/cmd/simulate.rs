@@ -1,7 +1,7 @@
 //! `tactus simulate`: recordings of the simulated rig.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use tactus::data::recording::Recording;
@@ -51,13 +51,16 @@ struct Simulated {
     seed: u64,
 }
 
-/// Records the textures asked for.
-pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let collection = collection(&args.textures, args.trials, args.seed)?;
+/// Records a collection into a folder, or what an interrupted command has not come to. Gives the number of slides that are there then.
+pub(crate) fn record(
+    collection: &Collection,
+    folder: &Path,
+    finger: FingerName,
+) -> anyhow::Result<usize> {
     let textures = collection.textures.len();
-    let mut writer = collection.writer(&args.out, args.finger)?;
-    let calibration = calibrated(collection.setup_with(args.finger, collection.textures[0], 0))?;
-    let each = Collection::MOVEMENTS.len() * args.trials as usize;
+    let mut writer = collection.writer(folder, finger)?;
+    let calibration = calibrated(collection.setup_with(finger, collection.textures[0], 0))?;
+    let each = Collection::MOVEMENTS.len() * collection.trials as usize;
     // those that an interrupted command has not come to
     let todo: Vec<(usize, u8)> = (0..)
         .zip(collection.textures.iter().copied())
@@ -71,7 +74,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             textures: some.iter().map(|(_, number)| *number).collect(),
             ..collection.clone()
         };
-        let recorded = part.record_with(args.finger, calibration, || bar.inc(1))?;
+        let recorded = part.record_with(finger, calibration, || bar.inc(1))?;
         for (slides, &(texture, _)) in recorded.into_iter().zip(some) {
             for slide in slides {
                 if !writer.has(texture, slide.number) {
@@ -81,8 +84,15 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         }
     }
     bar.finish_and_clear();
-    let slides = textures * each;
     writer.finish()?;
+    Ok(textures * each)
+}
+
+/// Records the textures asked for.
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    let collection = collection(&args.textures, args.trials, args.seed)?;
+    let textures = collection.textures.len();
+    let slides = record(&collection, &args.out, args.finger)?;
     if args.format == Format::Json {
         let simulated = Simulated {
             folder: args.out.display().to_string(),

@@ -227,7 +227,7 @@ mod tests {
 
     #[test]
     fn no_slide_is_replayed_twice() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
         let set = RecordingSet::open(folder.as_ref()).unwrap();
         let slides = set.load_texture(0).unwrap();
         let movement = slides[0].movement;

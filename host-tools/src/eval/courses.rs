@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn a_run_at_a_threshold_is_the_beginning_of_its_course() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
         let set = RecordingSet::open(folder.as_ref()).unwrap();
         let names = set.textures().iter().map(|t| t.name.clone()).collect();
         let measured = measure_all(&set, |_| ()).unwrap();

@@ -329,7 +329,7 @@ mod tests {
 
     #[test]
     fn looking_changes_no_exploration() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
         let set = RecordingSet::open(folder.as_ref()).unwrap();
         let names: Vec<String> = set.textures().iter().map(|t| t.name.clone()).collect();
         let lengths_ms = [500, 700, 60_000];

@@ -351,7 +351,7 @@ mod tests {
 
     /// The repository's recordings.
     fn recorded() -> Experiment {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
         let set = RecordingSet::open(folder.as_ref()).unwrap();
         let names = set.textures().iter().map(|t| t.name.clone()).collect();
         let measured = measure_all(&set, |_| ()).unwrap();
@@ -390,7 +390,7 @@ mod tests {
 
     #[test]
     fn a_reference_that_is_put_into_a_table_is_verified_as_if_it_had_been_learned() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
         let set = RecordingSet::open(folder.as_ref()).unwrap();
         let measured = measure_all(&set, |_| ()).unwrap();
         let experiment = recorded();

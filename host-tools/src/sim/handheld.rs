@@ -263,7 +263,7 @@ mod tests {
     use super::*;
     use crate::sim::collection::texture_number;
     use tactus_core::handheld::{ASK_AFTER, MAX_SLIDES, judge_at_most};
-    use tactus_core::table::Table;
+    use tactus_core::table::{Table, factory};
 
     fn world(among: u8) -> Collection {
         Collection {
@@ -441,14 +441,7 @@ mod tests {
         finger: FingerName,
         trials: std::ops::Range<u64>,
     ) -> (usize, Vec<[usize; 3]>) {
-        let file = match finger {
-            FingerName::Biotac => "handheld.tact",
-            FingerName::Analog => "handheld-analog.tact",
-            FingerName::Mems => "handheld-mems.tact",
-        };
-        let firmware = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware");
-        let table = std::fs::read(firmware.join(file)).unwrap();
-        let table = Table::read(&table).unwrap();
+        let table = Table::read(factory::handheld(finger)).unwrap();
         let world = world(117);
         let touches: Vec<_> = (1..=117)
             .filter_map(|texture| Some((texture, table.find(texture_name(texture))?)))

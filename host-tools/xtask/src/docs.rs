@@ -44,7 +44,7 @@ pub(crate) fn docs(options: &Options) -> Result<()> {
         test.args([
             "test",
             "--package",
-            "tactus",
+            "tactus-probe",
             "--lib",
             "come_out_of_all_fingers",
         ]);
@@ -57,7 +57,7 @@ pub(crate) fn docs(options: &Options) -> Result<()> {
         let begin = usize::from(!options.write);
         for (name, filter) in &all[begin..] {
             let mut test = cargo();
-            test.args(["test", "--package", "tactus", "--test", name, filter]);
+            test.args(["test", "--package", "tactus-probe", "--test", name, filter]);
             if options.write {
                 // one after the other: two of them may write one page
                 test.env("TACTUS_BOOK", "write")

@@ -77,6 +77,16 @@ pub(crate) fn start(run: &str, options: &[OsString]) -> Result<()> {
     shell::run(emulator.args(options))
 }
 
+/// What of a release is to be built twice: all where `--builds` stands alone, and nothing without it.
+pub(crate) fn builds(options: &[OsString]) -> Option<Vec<String>> {
+    options.iter().find(|o| {
+        let option = o.to_string_lossy();
+        option == "--builds" || option.starts_with("--builds=")
+    })?;
+    let only = value(options, "--builds").unwrap_or_default();
+    Some(only.split_terminator(',').map(str::to_owned).collect())
+}
+
 /// The campaign on emulated boards, or of faults where so many of them are asked for.
 pub(crate) fn campaign(options: &[OsString]) -> Result<()> {
     let given = |name: &str| {

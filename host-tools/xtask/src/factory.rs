@@ -12,6 +12,8 @@ const TRIALS: &str = "5";
 /// Slides of each texture that the handheld's table is learned from: a hand scatters more than a rig.
 const SLIDES_BY_HAND: &str = "15";
 
+/// Where they are kept: in the core, which has them as constants.
+pub(crate) const FOLDER: &str = "shared/tables";
 /// The rig's table and the handheld's of each finger, with the finger's name; then that of a probe on an arm, for the only finger that
 /// has an image for it.
 pub(crate) const TABLES: [(&str, &[&str]); 3] = [
@@ -34,16 +36,16 @@ pub(crate) fn factory(check: bool) -> Result<()> {
 
 fn take(names: &[&str], made: Vec<Vec<u8>>, check: bool) -> Result<()> {
     for (name, made) in names.iter().zip(made) {
-        let file = root().join("firmware").join(name);
+        let file = root().join(FOLDER).join(name);
         if check {
             let committed =
                 std::fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
             same(name, &committed, &made)?;
-            println!("firmware/{name} is what world {SEED} gives");
+            println!("{FOLDER}/{name} is what world {SEED} gives");
         } else {
             std::fs::write(&file, &made)
                 .with_context(|| format!("cannot write {}", file.display()))?;
-            println!("firmware/{name} is written");
+            println!("{FOLDER}/{name} is written");
         }
         println!("bytes    {}\nSHA-256  {}", made.len(), hash(&made));
     }
@@ -56,7 +58,14 @@ fn make(work: &Path, finger: &str, names: &[&str]) -> Result<Vec<Vec<u8>>> {
     let files: Vec<_> = names.iter().map(|name| work.join(name)).collect();
     let tactus = || {
         let mut cargo = cargo();
-        cargo.args(["run", "--quiet", "--release", "--package", "tactus", "--"]);
+        cargo.args([
+            "run",
+            "--quiet",
+            "--release",
+            "--package",
+            "tactus-probe",
+            "--",
+        ]);
         cargo
     };
     let mut simulate = tactus();
@@ -89,7 +98,7 @@ fn same(name: &str, committed: &[u8], made: &[u8]) -> Result<()> {
     let at = committed.iter().zip(made).position(|(a, b)| a != b);
     ensure!(
         at.is_none() && committed.len() == made.len(),
-        "firmware/{name} is not what world {SEED} gives: {} bytes there, {} made, first difference at byte {}.\n\
+        "{FOLDER}/{name} is not what world {SEED} gives: {} bytes there, {} made, first difference at byte {}.\n\
          If simulator, features or table were changed on purpose: cargo xtask factory, and commit the file",
         committed.len(),
         made.len(),

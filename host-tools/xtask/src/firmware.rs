@@ -55,7 +55,7 @@ const HANDHELD_FLAGS: [&str; 5] = [
     "-Cllvm-args=-enable-shrink-wrap=false",
 ];
 /// The images that are flashed, and gated. The bench image is for the emulated board only.
-const FLASHED: [&str; 10] = [
+pub(crate) const FLASHED: [&str; 10] = [
     "tactus-rig",
     "tactus-selftest",
     "tactus-silicon",

@@ -65,7 +65,14 @@ impl Options {
 /// `tactus device flash` does it: it stays attached for a report, and ends as the image ends; the rig is left alone.
 fn command(options: &Options, elf: &Path) -> Command {
     let mut tactus = cargo();
-    tactus.args(["run", "--quiet", "--release", "--package", "tactus", "--"]);
+    tactus.args([
+        "run",
+        "--quiet",
+        "--release",
+        "--package",
+        "tactus-probe",
+        "--",
+    ]);
     tactus.args(["device", "flash"]).arg(elf);
     for (flag, wanted) in [
         ("--attach", options.is_watched()),
@@ -99,7 +106,7 @@ mod tests {
             let words: Vec<_> = command.get_args().map(|w| w.to_string_lossy()).collect();
             words.join(" ")
         };
-        let run = "run --quiet --release --package tactus -- device flash t/elf";
+        let run = "run --quiet --release --package tactus-probe -- device flash t/elf";
         assert_eq!(line([false, false], &[]), run);
         assert_eq!(
             line([true, false], &["--probe", "0483:374b"]),

@@ -5,6 +5,7 @@ use std::process::{Command, Stdio};
 use anyhow::{Context as _, Result, bail};
 
 use crate::shell::{self, cargo, root, run, target};
+use crate::toolchain::rustflags;
 
 /// The package, from the top.
 const PACKAGE: &str = "host-tools/python";
@@ -34,7 +35,7 @@ pub(crate) fn check() -> Result<()> {
     println!("== pytest {PACKAGE}");
     let command = target().join("debug").join(program("tactus"));
     if !command.is_file() {
-        run(cargo().args(["build", "--package", "tactus", "--bin", "tactus"]))?;
+        run(cargo().args(["build", "--package", "tactus-probe", "--bin", "tactus"]))?;
     }
     let mut tests = Command::new(&python);
     tests.args(["-m", "pytest", "-rs"]);
@@ -49,6 +50,46 @@ pub(crate) fn check() -> Result<()> {
         .args(["--", "package::"])
         .env("TACTUS_PYTHON", python);
     run(&mut session)
+}
+
+/// An error where there is nothing here that builds the package.
+pub(crate) fn can_build() -> Result<()> {
+    let mut pip = Command::new("python3");
+    pip.args(["-m", "pip", "--version"]).stdout(Stdio::null());
+    let has_pip = pip.stderr(Stdio::null()).status();
+    if !fits(Path::new("python3")) || !has_pip.is_ok_and(|status| status.success()) {
+        bail!(
+            "no Python 3.9 or newer with venv and pip (apt-get install python3-venv python3-pip)"
+        );
+    }
+    Ok(())
+}
+
+/// Has pip build the package: the wheel. The same sources and the same maturin give the same bytes.
+pub(crate) fn wheel() -> Result<PathBuf> {
+    let out = target().join("wheels");
+    // an earlier version's would be found, too
+    let _ = std::fs::remove_dir_all(&out);
+    let mut pip = Command::new("python3");
+    pip.args([
+        "-m",
+        "pip",
+        "wheel",
+        "--quiet",
+        "--no-deps",
+        "--no-cache-dir",
+    ]);
+    pip.arg("--disable-pip-version-check");
+    pip.env("CARGO_ENCODED_RUSTFLAGS", rustflags(&[]));
+    pip.env("CARGO_TARGET_DIR", target().join("wheel"));
+    pip.env("MATURIN_PEP517_ARGS", "--locked");
+    // the time of the files in it: the oldest that a zip file can say
+    pip.env("SOURCE_DATE_EPOCH", "315532800");
+    run(pip.arg("--wheel-dir").arg(&out).arg(root().join(PACKAGE)))?;
+    let files = std::fs::read_dir(&out).with_context(|| out.display().to_string())?;
+    let mut files = files.filter_map(|file| Some(file.ok()?.path()));
+    let wheel = files.find(|file| file.extension() == Some("whl".as_ref()));
+    wheel.with_context(|| format!("pip has left no wheel in {}", out.display()))
 }
 
 /// The workspace of the package has settings of its own.

@@ -4,60 +4,149 @@ use std::collections::{BTreeMap, BTreeSet};
 use anyhow::{Context as _, Result, ensure};
 use serde_json::{Value, json};
 
-use crate::shell::cargo;
+use crate::shell::{cargo, root};
+use crate::toolchain::{self, BROWSER, CHIP};
 
-/// The chip for which the images are built.
-const CHIP: &str = "thumbv7em-none-eabihf";
-
-/// The bill of materials of the firmware's images.
-pub(crate) fn firmware() -> Result<Vec<u8>> {
-    let mut metadata = cargo();
-    metadata.args(["metadata", "--format-version", "1", "--locked"]);
-    metadata.args(["--filter-platform", CHIP]);
-    let out = metadata.output().context("cannot start cargo")?;
-    let said = String::from_utf8_lossy(&out.stderr);
-    ensure!(out.status.success(), "cargo metadata: {said}");
-    let bill = bill(&serde_json::from_slice(&out.stdout)?, "tactus-firmware")?;
-    let mut bytes = serde_json::to_vec_pretty(&bill)?;
-    bytes.push(b'\n');
-    Ok(bytes)
+/// What a release has beside other things, with its own bill of materials.
+#[derive(Clone, Copy)]
+pub(crate) struct Part {
+    name: &'static str,
+    /// Where its workspace is.
+    manifest: &'static str,
+    package: &'static str,
+    /// What it is, as CycloneDX says it.
+    kind: &'static str,
+    /// What it is built for; without one this machine.
+    triple: Option<&'static str>,
 }
 
-/// The packages that a package is linked with, itself first; what is only needed to build or to test is left out.
-fn bill(metadata: &Value, root: &str) -> Result<Value> {
-    let packages = metadata["packages"].as_array().context("no packages")?;
-    let by_id: BTreeMap<&str, &Value> = packages
-        .iter()
-        .filter_map(|package| Some((package["id"].as_str()?, package)))
-        .collect();
-    let nodes = metadata["resolve"]["nodes"].as_array();
-    let needs: BTreeMap<&str, Vec<&str>> = nodes
-        .context("no resolution")?
-        .iter()
-        .filter_map(|node| Some((node["id"].as_str()?, linked(node))))
-        .collect();
-    let root = packages.iter().find(|package| package["name"] == root);
-    let root = root.with_context(|| format!("no package {root:?}"))?;
-    let mut todo: Vec<&str> = root["id"].as_str().into_iter().collect();
-    let mut seen = BTreeSet::new();
-    while let Some(id) = todo.pop() {
-        if seen.insert(id) {
-            todo.extend(needs.get(id).into_iter().flatten());
-        }
+/// The images.
+pub(crate) const FIRMWARE: Part = Part {
+    name: "firmware",
+    manifest: "Cargo.toml",
+    package: "tactus-firmware",
+    kind: "firmware",
+    triple: Some(CHIP.triple),
+};
+/// The program `tactus`.
+pub(crate) const COMMAND: Part = Part {
+    name: "command",
+    manifest: "Cargo.toml",
+    package: "tactus-probe",
+    kind: "application",
+    triple: None,
+};
+/// The Python package.
+pub(crate) const WHEEL: Part = Part {
+    name: "wheel",
+    manifest: "host-tools/python/Cargo.toml",
+    package: "tactus-python",
+    kind: "library",
+    triple: None,
+};
+/// The page with the simulated probe.
+pub(crate) const PAGE: Part = Part {
+    name: "page",
+    manifest: "host-tools/page/Cargo.toml",
+    package: "tactus-page",
+    kind: "application",
+    triple: Some(BROWSER.triple),
+};
+
+impl Part {
+    /// The name of its bill: "sbom-firmware.cdx.json".
+    pub(crate) fn file(self) -> String {
+        format!("sbom-{}.cdx.json", self.name)
     }
-    let of = |id: &str| by_id.get(id).map(|package| reference(package));
+
+    /// What cargo resolves for it.
+    pub(crate) fn metadata(self) -> Result<Value> {
+        let mut metadata = cargo();
+        metadata.args(["metadata", "--format-version", "1", "--locked"]);
+        metadata
+            .arg("--manifest-path")
+            .arg(root().join(self.manifest));
+        let triple = match self.triple {
+            Some(triple) => triple.to_owned(),
+            None => toolchain::host()?,
+        };
+        metadata.args(["--filter-platform", &triple]);
+        let out = metadata.output().context("cannot start cargo")?;
+        let said = String::from_utf8_lossy(&out.stderr);
+        ensure!(out.status.success(), "cargo metadata: {said}");
+        Ok(serde_json::from_slice(&out.stdout)?)
+    }
+
+    /// Its bill of materials.
+    pub(crate) fn bill(self, metadata: &Value) -> Result<Vec<u8>> {
+        let bill = bill(&Linked::of(metadata, self.package)?, self.kind);
+        let mut bytes = serde_json::to_vec_pretty(&bill)?;
+        bytes.push(b'\n');
+        Ok(bytes)
+    }
+
+    /// The packages of others in it, by name and version.
+    pub(crate) fn packages(self, metadata: &Value) -> Result<BTreeMap<String, Value>> {
+        let linked = Linked::of(metadata, self.package)?;
+        let others = linked
+            .packages
+            .values()
+            .filter(|of| !of["source"].is_null());
+        Ok(others.map(|of| (reference(of), (*of).clone())).collect())
+    }
+}
+
+/// A package and all that it is linked with; what is only needed to build or to test is left out.
+struct Linked<'m> {
+    root: &'m Value,
+    /// By their identifiers.
+    packages: BTreeMap<&'m str, &'m Value>,
+    /// What each is linked with directly.
+    needs: BTreeMap<&'m str, Vec<&'m str>>,
+}
+
+impl<'m> Linked<'m> {
+    fn of(metadata: &'m Value, root: &str) -> Result<Self> {
+        let packages = metadata["packages"].as_array().context("no packages")?;
+        let mut by_id: BTreeMap<&str, &Value> = packages
+            .iter()
+            .filter_map(|package| Some((package["id"].as_str()?, package)))
+            .collect();
+        let nodes = metadata["resolve"]["nodes"].as_array();
+        let mut needs: BTreeMap<&str, Vec<&str>> = nodes
+            .context("no resolution")?
+            .iter()
+            .filter_map(|node| Some((node["id"].as_str()?, linked(node))))
+            .collect();
+        let root = packages.iter().find(|package| package["name"] == root);
+        let root = root.with_context(|| format!("no package {root:?}"))?;
+        let mut todo: Vec<&str> = root["id"].as_str().into_iter().collect();
+        let mut seen = BTreeSet::new();
+        while let Some(id) = todo.pop() {
+            if seen.insert(id) {
+                todo.extend(needs.get(id).into_iter().flatten());
+            }
+        }
+        by_id.retain(|id, _| seen.contains(id));
+        needs.retain(|id, _| seen.contains(id));
+        Ok(Self {
+            root,
+            packages: by_id,
+            needs,
+        })
+    }
+}
+
+/// The bill of a package, a component of this kind.
+fn bill(linked: &Linked<'_>, kind: &str) -> Value {
+    let of = |id: &&str| linked.packages.get(id).map(|package| reference(package));
     let mut components = Vec::new();
     let mut dependencies = Vec::new();
-    for id in &seen {
-        let package = by_id.get(id).with_context(|| (*id).to_owned())?;
-        let of_it: BTreeSet<String> = needs
-            .get(id)
-            .into_iter()
-            .flatten()
-            .filter_map(|n| of(n))
-            .collect();
-        dependencies.push(json!({"ref": reference(package), "dependsOn": of_it}));
-        if package["id"] != root["id"] {
+    for (id, package) in &linked.packages {
+        let needs = linked.needs.get(id).into_iter().flatten();
+        let needs: BTreeSet<String> = needs.filter_map(of).collect();
+        dependencies.push(json!({"ref": reference(package), "dependsOn": needs}));
+        if package["id"] != linked.root["id"] {
             components.push(component(package, "library"));
         }
     }
@@ -69,15 +158,15 @@ fn bill(metadata: &Value, root: &str) -> Result<Value> {
     };
     components.sort_by_key(by_name);
     dependencies.sort_by_key(by_name);
-    Ok(json!({
+    json!({
         "$schema": "http://cyclonedx.org/schema/bom-1.5.schema.json",
         "bomFormat": "CycloneDX",
         "specVersion": "1.5",
         "version": 1,
-        "metadata": {"component": component(root, "firmware")},
+        "metadata": {"component": component(linked.root, kind)},
         "components": components,
         "dependencies": dependencies,
-    }))
+    })
 }
 
 /// The packages that a node is linked with.
@@ -137,7 +226,7 @@ mod tests {
                 {"id": "other", "deps": []},
             ]},
         });
-        let bill = bill(&metadata, "image").unwrap();
+        let bill = bill(&Linked::of(&metadata, "image").unwrap(), "firmware");
         let names = bill["components"].as_array().unwrap().iter();
         let names: Vec<&str> = names.map(|one| one["name"].as_str().unwrap()).collect();
         assert_eq!(names, ["below", "linked"]);
@@ -149,6 +238,6 @@ mod tests {
         let image = &bill["dependencies"][1];
         assert_eq!(image["ref"], "pkg:cargo/image@1.0.0");
         assert_eq!(image["dependsOn"], json!(["pkg:cargo/linked@1.0.0"]));
-        assert!(super::bill(&metadata, "nobody").is_err());
+        assert!(Linked::of(&metadata, "nobody").is_err());
     }
 }

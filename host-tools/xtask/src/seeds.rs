@@ -414,7 +414,7 @@ fn build(what: What, finger: &str) -> Result<Program> {
             arguments: Vec::new(),
         });
     }
-    shell::run(cargo().args(["build", "--release", "--package", "tactus"]))?;
+    shell::run(cargo().args(["build", "--release", "--package", "tactus-probe"]))?;
     let path = target().join("release/tactus");
     if !path.is_file() {
         bail!("{} was built and is not there", path.display());

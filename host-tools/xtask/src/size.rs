@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use panics::{Panics, Symbol, panics, symbols};
 
 use crate::emulate::{self, ARM, MOTION};
+use crate::factory::FOLDER;
 use crate::firmware::{self, Size};
 use crate::reasons;
 use crate::shell::{root, run};
@@ -132,9 +133,9 @@ fn table(image: &str) -> Result<u64> {
     bytes_of(&name)
 }
 
-/// Bytes of a table beside the firmware.
+/// Bytes of a factory table.
 fn bytes_of(name: &str) -> Result<u64> {
-    let file = root().join("firmware").join(name);
+    let file = root().join(FOLDER).join(name);
     let table = std::fs::metadata(&file).with_context(|| file.display().to_string())?;
     Ok(table.len())
 }

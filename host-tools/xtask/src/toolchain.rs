@@ -147,8 +147,25 @@ impl Toolchain {
     }
 }
 
+/// The triple of this machine.
+pub(crate) fn host() -> Result<String> {
+    let version = stdout("rustc", &["-vV"]).context("rustc does not run")?;
+    let line = version.lines().find_map(|line| line.strip_prefix("host: "));
+    Ok(line.context("rustc does not name its host")?.to_owned())
+}
+
+/// A `cargo build` for this machine into a folder, on the same terms as [`Toolchain::cargo_build`].
+pub(crate) fn host_build(folder: &Path) -> Command {
+    let mut cargo = cargo();
+    cargo
+        .env("CARGO_ENCODED_RUSTFLAGS", rustflags(&[]))
+        .args(["build", "--target-dir"])
+        .arg(folder);
+    cargo
+}
+
 /// What every such build gets, then these.
-fn rustflags(more: &[&str]) -> OsString {
+pub(crate) fn rustflags(more: &[&str]) -> OsString {
     let mut flags = OsString::from("-Dwarnings");
     for flag in more {
         flags.push("\x1f");

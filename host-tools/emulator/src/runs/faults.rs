@@ -15,6 +15,7 @@ use serde_json::{Value, json};
 use tactus::eval::show::count;
 use tactus::sim::fault_case::{Bench, Case};
 use tactus_core::rig::Fault as Named;
+use tactus_core::table::factory;
 
 use self::board::{BoardBench, BoardCase};
 use super::error::RunError;
@@ -22,7 +23,7 @@ use super::soak::day::DayError;
 use crate::host::progress;
 
 /// The table that comes with the firmware.
-const FACTORY: &[u8] = include_bytes!("../../../../firmware/factory.tact");
+const FACTORY: &[u8] = factory::RIG;
 
 /// Breaks one to three things at any moment of whatever the probe does, case by case: on the simulated rig of the PC, or with
 /// --board on emulated boards, whose link, supply and debugger break, too.

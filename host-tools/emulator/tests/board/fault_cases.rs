@@ -1,6 +1,7 @@
 //! A few cases of the campaign of faults on the emulated board.
 
 use tactus::sim::fault_case;
+use tactus_core::table::factory;
 use tactus_emulator::runs::faults::board::{BoardBench, BoardCase, Upset};
 
 use crate::common::elf;
@@ -9,8 +10,7 @@ use crate::common::elf;
 #[test]
 fn the_first_cases_of_each_kind_end_well() {
     let Some(elf) = elf() else { return };
-    let factory = include_bytes!("../../../../firmware/factory.tact");
-    let pc = fault_case::Bench::new(factory).unwrap();
+    let pc = fault_case::Bench::new(factory::RIG).unwrap();
     let bench = BoardBench::new(&elf, &pc.calibration).unwrap();
     let kinds: [fn(&BoardCase) -> bool; 4] = [
         |case| has(case, |upset| matches!(upset, Upset::LinkNoise { .. })),

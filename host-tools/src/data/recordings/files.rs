@@ -29,7 +29,7 @@ pub(crate) const MAX_MANIFEST: u64 = 64 << 20;
 pub enum RecordingError {
     /// The folder does not exist.
     #[error(
-        "{}: no such folder. Simulated recordings are in tests/recordings/simulated; those of a real BioTac are at \
+        "{}: no such folder. `tactus unpack DIR` writes simulated ones; those of a real BioTac are at \
          https://github.com/dexrob/BioTac_slide_20_50, and `tactus import` reads them", .0.display()
     )]
     NoFolder(PathBuf),

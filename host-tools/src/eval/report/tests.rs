@@ -5,7 +5,7 @@ use crate::eval::learn::learn;
 
 /// The repository's recordings: names, and slides of each.
 fn recorded() -> (Vec<String>, Vec<Vec<MeasuredSlide>>) {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/simulated");
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
     let set = RecordingSet::open(folder.as_ref()).unwrap();
     let names = set.textures().iter().map(|t| t.name.clone()).collect();
     (names, measure_all(&set, |_| ()).unwrap())

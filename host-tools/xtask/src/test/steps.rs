@@ -68,7 +68,13 @@ pub(super) const STEPS: [Step; 15] = [
     },
     step("unit tests", "debug", &[], || {
         let mut tests = cargo();
-        tests.args(["test", "--package", "tactus-core", "--package", "tactus"]);
+        tests.args([
+            "test",
+            "--package",
+            "tactus-core",
+            "--package",
+            "tactus-probe",
+        ]);
         tests.args(["--lib", "--bins", "--no-fail-fast"]);
         announce_and_test(&mut tests)
     }),

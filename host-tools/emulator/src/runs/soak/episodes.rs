@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 use tactus::eval::show::count;
 pub(super) use tactus::sim::fault_case::{HOMINGS, world};
 use tactus::sim::faults::Fault;
+use tactus_core::table::factory;
 use tactus_core::wire::Identify;
 
 /// More force than this is never on the finger, N: see the guard of the core's `rig`.
@@ -22,7 +23,7 @@ const FAULTS_IN: u32 = 4;
 const LATEST_NS: u64 = 15_000_000_000;
 
 /// The table that comes with the firmware.
-pub(super) const FACTORY: &[u8] = include_bytes!("../../../../../firmware/factory.tact");
+pub(super) const FACTORY: &[u8] = factory::RIG;
 
 /// What the seed draws for an episode.
 pub(super) struct Plan {

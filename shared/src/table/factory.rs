@@ -1,0 +1,68 @@
+//! The tables that come with the firmware: textures of a simulated world, learned there by `cargo xtask factory`. A probe is trained
+//! by its user, or receives a table from the host. A table that is not named takes no space in an image.
+use crate::sensor::FingerName;
+
+macro_rules! tables {
+    ($($(#[$doc:meta])* $name:ident $file:literal;)*) => {
+        $($(#[$doc])* pub const $name: &[u8] = include_bytes!(concat!("../../tables/", $file));)*
+
+        /// Every one of them with the name of its file.
+        pub const ALL: &[(&str, &[u8])] = &[$(($file, $name)),*];
+    };
+}
+
+tables! {
+    /// The rig's with a BioTac: 117 textures at three movements.
+    RIG "factory.tact";
+    /// The rig's with the finger `analog`.
+    RIG_ANALOG "factory-analog.tact";
+    /// The rig's with the finger `mems`.
+    RIG_MEMS "factory-mems.tact";
+    /// The handheld's with a BioTac. Its whitening says how slides of one texture by hand differ.
+    HANDHELD "handheld.tact";
+    /// The handheld's with the finger `analog`.
+    HANDHELD_ANALOG "handheld-analog.tact";
+    /// The handheld's with the finger `mems`.
+    HANDHELD_MEMS "handheld-mems.tact";
+    /// That of a BioTac on somebody else's arm, which need not know the shear: band powers only.
+    ARM "arm.tact";
+}
+
+/// The rig's table of a finger.
+pub const fn rig(finger: FingerName) -> &'static [u8] {
+    match finger {
+        FingerName::Biotac => RIG,
+        FingerName::Analog => RIG_ANALOG,
+        FingerName::Mems => RIG_MEMS,
+    }
+}
+
+/// The handheld's table of a finger.
+pub const fn handheld(finger: FingerName) -> &'static [u8] {
+    match finger {
+        FingerName::Biotac => HANDHELD,
+        FingerName::Analog => HANDHELD_ANALOG,
+        FingerName::Mems => HANDHELD_MEMS,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sensor::FingerCode;
+    use crate::table::Table;
+
+    #[test]
+    fn each_is_of_its_finger() {
+        for finger in FingerName::ALL {
+            for table in [rig(finger), handheld(finger)] {
+                let table = Table::read(table).unwrap();
+                assert_eq!(table.textures(), 117);
+                assert_eq!(table.finger(), FingerCode::of(finger));
+            }
+        }
+        for (file, table) in ALL {
+            assert!(Table::read(table).is_ok(), "{file}");
+        }
+    }
+}
