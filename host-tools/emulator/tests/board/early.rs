@@ -92,7 +92,6 @@ fn seen(elf: &Path, world: &Collection, known: &Known, texture: u8) -> Seen {
 }
 
 #[test]
-#[ignore = "no image is built with the feature `early`: it has no space"]
 fn a_slide_ends_when_the_verdict_is_certain() {
     let Some(elf) = elf() else { return };
     let (collection, known) = world(3, 47, 6);
@@ -145,9 +144,9 @@ fn a_slide_ends_when_the_verdict_is_certain() {
     assert!(early.seconds_to_verdict < whole.seconds_to_verdict);
 }
 
-/// The emergency stop, while the stage brakes for a verdict: the finger is lifted, and there is no verdict.
+/// The emergency stop, while the stage brakes for a verdict: nothing moves on, and there is no verdict. It takes the motors' supply: the
+/// finger stays where it is.
 #[test]
-#[ignore = "no image is built with the feature `early`: it has no space"]
 fn the_guard_trips_while_a_slide_is_ended() {
     let Some(elf) = elf() else { return };
     let (collection, [_, early]) = world(3, 47, 6);
@@ -194,14 +193,11 @@ fn the_guard_trips_while_a_slide_is_ended() {
     assert_eq!(told, ["the stop"]);
     let truth = talk.board().rig().world().truth();
     assert!(truth.force_max_n < 2.2, "{truth:?}");
-    assert!(
-        truth.speed_mm_s.abs() < 0.5 && truth.force_n == 0.0,
-        "{truth:?}"
-    );
+    assert!(truth.speed_mm_s.abs() < 0.5, "{truth:?}");
 }
 
-/// How much sooner a person knows, over 20 worlds: `cargo test --release -p tactus-emulator --test board early:: -- --ignored --nocapture`
-/// with the ELF of a rig that is built with the feature `early` in `TACTUS_ELF`.
+/// How much sooner a person knows, over 20 worlds: `cargo test --release --test board early:: -- --ignored --nocapture` in this folder, with
+/// the ELF of `cargo xtask build` in `TACTUS_ELF`.
 #[test]
 #[ignore = "20 worlds take a quarter of an hour"]
 fn verdicts_come_sooner() {
