@@ -27,7 +27,7 @@ type Files = BTreeMap<String, Vec<u8>>;
 pub(crate) fn bundle(out: &Path) -> Result<()> {
     let out = root().join(out);
     let mut images = Vec::new();
-    for elf in firmware::elves()? {
+    for elf in firmware::all()? {
         let bytes = std::fs::read(&elf).with_context(|| elf.display().to_string())?;
         images.push((firmware::name(&elf)?.to_owned(), bytes));
     }
