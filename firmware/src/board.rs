@@ -1,18 +1,29 @@
-//! The NUCLEO-F429ZI: its clocks, and who gets which pin and timer (UM1974). Pins are named by their Arduino and Zio
-//! connectors in docs/src/rig.md.
+//! The Nucleo-144 (MB1137, UM1974): its clocks, and who gets which pin and timer. Pins are named by their Arduino and Zio
+//! connectors in docs/src/rig.md. Boards of this kind have the same pins for all that is used here; what is each board's own is in
+//! the file of its name.
+#[cfg(feature = "nucleo-f429zi")]
+mod nucleo_f429zi;
+#[cfg(feature = "nucleo-f767zi")]
+mod nucleo_f767zi;
+
 use core::mem::ManuallyDrop;
 
 use assign_resources::assign_resources;
 use embassy_stm32::gpio::{Flex, Level, OutputOpenDrain, Pin, Pull, Speed};
 use embassy_stm32::interrupt::{self, InterruptExt as _, Priority};
 use embassy_stm32::pac::rcc::vals::Pllsrc;
-use embassy_stm32::pac::{DBGMCU, FLASH as FLASH_INTERFACE, RCC};
+use embassy_stm32::pac::{DBGMCU, RCC};
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllQDiv, PllSource,
     Sysclk,
 };
 use embassy_stm32::time::Hertz;
-use embassy_stm32::{Peri, PeripheralType, bind_interrupts, flash, peripherals, usart};
+use embassy_stm32::{Peri, PeripheralType, peripherals};
+pub(crate) use nucleo::{Irqs, TURN_CYCLES, flaw};
+#[cfg(feature = "nucleo-f429zi")]
+use nucleo_f429zi as nucleo;
+#[cfg(feature = "nucleo-f767zi")]
+use nucleo_f767zi as nucleo;
 #[cfg(feature = "finger-analog")]
 pub(crate) use tactus_core::sensor::analog::Analog as Finger;
 #[cfg(not(any(feature = "finger-analog", feature = "finger-mems")))]
@@ -140,15 +151,8 @@ pub(crate) fn held(pin: Peri<'static, impl Pin>) -> ManuallyDrop<Flex<'static>> 
     ManuallyDrop::new(Flex::new(pin))
 }
 
-bind_interrupts!(pub(crate) struct Irqs {
-    USART3 => usart::BufferedInterruptHandler<peripherals::USART3>;
-    FLASH => flash::InterruptHandler;
-});
-
 /// The highest priority that critical sections mask.
 pub(crate) const MASKED: Priority = Priority::P1;
-/// Of the chip (RM0090, table 62).
-const INTERRUPTS: usize = 91;
 
 /// How often the 8 MHz are looked for, 100 us apart: 0.1 s, in which the probe has started too.
 const LOOKS: u32 = 1000;
@@ -162,15 +166,7 @@ pub(crate) fn start() -> AssignedResources {
     DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
     let external = find_clock();
     let p = embassy_stm32::init(clocks(external));
-    // embassy sets the wait states alone, five at 168 MHz: prefetch and the instruction cache make up for them (RM0090 3.5.2).
-    // No line of that cache goes stale: bank 2 alone is ever erased, and no code is in it. The data cache stays off. It must
-    // be off while one bank is written and the other one read (ES0206 2.2.12), and would keep what was there before;
-    // embassy's driver means to see to both, but takes this part for one with a single bank, since the list of its
-    // regions ends with the OTP area.
-    FLASH_INTERFACE.acr().modify(|w| {
-        w.set_prften(true);
-        w.set_icen(true);
-    });
+    nucleo::start_caches();
     if external {
         // should it stop later: an NMI, see `rescue`
         RCC.cr().modify(|w| w.set_csson(true));
@@ -180,7 +176,7 @@ pub(crate) fn start() -> AssignedResources {
     let r = split_resources!(p);
     // Chips before revision 3 misread bank 2 while PA12 moves (errata sheet ES0206, 2.2.11), and the store is in bank 2.
     // embassy's flash driver wants exactly this, an output that is low and pulled down, and panics otherwise; so PA12 is
-    // taken before anything can read the store, and is no one else's.
+    // taken before anything can read the store, and is no one else's. Other chips do without, and lose nothing.
     core::mem::forget(OutputOpenDrain::new_pull(
         // SAFETY: nobody else takes PA12, and it is never given back.
         unsafe { r.errata.pa12.clone_unchecked() },
@@ -192,7 +188,7 @@ pub(crate) fn start() -> AssignedResources {
     // not by `Peripherals::steal`, after which nobody could take them
     // SAFETY: nobody else sets priorities.
     let nvic = unsafe { &*cortex_m::peripheral::NVIC::PTR };
-    for priority in nvic.ipr.iter().take(INTERRUPTS) {
+    for priority in nvic.ipr.iter().take(nucleo::INTERRUPTS) {
         // SAFETY: no critical section is open.
         unsafe { priority.write(MASKED as u8) };
     }
@@ -217,8 +213,7 @@ fn find_clock() -> bool {
     RCC.cr().modify(|w| w.set_hsebyp(true));
     RCC.cr().modify(|w| w.set_hseon(true));
     let found = (0..LOOKS).any(|_| {
-        // a turn of its loop takes three cycles
-        cortex_m::asm::delay(RESET_HZ / 10_000 / 3);
+        cortex_m::asm::delay(RESET_HZ / 10_000 / TURN_CYCLES);
         RCC.cr().read().hserdy()
     });
     if !found {

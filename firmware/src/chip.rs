@@ -1,24 +1,34 @@
 //! What only this chip can do: its flash, the sensor's slots by its interrupts, its sleep, its timers' lever, its converter's motor current, its
-//! last acts, and the core's kernels in its assembly.
+//! last acts, and the core's kernels in its assembly. What its family does in its own way is in the file of the family.
 mod confusion_kernel;
 mod critical_section;
 pub(crate) mod current;
 mod decision_kernels;
 mod dsp_kernels;
+#[cfg(feature = "nucleo-f429zi")]
+mod f4;
+#[cfg(feature = "nucleo-f767zi")]
+mod f7;
 pub(crate) mod flash;
 pub(crate) mod lever;
 pub(crate) mod motion;
 pub(crate) mod rescue;
 mod select;
 pub(crate) mod slots;
+mod store_place;
 pub(crate) mod thread;
 mod transform_kernel;
 pub(crate) mod watchdog;
 
 pub(crate) use dsp_kernels::Chip;
+#[cfg(feature = "nucleo-f429zi")]
+use f4 as family;
+#[cfg(feature = "nucleo-f767zi")]
+use f7 as family;
 
-/// Waits for at least so many cycles of the core. cortex-m's delay counts turns of its loop, which takes three on an M4: one, and
-/// two of a branch that is taken at the least.
+use crate::board::TURN_CYCLES;
+
+/// Waits for at least so many cycles of the core. cortex-m's delay counts turns of its loop.
 pub(crate) fn wait_cycles(cycles: u32) {
-    cortex_m::asm::delay(cycles / 3);
+    cortex_m::asm::delay(cycles / TURN_CYCLES);
 }

@@ -1,4 +1,5 @@
-//! Tactus on a NUCLEO-F429ZI: pins, timing and messages round the core. Everything that decides is in `tactus-core`.
+//! Tactus on a NUCLEO-F429ZI: pins, timing and messages round the core. Everything that decides is in `tactus-core`. The rig's image is
+//! there for a NUCLEO-F767ZI, too.
 //!
 //! On a PC this crate is empty: there is nothing to drive.
 #![cfg_attr(target_os = "none", no_std)]
@@ -6,6 +7,7 @@
 
 #[cfg(feature = "arm")]
 mod arm;
+#[cfg(feature = "nucleo-f429zi")]
 mod bench;
 mod board;
 mod chip;
@@ -16,6 +18,7 @@ mod tasks;
 
 #[cfg(feature = "arm")]
 pub use arm::arm;
+#[cfg(feature = "nucleo-f429zi")]
 pub use bench::{bench, silicon, workload};
 pub use handheld::handheld;
 pub use rig::rig;

@@ -14,6 +14,7 @@ type Listed = &'static [(&'static str, &'static [&'static str])];
 /// The files that own peripherals wholly: no driver has them.
 const OWNERS: Listed = &[
     ("chip/current.rs", &["ADC1", "ADC123_COMMON", "DMA2"]),
+    ("chip/f7/bank2.rs", &["FLASH"]),
     ("chip/lever.rs", &["TIM1"]),
     ("chip/motion.rs", &["SPI4"]),
     ("chip/slots.rs", &["SPI1", "TIM2"]),
@@ -21,15 +22,19 @@ const OWNERS: Listed = &[
 ];
 /// Start and end of an image, when no driver is at work: clocks, caches, and why the chip was reset.
 const NO_DRIVER: Listed = &[
-    ("board.rs", &["DBGMCU", "FLASH", "RCC"]),
+    ("board.rs", &["DBGMCU", "RCC"]),
+    ("board/nucleo_f429zi.rs", &["FLASH"]),
     ("chip/rescue.rs", &["RCC"]),
 ];
 /// What another image has, in which the owner is not at work.
 const OTHER_IMAGE: Listed = &[("bench/silicon.rs", &["TIM2"])];
 /// What a driver leaves as it is, set by the file that holds the driver: how wide the flash is erased.
-const BESIDE_ITS_DRIVER: Listed = &[("chip/flash.rs", &["FLASH"])];
+const BESIDE_ITS_DRIVER: Listed = &[("chip/f4/bank2.rs", &["FLASH"])];
 /// Files that look at registers and write none.
-const LOOKS: Listed = &[("selftest/chip.rs", &["FLASH", "GPIOA", "RCC"])];
+const LOOKS: Listed = &[
+    ("board/nucleo_f767zi.rs", &["FLASH"]),
+    ("selftest/chip.rs", &["FLASH", "GPIOA", "RCC"]),
+];
 /// How a register is written.
 const WRITES: [&str; 3] = [".write(|", ".modify(|", ".write_value("];
 /// embassy's drivers of what the files above own.

@@ -3,23 +3,15 @@ use core::mem::{ManuallyDrop, MaybeUninit};
 use core::pin::Pin;
 use core::ptr::addr_of_mut;
 
-use embassy_stm32::flash::{Async, Error, FLASH_BASE, Flash};
-use embassy_stm32::pac::FLASH;
-use embassy_stm32::pac::flash::vals::Psize;
 use embassy_time::{Duration, with_timeout};
-use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use static_cell::ConstStaticCell;
 use tactus_core::probe::seams::StoredBytes;
 use tactus_core::sensor::FingerCode;
 use tactus_core::store::{Store, StoreError};
 
+use super::family::bank2::Bank2;
+use super::store_place::{STORE_AT, STORE_LENGTH};
 use crate::board;
-
-/// The store in the chip's memory: memory.x, STORE.
-const STORE_AT: usize = 0x0810_0000;
-const STORE_LENGTH: usize = 256 * 1024;
-/// The same from the flash's first byte on.
-const OFFSET: u32 = (STORE_AT - FLASH_BASE) as u32;
 
 pub(crate) type Storage = Store<Bank2>;
 const MAX_TABLE: usize = Storage::MAX_TABLE;
@@ -29,7 +21,7 @@ const LOOKS: u32 = 100;
 /// A look finds an erase over that no interrupt has told of.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Room for the longest table, in the CCM, which nothing else uses and the start-up code does not clear: memory.x.
+/// Room for the longest table, which the start-up code does not clear: memory.x; on the STM32F429 in the CCM, which nothing else uses.
 #[unsafe(link_section = ".ccm.BUFFER")]
 static mut BUFFER: MaybeUninit<[u8; MAX_TABLE]> = MaybeUninit::uninit();
 
@@ -45,63 +37,12 @@ pub(crate) fn buffer() -> &'static mut [u8] {
     }
 }
 
-/// The first six sectors of bank 2: four of 16 KB, one of 64, one of 128. Places are counted from its first byte on.
-pub(crate) struct Bank2(Flash<'static, Async>);
-
-/// The place in the flash of a place in the store.
-fn within(at: u32, length: usize) -> Result<u32, Error> {
-    let end = (at as usize).checked_add(length);
-    match end.is_some_and(|end| end <= STORE_LENGTH) {
-        true => Ok(OFFSET + at),
-        false => Err(Error::Size),
-    }
-}
-
-impl ErrorType for Bank2 {
-    type Error = Error;
-}
-
-impl ReadNorFlash for Bank2 {
-    const READ_SIZE: usize = 1;
-
-    async fn read(&mut self, at: u32, bytes: &mut [u8]) -> Result<(), Error> {
-        self.0.blocking_read(within(at, bytes.len())?, bytes)
-    }
-
-    fn capacity(&self) -> usize {
-        STORE_LENGTH
-    }
-}
-
-impl NorFlash for Bank2 {
-    const WRITE_SIZE: usize = 4;
-    const ERASE_SIZE: usize = 16 * 1024;
-
-    /// Of whole sectors, which the driver checks.
-    async fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
-        let length = to.saturating_sub(from);
-        let from = within(from, length as usize)?;
-        // The driver leaves the width as it is, 8 bits, which doubles the time. The supply allows 32 (RM0090 3.6.2). It keeps
-        // what an unlocked register holds, and locks it in the end.
-        if FLASH.cr().read().lock() {
-            FLASH.keyr().write_value(0x4567_0123);
-            FLASH.keyr().write_value(0xCDEF_89AB);
-        }
-        FLASH.cr().modify(|w| w.set_psize(Psize::PSIZE32));
-        self.0.erase(from, from + length).await
-    }
-
-    async fn write(&mut self, at: u32, bytes: &[u8]) -> Result<(), Error> {
-        self.0.write(within(at, bytes.len())?, bytes).await
-    }
-}
-
 /// The store.
 ///
 /// # Errors
 /// It cannot be opened.
 pub(crate) async fn open(flash: board::Storage) -> Result<Storage, StoreError> {
-    Store::open(Bank2(Flash::new(flash.flash, board::Irqs))).await
+    Store::open(Bank2::new(flash)).await
 }
 
 /// Waits for a store that is being opened; `progress` is called at every look. An erase under way must not be dropped:

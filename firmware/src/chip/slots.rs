@@ -11,7 +11,7 @@ use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering::Relaxed};
 use embassy_stm32::gpio::{AfType, Flex, OutputType, Pull, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::pac::spi::regs::Cr1;
-use embassy_stm32::pac::spi::vals::{Br, Dff, Mstr};
+use embassy_stm32::pac::spi::vals::{Br, Mstr};
 use embassy_stm32::pac::{SPI1, TIM2};
 use embassy_stm32::{Peri, peripherals, rcc};
 use heapless::spsc::Producer;
@@ -21,6 +21,7 @@ use tactus_core::sensor::{BadWord, GRAVITY_PARTS, PressureSensor};
 
 use crate::board::{self, Finger, held};
 use crate::chip;
+use crate::chip::family::spi;
 use crate::chip::select::Select;
 
 /// Why an answer of the finger is no sample.
@@ -240,7 +241,8 @@ impl Bus {
             select.set(false);
         }
         rcc::enable_and_reset::<peripherals::SPI1>();
-        SPI1.cr2().write(|w| w.set_rxneie(self.interrupts));
+        SPI1.cr2()
+            .write_value(spi::second_control(self.interrupts, self.is_wide()));
         SPI1.cr1().write_value(self.control);
     }
 
@@ -260,14 +262,19 @@ impl Bus {
         }
     }
 
-    /// Sends a frame. The one before has been read, so the data register is free, and the next that is received belongs to this one.
+    /// Frames are bytes as long as nobody has begun the slots.
+    fn is_wide(&self) -> bool {
+        WIDE && self.interrupts
+    }
+
+    /// Sends a frame, see [`spi::send`].
     fn send(&mut self, frame: u16) {
-        SPI1.dr().write(|w| w.set_dr(frame));
+        spi::send(SPI1, frame, self.is_wide());
     }
 
     /// The bytes of a frame that is over, in the last places.
     fn received(&mut self) -> [u8; 2] {
-        SPI1.dr().read().dr().to_be_bytes()
+        spi::received(SPI1, self.is_wide()).to_be_bytes()
     }
 
     /// Does a transaction and waits for it, before the slots begin: for who has nothing else to do. What comes in takes the place of
@@ -289,7 +296,6 @@ impl Bus {
         Err(NoFrame)
     }
 
-    /// Frames are bytes as long as nobody has begun the slots.
     fn wait_for_byte(&mut self, byte: &mut u8) -> bool {
         self.send((*byte).into());
         chip::wait_cycles(BYTE_CYCLES);
@@ -368,8 +374,7 @@ pub(crate) fn gravity() -> Option<f32> {
 /// Begins the slots; to be called once, when the sensor has started. `interrupt`s of SPI1 and TIM2 have one priority.
 pub(crate) fn begin(mut bus: Bus, timer: board::Slots, words: Producer<'static, Word>) {
     bus.interrupts = true;
-    bus.control
-        .set_dff(if WIDE { Dff::BITS16 } else { Dff::BITS8 });
+    spi::set_width(&mut bus.control, WIDE);
     bus.restart();
     rcc::enable_and_reset::<peripherals::TIM2>();
     let slots = Slots {

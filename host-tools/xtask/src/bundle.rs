@@ -12,7 +12,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 
 use crate::factory::{FOLDER, TABLES};
-use crate::firmware::{self, FLASHED, hash, shown};
+use crate::firmware::{self, hash, released, shown};
 use crate::sbom::FIRMWARE;
 use crate::shell::{self, root};
 use products::{COMMAND, PAGE, Product, WHEEL};
@@ -44,7 +44,7 @@ type Files = BTreeMap<String, Vec<u8>>;
 /// All that `--only` knows.
 fn names() -> Vec<&'static str> {
     let products = [COMMAND, WHEEL, PAGE].map(|product| product.name);
-    [&FLASHED[..], &products].concat()
+    [&released()[..], &products].concat()
 }
 
 /// Builds what was asked for and writes the release.
@@ -61,7 +61,7 @@ pub(crate) fn bundle(options: &Options) -> Result<()> {
 /// Everything that is in a release, or what of it is named.
 fn files(only: &[String]) -> Result<Files> {
     let wanted = |name: &str| only.is_empty() || only.iter().any(|one| one == name);
-    let images: Vec<&str> = FLASHED.into_iter().filter(|name| wanted(name)).collect();
+    let images: Vec<&str> = released().into_iter().filter(|name| wanted(name)).collect();
     let mut files = Files::new();
     let mut parts = Vec::new();
     if !images.is_empty() {
@@ -195,7 +195,7 @@ mod tests {
         let rows = text.lines().filter_map(|line| line.strip_prefix("| "));
         let files = rows.filter_map(|row| row.split(" |").next());
         let named: Vec<&str> = files.flat_map(|files| files.split(", ")).collect();
-        for image in FLASHED {
+        for image in released() {
             let elf = format!("{image}.elf");
             assert!(
                 named.iter().any(|name| *name == image || *name == elf),

@@ -10,7 +10,7 @@ use crate::shell::root;
 use crate::toolchain::{self, CHIP};
 
 /// The images by profile and features that each is built with: the rig for speed, the handheld for a small chip.
-const PROFILES: [(&str, &[&str], &[&str]); 8] = [
+const PROFILES: [(&str, &[&str], &[&str]); 9] = [
     (
         "firmware",
         &["--features=early"],
@@ -24,6 +24,11 @@ const PROFILES: [(&str, &[&str], &[&str]); 8] = [
     ("firmware", &["--features=arm"], &["tactus-arm"]),
     ("firmware", &[ANALOG], &["tactus-rig-analog"]),
     ("firmware", &[MEMS], &["tactus-rig-mems"]),
+    (
+        "firmware",
+        &["--no-default-features", "--features=nucleo-f767zi"],
+        &OTHER_BOARD,
+    ),
     (HANDHELD, &[], &["tactus-handheld"]),
     (
         HANDHELD,
@@ -54,8 +59,8 @@ const HANDHELD_FLAGS: [&str; 5] = [
     "-Cllvm-args=-enable-load-pre=false",
     "-Cllvm-args=-enable-shrink-wrap=false",
 ];
-/// The images that are flashed, and gated. The bench image is for the emulated board only.
-pub(crate) const FLASHED: [&str; 10] = [
+/// The images that are flashed to the reference board, and gated. The bench image is for the emulated board only.
+const FLASHED: [&str; 10] = [
     "tactus-rig",
     "tactus-selftest",
     "tactus-silicon",
@@ -67,6 +72,9 @@ pub(crate) const FLASHED: [&str; 10] = [
     "tactus-handheld-analog",
     "tactus-handheld-mems",
 ];
+
+/// The images for another board than the reference: built, and in a release, but neither emulated nor gated.
+const OTHER_BOARD: [&str; 1] = ["tactus-rig-f767"];
 
 /// The image of a kind for a finger: "tactus-rig-mems".
 pub(crate) fn image_for(kind: &str, finger: Option<&str>) -> Result<String> {
@@ -89,7 +97,7 @@ pub(crate) fn image_for(kind: &str, finger: Option<&str>) -> Result<String> {
 
 /// Builds every image of the firmware that is flashed and says what came out; the ELFs.
 pub(crate) fn build() -> Result<Vec<PathBuf>> {
-    let elves = elves()?;
+    let elves = compile(&released())?;
     for elf in &elves {
         describe(elf)?;
     }
@@ -98,11 +106,16 @@ pub(crate) fn build() -> Result<Vec<PathBuf>> {
 
 /// As [`build`], with the bench image: all that the other steps of `cargo xtask test` want.
 pub(crate) fn build_all() -> Result<()> {
-    compile(&[&FLASHED[..], &["tactus-bench"]].concat())?;
+    compile(&[&released()[..], &["tactus-bench"]].concat())?;
     build().map(|_| ())
 }
 
-/// Builds every image that is flashed: the ELFs, by name. Leaves stdout to who asks.
+/// The images that are flashed, to whichever board.
+pub(crate) fn released() -> Vec<&'static str> {
+    [&FLASHED[..], &OTHER_BOARD].concat()
+}
+
+/// Builds every image for the reference board that is flashed: the ELFs, by name. Leaves stdout to who asks.
 pub(crate) fn elves() -> Result<Vec<PathBuf>> {
     compile(&FLASHED)
 }
@@ -266,6 +279,19 @@ mod tests {
             "tactus-rig"
         );
         assert!(image_for("tactus-rig", Some("piezo")).is_err());
+    }
+
+    #[test]
+    fn another_boards_images_are_built_apart_from_the_reference() {
+        for image in OTHER_BOARD {
+            assert!(!FLASHED.contains(&image), "{image} would be gated");
+            let of = |(_, _, all): &&(&str, &[&str], &[&str])| all.contains(&image);
+            let built: Vec<_> = PROFILES.iter().filter(of).collect();
+            let [(_, features, _)] = built[..] else {
+                panic!("{image} is built {} times", built.len());
+            };
+            assert!(features.contains(&"--no-default-features"), "{features:?}");
+        }
     }
 
     #[test]

@@ -1,0 +1,3 @@
+//! What the STM32F7 does in its own way.
+pub(super) mod bank2;
+pub(super) mod spi;
