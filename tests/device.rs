@@ -5,6 +5,8 @@
 mod client;
 #[path = "device/package.rs"]
 mod package;
+#[path = "device/page.rs"]
+mod page;
 #[path = "device/software.rs"]
 mod software;
 #[path = "device/tables.rs"]

@@ -29,4 +29,5 @@ pub mod show;
 pub mod table_summary;
 pub mod transcript;
 pub mod verdicts;
+pub mod verified;
 pub mod verify;

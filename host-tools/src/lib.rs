@@ -5,6 +5,7 @@ pub mod data;
 pub mod eval;
 pub mod link;
 pub mod live;
+pub mod remote;
 pub mod sim;
 #[cfg(feature = "study")]
 pub mod study;

@@ -2,9 +2,12 @@
 //!
 //! [`Session`] makes requests and understands reports. A [`Transaction`] is one request ([`Request`]) or a sequence of them
 //! ([`PushTable`], [`ReadTable`]); [`Job`] runs it to its end, whatever is damaged or lost on the way.
-//! [`Port`] runs jobs over anything that reads and writes: a serial line, a TCP connection.
+//! [`Exchange`] runs jobs over bytes that somebody else carries, [`Port`] over anything that reads and writes: a serial line, a TCP
+//! connection.
 
+pub mod exchange;
 pub mod follow;
+pub mod lifting;
 #[cfg(feature = "serial")]
 pub mod line;
 pub mod log;
@@ -16,7 +19,8 @@ mod session;
 mod table;
 mod transaction;
 
-pub use port::{Port, PortError};
+pub use exchange::{Exchange, PortError};
+pub use port::Port;
 pub use request::{Found, Request};
 pub use session::{LinkError, MAX_TRIES, Session};
 pub use table::{PushTable, ReadTable};

@@ -4,14 +4,16 @@
 //! the same core is asked what the probe does not say: what is probable while a slide goes on, and where a slide lies among the
 //! textures. Requests and replies are JSON, so that a page needs one function.
 
+mod hearing;
 mod message;
 mod scene;
 mod session;
 mod slides;
 mod standing;
 
-pub use message::{Frame, Happening, Reply, Request, Settings};
-pub use session::Session;
+pub use hearing::{Heard, Hearing};
+pub use message::{Frame, Happening, Known, Reply, Request, Settings};
+pub use session::{Session, sentence};
 pub use slides::{LENGTHS_MS, TRIALS, Trials, WORLD};
 
 #[cfg(test)]

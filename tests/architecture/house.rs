@@ -30,6 +30,7 @@ pub(crate) const PACKAGES: [Package; 7] = [
             &["study"],
             &["link"],
             &["bringup"],
+            &["remote"],
             &["cmd"],
         ],
         // link and bring-up know the core only

@@ -1,15 +1,18 @@
-//! Tactus in a browser: [`Session`] as WebAssembly, asked in JSON.
+//! Tactus in a browser: a simulated probe, [`Session`], and one at a line, [`Remote`], as WebAssembly, asked in JSON.
 //!
-//! Three functions and the module's memory are the whole interface, so that neither wasm-bindgen nor its command is needed: the page
-//! writes a request where [`request`] says, calls [`ask`], and reads the reply where [`reply`] says. The module imports nothing.
+//! Four functions and the module's memory are the whole interface, so that neither wasm-bindgen nor its command is needed: the page
+//! writes a request where [`request`] says, calls [`ask`] or [`remote`], and reads the reply where [`reply`] says. The module imports
+//! nothing.
 
 use std::cell::RefCell;
 
 use tactus::live::Session;
+use tactus::remote::Remote;
 
 #[derive(Default)]
 struct Page {
     session: Session,
+    remote: Remote,
     request: Vec<u8>,
     reply: String,
 }
@@ -28,12 +31,22 @@ pub extern "C" fn request(length: usize) -> *mut u8 {
     })
 }
 
-/// Does what the request asks for: the bytes of the reply.
+/// Has the simulated probe do what the request asks for: the bytes of the reply.
 #[unsafe(no_mangle)]
 pub extern "C" fn ask() -> usize {
     PAGE.with_borrow_mut(|page| {
         let request = String::from_utf8_lossy(&page.request);
         page.reply = page.session.ask(&request);
+        page.reply.len()
+    })
+}
+
+/// The same for the probe at a line, or a log.
+#[unsafe(no_mangle)]
+pub extern "C" fn remote() -> usize {
+    PAGE.with_borrow_mut(|page| {
+        let request = String::from_utf8_lossy(&page.request);
+        page.reply = page.remote.ask(&request);
         page.reply.len()
     })
 }

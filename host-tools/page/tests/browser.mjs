@@ -115,6 +115,15 @@ export async function tab(browser, { width, height, touch = false, scheme = "lig
     const { data } = await send("Page.captureScreenshot", { format: "png", captureBeyondViewport: whole });
     return Buffer.from(data, "base64");
   };
+  /// Runs a script in the page before its own.
+  const before = source => send("Page.addScriptToEvaluateOnNewDocument", { source });
+  /// Gives the page a function of this name: what it is called with comes here.
+  const binding = async (name, called) => {
+    browser.on(({ method, params, sessionId: of }) => {
+      if (of === sessionId && method === "Runtime.bindingCalled" && params.name === name) called(params.payload);
+    });
+    await send("Runtime.addBinding", { name });
+  };
   const close = () => browser.send("Target.closeTarget", { targetId });
-  return { send, evaluate, until, open, key, screenshot, close, errors, loaded };
+  return { send, evaluate, until, open, key, screenshot, before, binding, close, errors, loaded };
 }

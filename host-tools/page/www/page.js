@@ -11,6 +11,7 @@
   let set = Settings.read();
   let known = null;
   let all = [];
+  let source = "sim";
   let playing = false, busy = false, asked = null, slides = 0, last = null, verdict = null;
   let frames = [], began = performance.now();
   const ink = document.createElement("span");
@@ -29,6 +30,7 @@
   function say(doing) { if (at("doing").textContent !== doing) at("doing").textContent = doing; }
   function aloud(text) { at("aloud").textContent = text; }
   function problem(why) {
+    if (source === "usb") { at("u-problem").hidden = !why; at("u-problem").textContent = why ?? ""; return; }
     at("problem").hidden = !why;
     at("problem").textContent = why ?? "";
   }
@@ -44,7 +46,7 @@
   }
 
   function enable(on) {
-    for (const id of ["play", "step", "surprise", "move", "apply", "learn", "confirm", "again"]) at(id).disabled = !on;
+    for (const id of ["play", "step", "surprise", "move", "apply", "learn", "confirm", "again", "worn"]) at(id).disabled = !on;
     at("unknown").disabled = !on || known === null || known.textures.length >= 117;
     at("play").textContent = playing && busy ? "Pause" : busy ? "Go on" : "Start";
   }
@@ -154,18 +156,18 @@
 
   // While it is at work, what would disturb it waits.
   function lock() {
-    for (const id of ["surprise", "unknown", "move", "apply"]) at(id).disabled = busy || !known;
+    for (const id of ["surprise", "unknown", "move", "apply", "worn"]) at(id).disabled = busy || !known;
     if (!busy && known && known.textures.length >= 117) at("unknown").disabled = true;
   }
 
   function surprise() {
-    if (busy || !known) return;
+    if (source !== "sim" || busy || !known) return;
     const numbers = known.numbers.filter(number => number !== null);
     identify(numbers[Math.floor(draw() * numbers.length)]);
   }
 
   function unknown() {
-    if (busy || !known) return;
+    if (source !== "sim" || busy || !known) return;
     const numbers = all.map((_, n) => n + 1).filter(number => !isKnown(number));
     if (numbers.length) identify(numbers[Math.floor(draw() * numbers.length)]);
   }
@@ -198,13 +200,21 @@
     const novel = standing.log_odds !== null;
     at("novel").classList.toggle("known", novel);
     if (novel) {
-      // the limit is at 60 % of the scale; far away it is compressed
-      const over = Math.tanh(standing.log_odds / 12);
-      at("needle").style.left = `${over < 0 ? 60 + 60 * over : 60 + 40 * over}%`;
+      const [place, zone] = novelty(standing);
+      at("needle").style.left = `${place}%`;
       const meter = at("novel-meter");
-      meter.setAttribute("aria-valuenow", over.toFixed(2));
-      meter.setAttribute("aria-valuetext", over > 0 ? "less like any texture it knows than it may be: new" : "like a texture it knows");
+      meter.setAttribute("aria-valuenow", place.toFixed(0));
+      meter.setAttribute("aria-valuetext", { known: "like a texture it knows", changed: "like one it knows, but not as it learned it", new: "less like any texture it knows than it may be: new" }[zone]);
+      meter.dataset.zone = zone;
     }
+  }
+
+  // Where the slides lie on the scale: known up to 50 %, changed up to 70 %, then new. The core has a limit for each of the two, and
+  // says how far the slides are over it; far away the scale is compressed.
+  function novelty({ log_odds: over, changed_by: changed }) {
+    if (over > 0) return [70 + 30 * Math.tanh(over / 12), "new"];
+    if (changed > 0) return [50 + 20 * changed / (changed - over || 1), "changed"];
+    return [50 + 50 * Math.tanh((changed ?? over) / 12), "known"];
   }
 
   function happened(one) {
@@ -217,7 +227,7 @@
         break;
       case "look":
         stands(one.standing);
-        Places.land(asked?.by === "identify" ? lookedAt : null, one.place, true);
+        Places.land(source !== "sim" || asked?.by === "identify" ? lookedAt : null, one.place, true);
         if (one.standing) say(`After ${one.ms / 1000} s of sliding: most like ${known.textures[most(one.standing.posterior)]}.`);
         break;
       case "slide": {
@@ -250,6 +260,7 @@
         answer(one);
         break;
       case "learned":
+        if (source !== "sim") { aloud(`Learned: ${one.name}.`); break; }
         knows(one.known);
         at("teach").hidden = true;
         at("taught").hidden = false;
@@ -257,6 +268,7 @@
         aloud(at("taught-say").textContent);
         break;
       case "done":
+        if (source !== "sim") break;
         busy = false;
         playing = false;
         say(asked?.by === "identify" && verdict ? "Its answer" : "Done");
@@ -272,12 +284,17 @@
 
   function answer(one) {
     const of = `after ${one.slides} ${one.slides === 1 ? "slide" : "slides"}`;
-    const truth = nameOf(asked.number);
     const name = { name: one.texture };
     if (one.told === "sure") headline(["It is ", name, `, ${sure(one.probability)} sure ${of}.`], "sure");
     if (one.told === "changed") headline(["It feels like ", name, ", but not as I learned it."], "changed");
     if (one.told === "new") headline([`This is none of those I know, ${of}.`], "new");
     if (one.told === "undecided") headline(["Not sure; most likely ", name, `, ${Mind.percent(one.probability)} ${of}.`]);
+    if (source !== "sim") {
+      at("truth").textContent = "";
+      if (one.wants_label && source === "usb") at("u-name").value = one.told === "new" ? "" : one.texture;
+      return;
+    }
+    const truth = nameOf(asked.number);
     const taught = known.numbers[one.index] === null ? one.texture : null;
     const right = one.told === "new" ? !isKnown(asked.number) && !lessons.has(asked.number) : one.texture === truth || taught !== null && lessons.get(asked.number) === taught;
     const judged = one.told === "undecided" ? "" : right ? " Right." : one.told === "changed" && !right ? " It is something else." : " That is wrong.";
@@ -465,8 +482,67 @@
       at("linked").textContent = "The address of this page is the link: copy it from there.";
     }
   });
+  at("worn").addEventListener("click", () => {
+    if (busy || !known) return;
+    at("wear").value = Math.min(1, Number(at("wear").value) + Number(at("wear").step));
+    outputs();
+    at("wear").dispatchEvent(new Event("change"));
+    identify(set.x || known.numbers.find(number => number !== null));
+  });
   addEventListener("resize", Traces.again);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", Traces.again);
+
+  // ---- which probe
+
+  // What a probe at a port and a log show with.
+  const outside = {
+    settings: () => set,
+    sentence,
+    knows: now => { if (JSON.stringify(now) !== JSON.stringify(known)) knows(now); },
+    // an exploration, or other work
+    begins: explores => {
+      problem();
+      if (!explores) return;
+      forget();
+      document.body.dataset.told = "";
+      verdict = null;
+      Places.likely([]);
+      if (known) Mind.posterior(at("posterior"), at("others"), known.textures, known.textures.map(() => 1 / known.textures.length));
+      headline(["What is this?"]);
+    },
+    happened,
+    hears: frame => {
+      Traces.take({ ...frame, pdc: [] });
+      for (const one of frame.happened) happened(one);
+      at("g-force").textContent = `${Math.max(0, frame.force_n).toFixed(2)} N`;
+      at("g-speed").textContent = `${Math.abs(frame.speed_mm_s).toFixed(0)} mm/s`;
+      at("g-time").textContent = `${(frame.at_ms / 1000).toFixed(1)} s`;
+      if (frame.phase) say(sentences[frame.phase] ?? "");
+      else say(frame.connected ? "Ready" : "");
+      const idle = `It knows ${known?.textures.length ?? 0} textures. Have it touch one.`;
+      if (!frame.busy && frame.connected && verdict === null && slides === 0 && at("verdict").textContent !== idle) headline([idle]);
+    },
+    fails: () => headline(["This did not work."]),
+    ends: () => { if (source === "usb") headline(["No probe is connected."]); },
+    turn: to => turn(to),
+  };
+
+  async function turn(to) {
+    if (to === source) return;
+    if (source === "sim" && busy) { try { Probe.ask({ do: "stop" }); } catch { /* nothing was asked for */ } }
+    busy = false; playing = false;
+    source = to;
+    document.body.dataset.source = to;
+    for (const name of ["sim", "usb", "log"]) at(`from-${name}`).setAttribute("aria-pressed", String(name === to));
+    forget();
+    Places.likely([]);
+    document.body.dataset.told = "";
+    verdict = null;
+    say("");
+    if (to === "sim") return guarded(makeWorld);
+    headline([to === "usb" ? "No probe is connected." : "No session is open."]);
+  }
+  for (const name of ["sim", "usb", "log"]) at(`from-${name}`).addEventListener("click", () => turn(name));
 
   // ---- the beginning
 
@@ -479,6 +555,8 @@
     if (typeof WebAssembly !== "object") throw new Error("this browser has no WebAssembly: take a newer one");
     await Probe.load();
     all = Probe.ask({ do: "textures" }).names;
+    Usb.build(outside);
+    Replay.build(outside);
     await makeWorld();
     window.tactus.ready = performance.now() - began;
     before = performance.now();
@@ -492,7 +570,9 @@
   // for tests: what is under way, and how fast
   window.tactus = {
     ready: null,
-    now: () => ({ busy, playing, slides, verdict, last, set, known, memory: Probe.bytes() }),
+    usb: Usb.now,
+    files: () => Files.kept.map(({ name, bytes }) => ({ name, bytes: [...bytes] })),
+    now: () => ({ source, busy, playing, slides, verdict, last, set, known, memory: Probe.bytes() }),
     framesPerSecond: () => frames.length < 2 ? 0 : 1000 * (frames.length - 1) / (frames.at(-1) - frames[0]),
   };
   guarded(start);

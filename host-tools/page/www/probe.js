@@ -15,16 +15,20 @@ const Probe = (() => {
   }
 
   // Asks for something, and gets what the core says. An error of the core is an Error with its sentence.
-  function ask(request) {
+  const ask = request => to("ask", request);
+  // The same of a probe at a line, or of a log.
+  const remote = request => to("remote", request);
+
+  function to(whom, request) {
     const bytes = encoder.encode(JSON.stringify(request));
     const at = exports.request(bytes.length);
     new Uint8Array(exports.memory.buffer, at, bytes.length).set(bytes);
-    const length = exports.ask();
+    const length = exports[whom]();
     const reply = JSON.parse(decoder.decode(new Uint8Array(exports.memory.buffer, exports.reply(), length)));
     if (reply.is === "error") throw new Error(reply.why);
     return reply;
   }
 
   const bytes = () => exports.memory.buffer.byteLength;
-  return { load, ask, bytes };
+  return { load, ask, remote, bytes };
 })();

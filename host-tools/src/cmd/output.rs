@@ -4,7 +4,10 @@ use std::io::Write;
 
 use clap::ValueEnum;
 use serde::Serialize;
+pub(crate) use tactus::eval::show::percent;
 use tactus::eval::verdicts::Verdicts;
+use tactus::eval::verified::{self, Verified};
+use tactus_core::explorer::Answer;
 
 /// How a command ended that did what it was to do.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -13,6 +16,17 @@ pub(crate) enum Done {
     Fully,
     /// An exploration without a name that is sure.
     NotIdentified,
+}
+
+impl Done {
+    /// Whether a sample was found to be the same.
+    pub(crate) fn of(verified: &Verified) -> Self {
+        if verified.answer == verified::name(Answer::Same) {
+            Self::Fully
+        } else {
+            Self::NotIdentified
+        }
+    }
 }
 
 /// Arguments that make no sense together, as clap says it.
@@ -42,12 +56,6 @@ pub(crate) fn print_rows(rows: &[(&str, String)], out: &mut impl Write) -> anyho
     Ok(())
 }
 
-/// A share as people write it: "30 %", "99.9 %".
-pub(crate) fn percent(share: f64) -> String {
-    let percent = format!("{:.4}", share * 100.0);
-    format!("{} %", percent.trim_end_matches('0').trim_end_matches('.'))
-}
-
 /// Verdicts by name, as people read them, with a remark behind the share.
 pub(crate) fn verdict_rows(v: &Verdicts) -> [(&'static str, f64, String); 5] {
     let named = v.changed_right.map_or(String::new(), |share| {
@@ -60,19 +68,4 @@ pub(crate) fn verdict_rows(v: &Verdicts) -> [(&'static str, f64, String); 5] {
         ("wrong", v.wrong, String::new()),
         ("undecided", v.undecided, String::new()),
     ]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::percent;
-
-    #[test]
-    fn a_share_is_written_without_the_digits_of_its_binary_form() {
-        let written =
-            [0.3_f32, 0.99, 0.999, 1.0, 0.0, 0.123_456].map(|share| percent(share.into()));
-        assert_eq!(
-            written,
-            ["30 %", "99 %", "99.9 %", "100 %", "0 %", "12.3456 %"]
-        );
-    }
 }

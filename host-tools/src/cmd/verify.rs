@@ -4,25 +4,24 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
-use serde::Serialize;
 use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::{MeasuredSlide, measure};
 use tactus::eval::evaluate::{Method, explorer};
 use tactus::eval::first::learn_first;
 use tactus::eval::learn::Expected;
 use tactus::eval::show::count;
+use tactus::eval::verified::{Slide, Verified, name, print_answer, print_slide};
 use tactus::eval::verify::{false_accept, put};
 use tactus::sim::collection::{Collection, calibrated, texture_name};
 use tactus::sim::rig::{SimError, SimRig};
 use tactus_core::dsp::Plan;
-use tactus_core::explorer::{Answer, Config, ENOUGH_TRIALS, Strategy};
+use tactus_core::explorer::{Answer, Config, Strategy};
 use tactus_core::features::{Movement, Observation, PropertySet};
 use tactus_core::table::{Action, POPULATION, Table};
-use tactus_core::wire::Failure;
 
 use super::args::Stop;
 use super::names::find;
-use super::output::{Done, Format, UsageError, percent, print_json};
+use super::output::{Done, Format, UsageError, print_json};
 use super::progress::with_progress;
 use super::table_file::read_table;
 use super::textures::{find_material, find_textures, measure_folder, of_one_finger};
@@ -75,78 +74,6 @@ pub(crate) struct Args {
     /// How to print the answer
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
-}
-
-/// What `verify --format json` prints.
-#[derive(Serialize)]
-pub(super) struct Verified {
-    pub(super) reference: String,
-    /// Where it is known what it is said to be.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) sample: Option<String>,
-    /// `same`, `different` or `unsure`.
-    pub(super) answer: &'static str,
-    /// Fewest slides of the reference at a movement.
-    pub(super) reference_slides: u8,
-    /// Whether these are too few to rely on.
-    pub(super) few: bool,
-    pub(super) false_alarm: f32,
-    pub(super) threshold: f32,
-    /// Share of other textures' visits of as many slides that would be called the same; `null`: the table has no other.
-    pub(super) false_accept: Option<f64>,
-    pub(super) slides: Vec<Slide>,
-}
-
-impl Verified {
-    /// Before the first slide.
-    ///
-    /// # Errors
-    /// The table has no limits.
-    pub(super) fn new(table: Table<'_>, texture: u16, config: &Config) -> anyhow::Result<Self> {
-        let limits = table.limits().context(Failure::NoLimits)?;
-        let movements = 0..table.movements().len() as u8;
-        let trials = movements.map(|at| table.trials(texture, at));
-        let reference_slides = trials.filter(|n| *n > 0).min().unwrap_or(0);
-        Ok(Self {
-            reference: table.name(texture).unwrap_or_default().to_owned(),
-            sample: None,
-            answer: name(Answer::Unsure),
-            reference_slides,
-            few: reference_slides < ENOUGH_TRIALS,
-            false_alarm: config.false_alarm.unwrap_or(limits.false_alarm),
-            threshold: config.threshold,
-            false_accept: None,
-            slides: Vec::new(),
-        })
-    }
-
-    /// How the command ends.
-    pub(super) fn done(&self) -> Done {
-        if self.answer == name(Answer::Same) {
-            Done::Fully
-        } else {
-            Done::NotIdentified
-        }
-    }
-}
-
-/// What was known after a slide.
-#[derive(Serialize)]
-pub(super) struct Slide {
-    pub(super) number: u32,
-    pub(super) force_n: f32,
-    pub(super) speed_mm_s: f32,
-    pub(super) score: f32,
-    pub(super) limit: f32,
-    pub(super) answer: &'static str,
-}
-
-pub(super) fn name(answer: Answer) -> &'static str {
-    match answer {
-        Answer::Same => "same",
-        Answer::Different => "different",
-        Answer::Unsure => "unsure",
-    }
 }
 
 /// A slide of the sample.
@@ -298,7 +225,7 @@ fn hold(
         Format::Json => print_json(&verified, out)?,
         Format::Text => print(&verified, out)?,
     }
-    Ok(verified.done())
+    Ok(Done::of(&verified))
 }
 
 /// The table with the reference in it.
@@ -403,53 +330,5 @@ fn print(v: &Verified, out: &mut impl Write) -> anyhow::Result<()> {
     for slide in &v.slides {
         print_slide(slide, out)?;
     }
-    print_answer(v, out)
-}
-
-pub(super) fn print_slide(slide: &Slide, out: &mut impl Write) -> std::io::Result<()> {
-    let says = match slide.answer {
-        "same" => "the same",
-        "different" => "different",
-        _ => "not sure yet",
-    };
-    writeln!(
-        out,
-        "  slide {}, {:.2} N at {:.1} mm/s: score {:.1}, different above {:.1}: {says}",
-        slide.number, slide.force_n, slide.speed_mm_s, slide.score, slide.limit
-    )
-}
-
-pub(super) fn print_answer(v: &Verified, out: &mut impl Write) -> anyhow::Result<()> {
-    let answer = match v.answer {
-        "same" => format!("The same as {}.", v.reference),
-        "different" => format!(
-            "Different from {}, or {0} changed beyond what is expected.",
-            v.reference
-        ),
-        _ => format!(
-            "Not sure yet whether it is {}: more slides would tell.",
-            v.reference
-        ),
-    };
-    writeln!(out, "{answer}")?;
-    let accepted = match v.false_accept {
-        Some(share) => format!(
-            "; of the table's other textures {} would be called the same",
-            percent((share * 1000.0).round() / 1000.0)
-        ),
-        None => String::new(),
-    };
-    writeln!(
-        out,
-        "At this limit {} of its own slides would be called different{accepted}.",
-        percent(v.false_alarm.into())
-    )?;
-    if v.few {
-        writeln!(
-            out,
-            "The reference has only {} at a movement: record more of it, five make it much surer.",
-            count(v.reference_slides, "slide")
-        )?;
-    }
-    Ok(())
+    Ok(print_answer(v, out)?)
 }

@@ -19,7 +19,7 @@ use tactus_core::sensor::FingerCode;
 
 use crate::data::recording::{Labels, Recording, SlideKey, Texture};
 pub use files::{RecordingError, Result};
-pub use writer::RecordingWriter;
+pub use writer::{RecordingWriter, files as files_of};
 
 /// The recordings of one folder.
 #[derive(Debug)]

@@ -322,6 +322,12 @@ pub fn count(number: impl Into<u64>, thing: &str) -> String {
     }
 }
 
+/// A share as people write it: "30 %", "99.9 %".
+pub fn percent(share: f64) -> String {
+    let percent = format!("{:.4}", share * 100.0);
+    format!("{} %", percent.trim_end_matches('0').trim_end_matches('.'))
+}
+
 /// A day as messages, tables and recordings have it, in words; nothing for 0.
 pub fn day(date: u32) -> Option<String> {
     match date {
@@ -490,4 +496,19 @@ pub(crate) fn apart(table: Table<'_>, movement: u8, textures: [u16; 2]) -> Optio
     let [a, b] = textures.map(|texture| table.white_mean(texture, movement));
     let squares = a.zip(b).map(|(a, b)| (white(a) - white(b)).powi(2));
     Some(squares.sum::<f32>().sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::percent;
+
+    #[test]
+    fn a_share_is_written_without_the_digits_of_its_binary_form() {
+        let written =
+            [0.3_f32, 0.99, 0.999, 1.0, 0.0, 0.123_456].map(|share| percent(share.into()));
+        assert_eq!(
+            written,
+            ["30 %", "99 %", "99.9 %", "100 %", "0 %", "12.3456 %"]
+        );
+    }
 }

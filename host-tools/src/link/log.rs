@@ -6,7 +6,7 @@
 
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::{self, BufRead as _, BufReader, BufWriter, Read, Write as _};
+use std::io::{self, BufRead as _, BufReader, BufWriter, Read, Write};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -31,6 +31,26 @@ pub enum Line<'a> {
     Command(Box<Cow<'a, Command>>),
     /// What it said.
     Report(Box<Cow<'a, Report>>),
+}
+
+impl<'a> Line<'a> {
+    /// The first line of a log of what is said at a port.
+    pub fn first(port: &'a str) -> Self {
+        Self::Session {
+            tactus: env!("CARGO_PKG_VERSION").into(),
+            protocol: PROTOCOL,
+            port: port.into(),
+        }
+    }
+
+    /// Writes it, with its end.
+    ///
+    /// # Errors
+    /// A failure to write.
+    pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        serde_json::to_writer(&mut *out, self)?;
+        out.write_all(b"\n")
+    }
 }
 
 /// Versions of the messages whose logs are read: since the first of them only reasons have become more than sentences.
@@ -62,11 +82,7 @@ impl Log {
             file: BufWriter::new(file.map_err(|why| named(path, &why))?),
             failed: Ok(()),
         };
-        log.line(&Line::Session {
-            tactus: env!("CARGO_PKG_VERSION").into(),
-            protocol: PROTOCOL,
-            port: port.into(),
-        });
+        log.line(&Line::first(port));
         log.flush()?;
         Ok(log)
     }
@@ -83,8 +99,7 @@ impl Log {
 
     fn line(&mut self, line: &Line<'_>) {
         if self.failed.is_ok() {
-            let written = serde_json::to_writer(&mut self.file, line).map_err(io::Error::from);
-            self.failed = written.and_then(|()| self.file.write_all(b"\n"));
+            self.failed = line.write(&mut self.file);
         }
     }
 
@@ -151,4 +166,21 @@ pub fn read(log: impl Read, mut each: impl FnMut(Line<'static>)) -> Result<(), L
         }
     }
     Ok(())
+}
+
+/// A table, as its parts come.
+#[derive(Debug, Default)]
+pub struct TableParts(Vec<u8>);
+
+impl TableParts {
+    /// Takes a part; the table, when it is whole.
+    pub fn take(&mut self, offset: u32, length: u32, bytes: &[u8]) -> Option<Vec<u8>> {
+        if offset == 0 {
+            self.0.clear();
+        }
+        if offset as usize == self.0.len() {
+            self.0.extend_from_slice(bytes);
+        }
+        (self.0.len() == length as usize).then(|| std::mem::take(&mut self.0))
+    }
 }

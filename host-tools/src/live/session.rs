@@ -218,7 +218,7 @@ impl Session {
             life: Box::pin(life),
         };
         running.poll();
-        let known = running.scene.borrow().known().clone();
+        let known = running.scene.borrow().hearing.known().clone();
         if known.textures.is_empty() {
             return Err("the probe does not start".into());
         }
@@ -253,7 +253,8 @@ fn shimmed(setup: Setup) -> Setup {
     }
 }
 
-fn sentence(why: &dyn std::error::Error) -> String {
+/// What went wrong, with its causes.
+pub fn sentence(why: &dyn std::error::Error) -> String {
     let mut sentence = why.to_string();
     let mut cause = why.source();
     while let Some(deeper) = cause {
@@ -302,7 +303,7 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
     let mut probe = match on {
         Ok(probe) => probe,
         Err(why) => {
-            scene.borrow_mut().happens(Happening::Refused {
+            scene.borrow_mut().hearing.happens(Happening::Refused {
                 why: why.to_string(),
             });
             return std::future::pending().await;
@@ -312,8 +313,8 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
     loop {
         {
             let mut scene = scene.borrow_mut();
-            scene.knows(probe.memory.in_force());
-            scene.learned();
+            scene.hearing.knows(probe.memory.in_force());
+            scene.hearing.learned();
             scene.busy = false;
             scene.stop = false;
             // nothing moves: whatever is due is done
@@ -337,7 +338,7 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
                 let command = *command;
                 if let (Command::Identify(wanted), Ok(table)) = (&command, probe.memory.table()) {
                     let config = wanted.config(table.contents());
-                    scene.borrow_mut().explores(config);
+                    scene.borrow_mut().hearing.explores(config);
                 }
                 id = u16::wrapping_add(id, 1);
                 let request = wire::Request { id, command };
@@ -345,8 +346,8 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
             }
             Job::Move(movement, seed) => {
                 let made = make(&mut probe, &scene, movement, seed).await;
-                scene.borrow_mut().happens(made);
-                scene.borrow_mut().happens(Happening::Done);
+                scene.borrow_mut().hearing.happens(made);
+                scene.borrow_mut().hearing.happens(Happening::Done);
             }
         }
     }
@@ -383,7 +384,7 @@ async fn make<'p>(
                 movement: at,
                 place: at
                     .zip(table)
-                    .and_then(|(at, table)| scene.borrow().place_of(table, at, &seen)),
+                    .and_then(|(at, table)| scene.borrow().hearing.place_of(table, at, &seen)),
                 measured: Measured::new(movement, &seen),
             }
         }

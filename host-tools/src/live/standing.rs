@@ -21,6 +21,8 @@ pub struct Standing {
     pub log_odds: Option<f32>,
     /// Whether they are not like the most probable one as that was learned.
     pub changed: bool,
+    /// By how much they are less like any of the textures, as these were learned, than they may be; above 0: changed, or new.
+    pub changed_by: Option<f32>,
 }
 
 /// An exploration from outside: what its probe said so far.
@@ -113,6 +115,7 @@ impl Followed {
             posterior: explorer.posterior().to_vec(),
             log_odds: explorer.log_odds(),
             changed: explorer.is_changed(),
+            changed_by: explorer.changed_by(),
         })
     }
 }

@@ -208,13 +208,17 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     /// Whether the texture, if it is one of the candidates, is not as it was learned: without the drift that the table
     /// expects it would be none of them. Never with a table that is not calibrated, or expects no drift.
     pub fn is_changed(&self) -> bool {
+        self.changed_by().is_some_and(|over| over > 0.0)
+    }
+
+    /// By how much the slides are less like any of the candidates, as these were learned, than they may be: above 0, the texture
+    /// has [changed](Self::is_changed). `None` before the first slide, and where the table cannot tell.
+    pub fn changed_by(&self) -> Option<f32> {
         let drifts = self.table.drift().is_some_and(|drift| !drift.is_none());
-        let Some(limits) = self.limits.filter(|_| drifts && self.slides > 0) else {
-            return false;
-        };
+        let limits = self.limits.filter(|_| drifts && self.slides > 0)?;
         let limit = self.limit(&limits, Against::Same, self.slides);
-        let score = self.score(&self.episode, Against::Same);
-        score.is_some_and(|score| score > limit)
+        let score = self.score(&self.episode, Against::Same)?;
+        Some(score - limit)
     }
 
     /// The limit after so many slides; with a shorter one among them its own, where that is less.

@@ -10,31 +10,22 @@ use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use tactus::bringup::Trouble;
+use tactus::link::exchange::{BOOTING, GREETING, TIMEOUT, is_up};
+use tactus::link::lifting::{Lifting, RigHeard, Stopped as Rig, moves};
 use tactus::link::line::Line;
 use tactus::link::owner::Owner;
 use tactus::link::{Job, LinkError, Port, PortError, ReadTable, Request, Transaction};
-use tactus_core::rig::Fault;
+pub(crate) use tactus::remote::say::Prompts;
+use tactus::remote::say::after;
 use tactus_core::table::{Table, TableError};
-use tactus_core::wire::{Command, Event, Phase, Prompt, Report, Status};
+use tactus_core::wire::{Command, Event, Report, Status};
 
 use super::history::History;
 use super::line::{Emulator, OpenError, Where};
 use super::log::Log;
 
-/// A probe that says nothing for so long is taken for gone: its longest silence is an erase of its flash, 2 s.
-const TIMEOUT: Duration = Duration::from_secs(5);
-/// A first answer comes sooner: the probe reports its status at once.
-const GREETING: Duration = Duration::from_secs(1);
 /// An emulated board may go slower than real time.
 const EMULATED: Duration = Duration::from_secs(30);
-/// A probe opens its store within 10 s of its start.
-const BOOTING: Duration = Duration::from_secs(90);
-/// Longest way up, and some: 10 mm at 2 mm/s.
-const LIFTING: Duration = Duration::from_secs(30);
-/// A faulted rig reports where it is 20 times a second until it is at rest.
-const AT_REST: Duration = Duration::from_millis(500);
-/// Longest that a request which was stopped takes to answer: something may be stored first.
-const ANSWERED: Duration = Duration::from_secs(5);
 
 /// What went wrong at the bench, and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -51,15 +42,13 @@ pub(crate) enum BenchError {
         moving: bool,
     },
     /// Ctrl-C.
-    #[error("stopped: the finger is lifted and the stage stands")]
+    #[error("{}", Rig::Lifted)]
     Stopped,
     /// Ctrl-C, and the fault is that the lever does not find its top.
-    #[error("stopped, but the lever is not home: the finger may still be down. Lift it by hand")]
+    #[error("{}", Rig::NotHome)]
     NotHome,
     /// Ctrl-C twice, or the probe did not answer.
-    #[error(
-        "the probe has not said that the finger is lifted: it may still be down. Look at the rig; its emergency stop lifts it"
-    )]
+    #[error("{}", Rig::NotLifted)]
     NotLifted,
     /// The probe holds a table that is none.
     #[error("the probe's table cannot be read: {0}")]
@@ -73,14 +62,6 @@ pub(crate) enum BenchError {
     /// There can be no log, or what is shown cannot be written.
     #[error(transparent)]
     Io(#[from] io::Error),
-}
-
-fn after(why: &PortError, moving: bool) -> &'static str {
-    if moving && !matches!(why, PortError::Link(_)) {
-        ".\nThe rig was moving: the probe goes on and lifts the finger at the end. To stop it now, press its emergency stop"
-    } else {
-        ""
-    }
 }
 
 impl BenchError {
@@ -133,12 +114,8 @@ pub(crate) struct Bench {
 struct Heard {
     log: Option<Log>,
     history: History,
-    /// what the rig does
-    phase: Option<Phase>,
-    /// when it last reported where it is
-    located: Instant,
-    /// the request that moves the rig, until it is over
-    moving: Option<u16>,
+    rig: RigHeard,
+    began: Instant,
 }
 
 impl Heard {
@@ -147,17 +124,12 @@ impl Heard {
             log.told(report);
         }
         self.history.hear(report);
-        match &report.event {
-            Event::Phase(now) => self.phase = Some(*now),
-            Event::Status(status) => self.phase = Some(status.phase),
-            Event::Live(_) => self.located = Instant::now(),
-            Event::Chosen {
-                slide, movement, ..
-            } => tracing::info!(slide, %movement, "the probe chooses"),
-            Event::Done(id) | Event::Refused { id, .. } if self.moving == Some(*id) => {
-                self.moving = None;
-            }
-            _ => {}
+        self.rig.hear(report, self.began.elapsed());
+        if let Event::Chosen {
+            slide, movement, ..
+        } = &report.event
+        {
+            tracing::info!(slide, %movement, "the probe chooses");
         }
     }
 
@@ -193,9 +165,8 @@ impl Bench {
             heard: Heard {
                 log: log.transpose()?,
                 history: History::of(&open.name),
-                phase: None,
-                located: Instant::now(),
-                moving: None,
+                rig: RigHeard::default(),
+                began: Instant::now(),
             },
             name: open.name,
             _emulator: open.emulator,
@@ -212,13 +183,8 @@ impl Bench {
         loop {
             let status = self.get(Request::status());
             let is_up = match &status {
-                // a probe without a table has not opened its store yet
-                Ok(status) => status.textures > 0 && status.phase != Phase::Homing,
-                // it had its power just now
-                Err(BenchError::Port {
-                    why: PortError::Link(LinkError::Rebooted { .. }),
-                    ..
-                }) => false,
+                Ok(status) => is_up(status),
+                Err(BenchError::Port { why, .. }) => !why.is_restart(),
                 Err(_) => true,
             };
             if is_up || began.elapsed() > BOOTING {
@@ -338,7 +304,7 @@ impl Bench {
     ) -> Result<Poll<E::Outcome>, BenchError> {
         let moving = job.command().is_some_and(moves);
         if moving {
-            self.heard.moving = job.last_id();
+            self.heard.rig.moves(job.last_id());
         }
         let polled = self.port.step(job, |report| {
             self.heard.hear(report);
@@ -387,45 +353,28 @@ impl Bench {
     /// the waiting.
     pub(crate) fn lift(&mut self) -> BenchError {
         match self.try_lift() {
-            Ok(Some(Fault::LeverNotHome)) => BenchError::NotHome,
-            Ok(_) => BenchError::Stopped,
+            Ok(Rig::Lifted) => BenchError::Stopped,
+            Ok(Rig::NotHome) => BenchError::NotHome,
+            Ok(Rig::NotLifted) => BenchError::NotLifted,
             Err(why) => why,
         }
     }
 
-    fn try_lift(&mut self) -> Result<Option<Fault>, BenchError> {
-        let began = Instant::now();
-        let mut asked: Option<Instant> = None;
-        let mut fault = None;
-        self.heard.phase = None;
-        while began.elapsed() < LIFTING {
+    fn try_lift(&mut self) -> Result<Rig, BenchError> {
+        let began = self.heard.began;
+        let mut lifting = Lifting::begin(&mut self.heard.rig, began.elapsed());
+        loop {
             if self.interrupt.take() {
-                return Err(BenchError::NotLifted);
+                return Ok(Rig::NotLifted);
             }
-            if asked.is_none_or(|at| at.elapsed() > Duration::from_millis(200)) {
-                asked = Some(Instant::now());
-                // again and again: a request may be damaged, and stopping twice does no harm
-                for command in [Command::Stop, Command::Stream(false), Command::Status] {
-                    self.send(command)?;
-                }
+            for command in lifting.asks(began.elapsed()).into_iter().flatten() {
+                self.send(command)?;
             }
-            self.listen(|report| {
-                if let Event::Status(status) = &report.event {
-                    fault = status.fault;
-                }
-            })?;
-            // between two slides the rig is ready, and what it was asked for is not over; an answer can be lost
-            if self.heard.moving.is_some() && began.elapsed() < ANSWERED {
-                continue;
-            }
-            let at_rest = self.heard.located.elapsed() > AT_REST;
-            match self.heard.phase {
-                Some(Phase::Ready | Phase::Parked) => return Ok(None),
-                Some(Phase::Faulted) if at_rest && fault.is_some() => return Ok(fault),
-                _ => {}
+            self.listen(|_| ())?;
+            if let Some(came) = lifting.came(&self.heard.rig, began.elapsed()) {
+                return Ok(came);
             }
         }
-        Err(BenchError::NotLifted)
     }
 
     fn error(&self, why: PortError, moving: bool) -> BenchError {
@@ -435,20 +384,6 @@ impl Bench {
             moving,
         }
     }
-}
-
-/// Whether a request has the rig move.
-fn moves(command: &Command) -> bool {
-    matches!(
-        command,
-        Command::Home
-            | Command::Identify(_)
-            | Command::Train(_)
-            | Command::Calibrate
-            | Command::Weigh(_)
-            | Command::TurnOver
-            | Command::Verify(_)
-    )
 }
 
 /// Waits for Enter, or for Ctrl-C.
@@ -476,37 +411,6 @@ pub(crate) fn read_answer(interrupt: &Interrupt, prompt: &str) -> Result<String,
             Ok(Err(why)) => return Err(why.into()),
             Err(RecvTimeoutError::Timeout) => {}
             Ok(Ok(None)) | Err(RecvTimeoutError::Disconnected) => return Err(BenchError::Stopped),
-        }
-    }
-}
-
-/// Prints the fault and its recovery, if the report is a fault.
-pub(crate) fn show_fault(report: &Report, out: &mut impl Write) -> io::Result<()> {
-    match &report.event {
-        Event::Fault(fault) => {
-            let recovery = fault.recovery();
-            writeln!(out, "FAULT: {fault}. {recovery}: tactus device home")?;
-        }
-        Event::Trouble(why) => writeln!(out, "trouble: {why}")?,
-        _ => return Ok(()),
-    }
-    out.flush()
-}
-
-/// What a handheld probe asks the person who holds it, for the terminal beside it: each once, although the probe repeats it.
-#[derive(Debug, Default)]
-pub(crate) struct Prompts(Option<Prompt>);
-
-impl Prompts {
-    /// Prints what the person is asked to do, or a fault and its recovery, if the report is one of these.
-    pub(crate) fn show(&mut self, report: &Report, out: &mut impl Write) -> io::Result<()> {
-        match report.event {
-            Event::Prompt(prompt) if self.0.replace(prompt) != Some(prompt) => {
-                writeln!(out, "the display says: {prompt}")?;
-                out.flush()
-            }
-            Event::Prompt(_) => Ok(()),
-            _ => show_fault(report, out),
         }
     }
 }

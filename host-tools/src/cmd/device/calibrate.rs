@@ -5,12 +5,11 @@ use std::io::Write;
 use anyhow::{Context as _, ensure};
 use clap::ArgGroup;
 use serde::Serialize;
-use tactus::eval::show::day;
 use tactus::link::Request;
+use tactus::remote::say::{calibration_rows, date, sensor, turned};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::weigh::ForceScale;
 use tactus_core::sensor::mems::Mems;
-use tactus_core::sensor::pressure::Calibration;
 use tactus_core::sensor::{FingerCode, FingerName, PressureSensor as _};
 use tactus_core::wire::Command;
 
@@ -101,24 +100,6 @@ impl CalibrationSummary {
             mg_per_count: turned(c).map(|_| c.pressure.pac_pa_per_count),
         }
     }
-}
-
-/// The day of the force scale: "2026-11-21", "not known" for a probe that was calibrated without a computer; nothing for a
-/// scale that was not measured.
-fn date(c: &RigCalibration) -> Option<String> {
-    day(c.scale_day()?)
-}
-
-/// The day on which its accelerometer was turned over, in the same way.
-fn turned(c: &RigCalibration) -> Option<String> {
-    day((c.turned != 0).then_some(c.turned)?)
-}
-
-/// The sensor's serial number.
-fn sensor(c: &RigCalibration) -> Option<String> {
-    let serial = String::from_utf8_lossy(&c.serial);
-    let serial = serial.trim_matches('\0');
-    (!serial.is_empty()).then(|| serial.to_owned())
 }
 
 /// Measures, shows or sets the rig's constants.
@@ -254,58 +235,6 @@ fn print(format: Format, c: &RigCalibration, out: &mut impl Write) -> anyhow::Re
 fn today() -> u32 {
     let (year, month, day) = time::OffsetDateTime::now_utc().to_calendar_date();
     u32::try_from(year).unwrap_or(0) * 10_000 + u32::from(u8::from(month)) * 100 + u32::from(day)
-}
-
-/// The constants in words.
-pub(crate) fn calibration_rows(c: &RigCalibration) -> Vec<(&'static str, String)> {
-    let (offset_ma, slope_ma) = (c.unloaded_a.0 * 1e3, c.unloaded_a.1 * 1e3);
-    let motor = format!("{offset_ma:.1} mA + {slope_ma:.3} mA per mm/s without load");
-    let mn = c.pressure.force_mn_per_count;
-    let whose = if mn == Calibration::PAPER.force_mn_per_count {
-        "the paper's "
-    } else {
-        ""
-    };
-    let air = if c.air_known {
-        ""
-    } else {
-        ", which nobody measured"
-    };
-    let mut rows = vec![
-        (
-            "force scale",
-            match date(c) {
-                None => format!("not measured ({whose}{mn:.1} mN a count)"),
-                Some(day) if c.date == RigCalibration::UNDATED => {
-                    format!("{mn:.2} mN a count, measured on a day {day}")
-                }
-                Some(day) => format!("{mn:.2} mN a count, measured on {day}"),
-            },
-        ),
-        (
-            "sensor",
-            sensor(c).unwrap_or_else(|| "not known".to_owned()),
-        ),
-        (
-            "P_DC",
-            format!("{:.1} counts in the air{air}", c.pressure.pdc_no_contact),
-        ),
-        ("motor current", motor),
-        (
-            "shear",
-            format!("{:.2} N/A above that", c.newton_per_ampere),
-        ),
-    ];
-    if let Some(day) = turned(c) {
-        let mg = c.pressure.pac_pa_per_count;
-        let text = if c.turned == RigCalibration::UNDATED {
-            format!("{mg:.4} mg a count, turned over on a day {day}")
-        } else {
-            format!("{mg:.4} mg a count, turned over on {day}")
-        };
-        rows.push(("accelerometer", text));
-    }
-    rows
 }
 
 /// Ends a fault.

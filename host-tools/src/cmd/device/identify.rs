@@ -7,9 +7,10 @@ use serde::Serialize;
 use tactus::eval::evaluate::Method;
 use tactus::eval::pictures::exploration::Exploration;
 use tactus::eval::pictures::timeline::{Timeline, Watch};
-use tactus::eval::show::{Show, count};
+use tactus::eval::show::Show;
 use tactus::eval::transcript::{Answer, Transcript};
 use tactus::link::Request;
+use tactus::remote::say::show_found;
 use tactus_core::explorer::Told;
 use tactus_core::table::Table;
 use tactus_core::wire::{Command, Identify, Status};
@@ -146,28 +147,8 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
     })?;
     let answered = show.answered();
     bench.get(Request::command(Command::Stream(false)))?;
-    if found.learned > 0 {
-        writeln!(
-            out,
-            "It has learned from {} of these slides.",
-            found.learned
-        )?;
-    }
-    if found.verdict.wants_label {
-        writeln!(
-            out,
-            "It is not certain. If you know what it is: tactus device teach NAME"
-        )?;
-    }
     let (damaged, missing) = bench.losses();
-    if damaged + missing > 0 {
-        writeln!(
-            out,
-            "Damaged or lost on the line: {} and {}.",
-            count(damaged, "frame"),
-            count(missing, "report")
-        )?;
-    }
+    show_found(&found, (damaged, missing), &mut *out)?;
     if *format == Format::Json {
         let identification = Identification {
             among,

@@ -4,7 +4,6 @@ use std::io::{IsTerminal as _, Write};
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
-use tactus::eval::show::count;
 use tactus_core::table::Table;
 
 use super::bench::{Bench, read_answer};
@@ -107,25 +106,4 @@ fn folder() -> anyhow::Result<PathBuf> {
     std::fs::create_dir_all(&folder)
         .with_context(|| format!("{}: name another file with --backup", folder.display()))?;
     Ok(folder)
-}
-
-/// The textures of a table that are not in another, which takes its place.
-pub(crate) fn replaced(old: &Table<'_>, new: Option<&Table<'_>>) -> String {
-    let lost: Vec<&str> = (0..old.textures())
-        .filter_map(|texture| old.name(texture))
-        .filter(|name| new.is_none_or(|new| new.find(name).is_none()))
-        .collect();
-    let all = match old.textures() {
-        1 => "the texture".to_owned(),
-        n => count(n, "texture"),
-    };
-    match lost.as_slice() {
-        [] => {
-            format!("The probe's table of {all} is replaced; all their names are in the new one.")
-        }
-        names => format!(
-            "The probe's table of {all} is replaced. No longer known: {}.",
-            names.join(", ")
-        ),
-    }
 }

@@ -4,13 +4,13 @@ use std::io::Write;
 
 use serde::Serialize;
 use tactus::link::Request;
+use tactus::remote::say::name_of;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire;
 
 use super::bench::Bench;
 use super::line::Where;
 use super::loss::Consent;
-use super::train::name_of;
 use crate::cmd::names;
 use crate::cmd::output::{Format, print_json};
 
@@ -141,5 +141,6 @@ pub(crate) fn forget(args: &Forget, out: &mut impl Write) -> anyhow::Result<()> 
 pub(super) fn known(table: &[u8], typed: &str) -> anyhow::Result<Name> {
     let table = Table::read(table)?;
     let all: Vec<&str> = table.names().collect();
-    name_of(names::find(typed, &all).map_err(anyhow::Error::msg)?)
+    let name = names::find(typed, &all).map_err(anyhow::Error::msg)?;
+    Ok(name_of(name)?)
 }

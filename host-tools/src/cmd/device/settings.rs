@@ -5,13 +5,13 @@ use std::io::Write;
 use clap::{ArgGroup, ValueEnum};
 use serde::Serialize;
 use tactus::link::Request;
+use tactus::remote::say::{limits, movements};
 use tactus_core::table::Table;
 use tactus_core::wire::Command;
 
 use super::bench::Bench;
 use super::line::Where;
 use super::loss::confirm;
-use super::status::{limits, movements};
 use crate::cmd::args::false_alarm;
 use crate::cmd::output::{Format, percent, print_json};
 

@@ -9,12 +9,13 @@ use serde::Serialize;
 use tactus::eval::show::{count, show_table};
 use tactus::eval::table_summary::TableSummary;
 use tactus::link::{PushTable, Request};
+use tactus::remote::say::replaced;
 use tactus_core::table::Table;
 use tactus_core::wire;
 
 use super::bench::Bench;
 use super::line::Where;
-use super::loss::{Consent, replaced};
+use super::loss::Consent;
 use crate::cmd::output::{Format, print_json};
 use crate::cmd::table_file::{TableFile, beside, read_table, write_table};
 

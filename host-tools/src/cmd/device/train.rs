@@ -1,18 +1,17 @@
 //! `tactus device train` and `teach`: what the probe learns, and what that feels most like.
 
-use std::io::{self, Write};
+use std::io::Write;
 use std::ops::ControlFlow;
 
-use anyhow::ensure;
 use serde::Serialize;
 use tactus::eval::alike::{self, Alike};
 use tactus::eval::show::count;
 use tactus::link::Request;
-use tactus_core::features::Property;
+use tactus::remote::say::{compare, name_of, of_sample, show_training};
 use tactus_core::probe::training::pilot_movements;
 use tactus_core::rig::most_mn;
 use tactus_core::table::{Name, Table};
-use tactus_core::wire::{self, Event, Report};
+use tactus_core::wire::{self, Event};
 
 use super::bench::{Bench, Prompts};
 use super::line::Where;
@@ -119,7 +118,7 @@ pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
         };
         let done = bench.run_until(Request::train(wanted), |report| {
             if text {
-                show_slide(report, &mut prompts, out)?;
+                show_training(report, &mut prompts, out)?;
             }
             let Event::TrainingSlide { left, .. } = report.event else {
                 return Ok(ControlFlow::Continue(()));
@@ -160,19 +159,6 @@ pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
     learned.print(args.format, out)
 }
 
-/// What the table says of the sample of a texture.
-fn of_sample(moved: Option<bool>) -> &'static str {
-    match moved {
-        Some(true) => "Its sample was moved between trials.",
-        Some(false) => {
-            "Its sample was not moved: slides on the same track say little about a texture. More trials elsewhere on it would help."
-        }
-        None => {
-            "The table does not know whether its sample was moved between all trials (--moved and --same-spot say so)."
-        }
-    }
-}
-
 /// Names the texture of the last exploration.
 pub(crate) fn teach(
     Teach { at, name, format }: &Teach,
@@ -210,92 +196,23 @@ impl Learned {
         match (format, &self.nearest) {
             (Format::Json, _) => return print_json(self, out),
             (Format::Text, None) => {}
-            (Format::Text, Some(nearest)) => self.compare(nearest, out)?,
+            (Format::Text, Some(nearest)) => compare(&self.name, self.is_new, nearest, out)?,
         }
         Ok(())
-    }
-
-    fn compare(&self, nearest: &Alike, out: &mut impl Write) -> io::Result<()> {
-        let (name, other) = (&self.name, &nearest.texture);
-        let (force_n, speed_mm_s) = (nearest.force_n, nearest.speed_mm_s);
-        let like = most_like(nearest);
-        writeln!(
-            out,
-            "{like}, at {force_n:.2} N, {speed_mm_s:.1} mm/s, the movement that tells the two apart best."
-        )?;
-        if !nearest.feels_the_same {
-            return Ok(());
-        }
-        write!(
-            out,
-            "WARNING: {name} feels the same as {other}: ten slides would not tell them apart. "
-        )?;
-        if self.is_new {
-            writeln!(
-                out,
-                "If it is {other}: tactus device forget --name '{name}', then teach it as '{other}'. If not: consider more trials."
-            )
-        } else {
-            writeln!(out, "Consider more trials.")
-        }
-    }
-}
-
-/// "Most like Canvas: 31 % of slides could be taken for it"
-pub(super) fn most_like(nearest: &Alike) -> String {
-    let other = &nearest.texture;
-    match (nearest.taken_for * 100.0).round() {
-        share if share < 1.0 => {
-            format!("Most like {other}: less than 1 % of slides could be taken for it")
-        }
-        share => format!("Most like {other}: {share:.0} % of slides could be taken for it"),
     }
 }
 
 /// The probe's name for a texture whose capitals were typed otherwise; any other stays as it is.
 fn known_as(typed: Name, before: &[String]) -> anyhow::Result<Name> {
     let before: Vec<&str> = before.iter().map(String::as_str).collect();
-    names::find(&typed, &before).map_or(Ok(typed.clone()), name_of)
-}
-
-pub(super) fn name_of(name: &str) -> anyhow::Result<Name> {
-    let name = name.trim();
-    ensure!(
-        !name.is_empty(),
-        "the name of the texture is empty: give one"
-    );
-    Name::try_from(name).map_err(|_| {
-        anyhow::anyhow!("{name:?} is longer than the 40 bytes that the probe keeps: shorten it")
-    })
+    let known = names::find(&typed, &before).map(name_of);
+    Ok(known.unwrap_or(Ok(typed))?)
 }
 
 /// Another number every time.
 pub(crate) fn seed_of_now() -> u32 {
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     now.map_or(1, |now| now.as_secs() as u32 ^ now.subsec_nanos())
-}
-
-/// What a training shows of a report.
-fn show_slide(report: &Report, prompts: &mut Prompts, out: &mut impl Write) -> io::Result<()> {
-    match &report.event {
-        Event::TrainingSlide {
-            movement,
-            trial,
-            left,
-            observed,
-        } => {
-            let value = |p: Property| Some(format!("{p} {:.3}", observed.properties().get(p)?));
-            let properties: Vec<String> = Property::ALL.into_iter().filter_map(value).collect();
-            let properties = properties.join(", ");
-            writeln!(
-                out,
-                "trial {trial} of {movement}: {properties}; {left} to go"
-            )?;
-        }
-        Event::Rejected { why, .. } => writeln!(out, "rejected, and repeated: {why}")?,
-        _ => prompts.show(report, out)?,
-    }
-    out.flush()
 }
 
 #[cfg(test)]

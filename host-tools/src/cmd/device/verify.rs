@@ -3,13 +3,14 @@
 use std::io::{self, Write};
 
 use anyhow::Context as _;
-use tactus::eval::evaluate::{Method, explorer};
-use tactus::eval::verify::false_accept;
+use tactus::eval::evaluate::Method;
+use tactus::eval::verified::{print_answer, print_slide};
 use tactus::link::Request;
+use tactus::remote::say::show_verifying;
+use tactus::remote::verifying::Verifying;
 use tactus_core::explorer::{Config, Strategy};
-use tactus_core::features::{Movement, Observation, PropertySet};
 use tactus_core::table::Table;
-use tactus_core::wire::{Command, Event, Identify};
+use tactus_core::wire::{Command, Identify};
 
 use super::bench::{Bench, Prompts};
 use super::line::Where;
@@ -17,7 +18,6 @@ use super::rename::known;
 use super::train::seed_of_now;
 use crate::cmd::args::Stop;
 use crate::cmd::output::{Done, Format, print_json};
-use crate::cmd::verify::{Slide, Verified, name, print_answer, print_slide};
 
 /// Have the probe say whether what lies under its finger is this texture
 #[derive(clap::Args)]
@@ -59,9 +59,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
         false_alarm: args.stop.false_alarm.or(status.false_alarm),
         ..args.stop.config(Method::Fused)
     };
-    let mut verified = Verified::new(table, texture, &config)?;
-    // what the probe says of its slides, held against the other textures here
-    let mut here = explorer(&bytes, PropertySet::ALL, config, Some(&[texture]))?;
+    let mut verifying = Verifying::new(&bytes, texture, config)?;
     let wanted = Identify {
         among: std::iter::once(texture).collect(),
         threshold: args.stop.threshold,
@@ -73,46 +71,17 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     };
     let text = args.format == Format::Text;
     if text {
-        writeln!(out, "Is it {}?", verified.reference)?;
+        writeln!(out, "Is it {}?", verifying.reference())?;
         out.flush()?;
     }
     let mut prompts = Prompts::default();
-    let mut movement: Option<Movement> = None;
-    let mut pace = None;
     bench.run(Request::command(Command::Verify(wanted)), |report| {
-        match &report.event {
-            Event::Chosen { movement: next, .. } => movement = Some(*next),
-            Event::Pace(measured) => pace = Some(*measured),
-            Event::SlideReport {
-                action, observed, ..
-            } => {
-                // a slide that says nothing here is the probe's to judge
-                let observation = Observation {
-                    pace: pace.take(),
-                    ..observed.observation()
-                };
-                let _ = here.observe(*action, &observation);
+        let slide = verifying.hear(&report.event);
+        if text {
+            match slide {
+                Some(slide) => print_slide(slide, out)?,
+                None => show_verifying(report, &mut prompts, out)?,
             }
-            Event::Verified { slides, now, .. } => {
-                let slide = Slide {
-                    number: u32::from(*slides),
-                    force_n: movement.map_or(0.0, Movement::force_n),
-                    speed_mm_s: movement.map_or(0.0, Movement::speed_mm_s),
-                    score: now.score,
-                    limit: now.limit,
-                    answer: name(now.answer),
-                };
-                if text {
-                    print_slide(&slide, out)?;
-                }
-                verified.answer = slide.answer;
-                verified.slides.push(slide);
-            }
-            Event::Rejected { why, .. } if text => {
-                writeln!(out, "  rejected, and repeated: {why}")?;
-            }
-            _ if text => prompts.show(report, out)?,
-            _ => {}
         }
         if text {
             out.flush()
@@ -120,10 +89,10 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
             io::Result::Ok(())
         }
     })?;
-    verified.false_accept = false_accept(&here, texture);
+    let verified = verifying.end();
     match args.format {
         Format::Json => print_json(&verified, out)?,
         Format::Text => print_answer(&verified, out)?,
     }
-    Ok(verified.done())
+    Ok(Done::of(&verified))
 }

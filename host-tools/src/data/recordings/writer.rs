@@ -160,51 +160,11 @@ impl RecordingWriter {
             });
         }
 
-        let stream = |stream: &str, samples: &[i16]| -> Result<[String; 2]> {
-            let file = format!("t{:03}_s{:03}_{stream}.npy", texture.id, slide.number);
-            let path = self.folder.join(&file);
-            let bytes = npy::write(samples);
-            fs::write(&path, &bytes).map_err(|e| io_error(&path, e))?;
-            Ok([file, sha256(&bytes)])
-        };
-        let none = || [String::new(), String::new()];
-        let (power, background) = match slide.background {
-            Some(power) => (power.to_string(), none()),
-            None => (String::new(), stream("still", &slide.still())?),
-        };
-        let pac = stream("pac", &slide.pac())?;
-        let pdc = stream("pdc", &slide.pdc)?;
-        let shear = match slide.shear_mn() {
-            Some(shear) => stream("shear", &shear)?,
-            None => none(),
-        };
-        let mut row = vec![
-            texture.id.to_string(),
-            texture.name.trim().to_owned(),
-            slide.number.to_string(),
-            thousandths(u32::from(slide.movement.force_mn())),
-            thousandths(slide.movement.speed_um_s()),
-            slide.window.0.to_string(),
-            slide.window.1.to_string(),
-            power,
-        ];
-        row.extend(background);
-        for ([file, sha256], rate) in [
-            (pac, PAC_RATE_HZ),
-            (pdc, slide.pdc_rate_hz),
-            (shear, slide.shear_rate_hz),
-        ] {
-            row.extend([file, rate.to_string(), sha256]);
-        }
-        let labels = &self.labels;
-        row.extend([&labels.lot, &labels.operator, &labels.note].map(Clone::clone));
-        let moved = labels.moved.map(|moved| if moved { "yes" } else { "no" });
-        row.push(moved.unwrap_or_default().to_owned());
-        row.push(labels.finger.to_string());
-        let day = (labels.calibrated != 0).then(|| labels.calibrated.to_string());
-        row.push(day.unwrap_or_default());
-        let pace = slide.pace.map(|pace| pace.to_string());
-        row.push(pace.unwrap_or_default());
+        let folder = &self.folder;
+        let row = row(texture, slide, &self.labels, |file, bytes| {
+            let path = folder.join(file);
+            fs::write(&path, bytes).map_err(|e| io_error(&path, e))
+        })?;
         let written = csv(std::iter::once(&row)).and_then(|row| self.journal.write_all(&row));
         written.map_err(|e| io_error(&self.folder.join(ROWS), e))?;
         self.rows.push(row);
@@ -256,6 +216,86 @@ impl Drop for RecordingWriter {
             }
         }
     }
+}
+
+/// The row of a slide; its files are `put` where they belong.
+fn row(
+    texture: &Texture,
+    slide: &Recording,
+    labels: &Labels,
+    mut put: impl FnMut(&str, &[u8]) -> Result<()>,
+) -> Result<Vec<String>> {
+    let mut stream = |stream: &str, samples: &[i16]| -> Result<[String; 2]> {
+        let file = format!("t{:03}_s{:03}_{stream}.npy", texture.id, slide.number);
+        let bytes = npy::write(samples);
+        put(&file, &bytes)?;
+        Ok([file, sha256(&bytes)])
+    };
+    let none = || [String::new(), String::new()];
+    let (power, background) = match slide.background {
+        Some(power) => (power.to_string(), none()),
+        None => (String::new(), stream("still", &slide.still())?),
+    };
+    let pac = stream("pac", &slide.pac())?;
+    let pdc = stream("pdc", &slide.pdc)?;
+    let shear = match slide.shear_mn() {
+        Some(shear) => stream("shear", &shear)?,
+        None => none(),
+    };
+    let mut row = vec![
+        texture.id.to_string(),
+        texture.name.trim().to_owned(),
+        slide.number.to_string(),
+        thousandths(u32::from(slide.movement.force_mn())),
+        thousandths(slide.movement.speed_um_s()),
+        slide.window.0.to_string(),
+        slide.window.1.to_string(),
+        power,
+    ];
+    row.extend(background);
+    for ([file, sha256], rate) in [
+        (pac, PAC_RATE_HZ),
+        (pdc, slide.pdc_rate_hz),
+        (shear, slide.shear_rate_hz),
+    ] {
+        row.extend([file, rate.to_string(), sha256]);
+    }
+    row.extend([&labels.lot, &labels.operator, &labels.note].map(Clone::clone));
+    let moved = labels.moved.map(|moved| if moved { "yes" } else { "no" });
+    row.push(moved.unwrap_or_default().to_owned());
+    row.push(labels.finger.to_string());
+    let day = (labels.calibrated != 0).then(|| labels.calibrated.to_string());
+    row.push(day.unwrap_or_default());
+    let pace = slide.pace.map(|pace| pace.to_string());
+    row.push(pace.unwrap_or_default());
+    Ok(row)
+}
+
+/// The files of a folder of recordings of one texture, by their names, for those who have no file system.
+///
+/// # Errors
+/// A slide makes no sense.
+pub fn files(
+    texture: &Texture,
+    labels: &Labels,
+    slides: &[Recording],
+) -> Result<Vec<(String, Vec<u8>)>> {
+    let mut files = Vec::new();
+    let mut rows = vec![header()];
+    for slide in slides {
+        slide.check().map_err(|cause| RecordingError::Entry {
+            path: MANIFEST.into(),
+            place: format!("texture {}, slide {}", texture.id, slide.number),
+            cause,
+        })?;
+        rows.push(row(texture, slide, labels, |file, bytes| {
+            files.push((file.to_owned(), bytes.to_vec()));
+            Ok(())
+        })?);
+    }
+    let manifest = csv(rows.iter()).map_err(|e| io_error(Path::new(MANIFEST), e))?;
+    files.push((MANIFEST.to_owned(), manifest));
+    Ok(files)
 }
 
 /// What the folder says while it is not whole.

@@ -1,10 +1,10 @@
 //! What the keys of the monitor do.
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use tactus::remote::say::name_of;
 use tactus_core::table::Name;
 
 use super::state::{Monitor, Weight};
-use crate::cmd::device::train::name_of;
 use crate::cmd::names;
 
 /// The keys and what they do, as the help has them; and in a word, for the last line.

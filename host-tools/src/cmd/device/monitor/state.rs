@@ -5,13 +5,12 @@ use std::time::Duration;
 
 use tactus::eval::alike;
 use tactus::eval::show::count;
+use tactus::remote::say::most_like;
 use tactus_core::features::Movement;
 use tactus_core::table::{Action, Name, Table};
 use tactus_core::wire::{
     Command, Event, Live, PROTOCOL, Phase, Prompt, Report, SlideReport, Status,
 };
-
-use crate::cmd::device::train::most_like;
 
 /// P_AC samples that are shown: a second.
 pub(crate) const SHOWN: usize = 2200;

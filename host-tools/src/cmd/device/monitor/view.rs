@@ -10,13 +10,13 @@ use ratatui::widgets::{
     Axis, Block, BorderType, Chart, Clear, Dataset, GraphType, Paragraph, Sparkline,
 };
 use tactus::eval::show::count;
+use tactus::remote::say::phase_name;
 use tactus_core::dsp::{BIN_HZ, Plain, SpectrumSum, angles};
 use tactus_core::features::Property;
 use tactus_core::wire::Phase;
 
 use super::keys::KEYS;
 use super::state::{Monitor, SHOWN, Weight};
-use crate::cmd::device::status::phase_name;
 
 // of the 256 colours that every terminal has, the nearest to Okabe's and Ito's
 pub(super) const BLUE: Color = Color::Indexed(39);

@@ -1,0 +1,48 @@
+// A serial port for a page: `navigator.serial` in the browser, a TCP port at the other end. The page's content-security policy
+// forbids it any connection, so bytes go through the pipe that drives the browser.
+import { connect } from "node:net";
+
+const SHIM = `(() => {
+  let come = null, open = false;
+  const text = bytes => btoa(String.fromCharCode(...bytes));
+  window.tactusSerialCame = base64 => come?.(Uint8Array.from(atob(base64), c => c.charCodeAt(0)));
+  window.tactusSerialGone = () => come?.(null);
+  const port = {
+    getInfo: () => ({ usbVendorId: 0x0483, usbProductId: 0x374b }),
+    async open({ baudRate }) {
+      if (open) throw new DOMException("The port is already open.", "InvalidStateError");
+      if (baudRate !== 921600) throw new Error("another baud rate: " + baudRate);
+      open = true;
+      this.readable = new ReadableStream({ start(to) {
+        come = bytes => { try { if (bytes) to.enqueue(bytes); else to.error(new DOMException("The device has been lost.", "NetworkError")); } catch { /* cancelled */ } };
+      } });
+      this.writable = new WritableStream({ write(bytes) { tactusSerial(JSON.stringify({ send: text(bytes) })); } });
+      tactusSerial(JSON.stringify({ open: true }));
+    },
+    async close() { open = false; come = null; tactusSerial(JSON.stringify({ open: false })); },
+  };
+  Object.defineProperty(navigator, "serial", { configurable: true, value: { requestPort: async () => port } });
+})()`;
+
+/// Gives a tab a serial port at whose other end is the TCP port HOST:PORT; before the tab opens the page. The function that it
+/// returns pulls the plug.
+export async function serial(it, address) {
+  let socket = null;
+  const [host, port] = [address.slice(0, address.lastIndexOf(":")), Number(address.slice(address.lastIndexOf(":") + 1))];
+  let sending = Promise.resolve();
+  const call = expression => { sending = sending.then(() => it.evaluate(expression)).catch(() => {}); };
+  const gone = () => { if (socket) { socket.destroy(); socket = null; call("tactusSerialGone()"); } };
+  await it.binding("tactusSerial", payload => {
+    const { send, open } = JSON.parse(payload);
+    if (send !== undefined) socket?.write(Buffer.from(send, "base64"));
+    if (open === true) {
+      const here = socket = connect({ host, port, noDelay: true });
+      here.on("data", bytes => { if (here === socket) call(`tactusSerialCame("${bytes.toString("base64")}")`); });
+      here.on("close", () => { if (here === socket) gone(); });
+      here.on("error", () => {});
+    }
+    if (open === false) { const old = socket; socket = null; old?.destroy(); }
+  });
+  await it.before(SHIM);
+  return gone;
+}

@@ -1,0 +1,179 @@
+"use strict";
+// A probe at a serial port: bytes between the browser's port and the module, and what is asked for.
+const Usb = (() => {
+  const BAUD = 921600, EVERY_MS = 20;
+  // of ST, who makes the NUCLEO's ST-LINK
+  const BOARDS = [{ usbVendorId: 0x0483 }];
+  const at = id => document.getElementById(id);
+  let page, port = null, reader = null, writer = null, came = [], timer = null, frame = null, writing = Promise.resolve();
+
+  const seed = () => crypto.getRandomValues(new Uint32Array(1))[0];
+  const now = () => Math.round(performance.now());
+
+  function build(callbacks) {
+    page = callbacks;
+    const has = "serial" in navigator;
+    at("u-none").hidden = has;
+    at("u-all").hidden = !has;
+    const works = {
+      "u-status": () => ({ do: "status" }),
+      "u-home": () => ({ do: "home" }),
+      "u-identify": () => ({ do: "identify", threshold: page.settings().t, false_alarm: page.settings().fa, max_slides: 10, seed: seed() }),
+      "u-teach": () => ({ do: "teach", name: at("u-name").value }),
+      "u-train": () => ({ do: "train", name: at("u-name").value, trials: whole("u-trials"), seed: seed() }),
+      "u-verify": () => ({ do: "verify", name: at("u-known").value, threshold: page.settings().t, max_slides: 10, seed: seed() }),
+      "u-record": () => ({ do: "record", name: at("u-name").value, slides: whole("u-slides"), seed: seed() }),
+      "u-pull": () => ({ do: "pull" }),
+    };
+    for (const [id, wanted] of Object.entries(works)) at(id).addEventListener("click", () => work(wanted()));
+    at("u-connect").addEventListener("click", () => port ? leave(true) : connect());
+    at("u-stop").addEventListener("click", () => step({ do: "stop" }));
+    at("u-log").addEventListener("click", () => step({ do: "log" }));
+    at("u-yes").addEventListener("click", () => step({ do: "answer", yes: true }));
+    at("u-no").addEventListener("click", () => step({ do: "answer", yes: false }));
+    at("u-push").addEventListener("change", async () => {
+      const file = at("u-push").files[0];
+      at("u-push").value = "";
+      if (file) work({ do: "push", file: file.name, bytes: [...new Uint8Array(await file.arrayBuffer())] });
+    });
+    show();
+  }
+
+  function whole(id) {
+    const value = Math.round(Number(at(id).value));
+    return Math.min(Number(at(id).max), Math.max(Number(at(id).min), value || 1));
+  }
+
+  async function connect() {
+    problem();
+    try {
+      port = await navigator.serial.requestPort({ filters: BOARDS });
+    } catch (why) {
+      // nobody chose one
+      if (why.name !== "NotFoundError") problem(`The browser gives no port: ${why.message}`);
+      return;
+    }
+    try {
+      await port.open({ baudRate: BAUD, bufferSize: 65536 });
+    } catch (why) {
+      port = null;
+      problem(`The port does not open: ${why.message} Is it open in another tab, a terminal or another tactus? Close that, then connect again.`);
+      return;
+    }
+    reader = port.readable.getReader();
+    writer = port.writable.getWriter();
+    came = [];
+    at("u-said").textContent = "";
+    const { usbVendorId: vendor, usbProductId: product } = port.getInfo?.() ?? {};
+    const hex = number => number.toString(16).padStart(4, "0");
+    const name = vendor === undefined ? "the serial port" : `USB ${hex(vendor)}:${hex(product ?? 0)}`;
+    read(reader, port);
+    page.begins();
+    step({ do: "connect", port: name, now_ms: now() });
+    timer = setInterval(tick, EVERY_MS);
+  }
+
+  async function read(from, of) {
+    try {
+      for (;;) {
+        const { value, done } = await from.read();
+        if (done) break;
+        came.push(value);
+      }
+    } catch {
+      // it is told below: a port that fails is closed
+    }
+    if (port === of) leave();
+  }
+
+  function tick() {
+    const received = came.flatMap(part => [...part]);
+    came = [];
+    step({ do: "step", now_ms: now(), received });
+  }
+
+  // The port is left: by the user, or since it has failed.
+  async function leave(wanted) {
+    const [old, from, to] = [port, reader, writer];
+    port = null;
+    clearInterval(timer);
+    try {
+      const last = Probe.remote({ do: "closed" });
+      take(wanted ? { ...last, failed: null } : last);
+    } catch { /* nothing was open */ }
+    frame = null;
+    page.ends();
+    show();
+    // a port that was pulled out cannot be closed any more
+    try { await from?.cancel(); from?.releaseLock(); await writing; to?.releaseLock(); await old?.close(); } catch { /* gone */ }
+  }
+
+  function work(wanted) {
+    problem();
+    page.begins(wanted.do === "identify");
+    step({ do: "work", work: wanted });
+  }
+
+  function step(request) {
+    try {
+      take(Probe.remote(request));
+    } catch (why) {
+      problem(page.sentence(why));
+    }
+  }
+
+  function take(now) {
+    frame = now;
+    if (now.send.length && writer) {
+      const [to, bytes] = [writer, Uint8Array.from(now.send)];
+      // in order; a port that fails is told by its reader
+      writing = writing.then(() => to.write(bytes)).catch(() => {});
+    }
+    if (now.known) { page.knows(now.known); choices(now.known.textures); }
+    if (now.said) say(now.said);
+    page.hears(now);
+    for (const { name, bytes } of now.files) Files.keep(name, Uint8Array.from(bytes));
+    for (const folder of now.folders) Files.keepFolder(folder);
+    if (now.failed) {
+      problem(page.sentence(new Error(now.failed)));
+      page.fails();
+      // nobody answers there
+      if (port && !now.connected && !now.busy) leave(true);
+    }
+    show();
+  }
+
+  function say(text) {
+    const box = at("u-said"), end = box.scrollTop + box.clientHeight >= box.scrollHeight - 4;
+    box.textContent = (box.textContent + text).slice(-60000);
+    if (end) box.scrollTop = box.scrollHeight;
+  }
+
+  function choices(names) {
+    const before = at("u-known").value;
+    at("u-known").replaceChildren(...names.map(name => new Option(name, name)));
+    if (names.includes(before)) at("u-known").value = before;
+    at("u-names").replaceChildren(...names.map(name => new Option(name)));
+  }
+
+  function problem(why) {
+    at("u-problem").hidden = !why;
+    at("u-problem").textContent = why ?? "";
+  }
+
+  // What can be asked for now.
+  function show() {
+    const there = frame?.connected === true, busy = frame?.busy === true;
+    at("u-connect").textContent = port ? "Disconnect" : "Connect a probe";
+    at("u-stop").disabled = !port || !busy;
+    at("u-log").disabled = !port;
+    at("u-push").disabled = !there || busy;
+    for (const id of ["u-status", "u-home", "u-identify", "u-teach", "u-train", "u-verify", "u-record", "u-pull"]) at(id).disabled = !there || busy;
+    const asked = frame?.question ?? null;
+    at("u-question").hidden = asked === null;
+    if (asked !== null && at("u-asked").textContent !== asked) at("u-asked").textContent = asked;
+    at("u-say").textContent = !port ? "No probe is connected." : !frame || busy && !there ? "Looking for a probe at this port." : there ? busy ? "The probe is at work." : "The probe waits." : "No probe answers here.";
+  }
+
+  return { build, now: () => frame };
+})();

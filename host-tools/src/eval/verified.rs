@@ -1,0 +1,140 @@
+//! Whether a sample is the same as a reference, as people and programs read it.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+use tactus_core::explorer::{Answer, Config, ENOUGH_TRIALS};
+use tactus_core::table::Table;
+use tactus_core::wire::Failure;
+
+use super::show::{count, percent};
+
+/// What `verify --format json` prints.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Verified {
+    /// The texture that it may be.
+    pub reference: String,
+    /// Where it is known what it is said to be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample: Option<String>,
+    /// `same`, `different` or `unsure`.
+    pub answer: &'static str,
+    /// Fewest slides of the reference at a movement.
+    pub reference_slides: u8,
+    /// Whether these are too few to rely on.
+    pub few: bool,
+    /// Share of the reference's own visits that would be called different.
+    pub false_alarm: f32,
+    /// How probable "the same" has to be.
+    pub threshold: f32,
+    /// Share of other textures' visits of as many slides that would be called the same; `null`: the table has no other.
+    pub false_accept: Option<f64>,
+    /// One after the other.
+    pub slides: Vec<Slide>,
+}
+
+impl Verified {
+    /// Before the first slide.
+    ///
+    /// # Errors
+    /// The table has no limits.
+    pub fn new(table: Table<'_>, texture: u16, config: &Config) -> Result<Self, Failure> {
+        let limits = table.limits().ok_or(Failure::NoLimits)?;
+        let movements = 0..table.movements().len() as u8;
+        let trials = movements.map(|at| table.trials(texture, at));
+        let reference_slides = trials.filter(|n| *n > 0).min().unwrap_or(0);
+        Ok(Self {
+            reference: table.name(texture).unwrap_or_default().to_owned(),
+            sample: None,
+            answer: name(Answer::Unsure),
+            reference_slides,
+            few: reference_slides < ENOUGH_TRIALS,
+            false_alarm: config.false_alarm.unwrap_or(limits.false_alarm),
+            threshold: config.threshold,
+            false_accept: None,
+            slides: Vec::new(),
+        })
+    }
+}
+
+/// What was known after a slide.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Slide {
+    /// From 1.
+    pub number: u32,
+    /// Contact force, N.
+    pub force_n: f32,
+    /// mm/s.
+    pub speed_mm_s: f32,
+    /// How unlike the reference the slides are.
+    pub score: f32,
+    /// Above it they are different.
+    pub limit: f32,
+    /// As that of [`Verified`].
+    pub answer: &'static str,
+}
+
+/// The word for programs.
+pub fn name(answer: Answer) -> &'static str {
+    match answer {
+        Answer::Same => "same",
+        Answer::Different => "different",
+        Answer::Unsure => "unsure",
+    }
+}
+
+/// Prints what was known after a slide.
+///
+/// # Errors
+/// A failure to write.
+pub fn print_slide(slide: &Slide, out: &mut impl Write) -> io::Result<()> {
+    let says = match slide.answer {
+        "same" => "the same",
+        "different" => "different",
+        _ => "not sure yet",
+    };
+    writeln!(
+        out,
+        "  slide {}, {:.2} N at {:.1} mm/s: score {:.1}, different above {:.1}: {says}",
+        slide.number, slide.force_n, slide.speed_mm_s, slide.score, slide.limit
+    )
+}
+
+/// Prints the answer, and what it is worth.
+///
+/// # Errors
+/// A failure to write.
+pub fn print_answer(v: &Verified, out: &mut impl Write) -> io::Result<()> {
+    let answer = match v.answer {
+        "same" => format!("The same as {}.", v.reference),
+        "different" => format!(
+            "Different from {}, or {0} changed beyond what is expected.",
+            v.reference
+        ),
+        _ => format!(
+            "Not sure yet whether it is {}: more slides would tell.",
+            v.reference
+        ),
+    };
+    writeln!(out, "{answer}")?;
+    let accepted = match v.false_accept {
+        Some(share) => format!(
+            "; of the table's other textures {} would be called the same",
+            percent((share * 1000.0).round() / 1000.0)
+        ),
+        None => String::new(),
+    };
+    writeln!(
+        out,
+        "At this limit {} of its own slides would be called different{accepted}.",
+        percent(v.false_alarm.into())
+    )?;
+    if v.few {
+        writeln!(
+            out,
+            "The reference has only {} at a movement: record more of it, five make it much surer.",
+            count(v.reference_slides, "slide")
+        )?;
+    }
+    Ok(())
+}

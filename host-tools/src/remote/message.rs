@@ -1,0 +1,185 @@
+//! What a page asks of a probe at a line, and what it gets.
+
+use serde::{Deserialize, Serialize};
+use tactus_core::wire::Phase;
+
+use crate::live::{Happening, Known};
+
+/// What is asked for.
+#[derive(Clone, PartialEq, Debug, Deserialize)]
+#[serde(tag = "do", rename_all = "kebab-case")]
+pub enum Request {
+    /// A line is open, and a probe is to be at its other end.
+    Connect {
+        /// What the line is called.
+        port: String,
+        /// Now, ms since any moment.
+        now_ms: u64,
+    },
+    /// Time has passed, and bytes may have come.
+    Step {
+        /// Now, ms since that moment.
+        now_ms: u64,
+        /// What came since the last step.
+        #[serde(default)]
+        received: Vec<u8>,
+    },
+    /// The line is closed.
+    Closed,
+    /// Something is to be done with the probe.
+    Work {
+        /// What.
+        work: Work,
+    },
+    /// Stops what is being done, and lifts the finger.
+    Stop,
+    /// Answers the question of the last [`Frame`].
+    Answer {
+        /// Whether to go on.
+        yes: bool,
+    },
+    /// The log of the session so far, as a file.
+    Log,
+    /// A log of `tactus device --log`: it is heard as if the probe said it now.
+    Replay {
+        /// Its text.
+        log: String,
+    },
+}
+
+/// What is to be done with a probe.
+#[derive(Clone, PartialEq, Debug, Deserialize)]
+#[serde(tag = "do", rename_all = "kebab-case")]
+pub enum Work {
+    /// How it is.
+    Status,
+    /// Ends a fault, and finds the limit switches.
+    Home,
+    /// What lies under its finger.
+    Identify {
+        /// A texture more probable than this is the answer.
+        threshold: f32,
+        /// Share of the known textures that may be taken for new ones; the probe's own, unless given.
+        false_alarm: Option<f32>,
+        /// After so many slides the most probable texture is the answer.
+        max_slides: u8,
+        /// For where on the sample slides begin.
+        seed: u32,
+    },
+    /// What it explored last is called so.
+    Teach {
+        /// The name.
+        name: String,
+    },
+    /// It learns what lies under its finger from new slides.
+    Train {
+        /// The name.
+        name: String,
+        /// Trials of each movement.
+        trials: u8,
+        /// For where on the sample slides begin.
+        seed: u32,
+    },
+    /// Whether what lies under its finger is this texture.
+    Verify {
+        /// One of its textures.
+        name: String,
+        /// "The same" has to be more probable than this.
+        threshold: f32,
+        /// After so many slides it stays unsure.
+        max_slides: u8,
+        /// For where on the sample slides begin.
+        seed: u32,
+    },
+    /// Slides in the project's format.
+    Record {
+        /// What lies under the finger.
+        name: String,
+        /// How many.
+        slides: u8,
+        /// For where on the sample slides begin.
+        seed: u32,
+    },
+    /// A copy of its table.
+    Pull,
+    /// It uses another table from now on; the one before is kept in a file first.
+    Push {
+        /// What the table's file is called.
+        file: String,
+        /// The table.
+        bytes: Vec<u8>,
+    },
+}
+
+/// The answer.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+#[serde(tag = "is", rename_all = "kebab-case")]
+#[allow(clippy::large_enum_variant)] // one at a time
+pub enum Reply {
+    /// What has been since the last one.
+    Frame(Frame),
+    /// The request makes no sense, and why.
+    Error {
+        /// A sentence.
+        why: String,
+    },
+}
+
+/// A moment, and what has been since the last one.
+#[derive(Clone, PartialEq, Debug, Serialize, Default)]
+pub struct Frame {
+    /// To be sent to the probe.
+    pub send: Vec<u8>,
+    /// Whether a probe is at the other end.
+    pub connected: bool,
+    /// Whether something is being done.
+    pub busy: bool,
+    /// What the rig does.
+    pub phase: Option<Phase>,
+    /// Contact force, N.
+    pub force_n: f64,
+    /// Place of the stage, mm.
+    pub stage_mm: f64,
+    /// Speed of the stage, mm/s.
+    pub speed_mm_s: f64,
+    /// Time of the probe, ms.
+    pub at_ms: u32,
+    /// P_AC of still finger and slide, counts about the still finger's, at 2200 Hz.
+    pub pac: Vec<i16>,
+    /// Spectra, as those of [`live::Frame`](crate::live::Frame).
+    pub spectra: Vec<Vec<i8>>,
+    /// What the probe said.
+    pub happened: Vec<Happening>,
+    /// What it knows, where that has become something else.
+    pub known: Option<Known>,
+    /// In a log: what it knew from each of these places in `happened` on.
+    pub tables: Vec<(usize, Known)>,
+    /// What `tactus device` prints.
+    pub said: String,
+    /// What went wrong, and what to do.
+    pub failed: Option<String>,
+    /// A question that has to be answered before anything goes on.
+    pub question: Option<String>,
+    /// Files to be kept.
+    pub files: Vec<File>,
+    /// Folders to be kept.
+    pub folders: Vec<Folder>,
+}
+
+/// A file.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct File {
+    /// Its name.
+    pub name: String,
+    /// What is in it.
+    pub bytes: Vec<u8>,
+}
+
+/// A folder of files.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Folder {
+    /// Its name.
+    pub name: String,
+    /// What is in it.
+    pub files: Vec<File>,
+}

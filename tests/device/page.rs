@@ -1,0 +1,270 @@
+//! What a page does with a probe at a port, `tactus::remote`: its bytes are carried here, and it says what the command says.
+
+use std::io::ErrorKind::{TimedOut, WouldBlock};
+
+use serde_json::{Value, json};
+use tactus::remote::Remote;
+
+use super::*;
+
+/// A page's end of a line.
+struct Page {
+    remote: Remote,
+    line: TcpStream,
+    began: Instant,
+}
+
+/// What a page got until its probe was done.
+#[derive(Default)]
+struct Got {
+    said: String,
+    failed: Option<String>,
+    happened: Vec<Value>,
+    files: Vec<Value>,
+    folders: Vec<Value>,
+    known: Value,
+}
+
+impl Page {
+    /// Connected to the probe at this address.
+    fn new(at: &str) -> (Self, Got) {
+        let line = TcpStream::connect(at.trim_start_matches("tcp:")).unwrap();
+        line.set_read_timeout(Some(Duration::from_millis(2)))
+            .unwrap();
+        let mut page = Self {
+            remote: Remote::default(),
+            line,
+            began: Instant::now(),
+        };
+        let got = page.done(&json!({"do": "connect", "port": at, "now_ms": 0}), |_| None);
+        (page, got)
+    }
+
+    fn ask(&mut self, request: &Value) -> Value {
+        let reply: Value = serde_json::from_str(&self.remote.ask(&request.to_string())).unwrap();
+        if let Some(send) = reply["send"].as_array() {
+            let bytes: Vec<u8> = send.iter().map(|b| b.as_u64().unwrap() as u8).collect();
+            self.line.write_all(&bytes).unwrap();
+        }
+        reply
+    }
+
+    /// Asks, and carries bytes until all is done; `meanwhile` may ask for something else at each step.
+    fn done(&mut self, request: &Value, meanwhile: impl Fn(&Value) -> Option<Value>) -> Got {
+        let mut got = Got::default();
+        let mut frame = self.ask(request);
+        loop {
+            assert_eq!(frame["is"], "frame", "{request}: {frame}");
+            got.said += frame["said"].as_str().unwrap();
+            got.failed = got.failed.or(frame["failed"].as_str().map(str::to_owned));
+            for (to, from) in [
+                (&mut got.happened, "happened"),
+                (&mut got.files, "files"),
+                (&mut got.folders, "folders"),
+            ] {
+                to.extend_from_slice(frame[from].as_array().unwrap());
+            }
+            if !frame["known"].is_null() {
+                got.known = frame["known"].clone();
+            }
+            if frame["busy"] == false {
+                return got;
+            }
+            assert!(self.began.elapsed() < Duration::from_secs(120), "{request}");
+            if let Some(asked) = meanwhile(&frame) {
+                frame = self.ask(&asked);
+                continue;
+            }
+            let mut bytes = [0; 4096];
+            let received = match self.line.read(&mut bytes) {
+                Ok(length) => &bytes[..length],
+                Err(why) if [WouldBlock, TimedOut].contains(&why.kind()) => &[],
+                Err(why) => panic!("{why}"),
+            };
+            let now_ms = self.began.elapsed().as_millis() as u64;
+            frame = self.ask(&json!({"do": "step", "now_ms": now_ms, "received": received}));
+        }
+    }
+
+    fn work(&mut self, work: Value) -> Got {
+        self.done(&json!({"do": "work", "work": work}), |_| None)
+    }
+}
+
+fn bytes(file: &Value) -> Vec<u8> {
+    let bytes = file["bytes"].as_array().unwrap();
+    bytes.iter().map(|b| b.as_u64().unwrap() as u8).collect()
+}
+
+fn identify(seed: u32) -> Value {
+    json!({"do": "identify", "threshold": 0.99, "false_alarm": null, "max_slides": 10, "seed": seed})
+}
+
+/// Lines that do not count what was done before.
+fn lasting(said: &str) -> Vec<&str> {
+    let counts = ["acquisition", "link", "skin"];
+    said.lines()
+        .filter(|line| !counts.iter().any(|name| line.starts_with(name)))
+        .collect()
+}
+
+#[test]
+fn a_page_says_what_the_command_says() {
+    let (at, _) = probe(1000);
+    let status = printed(&["status", "--port", &at]);
+    let (mut page, got) = Page::new(&at);
+    assert_eq!(got.failed, None);
+    assert_eq!(lasting(&got.said), lasting(&status));
+    assert_eq!(got.known["textures"].as_array().unwrap().len(), 3);
+
+    let found = page.work(identify(7));
+    assert_eq!(found.failed, None, "{}", found.said);
+    let verdicts: Vec<&Value> = found
+        .happened
+        .iter()
+        .filter(|one| one["what"] == "verdict")
+        .collect();
+    assert_eq!(verdicts.len(), 1, "{}", found.said);
+    let slides = found.happened.iter().filter(|one| one["what"] == "slide");
+    assert!(slides.clone().count() > 0);
+    for slide in slides {
+        assert!(slide["place"].is_array(), "{slide}");
+    }
+    // the log that the page keeps is one of the command's, which decides the same again
+    let log = page.ask(&json!({"do": "log"}));
+    let temp = tempfile::tempdir().unwrap();
+    let file = temp.path().join("session.jsonl");
+    fs::write(&file, bytes(&log["files"][0])).unwrap();
+    printed(&["log", "replay", path(&file)]);
+    // and shows the same words
+    let shown = printed(&["log", "show", path(&file)]);
+    let answer = found
+        .said
+        .lines()
+        .rfind(|line| line.starts_with("It is") && line.contains("after"));
+    let answer = answer.unwrap_or_else(|| panic!("{}", found.said));
+    assert!(shown.contains(answer), "{shown}\n{}", found.said);
+    // heard again it is the same
+    let text = fs::read_to_string(&file).unwrap();
+    let again = page.ask(&json!({"do": "replay", "log": text}));
+    let told = |happened: &[Value]| -> Vec<Value> {
+        let of = |one: &&Value| one["what"] != "done";
+        happened.iter().filter(of).cloned().collect()
+    };
+    assert_eq!(
+        told(again["happened"].as_array().unwrap()),
+        told(&found.happened)
+    );
+}
+
+#[test]
+fn a_page_teaches_verifies_and_records() {
+    let (at, _) = probe(1000);
+    let (mut page, _) = Page::new(&at);
+    page.work(identify(3));
+    let taught = page.work(json!({"do": "teach", "name": "mine"}));
+    assert_eq!(taught.failed, None);
+    assert_says(&taught.said, &["The probe has learned mine from"]);
+    let names = taught.known["textures"].as_array().unwrap();
+    assert!(names.contains(&json!("mine")), "{names:?}");
+    let verified = page.work(
+        json!({"do": "verify", "name": "mine", "threshold": 0.99, "max_slides": 3, "seed": 5}),
+    );
+    assert_eq!(verified.failed, None, "{}", verified.said);
+    assert_says(
+        &verified.said,
+        &["Is it mine?", "slide 1,", "At this limit"],
+    );
+    let trained = page.work(json!({"do": "train", "name": "mine too", "trials": 1, "seed": 1}));
+    assert_eq!(trained.failed, None, "{}", trained.said);
+    assert_says(&trained.said, &["trial 1 of", "mine too: 3 slides made."]);
+
+    let recorded = page.work(json!({"do": "record", "name": "Mine", "slides": 3, "seed": 2}));
+    assert_eq!(recorded.failed, None, "{}", recorded.said);
+    let temp = tempfile::tempdir().unwrap();
+    for file in recorded.folders[0]["files"].as_array().unwrap() {
+        let name = file["name"].as_str().unwrap();
+        fs::write(temp.path().join(name), bytes(file)).unwrap();
+    }
+    let set = tactus::data::recordings::RecordingSet::open(temp.path()).unwrap();
+    assert_eq!(set.names(), ["Mine"]);
+    assert_eq!(set.load_texture(0).unwrap().len(), 3);
+}
+
+#[test]
+fn a_page_keeps_a_table_before_it_is_replaced() {
+    let (at, _) = probe(1000);
+    let (mut page, _) = Page::new(&at);
+    let pulled = page.work(json!({"do": "pull"}));
+    let factory = bytes(&pulled.files[0]);
+    assert_eq!(factory, known().1);
+    page.work(identify(3));
+    page.work(json!({"do": "teach", "name": "mine"}));
+    let learned = bytes(&page.work(json!({"do": "pull"})).files[0]);
+    let push = json!({"do": "work", "work": {"do": "push", "file": "old.tact", "bytes": factory}});
+    let answer = |yes: bool| {
+        move |frame: &Value| {
+            frame["question"]
+                .is_string()
+                .then(|| json!({"do": "answer", "yes": yes}))
+        }
+    };
+    let kept = page.done(&push, answer(false));
+    assert_eq!(kept.failed.as_deref(), Some("nothing was changed"));
+    assert_eq!(bytes(&kept.files[0]), learned);
+    assert_says(&kept.said, &["No longer known: mine."]);
+    let pushed = page.done(&push, answer(true));
+    assert_eq!(pushed.failed, None);
+    assert_says(
+        &pushed.said,
+        &["old.tact: the probe uses it now: 3 textures"],
+    );
+    let mut damaged = factory.clone();
+    damaged[40] ^= 1;
+    let refused = page.work(json!({"do": "push", "file": "bad.tact", "bytes": damaged}));
+    assert!(refused.failed.unwrap().starts_with("bad.tact: "));
+}
+
+#[test]
+fn a_page_stops_a_probe_and_is_told_when_nobody_answers() {
+    let (at, _) = probe(20);
+    let (mut page, _) = Page::new(&at);
+    let stopped = page.done(&json!({"do": "work", "work": identify(1)}), |frame| {
+        (frame["phase"] == "Sliding").then(|| json!({"do": "stop"}))
+    });
+    assert_eq!(
+        stopped.failed.as_deref(),
+        Some("stopped: the finger is lifted and the stage stands")
+    );
+    let error = page.ask(&json!({"do": "dance"}));
+    assert!(error["why"].as_str().unwrap().starts_with("no request"));
+
+    let nobody = line(|mut stream| {
+        let _ = stream.read(&mut [0; 1]);
+        thread::sleep(Duration::from_secs(30));
+    });
+    let (_, silent) = Page::new(&nobody);
+    let failed = silent.failed.unwrap();
+    assert!(failed.contains("the probe said nothing for"), "{failed}");
+    let noise = line(|mut stream| {
+        let _ = stream.write_all(&[0x55; 4000]);
+        thread::sleep(Duration::from_secs(30));
+    });
+    let (mut page, garbage) = Page::new(&noise);
+    let failed = garbage.failed.unwrap();
+    assert!(failed.contains("and not one report"), "{failed}");
+    let error = page.ask(&json!({"do": "work", "work": {"do": "status"}}));
+    assert_eq!(error["why"], "no probe is connected");
+}
+
+/// With TACTUS_PAGE_PORT, `cargo xtask test --step page` has a page speak to this probe: the address goes to that file, and the
+/// probe lives until standard input ends.
+#[test]
+fn serves_a_page() {
+    let Some(file) = std::env::var_os("TACTUS_PAGE_PORT") else {
+        return;
+    };
+    let (at, _) = probe(40);
+    fs::write(file, at.trim_start_matches("tcp:")).unwrap();
+    let _ = std::io::stdin().read_to_end(&mut Vec::new());
+}
