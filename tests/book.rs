@@ -644,7 +644,7 @@ fn the_finger_is_built_as_it_is_drawn_and_wired() {
 fn region(board: &str, name: &str) -> (u64, u64) {
     let memory = match board {
         "nucleo-f429zi" => read("memory.x"),
-        other => read(&format!("firmware/boards/{other}/memory.x")),
+        other => read(format!("firmware/boards/{other}/memory.x")),
     };
     let line = memory.lines().find_map(|line| {
         let rest = line.trim().strip_prefix(name)?;

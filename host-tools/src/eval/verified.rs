@@ -33,13 +33,18 @@ pub struct Verified {
     pub slides: Vec<Slide>,
 }
 
+/// The table cannot say what is the same.
+#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[error("{}", Failure::NoLimits)]
+pub struct NoLimits;
+
 impl Verified {
     /// Before the first slide.
     ///
     /// # Errors
-    /// The table has no limits.
-    pub fn new(table: Table<'_>, texture: u16, config: &Config) -> Result<Self, Failure> {
-        let limits = table.limits().ok_or(Failure::NoLimits)?;
+    /// [`NoLimits`].
+    pub fn new(table: Table<'_>, texture: u16, config: &Config) -> Result<Self, NoLimits> {
+        let limits = table.limits().ok_or(NoLimits)?;
         let movements = 0..table.movements().len() as u8;
         let trials = movements.map(|at| table.trials(texture, at));
         let reference_slides = trials.filter(|n| *n > 0).min().unwrap_or(0);

@@ -3,9 +3,9 @@
 use tactus_core::explorer::{Config, Explorer, ExplorerError};
 use tactus_core::features::{Movement, Observation, PropertySet};
 use tactus_core::table::{MAX_TEXTURES, Table, TableError};
-use tactus_core::wire::{Event, Failure};
+use tactus_core::wire::Event;
 
-use crate::eval::verified::{Slide, Verified, name};
+use crate::eval::verified::{NoLimits, Slide, Verified, name};
 use crate::eval::verify::false_accept;
 
 /// A verification under way.
@@ -23,7 +23,7 @@ pub struct Verifying<'t> {
 pub enum NoReference {
     /// It has no limits.
     #[error(transparent)]
-    Limits(#[from] Failure),
+    Limits(#[from] NoLimits),
     /// It does not read.
     #[error(transparent)]
     Table(#[from] TableError),

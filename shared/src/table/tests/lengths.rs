@@ -3,7 +3,6 @@
 use super::damage::read_all;
 use super::sections::{full, sealed};
 use super::*;
-use crate::features::MAX_FEATURES;
 
 /// [`full`] with other means, as slides of another length have.
 fn of_length(by: i16) -> Vec<u8> {
