@@ -50,7 +50,7 @@
 //! that finger's force per count was measured (4, as 20261121). Without it a table is a BioTac's. A probe of another finger refuses it.
 //!
 //! Section 6, of either kind of table, is what the first part of a slide says: one section for each length, the shortest first
-//! ([`with_lengths`]). A table has slopes or lengths, never both.
+//! ([`with_lengths`]). A table has slopes or lengths, never both. A texture that is learned or deleted takes all lengths with it.
 //!
 //! | bytes | what |
 //! |---|---|

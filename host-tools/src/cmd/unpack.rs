@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
 use serde::Serialize;
+use tactus::data::recordings::RecordingSet;
 use tactus::eval::show::count;
 use tactus_core::sensor::FingerName;
 use tactus_core::table::factory;
@@ -64,7 +65,13 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     let folder = args.folder.join(RECORDINGS);
     let collection = collection(&TEXTURES.map(str::to_owned), TRIALS, SEED)?;
-    let slides = simulate::record(&collection, &folder, FingerName::Biotac)?;
+    let slides = match RecordingSet::open(&folder) {
+        // written to their end before
+        Ok(there) if there.names() == collection.names() => (0..TEXTURES.len())
+            .map(|texture| there.slides(texture).len())
+            .sum(),
+        _ => simulate::record(&collection, &folder, FingerName::Biotac)?,
+    };
     let unpacked = Unpacked {
         tables,
         recordings: folder.display().to_string(),

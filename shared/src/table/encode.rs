@@ -301,9 +301,14 @@ pub fn amend<'o>(
     if old.is_paced() {
         return rewrite_paced(out, old, rows);
     }
+    if !EARLY {
+        let sections = old.sections;
+        let write = |writer: &mut Writer<'_>| writer.put(sections);
+        return rewrite(out, old, old.lineage(), rows, (sections.len(), write));
+    }
     // what shorter slides say is of these textures and no others
     let same = matches!(change, Change::Rename { .. });
-    let left_out = if EARLY && !same { LENGTH } else { 0 };
+    let left_out = if same { 0 } else { LENGTH };
     let others = || old.other_sections(left_out);
     let of_others = others().map(|(head, contents)| head.len() + contents.len());
     let of_others = of_others.sum();
