@@ -36,9 +36,9 @@ use shell::{cargo, has_subcommand, run};
 enum Cli {
     /// Build the firmware for the chip, with warnings as errors
     ///
-    /// Prints where each ELF is, its SHA-256 and what it takes of the chip. Builds with the active Rust toolchain if that
-    /// has the target thumbv7em-none-eabihf (`rustup target add thumbv7em-none-eabihf`). If it has not, Debian's Rust
-    /// packages build it, and where those are missing too, root gets them installed by apt-get.
+    /// Prints where each ELF is, its SHA-256 and what it takes of the chip; `tactus-rig-f767` is for another board. Builds with
+    /// the active Rust toolchain if that has the target thumbv7em-none-eabihf (`rustup target add thumbv7em-none-eabihf`). If
+    /// it has not, Debian's Rust packages build it, and where those are missing too, root gets them installed by apt-get.
     Build,
     /// Run the quick checks: formatting, lints, and the unit tests of core and host tools
     ///

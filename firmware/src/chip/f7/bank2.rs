@@ -3,8 +3,8 @@
 //! the bank is the fifth.
 //!
 //! The core of an STM32F7 reads ahead, also where no code asks for it, and a read of a bank that is being erased makes the whole core wait for
-//! the end of it: others have seen that for up to 0.7 s on this chip. So while bank 2 is written or erased the MPU has it as a
-//! device's memory without code, which nobody reads ahead.
+//! the end of it: others have seen that for up to 0.7 s on this chip (rusefi 7700, FOME 775). So while bank 2 is written or erased
+//! the MPU has it as a device's memory without code, which the core does not read ahead.
 use core::ptr::write_volatile;
 
 use cortex_m::asm::{dsb, isb};
@@ -60,7 +60,9 @@ impl Bank2 {
         while FLASH.sr().read().bsy() {
             Timer::after_millis(LOOK_MS).await;
         }
-        FLASH.cr().write(|w| w.set_lock(true));
+        if !FLASH.cr().read().lock() {
+            FLASH.cr().write(|w| w.set_lock(true));
+        }
         attribute(NORMAL);
         Ok(())
     }
