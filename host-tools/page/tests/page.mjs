@@ -196,15 +196,19 @@ test("no name on the map lies on another", async () => {
   return `${counts.join(", ")} names`;
 });
 
-const usb = run => {
-  let unplug;
-  const before = async it => { unplug = await serial(it, probe); };
-  return opened("#speed=max&t=0.99", { motion: "reduce", before }, async it => {
-    await press(it, "from-usb");
-    await press(it, "u-connect");
-    await it.until("the probe has said how it is", "tactus.usb()?.connected && !tactus.usb().busy", 30 * SLOW);
-    return run(it, () => unplug());
-  });
+const usb = async run => {
+  let line;
+  const before = async it => { line = await serial(it, probe); };
+  try {
+    return await opened("#speed=max&t=0.99", { motion: "reduce", before }, async it => {
+      await press(it, "from-usb");
+      await press(it, "u-connect");
+      await it.until("the probe has said how it is", "tactus.usb()?.connected && !tactus.usb().busy", 30 * SLOW);
+      return run(it, line.unplug);
+    });
+  } finally {
+    line?.end();
+  }
 };
 const idle = (it, what, seconds = 60) => it.until(what, "!tactus.usb()?.busy", seconds * SLOW);
 const said = it => text(it, "u-said");

@@ -24,8 +24,8 @@ const SHIM = `(() => {
   Object.defineProperty(navigator, "serial", { configurable: true, value: { requestPort: async () => port } });
 })()`;
 
-/// Gives a tab a serial port at whose other end is the TCP port HOST:PORT; before the tab opens the page. The function that it
-/// returns pulls the plug.
+/// Gives a tab a serial port at whose other end is the TCP port HOST:PORT; before the tab opens the page. `unplug` pulls
+/// the plug while the page looks, `end` when it does not any more.
 export async function serial(it, address) {
   let socket = null;
   const [host, port] = [address.slice(0, address.lastIndexOf(":")), Number(address.slice(address.lastIndexOf(":") + 1))];
@@ -44,5 +44,7 @@ export async function serial(it, address) {
     if (open === false) { const old = socket; socket = null; old?.destroy(); }
   });
   await it.before(SHIM);
-  return gone;
+  // a probe serves one host after the other
+  const end = () => { const old = socket; socket = null; old?.destroy(); };
+  return { unplug: gone, end };
 }

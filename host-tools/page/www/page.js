@@ -498,7 +498,10 @@
   const outside = {
     settings: () => set,
     sentence,
-    knows: now => { if (JSON.stringify(now) !== JSON.stringify(known)) knows(now); },
+    knows: now => {
+      delete document.body.dataset.blank;
+      if (JSON.stringify(now) !== JSON.stringify(known)) knows(now);
+    },
     // an exploration, or other work
     begins: explores => {
       problem();
@@ -533,6 +536,8 @@
     busy = false; playing = false;
     source = to;
     document.body.dataset.source = to;
+    // nothing is known of a probe that is not there
+    if (to === "sim") delete document.body.dataset.blank; else { document.body.dataset.blank = ""; at("figures").textContent = ""; known = null; }
     for (const name of ["sim", "usb", "log"]) at(`from-${name}`).setAttribute("aria-pressed", String(name === to));
     forget();
     Places.likely([]);
