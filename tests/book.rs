@@ -640,12 +640,9 @@ fn the_finger_is_built_as_it_is_drawn_and_wired() {
     }
 }
 
-/// A region of a board's memory.x, (address, bytes).
+/// A region of a board's memories, (address, bytes).
 fn region(board: &str, name: &str) -> (u64, u64) {
-    let memory = match board {
-        "nucleo-f429zi" => read("memory.x"),
-        other => read(format!("firmware/boards/{other}/memory.x")),
-    };
+    let memory = read(format!("firmware/boards/{board}/board.x"));
     let line = memory.lines().find_map(|line| {
         let rest = line.trim().strip_prefix(name)?;
         rest.strip_prefix(" : ORIGIN = 0x")?
@@ -653,7 +650,7 @@ fn region(board: &str, name: &str) -> (u64, u64) {
             .0
             .split_once(", LENGTH = ")
     });
-    let (at, kb) = line.unwrap_or_else(|| panic!("memory.x of {board} has no {name}"));
+    let (at, kb) = line.unwrap_or_else(|| panic!("board.x of {board} has no {name}"));
     let at = u64::from_str_radix(at, 16).unwrap();
     (at, kb.parse::<u64>().unwrap() << 10)
 }

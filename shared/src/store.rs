@@ -1,6 +1,6 @@
 //! What survives a power cut: the texture table, and the settings of this rig.
 //!
-//! A [`Store`] owns six erase sectors (256 KB of the chip, `STORE` in `memory.x`):
+//! A [`Store`] owns six erase sectors (256 KB of the chip, `STORE` in `board.x`):
 //!
 //! | sector | KB | what |
 //! |---|---|---|

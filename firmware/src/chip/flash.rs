@@ -21,7 +21,7 @@ const LOOKS: u32 = 100;
 /// A look finds an erase over that no interrupt has told of.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Room for the longest table, which the start-up code does not clear: memory.x; on the STM32F429 in the CCM, which nothing else uses.
+/// Room for the longest table, which the start-up code does not clear: board.x; on the STM32F429 in the CCM, which nothing else uses.
 #[unsafe(link_section = ".ccm.BUFFER")]
 static mut BUFFER: MaybeUninit<[u8; MAX_TABLE]> = MaybeUninit::uninit();
 

@@ -99,9 +99,34 @@ pub(crate) fn image_for(kind: &str, finger: Option<&str>) -> Result<String> {
 pub(crate) fn build() -> Result<Vec<PathBuf>> {
     let elves = compile(&released())?;
     for elf in &elves {
+        let bytes = std::fs::read(elf).with_context(|| elf.display().to_string())?;
+        let (name, top) = (name(elf)?, stack_top(&bytes)?);
+        let of_board = if OTHER_BOARD.contains(&name) {
+            F767_STACK_TOP
+        } else {
+            F429_STACK_TOP
+        };
+        ensure!(
+            top == of_board,
+            "{name}: the stack begins at {top:#x}, so it was linked for the memory of another board"
+        );
         describe(elf)?;
     }
     Ok(elves)
+}
+
+/// The end of the memory that holds the stack, by each board's board.x.
+const F429_STACK_TOP: u32 = 0x2003_0000;
+const F767_STACK_TOP: u32 = 0x2002_0000;
+
+/// Where an image's stack begins: the first word of its flash.
+fn stack_top(elf: &[u8]) -> Result<u32> {
+    let file = object::File::parse(elf)?;
+    let mut segments = file.segments();
+    let vectors = segments.find(|segment| segment.address() == 0x0800_0000);
+    let vectors = vectors.context("an image without vectors")?.data()?;
+    let word = vectors.first_chunk().context("an image without a stack")?;
+    Ok(u32::from_le_bytes(*word))
 }
 
 /// As [`build`], with the bench image: all that the other steps of `cargo xtask test` want.
@@ -229,7 +254,7 @@ impl Size {
         )
     }
 
-    /// Sums segments of (address at run time, size there, bytes in the file); the regions are memory.x's.
+    /// Sums segments of (address at run time, size there, bytes in the file); the regions are board.x's.
     fn sum(segments: impl Iterator<Item = (u64, u64, u64)>) -> Result<Self> {
         let mut size = Self::default();
         for (address, in_memory, in_file) in segments {

@@ -27,9 +27,9 @@ const KB: u64 = 1024;
 const MAX_FLASH: [(&str, u64); 3] = [(RIG, 160 * KB), (HANDHELD, 160 * KB), (ARM, 160 * KB)];
 const HANDHELD: &str = "tactus-handheld";
 const MAX_VARIABLES: u64 = 64 * KB;
-/// Twice the deepest stack has to fit into what memory.x leaves above the variables and the guard.
+/// Twice the deepest stack has to fit into what board.x leaves above the variables and the guard.
 const MARGIN: u64 = 2;
-/// RAM in memory.x, without the variables' part and the guard.
+/// RAM in board.x, without the variables' part and the guard.
 const STACK: u64 = 192 * KB - MAX_VARIABLES - 16 * KB;
 /// The image whose stack is measured.
 const RIG: &str = "tactus-rig";
