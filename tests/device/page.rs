@@ -49,9 +49,9 @@ impl Page {
         reply
     }
 
-    /// Asks, and carries bytes until all is done; `meanwhile` may ask for something else at each step.
+    /// Asks, and carries bytes until all is done; `meanwhile` may ask for something else, once.
     fn done(&mut self, request: &Value, meanwhile: impl Fn(&Value) -> Option<Value>) -> Got {
-        let mut got = Got::default();
+        let (mut got, mut interrupted) = (Got::default(), false);
         let mut frame = self.ask(request);
         loop {
             assert_eq!(frame["is"], "frame", "{request}: {frame}");
@@ -71,7 +71,8 @@ impl Page {
                 return got;
             }
             assert!(self.began.elapsed() < Duration::from_secs(120), "{request}");
-            if let Some(asked) = meanwhile(&frame) {
+            if let Some(asked) = meanwhile(&frame).filter(|_| !interrupted) {
+                interrupted = true;
                 frame = self.ask(&asked);
                 continue;
             }
