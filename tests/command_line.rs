@@ -118,6 +118,13 @@ fn help_says_what_it_is_and_what_to_try_first() {
 }
 
 #[test]
+fn the_command_is_tactus_whatever_its_package() {
+    let version = concat!("tactus ", env!("CARGO_PKG_VERSION"), "\n");
+    assert_eq!(printed(&["--version"]), version);
+    assert!(printed(&["man"]).contains(".TH tactus 1 "));
+}
+
+#[test]
 fn verbose_tells_files_and_choices_beside_the_same_results() {
     let recordings = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
     let plain = [
