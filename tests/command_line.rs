@@ -118,6 +118,13 @@ fn help_says_what_it_is_and_what_to_try_first() {
 }
 
 #[test]
+fn the_command_is_tactus_whatever_its_package() {
+    let version = concat!("tactus ", env!("CARGO_PKG_VERSION"), "\n");
+    assert_eq!(printed(&["--version"]), version);
+    assert!(printed(&["man"]).contains(".TH tactus 1 "));
+}
+
+#[test]
 fn verbose_tells_files_and_choices_beside_the_same_results() {
     let recordings = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
     let plain = [
@@ -895,8 +902,9 @@ fn what_the_command_brings_along_is_what_the_repository_has() {
     assert!(contents(&folder) == contents(&here.join("../shared/tables")));
     let recordings = folder.join("recordings");
     assert!(contents(&recordings) == contents(&here.join("recordings/simulated")));
-    // once more changes nothing, and a table of somebody's own is left alone
-    assert_eq!(printed(&unpack), told);
+    // what is whole is not written again, and a table of somebody's own is left alone
+    let said = complaint(&unpack);
+    assert!(said.contains("already holds recordings"), "{said}");
     let own = folder.join("factory.tact");
     fs::write(&own, "mine").unwrap();
     let said = complaint(&unpack);

@@ -36,7 +36,7 @@ pub(crate) use output::{Done, UsageError};
 
 /// Tactus tells what a surface is by touching it.
 #[derive(Parser)]
-#[command(version, about = "Tactus tells what a surface is by touching it", long_about = "Tactus tells what a surface is by touching it: it slides a BioTac fingertip, measures traction, roughness and \
+#[command(name = "tactus", version, about = "Tactus tells what a surface is by touching it", long_about = "Tactus tells what a surface is by touching it: it slides a BioTac fingertip, measures traction, roughness and \
 fineness, and chooses each next movement so as to tell the remaining candidates apart (Bayesian exploration, Fishel & \
 Loeb 2012).\n\nThis command runs the core of the firmware, the same code, on recordings and on a simulated rig.", after_help = after_help())]
 struct Tactus {

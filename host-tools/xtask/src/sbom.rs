@@ -112,11 +112,16 @@ impl<'m> Linked<'m> {
             .iter()
             .filter_map(|package| Some((package["id"].as_str()?, package)))
             .collect();
+        let runs_in_compiler = |id: &&str| by_id.get(id).is_some_and(|of| is_macro(of));
         let nodes = metadata["resolve"]["nodes"].as_array();
         let mut needs: BTreeMap<&str, Vec<&str>> = nodes
             .context("no resolution")?
             .iter()
-            .filter_map(|node| Some((node["id"].as_str()?, linked(node))))
+            .filter_map(|node| {
+                let mut of_it = linked(node);
+                of_it.retain(|id| !runs_in_compiler(id));
+                Some((node["id"].as_str()?, of_it))
+            })
             .collect();
         let root = packages.iter().find(|package| package["name"] == root);
         let root = root.with_context(|| format!("no package {root:?}"))?;
@@ -179,6 +184,15 @@ fn linked(node: &Value) -> Vec<&str> {
     normal.filter_map(|need| need["pkg"].as_str()).collect()
 }
 
+/// Whether a package is a plug-in of the compiler, of which nothing is linked.
+fn is_macro(package: &Value) -> bool {
+    let targets = package["targets"].as_array().map_or(&[][..], Vec::as_slice);
+    let mut kinds = targets
+        .iter()
+        .filter_map(|target| target["kind"].as_array());
+    kinds.any(|kinds| kinds.iter().any(|kind| kind == "proc-macro"))
+}
+
 fn reference(package: &Value) -> String {
     let [name, version] = ["name", "version"].map(|of| package[of].as_str().unwrap_or_default());
     format!("pkg:cargo/{name}@{version}")
@@ -219,9 +233,10 @@ mod tests {
                 package("below", registry.clone()),
                 package("builds", registry.clone()),
                 package("other", registry),
+                json!({"id": "derives", "name": "derives", "version": "1.0.0", "targets": [{"kind": ["proc-macro"]}]}),
             ],
             "resolve": {"nodes": [
-                {"id": "image", "deps": [need("linked", Value::Null), need("builds", json!("build"))]},
+                {"id": "image", "deps": [need("linked", Value::Null), need("builds", json!("build")), need("derives", Value::Null)]},
                 {"id": "linked", "deps": [need("below", Value::Null)]},
                 {"id": "other", "deps": []},
             ]},

@@ -41,7 +41,8 @@ pub(super) fn of<'m>(packages: impl Iterator<Item = &'m Value>) -> Result<String
         }
     }
     let mut all = format!(
-        "What the files of this release are linked with, and on which terms; Rust's standard library, MIT OR Apache-2.0, is in each of them.\n\n{list}"
+        "What the files of this release are linked with, and on which terms; Rust's standard library, MIT OR Apache-2.0, is in each of them.\n\
+         Where a package has no text, MIT and Apache-2.0 read as in LICENSE-MIT and LICENSE-APACHE, with its authors in place of ours.\n\n{list}"
     );
     for (text, names) in texts {
         let line = "-".repeat(80);
