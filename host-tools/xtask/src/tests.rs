@@ -14,6 +14,7 @@ fn workflows_and_instructions_ask_for_commands_that_there_are() {
     let mut asked = 0;
     let files = [
         ".github/workflows/ci.yml",
+        ".github/workflows/page.yml",
         ".github/workflows/release.yml",
         ".ci/run",
         "docs/src/release.md",
@@ -39,7 +40,7 @@ fn workflows_and_instructions_ask_for_commands_that_there_are() {
 #[test]
 fn a_workflow_is_steps_of_one_job() {
     // no YAML here: what a misplaced indentation or a tab would break
-    for name in ["ci", "release"] {
+    for name in ["ci", "page", "release"] {
         let file = shell::root().join(format!(".github/workflows/{name}.yml"));
         let text = std::fs::read_to_string(&file).unwrap();
         assert!(!text.contains('\t'), "{name}: a tab");
