@@ -55,9 +55,11 @@ mod tests {
     #[test]
     fn each_is_of_its_finger() {
         for finger in FingerName::ALL {
-            for table in [rig(finger), handheld(finger)] {
+            // a hand with a BioTac has no slides of one of them that count
+            let by_hand = 117 - u16::from(finger == FingerName::Biotac);
+            for (table, textures) in [(rig(finger), 117), (handheld(finger), by_hand)] {
                 let table = Table::read(table).unwrap();
-                assert_eq!(table.textures(), 117);
+                assert_eq!(table.textures(), textures);
                 assert_eq!(table.finger(), FingerCode::of(finger));
             }
         }

@@ -1,9 +1,9 @@
 //! Reading a table where it is stored.
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, Contents, DRIFT, EARLY, EARLY_VERSION, HEADER, LABEL_BYTES,
-    LENGTH, Layout, MAGIC, MAX_MOVEMENTS, MOVEMENT_BYTES, MS, PACED, PACED_VERSION, PLAIN_VERSION,
-    SLOPES, TWO, TableError, Tally, VERSION, array, each,
+    Action, CELL_BYTES, CRC_BYTES, Contents, EARLY, EARLY_VERSION, HEADER, LABEL_BYTES, LENGTH,
+    Layout, MAGIC, MAX_MOVEMENTS, MOVEMENT_BYTES, PACED, PACED_VERSION, PLAIN_VERSION, SLOPES,
+    TableError, Tally, VERSION, array, each,
 };
 use super::gaussian::{Gaussian, Gaussians, SD_STEP, mean_step};
 use super::training_stats::{Experience, Whitened};
@@ -26,16 +26,6 @@ pub struct Table<'a> {
     pub(super) novelty: &'a [u8],
     /// The section of slopes; nothing in a table that knows no speeds.
     pub(super) slopes: &'a [u8],
-}
-
-/// What slides of one of the shorter lengths say, where it lies.
-#[derive(Clone, Copy)]
-pub(super) struct Length<'a> {
-    pub(super) ms: u16,
-    /// What it has for them: without names and numbers.
-    pub(super) table: Table<'a>,
-    /// What is behind the trials.
-    pub(super) rest: &'a [u8],
 }
 
 impl<'a> Table<'a> {
@@ -202,56 +192,6 @@ impl<'a> Table<'a> {
     pub(super) fn section(&self, wanted: u16) -> Option<&'a [u8]> {
         let mut each = each(self.sections).flatten();
         each.find_map(|(kind, contents)| (kind == wanted).then_some(contents))
-    }
-
-    /// The lengths that it knows, the shortest first.
-    pub(super) fn lengths(&self) -> impl Iterator<Item = Length<'a>> + Clone + use<'a> {
-        let table = *self;
-        let sections = if EARLY { self.sections } else { &[] };
-        let sections = each(sections).flatten().filter(|(kind, _)| *kind == LENGTH);
-        sections.map_while(move |(_, contents)| table.length_of(contents))
-    }
-
-    /// What a section of kind 6 has; `None` where it is too short.
-    pub(super) fn length_of(&self, contents: &'a [u8]) -> Option<Length<'a>> {
-        let (ms, bytes) = contents.split_first_chunk::<MS>()?;
-        let rest = bytes.get(self.layout().lineage..)?;
-        let drift = self.section(DRIFT).map_or(0, <[u8]>::len);
-        let (drifts, novelty) = rest.split_at_checked(drift)?;
-        let drifts = drifts.get(TWO..).filter(|_| !self.drifts.is_empty());
-        let table = Table {
-            bytes,
-            sections: &[],
-            drifts: drifts.unwrap_or_default(),
-            novelty,
-            slopes: &[],
-            ..*self
-        };
-        let ms = u16::from_le_bytes(*ms);
-        Some(Length { ms, table, rest })
-    }
-
-    /// The table of the length that a movement stands for, and which of its movements that is; `None` for whole slides.
-    #[inline(always)]
-    pub(super) fn shorter(&self, movement: u8) -> Option<(Table<'a>, u8)> {
-        if !EARLY || movement < self.movements {
-            return None;
-        }
-        self.find_shorter(movement)
-    }
-
-    /// Once in the image, not wherever a table is read.
-    #[cold]
-    #[inline(never)]
-    fn find_shorter(&self, movement: u8) -> Option<(Table<'a>, u8)> {
-        let mut left = movement;
-        for length in self.lengths() {
-            left = left.checked_sub(self.movements)?;
-            if left < self.movements {
-                return Some((length.table, left));
-            }
-        }
-        None
     }
 
     fn stored_movement(&self, index: u8) -> Option<(u16, u32)> {

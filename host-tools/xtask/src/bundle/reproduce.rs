@@ -47,7 +47,7 @@ pub(crate) fn reproduce(only: &[String]) -> Result<()> {
         copy.display(),
         lines.join("\n")
     );
-    println!("{} files, the same in {}", here.len(), copy.display());
+    println!("{}: the same files, {} of them", copy.display(), here.len());
     Ok(())
 }
 

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail, ensure};
 
-use super::{CRATE, build};
+use super::build::{CRATE, build};
 use crate::shell::{cargo, root, run, skip, target};
 use crate::toolchain::{self, BROWSER};
 use crate::{emulate, firmware};
