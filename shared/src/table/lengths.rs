@@ -37,16 +37,6 @@ pub struct Shorter<'t> {
     pub movements: u64,
 }
 
-/// What slides of one of the shorter lengths say, where it lies.
-#[derive(Clone, Copy)]
-pub(super) struct Length<'a> {
-    pub(super) ms: u16,
-    /// What it has for them: without names and numbers.
-    pub(super) table: Table<'a>,
-    /// What is behind the trials.
-    pub(super) rest: &'a [u8],
-}
-
 impl Shorter<'_> {
     fn is_longer(&self, movement: usize) -> bool {
         movement < u64::BITS as usize && self.movements >> movement & 1 == 1
@@ -122,56 +112,6 @@ pub fn with_lengths<'o>(
 }
 
 impl<'a> Table<'a> {
-    /// The lengths that it knows, the shortest first.
-    pub(super) fn lengths(&self) -> impl Iterator<Item = Length<'a>> + Clone + use<'a> {
-        let table = *self;
-        let sections = if EARLY { self.sections } else { &[] };
-        let sections = each(sections).flatten().filter(|(kind, _)| *kind == LENGTH);
-        sections.map_while(move |(_, contents)| table.length_of(contents))
-    }
-
-    /// What a section of kind 6 has; `None` where it is too short.
-    pub(super) fn length_of(&self, contents: &'a [u8]) -> Option<Length<'a>> {
-        let (ms, bytes) = contents.split_first_chunk::<MS>()?;
-        let rest = bytes.get(self.layout().lineage..)?;
-        let drift = self.section(DRIFT).map_or(0, <[u8]>::len);
-        let (drifts, novelty) = rest.split_at_checked(drift)?;
-        let drifts = drifts.get(TWO..).filter(|_| !self.drifts.is_empty());
-        let table = Table {
-            bytes,
-            sections: &[],
-            drifts: drifts.unwrap_or_default(),
-            novelty,
-            slopes: &[],
-            ..*self
-        };
-        let ms = u16::from_le_bytes(*ms);
-        Some(Length { ms, table, rest })
-    }
-
-    /// The table of the length that a movement stands for, and which of its movements that is; `None` for whole slides.
-    #[inline(always)]
-    pub(super) fn shorter(&self, movement: u8) -> Option<(Table<'a>, u8)> {
-        if !EARLY || movement < self.movements {
-            return None;
-        }
-        self.find_shorter(movement)
-    }
-
-    /// Once in the image, not wherever a table is read.
-    #[cold]
-    #[inline(never)]
-    fn find_shorter(&self, movement: u8) -> Option<(Table<'a>, u8)> {
-        let mut left = movement;
-        for length in self.lengths() {
-            left = left.checked_sub(self.movements)?;
-            if left < self.movements {
-                return Some((length.table, left));
-            }
-        }
-        None
-    }
-
     /// Number of shorter lengths that it knows, and what each is, in ms at constant speed.
     pub fn lengths_ms(&self) -> impl Iterator<Item = u16> + use<'a> {
         self.lengths().map(|length| length.ms)

@@ -4,11 +4,13 @@ use heapless::Vec;
 
 use super::encode::EncodeError;
 use super::format::{Contents, LABEL_BYTES, Tally};
+use super::gaussian::{SD_STEP, mean_step};
 use super::lengths::MAX_LENGTHS;
-use super::training_stats::Whitened;
+use super::training_stats::{Experience, Whitened};
 use super::view::Table;
 use super::whitening::Whitening;
 use crate::CRC32;
+use crate::features::Property;
 
 /// Puts what a fused table has learned on the go of a texture at a movement in its place, and marks the table as made from
 /// the one that it was.
@@ -54,6 +56,30 @@ pub fn retell(
         *crc = CRC32.checksum(body).to_le_bytes();
     }
     Ok(())
+}
+
+impl Table<'_> {
+    /// What was learned of a texture at a movement, to go on from; what is in the table is rounded.
+    pub fn experience(&self, texture: u16, movement: u8) -> Experience {
+        let trials = self.trials(texture, movement);
+        if trials == 0 {
+            return Experience::default();
+        }
+        let mut experience = Experience {
+            trials,
+            ..Experience::default()
+        };
+        for (property, (mean, squares)) in Property::ALL
+            .into_iter()
+            .zip(experience.mean.iter_mut().zip(&mut experience.squares))
+        {
+            let (m, sd) = self.cell(texture, movement, property).unwrap_or_default();
+            let sd = f32::from(sd) * SD_STEP;
+            *mean = f32::from(m) * mean_step(property);
+            *squares = sd * sd * f32::from(trials - 1);
+        }
+        experience
+    }
 }
 
 /// Puts other features in the place of those that are whitened to 0 at a movement: what was learned keeps its place among the

@@ -1,12 +1,12 @@
 //! Reading a table where it is stored.
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, Contents, EARLY, EARLY_VERSION, HEADER, LABEL_BYTES, LENGTH,
-    Layout, MAGIC, MAX_MOVEMENTS, MOVEMENT_BYTES, PACED, PACED_VERSION, PLAIN_VERSION, SLOPES,
-    TableError, Tally, VERSION, array, each,
+    Action, CELL_BYTES, CRC_BYTES, Contents, DRIFT, EARLY, EARLY_VERSION, HEADER, LABEL_BYTES,
+    LENGTH, Layout, MAGIC, MAX_MOVEMENTS, MOVEMENT_BYTES, MS, PACED, PACED_VERSION, PLAIN_VERSION,
+    SLOPES, TWO, TableError, Tally, VERSION, array, each,
 };
 use super::gaussian::{Gaussian, Gaussians, SD_STEP, mean_step};
-use super::training_stats::{Experience, Whitened};
+use super::training_stats::Whitened;
 use super::whitening::{Column, Row, View, Whitening, Words};
 use crate::CRC32;
 use crate::features::{MAX_FEATURES, Movement, Property, PropertySet, Vector};
@@ -26,6 +26,16 @@ pub struct Table<'a> {
     pub(super) novelty: &'a [u8],
     /// The section of slopes; nothing in a table that knows no speeds.
     pub(super) slopes: &'a [u8],
+}
+
+/// What slides of one of the shorter lengths say, where it lies.
+#[derive(Clone, Copy)]
+pub(super) struct Length<'a> {
+    pub(super) ms: u16,
+    /// What it has for them: without names and numbers.
+    pub(super) table: Table<'a>,
+    /// What is behind the trials.
+    pub(super) rest: &'a [u8],
 }
 
 impl<'a> Table<'a> {
@@ -192,6 +202,56 @@ impl<'a> Table<'a> {
     pub(super) fn section(&self, wanted: u16) -> Option<&'a [u8]> {
         let mut each = each(self.sections).flatten();
         each.find_map(|(kind, contents)| (kind == wanted).then_some(contents))
+    }
+
+    /// The lengths that it knows, the shortest first.
+    pub(super) fn lengths(&self) -> impl Iterator<Item = Length<'a>> + Clone + use<'a> {
+        let table = *self;
+        let sections = if EARLY { self.sections } else { &[] };
+        let sections = each(sections).flatten().filter(|(kind, _)| *kind == LENGTH);
+        sections.map_while(move |(_, contents)| table.length_of(contents))
+    }
+
+    /// What a section of kind 6 has; `None` where it is too short.
+    pub(super) fn length_of(&self, contents: &'a [u8]) -> Option<Length<'a>> {
+        let (ms, bytes) = contents.split_first_chunk::<MS>()?;
+        let rest = bytes.get(self.layout().lineage..)?;
+        let drift = self.section(DRIFT).map_or(0, <[u8]>::len);
+        let (drifts, novelty) = rest.split_at_checked(drift)?;
+        let drifts = drifts.get(TWO..).filter(|_| !self.drifts.is_empty());
+        let table = Table {
+            bytes,
+            sections: &[],
+            drifts: drifts.unwrap_or_default(),
+            novelty,
+            slopes: &[],
+            ..*self
+        };
+        let ms = u16::from_le_bytes(*ms);
+        Some(Length { ms, table, rest })
+    }
+
+    /// The table of the length that a movement stands for, and which of its movements that is; `None` for whole slides.
+    #[inline(always)]
+    pub(super) fn shorter(&self, movement: u8) -> Option<(Table<'a>, u8)> {
+        if !EARLY || movement < self.movements {
+            return None;
+        }
+        self.find_shorter(movement)
+    }
+
+    /// Once in the image, not wherever a table is read.
+    #[cold]
+    #[inline(never)]
+    fn find_shorter(&self, movement: u8) -> Option<(Table<'a>, u8)> {
+        let mut left = movement;
+        for length in self.lengths() {
+            left = left.checked_sub(self.movements)?;
+            if left < self.movements {
+                return Some((length.table, left));
+            }
+        }
+        None
     }
 
     fn stored_movement(&self, index: u8) -> Option<(u16, u32)> {
@@ -401,28 +461,6 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// What was learned of a texture at a movement, to go on from; what is in the table is rounded.
-    pub fn experience(&self, texture: u16, movement: u8) -> Experience {
-        let trials = self.trials(texture, movement);
-        if trials == 0 {
-            return Experience::default();
-        }
-        let mut experience = Experience {
-            trials,
-            ..Experience::default()
-        };
-        for (property, (mean, squares)) in Property::ALL
-            .into_iter()
-            .zip(experience.mean.iter_mut().zip(&mut experience.squares))
-        {
-            let (m, sd) = self.cell(texture, movement, property).unwrap_or_default();
-            let sd = f32::from(sd) * SD_STEP;
-            *mean = f32::from(m) * mean_step(property);
-            *squares = sd * sd * f32::from(trials - 1);
-        }
-        experience
-    }
-
     /// How features are whitened at a movement; `None` in a table of Gaussians and outside the table.
     pub fn whitening(&self, movement: u8) -> Option<Whitening> {
         let (bytes, features) = self.bytes_from_whitening(movement)?;
@@ -512,11 +550,6 @@ impl<'a> Table<'a> {
     pub fn next_number(&self) -> u16 {
         let numbers = (0..self.textures).map(|texture| self.number(texture));
         numbers.max().map_or(0, |most| most.wrapping_add(1))
-    }
-
-    /// The texture with this number.
-    pub fn numbered(&self, number: u16) -> Option<u16> {
-        (0..self.textures).find(|&texture| self.number(texture) == number)
     }
 
     /// From whom a texture was learned.
