@@ -31,8 +31,6 @@ pub fn arm() -> ! {
     watchdog::start();
     rescue::guard_stack();
     let r = board::start();
-    let no_clock = (!board::has_clock()).then_some(board::NO_CLOCK);
-    let flaw = board::flaw().or(no_clock);
     defmt::info!("tactus-arm {=str}", env!("CARGO_PKG_VERSION"));
     let (words_in, words_out) = WORD_QUEUE.take().split();
     let (samples_in, samples_out) = SAMPLE_QUEUE.take().split();
@@ -44,7 +42,7 @@ pub fn arm() -> ! {
         protocol: PROTOCOL,
         version: env!("CARGO_PKG_VERSION").try_into().unwrap_or_default(),
         reset,
-        last_words: last_words.or_else(|| flaw?.try_into().ok()),
+        last_words: last_words.or_else(|| board::flaw()?.try_into().ok()),
         finger: board::FINGER,
     });
     thread::run(|thread| {

@@ -19,7 +19,7 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Peri, PeripheralType, peripherals};
-pub(crate) use nucleo::{Irqs, TURN_CYCLES, flaw};
+pub(crate) use nucleo::{Irqs, TURN_CYCLES};
 #[cfg(feature = "nucleo-f429zi")]
 use nucleo_f429zi as nucleo;
 #[cfg(feature = "nucleo-f767zi")]
@@ -204,8 +204,13 @@ pub(crate) fn start() -> AssignedResources {
     r
 }
 
+/// What is wrong with the board, in words for the host.
+pub(crate) fn flaw() -> Option<&'static str> {
+    nucleo::flaw().or_else(|| (!has_clock()).then_some(NO_CLOCK))
+}
+
 /// What is to be said of a board whose probe gives no clock.
-pub(crate) const NO_CLOCK: &str =
+const NO_CLOCK: &str =
     "no 8 MHz from the ST-LINK (see its solder bridges): runs by the chip's own clock, 1 % off";
 
 /// Whether the debug probe's 8 MHz are there. embassy would wait for them without end.

@@ -33,8 +33,6 @@ pub fn rig() -> ! {
     watchdog::start();
     rescue::guard_stack();
     let r = board::start();
-    let no_clock = (!board::has_clock()).then_some(board::NO_CLOCK);
-    let flaw = board::flaw().or(no_clock);
     defmt::info!("tactus-rig {=str}", env!("CARGO_PKG_VERSION"));
     let (words_in, words_out) = WORD_QUEUE.take().split();
     let (samples_in, samples_out) = SAMPLE_QUEUE.take().split();
@@ -46,7 +44,7 @@ pub fn rig() -> ! {
         protocol: PROTOCOL,
         version: env!("CARGO_PKG_VERSION").try_into().unwrap_or_default(),
         reset,
-        last_words: last_words.or_else(|| flaw?.try_into().ok()),
+        last_words: last_words.or_else(|| board::flaw()?.try_into().ok()),
         finger: board::FINGER,
     });
     // those of thread mode run when all are there, `servo`, which has the motors, at once: it is the last one

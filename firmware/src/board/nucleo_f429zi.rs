@@ -24,7 +24,7 @@ pub(super) fn start_caches() {
     });
 }
 
-/// What is wrong with the board, in words for the host: nothing, its flash has two banks whatever the option bytes say.
-pub(crate) fn flaw() -> Option<&'static str> {
+/// What is wrong with this board alone: nothing, its flash has two banks whatever the option bytes say.
+pub(super) fn flaw() -> Option<&'static str> {
     None
 }

@@ -22,9 +22,9 @@ pub(super) fn start_caches() {
     }
 }
 
-/// What is wrong with the board, in words for the host. As it is delivered its flash is one bank, where code stands still for a
+/// What is wrong with this board alone. As it is delivered its flash is one bank, where code stands still for a
 /// second while a sector is erased: nothing is stored then.
-pub(crate) fn flaw() -> Option<&'static str> {
+pub(super) fn flaw() -> Option<&'static str> {
     FLASH.optcr().read().n_dbank().then_some(
         "the flash is one bank, so nothing is stored: STM32_Programmer_CLI -c port=SWD -ob nDBANK=0",
     )

@@ -4,7 +4,7 @@ use std::path::Path;
 use anyhow::{Context as _, Result, ensure};
 
 use crate::firmware::hash;
-use crate::shell::{cargo, root, run, target};
+use crate::shell::{root, run, tactus, target};
 
 /// The world, and the trials of each texture and movement, that the firmware's table is learned from.
 const SEED: &str = "1";
@@ -56,18 +56,6 @@ fn make(work: &Path, finger: &str, names: &[&str]) -> Result<Vec<Vec<u8>>> {
     std::fs::create_dir_all(work).with_context(|| format!("cannot make {}", work.display()))?;
     let recordings = work.join("recordings");
     let files: Vec<_> = names.iter().map(|name| work.join(name)).collect();
-    let tactus = || {
-        let mut cargo = cargo();
-        cargo.args([
-            "run",
-            "--quiet",
-            "--release",
-            "--package",
-            "tactus-probe",
-            "--",
-        ]);
-        cargo
-    };
     let mut simulate = tactus();
     let world = ["--seed", SEED, "--finger", finger];
     simulate.arg("simulate").args(world);

@@ -7,7 +7,7 @@ use anyhow::Result;
 use clap::Args;
 
 use crate::firmware;
-use crate::shell::{cargo, run};
+use crate::shell::{self, run};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -64,15 +64,7 @@ impl Options {
 
 /// `tactus device flash` does it: it stays attached for a report, and ends as the image ends; the rig is left alone.
 fn command(options: &Options, elf: &Path) -> Command {
-    let mut tactus = cargo();
-    tactus.args([
-        "run",
-        "--quiet",
-        "--release",
-        "--package",
-        "tactus-probe",
-        "--",
-    ]);
+    let mut tactus = shell::tactus();
     tactus.args(["device", "flash"]).arg(elf);
     for (flag, wanted) in [
         ("--attach", options.is_watched()),

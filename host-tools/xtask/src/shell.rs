@@ -28,6 +28,14 @@ pub(crate) fn cargo() -> Command {
     cargo
 }
 
+/// The command `tactus`, optimised; it is built first.
+pub(crate) fn tactus() -> Command {
+    let mut tactus = cargo();
+    tactus.args(["run", "--quiet", "--release", "--package", "tactus-probe"]);
+    tactus.arg("--");
+    tactus
+}
+
 /// Whether cargo has this command.
 pub(crate) fn has_subcommand(name: &str) -> bool {
     cargo()

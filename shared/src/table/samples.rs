@@ -32,11 +32,6 @@ fn of_name(name: &str) -> [u8; 2] {
 }
 
 impl Table<'_> {
-    /// The texture with this number.
-    pub fn numbered(&self, number: u16) -> Option<u16> {
-        (0..self.textures).find(|&texture| self.number(texture) == number)
-    }
-
     /// Whether a texture's sample was moved or turned between trials; `None` where nobody said, and of one that has got
     /// another name since.
     pub fn moved(&self, texture: u16) -> Option<bool> {

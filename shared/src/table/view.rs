@@ -552,6 +552,11 @@ impl<'a> Table<'a> {
         numbers.max().map_or(0, |most| most.wrapping_add(1))
     }
 
+    /// The texture with this number.
+    pub fn numbered(&self, number: u16) -> Option<u16> {
+        (0..self.textures).find(|&texture| self.number(texture) == number)
+    }
+
     /// From whom a texture was learned.
     pub fn tally(&self, texture: u16) -> Tally {
         let [_, _, factory, user, itself] = self.label(texture);
