@@ -46,6 +46,9 @@ fn a_session_in_python_is_that_of_the_command() {
         return;
     };
     let (at, _) = probe(1000);
+    // before the session, for it teaches what lies under the finger by a second name
+    let before = ["identify", "--port", &at, "--seed", "7", "--format", "json"];
+    let found = object(&before, 0);
     let temp = tempfile::tempdir().unwrap();
     let log = temp.path().join("session.jsonl");
     let mut session = Command::new(python);
@@ -54,8 +57,6 @@ fn a_session_in_python_is_that_of_the_command() {
     let Output { stdout, stderr, .. } = session.output().unwrap();
     let said = String::from_utf8_lossy(&stderr);
     let verdict: serde_json::Value = serde_json::from_slice(&stdout).expect(&said);
-    let again = ["identify", "--port", &at, "--seed", "7", "--format", "json"];
-    let found = object(&again, 0);
     assert_eq!(verdict["name"], found["verdict"]["texture"]);
     assert_eq!(verdict["name"], texture_name(UNKNOWN));
     // the command reads what the package wrote
