@@ -1,5 +1,8 @@
 //! What a watched probe has learned from: trials of a simulated world, made here or before.
 
+#[cfg(target_family = "wasm")]
+use std::sync::OnceLock;
+
 use serde::{Deserialize, Serialize};
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
@@ -52,8 +55,48 @@ impl Trials {
     /// # Errors
     /// The file that comes with the program is not of this version; a test looks.
     pub fn of_world() -> Result<Vec<Self>, postcard::Error> {
-        postcard::from_bytes(include_bytes!("world-1.trials"))
+        postcard::from_bytes(made_before())
     }
+}
+
+#[cfg(not(target_family = "wasm"))]
+const fn made_before() -> &'static [u8] {
+    include_bytes!("world-1.trials")
+}
+
+/// In a page they lie beside the module, which is small then.
+#[cfg(target_family = "wasm")]
+static MADE_BEFORE: OnceLock<Vec<u8>> = OnceLock::new();
+
+#[cfg(target_family = "wasm")]
+fn made_before() -> &'static [u8] {
+    MADE_BEFORE.get().map_or(&[], Vec::as_slice)
+}
+
+/// Brings the trials of [`WORLD`], before anything asks for them.
+#[cfg(target_family = "wasm")]
+pub fn bring_world(trials: Vec<u8>) {
+    // once is enough
+    let _ = MADE_BEFORE.set(trials);
+}
+
+/// Why the table of the world that comes with the program is not there.
+#[derive(Debug, thiserror::Error)]
+pub enum WorldError {
+    /// Its trials are of another version.
+    #[error(transparent)]
+    Trials(#[from] postcard::Error),
+    /// They make no table.
+    #[error(transparent)]
+    Table(#[from] TableError),
+}
+
+/// The table of all textures of [`WORLD`], of all features.
+///
+/// # Errors
+/// What comes with the program is not of this version.
+pub fn world_table() -> Result<Vec<u8>, WorldError> {
+    Ok(table(&Trials::of_world()?, false, 1.0)?)
 }
 
 /// The table that these trials make, for the fused method or the paper's.
