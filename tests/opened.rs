@@ -286,7 +286,7 @@ fn what_cannot_be_shown_is_told_with_what_to_do() {
         ),
         (
             without_file,
-            "a/t001_s001_pac.npy: manifest.csv names this file, and it is not among those that were given: give the whole folder",
+            "a/t001_s001_pac.npy: is in manifest.csv, but not among the files that were given: give the whole folder",
         ),
         (changed, "a/t001_s001_pac.npy: "),
         (unfinished, "a: recordings that are not whole, by: "),
@@ -321,8 +321,6 @@ fn leaves_files_for_a_page() {
     let log = folder.join("session.jsonl");
     fs::write(&log, session()).unwrap();
     let recorded = mcap(Path::new(RECORDINGS));
-    let zip =
-        zipped(&recordings("touched/"), CompressionMethod::Deflated)["recordings.zip"].clone();
     for (name, bytes) in [
         ("session.mcap", mcap(&log)),
         ("cut.mcap", recorded[..recorded.len() / 2].to_vec()),

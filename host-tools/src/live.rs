@@ -14,9 +14,7 @@ mod standing;
 pub use hearing::{Heard, Hearing, spectra};
 pub use message::{Expected, Frame, Happening, Known, Measured, Reply, Request, Settings};
 pub use session::{Session, sentence};
-#[cfg(target_family = "wasm")]
-pub use slides::bring_world;
-pub use slides::{LENGTHS_MS, TRIALS, Trials, WORLD, WorldError, world_table};
+pub use slides::{LENGTHS_MS, TRIALS, Trials, WORLD, WorldError, bring_world, world_table};
 pub use standing::Standing;
 
 #[cfg(test)]

@@ -283,7 +283,7 @@ async function drop(it, ...paths) {
 const read = (it, name) => it.until(`${name} is read`, `document.getElementById('l-say').textContent.startsWith(${JSON.stringify(`${name}: `)}) || !document.getElementById('l-problem').hidden`, 60);
 const labels = (it, kind) => it.evaluate(`[...document.querySelectorAll("#l-list .${kind}")].map(e => e.textContent)`);
 const looks = (it, kind, n = 0) => it.evaluate(`document.querySelectorAll("#l-list .${kind}")[${n}].click()`);
-const drawn = (it, id) => it.evaluate(`new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => { const c = document.getElementById("${id}"); done(c.clientHeight > 0 && c.getContext("2d").getImageData(0, 0, c.width, c.height).data.some(v => v > 0)); })))`);
+const drawn = (it, id) => it.evaluate(`new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => { const c = document.getElementById("${id}"); if (!c.clientHeight) return done(false); const paper = new OffscreenCanvas(c.width, c.height).getContext("2d", { willReadFrequently: true }); paper.drawImage(c, 0, 0); done(paper.getImageData(0, 0, c.width, c.height).data.some(v => v > 0)); })))`);
 const shown = (it, id) => it.evaluate(`document.getElementById("${id}").getClientRects().length > 0`);
 
 test("recordings are shown slide by slide: a folder, and an MCAP file of it", () => opened("", { motion: "reduce" }, async it => {
@@ -299,7 +299,7 @@ test("recordings are shown slide by slide: a folder, and an MCAP file of it", ()
     assert.match(await text(it, "why"), /^It would choose for slide 1: /);
     assert.equal(await it.evaluate("document.querySelectorAll('#benefit li').length"), 3);
     await looks(it, "recorded", 1);
-    assert.equal(await text(it, "verdict"), "Computer paper");
+    assert.equal(await text(it, "verdict"), "Recorded on Computer paper");
     assert.match(await text(it, "features"), /^Features: traction \d\.\d\d N, roughness .* of its 12 bands: /);
     for (const id of ["pac", "spectrum", "pdc", "shear"]) assert.ok(await drawn(it, id), id);
     await looks(it, "slide", 1);

@@ -84,8 +84,26 @@ const Files = (() => {
   // What was dropped, folders with all that lies in them: names with their folders, and the files.
   async function dropped(data) {
     // all at once: later the browser has forgotten them
-    const entries = [...data.items].map(item => item.webkitGetAsEntry?.()).filter(entry => entry);
-    if (!entries.length) return chosen(data.files);
+    const items = [...data.items].filter(item => item.kind === "file"), files = chosen(data.files);
+    const entries = items.map(item => item.webkitGetAsEntry?.());
+    if (!entries.some(entry => entry?.isDirectory)) return files;
+    // of a page that lies in a folder itself, Chromium opens no entries, but handles
+    if (items[0].getAsFileSystemHandle) return fromHandles(await Promise.all(items.map(item => item.getAsFileSystemHandle())));
+    return fromEntries(entries.filter(entry => entry));
+  }
+
+  async function fromHandles(handles) {
+    const files = [];
+    const walk = async (handle, folder) => {
+      const name = folder + handle.name;
+      if (handle.kind === "file") files.push({ name, file: await handle.getFile() });
+      else for await (const one of handle.values()) await walk(one, `${name}/`);
+    };
+    for (const handle of handles) await walk(handle, "");
+    return files;
+  }
+
+  async function fromEntries(entries) {
     const files = [];
     const walk = async (entry, folder) => {
       const name = folder + entry.name;

@@ -253,7 +253,7 @@
       case "recorded": {
         const m = one.measured, value = (name, v, unit = "") => `${name} ${fixed(v, 2, unit)}`;
         say(`Recorded: slide ${one.number}, ${Mind.movementName(one.movement)}`);
-        headline([{ name: one.texture }]);
+        headline(["Recorded on ", { name: one.texture }]);
         at("truth").textContent = "";
         at("features").textContent = m ? `Features: ${value("traction", m.traction_n, " N")}, ${value("roughness", m.roughness_ln)}, ${value("fineness", m.fineness_ln)}. Logarithms of the power of its ${m.bands_ln.length} bands: ${m.bands_ln.map(v => v.toFixed(1)).join(", ")}.` : `It says nothing: ${one.why}.`;
         if (known === null && m) {

@@ -1,6 +1,5 @@
 //! What a watched probe has learned from: trials of a simulated world, made here or before.
 
-#[cfg(target_family = "wasm")]
 use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
@@ -59,25 +58,23 @@ impl Trials {
     }
 }
 
-#[cfg(not(target_family = "wasm"))]
-const fn made_before() -> &'static [u8] {
+/// Those of [`WORLD`] that came from outside.
+static BROUGHT: OnceLock<Vec<u8>> = OnceLock::new();
+/// Those that are in the program; in a page they lie beside the module, which is small then.
+const BUILT_IN: &[u8] = if cfg!(target_family = "wasm") {
+    &[]
+} else {
     include_bytes!("world-1.trials")
-}
+};
 
-/// In a page they lie beside the module, which is small then.
-#[cfg(target_family = "wasm")]
-static MADE_BEFORE: OnceLock<Vec<u8>> = OnceLock::new();
-
-#[cfg(target_family = "wasm")]
 fn made_before() -> &'static [u8] {
-    MADE_BEFORE.get().map_or(&[], Vec::as_slice)
+    BROUGHT.get().map_or(BUILT_IN, Vec::as_slice)
 }
 
-/// Brings the trials of [`WORLD`], before anything asks for them.
-#[cfg(target_family = "wasm")]
+/// Brings the trials of [`WORLD`] to a program without them, before anything asks for them; once is enough.
 pub fn bring_world(trials: Vec<u8>) {
-    // once is enough
-    let _ = MADE_BEFORE.set(trials);
+    // those that came first are the same
+    let _ = BROUGHT.set(trials);
 }
 
 /// Why the table of the world that comes with the program is not there.

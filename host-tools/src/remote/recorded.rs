@@ -23,6 +23,7 @@ const ENOUGH: usize = 3;
 const MOST_TABLES: usize = 5;
 
 /// What was given.
+#[allow(clippy::large_enum_variant)] // one at a time
 pub(super) enum Opened {
     /// All that a session said.
     Session(Frame),

@@ -102,7 +102,10 @@ impl Replay {
             event => {
                 let judges = matches!(event, Event::Verified { .. });
                 events.push(event);
-                let judged = judges.then(|| Some(self.verifying()?.1?)).flatten();
+                let judged = match judges {
+                    true => self.verifying().and_then(|(_, slide)| slide),
+                    false => None,
+                };
                 if let Some(slide) = judged {
                     self.hearing.happens(Happening::Judged {
                         slide: slide.number,

@@ -89,7 +89,7 @@ pub enum RecordingError {
         name: String,
     },
     /// A manifest names a file that did not come with it.
-    #[error("{}: {manifest} names this file, and it is not among those that were given: give the whole folder", path.display())]
+    #[error("{}: is in {manifest}, but not among the files that were given: give the whole folder", path.display())]
     Missing {
         /// The file.
         path: PathBuf,
