@@ -269,6 +269,7 @@ test("a log is shown moment by moment", () => opened("", { motion: "reduce" }, a
   assert.match(await text(it, "verdict"), /^(The same as my own cloth\.|Different from my own cloth|Not sure yet whether it is my own cloth)/);
   assert.match(await text(it, "truth"), /^At this limit/);
   await it.evaluate("document.querySelector('#l-list .verdict').click()");
+  assert.equal(await text(it, "doing"), "");
   writeFileSync(join(folder, "screenshot-replayed-1280.png"), await it.screenshot(true));
   await press(it, "l-back");
   assert.doesNotMatch(await text(it, "verdict"), /^It is /);

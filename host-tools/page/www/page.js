@@ -518,6 +518,9 @@
 
   // ---- which probe
 
+  const FAILED = "This did not work.";
+  const idle = () => `It knows ${known?.textures.length ?? 0} textures. Have it touch one.`;
+
   // What a probe at a port and a log show with.
   const outside = {
     settings: () => set,
@@ -529,8 +532,12 @@
     // an exploration, or other work
     begins: explores => {
       problem();
-      if (!explores) return;
+      if (!explores) {
+        if (at("verdict").textContent === FAILED) headline([idle()]);
+        return;
+      }
       forget();
+      if (source === "log") say("");
       document.body.dataset.told = "";
       verdict = null;
       Places.likely([]);
@@ -555,10 +562,9 @@
       at("g-time").textContent = `${(frame.at_ms / 1000).toFixed(1)} s`;
       if (frame.phase) say(sentences[frame.phase] ?? "");
       else say(frame.connected ? "Ready" : "");
-      const idle = `It knows ${known?.textures.length ?? 0} textures. Have it touch one.`;
-      if (!frame.busy && frame.connected && verdict === null && slides === 0 && at("verdict").textContent !== idle) headline([idle]);
+      if (!frame.busy && frame.connected && verdict === null && slides === 0 && ![idle(), FAILED].includes(at("verdict").textContent)) headline([idle()]);
     },
-    fails: () => headline(["This did not work."]),
+    fails: () => headline([FAILED]),
     ends: () => { if (source === "usb") headline(["No probe is connected."]); },
     turn: to => turn(to),
   };
