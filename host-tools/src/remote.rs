@@ -9,6 +9,7 @@ mod message;
 mod open;
 #[cfg(feature = "open")]
 mod recorded;
+#[cfg(feature = "open")]
 mod replay;
 pub mod say;
 mod session;

@@ -4,7 +4,7 @@ use tactus_core::table::Table;
 use tactus_core::wire::{Command, Event, Identify};
 
 use super::message::Frame;
-use super::verifying::{Verifying, config_of};
+use super::verifying::{Verifying, config_of, words};
 use crate::eval::show::count;
 use crate::eval::verified::{Slide, print_answer, print_slide};
 use crate::link::log::{self, Line, LogError};
@@ -118,7 +118,6 @@ impl Replay {
     }
 
     /// It said why something came to nothing.
-    #[cfg(feature = "open")]
     pub(super) fn refused(&mut self, at_ms: u32, why: &str) {
         self.frame.at_ms = at_ms;
         self.hearing.happens(Happening::Refused {
@@ -180,12 +179,4 @@ impl Replay {
         self.frame.said += &format!("{explored}, {verified}.\n");
         self.frame
     }
-}
-
-/// What is printed, without what is around it.
-pub(super) fn words(print: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>) -> String {
-    let mut out = Vec::new();
-    // memory takes it
-    let _ = print(&mut out);
-    String::from_utf8_lossy(&out).trim().to_owned()
 }

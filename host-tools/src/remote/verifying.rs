@@ -105,3 +105,11 @@ impl<'t> Verifying<'t> {
         self.verified
     }
 }
+
+/// What is printed, without what is around it.
+pub(super) fn words(print: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>) -> String {
+    let mut out = Vec::new();
+    // memory takes it
+    let _ = print(&mut out);
+    String::from_utf8_lossy(&out).trim().to_owned()
+}

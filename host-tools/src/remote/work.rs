@@ -9,12 +9,11 @@ use tactus_core::wire::{self, Command, Event, Forget, Identify};
 
 use super::bench::{Bench, WorkError};
 use super::message::{File, Folder, Question, Work};
-use super::replay::words;
 use super::say::{
     HIGH_FORCE, Prompts, YIELDS, compare, forgotten, move_sample, name_of, not_noted, of_sample,
     replaced, show_found, show_settings, show_training, show_verifying, status_rows, uses_factory,
 };
-use super::verifying::{Verifying, config_of};
+use super::verifying::{Verifying, config_of, words};
 use crate::data::recorder::Recorder;
 use crate::data::recording::{Labels, Texture};
 use crate::data::recordings::files_of;
