@@ -11,10 +11,11 @@ mod session;
 mod slides;
 mod standing;
 
-pub use hearing::{Heard, Hearing};
-pub use message::{Frame, Happening, Known, Reply, Request, Settings};
+pub use hearing::{Heard, Hearing, spectra};
+pub use message::{Expected, Frame, Happening, Known, Measured, Reply, Request, Settings};
 pub use session::{Session, sentence};
-pub use slides::{LENGTHS_MS, TRIALS, Trials, WORLD};
+pub use slides::{LENGTHS_MS, TRIALS, Trials, WORLD, WorldError, bring_world, world_table};
+pub use standing::Standing;
 
 #[cfg(test)]
 mod tests;

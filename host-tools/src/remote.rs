@@ -2,12 +2,21 @@
 //! time, and gives back bytes to be sent and what has happened. What it does and says is what `tactus device` does and says.
 
 mod bench;
+#[cfg(feature = "open")]
+pub mod mcap;
 mod message;
+#[cfg(feature = "open")]
+mod open;
+#[cfg(feature = "open")]
+mod recorded;
+#[cfg(feature = "open")]
 mod replay;
 pub mod say;
 mod session;
 pub mod verifying;
 mod work;
 
-pub use message::{File, Folder, Frame, Reply, Request, Work};
+pub use message::{File, Folder, Frame, Question, Reply, Request, Streams, Work};
+#[cfg(feature = "open")]
+pub use open::OpenError;
 pub use session::Remote;

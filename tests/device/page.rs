@@ -146,8 +146,8 @@ fn a_page_says_what_the_command_says() {
     let answer = answer.unwrap_or_else(|| panic!("{}", found.said));
     assert!(shown.contains(answer), "{shown}\n{}", found.said);
     // heard again it is the same
-    let text = fs::read_to_string(&file).unwrap();
-    let again = page.ask(&json!({"do": "replay", "log": text}));
+    page.remote.give(fs::read(&file).unwrap());
+    let again = page.ask(&json!({"do": "open", "files": ["session.jsonl"]}));
     let told = |happened: &[Value]| -> Vec<Value> {
         let of = |one: &&Value| one["what"] != "done";
         happened.iter().filter(of).cloned().collect()
@@ -176,6 +176,31 @@ fn a_page_teaches_verifies_and_records() {
         &verified.said,
         &["Is it mine?", "slide 1,", "At this limit"],
     );
+    // in the log it is judged again, and converted it says the same
+    let log = page.ask(&json!({"do": "log"}));
+    let temp = tempfile::tempdir().unwrap();
+    let [file, converted] = ["session.jsonl", "session.mcap"].map(|name| temp.path().join(name));
+    fs::write(&file, bytes(&log["files"][0])).unwrap();
+    let mut convert = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    let convert = convert.args(["convert", path(&file), "--mcap", path(&converted)]);
+    assert!(convert.output().unwrap().status.success());
+    for file in [file, converted] {
+        page.remote.give(fs::read(&file).unwrap());
+        let again = page.ask(&json!({"do": "open", "files": [file.file_name().unwrap().to_str()]}));
+        let happened = again["happened"]
+            .as_array()
+            .unwrap_or_else(|| panic!("{again}"));
+        let of = |what: &str| -> Vec<&str> {
+            let all = happened.iter().filter(|one| one["what"] == what);
+            all.map(|one| one["said"].as_str().unwrap()).collect()
+        };
+        for said in [of("judged"), of("verified")].concat() {
+            assert!(verified.said.contains(said), "{said}\n{}", verified.said);
+        }
+        let slides = verified.said.matches("  slide ").count();
+        assert_eq!((of("judged").len(), of("verified").len()), (slides, 1));
+    }
+
     let trained = page.work(json!({"do": "train", "name": "mine too", "trials": 1, "seed": 1}));
     assert_eq!(trained.failed, None, "{}", trained.said);
     assert_says(&trained.said, &["trial 1 of", "mine too: 3 slides made."]);
@@ -206,7 +231,7 @@ fn a_page_keeps_a_table_before_it_is_replaced() {
     let answer = |yes: bool| {
         move |frame: &Value| {
             frame["question"]
-                .is_string()
+                .is_object()
                 .then(|| json!({"do": "answer", "yes": yes}))
         }
     };
@@ -224,6 +249,143 @@ fn a_page_keeps_a_table_before_it_is_replaced() {
     damaged[40] ^= 1;
     let refused = page.work(json!({"do": "push", "file": "bad.tact", "bytes": damaged}));
     assert!(refused.failed.unwrap().starts_with("bad.tact: "));
+}
+
+#[test]
+fn a_page_asks_to_move_the_sample_where_the_command_does() {
+    let (at, _) = probe(1000);
+    let (mut page, _) = Page::new(&at);
+    let sentence =
+        "Move or turn Mine under the finger, so that the next slide is on another track.";
+    let answers = |answer: Value| {
+        move |frame: &Value| {
+            let question = frame["question"].as_object()?;
+            assert_eq!(question["asked"], sentence);
+            assert_eq!(question["yes"], "It is moved");
+            Some(answer.clone())
+        }
+    };
+    // of a new texture, before the second trial alone
+    let train =
+        json!({"do": "work", "work": {"do": "train", "name": "Mine", "trials": 2, "seed": 1}});
+    let trained = page.done(&train, answers(json!({"do": "answer", "yes": true})));
+    assert_eq!(trained.failed, None, "{}", trained.said);
+    assert_says(
+        &trained.said,
+        &[
+            "Mine: 6 slides made.",
+            "Its sample was moved between trials.",
+        ],
+    );
+    // of one with trials, before the first
+    let again =
+        json!({"do": "work", "work": {"do": "train", "name": "Mine", "trials": 3, "seed": 2}});
+    let stopped = page.done(&again, answers(json!({"do": "stop"})));
+    assert_eq!(
+        stopped.failed.as_deref(),
+        Some("stopped: the finger is lifted and the stage stands")
+    );
+    let known =
+        page.work(json!({"do": "train", "name": "Mine", "trials": 3, "moved": false, "seed": 2}));
+    assert_eq!(known.failed, None, "{}", known.said);
+    assert_says(&known.said, &["Mine: 3 slides made."]);
+
+    let record =
+        json!({"do": "work", "work": {"do": "record", "name": "Mine", "slides": 4, "seed": 2}});
+    let recorded = page.done(&record, answers(json!({"do": "answer", "yes": false})));
+    assert_eq!(recorded.failed, None, "{}", recorded.said);
+    let manifest = recorded.folders[0]["files"].as_array().unwrap().last();
+    let manifest = String::from_utf8(bytes(manifest.unwrap())).unwrap();
+    let of_slide = |row: &str| row.rsplit(',').nth(3).unwrap().to_owned();
+    let moved: Vec<String> = manifest.lines().skip(1).map(of_slide).collect();
+    assert_eq!(moved, ["no"; 4], "{manifest}");
+}
+
+#[test]
+fn a_page_changes_what_a_probe_knows_and_keeps_as_the_command_does() {
+    let (at, _) = probe(1000);
+    let (mut page, _) = Page::new(&at);
+    let factory = bytes(&page.work(json!({"do": "pull"})).files[0]);
+    let first = Table::read(&factory).unwrap().name(0).unwrap().to_owned();
+    let answer = |yes: bool| {
+        move |frame: &Value| {
+            let asked = frame["question"]["asked"].as_str()?;
+            assert!(asked.ends_with("\nGo on?"), "{asked}");
+            Some(json!({"do": "answer", "yes": yes}))
+        }
+    };
+    let work = |work: Value| json!({"do": "work", "work": work});
+
+    let renamed = page.work(json!({"do": "rename", "from": first, "to": "renamed"}));
+    assert_eq!(renamed.failed, None);
+    assert_says(&renamed.said, &[&format!("{first} is renamed now.")]);
+    assert!(
+        renamed.known["textures"]
+            .as_array()
+            .unwrap()
+            .contains(&json!("renamed"))
+    );
+    let before = bytes(&page.work(json!({"do": "pull"})).files[0]);
+
+    let forget = work(json!({"do": "forget", "name": "renamed"}));
+    let kept = page.done(&forget, answer(false));
+    assert_eq!(kept.failed.as_deref(), Some("nothing was changed"));
+    assert_eq!(bytes(&kept.files[0]), before);
+    let forgotten = page.done(&forget, answer(true));
+    assert_eq!(forgotten.failed, None);
+    assert_says(
+        &forgotten.said,
+        &[
+            "The probe is to forget renamed.",
+            "The probe's table is kept: table-",
+            "The probe has forgotten renamed.",
+        ],
+    );
+    assert_eq!(bytes(&forgotten.files[0]), before);
+    assert_eq!(forgotten.known["textures"].as_array().unwrap().len(), 2);
+    let nothing = page.done(&work(json!({"do": "forget-self-learned"})), answer(true));
+    assert_says(
+        &nothing.said,
+        &["The probe is to forget what it learned by itself."],
+    );
+    let nobody = page.done(
+        &work(json!({"do": "forget-training", "name": "nothing"})),
+        answer(true),
+    );
+    assert_eq!(nobody.failed, None);
+    assert_says(
+        &nobody.said,
+        &["The probe has forgotten the training of nothing."],
+    );
+
+    let back = page.done(&work(json!({"do": "factory"})), answer(true));
+    assert_eq!(back.failed, None);
+    assert_says(
+        &back.said,
+        &["The probe uses the firmware's own table: 3 textures"],
+    );
+    assert_eq!(bytes(&page.work(json!({"do": "pull"})).files[0]), factory);
+    // there is nothing to lose, and no question
+    assert_eq!(page.work(json!({"do": "factory"})).files.len(), 0);
+
+    // the same words as the command's
+    let alarm = page.work(json!({"do": "false-alarm", "share": 0.005}));
+    drop(page);
+    let printed = printed(&["settings", "--port", &at]);
+    assert_eq!(alarm.said, printed);
+    assert_says(&printed, &["for 0.5 % false alarms, as set"]);
+    let (mut page, _) = Page::new(&at);
+    let high = page.done(&work(json!({"do": "high-force", "on": true})), |frame| {
+        let asked = frame["question"]["asked"].as_str()?;
+        assert!(asked.contains("a mount whose spring yields"), "{asked}");
+        Some(json!({"do": "answer", "yes": true}))
+    });
+    assert_eq!(high.failed, None);
+    assert_says(&high.said, &["up to 2.00 N, as set"]);
+    let low = page.work(json!({"do": "high-force", "on": false}));
+    assert_says(&low.said, &["up to 1.26 N"]);
+    let table = page.work(json!({"do": "false-alarm", "share": null}));
+    assert_says(&table.said, &["for the table's own false alarms"]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Tactus in a browser: a simulated probe, [`Session`], and one at a line, [`Remote`], as WebAssembly, asked in JSON.
 //!
-//! Four functions and the module's memory are the whole interface, so that neither wasm-bindgen nor its command is needed: the page
+//! Six functions and the module's memory are the whole interface, so that neither wasm-bindgen nor its command is needed: the page
 //! writes a request where [`request`] says, calls [`ask`] or [`remote`], and reads the reply where [`reply`] says. The module imports
 //! nothing.
 
@@ -31,6 +31,12 @@ pub extern "C" fn request(length: usize) -> *mut u8 {
     })
 }
 
+/// The request's bytes are the trials that the world of the page was learned from: they lie beside the module.
+#[unsafe(no_mangle)]
+pub extern "C" fn world() {
+    PAGE.with_borrow_mut(|page| tactus::live::bring_world(std::mem::take(&mut page.request)));
+}
+
 /// Has the simulated probe do what the request asks for: the bytes of the reply.
 #[unsafe(no_mangle)]
 pub extern "C" fn ask() -> usize {
@@ -41,7 +47,16 @@ pub extern "C" fn ask() -> usize {
     })
 }
 
-/// The same for the probe at a line, or a log.
+/// The request's bytes are those of a file, which a request of [`remote`] names then.
+#[unsafe(no_mangle)]
+pub extern "C" fn give() {
+    PAGE.with_borrow_mut(|page| {
+        let bytes = std::mem::take(&mut page.request);
+        page.remote.give(bytes);
+    });
+}
+
+/// The same for the probe at a line, or files that were given.
 #[unsafe(no_mangle)]
 pub extern "C" fn remote() -> usize {
     PAGE.with_borrow_mut(|page| {

@@ -1,14 +1,16 @@
-// Tests of the page: node page.mjs INDEX.HTML MODULE.WASM REPLIES.JSONL CHROMIUM HOST:PORT
+// Tests of the page: node page.mjs INDEX.HTML MODULE.WASM REPLIES.JSONL FILES RECORDINGS CHROMIUM HOST:PORT
+// In the folder FILES is what can be dropped, RECORDINGS is a folder of recordings.
 // At HOST:PORT is the serial port of a probe. With TACTUS_PAGE_ONLY=PART those tests alone whose name has that part.
 import assert from "node:assert/strict";
-import { readFileSync, writeFileSync } from "node:fs";
+import { readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { pathToFileURL } from "node:url";
 import { Worker } from "node:worker_threads";
+import { crc32, deflateRawSync } from "node:zlib";
 import { launch, tab, within } from "./browser.mjs";
 import { serial } from "./serial.mjs";
 
-const [page, wasm, replies, chromium, probe] = process.argv.slice(2);
+const [page, wasm, replies, files, recordings, chromium, probe] = process.argv.slice(2);
 const url = hash => `${pathToFileURL(page)}${hash}`;
 const folder = dirname(page);
 const tests = [];
@@ -22,7 +24,12 @@ const ALL_S = Number(process.env.TACTUS_PAGE_LIMIT_S ?? 360 * SLOW), TEST_S = 15
 
 function module() {
   const instance = new WebAssembly.Instance(new WebAssembly.Module(readFileSync(wasm)), {});
-  const { request, ask, reply, memory } = instance.exports;
+  const { request, ask, reply, world, memory } = instance.exports;
+  const trials = readFileSync(new URL("../../src/live/world-1.trials", import.meta.url));
+  // the memory may grow
+  const at = request(trials.length);
+  trials.copy(Buffer.from(memory.buffer, at, trials.length));
+  world();
   return {
     memory,
     ask(text) {
@@ -255,12 +262,152 @@ test("a log is shown moment by moment", () => opened("", { motion: "reduce" }, a
   await it.evaluate("document.querySelector('#l-list .verdict').click()");
   assert.match(await text(it, "verdict"), /^(It is |It feels like |This is none|Not sure)/);
   assert.ok((await it.evaluate(NOW)).slides >= 1);
+  // the verification, with its answer
+  await it.evaluate("document.querySelector('#l-list .judged').click()");
+  assert.match(await text(it, "doing"), /^slide 1, .*: score .*, different above/);
+  await it.evaluate("document.querySelector('#l-list .verified').click()");
+  assert.match(await text(it, "verdict"), /^(The same as my own cloth\.|Different from my own cloth|Not sure yet whether it is my own cloth)/);
+  assert.match(await text(it, "truth"), /^At this limit/);
+  await it.evaluate("document.querySelector('#l-list .verdict').click()");
+  assert.equal(await text(it, "doing"), "");
   writeFileSync(join(folder, "screenshot-replayed-1280.png"), await it.screenshot(true));
   await press(it, "l-back");
   assert.doesNotMatch(await text(it, "verdict"), /^It is /);
   await it.evaluate(`(() => { const to = new DataTransfer(); to.items.add(new File(["no log"], "a.jsonl")); const e = document.getElementById("l-file"); e.files = to.files; e.dispatchEvent(new Event("change")); })()`);
   await it.until("it is refused", "!document.getElementById('l-problem').hidden", 20);
-  assert.match(await text(it, "l-problem"), /^Line 1 is no line of a session's log/);
+  assert.match(await text(it, "l-problem"), /^A\.jsonl: line 1 is no line of a session's log/);
+}));
+
+// As a person drops them: files or folders of this machine.
+async function drop(it, ...paths) {
+  const data = { items: [], files: paths, dragOperationsMask: 1 };
+  for (const type of ["dragEnter", "dragOver", "drop"]) await it.send("Input.dispatchDragEvent", { type, x: 300, y: 300, data });
+}
+const read = (it, name) => it.until(`${name} is read`, `document.getElementById('l-say').textContent.startsWith(${JSON.stringify(`${name}: `)}) || !document.getElementById('l-problem').hidden`, 60);
+const labels = (it, kind) => it.evaluate(`[...document.querySelectorAll("#l-list .${kind}")].map(e => e.textContent)`);
+const looks = (it, kind, n = 0) => it.evaluate(`document.querySelectorAll("#l-list .${kind}")[${n}].click()`);
+const drawn = (it, id) => it.evaluate(`new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => { const c = document.getElementById("${id}"); if (!c.clientHeight) return done(false); const paper = new OffscreenCanvas(c.width, c.height).getContext("2d", { willReadFrequently: true }); paper.drawImage(c, 0, 0); done(paper.getImageData(0, 0, c.width, c.height).data.some(v => v > 0)); })))`);
+const shown = (it, id) => it.evaluate(`document.getElementById("${id}").getClientRects().length > 0`);
+
+test("recordings are shown slide by slide: a folder, and an MCAP file of it", () => opened("", { motion: "reduce" }, async it => {
+  const seen = [];
+  for (const [path, name] of [[recordings, "simulated"], [join(files, "recordings.mcap"), "recordings.mcap"]]) {
+    await drop(it, path);
+    await read(it, name);
+    assert.equal(await text(it, "l-problem"), "");
+    assert.equal((await it.evaluate(NOW)).source, "log");
+    assert.match(await text(it, "l-say"), /54 slides of 6 textures\..*not learned from it/);
+    assert.equal((await labels(it, "recorded")).length, 54);
+    await looks(it, "chosen");
+    assert.match(await text(it, "why"), /^It would choose for slide 1: /);
+    assert.equal(await it.evaluate("document.querySelectorAll('#benefit li').length"), 3);
+    await looks(it, "recorded", 1);
+    assert.equal(await text(it, "verdict"), "Recorded on Computer paper");
+    assert.match(await text(it, "features"), /^Features: traction \d\.\d\d N, roughness .* of its 12 bands: /);
+    for (const id of ["pac", "spectrum", "pdc", "shear"]) assert.ok(await drawn(it, id), id);
+    await looks(it, "slide", 1);
+    assert.equal((await it.evaluate(NOW)).slides, 2);
+    assert.equal(await it.evaluate("document.querySelectorAll('#map .slide').length"), 2);
+    await looks(it, "verdict");
+    assert.equal(await text(it, "truth"), "Recorded on Computer paper.");
+    assert.equal(await it.evaluate("document.querySelector('#posterior .name').textContent"), "Computer paper");
+    seen.push(await it.evaluate("[...document.querySelectorAll('#l-list button')].map(e => e.textContent).join('|')"));
+  }
+  assert.equal(seen[1], seen[0]);
+  return `${seen[0].split("|").length} moments`;
+}));
+
+test("new views have no clipped text, contrast AA and names, at 390 and 1280 px", async () => {
+  for (const [width, height] of [[360, 780], [390, 844], [1280, 900]]) {
+    for (const scheme of ["light", "dark"]) {
+      await opened("", { width, height, touch: width < 500, motion: "reduce", scheme }, async it => {
+        await press(it, "from-log");
+        await drop(it, recordings);
+        await read(it, "simulated");
+        await looks(it, "slide", 2);
+        assert.ok(await drawn(it, "pac"));
+        assert.deepEqual(await it.evaluate(CLIPPED), [], `${width}`);
+        assert.deepEqual(await it.evaluate(CONTRAST), [], `${width} ${scheme}`);
+        assert.ok(await it.evaluate("document.documentElement.scrollWidth") <= width, `${width}`);
+        const { nodes } = await it.send("Accessibility.getFullAXTree");
+        const nameless = nodes.filter(node => !node.ignored && ["button", "slider", "image", "list"].includes(node.role?.value) && !node.name?.value);
+        assert.deepEqual(nameless.map(node => node.role.value), []);
+        writeFileSync(join(folder, `screenshot-recordings-${width}-${scheme}.png`), await it.screenshot(true));
+      });
+    }
+  }
+});
+
+test("the lens's caption lies on nothing, wherever the stage is", () => opened("", { motion: "reduce" }, async it => {
+  const found = await it.evaluate(`(() => {
+    const caption = document.getElementById("lens-say").getBoundingClientRect(), svg = document.getElementById("rig").getBoundingClientRect(), found = [];
+    if (caption.top < svg.top || caption.right > svg.right) found.push("it sticks out");
+    for (let stage = 0; stage <= 160; stage += 4) for (const tip of [0.5, 8, 16, 40]) {
+      Rig.show({ tip_mm: tip, indentation_mm: -1, stage_mm: stage, speed_mm_s: 60, texture: 40 });
+      for (const e of document.querySelectorAll("#rig :is(.sample, .shim, .plate, .lever, .skin, .bone, .ridge, circle.lens)")) {
+        if (e.closest("clipPath, [clip-path]")) continue;
+        const box = e.getBoundingClientRect();
+        if (box.width && box.left < caption.right && caption.left < box.right && box.top < caption.bottom && caption.top < box.bottom) found.push(e.getAttribute("class") + " at " + stage + " " + tip);
+      }
+    }
+    return found;
+  })()`);
+  assert.deepEqual(found, []);
+}));
+
+test("a probe at a serial port: names, settings, and the sample is moved between trials", () => usb(async it => {
+  const asks = async (what, words) => {
+    await it.until(what, "!document.getElementById('u-question').hidden", 150 * SLOW);
+    assert.match(await text(it, "u-asked"), words);
+  };
+  await set(it, "u-name", "Loden");
+  await set(it, "u-trials", "2");
+  await press(it, "u-train");
+  await asks("it asks", /^Move or turn Loden under the finger, so that the next slide is on another track\.$/);
+  assert.equal(await text(it, "u-yes"), "It is moved");
+  await press(it, "u-yes");
+  await idle(it, "it is trained", 150);
+  assert.match(await said(it), /Loden: 6 slides made\.[^]*Its sample was moved between trials\./);
+  await set(it, "u-which", "Loden");
+  await set(it, "u-new", "Loden, green");
+  await press(it, "u-rename");
+  await idle(it, "it is renamed");
+  assert.match(await said(it), /Loden is Loden, green now\./);
+  await set(it, "u-which", "Loden, green");
+  await press(it, "u-forget");
+  await asks("it asks", /^The probe is to forget Loden, green\.\nThe probe's table is kept: table-[0-9a-f]{8}\.tact\nGo on\?$/);
+  await press(it, "u-no");
+  await idle(it, "nothing is done");
+  assert.equal(await text(it, "u-problem"), "Nothing was changed.");
+  await press(it, "u-forget");
+  await asks("it asks again", /forget Loden/);
+  for (const [width, height] of [[390, 844], [1280, 900]]) {
+    await it.send("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor: 1, mobile: width < 500 });
+    assert.deepEqual(await it.evaluate(CLIPPED), [], `${width}`);
+    assert.deepEqual(await it.evaluate(CONTRAST), [], `${width}`);
+    writeFileSync(join(folder, `screenshot-question-${width}.png`), await it.screenshot(true));
+  }
+  await press(it, "u-yes");
+  await idle(it, "it is forgotten");
+  assert.match(await said(it), /The probe has forgotten Loden, green\./);
+  assert.ok([...(await kept(it)).keys()].some(name => /^table-[0-9a-f]{8}\.tact$/.test(name)));
+  await set(it, "u-share", "0.005");
+  await press(it, "u-alarm");
+  await idle(it, "it is set");
+  assert.match(await said(it), /The probe's limits are for 0\.5 % false alarms, as set/);
+  await press(it, "u-high");
+  await asks("it asks", /a mount whose spring yields[^]*Does the finger's mount yield, or does a stop hold the lever\?$/);
+  await press(it, "u-no");
+  await idle(it, "it stays");
+  await set(it, "u-share", "");
+  await press(it, "u-alarm");
+  await idle(it, "it is set back");
+  assert.match(await said(it), /The probe's limits are for the table's own false alarms/);
+  await press(it, "u-factory");
+  await asks("it asks", /is replaced[^]*Go on\?$/);
+  await press(it, "u-yes");
+  await idle(it, "the factory table is in use");
+  assert.match(await said(it), /The probe uses the firmware's own table: /);
 }));
 
 test("a probe at a serial port: stop, record, tables, and a plug that is pulled", () => usb(async (it, unplug) => {
@@ -293,6 +440,61 @@ test("a probe at a serial port: stop, record, tables, and a plug that is pulled"
   unplug();
   await it.until("it is told", "/closed the port; open it again/.test(document.getElementById('u-problem').textContent)", 20);
   assert.equal(await text(it, "u-connect"), "Connect a probe");
+}));
+
+// The files of a folder in a zip file, deflated: what people's programs make of it.
+function zipped(of) {
+  const parts = [], directory = [];
+  let at = 0;
+  for (const name of readdirSync(of)) {
+    const content = readFileSync(join(of, name)), packed = deflateRawSync(content), called = Buffer.from(`touched/${name}`);
+    const common = Buffer.alloc(26);
+    common.writeUInt16LE(20, 0); common.writeUInt16LE(8, 4); common.writeUInt32LE(crc32(content), 10);
+    common.writeUInt32LE(packed.length, 14); common.writeUInt32LE(content.length, 18); common.writeUInt16LE(called.length, 22);
+    const entry = Buffer.alloc(20);
+    entry.writeUInt16LE(20, 4); entry.writeUInt32LE(0x02014b50, 0);
+    const rest = Buffer.alloc(14);
+    rest.writeUInt32LE(at, 10);
+    directory.push(entry.subarray(0, 6), common, rest, called);
+    parts.push(Buffer.from([0x50, 0x4b, 3, 4]), common, called, packed);
+    at += 30 + called.length + packed.length;
+  }
+  const inside = Buffer.concat(directory), end = Buffer.alloc(22), files = readdirSync(of).length;
+  end.writeUInt32LE(0x06054b50, 0); end.writeUInt16LE(files, 8); end.writeUInt16LE(files, 10);
+  end.writeUInt32LE(inside.length, 12); end.writeUInt32LE(at, 16);
+  return Buffer.concat([...parts, inside, end]);
+}
+
+test("a zip file of the page's own recording, and an MCAP file of a session", () => opened("", { motion: "reduce" }, async it => {
+  await drop(it, join(folder, "cloth-2.zip"));
+  await read(it, "cloth-2.zip");
+  assert.match(await text(it, "l-say"), /2 slides of 1 texture\. A table is learned from two textures or more\. So the slides are judged with the table of the simulated world 1/);
+  assert.equal((await labels(it, "recorded")).length, 2);
+  assert.equal((await labels(it, "verdict")).length, 1);
+  const zip = zipped(recordings);
+  writeFileSync(join(folder, "deflated.zip"), zip);
+  writeFileSync(join(folder, "cut.zip"), zip.subarray(0, zip.length / 2));
+  const damaged = Buffer.from(zip);
+  damaged[zip.length >> 1] ^= 0x55;
+  writeFileSync(join(folder, "damaged.zip"), damaged);
+  await drop(it, join(folder, "deflated.zip"));
+  await read(it, "deflated.zip");
+  assert.equal((await labels(it, "recorded")).length, 54, await text(it, "l-problem"));
+  await drop(it, join(files, "session.mcap"));
+  await read(it, "session.mcap");
+  assert.match(await text(it, "l-say"), /1 exploration, 0 verifications/);
+  assert.equal((await labels(it, "recorded")).length, 0);
+  assert.equal(await shown(it, "pac"), false);
+  assert.ok((await labels(it, "chosen")).length >= 1);
+  await looks(it, "verdict");
+  assert.match(await text(it, "verdict"), /^(It is |It feels like |This is none|Not sure)/);
+  for (const [name, wanted] of [["theirs.mcap", /^Theirs\.mcap: its channels are not those of Tactus \(\/camera\): only what/], ["cut.mcap", /^Cut\.mcap: the MCAP file is cut off: copy it again/], ["no-manifest", /^No-manifest: neither manifest\.csv nor manifest\.json in this folder/], ["cut.zip", /^Cut\.zip: the zip file cannot be read \(its end is missing\): copy it again, or give the folder itself/], ["damaged.zip", /^Damaged\.zip: the zip file cannot be read \(/], ["some.txt", /^Some\.txt: neither a session's log/]]) {
+    await drop(it, join(name.endsWith(".zip") ? folder : files, name));
+    await it.until(`${name} is refused`, `!document.getElementById("l-problem").hidden && document.getElementById("l-problem").textContent.startsWith(${JSON.stringify(name[0].toUpperCase() + name.slice(1))})`, 20);
+    assert.match(await text(it, "l-problem"), wanted);
+  }
+  // what was open stays
+  assert.ok((await labels(it, "chosen")).length >= 1);
 }));
 
 test("without Web Serial it says which browsers have it", () => opened("", { motion: "reduce", before: it => it.before("delete Navigator.prototype.serial") }, async it => {

@@ -7,22 +7,37 @@ const Probe = (() => {
 
   // The module stands in the page itself, so that the page works from a file, too.
   async function load() {
-    const text = document.getElementById("wasm").textContent;
-    const binary = atob(text.trim());
+    exports = (await WebAssembly.instantiate(inPage("wasm"), {})).instance.exports;
+    write(inPage("trials"));
+    exports.world();
+  }
+
+  // Bytes that stand in the page.
+  function inPage(id) {
+    const binary = atob(document.getElementById(id).textContent.trim());
     const bytes = new Uint8Array(binary.length);
     for (let n = 0; n < binary.length; n++) bytes[n] = binary.charCodeAt(n);
-    exports = (await WebAssembly.instantiate(bytes, {})).instance.exports;
+    return bytes;
   }
 
   // Asks for something, and gets what the core says. An error of the core is an Error with its sentence.
   const ask = request => to("ask", request);
-  // The same of a probe at a line, or of a log.
+  // The same of a probe at a line, or of files.
   const remote = request => to("remote", request);
 
-  function to(whom, request) {
-    const bytes = encoder.encode(JSON.stringify(request));
+  // A file, which a request of `remote` names then.
+  function give(bytes) {
+    write(bytes);
+    exports.give();
+  }
+
+  function write(bytes) {
     const at = exports.request(bytes.length);
     new Uint8Array(exports.memory.buffer, at, bytes.length).set(bytes);
+  }
+
+  function to(whom, request) {
+    write(encoder.encode(JSON.stringify(request)));
     const length = exports[whom]();
     const reply = JSON.parse(decoder.decode(new Uint8Array(exports.memory.buffer, exports.reply(), length)));
     if (reply.is === "error") throw new Error(reply.why);
@@ -30,5 +45,5 @@ const Probe = (() => {
   }
 
   const bytes = () => exports.memory.buffer.byteLength;
-  return { load, ask, remote, bytes };
+  return { load, ask, remote, give, bytes };
 })();

@@ -1,50 +1,89 @@
 "use strict";
-// A log of a session, event by event.
+// A log of a session, event by event, or recordings, slide by slide.
 const Replay = (() => {
   const at = id => document.getElementById(id);
   let page, events = [], shown = -1;
 
   function build(callbacks) {
     page = callbacks;
-    at("l-file").addEventListener("change", () => open(at("l-file").files[0]));
+    for (const id of ["l-file", "l-folder"]) {
+      at(id).addEventListener("change", () => {
+        const files = Files.chosen(at(id).files);
+        at(id).value = "";
+        if (files.length) open(files);
+      });
+    }
     at("l-at").addEventListener("input", () => go(Number(at("l-at").value)));
     at("l-back").addEventListener("click", () => go(shown - 1));
     at("l-next").addEventListener("click", () => go(shown + 1));
     for (const name of ["dragover", "drop"]) addEventListener(name, event => event.preventDefault());
-    addEventListener("drop", event => {
-      const file = event.dataTransfer?.files[0];
-      if (file) { page.turn("log"); open(file); }
+    addEventListener("drop", async event => {
+      if (!event.dataTransfer) return;
+      const files = Files.dropped(event.dataTransfer);
+      page.turn("log");
+      guarded(async () => { const all = await files; if (all.length) await read(all); });
     });
   }
 
-  async function open(file) {
+  const open = files => guarded(() => read(files));
+
+  async function guarded(work) {
     at("l-problem").hidden = true;
-    if (!file) return;
     try {
-      if (!/\.jsonl?$/i.test(file.name)) throw new Error(`${file.name} is no session log: drop a .jsonl file, as the page or tactus device identify --log FILE writes it`);
-      const log = Probe.remote({ do: "replay", log: await file.text() });
-      const told = [];
-      log.happened.forEach((one, n) => {
-        const known = log.tables.findLast(([from]) => from <= n)?.[1];
-        if (known && one.what in names) told.push({ ...one, known });
-      });
-      if (!told.some(one => one.what === "chosen")) throw new Error(`${file.name} has no exploration with its table; tactus device identify --log FILE writes one`);
-      [events, shown] = [told, -1];
-      at("l-say").textContent = `${file.name}: ${log.said.trim().split("\n").join(" ")}`;
-      list();
-      go(0);
+      await work();
     } catch (why) {
       at("l-problem").hidden = false;
       at("l-problem").textContent = page.sentence(why);
     }
   }
 
+  async function read(files) {
+    const name = files[0].name.split("/")[0];
+    at("l-say").textContent = `Reading ${name}.`;
+    // let the browser draw and say that
+    await new Promise(done => setTimeout(done));
+    let opened;
+    try {
+      if (files.length === 1 && /\.zip$/i.test(files[0].name)) files = await Files.unzip(files[0]);
+      const contents = [];
+      for (const { file } of files) contents.push(new Uint8Array(await file.arrayBuffer()));
+      contents.forEach(Probe.give);
+      opened = Probe.remote({ do: "open", files: files.map(file => file.name) });
+    } finally {
+      at("l-say").textContent = "";
+    }
+    const told = [];
+    let on = null, begin = null;
+    opened.happened.forEach((one, n) => {
+      const known = opened.tables.findLast(([from]) => from <= n)?.[1];
+      if (!(one.what in names) || !known && one.what !== "recorded") return;
+      if (one.what === "recorded") on = one.texture;
+      if (one.what === "chosen" && one.slide === 1) begin = told.length;
+      if (one.what === "judged" && told.at(-1)?.what !== "judged") begin = told.length;
+      told.push({ ...one, known, on, would: opened.happened[n + 1]?.what === "recorded", begin: begin ?? told.length });
+      if (one.what === "verdict" || one.what === "verified") begin = null;
+    });
+    if (!told.some(one => ["chosen", "judged", "recorded"].includes(one.what))) throw new Error(`${name} has no exploration with its table; tactus device identify --log FILE writes one`);
+    [events, shown] = [told, -1];
+    at("l-say").textContent = `${name}: ${opened.said.trim().split("\n").join(" ")}`;
+    page.opens();
+    list();
+    go(0);
+  }
+
+  const likely = ({ standing: { posterior }, known }) => {
+    const p = Math.max(...posterior);
+    return `${known.textures[posterior.indexOf(p)]}, ${Mind.percent(p)}`;
+  };
   const names = {
-    chosen: one => `Slide ${one.slide} chosen: ${Mind.movementName(one.known.movements[one.movement])}`,
+    chosen: one => `Slide ${one.slide} ${one.would ? "would be" : "chosen:"} ${Mind.movementName(one.known.movements[one.movement])}`,
     look: one => `${one.ms / 1000} s of the slide`,
-    slide: one => `Slide ${one.slide} made`,
+    slide: one => `Slide ${one.slide} ${one.on ? "taken in" : "made"}: most like ${likely(one)}`,
+    recorded: one => `${one.texture}, recorded slide ${one.number}: ${Mind.movementName(one.movement)}`,
+    judged: one => one.said,
     rejected: one => `Rejected: ${one.why}`,
     verdict: one => ({ sure: `It is ${one.texture}`, changed: `${one.texture}, but changed`, new: "None of those it knows", undecided: `Not sure; most likely ${one.texture}` })[one.told],
+    verified: one => one.said.split("\n")[0],
     refused: one => one.why,
     learned: one => `Learned ${one.name}`,
   };
@@ -66,11 +105,16 @@ const Replay = (() => {
   // What was known after this event: everything from the first choice of its exploration on is heard again.
   function go(to) {
     shown = Math.max(0, Math.min(events.length - 1, to));
-    let from = shown;
-    while (from > 0 && !(events[from].what === "chosen" && events[from].slide === 1)) from -= 1;
+    const { begin, known } = events[shown];
+    page.records(events.some(one => one.what === "recorded"));
     page.begins(true);
-    page.knows(events[from].known);
-    for (let n = from; n <= shown; n++) page.happened(events[n]);
+    if (known) page.knows(known);
+    let recorded = null;
+    for (let n = begin; n <= shown; n++) {
+      if (events[n].what === "recorded") recorded = events[n].at;
+      page.happened(events[n]);
+    }
+    if (recorded !== null) page.feels(Probe.remote({ do: "recorded", at: recorded }).streams);
     at("l-at").value = shown;
     at("l-at").setAttribute("aria-valuetext", names[events[shown].what](events[shown]));
     at("l-back").disabled = shown === 0;

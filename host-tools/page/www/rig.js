@@ -59,7 +59,7 @@ const Rig = (() => {
     const skin = make(close, "path", { class: "skin" });
     const ridges = make(close, "path", { class: "ridge", "stroke-width": 1 });
     make(svg, "circle", { class: "lens", cx: 58, cy: -27, r: 15, "fill-opacity": 0 });
-    make(svg, "text", { class: "unit", x: 58, y: -8.6, "text-anchor": "middle" }, "10 times as large");
+    make(svg, "text", { class: "unit", id: "lens-say", x: 58, y: -43.4, "text-anchor": "middle" }, "10 times as large");
     // a scale
     make(svg, "path", { class: "tick", d: "M-49 -36 v-1.5 M-49 -36.75 h20 M-29 -36 v-1.5" });
     make(svg, "text", { class: "unit", x: -39, y: -38.4, "text-anchor": "middle" }, "20 mm");

@@ -7,6 +7,8 @@ const Usb = (() => {
   const at = id => document.getElementById(id);
   let page, port = null, reader = null, writer = null, came = [], timer = null, frame = null, writing = Promise.resolve();
 
+  let buttons = [];
+  const moved = () => ({ yes: true, no: false })[at("u-moved").value] ?? null;
   const seed = () => crypto.getRandomValues(new Uint32Array(1))[0];
   const now = () => Math.round(performance.now());
 
@@ -20,11 +22,21 @@ const Usb = (() => {
       "u-home": () => ({ do: "home" }),
       "u-identify": () => ({ do: "identify", threshold: page.settings().t, false_alarm: page.settings().fa, max_slides: 10, seed: seed() }),
       "u-teach": () => ({ do: "teach", name: at("u-name").value }),
-      "u-train": () => ({ do: "train", name: at("u-name").value, trials: whole("u-trials"), seed: seed() }),
+      "u-train": () => ({ do: "train", name: at("u-name").value, trials: whole("u-trials"), moved: moved(), seed: seed() }),
       "u-verify": () => ({ do: "verify", name: at("u-known").value, threshold: page.settings().t, max_slides: 10, seed: seed() }),
-      "u-record": () => ({ do: "record", name: at("u-name").value, slides: whole("u-slides"), seed: seed() }),
+      "u-record": () => ({ do: "record", name: at("u-name").value, slides: whole("u-slides"), moved: moved(), seed: seed() }),
       "u-pull": () => ({ do: "pull" }),
+      "u-rename": () => ({ do: "rename", from: at("u-which").value, to: at("u-new").value }),
+      "u-forget": () => ({ do: "forget", name: at("u-which").value }),
+      "u-training": () => ({ do: "forget-training", name: at("u-new").value }),
+      "u-self": () => ({ do: "forget-self-learned" }),
+      "u-factory": () => ({ do: "factory" }),
+      "u-settings": () => ({ do: "settings" }),
+      "u-alarm": () => ({ do: "false-alarm", share: at("u-share").value === "" ? null : Number(at("u-share").value) }),
+      "u-high": () => ({ do: "high-force", on: true }),
+      "u-low": () => ({ do: "high-force", on: false }),
     };
+    buttons = Object.keys(works);
     for (const [id, wanted] of Object.entries(works)) at(id).addEventListener("click", () => work(wanted()));
     at("u-connect").addEventListener("click", () => port ? leave(true) : connect());
     at("u-stop").addEventListener("click", () => step({ do: "stop" }));
@@ -150,9 +162,11 @@ const Usb = (() => {
   }
 
   function choices(names) {
-    const before = at("u-known").value;
-    at("u-known").replaceChildren(...names.map(name => new Option(name, name)));
-    if (names.includes(before)) at("u-known").value = before;
+    for (const id of ["u-known", "u-which"]) {
+      const before = at(id).value;
+      at(id).replaceChildren(...names.map(name => new Option(name, name)));
+      if (names.includes(before)) at(id).value = before;
+    }
     at("u-names").replaceChildren(...names.map(name => new Option(name)));
   }
 
@@ -168,10 +182,12 @@ const Usb = (() => {
     at("u-stop").disabled = !port || !busy;
     at("u-log").disabled = !port;
     at("u-push").disabled = !there || busy;
-    for (const id of ["u-status", "u-home", "u-identify", "u-teach", "u-train", "u-verify", "u-record", "u-pull"]) at(id).disabled = !there || busy;
+    for (const id of buttons) at(id).disabled = !there || busy;
     const asked = frame?.question ?? null;
     at("u-question").hidden = asked === null;
-    if (asked !== null && at("u-asked").textContent !== asked) at("u-asked").textContent = asked;
+    if (asked !== null && at("u-asked").textContent !== asked.asked) at("u-asked").textContent = asked.asked;
+    at("u-yes").textContent = asked?.yes ?? "Yes";
+    at("u-no").textContent = asked?.no ?? "No";
     at("u-say").textContent = !port ? "No probe is connected." : !frame || busy && !there ? "Looking for a probe at this port." : there ? busy ? "The probe is at work." : "The probe waits." : "No probe answers here.";
   }
 

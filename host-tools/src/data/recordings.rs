@@ -12,19 +12,21 @@ pub mod npy;
 pub mod own;
 mod writer;
 
-use std::path::{Path, PathBuf};
+use std::collections::BTreeMap;
+use std::path::Path;
 
 use tactus_core::features::Movement;
 use tactus_core::sensor::FingerCode;
 
 use crate::data::recording::{Labels, Recording, SlideKey, Texture};
+use files::Place;
 pub use files::{RecordingError, Result};
 pub use writer::{RecordingWriter, files as files_of};
 
 /// The recordings of one folder.
 #[derive(Debug)]
 pub struct RecordingSet {
-    folder: PathBuf,
+    place: Place,
     textures: Vec<Texture>,
     /// per texture, in the order of numbers
     slides: Vec<Vec<SlideKey>>,
@@ -47,19 +49,30 @@ impl RecordingSet {
         if !folder.is_dir() {
             return Err(RecordingError::NoFolder(folder.to_owned()));
         }
-        let (own, biotac) = (
-            folder.join(files::OWN_MANIFEST),
-            folder.join(files::BIOTAC_MANIFEST),
-        );
-        let (source, textures, slides) = if own.is_file() {
-            let manifest = own::Manifest::read(&own)?;
+        Self::at(Place::Folder(folder.to_owned()))
+    }
+
+    /// The recordings of a folder that is in memory: its files by their names in it.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn in_memory(folder: &str, files: BTreeMap<String, Vec<u8>>) -> Result<Self> {
+        Self::at(Place::Memory(folder.into(), files))
+    }
+
+    fn at(place: Place) -> Result<Self> {
+        let folder = place.folder();
+        let (source, textures, slides) = if place.has(files::OWN_MANIFEST) {
+            let manifest = own::Manifest::read(&place)?;
             let (textures, slides) = manifest.contents();
             (Source::Own(manifest), textures, slides)
-        } else if biotac.is_file() {
-            let manifest = biotac::Manifest::read(&biotac)?;
+        } else if place.has(files::BIOTAC_MANIFEST) {
+            let manifest = biotac::Manifest::read(&place)?;
             let (textures, slides) = manifest.contents();
             (Source::Biotac(manifest), textures, slides)
-        } else if let Ok(by) = std::fs::read_to_string(folder.join(files::INCOMPLETE)) {
+        } else if place.has(files::INCOMPLETE) {
+            let by = place.read(files::INCOMPLETE, files::INCOMPLETE, files::MAX_MANIFEST)?;
+            let by = String::from_utf8_lossy(&by).into_owned();
             return Err(RecordingError::Unfinished(folder.to_owned(), by));
         } else {
             return Err(RecordingError::NoManifest(folder.to_owned()));
@@ -67,7 +80,7 @@ impl RecordingSet {
         let rows: usize = slides.iter().map(Vec::len).sum();
         tracing::info!(folder = %folder.display(), textures = textures.len(), slides = rows, "reads the manifest");
         Ok(Self {
-            folder: folder.to_owned(),
+            place,
             textures,
             slides,
             source,
@@ -76,7 +89,7 @@ impl RecordingSet {
 
     /// The folder that was opened.
     pub fn folder(&self) -> &Path {
-        &self.folder
+        self.place.folder()
     }
 
     /// The textures; each has at least one slide.
@@ -138,14 +151,14 @@ impl RecordingSet {
     pub fn load_texture(&self, index: usize) -> Result<Vec<Recording>> {
         if index >= self.textures.len() {
             return Err(RecordingError::NoTexture {
-                folder: self.folder.clone(),
+                folder: self.folder().to_owned(),
                 index,
                 count: self.textures.len(),
             });
         }
         let slides = match &self.source {
-            Source::Own(manifest) => manifest.load(&self.folder, index),
-            Source::Biotac(manifest) => manifest.load(&self.folder, index),
+            Source::Own(manifest) => manifest.load(&self.place, index),
+            Source::Biotac(manifest) => manifest.load(&self.place, index),
         }?;
         let texture = &self.textures[index].name;
         tracing::info!(texture, slides = slides.len(), "reads samples");

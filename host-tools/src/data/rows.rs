@@ -1,6 +1,6 @@
 //! Rows of a CSV table with a header, one at a time; every error names the file, the line and the column.
 use std::fs::File;
-use std::io::{self, BufReader, Read as _};
+use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -26,7 +26,7 @@ pub struct RowError {
 /// A table that is being read.
 pub struct Rows {
     path: PathBuf,
-    reader: csv::Reader<BufReader<io::Take<File>>>,
+    reader: csv::Reader<BufReader<io::Take<Box<dyn Read>>>>,
     record: csv::StringRecord,
     header_fields: usize,
     /// where the wanted columns are
@@ -51,19 +51,27 @@ impl Rows {
         columns: &[&'static str],
         optional: &[&'static str],
     ) -> Result<Self, RowError> {
-        let header_error = |cause| RowError {
-            path: path.to_owned(),
-            line: 1,
-            column: None,
-            cause,
-        };
-        let file = File::open(path).map_err(|e| header_error(ContentError::Io(e)))?;
+        let file = File::open(path).map_err(|why| header_error(path, ContentError::Io(why)))?;
+        Self::of(path, Box::new(file), columns, optional)
+    }
+
+    /// The table that is read from there and called `path`, as [`open`](Self::open) wants it.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn of(
+        path: &Path,
+        table: Box<dyn Read>,
+        columns: &[&'static str],
+        optional: &[&'static str],
+    ) -> Result<Self, RowError> {
+        let header_error = |cause| header_error(path, cause);
         let mut reader = csv::ReaderBuilder::new()
             // of "\r\n" the first half is trimmed away: csv's own way of ending a line there counts lines one short
             .terminator(csv::Terminator::Any(b'\n'))
             .trim(csv::Trim::All)
             .flexible(true)
-            .from_reader(BufReader::new(file.take(MAX_BYTES)));
+            .from_reader(BufReader::new(table.take(MAX_BYTES)));
         let header = reader
             .headers()
             .map_err(|e| header_error(cause_of(e)))?
@@ -188,6 +196,15 @@ impl<'a> Row<'a> {
             column,
             cause,
         }
+    }
+}
+
+fn header_error(path: &Path, cause: ContentError) -> RowError {
+    RowError {
+        path: path.to_owned(),
+        line: 1,
+        column: None,
+        cause,
     }
 }
 

@@ -27,6 +27,77 @@ pub fn note(bytes: &[u8], moved: impl Fn(u16) -> Option<bool>) -> Result<Vec<u8>
     Ok(noted)
 }
 
+/// How the trials of a texture were made: what was said of those of a training, and of those before it.
+#[derive(Debug, Default)]
+pub struct Trials {
+    answers: Vec<Option<bool>>,
+}
+
+impl Trials {
+    /// These were made before this training.
+    pub fn before(&mut self, moved: Option<bool>) {
+        self.answers.push(moved);
+    }
+
+    /// This was said of the next ones; `None`: nothing.
+    pub fn said(&mut self, moved: Option<bool>) {
+        self.answers.push(moved);
+    }
+
+    /// What was said before a trial, from 0. Of the first one nobody is asked: it is as all others are.
+    pub fn before_trial(&self, trial: usize) -> Option<bool> {
+        match trial.checked_sub(1) {
+            Some(asked) => *self.answers.get(asked)?,
+            None => self.moved(),
+        }
+    }
+
+    /// What is to be noted: what is true of all of them.
+    pub fn moved(&self) -> Option<bool> {
+        of_all(self.answers.iter().copied())
+    }
+}
+
+/// What becomes of a note on how the sample of a texture was treated.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Noting {
+    /// The table says so already, or does not know the texture.
+    Nothing,
+    /// The table with the note, which the probe is to use.
+    Table(Vec<u8>),
+    /// It cannot be noted, and why.
+    Impossible(&'static str),
+}
+
+/// Notes how the trials of a texture were made, in the table that a probe uses.
+///
+/// # Errors
+/// These bytes are no table.
+pub fn noting(bytes: &[u8], name: &str, moved: Option<bool>) -> Result<Noting, EncodeError> {
+    let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
+    let Some(texture) = table.find(name).filter(|&t| table.moved(t) != moved) else {
+        return Ok(Noting::Nothing);
+    };
+    // it cannot be read without what the probe has learned by itself, which must not become a part of it
+    if (0..table.textures()).any(|texture| table.tally(texture).itself > 0) {
+        return Ok(Noting::Impossible(
+            "the probe has learned by itself, and its table cannot be replaced without mixing that in",
+        ));
+    }
+    let noted = note(bytes, |other| match other == texture {
+        true => moved,
+        false => table.moved(other),
+    })?;
+    Ok(Noting::Table(noted))
+}
+
+/// The fewest trials of a texture at a movement of the table; `None`: the table does not know it.
+pub fn fewest(table: Table<'_>, name: &str) -> Option<u8> {
+    let texture = table.find(name)?;
+    let movements = (0..).zip(table.movements());
+    movements.map(|(m, _)| table.trials(texture, m)).min()
+}
+
 /// What a table says of its samples, in words.
 pub fn in_words(table: Table<'_>) -> String {
     let of = |wanted: Option<bool>| -> Vec<&str> {
@@ -123,5 +194,40 @@ mod tests {
         assert_eq!(of(&[Some(true), Some(false)]), None);
         assert_eq!(of(&[None, Some(true)]), None);
         assert_eq!(of(&[Some(true), None]), None);
+    }
+
+    #[test]
+    fn what_is_noted_is_true_of_all_trials() {
+        let of = |before: Option<Option<bool>>, said: &[bool]| {
+            let mut trials = Trials::default();
+            if let Some(before) = before {
+                trials.before(before);
+            }
+            said.iter().for_each(|moved| trials.said(Some(*moved)));
+            trials.moved()
+        };
+        assert_eq!(of(None, &[]), None);
+        assert_eq!(of(None, &[true, true]), Some(true));
+        assert_eq!(of(None, &[false, false]), Some(false));
+        assert_eq!(of(None, &[true, false]), None);
+        assert_eq!(of(Some(None), &[true, true]), None);
+        assert_eq!(of(Some(Some(true)), &[true]), Some(true));
+        assert_eq!(of(Some(Some(false)), &[true]), None);
+        assert_eq!(of(Some(Some(true)), &[]), Some(true));
+    }
+
+    #[test]
+    fn a_trial_is_noted_as_it_was_said_and_the_first_one_as_all_others() {
+        let of = |said: &[bool]| -> Vec<Option<bool>> {
+            let mut trials = Trials::default();
+            said.iter().for_each(|moved| trials.said(Some(*moved)));
+            (0..=said.len())
+                .map(|trial| trials.before_trial(trial))
+                .collect()
+        };
+        assert_eq!(of(&[true, true]), [Some(true); 3]);
+        assert_eq!(of(&[false]), [Some(false); 2]);
+        assert_eq!(of(&[true, false]), [None, Some(true), Some(false)]);
+        assert_eq!(of(&[]), [None]);
     }
 }

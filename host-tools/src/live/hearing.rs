@@ -228,6 +228,13 @@ impl Hearing {
     }
 }
 
+/// The spectra of samples from their first on, as those of [`Heard`].
+pub fn spectra(pac: &[i16]) -> Vec<Vec<i8>> {
+    let ends = (1..=pac.len() / BLOCK).map(|block| block * BLOCK);
+    let before = |end: usize| pac.get(end.saturating_sub(FRAME)..end);
+    ends.filter_map(|end| spectrum(before(end)?)).collect()
+}
+
 /// The power of these samples, dB per four bins.
 fn spectrum(samples: &[i16]) -> Option<Vec<i8>> {
     let mut sum = SpectrumSum::default();

@@ -232,6 +232,37 @@ pub enum Happening {
         /// The table.
         known: Known,
     },
+    /// A verification has judged a slide.
+    Judged {
+        /// Number of the slide, from 1.
+        slide: u32,
+        /// `same`, `different` or `unsure`.
+        answer: &'static str,
+        /// That in words.
+        said: String,
+    },
+    /// A verification is over.
+    Verified {
+        /// `same`, `different` or `unsure`.
+        answer: &'static str,
+        /// That in words, and what it is worth.
+        said: String,
+    },
+    /// A slide of recordings.
+    Recorded {
+        /// Which of them, from 0.
+        at: usize,
+        /// What it was recorded on.
+        texture: String,
+        /// Its number.
+        number: u32,
+        /// Force, N, and speed, mm/s.
+        movement: (f32, f32),
+        /// What it measured.
+        measured: Option<Measured>,
+        /// Why it measured nothing.
+        why: Option<String>,
+    },
     /// What was asked for is not done.
     Refused {
         /// Why, and what to do.
@@ -288,7 +319,8 @@ pub struct Measured {
 }
 
 impl Measured {
-    pub(super) fn new(movement: Movement, slide: &Observation) -> Self {
+    /// By a slide of this movement.
+    pub fn new(movement: Movement, slide: &Observation) -> Self {
         let of = |property| slide.properties.get(property);
         let bands = slide.bands.iter();
         Self {

@@ -1,5 +1,7 @@
 //! What a watched probe has learned from: trials of a simulated world, made here or before.
 
+use std::sync::OnceLock;
+
 use serde::{Deserialize, Serialize};
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
@@ -52,8 +54,46 @@ impl Trials {
     /// # Errors
     /// The file that comes with the program is not of this version; a test looks.
     pub fn of_world() -> Result<Vec<Self>, postcard::Error> {
-        postcard::from_bytes(include_bytes!("world-1.trials"))
+        postcard::from_bytes(made_before())
     }
+}
+
+/// Those of [`WORLD`] that came from outside.
+static BROUGHT: OnceLock<Vec<u8>> = OnceLock::new();
+/// Those that are in the program; in a page they lie beside the module, which is small then.
+const BUILT_IN: &[u8] = if cfg!(target_family = "wasm") {
+    &[]
+} else {
+    include_bytes!("world-1.trials")
+};
+
+fn made_before() -> &'static [u8] {
+    BROUGHT.get().map_or(BUILT_IN, Vec::as_slice)
+}
+
+/// Brings the trials of [`WORLD`] to a program without them, before anything asks for them; once is enough.
+pub fn bring_world(trials: Vec<u8>) {
+    // those that came first are the same
+    let _ = BROUGHT.set(trials);
+}
+
+/// Why the table of the world that comes with the program is not there.
+#[derive(Debug, thiserror::Error)]
+pub enum WorldError {
+    /// Its trials are of another version.
+    #[error(transparent)]
+    Trials(#[from] postcard::Error),
+    /// They make no table.
+    #[error(transparent)]
+    Table(#[from] TableError),
+}
+
+/// The table of all textures of [`WORLD`], of all features.
+///
+/// # Errors
+/// What comes with the program is not of this version.
+pub fn world_table() -> Result<Vec<u8>, WorldError> {
+    Ok(table(&Trials::of_world()?, false, 1.0)?)
 }
 
 /// The table that these trials make, for the fused method or the paper's.

@@ -25,6 +25,18 @@ pub struct Standing {
     pub changed_by: Option<f32>,
 }
 
+impl Standing {
+    /// As an explorer has it.
+    pub fn of<const N: usize>(explorer: &Explorer<'_, N>) -> Self {
+        Self {
+            posterior: explorer.posterior().to_vec(),
+            log_odds: explorer.log_odds(),
+            changed: explorer.is_changed(),
+            changed_by: explorer.changed_by(),
+        }
+    }
+}
+
 /// An exploration from outside: what its probe said so far.
 #[derive(Debug, Default)]
 pub(super) struct Followed {
@@ -111,11 +123,6 @@ impl Followed {
             let taken = explorer.observe_early(action, n, slide).ok()?;
             taken.then_some(())?;
         }
-        Some(Standing {
-            posterior: explorer.posterior().to_vec(),
-            log_odds: explorer.log_odds(),
-            changed: explorer.is_changed(),
-            changed_by: explorer.changed_by(),
-        })
+        Some(Standing::of(&explorer))
     }
 }

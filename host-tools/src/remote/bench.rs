@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::io::{self, Write};
+use std::ops::ControlFlow;
 use std::rc::Rc;
 use std::task::Poll;
 use std::time::Duration;
@@ -10,7 +11,7 @@ use embassy_futures::yield_now;
 use tactus_core::table::TableError;
 use tactus_core::wire::{Command, Event, Live, Phase, Report, Status};
 
-use super::message::{File, Folder, Frame};
+use super::message::{File, Folder, Frame, Question};
 use super::say::{NameError, after};
 use super::verifying::NoReference;
 use crate::data::recordings::RecordingError;
@@ -18,7 +19,7 @@ use crate::link::exchange::{BOOTING, Exchange, GREETING, PortError, TIMEOUT, is_
 use crate::link::lifting::{Lifting, RigHeard, Stopped, moves};
 use crate::link::log::Line as Logged;
 use crate::link::{Job, LinkError, ReadTable, Request, Transaction};
-use crate::live::{Hearing, Known};
+use crate::live::{Happening, Hearing, Known};
 
 /// What went wrong, and what to do: the sentences of `tactus device`.
 #[derive(Debug, thiserror::Error)]
@@ -112,7 +113,7 @@ struct Line {
     busy: bool,
     stop: bool,
     failed: Option<String>,
-    question: Option<String>,
+    question: Option<Question>,
     answer: Option<bool>,
     files: Vec<File>,
     folders: Vec<Folder>,
@@ -217,6 +218,7 @@ impl Bench {
             happened: heard.happened,
             known: line.known.take(),
             tables: Vec::new(),
+            streams: None,
             said: String::from_utf8_lossy(&said).into_owned(),
             failed: line.failed.take(),
             question: line.question.clone(),
@@ -260,22 +262,24 @@ impl Bench {
         (session.damaged(), session.missing())
     }
 
-    /// Asks, and waits for the answer.
-    ///
-    /// # Errors
-    /// The user stops it.
-    pub(super) async fn ask(&self, question: &str) -> Result<bool, WorkError> {
-        self.line.borrow_mut().question = Some(question.to_owned());
+    /// Something that the probe said is to be shown.
+    pub(super) fn happens(&self, what: Happening) {
+        self.line.borrow_mut().told.hearing.happens(what);
+    }
+
+    /// Asks, and waits for the answer; `None`: the user stops it.
+    pub(super) async fn ask(&self, question: Question) -> Result<Option<bool>, WorkError> {
+        self.line.borrow_mut().question = Some(question);
         loop {
             self.listen()?;
             {
                 let mut line = self.line.borrow_mut();
                 if let Some(answer) = line.answer.take() {
-                    return Ok(answer);
+                    return Ok(Some(answer));
                 }
                 if std::mem::take(&mut line.stop) {
                     line.question = None;
-                    return Ok(false);
+                    return Ok(None);
                 }
             }
             yield_now().await;
@@ -326,10 +330,33 @@ impl Bench {
         transaction: E,
         mut each: impl FnMut(&Report) -> io::Result<()>,
     ) -> Result<E::Outcome, WorkError> {
+        let each = |report: &Report| each(report).map(|()| ControlFlow::Continue(()));
+        let outcome = self.run_until(transaction, each).await?;
+        // nothing but the user stops it
+        outcome.ok_or(Stopped::Lifted.into())
+    }
+
+    /// As [`run`](Self::run), and `each` may break it off: `None` then, and the rig is stopped and lifted.
+    pub(super) async fn run_until<E: Transaction>(
+        &self,
+        transaction: E,
+        mut each: impl FnMut(&Report) -> io::Result<ControlFlow<()>>,
+    ) -> Result<Option<E::Outcome>, WorkError> {
         let mut job = self.begin(transaction)?;
+        let mut enough = false;
         loop {
-            if let Poll::Ready(outcome) = self.step(&mut job, &mut each)? {
-                return Ok(outcome);
+            let polled = self.step(&mut job, |report| {
+                enough |= each(report)?.is_break();
+                Ok(())
+            })?;
+            if let Poll::Ready(outcome) = polled {
+                return Ok(Some(outcome));
+            }
+            if enough {
+                return match self.lift().await? {
+                    Stopped::Lifted => Ok(None),
+                    came => Err(came.into()),
+                };
             }
             if std::mem::take(&mut self.line.borrow_mut().stop) {
                 writeln!(self.out.clone(), "Stopping and lifting the finger ...")?;

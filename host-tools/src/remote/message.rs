@@ -40,10 +40,18 @@ pub enum Request {
     },
     /// The log of the session so far, as a file.
     Log,
-    /// A log of `tactus device --log`: it is heard as if the probe said it now.
-    Replay {
-        /// Its text.
-        log: String,
+    /// Files that were [given](super::Remote::give), in this order: a session's log, recordings, or an MCAP file of either. A
+    /// session is heard as if the probe said it now.
+    #[cfg(feature = "open")]
+    Open {
+        /// What they are called, with the folders that they lie in.
+        files: Vec<String>,
+    },
+    /// The samples of a slide of the recordings that were opened last: [`Frame::streams`].
+    #[cfg(feature = "open")]
+    Recorded {
+        /// Which of them, from 0.
+        at: usize,
     },
 }
 
@@ -77,6 +85,9 @@ pub enum Work {
         name: String,
         /// Trials of each movement.
         trials: u8,
+        /// Whether the sample is moved between trials; asked for before each of them, unless given.
+        #[serde(default)]
+        moved: Option<bool>,
         /// For where on the sample slides begin.
         seed: u32,
     },
@@ -97,8 +108,44 @@ pub enum Work {
         name: String,
         /// How many.
         slides: u8,
+        /// Whether the sample is moved between slides; asked for after each of all movements, unless given.
+        #[serde(default)]
+        moved: Option<bool>,
         /// For where on the sample slides begin.
         seed: u32,
+    },
+    /// A texture gets another name.
+    Rename {
+        /// One of its textures.
+        from: String,
+        /// The new name.
+        to: String,
+    },
+    /// It forgets a texture; its table is kept in a file first.
+    Forget {
+        /// One of its textures.
+        name: String,
+    },
+    /// It forgets an unfinished training; its table is kept in a file first.
+    ForgetTraining {
+        /// The name.
+        name: String,
+    },
+    /// It forgets what it learned by itself; its table is kept in a file first.
+    ForgetSelfLearned,
+    /// It goes back to the table that came with its firmware; the one before is kept in a file first.
+    Factory,
+    /// What it keeps besides its table and its calibration.
+    Settings,
+    /// For which share of false alarms its limits are.
+    FalseAlarm {
+        /// The share; that of its table, unless given.
+        share: Option<f32>,
+    },
+    /// Whether its movements may press with up to 2 N.
+    HighForce {
+        /// Whether.
+        on: bool,
     },
     /// A copy of its table.
     Pull,
@@ -159,11 +206,43 @@ pub struct Frame {
     /// What went wrong, and what to do.
     pub failed: Option<String>,
     /// A question that has to be answered before anything goes on.
-    pub question: Option<String>,
+    pub question: Option<Question>,
+    /// Of recordings: the samples of a slide that was asked for.
+    pub streams: Option<Streams>,
     /// Files to be kept.
     pub files: Vec<File>,
     /// Folders to be kept.
     pub folders: Vec<Folder>,
+}
+
+/// A question, and what can be said to it.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Question {
+    /// The question.
+    pub asked: String,
+    /// What goes on.
+    pub yes: &'static str,
+    /// What does not, or goes on otherwise.
+    pub no: &'static str,
+}
+
+/// The samples of a recorded slide.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Streams {
+    /// So many samples of P_AC are of the still finger, and come first.
+    pub still: usize,
+    /// P_AC, counts about the still finger's, at 2200 Hz.
+    pub pac: Vec<i16>,
+    /// Its spectra, as those of [`live::Frame`](crate::live::Frame).
+    pub spectra: Vec<Vec<i8>>,
+    /// P_DC, counts about the still finger's.
+    pub pdc: Vec<i16>,
+    /// Of these, Hz.
+    pub pdc_rate_hz: u32,
+    /// Tangential force, mN; none where it was not measured.
+    pub shear_mn: Vec<i16>,
+    /// Of these, Hz.
+    pub shear_rate_hz: u32,
 }
 
 /// A file.

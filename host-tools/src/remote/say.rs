@@ -7,7 +7,7 @@ use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::most_mn;
 use tactus_core::sensor::pressure::Calibration;
 use tactus_core::table::{Name, Table};
-use tactus_core::wire::{Event, Phase, Prompt, Report, Status};
+use tactus_core::wire::{Event, Forget, Phase, Prompt, Report, Status};
 
 use crate::eval::alike::Alike;
 use crate::eval::show::{count, day, percent};
@@ -158,6 +158,68 @@ pub fn movements(high_force: bool) -> String {
         ""
     };
     format!("up to {most_n:.2} N{set}")
+}
+
+/// What a person must know who turns high forces on.
+pub const HIGH_FORCE: &str = "\
+With high forces on, movements may press with up to 2 N, and the guard acts at 2.1 N by P_DC. Above 2 N the skin lies on the
+finger's core, and P_DC no longer tells the force; where P_DC says too little, or the skin is torn, the lever presses on. What
+keeps the finger whole then is no program: a mount whose spring yields (preloaded to 2.05 N, 0.009 N/mm), or a hard stop that
+the lever cannot push beyond 2.2 N. The usual mount, of 1.45 N, yields before 2 N are reached.";
+/// What such a person is asked.
+pub const YIELDS: &str = "Does the finger's mount yield, or does a stop hold the lever?";
+
+/// Prints the probe's settings; its table was learned for this share of false alarms, where it has limits.
+///
+/// # Errors
+/// A failure to write.
+pub fn show_settings(
+    status: &Status,
+    of_table: Option<f32>,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    writeln!(
+        out,
+        "The probe's limits are {}.",
+        limits(status.false_alarm)
+    )?;
+    match of_table {
+        Some(share) => writeln!(out, "Its table was learned for {}.", percent(share.into()))?,
+        None => writeln!(
+            out,
+            "Its table has no limits: learn it again, with --method fused."
+        )?,
+    }
+    writeln!(
+        out,
+        "A rig's movements press with {}.",
+        movements(status.high_force)
+    )
+}
+
+/// What the probe is to know no longer, in words.
+pub fn forgotten(what: &Forget) -> String {
+    match what {
+        Forget::Texture(name) => name.to_string(),
+        Forget::Training(name) => format!("the training of {name}"),
+        Forget::SelfLearned => "what it learned by itself".to_owned(),
+    }
+}
+
+/// What somebody beside the probe is asked to do between two trials.
+pub fn move_sample(name: &str) -> String {
+    format!("Move or turn {name} under the finger, so that the next slide is on another track")
+}
+
+/// That a note on the sample is not in the table, and why.
+pub fn not_noted(why: &str) -> String {
+    format!("Whether the sample was moved is not noted in the table: {why}")
+}
+
+/// The table that the probe uses after it went back to its firmware's own.
+pub fn uses_factory(textures: u16, checksum: &str) -> String {
+    let textures = count(textures, "texture");
+    format!("The probe uses the firmware's own table: {textures}, checksum {checksum}")
 }
 
 /// What the rig does, in a word.

@@ -11,7 +11,10 @@ use embassy_futures::yield_now;
 
 use super::bench::{Bench, WorkError};
 use super::message::{File, Frame, Reply, Request, Work};
-use super::replay::replay;
+#[cfg(feature = "open")]
+use super::open::open;
+#[cfg(feature = "open")]
+use super::recorded::{Opened, Recorded};
 use super::work;
 use crate::live::sentence;
 
@@ -27,11 +30,23 @@ struct Open {
 
 /// A probe at a line that somebody else carries.
 #[derive(Default)]
-pub struct Remote(Option<Open>);
+pub struct Remote {
+    open: Option<Open>,
+    #[cfg(feature = "open")]
+    given: Vec<Vec<u8>>,
+    #[cfg(feature = "open")]
+    recorded: Option<Recorded>,
+}
 
 type Answered = Result<Frame, Box<dyn std::error::Error>>;
 
 impl Remote {
+    /// Takes the bytes of a file, which [`Request::Open`] names then.
+    #[cfg(feature = "open")]
+    pub fn give(&mut self, bytes: Vec<u8>) {
+        self.given.push(bytes);
+    }
+
     /// Does what is asked for, in JSON: a [`Request`], and a [`Reply`].
     pub fn ask(&mut self, request: &str) -> String {
         let reply = match serde_json::from_str(request) {
@@ -58,23 +73,23 @@ impl Remote {
                 let bench = Bench::new(&port, Duration::from_millis(now_ms))?;
                 let desk = Desk::default();
                 let life = Box::pin(live(bench.clone(), Rc::clone(&desk)));
-                self.0 = Some(Open { bench, desk, life });
-                self.open()?.go_on()
+                self.open = Some(Open { bench, desk, life });
+                self.at_line()?.go_on()
             }
             Request::Step { now_ms, received } => {
-                let open = self.open()?;
+                let open = self.at_line()?;
                 open.bench.take(&received, Duration::from_millis(now_ms));
                 open.go_on()
             }
             Request::Closed => {
-                let open = self.open()?;
+                let open = self.at_line()?;
                 open.bench.close();
                 let last = open.go_on();
-                self.0 = None;
+                self.open = None;
                 last
             }
             Request::Work { work } => {
-                let open = self.open()?;
+                let open = self.at_line()?;
                 if !open.bench.is_connected() {
                     return Err("no probe is connected".into());
                 }
@@ -86,17 +101,17 @@ impl Remote {
                 open.go_on()
             }
             Request::Stop => {
-                let open = self.open()?;
+                let open = self.at_line()?;
                 open.bench.stop();
                 open.go_on()
             }
             Request::Answer { yes } => {
-                let open = self.open()?;
+                let open = self.at_line()?;
                 open.bench.answer(yes);
                 open.go_on()
             }
             Request::Log => {
-                let bench = &self.open()?.bench;
+                let bench = &self.at_line()?.bench;
                 let mut frame = bench.frame();
                 frame.files.push(File {
                     name: "session.jsonl".to_owned(),
@@ -104,12 +119,30 @@ impl Remote {
                 });
                 Ok(frame)
             }
-            Request::Replay { log } => Ok(replay(log.as_bytes())?),
+            #[cfg(feature = "open")]
+            Request::Open { files } => {
+                let given = std::mem::take(&mut self.given);
+                let files = files.into_iter().zip(given);
+                let files = files.map(|(name, bytes)| File { name, bytes }).collect();
+                self.recorded = None;
+                Ok(match open(files)? {
+                    Opened::Session(frame) => frame,
+                    Opened::Recordings(recorded) => self.recorded.insert(recorded).show(),
+                })
+            }
+            #[cfg(feature = "open")]
+            Request::Recorded { at } => {
+                let streams = self.recorded.as_ref().and_then(|all| all.streams(at));
+                Ok(Frame {
+                    streams: Some(streams.ok_or("there is no such slide")?),
+                    ..Frame::default()
+                })
+            }
         }
     }
 
-    fn open(&mut self) -> Result<&mut Open, &'static str> {
-        self.0.as_mut().ok_or("no probe is connected")
+    fn at_line(&mut self) -> Result<&mut Open, &'static str> {
+        self.open.as_mut().ok_or("no probe is connected")
     }
 }
 

@@ -1,9 +1,9 @@
 //! A verification of the probe, held against the other textures of its table here.
 
-use tactus_core::explorer::{Config, Explorer, ExplorerError};
+use tactus_core::explorer::{Config, Explorer, ExplorerError, Method, Strategy};
 use tactus_core::features::{Movement, Observation, PropertySet};
 use tactus_core::table::{MAX_TEXTURES, Table, TableError};
-use tactus_core::wire::Event;
+use tactus_core::wire::{Event, Identify};
 
 use crate::eval::verified::{NoLimits, Slide, Verified, name};
 use crate::eval::verify::false_accept;
@@ -30,6 +30,19 @@ pub enum NoReference {
     /// It cannot be explored.
     #[error(transparent)]
     Explorer(#[from] ExplorerError),
+}
+
+/// How a probe verifies that is asked like this.
+pub fn config_of(asked: &Identify) -> Config {
+    Config {
+        method: Method::Fused,
+        strategy: Strategy::Cycling,
+        threshold: asked.threshold,
+        max_slides: asked.max_slides,
+        false_alarm: asked.false_alarm,
+        verify: true,
+        ..Config::default()
+    }
 }
 
 impl<'t> Verifying<'t> {
@@ -91,4 +104,12 @@ impl<'t> Verifying<'t> {
         self.verified.false_accept = false_accept(&self.here, self.texture);
         self.verified
     }
+}
+
+/// What is printed, without what is around it.
+pub(super) fn words(print: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>) -> String {
+    let mut out = Vec::new();
+    // memory takes it
+    let _ = print(&mut out);
+    String::from_utf8_lossy(&out).trim().to_owned()
 }

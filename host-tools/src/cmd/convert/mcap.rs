@@ -5,15 +5,16 @@ use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Context as _;
-use mcap::WriteOptions;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
+use mcap::{Attachment, WriteOptions};
 use serde_json::{Map, Value, json};
 use tactus::data::recording::PAC_RATE_HZ;
 use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::measure;
+use tactus::remote::mcap::TABLE;
 use tactus_core::dsp::Plan;
-use tactus_core::features::{Block, Movement, Property};
+use tactus_core::features::{Block, FEATURE_STEPS, Movement};
 use tactus_core::table::Table;
 use tactus_core::wire::{Event, Report, SlideReport};
 
@@ -21,7 +22,7 @@ use super::to::{To, create};
 use crate::cmd::device::log::{self, Line, TableParts};
 
 /// The channels, each with what its messages hold: a name, and JSON's word for what it is.
-const CHANNELS: [(&str, &[(&str, &str)]); 13] = [
+const CHANNELS: [(&str, &[(&str, &str)]); 14] = [
     ("/pac", &[("counts", "integer"), ("still", "boolean")]),
     ("/pdc", &[("counts", "integer")]),
     ("/shear", &[("mn", "integer")]),
@@ -53,6 +54,7 @@ const CHANNELS: [(&str, &[(&str, &str)]); 13] = [
             ("roughness", "number"),
             ("fineness", "number"),
             ("ln_bands", "array"),
+            ("ln_pressure", "array"),
         ],
     ),
     (
@@ -70,6 +72,7 @@ const CHANNELS: [(&str, &[(&str, &str)]); 13] = [
             ("slide", "integer"),
             ("force_n", "number"),
             ("speed_mm_s", "number"),
+            ("action", "object"),
             ("expected", "array"),
         ],
     ),
@@ -82,6 +85,15 @@ const CHANNELS: [(&str, &[(&str, &str)]); 13] = [
             ("unknown", "boolean"),
             ("changed", "boolean"),
             ("slides", "integer"),
+        ],
+    ),
+    (
+        "/verification",
+        &[
+            ("slides", "integer"),
+            ("score", "number"),
+            ("limit", "number"),
+            ("answer", "string"),
         ],
     ),
     ("/fault", &[("fault", "string"), ("remedy", "string")]),
@@ -170,18 +182,28 @@ impl Writer {
         self.tell(LOG, at_ns, &message)
     }
 
-    fn features(
-        &mut self,
-        at_ns: u64,
-        slide: u32,
-        properties: [Option<f32>; 3],
-        ln_bands: &[f32],
-    ) -> anyhow::Result<()> {
-        let [traction, roughness, fineness] = properties;
-        let message = json!({
+    fn features(&mut self, at_ns: u64, slide: u32, observed: &SlideReport) -> anyhow::Result<()> {
+        let [traction, roughness, fineness] = observed.properties;
+        let of = |steps: &i16| f32::from(*steps) / FEATURE_STEPS;
+        let ln_bands: Vec<f32> = observed.bands.iter().map(of).collect();
+        let mut message = json!({
             "slide": slide, "traction_n": traction, "roughness": roughness, "fineness": fineness, "ln_bands": ln_bands
         });
+        if let Some(pressure) = observed.pressure {
+            message["ln_pressure"] = json!(pressure.each_ref().map(of));
+        }
         self.tell("/features", at_ns, &message)
+    }
+
+    /// The table in use from now on, as a file beside the messages.
+    fn table(&mut self, at_ns: u64, table: &[u8]) -> anyhow::Result<()> {
+        Ok(self.mcap.attach(&Attachment {
+            log_time: at_ns,
+            create_time: at_ns,
+            name: TABLE.to_owned(),
+            media_type: "application/octet-stream".to_owned(),
+            data: table.into(),
+        })?)
     }
 
     fn finish(mut self) -> anyhow::Result<()> {
@@ -256,8 +278,7 @@ pub(super) fn recordings(
             )?;
             match measure(&plan, &slide) {
                 Ok(measured) => {
-                    let properties = Property::ALL.map(|p| measured.properties.get(p));
-                    to.features(end, slide.number, properties, &measured.ln_bands())?;
+                    to.features(end, slide.number, &SlideReport::from(&measured))?;
                 }
                 Err(why) => to.log(end, WARNING, &format!("slide {}: {why}", slide.number))?,
             }
@@ -313,6 +334,7 @@ struct Converted {
     parts: TableParts,
     /// of the table in use, as far as it was read
     names: Vec<String>,
+    table: Vec<u8>,
     /// when the next sample of this kind is, still or not: P_AC, shear
     next: Option<(bool, u64, u64)>,
     failed: anyhow::Result<()>,
@@ -325,6 +347,7 @@ impl Converted {
             now_ns: 0,
             parts: TableParts::default(),
             names: Vec::new(),
+            table: Vec::new(),
             next: None,
             failed: Ok(()),
         })
@@ -378,18 +401,23 @@ impl Converted {
                     let table = Table::read(&bytes);
                     let names = table.map(|table| table.names().map(str::to_owned).collect());
                     self.names = names.unwrap_or_default();
+                    // it is read again before each request that needs it
+                    if self.table != bytes {
+                        self.to.table(now, &bytes)?;
+                        self.table = bytes;
+                    }
                 }
                 Ok(())
             }
             Event::Chosen {
                 slide,
                 movement,
+                action,
                 expected,
-                ..
             } => {
                 let (force_n, speed_mm_s) = force_and_speed(*movement);
                 let message = json!({
-                    "slide": slide, "force_n": force_n, "speed_mm_s": speed_mm_s, "expected": expected
+                    "slide": slide, "force_n": force_n, "speed_mm_s": speed_mm_s, "action": action, "expected": expected
                 });
                 self.to.tell("/choice", now, &message)
             }
@@ -399,13 +427,19 @@ impl Converted {
                 posterior,
                 ..
             } => {
-                self.observed(u32::from(*slide), observed)?;
+                self.to.features(now, u32::from(*slide), observed)?;
                 self.posterior(*slide, posterior)
             }
             Event::TrainingSlide {
                 trial, observed, ..
-            } => self.observed(u32::from(*trial), observed),
+            } => self.to.features(now, u32::from(*trial), observed),
             Event::Verdict(verdict) => self.to.tell("/verdict", now, &json!(verdict)),
+            Event::Verified { slides, now: told } => {
+                let message = json!({
+                    "slides": slides, "score": told.score, "limit": told.limit, "answer": told.answer
+                });
+                self.to.tell("/verification", now, &message)
+            }
             Event::Fault(fault) => {
                 let (name, remedy) = (fault.to_string(), fault.recovery());
                 self.to.log(now, ERROR, &format!("{name}: {remedy}"))?;
@@ -453,13 +487,6 @@ impl Converted {
             .samples("/shear", shear, SHEAR_HZ, &block.shear_mn, message)?;
         self.next = Some((still, pac, shear));
         Ok(())
-    }
-
-    fn observed(&mut self, slide: u32, observed: &SlideReport) -> anyhow::Result<()> {
-        let bands = observed.bands.iter();
-        let ln_bands: Vec<f32> = bands.map(|band| f32::from(*band) / 1024.0).collect();
-        self.to
-            .features(self.now_ns, slide, observed.properties, &ln_bands)
     }
 
     fn posterior(&mut self, slide: u8, posterior: &[f32]) -> anyhow::Result<()> {

@@ -8,6 +8,7 @@ use serde::Serialize;
 use tactus::data::recorder::Recorder;
 use tactus::data::recording::{Labels, Texture};
 use tactus::data::recordings::RecordingWriter;
+use tactus::eval::samples::Trials;
 use tactus::eval::show::count;
 use tactus::link::Request;
 use tactus_core::explorer::Strategy;
@@ -16,7 +17,7 @@ use tactus_core::wire::{Command, Identify};
 
 use super::bench::{Bench, Prompts, wait_for_enter};
 use super::line::Where;
-use super::samples::{Sample, Trials, ask_to_move};
+use super::samples::{Sample, ask_to_move};
 use super::train::seed_of_now;
 use crate::cmd::output::{Format, print_json};
 

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use serde::Serialize;
 use tactus::link::Request;
-use tactus::remote::say::name_of;
+use tactus::remote::say::{forgotten, name_of};
 use tactus_core::table::{Name, Table};
 use tactus_core::wire;
 
@@ -102,24 +102,18 @@ pub(crate) fn rename(args: &Rename, out: &mut impl Write) -> anyhow::Result<()> 
 /// Has the probe forget something.
 pub(crate) fn forget(args: &Forget, out: &mut impl Write) -> anyhow::Result<()> {
     let (mut bench, _) = Bench::open(&args.at)?;
-    let (what, kind, name, said) = match (&args.what.name, &args.what.training) {
+    let (what, kind, name) = match (&args.what.name, &args.what.training) {
         (Some(name), _) => {
             let name = known(&bench.table()?, name)?;
-            let said = name.to_string();
-            let what = wire::Forget::Texture(name.clone());
-            (what, "texture", Some(name), said)
+            (wire::Forget::Texture(name.clone()), "texture", Some(name))
         }
         (None, Some(name)) => {
-            let said = format!("the training of {name}");
             let name = name_of(name)?;
-            let what = wire::Forget::Training(name.clone());
-            (what, "training", Some(name), said)
+            (wire::Forget::Training(name.clone()), "training", Some(name))
         }
-        (None, None) => {
-            let said = "what it learned by itself".to_owned();
-            (wire::Forget::SelfLearned, "self-learned", None, said)
-        }
+        (None, None) => (wire::Forget::SelfLearned, "self-learned", None),
     };
+    let said = forgotten(&what);
     let lost = |_: &Table<'_>| format!("The probe is to forget {said}.");
     let backup = args.consent.ask(&mut bench, lost, args.format, out)?;
     bench.get(Request::forget(what))?;

@@ -5,7 +5,7 @@ use std::io::Write;
 use clap::{ArgGroup, ValueEnum};
 use serde::Serialize;
 use tactus::link::Request;
-use tactus::remote::say::{limits, movements};
+use tactus::remote::say::{HIGH_FORCE, YIELDS, show_settings};
 use tactus_core::table::Table;
 use tactus_core::wire::Command;
 
@@ -13,7 +13,7 @@ use super::bench::Bench;
 use super::line::Where;
 use super::loss::confirm;
 use crate::cmd::args::false_alarm;
-use crate::cmd::output::{Format, percent, print_json};
+use crate::cmd::output::{Format, print_json};
 
 /// Show or set for which share of false alarms the probe's limits are, and whether a rig may press with up to 2 N
 #[derive(clap::Args)]
@@ -53,13 +53,6 @@ enum Switch {
     Off,
 }
 
-/// What a person must know who turns high forces on.
-const HIGH_FORCE: &str = "\
-With high forces on, movements may press with up to 2 N, and the guard acts at 2.1 N by P_DC. Above 2 N the skin lies on the
-finger's core, and P_DC no longer tells the force; where P_DC says too little, or the skin is torn, the lever presses on. What
-keeps the finger whole then is no program: a mount whose spring yields (preloaded to 2.05 N, 0.009 N/mm), or a hard stop that
-the lever cannot push beyond 2.2 N. The usual mount, of 1.45 N, yields before 2 N are reached.";
-
 /// What `device settings --format json` prints.
 #[derive(Serialize)]
 struct Settings {
@@ -82,8 +75,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if let Some(switch) = args.high_force {
         let on = switch == Switch::On;
         if on && !status.high_force {
-            let question = "Does the finger's mount yield, or does a stop hold the lever?";
-            confirm(HIGH_FORCE, question, args.yes, &bench, args.format, out)?;
+            confirm(HIGH_FORCE, YIELDS, args.yes, &bench, args.format, out)?;
         }
         bench.get(Request::command(Command::SetHighForce(on)))?;
         status = bench.get(Request::status())?;
@@ -98,22 +90,6 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if args.format == Format::Json {
         return print_json(&settings, out);
     }
-    writeln!(
-        out,
-        "The probe's limits are {}.",
-        limits(status.false_alarm)
-    )?;
-    match settings.table_false_alarm {
-        Some(share) => writeln!(out, "Its table was learned for {}.", percent(share.into()))?,
-        None => writeln!(
-            out,
-            "Its table has no limits: learn it again, with --method fused."
-        )?,
-    }
-    writeln!(
-        out,
-        "A rig's movements press with {}.",
-        movements(status.high_force)
-    )?;
+    show_settings(&status, settings.table_false_alarm, out)?;
     Ok(())
 }

@@ -9,7 +9,7 @@ use serde::Serialize;
 use tactus::eval::show::{count, show_table};
 use tactus::eval::table_summary::TableSummary;
 use tactus::link::{PushTable, Request};
-use tactus::remote::say::replaced;
+use tactus::remote::say::{replaced, uses_factory};
 use tactus_core::table::Table;
 use tactus_core::wire;
 
@@ -93,10 +93,7 @@ impl InUse {
                 out,
                 "{file}: the probe uses it now: {textures}, checksum {checksum}"
             )?,
-            (Format::Text, None) => writeln!(
-                out,
-                "The probe uses the firmware's own table: {textures}, checksum {checksum}"
-            )?,
+            (Format::Text, None) => writeln!(out, "{}", uses_factory(self.textures, checksum))?,
         }
         Ok(())
     }

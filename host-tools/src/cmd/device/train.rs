@@ -5,9 +5,10 @@ use std::ops::ControlFlow;
 
 use serde::Serialize;
 use tactus::eval::alike::{self, Alike};
+use tactus::eval::samples::{Trials, fewest};
 use tactus::eval::show::count;
 use tactus::link::Request;
-use tactus::remote::say::{compare, name_of, of_sample, show_training};
+use tactus::remote::say::{compare, name_of, not_noted, of_sample, show_training};
 use tactus_core::probe::training::pilot_movements;
 use tactus_core::rig::most_mn;
 use tactus_core::table::{Name, Table};
@@ -15,7 +16,7 @@ use tactus_core::wire::{self, Event};
 
 use super::bench::{Bench, Prompts};
 use super::line::Where;
-use super::samples::{Sample, Trials, ask_to_move, note_in_table};
+use super::samples::{Sample, ask_to_move, note_in_table};
 use crate::cmd::names;
 use crate::cmd::output::{Format, print_json};
 
@@ -97,13 +98,7 @@ pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
     let text = args.format == Format::Text;
     let (mut prompts, mut slides) = (Prompts::default(), 0);
     let mut trials = Trials::default();
-    let fewest = |texture| {
-        (0..)
-            .zip(table.movements())
-            .map(move |(m, _)| table.trials(texture, m))
-            .min()
-    };
-    let fewest = table.find(&name).and_then(fewest);
+    let fewest = fewest(table, &name);
     // trials of before, and somebody who knows whether the sample lies as it did
     if args.sample.asks() && !args.pilot && fewest.is_some_and(|there| there < args.trials) {
         trials.said(Some(ask_to_move(&bench, &name)?));
@@ -149,7 +144,7 @@ pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
         // one trial is moved from nowhere
         let moved = trials.moved().filter(|_| args.trials > 1);
         if let Some(why) = note_in_table(&mut bench, &name, moved)? {
-            eprintln!("Whether the sample was moved is not noted in the table: {why}");
+            eprintln!("{}", not_noted(&why));
         }
     }
     let learned = Learned::new(&mut bench, &name, slides, &before)?;

@@ -5,14 +5,14 @@
 //! each field of a record, in its order; wanted are `pac`, `pdc` and `f_tangential`), `motion.speed_mm_s`,
 //! `steady_window_s`, and per file its name, material, sizes and hashes. Nothing is assumed about how many materials, slides
 //! or samples there are.
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde::Deserialize;
 use tactus_core::features::Movement;
 
 use super::files::{
-    BIOTAC_MANIFEST as MANIFEST, MAX_MANIFEST, RecordingError, Result, distinct_textures,
-    in_order_of_time, inside, read_bounded, unpack,
+    BIOTAC_MANIFEST as MANIFEST, MAX_MANIFEST, Place, RecordingError, Result, distinct_textures,
+    in_order_of_time, unpack,
 };
 use super::npy::{self, MAX_SAMPLES};
 use crate::data::content::ContentError;
@@ -93,13 +93,14 @@ impl Manifest {
     ///
     /// # Errors
     /// If it cannot be read, is no such manifest, or contradicts itself.
-    pub fn read(path: &Path) -> Result<Self> {
+    pub fn read(place: &Place) -> Result<Self> {
+        let path = &place.folder().join(MANIFEST);
         let fault = |place: &str, cause| RecordingError::Entry {
             path: path.to_owned(),
             place: place.to_owned(),
             cause,
         };
-        let bytes = read_bounded(path, MAX_MANIFEST)?;
+        let bytes = place.read(MANIFEST, MANIFEST, MAX_MANIFEST)?;
         let json: Json = serde_json::from_slice(&bytes).map_err(|e| {
             let place = format!("line {}, column {}", e.line(), e.column());
             let json: serde_json::Value = serde_json::from_slice(&bytes).unwrap_or_default();
@@ -183,10 +184,9 @@ impl Manifest {
     }
 
     /// Reads all slides of one texture.
-    pub(super) fn load(&self, folder: &Path, texture: usize) -> Result<Vec<Recording>> {
+    pub(super) fn load(&self, place: &Place, texture: usize) -> Result<Vec<Recording>> {
         let entry = &self.files[texture];
-        let path = inside(folder, MANIFEST, &entry.file)?;
-        let values = entry.values(&path)?;
+        let values = entry.values(place)?;
         let records: Vec<&[i16]> = values.chunks_exact(self.record.values).collect();
         self.slides
             .iter()
@@ -272,16 +272,17 @@ impl Entry {
     }
 
     /// All values of the file, hashes checked before and after decompression.
-    fn values(&self, path: &Path) -> Result<Vec<i16>> {
-        let packed = read_bounded(path, self.bytes_gz)?;
+    fn values(&self, place: &Place) -> Result<Vec<i16>> {
+        let packed = place.read(MANIFEST, &self.file, self.bytes_gz)?;
+        let path = place.folder().join(&self.file);
         if (packed.len() as u64) < self.bytes_gz {
             return Err(RecordingError::Samples {
-                path: path.to_owned(),
+                path,
                 cause: ContentError::Truncated(packed.len(), self.bytes_gz),
             });
         }
         let raw = unpack(
-            path,
+            &path,
             &packed,
             &self.sha256_gz,
             self.bytes_raw,

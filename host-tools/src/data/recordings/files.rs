@@ -1,6 +1,6 @@
 //! What all readers and writers of recordings share: their errors, bounded reads, and hashes.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Read as _};
@@ -87,6 +87,14 @@ pub enum RecordingError {
         manifest: PathBuf,
         /// The name it gives.
         name: String,
+    },
+    /// A manifest names a file that did not come with it.
+    #[error("{}: is in {manifest}, but not among the files that were given: give the whole folder", path.display())]
+    Missing {
+        /// The file.
+        path: PathBuf,
+        /// The manifest.
+        manifest: String,
     },
     /// A texture without a slide cannot be learned or tested.
     #[error("{}: texture {id} ({name}) has no slide; record some or remove the texture", manifest.display())]
@@ -190,6 +198,49 @@ pub(crate) fn inside(folder: &Path, manifest: &str, name: &str) -> Result<PathBu
         });
     }
     Ok(folder.join(relative))
+}
+
+/// Where the files of a set are.
+#[derive(Debug)]
+pub enum Place {
+    /// In a folder of this machine.
+    Folder(PathBuf),
+    /// In memory, by their names in the folder that is called so.
+    Memory(PathBuf, BTreeMap<String, Vec<u8>>),
+}
+
+impl Place {
+    /// What the folder is called.
+    pub fn folder(&self) -> &Path {
+        match self {
+            Self::Folder(folder) | Self::Memory(folder, _) => folder,
+        }
+    }
+
+    /// Whether a file of this name is there.
+    pub(super) fn has(&self, name: &str) -> bool {
+        match self {
+            Self::Folder(folder) => folder.join(name).is_file(),
+            Self::Memory(_, files) => files.contains_key(name),
+        }
+    }
+
+    /// The bytes of a file that a manifest names, of at most `limit` bytes.
+    pub(super) fn read(&self, manifest: &str, name: &str, limit: u64) -> Result<Vec<u8>> {
+        let path = inside(self.folder(), manifest, name)?;
+        let Self::Memory(_, files) = self else {
+            return read_bounded(&path, limit);
+        };
+        let found = files.get(name).ok_or_else(|| RecordingError::Missing {
+            path: path.clone(),
+            manifest: manifest.to_owned(),
+        })?;
+        if found.len() as u64 > limit {
+            let cause = ContentError::TooLong(limit);
+            return Err(RecordingError::Samples { path, cause });
+        }
+        Ok(found.clone())
+    }
 }
 
 /// The bytes of a file of at most `limit` bytes. Memory grows with the bytes that come, not with what a manifest claims.

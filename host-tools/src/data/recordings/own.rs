@@ -22,14 +22,14 @@
 //! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it; each is a
 //! one-dimensional array of `<i2` (numpy.int16). The hash is the SHA-256 of the whole file in hexadecimal. The rows may come
 //! in any order; textures are taken in the order of their first row.
-use std::path::Path;
+use std::io::Cursor;
 
 use tactus_core::features::Movement;
 use tactus_core::sensor::FingerCode;
 
 use super::files::{
-    OWN_MANIFEST as MANIFEST, RecordingError, Result, check_hash, distinct_textures,
-    in_order_of_time, inside, read_bounded,
+    MAX_MANIFEST, OWN_MANIFEST as MANIFEST, Place, RecordingError, Result, check_hash,
+    distinct_textures, in_order_of_time,
 };
 use super::npy;
 use crate::data::content::ContentError;
@@ -111,9 +111,16 @@ impl Manifest {
     ///
     /// # Errors
     /// If it cannot be read, a row makes no sense, or two rows contradict each other.
-    pub fn read(path: &Path) -> Result<Self> {
+    pub fn read(place: &Place) -> Result<Self> {
+        let path = &place.folder().join(MANIFEST);
         let mut textures: Vec<(Texture, Vec<Entry>)> = Vec::new();
-        let mut rows = Rows::open(path, &COLUMNS, &LABELS)?;
+        let mut rows = match place {
+            Place::Folder(_) => Rows::open(path, &COLUMNS, &LABELS)?,
+            Place::Memory(..) => {
+                let bytes = place.read(MANIFEST, MANIFEST, MAX_MANIFEST)?;
+                Rows::of(path, Box::new(Cursor::new(bytes)), &COLUMNS, &LABELS)?
+            }
+        };
         while let Some(row) = rows.next_row()? {
             let texture = Texture {
                 id: row.parse("texture", "the number of a texture")?,
@@ -160,11 +167,11 @@ impl Manifest {
     }
 
     /// Reads all slides of one texture.
-    pub(super) fn load(&self, folder: &Path, texture: usize) -> Result<Vec<Recording>> {
+    pub(super) fn load(&self, place: &Place, texture: usize) -> Result<Vec<Recording>> {
         let (_, entries) = &self.textures[texture];
         entries
             .iter()
-            .map(|entry| entry.load(folder, texture))
+            .map(|entry| entry.load(place, texture))
             .collect()
     }
 }
@@ -235,13 +242,13 @@ impl Entry {
         })
     }
 
-    fn load(&self, folder: &Path, texture: usize) -> Result<Recording> {
-        let pac = self.pac.load(folder)?;
-        let pdc = self.pdc.load(folder)?;
-        let shear = self.shear.as_ref().map(|s| s.load(folder)).transpose()?;
+    fn load(&self, place: &Place, texture: usize) -> Result<Recording> {
+        let pac = self.pac.load(place)?;
+        let pdc = self.pdc.load(place)?;
+        let shear = self.shear.as_ref().map(|s| s.load(place)).transpose()?;
         let (background, still) = match &self.background {
             Background::Power(power) => (Some(*power), Vec::new()),
-            Background::Still(still) => (None, still.load(folder)?),
+            Background::Still(still) => (None, still.load(place)?),
         };
         let slide = Recording {
             texture,
@@ -258,7 +265,7 @@ impl Entry {
         };
         let slide = slide.cut(&still, &pac, shear.as_deref());
         slide.map_err(|cause| RecordingError::Entry {
-            path: folder.join(MANIFEST),
+            path: place.folder().join(MANIFEST),
             place: format!("line {}, {}", self.line, self.pac.file),
             cause,
         })
@@ -283,9 +290,9 @@ impl Stream {
         }
     }
 
-    fn load(&self, folder: &Path) -> Result<Vec<i16>> {
-        let path = inside(folder, MANIFEST, &self.file)?;
-        let bytes = read_bounded(&path, npy::MAX_BYTES)?;
+    fn load(&self, place: &Place) -> Result<Vec<i16>> {
+        let bytes = place.read(MANIFEST, &self.file, npy::MAX_BYTES)?;
+        let path = place.folder().join(&self.file);
         check_hash(&path, "the file", &bytes, &self.sha256)?;
         npy::read(&bytes).map_err(|why| RecordingError::Samples {
             path,

@@ -271,18 +271,14 @@ fn row(
     Ok(row)
 }
 
-/// The files of a folder of recordings of one texture, by their names, for those who have no file system.
+/// The files of a folder of recordings of one texture, by their names, for those who have no file system; each slide has labels.
 ///
 /// # Errors
 /// A slide makes no sense.
-pub fn files(
-    texture: &Texture,
-    labels: &Labels,
-    slides: &[Recording],
-) -> Result<Vec<(String, Vec<u8>)>> {
+pub fn files(texture: &Texture, slides: &[(Recording, Labels)]) -> Result<Vec<(String, Vec<u8>)>> {
     let mut files = Vec::new();
     let mut rows = vec![header()];
-    for slide in slides {
+    for (slide, labels) in slides {
         slide.check().map_err(|cause| RecordingError::Entry {
             path: MANIFEST.into(),
             place: format!("texture {}, slide {}", texture.id, slide.number),

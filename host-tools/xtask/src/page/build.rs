@@ -14,6 +14,8 @@ use crate::toolchain::{self, BROWSER};
 
 /// The crate, from the top.
 pub(super) const CRATE: &str = "host-tools/page";
+/// What the page's world was learned from: it stands beside the module in the page.
+const TRIALS: &str = "host-tools/src/live/world-1.trials";
 /// The module is downloaded by whoever opens the page.
 const MOST_BYTES: usize = 1_500_000;
 
@@ -49,7 +51,11 @@ pub(crate) fn build() -> Result<Built> {
         module.len()
     );
     let page = target().join("page").join("index.html");
-    let html = assemble(&root().join(CRATE).join("www"), &module)?;
+    let html = assemble(
+        &root().join(CRATE).join("www"),
+        &module,
+        &read(&root().join(TRIALS))?,
+    )?;
     std::fs::create_dir_all(target().join("page")).context("cannot make target/page")?;
     std::fs::write(&page, html).with_context(|| format!("cannot write {}", page.display()))?;
     Ok(Built {
@@ -64,7 +70,7 @@ fn read(file: &Path) -> Result<Vec<u8>> {
 }
 
 /// The page of a folder, with everything that it names in it.
-fn assemble(folder: &Path, module: &[u8]) -> Result<String> {
+fn assemble(folder: &Path, module: &[u8], trials: &[u8]) -> Result<String> {
     let text = |name: &str| -> Result<String> {
         String::from_utf8(read(&folder.join(name))?).with_context(|| format!("{name} is no text"))
     };
@@ -98,7 +104,11 @@ fn assemble(folder: &Path, module: &[u8]) -> Result<String> {
     let csp = format!(
         "default-src 'none'; script-src 'wasm-unsafe-eval'{scripts}; style-src{styles}; img-src data:; base-uri 'none'; form-action 'none'"
     );
-    for (mark, text) in [("{{csp}}", csp), ("{{wasm}}", BASE64.encode(module))] {
+    for (mark, text) in [
+        ("{{csp}}", csp),
+        ("{{wasm}}", BASE64.encode(module)),
+        ("{{trials}}", BASE64.encode(trials)),
+    ] {
         ensure!(
             html.matches(mark).count() == 1,
             "index.html has not one {mark}"
@@ -120,14 +130,14 @@ mod tests {
         folder
     }
 
-    const HTML: &str = "<meta content=\"{{csp}}\"><link rel=\"stylesheet\" href=\"a.css\"><p id=w>{{wasm}}</p><script src=\"a.js\"></script>";
+    const HTML: &str = "<meta content=\"{{csp}}\"><link rel=\"stylesheet\" href=\"a.css\"><p id=w>{{wasm}}</p><p id=t>{{trials}}</p><script src=\"a.js\"></script>";
 
     #[test]
     fn all_that_a_page_names_is_in_it_and_allowed_by_its_hash() {
         let folder = folder(&[("index.html", HTML), ("a.css", "p{}"), ("a.js", "go()")]);
-        let html = assemble(folder.path(), b"\0asm").unwrap();
+        let html = assemble(folder.path(), b"\0asm", b"t").unwrap();
         assert!(html.contains("<style>p{}</style>") && html.contains("<script>go()</script>"));
-        assert!(html.contains("<p id=w>AGFzbQ==</p>"));
+        assert!(html.contains("<p id=w>AGFzbQ==</p><p id=t>dA==</p>"));
         // printf 'go()' | openssl dgst -sha256 -binary | base64
         assert!(html.contains("script-src 'wasm-unsafe-eval' 'sha256-"));
         assert!(!html.contains("a.js") && !html.contains("unsafe-inline"));
@@ -136,13 +146,13 @@ mod tests {
     #[test]
     fn a_script_that_would_end_itself_is_an_error() {
         let folder = folder(&[("index.html", HTML), ("a.css", ""), ("a.js", "'</script>'")]);
-        let error = assemble(folder.path(), b"").unwrap_err().to_string();
+        let error = assemble(folder.path(), b"", b"").unwrap_err().to_string();
         assert_eq!(error, "a.js contains </script");
     }
 
     #[test]
     fn the_page_loads_nothing() {
-        let html = assemble(&root().join(CRATE).join("www"), b"").unwrap();
+        let html = assemble(&root().join(CRATE).join("www"), b"", b"").unwrap();
         for word in ["http://", "https://", " src=", "import ", "fetch("] {
             let found = html.match_indices(word);
             // the name of a namespace is no address

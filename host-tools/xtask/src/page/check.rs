@@ -16,6 +16,8 @@ const WHAT: &str = "the page in a browser";
 const NOT_AS_IT_SHOULD_BE: &str = "the page is not as it should be";
 /// Longest that the probe in software takes: it may be compiled first.
 const STARTING: Duration = Duration::from_secs(600);
+/// Those that come with the command.
+const RECORDINGS: &str = "host-tools/recordings/simulated";
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 
 /// Builds the page and tries it; skipped where there is no toolchain for it, no Chromium or no Node.js. The screenshots that it takes
@@ -43,8 +45,9 @@ pub(crate) fn check() -> Result<()> {
     println!("== {} bytes of WebAssembly", built.wasm_bytes);
     let native = reference()?;
     let probe = Probe::in_software()?;
+    let (files, recordings) = (files()?, root().join(RECORDINGS));
     let (page, wasm) = (&built.page, &built.wasm);
-    let arguments = [page, wasm, &native].map(|path| path.as_os_str());
+    let arguments = [page, wasm, &native, &files, &recordings].map(|path| path.as_os_str());
     let mut tests = in_browser(browser, &arguments, &probe.address);
     run(&mut tests).context(NOT_AS_IT_SHOULD_BE)
 }
@@ -55,7 +58,7 @@ pub(super) fn emulated() -> Result<()> {
     let built = build()?;
     let probe = Probe::emulated()?;
     let (page, wasm) = (&built.page, &built.wasm);
-    let arguments = [page, wasm, page].map(|path| path.as_os_str());
+    let arguments = [page, wasm, page, page, page].map(|path| path.as_os_str());
     let mut tests = in_browser(browser, &arguments, &probe.address);
     // one second of the board takes longer than a second
     tests.env("TACTUS_PAGE_SLOW", "10");
@@ -167,4 +170,15 @@ fn reference() -> Result<PathBuf> {
     native.args(["test", "--workspace", "--test", "page", "--", "replies"]);
     run(native.env("TACTUS_PAGE_REPLIES", &file))?;
     Ok(file)
+}
+
+/// What can be dropped on the page, as the command writes it: the folder.
+fn files() -> Result<PathBuf> {
+    let folder = target().join("page-files");
+    // as the step of the tests has built it
+    let mut writes = cargo();
+    writes.args(["test", "--workspace", "--test", "opened", "--"]);
+    writes.args(["leaves_files_for_a_page", "--exact"]);
+    run(writes.env("TACTUS_PAGE_FILES", &folder))?;
+    Ok(folder)
 }
