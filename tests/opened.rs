@@ -5,8 +5,11 @@ use std::fs;
 use std::io::{Cursor, Read as _};
 use std::path::Path;
 use std::process::Command;
+use std::sync::LazyLock;
 
 use flate2::read::GzDecoder;
+use mcap::records::Record;
+use proptest::prelude::*;
 use serde_json::{Value, json};
 use tactus::data::recordings::RecordingSet;
 use tactus::data::replay::measure_all;
@@ -62,6 +65,96 @@ fn mcap(from: &Path) -> Vec<u8> {
     let out = out.output().unwrap();
     assert!(out.status.success(), "{out:?}");
     fs::read(to).unwrap()
+}
+
+/// MCAP files of the session and of two recorded slides, with some of their samples.
+static CONVERTED: LazyLock<[Vec<u8>; 2]> = LazyLock::new(|| {
+    let temp = tempfile::tempdir().unwrap();
+    let log = temp.path().join("session.jsonl");
+    fs::write(&log, session()).unwrap();
+    let few = |file: Vec<u8>, slides: u32| {
+        let (mut features, mut samples) = (0, 0_u32);
+        again(&file, |topic, bytes| {
+            // those of a slide come after its samples
+            features += u32::from(topic == "/features");
+            let is_sample = ["/pac", "/pdc", "/shear"].contains(&topic);
+            samples += u32::from(is_sample);
+            (features <= slides && (!is_sample || samples.is_multiple_of(50))).then_some(bytes)
+        })
+    };
+    [
+        few(mcap(&log), u32::MAX),
+        few(mcap(Path::new(RECORDINGS)), 2),
+    ]
+});
+
+/// The same file with other messages and attachments: what is made of each, with its topic or name, or nothing.
+fn again(file: &[u8], mut changed: impl FnMut(&str, Vec<u8>) -> Option<Vec<u8>>) -> Vec<u8> {
+    let mut to = mcap::Writer::new(Cursor::new(Vec::new())).unwrap();
+    let mut channels = BTreeMap::new();
+    for record in mcap::read::ChunkFlattener::new(file).unwrap() {
+        match record.unwrap() {
+            Record::Channel(of) => {
+                let id = to.add_channel(0, &of.topic, "json", &BTreeMap::new());
+                channels.insert(of.id, (id.unwrap(), of.topic));
+            }
+            Record::Message { mut header, data } => {
+                let (id, topic) = &channels[&header.channel_id];
+                header.channel_id = *id;
+                if let Some(data) = changed(topic, data.into_owned()) {
+                    to.write_to_known_channel(&header, &data).unwrap();
+                }
+            }
+            Record::Attachment { header, data, .. } => {
+                if let Some(data) = changed(&header.name, data.into_owned()) {
+                    let attachment = mcap::Attachment {
+                        log_time: header.log_time,
+                        create_time: header.create_time,
+                        name: header.name,
+                        media_type: header.media_type,
+                        data: data.into(),
+                    };
+                    to.attach(&attachment).unwrap();
+                }
+            }
+            _ => {}
+        }
+    }
+    to.finish().unwrap();
+    to.into_inner().into_inner()
+}
+
+/// What no program of ours writes where there is a number, a name or a list.
+fn odd() -> impl Strategy<Value = Value> {
+    prop_oneof![
+        Just(Value::Null),
+        Just(json!(true)),
+        Just(json!([])),
+        Just(json!({})),
+        any::<f64>().prop_map(|number| json!(number)),
+        any::<i64>().prop_map(|number| json!(number)),
+        ".{0,8}".prop_map(|text| json!(text)),
+        proptest::collection::vec(any::<f32>(), 0..40).prop_map(|list| json!(list)),
+    ]
+}
+
+/// Puts it in the place of a value, the one that `at` chooses on the way down.
+fn put(value: &mut Value, at: &mut impl Iterator<Item = usize>, odd: &Value) {
+    let inner = match value {
+        Value::Array(list) if !list.is_empty() => at.next().map(|n| {
+            let n = n % list.len();
+            &mut list[n]
+        }),
+        Value::Object(map) if !map.is_empty() => at.next().map(|n| {
+            let n = n % map.len();
+            map.values_mut().nth(n).unwrap()
+        }),
+        _ => None,
+    };
+    match inner {
+        Some(inner) => put(inner, at, odd),
+        None => *value = odd.clone(),
+    }
 }
 
 /// An MCAP file of another program.
@@ -305,6 +398,59 @@ fn what_cannot_be_shown_is_told_with_what_to_do() {
             why.starts_with(wanted),
             "{wanted}\nis not how this begins:\n{why}"
         );
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// A panic would end the page's module. What comes is shown, or refused in a sentence.
+    #[test]
+    fn odd_messages_and_tables_never_panic(
+        // of recorded slides fewer: for them the table of a world is learned each time
+        of in prop_oneof![7 => Just(0_usize), 1 => Just(1)],
+        odd in odd(),
+        topic in prop_oneof!["/pac", "/pdc", "/shear", "/movement", "/features", "/log", "/request", "/choice", "/posterior", "/verification", "/verdict", "table.tact"],
+        every in 1_u32..4,
+        way in proptest::collection::vec(any::<usize>(), 0..4),
+        byte in any::<(usize, u8)>(),
+    ) {
+        let mut seen = 0;
+        let file = again(&CONVERTED[of], |of, mut bytes| {
+            seen += u32::from(of == topic);
+            if of != topic || !seen.is_multiple_of(every) {
+                return Some(bytes);
+            }
+            match serde_json::from_slice::<Value>(&bytes) {
+                Ok(mut value) => {
+                    put(&mut value, &mut way.iter().copied(), &odd);
+                    bytes = serde_json::to_vec(&value).unwrap();
+                }
+                Err(_) => {
+                    let at = byte.0 % bytes.len();
+                    bytes[at] ^= byte.1;
+                }
+            }
+            Some(bytes)
+        });
+        let reply = ask(&mut Remote::default(), &one("odd.mcap", file));
+        prop_assert!(reply["is"] == "frame" || reply["why"].is_string(), "{reply}");
+    }
+
+    #[test]
+    fn damaged_files_never_panic(
+        of in 0_usize..2,
+        cut in any::<prop::sample::Index>(),
+        changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..4),
+    ) {
+        let mut file = CONVERTED[of].clone();
+        for (at, byte) in changes {
+            let at = at.index(file.len());
+            file[at] ^= byte;
+        }
+        file.truncate(cut.index(file.len() + 1));
+        let reply = ask(&mut Remote::default(), &one("damaged.mcap", file));
+        prop_assert!(reply["is"] == "frame" || reply["why"].is_string(), "{reply}");
     }
 }
 
