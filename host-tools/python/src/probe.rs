@@ -15,7 +15,6 @@ use tactus::link::line::{Line, found, only_nucleo, open};
 use tactus::link::log::{self, Log};
 use tactus::link::owner::Owner;
 use tactus::link::{Job, Port, PortError, PushTable, ReadTable, Request, Transaction};
-use tactus_core::explorer::Strategy;
 use tactus_core::table::{Name, Table as Read};
 use tactus_core::wire::{ArmReport, ArmState, Command, Event, Identify, Report, Train};
 
@@ -418,15 +417,7 @@ impl Probe {
         let (probe, py) = (slf.get(), slf.py());
         let calibration = probe.complete(py, Request::read_calibration())?;
         probe.stream(py, true)?;
-        // never sure: all slides are made
-        let wanted = Identify {
-            threshold: 1.0,
-            max_slides: slides,
-            strategy: Strategy::Cycling,
-            open: false,
-            seed: seed.unwrap_or_else(seed_of_now),
-            ..Identify::default()
-        };
+        let wanted = Recorder::wanted(0, slides, seed.unwrap_or_else(seed_of_now));
         Self::begin(slf, Command::Identify(wanted))?;
         let (mut recorder, mut made) = (Recorder::new(calibration.pressure), Vec::new());
         while let Some(report) = probe.next(py)? {

@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import signal
 import subprocess
 
 import pytest
@@ -10,6 +11,9 @@ import tactus
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 REQUIRED = os.environ.get("CI") == "true" or os.environ.get("TACTUS_REQUIRE_DATA") == "1"
+
+# what a shell starts in the background ignores it, and so do its children: those of the tests are to hear it
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def lacking(why, required=REQUIRED):

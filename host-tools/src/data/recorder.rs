@@ -5,9 +5,10 @@
 //! from the contact force, which the rig reports 20 times a second.
 
 use crate::data::recording::{PAC_RATE_HZ, Recording};
+use tactus_core::explorer::Strategy;
 use tactus_core::features::{Block, Movement};
 use tactus_core::sensor::pressure::Calibration;
-use tactus_core::wire::{Event, Live, Phase, Report};
+use tactus_core::wire::{Event, Identify, Live, Phase, Report};
 
 /// How often the probe reports the force while the rig moves.
 const LIVE_HZ: u32 = 20;
@@ -50,6 +51,19 @@ struct Begun {
 }
 
 impl Recorder {
+    /// The exploration of a trial, counted from 0, that makes the slides to record: with this threshold it does not end before.
+    pub fn wanted(trial: usize, slides: u8, seed: u32) -> Identify {
+        Identify {
+            threshold: 1.0,
+            max_slides: slides,
+            strategy: Strategy::Cycling,
+            open: false,
+            // those of the next trial begin elsewhere, too
+            seed: seed.wrapping_add(trial as u32),
+            ..Identify::default()
+        }
+    }
+
     /// A recorder of slides of one texture, with the probe's calibration.
     pub fn new(calibration: Calibration) -> Self {
         Self {

@@ -339,16 +339,7 @@ async fn record(
         if trial > 0 {
             samples.said(Some(ask_to_move(bench, &name).await?));
         }
-        // never sure: all slides are made
-        let wanted = Identify {
-            threshold: 1.0,
-            max_slides: part.min(slides - begin),
-            strategy: Strategy::Cycling,
-            open: false,
-            // slides of the next part begin elsewhere, too
-            seed: seed.wrapping_add(trial as u32),
-            ..Identify::default()
-        };
+        let wanted = Recorder::wanted(trial, part.min(slides - begin), seed);
         let each = |report: &wire::Report| {
             match recorder.hear(0, report) {
                 Some(Ok(slide)) => {

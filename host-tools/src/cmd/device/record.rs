@@ -11,9 +11,8 @@ use tactus::data::recordings::RecordingWriter;
 use tactus::eval::samples::Trials;
 use tactus::eval::show::count;
 use tactus::link::Request;
-use tactus_core::explorer::Strategy;
 use tactus_core::table::Table;
-use tactus_core::wire::{Command, Identify};
+use tactus_core::wire::Command;
 
 use super::bench::{Bench, Prompts, wait_for_enter};
 use super::line::Where;
@@ -147,16 +146,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             if trial > 0 {
                 trials.said(Some(ask_to_move(&bench, name)?));
             }
-            // never sure: all slides are made
-            let wanted = Identify {
-                threshold: 1.0,
-                max_slides: part.min(slides - begin),
-                strategy: Strategy::Cycling,
-                open: false,
-                // slides of the next part begin elsewhere, too
-                seed: seed.wrapping_add(trial as u32),
-                ..Identify::default()
-            };
+            let wanted = Recorder::wanted(trial, part.min(slides - begin), seed);
             bench.run(Request::identify(wanted), |report| {
                 match recorder.hear(index, report) {
                     Some(Ok(slide)) => {
