@@ -12,9 +12,13 @@ use mcap::records::Record;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 use tactus::data::recordings::RecordingSet;
-use tactus::data::replay::measure_all;
+use tactus::data::replay::{MeasuredSlide, measure_all};
+use tactus::eval::learn::learn;
 use tactus::remote::Remote;
-use tactus_core::features::Property;
+use tactus_core::explorer::Method;
+use tactus_core::features::{Observation, Property};
+use tactus_core::table::Table;
+use tactus_core::wire::SlideReport;
 
 const RECORDINGS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/simulated");
 
@@ -202,6 +206,53 @@ fn of<'a>(reply: &'a Value, what: &str) -> Vec<&'a Value> {
     all.filter(|one| one["what"] == what).collect()
 }
 
+/// CRCs of the tables of all slides but those that are judged after each.
+fn learned_from_others(
+    reply: &Value,
+    names: &[String],
+    measured: &[Vec<MeasuredSlide>],
+) -> Vec<u32> {
+    let happened = reply["happened"].as_array().unwrap();
+    let mut begins: Vec<usize> =
+        serde_json::from_value::<Vec<(usize, Value)>>(reply["tables"].clone())
+            .unwrap()
+            .into_iter()
+            .map(|(begin, _)| begin)
+            .collect();
+    begins.push(happened.len());
+    let mut movements = Vec::new();
+    for slide in measured.iter().flatten() {
+        if !movements.contains(&slide.movement) {
+            movements.push(slide.movement);
+        }
+    }
+    let table = |judged: &[Value]| {
+        let judged: Vec<&Value> = judged.iter().map(|one| &one["at"]).collect();
+        let mut at = 0;
+        let slides: Vec<Vec<Vec<Observation>>> = measured
+            .iter()
+            .map(|texture| {
+                let mut cells = vec![Vec::new(); movements.len()];
+                for slide in texture {
+                    let movement = movements.iter().position(|m| *m == slide.movement);
+                    if !judged.contains(&&json!(at)) {
+                        let report = SlideReport::from(&slide.measurement);
+                        cells[movement.unwrap()].push(report.observation());
+                    }
+                    at += 1;
+                }
+                cells
+            })
+            .collect();
+        let table = learn(Method::Fused, None, names, &movements, &slides).unwrap();
+        Table::read(&table).unwrap().crc()
+    };
+    begins
+        .windows(2)
+        .map(|part| table(&happened[part[0]..part[1]]))
+        .collect()
+}
+
 #[test]
 fn recordings_are_shown_slide_by_slide_and_judged_by_tables_that_have_not_seen_them() {
     let mut remote = Remote::default();
@@ -213,7 +264,12 @@ fn recordings_are_shown_slide_by_slide_and_judged_by_tables_that_have_not_seen_t
     assert_eq!(reply["tables"].as_array().unwrap().len(), 3);
 
     let set = RecordingSet::open(Path::new(RECORDINGS)).unwrap();
-    let measured = measure_all(&set, |_| ()).unwrap().concat();
+    let measured = measure_all(&set, |_| ()).unwrap();
+    let learned = learned_from_others(&reply, &set.names(), &measured);
+    for (told, learned) in reply["tables"].as_array().unwrap().iter().zip(learned) {
+        assert_eq!(told[1]["crc"], learned);
+    }
+    let measured = measured.concat();
     let recorded = of(&reply, "recorded");
     assert_eq!(recorded.len(), measured.len());
     for slide in &recorded {
