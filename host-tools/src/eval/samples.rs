@@ -34,12 +34,7 @@ pub struct Trials {
 }
 
 impl Trials {
-    /// These were made before this training.
-    pub fn before(&mut self, moved: Option<bool>) {
-        self.answers.push(moved);
-    }
-
-    /// This was said of the next ones; `None`: nothing.
+    /// This was said of the next ones, or is known of those before this training; `None`: nothing.
     pub fn said(&mut self, moved: Option<bool>) {
         self.answers.push(moved);
     }
@@ -201,7 +196,7 @@ mod tests {
         let of = |before: Option<Option<bool>>, said: &[bool]| {
             let mut trials = Trials::default();
             if let Some(before) = before {
-                trials.before(before);
+                trials.said(before);
             }
             said.iter().for_each(|moved| trials.said(Some(*moved)));
             trials.moved()

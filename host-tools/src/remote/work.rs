@@ -218,7 +218,7 @@ async fn train(bench: &Bench, wanted: wire::Train, moved: Option<bool>) -> Resul
             };
             let left = usize::from(left);
             if slides == 0 && left + 1 < usize::from(trials) * movements {
-                samples.before(noted.flatten());
+                samples.said(noted.flatten());
             }
             slides += 1;
             let ends_trial = left > 0 && left.is_multiple_of(movements);

@@ -120,7 +120,7 @@ pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
             };
             let left = usize::from(left);
             if slides == 0 && left + 1 < usize::from(args.trials) * movements {
-                trials.before(noted.flatten());
+                trials.said(noted.flatten());
             }
             slides += 1;
             let ends_trial = left > 0 && left.is_multiple_of(movements);

@@ -3,12 +3,11 @@
 use std::io::{self, Write};
 
 use anyhow::Context as _;
-use tactus::eval::evaluate::Method;
 use tactus::eval::verified::{print_answer, print_slide};
 use tactus::link::Request;
 use tactus::remote::say::show_verifying;
-use tactus::remote::verifying::Verifying;
-use tactus_core::explorer::{Config, Strategy};
+use tactus::remote::verifying::{Verifying, config_of};
+use tactus_core::explorer::Strategy;
 use tactus_core::table::Table;
 use tactus_core::wire::{Command, Identify};
 
@@ -53,22 +52,16 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     let texture = table
         .find(&reference)
         .context("a name of the table is in the table")?;
-    let config = Config {
-        strategy: Strategy::Cycling,
-        verify: true,
-        false_alarm: args.stop.false_alarm.or(status.false_alarm),
-        ..args.stop.config(Method::Fused)
-    };
-    let mut verifying = Verifying::new(&bytes, texture, config)?;
     let wanted = Identify {
         among: std::iter::once(texture).collect(),
         threshold: args.stop.threshold,
         max_slides: args.stop.max_slides,
         strategy: Strategy::Cycling,
         seed: args.seed.unwrap_or_else(seed_of_now),
-        false_alarm: config.false_alarm,
+        false_alarm: args.stop.false_alarm.or(status.false_alarm),
         ..Identify::default()
     };
+    let mut verifying = Verifying::new(&bytes, texture, config_of(&wanted))?;
     let text = args.format == Format::Text;
     if text {
         writeln!(out, "Is it {}?", verifying.reference())?;
