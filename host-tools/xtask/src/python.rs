@@ -4,6 +4,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, Result, bail};
 
+use crate::anywhere;
 use crate::shell::{self, cargo, root, run, target};
 use crate::toolchain::rustflags;
 
@@ -83,6 +84,7 @@ pub(crate) fn wheel() -> Result<PathBuf> {
     pip.env("CARGO_ENCODED_RUSTFLAGS", rustflags(&[]));
     pip.env("CARGO_TARGET_DIR", target().join("wheel"));
     pip.env("MATURIN_PEP517_ARGS", "--locked");
+    anywhere::same(&mut pip)?;
     // the time of the files in it: the oldest that a zip file can say
     pip.env("SOURCE_DATE_EPOCH", "315532800");
     run(pip.arg("--wheel-dir").arg(&out).arg(root().join(PACKAGE)))?;

@@ -9,6 +9,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use sha2::{Digest as _, Sha256};
 
+use crate::anywhere;
 use crate::shell::{root, run, target};
 use crate::toolchain::{self, BROWSER};
 
@@ -37,6 +38,7 @@ pub(crate) fn build() -> Result<Built> {
     let toolchain = toolchain::get(BROWSER)?;
     eprintln!("Building with {}", toolchain.version());
     let mut cargo = toolchain.cargo_build(BROWSER, &[]);
+    anywhere::same(&mut cargo)?;
     cargo.arg("--release").arg("--manifest-path");
     run(cargo.arg(root().join(CRATE).join("Cargo.toml"))).context("the page does not build")?;
     let release = toolchain
