@@ -7,7 +7,7 @@
 
 #[cfg(feature = "arm")]
 mod arm;
-#[cfg(feature = "nucleo-f429zi")]
+#[cfg(all(feature = "nucleo-f429zi", feature = "early"))]
 mod bench;
 mod board;
 mod chip;
@@ -18,7 +18,7 @@ mod tasks;
 
 #[cfg(feature = "arm")]
 pub use arm::arm;
-#[cfg(feature = "nucleo-f429zi")]
+#[cfg(all(feature = "nucleo-f429zi", feature = "early"))]
 pub use bench::{bench, silicon, workload};
 pub use handheld::handheld;
 pub use rig::rig;

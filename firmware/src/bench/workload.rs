@@ -43,11 +43,13 @@ pub enum Workload {
     Decision,
     /// Confusion of the first of some whitened means with the others, all learned from as many slides.
     Confuse,
+    /// A look at the first part of a slide, by the shortest length that the table knows.
+    Look,
 }
 
 impl Workload {
     /// All, by their codes.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Nothing,
         Self::BandPower,
         Self::Frame,
@@ -58,6 +60,7 @@ impl Workload {
         Self::Choice,
         Self::Decision,
         Self::Confuse,
+        Self::Look,
     ];
 }
 
@@ -243,6 +246,15 @@ fn explore<K: Kernels, const N: usize>(
             let slide = black_box(&observed.slide);
             let done = counter.count(|| explorer.observe(observed.action, slide));
             done.ok()?;
+            None
+        }
+        Workload::Look => {
+            let slide = black_box(&observed.slide);
+            let look = counter.count(|| explorer.look(observed.action, 1, slide));
+            let look = look.ok()??;
+            put(&look.texture.to_le_bytes());
+            put(&look.doubt.to_le_bytes());
+            put(&[look.known.into()]);
             None
         }
         Workload::Choice => {

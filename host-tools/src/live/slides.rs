@@ -16,8 +16,6 @@ use crate::sim::collection::{Collection, TrialError, record_texture, texture_nam
 pub const WORLD: u64 = 1;
 /// Trials of each texture and movement.
 pub const TRIALS: u32 = 5;
-/// Lengths at which a slide may end, ms at constant speed.
-pub const LENGTHS_MS: [u16; 3] = [500, 1000, 2000];
 
 /// The trials of one texture.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -45,7 +43,13 @@ impl Trials {
         let plan = Plan::new();
         Ok(Self {
             texture,
-            movements: collection.observe(&plan, movements, texture, &slides, &LENGTHS_MS)?,
+            movements: collection.observe(
+                &plan,
+                movements,
+                texture,
+                &slides,
+                &Collection::LENGTHS_MS,
+            )?,
         })
     }
 
@@ -116,7 +120,8 @@ pub(super) fn table(trials: &[Trials], paper: bool, drift: f32) -> Result<Vec<u8
         .collect();
     let slides: Vec<_> = trials.iter().map(|t| t.movements.clone()).collect();
     let movements = &Collection::MOVEMENTS;
-    let table = learn_lengths(&expected, method, &names, movements, &LENGTHS_MS, &slides)?;
+    let lengths_ms = &Collection::LENGTHS_MS;
+    let table = learn_lengths(&expected, method, &names, movements, lengths_ms, &slides)?;
     let named = name_finger(&table, FingerCode::of(FingerName::Biotac), 0);
     named.map_err(|why: EncodeError| why.into())
 }

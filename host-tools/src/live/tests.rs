@@ -1,4 +1,4 @@
-use super::{LENGTHS_MS, TRIALS, Trials, WORLD};
+use super::{TRIALS, Trials, WORLD};
 use crate::sim::collection::{Collection, calibrated};
 use crate::sim::textures::TEXTURES;
 
@@ -32,6 +32,9 @@ fn the_trials_that_come_with_the_program_are_what_the_world_gives() {
             "T{texture}: sensor, features or world were changed on purpose? \
              TACTUS_TRIALS=write cargo test -p tactus-probe live::"
         );
-        assert_eq!(here.movements[0][0].first.len(), LENGTHS_MS.len());
+        assert_eq!(
+            here.movements[0][0].first.len(),
+            Collection::LENGTHS_MS.len()
+        );
     }
 }

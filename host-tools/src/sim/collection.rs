@@ -37,6 +37,9 @@ impl Collection {
         Movement::FOR_ROUGHNESS,
     ];
 
+    /// The lengths after which a slide may end, ms at constant speed, where nothing else is asked for.
+    pub const LENGTHS_MS: [u16; 3] = [500, 1000, 2000];
+
     /// The textures of a collection of `among` that holds `unknown`: the others are spread over Table 1.
     pub fn spread(unknown: u8, among: u8) -> Vec<u8> {
         let others = u16::from(among.clamp(1, 117)) - 1;
@@ -514,4 +517,54 @@ pub fn record_trials(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use tactus_core::table::{Contents, Table, factory};
+
+    use super::*;
+
+    /// Of each rig's table that comes with the firmware every 29th texture, learned anew: the table is of this simulator. All of
+    /// each is compared by `cargo xtask factory --check`.
+    #[test]
+    fn factory_tables_are_of_this_world() {
+        let plan = Plan::new();
+        for finger in FingerName::ALL {
+            let table = Table::read(factory::rig(finger)).unwrap();
+            let Contents::Fused(set, features) = table.contents() else {
+                panic!("{finger}: {:?}", table.contents());
+            };
+            let collection = Collection {
+                seed: 1,
+                textures: (1..=117).step_by(29).collect(),
+                trials: 5,
+            };
+            let calibration = calibrated(collection.setup_with(finger, 1, 0)).unwrap();
+            let slides = collection.record_with(finger, calibration, || ());
+            let slides = slides.unwrap();
+            for (slides, &texture) in slides.iter().zip(&collection.textures) {
+                let movements = &Collection::MOVEMENTS;
+                let observed = collection.observe(&plan, movements, texture, slides, &[]);
+                for (movement, trials) in (0..).zip(observed.unwrap()) {
+                    let vectors = trials.iter().map(|trial| {
+                        let vector = trial.whole.vector(set, features.into()).unwrap();
+                        table.whiten(movement, &vector).unwrap()
+                    });
+                    let vectors: Vec<_> = vectors.collect();
+                    let known = table.white_mean(u16::from(texture) - 1, movement);
+                    for (axis, known) in known.enumerate() {
+                        let sum: f64 = vectors.iter().map(|v| f64::from(v[axis])).sum();
+                        let mean = sum / vectors.len() as f64;
+                        // two roundings
+                        assert!(
+                            (mean - f64::from(known)).abs() <= 2.0,
+                            "{finger}, texture {texture}, movement {movement}, axis {axis}: {mean} and {known}; if simulator or features \
+                             were changed on purpose: cargo xtask factory"
+                        );
+                    }
+                }
+            }
+        }
+    }
 }

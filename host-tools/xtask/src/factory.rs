@@ -9,6 +9,8 @@ use crate::shell::{root, run, tactus, target};
 /// The world, and the trials of each texture and movement, that the firmware's table is learned from.
 const SEED: &str = "1";
 const TRIALS: &str = "5";
+/// The lengths at which the rig's slides may end, s at constant speed: of the image that ends slides early.
+const LENGTHS: &str = "0.5,1,2";
 /// Slides of each texture that the handheld's table is learned from: a hand scatters more than a rig.
 const SLIDES_BY_HAND: &str = "15";
 
@@ -73,6 +75,9 @@ fn make(work: &Path, finger: &str, names: &[&str]) -> Result<Vec<Vec<u8>>> {
         if name.starts_with("arm") {
             // whoever moves the finger may know the shear, the probe does not
             learn.args(["--features", "bands"]);
+        }
+        if *name == "factory.tact" {
+            learn.args(["--lengths", LENGTHS]);
         }
         run(learn.arg("--out").arg(file)).context("the learning failed")?;
     }

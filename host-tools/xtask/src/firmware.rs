@@ -14,14 +14,14 @@ const PROFILES: [(&str, &[&str], &[&str]); 9] = [
     (
         "firmware",
         &["--features=early"],
-        &["tactus-rig", "tactus-selftest", "tactus-silicon"],
+        &[
+            "tactus-rig",
+            "tactus-selftest",
+            "tactus-silicon",
+            "tactus-bench",
+        ],
     ),
-    // decides as all images but the rig's, which looks at a slide while it is made
-    (
-        "firmware",
-        &["--features=arm"],
-        &["tactus-arm", "tactus-bench"],
-    ),
+    ("firmware", &["--features=arm"], &["tactus-arm"]),
     ("firmware", &[ANALOG], &["tactus-rig-analog"]),
     ("firmware", &[MEMS], &["tactus-rig-mems"]),
     (

@@ -226,7 +226,8 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     pub(super) fn limit(&self, limits: &Limits, against: Against, slides: u8) -> f32 {
         let share = self.config.false_alarm;
         let mut least = limits.limit(against, slides, share);
-        if EARLY {
+        // models of shorter slides are behind those of the actions
+        if EARLY && self.novelty_models.len() > self.actions.len() {
             for sums in self
                 .episode
                 .iter()

@@ -92,7 +92,14 @@ impl Chosen {
             Textures::Simulated(finger, collection) => {
                 let count = collection.textures.len() as u64;
                 bar = progress::bar("learning textures", count, ", {eta} left");
-                under_finger::simulated_with(*finger, collection, method, || bar.inc(1))?
+                let done = || bar.inc(1);
+                // the image of the other fingers ends no slide early, nor does the paper's method
+                match (finger, method) {
+                    (FingerName::Biotac, Method::Fused) => {
+                        under_finger::simulated_early(collection, method, done)?
+                    }
+                    _ => under_finger::simulated_with(*finger, collection, method, done)?,
+                }
             }
             Textures::Recorded(recorded_texture) => {
                 bar = progress::spinner("learning materials");

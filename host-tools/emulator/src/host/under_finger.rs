@@ -114,6 +114,19 @@ pub fn simulated_with(
     Ok(Known { calibration, table })
 }
 
+/// As [`simulated`], with what slides say before their end: the rig's image ends them as soon as it is certain.
+pub fn simulated_early(
+    collection: &Collection,
+    method: Method,
+    done: impl Fn() + Sync,
+) -> Result<Known, KnownError> {
+    let first = collection.textures.first().copied().unwrap_or(1);
+    let calibration = calibrated(collection.setup(first, 0)).map_err(LearnError::from)?;
+    let lengths_ms = &Collection::LENGTHS_MS;
+    let table = collection.learn_lengths(method, calibration, lengths_ms, done)?;
+    Ok(Known { calibration, table })
+}
+
 /// A texture of a simulated world in a trial that nothing was learned from: those from 1 on.
 pub fn mounted(collection: &Collection, texture: u8, trial: u64) -> Unknown {
     mounted_with(FingerName::Biotac, collection, texture, trial)

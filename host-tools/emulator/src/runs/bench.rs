@@ -17,6 +17,8 @@ use std::process::ExitCode;
 
 use clap::Args as Arguments;
 use serde_json::Value;
+use tactus::eval::learn::{TableError, know_lengths};
+use tactus::sim::collection::Collection;
 use tactus_core::explorer::Method;
 use tactus_core::sensor::FingerName;
 
@@ -201,6 +203,7 @@ fn kernels(bench: &mut Bench, samples: &[i16]) -> Result<Vec<Row>, BenchError> {
         let table = of_gates(method)?;
         rows.extend(decisions(bench, samples, &table, method)?);
     }
+    rows.push(look(bench)?);
     Ok(rows)
 }
 
@@ -241,6 +244,16 @@ fn decisions(
         .filter(is_counted)
         .map(|kernel| kernel.count(bench))
         .collect()
+}
+
+/// What a look at a slide takes that may end early: by a table whose three lengths say the same as the whole slide.
+fn look(bench: &mut Bench) -> Result<Row, BenchError> {
+    let whole = of_gates(Method::Fused)?;
+    let words = observed(&whole, Method::Fused, 50)?.words;
+    let lengths = Collection::LENGTHS_MS.map(|ms| (ms, whole.clone(), u64::MAX));
+    let table = know_lengths(&whole, &lengths).map_err(TableError::from)?;
+    let name = "a look at a slide, fused";
+    Kernel::new(name, "117 textures", Workload::Look, &table, &words).count(bench)
 }
 
 /// Table bytes, and instructions of a fused decision of three movements after a typical slide.

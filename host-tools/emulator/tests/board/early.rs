@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use tactus::eval::learn::know_lengths;
-use tactus::sim::collection::{Collection, calibrated};
+use tactus::sim::collection::Collection;
 use tactus::sim::faults::Fault;
 use tactus_core::explorer::Method;
 use tactus_core::wire::{Event, Identify, Phase};
@@ -14,9 +14,6 @@ use tactus_emulator::host::under_finger::{self, Known};
 
 use crate::common::{boot, elf};
 
-/// The lengths of the table, ms.
-const LENGTHS_MS: [u16; 3] = [500, 1000, 2000];
-
 /// A world of so many textures that holds this one, and what is learned of it with and without lengths.
 fn world(seed: u64, texture: u8, among: u8) -> (Collection, [Known; 2]) {
     let collection = Collection {
@@ -24,12 +21,12 @@ fn world(seed: u64, texture: u8, among: u8) -> (Collection, [Known; 2]) {
         textures: Collection::spread(texture, among),
         trials: 5,
     };
-    let calibration = calibrated(collection.setup(texture, 0)).unwrap();
-    let table = collection.learn_lengths(Method::Fused, calibration, &LENGTHS_MS, || ());
-    let table = table.unwrap();
-    let whole = know_lengths(&table, &[]).unwrap();
-    let of = |table| Known { calibration, table };
-    (collection, [of(whole), of(table)])
+    let early = under_finger::simulated_early(&collection, Method::Fused, || ()).unwrap();
+    let whole = Known {
+        table: know_lengths(&early.table, &[]).unwrap(),
+        ..early.clone()
+    };
+    (collection, [whole, early])
 }
 
 /// What an exploration came to.
@@ -114,7 +111,7 @@ fn a_slide_ends_when_the_verdict_is_certain() {
     };
     assert_eq!(early.early.len(), 1);
     let ms = early.early[0];
-    assert!(LENGTHS_MS.contains(&ms));
+    assert!(Collection::LENGTHS_MS.contains(&ms));
     let seconds =
         |slide: &tactus_emulator::board::Slide| (slide.ended_ns - slide.began_ns) as f64 * 1e-9;
     println!(

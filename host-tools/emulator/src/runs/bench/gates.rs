@@ -16,6 +16,8 @@ pub(crate) const GATES: &[(&str, &str, f64)] = &[
     ("choice among 50 live textures, fused", "choice", 99_300.0),
     ("choice among 20 live textures, fused", "choice", 30_600.0),
     ("last sample to decision, fused", "decision", 152_000.0),
+    // with what it takes to know the first part of slides of this movement, once an exploration
+    ("a look at a slide, fused", "117 textures", 84_000.0),
     ("slot, not waiting", "slot", 500.0),
     ("core busy during a slide", "% at 168 MHz", 6.0),
     ("last sample to the verdict on the link", "ms", 5.0),
