@@ -47,10 +47,10 @@ pub fn arm() -> ! {
     });
     thread::run(|thread| {
         thread.spawn(only(link::send(tx)));
-        thread.spawn(only(link::receive(rx, &drive::BODY)));
-        thread.spawn(only(watch::watch()));
+        thread.spawn(only(link::receive(rx, &drive::BODY_ON_ARM)));
+        thread.spawn(only(watch::watch(true)));
         thread.spawn(only(task::orders()));
-        thread.spawn(only(probe::probe(r.store, r.go, samples_out)));
+        thread.spawn(only(probe::probe_on_arm(r.store, r.go, samples_out)));
         thread.spawn(only(acquire::acquire(r.sensor, r.slots, words_in)));
         SERVO
             .start(interrupt::UART5)

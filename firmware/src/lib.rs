@@ -5,9 +5,8 @@
 #![cfg_attr(target_os = "none", no_std)]
 #![cfg(target_os = "none")]
 
-#[cfg(feature = "arm")]
 mod arm;
-#[cfg(all(feature = "nucleo-f429zi", feature = "early"))]
+#[cfg(feature = "nucleo-f429zi")]
 mod bench;
 mod board;
 mod chip;
@@ -16,9 +15,8 @@ mod rig;
 mod selftest;
 mod tasks;
 
-#[cfg(feature = "arm")]
 pub use arm::arm;
-#[cfg(all(feature = "nucleo-f429zi", feature = "early"))]
+#[cfg(feature = "nucleo-f429zi")]
 pub use bench::{bench, silicon, workload};
 pub use handheld::handheld;
 pub use rig::rig;

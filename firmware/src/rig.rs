@@ -51,7 +51,7 @@ pub fn rig() -> ! {
     thread::run(|thread| {
         thread.spawn(only(link::send(tx)));
         thread.spawn(only(link::receive(rx, &drive::BODY)));
-        thread.spawn(only(watch::watch()));
+        thread.spawn(only(watch::watch(false)));
         thread.spawn(only(probe::probe(r.store, r.go, samples_out)));
         thread.spawn(only(acquire::acquire(r.sensor, r.slots, words_in)));
         SERVO.start(interrupt::UART5).spawn(only(servo::servo(

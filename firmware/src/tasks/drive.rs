@@ -8,7 +8,6 @@ use embassy_executor::InterruptExecutor;
 use embassy_stm32::interrupt;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-#[cfg(feature = "arm")]
 use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use tactus_core::probe::RigState;
@@ -16,8 +15,6 @@ use tactus_core::probe::servo_rig::RigCommand;
 use tactus_core::rig::Refused;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::PressureSensor as _;
-use tactus_core::table::EARLY;
-#[cfg(feature = "arm")]
 use tactus_core::wire::ArmReport;
 
 use super::link::Body;
@@ -57,10 +54,8 @@ static STUCK_MS: AtomicU32 = AtomicU32::new(0);
 const WAITS: u32 = u32::MAX;
 
 /// Words of an arm between two ticks: it says one in 50 ms.
-#[cfg(feature = "arm")]
 pub(super) const REPORTS: usize = 8;
 /// What the arm has said; what has no room is said again.
-#[cfg(feature = "arm")]
 pub(super) static HEARD: Channel<CriticalSectionRawMutex, ArmReport, REPORTS> = Channel::new();
 
 /// The reference rig's constants, until measured ones are read from the store.
@@ -96,7 +91,7 @@ pub(crate) fn stop() {
 
 /// Ends the slide that is being made, if one is.
 pub(crate) fn end_slide() {
-    END_SLIDE.store(EARLY, Relaxed);
+    END_SLIDE.store(true, Relaxed);
 }
 
 /// Stops what is being done, and what would come after it until [`forget_stop`].
@@ -157,13 +152,21 @@ pub(super) fn hung() -> Option<&'static str> {
     }
 }
 
-/// The servo as the link asks it at any time.
-pub(crate) static BODY: Body = Body {
+/// The rig as the link asks it at any time.
+pub(crate) static BODY: Body = MOVED_BY_MOTORS;
+const MOVED_BY_MOTORS: Body = Body {
     state,
     stop: |all| if all { stop_for_good() } else { stop() },
     lost: || LOST.load(Relaxed),
-    #[cfg(feature = "arm")]
+    arm: |_| false,
+};
+
+/// The same where somebody else's arm moves the finger.
+pub(crate) static BODY_ON_ARM: Body = Body {
     arm: |report| {
+        // what has no room is said again
         let _ = HEARD.try_send(report);
+        true
     },
+    ..MOVED_BY_MOTORS
 };

@@ -15,13 +15,13 @@ use static_cell::StaticCell;
 use tactus_core::dsp::Plan;
 use tactus_core::handheld::by_hand::{self, ByHand, Hand, Shown};
 use tactus_core::handheld::jobs::{self, Outcome};
-use tactus_core::handheld::{About, Handheld, Moved, Picture, Screen, Small, TICKS_HZ, draw};
+use tactus_core::handheld::{About, Handheld, Moved, Picture, Screen, TICKS_HZ, draw};
 use tactus_core::probe::seams::Events;
 use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::PressureSensor as _;
 use tactus_core::sensor::paa5100je::{MotionFault, Paa5100je};
-use tactus_core::table::{PACED, factory};
+use tactus_core::table::factory;
 use tactus_core::wire::{Event, PROTOCOL, Reset, Text};
 
 use super::display;
@@ -29,6 +29,7 @@ use super::level::OneLevel;
 use super::link::{BUSY, Body, HEARD, JOBS, TABLE};
 use super::outbox::{self, STREAM};
 use crate::board::{self, Finger};
+use crate::chip::Chip;
 use crate::chip::flash::{self, MappedTable};
 use crate::chip::motion::MotionBus;
 use crate::chip::slots::{self, Word};
@@ -158,8 +159,7 @@ pub(crate) static BODY: Body = Body {
     state: || STATE.lock(Cell::get),
     stop: |all| STOPPED.store(all, Relaxed),
     lost: || 0,
-    #[cfg(feature = "arm")]
-    arm: |_| (),
+    arm: |_| false,
 };
 
 /// A fingertip that nobody has measured; what belongs to motors is not used.
@@ -184,13 +184,15 @@ struct Parts {
     listens: bool,
     same: bool,
     ticks: u32,
-    /// The sensor of motion, in images that have one, and whether it failed when that was logged last.
-    motion: Option<Paa5100je<MotionBus>>,
+    /// The sensor of motion, and whether it failed when that was logged last.
+    motion: Paa5100je<MotionBus>,
     motion_fails: bool,
 }
 
 impl Hand for Parts {
-    const FEELS_GRAVITY: bool = Finger::FEELS_GRAVITY;
+    fn feels_gravity(&self) -> bool {
+        Finger::FEELS_GRAVITY
+    }
 
     async fn wait(&mut self) {
         self.ticker.next().await;
@@ -207,9 +209,12 @@ impl Hand for Parts {
     }
 
     fn moved(&mut self) -> Option<Moved> {
-        // leaves the driver out of the other image
-        let sensor = self.motion.as_mut().filter(|_| PACED)?;
+        let sensor = &mut self.motion;
         let moved = sensor.poll(Instant::now().as_millis() as u32);
+        // a probe without one is asked now and then: it may be plugged in
+        if !sensor.is_found() {
+            return None;
+        }
         let fault = sensor.fault();
         if fault.is_some() != self.motion_fails {
             self.motion_fails = fault.is_some();
@@ -346,7 +351,7 @@ pub(crate) async fn hand(
     let mut memory = Memory::new(store, MappedTable, FACTORY, flash::buffer());
     memory.reload(&mut events).await;
     let textures = memory.table().map_or(0, |table| table.textures());
-    let mut handheld = Handheld::<Small>::new(plan, textures);
+    let mut handheld = Handheld::<Chip>::new(plan, textures);
     if let Some(why) = memory.trouble() {
         handheld.memory_failed(jobs::words(why));
     }
@@ -361,7 +366,7 @@ pub(crate) async fn hand(
         listens: false,
         same: false,
         ticks: 0,
-        motion: PACED.then(|| Paa5100je::new(MotionBus::new(motion))),
+        motion: Paa5100je::new(MotionBus::new(motion)),
         motion_fails: false,
     };
     let mut probe = Probe {

@@ -10,7 +10,6 @@ use static_cell::ConstStaticCell;
 use tactus_core::probe::seams::Panel;
 use tactus_core::probe::{RigState, TableInUse, Turn, receive as receive_request};
 use tactus_core::sensor::FingerCode;
-#[cfg(feature = "arm")]
 use tactus_core::wire::ArmReport;
 use tactus_core::wire::{Counts, Event, Receiver, Request};
 
@@ -79,9 +78,8 @@ pub(crate) struct Body {
     pub(crate) stop: fn(bool),
     /// Samples that were lost behind the acquisition.
     pub(crate) lost: fn() -> u32,
-    /// Hears what the arm says.
-    #[cfg(feature = "arm")]
-    pub(crate) arm: fn(ArmReport),
+    /// Takes what the arm says, if one moves the finger.
+    pub(crate) arm: fn(ArmReport) -> bool,
 }
 
 #[embassy_executor::task]
@@ -149,9 +147,8 @@ impl Panel for AtAnyTime {
         (self.0.stop)(all);
     }
 
-    #[cfg(feature = "arm")]
-    fn arm(&mut self, report: ArmReport) {
-        (self.0.arm)(report);
+    fn arm(&mut self, report: ArmReport) -> bool {
+        (self.0.arm)(report)
     }
 
     fn stream(&mut self, on: bool) {

@@ -7,7 +7,7 @@ use heapless::spsc::Consumer;
 use static_cell::StaticCell;
 use tactus_core::dsp::Plan;
 use tactus_core::probe::seams::{Events, RigHandle as _};
-use tactus_core::probe::servo_rig::{Samples, Servo as _, ServoRig};
+use tactus_core::probe::servo_rig::{Samples, ServoRig};
 use tactus_core::probe::{self, Memory, Probe, TableInUse};
 use tactus_core::sensor::PressureSensor as _;
 use tactus_core::table::factory;
@@ -23,11 +23,13 @@ use crate::chip::flash::{self, MappedTable};
 
 /// The table that comes with the firmware: textures of a simulated world, which suit the emulated board. A real rig
 /// is trained by its user, or receives a table from the host.
-static FACTORY: &[u8] = if cfg!(feature = "arm") {
-    factory::ARM
-} else {
-    factory::rig(Finger::MODEL.name)
-};
+const fn factory_table(on_arm: bool) -> &'static [u8] {
+    if on_arm {
+        factory::ARM
+    } else {
+        factory::rig(Finger::MODEL.name)
+    }
+}
 /// The sensor's first words are there by now.
 const HEARD_MS: u64 = 150;
 
@@ -37,13 +39,31 @@ pub(crate) async fn probe(
     go: board::Go,
     samples: Consumer<'static, Samples>,
 ) {
+    work::<true>(flash, go, samples).await
+}
+
+/// The same where somebody else's arm moves the finger.
+#[embassy_executor::task]
+pub(crate) async fn probe_on_arm(
+    flash: board::Storage,
+    go: board::Go,
+    samples: Consumer<'static, Samples>,
+) {
+    work::<false>(flash, go, samples).await
+}
+
+async fn work<const HAS_STAGE: bool>(
+    flash: board::Storage,
+    go: board::Go,
+    samples: Consumer<'static, Samples>,
+) {
     static PLAN: StaticCell<Plan> = StaticCell::new();
-    let mut rig = ServoRig::new(ServoHandle(samples));
+    let mut rig = ServoRig::new(ServoHandle::<HAS_STAGE>(samples));
     // Whatever was before the reset, the finger is lifted first, and waits for nothing but the sensor. The stage does not
     // move before the calibration is there, which says whether the finger is in the air.
     Timer::after_millis(HEARD_MS).await;
     // An arm is told to stop, and asked for more once somebody asks for a slide: it may not be there.
-    let lifted = !ServoHandle::HAS_STAGE || rig.lift().await.is_ok();
+    let lifted = !HAS_STAGE || rig.lift().await.is_ok();
     let opening = async {
         let mut store = flash::open(flash).await?;
         if let Err(why) = store.mend().await {
@@ -61,13 +81,18 @@ pub(crate) async fn probe(
     }
     let mut probe = Probe {
         rig,
-        memory: Memory::new(store, MappedTable, FACTORY, flash::buffer()),
+        memory: Memory::new(
+            store,
+            MappedTable,
+            factory_table(!HAS_STAGE),
+            flash::buffer(),
+        ),
         events: Told(Output::new(go.same, Level::Low, Speed::Low)),
         plan: PLAN.init_with(Plan::new),
     };
     probe.memory.reload(&mut probe.events).await;
     // a lever that does not go up must not be asked again before somebody has looked at it
-    if lifted && ServoHandle::HAS_STAGE {
+    if lifted && HAS_STAGE {
         let _ = probe.rig.home().await;
     }
     loop {

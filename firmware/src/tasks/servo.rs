@@ -16,7 +16,6 @@ use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::pins::{Inputs, MAX_WORDS};
 use tactus_core::rig::stage::StageConstants;
 use tactus_core::sensor::PressureSensor as _;
-use tactus_core::table::EARLY;
 
 use super::drive::{self, ANSWER, COMMAND, END_SLIDE, ENDED, LOST, STATE, STOP, UNMEASURED};
 use crate::board::{self, Finger};
@@ -94,7 +93,7 @@ pub(crate) async fn servo(
             control.stop();
         }
         // before a command: what was to be ended is not the next one
-        if EARLY && END_SLIDE.swap(false, Relaxed) {
+        if END_SLIDE.swap(false, Relaxed) {
             control.end_slide();
         }
         if let Some(command) = COMMAND.try_take() {

@@ -241,7 +241,6 @@ impl<'p, K: Kernels> Slide<'p, K> {
     }
 
     /// Samples of P_AC at constant speed that have come.
-    #[cfg(any(test, feature = "early"))]
     pub fn samples(&self) -> u32 {
         self.spectrum.samples()
     }
@@ -251,7 +250,6 @@ impl<'p, K: Kernels> Slide<'p, K> {
     ///
     /// # Errors
     /// See [`SlideError`].
-    #[cfg(any(test, feature = "early"))]
     pub fn look(&mut self, samples: u32) -> Result<Measurement, SlideError> {
         self.measure(samples)
     }

@@ -175,6 +175,8 @@ pub struct Paa5100je<SPI> {
     /// When it saw something move last.
     moved_ms: u32,
     fault: Option<MotionFault>,
+    /// It has said once who it is.
+    found: bool,
 }
 
 impl<SPI: SpiDevice> Paa5100je<SPI> {
@@ -186,6 +188,7 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
             until_ms: None,
             moved_ms: 0,
             fault: None,
+            found: false,
         }
     }
 
@@ -197,6 +200,11 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
     /// Why it does not measure; `None` while it starts, and when it does.
     pub fn fault(&self) -> Option<MotionFault> {
         self.fault
+    }
+
+    /// Whether there is one: it has said who it is since this was made.
+    pub fn is_found(&self) -> bool {
+        self.found
     }
 
     /// To be called every 10 ms or so with a clock of ms that may turn over: starts it, waiting between the calls, and reads
@@ -273,6 +281,7 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
     fn identify(&mut self) -> Result<(), MotionFault> {
         let is = [self.read(IDENTITY)?, self.read(INVERSE_IDENTITY)?];
         if is == IS {
+            self.found = true;
             Ok(())
         } else {
             Err(MotionFault::Identity(is))
