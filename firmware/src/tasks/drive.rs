@@ -14,11 +14,10 @@ use tactus_core::probe::RigState;
 use tactus_core::probe::servo_rig::RigCommand;
 use tactus_core::rig::Refused;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::sensor::PressureSensor as _;
+use tactus_core::sensor::FingerName;
 use tactus_core::wire::ArmReport;
 
 use super::link::Body;
-use crate::board::Finger;
 
 /// Runs the task that drives the rig, and nothing else.
 pub(crate) static SERVO: InterruptExecutor = InterruptExecutor::new();
@@ -43,7 +42,7 @@ pub(super) static END_SLIDE: AtomicBool = AtomicBool::new(false);
 /// The session was told to stop: between two movements the rig has nothing to stop.
 static STOPPED: AtomicBool = AtomicBool::new(false);
 pub(super) static STATE: Mutex<CriticalSectionRawMutex, Cell<RigState>> =
-    Mutex::new(Cell::new(RigState::parked(UNMEASURED)));
+    Mutex::new(Cell::new(RigState::parked(unmeasured(FingerName::Biotac))));
 /// Samples dropped because the queue to the probe was full, or without a current of their own.
 pub(crate) static LOST: AtomicU32 = AtomicU32::new(0);
 /// Milliseconds since the tasks in thread mode have checked in.
@@ -59,15 +58,17 @@ pub(super) const REPORTS: usize = 8;
 pub(super) static HEARD: Channel<CriticalSectionRawMutex, ArmReport, REPORTS> = Channel::new();
 
 /// The reference rig's constants, until measured ones are read from the store.
-pub(crate) const UNMEASURED: RigCalibration = RigCalibration {
-    pressure: Finger::MODEL.calibration,
-    unloaded_a: (0.037, 0.0),
-    newton_per_ampere: 16.4,
-    date: 0,
-    air_known: false,
-    turned: 0,
-    serial: [0; 16],
-};
+pub(crate) const fn unmeasured(finger: FingerName) -> RigCalibration {
+    RigCalibration {
+        pressure: finger.parts().model.calibration,
+        unloaded_a: (0.037, 0.0),
+        newton_per_ampere: 16.4,
+        date: 0,
+        air_known: false,
+        turned: 0,
+        serial: [0; 16],
+    }
+}
 
 /// Tasks that are silent for longer hang: the longest that they compute, the choice among the actions of a whole grid, is
 /// half of it.

@@ -16,7 +16,7 @@ use tactus_core::wire::{Counts, Event, Receiver, Request};
 use super::level::OneLevel;
 use super::outbox::{self, OUTBOX, STREAM, tell};
 use crate::board::{self, Irqs};
-use crate::chip::slots;
+use crate::chip::{finger, slots};
 
 /// embassy's buffer for the line, and the longest write: a longer one would fail, and the flush after it never end.
 pub(crate) const CHUNK: usize = 256;
@@ -87,6 +87,8 @@ pub(crate) async fn receive(mut uart: BufferedUartRx<'static>, body: &'static Bo
     static RECEIVER: ConstStaticCell<Receiver> = ConstStaticCell::new(Receiver::new());
     let receiver = RECEIVER.take();
     let mut bytes = [0; 64];
+    // the first report says that the probe has booted, and with which finger
+    finger::found().await;
     loop {
         // a framing or overrun error costs bytes, which the CRC notices
         let Ok(length) = uart.read(&mut bytes).await else {
@@ -120,7 +122,7 @@ struct AtAnyTime(&'static Body);
 
 impl Panel for AtAnyTime {
     fn finger(&self) -> FingerCode {
-        board::FINGER
+        finger::code()
     }
 
     fn rig(&self) -> RigState {

@@ -4,9 +4,11 @@ use tactus_core::probe::Watch;
 
 use super::drive;
 use super::outbox::tell;
+use crate::chip::finger;
 
 #[embassy_executor::task]
 pub(crate) async fn watch(on_arm: bool) {
+    finger::found().await;
     let mut ticker = Ticker::every(Duration::from_millis(Watch::EVERY_MS));
     let mut watch = Watch::default();
     loop {
