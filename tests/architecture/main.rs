@@ -6,6 +6,7 @@ use syn::visit::Visit;
 const ROOMS: &str = "
 shared/src/ sensor < dsp < features < table < explorer rig < store < wire < probe < handheld
 firmware/src/ board < chip < tasks < bench selftest handheld rig arm
+host-tools/lab/src/ data < eval < sim < live < remote
 host-tools/emulator/src/ board < host < scenario < runs";
 /// Crates of the project that a crate may depend on.
 const CRATES: &str = "
