@@ -103,7 +103,7 @@ impl Whitened {
     }
 }
 
-/// What was learned of a texture at one movement, as the table that it is for keeps it.
+/// The training statistics of a texture at one movement, in the form of its table.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub enum TrainingStats {
     /// For a table of Gaussians.
