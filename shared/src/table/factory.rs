@@ -1,5 +1,6 @@
-//! The tables that come with the firmware: textures of a simulated world, learned there by `cargo xtask factory`. A probe is trained
-//! by its user, or receives a table from the host. A table that is not named takes no space in an image.
+//! The tables that come with the firmware: textures of a simulated world, learned there by `cargo xtask factory`. A
+//! probe is trained by its user, or receives a table from the host. A table that is not named takes no space in an
+//! image.
 use crate::sensor::FingerName;
 
 macro_rules! tables {

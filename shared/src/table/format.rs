@@ -47,8 +47,8 @@ pub const MAX_TEXTURES: usize = 128;
 /// Name of a texture.
 pub type Name = String<40>;
 
-/// What an exploration does next: makes one of the table's movements and looks at one property of it, or at all that the
-/// slide says.
+/// The next action of an exploration: one of the table's movements, and the property to look at, or all features of the
+/// slide.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 pub struct Action {
     /// Index of the movement in the table.
@@ -75,7 +75,7 @@ impl Action {
     }
 }
 
-/// What a table knows of a texture.
+/// The kind of data that a table holds of a texture.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Contents {
     /// A Gaussian per (movement, property), of these properties.
@@ -95,7 +95,7 @@ pub struct Tally {
     pub itself: u8,
 }
 
-/// Why bytes are no texture table.
+/// The reasons why bytes are not a valid texture table.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum TableError {
     /// Fewer bytes than the table needs.
@@ -113,9 +113,9 @@ pub enum TableError {
     Method(u8),
     /// The length in the header does not fit what it holds.
     Length {
-        /// What the header says.
+        /// The length in the header.
         header: usize,
-        /// What the contents take.
+        /// The length of the contents.
         contents: usize,
     },
     /// The checksum differs: the bytes have changed since they were written.
@@ -144,7 +144,7 @@ pub enum TableError {
     Name(u16),
     /// A texture has the number of another one.
     Number(u16),
-    /// What follows the names is no row of sections.
+    /// The bytes after the names are not valid sections.
     Sections,
     /// A section of this kind is damaged, there twice, or not for such a table.
     Section(u16),
@@ -230,7 +230,7 @@ impl core::error::Error for TableError {}
 /// Bytes of a texture's number and tally.
 pub(super) const LABEL_BYTES: usize = 5;
 
-/// Where the parts of a table begin.
+/// The offsets of the parts of a table.
 pub(super) struct Layout {
     pub(super) whitenings: usize,
     pub(super) cells: usize,

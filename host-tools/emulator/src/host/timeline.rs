@@ -2,7 +2,7 @@
 //! reports and by the world's truth.
 
 use serde_json::{Map, Value};
-use tactus::sim::world::Truth;
+use tactus_world::world::Truth;
 use tactus_core::wire::{Event, Phase};
 
 use crate::board::CONTACT_N;

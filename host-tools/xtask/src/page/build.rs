@@ -9,14 +9,13 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use sha2::{Digest as _, Sha256};
 
-use crate::anywhere;
 use crate::shell::{root, run, target};
 use crate::toolchain::{self, BROWSER};
 
 /// The crate, from the top.
 pub(super) const CRATE: &str = "host-tools/page";
 /// What the page's world was learned from: it stands beside the module in the page.
-const TRIALS: &str = "host-tools/src/live/world-1.trials";
+const TRIALS: &str = "host-tools/lab/src/live/world-1.trials";
 /// The module is downloaded by whoever opens the page.
 const MOST_BYTES: usize = 1_500_000;
 
@@ -27,18 +26,11 @@ pub(crate) struct Built {
     pub(crate) wasm_bytes: usize,
 }
 
-impl Built {
-    pub(super) fn folder(&self) -> Result<&Path> {
-        self.page.parent().context("the page has no folder")
-    }
-}
-
 /// Builds the page.
 pub(crate) fn build() -> Result<Built> {
     let toolchain = toolchain::get(BROWSER)?;
     eprintln!("Building with {}", toolchain.version());
     let mut cargo = toolchain.cargo_build(BROWSER, &[]);
-    anywhere::same(&mut cargo)?;
     cargo.arg("--release").arg("--manifest-path");
     run(cargo.arg(root().join(CRATE).join("Cargo.toml"))).context("the page does not build")?;
     let release = toolchain

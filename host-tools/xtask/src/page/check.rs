@@ -37,11 +37,6 @@ pub(crate) fn check() -> Result<()> {
         return skip(WHAT, &format!("{why:#}"));
     }
     let built = build()?;
-    println!("== formatting of the page");
-    let manifest = root().join(CRATE).join("Cargo.toml");
-    run(cargo()
-        .args(["fmt", "--check", "--manifest-path"])
-        .arg(manifest))?;
     println!("== {} bytes of WebAssembly", built.wasm_bytes);
     let native = reference()?;
     let probe = Probe::in_software()?;
@@ -53,7 +48,7 @@ pub(crate) fn check() -> Result<()> {
 }
 
 /// Tries what the page does with a probe, with the emulated board in place of the one in software.
-pub(super) fn emulated() -> Result<()> {
+pub(crate) fn emulated() -> Result<()> {
     let browser = browser()?;
     let built = build()?;
     let probe = Probe::emulated()?;
@@ -83,7 +78,7 @@ fn starts(program: &&str) -> bool {
 }
 
 /// A Chromium of this machine.
-pub(super) fn browser() -> Result<&'static str> {
+fn browser() -> Result<&'static str> {
     let browser = BROWSERS.into_iter().find(starts);
     browser.context("no Chromium (apt-get install chromium)")
 }
@@ -110,8 +105,8 @@ impl Probe {
         let _ = std::fs::remove_file(&file);
         let mut serves = cargo();
         // as the step of the tests has built it
-        serves.args(["test", "--workspace", "--test", "device", "--"]);
-        serves.args(["page::serves_a_page", "--exact", "--nocapture"]);
+        serves.args(["test", "--workspace", "--test", "command", "--"]);
+        serves.args(["device::page::serves_a_page", "--exact", "--nocapture"]);
         serves.env("TACTUS_PAGE_PORT", &file).stdin(Stdio::piped());
         let child = serves.spawn().context("cannot start cargo")?;
         let mut probe = Self {
@@ -167,7 +162,14 @@ fn reference() -> Result<PathBuf> {
     let file = target().join("page-native.jsonl");
     // as the step of the tests has built it
     let mut native = cargo();
-    native.args(["test", "--workspace", "--test", "page", "--", "replies"]);
+    native.args([
+        "test",
+        "--workspace",
+        "--test",
+        "core_and_lab",
+        "--",
+        "page::replies",
+    ]);
     run(native.env("TACTUS_PAGE_REPLIES", &file))?;
     Ok(file)
 }
@@ -177,8 +179,8 @@ fn files() -> Result<PathBuf> {
     let folder = target().join("page-files");
     // as the step of the tests has built it
     let mut writes = cargo();
-    writes.args(["test", "--workspace", "--test", "opened", "--"]);
-    writes.args(["leaves_files_for_a_page", "--exact"]);
+    writes.args(["test", "--workspace", "--test", "command", "--"]);
+    writes.args(["opened::leaves_files_for_a_page", "--exact"]);
     run(writes.env("TACTUS_PAGE_FILES", &folder))?;
     Ok(folder)
 }
