@@ -8,7 +8,6 @@ mod firmware;
 mod flash;
 mod page;
 mod python;
-mod reasons;
 mod shell;
 mod size;
 mod test;
@@ -36,6 +35,9 @@ enum Cli {
     /// All of them run even when one fails, in two rows side by side; the output of each comes when it is over. The last lines
     /// say what ran and how long it took, and what was skipped and why; tests that want recordings are skipped where there are
     /// none (TACTUS_REQUIRE_DATA=1 makes them fail instead). Longer checks: `cargo xtask campaign`.
+    ///
+    /// The images are built by the active toolchain if it has their target, or else by Debian's; TACTUS_TOOLCHAIN=debian or
+    /// TACTUS_TOOLCHAIN=active asks for one of them. The last line names the compiler that made them.
     Test {
         /// Run this step only, in this process
         #[arg(long, value_name = "NAME")]
@@ -59,7 +61,7 @@ enum Cli {
     Campaign(campaign::Options),
     /// Count what the core's kernels cost on the chip
     ///
-    /// Instructions of the bench image on the emulated board, the same code as in the rig's image, on a slide of a real finger
+    /// Instructions of the bench in the silicon image on the emulated board, the same code as in the rig's image, on a slide of a real finger
     /// where there is one; every result is compared with the plain kernels' on this PC. An error if a kernel misses its gate.
     #[command(after_help = bench::EXAMPLES)]
     Bench(bench::Options),
