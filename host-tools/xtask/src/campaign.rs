@@ -36,7 +36,7 @@ const BOOK: &str = "docs/src/tests.md";
 #[derive(Args)]
 pub(crate) struct Options {
     /// Part to run
-    #[arg(value_enum)]
+    #[arg(value_enum, default_value_t = Part::All)]
     part: Part,
     /// Seeds of a part that takes them; each has its own default
     #[arg(long, value_name = "A-B", value_parser = range)]

@@ -194,7 +194,7 @@ fn the_guard_trips_while_a_slide_is_ended() {
 }
 
 /// How much sooner a person knows, over 20 worlds: `cargo test --release --test board early:: -- --ignored --nocapture` in this folder, with
-/// the ELF of `cargo xtask build` in `TACTUS_ELF`.
+/// the ELF of `cargo xtask size` in `TACTUS_ELF`.
 #[test]
 #[ignore = "20 worlds take a quarter of an hour"]
 fn verdicts_come_sooner() {
