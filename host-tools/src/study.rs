@@ -2,7 +2,6 @@
 //! identification among all 117 textures, beside the published numbers.
 
 mod error;
-pub mod growth;
 pub mod identify;
 pub mod pilot;
 pub mod published;

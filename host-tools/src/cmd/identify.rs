@@ -18,7 +18,6 @@ use tactus::eval::first::at_least_two;
 use tactus::eval::learn::Expected;
 use tactus::eval::pictures::exploration::Exploration;
 use tactus::eval::pictures::timeline::{Timeline, Watch};
-use tactus::eval::seconds;
 use tactus::eval::show::{Show, count, is_right};
 use tactus::eval::transcript::{Answer, Transcript};
 use tactus::sim::collection::{Collection, calibrated, texture_name};
@@ -30,7 +29,7 @@ use tactus_core::probe::explore::{ExplorationStep, ExploreError, Rejection, expl
 use tactus_core::rig::Rig;
 use tactus_core::table::Table;
 
-use super::args::{Choosing, Expecting, Recordings, Stop, length, rising};
+use super::args::{Expecting, Recordings, Stop, length, rising};
 use super::learn::learned_here;
 use super::output::{Done, Format, UsageError, print_json};
 use super::plot::{Canvas, Plot};
@@ -100,8 +99,6 @@ pub(crate) struct Args {
     expecting: Expecting,
     #[command(flatten)]
     stop: Stop,
-    #[command(flatten)]
-    choosing: Choosing,
     /// Another seed draws other slides; with --simulated also another world, and another texture unless one is given
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -314,7 +311,6 @@ where
         open: true,
         ..args.stop.config(method)
     };
-    let config = args.choosing.config(config, seconds::RIG)?;
     let mut explorer = Explorer::<MAX_TEXTURES>::new(table, rig.measures(), config)?;
     out.flush()?;
     let mut slides = Transcript::default();
