@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tactus::sim::parts::ClockMode;
-use tactus::sim::world::{Setup, World};
+use tactus_world::parts::ClockMode;
+use tactus_world::world::{Setup, World};
 use tactus_core::sensor::FingerName;
 
 use super::display::Display;
