@@ -1,6 +1,5 @@
 //! The pictures that commands draw with `--plot`: what each shows, and how it is counted.
 
-pub mod channels;
 pub mod control;
 pub mod evaluation;
 pub mod exploration;
