@@ -41,8 +41,8 @@ pub(crate) fn docs(options: &Options) -> Result<()> {
 
 /// Checks what is generated, or writes it.
 fn parts(write: bool) -> Result<()> {
-    // a picture that a test of the simulator draws; then the book, whose outputs and plots are made from the recordings that one
-    // of its tests writes
+    // a picture that a test of the simulator draws; then the book, whose outputs and plots are made from the recordings
+    // that one of its tests writes
     let picture = [
         "--package",
         "tactus-world",

@@ -26,8 +26,8 @@ pub(crate) const MOTION: &str = "tactus-handheld-motion";
 /// The image of a probe on somebody else's arm.
 pub(crate) const ARM: &str = "tactus-arm";
 
-/// Has the firmware identify a texture, the rig's or with `--handheld` the handheld's, or serves its serial port where a TCP port
-/// for it is given.
+/// Has the firmware identify a texture, the rig's or with `--handheld` the handheld's, or serves its serial port where
+/// a TCP port for it is given.
 pub(crate) fn emulate(options: &[OsString]) -> Result<()> {
     let (by_hand, options): (Vec<_>, Vec<_>) =
         options.iter().cloned().partition(|o| o == "--handheld");
