@@ -120,12 +120,12 @@ pub(crate) fn one(name: &str) -> Result<()> {
 pub(crate) fn check() -> Result<()> {
     formatting()?;
     lints()?;
-    let packages = ["--package", "tactus-core", "--package", "tactus-lab"];
-    tests(
-        cargo()
-            .args(["test", "--lib", "--no-fail-fast"])
-            .args(packages),
-    )
+    let mut unit_tests = cargo();
+    unit_tests.args(["test", "--lib", "--no-fail-fast"]);
+    for package in ["core", "link", "world", "lab"] {
+        unit_tests.args(["--package", &format!("tactus-{package}")]);
+    }
+    tests(&mut unit_tests)
 }
 
 /// A step that is over: its name, the seconds that it took, and why it failed if it did.
