@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use tactus::data::properties::PropertyTable;
-use tactus::eval::evaluation::{Asked, evaluation};
-use tactus::eval::experiment::{Experiment, Protocol};
-use tactus::eval::learn::Expected;
-use tactus::eval::{novelty, verify};
+use tactus_lab::data::properties::PropertyTable;
+use tactus_lab::eval::evaluation::{Asked, evaluation};
+use tactus_lab::eval::experiment::{Experiment, Protocol};
+use tactus_lab::eval::learn::Expected;
+use tactus_lab::eval::{novelty, verify};
 use tactus_core::explorer::{self, Config};
 
 use crate::arguments;
@@ -112,7 +112,6 @@ impl Asks {
                 runs,
                 seed,
                 config,
-                time: None,
                 with_courses: arguments.reliability,
             },
         })

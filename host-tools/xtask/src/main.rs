@@ -18,7 +18,6 @@ mod size;
 mod test;
 #[cfg(test)]
 mod tests;
-mod timeline;
 mod toolchain;
 
 use std::ffi::OsString;
@@ -66,7 +65,6 @@ enum Cli {
   cargo xtask emulate --finger mems          with another finger: analog or mems
   cargo xtask emulate --handheld             a hand that explores with the handheld
   cargo xtask emulate --handheld --motion    the handheld with a sensor of motion, in a hand
-  cargo xtask emulate --timeline FILE.svg    what each second goes to, of rig and handheld, medians of 20 seeds
   cargo xtask emulate --port 7429            serves its serial port at tcp:127.0.0.1:7429 instead
   cargo xtask emulate --help                 all options")]
     #[command(disable_help_flag = true)]
@@ -191,7 +189,7 @@ fn main() -> ExitCode {
     }
     let done = match Cli::parse() {
         Cli::Build => firmware::build().map(|_| ()),
-        Cli::Emulate { options } => timeline::emulate(&options),
+        Cli::Emulate { options } => emulate::emulate(&options),
         Cli::Campaign { options } => match emulate::builds(&options) {
             Some(only) => bundle::reproduce(&only),
             None => emulate::campaign(&options),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde_json::Value;
 use sha2::{Digest as _, Sha256};
-use tactus::eval::evaluate::Method;
+use tactus_lab::eval::evaluate::Method;
 use tactus_core::sensor::FingerName;
 
 use crate::board::Error;

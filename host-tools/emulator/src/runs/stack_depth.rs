@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::Args as Arguments;
 use serde_json::{Value, json};
-use tactus::sim::world::Setup;
+use tactus_world::world::Setup;
 use tactus_core::wire::{Command, Event, Identify, Phase};
 
 use super::error::RunError;

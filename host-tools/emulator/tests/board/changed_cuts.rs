@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use tactus::link::{ReadTable, Request};
-use tactus::sim::collection::Collection;
-use tactus::sim::person::Manner;
+use tactus_link::{ReadTable, Request};
+use tactus_lab::sim::collection::Collection;
+use tactus_world::person::Manner;
 use tactus_core::explorer::Method;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire::{Event, Identify, Phase, Report, Reset};

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use tactus::link::Request;
-use tactus::sim::world::Setup;
+use tactus_link::Request;
+use tactus_world::world::Setup;
 use tactus_core::wire::Event;
 use tactus_emulator::board::{Emulator, Options, Switch};
 use tactus_emulator::host::talk::Talk;

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use tactus::sim::collection::Collection;
-use tactus::sim::parts::PartFault;
-use tactus::sim::world::Setup;
+use tactus_lab::sim::collection::Collection;
+use tactus_world::parts::PartFault;
+use tactus_world::world::Setup;
 use tactus_core::explorer::Method;
 use tactus_core::rig::Fault;
 use tactus_core::sensor::{FingerCode, FingerName};

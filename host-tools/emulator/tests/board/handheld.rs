@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use tactus::sim::scenario::Scenario;
+use tactus_lab::sim::scenario::Scenario;
 use tactus_core::sensor::FingerName;
 use tactus_emulator::board::Emulator;
 

@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use tactus::link::{PushTable, ReadTable, Request};
-use tactus::sim::collection::{Collection, calibrated};
-use tactus::sim::person::Manner;
+use tactus_link::{PushTable, ReadTable, Request};
+use tactus_lab::sim::collection::{Collection, calibrated};
+use tactus_world::person::Manner;
 use tactus_core::explorer::Method;
 use tactus_core::features::Movement;
 use tactus_core::table::{Change, Name, Table, TableError, amend};

@@ -3,12 +3,12 @@
 
 use std::path::PathBuf;
 
-use tactus::eval::learn::learn;
-use tactus::link::Request;
-use tactus::link::follow::Follower;
-use tactus::sim::collection::Collection;
-use tactus::sim::handheld::slides;
-use tactus::sim::person::Manner;
+use tactus_lab::eval::learn::learn;
+use tactus_link::Request;
+use tactus_link::follow::Follower;
+use tactus_lab::sim::collection::Collection;
+use tactus_lab::sim::handheld::slides;
+use tactus_world::person::Manner;
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
 use tactus_core::features::Property;

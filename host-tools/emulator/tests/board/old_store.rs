@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use tactus::link::{PushTable, ReadTable, Request};
-use tactus::sim::collection::Collection;
+use tactus_link::{PushTable, ReadTable, Request};
+use tactus_lab::sim::collection::Collection;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::store::StoreError;
 use tactus_core::table::{Name, Table, TableError};

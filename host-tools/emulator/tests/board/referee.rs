@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use tactus::sim::world::Setup;
+use tactus_world::world::Setup;
 use tactus_emulator::board::referee::{Rule, Violation};
 use tactus_emulator::board::{Emulator, Options};
 

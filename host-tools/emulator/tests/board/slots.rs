@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tactus::sim::world::Setup;
+use tactus_world::world::Setup;
 use tactus_core::rig::Fault as Seen;
 use tactus_core::wire::{Command, Event};
 use tactus_emulator::board::{Emulator, Options};

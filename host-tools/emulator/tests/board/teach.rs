@@ -4,8 +4,8 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use tactus::link::{ReadTable, Request};
-use tactus::sim::collection::Collection;
+use tactus_link::{ReadTable, Request};
+use tactus_lab::sim::collection::Collection;
 use tactus_core::explorer::Method;
 use tactus_core::table::{Name, Table, Tally};
 use tactus_core::wire::{Event, Forget, Identify, Status, TextureLearned, Train, Verdict};

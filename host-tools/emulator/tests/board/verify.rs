@@ -1,6 +1,6 @@
 //! "The same as this one?" by the real ELF, judged by what lies under its finger; and the output that follows the answer.
 
-use tactus::link::Request;
+use tactus_link::Request;
 use tactus_core::explorer::{Answer, Strategy};
 use tactus_core::table::Table;
 use tactus_core::wire::{Command, Event, Identify};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tactus::sim::world::Setup;
+use tactus_world::world::Setup;
 use tactus_core::dsp::{Plain, Plan};
 
 use super::error::BenchError;

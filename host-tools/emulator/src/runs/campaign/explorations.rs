@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use rayon::prelude::*;
-use tactus::eval::evaluate::Method;
-use tactus::sim::collection::Collection;
-use tactus::sim::recorded::RecordedTexture;
+use tactus_lab::eval::evaluate::Method;
+use tactus_lab::sim::collection::Collection;
+use tactus_lab::sim::recorded::RecordedTexture;
 use tactus_core::wire::Identify;
 
 use crate::board::Options;

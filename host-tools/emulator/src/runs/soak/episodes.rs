@@ -9,9 +9,9 @@ use rand::RngExt as _;
 use rand::seq::IndexedRandom as _;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
-use tactus::eval::show::count;
-pub(super) use tactus::sim::fault_case::{HOMINGS, world};
-use tactus::sim::faults::Fault;
+use tactus_lab::eval::show::count;
+pub(super) use tactus_lab::sim::fault_case::{HOMINGS, world};
+use tactus_world::faults::Fault;
 use tactus_core::table::factory;
 use tactus_core::wire::Identify;
 

@@ -1,0 +1,437 @@
+use std::time::Duration;
+
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use tactus_core::features::{Block, Movement, Property};
+use tactus_core::rig::Fault;
+use tactus_core::sensor::FingerCode;
+use tactus_core::table::Action;
+use tactus_core::wire::{
+    Command, Counts, Event, ExpectedOutcome, Failure, Live, Phase, Report, SlideReport, Status,
+    Text, Verdict,
+};
+
+use super::keys::{Act, KEYS, press};
+use super::state::{Monitor, NOTES, SHOWN};
+use super::{is_gone, view};
+
+fn status() -> Status {
+    Status {
+        phase: Phase::Ready,
+        fault: None,
+        textures: 4,
+        table_bytes: 900,
+        table_crc: 7,
+        factory: true,
+        calibrated: 0,
+        counts: Counts::default(),
+        skin_mj: (1500, 250),
+        false_alarm: None,
+        high_force: false,
+        finger: FingerCode::BIOTAC,
+    }
+}
+
+/// A monitor that has received these events.
+fn heard(events: impl IntoIterator<Item = Event>) -> Monitor {
+    let names = ["Burlap", "Oak wood", "Velcro", "Felt"].map(str::to_owned);
+    let mut monitor = Monitor::new("/dev/ttyACM0", status(), names.to_vec());
+    for (event, number) in events.into_iter().zip(1u16..) {
+        let at_ms = 1000 * u32::from(number);
+        monitor.hear(&Report {
+            number,
+            at_ms,
+            event,
+        });
+    }
+    monitor
+}
+
+/// The screen, its lines without the blanks at their ends.
+fn screen(monitor: &Monitor, width: u16, height: u16) -> Vec<String> {
+    let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+    terminal.draw(|frame| view::draw(monitor, frame)).unwrap();
+    let buffer = terminal.backend().buffer();
+    buffer
+        .content()
+        .chunks(width.into())
+        .map(|row| {
+            let line: String = row.iter().map(|cell| cell.symbol()).collect();
+            line.trim_end().to_owned()
+        })
+        .collect()
+}
+
+fn exploration() -> Vec<Event> {
+    let action = Action {
+        movement: 0,
+        property: Some(Property::Roughness),
+    };
+    vec![
+        Event::Chosen {
+            slide: 1,
+            movement: Movement::FOR_TRACTION,
+            action,
+            expected: [ExpectedOutcome {
+                action,
+                uncertainty: 0.125,
+                benefit: 0.9,
+            }]
+            .into_iter()
+            .collect(),
+        },
+        Event::Phase(Phase::Sliding),
+        Event::SlideReport {
+            slide: 1,
+            action,
+            observed: SlideReport {
+                properties: [Some(0.512), Some(5.25), None],
+                roughness_is_bound: false,
+                background: 1.0,
+                bands: Default::default(),
+                pressure: None,
+            },
+            posterior: [0.05, 0.75, 0.15, 0.05].into_iter().collect(),
+        },
+        Event::Live(Live {
+            force_mn: 1050,
+            steps: 1600,
+            stage_um: 31_250,
+            speed_um_s: 10_040,
+            current_ma: 132,
+        }),
+    ]
+}
+
+#[test]
+fn a_slide_looks_like_this() {
+    let screen = screen(&heard(exploration()), 80, 24);
+    let golden = "\
+╭ Rig ─────────────────╮╭ Slide 1 ───────────╮╭ What it may be ────────────────╮
+│phase   sliding       ││1.26 N, 10.0 mm/s   ││Oak wood       ██████░░  75.0 % │
+│force   1.050 N       ││for roughness       ││Velcro         █░░░░░░░  15.0 % │
+│████████░░┃░░░░░ 2.1 N││to leave 12.5 %     ││Burlap         ░░░░░░░░   5.0 % │
+│speed    10.0 mm/s    ││last slide          ││Felt           ░░░░░░░░   5.0 % │
+│stage    31.3 mm      ││traction    0.512 N ││                                │
+│lever    1.00 mm      ││roughness   5.250   ││                                │
+│motor     132 mA      ││fineness        -   ││                                │
+╰──────────────────────╯╰────────────────────╯╰────────────────────────────────╯
+╭ Messages ────────────────────────────────────────────────────────────────────╮
+│0:00:03 slide 1: most likely Oak wood, 75.0 %                                 │";
+    assert_eq!(screen[10..21].join("\n"), golden);
+    assert_eq!(
+        screen[0],
+        " Tactus  /dev/ttyACM0  4 textures (factory)            nothing lost, up 0:00:04"
+    );
+}
+
+#[test]
+fn an_answer_a_fault_and_silence_are_said_in_words() {
+    let mut events = exploration();
+    events.push(Event::Verdict(Verdict {
+        texture: 1,
+        name: "Oak wood".try_into().unwrap(),
+        probability: 0.995,
+        sure: true,
+        unknown: false,
+        log_odds: None,
+        slides: 1,
+        wants_label: false,
+        changed: false,
+    }));
+    let mut monitor = heard(events.clone());
+    assert!(
+        screen(&monitor, 80, 24)
+            .join("\n")
+            .contains("it is Oak wood: 99.5 % after 1 slide")
+    );
+    events.push(Event::Fault(Fault::EStop));
+    monitor = heard(events);
+    let faulted = screen(&monitor, 80, 24);
+    assert!(
+        faulted[0].ends_with("FAULT: emergency stop"),
+        "{}",
+        faulted[0]
+    );
+    assert!(
+        faulted
+            .iter()
+            .any(|line| line.contains("release it, then reset (key h)"))
+    );
+    monitor.silent = Some(Duration::from_secs(4));
+    assert!(screen(&monitor, 80, 24)[0].ends_with("SILENT for 4 s"));
+    // it is over when the rig has found its switches again
+    monitor.hear(&Report {
+        number: 9,
+        at_ms: 9000,
+        event: Event::Phase(Phase::Homing),
+    });
+    assert_eq!(monitor.status.fault, None);
+    // what is lost on the line stands where everybody looks
+    monitor.silent = None;
+    monitor.losses = (2, 3);
+    assert!(screen(&monitor, 80, 24)[0].contains("line 2 damaged 3 lost"));
+}
+
+#[test]
+fn a_sine_is_a_peak_at_its_frequency() {
+    let mut events = Vec::new();
+    for number in 0..40u16 {
+        let sample = |n: u16| {
+            let t = f64::from(number * 64 + n) / 2200.0;
+            (200.0 * (std::f64::consts::TAU * 100.0 * t).sin()) as i16
+        };
+        events.push(Event::Block(Block {
+            number,
+            still: false,
+            steady: None,
+            pac: (0..64).map(sample).collect(),
+            shear_mn: Default::default(),
+            lost: 0,
+        }));
+    }
+    let monitor = heard(events);
+    assert_eq!(monitor.pac.len(), SHOWN);
+    let screen = screen(&monitor, 80, 24);
+    let cells = |line: &str| line.chars().collect::<Vec<char>>();
+    let axis = screen.iter().find(|line| line.contains("1000 Hz")).unwrap();
+    let mark: Vec<char> = "100 ".chars().collect();
+    let hundred = cells(axis)
+        .windows(4)
+        .position(|cells| cells == mark)
+        .unwrap();
+    // the highest bar stands over the 100
+    let top = screen
+        .iter()
+        .skip(2)
+        .find(|line| cells(line)[41..79].iter().any(|c| ('▁'..='█').contains(c)))
+        .unwrap();
+    let peak = (41..79)
+        .find(|&column| ('▁'..='█').contains(&cells(top)[column]))
+        .unwrap();
+    assert!(
+        peak.abs_diff(hundred) <= 2,
+        "{peak} {hundred}\n{}",
+        screen.join("\n")
+    );
+    // and the trace reaches both ends of its scale
+    assert!(
+        screen.iter().any(|line| line.contains(" 256│"))
+            && screen.iter().any(|line| line.contains("-256│"))
+    );
+}
+
+#[test]
+fn any_size_of_terminal_is_drawn_on() {
+    let mut events = exploration();
+    events.extend((0..60).map(|n| {
+        Event::Rejected {
+            slide: n,
+            why: Failure::Said(
+                Text::try_from("a reason that is much too long for a narrow terminal, and goes on")
+                    .unwrap(),
+            ),
+        }
+    }));
+    let monitor = heard(events);
+    for (width, height) in [(1, 1), (10, 5), (40, 12), (80, 24), (140, 40), (300, 90)] {
+        assert_eq!(screen(&monitor, width, height).len(), usize::from(height));
+    }
+    assert_eq!(monitor.notes.len(), NOTES);
+}
+
+#[test]
+fn from_60_to_200_columns_nothing_lies_over_anything_else() {
+    let mut monitor = heard(exploration());
+    monitor.losses = (12, 345);
+    for width in 60..=200 {
+        for height in [21, 24, 33, 34, 50] {
+            let screen = screen(&monitor, width, height);
+            let all = screen.join("\n");
+            // what is wrong is whole, and the panels are
+            let losses = "line 12 damaged 345 lost, slots 0 late 0 lost";
+            assert!(screen[0].ends_with(losses), "{all}");
+            let corners = |corner| all.matches(corner).count();
+            assert_eq!(corners('╭'), 6, "{all}");
+            assert_eq!(corners('╯'), 6, "{all}");
+            for part in [
+                "P_AC",
+                "Spectrum",
+                "sliding",
+                "Oak wood",
+                "1.26 N, 10.0 mm/s",
+            ] {
+                assert!(all.contains(part), "{width} x {height}: no {part}\n{all}");
+            }
+            let keys = &screen[usize::from(height) - 1];
+            for (key, what, _) in KEYS {
+                assert!(keys.contains(&format!(" {key}  {what}")), "{keys}");
+            }
+            // frequencies that can be read
+            let axis = screen.iter().find(|line| line.contains("1000 Hz")).unwrap();
+            let of_spectrum = axis
+                .chars()
+                .skip(usize::from(width) / 2)
+                .collect::<String>();
+            let of_spectrum = of_spectrum.replace('│', " ");
+            let marks: Vec<&str> = of_spectrum.split_whitespace().collect();
+            let allowed = ["17", "50", "100", "200", "500", "1000", "Hz"];
+            assert!(
+                marks.iter().all(|mark| allowed.contains(mark)),
+                "{marks:?}\n{all}"
+            );
+            assert!(marks.len() >= 4, "{marks:?}");
+        }
+    }
+}
+
+#[test]
+fn a_terminal_that_is_too_small_is_told_so() {
+    let monitor = heard(exploration());
+    for (width, height) in [(59, 24), (80, 20), (30, 5)] {
+        let all = screen(&monitor, width, height).join("\n");
+        let said = format!("Too small: {width} x {height}.");
+        assert!(all.contains(&said) && all.contains("60 x 21"), "{all}");
+        assert!(!all.contains("P_AC"));
+    }
+}
+
+fn key(code: KeyCode) -> KeyEvent {
+    KeyEvent::new(code, KeyModifiers::NONE)
+}
+
+#[test]
+fn the_help_has_every_key_and_any_key_closes_it() {
+    let mut monitor = heard(exploration());
+    assert_eq!(press(&mut monitor, key(KeyCode::Char('?')), true), None);
+    for (width, height) in [(60, 21), (80, 24), (200, 60)] {
+        let all = screen(&monitor, width, height).join("\n");
+        for (key, _, what) in KEYS {
+            assert!(all.contains(&format!(" {key}   {what}")), "{all}");
+        }
+    }
+    assert_eq!(press(&mut monitor, key(KeyCode::Char('q')), true), None);
+    assert!(!screen(&monitor, 80, 24).join("\n").contains(" Keys "));
+    let quit = press(&mut monitor, key(KeyCode::Char('q')), true);
+    assert_eq!(quit, Some(Act::Quit));
+}
+
+#[test]
+fn a_name_is_typed_and_taught() {
+    let mut monitor = heard(exploration());
+    let type_in = |monitor: &mut Monitor, text: &str| {
+        for c in text.chars() {
+            assert_eq!(press(monitor, key(KeyCode::Char(c)), false), None);
+        }
+    };
+    // not while it is at something
+    assert_eq!(press(&mut monitor, key(KeyCode::Char('t')), true), None);
+    assert_eq!(monitor.typed, None);
+    // q is a letter of the name
+    type_in(&mut monitor, "tquilt");
+    assert!(screen(&monitor, 60, 21)[20].contains("teach  quilt"));
+    let taught = |name: &str| Some(Act::Teach(name.try_into().unwrap()));
+    assert_eq!(
+        press(&mut monitor, key(KeyCode::Enter), false),
+        taught("quilt")
+    );
+    assert_eq!(monitor.typed, None);
+    // a known name, whatever its capitals; and from its first letters
+    type_in(&mut monitor, "tOAK wood");
+    assert_eq!(
+        press(&mut monitor, key(KeyCode::Enter), false),
+        taught("Oak wood")
+    );
+    type_in(&mut monitor, "tbu");
+    assert_eq!(press(&mut monitor, key(KeyCode::Tab), false), None);
+    assert_eq!(
+        press(&mut monitor, key(KeyCode::Enter), false),
+        taught("Burlap")
+    );
+    // nothing, and not at all
+    type_in(&mut monitor, "t");
+    assert_eq!(press(&mut monitor, key(KeyCode::Enter), false), None);
+    type_in(&mut monitor, "tfelt");
+    assert_eq!(press(&mut monitor, key(KeyCode::Esc), false), None);
+    assert_eq!(monitor.typed, None);
+    let control_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
+    type_in(&mut monitor, "tfelt");
+    assert_eq!(press(&mut monitor, control_c, false), Some(Act::Interrupt));
+}
+
+#[test]
+fn what_was_stopped_is_shown_no_more() {
+    let mut monitor = heard(exploration());
+    let shown = |monitor: &Monitor| screen(monitor, 80, 24)[..19].join("\n");
+    assert!(shown(&monitor).contains("Slide 1") && shown(&monitor).contains("Oak wood"));
+    monitor.asked(&Command::Stop);
+    // reports of it are still on the line
+    for event in exploration() {
+        monitor.hear(&Report {
+            number: 9,
+            at_ms: 9000,
+            event,
+        });
+    }
+    let screen = shown(&monitor);
+    assert!(
+        !screen.contains("Slide 1") && !screen.contains("0.512"),
+        "{screen}"
+    );
+    assert!(screen.contains("i: find out"), "{screen}");
+    monitor.asked(&Command::Identify(Default::default()));
+    monitor.hear(&Report {
+        number: 10,
+        at_ms: 9500,
+        event: exploration().remove(0),
+    });
+    assert!(shown(&monitor).contains("Slide 1"));
+}
+
+#[test]
+fn between_slides_the_trace_is_said_to_be_the_last_ones() {
+    let block = Event::Block(Block {
+        number: 0,
+        still: false,
+        steady: None,
+        pac: (0..64).collect(),
+        shear_mn: Default::default(),
+        lost: 0,
+    });
+    let phase = |phase| Event::Phase(phase);
+    let nothing = heard([phase(Phase::Ready)]);
+    assert!(
+        screen(&nothing, 60, 21)
+            .join("\n")
+            .contains("drawn while sliding")
+    );
+    let mut events = vec![phase(Phase::Sliding), block];
+    let sliding = heard(events.clone());
+    assert!(screen(&sliding, 60, 21)[1].contains("P_AC, counts, 1 s"));
+    events.push(phase(Phase::Lifting));
+    let after = heard(events);
+    assert!(screen(&after, 60, 21)[1].contains("P_AC of the last slide"));
+}
+
+#[test]
+fn the_end_of_homing_is_told() {
+    let monitor = heard([Event::Phase(Phase::Homing), Event::Phase(Phase::Ready)]);
+    assert!(
+        screen(&monitor, 80, 24)
+            .join("\n")
+            .contains("homed: the rig is ready")
+    );
+    // not after every slide
+    let monitor = heard([Event::Phase(Phase::Lifting), Event::Phase(Phase::Ready)]);
+    assert!(monitor.notes.is_empty());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_terminal_that_is_closed_is_noticed() {
+    let (terminal, other) = std::io::pipe().unwrap();
+    assert!(!is_gone(&terminal));
+    drop(other);
+    assert!(is_gone(&terminal));
+}

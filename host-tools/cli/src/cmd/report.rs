@@ -1,0 +1,204 @@
+//! `tactus report`: what a table is good for, on one page; without a table, how repeatable slides are.
+
+mod repeatability;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use serde::Serialize;
+use tactus_core::table::Table;
+use tactus_lab::data::whole::write_whole;
+use tactus_lab::eval::report::{RUNS, Report, Slides};
+use tactus_lab::eval::samples;
+use tactus_lab::eval::show::count;
+use tactus_study::page::render;
+use tactus_study::pictures::map;
+
+use super::args::Recordings;
+use super::learn::learned_here;
+use super::output::{Format, UsageError, percent, print_json, verdict_rows};
+use super::plot::Plot;
+use super::progress::{notice, progress};
+use super::table_file::read_table;
+use super::textures::{measure_folder, of_one_finger};
+
+/// Say what a table is good for, or how repeatable recorded slides are by part and operator
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus report TABLE                                        textures, nearest pairs, advice
+  tactus report TABLE --recordings DIR --out report.html     and what users would be told, as a page
+  tactus report --recordings DIR                             variance by part, operator and repetition
+  tactus report --recordings ANNA --recordings BEN --plot charts    two operators, and control charts
+  tactus device record cork felt --slides 5 --operator Anna --lot 7 --out ANNA
+
+Slides that the table was learned from do not count, where it was learned from this very folder.
+Without a table, a part is a texture, or a lot of it. Operators are compared if each of them touched
+every part. Below 10 % of all variation a gauge is usually called good, above 30 % not acceptable; it
+should tell at least five classes apart.")]
+pub(crate) struct Args {
+    /// The table; without it, the variance of the recorded slides is told
+    table: Option<PathBuf>,
+    /// Recordings to explore with the table; they may hold textures that it does not have. Without a
+    /// table it may be given several times, for a study of several operators
+    #[arg(long, value_name = "DIR")]
+    recordings: Vec<PathBuf>,
+    /// Seed of the explorations
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// The page to write; a page that is there is replaced
+    #[arg(long, value_name = "FILE.html", requires = "table")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    plot: Plot,
+    /// How to print the report
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What the page is made of.
+#[derive(Serialize)]
+struct Page<'r> {
+    name: String,
+    version: &'static str,
+    command: String,
+    report: &'r Report,
+    map: String,
+}
+
+/// Reports on a table, or on recorded slides.
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    if let Some(table) = &args.table {
+        return of_table(table, args, out);
+    }
+    let mut folders = args.recordings.clone();
+    if folders.is_empty() {
+        folders.push(Recordings { recordings: None }.folder()?);
+    }
+    repeatability::run(&folders, &args.plot, args.format, out)
+}
+
+fn of_table(file: &Path, args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    if args.recordings.len() > 1 || args.plot.is_asked() {
+        let say = "with a table, give --recordings once and no --plot";
+        return Err(UsageError(say.to_owned()).into());
+    }
+    let mut bytes = Vec::new();
+    let table = read_table(file, &mut bytes)?;
+    let folder = args.recordings.first();
+    let slides = folder.map(|folder| unseen(folder, table)).transpose()?;
+    let runs = slides
+        .as_ref()
+        .map_or(0, |slides| RUNS * slides.len() as u64);
+    let bar = progress(runs, "exploring");
+    let report = Report::new(table, slides.as_deref(), args.seed, || bar.inc(1));
+    bar.finish_and_clear();
+    let report = report.with_context(|| file.display().to_string())?;
+    if let Some(path) = &args.out {
+        let page = Page {
+            name: file.display().to_string(),
+            version: env!("CARGO_PKG_VERSION"),
+            command: command(file, args),
+            report: &report,
+            map: map::figure(table)?.svg,
+        };
+        let page = render(include_str!("report/page.html"), &page)?;
+        write_whole(path, page).with_context(|| path.display().to_string())?;
+    }
+    match args.format {
+        Format::Json => print_json(&report, out)?,
+        Format::Text => print(&report, &samples::in_words(table), out)?,
+    }
+    out.flush()?;
+    if let Some(path) = &args.out {
+        notice(&format!("wrote {}", path.display()));
+    }
+    Ok(())
+}
+
+fn command(file: &Path, args: &Args) -> String {
+    let mut command = format!("tactus report {}", file.display());
+    if let Some(folder) = args.recordings.first() {
+        command += &format!(" --recordings {} --seed {}", folder.display(), args.seed);
+    }
+    command
+}
+
+/// The slides of a folder that the table has not seen.
+fn unseen(folder: &Path, table: Table<'_>) -> anyhow::Result<Vec<Slides>> {
+    let (set, measured) = measure_folder(folder)?;
+    of_one_finger(&set, table)?;
+    let mut first = learned_here(&set, &measured, table);
+    let textures = set.textures().iter().zip(measured);
+    Ok(textures
+        .map(|(texture, mut slides)| {
+            slides.retain(|slide| !first.is_one(&texture.name, slide.movement));
+            Slides {
+                name: texture.name.clone(),
+                slides,
+            }
+        })
+        .collect())
+}
+
+fn print(report: &Report, samples: &str, out: &mut impl Write) -> anyhow::Result<()> {
+    let wide = report.textures.iter().map(|t| t.name.chars().count()).max();
+    let wide = wide.unwrap_or(0).max(7);
+    writeln!(
+        out,
+        "{}, {}\n\n{:<wide$}  {:>6}  {:<wide$} {:>12} {:>14}",
+        count(report.textures.len() as u64, "texture"),
+        count(report.table.movements.len() as u64, "movement"),
+        "texture",
+        "slides",
+        "nearest",
+        "taken for it",
+        "slides to tell"
+    )?;
+    for texture in &report.textures {
+        let learned: u32 = texture.trials.iter().map(|&n| u32::from(n)).sum();
+        let (nearest, taken, slides) = match &texture.nearest {
+            Some(near) => (
+                near.texture.as_str(),
+                percent((1000.0 * near.taken_for).round() / 1000.0),
+                near.slides.map_or("over ten".to_owned(), |n| n.to_string()),
+            ),
+            None => ("-", "-".to_owned(), "-".to_owned()),
+        };
+        let name = &texture.name;
+        writeln!(
+            out,
+            "{name:<wide$}  {learned:>6}  {nearest:<wide$} {taken:>12} {slides:>14}"
+        )?;
+    }
+    writeln!(out, "{samples}")?;
+    if let Some(recorded) = &report.recorded {
+        let explorations = count(recorded.explorations as u64, "exploration");
+        writeln!(
+            out,
+            "\nWhat users would be told, by {explorations} of recorded slides, {:.1} slides each in the mean:",
+            recorded.mean_slides
+        )?;
+        let unknown = recorded.unknown.as_ref();
+        let of = [
+            ("textures of the table", Some(&recorded.known)),
+            ("others", unknown),
+        ];
+        for (kind, verdicts) in of.into_iter().filter_map(|(k, v)| Some((k, v?))) {
+            let told = verdict_rows(verdicts).map(|(name, share, remark)| {
+                let share = percent((1000.0 * share).round() / 1000.0);
+                format!("{name} {share}{remark}")
+            });
+            writeln!(out, "  {kind}: {}", told.join(", "))?;
+        }
+    }
+    match report.advice.is_empty() {
+        true => writeln!(
+            out,
+            "\nNothing stands out: all textures are told apart by a few slides."
+        )?,
+        false => writeln!(out, "\nWhat would help:\n- {}", report.advice.join("\n- "))?,
+    }
+    Ok(())
+}

@@ -1,0 +1,129 @@
+//! Figures of virtual explorations, with and without what a user would have been told: what `tactus evaluate` prints.
+
+use serde::Serialize;
+use tactus_core::explorer::Config;
+
+use crate::eval::courses::courses;
+use crate::eval::evaluate::{EvaluateError, Method, Outcome, Summary, evaluate};
+use crate::eval::experiment::Experiment;
+use crate::eval::reliability::{AtThreshold, Statements, by_threshold, statements};
+use crate::eval::verdicts::Verdicts;
+
+pub use crate::eval::courses::Course;
+
+/// The figures, and what they are of.
+#[derive(Serialize)]
+pub struct Evaluation {
+    /// How the runs decide.
+    pub method: Method,
+    /// Which slides are learned from and tested on.
+    pub protocol: &'static str,
+    /// Slides learned from, per texture and movement.
+    pub train_slides: usize,
+    /// Virtual explorations.
+    pub runs: u64,
+    /// Textures.
+    pub textures: usize,
+    /// A texture more probable than this is the answer.
+    pub threshold: f32,
+    /// Most slides of a run.
+    pub max_slides: u8,
+    /// Of all draws.
+    pub seed: u64,
+    /// What users would have been told: the texture may be none of those known, and no slide counts twice.
+    pub verdicts: Verdicts,
+    /// Mean number of slides until then.
+    pub mean_slides_told: f64,
+    /// How often it was right when it said so, by what it said.
+    pub reliability: Vec<Statements>,
+    /// What another threshold would change.
+    pub by_threshold: Vec<AtThreshold>,
+    /// Figures of explorations that know that the texture is one of the table's, with slides drawn with replacement: the
+    /// paper's protocol.
+    #[serde(flatten)]
+    pub summary: Summary,
+}
+
+/// What is to be evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked {
+    /// How the runs decide.
+    pub method: Method,
+    /// The protocol's name.
+    pub protocol: &'static str,
+    /// How many runs.
+    pub runs: u64,
+    /// The experiment's seed.
+    pub seed: u64,
+    /// How runs end, and choose.
+    pub config: Config,
+    /// Whether reliability and other thresholds are wanted: a third of the work.
+    pub with_courses: bool,
+}
+
+/// A part of the work: it calls the function that it gets after every run.
+pub type Stage<'s> = dyn FnMut(&(dyn Fn() + Sync)) -> Result<(), EvaluateError> + 's;
+
+/// Plays the explorations. `stage` gets the number of each stage, how many there are, and its work, which it has to do. Gives the
+/// courses behind [`Evaluation::reliability`], too.
+///
+/// # Errors
+/// See [`EvaluateError`].
+pub fn evaluation(
+    experiment: Experiment,
+    asked: &Asked,
+    mut stage: impl FnMut([u32; 2], &mut Stage<'_>) -> Result<(), EvaluateError>,
+) -> Result<(Evaluation, Vec<Course>), EvaluateError> {
+    let Asked {
+        config,
+        runs,
+        method,
+        ..
+    } = *asked;
+    let stages = if asked.with_courses { 3 } else { 2 };
+    let mut outcomes = Vec::new();
+    stage([1, stages], &mut |done| {
+        outcomes = evaluate(&experiment, config, runs, done)?;
+        Ok(())
+    })?;
+    let summary = Summary::new(&outcomes, experiment.names(), config.max_slides);
+    let (experiment, config) = as_told(experiment, config);
+    let mut told = Vec::new();
+    stage([2, stages], &mut |done| {
+        told = evaluate(&experiment, config, runs, done)?;
+        Ok(())
+    })?;
+    let mut all = Vec::new();
+    if asked.with_courses {
+        stage([3, stages], &mut |done| {
+            all = courses(&experiment, config, runs, done)?;
+            Ok(())
+        })?;
+    }
+    let names = experiment.names();
+    let evaluation = Evaluation {
+        reliability: statements(&all, config.threshold),
+        by_threshold: by_threshold(&all, config.threshold),
+        method,
+        protocol: asked.protocol,
+        train_slides: experiment.train_slides(),
+        runs,
+        textures: names.len(),
+        threshold: config.threshold,
+        max_slides: config.max_slides,
+        seed: asked.seed,
+        verdicts: Verdicts::of(told.iter().map(Outcome::told)),
+        mean_slides_told: Summary::new(&told, names, config.max_slides).mean_slides,
+        summary,
+    };
+    Ok((evaluation, all))
+}
+
+/// The experiment as `identify` meets it: the texture may be none of those known, and no slide counts twice.
+fn as_told(experiment: Experiment, config: Config) -> (Experiment, Config) {
+    let config = Config {
+        open: true,
+        ..config
+    };
+    (experiment.each_slide_once(), config)
+}
