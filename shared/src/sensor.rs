@@ -6,6 +6,7 @@
 
 pub mod ads1220;
 pub mod analog;
+mod any;
 pub mod biotac;
 mod driver;
 mod finger;
@@ -17,6 +18,7 @@ pub mod paa5100je;
 pub mod pressure;
 pub mod slot;
 
+pub use any::{AnyFinger, FingerError, FingerParts, SLOWEST_HZ, find};
 pub use driver::{BadWord, Driver, Error, GRAVITY_PARTS, PressureSensor, StartError, slot_of};
 pub use finger::{AtRest, FingerModel, FingerName, UnknownFinger};
 pub use finger_code::FingerCode;

@@ -87,8 +87,7 @@ pub use encode::{
 };
 pub use finger::{FINGER_LENGTH, with_finger};
 pub use format::{
-    Action, Contents, EARLY, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, Name, PACED, TableError,
-    Tally, VERSION,
+    Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, Name, TableError, Tally, VERSION,
 };
 pub use gaussian::{Gaussian, Gaussians, SD_LEAST, SD_STEP, mean_step};
 pub use lengths::{MAX_LENGTHS, Shorter, lengths_length, with_lengths};

@@ -242,7 +242,6 @@ impl<'p, K: Kernels> Slide<'p, K> {
     }
 
     /// Samples of P_AC at constant speed that have come.
-    #[cfg(any(test, feature = "early"))]
     pub fn samples(&self) -> u32 {
         self.spectrum.samples()
     }
@@ -252,7 +251,6 @@ impl<'p, K: Kernels> Slide<'p, K> {
     ///
     /// # Errors
     /// See [`SlideError`].
-    #[cfg(any(test, feature = "early"))]
     pub fn look(&mut self, samples: u32) -> Result<Measurement, SlideError> {
         self.measure(samples)
     }

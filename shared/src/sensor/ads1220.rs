@@ -65,6 +65,12 @@ const fn step(
     }
 }
 
+/// The steps of [`START`] that show whether it is there.
+pub const CHECK: [StartStep; 3] = {
+    let [reset, write, read, _] = START;
+    [reset, write, read]
+};
+
 /// From power-up to the first slot.
 pub const START: [StartStep; 4] = [
     // DS 8.5.3.1: 50 us and 32 clocks, here twice as long

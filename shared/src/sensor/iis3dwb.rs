@@ -73,6 +73,12 @@ const fn read(out: &'static [u8], expect: &'static [(u8, u8)]) -> StartStep {
     }
 }
 
+/// The step of [`START`] that shows whether it is there.
+pub const CHECK: [StartStep; 1] = {
+    let [identity, ..] = START;
+    [identity]
+};
+
 /// From power-up to the first slot.
 pub const START: [StartStep; 13] = [
     read(&[READ | WHO_AM_I, 0], &[(0xFF, IDENTITY)]),

@@ -176,6 +176,8 @@ pub struct Paa5100je<SPI> {
     /// The time of the last motion.
     moved_ms: u32,
     fault: Option<MotionFault>,
+    /// It has said once who it is.
+    found: bool,
 }
 
 impl<SPI: SpiDevice> Paa5100je<SPI> {
@@ -187,6 +189,7 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
             until_ms: None,
             moved_ms: 0,
             fault: None,
+            found: false,
         }
     }
 
@@ -198,6 +201,11 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
     /// Returns why it does not measure; `None` while it starts, and while it measures.
     pub fn fault(&self) -> Option<MotionFault> {
         self.fault
+    }
+
+    /// Returns whether there is one: it has said who it is since this was made.
+    pub fn is_found(&self) -> bool {
+        self.found
     }
 
     /// To be called every 10 ms or so with a clock of ms that may turn over: starts it, waiting between the calls, and
@@ -275,6 +283,7 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
     fn identify(&mut self) -> Result<(), MotionFault> {
         let is = [self.read(IDENTITY)?, self.read(INVERSE_IDENTITY)?];
         if is == IS {
+            self.found = true;
             Ok(())
         } else {
             Err(MotionFault::Identity(is))

@@ -5,8 +5,8 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, Contents, EARLY, EARLY_VERSION, LENGTH, MAGIC, MAX_MOVEMENTS,
-    PACED, PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally, VERSION, each,
+    Action, CELL_BYTES, CRC_BYTES, Contents, EARLY_VERSION, LENGTH, MAGIC, MAX_MOVEMENTS,
+    PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally, VERSION, each,
 };
 use super::gaussian::{SD_LEAST, SD_STEP, mean_step};
 use super::sections::Sections;
@@ -301,11 +301,6 @@ pub fn amend<'o>(
     if old.is_paced() {
         return rewrite_paced(out, old, rows);
     }
-    if !EARLY {
-        let sections = old.sections;
-        let write = |writer: &mut Writer<'_>| writer.put(sections);
-        return rewrite(out, old, old.lineage(), rows, (sections.len(), write));
-    }
     // what shorter slides say is of these textures and no others
     let same = matches!(change, Change::Rename { .. });
     let left_out = if same { 0 } else { LENGTH };
@@ -554,9 +549,9 @@ fn write<'o, 'a>(
     sections(&mut writer);
     let written = writer.buffer.get(names_end..writer.at).unwrap_or_default();
     let has = |wanted| each(written).flatten().any(|(kind, _)| kind == wanted);
-    let newer = if PACED && has(SLOPES) {
+    let newer = if has(SLOPES) {
         Some(PACED_VERSION)
-    } else if EARLY && has(LENGTH) {
+    } else if has(LENGTH) {
         Some(EARLY_VERSION)
     } else {
         None

@@ -38,6 +38,15 @@ pub const fn rig(finger: FingerName) -> &'static [u8] {
     }
 }
 
+/// The table of a finger on somebody else's arm. Only a BioTac has one of its own; the rig's of the others names the finger and the
+/// movements, and knows the shear, which an arm's slides do not have: such a probe is trained, or receives a table.
+pub const fn arm(finger: FingerName) -> &'static [u8] {
+    match finger {
+        FingerName::Biotac => ARM,
+        FingerName::Analog | FingerName::Mems => rig(finger),
+    }
+}
+
 /// The handheld's table of a finger.
 pub const fn handheld(finger: FingerName) -> &'static [u8] {
     match finger {

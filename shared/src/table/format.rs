@@ -16,8 +16,6 @@ pub const VERSION: u16 = 4;
 pub(super) const PACED_VERSION: u16 = 5;
 /// Version of those without sections, which is the same otherwise.
 pub(super) const PLAIN_VERSION: u16 = 3;
-/// True if this build knows speeds. A probe without a sensor of speed saves the space, and refuses such tables.
-pub const PACED: bool = cfg!(any(test, feature = "pace"));
 /// The kind of the section that has them.
 pub(super) const SLOPES: u16 = 4;
 /// Version of those that know what slides say before their end, which is the same otherwise.
@@ -29,8 +27,6 @@ pub(super) const DRIFT: u16 = 1;
 pub(super) const TWO: usize = 8;
 /// Bytes of a length of shorter slides in its section.
 pub(super) const MS: usize = 2;
-/// True if this build can end a slide early. A probe that cannot saves the space, and refuses such tables.
-pub const EARLY: bool = cfg!(any(test, feature = "early"));
 /// The kind of the sections that say it, one for each length.
 pub(super) const LENGTH: u16 = 6;
 pub(super) const GAUSSIANS: u8 = 0;
@@ -172,14 +168,9 @@ impl fmt::Display for TableError {
                 "not a texture table: it begins with [{a:02x}, {b:02x}, {c:02x}, {d:02x}], not `TACT`"
             ),
             Self::Version(found) => {
-                let newest = match (EARLY, PACED) {
-                    (true, _) => EARLY_VERSION,
-                    (_, true) => PACED_VERSION,
-                    _ => VERSION,
-                };
                 write!(
                     f,
-                    "version {found}, and this program reads versions {PLAIN_VERSION} to {newest}: learn the table anew"
+                    "version {found}, and this program reads versions {PLAIN_VERSION} to {EARLY_VERSION}: learn the table anew"
                 )
             }
             Self::Method(found) => write!(f, "method {found} is unknown to this program"),
@@ -217,8 +208,8 @@ impl fmt::Display for TableError {
             ),
             Self::Section(1) => f.write_str("the drift that it expects is damaged"),
             Self::Section(2) => f.write_str("its limits of new and changed textures are damaged"),
-            Self::Section(4) if PACED => f.write_str("its slopes over speed are damaged"),
-            Self::Section(6) if EARLY => f.write_str("what it says of shorter slides is damaged"),
+            Self::Section(4) => f.write_str("its slopes over speed are damaged"),
+            Self::Section(6) => f.write_str("what it says of shorter slides is damaged"),
             Self::Section(kind) => write!(f, "section {kind} is damaged"),
             Self::Number(texture) => {
                 write!(f, "texture {} has another's number", texture + 1)

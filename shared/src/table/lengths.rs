@@ -14,9 +14,7 @@
 //! | | contents of section 1, and of section 2, where the table has them |
 
 use super::encode::{EncodeError, rewrite_with};
-use super::format::{
-    CRC_BYTES, DRIFT, EARLY, HEAD, HEADER, LENGTH, MAX_MOVEMENTS, MS, SLOPES, TWO, array, each,
-};
+use super::format::{CRC_BYTES, DRIFT, HEAD, HEADER, LENGTH, MAX_MOVEMENTS, MS, TWO, array, each};
 use super::limits::Limits;
 use super::sections::{NOVELTY, are_drifts, are_limits, of_drift, of_population};
 use super::view::Table;
@@ -120,7 +118,6 @@ impl<'a> Table<'a> {
 
     /// The number that stands for a movement whose slide has had the `n`th length, from 1; `None` if there is no such
     /// length.
-    #[cfg(any(test, feature = "early"))]
     pub(crate) fn at_length(&self, movement: u8, n: u8) -> Option<u8> {
         let at = n.checked_mul(self.movements)?.checked_add(movement)?;
         let known = movement < self.movements && self.shorter(at).is_some();
@@ -129,7 +126,7 @@ impl<'a> Table<'a> {
 
     /// Returns whether this is a movement's own number, not that of a shorter slide of it.
     pub(crate) fn is_whole(&self, movement: u8) -> bool {
-        !EARLY || movement < self.movements
+        movement < self.movements
     }
 
     /// As [`Table::limits`], of slides of the length that a movement stands for.
@@ -182,7 +179,7 @@ impl<'a> Table<'a> {
     /// The offsets of the trials of each length among the bytes of the table.
     pub(super) fn trials_of_lengths(&self) -> impl Iterator<Item = usize> + use<'a> {
         let trials = self.layout().trials;
-        let sections = if EARLY { self.sections } else { &[] };
+        let sections = self.sections;
         let mut at = self.bytes.len() - CRC_BYTES - self.sections.len();
         each(sections)
             .flatten()
@@ -191,10 +188,5 @@ impl<'a> Table<'a> {
                 at = begin + contents.len();
                 (kind == LENGTH).then_some(begin + MS + trials)
             })
-    }
-
-    /// Returns whether it has the section of speeds, whether or not this build knows them.
-    pub(super) fn has_slopes(&self) -> bool {
-        self.section(SLOPES).is_some()
     }
 }

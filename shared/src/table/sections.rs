@@ -15,9 +15,7 @@
 use heapless::Vec;
 
 use super::drift::{Drift, Drifts};
-use super::format::{
-    DRIFT, EARLY, HEAD, LENGTH, MAX_MOVEMENTS, PACED, SLOPES, TWO, TableError, array, each,
-};
+use super::format::{DRIFT, HEAD, LENGTH, MAX_MOVEMENTS, SLOPES, TWO, TableError, array, each};
 use super::limits::{Limits, Numbers};
 use super::population::{LEAST, Population};
 use super::slopes::{self, Slopes};
@@ -196,9 +194,7 @@ impl<'a> Table<'a> {
         let section = self.section(DRIFT).filter(|_| drifts);
         self.drifts = section.and_then(|s| s.get(TWO..)).unwrap_or_default();
         self.novelty = self.section(NOVELTY).unwrap_or_default();
-        if PACED {
-            self.slopes = self.section(SLOPES).unwrap_or_default();
-        }
+        self.slopes = self.section(SLOPES).unwrap_or_default();
     }
 
     /// That the sections are sections, and those that are known what they say.
@@ -213,10 +209,8 @@ impl<'a> Table<'a> {
                         && self.drift().is_some_and(Drift::is_possible)
                 }
                 NOVELTY => are_limits(contents, features, movements),
-                LENGTH if EARLY => continue,
-                SLOPES if PACED => {
-                    slopes::are_slopes(contents, features, self.textures.into(), movements)
-                }
+                LENGTH => continue,
+                SLOPES => slopes::are_slopes(contents, features, self.textures.into(), movements),
                 _ => continue,
             };
             let first = seen.get_mut(match kind {

@@ -7,7 +7,7 @@
 //! [`Pace::variance`] (f32), the slope of all textures together (d numbers, i16); then per texture and movement its
 //! slope (d numbers, i16).
 
-use super::format::{PACED, array};
+use super::format::array;
 use super::view::Table;
 use super::whitening::{Column, Slope};
 use crate::features::{FEATURE_STEPS, Observation, Vector};
@@ -89,7 +89,7 @@ pub(super) fn are_slopes(bytes: &[u8], features: usize, textures: usize, movemen
 impl<'a> Table<'a> {
     /// Returns whether its means depend on the speed.
     pub fn is_paced(&self) -> bool {
-        PACED && !self.slopes.is_empty()
+        !self.slopes.is_empty()
     }
 
     /// The part of the section that all textures share.

@@ -1,9 +1,9 @@
 //! Reading a table where it is stored.
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, Contents, DRIFT, EARLY, EARLY_VERSION, HEADER, LABEL_BYTES,
-    LENGTH, Layout, MAGIC, MAX_MOVEMENTS, MOVEMENT_BYTES, MS, PACED, PACED_VERSION, PLAIN_VERSION,
-    SLOPES, TWO, TableError, Tally, VERSION, array, each,
+    Action, CELL_BYTES, CRC_BYTES, Contents, DRIFT, EARLY_VERSION, HEADER, LABEL_BYTES, LENGTH,
+    Layout, MAGIC, MAX_MOVEMENTS, MOVEMENT_BYTES, MS, PACED_VERSION, PLAIN_VERSION, SLOPES, TWO,
+    TableError, Tally, VERSION, array, each,
 };
 use super::gaussian::{Gaussian, Gaussians, SD_STEP, mean_step};
 use super::training_stats::Whitened;
@@ -72,8 +72,8 @@ impl<'a> Table<'a> {
             return Err(TableError::Magic([m0, m1, m2, m3]));
         }
         let version = u16::from_le_bytes([v0, v1]);
-        let paced = PACED && version == PACED_VERSION;
-        let early = EARLY && version == EARLY_VERSION;
+        let paced = version == PACED_VERSION;
+        let early = version == EARLY_VERSION;
         if version != VERSION && version != PLAIN_VERSION && !paced && !early {
             return Err(TableError::Version(version));
         }
@@ -112,14 +112,12 @@ impl<'a> Table<'a> {
         }
         table.check_sections()?;
         table.find_sections();
-        if PACED && paced == table.slopes.is_empty() {
+        if paced == table.slopes.is_empty() {
             return Err(TableError::Section(SLOPES));
         }
-        if EARLY {
-            let is_early = table.count_lengths().map(|lengths| lengths > 0);
-            if is_early != Some(early) || early && table.has_slopes() {
-                return Err(TableError::Section(LENGTH));
-            }
+        let is_early = table.count_lengths().map(|lengths| lengths > 0);
+        if is_early != Some(early) || early && table.is_paced() {
+            return Err(TableError::Section(LENGTH));
         }
         Ok(table)
     }
@@ -207,8 +205,9 @@ impl<'a> Table<'a> {
     /// The lengths that it knows, the shortest first.
     pub(super) fn lengths(&self) -> impl Iterator<Item = Length<'a>> + Clone + use<'a> {
         let table = *self;
-        let sections = if EARLY { self.sections } else { &[] };
-        let sections = each(sections).flatten().filter(|(kind, _)| *kind == LENGTH);
+        let sections = each(self.sections)
+            .flatten()
+            .filter(|(kind, _)| *kind == LENGTH);
         sections.map_while(move |(_, contents)| table.length_of(contents))
     }
 
@@ -234,7 +233,7 @@ impl<'a> Table<'a> {
     /// The table of the length that a movement stands for, and which of its movements that is; `None` for whole slides.
     #[inline(always)]
     pub(super) fn shorter(&self, movement: u8) -> Option<(Table<'a>, u8)> {
-        if !EARLY || movement < self.movements {
+        if movement < self.movements {
             return None;
         }
         self.find_shorter(movement)
