@@ -551,9 +551,9 @@ fn the_finger_is_built_as_it_is_drawn_and_wired() {
     }
 }
 
-/// A region of a board's memories, (address, bytes).
-fn region(board: &str, name: &str) -> (u64, u64) {
-    let memory = read(format!("firmware/boards/{board}/board.x"));
+/// A region of the chip's memories, (address, bytes).
+fn region(name: &str) -> (u64, u64) {
+    let memory = read("memory.x");
     let line = memory.lines().find_map(|line| {
         let rest = line.trim().strip_prefix(name)?;
         rest.strip_prefix(" : ORIGIN = 0x")?
@@ -561,15 +561,15 @@ fn region(board: &str, name: &str) -> (u64, u64) {
             .0
             .split_once(", LENGTH = ")
     });
-    let (at, kb) = line.unwrap_or_else(|| panic!("board.x of {board} has no {name}"));
+    let (at, kb) = line.unwrap_or_else(|| panic!("memory.x has no {name}"));
     let at = u64::from_str_radix(at, 16).unwrap();
     (at, kb.parse::<u64>().unwrap() << 10)
 }
 
 #[test]
-fn the_boards_have_their_memories_where_the_firmware_and_the_page_say() {
+fn the_store_is_where_the_firmware_has_it() {
     let place = read("firmware/src/chip/store_place.rs");
-    let (at, bytes) = region("nucleo-f429zi", "STORE");
+    let (at, bytes) = region("STORE");
     let high_low = format!("0x{:04x}_{:04x}", at >> 16, at & 0xffff);
     for line in [
         format!("STORE_AT: usize = {high_low};"),
@@ -577,26 +577,6 @@ fn the_boards_have_their_memories_where_the_firmware_and_the_page_say() {
     ] {
         assert!(place.contains(&line), "store_place.rs lacks {line}");
     }
-    for name in ["FLASH", "STORE"] {
-        let [reference, other] =
-            ["nucleo-f429zi", "nucleo-f767zi"].map(|board| region(board, name));
-        assert_eq!(reference, other, "{name}");
-    }
-    let page = read("docs/src/another-board.md");
-    let kb = |board, name| region(board, name).1 >> 10;
-    for words in [
-        format!("| {} KB, buffer", kb("nucleo-f429zi", "RAM")),
-        format!("SRAM1 ({} KB)", kb("nucleo-f767zi", "RAM")),
-        format!("DTCM ({} KB)", kb("nucleo-f767zi", "DTCM")),
-        format!("stack's {} KB", kb("nucleo-f767zi", "DTCM") - 16),
-    ] {
-        assert!(page.contains(&words), "the page lacks {words}");
-    }
-    // what the firmware tells to do is on the page
-    let board = read("firmware/src/board/nucleo_f767zi.rs");
-    let (_, command) = board.split_once("nothing is stored: ").unwrap();
-    let (command, _) = command.split_once('"').unwrap();
-    assert!(page.contains(command), "the page lacks {command}");
 }
 
 #[test]
