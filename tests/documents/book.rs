@@ -191,38 +191,6 @@ fn simulate(out: &str) -> [&str; 9] {
     ]
 }
 
-/// Pictures of recordings that are not in the repository: made again where they are, when the book is written.
-const OF_OTHERS: (&str, [&str; 2]) = (
-    "evaluate --recordings biotac --lifelong --runs 20",
-    ["drift", "told-without-learning"],
-);
-
-#[test]
-fn pictures_of_others_recordings_stand_beside_their_command() {
-    let temp = tempfile::tempdir().unwrap();
-    let drawn = temp.path().to_str().unwrap();
-    let page = read("docs/src/evidence.md");
-    let (command, pictures) = OF_OTHERS;
-    assert!(page.contains(&format!("`tactus {command}`")));
-    let data = writes().then(|| tactus_tests::data("biotac")).flatten();
-    if let Some(folder) = &data {
-        let folder = folder.to_str().unwrap();
-        let arguments = words(&command.replace("biotac", folder));
-        let mut arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-        arguments.extend(["--plot", drawn]);
-        tactus(&arguments);
-    }
-    for picture in pictures {
-        let name = format!("plot-{picture}.svg");
-        if data.is_some() {
-            let svg = fs::read(temp.path().join(format!("{picture}.svg"))).unwrap();
-            fs::write(root().join("docs/src").join(&name), svg).unwrap();
-        }
-        assert!(page.contains(&format!("]({name})")), "{name}");
-        roxmltree::Document::parse(&read(format!("docs/src/{name}"))).unwrap();
-    }
-}
-
 /// The pictures of the page about pictures, the command of each, and what comes before it.
 const PLOTS: [(&str, &[&str]); 4] = [
     (
@@ -231,7 +199,7 @@ const PLOTS: [(&str, &[&str]); 4] = [
     ),
     (
         "identify --simulated --texture burlap --among 20 --seed 2",
-        &["spectrum", "timeline"],
+        &["spectrum"],
     ),
     ("table show TABLE", &["map"]),
     (
