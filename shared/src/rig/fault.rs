@@ -1,6 +1,6 @@
-//! What can go wrong, how it is noticed and what happens then: one table, [`FAULTS`]. The book's table is made from it.
+//! The table of faults, [`FAULTS`]: how each is detected and how the rig answers. The book's table is made from it.
 //!
-//! Whatever is noticed, the stage's motor is braked and the finger lifts before anything is reported.
+//! At every fault the stage's motor is braked and the finger lifts before anything is reported.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,15 +11,15 @@ pub struct Row {
     pub fault: Fault,
     /// Its name on the link and on the display.
     pub name: &'static str,
-    /// How it is detected.
+    /// Its detection.
     pub detected: &'static str,
-    /// Longest time in ms from the moment it can be detected until the motors have been told.
+    /// Longest time in ms from the moment it can be detected until the motors have their new outputs.
     pub deadline_ms: u32,
-    /// What stops.
+    /// The outputs that stop.
     pub stops: &'static str,
-    /// What is refused until it is over.
+    /// The commands that are refused until it is over.
     pub refused: &'static str,
-    /// What the user does.
+    /// The user's remedy.
     pub recovery: &'static str,
 }
 
@@ -52,7 +52,8 @@ macro_rules! faults {
     };
 }
 
-// the fault (of images with this feature only), its name, how it is detected, the deadline in ms, what stops, what is refused, what the user does
+// the fault (of images with this feature only), its name, how it is detected, the deadline in ms, what stops, what is
+// refused, what the user does
 faults! {
     /// The finger is pressed too hard.
     ForceHigh, "force too high", "P_DC means more than 2.05 N, mean of 10 ms made up for its lag; it bends: that is 2.1 N. While a rig that was set to it presses more than 1.26 N, 2.1 N: that is 2.18 N. Or it rises by 8 counts while the lever looks for its switch, or while the stage moves under a lifted finger; or by 40 while the rig waits with its finger lifted", 12,
@@ -69,7 +70,7 @@ faults! {
     /// The motor of the stage is driven and does not turn.
     StageStall, "stage blocked", "less than a tenth of the way made in 30 ms, and the motor has no back-EMF", 35, BOTH, ALL,
         "clear the stage's way, then reset";
-    /// The motor of the stage turns, and the encoder says nothing.
+    /// The motor of the stage turns, and the encoder does not count.
     EncoderSilent, "encoder silent", "less than a tenth of the way made in 30 ms, and the motor's back-EMF says that it turns", 35,
         BOTH, ALL, "check the encoder's wires, then reset";
     /// The stage does not follow its profile.
@@ -80,7 +81,7 @@ faults! {
     /// Too many words are damaged.
     SensorErrors, "sensor link bad", "23 damaged words within a second: half a percent", 2, BOTH, ALL,
         "check cable length, ground and clock phase, then reset";
-    /// The sensor says the same thing again and again.
+    /// The sensor repeats the same word.
     SensorFrozen, "sensor frozen", "P_AC the same for 100 ms, which always has noise", 102, BOTH, ALL,
         "switch the probe and its sensor off and on";
     /// Samples of a slide are missing.
@@ -96,7 +97,7 @@ faults! {
     /// The contact force does not stay where it was put.
     Unsteady, "force unsteady", "six trims and still more than 1 count and 5 % off, trims that add up to 15 %, a zero that has moved by 8 counts, P_DC in the air that moves by 20 counts while the rig is calibrated, contact within 0.1 mm of where the zero was taken, or a slide whose mean force is 3 counts and a quarter off that of the still finger", 2, BOTH, ALL,
         "check that sample and lever are fixed, then reset";
-    /// The probe's own tasks do nothing any more.
+    /// The probe's own tasks no longer run.
     TasksHung, "tasks hung", "the firmware's tasks have not checked in for 2 s, or what was asked for makes no progress for 30 s", 2, BOTH, ALL,
         "none: the watchdog restarts the probe once the finger is lifted";
     /// The lever did not find its limit switch.
@@ -105,34 +106,34 @@ faults! {
     /// The stage did not find its limit switch.
     StageNotHome, "stage not home", "limit switch not reached: the stage falls behind, or has gone 1.25 times the travel, or 3 mm where it touches it again, or is still in the switch 7 mm from where it closed", 2, BOTH, ALL,
         "clear the stage's way and check the switch, then reset";
-    /// The finger presses, and P_DC does not say so.
+    /// The finger presses, and P_DC does not show it.
     PressureDead, "pressure dead", "P_AC shows contact and P_DC does not rise within 0.5 mm, or no longer rises while P_AC shows that the pressure does, or no contact 1 mm below that of the last press on this sample", 2,
         BOTH, ALL, "look whether the finger is up, and turn the lever's knob until it is; check the fingertip and the sensor's P_DC, then reset";
-    /// The arm that moves the finger says nothing any more. New in version 11.
+    /// The arm that moves the finger sends no reports any more. New in version 11.
     ArmSilent of "arm", "arm silent", "no word of the arm about what it was asked for in 0.5 s", 502, ARM, ALL,
         "look whether the finger is up, and move the arm away by its own controls; check that its program runs, then reset";
-    /// The arm does not stop when it is to. New in version 11.
+    /// The arm does not stop when ordered to. New in version 11.
     ArmRuns of "arm", "arm does not stop", "0.2 s after a stop was demanded the force is over the limit still, or after 2 s the finger still presses", 202, ARM, ALL,
         "press the arm's own emergency stop, and move it away by its controls; then reset";
-    /// The arm did something else than it was asked for. New in version 11.
+    /// The arm did something other than its order. New in version 11.
     ArmOff of "arm", "arm off its order", "it says that it presses and P_DC is more than 2 counts and 10 % off the force; it says that it is lifted and P_DC is not; its slide was 5 % shorter, longer, slower or faster than was asked for, by what it says or by the probe's clock; it was not done in its time; or it says that it cannot", 2,
         ARM, ALL, "look at the arm and the sample, and at what the arm's program says; then reset";
 }
 
 impl Fault {
-    /// Its name on the link and on the display. It has a list of its own, so that the chip's flash need not hold the whole
-    /// table.
+    /// Its name on the link and on the display. It has a list of its own, so that the chip's flash need not hold the
+    /// whole table.
     pub fn name(self) -> &'static str {
         NAMES.get(self as usize).copied().unwrap_or("unknown fault")
     }
 
-    /// What the user does; from a list of its own, too.
+    /// The user's remedy; from a list of its own, too.
     pub fn recovery(self) -> &'static str {
         RECOVERIES.get(self as usize).copied().unwrap_or("reset")
     }
 
-    /// Whether it can come of one movement or pass by itself: a rig that has homed after it may go on without a person. Each
-    /// press begins with its checks of the zero, and every guard stays on.
+    /// Returns true if one movement can cause it or if it can pass by itself: a rig that has homed after it may
+    /// continue without a person. Each press begins with its checks of the zero, and every guard stays on.
     pub const fn is_of_the_movement(self) -> bool {
         #[cfg(any(feature = "arm", test))]
         if matches!(self, Self::ArmOff) {

@@ -11,7 +11,7 @@ fn word(channel: Channel, counts: u16) -> Option<Pressure> {
     })
 }
 
-/// What a rig at rest shows; P_AC has its noise.
+/// The inputs of a rig at rest; P_AC has its noise.
 fn at_rest(ms: u32) -> ([Option<Pressure>; 4], Seen<'static>) {
     let pac = |n: u32| word(Channel::Pac, 2040 + (ms * 7 + n * 5) as u16 % 9);
     let words = [
@@ -34,7 +34,7 @@ fn at_rest(ms: u32) -> ([Option<Pressure>; 4], Seen<'static>) {
     (words, seen)
 }
 
-/// Runs a second of ms, each changed by `change`; returns the first fault and when.
+/// Runs a second of ms, each changed by `change`; returns the first fault and its time.
 fn run(change: impl Fn(u32, &mut [Option<Pressure>; 4], &mut Seen<'_>)) -> Option<(u32, Fault)> {
     let mut guard = Guard::default();
     let meter = ForceMeter::new(2593.0);
