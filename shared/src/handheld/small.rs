@@ -1,4 +1,4 @@
-//! The plain kernels without the methods that a handheld's tables are never for: its image shall fit a small chip.
+//! The plain kernels without the methods that a handheld's tables never use: its image shall fit a small chip.
 
 use core::mem::MaybeUninit;
 
