@@ -82,7 +82,7 @@ impl MotionSensor {
         &mut self.driver.bus().flow
     }
 
-    /// What the driver makes of it when the probe has come here at that time.
+    /// The driver's counts when the probe has come here at that time.
     pub fn poll(&mut self, at_ns: u64, x_mm: f64) -> Option<[i16; 2]> {
         let bus = self.driver.bus();
         bus.x_mm = x_mm;

@@ -1,7 +1,7 @@
-//! The BioTac's protocol as the sensor plays it: what it answers at each chip select.
+//! The sensor's side of the BioTac's protocol: its answer at each chip select.
 //!
-//! Its words are made here, apart from the core's, which are what is tested with them. [`sim`](super) names the documents;
-//! what none of them says is chosen and marked.
+//! Its words are made here, independently of the core's, which are tested with them. [`sim`](super) names the
+//! documents; values that none of them gives are chosen and marked.
 
 use std::collections::BTreeMap;
 
@@ -44,7 +44,7 @@ const SLOW_NOISE: f64 = 1.0;
 /// Electrodes change with the force on the finger, counts/N (chosen).
 const ELECTRODE_PER_N: f64 = -150.0;
 
-/// What the sensor has to say at the next select.
+/// The sensor's answer at the next select.
 #[derive(Clone, Copy)]
 enum Reply {
     Word([u8; 2]),
@@ -63,7 +63,7 @@ pub struct SensorPeer {
     ended_ns: u64,
     streaming: bool,
     flip: u16,
-    /// of this select: whether the sensor heard it, after how long, the bytes so far, what it says
+    /// of this select: whether the sensor heard it, after how long, the bytes so far, the answer
     on: bool,
     quiet_ns: u64,
     bytes: usize,
@@ -104,12 +104,12 @@ impl SensorPeer {
         &self.complaints
     }
 
-    /// Whether it is in its streaming mode, and answers nothing.
+    /// Returns true if it is in its streaming mode, and answers nothing.
     pub fn is_streaming(&self) -> bool {
         self.streaming
     }
 
-    /// Whether it has power.
+    /// Returns true if it has power.
     pub fn is_plugged(&self) -> bool {
         self.powered_ns.is_some()
     }
@@ -136,7 +136,8 @@ impl SensorPeer {
 
     /// Chip select falls. A sample is taken at the command, and read at the next select.
     ///
-    /// A command while an answer waits starts anew (chosen: a host that restarts between the two is then in step again).
+    /// A command while an answer waits starts anew (chosen: a host that restarts between the two is then in step
+    /// again).
     pub fn select(&mut self, now_ns: u64) {
         self.quiet_ns = now_ns.saturating_sub(self.ended_ns);
         self.on = self
@@ -157,7 +158,7 @@ impl SensorPeer {
         }
     }
 
-    /// What the sensor says in this period of chip select, byte by byte; later ones float.
+    /// The sensor's bytes in this period of chip select; later ones float.
     pub fn line(&mut self) -> &mut [u8; PROPERTY_LEN] {
         &mut self.line
     }
@@ -290,7 +291,7 @@ impl SensorPeer {
     }
 }
 
-/// Whether a first byte starts something: a command of right parity that samples or reads a property.
+/// Returns true if a first byte starts something: a command of right parity that samples or reads a property.
 fn is_command(byte: u8) -> bool {
     (byte >= 0x80 || byte == PROPERTY) && !byte.count_ones().is_multiple_of(2)
 }

@@ -23,7 +23,7 @@ pub struct Transfer {
     pub part: u8,
     /// See [`Transfer::part`].
     pub mode: ClockMode,
-    /// When it falls, and how long it stays low, ns.
+    /// Its falling edge, and the time that it stays low, ns.
     pub begins_ns: u64,
     /// See [`Transfer::begins_ns`].
     pub takes_ns: u64,
@@ -41,7 +41,7 @@ pub enum Reader {
     Mems(Mems),
 }
 
-/// What one decoder or the other says.
+/// Calls the same method of the finger's own decoder.
 macro_rules! each {
     ($self:expr, $S:ident, $expression:expr) => {
         match $self {
@@ -71,7 +71,7 @@ impl Reader {
         }
     }
 
-    /// What kind of finger it is.
+    /// The kind of finger.
     pub fn model(&self) -> &'static FingerModel {
         each!(self, S, &S::MODEL)
     }
@@ -113,7 +113,7 @@ impl Reader {
         parts.map(|parts| parts as f32 / GRAVITY_PARTS)
     }
 
-    /// How a transaction is made that begins at this time, ns.
+    /// The transfer of a transaction that begins at this time, ns.
     pub fn transfer(&self, transaction: &Transaction, begins_ns: u64) -> Transfer {
         let port = self.ports().get(usize::from(transaction.port));
         Transfer {
@@ -124,7 +124,8 @@ impl Reader {
         }
     }
 
-    /// The word of slot `n`, which begins at `at_ns`. `transact` gets each of its transfers, what is sent, and room for what comes in.
+    /// The word of slot `n`, which begins at `at_ns`. `transact` gets each of its transfers, the bytes to send, and a
+    /// buffer for the answer.
     pub fn word_of_slot(
         &mut self,
         n: u64,

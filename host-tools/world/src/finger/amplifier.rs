@@ -29,8 +29,8 @@ const PDC_NOISE: f64 = 0.3;
 /// Highest count of 12 bits.
 const FULL: f64 = 4095.0;
 
-/// P_DC's rest follows the temperature of the finger, about a value of that finger (OUT: three fingers, each steady): its
-/// deviation, counts, and the times, s, over which the air wanders and the finger follows. Chosen.
+/// P_DC's rest follows the temperature of the finger, about a value of that finger (OUT: three fingers, each steady):
+/// its deviation, counts, and the times, s, over which the air wanders and the finger follows. Chosen.
 const DRIFT_COUNTS: f64 = 2.0;
 const AIR_S: f64 = 600.0;
 const WARM_S: f64 = 60.0;
@@ -128,7 +128,7 @@ impl Amplifiers {
         self.pac_noise_pa / PAC_PA_PER_COUNT * noise.normal()
     }
 
-    /// What the converter makes of a P_AC so far from its rest, counts, and whether that had to be cut.
+    /// Reading of the converter at a P_AC so far from its rest, counts, and true if it was cut.
     pub(super) fn convert_pac(&self, about_rest: f64) -> (u16, bool) {
         let value = self.pac_rest.round() + about_rest;
         (counts(value), !(0.0..=FULL).contains(&value))
@@ -143,7 +143,7 @@ pub(super) fn between([a, b]: [f64; 2], fraction: f64) -> f64 {
     a + (b - a) * fraction.clamp(0.0, 1.0)
 }
 
-/// What the converter makes of it.
+/// Reading of the converter.
 fn counts(value: f64) -> u16 {
     value.round().clamp(0.0, FULL) as u16
 }

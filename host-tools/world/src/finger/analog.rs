@@ -1,7 +1,8 @@
 //! A piezo disc behind the skin with two amplifiers, and a load cell with one, as voltages before a converter.
 //!
-//! A disc gives charge for a change of force; with the amplifier's input that is a high-pass. It says more when it is loaded, since
-//! the skin then covers more of it, and its charge drifts with warmth (pyroelectricity), which the high-pass takes away.
+//! A disc gives charge for a change of force; with the amplifier's input that is a high-pass. It says more when it is
+//! loaded, since the skin then covers more of it, and its charge drifts with warmth (pyroelectricity), which the
+//! high-pass takes away.
 
 use super::amplifier::{HighPass, LowPass, between};
 use super::cell::Cell;
@@ -10,8 +11,8 @@ use crate::noise::Noise;
 
 /// Supply of bridge and converter, V.
 pub(super) const SUPPLY_V: f64 = 3.3;
-/// Voltage of P_AC for each newton within its band: the paper's second gain of 99.1 above 0.0701 V/N (chosen, so that its counts are
-/// a BioTac's).
+/// Voltage of P_AC for each newton within its band: the paper's second gain of 99.1 above 0.0701 V/N (chosen, so that
+/// its counts are a BioTac's).
 pub(super) const PAC_V_PER_N: f64 = 99.1 * SUPPLY_V / 4096.0 / 0.0115;
 /// Its upper corner, Hz; the lower one is the high-pass's 10 Hz.
 const UPPER_HZ: f64 = 1040.0;

@@ -12,13 +12,15 @@ const RATIO_PER_N: f64 = 1e-3 / 9.806_65;
 const ZERO_SHARE: f64 = 0.065;
 /// The tip weighs 10 g, N.
 const TIP_N: f64 = 0.098;
-/// The tip on the bar: 0.4 mm at 1 kg (usual) are 25 kN/m, with 10 g 250 Hz; damping of glued silicone and foam (chosen).
+/// The tip on the bar: 0.4 mm at 1 kg (usual) are 25 kN/m, with 10 g 250 Hz; damping of glued silicone and foam
+/// (chosen).
 const RESONANCE_HZ: f64 = 250.0;
 const DAMPING: f64 = 0.15;
 /// A bar feels this share of a force across it (chosen; makers promise some per cent).
 const ACROSS: f64 = 0.02;
-/// Its zero drifts with temperature: deviation, N, and the time in which it wanders, s. A degree (chosen) is 1 mN for a bar of 0.1 % of
-/// its range in 10 degrees (usual), and 6 mN for an INA125 of 2 uV a degree; an ADS1220 adds less than a tenth of that.
+/// Its zero drifts with temperature: deviation, N, and the time in which it wanders, s. A degree (chosen) is 1 mN for a
+/// bar of 0.1 % of its range in 10 degrees (usual), and 6 mN for an INA125 of 2 uV a degree; an ADS1220 adds less than
+/// a tenth of that.
 const DRIFT_N: f64 = 0.006;
 const DRIFT_S: f64 = 600.0;
 
@@ -30,7 +32,7 @@ pub(in super::super) struct Cell {
     /// Force in the spring, N, and its rate.
     spring_n: f64,
     rate: f64,
-    /// What a newton gives, of what it should; below 0 where wires are exchanged.
+    /// Response to a newton, relative to a sound cell's; below 0 where wires are exchanged.
     gain: f64,
     /// The output, share of the supply, at the last two ticks.
     ratio: [f64; 2],
@@ -49,7 +51,7 @@ impl Cell {
         }
     }
 
-    /// What a newton gives from now on, of what it should.
+    /// Sets the response to a newton, relative to a sound cell's.
     pub(super) fn set_gain(&mut self, gain: f64) {
         self.gain = gain;
     }

@@ -1,7 +1,7 @@
 //! An accelerometer that floats in silicone behind the skin, and a load cell.
 //!
-//! The accelerometer's board is a mass on the silicone between it and the core. Of the force on the skin a share goes through it; the rest goes
-//! round it. Its resonance and the silicone's losses shape what it feels.
+//! The accelerometer's board is a mass on the silicone between it and the core. Of the force on the skin a share goes
+//! through it; the rest goes round it. Its resonance and the silicone's losses shape what it feels.
 
 use std::f64::consts::TAU;
 
@@ -12,12 +12,13 @@ use crate::noise::Noise;
 
 /// Mass of the board with its share of silicone and wires, kg (chosen: a board of 10 mm by 10 mm by 1 mm with parts).
 const MASS_KG: f64 = 1.5e-3;
-/// Its resonance, Hz: a square centimetre of silicone of 0.25 MPa (Shore 10 A to 20 A) and 5 mm is 5 kN/m, with the mass 290 Hz.
+/// Its resonance, Hz: a square centimetre of silicone of 0.25 MPa (Shore 10 A to 20 A) and 5 mm is 5 kN/m, with the
+/// mass 290 Hz.
 const RESONANCE_HZ: f64 = 290.0;
 /// Damping ratio: half of the loss factor of such silicones, 0.2 to 0.3.
 const DAMPING: f64 = 0.13;
-/// Share of the force on the skin that goes through the mass (chosen, for accelerations of a tenth of a g to 2 g, as tools that slide
-/// over textures have: Culbertson, Unwin and Kuchenbecker 2014).
+/// Share of the force on the skin that goes through the mass (chosen, for accelerations of a tenth of a g to 2 g, as
+/// tools that slide over textures have: Culbertson, Unwin and Kuchenbecker 2014).
 const THROUGH: f64 = 0.1;
 const G: f64 = 9.806_65;
 
@@ -64,7 +65,7 @@ impl Mems {
         self.acceleration_g = g;
     }
 
-    /// What the accelerometer feels along the press, gravity with it, g.
+    /// Acceleration along the press with gravity, g.
     pub(in super::super) fn acceleration_g(&self) -> f64 {
         self.acceleration_g
     }

@@ -1,4 +1,4 @@
-//! From what a contact does to a fingertip to what its transducers say: one for each kind of finger.
+//! From the effects of a contact on a fingertip to the signals of its transducers: one for each kind of finger.
 
 use super::amplifier::{Amplifiers, PA_PER_N};
 use super::analog::Analog;
@@ -6,8 +6,8 @@ use super::felt::Felt;
 use super::mems::Mems;
 use crate::noise::Noise;
 
-/// Pressure that the mounting's acceleration makes in a fluid, Pa for a g: a column of 10 mm of water. The lever's vibration is known
-/// as such a pressure.
+/// Pressure that the mounting's acceleration makes in a fluid, Pa for a g: a column of 10 mm of water. The lever's
+/// vibration is known as such a pressure.
 pub(in super::super) const FLUID_PA_PER_G: f64 = 98.0;
 
 /// The transducers.

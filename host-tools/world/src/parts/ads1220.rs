@@ -1,5 +1,5 @@
-//! TI's ADS1220 by its data sheet SBAS501: commands and registers of 8.5 and 8.6, timing of 6.6, conversion modes of 8.4.2. What I could
-//! not read there is marked "chosen".
+//! TI's ADS1220 by its data sheet SBAS501: commands and registers of 8.5 and 8.6, timing of 6.6, conversion modes of
+//! 8.4.2. What I could not read there is marked "chosen".
 
 use super::bus::{ClockMode, FLOATING, Late};
 use crate::noise::Noise;
@@ -20,7 +20,7 @@ const SUPPLY_V: f64 = 3.3;
 const INTERNAL_V: f64 = 2.048;
 const FULL: f64 = 8_388_607.0;
 
-/// What the bytes of this select are.
+/// The meaning of this select's bytes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Says {
     Command,
@@ -163,8 +163,8 @@ impl Ads1220 {
             .clamp(-FULL - 1.0, FULL) as i32
     }
 
-    /// Chip select falls: a new command (8.5.1.1). Only mode 1 works: DIN is taken as the clock falls (8.5.1); in modes 0 and 3 it
-    /// is taken half a clock late, so that both lines come a bit late (chosen); in mode 2, as in mode 1.
+    /// Chip select falls: a new command (8.5.1.1). Only mode 1 works: DIN is taken as the clock falls (8.5.1); in modes
+    /// 0 and 3 it is taken half a clock late, so that both lines come a bit late (chosen); in mode 2, as in mode 1.
     pub fn select(&mut self, now_ns: u64, mode: ClockMode) {
         self.heard = now_ns >= self.ready_ns;
         self.wrong_phase = mode.on_rising().then(Late::default);

@@ -1,9 +1,10 @@
-//! What breaks in the parts of a finger.
+//! Faults in the parts of a finger.
 
 /// Something that breaks in a finger of parts.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum PartFault {
-    /// The supply of the accelerometer dips: its registers are those of power-up again, its identity too, and it is off.
+    /// The supply of the accelerometer dips: its registers are those of power-up again, its identity too, and it is
+    /// off.
     AccelerometerBrownOut,
     /// The supply of the cell's converter dips: its registers are those of power-up again, and it converts no more.
     CellBrownOut,

@@ -1,4 +1,5 @@
-//! The parts on their own bus: words worked out by hand from the data sheets, and what each does when it is used wrongly.
+//! The parts on their own bus: words worked out by hand from the data sheets, and what each does when it is used
+//! wrongly.
 
 use super::ads1220::Ads1220;
 use super::iis3dwb::{BOOT_NS, Iis3dwb};

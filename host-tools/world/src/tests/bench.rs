@@ -1,4 +1,5 @@
-//! The bench on which the world is observed: a finger pressed and slid by hand, and an analysis of its signals of its own.
+//! The bench on which the world is observed: a finger pressed and slid by hand, and an analysis of its signals of its
+//! own.
 
 use std::f64::consts::TAU;
 
@@ -22,8 +23,8 @@ const ONSET_MM: f64 = 4.0;
 const STEADY_MM: f64 = 50.0;
 const STEADY_S: f64 = 1.0;
 
-/// A locked stepper motor: three tones in the fluid, other ones for each slide (PAPER: its noise differs from trial to trial).
-/// About the amplifier's own noise; chosen.
+/// A locked stepper motor: three tones in the fluid, other ones for each slide (PAPER: its noise differs from trial to
+/// trial). About the amplifier's own noise; chosen.
 struct Hum([(f64, f64, f64); 3]);
 
 impl Hum {

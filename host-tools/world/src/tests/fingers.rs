@@ -1,4 +1,5 @@
-//! One vibration and one force through every finger's transducers, parts, wire and decoder: what comes out agrees.
+//! Tests that one vibration and one force through every finger's transducers, parts, wire and decoder give the same
+//! result.
 
 use std::f64::consts::TAU;
 
@@ -10,7 +11,7 @@ use crate::finger::{Felt, Finger, Held, PA_PER_N};
 use crate::parts::Peers;
 use crate::slot::Reader;
 
-/// What comes out: counts of P_AC and of P_DC with the times of their slots, s since the signal began.
+/// The decoder's output: counts of P_AC and of P_DC with the times of their slots, s since the signal began.
 type Heard = [Vec<(f64, f64)>; 2];
 
 /// A finger on its bus, without a contact, that feels this force and this vibration, N, at each time, s.
@@ -122,10 +123,10 @@ fn tone(name: FingerName, hz: f64, counts: f64) -> (f64, f64) {
 /// Tones with whole periods in half a second, Hz: those of the band, and of its ends.
 const TONES_HZ: [f64; 7] = [30.0, 60.0, 120.0, 240.0, 400.0, 560.0, 700.0];
 const ENDS_HZ: [f64; 4] = [10.0, 20.0, 850.0, 1000.0];
-/// When the force steps from 0 to 1 N, s.
+/// Time when the force steps from 0 to 1 N, s.
 const STEP_S: f64 = 0.5;
 
-/// How a vibration comes out of a finger.
+/// A vibration behind a finger.
 struct Vibration {
     name: FingerName,
     /// Frequency, Hz, gain, dB, and phase in radians without that of the high-pass, going on from the one before.

@@ -191,8 +191,8 @@ fn traction_is_best_felt_slow_and_heavy_and_roughness_fast_and_light() {
 
 #[test]
 fn rougher_textures_have_less_traction() {
-    // Table 3: correlations over all textures, by movement: traction and roughness, traction and fineness, roughness and
-    // fineness
+    // Table 3: correlations over all textures, by movement: traction and roughness, traction and fineness, roughness
+    // and fineness
     const MOVEMENTS: [(f64, f64); 3] = [(1.26, 10.0), (0.5, 25.1), (0.2, 63.1)];
     const PAPER: [[f64; 3]; 3] = [
         [-0.5564, -0.3560, 0.2183],

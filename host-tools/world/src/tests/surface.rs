@@ -149,7 +149,7 @@ fn friction_depends_on_speed_load_and_place() {
 
 #[test]
 fn the_mean_force_of_a_slide_is_that_of_the_press() {
-    // nobody adjusts it (PAPER); what is left is the start on a crest or in a valley, and relaxation
+    // nobody adjusts it (PAPER); what remains is the start on a crest or in a valley, and relaxation
     let mut finger = Finger::new(1);
     let mut errors: Vec<(f64, u8)> = (1..=117)
         .step_by(2)

@@ -1,4 +1,5 @@
-//! Median parameters of the textures: of each group, and of single textures about which the paper or the name says more.
+//! Median parameters of the textures: of each group, and of single textures about which the paper or the name says
+//! more.
 //!
 //! All are chosen. Heights are rms in um, lengths in mm.
 
@@ -29,7 +30,7 @@ pub(super) struct Recipe {
     pub(super) damping: f64,
     /// Thickness.
     pub(super) thickness_mm: f64,
-    /// How much it gives way.
+    /// Compliance.
     pub(super) compliance_mm_per_n: f64,
 }
 
@@ -37,7 +38,8 @@ pub(super) struct Recipe {
 #[rustfmt::skip]
 fn of(group: Group) -> Recipe {
     use Group::*;
-    //   friction, fine um, mm, Hz, relief um, mm, weave um, mm, friction noise, heterogeneity, damping, thickness, compliance
+    //   friction, fine um, mm, Hz, relief um, mm, weave um, mm, friction noise, heterogeneity, damping, thickness,
+    //   compliance
     let (friction, fine, impulse_hz, relief, weave, friction_noise, heterogeneity, damping, thickness_mm, compliance_mm_per_n) =
         match group {
             Paper       => (0.55, (2.0, 0.06),  900.0, ( 4.0, 1.0), ( 0.0, 1.0), 0.0040, 0.06, 0.0,  0.3, 0.02),

@@ -15,7 +15,7 @@ const TRANSFER_NS: u64 = 3_048;
 const PAC: u8 = 0x80;
 const PDC: u8 = 0x83;
 
-/// Somebody at the pins who looks at the truth.
+/// A bench at the pins that also sees the truth.
 struct Bench {
     world: World,
     now_ns: u64,
