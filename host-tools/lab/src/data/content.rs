@@ -1,4 +1,4 @@
-//! What can be wrong with the contents of a file, and what to do about it. Who reads the file says where it is.
+//! Faults in the contents of a file, and their remedies. The reader of the file adds the place.
 
 use std::io;
 
@@ -7,7 +7,7 @@ use tactus_core::sensor::pressure::RATE_HZ;
 
 use crate::data::recordings::npy::{MAX_SAMPLES, NpyError};
 
-/// What is wrong with the contents of a file, and what to do. The errors that hold it say which file, and where in it.
+/// A fault in the contents of a file, and its remedy. The errors that hold it name the file, and the place in it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ContentError {
@@ -132,7 +132,7 @@ pub enum ContentError {
          again"
     )]
     Hash {
-        /// What was hashed.
+        /// The contents that were hashed.
         what: &'static str,
         /// Its hash.
         found: Box<str>,
@@ -239,7 +239,7 @@ pub enum ContentError {
     /// Two files of a fabric.
     #[error("a second file of the fabric {0:?}; give each fabric one file and one name")]
     SecondFile(String),
-    /// How many slides are listed, and may be at most.
+    /// Number of slides in the list, and the largest number.
     #[error("the slides listed are {0}, and 1 to {1} can be: add some, or split the file")]
     SlideCount(usize, usize),
     /// A third repetition.
@@ -263,7 +263,7 @@ pub enum ContentError {
         /// As in the manifest.
         repetition: u8,
     },
-    /// Where a recording begins, and where the one before ends.
+    /// Begin of a recording, and end of the one before.
     #[error(
         "offset_values is {0}, but the recording before it ends at {1}; recordings follow each other without gap or overlap: \
          correct the manifest"

@@ -1,5 +1,5 @@
-//! "The same as this one?": how often slides of a texture are taken for another one's, and the other way round, whatever the
-//! limit.
+//! "The same as this one?": the share of slides of a texture that are taken for another one's, and the other way round,
+//! for every limit.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -16,28 +16,28 @@ use crate::eval::learn;
 
 /// Slides after which it is counted.
 pub const SLIDES: usize = 3;
-/// Other textures that each one is held against.
+/// Other textures that each one is compared with.
 const OTHERS: usize = 3;
 /// Points of a curve.
 const POINTS: usize = 60;
 
-/// What verifications come to.
+/// The result of verifications.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Verified {
     /// After one slide, two, three.
     pub verify: Vec<After>,
-    /// What is told of the reference's own slides, where they go on until it is told or they run out.
+    /// Answers for the reference's own slides, which end with an answer or with the last slide.
     pub same: Told,
-    /// What is told of another texture's.
+    /// Answers for another texture's slides.
     pub other: Told,
 }
 
-/// What is counted after so many slides.
+/// Shares after so many slides.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct After {
-    /// Slides of the visit.
+    /// Slides of the episode.
     pub slides: usize,
-    /// Where as large a share of the reference's own slides is rejected as of others' is accepted.
+    /// Error rate at the limit where the shares of false rejects and of false accepts are equal.
     pub equal_error: f64,
     /// Share of the reference's own that is called different.
     pub false_reject: f64,
@@ -60,7 +60,7 @@ pub struct Told {
     pub mean_slides: f64,
 }
 
-/// What slides of one visit say about one reference.
+/// The comparison of the slides of one episode with one reference.
 struct Visit {
     is_same: bool,
     scores: [f64; SLIDES],
@@ -69,13 +69,13 @@ struct Visit {
     end: (Answer, usize),
 }
 
-/// Why it was not evaluated.
+/// Reasons why it was not evaluated.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// As any evaluation.
     #[error(transparent)]
     Evaluate(#[from] EvaluateError),
-    /// What was learned has no limits.
+    /// The learned table has no limits.
     #[error(
         "tables of these slides have no limits: verification needs three textures at least, whitened features, and --method fused"
     )]
@@ -88,7 +88,7 @@ impl From<learn::TableError> for VerifyError {
     }
 }
 
-/// Holds slides of each texture in turn against its own reference and against those of others.
+/// Compares slides of each texture in turn with its own reference and with those of others.
 ///
 /// # Errors
 /// See [`VerifyError`].
@@ -146,7 +146,7 @@ pub fn verify(
     })
 }
 
-/// The slides of a run, held against one texture of the table.
+/// Compares the slides of a run with one texture of the table.
 fn visit(
     experiment: &Experiment,
     bytes: &[u8],
@@ -186,7 +186,7 @@ fn visit(
             visit.end = (verification.answer, made);
         }
     }
-    // where slides ran out, what was known last
+    // where slides ran out, the last state counts
     for after in made.max(1)..SLIDES {
         visit.scores[after] = visit.scores[after - 1];
         visit.answers[after] = visit.answers[after - 1];
@@ -219,7 +219,7 @@ impl After {
     }
 }
 
-/// Where false rejects and false accepts are equal, and the curve of both, of sorted scores.
+/// The rate at which false rejects and false accepts are equal, and the curve of both, of sorted scores.
 fn trade_off(own: &[f64], others: &[f64]) -> (f64, Vec<[f64; 2]>) {
     let at = |limit: f64| {
         let rejected = own.len() - own.partition_point(|s| *s <= limit);
@@ -248,7 +248,7 @@ fn trade_off(own: &[f64], others: &[f64]) -> (f64, Vec<[f64; 2]>) {
     (equal, at_limits.into_iter().map(at).collect())
 }
 
-/// Why a texture cannot be put into a table.
+/// Reasons why a texture cannot be put into a table.
 #[derive(Debug, thiserror::Error)]
 pub enum PutError {
     /// The table compares the paper's properties.
@@ -301,11 +301,11 @@ pub fn put(table: Table<'_>, name: &str, slides: &[MeasuredSlide]) -> Result<Vec
 
 /// More bytes than one texture takes in a table.
 const MOST_OF_ONE: usize = 4096;
-/// Visits that are drawn of each other texture.
+/// Episodes that are drawn of each other texture.
 const DRAWN: usize = 40;
 
-/// Share of visits of the table's other textures, drawn about their means and as long as that of `explorer`, that would be
-/// called the same as `reference`. `None` where the table has no other texture, or nothing was observed.
+/// Share of episodes of the table's other textures, drawn about their means and as long as that of `explorer`, that
+/// would be called the same as `reference`. `None` if the table has no other texture, or nothing was observed.
 pub fn false_accept<const N: usize>(explorer: &Explorer<'_, N>, reference: u16) -> Option<f64> {
     let table = explorer.table();
     let mut random = ChaCha8Rng::seed_from_u64(1);
@@ -322,7 +322,7 @@ pub fn false_accept<const N: usize>(explorer: &Explorer<'_, N>, reference: u16) 
         }
         for _ in 0..DRAWN {
             let drawn = visits.iter().map(|&(movement, slides)| {
-                // the mean of the slides, and what is not known of the texture's own
+                // the mean of the slides, and the uncertainty of the texture's own
                 let n = f32::from(table.trials(texture, movement));
                 let sd = (1.0 / f32::from(slides) + 1.0 / n).sqrt() * WHITE_STEPS;
                 let mean = table.white_mean(texture, movement);
@@ -399,7 +399,7 @@ mod tests {
             .learn_without(Method::Fused, &[5])
             .unwrap();
         let table = Table::read(&bytes).unwrap();
-        // two of each movement, and a third one of each to hold against it
+        // two of each movement, and a third one of each to compare with it
         let third = |texture: usize| -> Vec<MeasuredSlide> {
             let thirds = measured[texture].chunks(3).map(|trials| trials[2].clone());
             thirds.collect()
@@ -440,7 +440,7 @@ mod tests {
         };
         assert_eq!(answer(&third(5)), Answer::Same);
         assert_eq!(answer(&third(4)), Answer::Different);
-        // a slide of another movement than the table's says nothing
+        // a slide of another movement than the table's does not count
         let mut elsewhere = measured[5][0].clone();
         elsewhere.movement = Movement::grid()
             .find(|m| with.movements().all(|n| n != *m))

@@ -1,4 +1,4 @@
-//! What a probe says, for a display: its explorations, followed with the same core, and the map of what it knows.
+//! A probe's messages for a display: its explorations, followed with the same core, and the map of its textures.
 
 use std::rc::Rc;
 
@@ -19,18 +19,18 @@ const FRAME: usize = 512;
 /// Bins that are shown as one, of those over 0 Hz.
 const BINS: usize = 4;
 
-/// What has come since it was taken last.
+/// The events since the last call.
 #[derive(Default)]
 pub struct Heard {
     /// P_AC of still finger and slide, counts about the still finger's, at 2200 Hz.
     pub pac: Vec<i16>,
     /// Spectra of the last 233 ms, one every 64 samples: dB of the mean power of four bins, of 17.2 Hz together.
     pub spectra: Vec<Vec<i8>>,
-    /// What the probe said.
+    /// The probe's events.
     pub happened: Vec<Happening>,
 }
 
-/// Hears a probe.
+/// Follows a probe's messages.
 #[derive(Default)]
 pub struct Hearing {
     /// The table in force, and its maps.
@@ -81,12 +81,12 @@ impl Hearing {
         };
     }
 
-    /// What the probe knows.
+    /// The probe's textures and movements.
     pub fn known(&self) -> &Known {
         &self.known
     }
 
-    /// Where a slide lies among the textures at its movement.
+    /// Place of a slide among the textures at its movement.
     pub fn place_of(
         &self,
         table: Table<'_>,
@@ -98,17 +98,17 @@ impl Hearing {
         Some(plane.place(&distances))
     }
 
-    /// Something that the probe said.
+    /// Adds an event of the probe.
     pub fn happens(&mut self, what: Happening) {
         self.heard.happened.push(what);
     }
 
-    /// What has been since the last time.
+    /// Takes the events since the last call.
     pub fn take(&mut self) -> Heard {
         std::mem::take(&mut self.heard)
     }
 
-    /// Takes in what the probe says.
+    /// Takes a message of the probe.
     pub fn hear(&mut self, event: Event) {
         if let Event::Block(block) = &event {
             self.block(block);
@@ -178,7 +178,7 @@ impl Hearing {
                 let standing = self
                     .followed
                     .observed(table, action, seen.clone(), early_ms);
-                // the probe's own word is the one that counts
+                // the probe's own figures count
                 let standing = Standing {
                     posterior: posterior.to_vec(),
                     log_odds: standing.as_ref().and_then(|s| s.log_odds),

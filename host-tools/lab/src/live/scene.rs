@@ -1,4 +1,4 @@
-//! What is seen of a probe: its host in the simulation.
+//! The view of a probe: its host in the simulation.
 
 use std::cell::Cell;
 use std::time::Duration;
@@ -16,17 +16,17 @@ use tactus_world::world::Truth;
 /// P_DC is shown so often, ms.
 const PDC_MS: u64 = 10;
 
-/// What is under way, and what was seen since the last frame.
+/// The work in progress, and the events since the last frame.
 pub(super) struct Scene {
     /// The time at which it stands still; `None`: it does not.
     pub(super) until: Option<Duration>,
-    /// Whether somebody waits for it to go on.
+    /// True if a request waits for it to continue.
     pub(super) waits: Cell<bool>,
-    /// What is to be done to the rig before its next millisecond.
+    /// Changes of the rig before its next millisecond.
     texture: Option<u8>,
     pub(super) wear: Option<f64>,
     pub(super) stop: bool,
-    /// What the probe says.
+    /// The probe's messages.
     pub(super) hearing: Hearing,
     now: Duration,
     phase: Phase,
@@ -57,7 +57,7 @@ impl Scene {
         self.now
     }
 
-    /// Number of what lies under the finger.
+    /// Number of the texture under the finger.
     pub(super) fn texture(&self) -> u8 {
         self.truth.texture
     }
@@ -72,7 +72,7 @@ impl Scene {
         }
     }
 
-    /// What has been since the last frame.
+    /// Takes the events since the last frame.
     pub(super) fn frame(&mut self) -> Frame {
         let Truth {
             tip_mm,

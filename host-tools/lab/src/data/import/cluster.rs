@@ -1,23 +1,24 @@
-//! Import of the Cluster Haptic Texture Dataset (Eguchi et al., arXiv 2407.16206): an IIS3DWB accelerometer in a rubber tip on a
-//! load cell of 1 kg, moved by a machine over 118 surfaces in 8 directions at 5 speeds with 2 forces, twice each.
+//! Import of the Cluster Haptic Texture Dataset (Eguchi et al., arXiv 2407.16206): an IIS3DWB accelerometer in a rubber
+//! tip on a load cell of 1 kg, moved by a machine over 118 surfaces in 8 directions at 5 speeds with 2 forces, twice
+//! each.
 //!
 //! # The layout
-//! As `documents/dataset_details.md` and the loaders in <https://github.com/cluster-lab/Cluster-Haptic-Texture-Dataset> have it:
-//! `sensor_data/{accel,force,position}/T/T_D_V_F_R.csv`, where T is the surface, D the direction in degrees, V the speed in mm/s,
-//! F the force in mN, R the repetition. In `accel` the columns are `time,X,Y,Z` in s and g at about 6 kHz, in `force`
-//! `time,force` in N at the same rate, in `position` `time,X,Y` in mm at 100 Hz. Times are those at which each value was read,
-//! and jitter. Nobody here has seen the files themselves. Guessed are: that the three times of a slide have one zero; that Z
-//! points along the pressing force, since the example has gravity on it; that surfaces have the numbers 0 to 118, since the
-//! authors' loader takes 119.
+//! As `documents/dataset_details.md` and the loaders in <https://github.com/cluster-lab/Cluster-Haptic-Texture-Dataset>
+//! have it: `sensor_data/{accel,force,position}/T/T_D_V_F_R.csv`, where T is the surface, D the direction in degrees, V
+//! the speed in mm/s, F the force in mN, R the repetition. In `accel` the columns are `time,X,Y,Z` in s and g at about
+//! 6 kHz, in `force` `time,force` in N at the same rate, in `position` `time,X,Y` in mm at 100 Hz. Times are those at
+//! which each value was read, and jitter. We have not seen the files themselves. Three points are guesses: the three
+//! times of a slide have one zero; Z points along the pressing force, since the example has gravity on it; surfaces
+//! have the numbers 0 to 118, since the authors' loader takes 119.
 //!
 //! # What is made of it
-//! What the finger `mems` gives: P_AC is Z in counts of 0.98 mg, behind a high-pass of 10 Hz, clipped at 2 g; P_DC is the force in
-//! counts of [`MN_PER_COUNT`]. There is no tangential force. The rate is that of the times, whatever it is: Z is put on equal
-//! steps along straight lines (a tone of 500 Hz in a record of 6 kHz errs by 3.4 % at most), and taken to 2200 Hz by a
-//! polyphase windowed-sinc filter of constant length in time (128 samples of 2200 Hz, squared Blackman-Harris).
+//! The signals of the finger `mems`: P_AC is Z in counts of 0.98 mg, behind a high-pass of 10 Hz, clipped at 2 g; P_DC
+//! is the force in counts of [`MN_PER_COUNT`]. There is no tangential force. The rate is that of the times: Z is put on
+//! equal steps along straight lines (a tone of 500 Hz in a record of 6 kHz errs by 3.4 % at most), and taken to 2200 Hz
+//! by a polyphase windowed-sinc filter of constant length in time (128 samples of 2200 Hz, squared Blackman-Harris).
 //!
 //! The steady part is from 10 % to 90 % of the way that `position` shows. A slide's number follows from its name, the
-//! repetition first: "early" and "late" slides are the two repetitions. When they were made is not known.
+//! repetition first: "early" and "late" slides are the two repetitions. The dates of the slides are unknown.
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -50,12 +51,13 @@ const PDC_RATE_HZ: u32 = 100;
 const LONGEST_PAUSE: f64 = 0.01;
 /// Surfaces have numbers up to this.
 const LAST_SURFACE: u32 = 118;
-/// How far the speed of a slide may be from that in its name.
+/// Largest deviation of a slide's speed from that in its name, as a share.
 const SPEED_OFF: f64 = 0.1;
 /// Longest file, in rows: half a minute at 26.7 kHz.
 const MAX_ROWS: usize = 800_000;
 
-/// Imports the dataset from the folder that holds `sensor_data`, or from that itself. As [`import`](super::import) otherwise.
+/// Imports the dataset from the folder that holds `sensor_data`, or from that itself. As [`import`](super::import)
+/// otherwise.
 ///
 /// # Errors
 /// As [`import`](super::import); also if a slide's force or position is missing, or its speed is not that of its name.
@@ -112,7 +114,7 @@ pub fn import(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) ->
     Ok(done)
 }
 
-/// What the name of a file says.
+/// The fields of a file's name.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Name {
     surface: u32,
@@ -220,7 +222,7 @@ impl Name {
         slide.cut(&[], &pac, None).map(Some).map_err(fault)
     }
 
-    /// When 10 % and 90 % of the way are done, s.
+    /// Times at which 10 % and 90 % of the way are done, s.
     fn way(&self, at: &[(f64, [f64; 2])]) -> std::result::Result<[f64; 2], ContentError> {
         let mut total = 0.0;
         let steps = at.windows(2).map(|w| {

@@ -1,4 +1,4 @@
-//! What all readers and writers of recordings share: their errors, bounded reads, and hashes.
+//! Common code of all readers and writers of recordings: their errors, bounded reads, and hashes.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
@@ -18,12 +18,12 @@ use crate::data::rows::RowError;
 pub const OWN_MANIFEST: &str = "manifest.csv";
 /// Name of the manifest of folders like `data/biotac`.
 pub const BIOTAC_MANIFEST: &str = "manifest.json";
-/// What a folder has in it while it is not whole.
+/// Name of the mark in a folder that is not whole.
 pub const INCOMPLETE: &str = "INCOMPLETE";
 /// Largest manifest that is read, in bytes.
 pub const MAX_MANIFEST: u64 = 64 << 20;
 
-/// Why recordings cannot be read or written. Every message names the file, the cause and what to do.
+/// Reasons why recordings cannot be read or written. Every message names the file, the cause and a remedy.
 #[derive(thiserror::Error, Debug)]
 #[non_exhaustive]
 pub enum RecordingError {
@@ -56,7 +56,7 @@ pub enum RecordingError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         cause: io::Error,
     },
     /// A row of a table makes no sense.
@@ -69,15 +69,15 @@ pub enum RecordingError {
         path: PathBuf,
         /// Line, or the name of the field.
         place: String,
-        /// What is wrong with it, and what to do.
+        /// The fault, and its remedy.
         cause: ContentError,
     },
-    /// A file of samples is not what its manifest says.
+    /// A file of samples differs from its manifest.
     #[error("{}: {cause}", path.display())]
     Samples {
         /// The file of samples.
         path: PathBuf,
-        /// What is wrong with it, and what to do.
+        /// The fault, and its remedy.
         cause: ContentError,
     },
     /// A manifest names a file outside its folder.
@@ -111,7 +111,7 @@ pub enum RecordingError {
     DuplicateSlide {
         /// The manifest.
         manifest: PathBuf,
-        /// Where the second one is.
+        /// Place of the second one.
         place: String,
         /// Number of the texture.
         id: u32,
@@ -125,7 +125,7 @@ pub enum RecordingError {
         folder: PathBuf,
         /// The index that was asked for.
         index: usize,
-        /// How many textures there are.
+        /// Number of textures.
         count: usize,
     },
     /// Recordings that were begun and are not whole.
@@ -200,24 +200,24 @@ pub fn inside(folder: &Path, manifest: &str, name: &str) -> Result<PathBuf> {
     Ok(folder.join(relative))
 }
 
-/// Where the files of a set are.
+/// The place of a set's files.
 #[derive(Debug)]
 pub enum Place {
     /// In a folder of this machine.
     Folder(PathBuf),
-    /// In memory, by their names in the folder that is called so.
+    /// In memory, by their names in the folder of this name.
     Memory(PathBuf, BTreeMap<String, Vec<u8>>),
 }
 
 impl Place {
-    /// What the folder is called.
+    /// Name of the folder.
     pub fn folder(&self) -> &Path {
         match self {
             Self::Folder(folder) | Self::Memory(folder, _) => folder,
         }
     }
 
-    /// Whether a file of this name is there.
+    /// Returns true if there is a file of this name.
     pub(super) fn has(&self, name: &str) -> bool {
         match self {
             Self::Folder(folder) => folder.join(name).is_file(),
@@ -243,7 +243,8 @@ impl Place {
     }
 }
 
-/// The bytes of a file of at most `limit` bytes. Memory grows with the bytes that come, not with what a manifest claims.
+/// The bytes of a file of at most `limit` bytes. Memory grows with the bytes that come, not with what a manifest
+/// claims.
 pub fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
     let io_error = |source| RecordingError::Io {
         path: path.to_owned(),

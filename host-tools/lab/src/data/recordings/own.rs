@@ -19,9 +19,9 @@
 //! | `calibrated` | day on which that finger's force per count was measured, as 20261121; 1 where nobody knew the day; empty, 0 or missing if it was not, or is not known |
 //! | `pace` | natural logarithm of the slide's mean speed in parts of `speed_mm_s`, in steps of 1/1024, by a sensor of motion; empty or missing where it was not measured |
 //!
-//! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it; each is a
-//! one-dimensional array of `<i2` (numpy.int16). The hash is the SHA-256 of the whole file in hexadecimal. The rows may come
-//! in any order; textures are taken in the order of their first row.
+//! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it; each is
+//! a one-dimensional array of `<i2` (numpy.int16). The hash is the SHA-256 of the whole file in hexadecimal. The rows
+//! may come in any order; textures are taken in the order of their first row.
 use std::io::Cursor;
 
 use tactus_core::features::Movement;
@@ -70,7 +70,7 @@ pub const LABELS: [&str; 7] = [
     "pace",
 ];
 
-/// What the manifest says, checked.
+/// The contents of a manifest, checked.
 #[derive(Debug)]
 pub struct Manifest {
     textures: Vec<(Texture, Vec<Entry>)>,

@@ -514,7 +514,7 @@ fn labels_come_back_and_older_manifests_have_none() {
     };
     let paces = [0, 1].map(|texture| pace(folder.path(), texture));
     assert_eq!(paces, [Some(-341), None]);
-    // what is neither yes nor no is none
+    // a value that is neither yes nor no is unknown
     let manifest = folder.path().join("manifest.csv");
     let text = fs::read_to_string(&manifest).unwrap();
     fs::write(&manifest, text.replace(",,no,", ",,maybe,")).unwrap();

@@ -1,11 +1,11 @@
-//! Why slides do not make an experiment.
+//! Reasons why slides do not make an experiment.
 
 use tactus_core::features::Movement;
 use tactus_core::table;
 
 use crate::eval::show::count;
 
-/// Why an experiment cannot be made.
+/// Reasons why an experiment cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ExperimentError {
     /// Too few slides.

@@ -38,7 +38,8 @@ fn tone(pac: &[i16], hz: f64) -> (f64, f64) {
     (tone.sqrt(), (all / n - tone).max(0.0).sqrt())
 }
 
-/// Whole cycles in the half of a slide that [`tone`] looks at are not needed: leakage of a tone over seconds is below a count.
+/// Whole cycles in the half of a slide that [`tone`] looks at are not needed: leakage of a tone over seconds is below a
+/// count.
 #[test]
 fn a_tone_keeps_its_strength_at_every_rate_and_what_is_above_the_band_is_gone() {
     // jitter of a third, as in the description's example

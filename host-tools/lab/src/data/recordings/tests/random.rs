@@ -1,4 +1,4 @@
-//! Random samples, and damage that nobody thought of.
+//! Random samples, and random damage.
 use proptest::prelude::*;
 
 use super::biotac_layout::biotac;
