@@ -1,7 +1,7 @@
-//! Cycles instead of instructions: a model of the core's pipeline and of the flash that it waits for, fed with every instruction
-//! that the emulated core executes.
+//! Cycles instead of instructions: a model of the core's pipeline and of the flash that it waits for, fed with every
+//! instruction that the emulated core executes.
 //!
-//! What the manuals leave open is counted as the longer of what they allow, so that the model errs on the slow side:
+//! Where the manuals leave a range, the longest time is counted, so that the model errs on the slow side:
 //!
 //! | what | counted as |
 //! |---|---|

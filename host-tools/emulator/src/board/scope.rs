@@ -1,12 +1,12 @@
-//! What the probes of an oscilloscope see at the chip's pins, beside [`Rig::trace`](super::Rig::trace): the sensor's bus, the encoder,
-//! the motor's current and the emergency stop.
+//! The data of an oscilloscope's probes at the chip's pins, beside [`Rig::trace`](super::Rig::trace): the sensor's bus,
+//! the encoder, the motor's current and the emergency stop.
 
 use tactus_world::encoder::Edge;
 
 /// A frame over the sensor's bus.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Frame {
-    /// When its last bit was over, ns.
+    /// Time when its last bit was over, ns.
     pub at_ns: u64,
     /// Bits, the highest first.
     pub bits: u8,
@@ -18,7 +18,7 @@ pub struct Frame {
     pub divider: u32,
 }
 
-/// What was seen since the probes were put there, oldest first.
+/// The data since the probes were put there, oldest first.
 #[derive(Clone, Debug, Default)]
 pub struct Scope {
     /// Levels of chip select with their times, ns.
@@ -27,7 +27,7 @@ pub struct Scope {
     pub frames: Vec<Frame>,
     /// Edges of the encoder's lines.
     pub encoder: Vec<Edge>,
-    /// What the converter was given of the motor's current whenever somebody looked at it: time, ns, and counts.
+    /// The converter's input of the motor's current at every read of it: time, ns, and counts.
     pub current: Vec<(u64, u16)>,
     /// Levels of the emergency stop's pin, ns.
     pub stop: Vec<(u64, bool)>,
@@ -40,6 +40,6 @@ pub struct BridgePwm {
     pub period_s: f64,
     /// Share of it that the pin is high.
     pub duty: f64,
-    /// When a period began, s before now.
+    /// Begin of a period, s before now.
     pub since_s: f64,
 }

@@ -1,4 +1,4 @@
-//! What is under the finger, and what the firmware is given beforehand: learned once for a world, then kept in a file.
+//! The texture under the finger, and the firmware's table: learned once for a world, then kept in a file.
 
 use std::path::{Path, PathBuf};
 
@@ -15,15 +15,15 @@ use super::args::{World, hex_sha256};
 use super::progress;
 use super::under_finger::{self, Known, KnownError, TRIALS, Unknown};
 
-/// Where the textures come from.
+/// The source of the textures.
 enum Textures {
     Simulated(FingerName, Collection),
     Recorded(RecordedTexture),
 }
 
-/// What the seed draws.
+/// The draws of the seed.
 pub struct Chosen {
-    /// What lies under the finger.
+    /// The texture under the finger.
     pub unknown: Unknown,
     /// For the firmware's own draws.
     pub seed: u32,
@@ -31,7 +31,7 @@ pub struct Chosen {
 }
 
 impl Chosen {
-    /// Draws what the arguments leave open.
+    /// Draws the values that the arguments leave open.
     pub fn new(cli: &World) -> Result<Self, KnownError> {
         let mut random = ChaCha8Rng::seed_from_u64(cli.seed);
         if let Some(name) = &cli.recording {
@@ -110,8 +110,8 @@ impl Chosen {
         Ok(known)
     }
 
-    /// A file named for all that the table depends on: the world, and this program, which holds core and simulator. None
-    /// for recordings: what they hold is not in their name.
+    /// A file named for all that the table depends on: the world, and this program, which holds core and simulator.
+    /// None for recordings: their contents are not in their name.
     fn kept_in(&self, method: Method) -> Option<PathBuf> {
         let Textures::Simulated(finger, collection) = &self.textures else {
             return None;

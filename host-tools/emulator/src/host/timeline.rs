@@ -1,4 +1,4 @@
-//! What each second went to, from power-up to ready and from the command, or the touch, to the verdict: by what the firmware
+//! Use of each second, from power-up to ready and from the command, or the touch, to the verdict: by the firmware's
 //! reports and by the world's truth.
 
 use serde_json::{Map, Value};
@@ -10,10 +10,10 @@ use crate::board::CONTACT_N;
 /// The fingertip has moved down when it is this much lower, mm: three steps.
 const MOVED_MM: f64 = 0.002;
 
-/// What time goes to, in the order in which it comes.
+/// Parts of the time, in the order in which they come.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Part {
-    /// Power-up, until the firmware says that it runs, or shows something.
+    /// Power-up, until the firmware reports that it runs, or shows something.
     Boot,
     /// Until it begins to home, or is ready for a touch.
     SelfCheck,
@@ -29,13 +29,13 @@ pub enum Part {
     Settle,
     /// The still finger is measured.
     Still,
-    /// The person sees what is wanted and begins.
+    /// The person sees the prompt and begins.
     Reaction,
     /// The slide.
     Slide,
     /// The finger is lifted.
     Lift,
-    /// From the end of what was moved to the choice or verdict.
+    /// From the end of the motion to the choice or verdict.
     Decision,
 }
 
@@ -75,7 +75,7 @@ impl Part {
     }
 }
 
-/// Time by what it went to.
+/// Time by its parts.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Timeline {
     /// ns of each part.
@@ -97,7 +97,7 @@ impl Timeline {
         }
     }
 
-    /// From now on time goes to this, or to nothing of the probe's.
+    /// Counts the time from now on for this part, or for none of the probe's.
     pub fn enter(&mut self, now_ns: u64, part: Option<Part>) {
         if let Some((last, since_ns)) = self.now.take()
             && let Some(spent) = self.spent.get_mut(last as usize)
@@ -107,7 +107,7 @@ impl Timeline {
         self.now = part.map(|part| (part, now_ns));
     }
 
-    /// It is ready: what it does until it is told to explore does not count.
+    /// It is ready: its time until the next command does not count.
     pub fn ready(&mut self, now_ns: u64) {
         if self.ready_ns.is_none() {
             self.ready_ns = Some(now_ns);
@@ -115,13 +115,13 @@ impl Timeline {
         }
     }
 
-    /// It is told to explore, or touched.
+    /// It gets the command to explore, or is touched.
     pub fn begin(&mut self, now_ns: u64, part: Part) {
         self.commanded_ns = Some(now_ns);
         self.enter(now_ns, Some(part));
     }
 
-    /// It says what it is.
+    /// It gives its verdict.
     pub fn verdict(&mut self, now_ns: u64) {
         if self.commanded_ns.is_some() && self.verdict_ns.is_none() {
             self.verdict_ns = Some(now_ns);
@@ -155,7 +155,7 @@ impl Timeline {
         self.enter(now_ns, Some(part));
     }
 
-    /// The world's truth now: what the rig does not report.
+    /// Takes the world's truth now, which the rig does not report.
     pub fn look(&mut self, now_ns: u64, truth: &Truth) {
         let part = match self.now {
             Some((Part::Zero, _)) if self.from_mm - truth.tip_mm > MOVED_MM => Part::Approach,
@@ -175,7 +175,7 @@ impl Timeline {
         Some(seconds(self.verdict_ns?.checked_sub(self.commanded_ns?)?))
     }
 
-    /// Both for people, if it came to both; the verdict since that.
+    /// Both for people, if both are known; the verdict since that.
     pub fn sentence(&self, since: &str) -> String {
         match (self.seconds_to_ready(), self.seconds_to_verdict()) {
             (Some(ready), Some(verdict)) => {

@@ -13,7 +13,7 @@ use super::pipeline::{Core, Executed};
 use crate::board::handlers::Handlers;
 use crate::board::registers::{register, word};
 
-/// What is spent is kept for so long a time each, ns.
+/// Length of a bin of the profile, ns.
 const BIN_NS: u64 = 250_000;
 /// Windows are of 1 ms and begin at any of these.
 const BINS: u64 = 4;
@@ -57,16 +57,16 @@ impl Sum for Spent {
     }
 }
 
-/// What was spent in one millisecond.
+/// The cycles of one millisecond.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Load {
-    /// When it began, ns of virtual time.
+    /// Its beginning, ns of virtual time.
     pub at_ns: u64,
-    /// What was spent.
+    /// The cycles.
     pub spent: Spent,
 }
 
-/// What was spent, in parts of a millisecond and by groups of handlers; the last group is all the rest.
+/// Cycles in parts of a millisecond and by groups of handlers; the last group is all the rest.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct CycleProfile {
     bins: BTreeMap<u64, Vec<Spent>>,
@@ -83,7 +83,7 @@ impl CycleProfile {
         }
     }
 
-    /// With what was spent later, or before.
+    /// Adds a later, or an earlier, profile.
     pub fn extend(&mut self, other: Self) {
         for (bin, spent) in other.bins {
             let here = self
@@ -97,7 +97,7 @@ impl CycleProfile {
         self.unseen += other.unseen;
     }
 
-    /// All that was spent by some groups.
+    /// The sum of some groups.
     pub fn total(&self, groups: Range<usize>) -> Spent {
         let bins = self.bins.values();
         bins.flat_map(|bin| bin.get(groups.clone()))
@@ -124,7 +124,7 @@ impl CycleProfile {
     }
 }
 
-/// An instruction that the core has arrived at, and what becomes known of it until it arrives at the next one.
+/// An instruction that the core has arrived at, and its effects until the core arrives at the next one.
 struct Pending {
     at: u32,
     at_ns: u64,
@@ -152,8 +152,8 @@ pub(crate) struct Tracer {
 }
 
 impl Tracer {
-    /// Follows all code there from now on. Handlers are told apart by their groups. With a switch, what is executed counts while
-    /// the word at that address is not 0.
+    /// Follows all code there from now on. Handlers are told apart by their groups. With a switch, what is executed
+    /// counts while the word at that address is not 0.
     pub(crate) fn new(
         code: Vec<Range<u64>>,
         groups: &[Vec<u64>],
@@ -199,7 +199,7 @@ impl Tracer {
         Some(Watch::Writes { address, length })
     }
 
-    /// Whether to be told of each instruction, which costs most of the speed.
+    /// Sets whether each instruction is traced, which costs most of the speed.
     fn follow(&self, follows: bool, host: &mut dyn Host) {
         for address in self.code.iter().flat_map(|range| range.clone().step_by(2)) {
             let watch = Watch::Instruction(address);
@@ -220,7 +220,7 @@ impl Tracer {
         self.profile
     }
 
-    /// What was spent since the last call.
+    /// Takes the profile since the last call.
     pub(crate) fn take(&mut self) -> CycleProfile {
         std::mem::take(&mut self.profile)
     }
@@ -277,7 +277,7 @@ impl Tracer {
             let length = pending.instruction.length;
             let next = match returns_to {
                 Some(next) => next,
-                // what it takes to come back is the exception's
+                // the cycles of the return are the exception's
                 None if left > 0 => pending.at + length,
                 None => hit.address as u32,
             };

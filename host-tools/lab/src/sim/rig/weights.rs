@@ -1,4 +1,5 @@
-//! A kitchen scale's weights on the lifted finger of a rig, as [`ServoRig`] asks for them: its guard is on, whatever lies on it.
+//! A kitchen scale's weights on the lifted finger of a rig, as [`ServoRig`] asks for them: its guard is on with any
+//! weight on it.
 
 use embassy_futures::block_on;
 use rayon::prelude::*;
@@ -20,15 +21,15 @@ use tactus_world::person::{Hand, Manner};
 use tactus_world::slot::Reader;
 use tactus_world::world::Setup;
 
-/// The finger must never feel more, N.
+/// Largest force that the finger ever bears, N.
 const MOST_N: f64 = 2.2;
 /// Seeds of each finger.
 const SEEDS: u64 = 5;
 
-/// A person at a rig who does what it asks for, without a tremor: what lies on the finger is a weight.
+/// A person at a rig who follows its prompts, without a tremor: a weight lies on the finger.
 struct Weights {
     rig: SimRig,
-    /// What a weight is in truth, of what it says.
+    /// True weight, relative to the one that is written on it.
     share: f64,
     state: RigState,
 }
@@ -156,7 +157,7 @@ fn weights_on_the_lifted_finger_give_its_force_per_count() {
         let model = Reader::new(finger).model().calibration;
         let share = weighed.mn_per_count / model.force_mn_per_count;
         assert!((share - 1.0).abs() < 0.03, "{finger}, {seed}: {weighed:?}");
-        // nobody is asked for a weight any more: what presses now is a fault
+        // no weight is asked for any more: a press now is a fault
         let servo = &mut rig.servo;
         assert_eq!(servo.lay(0.3), Phase::Ready, "{finger}, {seed}");
         let phase = servo.lay(0.6);
@@ -208,7 +209,8 @@ fn a_lever_that_comes_down_in_place_of_a_weight_is_seen() {
     });
 }
 
-/// A person who points the finger down and turns it over, as asked. What comes of it, and a g and the zero in truth, in counts.
+/// A person who points the finger down and turns it over, as asked. Returns the result, and the true values of a g and
+/// of the zero, in counts.
 fn turned(seed: u64, lean_rad: f64) -> (Result<Turned, Failure>, [f64; 2]) {
     let mut draws = Noise::new(seed, 77);
     let (share, zero_g) = (draws.between(-0.03, 0.03), draws.between(-0.06, 0.06));
