@@ -1,5 +1,5 @@
-//! How identification grows with the number of textures, in the simulated world: textures of one rig's collection and of those
-//! of the worlds after it, since Table 1 names no more than 117.
+//! Identification as a function of the number of textures, in the simulated world: textures of one rig's collection and
+//! of those of the worlds after it, since Table 1 names no more than 117.
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -45,7 +45,7 @@ pub struct Pool {
     pub left_out: usize,
 }
 
-/// What came of explorations among so many textures.
+/// The result of explorations among so many textures.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Row {
     /// Textures of a table.
@@ -60,18 +60,19 @@ pub struct Row {
     pub seconds: f64,
     /// Textures that are still likely after the first slide (mean): the work of a choice grows with their square.
     pub live: f64,
-    /// The right name was told as sure, 0 to 1.
+    /// Share of right names, as sure, 0 to 1.
     pub right: f64,
-    /// Wrong names among those told as sure, 0 to 1.
+    /// Share of wrong names among the sure ones, 0 to 1.
     pub wrong_when_sure: f64,
-    /// Known textures that were told to be none of those known, 0 to 1.
+    /// Share of known textures that were called unknown, 0 to 1.
     pub false_alarms: f64,
-    /// Explorations of textures that the table does not have that were told so, 0 to 1.
+    /// Share of unknown textures that were called so, 0 to 1.
     pub new_noticed: f64,
 }
 
 impl Pool {
-    /// Records so many textures of a world and of those after it, all under the finger, motors and amplifier of the first.
+    /// Records so many textures of a world and of those after it, all under the finger, motors and amplifier of the
+    /// first.
     ///
     /// # Errors
     /// The rig cannot be calibrated.
@@ -103,8 +104,8 @@ impl Pool {
         })
     }
 
-    /// Explores among so many of the textures, but for the last [`STRANGERS`]: with tables of several draws of them, until there
-    /// are enough explorations.
+    /// Explores among so many of the textures, but for the last [`STRANGERS`]: with tables of several draws of them,
+    /// until there are enough explorations.
     ///
     /// # Errors
     /// See [`EvaluateError`].
@@ -191,7 +192,7 @@ fn record(
     Some((format!("{} {world}", texture_name(texture)), slides))
 }
 
-/// Which of the trials: the first are learned from, the last are shown.
+/// A part of the trials: the first are learned from, the last are shown.
 fn part(textures: &[&Slides], from: usize, to: usize) -> Vec<Vec<Vec<Observation>>> {
     let of = |slides: &Vec<Observation>| slides[from..to].to_vec();
     let textures = textures.iter();
@@ -233,8 +234,8 @@ impl Played {
         Ok(Self { bytes, experiment })
     }
 
-    /// Explores textures of `shown`; how that ended, and how many textures were still likely after the first slides, all
-    /// together.
+    /// Explores textures of `shown`; returns the verdicts, and the number of textures still likely after the first
+    /// slides, all together.
     fn play(
         &self,
         shown: &Experiment,
@@ -275,7 +276,7 @@ pub fn explorations(textures: usize) -> usize {
     EXPLORATIONS.div_ceil(with_a_table) * (with_a_table + STRANGERS)
 }
 
-/// What is told, and slides with the time they take, by the number of textures.
+/// Verdicts, and slides with their duration, by the number of textures.
 ///
 /// # Errors
 /// See [`DrawError`].

@@ -1,4 +1,4 @@
-//! Why a folder of fabrics cannot be read.
+//! Reasons why a folder of fabrics cannot be read.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use tactus_lab::data::recordings::files::RecordingError;
 /// Name of the manifest.
 pub const MANIFEST: &str = "manifest.json";
 
-/// Why fabrics cannot be read. Every message names the file, the cause and what to do.
+/// Reasons why fabrics cannot be read. Every message names the file, the cause and a remedy.
 #[derive(thiserror::Error, Debug)]
 #[non_exhaustive]
 pub enum FabricError {
@@ -28,7 +28,7 @@ pub enum FabricError {
     NothingShared {
         /// The manifest.
         manifest: PathBuf,
-        /// How many fabrics it lists.
+        /// Number of fabrics that it lists.
         fabrics: usize,
     },
     /// A slide from which nothing can be measured.
@@ -42,7 +42,7 @@ pub enum FabricError {
         direction: i8,
         /// As in the manifest.
         repetition: u8,
-        /// What is wrong with it, and what to do.
+        /// The fault, and its remedy.
         cause: ContentError,
     },
     /// A file cannot be read or is not what its manifest says.

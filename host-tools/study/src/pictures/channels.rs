@@ -27,7 +27,7 @@ pub fn figure(title: &str, panels: &[(&str, Vec<Trace>)]) -> Result<Figure, Draw
     for (n, (what, traces)) in panels.iter().enumerate() {
         let shown = traces.iter().filter(|trace| !trace.points.is_empty());
         let series = shown.enumerate().map(|(colour, trace)| {
-            // what is told once a slide has a mark
+            // a value that comes once a slide has a mark
             let mark = match trace.points.len() {
                 0..=60 => Mark::Circle,
                 _ => Mark::None,

@@ -1,9 +1,10 @@
-//! What `tactus evaluate --novelty --plot` draws: what is told of known textures and of those that were left out of the table.
+//! Pictures of `tactus evaluate --novelty --plot`: verdicts on known textures and on those that were left out of the
+//! table.
 
 use crate::chart::{Chart, DrawError, Figure, MARKS, Series};
 use tactus_lab::eval::novelty::{After, Novelty};
 
-/// What a curve is called, its colour, and its share after so many slides.
+/// Name of a curve, its colour, and its share after so many slides.
 type Curve = (&'static str, usize, fn(&After) -> f64);
 
 const KNOWN: [Curve; 4] = [

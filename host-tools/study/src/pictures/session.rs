@@ -1,5 +1,5 @@
-//! What `tactus evaluate --lifelong --plot` draws: how slides move away from what was learned while a session goes on, and what
-//! is told of them.
+//! Pictures of `tactus evaluate --lifelong --plot`: the drift of slides from the learned means during a session, and
+//! the verdicts.
 
 use crate::chart::{Chart, DrawError, Figure, MARKS, Series};
 use tactus_lab::eval::lifelong::{Learning, Lifelong, Moment};
@@ -7,7 +7,7 @@ use tactus_lab::eval::lifelong::{Learning, Lifelong, Moment};
 /// Textures that have a line of their own.
 const FARTHEST: usize = 4;
 
-/// What a curve is called, its colour, and its share.
+/// Name of a curve, its colour, and its share.
 type Curve = (&'static str, usize, fn(&Moment) -> f64);
 
 const TOLD: [Curve; 5] = [
@@ -18,8 +18,8 @@ const TOLD: [Curve; 5] = [
     ("undecided", 4, |m| m.verdicts.undecided),
 ];
 
-/// How far slides are from what was learned, of all textures and of those that went farthest; and what is told, a picture
-/// for each way of learning. `train_slides` of each texture and movement were learned from.
+/// Distances of slides from the learned means, of all textures and of those that went farthest; and the verdicts, a
+/// picture for each way of learning. `train_slides` of each texture and movement were learned from.
 ///
 /// # Errors
 /// See [`DrawError`].
@@ -33,7 +33,7 @@ pub fn figures(lives: &[Lifelong], train_slides: usize) -> Result<Vec<Figure>, D
     Ok(figures)
 }
 
-/// A curve over the slides of a session, of which each point says its number.
+/// A curve over the slides of a session, with the number of each point as its tooltip.
 fn curve(
     colour: usize,
     name: &str,

@@ -1,4 +1,4 @@
-//! One slide over time: force, speed, P_AC, and the part of it that the features are made of.
+//! One slide over time: force, speed, P_AC, and the part of it that the features are taken from.
 
 use tactus_core::features::{Block, Movement};
 use tactus_core::sensor::pressure::RATE_HZ;
@@ -9,23 +9,23 @@ use tactus_lab::data::recording::Recording;
 
 /// Points across the picture: more than these are drawn as their least and their greatest.
 const COLUMNS: usize = 380;
-/// What is shown before and after the slide, s.
+/// Time shown before and after the slide, s.
 const AROUND_S: f64 = 0.5;
 
 /// A slide over time.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Timeline {
     title: String,
-    /// What each shows, with its unit, and its values by the time in s from the slide's begin.
+    /// Name of each trace with its unit, and its values by the time in s from the slide's begin.
     traces: Vec<(&'static str, Vec<(f64, f64)>)>,
     /// The part at constant speed, s.
     window: (f64, f64),
-    /// What is not shown, and why.
+    /// The traces that are missing, and the reason.
     missing: &'static str,
 }
 
 impl Timeline {
-    /// Of a recorded slide: recordings hold the force and the speed that were asked for, not those that were.
+    /// The timeline of a recorded slide: recordings hold the commanded force and speed, not the real ones.
     pub fn of_recording(recording: &Recording) -> Self {
         let over = |samples: &[i16], rate_hz: u32, unit: f64| {
             let seconds = (0..samples.len()).map(|n| n as f64 / f64::from(rate_hz));
@@ -126,11 +126,11 @@ pub(super) fn drawn(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     ends.collect()
 }
 
-/// Keeps what a probe reports of the slide it makes.
+/// Keeps a probe's reports of the current slide.
 #[derive(Clone, Debug, Default)]
 pub struct Watch {
     movement: Option<Movement>,
-    /// When the stage began the slide, ms.
+    /// Time when the stage began the slide, ms.
     began_ms: Option<u32>,
     live: Vec<(u32, Live)>,
     blocks: Vec<Block>,
@@ -150,7 +150,7 @@ impl Watch {
         }
     }
 
-    /// A movement begins: what was kept of the one before is no part of it.
+    /// A movement begins: drops the reports of the one before.
     pub fn begin(&mut self, movement: Movement) {
         *self = Self {
             movement: Some(movement),

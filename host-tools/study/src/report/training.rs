@@ -9,10 +9,10 @@ use crate::chart::{Chart, DrawError, Figure, MARKS, Mark, Series, buffer};
 use crate::published::{MOST_USEFUL, TRIALS};
 use crate::training::Training;
 
-/// What the axes of textures show.
+/// Label of the axes of textures.
 const TEXTURES: &str = "number of the texture (Table 1)";
 
-/// Adds what the training found.
+/// Adds the results of the training.
 pub(super) fn add(training: &Training, report: &mut Report) -> Result<(), DrawError> {
     let names: Vec<String> = training
         .movements
@@ -96,7 +96,7 @@ fn add_matrix(report: &mut Report, id: &str, of: &[Vec<f32>]) {
     report.file(id, header, rows.collect());
 }
 
-/// Adds the file of what was learned of every texture.
+/// Adds the file of the learned Gaussians of every texture.
 fn trained(training: &Training, report: &mut Report) {
     let mut header = owned(&["texture", "name"]);
     for m in 1..=training.movements.len() {
@@ -190,7 +190,7 @@ fn wear(training: &Training) -> Result<Figure, DrawError> {
     .figure("skin-during-training")
 }
 
-/// What wear does to roughness, by movement.
+/// Effect of wear on roughness, by movement.
 fn roughness(training: &Training) -> Result<Figure, DrawError> {
     let mut series = Vec::new();
     for (m, &movement) in training.movements.iter().enumerate() {

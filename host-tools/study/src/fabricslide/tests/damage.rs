@@ -1,4 +1,4 @@
-//! Every way in which a folder of fabrics can be wrong, with the message it must give; and damage nobody thought of.
+//! Every fault of a folder of fabrics, with its message; and random damage.
 use proptest::prelude::*;
 
 use super::*;
