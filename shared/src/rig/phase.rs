@@ -69,7 +69,8 @@ pub enum Refused {
     Fault(Fault),
     /// The force is over this rig's limit.
     #[error(
-        "{0} mN is more than this rig may press: {HIGH_FORCE_MN} mN, or {most} mN with tactus device settings --high-force on, and no more than its calibration can tell",
+        "{0} mN is more than this rig may press: {HIGH_FORCE_MN} mN, or {most} mN with tactus device settings \
+         --high-force on, and no more than its calibration can tell",
         most = most_mn(true)
     )]
     Force(u16),

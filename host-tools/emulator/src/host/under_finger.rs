@@ -16,8 +16,8 @@ use crate::board::{Emulator, Error, Options};
 /// Trials of each texture and movement (PAPER: five).
 pub const TRIALS: u32 = 5;
 /// Limits of recordings.
-pub const RECORDED_LIMITS: &str = "Recordings: one movement, 3 of their 5 s are played, and what 12 bits do not hold is clipped; learned and explored \
-     slides are of one session (interleaved).";
+pub const RECORDED_LIMITS: &str = "Recordings: one movement, 3 of their 5 s are played, and what 12 bits do not hold \
+     is clipped; learned and explored slides are of one session (interleaved).";
 
 /// Reasons why there is nothing to learn, or no texture under the finger.
 #[derive(Debug, thiserror::Error)]
@@ -25,8 +25,8 @@ pub const RECORDED_LIMITS: &str = "Recordings: one movement, 3 of their 5 s are 
 pub enum KnownError {
     /// There are no recordings.
     #[error(
-        "no recordings in {}: make them from github.com/dexrob/BioTac_slide_20_50 in the layout of data/biotac, and set \
-         TACTUS_DATA to the folder that holds biotac/",
+        "no recordings in {}: make them from github.com/dexrob/BioTac_slide_20_50 in the layout of data/biotac, and \
+         set TACTUS_DATA to the folder that holds biotac/",
         .0.display()
     )]
     NoData(PathBuf),

@@ -128,8 +128,8 @@ pub enum ContentError {
     // files of samples
     /// The file was changed.
     #[error(
-        "SHA-256 of {what} is {found}, the manifest says {expected}: the file was damaged or changed; fetch or record it \
-         again"
+        "SHA-256 of {what} is {found}, the manifest says {expected}: the file was damaged or changed; fetch or record \
+         it again"
     )]
     Hash {
         /// The contents that were hashed.
@@ -213,8 +213,9 @@ pub enum ContentError {
     NoForce,
     /// The name of a file of the Cluster dataset.
     #[error(
-        "the name is not SURFACE_DIRECTION_SPEED_FORCE_REPETITION.csv of the Cluster Haptic Texture Dataset (0_135_40_500_0.csv: \
-         multiples of 45 degrees, 20 to 60 mm/s, 500 or 1000 mN, 0 or 1); correct it or move the file away"
+        "the name is not SURFACE_DIRECTION_SPEED_FORCE_REPETITION.csv of the Cluster Haptic Texture Dataset \
+         (0_135_40_500_0.csv: multiples of 45 degrees, 20 to 60 mm/s, 500 or 1000 mN, 0 or 1); correct it or move the \
+         file away"
     )]
     ClusterName,
     /// A surface that is not in the dataset, and the last one that is.
@@ -222,7 +223,8 @@ pub enum ContentError {
     Surface(u32, u32),
     /// Speed along the way, and that of the file's name, mm/s.
     #[error(
-        "the finger moves at {0:.1} mm/s where the file's name says {1}: it was cut off or has a wrong name; fetch it again"
+        "the finger moves at {0:.1} mm/s where the file's name says {1}: it was cut off or has a wrong name; fetch it \
+         again"
     )]
     Speed(f64, u32),
     /// The force ends too early.
@@ -247,8 +249,8 @@ pub enum ContentError {
     Repetition(u8),
     /// Rows of a recording, its first value, and the most values of a file.
     #[error(
-        "the rows, {0} of 16 values from value {1} on: a recording has 1 row at least, and a file no more than {2} values; correct \
-         the manifest"
+        "the rows, {0} of 16 values from value {1} on: a recording has 1 row at least, and a file no more than {2} \
+         values; correct the manifest"
     )]
     Span(u64, u64, u64),
     /// A recording comes twice.
@@ -265,8 +267,8 @@ pub enum ContentError {
     },
     /// Begin of a recording, and end of the one before.
     #[error(
-        "offset_values is {0}, but the recording before it ends at {1}; recordings follow each other without gap or overlap: \
-         correct the manifest"
+        "offset_values is {0}, but the recording before it ends at {1}; recordings follow each other without gap or \
+         overlap: correct the manifest"
     )]
     Gap(u64, u64),
     /// A set-point and speed that are no movement.
@@ -285,13 +287,14 @@ pub enum ContentError {
     Ends,
     /// Samples of a slide, and the least there must be.
     #[error(
-        "a slide of {0} samples is too short, {1} are the least; record it again or take this movement out of the manifest"
+        "a slide of {0} samples is too short, {1} are the least; record it again or take this movement out of the \
+         manifest"
     )]
     Short(usize, usize),
     /// No taxel moves.
     #[error(
-        "no taxel moves: the finger did not touch, or the sensor is dead; record it again or take this movement out of the \
-         manifest"
+        "no taxel moves: the finger did not touch, or the sensor is dead; record it again or take this movement out of \
+         the manifest"
     )]
     Silent,
 }

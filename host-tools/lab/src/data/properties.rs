@@ -45,8 +45,8 @@ pub enum PropertyError {
     Row(#[from] RowError),
     /// A texture lacks trials of a movement.
     #[error(
-        "{}: texture {}, movement {}: no {set} trials, where texture {}, movement {} has {there}; give some, or leave out the \
-         movement or the texture",
+        "{}: texture {}, movement {}: no {set} trials, where texture {}, movement {} has {there}; give some, or leave \
+         out the movement or the texture",
         path.display(), at[0], at[1], like[0], like[1]
     )]
     Missing {

@@ -18,7 +18,8 @@ pub enum FirstError {
     One(usize),
     /// As [`Self::One`], of one texture and movement.
     #[error(
-        "{texture}, {movement}: {}, and how slides of one texture differ takes at least two", count(*there as u64, "slide")
+        "{texture}, {movement}: {}, and how slides of one texture differ takes at least \
+         two", count(*there as u64, "slide")
     )]
     Few {
         /// Name of the texture.

@@ -324,8 +324,8 @@ fn advice(report: &Report) -> Vec<String> {
         let share = format!("{:.0} %", 100.0 * other.taken_for);
         match other.slides {
             None => advice.push(format!(
-                "{a} and {b} cannot be told apart with these movements: {share} of the slides of {a} would be taken for {b}, and \
-                 ten slides do not settle it. Give them one name, or learn them at another movement."
+                "{a} and {b} cannot be told apart with these movements: {share} of the slides of {a} would be taken \
+                 for {b}, and ten slides do not settle it. Give them one name, or learn them at another movement."
             )),
             Some(n @ 4..) => advice.push(format!(
                 "{a} and {b} take about {} to tell apart; more trials of both would help.",
@@ -361,20 +361,21 @@ fn advice(report: &Report) -> Vec<String> {
         };
         if let Some(moved) = recorded.moved.filter(|moved| *moved > MOVED) {
             advice.push(format!(
-                "{name} is not as it was learned: the mean of its recorded slides is off by {moved:.1} times what chance explains. \
-                 If finger or sample changed, learn it again."
+                "{name} is not as it was learned: the mean of its recorded slides is off by {moved:.1} times what \
+                 chance explains. If finger or sample changed, learn it again."
             ));
         }
         if let Some(spread) = recorded.spread.filter(|spread| *spread > WIDE) {
             advice.push(format!(
-                "Slides of {name} scatter {spread:.1} times as much as the table expects: it may differ from place to place. \
-                 Learn it from more places of the sample."
+                "Slides of {name} scatter {spread:.1} times as much as the table expects: it may differ from place to \
+                 place. Learn it from more places of the sample."
             ));
         }
     }
     if report.table.movements.len() == 1 && report.table.textures.len() > 1 {
         advice.push(
-            "The table has one movement, so there is nothing to choose: a second one, at another force and speed, tells more."
+            "The table has one movement, so there is nothing to choose: a second one, at another force and speed, \
+             tells more."
                 .to_owned(),
         );
     }

@@ -123,8 +123,8 @@ pub fn in_words(table: Table<'_>) -> String {
 pub fn advice(stayed: &[&str]) -> Option<String> {
     (!stayed.is_empty()).then(|| {
         format!(
-            "Learned at one spot: {}. A slide on the same track again says little about a texture, so it may not be known at \
-             other spots, or turned: learn it again, and move or turn the sample between trials.",
+            "Learned at one spot: {}. A slide on the same track again says little about a texture, so it may not be \
+             known at other spots, or turned: learn it again, and move or turn the sample between trials.",
             stayed.join(", ")
         )
     })

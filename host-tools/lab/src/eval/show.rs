@@ -303,7 +303,8 @@ impl<'t, W: Write> Show<'t, W> {
             }
             Told::Changed => writeln!(
                 self.out,
-                "\nIt is like {name}, but not as I learned it, after {slides}: worn, drifted, or something much like it."
+                "\nIt is like {name}, but not as I learned it, after {slides}: worn, drifted, or something much like \
+                 it."
             ),
             Told::Sure => writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}."),
             Told::Undecided => writeln!(

@@ -77,7 +77,8 @@ pub enum VerifyError {
     Evaluate(#[from] EvaluateError),
     /// The learned table has no limits.
     #[error(
-        "tables of these slides have no limits: verification needs three textures at least, whitened features, and --method fused"
+        "tables of these slides have no limits: verification needs three textures at least, whitened features, and \
+         --method fused"
     )]
     NoLimits,
 }
@@ -258,7 +259,8 @@ pub enum PutError {
     NotFused,
     /// A slide lacks features, or none is of a movement of the table.
     #[error(
-        "the reference has no slide at a movement of the table with the features that it compares: record it with this table"
+        "the reference has no slide at a movement of the table with the features that it compares: record it with this \
+         table"
     )]
     NothingInCommon,
     /// The table cannot be written.

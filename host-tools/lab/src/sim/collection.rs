@@ -567,8 +567,8 @@ mod tests {
                         // two roundings
                         assert!(
                             (mean - f64::from(known)).abs() <= 2.0,
-                            "{finger}, texture {texture}, movement {movement}, axis {axis}: {mean} and {known}; if simulator or features \
-                             were changed on purpose: cargo xtask factory"
+                            "{finger}, texture {texture}, movement {movement}, axis {axis}: {mean} and {known}; if \
+                             simulator or features were changed on purpose: cargo xtask factory"
                         );
                     }
                 }

@@ -61,7 +61,8 @@ pub(crate) fn matrix(
     }
     let (width, height) = ((right - left) / n, (bottom - top) / n);
     drawn.add(&format!(
-        "<g shape-rendering=\"crispEdges\" transform=\"translate({left} {top}) scale({width} {height})\">\n{paths}</g>\n"
+        "<g shape-rendering=\"crispEdges\" transform=\"translate({left} {top}) scale({width} \
+         {height})\">\n{paths}</g>\n"
     ));
     Ok(drawn)
 }

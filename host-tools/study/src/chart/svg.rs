@@ -133,7 +133,8 @@ impl Figure {
         let width = figures.iter().map(|f| f.size.0).max().unwrap_or(0);
         let height: u32 = figures.iter().map(|f| f.size.1).sum();
         let mut svg = format!(
-            "<svg {FITS} width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" xmlns=\"http://www.w3.org/2000/svg\">\n<title>{}</title>\n",
+            "<svg {FITS} width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
+             xmlns=\"http://www.w3.org/2000/svg\">\n<title>{}</title>\n",
             escaped(title)
         );
         let mut y = 0;

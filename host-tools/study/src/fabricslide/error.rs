@@ -17,13 +17,14 @@ pub enum FabricError {
     NoFolder(PathBuf),
     /// The folder has no manifest.
     #[error(
-        "{}: no {MANIFEST} in this folder, so it holds no fabrics; give one in the layout of data/fabricslide", .0.display()
+        "{}: no {MANIFEST} in this folder, so it holds no fabrics; give one in the layout of \
+         data/fabricslide", .0.display()
     )]
     NoManifest(PathBuf),
     /// The fabrics cannot be compared.
     #[error(
-        "{}: no movement that all {fabrics} fabrics have with both repetitions (rep 0 and 1) in one direction; take out the \
-         fabric that lacks them or record it again", manifest.display()
+        "{}: no movement that all {fabrics} fabrics have with both repetitions (rep 0 and 1) in one direction; take \
+         out the fabric that lacks them or record it again", manifest.display()
     )]
     NothingShared {
         /// The manifest.

@@ -65,8 +65,8 @@ pub fn figure(
             ..Series::points(1, Mark::Cross, "outside the limits", outside.collect())
         });
     }
-    let below = "Each slide, as far as it is from the mean of its part and operator. Dashed: three standard deviations, by \
-                 the mean moving range. A slide outside is worth a look at the sample, the finger and the rig.";
+    let below = "Each slide, as far as it is from the mean of its part and operator. Dashed: three standard \
+         deviations, by the mean moving range. A slide outside is worth a look at the sample, the finger and the rig.";
     let y = format!("away from the mean{unit}");
     Chart {
         size: (WIDTH, TALL + Chart::height_of(below)),

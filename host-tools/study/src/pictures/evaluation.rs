@@ -84,7 +84,8 @@ fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Fig
     let columns = numbers.chain(["C", "N", "?"].map(str::to_owned));
     let verdicts = verdicts(courses, threshold);
     let about = format!(
-        "Of {} explorations {:.1} % ended with the right name, {:.1} % with a wrong one, {:.1} % with a changed one, {:.1} % with none of those known and {:.1} % undecided.",
+        "Of {} explorations {:.1} % ended with the right name, {:.1} % with a wrong one, {:.1} % with a changed one, \
+         {:.1} % with none of those known and {:.1} % undecided.",
         courses.len(),
         100.0 * verdicts.right,
         100.0 * verdicts.wrong,
@@ -93,9 +94,11 @@ fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Fig
         100.0 * verdicts.undecided
     );
     let below = if known > FEW {
-        "Darker is more often. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of those known (N), not sure (?)."
+        "Darker is more often. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of \
+         those known (N), not sure (?)."
     } else {
-        "In % of the row. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of those known (N), not sure (?)."
+        "In % of the row. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of those \
+         known (N), not sure (?)."
     };
     Grid {
         id: "confusion".to_owned(),

@@ -48,8 +48,8 @@ pub fn figure(table: Table<'_>) -> Result<Figure, DrawError> {
     }
     series.push(textures);
     let below = format!(
-        "Distance: in standard deviations between slides of one texture. In a plane distances are not quite right: here \
-         they are off by {:.0} % (root mean square). Dashed: to the texture that is nearest in truth.",
+        "Distance: in standard deviations between slides of one texture. In a plane distances are not quite right: \
+         here they are off by {:.0} % (root mean square). Dashed: to the texture that is nearest in truth.",
         100.0 * off(&distances, &places)
     );
     let list: Vec<String> = names

@@ -35,20 +35,22 @@ pub enum RecordingError {
     NoFolder(PathBuf),
     /// The folder has no manifest.
     #[error(
-        "{}: neither manifest.csv nor manifest.json in this folder, so it holds no recordings; the publisher's CSV files \
-         (mat1/mat1_1_bio.csv, ...) must pass through `tactus import` first", .0.display()
+        "{}: neither manifest.csv nor manifest.json in this folder, so it holds no recordings; the publisher's CSV \
+         files (mat1/mat1_1_bio.csv, ...) must pass through `tactus import` first", .0.display()
     )]
     NoManifest(PathBuf),
     /// The folder has nothing that can be imported.
     #[error(
         "{}: nothing to import: neither a manifest, nor raw_data/mat1/mat1_1_bio.csv and the like of \
-         https://github.com/dexrob/BioTac_slide_20_50; give the folder that holds raw_data or mat1, mat2, ...", .0.display()
+         https://github.com/dexrob/BioTac_slide_20_50; give the folder that holds raw_data or mat1, mat2, \
+         ...", .0.display()
     )]
     NothingToImport(PathBuf),
     /// The folder does not have the Cluster dataset's layout.
     #[error(
-        "{}: no slide of the Cluster Haptic Texture Dataset here, such as sensor_data/accel/0/0_135_40_500_0.csv; give the folder \
-         that holds sensor_data. The CSV files of https://doi.org/10.6084/m9.figshare.29438288 are read, .parquet is not", .0.display()
+        "{}: no slide of the Cluster Haptic Texture Dataset here, such as sensor_data/accel/0/0_135_40_500_0.csv; give \
+         the folder that holds sensor_data. The CSV files of https://doi.org/10.6084/m9.figshare.29438288 are read, \
+         .parquet is not", .0.display()
     )]
     NoCluster(PathBuf),
     /// The system could not read or write.
@@ -81,7 +83,8 @@ pub enum RecordingError {
         cause: ContentError,
     },
     /// A manifest names a file outside its folder.
-    #[error("{}: names the file {name:?}, which is not inside this folder; it is not opened. Correct the manifest", manifest.display())]
+    #[error("{}: names the file {name:?}, which is not inside this folder; it is not opened. Correct the \
+         manifest", manifest.display())]
     Outside {
         /// The manifest.
         manifest: PathBuf,
@@ -107,7 +110,8 @@ pub enum RecordingError {
         name: String,
     },
     /// Two slides have one number, so their order in time is unknown.
-    #[error("{}: {place}: slide {number} of texture {id} is listed twice; number the slides of a texture in the order of time", manifest.display())]
+    #[error("{}: {place}: slide {number} of texture {id} is listed twice; number the slides of a texture in the order \
+         of time", manifest.display())]
     DuplicateSlide {
         /// The manifest.
         manifest: PathBuf,

@@ -10,7 +10,8 @@ use crate::eval::show::count;
 pub enum ExperimentError {
     /// Too few slides.
     #[error(
-        "{texture}, {movement}: {} to train from, and --train-slides is {wanted}; ask for fewer", count(*there as u64, "slide")
+        "{texture}, {movement}: {} to train from, and --train-slides is {wanted}; ask for \
+         fewer", count(*there as u64, "slide")
     )]
     Training {
         /// Name of the texture.

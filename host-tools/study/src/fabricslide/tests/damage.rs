@@ -175,7 +175,8 @@ fn slides_that_cannot_be_measured_are_named() {
     fails(
         folder(&[short]).path(),
         &[
-            "A.u16le.gz: set-point 120 at 10 mm/s, direction -1, rep 1: a slide of 31 samples is too short, 32 are the least",
+            "A.u16le.gz: set-point 120 at 10 mm/s, direction -1, rep 1: a slide of 31 samples is too short, 32 are the \
+             least",
         ],
     );
 
