@@ -121,7 +121,6 @@ fn help_says_what_it_is_and_what_to_try_first() {
 fn the_command_is_tactus_whatever_its_package() {
     let version = concat!("tactus ", env!("CARGO_PKG_VERSION"), "\n");
     assert_eq!(printed(&["--version"]), version);
-    assert!(printed(&["man"]).contains(".TH tactus 1 "));
 }
 
 #[test]

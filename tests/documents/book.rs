@@ -5,8 +5,6 @@
 
 #[path = "book/parts.rs"]
 mod parts;
-#[path = "book/picture.rs"]
-mod picture;
 #[path = "book/schema.rs"]
 mod schema;
 
@@ -18,20 +16,6 @@ use std::process::{Command, Stdio};
 /// Where the simulated recordings are, and the command that makes them: [`simulate`].
 const RECORDINGS: &str = "host-tools/recordings/simulated";
 const TEXTURES: &str = "Computer paper,Coarse suede,Burlap,Denim twill,Corduroy,Terry cloth";
-/// The exploration of the moving picture.
-const PICTURE: &str = "docs/src/identify.svg";
-const EXPLORATION: &[&str] = &[
-    "identify",
-    "--simulated",
-    "--method",
-    "paper",
-    "--among",
-    "60",
-    "--seed",
-    "2",
-];
-/// Most bytes of the moving picture, and of all recordings.
-const MAX_PICTURE: usize = 500_000;
 const MAX_RECORDINGS: usize = 2_000_000;
 const MAX_README_LINES: usize = 180;
 
@@ -120,10 +104,8 @@ fn filled(page: &str, begin: &str, end: &str, content: &str) -> Option<String> {
 
 #[test]
 fn generated_parts_are_as_the_code_has_them() {
-    let mut parts = parts::from_sources();
-    parts.push(("docs/src/commands.md", "commands", commands()));
     let mut wrong = Vec::new();
-    for (path, name, content) in parts {
+    for (path, name, content) in parts::from_sources() {
         let begin = format!("{name}: generated, cargo xtask docs --write");
         let page = filled(&read(path), &begin, name, &format!("\n{content}\n"));
         let page = page.unwrap_or_else(|| panic!("{path} has no place for {name}"));
@@ -209,54 +191,6 @@ fn simulate(out: &str) -> [&str; 9] {
     ]
 }
 
-/// It is made from an exploration among 60 textures, which takes a minute where nothing is optimised: only when written.
-#[test]
-fn the_moving_picture_is_small_and_moves() {
-    if writes() {
-        let svg = picture::moving(&tactus(EXPLORATION), &EXPLORATION.join(" "));
-        fs::write(root().join(PICTURE), svg).unwrap();
-    }
-    let svg = read(PICTURE);
-    roxmltree::Document::parse(&svg).unwrap();
-    assert!(svg.len() <= MAX_PICTURE, "{} bytes", svg.len());
-    assert!(svg.contains("@keyframes") && svg.contains(&EXPLORATION.join(" ")));
-}
-
-/// The monitor in the book: a session of the simulated rig, filmed.
-#[test]
-fn the_film_is_what_its_command_makes() {
-    let temp = tempfile::tempdir().unwrap();
-    let [log, film] = ["session.jsonl", "film.svg"].map(|name| temp.path().join(name));
-    let packed = fs::File::open(root().join("tests/golden/identify.jsonl.gz")).unwrap();
-    let mut unpacked = fs::File::create(&log).unwrap();
-    std::io::copy(&mut flate2::read::GzDecoder::new(packed), &mut unpacked).unwrap();
-    let [log, film] = [&log, &film].map(|path| path.to_str().unwrap());
-    tactus(&["device", "log", "film", log, "--out", film]);
-    let svg = fs::read(film).unwrap();
-    assert!(svg.len() <= MAX_PICTURE, "{} bytes", svg.len());
-    assert!(read("docs/src/bench.md").contains("](monitor.svg)"));
-    compare("docs/src/monitor.svg", &svg).unwrap();
-}
-
-/// What the viewers show of a session, drawn from the MCAP file.
-#[test]
-fn the_channels_are_what_their_command_draws() {
-    let temp = tempfile::tempdir().unwrap();
-    let names = ["session.jsonl", "session.mcap", "channels.svg"];
-    let [log, mcap, drawn] = names.map(|name| temp.path().join(name));
-    let packed = fs::File::open(root().join("tests/golden/identify.jsonl.gz")).unwrap();
-    let mut unpacked = fs::File::create(&log).unwrap();
-    std::io::copy(&mut flate2::read::GzDecoder::new(packed), &mut unpacked).unwrap();
-    let [log, mcap, drawn] = [&log, &mcap, &drawn].map(|path| path.to_str().unwrap());
-    tactus(&["convert", log, "--mcap", mcap, "--plot", drawn]);
-    let page = read("docs/src/convert.md");
-    assert!(page.contains("tactus convert session.jsonl --mcap session.mcap --plot channels.svg"));
-    assert!(page.contains("](plot-channels.svg)"));
-    let svg = fs::read(drawn).unwrap();
-    assert!(svg.len() < 100_000, "{} bytes", svg.len());
-    compare("docs/src/plot-channels.svg", &svg).unwrap();
-}
-
 /// Pictures of recordings that are not in the repository: made again where they are, when the book is written.
 const OF_OTHERS: (&str, [&str; 2]) = (
     "evaluate --recordings biotac --lifelong --runs 20",
@@ -301,7 +235,7 @@ const PLOTS: [(&str, &[&str]); 4] = [
     ),
     ("table show TABLE", &["map"]),
     (
-        "gauge --recordings host-tools/recordings/simulated",
+        "report --recordings host-tools/recordings/simulated",
         &["control-roughness-1"],
     ),
 ];
@@ -529,29 +463,6 @@ fn subcommands(command: &[&str]) -> Vec<(Vec<String>, String)> {
         all.extend(below);
     }
     all
-}
-
-/// The list of all commands, and the help of each.
-fn commands() -> String {
-    let known = subcommands(&[]);
-    let mut text = String::from("| command | what it does |\n|---|---|\n");
-    for (path, about) in &known {
-        text += &format!("| `tactus {}` | {about} |\n", path.join(" "));
-    }
-    for (path, _) in &known {
-        let names: Vec<&str> = path.iter().map(String::as_str).collect();
-        let help = help(&names);
-        // a group of commands is in the list above, unless it does something itself
-        let itself = ["\nArguments:\n", "\n       tactus "];
-        if !help.contains("\nCommands:\n") || itself.iter().any(|part| help.contains(part)) {
-            text += &format!(
-                "\n## tactus {}\n\n```text\n{}\n```\n",
-                path.join(" "),
-                help.trim_end()
-            );
-        }
-    }
-    text
 }
 
 /// The number that a name has in an OpenSCAD file.

@@ -140,7 +140,7 @@ pub(crate) fn guard_stack() {
     const NO_CODE: u32 = 1 << 28;
     // the rest is as without the MPU; on
     const PRIVDEFENA: u32 = 1 << 2;
-    // SAFETY: nobody else uses the MPU, and the linker has left the guard free: board.x.
+    // SAFETY: nobody else uses the MPU, and the linker has left the guard free: memory.x.
     unsafe {
         let mpu = &*MPU::PTR;
         mpu.rnr.write(0);

@@ -1,18 +1,17 @@
 //! The command `tactus`: a file for each of its commands, with the arguments, what is done and what is said.
 
 mod args;
+mod completions;
 mod config;
 mod convert;
 mod device;
 mod evaluate;
 mod features;
-mod gauge;
-mod growth;
 mod identify;
 mod import;
 mod known;
 mod learn;
-mod manual;
+
 mod names;
 mod output;
 mod plot;
@@ -61,16 +60,13 @@ enum Command {
     Identify(identify::Args),
     Evaluate(evaluate::Args),
     Verify(verify::Args),
-    Gauge(gauge::Args),
     Simulate(simulate::Args),
     LearnByHand(learn::ByHand),
     Study(study::Args),
-    Growth(growth::Args),
     #[command(subcommand)]
     Device(device::Command),
     Textures(known::Args),
-    Completions(manual::Completions),
-    Man(manual::Man),
+    Completions(completions::Args),
     Import(import::Args),
     Convert(convert::Args),
     Config(config::Args),
@@ -114,15 +110,12 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         Some(Command::Identify(args)) => done = identify::run(&args, out)?,
         Some(Command::Evaluate(args)) => evaluate::run(&args, out)?,
         Some(Command::Verify(args)) => done = verify::run(&args, out)?,
-        Some(Command::Gauge(args)) => gauge::run(&args, out)?,
         Some(Command::Simulate(args)) => simulate::run(&args, out)?,
         Some(Command::LearnByHand(args)) => learn::by_hand(&args, out)?,
         Some(Command::Study(args)) => study::run(&args, out)?,
-        Some(Command::Growth(args)) => growth::run(&args, out)?,
         Some(Command::Device(command)) => done = device::run(&command, out)?,
         Some(Command::Textures(args)) => known::run(&args, out)?,
-        Some(Command::Completions(args)) => manual::completions(&args, Tactus::command(), out)?,
-        Some(Command::Man(args)) => manual::pages(&args, Tactus::command(), out)?,
+        Some(Command::Completions(args)) => completions::run(&args, Tactus::command(), out)?,
         Some(Command::Import(args)) => import::run(&args, out)?,
         Some(Command::Convert(args)) => convert::run(&args, out)?,
         Some(Command::Config(args)) => config::run(&args, out)?,

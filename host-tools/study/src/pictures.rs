@@ -1,6 +1,5 @@
 //! The pictures that commands draw with `--plot`: their contents, and their counting.
 
-pub mod channels;
 pub mod control;
 pub mod evaluation;
 pub mod exploration;

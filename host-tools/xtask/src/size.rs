@@ -9,8 +9,8 @@ use serde_json::{Value, json};
 
 use panics::{Panics, Symbol, panics, symbols};
 
+use crate::campaign::FOLDER;
 use crate::emulate::{self, ARM, MOTION};
-use crate::factory::FOLDER;
 use crate::firmware::{self, Size};
 use crate::reasons;
 use crate::shell::{root, run};
@@ -88,6 +88,7 @@ fn measure(no_stack: bool) -> Result<Vec<Measured>> {
     for elf in firmware::elves()? {
         let name = firmware::name(&elf)?.to_owned();
         let bytes = std::fs::read(&elf).with_context(|| elf.display().to_string())?;
+        eprintln!("{}  {}", firmware::hash(&bytes), firmware::shown(&elf));
         let stack = if name == RIG && !no_stack {
             Some(stack(&elf)?)
         } else {

@@ -119,7 +119,7 @@ impl Toolchain {
         };
         cargo
             .env("CARGO_ENCODED_RUSTFLAGS", rustflags(flags))
-            .args(["build", "--target", to.triple, "--target-dir"])
+            .args(["build", "--locked", "--target", to.triple, "--target-dir"])
             .arg(self.folder(to));
         if self == Self::Debian {
             cargo.arg(format!("-Zbuild-std={}", to.library));

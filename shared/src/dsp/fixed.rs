@@ -55,8 +55,8 @@ const fn exp2_of_part(n: usize) -> u32 {
     (sum * 1_073_741_824.0 + 0.5) as u32
 }
 
-/// Natural logarithm of `x / 65536`, in Q16; 0 is taken as the smallest number. At most 1.5e-4 below the true value, never
-/// more than a step of Q16 above it.
+/// Natural logarithm of `x / 65536`, in Q16; 0 is taken as the smallest number. At most 1.5e-4 below the true value,
+/// never more than a step of Q16 above it.
 pub const fn ln_q16(x: u64) -> i32 {
     let x = if x == 0 { 1 } else { x };
     // a shift of 64 bits takes the chip several
@@ -96,8 +96,8 @@ pub const fn exp2_neg_q30(x: u32) -> u32 {
     power(x >> 18, (x >> 13) as usize, x << 19)
 }
 
-/// 2 to the power of less these whole octaves and this part, of which the last five bits count; `between` that and the next
-/// one, Q32.
+/// 2 to the power of less these whole octaves and this part, of which the last five bits count; `between` that and the
+/// next one, Q32.
 #[inline(always)]
 const fn power(whole: u32, part: usize, between: u32) -> u32 {
     let [high, less] = EXP2[part & (PARTS - 1)];

@@ -13,7 +13,6 @@ use crate::dsp::Plan;
 use crate::explorer::Kernels;
 use crate::features::{BLOCK, Block, Blocks, Observation, SamplePhase, Slide, SlideError};
 use crate::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ};
-use crate::table::PACED;
 
 /// Samples of a channel that are looked at together: 10 ms.
 const LOOK: usize = 22;
@@ -167,14 +166,12 @@ impl<'p, K: Kernels> Touch<'p, K> {
 
     /// Takes a reading of the sensor of motion: one every 10 ms. Without them the speed is not known.
     pub fn moved(&mut self, moved: Moved) {
-        if PACED {
-            self.speed.take(moved);
-        }
+        self.speed.take(moved);
     }
 
     /// Returns true if the probe moves; `None` if no sensor sees it.
     fn moves(&self) -> Option<bool> {
-        if PACED { self.speed.moves() } else { None }
+        self.speed.moves()
     }
 
     /// The slide that was good last, until the finger is pressed again.
@@ -225,7 +222,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
     }
 
     fn way(&self) -> Way {
-        if !PACED || !self.speed.is_there() {
+        if !self.speed.is_there() {
             return Way::NoSensor;
         }
         let seconds = (COMING_UP + STEADY) as f32 / RATE_HZ as f32;
@@ -490,9 +487,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
             0
         };
         if self.moves().unwrap_or(self.begins >= BEGINS) {
-            if PACED {
-                self.speed.begin();
-            }
+            self.speed.begin();
             self.tenths.clear();
             self.phase = Phase::Sliding;
             (self.still_mean, self.samples, self.stopped, self.tenth) = (mean, 0, 0, 0.0);
@@ -517,7 +512,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
         };
         self.put(&phase, &self.about_rest());
         let steady = self.samples >= COMING_UP;
-        if PACED && self.samples == COMING_UP {
+        if self.samples == COMING_UP {
             self.speed.steady();
         }
         let force_mn = self.force_mn();
@@ -563,10 +558,8 @@ impl<'p, K: Kernels> Touch<'p, K> {
         }
         let last = core::mem::take(&mut self.blocks).end(0);
         self.take(last);
-        if PACED {
-            let seconds = STEADY as f32 / RATE_HZ as f32;
-            self.slide.set_pace(self.speed.pace(seconds, MOVEMENT));
-        }
+        let seconds = STEADY as f32 / RATE_HZ as f32;
+        self.slide.set_pace(self.speed.pace(seconds, MOVEMENT));
         let mut slide = Slide::<K>::new(self.plan, MOVEMENT);
         slide.adopt(&self.slide);
         match slide.finish() {

@@ -22,7 +22,6 @@ use tactus_lab::eval::evaluate::{MAX_TEXTURES, Method};
 use tactus_lab::eval::experiment::{Experiment, Protocol};
 use tactus_lab::eval::first::at_least_two;
 use tactus_lab::eval::learn::Expected;
-use tactus_lab::eval::seconds;
 use tactus_lab::eval::show::{Show, count, is_right};
 use tactus_lab::eval::transcript::{Answer, Transcript};
 use tactus_lab::sim::collection::{Collection, calibrated, texture_name};
@@ -30,7 +29,7 @@ use tactus_lab::sim::rig::SimRig;
 use tactus_study::pictures::exploration::Exploration;
 use tactus_study::pictures::timeline::{Timeline, Watch};
 
-use super::args::{Choosing, Expecting, Recordings, Stop, length, rising};
+use super::args::{Expecting, Recordings, Stop, length, rising};
 use super::learn::learned_here;
 use super::output::{Done, Format, UsageError, print_json};
 use super::plot::{Canvas, Plot};
@@ -100,8 +99,6 @@ pub(crate) struct Args {
     expecting: Expecting,
     #[command(flatten)]
     stop: Stop,
-    #[command(flatten)]
-    choosing: Choosing,
     /// Another seed draws other slides; with --simulated also another world, and another texture unless one is given
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -314,7 +311,6 @@ where
         open: true,
         ..args.stop.config(method)
     };
-    let config = args.choosing.config(config, seconds::RIG)?;
     let mut explorer = Explorer::<MAX_TEXTURES>::new(table, rig.measures(), config)?;
     out.flush()?;
     let mut slides = Transcript::default();

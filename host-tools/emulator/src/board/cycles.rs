@@ -1,7 +1,7 @@
 //! Cycles instead of instructions: a model of the core's pipeline and of the flash that it waits for, fed with every
 //! instruction that the emulated core executes.
 //!
-//! Where the manuals leave a range, the longest time is counted, so that the model errs on the slow side:
+//! The longest time of a range in the manuals is counted, so that the model errs on the slow side:
 //!
 //! | what | counted as |
 //! |---|---|

@@ -4,15 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, ensure};
 use clap::ValueEnum;
-use tactus_core::explorer::SlideTime;
 use tactus_lab::data::properties::PropertyTable;
 use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::experiment::{Experiment, Protocol};
 use tactus_lab::eval::learn::Expected;
-use tactus_lab::eval::seconds;
 use tactus_study::fabricslide::FabricSet;
 
-use crate::cmd::args::{Choosing, Ending, Expecting, Features, Recordings, Stop};
+use crate::cmd::args::{Ending, Expecting, Features, Recordings, Stop};
 use crate::cmd::output::Format;
 use crate::cmd::plot::Plot;
 use crate::cmd::textures::measure_folder;
@@ -56,7 +54,7 @@ Examples:
   tactus evaluate --recordings DIR --novelty leave-one-out
   tactus evaluate --recordings DIR --novelty leave-one-out --left-out 5     tables of all but five
   tactus evaluate --recordings DIR --plot pictures
-  tactus evaluate --fabrics DIR --objective bits-per-second      slow slides have to tell more
+  tactus evaluate --fabrics DIR
   tactus evaluate --recordings DIR --verify --protocol blocked
   tactus evaluate --recordings DIR --early --protocol blocked
   tactus evaluate --recordings DIR --lifelong
@@ -112,8 +110,6 @@ pub(crate) struct Args {
     pub(crate) expecting: Expecting,
     #[command(flatten)]
     pub(crate) stop: Stop,
-    #[command(flatten)]
-    pub(crate) choosing: Choosing,
     /// The same seed gives the same figures, whatever the number of cores
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
@@ -125,14 +121,6 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// How long slides take.
-    pub(crate) fn slide_time(&self) -> SlideTime {
-        match self.fabrics {
-            Some(_) => seconds::FABRICS,
-            None => seconds::RIG,
-        }
-    }
-
     /// Number of virtual explorations, or of sessions.
     pub(crate) fn runs(&self) -> u64 {
         self.runs.unwrap_or(if self.lifelong { 50 } else { 8000 })
