@@ -64,7 +64,7 @@ pub enum JudgeError {
     #[error("the table has no movement")]
     Movement,
     /// The table has no limits, by which slides are the same as a texture's or different.
-    #[error("the table has no limits to tell same from different by")]
+    #[error("the table has no limits for same and different")]
     NoLimits,
 }
 

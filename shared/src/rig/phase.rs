@@ -62,7 +62,7 @@ pub enum Refused {
     #[error("the rig is busy; stop it first")]
     Busy,
     /// The positions of lever and stage are unknown: home first.
-    #[error("lever and stage do not know where they are; home them first")]
+    #[error("the positions of lever and stage are unknown; home them first")]
     NotHomed,
     /// A fault has to be reset first.
     #[error("{}: {}", .0, .0.recovery())]
@@ -70,7 +70,7 @@ pub enum Refused {
     /// The force is over this rig's limit.
     #[error(
         "{0} mN is more than this rig may press: {HIGH_FORCE_MN} mN, or {most} mN with tactus device settings \
-         --high-force on, and no more than its calibration can tell",
+         --high-force on, and no more than its calibration covers",
         most = most_mn(true)
     )]
     Force(u16),
@@ -98,10 +98,10 @@ pub enum RigError {
     #[error("stopped")]
     Stopped,
     /// The movement did not end by itself, and was stopped: see [`super::timeout`].
-    #[error("the rig does not come to an end: home it")]
+    #[error("the movement does not end: home the rig")]
     Hangs,
     /// Nobody made the movement by hand in time.
-    #[error("nobody touched anything for a minute: ask again")]
+    #[error("no touch for a minute: ask again")]
     NobodyThere,
     /// A hand does not make this movement.
     #[error(

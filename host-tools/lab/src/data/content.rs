@@ -23,7 +23,7 @@ pub enum ContentError {
 
     // tables
     /// No text.
-    #[error("not UTF-8 text; this is no such table")]
+    #[error("not UTF-8 text, so this is not a table in CSV")]
     NotUtf8,
     /// The CSV reader complains.
     #[error("{0}")]

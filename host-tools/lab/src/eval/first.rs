@@ -14,12 +14,11 @@ use crate::eval::show::count;
 #[derive(Debug, thiserror::Error)]
 pub enum FirstError {
     /// A standard deviation needs two slides.
-    #[error("--train-slides {0}: how slides of one texture differ takes at least two slides")]
+    #[error("--train-slides {0}: the spread of a texture's slides takes at least two slides")]
     One(usize),
     /// As [`Self::One`], of one texture and movement.
     #[error(
-        "{texture}, {movement}: {}, and how slides of one texture differ takes at least \
-         two", count(*there as u64, "slide")
+        "{texture}, {movement}: {}; the spread of a texture's slides takes at least two", count(*there as u64, "slide")
     )]
     Few {
         /// Name of the texture.

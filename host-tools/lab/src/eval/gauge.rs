@@ -65,7 +65,7 @@ pub enum GaugeError {
     OnePart,
     /// Nothing was repeated.
     #[error(
-        "no part has two slides by one operator; what repetition changes takes two at least: record with --slides 3"
+        "no part has two slides by one operator; repeatability takes at least two: record with --slides 3"
     )]
     NoRepetition,
 }

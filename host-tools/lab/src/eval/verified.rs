@@ -114,11 +114,11 @@ pub fn print_answer(v: &Verified, out: &mut impl Write) -> io::Result<()> {
     let answer = match v.answer {
         "same" => format!("The same as {}.", v.reference),
         "different" => format!(
-            "Different from {}, or {0} changed beyond what is expected.",
+            "Different from {}, or {0} has changed more than expected.",
             v.reference
         ),
         _ => format!(
-            "Not sure yet whether it is {}: more slides would tell.",
+            "Not sure yet whether it is {}: more slides would decide.",
             v.reference
         ),
     };

@@ -102,7 +102,7 @@ fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Fig
     };
     Grid {
         id: "confusion".to_owned(),
-        title: format!("What is told of each texture, at {} %", percent(threshold)),
+        title: format!("Verdicts on each texture, at {} %", percent(threshold)),
         about: &about,
         x: ("told: the texture of this number", columns.collect()),
         y: ("presented", rows.collect()),
@@ -134,7 +134,7 @@ fn reliability(courses: &[Course], threshold: f32) -> Result<Figure, DrawError> 
         "was right (bar: 95 % of such counts)",
         Vec::new(),
     );
-    let mut said = Series::dashed("what it said (mean)", Vec::new());
+    let mut said = Series::dashed("as stated (mean)", Vec::new());
     for (bin, x) in bins.iter().zip(1..).filter(|(bin, _)| bin.count > 0) {
         let (x, of) = (f64::from(x), bin.count as f64);
         let mean = 100.0 * bin.said.unwrap_or_default();

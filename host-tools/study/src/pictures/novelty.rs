@@ -59,7 +59,7 @@ pub fn figures(novelty: &Novelty) -> Result<Vec<Figure>, DrawError> {
         .figure(file)
     };
     Ok(vec![
-        draw("What is told of known textures", KNOWN, "known-by-slides")?,
-        draw("What is told of new textures", NEW, "new-by-slides")?,
+        draw("Verdicts on known textures", KNOWN, "known-by-slides")?,
+        draw("Verdicts on new textures", NEW, "new-by-slides")?,
     ])
 }

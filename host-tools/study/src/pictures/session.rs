@@ -79,8 +79,7 @@ fn top(series: &[Series]) -> f64 {
 }
 
 const APART: &str = "distance (standard deviations)";
-const BELOW: &str =
-    "Root mean square over features. Dashed: what slides that do not drift would give.";
+const BELOW: &str = "Root mean square over features. Dashed: expected for slides without drift.";
 
 fn distances(lives: &[Lifelong], train_slides: usize) -> Result<Figure, DrawError> {
     let mut series: Vec<Series> = (0..)
@@ -102,7 +101,7 @@ fn distances(lives: &[Lifelong], train_slides: usize) -> Result<Figure, DrawErro
     Chart {
         below: BELOW,
         ..chart(
-            "How far slides are from what the table says",
+            "Distance of slides from the table's means",
             APART,
             top,
             slides,
@@ -158,7 +157,7 @@ fn told(life: &Lifelong) -> Result<Figure, DrawError> {
         Learning::Asking => ("told-asking", "it asks where it is uncertain"),
     };
     chart(
-        &format!("What is told after one slide, while {who}"),
+        &format!("Verdicts after one slide, while {who}"),
         "episodes (%)",
         104.0,
         life.over_time.len(),

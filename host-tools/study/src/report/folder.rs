@@ -76,7 +76,7 @@ impl Folder {
             return Err(ReportError::Taken(folder.whole.clone()));
         }
         let says = format!(
-            "{study}\nThe same command goes on with this study; another one with this --out replaces it.\n({})\n",
+            "{study}\nThe same command continues this study; another one with this --out replaces it.\n({})\n",
             program()
         );
         if fs::read_to_string(&note).is_ok_and(|there| there != says) {

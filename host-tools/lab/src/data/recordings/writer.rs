@@ -298,7 +298,7 @@ pub fn files(texture: &Texture, slides: &[(Recording, Labels)]) -> Result<Vec<(S
 /// Text of the mark in a folder that is not whole.
 fn note(command: &str) -> String {
     format!(
-        "{command}\nThe same command goes on here where it stopped; to begin anew, remove this folder.\n({})\n",
+        "{command}\nThe same command continues these recordings; to begin anew, remove this folder.\n({})\n",
         program()
     )
 }

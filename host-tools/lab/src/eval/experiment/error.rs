@@ -35,7 +35,7 @@ pub enum ExperimentError {
     },
     /// As [`Self::Training`], where all of them are to be used.
     #[error(
-        "{texture}, {movement}: {there} training slide; how slides of one texture differ takes at least two"
+        "{texture}, {movement}: {there} training slide; the spread of a texture's slides takes at least two"
     )]
     Few {
         /// Name of the texture.
@@ -46,7 +46,7 @@ pub enum ExperimentError {
         there: usize,
     },
     /// A standard deviation needs two slides.
-    #[error("--train-slides {0}: how slides of one texture differ takes at least two slides")]
+    #[error("--train-slides {0}: the spread of a texture's slides takes at least two slides")]
     One(usize),
     /// The folder of test slides lacks something.
     #[error(
