@@ -2,8 +2,8 @@
 //! supply's final value, with the PWM low towards the back-EMF's, both with the motor's L/R.
 //!
 //! ```text
-//! L di/dt = u - R i - K v     u: the supply while PWM is high; while it is low 0 (slow decay), or the supply turned round
-//!                             until i = 0 (fast decay)
+//! L di/dt = u - R i - K v     u: the supply while PWM is high; while it is low 0 (slow decay),
+//!                             or the supply turned round until i = 0 (fast decay)
 //! ```
 //! The mean over a period moves the stage, and is [`Stage::current_a`](super::stage::Stage::current_a). A converter
 //! reads the current of an instant.

@@ -117,7 +117,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn direction_is_stable_for_a_period_about_every_pulse(rates in proptest::collection::vec((-4000i32..4000, 1usize..40), 1..30)) {
+        fn direction_is_stable_for_a_period_about_every_pulse(
+            rates in proptest::collection::vec((-4000i32..4000, 1usize..40), 1..30),
+        ) {
             let mut steps = Steps::new();
             let mut made = 0;
             // DIR before the period, whether it has a pulse

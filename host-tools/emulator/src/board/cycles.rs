@@ -10,7 +10,7 @@
 //! | an exception's first instructions, which may be read while registers are stacked | read afterwards |
 //! | an exception that arrives while another one's registers are stacked | stacked again |
 //! | a store in the write buffer, which a load from the flash may overtake | every load and store waits for it |
-//! | a bridge to a peripheral's bus, whose cycles no manual gives | begins up to a cycle of that bus late, and takes two |
+//! | a bridge to a peripheral's bus, whose cycles no manual gives | up to a cycle of that bus late, and takes two |
 //! | code that was prefetched, though not in time | a miss: it goes to the cache |
 //!
 //! Not modelled: the bus that DMA takes now and then (a half-word of the motor's current every 3 us).

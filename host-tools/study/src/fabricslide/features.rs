@@ -87,8 +87,8 @@ impl Meter {
         })
     }
 
-    /// |X|^2 over the sum of the squares of the window, averaged over taxels and whole frames. A slide that is shorter than
-    /// a frame makes one, zeros behind it.
+    /// Averaged spectrum: |X|^2 over the sum of the squares of the window, mean over taxels and whole frames. A slide
+    /// that is shorter than a frame makes one, with zeros behind it.
     fn spectrum(&self, taxels: &[Vec<f64>; TAXELS]) -> [f64; BINS] {
         let mut sum = [0.0; BINS];
         let mut frames = 0;

@@ -69,7 +69,8 @@ fn fabric(folder: &Path, name: &str, recordings: &[Recording], raw: &[u8]) -> Va
     }
     json!({
         "file": file, "fabric": name, "slides": slides,
-        "sha256_gz": tactus_lab::data::recordings::files::sha256(&packed), "sha256_raw": tactus_lab::data::recordings::files::sha256(raw),
+        "sha256_gz": tactus_lab::data::recordings::files::sha256(&packed),
+        "sha256_raw": tactus_lab::data::recordings::files::sha256(raw),
     })
 }
 

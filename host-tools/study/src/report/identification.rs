@@ -127,7 +127,11 @@ pub(super) fn add(identification: &Identification, report: &mut Report) -> Resul
         let ours = identification.column(method)?.correct;
         Some(format!("{:+.1}", ours - names(method).2?.correct))
     });
-    let words = json!({"simulations": identification.simulations, "cycled": cycled.collect::<Vec<_>>(), "against": against.into_iter().collect::<Option<Vec<_>>>()});
+    let words = json!({
+        "simulations": identification.simulations,
+        "cycled": cycled.collect::<Vec<_>>(),
+        "against": against.into_iter().collect::<Option<Vec<_>>>(),
+    });
     report.words.insert("identification", words);
     Ok(())
 }

@@ -82,7 +82,18 @@ pub(super) fn add(training: &Training, report: &mut Report) -> Result<(), DrawEr
     let changed = skin.changed_before.iter().map(|t| format!("T{}", t.number));
     let textures = training.textures.iter();
     let names: Vec<String> = textures.map(|t| t.texture.name.to_string()).collect();
-    let words = json!({"names": names, "slides": training.textures.len() * training.movements.len() * TRIALS as usize, "between_movements": training.between_movements.map(|c| format!("{c:.2}")), "white": SHADES[0].to_string(), "black": SHADES[4].to_string(), "pairs_confused": training.pairs_confused, "changed": changed.collect::<Vec<_>>(), "changed_at": format!("{:.0}", skin.changed_at), "paper_changes": skin.paper_changes, "matrices": matrices});
+    let words = json!({
+        "names": names,
+        "slides": training.textures.len() * training.movements.len() * TRIALS as usize,
+        "between_movements": training.between_movements.map(|c| format!("{c:.2}")),
+        "white": SHADES[0].to_string(),
+        "black": SHADES[4].to_string(),
+        "pairs_confused": training.pairs_confused,
+        "changed": changed.collect::<Vec<_>>(),
+        "changed_at": format!("{:.0}", skin.changed_at),
+        "paper_changes": skin.paper_changes,
+        "matrices": matrices,
+    });
     report.words.insert("training", words);
     Ok(())
 }

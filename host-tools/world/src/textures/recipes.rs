@@ -40,7 +40,10 @@ fn of(group: Group) -> Recipe {
     use Group::*;
     //   friction, fine um, mm, Hz, relief um, mm, weave um, mm, friction noise, heterogeneity, damping, thickness,
     //   compliance
-    let (friction, fine, impulse_hz, relief, weave, friction_noise, heterogeneity, damping, thickness_mm, compliance_mm_per_n) =
+    let (
+        friction, fine, impulse_hz, relief, weave, friction_noise, heterogeneity, damping, thickness_mm,
+        compliance_mm_per_n,
+    ) =
         match group {
             Paper       => (0.55, (2.0, 0.06),  900.0, ( 4.0, 1.0), ( 0.0, 1.0), 0.0040, 0.06, 0.0,  0.3, 0.02),
             Art         => (0.50, (4.0, 0.08),  500.0, (20.0, 1.5), ( 0.0, 1.0), 0.0053, 0.10, 0.1,  2.0, 0.20),
@@ -60,8 +63,8 @@ fn of(group: Group) -> Recipe {
     // cells are round, grain and fibres are not
     let relief_exponent = if group == Foam { 4.0 } else { 3.0 };
     Recipe {
-        friction, fine, impulse_hz, relief, relief_exponent, weave, grating: false, friction_noise, heterogeneity, damping, thickness_mm,
-        compliance_mm_per_n,
+        friction, fine, impulse_hz, relief, relief_exponent, weave, grating: false, friction_noise, heterogeneity,
+        damping, thickness_mm, compliance_mm_per_n,
     }
 }
 

@@ -245,7 +245,12 @@ fn a_sensor_that_is_silent_or_hangs_is_noticed() {
 proptest! {
     /// For any words, nothing panics, and a rejected slide gives no observation.
     #[test]
-    fn any_words_will_do(parts in proptest::collection::vec((0.0..0.6f64, -200.0..3000f64, -200.0..3000f64, 0.0..900f64, 0.0..0.01f64), 1..12)) {
+    fn any_words_will_do(
+        parts in proptest::collection::vec(
+            (0.0..0.6f64, -200.0..3000f64, -200.0..3000f64, 0.0..900f64, 0.0..0.01f64),
+            1..12,
+        ),
+    ) {
         let mut all = words(&[part(0.3, 0.0, 0.0)]);
         for (seconds, from, to, rms, lost) in parts {
             let mut some = words(&[Part { seconds, mn: (from, to), rms: (rms, rms) }]);

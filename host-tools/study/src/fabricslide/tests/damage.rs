@@ -252,7 +252,9 @@ proptest! {
 
     /// A manifest with a few bytes changed: nearer to what happens than noise.
     #[test]
-    fn damaged_manifests_never_panic(changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
+    fn damaged_manifests_never_panic(
+        changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+    ) {
         let folder = small();
         let path = folder.path().join(MANIFEST);
         let mut bytes = fs::read(&path).unwrap();
