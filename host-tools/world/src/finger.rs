@@ -8,10 +8,10 @@
 mod amplifier;
 mod analog;
 mod cell;
-mod felt;
 mod mems;
 mod signals;
 mod skin;
+mod stimulus;
 mod vibration;
 
 use super::conditions::{Conditions, TICK_S};
@@ -22,11 +22,11 @@ use super::played::{PlayCounts, Playback, Played};
 use super::surface::Surface;
 use super::textures::Texture;
 use amplifier::Amplifiers;
-pub(super) use felt::Felt;
-pub use felt::Held;
 use signals::newtons;
 pub(super) use signals::{FLUID_PA_PER_G, Signals};
 use skin::Skin;
+pub use stimulus::Held;
+pub(super) use stimulus::Stimulus;
 use tactus_core::sensor::FingerName;
 use vibration::Vibrations;
 
@@ -211,10 +211,10 @@ impl Finger {
     /// Feeds the transducers alone, without a contact: for tests of what is behind them. An accelerometer feels as many
     /// g as the vibration has newtons, without the silicone's resonance.
     #[cfg(test)]
-    pub(super) fn feed(&mut self, felt: &Felt) {
-        self.signals.tick(felt, &mut self.noise);
+    pub(super) fn feed(&mut self, stimulus: &Stimulus) {
+        self.signals.tick(stimulus, &mut self.noise);
         if let Signals::Mems(mems) = &mut self.signals {
-            mems.feed(felt.held.down + felt.vibration_n);
+            mems.feed(stimulus.held.down + stimulus.vibration_n);
         }
     }
 
@@ -271,7 +271,7 @@ impl Finger {
             .fluid(pressure_pa + PA_PER_N * force, force, detuned);
         let dc_n = force + SHEAR_TO_PDC * self.shear_n.abs();
         let lever_g = contact.lever_vibration / FLUID_PA_PER_G;
-        let felt = Felt {
+        let stimulus = Stimulus {
             fluid_pa,
             slow_pa: PA_PER_N * dc_n,
             force_n: self.skin.force_n(),
@@ -282,7 +282,7 @@ impl Finger {
                 ..self.held
             },
         };
-        self.signals.tick(&felt, &mut self.noise);
+        self.signals.tick(&stimulus, &mut self.noise);
     }
 
     /// Part of the force that the fluid carries at this tick, N. Fluid that has run out of a torn skin does not come

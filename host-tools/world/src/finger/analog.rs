@@ -6,7 +6,7 @@
 
 use super::amplifier::{HighPass, LowPass, between};
 use super::cell::Cell;
-use super::felt::Felt;
+use super::stimulus::Stimulus;
 use crate::noise::Noise;
 
 /// Supply of bridge and converter, V.
@@ -62,13 +62,13 @@ impl Analog {
         &mut self.cell
     }
 
-    pub(super) fn tick(&mut self, felt: &Felt, noise: &mut Noise) {
-        self.cell.tick(felt, noise);
+    pub(super) fn tick(&mut self, stimulus: &Stimulus, noise: &mut Noise) {
+        self.cell.tick(stimulus, noise);
         self.pyro_v += PYRO_V_PER_S * crate::conditions::TICK_S * noise.white()[1];
-        let loaded = 1.0 + LOADED_PER_N * felt.force_n;
+        let loaded = 1.0 + LOADED_PER_N * stimulus.force_n;
         // the skin in front of the disc has a mass: what shakes the mounting presses it on the disc
-        let shaken_n = SKIN_KG * 9.806_65 * felt.held.acceleration_g;
-        let force_n = felt.force_n + felt.vibration_n + shaken_n;
+        let shaken_n = SKIN_KG * 9.806_65 * stimulus.held.acceleration_g;
+        let force_n = stimulus.force_n + stimulus.vibration_n + shaken_n;
         let volts = PAC_V_PER_N * loaded * force_n + self.pyro_v;
         let band = self.low_pass.tick(self.high_pass.tick(volts));
         self.pac_v = [self.pac_v[1], self.offset_v + band];

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::felt::Felt;
+use super::stimulus::Stimulus;
 use crate::conditions::{TICK_S, TICKS_PER_S};
 use crate::noise::Noise;
 
@@ -56,12 +56,12 @@ impl Cell {
         self.gain = gain;
     }
 
-    pub(super) fn tick(&mut self, felt: &Felt, noise: &mut Noise) {
+    pub(super) fn tick(&mut self, stimulus: &Stimulus, noise: &mut Noise) {
         let kick = DRIFT_N * (2.0 * TICK_S / DRIFT_S).sqrt();
         self.drift_n += kick * noise.white()[0] - self.drift_n * TICK_S / DRIFT_S;
         // what presses up is positive, the tip's weight and its inertia are not
-        let weight_n = TIP_N * (felt.held.down + felt.held.acceleration_g);
-        let load_n = felt.force_n + felt.vibration_n + ACROSS * felt.shear_n - weight_n;
+        let weight_n = TIP_N * (stimulus.held.down + stimulus.held.acceleration_g);
+        let load_n = stimulus.force_n + stimulus.vibration_n + ACROSS * stimulus.shear_n - weight_n;
         let omega = TAU * RESONANCE_HZ;
         self.rate +=
             TICK_S * omega * (omega * (load_n - self.spring_n) - 2.0 * DAMPING * self.rate);

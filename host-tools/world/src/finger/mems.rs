@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 
 use super::cell::Cell;
-use super::felt::Felt;
+use super::stimulus::Stimulus;
 use crate::conditions::TICK_S;
 use crate::noise::Noise;
 
@@ -45,18 +45,18 @@ impl Mems {
         &mut self.cell
     }
 
-    pub(super) fn tick(&mut self, felt: &Felt, noise: &mut Noise) {
-        self.cell.tick(felt, noise);
+    pub(super) fn tick(&mut self, stimulus: &Stimulus, noise: &mut Noise) {
+        self.cell.tick(stimulus, noise);
         let omega = TAU * RESONANCE_HZ;
-        let skin_n = felt.force_n + felt.vibration_n;
+        let skin_n = stimulus.force_n + stimulus.vibration_n;
         // in the frame of the core, which accelerates, too
-        let core = felt.held.acceleration_g * G;
+        let core = stimulus.held.acceleration_g * G;
         let pushed = THROUGH * skin_n / MASS_KG
             - omega * (omega * self.place + 2.0 * DAMPING * self.speed)
             - core;
         self.speed += pushed * TICK_S;
         self.place += self.speed * TICK_S;
-        self.acceleration_g = felt.held.down + (pushed + core) / G;
+        self.acceleration_g = stimulus.held.down + (pushed + core) / G;
     }
 
     /// It feels this, g, whatever its silicone does.

@@ -7,12 +7,12 @@ use tactus_core::sensor::pressure::{Channel, SLOTS_HZ};
 use tactus_core::sensor::{FingerModel, FingerName};
 
 use crate::conditions::TICK_S;
-use crate::finger::{Felt, Finger, Held, PA_PER_N};
+use crate::finger::{Finger, Held, PA_PER_N, Stimulus};
 use crate::parts::Peers;
 use crate::slot::Reader;
 
 /// The decoder's output: counts of P_AC and of P_DC with the times of their slots, s since the signal began.
-type Heard = [Vec<(f64, f64)>; 2];
+type Decoded = [Vec<(f64, f64)>; 2];
 
 /// A finger on its bus, without a contact, that feels this force and this vibration, N, at each time, s.
 struct Wire {
@@ -42,7 +42,7 @@ impl Wire {
             self.ticks += 1;
             let at_s = self.ticks as f64 * TICK_S;
             let [force_n, vibration_n] = signal(at_s - BEFORE_S);
-            self.finger.feed(&Felt {
+            self.finger.feed(&Stimulus {
                 fluid_pa: PA_PER_N * vibration_n,
                 slow_pa: PA_PER_N * force_n,
                 force_n,
@@ -55,7 +55,7 @@ impl Wire {
         (now_s / TICK_S).fract()
     }
 
-    fn hear(mut self, seconds: f64, signal: impl Fn(f64) -> [f64; 2]) -> Heard {
+    fn hear(mut self, seconds: f64, signal: impl Fn(f64) -> [f64; 2]) -> Decoded {
         let mut reader = self.reader.clone();
         let mut transact = |begins_ns: u64, part, mode, mosi: &[u8], miso: &mut [u8]| {
             let fraction = self.advance(1e-9 * begins_ns as f64, &signal);
@@ -77,7 +77,7 @@ impl Wire {
                 transact(transfer.begins_ns, transfer.part, transfer.mode, mosi, miso);
             })
             .unwrap();
-        let mut heard = Heard::default();
+        let mut heard = Decoded::default();
         for n in 0..((BEFORE_S + seconds - 0.15) * f64::from(SLOTS_HZ)) as u64 {
             let at_s = 0.15 + n as f64 / f64::from(SLOTS_HZ);
             let word = reader.word_of_slot(n, (1e9 * at_s) as u64, |transfer, mosi, miso| {

@@ -2,7 +2,7 @@
 
 /// The effects of a tick of a contact on a fingertip.
 #[derive(Clone, Copy, Debug)]
-pub(in super::super) struct Felt {
+pub(in super::super) struct Stimulus {
     /// Pressure in a fluid, Pa, and its slow part.
     pub(in super::super) fluid_pa: f64,
     pub(in super::super) slow_pa: f64,
