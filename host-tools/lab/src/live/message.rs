@@ -95,7 +95,7 @@ pub enum Reply {
         of: usize,
     },
     /// The probe waits for requests.
-    Ready(Known),
+    Ready(KnownTable),
     /// The events since the last one.
     Frame(Frame),
     /// The request is invalid; the reason.
@@ -107,7 +107,7 @@ pub enum Reply {
 
 /// The probe's textures and movements.
 #[derive(Clone, PartialEq, Debug, Serialize, Default)]
-pub struct Known {
+pub struct KnownTable {
     /// Names of its textures, in the order of the table.
     pub textures: Vec<String>,
     /// Their numbers in Table 1; `None` for one that was taught under another name.
@@ -230,7 +230,7 @@ pub enum Happening {
         /// From so many slides.
         slides: u8,
         /// The table.
-        known: Known,
+        known: KnownTable,
     },
     /// A verification has judged a slide.
     Judged {

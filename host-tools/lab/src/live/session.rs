@@ -218,7 +218,7 @@ impl Session {
             life: Box::pin(life),
         };
         running.poll();
-        let known = running.scene.borrow().hearing.known().clone();
+        let known = running.scene.borrow().monitor.known().clone();
         if known.textures.is_empty() {
             return Err("the probe does not start".into());
         }
@@ -303,7 +303,7 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
     let mut probe = match on {
         Ok(probe) => probe,
         Err(why) => {
-            scene.borrow_mut().hearing.happens(Happening::Refused {
+            scene.borrow_mut().monitor.happens(Happening::Refused {
                 why: why.to_string(),
             });
             return std::future::pending().await;
@@ -313,8 +313,8 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
     loop {
         {
             let mut scene = scene.borrow_mut();
-            scene.hearing.knows(probe.memory.in_force());
-            scene.hearing.learned();
+            scene.monitor.knows(probe.memory.in_force());
+            scene.monitor.learned();
             scene.busy = false;
             scene.stop = false;
             // nothing moves: every due change is made
@@ -338,7 +338,7 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
                 let command = *command;
                 if let (Command::Identify(wanted), Ok(table)) = (&command, probe.memory.table()) {
                     let config = wanted.config(table.contents());
-                    scene.borrow_mut().hearing.explores(config);
+                    scene.borrow_mut().monitor.explores(config);
                 }
                 id = u16::wrapping_add(id, 1);
                 let request = wire::Request { id, command };
@@ -346,8 +346,8 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
             }
             Job::Move(movement, seed) => {
                 let made = make(&mut probe, &scene, movement, seed).await;
-                scene.borrow_mut().hearing.happens(made);
-                scene.borrow_mut().hearing.happens(Happening::Done);
+                scene.borrow_mut().monitor.happens(made);
+                scene.borrow_mut().monitor.happens(Happening::Done);
             }
         }
     }
@@ -384,7 +384,7 @@ async fn make<'p>(
                 movement: at,
                 place: at
                     .zip(table)
-                    .and_then(|(at, table)| scene.borrow().hearing.place_of(table, at, &seen)),
+                    .and_then(|(at, table)| scene.borrow().monitor.place_of(table, at, &seen)),
                 measured: Measured::new(movement, &seen),
             }
         }

@@ -8,7 +8,7 @@ use tactus_core::features::{BLOCK, Block, Observation};
 use tactus_core::table::Table;
 use tactus_core::wire::{self, Event};
 
-use super::message::{Expected, Happening, Known, Measured, name};
+use super::message::{Expected, Happening, KnownTable, Measured, name};
 use super::standing::{Followed, PLAN, Standing};
 use crate::eval::places::{Plane, distances, slide_distances};
 use crate::eval::transcript::Answer;
@@ -21,7 +21,7 @@ const BINS: usize = 4;
 
 /// The events since the last call.
 #[derive(Default)]
-pub struct Heard {
+pub struct Received {
     /// P_AC of still finger and slide, counts about the still finger's, at 2200 Hz.
     pub pac: Vec<i16>,
     /// Spectra of the last 233 ms, one every 64 samples: dB of the mean power of four bins, of 17.2 Hz together.
@@ -32,19 +32,19 @@ pub struct Heard {
 
 /// Follows a probe's messages.
 #[derive(Default)]
-pub struct Hearing {
+pub struct ProbeMonitor {
     /// The table in force, and its maps.
     table: Rc<[u8]>,
     planes: Vec<Plane>,
-    known: Known,
+    known: KnownTable,
     followed: Followed,
     early_ms: Option<u16>,
     /// The last samples of P_AC.
     recent: Vec<i16>,
-    heard: Heard,
+    received: Received,
 }
 
-impl Hearing {
+impl ProbeMonitor {
     /// An exploration begins.
     pub fn explores(&mut self, config: Config) {
         self.followed = Followed::begin(config);
@@ -67,7 +67,7 @@ impl Hearing {
                 None => plane,
             });
         }
-        self.known = Known {
+        self.known = KnownTable {
             textures: table.names().map(str::to_owned).collect(),
             numbers: table.names().map(texture_number).collect(),
             movements: table
@@ -82,7 +82,7 @@ impl Hearing {
     }
 
     /// The probe's textures and movements.
-    pub fn known(&self) -> &Known {
+    pub fn known(&self) -> &KnownTable {
         &self.known
     }
 
@@ -100,12 +100,12 @@ impl Hearing {
 
     /// Adds an event of the probe.
     pub fn happens(&mut self, what: Happening) {
-        self.heard.happened.push(what);
+        self.received.happened.push(what);
     }
 
     /// Takes the events since the last call.
-    pub fn take(&mut self) -> Heard {
-        std::mem::take(&mut self.heard)
+    pub fn take(&mut self) -> Received {
+        std::mem::take(&mut self.received)
     }
 
     /// Takes a message of the probe.
@@ -117,19 +117,19 @@ impl Hearing {
         let bytes = Rc::clone(&self.table);
         let table = Table::read(&bytes).ok();
         let happening = table.and_then(|table| self.told(table, event));
-        self.heard.happened.extend(happening);
+        self.received.happened.extend(happening);
     }
 
     fn block(&mut self, block: &Block) {
         if block.number == 0 {
             self.recent.clear();
         }
-        self.heard.pac.extend_from_slice(&block.pac);
+        self.received.pac.extend_from_slice(&block.pac);
         self.recent.extend_from_slice(&block.pac);
         let older = self.recent.len().saturating_sub(FRAME);
         self.recent.drain(..older);
         if block.pac.len() == BLOCK {
-            self.heard.spectra.extend(spectrum(&self.recent));
+            self.received.spectra.extend(spectrum(&self.recent));
         }
         let looked = self.followed.block(&self.known.lengths_ms, block);
         let (Some((ms, seen)), Some(movement)) = (looked, self.followed.movement()) else {
@@ -137,7 +137,7 @@ impl Hearing {
         };
         let table = Rc::clone(&self.table);
         if let Ok(table) = Table::read(&table) {
-            self.heard.happened.push(Happening::Look {
+            self.received.happened.push(Happening::Look {
                 ms,
                 standing: self.followed.so_far(table, &seen),
                 place: self.place_of(table, movement, &seen),
@@ -210,7 +210,7 @@ impl Hearing {
                     name: name.to_string(),
                     slides,
                     // the table is another one when the request is over: see `Session`
-                    known: Known::default(),
+                    known: KnownTable::default(),
                 })
             }
             Event::Done(_) => Some(Happening::Done),
@@ -220,7 +220,7 @@ impl Hearing {
 
     /// A texture was learned, and the table is this one now.
     pub fn learned(&mut self) {
-        for happening in &mut self.heard.happened {
+        for happening in &mut self.received.happened {
             if let Happening::Learned { known, .. } = happening {
                 known.clone_from(&self.known);
             }
@@ -228,7 +228,7 @@ impl Hearing {
     }
 }
 
-/// The spectra of samples from their first on, as those of [`Heard`].
+/// The spectra of samples from their first on, as those of [`Received`].
 pub fn spectra(pac: &[i16]) -> Vec<Vec<i8>> {
     let ends = (1..=pac.len() / BLOCK).map(|block| block * BLOCK);
     let before = |end: usize| pac.get(end.saturating_sub(FRAME)..end);
